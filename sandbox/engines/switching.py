@@ -82,7 +82,7 @@ def launch_state(action: Launch, scene: Scene, bodies: Bodies, frame: Frame) -> 
     Raises:
         ActionError: there is no such generator, or its bodies do not fit.
     """
-    found = next(((index, mover) for name, index, mover in generators(scene) if name == action.generator), None)
+    found = next(((index, source) for name, index, source in generators(scene) if name == action.generator), None)
     if found is None:
         raise ActionError(f"no generator is named {action.generator!r}")
     index, generator = found
@@ -120,8 +120,8 @@ def launch_state(action: Launch, scene: Scene, bodies: Bodies, frame: Frame) -> 
 
 def _first_body(scene: Scene, generator: BodySource) -> int:
     """Return the index of a generator's first body."""
-    movers = scene.movers
-    return sum(count_of(each) for each in movers[: next(k for k, each in enumerate(movers) if each is generator)])
+    sources = scene.body_sources
+    return sum(count_of(each) for each in sources[: next(k for k, each in enumerate(sources) if each is generator)])
 
 
 def start(

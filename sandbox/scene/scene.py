@@ -32,25 +32,25 @@ class Scene(SceneDescription, HtmlRepr):
 
     @cached_property
     def elements(self) -> tuple[BodySource, ...]:
-        """Shape and material of the bodies in scene order: the movers, or the elements that these expand to."""
+        """Shape and material of the bodies in scene order; generators are expanded."""
         from sandbox.scene.compile.layout import elements_in
 
         return elements_in(self)
 
-    def mover_of(self, element: int) -> int:
-        """Return the index in `movers` of the mover to which an element belongs.
+    def source_index(self, element: int) -> int:
+        """Return the index in `body_sources` of the source to which an element belongs.
 
-        Elements that were added to a running scene count on from the last mover.
+        Elements that were added to a running scene continue the numbering after the last source.
         """
         from sandbox.scene.compile.layout import elements_of
 
-        if len(self.elements) == len(self.movers):
+        if len(self.elements) == len(self.body_sources):
             return element
-        for index, mover in enumerate(self.movers):
-            element -= len(elements_of(mover))
+        for index, source in enumerate(self.body_sources):
+            element -= len(elements_of(source))
             if element < 0:
                 return index
-        return len(self.movers) + element
+        return len(self.body_sources) + element
 
     def __repr__(self) -> str:
         """Return the title, the counts of elements and the key figures, as `str` does."""

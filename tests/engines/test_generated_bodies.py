@@ -48,10 +48,10 @@ def test_changed_coefficient_reaches_the_bodies_of_its_element_and_spawned_ones_
 
 def test_element_leads_back_to_its_mover() -> None:
     scene = mixed()
-    assert [scene.mover_of(k) for k in range(len(scene.elements))] == [0, 1, 2, *[3] * 15]
-    assert scene.mover_of(len(scene.elements)) == len(scene.movers)
+    assert [scene.source_index(k) for k in range(len(scene.elements))] == [0, 1, 2, *[3] * 15]
+    assert scene.source_index(len(scene.elements)) == len(scene.body_sources)
     plain = from_document({"ball": [{"position": [k, 0], "radius": 0.1} for k in range(3)]})
-    assert [plain.mover_of(k) for k in range(4)] == [0, 1, 2, 3]
+    assert [plain.source_index(k) for k in range(4)] == [0, 1, 2, 3]
 
 
 @every_engine

@@ -408,7 +408,7 @@ def test_knob_of_a_generators_ball_turns_all_of_that_generator() -> None:
     show = LiveView(Session(scene))
     for action in turned(show, "restitution", 0.5, 4):
         show.act(action)
-    assert [each.restitution for each in show.scene.movers] == [None, None, 0.5]
+    assert [each.restitution for each in show.scene.body_sources] == [None, None, 0.5]
 
 
 def test_knobs_of_a_scene_without_balls_or_of_a_ball_that_has_not_come_are_harmless() -> None:

@@ -90,14 +90,14 @@ class ActionTarget(Protocol):
     def set_roll(self, index: int, roll: tuple[float, float]) -> None:
         """Set the angular velocity of a sphere on a surface about x and y, rad/s."""
 
-    def push(self, index: int, force: FloatArray, torque: float) -> None:
+    def set_constant_force(self, index: int, force: FloatArray, torque: float) -> None:
         """Apply a constant force, N, and torque, N·m, to a body from now on. They replace the previous ones.
 
         Raises:
             ActionError: the engine models no such force.
         """
 
-    def put(self, index: int, position: FloatArray) -> None:
+    def move_body(self, index: int, position: FloatArray) -> None:
         """Set the position of a body, m."""
 
     def check_place(self, position: tuple[float, float], radius: float, collides: Collides) -> None:
@@ -250,11 +250,11 @@ def toggle(action: Toggle, target: ActionTarget) -> None:
     index = number_among(names, action.thing, "wall or post")
     if scene.surface is not None or scene.pockets:
         raise ActionError("the cushions of a billiard table cannot be switched off")
-    things: list[Wall | Post] = [*scene.walls, *scene.posts]
-    if things[index].solid == action.solid:
+    colliders: list[Wall | Post] = [*scene.walls, *scene.posts]
+    if colliders[index].solid == action.solid:
         return
-    things[index] = things[index].model_copy(update={"solid": action.solid})
-    walls, posts = tuple(things[: len(scene.walls)]), tuple(things[len(scene.walls) :])
+    colliders[index] = colliders[index].model_copy(update={"solid": action.solid})
+    walls, posts = tuple(colliders[: len(scene.walls)]), tuple(colliders[len(scene.walls) :])
     target.change(target.setup.with_scene(scene.model_copy(update={"walls": walls, "posts": posts})))
 
 
@@ -338,10 +338,10 @@ def derive_contacts(setup: Setup, bodies: Bodies) -> ContactMatrix:
     Raises:
         ActionError: the scene would have more different surfaces than allowed.
     """
-    meet = contact_matrix(setup, bodies)
-    if len(meet.surfaces.surfaces) > MAX_SURFACES:
+    matrix = contact_matrix(setup, bodies)
+    if len(matrix.surfaces.surfaces) > MAX_SURFACES:
         raise ActionError(f"more than {MAX_SURFACES} different surfaces; share materials between balls")
-    return meet
+    return matrix
 
 
 def _body_index(name: str, target: ActionTarget) -> int:
@@ -399,7 +399,7 @@ def _apply_force(action: Force, target: ActionTarget) -> None:
     mass, moment = float(target.bodies.mass[index]), float(target.bodies.moment[index])
     speed_limit(math.hypot(*action.force) / mass * target.h, f"one step under the force on {action.body!r}")
     speed_limit(abs(action.torque) / moment * target.h, f"one step under the torque on {action.body!r}")
-    target.push(index, np.asarray(action.force), action.torque)
+    target.set_constant_force(index, np.asarray(action.force), action.torque)
 
 
 def _move(action: Move, target: ActionTarget) -> None:
@@ -410,7 +410,7 @@ def _move(action: Move, target: ActionTarget) -> None:
         raise ActionError(f"{action.body!r} is fixed; its position can be changed, but it cannot have a velocity")
     collides = target.bodies.elements[target.bodies.element[index]].collides
     _check_place(action.position, float(target.bodies.radius[index]), collides, target)
-    target.put(index, np.asarray(action.position))
+    target.move_body(index, np.asarray(action.position))
     if action.velocity is not None and not fixed:
         target.set_velocity(index, np.asarray(action.velocity))
 
@@ -451,8 +451,8 @@ def _spawn(action: Spawn, target: ActionTarget) -> None:
 
 def _check_cushion_heights(radius: float, scene: Scene) -> None:
     """Refuse a ball of a radius, m, that a cushion's nose would pass over. Balls of a file are checked alike."""
-    for thing, name in zip(scene.fixed, scene.fixed_names, strict=False):  # pockets come last among the names
-        height = thing.height if isinstance(thing, Wall | Post) else None
+    for collider, name in zip(scene.fixed, scene.fixed_names, strict=False):  # pockets come last among the names
+        height = collider.height if isinstance(collider, Wall | Post) else None
         if height is not None and height >= 2.0 * radius:
             raise ActionError(f"the nose of {name!r}, {height:g} m high, passes over a ball of radius {radius:g} m")
 

@@ -24,10 +24,10 @@ from sandbox.scene.description.forces import PlungerDrive, TorqueDrive
 from sandbox.scene.scene import Scene
 
 NOTHING, FIXED, ALL = 0, 1, 2
-"""Collision masks of `BodyStore.meets`: a body collides with nothing, with static and fixed bodies, or with everything.
-They follow from `collides`; a removed body collides with nothing."""
+"""Collision masks, as in `BodyStore.collision_mask`: a body collides with nothing, with static and fixed bodies, or
+with everything. They follow from `collides`; a removed body collides with nothing."""
 
-MEETS: dict[Collides, int] = {"none": NOTHING, "fixed": FIXED, "all": ALL}
+COLLISION_MASKS: dict[Collides, int] = {"none": NOTHING, "fixed": FIXED, "all": ALL}
 
 
 class BodyStore:
@@ -70,23 +70,23 @@ class BodyStore:
         """The scene, with all changes that actions have made."""
         return self.setup.scene
 
-    def _rebuild(self, setup: Setup, bodies: Bodies, meet: ContactMatrix) -> None:
+    def _rebuild(self, setup: Setup, bodies: Bodies, matrix: ContactMatrix) -> None:
         """Derive the arrays that depend on the set of bodies and their materials."""
-        self.setup, self.bodies, self.meet = setup, bodies, meet
-        surfaces = meet.surfaces
+        self.setup, self.bodies, self.contact_matrix = setup, bodies, matrix
+        surfaces = matrix.surfaces
         self.radius: FloatArray = bodies.radius
         self.surface: IntArray = surfaces.of_body
         self.fixed_surface: IntArray = surfaces.of_fixed
         self.restitution: FloatArray = surfaces.restitution
         self.friction: FloatArray = surfaces.friction
         self.falloff: FloatArray = surfaces.falloff
-        kinds = np.asarray([MEETS[element.collides] for element in bodies.elements], dtype=np.int64)
-        self.meets: IntArray = np.where(self.present, kinds[bodies.element], NOTHING)
+        kinds = np.asarray([COLLISION_MASKS[element.collides] for element in bodies.elements], dtype=np.int64)
+        self.collision_mask: IntArray = np.where(self.present, kinds[bodies.element], NOTHING)
         """(N,) `NOTHING`, `FIXED` (planes, walls, posts, fixed bodies) or `ALL`"""
         moves = self.moving
         self.inverse_mass: FloatArray = np.where(moves, 1.0 / bodies.mass, 0.0)
         # A body that nothing can turn gets no inverse moment: its spin stays the same, bit for bit.
-        turns = moves & (meet.turnable | self._has_torque)
+        turns = moves & (matrix.turnable | self._has_torque)
         self.inverse_moment: FloatArray = np.where(turns, 1.0 / bodies.moment, 0.0)
         self.held: dict[int, Mount] = {}
         """how drives hold the present bodies, by body index"""
@@ -175,14 +175,14 @@ class BodyStore:
         """Set the angular velocity of a sphere on a surface about x and y, rad/s."""
         self.roll[index] = roll
 
-    def push(self, index: int, force: FloatArray, torque: float) -> None:
+    def set_constant_force(self, index: int, force: FloatArray, torque: float) -> None:
         """Apply a constant force (N) and torque (N·m) to a body from now on."""
         self.force[index], self.torque[index] = force, torque
         if torque and not self._has_torque[index]:
             self._has_torque[index] = True
-            self._rebuild(self.setup, self.bodies, self.meet)
+            self._rebuild(self.setup, self.bodies, self.contact_matrix)
 
-    def put(self, index: int, position: FloatArray) -> None:
+    def move_body(self, index: int, position: FloatArray) -> None:
         """Set the position of a body, m."""
         self.position[index] = position
 
@@ -201,10 +201,10 @@ class BodyStore:
             return
         spawned = self.bodies.elements[len(self.scene.elements) :] if spawned is None else spawned
         bodies = replace(self.bodies, elements=(*scene.elements, *spawned))
-        meet = derive_contacts(setup, bodies)
+        matrix = derive_contacts(setup, bodies)
         if scene.fixed != self.scene.fixed:
             self.fixtures = static_colliders(scene)
-        self._rebuild(setup, bodies, meet)
+        self._rebuild(setup, bodies, matrix)
 
     def add(self, single: BodySpec, name: str) -> int:
         """Add a body that has been checked, and return its index.
@@ -213,7 +213,7 @@ class BodyStore:
             ActionError: the scene would have more different surfaces than allowed.
         """
         bodies = self.bodies.joined_by(single, name)
-        meet = derive_contacts(self.setup, bodies)
+        matrix = derive_contacts(self.setup, bodies)
         self.position = np.vstack((self.position, bodies.position[-1:]))
         self.velocity = np.vstack((self.velocity, bodies.velocity[-1:]))
         self.roll = np.vstack((self.roll, bodies.roll[-1:]))
@@ -224,17 +224,17 @@ class BodyStore:
         self._has_torque, self.caught = np.append(self._has_torque, False), np.append(self.caught, False)
         self.layer = np.append(self.layer, bodies.layer[-1])
         self.visits = np.vstack((self.visits, bodies.visits[-1:]))
-        self._rebuild(self.setup, bodies, meet)
+        self._rebuild(self.setup, bodies, matrix)
         return len(bodies) - 1
 
-    def take_out(self, indices: IntArray, time: float) -> None:
+    def remove_bodies(self, indices: IntArray, time: float) -> None:
         """Remove bodies at a time, s. Their rows stay in the arrays, with zero velocity."""
         self.present[indices] = False
         self.velocity[indices], self.angular_velocity[indices], self.roll[indices] = 0.0, 0.0, 0.0
         self.force[indices], self.torque[indices] = 0.0, 0.0
         self.caught[indices] = False
         self._retired |= dict.fromkeys(indices.tolist(), time)
-        self._rebuild(self.setup, self.bodies, self.meet)
+        self._rebuild(self.setup, self.bodies, self.contact_matrix)
 
     def expired(self, time: float) -> IntArray:
         """Return the indices of the bodies to be removed at a time, s: by their lifetime or by world.bounds, (K,)."""

@@ -33,11 +33,11 @@ class StaticColliders(NamedTuple):
 
     planes: FloatArray
     """(P, 4) a point of the surface, m, and the unit normal pointing out of the solid"""
-    plane_thing: IntArray
+    plane_collider: IntArray
     """(P,) index of the collider of each plane"""
     segments: FloatArray
     """(G, 5) both ends and half the thickness, m; a post is a segment of length 0"""
-    segment_thing: IntArray
+    segment_collider: IntArray
     """(G,) index of the collider that each segment belongs to"""
     joints: FloatArray
     """(G, 4) m, from the two ends of a segment to the far ends of its neighbours; 0 where the wall ends"""

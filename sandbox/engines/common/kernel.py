@@ -116,7 +116,7 @@ def _is_unused(folder: Path) -> bool:
         return False
 
 
-def tell_if_slow(bodies: int) -> None:
+def warn_if_uncompiled(bodies: int) -> None:
     """Print a notice if a large scene runs on uncompiled kernels."""
     if not COMPILED and bodies >= SLOW_FROM:
         say(f"{bodies:,} bodies are slow without compiled kernels; install them with: pip install -e '.[fast]'")

@@ -20,13 +20,13 @@ def overload(start: Scene | Setup, settings: Settings) -> list[str]:
     scene, bodies = setup.scene, setup.bodies
     touching = np.asarray([element.collides != "none" for element in bodies.elements], np.bool_)[bodies.element]
     moving = touching & ~bodies.fixed
-    movers = int(moving.sum())
+    moving_count = int(moving.sum())
     iterations = (settings.iterations + DETECTION_COST) * settings.substeps
-    max_overlaps = MAX_OVERLAPS + MAX_OVERLAPS_EACH * movers  # validation refuses a scene that starts with more
+    max_overlaps = MAX_OVERLAPS + MAX_OVERLAPS_EACH * moving_count  # validation refuses a scene that starts with more
     overlaps = 0
     if max_overlaps * iterations > STEP_WORK.value:  # rare; other scenes need no search for overlaps
         overlaps = count_overlaps(bodies.position[moving], bodies.core[moving], max_overlaps)
-    rows = max(CONTACTS_PER_BODY * movers, overlaps) + len(setup.links)
+    rows = max(CONTACTS_PER_BODY * moving_count, overlaps) + len(setup.links)
     solved = STEP_WORK.refusal(
         f"a step of up to {rows:,} contacts and joints × ({settings.iterations:,} iterations + {DETECTION_COST} for "
         f"detection) × {settings.substeps:,} substeps takes work of",

@@ -67,9 +67,9 @@ class ZoneTracker:
         self._position, self._velocity, self._spin = position, velocity, spin
         self.layer, self.visits = layer, visits
 
-    def rebuild(self, meet: ContactMatrix) -> None:
+    def rebuild(self, matrix: ContactMatrix) -> None:
         """Update after a change of the scene's gravity, or of the set of bodies."""
-        self._has_joint: BoolArray = meet.held
+        self._has_joint: BoolArray = matrix.held
         for index in self._host.with_own_gravity:
             self._apply_gravity(index, self._host.at(self._position[index]))
 

@@ -5,7 +5,7 @@ import numpy as np
 from sandbox.action import ActionError
 from sandbox.arrays import BoolArray, FloatArray
 from sandbox.engines.common.actions import has_same_bodies
-from sandbox.engines.common.body_store import ALL, FIXED, MEETS, NOTHING, BodyStore
+from sandbox.engines.common.body_store import ALL, COLLISION_MASKS, FIXED, NOTHING, BodyStore
 from sandbox.engines.common.colliders import static_colliders
 from sandbox.engines.exact.start_overlaps import overlap_message, overlapping_collider, touch_tolerance
 from sandbox.engines.tabletop.requirements import caught, unlevel
@@ -55,7 +55,7 @@ class EventDrivenBodies(BodyStore):
         super().set_spin(number, spin)
         self.velocity_set.add(number)
 
-    def push(self, number: int, force: FloatArray, torque: float) -> None:
+    def set_constant_force(self, number: int, force: FloatArray, torque: float) -> None:
         """Refuse a constant force: only uniform gravity has the closed forms of motion that events are found from.
 
         Raises:
@@ -67,16 +67,16 @@ class EventDrivenBodies(BodyStore):
                 "pymunk and reference do"
             )
 
-    def put(self, number: int, position: FloatArray) -> None:
+    def move_body(self, number: int, position: FloatArray) -> None:
         """Set the position of a body, m.
 
         Raises:
             ActionError: it would overlap something.
         """
         others = np.arange(len(self.bodies)) != number
-        kind, fixed = int(self.meets[number]), bool(self.bodies.fixed[number])
+        kind, fixed = int(self.collision_mask[number]), bool(self.bodies.fixed[number])
         self._check_free(self.bodies.names[number], position, float(self.radius[number]), kind, fixed, others)
-        super().put(number, position)
+        super().move_body(number, position)
         self.position_set.add(number)
 
     def change(self, setup: Setup, spawned: tuple[BodySource, ...] | None = None) -> None:
@@ -94,12 +94,12 @@ class EventDrivenBodies(BodyStore):
             raise ActionError(lacks)
         if curls(setup):
             raise ActionError("exact does not model curl; pymunk does")
-        meets = np.flatnonzero((self.meets != NOTHING) & self.moving)
-        if len(meets) and any(new is not old for new, old in zip(scene.fixed, self.scene.fixed, strict=True)):
-            found = overlapping_collider(self.position[meets], self.radius[meets], static_colliders(scene))
+        candidates = np.flatnonzero((self.collision_mask != NOTHING) & self.moving)
+        if len(candidates) and any(new is not old for new, old in zip(scene.fixed, self.scene.fixed, strict=True)):
+            found = overlapping_collider(self.position[candidates], self.radius[candidates], static_colliders(scene))
             if found is not None:
                 raise ActionError(
-                    overlap_message(self.bodies.names[meets[found[0]]], scene.fixed_names[found[1]], found[2])
+                    overlap_message(self.bodies.names[candidates[found[0]]], scene.fixed_names[found[1]], found[2])
                 )
         walls_changed = [wall.points for wall in scene.walls] != [wall.points for wall in self.scene.walls]
         super().change(setup, spawned)
@@ -114,7 +114,7 @@ class EventDrivenBodies(BodyStore):
         """
         if isinstance(single, Ball):
             others = np.ones(len(self.bodies), dtype=np.bool_)
-            position, kind = np.asarray(single.position), MEETS[single.collides]
+            position, kind = np.asarray(single.position), COLLISION_MASKS[single.collides]
             self._check_free(name, position, single.radius, kind, single.fixed, others)
             if on_floor(self.setup) and (lacks := next(unlevel(self.setup, self.bodies.joined_by(single, name)), None)):
                 raise ActionError(lacks)
@@ -130,7 +130,7 @@ class EventDrivenBodies(BodyStore):
         Raises:
             ActionError: it is in a pocket.
         """
-        if number in self.position_set or self.meets[number] == NOTHING:
+        if number in self.position_set or self.collision_mask[number] == NOTHING:
             return
         if caught(self.scene, self.position[number : number + 1])[0] >= 0:
             raise ActionError(f"{self.bodies.names[number]!r} is in a pocket; move it back into play first")
@@ -149,13 +149,13 @@ class EventDrivenBodies(BodyStore):
         if caught(self.scene, position[None, :])[0] >= 0:
             return
         others = others & (caught(self.scene, self.position) < 0)  # captured balls do not collide
-        meet = others & (self.meets == ALL) & ~still if kind == ALL else np.zeros_like(others)
-        meet |= others & (self.meets == FIXED) & ~still if fixed and kind == ALL else False
-        meet |= others & (self.meets == ALL) & still & (not fixed)
+        collides = others & (self.collision_mask == ALL) & ~still if kind == ALL else np.zeros_like(others)
+        collides |= others & (self.collision_mask == FIXED) & ~still if fixed and kind == ALL else False
+        collides |= others & (self.collision_mask == ALL) & still & (not fixed)
         apart = self.position - position
         depth = self.radius + radius - np.hypot(apart[:, 0], apart[:, 1])
         here = np.broadcast_to(position, self.position.shape)
-        deep = np.flatnonzero(meet & (depth > touch_tolerance(self.position, here)))
+        deep = np.flatnonzero(collides & (depth > touch_tolerance(self.position, here)))
         if len(deep):
             raise ActionError(overlap_message(name, self.bodies.names[deep[0]], float(depth[deep[0]])))
         if fixed:

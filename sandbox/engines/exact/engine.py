@@ -91,15 +91,15 @@ def too_many_pairs(setup: Setup) -> str | None:
 
     scene, bodies = setup.scene, setup.bodies
     touching = np.asarray([element.collides != "none" for element in bodies.elements], np.bool_)[bodies.element]
-    balls, movers = int(touching.sum()), int((touching & ~bodies.fixed).sum())
+    balls, moving = int(touching.sum()), int((touching & ~bodies.fixed).sum())
     if on_floor(setup):  # the table of pairs has a row for every ball
         refusal = MEMORY.refusal(f"the table of pairs of {len(bodies):,} balls takes", 8 * len(bodies) ** 2)
         if refusal is not None:
             return refusal
     fixed = sum(2 * len(wall.points) for wall in scene.walls) + len(scene.planes) + len(scene.posts)
-    pairs = movers * (balls + fixed + len(scene.pockets))
+    pairs = moving * (balls + fixed + len(scene.pockets))
     return PAIRS.refusal(
-        f"the number of pairs of {movers:,} moving balls with {balls + fixed:,} balls and surfaces is", pairs
+        f"the number of pairs of {moving:,} moving balls with {balls + fixed:,} balls and surfaces is", pairs
     )
 
 
@@ -119,8 +119,8 @@ def overlap_of(start: Scene | Setup, position: FloatArray) -> str | None:
     pair = overlapping_balls(position, bodies.radius, to_all, to_fixed, bodies.fixed)
     if pair is not None:
         return overlap_message(bodies.names[pair[0]], bodies.names[pair[1]], pair[2])
-    meets = np.flatnonzero((to_all | to_fixed) & ~bodies.fixed)
-    found = overlapping_collider(position[meets], bodies.radius[meets], static_colliders(scene))
+    candidates = np.flatnonzero((to_all | to_fixed) & ~bodies.fixed)
+    found = overlapping_collider(position[candidates], bodies.radius[candidates], static_colliders(scene))
     if found is not None:
-        return overlap_message(bodies.names[meets[found[0]]], scene.fixed_names[found[1]], found[2])
+        return overlap_message(bodies.names[candidates[found[0]]], scene.fixed_names[found[1]], found[2])
     return None

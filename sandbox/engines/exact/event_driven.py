@@ -14,7 +14,7 @@ from sandbox.engines.common.base import BEYOND, BaseSimulation
 from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 from sandbox.engines.common.contact_log import too_many_contacts
 from sandbox.engines.common.energy_balance import booked
-from sandbox.engines.common.kernel import tell_if_slow
+from sandbox.engines.common.kernel import warn_if_uncompiled
 from sandbox.engines.contract import Divergence, Exhaustion, Observer
 from sandbox.engines.energy_ledger import Cause, EnergyLedger
 from sandbox.engines.exact import state as c
@@ -56,7 +56,7 @@ class EventDrivenSimulation(BaseSimulation, Generic[Data]):
         self._data: Data = data
         self._stopped: float | None = None
         self._ledger: EnergyLedger | None = None
-        tell_if_slow(len(store.bodies))
+        warn_if_uncompiled(len(store.bodies))
 
     @property
     def time(self) -> float:

@@ -62,8 +62,8 @@ def advance_to(data: EventState, i: int, t: float, residual: float) -> None:
 @kernel
 def predict_all(data: EventState) -> None:
     """Predict the earliest event of every ball."""
-    for k in range(len(data.movers)):
-        predict_next_event(data, data.movers[k], data.world[c.NOW], data.world[c.NOW_RESIDUAL])
+    for k in range(len(data.moving_balls)):
+        predict_next_event(data, data.moving_balls[k], data.world[c.NOW], data.world[c.NOW_RESIDUAL])
 
 
 @kernel
@@ -88,15 +88,15 @@ def update_motion(data: EventState, i: int) -> None:
 
 
 @kernel
-def earliest_event(movers: IntArray, times: FloatArray) -> int:
+def earliest_event(moving_balls: IntArray, times: FloatArray) -> int:
     """Return the ball with the earliest event, the lowest index of several; −1 if no ball can move."""
     ball = -1
-    if len(movers) > 0:
-        ball = movers[0]
+    if len(moving_balls) > 0:
+        ball = moving_balls[0]
         best = times[ball]
-        for k in range(1, len(movers)):
-            if times[movers[k]] < best:
-                ball = movers[k]
+        for k in range(1, len(moving_balls)):
+            if times[moving_balls[k]] < best:
+                ball = moving_balls[k]
                 best = times[ball]
     return ball
 
@@ -163,9 +163,9 @@ def process_event(data: EventState, i: int, kind: int, partner: int, t: float, r
 def advance(data: EventState, until: float) -> int:
     """Process all events up to a time, s; return why it stopped."""
     state, tags, times = data.state, data.tags, data.next_time
-    movers, counts, world = data.movers, data.counts, data.world
+    moving_balls, counts, world = data.moving_balls, data.counts, data.world
     for _ in range(EVENTS_PER_CALL):
-        i = earliest_event(movers, times)
+        i = earliest_event(moving_balls, times)
         if i < 0 or times[i] > until:
             return c.DONE
         if counts[c.RECORDING] != 0 and counts[c.LOG_ROWS] + ROWS_PER_EVENT > len(data.log):
@@ -177,7 +177,7 @@ def advance(data: EventState, until: float) -> int:
             continue
         world[c.NOW], world[c.NOW_RESIDUAL] = t, residual
         counts[c.EVENT_BODY], counts[c.EVENT_KIND], counts[c.EVENT_PARTNER] = i, kind, partner
-        bound = check_limits(counts, world, len(movers), t)
+        bound = check_limits(counts, world, len(moving_balls), t)
         if bound != c.DONE:
             return bound
         process_event(data, i, kind, partner, t, residual)

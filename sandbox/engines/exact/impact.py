@@ -175,18 +175,18 @@ def hit_ball(
     mi, mj = state[i, c.INVERSE_MASS], state[j, c.INVERSE_MASS]
     ii, ij = state[i, c.INVERSE_INERTIA], state[j, c.INVERSE_INERTIA]
     normal = max((closing + separation) / (mi + mj), 0.0)
-    rub = 0.0
+    tangential = 0.0
     friction = surfaces[c.FRICTION, mine, its]
     if friction > 0.0:
         slip = across - (state[i, c.SPIN] * ri + state[j, c.SPIN] * rj)
-        rub = friction_impulse(slip, mi + mj + ri * ri * ii + rj * rj * ij, friction, normal)
-    jx, jy = normal * nx - rub * ny, normal * ny + rub * nx  # of i on j
+        tangential = friction_impulse(slip, mi + mj + ri * ri * ii + rj * rj * ij, friction, normal)
+    jx, jy = normal * nx - tangential * ny, normal * ny + tangential * nx  # of i on j
     state[i, c.VX] -= jx * mi
     state[i, c.VY] -= jy * mi
     state[j, c.VX] += jx * mj
     state[j, c.VY] += jy * mj
-    state[i, c.SPIN] -= ri * rub * ii
-    state[j, c.SPIN] -= rj * rub * ij
+    state[i, c.SPIN] -= ri * tangential * ii
+    state[j, c.SPIN] -= rj * tangential * ij
     record_partner(state, tags, i, c.BALL, j)
     record_partner(state, tags, j, c.BALL, i)
     return jx, jy, nx, ny

@@ -79,8 +79,8 @@ def log_support(state: FloatArray, tags: IntArray, log: FloatArray, i: int, t: f
 @kernel
 def log_supports(data: EventState, t: float) -> None:
     """Add the impulses of all balls on their supports to the log, up to a time, s."""
-    for k in range(len(data.movers)):
-        log_support(data.state, data.tags, data.log, data.movers[k], t)
+    for k in range(len(data.moving_balls)):
+        log_support(data.state, data.tags, data.log, data.moving_balls[k], t)
 
 
 def with_log_rows(data: EventState, rows: int) -> EventState:
@@ -157,14 +157,16 @@ def account_hit(data: EventState, i: int, j: int, jx: float, jy: float, nx: floa
         ny: likewise.
     """
     state, world = data.state, data.world
-    normal, rub = jx * nx + jy * ny, jy * nx - jx * ny
+    normal, tangential = jx * nx + jy * ny, jy * nx - jx * ny
     vx, vy = state[j, c.VX] - state[i, c.VX], state[j, c.VY] - state[i, c.VY]
     separation = vx * nx + vy * ny
     along = normal * (separation - 0.5 * normal * (state[i, c.INVERSE_MASS] + state[j, c.INVERSE_MASS]))
-    across = 0.0  # without friction `rub` is rounding error
+    across = 0.0  # without friction `tangential` is rounding error
     if data.surfaces[c.FRICTION, data.tags[i, c.SURFACE], data.tags[j, c.SURFACE]] > 0.0:
         slip = vy * nx - vx * ny - (rim_speed(state, i) + rim_speed(state, j))
-        across = rub * (slip - 0.5 * rub * (inverse_mass_at_rim(state, i) + inverse_mass_at_rim(state, j)))
+        across = tangential * (
+            slip - 0.5 * tangential * (inverse_mass_at_rim(state, i) + inverse_mass_at_rim(state, j))
+        )
     account_contact(world, along, across)
 
 
@@ -241,5 +243,5 @@ def account_slip(data: EventState, i: int, t: float, residual: float) -> None:
 @kernel
 def account_slips(data: EventState, t: float, residual: float) -> None:
     """Do so for all balls."""
-    for k in range(len(data.movers)):
-        account_slip(data, data.movers[k], t, residual)
+    for k in range(len(data.moving_balls)):
+        account_slip(data, data.moving_balls[k], t, residual)

@@ -101,9 +101,13 @@ def rest_in_corner(data: EventState, i: int) -> None:
         state[i, c.SLIP_END_TIME] = state[i, c.T] + (state[i, c.TIME_RESIDUAL] - state[i, c.SPIN] / state[i, c.ALPHA])
     for which in range(2):
         f = data.tags[i, c.SUPPORT + which]
-        push, rub = (first, mu) if which == 0 else (second, nu)
-        data.state[i, c.SUPPORT_FORCE + 2 * which] = (push * data.lines[f, c.NX] - rub * data.lines[f, c.NY]) / im
-        data.state[i, c.SUPPORT_FORCE + 2 * which + 1] = (push * data.lines[f, c.NY] + rub * data.lines[f, c.NX]) / im
+        normal_force, friction_force = (first, mu) if which == 0 else (second, nu)
+        data.state[i, c.SUPPORT_FORCE + 2 * which] = (
+            normal_force * data.lines[f, c.NX] - friction_force * data.lines[f, c.NY]
+        ) / im
+        data.state[i, c.SUPPORT_FORCE + 2 * which + 1] = (
+            normal_force * data.lines[f, c.NY] + friction_force * data.lines[f, c.NX]
+        ) / im
 
 
 REST_FRACTION = 8.0 * 2.0**-52

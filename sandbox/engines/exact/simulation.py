@@ -124,7 +124,7 @@ class ExactSimulation(EventDrivenSimulation[EventState]):
         for i in store.position_set:
             release_supports(data, i)
         if store.walls_changed:
-            for i in data.movers.tolist():
+            for i in data.moving_balls.tolist():
                 advance_to(data, i, now, 0.0)
                 release_supports(data, i)
             self._data = data = with_new_walls(data, store)
@@ -157,9 +157,9 @@ class ExactSimulation(EventDrivenSimulation[EventState]):
                 self._data.next_time[i] = np.inf
                 self._data.tags[i, c.VERSION] += 1
         with booked(self._ledger, Cause.RETIRED, self):
-            self._store.take_out(numbers, now)
+            self._store.remove_bodies(numbers, now)
         self._data = rebuilt(self._data, self._store)
 
     def _set_event_limit(self) -> None:
         """Set the largest number of events in one second."""
-        self._data.counts[c.MAX_EVENTS] = max(PER_SECOND, PER_SECOND_AND_BALL * len(self._data.movers))
+        self._data.counts[c.MAX_EVENTS] = max(PER_SECOND, PER_SECOND_AND_BALL * len(self._data.moving_balls))

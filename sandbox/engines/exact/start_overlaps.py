@@ -45,9 +45,9 @@ def overlapping_balls(
         i, j = chosen[np.minimum(a, b)], chosen[np.maximum(a, b)]
         apart = position[j] - position[i]
         depth = radius[i] + radius[j] - np.hypot(apart[:, 0], apart[:, 1])
-        meet = (to_all[i] & to_all[j] & ~(fixed[i] & fixed[j])) | (to_all[i] & fixed[i] & ~fixed[j])
-        meet |= to_all[j] & fixed[j] & ~fixed[i]
-        deep = np.flatnonzero(meet & (depth > touch_tolerance(position[i], position[j])))
+        collides = (to_all[i] & to_all[j] & ~(fixed[i] & fixed[j])) | (to_all[i] & fixed[i] & ~fixed[j])
+        collides |= to_all[j] & fixed[j] & ~fixed[i]
+        deep = np.flatnonzero(collides & (depth > touch_tolerance(position[i], position[j])))
         if len(deep):
             first = deep[np.lexsort((j[deep], i[deep]))[0]]
             found.append((int(i[first]), int(j[first]), float(depth[first])))
@@ -66,7 +66,7 @@ def overlapping_collider(
     """
     if not len(position):
         return None
-    for (px, py, nx, ny), collider in zip(fixtures.planes, fixtures.plane_thing.tolist(), strict=True):
+    for (px, py, nx, ny), collider in zip(fixtures.planes, fixtures.plane_collider.tolist(), strict=True):
         gap = (position[:, 0] - px) * nx + (position[:, 1] - py) * ny
         point = np.broadcast_to(np.array([px, py]), position.shape)
         deep = np.flatnonzero(radius - gap > touch_tolerance(position, point))
@@ -78,7 +78,7 @@ def overlapping_collider(
         deep = np.flatnonzero(radius[near] - gap > touch_tolerance(position[near], ends))
         if len(deep):
             ball = int(near[deep[0]])
-            return ball, int(fixtures.segment_thing[k]), float(radius[ball] - gap[deep[0]])
+            return ball, int(fixtures.segment_collider[k]), float(radius[ball] - gap[deep[0]])
     return None
 
 

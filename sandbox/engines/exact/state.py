@@ -46,7 +46,7 @@ COLLISION_MASK, SURFACE, SUPPORT, LOG_ROW = 0, 1, 2, 4
 LAST_KIND, LAST_PARTNER, NEXT_KIND, NEXT_PARTNER, PARTNER_VERSION, VERSION, TAG_COLUMNS = range(6, 13)
 """Columns of `tags`, integers:
 
-- COLLISION_MASK: as in `BodyStore.meets`. SURFACE: index of the material's row in `surfaces`.
+- COLLISION_MASK: as in `BodyStore.collision_mask`. SURFACE: index of the material's row in `surfaces`.
 - SUPPORT, two columns: lines that the ball rests on. −1 means none; the first column is filled first, so −1 there means
   free flight and −1 in the second alone means one support. Test with `is_supported` and `is_in_corner`.
 - LOG_ROW, two columns: rows of the contact log of the two supports, −1 for none.
@@ -130,7 +130,7 @@ class EventState(NamedTuple):
     """(N, 12)"""
     next_time: FloatArray
     """(N,) time of the earliest event of each ball, s; a lower bound if its partner's motion has changed since"""
-    movers: IntArray
+    moving_balls: IntArray
     """indices of the balls that can have events"""
     targets: IntArray
     """indices of the balls that other balls can collide with"""
@@ -185,7 +185,7 @@ def make_state(store: BodyStore) -> EventState:
         state=state,
         tags=tags,
         next_time=np.full(count, np.inf),
-        movers=np.empty(0, np.int64),
+        moving_balls=np.empty(0, np.int64),
         targets=np.empty(0, np.int64),
         surfaces=np.empty((3, 0, 0)),
         **_collider_arrays(store.scene),
@@ -234,7 +234,7 @@ def rebuilt(data: EventState, store: BodyStore) -> EventState:
     state, tags, world = data.state, data.tags, data.world
     state[:, RADIUS] = store.radius
     state[:, INVERSE_MASS], state[:, INVERSE_INERTIA] = store.inverse_mass, store.inverse_moment
-    tags[:, COLLISION_MASK], tags[:, SURFACE] = store.meets, store.surface
+    tags[:, COLLISION_MASK], tags[:, SURFACE] = store.collision_mask, store.surface
     for collider_tags in (data.line_tags, data.vertex_tags):
         collider_tags[:, COLLIDER_SURFACE] = store.fixed_surface[collider_tags[:, COLLIDER]]
     _set_solid_and_kicks(data, store.scene)
@@ -242,8 +242,8 @@ def rebuilt(data: EventState, store: BodyStore) -> EventState:
     world[GX], world[GY] = gravity
     world[MICRO_BOUNCE] = min(math.hypot(*gravity) * MICRO_BOUNCE_TIME, MAX_MICRO_BOUNCE)
     return data._replace(
-        movers=np.flatnonzero((store.inverse_mass > 0) & (store.meets != NOTHING)),
-        targets=np.flatnonzero(store.meets == ALL),
+        moving_balls=np.flatnonzero((store.inverse_mass > 0) & (store.collision_mask != NOTHING)),
+        targets=np.flatnonzero(store.collision_mask == ALL),
         surfaces=np.stack((store.restitution, store.friction, store.falloff)),
     )
 
@@ -282,7 +282,7 @@ def _vertices(fixtures: StaticColliders) -> tuple[FloatArray, IntArray, dict[tup
     """
     index: dict[tuple[float, float, float, int], int] = {}
     for (ax, ay, bx, by, half), collider in zip(
-        fixtures.segments.tolist(), fixtures.segment_thing.tolist(), strict=True
+        fixtures.segments.tolist(), fixtures.segment_collider.tolist(), strict=True
     ):
         index.setdefault((ax, ay, half, collider), len(index))
         index.setdefault((bx, by, half, collider), len(index))
@@ -303,12 +303,12 @@ def _lines(
     rows: list[tuple[float, ...]] = []
     colliders: list[int] = []
     vertices: list[tuple[int, int]] = []
-    for (px, py, nx, ny), collider in zip(fixtures.planes.tolist(), fixtures.plane_thing.tolist(), strict=True):
+    for (px, py, nx, ny), collider in zip(fixtures.planes.tolist(), fixtures.plane_collider.tolist(), strict=True):
         rows.append((px, py, nx, ny, ny, -nx, np.inf, 0.0))
         colliders.append(collider)
         vertices.append((-1, -1))
     for (ax, ay, bx, by, half), collider in zip(
-        fixtures.segments.tolist(), fixtures.segment_thing.tolist(), strict=True
+        fixtures.segments.tolist(), fixtures.segment_collider.tolist(), strict=True
     ):
         dx, dy = bx - ax, by - ay
         length = float(np.hypot(dx, dy))

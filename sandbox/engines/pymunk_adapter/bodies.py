@@ -152,7 +152,7 @@ class PymunkBodies:
         self.capture()
         if self.zone_tracker is not None:
             here = filter(
-                self.space_bodies.is_sensed, np.flatnonzero(self._meet.noted).tolist()
+                self.space_bodies.is_sensed, np.flatnonzero(self._contact_matrix.noted).tolist()
             )  # others may lie in pockets
             self.zone_tracker.begin(here, anew=setup.time == 0.0)
 
@@ -161,20 +161,20 @@ class PymunkBodies:
         """The scene, with all changes that actions have made."""
         return self.setup.scene
 
-    def _rebuild(self, scene: Scene, meet: ContactMatrix, same: bool = False) -> None:
+    def _rebuild(self, scene: Scene, matrix: ContactMatrix, same: bool = False) -> None:
         """Rebuild what depends on a scene and its contact matrix. With `same`, only the world has changed."""
-        self._meet = meet
+        self._contact_matrix = matrix
         if self.tabletop is not None:  # the tabletop stepper resolves collisions, not pymunk
-            self.tabletop.rebuild(scene, meet)
-            nothing = np.zeros_like(meet.surfaces.restitution)
-            meet = replace(meet, surfaces=replace(meet.surfaces, restitution=nothing, friction=nothing))
+            self.tabletop.rebuild(scene, matrix)
+            nothing = np.zeros_like(matrix.surfaces.restitution)
+            matrix = replace(matrix, surfaces=replace(matrix.surfaces, restitution=nothing, friction=nothing))
         if same:
             self.space_bodies.rebuild_world(scene)
         else:
-            self.space_bodies.rebuild(scene, meet)
+            self.space_bodies.rebuild(scene, matrix)
         if self.zone_tracker is not None:
             self._zone_host.rebuild(scene, self.bodies)
-            self.zone_tracker.rebuild(meet)
+            self.zone_tracker.rebuild(matrix)
 
     def _set_arrays(self) -> None:
         """Pass the present arrays to the space, the zones and the tabletop stepper."""
@@ -248,13 +248,13 @@ class PymunkBodies:
 
     def distribute(self, indices: IntArray) -> None:
         """Add each of some bodies to the space or to the particles."""
-        meet, bodies = self._meet, self.bodies
-        flying = meet.free[indices] & ~self._driven[indices]
+        matrix, bodies = self._contact_matrix, self.bodies
+        flying = matrix.free[indices] & ~self._driven[indices]
         state = self.position, self.velocity, self.angle, self.angular_velocity
         self.particles.set_arrays(*state, bodies)
         self.particles.join(indices[flying & ~bodies.fixed[indices]])
         # In the space, a body that nothing can turn gets no moment. A particle keeps it, for torques of actions.
-        turned = np.where(meet.turnable, bodies.moment, math.inf)
+        turned = np.where(matrix.turnable, bodies.moment, math.inf)
         chosen = indices[~flying]
         position, velocity, angle, spin = (array[chosen] for array in state)
         self.space_bodies.join(chosen, bodies, position, velocity, angle, spin, turned[chosen])
@@ -280,7 +280,7 @@ class PymunkBodies:
         scene = setup.scene
         if self._half_kick and (scene.world.linear_drag or scene.world.quadratic_drag):
             raise ActionError("drag cannot be switched on in a run with half_kick, which does not support it")
-        bodies, meet = self.bodies, self._meet
+        bodies, matrix = self.bodies, self._contact_matrix
         same = spawned is None and has_same_bodies(scene, self.scene)
         checked = same and scene.world is self.scene.world
         if self.tabletop is not None and not checked and (lacks := next(of_floors(setup), None)):
@@ -288,17 +288,17 @@ class PymunkBodies:
         if not same:
             spawned = bodies.elements[len(self.scene.elements) :] if spawned is None else spawned
             bodies = replace(bodies, elements=(*scene.elements, *spawned))
-            meet = derive_contacts(setup, bodies)
+            matrix = derive_contacts(setup, bodies)
         self.refresh()
         self.velocity[self.moving] -= self.ahead
         self.setup, self.bodies = setup, bodies
         self.velocity[self.moving] += self.ahead
         if self._half_kick:
-            for index in self.space_bodies.movers():
+            for index in self.space_bodies.movable_indices():
                 self.space_bodies.set_velocity(index, self.velocity[index])
         self.particles.world = scene.world
         self.particles.rebuild()
-        self._rebuild(scene, meet, same)
+        self._rebuild(scene, matrix, same)
         self._set_arrays()
 
     def is_in_pocket(self, index: int) -> bool:
@@ -315,7 +315,7 @@ class PymunkBodies:
         bodies = self.bodies.joined_by(single, name)
         if self.tabletop is not None and (lacks := next(of_floors(self.setup, bodies), None)):
             raise ActionError(lacks)
-        meet = derive_contacts(self.setup, bodies)
+        matrix = derive_contacts(self.setup, bodies)
         self.refresh()
         index = len(self.bodies)
         self.bodies = bodies
@@ -329,10 +329,10 @@ class PymunkBodies:
         self.layer = np.append(self.layer, self.bodies.layer[-1])
         self.visits = np.vstack((self.visits, self.bodies.visits[-1:]))
 
-        self._rebuild(scene, meet)
+        self._rebuild(scene, matrix)
         self._set_arrays()
         self.space_bodies.add_missing_shapes(bodies)
-        out = [n for n in np.flatnonzero(self.present & ~meet.free).tolist() if not self.space_bodies.holds(n)]
+        out = [n for n in np.flatnonzero(self.present & ~matrix.free).tolist() if not self.space_bodies.holds(n)]
         self._promote(np.asarray([n for n in out if n != index and not self.is_in_pocket(n)], np.int64))
         self.distribute(np.asarray([index]))
         if self.zone_tracker is not None:
@@ -351,9 +351,9 @@ class PymunkBodies:
             if torque:
                 self.space_bodies.give_moment(index, float(self.bodies.moment[index]))
             if force.any() or torque:
-                self.space_bodies.push(index, force, torque)
+                self.space_bodies.set_constant_force(index, force, torque)
 
-    def take_out(self, indices: IntArray) -> None:
+    def remove_bodies(self, indices: IntArray) -> None:
         """Remove bodies. Their rows stay in the arrays, with zero velocity."""
         self.refresh()
         self.particles.leave(indices)
@@ -419,7 +419,7 @@ class PymunkBodies:
             raise ActionError(f"{self.bodies.names[index]!r} is in a pocket; move it back into play first")
         return True
 
-    def push(self, index: int, force: FloatArray, torque: float) -> None:
+    def set_constant_force(self, index: int, force: FloatArray, torque: float) -> None:
         """Apply a constant force (N) and torque (N·m) to a body from now on.
 
         Raises:
@@ -431,9 +431,9 @@ class PymunkBodies:
         part = self._owner(index)
         if torque and part is self.space_bodies and not math.isfinite(part.moment(index)):
             part.give_moment(index, float(self.bodies.moment[index]))
-        part.push(index, force, torque)
+        part.set_constant_force(index, force, torque)
 
-    def put(self, index: int, position: FloatArray) -> None:
+    def move_body(self, index: int, position: FloatArray) -> None:
         """Set the position of a body, m."""
         self.refresh()
         self.position[index] = position

@@ -210,14 +210,14 @@ class SurfaceSetter:
         self._elasticity: list[float] = []
         self._friction: list[float] = []
 
-    def rebuild(self, meet: ContactMatrix, jointed: set[int]) -> None:
+    def rebuild(self, matrix: ContactMatrix, jointed: set[int]) -> None:
         """Compute the factors of each surface, and the callbacks of pairs that no factors can represent.
 
         Args:
-            meet: contact matrix.
+            matrix: contact matrix.
             jointed: surfaces of walls of several segments.
         """
-        surfaces, touching = meet.surfaces, meet.touching
+        surfaces, touching = matrix.surfaces, matrix.touching
         stated = [(s.restitution, s.friction) for s in surfaces.surfaces]
         self._elasticity = factors(surfaces.restitution, touching, [e for e, _ in stated])
         self._friction = factors(surfaces.friction, touching, [mu for _, mu in stated])
@@ -226,7 +226,7 @@ class SurfaceSetter:
             *wrong_pairs(surfaces.friction, touching, self._friction),
             *_pairs(touching & ~(surfaces.fixed_coefficients & ~(surfaces.one_way | surfaces.one_way[:, None]))),
         }
-        solid = meet.solid
+        solid = matrix.solid
         mended = {(a, b) for a, b in _pairs(touching) if (a in jointed and solid[b]) or (b in jointed and solid[a])}
         self.pair_callbacks.rebuild(surfaces, wrong, mended)
         if surfaces.one_way.any():

@@ -48,15 +48,15 @@ def applied_impulses(
     """
     bodies, world = population.bodies, population.scene.world
     mass = np.where(counts, bodies.mass, 0.0)[:, None]
-    pushed, torque = _constant_forces(population)
-    pull, thrust, twist = _field(population)
+    constant, torque = _constant_forces(population)
+    pull, thrust, thrust_torque = _field(population)
     dragged = np.zeros_like(before)
     if has_drag(world):
-        push = (pushed + thrust + (0.0 if springs is None else springs)) / bodies.mass[:, None] + pull
-        given = acceleration(world, before, push, population.h) - np.asarray(world.gravity) - push
+        applied = (constant + thrust + (0.0 if springs is None else springs)) / bodies.mass[:, None] + pull
+        given = acceleration(world, before, applied, population.h) - np.asarray(world.gravity) - applied
         dragged = mass * given * h
-    driven = np.where(counts[:, None], pushed + thrust, 0.0)
-    twisted = np.where(counts, torque + twist, 0.0)
+    driven = np.where(counts[:, None], constant + thrust, 0.0)
+    twisted = np.where(counts, torque + thrust_torque, 0.0)
     return AppliedImpulses(mass * (np.asarray(world.gravity) + pull) * h, driven * h, twisted * h, dragged)
 
 
@@ -64,8 +64,8 @@ def _constant_forces(population: PymunkBodies) -> tuple[FloatArray, FloatArray]:
     """Return the constant forces (N, 2), N, and torques (N,), N·m."""
     force, torque = np.zeros_like(population.position), np.zeros(len(population.position))
     for steady in (population.particles.forces, population.space_bodies.constant_forces):
-        for index, (push, twist) in steady.items():
-            force[index], torque[index] = push, twist
+        for index, constant in steady.items():
+            force[index], torque[index] = constant
     return force, torque
 
 
@@ -73,15 +73,15 @@ def _field(population: PymunkBodies) -> tuple[FloatArray, FloatArray, FloatArray
     """Return the attraction (N, 2), m/s², on all bodies, and the thrusts, (N, 2) N and (N,) N·m."""
     field, particles, names = population.space_bodies.field, population.particles.indices, population.bodies.names
     pull, thrust = np.zeros_like(population.position), np.zeros_like(population.position)
-    twist = np.zeros(len(pull))
+    thrust_torque = np.zeros(len(pull))
     if field.attracts:
         pull[particles] = field.at(population.position[particles])
     if field.applied:
         index = {name: k for k, name in enumerate(names)}
         rows = [index[name] for name in field.applied]
         applied = np.asarray(list(field.applied.values()))
-        pull[rows], thrust[rows], twist[rows] = applied[:, 0:2], applied[:, 2:4], applied[:, 4]
-    return pull, thrust, twist
+        pull[rows], thrust[rows], thrust_torque[rows] = applied[:, 0:2], applied[:, 2:4], applied[:, 4]
+    return pull, thrust, thrust_torque
 
 
 class EnergyState(NamedTuple):

@@ -88,16 +88,16 @@ class SpaceForceField:
         def kick(body: pymunk.Body, gravity: tuple[float, float], damping: float, dt: float) -> None:
             x, y = body.position
             ax, ay = self._attraction(name, x, y, body.mass, members) if self.attracts else (0.0, 0.0)
-            pull, push, torque = (ax, ay), (0.0, 0.0), 0.0
+            pull, applied, torque = (ax, ay), (0.0, 0.0), 0.0
             if thrusts:
                 cos, sin = body.rotation_vector  # math.cos would raise if the angle is not finite
                 fx, fy, torque = self._thrust(thrusts)
-                push = cos * fx - sin * fy, sin * fx + cos * fy
-                ax += push[0] / body.mass
-                ay += push[1] / body.mass
+                applied = cos * fx - sin * fy, sin * fx + cos * fy
+                ax += applied[0] / body.mass
+                ay += applied[1] / body.mass
                 body.torque += torque
             if self.applied is not None:
-                self.applied[name] = (*pull, *push, torque)
+                self.applied[name] = (*pull, *applied, torque)
             if self.fractions:
                 fraction = self.fractions[name]
                 ax, ay = ax * fraction, ay * fraction
@@ -149,26 +149,26 @@ def _rate(attraction: Attraction, dx: float, dy: float) -> float:
     return attraction.strength / below if below > 0.0 else 0.0
 
 
-def acceleration(world: World, velocity: FloatArray, push: FloatArray | None, h: float) -> FloatArray:
+def acceleration(world: World, velocity: FloatArray, applied: FloatArray | None, h: float) -> FloatArray:
     """Return the mean acceleration (N, 2), m/s², of the next substep under gravity, drag and a constant force.
 
-    With κ = k + c|u|, u = v − wind, held over the step, v̇ = g + push − κu is solved exactly:
-    a = (g + push − κu)·(1 − e^(−κh))/(κh), the exponential Euler step (Hochbruck & Ostermann 2010, eq. 2.1). It is
+    With κ = k + c|u|, u = v − wind, held over the step, v̇ = g + a_f − κu is solved exactly:
+    a = (g + a_f − κu)·(1 − e^(−κh))/(κh), the exponential Euler step (Hochbruck & Ostermann 2010, eq. 2.1). It is
     exact in velocity for linear drag, first order for quadratic; the terminal velocity is exact, and it is stable at
     any h.
 
     Args:
         world: gravity, wind and drag.
         velocity: (N, 2) m/s.
-        push: (N, 2) m/s² by other forces, or None.
+        applied: (N, 2) m/s², the acceleration a_f by other forces, or None.
         h: substep, s.
     """
     relative = velocity - np.asarray(world.wind)
     rate = rates(world, velocity)
     fraction = mean_fraction(rate, h)
     total = np.asarray(world.gravity) - rate[:, None] * relative
-    if push is not None:
-        total += push
+    if applied is not None:
+        total += applied
     return np.asarray(total * fraction[:, None])
 
 

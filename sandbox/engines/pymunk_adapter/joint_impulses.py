@@ -23,12 +23,12 @@ class JointImpulses(NamedTuple):
     """(K, 2) likewise of the second"""
     impulse: FloatArray
     """(K, 2) N·s"""
-    twist: FloatArray
+    angular_impulse: FloatArray
     """(K,) N·m·s, angular impulse in addition to that of `impulse` at its arms"""
 
     def scaled(self, fraction: float | FloatArray) -> Self:
         """Return fractions of them, one for all or (K,)."""
-        return self._replace(impulse=(self.impulse.T * fraction).T, twist=self.twist * fraction)
+        return self._replace(impulse=(self.impulse.T * fraction).T, angular_impulse=self.angular_impulse * fraction)
 
     def separating_velocity(self, velocity: FloatArray, spin: FloatArray) -> FloatArray:
         """Return the velocities of the second anchors relative to the first, (K, 2) m/s.
@@ -43,7 +43,7 @@ class JointImpulses(NamedTuple):
 
     def work(self, velocity: FloatArray, spin: FloatArray) -> float:
         """Return their work, J, at mean velocities."""
-        turning = self.twist @ (spin[self.b] - spin[self.a])
+        turning = self.angular_impulse @ (spin[self.b] - spin[self.a])
         return float(np.sum(self.impulse * self.separating_velocity(velocity, spin)) + turning)
 
 
@@ -67,7 +67,9 @@ class ImpulseSums(NamedTuple):
             (joint_impulses.b, joint_impulses.arm_b, 1.0),
         ):
             np.subtract.at(self.linear, n, sign * joint_impulses.impulse)
-            np.subtract.at(self.angular, n, sign * (cross(arm, joint_impulses.impulse) + joint_impulses.twist))
+            np.subtract.at(
+                self.angular, n, sign * (cross(arm, joint_impulses.impulse) + joint_impulses.angular_impulse)
+            )
 
     def work(self, velocity: FloatArray, spin: FloatArray) -> float:
         """Return their work on bodies with joints, J, at mean velocities and spins."""

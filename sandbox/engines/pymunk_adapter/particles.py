@@ -218,7 +218,7 @@ class Particles:
             self._air = np.repeat(self._mass, 2), tile_of(world.gravity), tile_of(world.wind)
             self._drag = world.linear_drag, fraction
 
-    def push(self, index: int, force: FloatArray, torque: float) -> None:
+    def set_constant_force(self, index: int, force: FloatArray, torque: float) -> None:
         """Apply a constant force (N) and torque (N·m) to a body from now on."""
         self._forces[index] = force, torque
         self.rebuild()
@@ -286,16 +286,16 @@ class Particles:
 
     def _fly_by_numpy(self, substeps: int, forced: bool) -> None:
         even = self._kick[:2]
-        pushes = self._force_array() if self._has_force else None
+        forces = self._force_array() if self._has_force else None
         for piece in self._pieces():
             position, velocity = self._position[piece], self._velocity[piece]
             moved = np.empty_like(velocity)
             mass = self._mass[piece][:, None]
-            push = None if pushes is None else pushes[piece]
+            force = None if forces is None else forces[piece]
             for _ in range(substeps):
                 np.multiply(velocity, self._h, out=moved)
                 position += moved
-                velocity += self._forced_kick(position, velocity, mass, push) if forced else even
+                velocity += self._forced_kick(position, velocity, mass, force) if forced else even
             if not isinstance(piece, slice):
                 self._position[piece], self._velocity[piece] = position, velocity
 
@@ -329,8 +329,8 @@ class Particles:
         """Return (g + a + f/m)·h, a the attraction; with drag, whose force includes gravity, g is 0."""
         inverse = 1.0 / mass
         if self._has_drag:
-            push = None if force is None else force * inverse
-            kick = (mass * acceleration(self.world, velocity, push, self._h)) * inverse
+            acceleration_by_force = None if force is None else force * inverse
+            kick = (mass * acceleration(self.world, velocity, acceleration_by_force, self._h)) * inverse
             if self._field is not None:
                 kick += self._field.at(position) * mean_fraction(rates(self.world, velocity), self._h)[:, None]
             return kick * self._h

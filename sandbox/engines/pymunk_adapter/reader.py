@@ -59,7 +59,7 @@ TOUCH = (
 )
 
 
-WHO = ArbiterFields.BODY_A_ID | ArbiterFields.BODY_B_ID | ArbiterFields.CONTACT_COUNT
+PAIR_FIELDS = ArbiterFields.BODY_A_ID | ArbiterFields.BODY_B_ID | ArbiterFields.CONTACT_COUNT
 
 SECOND = TOUCH | ArbiterFields.POINT_A_2 | ArbiterFields.POINT_B_2
 """Fields for polygons, which touch in up to two points."""
@@ -142,7 +142,7 @@ class SpaceReader:
         self.slots = slice(first, first + len(self._indices)) if consecutive else self._indices
         self._moved = False
 
-    def push(self, force: FloatArray) -> None:
+    def set_forces(self, force: FloatArray) -> None:
         """Set the force, N, on each body of the last `state`, in its order, for the next step only."""
         self._outgoing = np.zeros((self._all, 2))  # kept alive: pymunk holds a bare pointer into it
         self._outgoing[self._rows] = force
@@ -153,7 +153,7 @@ class SpaceReader:
         """Set the velocities of all moving bodies to those of (N, 2), m/s, in scene order."""
         if self._moved:
             self._read_order()
-        self._outgoing = np.zeros((self._all, 2))  # kept alive, as in `push`; static bodies do not move
+        self._outgoing = np.zeros((self._all, 2))  # kept alive, as in `set_forces`; static bodies do not move
         self._outgoing[self._rows] = velocity[self._indices]
         self._forces.set_float_buf(self._outgoing.reshape(-1))
         set_space_bodies(self._space, BodyFields.VELOCITY, self._forces)
@@ -161,7 +161,7 @@ class SpaceReader:
     def pairs(self) -> IntArray:
         """Return the indices (K, 2) of bodies in contact. A pair is listed once for each two shapes that touch."""
         self._arbiters.clear()
-        get_space_arbiters(self._space, WHO, self._arbiters)
+        get_space_arbiters(self._space, PAIR_FIELDS, self._arbiters)
         words = np.frombuffer(self._arbiters.int_buf(), np.int64).reshape(-1, 3)
         if not len(words):
             return np.empty((0, 2), np.int64)

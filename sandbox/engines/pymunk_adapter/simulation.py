@@ -205,7 +205,7 @@ class PymunkSimulation(BaseSimulation):
             if self._recorder is not None:
                 self._recorder.rebuild()
             if leaving is not None:
-                self._take_out(np.asarray([leaving]))
+                self._remove_bodies(np.asarray([leaving]))
 
     def frame(self) -> Frame:
         """Return the present state."""
@@ -372,11 +372,11 @@ class PymunkSimulation(BaseSimulation):
             self.time, population.position, population.present, population.bodies.fixed, bounds
         )
         if len(removed):
-            self._take_out(removed)
+            self._remove_bodies(removed)
 
-    def _take_out(self, indices: IntArray) -> None:
+    def _remove_bodies(self, indices: IntArray) -> None:
         with booked(self._action_ledger, Cause.RETIRED, self):
             self._shared_angles = None
-            self._population.take_out(indices)
+            self._population.remove_bodies(indices)
         self._shared_angles = None
         self._retired |= dict.fromkeys(indices.tolist(), self.time)

@@ -62,7 +62,7 @@ class SpaceBodyTable:
         """Return whether a body is in the space."""
         return index in self._members
 
-    def movers(self) -> list[int]:
+    def movable_indices(self) -> list[int]:
         """Return the indices of the bodies that are not fixed."""
         return [index for index, member in self._members.items() if member.moves]
 
@@ -203,15 +203,15 @@ class ConstantForces:
         indices, values = state
         mass = np.asarray([members[n].body.mass for n in indices.tolist()])[:, None]
         mass[np.isinf(mass)] = 0.0  # of bodies moved by a drive or held by a zone: no force affects them
-        push = np.zeros((len(indices), 2))
+        applied = np.zeros((len(indices), 2))
         for row, index in enumerate(indices.tolist()):
             if index in self._total and mass[row]:
-                push[row] = self._total[index][0] * (1.0 / mass[row])
+                applied[row] = self._total[index][0] * (1.0 / mass[row])
         if springs is None:
-            reader.push(mass * acceleration(world, values[:, 3:5], push, h))
+            reader.set_forces(mass * acceleration(world, values[:, 3:5], applied, h))
         else:
             pull = np.divide(springs, mass, out=np.zeros_like(springs), where=mass > 0.0)
-            reader.push(mass * (acceleration(world, values[:, 3:5], push + pull, h) - pull))
+            reader.set_forces(mass * (acceleration(world, values[:, 3:5], applied + pull, h) - pull))
         self._set_torques(members)
 
     def _set_torques(self, members: Mapping[int, SpaceBody]) -> None:
@@ -411,18 +411,18 @@ class SpaceBodies(SpaceBodyTable):
             len(member.shapes) > 1 for member in self._members.values()
         )
 
-    def rebuild(self, scene: Scene, meet: ContactMatrix) -> None:
+    def rebuild(self, scene: Scene, matrix: ContactMatrix) -> None:
         """Update after a change of the scene's coefficients, walls, surfaces or world."""
         if self._static_shapes.reshape(self._scene, scene):
             self._has_single_contacts = False  # contacts with the removed shapes vanish without being listed as ended
         self.rebuild_world(scene)
-        self._surface_of, self._surface_of_fixed = meet.surfaces.of_shape, meet.surfaces.of_fixed
-        self._can_touch, self._sensed = meet.touches, meet.noted
-        self._surface_setter.rebuild(meet, jointed_surfaces(scene, self._surface_of_fixed))
+        self._surface_of, self._surface_of_fixed = matrix.surfaces.of_shape, matrix.surfaces.of_fixed
+        self._can_touch, self._sensed = matrix.touches, matrix.noted
+        self._surface_setter.rebuild(matrix, jointed_surfaces(scene, self._surface_of_fixed))
         for index, (_, own) in self._members.items():
             for piece, shape in own:
                 self._surface_setter.set_surface(shape, int(self._surface_of[piece]))
-            heavy = meet.turnable[index] and math.isinf(self.moment(index))
+            heavy = matrix.turnable[index] and math.isinf(self.moment(index))
             if heavy and index not in self.drives.indices:
                 self.give_moment(index, float(self._moments[index]))
         if self.drives.driven_bodies:
@@ -552,6 +552,6 @@ class SpaceBodies(SpaceBodyTable):
         if self._moving and math.isfinite(self._static_shapes.reach):
             self._static_shapes.extend(self._read()[1][:, 0:2])
 
-    def push(self, index: int, force: FloatArray, torque: float) -> None:
+    def set_constant_force(self, index: int, force: FloatArray, torque: float) -> None:
         """Apply a constant force (N) and torque (N·m) to a body from now on."""
         self.constant_forces.set_force(index, force, torque)

@@ -2,13 +2,11 @@
 
 A pair is one integer key. Candidates come in ascending order of their keys, so results do not depend on the method.
 
-Broad phases: which pairs of balls are near enough to look at. BROAD_PHASES is the table of them.
-
-Each is a kernel (order, position, radius, meets, moves, margin, most, keys) -> (found, tests). It writes the keys of
-candidate pairs into `keys` (C,), each once, in any order, as far as there is room, and returns how many it found and
-how many cheap tests that took, or `EXCEEDED` where it gave up after looking at `most` pairs. None loses a pair nearer
-than the margin, so after the narrow phase all agree. `order` is a broad phase's own, from step to step: the numbers of
-the balls that can meet anything.
+BROAD_PHASES is the table of broad phases. Each is a kernel (order, position, radius, collision_mask, moves, margin,
+most, keys) -> (found, tests). It writes the keys of candidate pairs into `keys` (C,), each once, in any order, up to
+its capacity. It returns the number of candidates found and the number of cheap tests, or `EXCEEDED` if it stopped after
+`most` tests. Every pair nearer than the margin is found, so all broad phases agree after the narrow phase. `order` is
+the broad phase's own order of the balls that can collide with anything; it is kept from step to step.
 
 Grid: balls are sorted into square cells as wide as the widest of them; only neighbouring cells are looked at.
 
@@ -68,13 +66,16 @@ def listed(keys: IntArray, key: int) -> bool:
 
 
 @bare_kernel
-def may_meet(meets_a: int, moves_a: bool, meets_b: int, moves_b: bool) -> bool:
-    """Return whether two bodies can touch: both move and meet all, or one is fixed and the other meets fixed ones."""
+def can_collide(mask_a: int, moves_a: bool, mask_b: int, moves_b: bool) -> bool:
+    """Return whether two bodies can collide.
+
+    Either both move and collide with everything, or one is fixed and the other collides with fixed bodies.
+    """
     if moves_a and moves_b:
-        return meets_a == ALL and meets_b == ALL
+        return mask_a == ALL and mask_b == ALL
     if moves_a:
-        return meets_a >= FIXED and meets_b == ALL
-    return moves_b and meets_b >= FIXED and meets_a == ALL
+        return mask_a >= FIXED and mask_b == ALL
+    return moves_b and mask_b >= FIXED and mask_a == ALL
 
 
 @kernel
@@ -82,7 +83,7 @@ def all_pairs(
     order: IntArray,  # noqa: ARG001, all broad phases are called alike
     position: FloatArray,
     radius: FloatArray,  # noqa: ARG001
-    meets: IntArray,
+    collision_mask: IntArray,
     moves: BoolArray,
     margin: float,  # noqa: ARG001
     most: int,  # noqa: ARG001, the finder counts these pairs beforehand
@@ -91,10 +92,10 @@ def all_pairs(
     """Emit every pair that can touch."""
     found = 0
     for i in range(len(position)):
-        if meets[i] == NOTHING:  # particles may be many
+        if collision_mask[i] == NOTHING:  # particles may be many
             continue
         for j in range(i + 1, len(position)):
-            if may_meet(meets[i], moves[i], meets[j], moves[j]):
+            if can_collide(collision_mask[i], moves[i], collision_mask[j], moves[j]):
                 if found < len(keys):
                     keys[found] = pair_key(i, j)
                 found += 1
@@ -106,7 +107,7 @@ def circles(
     order: IntArray,  # noqa: ARG001, all broad phases are called alike
     position: FloatArray,
     radius: FloatArray,
-    meets: IntArray,
+    collision_mask: IntArray,
     moves: BoolArray,
     margin: float,
     most: int,  # noqa: ARG001, the finder counts these pairs beforehand
@@ -115,10 +116,10 @@ def circles(
     """Emit the pairs whose bounding circles, widened by the margin, overlap."""
     found, tests = 0, 0
     for i in range(len(position)):
-        if meets[i] == NOTHING:  # particles may be many
+        if collision_mask[i] == NOTHING:  # particles may be many
             continue
         for j in range(i + 1, len(position)):
-            if may_meet(meets[i], moves[i], meets[j], moves[j]):
+            if can_collide(collision_mask[i], moves[i], collision_mask[j], moves[j]):
                 tests += 1
                 x, y = position[j, 0] - position[i, 0], position[j, 1] - position[i, 1]
                 reach = radius[i] + radius[j] + margin
@@ -156,7 +157,7 @@ def grid(
     order: IntArray,
     position: FloatArray,
     radius: FloatArray,
-    meets: IntArray,
+    collision_mask: IntArray,
     moves: BoolArray,
     margin: float,
     most: int,
@@ -165,7 +166,7 @@ def grid(
     """Emit the pairs whose bounding circles, widened by the margin, overlap; `order` (N,) is used for scratch."""
     count, widest = len(position), 0.0
     for i in range(count):
-        if meets[i] > 0:
+        if collision_mask[i] > 0:
             widest = max(widest, radius[i])
     width = 2.0 * widest + margin
     if width <= 0.0:
@@ -179,20 +180,20 @@ def grid(
     column, row, slot = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count, np.int64)
     begin = np.zeros(mask + 3, np.int64)
     for i in range(count):
-        if meets[i] > 0:
+        if collision_mask[i] > 0:
             column[i], row[i] = cell_of(position[i, 0], width), cell_of(position[i, 1], width)
             slot[i] = slot_of(column[i], row[i], mask)
             begin[slot[i] + 2] += 1
     for s in range(2, mask + 3):
         begin[s] += begin[s - 1]
     for i in range(count):
-        if meets[i] > 0:
+        if collision_mask[i] > 0:
             order[begin[slot[i] + 1]] = i
             begin[slot[i] + 1] += 1
 
     found, tests, looked = 0, 0, 0
     for i in range(count):
-        if meets[i] == 0:
+        if collision_mask[i] == 0:
             continue
         if looked > most:
             return found, EXCEEDED
@@ -207,7 +208,7 @@ def grid(
                     # Another cell may share the slot.
                     if j <= i or column[j] != across or row[j] != up:
                         continue
-                    if may_meet(meets[i], moves[i], meets[j], moves[j]):
+                    if can_collide(collision_mask[i], moves[i], collision_mask[j], moves[j]):
                         tests += 1
                         dx, dy = position[j, 0] - x, position[j, 1] - y
                         reach = radius[i] + radius[j] + margin
@@ -227,7 +228,7 @@ def sweep(
     order: IntArray,
     position: FloatArray,
     radius: FloatArray,
-    meets: IntArray,
+    collision_mask: IntArray,
     moves: BoolArray,
     margin: float,
     most: int,
@@ -262,7 +263,7 @@ def sweep(
             if position[j, 0] - radius[j] > right:
                 break
             looked += 1
-            if may_meet(meets[i], moves[i], meets[j], moves[j]):
+            if can_collide(collision_mask[i], moves[i], collision_mask[j], moves[j]):
                 tests += 1
                 if abs(position[j, 1] - position[i, 1]) <= radius[i] + radius[j] + margin:
                     if found < len(keys):

@@ -25,17 +25,23 @@ from sandbox.engines.reference.broad_phase import (
     near_segments,
 )
 from sandbox.engines.reference.filtering import CollisionFilter
-from sandbox.engines.reference.manifold import KIND, Manifolds, meet_balls, meet_planes, meet_segments
+from sandbox.engines.reference.manifold import (
+    KIND,
+    Manifolds,
+    find_ball_contacts,
+    find_plane_contacts,
+    find_segment_contacts,
+)
 from sandbox.engines.reference.polygon_contacts import (
     NarrowPhaseInput,
     WorldPieces,
     apart_keys,
     drop,
     drop_apart,
+    find_body_contacts,
+    find_fixed_segment_contacts,
+    find_half_plane_contacts,
     lay_boxes,
-    meet_bodies,
-    meet_fixed_segments,
-    meet_half_planes,
 )
 from sandbox.engines.reference.time_of_impact import first_touch
 
@@ -58,8 +64,8 @@ class CollisionPipeline(ABC):
     _owner: IntArray
     """body of each ball, or piece"""
 
-    def __init__(self, roster: BodyStore, broad_phase: str, work: Counter[str] | None = None) -> None:
-        self._roster, self._broad_phase = roster, BROAD_PHASES[broad_phase]
+    def __init__(self, store: BodyStore, broad_phase: str, work: Counter[str] | None = None) -> None:
+        self._store, self._broad_phase = store, BROAD_PHASES[broad_phase]
         self._sorts, self._listing = broad_phase == "sweep", broad_phase in ("all_pairs", "circles")
         self._most_pairs = resource_limits.PAIRS.value
         self._ball_keys, self._segment_keys = np.empty(64, np.int64), np.empty(64, np.int64)
@@ -69,18 +75,18 @@ class CollisionPipeline(ABC):
         self.rebuild()
 
     def rebuild(self) -> None:
-        """Derive the data of bodies, pieces and static colliders anew from the roster."""
-        roster = self._roster
-        self.can_touch: BoolArray = roster.moving & (roster.meets > NOTHING)
-        self._moves: BoolArray = roster.mobile
+        """Derive the data of bodies, pieces and static colliders anew from the body store."""
+        store = self._store
+        self.can_touch: BoolArray = store.moving & (store.collision_mask > NOTHING)
+        self._moves: BoolArray = store.mobile
         self._order: IntArray | None = None
-        self._boxes = SegmentBoxes(roster.fixtures)
-        self._planes = len(roster.fixtures.planes) if self.can_touch.any() else 0
+        self._boxes = SegmentBoxes(store.fixtures)
+        self._planes = len(store.fixtures.planes) if self.can_touch.any() else 0
         self._plane_tests = self._planes * int(np.count_nonzero(self.can_touch))
-        touching = roster.radius[self.can_touch]
-        self.widest = float(roster.radius[roster.meets > NOTHING].max(initial=0.0))
+        touching = store.radius[self.can_touch]
+        self.widest = float(store.radius[store.collision_mask > NOTHING].max(initial=0.0))
         """m; the largest radius of what can touch anything"""
-        alone = not (roster.meet.ball_ball or self._planes or len(self._boxes))
+        alone = not (store.contact_matrix.ball_ball or self._planes or len(self._boxes))
         self.thinnest = np.inf if alone else float(touching.min(initial=np.inf))
         """m; the smallest radius of what moves and can touch anything"""
 
@@ -106,19 +112,19 @@ class CollisionPipeline(ABC):
             self.work.update(before)
 
     def _near(
-        self, middle: FloatArray, reach: FloatArray, meets: IntArray, moves: BoolArray, margin: float
+        self, middle: FloatArray, reach: FloatArray, collision_mask: IntArray, moves: BoolArray, margin: float
     ) -> IntArray:
         """Return the keys of the pairs of discs whose gap may be less than the margin, m, ascending.
 
         Raises:
             Exhaustion: there are too many to look at.
         """
-        order = self._order = self._arranged(middle, reach, meets) if self._order is None else self._order
+        order = self._order = self._arranged(middle, reach, collision_mask) if self._order is None else self._order
         if self._turned:
             middle = np.ascontiguousarray(middle[:, 1::-1])
 
         def search(room: IntArray) -> tuple[int, int]:
-            given = middle, reach, meets, moves, margin, self._most_pairs, room
+            given = middle, reach, collision_mask, moves, margin, self._most_pairs, room
             found, tests = self._broad_phase(order, *given)
             if tests == UNSORTED:
                 order[:] = order[np.argsort((middle[:, 0] - reach)[order], kind="stable")]
@@ -128,16 +134,16 @@ class CollisionPipeline(ABC):
         self._ball_keys, keys = self._filled(self._ball_keys, search)
         return keys
 
-    def _arranged(self, middle: FloatArray, reach: FloatArray, meets: IntArray) -> IntArray:
-        """Return the discs that can meet anything, in the order for a sweep along the axis that suits it.
+    def _arranged(self, middle: FloatArray, reach: FloatArray, collision_mask: IntArray) -> IntArray:
+        """Return the discs that can collide with anything, in the order for a sweep along the axis that suits it.
 
         Raises:
             Exhaustion: there are too many pairs to list them all.
         """
-        some = np.flatnonzero(meets > NOTHING)
+        some = np.flatnonzero(collision_mask > NOTHING)
         if self._listing:
             subject = f"broad_phase 'all_pairs' or 'circles' of {len(some):,} discs tests this many pairs:"
-            _require(resource_limits.PAIRS.refusal(subject, 0.5 * len(some) * len(meets)))
+            _require(resource_limits.PAIRS.refusal(subject, 0.5 * len(some) * len(collision_mask)))
         self._turned = False
         if self._sorts:
             low = middle[some, :2] - reach[some, None]
@@ -245,7 +251,7 @@ def _room_for(size: int) -> Manifolds:
         separation=np.empty(size),
         point=np.empty((size, 2)),
         arm=np.empty((size, 2)),
-        offset=np.zeros((size, 2)),  # where only discs meet it stays so
+        offset=np.zeros((size, 2)),  # stays 0 where only discs collide
         friction=np.empty(size),
         surface_pair=np.empty(size, np.int64),
     )
@@ -255,24 +261,24 @@ class CirclePipeline(CollisionPipeline):
     """Finds contacts of balls, in the order of their keys; counts the work."""
 
     def rebuild(self) -> None:
-        """Derive the data of bodies, pieces and static colliders anew from the roster."""
+        """Derive the data of bodies, pieces and static colliders anew from the body store."""
         super().rebuild()
-        self._apart: IntArray = apart_keys(self._roster.links)
-        self._owner = np.arange(len(self._roster.position))  # each ball is its own body
+        self._apart: IntArray = apart_keys(self._store.links)
+        self._owner = np.arange(len(self._store.position))  # each ball is its own body
 
     def candidates(self, position: FloatArray, margin: float = 0.0, walls_alone: bool = False) -> CandidatePairs:
         """Return the pairs worth a look at (N, ≥ 2) positions, m: none nearer than the margin, m, is left out."""
-        roster, boxes = self._roster, self._boxes
+        store, boxes = self._store, self._boxes
         balls = segments = self._ball_keys[:0]
-        if roster.meet.ball_ball and not walls_alone:
-            balls = self._near(position, roster.radius, roster.meets, self._moves, margin)
+        if store.contact_matrix.ball_ball and not walls_alone:
+            balls = self._near(position, store.radius, store.collision_mask, self._moves, margin)
             if len(self._apart):
-                balls = balls[: drop(balls, self._owner, self._apart, roster.bodies.group)]
+                balls = balls[: drop(balls, self._owner, self._apart, store.bodies.group)]
         if len(boxes.index):
             self._segment_keys, segments = self._filled(
                 self._segment_keys,
                 lambda room: near_segments(
-                    position, roster.radius, self.can_touch, *boxes.sorted, margin, self._most_pairs, room
+                    position, store.radius, self.can_touch, *boxes.sorted, margin, self._most_pairs, room
                 ),
             )
         near = CandidatePairs(balls, segments)
@@ -280,19 +286,19 @@ class CirclePipeline(CollisionPipeline):
 
     def _write_manifolds(self, position: FloatArray, near: CandidatePairs, reach: float) -> int:
         """Write the contacts as far as there is room; return how many there are."""
-        roster, fixtures, size = self._roster, self._roster.fixtures, 0
-        radius, surface, other = roster.radius, roster.surface, roster.fixed_surface
+        store, fixtures, size = self._store, self._store.fixtures, 0
+        radius, surface, other = store.radius, store.surface, store.fixed_surface
         if len(near.balls):
-            size = meet_balls(near.balls, position, radius, surface, roster.friction, reach, self._out, size)
+            size = find_ball_contacts(near.balls, position, radius, surface, store.friction, reach, self._out, size)
         if self._planes:
-            things = fixtures.planes, fixtures.plane_thing, other
-            size = meet_planes(
-                position, radius, self.can_touch, surface, *things, roster.friction, reach, self._out, size
+            planes = fixtures.planes, fixtures.plane_collider, other
+            size = find_plane_contacts(
+                position, radius, self.can_touch, surface, *planes, store.friction, reach, self._out, size
             )
         if len(near.segments):
-            walls = fixtures.segments, fixtures.joints, fixtures.segment_thing, other
-            size = meet_segments(
-                near.segments, position, radius, surface, *walls, roster.friction, reach, self._out, size
+            walls = fixtures.segments, fixtures.joints, fixtures.segment_collider, other
+            size = find_segment_contacts(
+                near.segments, position, radius, surface, *walls, store.friction, reach, self._out, size
             )
         return size
 
@@ -306,16 +312,14 @@ class CirclePipeline(CollisionPipeline):
 
         Pairs whose keys are in `rest`, ascending, are left out.
         """
-        roster = self._roster
+        store = self._store
         if self.filter is not None:
             rest = self.filter.with_planes_apart(rest, self.can_touch)
         near = self.candidates(start, 2.0 * self.max_displacement(start, end))
         self.work["pair_tests"] += len(near.balls) + len(near.segments) + self._plane_tests
-        fixtures = roster.fixtures
+        fixtures = store.fixtures
         walls = near.segments, fixtures.segments, fixtures.joints
-        fraction, key = first_touch(
-            start, end, roster.radius, self.can_touch, near.balls, fixtures.planes, *walls, rest
-        )
+        fraction, key = first_touch(start, end, store.radius, self.can_touch, near.balls, fixtures.planes, *walls, rest)
         return float(fraction), int(key)
 
     def only(self, position: FloatArray, key: int) -> Manifolds:
@@ -329,34 +333,34 @@ class CirclePipeline(CollisionPipeline):
 class ConvexPipeline(CollisionPipeline):
     """Finds contacts of convex pieces, in the order of their keys; counts the work."""
 
-    def __init__(self, roster: BodyStore, broad_phase: str, work: Counter[str] | None = None) -> None:
+    def __init__(self, store: BodyStore, broad_phase: str, work: Counter[str] | None = None) -> None:
         self._oriented = broad_phase == "oriented"
-        super().__init__(roster, "sweep" if self._oriented else broad_phase, work)
+        super().__init__(store, "sweep" if self._oriented else broad_phase, work)
 
     def rebuild(self) -> None:
-        """Derive the data of bodies, pieces and static colliders anew from the roster."""
+        """Derive the data of bodies, pieces and static colliders anew from the body store."""
         super().rebuild()
-        roster = self._roster
-        self._pieces = WorldPieces(roster)
+        store = self._store
+        self._pieces = WorldPieces(store)
         self._owner = self._pieces.body
         self._plane_tests = self._planes * int(np.count_nonzero(self._pieces.can_touch))
         self._box = np.empty((len(self._pieces.radius), 6))
         self._scratch = np.empty((2, 6))
-        touching = roster.bodies.thin[self.can_touch]
+        touching = store.bodies.thin[self.can_touch]
         if np.isfinite(self.thinnest):
             self.thinnest = float(touching.min(initial=np.inf))
 
     def _lay_out(self, position: FloatArray) -> None:
-        angle = position[:, 2] if position.shape[1] == 3 else self._roster.angle
+        angle = position[:, 2] if position.shape[1] == 3 else self._store.angle
         self._pieces.lay_out(position, angle)
 
     def candidates(self, position: FloatArray, margin: float = 0.0, walls_alone: bool = False) -> CandidatePairs:
         """Return the pairs of pieces, and of pieces and segments, worth a look at (N, ≥ 2) positions, m."""
         self._lay_out(position)
-        roster, boxes, pieces = self._roster, self._boxes, self._pieces
+        store, boxes, pieces = self._store, self._boxes, self._pieces
         bodies = segments = self._ball_keys[:0]
-        if roster.meet.mutual and not walls_alone:
-            bodies = self._near(pieces.middle, pieces.reach, pieces.meets, pieces.moves, margin)
+        if store.contact_matrix.mutual and not walls_alone:
+            bodies = self._near(pieces.middle, pieces.reach, pieces.collision_mask, pieces.moves, margin)
             bodies = bodies[: drop(bodies, pieces.body, pieces.apart, pieces.group)]
         if len(boxes.index):
             self._segment_keys, segments = self._filled(
@@ -377,17 +381,17 @@ class ConvexPipeline(CollisionPipeline):
     def _write_manifolds(self, position: FloatArray, near: CandidatePairs, reach: float) -> int:
         """Write the contacts as far as there is room; return how many there are."""
         self._lay_out(position)
-        roster, fixtures, pieces, size = self._roster, self._roster.fixtures, self._pieces, 0
+        store, fixtures, pieces, size = self._store, self._store.fixtures, self._pieces, 0
         hulls = pieces.hulls
-        look = NarrowPhaseInput(roster.friction, reach, self._scratch)
+        look = NarrowPhaseInput(store.friction, reach, self._scratch)
         if len(near.balls):
-            size = meet_bodies(near.balls, hulls, position, look, self._out, size)
+            size = find_body_contacts(near.balls, hulls, position, look, self._out, size)
         if self._planes:
-            things = fixtures.planes, fixtures.plane_thing, roster.fixed_surface
-            size = meet_half_planes(hulls, pieces.can_touch, position, *things, look, self._out, size)
+            planes = fixtures.planes, fixtures.plane_collider, store.fixed_surface
+            size = find_half_plane_contacts(hulls, pieces.can_touch, position, *planes, look, self._out, size)
         if len(near.segments):
-            walls = fixtures.joints, fixtures.segment_thing, roster.fixed_surface
-            size = meet_fixed_segments(near.segments, hulls, position, *walls, look, self._out, size)
+            walls = fixtures.joints, fixtures.segment_collider, store.fixed_surface
+            size = find_fixed_segment_contacts(near.segments, hulls, position, *walls, look, self._out, size)
         return size
 
     def max_displacement(self, start: FloatArray, end: FloatArray) -> float:
@@ -395,35 +399,35 @@ class ConvexPipeline(CollisionPipeline):
         way = (end - start)[self.can_touch]
         length = np.sqrt((way[:, :2] ** 2).sum(axis=1))
         if way.shape[1] == 3:
-            reach = self._roster.radius[self.can_touch]
-            if self._roster.held:
-                reach = reach + np.hypot(*self._roster.hinge[self.can_touch].T)
+            reach = self._store.radius[self.can_touch]
+            if self._store.held:
+                reach = reach + np.hypot(*self._store.hinge[self.can_touch].T)
             length += np.abs(way[:, 2]) * reach
         return float(length.max(initial=0.0))
 
 
 def make_pipeline(
-    roster: BodyStore, broad_phase: str, collision_filter: CollisionFilter | None, work: Counter[str]
+    store: BodyStore, broad_phase: str, collision_filter: CollisionFilter | None, work: Counter[str]
 ) -> CollisionPipeline:
-    """Return the collision pipeline for the bodies of a roster.
+    """Return the collision pipeline for the bodies of a simulation.
 
     Args:
-        roster: the bodies.
+        store: the bodies.
         broad_phase: its name.
         collision_filter: None if every candidate pair may touch.
         work: counters of the work done, shared with the solvers.
     """
-    kind = ConvexPipeline if pieced(roster) else CirclePipeline
-    pipeline = kind(roster, broad_phase, work)
+    kind = ConvexPipeline if pieced(store) else CirclePipeline
+    pipeline = kind(store, broad_phase, work)
     pipeline.filter = collision_filter
     return pipeline
 
 
-def suits(pipeline: CollisionPipeline, roster: BodyStore) -> bool:
-    """Return whether a pipeline is of the kind that a roster needs; if not, its keys mean other pairs."""
-    return isinstance(pipeline, ConvexPipeline) == pieced(roster)
+def suits(pipeline: CollisionPipeline, store: BodyStore) -> bool:
+    """Return whether a pipeline is of the kind that a body store needs; if not, its keys mean other pairs."""
+    return isinstance(pipeline, ConvexPipeline) == pieced(store)
 
 
-def pieced(roster: BodyStore) -> bool:
+def pieced(store: BodyStore) -> bool:
     """Return whether collisions are detected by convex pieces: not all bodies are discs about their centres."""
-    return roster.meet.solids or len(roster.drives) > 0
+    return store.contact_matrix.solids or len(store.drives) > 0

@@ -50,13 +50,13 @@ STILL = 1e-9
 class DrivenBody(ABC):
     """Base of driven bodies. A substep calls `plan`, `begin`, `place`, and after the contacts `done`."""
 
-    def __init__(self, roster: BodyStore, number: int, mount: Mount) -> None:
+    def __init__(self, store: BodyStore, number: int, mount: Mount) -> None:
         self.number, self.mount = number, mount
-        self.mass = float(roster.bodies.mass[number])
-        self.moment = about_hinge(mount, self.mass, float(roster.bodies.moment[number]))
+        self.mass = float(store.bodies.mass[number])
+        self.moment = about_hinge(mount, self.mass, float(store.bodies.moment[number]))
         """moment of inertia about the hinge, kg·m²"""
-        self.gravity: Point = roster.scene.world.gravity
-        self.state: FloatArray = roster.drives[mount.number]
+        self.gravity: Point = store.scene.world.gravity
+        self.state: FloatArray = store.drives[mount.number]
         """(3,) of its drive, as in a frame; written to"""
         drive = mount.drive
         self._seat = mount.home if isinstance(drive, PlungerDrive) else drive.pivot
@@ -113,8 +113,8 @@ class HingeMotor(DrivenBody):
     fall: float
     """torque of the weight in the planned substep, N·m"""
 
-    def __init__(self, roster: BodyStore, number: int, mount: Mount) -> None:
-        super().__init__(roster, number, mount)
+    def __init__(self, store: BodyStore, number: int, mount: Mount) -> None:
+        super().__init__(store, number, mount)
         assert isinstance(mount.drive, TorqueDrive)
         self._law = HingeDrive(mount.drive, self.moment)
         self._h = 0.0
@@ -209,8 +209,8 @@ class KinematicHinge(DrivenBody):
 class DrivenPlunger(DrivenBody):
     """A body that is pulled back along a line, and released by a spring."""
 
-    def __init__(self, roster: BodyStore, number: int, mount: Mount) -> None:
-        super().__init__(roster, number, mount)
+    def __init__(self, store: BodyStore, number: int, mount: Mount) -> None:
+        super().__init__(store, number, mount)
         assert isinstance(mount.drive, PlungerDrive)
         self._drive, self._along = mount.drive, stroke_direction(mount.drive)
 
@@ -258,11 +258,11 @@ class DrivenPlunger(DrivenBody):
         return -self.mass * float(np.dot(self.gravity, pose[self.number, :2]))
 
 
-def lead_of(roster: BodyStore, number: int, mount: Mount) -> DrivenBody:
+def lead_of(store: BodyStore, number: int, mount: Mount) -> DrivenBody:
     """Return the driven body with an index."""
     kinds: dict[str, type[HingeMotor] | type[KinematicHinge] | type[DrivenPlunger]]
     kinds = {"torque": HingeMotor, "stroke": KinematicHinge, "plunger": DrivenPlunger}
-    return kinds[mount.drive.kind](roster, number, mount)
+    return kinds[mount.drive.kind](store, number, mount)
 
 
 class DriveWork(NamedTuple):
@@ -279,25 +279,25 @@ class DriveWork(NamedTuple):
 class Drives:
     """The driven bodies that are present."""
 
-    def __init__(self, roster: BodyStore) -> None:
-        self._roster = roster
-        self.leads: list[DrivenBody] = [lead_of(roster, number, mount) for number, mount in roster.held.items()]
+    def __init__(self, store: BodyStore) -> None:
+        self._store = store
+        self.leads: list[DrivenBody] = [lead_of(store, number, mount) for number, mount in store.held.items()]
         self._hinges = [lead for lead in self.leads if isinstance(lead, HingeMotor)]
         self._numbers: IntArray = np.asarray([lead.number for lead in self.leads], np.int64)
-        self._turning = not roster.led[self._numbers].all()
-        self.firm: FloatArray = roster.inverse_moment.copy()
+        self._turning = not store.led[self._numbers].all()
+        self.firm: FloatArray = store.inverse_moment.copy()
         """(N,) 1/(kg·m²), inverse moments for the correction of overlaps: 0 for driven bodies, which keep their pose"""
         self.firm[self._numbers] = 0.0
-        self.yielding: FloatArray = roster.inverse_moment
+        self.yielding: FloatArray = store.inverse_moment
         """(N,) 1/(kg·m²), inverse moments for forces in the planned substep: 0 for a body pressed onto a stop"""
-        self._no_rows: VelocityConstraints = rows_of(ties_of(roster.setup.links, among=np.empty(0, np.int64)))
+        self._no_rows: VelocityConstraints = rows_of(ties_of(store.setup.links, among=np.empty(0, np.int64)))
 
     @classmethod
-    def of(cls, roster: BodyStore, old: Self | None) -> Self | None:
-        """Return the drives of the bodies in a roster, continuing old ones; None if no body is driven."""
-        if not roster.held:
+    def of(cls, store: BodyStore, old: Self | None) -> Self | None:
+        """Return the drives of the bodies in a body store, continuing old ones; None if no body is driven."""
+        if not store.held:
             return None
-        new = cls(roster)
+        new = cls(store)
         stopped = {} if old is None else {hinge.number: hinge for hinge in old._hinges}
         for hinge in new._hinges:
             if hinge.number in stopped:
@@ -311,9 +311,9 @@ class Drives:
 
     def leave(self, x: State) -> None:
         """Write the centres of mass of a state into the body store."""
-        roster = self._roster
+        store = self._store
         for lead in self.leads:
-            roster.position[lead.number], roster.velocity[lead.number] = lead.centre(*x)
+            store.position[lead.number], store.velocity[lead.number] = lead.centre(*x)
 
     def centred(self, x: State) -> FloatArray:
         """Return the centres of mass of all bodies in a state, (N, 2) m."""
@@ -345,7 +345,7 @@ class Drives:
         self.begin(x, h)
         for lead in self.leads:
             lead.glide(self.start, h)
-        self.yielding = self._roster.inverse_moment.copy()
+        self.yielding = self._store.inverse_moment.copy()
         standing = [hinge for hinge in self._hinges if hinge.stands]
         self.yielding[[hinge.number for hinge in standing]] = 0.0
         while True:  # at most once for each of them
@@ -396,7 +396,7 @@ class Drives:
         iterations: int,
     ) -> None:
         """Solve contacts, joints and stops together; the arguments are those of `solve_together`."""
-        inverse_moment, stopped = self._roster.inverse_moment.copy(), list[HingeMotor]()
+        inverse_moment, stopped = self._store.inverse_moment.copy(), list[HingeMotor]()
         for hinge in self._hinges:
             if hinge.direction and _presses(contacts, hinge.number, hinge.direction):
                 inverse_moment[hinge.number] = velocity[hinge.number, 2] = 0.0
@@ -408,7 +408,7 @@ class Drives:
             np.asarray([hinge.given for hinge in stopped]),
         )
         rows = self._no_rows if rows is None else rows
-        inverse = self._roster.inverse_mass, inverse_moment
+        inverse = self._store.inverse_mass, inverse_moment
         solve_together(contacts, bounce, rows, stops, velocity, *inverse, impulse, iterations)
         given = dict(zip(stops.body.tolist(), stops.given.tolist(), strict=True))
         for hinge in self._hinges:
@@ -424,13 +424,13 @@ class Drives:
         if not contacts.size:
             return 0.0
         along, across = impulse.T
-        push = contacts.normal * along[:, None] + _left(contacts.normal) * across[:, None]
+        impulse_xy = contacts.normal * along[:, None] + _left(contacts.normal) * across[:, None]
         work = 0.0
         for body, side, sign in ((contacts.first, 0, -1.0), (contacts.second, 1, 1.0)):
             which = np.isin(body, self._numbers)
             rate = mean[body[which]]
             lever = contacts.arm[which, side] * across[which] + sign * contacts.offset[which, side] * along[which]
-            work += sign * float((push[which] * rate[:, :2]).sum()) - float(lever @ rate[:, 2])
+            work += sign * float((impulse_xy[which] * rate[:, :2]).sum()) - float(lever @ rate[:, 2])
         return work
 
     def work(self, before: State, after: State, h: float) -> DriveWork:
@@ -453,7 +453,7 @@ class DrivenSolver(ImpulseSolver):
 
     Args:
         drives: of the driven bodies.
-        roster: the other arguments are those of `ImpulseSolver`.
+        store: the other arguments are those of `ImpulseSolver`.
         settings: likewise.
         pipeline: likewise.
         joints: likewise.
@@ -463,15 +463,15 @@ class DrivenSolver(ImpulseSolver):
     def __init__(
         self,
         drives: Drives,
-        roster: BodyStore,
+        store: BodyStore,
         settings: Settings,
         pipeline: CollisionPipeline,
         joints: JointSolver | None,
         memory: ContactMemory,
     ) -> None:
-        super().__init__(roster, settings, pipeline, joints, memory)
+        super().__init__(store, settings, pipeline, joints, memory)
         self._drives, self._always = drives, True
-        self._inverse_overlap = roster.inverse_mass, drives.firm
+        self._inverse_overlap = store.inverse_mass, drives.firm
 
     def integrate(self, x: State, forces: Inputs, time: float, h: float) -> Motion:
         """Return the motion from a state at a time, s, over h, s, as if nothing were hit."""

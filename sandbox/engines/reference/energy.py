@@ -37,13 +37,13 @@ class StepEnergyLedger:
     """Energy ledger of a running world: it reads the record of each step after that is done.
 
     Args:
-        roster: the bodies.
+        store: the bodies.
         world: their state, forces, joints and drives.
     """
 
-    def __init__(self, roster: BodyStore, world: WorldState) -> None:
+    def __init__(self, store: BodyStore, world: WorldState) -> None:
         self.account = EnergyLedger()
-        self._roster, self._world, self._field = roster, world, world.field
+        self._store, self._world, self._field = store, world, world.field
         self._fraction = world.position_fraction
         self.rebuild()
 
@@ -52,22 +52,22 @@ class StepEnergyLedger:
 
         The penalty contacts of the ledger use a collision pipeline of their own, so that they are not counted as work.
         """
-        roster, world = self._roster, self._world
+        store, world = self._store, self._world
         self._u, self._joints, self._drives = world.forces, world.joints, world.drives
         self._penalty = world.ledger_penalty()
-        moving = roster.mobile  # a body that a zone holds has no motion, but height
-        self._everyone: FloatArray = np.where(moving, (roster.bodies.mass,) * 2 + (roster.bodies.moment,), 0.0).T
+        moving = store.mobile  # a body that a zone holds has no motion, but height
+        self._everyone: FloatArray = np.where(moving, (store.bodies.mass,) * 2 + (store.bodies.moment,), 0.0).T
         self._inertia = self._everyone
         if self._drives is not None:  # the motion of driven bodies is booked separately
             self._inertia = self._everyone.copy()
-            self._inertia[list(roster.held)] = 0.0
-        self._weight: FloatArray = self._inertia[:, :1] * roster.scene.world.gravity
-        self._lifted: FloatArray = self._inertia[:, :1] * (roster.gravity - np.asarray(roster.scene.world.gravity))
-        breaks = np.full(len(roster.setup.links), np.inf)
-        breaks[list(roster.broken)] = -np.inf
-        self._potential = Potential(roster.setup, roster.bodies, breaks=breaks)
+            self._inertia[list(store.held)] = 0.0
+        self._weight: FloatArray = self._inertia[:, :1] * store.scene.world.gravity
+        self._lifted: FloatArray = self._inertia[:, :1] * (store.gravity - np.asarray(store.scene.world.gravity))
+        breaks = np.full(len(store.setup.links), np.inf)
+        breaks[list(store.broken)] = -np.inf
+        self._potential = Potential(store.setup, store.bodies, breaks=breaks)
         self._no_spin: FloatArray = np.zeros(len(moving))
-        steady = bool(roster.force.any() or roster.torque.any() or self._lifted.any())
+        steady = bool(store.force.any() or store.torque.any() or self._lifted.any())
         u = self._u
         self._worked = u.dragged or u.rubbing or steady or self._field.thrusting or self._penalty is not None
         self._compliant = self._joints is not None and self._joints.method == "xpbd"
@@ -123,19 +123,19 @@ class StepEnergyLedger:
             self.account.enter(cause, work[cause])
         forces = work[Cause.DRAG] + work[Cause.DRIVES] + self._spring_contacts(work, start[0], after[0])
 
-        put = placed[1] - free[1]  # by joints that are solved by positions
-        displaced = bool(put.any())
-        pushed = free[0] if motion.shift is None else free[0] + shift
-        followed = pushed + (self._fraction * h) * (end - free[1]) if displaced else after[0]
-        drift = self._kinetic(start[1], free[1]) + self._lift(start[0], free[0]) + self._lift(pushed, followed)
+        joint_change = placed[1] - free[1]  # by joints that are solved by positions
+        displaced = bool(joint_change.any())
+        corrected = free[0] if motion.shift is None else free[0] + shift
+        followed = corrected + (self._fraction * h) * (end - free[1]) if displaced else after[0]
+        drift = self._kinetic(start[1], free[1]) + self._lift(start[0], free[0]) + self._lift(corrected, followed)
         # What contacts and joints took back of the kick that they were not given time to withstand.
-        drift += 0.5 * self._product(put, free[1] - start[1] + placed[1] - end)
+        drift += 0.5 * self._product(joint_change, free[1] - start[1] + placed[1] - end)
         drift += 0.5 * self._product(end - placed[1], placed[1] - start[1])
-        correction = self._lift(free[0], pushed) + self._strain(free[0], pushed) + self._lift(followed, after[0])
-        strain, strain_after = self._strain(start[0], free[0]) + self._strain(pushed, followed), 0.0
+        correction = self._lift(free[0], corrected) + self._strain(free[0], corrected) + self._lift(followed, after[0])
+        strain, strain_after = self._strain(start[0], free[0]) + self._strain(corrected, followed), 0.0
         if displaced:
             strain_after = self._strain(followed, after[0])
-        joints = 0.5 * self._product(put, start[1] + end)
+        joints = 0.5 * self._product(joint_change, start[1] + end)
         if self._compliant:  # springs are held as joints are: what they store is theirs, but for what dampers take
             joints += strain + strain_after - work[Cause.DAMPING]
         else:
@@ -168,16 +168,16 @@ class StepEnergyLedger:
 
     def _powers(self, time: float, x: State) -> Iterator[tuple[Cause, float]]:
         """Yield the power, W, of each cause in a state."""
-        u, roster, rate = self._u, self._roster, x[1]
+        u, store, rate = self._u, self._store, x[1]
         if u.dragged:
             wind = rate[:, :2] - u.wind
             fraction = u.linear_drag + u.quadratic_drag * np.hypot(wind[:, :1], wind[:, 1:])
             yield Cause.DRAG, -float((self._inertia[:, :1] * fraction * wind * rate[:, :2]).sum())
         if u.rubbing and self._joints is not None:
             yield Cause.DAMPING, self._joints.damper_power(x)
-        if roster.force.any() or roster.torque.any():
-            yield Cause.DRIVES, float((roster.force * rate[:, :2]).sum())
-            yield Cause.DRIVES, float(roster.torque @ rate[:, 2]) if rate.shape[1] == 3 else 0.0
+        if store.force.any() or store.torque.any():
+            yield Cause.DRIVES, float((store.force * rate[:, :2]).sum())
+            yield Cause.DRIVES, float(store.torque @ rate[:, 2]) if rate.shape[1] == 3 else 0.0
         if self._lifted.any():  # what zones give beyond the world's gravity
             yield Cause.DRIVES, float((self._lifted * rate[:, :2]).sum())
         if self._field.thrusting:
@@ -211,20 +211,20 @@ class StepEnergyLedger:
         return self._strained(after) - self._strained(before)
 
     def _attracted(self, pose: FloatArray) -> float:
-        return float(self._potential.of_attraction(pose[None, :, :2], self._roster.present[None])[0])
+        return float(self._potential.of_attraction(pose[None, :, :2], self._store.present[None])[0])
 
     def _strained(self, pose: FloatArray) -> float:
-        angle = pose[:, 2] if pose.shape[1] == 3 else self._roster.angle
-        here = pose[None, :, :2], angle[None], self._roster.present[None]
+        angle = pose[:, 2] if pose.shape[1] == 3 else self._store.angle
+        here = pose[None, :, :2], angle[None], self._store.present[None]
         return float(self._potential.of_springs(np.zeros(1), *here)[0])
 
     def _total(self) -> float:
-        """Return the energy of the roster, J."""
-        roster = self._roster
-        pose = np.column_stack((roster.position, roster.angle))
-        rate = np.column_stack((roster.velocity, roster.angular_velocity))
-        weight = self._everyone[:, :1] * roster.scene.world.gravity
-        total = 0.5 * float((self._everyone * rate * rate).sum()) - float((weight * roster.position).sum())
+        """Return the energy of all bodies, J."""
+        store = self._store
+        pose = np.column_stack((store.position, store.angle))
+        rate = np.column_stack((store.velocity, store.angular_velocity))
+        weight = self._everyone[:, :1] * store.scene.world.gravity
+        total = 0.5 * float((self._everyone * rate * rate).sum()) - float((weight * store.position).sum())
         if self._potential.attracts:
             total += self._attracted(pose)
         return total + self._strained(pose) if self._potential.springs else total

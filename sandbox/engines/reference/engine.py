@@ -44,7 +44,7 @@ WORDS = {"integrator": "explicit_euler", "detection": "discrete", "response": "i
 """What is chosen where nothing is stated: what pymunk does, and the tutorial."""
 
 SUITED = {"relaxation": "semi_implicit_euler", "xpbd": "semi_implicit_euler", "rattle": "velocity_verlet"}
-"""What goes with ways to hold joints by their positions: kicks come before positions are put right."""
+"""Integrators that suit position-based joint methods: kicks come before position correction."""
 
 HELD = {Demand.RODS, Demand.PIVOTS, Demand.SLIDES, Demand.ROTARY_LIMITS}
 """Joints that hold, other than springs, which are forces."""

@@ -31,30 +31,32 @@ Pair = tuple[int, int]
 class OneWayWalls:
     """The one-way walls of a run, and the bodies that touch them."""
 
-    def __init__(self, roster: BodyStore) -> None:
-        self._roster = roster
-        self.of_thing: BoolArray = np.asarray([isinstance(t, Wall) and t.one_way for t in roster.scene.fixed], np.bool_)
+    def __init__(self, store: BodyStore) -> None:
+        self._store = store
+        self.is_one_way: BoolArray = np.asarray(
+            [isinstance(t, Wall) and t.one_way for t in store.scene.fixed], np.bool_
+        )
         """(F,) which static colliders are one-way walls"""
-        self._passing: set[Pair] = {(body, -1 - wall) for body, wall in roster.setup.passing}
+        self._passing: set[Pair] = {(body, -1 - wall) for body, wall in store.setup.passing}
         self._stopped: set[Pair] = set()
-        self._goes_on = roster.setup.time > 0.0  # the state says which bodies pass: others on the left are stopped
+        self._goes_on = store.setup.time > 0.0  # the state says which bodies pass: others on the left are stopped
 
     def rebuild(self, start: FloatArray) -> None:
         """Take centres (N, ≥ 2), m, and walls that may have another course, or have become solid."""
-        fixtures, self._start = self._roster.fixtures, start
-        order = np.argsort(fixtures.segment_thing, kind="stable")
-        things = np.flatnonzero(self.of_thing)
-        begin, end = (np.searchsorted(fixtures.segment_thing[order], things, side) for side in ("left", "right"))
+        fixtures, self._start = self._store.fixtures, start
+        order = np.argsort(fixtures.segment_collider, kind="stable")
+        colliders = np.flatnonzero(self.is_one_way)
+        begin, end = (np.searchsorted(fixtures.segment_collider[order], colliders, side) for side in ("left", "right"))
         self._segments = {
-            thing: fixtures.segments[order[first:last], :4]
-            for thing, first, last in zip(things.tolist(), begin.tolist(), end.tolist(), strict=True)
+            collider: fixtures.segments[order[first:last], :4]
+            for collider, first, last in zip(colliders.tolist(), begin.tolist(), end.tolist(), strict=True)
         }
 
-    def stop(self, bodies: IntArray, things: IntArray) -> BoolArray:
-        """Return which pairs (K,) of a body and a fixed thing collide: all but bodies that pass a one-way wall."""
+    def stop(self, bodies: IntArray, colliders: IntArray) -> BoolArray:
+        """Return which pairs (K,) of a body and a static collider collide: all but bodies that pass a one-way wall."""
         found = np.ones(len(bodies), np.bool_)
-        for k in np.flatnonzero(self.of_thing[things]).tolist():
-            found[k] = self._stops((int(bodies[k]), int(things[k])))
+        for k in np.flatnonzero(self.is_one_way[colliders]).tolist():
+            found[k] = self._stops((int(bodies[k]), int(colliders[k])))
         return found
 
     def settle(self, overlaps: Manifolds, end: FloatArray) -> None:
@@ -78,7 +80,7 @@ class OneWayWalls:
     @property
     def passing(self) -> IntArray | None:
         """Bodies that pass a wall, and the wall, −1 − k, (P, 2); None if no body does."""
-        pairs = sorted((body, -1 - thing) for body, thing in self._passing)
+        pairs = sorted((body, -1 - collider) for body, collider in self._passing)
         return np.asarray(pairs, np.int64) if pairs else None
 
     def _stops(self, pair: Pair) -> bool:
@@ -88,8 +90,8 @@ class OneWayWalls:
 
     def _on_left(self, pair: Pair) -> bool:
         """Return whether a body is on the left of a wall, or on its line."""
-        body, thing = pair
-        segments = self._segments[thing]
+        body, collider = pair
+        segments = self._segments[collider]
         a, b, place = segments[:, :2], segments[:, 2:], self._start[body, :2]
         along = b - a
         length = np.sqrt((along * along).sum(axis=1))
@@ -107,16 +109,16 @@ def _pairs(contacts: Manifolds) -> set[Pair]:
 
 
 class CollisionFilter:
-    """Removes candidate pairs of a roster that do not collide."""
+    """Removes candidate pairs of a body store that do not collide."""
 
-    def __init__(self, roster: BodyStore) -> None:
-        self._roster, scene = roster, roster.scene
+    def __init__(self, store: BodyStore) -> None:
+        self._store, scene = store, store.scene
         self._of_fixed: IntArray = np.asarray([mask_of(t.layers, scene.layers) for t in scene.fixed], np.int64)
         every = (1 << len(scene.layers)) - 1
         self._planes_apart = bool((self._of_fixed[: len(scene.planes)] != every).any())
-        self.walls = OneWayWalls(roster) if any(wall.one_way for wall in scene.walls) else None
+        self.walls = OneWayWalls(store) if any(wall.one_way for wall in scene.walls) else None
         """the one-way walls, if there are any"""
-        self.rebuild(roster.position)
+        self.rebuild(store.position)
 
     @staticmethod
     def is_needed(scene: Scene) -> bool:
@@ -124,50 +126,50 @@ class CollisionFilter:
         return len(scene.layers) > 1 or any(wall.one_way for wall in scene.walls) or any(z.holds for z in scene.zones)
 
     def rebuild(self, position: FloatArray) -> None:
-        """Derive layers, movable bodies and walls anew from the roster; positions are (N, ≥ 2) m."""
-        self._bits: IntArray = 1 << self._roster.layer
-        self._yields: BoolArray = (self._roster.inverse_mass > 0.0) | (self._roster.inverse_moment > 0.0)
-        self._thing = self._roster.fixtures.segment_thing
+        """Derive layers, movable bodies and walls anew from the body store; positions are (N, ≥ 2) m."""
+        self._bits: IntArray = 1 << self._store.layer
+        self._yields: BoolArray = (self._store.inverse_mass > 0.0) | (self._store.inverse_moment > 0.0)
+        self._segment_collider = self._store.fixtures.segment_collider
         if self.walls is not None:
             self.walls.rebuild(position)
 
     def apply(self, near: CandidatePairs, owner: IntArray) -> CandidatePairs:
-        """Return the candidates that meet; `owner` is the body of each ball, or piece."""
+        """Return the candidate pairs that collide; `owner` is the body of each ball, or piece."""
         balls, segments = near
         if len(balls):
             a, b = owner[balls >> FIRST], owner[balls & SECOND]
             balls = balls[(self._yields[a] | self._yields[b]) & (self._bits[a] & self._bits[b] != 0)]
         if len(segments):
-            body, thing = owner[segments >> FIRST], self._thing[segments & SECOND]
-            meets = self._bits[body] & self._of_fixed[thing] != 0
+            body, collider = owner[segments >> FIRST], self._segment_collider[segments & SECOND]
+            collides = self._bits[body] & self._of_fixed[collider] != 0
             if self.walls is not None:
-                meets[meets] = self.walls.stop(body[meets], thing[meets])
-            segments = segments[meets]
+                collides[collides] = self.walls.stop(body[collides], collider[collides])
+            segments = segments[collides]
         return CandidatePairs(balls, segments)
 
     def at_one_way_walls(self, near: CandidatePairs, owner: IntArray) -> CandidatePairs:
         """Return the candidates of one-way walls that share a layer with them, and no others."""
         assert self.walls is not None
-        body, thing = owner[near.segments >> FIRST], self._thing[near.segments & SECOND]
-        meets = self.walls.of_thing[thing] & (self._bits[body] & self._of_fixed[thing] != 0)
-        return CandidatePairs(near.balls[:0], near.segments[meets])
+        body, collider = owner[near.segments >> FIRST], self._segment_collider[near.segments & SECOND]
+        collides = self.walls.is_one_way[collider] & (self._bits[body] & self._of_fixed[collider] != 0)
+        return CandidatePairs(near.balls[:0], near.segments[collides])
 
     def is_one_way(self, second: IntArray) -> BoolArray:
         """Return which second partners of contacts (K,) are one-way walls."""
         assert self.walls is not None
-        return np.asarray(self.walls.of_thing[np.maximum(-1 - second, 0)] & (second < 0))
+        return np.asarray(self.walls.is_one_way[np.maximum(-1 - second, 0)] & (second < 0))
 
     def on_planes(self, contacts: Manifolds) -> Manifolds:
         """Return contacts without those of planes on other layers, of which every body is a candidate."""
         if not self._planes_apart:
             return contacts
-        thing = np.maximum(-1 - contacts.second, 0)
-        return contacts.of((contacts.second >= 0) | (self._bits[contacts.first] & self._of_fixed[thing] != 0))
+        collider = np.maximum(-1 - contacts.second, 0)
+        return contacts.of((contacts.second >= 0) | (self._bits[contacts.first] & self._of_fixed[collider] != 0))
 
     def with_planes_apart(self, keys: IntArray, can_touch: BoolArray) -> IntArray:
         """Return keys, ascending, with those of all can_touch balls and planes on other layers."""
         if not self._planes_apart:
             return keys
-        apart = can_touch[:, None] & (self._bits[:, None] & self._of_fixed[self._roster.fixtures.plane_thing] == 0)
+        apart = can_touch[:, None] & (self._bits[:, None] & self._of_fixed[self._store.fixtures.plane_collider] == 0)
         ball, plane = np.nonzero(apart)
         return np.union1d(keys, (1 << KIND) + (ball << FIRST) + plane)

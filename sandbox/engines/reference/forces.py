@@ -92,9 +92,9 @@ def thrust(
 class ForceField:
     """What acts on the bodies of a running scene from afar and from within."""
 
-    def __init__(self, roster: BodyStore) -> None:
-        self._roster, self._began = roster, roster.setup.time
-        scene, bodies = roster.scene, roster.bodies
+    def __init__(self, store: BodyStore) -> None:
+        self._store, self._began = store, store.setup.time
+        scene, bodies = store.scene, store.bodies
         number = {name: k for k, name in enumerate(bodies.names)}
         # Bodies that left before an earlier engine handed over attract no more, and carry nothing.
         attractions = [a for a in scene.attractions if not isinstance(a.toward, str) or a.toward in number]
@@ -122,12 +122,12 @@ class ForceField:
 
     def __call__(self, time: float, x: State) -> FloatArray:
         """Return the accelerations (N, D) at a time, s, in a state (2, N, D), m/s² and rad/s²."""
-        roster = self._roster
+        store = self._store
         out: FloatArray = np.zeros_like(x[1])
         if len(self._target):
-            there = np.append(roster.present, True)[self._target]  # the world, −1, finds the last
+            there = np.append(store.present, True)[self._target]  # the world, −1, finds the last
             some = self._target[there], self._place[there], self._strength[there], self._softening[there]
-            attract(x[0], *some, roster.inverse_mass, out[: len(roster.inverse_mass)])
+            attract(x[0], *some, store.inverse_mass, out[: len(store.inverse_mass)])
         self._drive(time, x, out)
         return out
 
@@ -145,32 +145,32 @@ class ForceField:
     def _drive(self, time: float, x: State, out: FloatArray) -> None:
         """Add the accelerations by thrusts."""
         if self.thrusting:
-            roster, now = self._roster, self._began + time
-            level = roster.throttles[self._thrust] * ((self._begin <= now) & (now < self._end))
-            inverse = roster.inverse_mass, roster.inverse_moment
+            store, now = self._store, self._began + time
+            level = store.throttles[self._thrust] * ((self._begin <= now) & (now < self._end))
+            inverse = store.inverse_mass, store.inverse_moment
             thrust(x[0], self._body, self._point, self._force, level, *inverse, out)
 
 
-def forces_on(roster: BodyStore, field: ForceField, joints: JointSolver | None, coordinates: int) -> Inputs:
-    """Return what acts on the bodies of a roster.
+def forces_on(store: BodyStore, field: ForceField, joints: JointSolver | None, coordinates: int) -> Inputs:
+    """Return the forces on the bodies of a body store.
 
     Args:
-        roster: the bodies, and the steady forces on them.
+        store: the bodies, and the steady forces on them.
         field: what acts from afar and from within.
         joints: what holds the scene's links, if it has any.
         coordinates: of a state: 2, or 3 where something turns.
     """
-    world = roster.scene.world
-    moving = roster.moving[:, None]
-    if roster.held:  # what acts on them is their drives' concern
+    world = store.scene.world
+    moving = store.moving[:, None]
+    if store.held:  # what acts on them is their drives' concern
         moving = moving.copy()
-        moving[list(roster.held)] = False
+        moving[list(store.held)] = False
     steady: FloatArray = np.zeros((len(moving), coordinates))
-    steady[:, :2] = np.where(moving, roster.gravity, 0.0) + roster.force * roster.inverse_mass[:, None]
+    steady[:, :2] = np.where(moving, store.gravity, 0.0) + store.force * store.inverse_mass[:, None]
     if coordinates == 3:
-        steady[:, 2] = roster.torque * roster.inverse_moment
+        steady[:, 2] = store.torque * store.inverse_moment
     forces: list[Callable[[float, State], FloatArray]] = [] if field.empty else [field]
-    springs = roster.setup.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)
+    springs = store.setup.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)
     if joints is not None and joints.method != "xpbd" and len(springs):
         forces.append(lambda _, x: joints.forces(x))
     return Inputs(

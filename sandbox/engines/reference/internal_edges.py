@@ -73,7 +73,7 @@ def smooth(
     its = side * sign * (uy * jx - ux * jy) / beyond
     deepest = out[0, 2] if count == 1 else min(out[0, 2], out[1, 2])
     one, two = (a + 1, a) if side > 0.0 else (a, a + 1)
-    count = _meet_face(corner, start, end, radius, one, two, wall_radius, reach, out)
+    count = _collide_face(corner, start, end, radius, one, two, wall_radius, reach, out)
     if its > own + LEAN:
         for row in range(count):
             if out[row, 2] < deepest - FAVOUR * length:
@@ -82,7 +82,7 @@ def smooth(
 
 
 @kernel
-def _meet_face(
+def _collide_face(
     corner: FloatArray,
     start: int,
     end: int,

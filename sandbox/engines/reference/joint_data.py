@@ -1,8 +1,8 @@
 """Joints as arrays: geometry, lengths, spring laws and the limit of stretch.
 
-JointData: links as kernels take them, and what all of them need: where they hold, and how a push at one acts.
+JointData: joints in the form of kernel arguments, their anchors, and the effect of an impulse at an anchor.
 
-A tie's line goes from its end on the first body to its end on the second. A push is on the second body, and its
+A tie's line goes from its end on the first body to its end on the second. An impulse acts on the second body, and its
 opposite on the first.
 
 Springs as forces: F = −k (l − l₀) − c l̇ along the line of a spring, τ = −k (φ − φ₀) − c φ̇ of a rotary one.
@@ -115,7 +115,7 @@ def turning(i: int, j: int, rate: FloatArray) -> float:
 
 
 @bare_kernel
-def push(
+def apply_impulse(
     i: int,
     j: int,
     arms: Arms,
@@ -137,8 +137,8 @@ def push(
 
 
 @bare_kernel
-def twist(i: int, j: int, torque: float, inverse_moment: FloatArray, out: FloatArray) -> None:
-    """Apply a torque, as `push` applies a force."""
+def apply_angular_impulse(i: int, j: int, torque: float, inverse_moment: FloatArray, out: FloatArray) -> None:
+    """Apply a torque, as `apply_impulse` applies a force."""
     out[j, 2] += inverse_moment[j] * torque
     if i >= 0:
         out[i, 2] -= inverse_moment[i] * torque
@@ -215,9 +215,9 @@ def spring_forces(
         if ties.kind[k] == SPRING:
             arms, dx, dy = reach(ties, k, pose)
             x, y = tension(ties, k, arms, dx, dy, rates)
-            push(i, j, arms, x, y, inverse_mass, inverse_moment, out)
+            apply_impulse(i, j, arms, x, y, inverse_mass, inverse_moment, out)
         elif ties.kind[k] == ROTARY_SPRING:
-            twist(i, j, torsion(ties, k, pose, rates), inverse_moment, out)
+            apply_angular_impulse(i, j, torsion(ties, k, pose, rates), inverse_moment, out)
 
 
 @bare_kernel

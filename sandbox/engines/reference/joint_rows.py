@@ -19,14 +19,14 @@ from sandbox.engines.reference.joint_data import (
     ROTARY_LIMIT,
     ROTARY_SPRING,
     JointData,
+    apply_angular_impulse,
+    apply_impulse,
     block,
     line,
     parting,
-    push,
     reach,
     slackness,
     turning,
-    twist,
     yielding,
 )
 
@@ -138,7 +138,7 @@ def prepare(
 
 @bare_kernel
 def _beyond(rows: VelocityConstraints, k: int, value: float, least: float, most: float) -> float:
-    """Return how far a value is out of its bounds, and let row k push back only; within, it forgets its impulse."""
+    """Return how far a value is out of its bounds; bound row k to one sign, or clear its impulse within bounds."""
     if value > most:
         rows.bound[k, 1] = 0.0
         rows.impulse[k, 0] = min(rows.impulse[k, 0], 0.0)
@@ -243,9 +243,9 @@ def _give(
     """Apply an impulse of row k, in the row's own terms."""
     i, j = rows.first[k], rows.second[k]
     if rows.holds[k] == TURN:
-        twist(i, j, x, inverse_moment, velocity)
+        apply_angular_impulse(i, j, x, inverse_moment, velocity)
         return
     if rows.holds[k] != BOTH:
         x, y = x * rows.normal[k, 0], x * rows.normal[k, 1]
     arms = rows.arm[k, 0], rows.arm[k, 1], rows.arm[k, 2], rows.arm[k, 3]
-    push(i, j, arms, x, y, inverse_mass, inverse_moment, velocity)
+    apply_impulse(i, j, arms, x, y, inverse_mass, inverse_moment, velocity)

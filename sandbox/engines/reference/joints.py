@@ -15,8 +15,8 @@ JointSolver: the links of a running scene, held in one of four ways.
 | xpbd | 1 | lost | compliant links: stable at any stiffness |
 | rattle | 2, with an integrator of 2 or more | in a band | forces |
 
-RATTLE (Andersen 1983) is velocity Verlet with constraints: positions are put right along the lines of the step's start,
-and then velocities along those of its end. It asks for convergence: where a step turns lines by a right angle it fails.
+RATTLE (Andersen 1983) is velocity Verlet with constraints: positions are corrected along the lines of the step's start,
+and then velocities along those of its end. It must converge, and fails if a step turns lines by a right angle.
 """
 
 import math
@@ -176,9 +176,9 @@ class JointSolver:
             self._align(moved)
 
     def _align(self, moved: State) -> None:
-        """Take from velocities what would part the ends of what was put in place: the second stage of RATTLE."""
+        """Remove the velocity components that would separate the corrected joint ends: the second stage of RATTLE."""
         given, bound, h = self.rows.impulse.copy(), self.rows.bound, self._h
-        # No bias, for positions are right; a row that pushed holds, on whichever side of its bound rounding left it.
+        # No bias: positions are corrected already. A row with an impulse is active, whichever side of its bound it is on.
         prepare(self.rows, self._held, moved[0], h, h, 1.0, self.inverse_mass, self.inverse_moment)
         either = np.isin(self._held.kind, (LinkKind.ROD, LinkKind.PIVOT))
         bound[:, 0] = np.where(either | (given[:, 0] < 0.0), -h * self._held.most_force, 0.0)

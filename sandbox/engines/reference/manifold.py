@@ -120,7 +120,7 @@ def is_covered(
 
 
 class Manifolds(NamedTuple):
-    """K contacts, by ascending key. The second of a pair may be a fixed thing."""
+    """K contacts, by ascending key. The second of a pair may be a static collider."""
 
     key: IntArray
     """(K,) says which pair of shapes, from step to step"""
@@ -160,7 +160,7 @@ class Manifolds(NamedTuple):
 
 
 @bare_kernel
-def meet_balls(
+def find_ball_contacts(
     keys: IntArray,
     position: FloatArray,
     radius: FloatArray,
@@ -188,14 +188,14 @@ def meet_balls(
 
 
 @bare_kernel
-def meet_planes(
+def find_plane_contacts(
     position: FloatArray,
     radius: FloatArray,
     can_touch: BoolArray,
     surface: IntArray,
     planes: FloatArray,
-    thing: IntArray,
-    thing_surface: IntArray,
+    collider: IntArray,
+    collider_surface: IntArray,
     friction: FloatArray,
     reach: float,
     out: Manifolds,
@@ -211,9 +211,9 @@ def meet_planes(
             )
             if separation < reach:
                 if at < len(out.key):
-                    other = thing_surface[thing[p]]
+                    other = collider_surface[collider[p]]
                     out.key[at] = (1 << KIND) + pair_key(i, p)
-                    out.first[at], out.second[at] = i, -1 - thing[p]
+                    out.first[at], out.second[at] = i, -1 - collider[p]
                     _place(out, at, position[i, 0], position[i, 1], radius[i], 0.0, separation, nx, ny)
                     out.friction[at] = friction[surface[i], other]
                     out.surface_pair[at] = surface[i] * len(friction) + other
@@ -222,15 +222,15 @@ def meet_planes(
 
 
 @bare_kernel
-def meet_segments(
+def find_segment_contacts(
     keys: IntArray,
     position: FloatArray,
     radius: FloatArray,
     surface: IntArray,
     segments: FloatArray,
     joints: FloatArray,
-    thing: IntArray,
-    thing_surface: IntArray,
+    collider: IntArray,
+    collider_surface: IntArray,
     friction: FloatArray,
     reach: float,
     out: Manifolds,
@@ -264,9 +264,9 @@ def meet_segments(
             joints[s, 3],
         ):
             if at < len(out.key):
-                other = thing_surface[thing[s]]
+                other = collider_surface[collider[s]]
                 out.key[at] = (2 << KIND) + keys[k]
-                out.first[at], out.second[at] = i, -1 - thing[s]
+                out.first[at], out.second[at] = i, -1 - collider[s]
                 _place(out, at, position[i, 0], position[i, 1], radius[i], segments[s, 4], separation, nx, ny)
                 out.friction[at] = friction[surface[i], other]
                 out.surface_pair[at] = surface[i] * len(friction) + other

@@ -74,19 +74,19 @@ def _forces(
     a_off, b_off = now.offset[k, 0], now.offset[k, 1]
     mass = inverse_mass[i] + inverse_moment[i] * a_off * a_off
     turning = inverse_moment[i] * (a * a - a_off * a_off)
-    vx, vy, rub = -rates[i, 0], -rates[i, 1], -spin[i] * a
+    vx, vy, slip_of_spin = -rates[i, 0], -rates[i, 1], -spin[i] * a
     roll = spin[i] * a_off
     if j >= 0:
         mass += inverse_mass[j] + inverse_moment[j] * b_off * b_off
         turning += inverse_moment[j] * (b * b - b_off * b_off)
         vx += rates[j, 0]
         vy += rates[j, 1]
-        rub -= spin[j] * b
+        slip_of_spin -= spin[j] * b
         roll -= spin[j] * b_off
     if mass == 0.0:
         return 0.0, 0.0, 0.0, 0.0
     damper = 2.0 * damping[now.surface_pair[k]] * math.sqrt(stiffness / mass)
-    parting, slip = vx * nx + vy * ny + roll, vy * nx - vx * ny + rub
+    parting, slip = vx * nx + vy * ny + roll, vy * nx - vx * ny + slip_of_spin
     normal = max(-stiffness * now.separation[k] - damper * parting, 0.0)
     most = now.friction[k] * normal
     # A viscous slope that damps slip as fast as the spring swings, so that it asks for no smaller step.
@@ -168,18 +168,18 @@ class PenaltyContacts:
     forces, it gives to them.
     """
 
-    def __init__(self, roster: BodyStore, settings: Settings, finder: CollisionPipeline) -> None:
+    def __init__(self, store: BodyStore, settings: Settings, finder: CollisionPipeline) -> None:
         assert settings.stiffness is not None
-        self._roster, self._finder, self._settings = roster, finder, settings
+        self._store, self._finder, self._settings = store, finder, settings
         self._stiffness = settings.stiffness
         self.rebuild(None)
         self._keys: IntArray = np.empty(0, np.int64)
-        self._given: tuple[Manifolds, FloatArray] = finder.overlaps(roster.position).of(slice(0)), np.zeros((0, 2))
+        self._given: tuple[Manifolds, FloatArray] = finder.overlaps(store.position).of(slice(0)), np.zeros((0, 2))
 
     def rebuild(self, drives: Drives | None) -> None:
         """Derive the damping ratio of every pair of surfaces anew; take the drives of the driven bodies, if any."""
         self._drives = drives
-        table = self._roster.restitution
+        table = self._store.restitution
         if self._settings.damping is not None:
             damping = np.full(table.shape, self._settings.damping)
         else:
@@ -205,7 +205,7 @@ class PenaltyContacts:
             acceleration = np.zeros((count + rows, x.shape[2]))
             if contacts.size:
                 row, known = self._rows(contacts)
-                self._push(contacts.of(known), count + row[known], state[1], acceleration)
+                self._add_forces(contacts.of(known), count + row[known], state[1], acceleration)
             return acceleration
 
         wide = np.concatenate((x, np.zeros((2, rows, x.shape[2]))), axis=1)
@@ -221,16 +221,16 @@ class PenaltyContacts:
         row = np.minimum(np.searchsorted(self._keys, contacts.key), len(self._keys) - 1)
         return row, np.asarray(self._keys[row] == contacts.key)
 
-    def _push(self, contacts: Manifolds, row: IntArray, rates: FloatArray, acceleration: FloatArray) -> None:
-        roster = self._roster
+    def _add_forces(self, contacts: Manifolds, row: IntArray, rates: FloatArray, acceleration: FloatArray) -> None:
+        store = self._store
         spin = rates[:, 2] if rates.shape[1] == 3 else np.zeros((len(rates), 3))[:, 2]
         turn = acceleration[:, 2] if rates.shape[1] == 3 else np.zeros((len(rates), 3))[:, 2]
-        inverse = roster.inverse_mass, self._inverse_moment
+        inverse = store.inverse_mass, self._inverse_moment
         penalty_forces(contacts, row, rates, spin, *inverse, self._stiffness, self._damping, acceleration, turn)
 
     @property
     def _inverse_moment(self) -> FloatArray:
-        return self._roster.inverse_moment if self._drives is None else self._drives.yielding
+        return self._store.inverse_moment if self._drives is None else self._drives.yielding
 
     def stored(self, pose: FloatArray) -> float:
         """Return what the springs of all contacts at (N, ≥ 2) poses store, ½ k overlap² each, J."""
@@ -238,9 +238,9 @@ class PenaltyContacts:
 
     def losses(self, x: State) -> tuple[float, float]:
         """Return the power, W, of all contacts in a state, along normals and across, less that of their springs."""
-        contacts, roster = self._finder.overlaps(x[0]), self._roster
+        contacts, store = self._finder.overlaps(x[0]), self._store
         spin = x[1, :, 2] if x.shape[2] == 3 else np.zeros((x.shape[1], 3))[:, 2]
-        inverse = roster.inverse_mass, self._inverse_moment
+        inverse = store.inverse_mass, self._inverse_moment
         return penalty_losses(contacts, x[1], spin, *inverse, self._stiffness, self._damping)
 
     def _note(self, position: FloatArray, impulse: FloatArray, near: CandidatePairs, reach: float) -> None:
@@ -324,9 +324,9 @@ DAMPER = 1.3
 
 
 def lightest(start: Scene | Setup) -> float:
-    """Return the smallest reduced mass, kg, of a pair that can meet: two equal balls have half the mass of one."""
+    """Return the smallest reduced mass, kg, of a pair that can collide: two equal balls have half the mass of one."""
     setup = Setup.of(start)
-    scene, meet, bodies = setup.scene, contact_matrix(setup), setup.bodies
+    scene, matrix, bodies = setup.scene, contact_matrix(setup), setup.bodies
     mass, moving, hinged = bodies.mass, ~bodies.fixed, False
     if scene.drives:
         mass, moving = mass.copy(), moving.copy()
@@ -337,10 +337,10 @@ def lightest(start: Scene | Setup) -> float:
                 hinged = hinged or bool(moving[n])
                 arm = math.hypot(*mount.hinge)  # at its far end it is lightest: I / r²
                 mass[n] = (bodies.moment[n] + bodies.mass[n] * arm * arm) / (bodies.radius[n] + arm) ** 2
-    masses = mass[~meet.free & moving]
+    masses = mass[~matrix.free & moving]
     if not len(masses):
         return 1.0
-    return float(masses.min()) * (0.5 if meet.ball_ball or hinged else 1.0)
+    return float(masses.min()) * (0.5 if matrix.ball_ball or hinged else 1.0)
 
 
 def suited(start: Scene | Setup, settings: Settings) -> float:
@@ -350,33 +350,33 @@ def suited(start: Scene | Setup, settings: Settings) -> float:
     return min(own, MAX_STIFFNESS)
 
 
-def _dampings(meet: ContactMatrix, settings: Settings) -> list[float]:
+def _dampings(matrix: ContactMatrix, settings: Settings) -> list[float]:
     """Return the damping ratios of all contacts that can come about."""
     if settings.damping is not None:
         return [settings.damping]
-    restitution = np.unique(meet.surfaces.restitution[meet.touching])
+    restitution = np.unique(matrix.surfaces.restitution[matrix.touching])
     return [damping_of(max(e, LEAST_RESTITUTION)) for e in restitution.tolist()]
 
 
 def unstable(start: Scene | Setup, settings: Settings, stiffness_stated: bool = True) -> str | None:
     """Return why penalty springs cannot work as set, or None where they can.
 
-    The stiffest that can come about is a ball held by several springs: against fixed things by two, in a close packing
-    by six, which swings √3 times as fast as a pair alone (its mode of shortest waves has ω² = 6 k/m; a pair, 2 k/m).
+    The stiffest case is a ball between several springs: two against static colliders, six in a close packing. There it
+    oscillates √3 times as fast as a pair alone (the mode of shortest waves has ω² = 6 k/m; a pair, 2 k/m).
     """
     assert settings.stiffness is not None and settings.integrator is not None
-    meet = contact_matrix(start)
-    if not meet.touching.any():
+    matrix = contact_matrix(start)
+    if not matrix.touching.any():
         return None
-    table = meet.surfaces.restitution[meet.touching]
+    table = matrix.surfaces.restitution[matrix.touching]
     if settings.damping is None and table.min() < LEAST_RESTITUTION:
         return (
             f"penalty contacts cannot model restitution {table.min():g}, the smallest is "
             f"{LEAST_RESTITUTION:g}; use that, or "
             "set solver.damping (1 = critical) instead"
         )
-    dampings = _dampings(meet, settings)
-    crowd = np.sqrt(3.0) if meet.ball_ball else np.sqrt(2.0)
+    dampings = _dampings(matrix, settings)
+    crowd = np.sqrt(3.0) if matrix.ball_ball else np.sqrt(2.0)
     frequency = crowd * np.sqrt(settings.stiffness / lightest(start))
     worst = max(dampings, key=lambda z: _growth(settings, frequency, crowd * z, settings.h))
     if _growth(settings, frequency, crowd * worst, settings.h) <= 1.0 + ROUNDING:

@@ -220,7 +220,7 @@ SLACK = 1e-9
 
 
 @kernel
-def meet_pieces(
+def collide_pieces(
     corner: FloatArray, first: IntArray, radius: FloatArray, p: int, q: int, reach: float, out: FloatArray
 ) -> int:
     """Write where pieces p and q are nearer than `reach`, m; return at how many points: 0, 1 or 2.
@@ -236,14 +236,14 @@ def meet_pieces(
     """
     a, a_end, b, b_end = first[p], first[p + 1], first[q], first[q + 1]
     if a_end - a == 1:
-        return meet_disc(corner, a, radius[p], b, b_end, radius[q], 1.0, reach, out)
+        return collide_disc(corner, a, radius[p], b, b_end, radius[q], 1.0, reach, out)
     if b_end - b == 1:
-        return meet_disc(corner, b, radius[q], a, a_end, radius[p], -1.0, reach, out)
-    return meet_faces(corner, a, a_end, radius[p], b, b_end, radius[q], reach, out)
+        return collide_disc(corner, b, radius[q], a, a_end, radius[p], -1.0, reach, out)
+    return collide_faces(corner, a, a_end, radius[p], b, b_end, radius[q], reach, out)
 
 
 @kernel
-def meet_disc(
+def collide_disc(
     corner: FloatArray,
     c: int,
     disc_radius: float,
@@ -300,7 +300,7 @@ def disc_polygon(
 
 
 @kernel
-def meet_faces(
+def collide_faces(
     corner: FloatArray,
     a: int,
     a_end: int,
@@ -321,7 +321,7 @@ def meet_faces(
         return 0
     gap = max(a_gap, b_gap)
     if gap == -math.inf:  # neither is larger than rounding: two discs
-        return meet_disc(corner, a, a_radius, b, b + 1, b_radius, 1.0, reach, out)
+        return collide_disc(corner, a, a_radius, b, b + 1, b_radius, 1.0, reach, out)
 
     # The reference face, whose normal counts, and the incident one across from it
     turned, one, two, incident, other = facing(
@@ -401,7 +401,7 @@ def facing(
 
 
 @kernel
-def meet_half_plane(
+def collide_half_plane(
     corner: FloatArray,
     first: IntArray,
     radius: FloatArray,

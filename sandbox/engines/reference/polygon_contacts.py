@@ -21,7 +21,7 @@ from sandbox.engines.contract import Exhaustion
 from sandbox.engines.reference.broad_phase import FIRST, ROUNDING, SECOND, listed, pair_key
 from sandbox.engines.reference.internal_edges import smooth
 from sandbox.engines.reference.manifold import KIND, Manifolds, is_covered
-from sandbox.engines.reference.polygon import following, meet_half_plane, meet_pieces
+from sandbox.engines.reference.polygon import collide_half_plane, collide_pieces, following
 from sandbox.resource_limits import MEMORY
 from sandbox.scene.compile.joint_arrays import Links
 
@@ -47,16 +47,16 @@ class ConvexHulls(NamedTuple):
 class WorldPieces:
     """S pieces of bodies and G segments, which a piece of two corners or one is just as well."""
 
-    def __init__(self, roster: BodyStore) -> None:
-        shapes, segments = roster.bodies.shapes, roster.fixtures.segments
+    def __init__(self, store: BodyStore) -> None:
+        shapes, segments = store.bodies.shapes, store.fixtures.segments
         self.count = len(shapes)
         self.body: IntArray = shapes.body
-        self.surface: IntArray = roster.meet.surfaces.of_shape
+        self.surface: IntArray = store.contact_matrix.surfaces.of_shape
         self.local: FloatArray = shapes.corner
         self.local_middle: FloatArray = shapes.middle
-        if roster.held:  # poses are those of hinges
-            self.local = shapes.corner - np.repeat(roster.hinge[shapes.body], np.diff(shapes.first), axis=0)
-            self.local_middle = shapes.middle - roster.hinge[shapes.body]
+        if store.held:  # poses are those of hinges
+            self.local = shapes.corner - np.repeat(store.hinge[shapes.body], np.diff(shapes.first), axis=0)
+            self.local_middle = shapes.middle - store.hinge[shapes.body]
         self.reach: FloatArray = shapes.reach
         self.radius: FloatArray = np.concatenate((shapes.radius, segments[:, 4]))
         ends = segments[:, :4].reshape(-1, 2)
@@ -65,14 +65,14 @@ class WorldPieces:
         """(V + 2G, 2) m, in the world as it was last laid out"""
         self.middle: FloatArray = np.empty((self.count, 2))
         """(S, 2) m, likewise"""
-        self.meets: IntArray = roster.meets[self.body]
-        self.moves: BoolArray = roster.mobile[self.body]
-        self.can_touch: BoolArray = roster.moving[self.body] & (self.meets > NOTHING)
-        self.apart: IntArray = apart_keys(roster.links)
-        if roster.held:
-            self.can_touch = self.can_touch & ~roster.led[self.body]
-            self.apart = np.union1d(self.apart, led_keys(roster))
-        self.group: IntArray = roster.bodies.group
+        self.collision_mask: IntArray = store.collision_mask[self.body]
+        self.moves: BoolArray = store.mobile[self.body]
+        self.can_touch: BoolArray = store.moving[self.body] & (self.collision_mask > NOTHING)
+        self.apart: IntArray = apart_keys(store.links)
+        if store.held:
+            self.can_touch = self.can_touch & ~store.led[self.body]
+            self.apart = np.union1d(self.apart, led_keys(store))
+        self.group: IntArray = store.bodies.group
         """(N,) of each body"""
 
     @property
@@ -86,18 +86,18 @@ class WorldPieces:
 
 
 def apart_keys(links: Links) -> IntArray:
-    """Return keys of the pairs of bodies that joints keep from meeting, (K,), ascending."""
+    """Return the keys of the pairs of bodies that joints exclude from collision, (K,), ascending."""
     return np.sort([pair_key(a, b) for a, b in links.apart().tolist()]).astype(np.int64)
 
 
-def led_keys(roster: BodyStore) -> IntArray:
+def led_keys(store: BodyStore) -> IntArray:
     """Return keys of the pairs of bodies of which nothing moves either, (K,), ascending: led ones, and fixed ones.
 
     Raises:
         Exhaustion: there are too many.
     """
-    firm = np.flatnonzero(roster.led | roster.bodies.fixed)
-    led = np.flatnonzero(roster.led)
+    firm = np.flatnonzero(store.led | store.bodies.fixed)
+    led = np.flatnonzero(store.led)
     refusal = MEMORY.refusal(
         "the table of pairs of driven and fixed bodies takes", len(firm) * len(led) * BYTES_PER_PAIR
     )
@@ -197,7 +197,7 @@ class NarrowPhaseInput(NamedTuple):
 
 @kernel
 def drop(keys: IntArray, body: IntArray, apart: IntArray, group: IntArray) -> int:
-    """Keep, at the front, the pairs of pieces that may meet, and return how many.
+    """Keep, at the front, the pairs of pieces that can collide, and return their number.
 
     They are of two bodies, which are neither joined nor of one group.
     """
@@ -232,26 +232,26 @@ def drop_apart(keys: IntArray, offset: int, box: FloatArray, margin: float) -> i
 
 
 @kernel
-def meet_bodies(
+def find_body_contacts(
     keys: IntArray, hulls: ConvexHulls, position: FloatArray, look: NarrowPhaseInput, out: Manifolds, at: int
 ) -> int:
     """Write the pairs of pieces that are near from row `at` on; return the next free row."""
     for k in range(len(keys)):
         p, q = keys[k] >> FIRST, keys[k] & SECOND
         j = hulls.body[q]
-        count = meet_pieces(hulls.corner, hulls.first, hulls.radius, p, q, look.reach, look.scratch)
+        count = collide_pieces(hulls.corner, hulls.first, hulls.radius, p, q, look.reach, look.scratch)
         at = _write(hulls, look, count, 2 * keys[k], p, j, hulls.surface[q], position, out, at)
     return at
 
 
 @kernel
-def meet_half_planes(
+def find_half_plane_contacts(
     hulls: ConvexHulls,
     can_touch: BoolArray,
     position: FloatArray,
     planes: FloatArray,
-    thing: IntArray,
-    thing_surface: IntArray,
+    collider: IntArray,
+    collider_surface: IntArray,
     look: NarrowPhaseInput,
     out: Manifolds,
     at: int,
@@ -262,22 +262,22 @@ def meet_half_planes(
             continue
         for s in range(len(planes)):
             px, py, nx, ny = planes[s, 0], planes[s, 1], planes[s, 2], planes[s, 3]
-            count = meet_half_plane(
+            count = collide_half_plane(
                 hulls.corner, hulls.first, hulls.radius, p, px, py, nx, ny, look.reach, look.scratch
             )
-            key, other = (1 << KIND) + 2 * pair_key(p, s), thing_surface[thing[s]]
-            at = _write(hulls, look, count, key, p, -1 - thing[s], other, position, out, at)
+            key, other = (1 << KIND) + 2 * pair_key(p, s), collider_surface[collider[s]]
+            at = _write(hulls, look, count, key, p, -1 - collider[s], other, position, out, at)
     return at
 
 
 @kernel
-def meet_fixed_segments(
+def find_fixed_segment_contacts(
     keys: IntArray,
     hulls: ConvexHulls,
     position: FloatArray,
     joints: FloatArray,
-    thing: IntArray,
-    thing_surface: IntArray,
+    collider: IntArray,
+    collider_surface: IntArray,
     look: NarrowPhaseInput,
     out: Manifolds,
     at: int,
@@ -286,11 +286,11 @@ def meet_fixed_segments(
     for k in range(len(keys)):
         p, s = keys[k] >> FIRST, keys[k] & SECOND
         q = len(hulls.body) + s
-        count = meet_pieces(hulls.corner, hulls.first, hulls.radius, p, q, look.reach, look.scratch)
+        count = collide_pieces(hulls.corner, hulls.first, hulls.radius, p, q, look.reach, look.scratch)
         if count > 0 and joints[s].any():
             count = _smoothed(hulls, p, q, joints[s], count, look)
-        key, other = (2 << KIND) + 2 * keys[k], thing_surface[thing[s]]
-        at = _write(hulls, look, count, key, p, -1 - thing[s], other, position, out, at)
+        key, other = (2 << KIND) + 2 * keys[k], collider_surface[collider[s]]
+        at = _write(hulls, look, count, key, p, -1 - collider[s], other, position, out, at)
     return at
 
 

@@ -22,13 +22,13 @@ from sandbox.engines.reference.joint_data import (
     SLIDE,
     SPRING,
     JointData,
+    apply_angular_impulse,
+    apply_impulse,
     block,
     line,
-    push,
     reach,
     slackness,
     turning,
-    twist,
     yielding,
 )
 
@@ -57,7 +57,7 @@ def project(
         start: (N, 3) where they were at the start of the step: dampers resist the way from there.
         h: step, s.
         iterations: passes over all ties.
-        lagged: push along the lines as they were at the start; else as they are.
+        lagged: apply impulses along the lines as they were at the start; else as they are.
         inverse_mass: (N,) 1/kg, 0 for what is fixed.
         inverse_moment: (N,) 1/(kg·m²).
         shift: (N, 3) how far each was moved and turned; written. Taken from poses, it would have their rounding: that
@@ -99,8 +99,8 @@ def project(
             new = min(max(new, -bound), bound)
             multiplier[k, 0], direction[k, 0], direction[k, 1] = new, nx, ny
             x, y = (new - old) * nx, (new - old) * ny
-            push(i, j, arms, x, y, inverse_mass, inverse_moment, pose)
-            push(i, j, arms, x, y, inverse_mass, inverse_moment, shift)
+            apply_impulse(i, j, arms, x, y, inverse_mass, inverse_moment, pose)
+            apply_impulse(i, j, arms, x, y, inverse_mass, inverse_moment, shift)
 
 
 @bare_kernel
@@ -127,8 +127,8 @@ def _angle(
         new = _bounded(turned - inverse * old, ties.figures[k, 0], ties.figures[k, 1], inverse)
     bound = ties.most_force[k] * h * h
     multiplier[k, 0] = min(max(new, -bound), bound)
-    twist(i, j, multiplier[k, 0] - old, inverse_moment, pose)
-    twist(i, j, multiplier[k, 0] - old, inverse_moment, shift)
+    apply_angular_impulse(i, j, multiplier[k, 0] - old, inverse_moment, pose)
+    apply_angular_impulse(i, j, multiplier[k, 0] - old, inverse_moment, shift)
 
 
 @bare_kernel
@@ -157,8 +157,8 @@ def _together(
         scale = bound / size if size > bound else 1.0
         x, y = scale * x, scale * y
     multiplier[k, 0], multiplier[k, 1] = x, y
-    push(i, j, arms, x - old_x, y - old_y, inverse_mass, inverse_moment, pose)
-    push(i, j, arms, x - old_x, y - old_y, inverse_mass, inverse_moment, shift)
+    apply_impulse(i, j, arms, x - old_x, y - old_y, inverse_mass, inverse_moment, pose)
+    apply_impulse(i, j, arms, x - old_x, y - old_y, inverse_mass, inverse_moment, shift)
 
 
 @bare_kernel

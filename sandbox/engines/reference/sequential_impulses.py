@@ -91,7 +91,7 @@ def start_with(
 ) -> None:
     """Apply the impulses (K, 2) that contacts start with; the arguments are those of `solve_velocities`."""
     for k in range(len(now.key)):
-        _push(now, k, impulse[k, 0], impulse[k, 1], velocity, spin, inverse_mass, inverse_moment)
+        _apply_impulse(now, k, impulse[k, 0], impulse[k, 1], velocity, spin, inverse_mass, inverse_moment)
 
 
 @kernel
@@ -113,7 +113,7 @@ def solve_once(
         along_mass = mass + inverse_moment[i] * a_off * a_off
         across_mass = mass + inverse_moment[i] * a * a
         vx, vy = -velocity[i, 0], -velocity[i, 1]
-        rub, turn = -spin[i] * a, spin[i] * a_off
+        slip_of_spin, turn = -spin[i] * a, spin[i] * a_off
         if j >= 0:
             b, b_off = now.arm[k, 1], now.offset[k, 1]
             mass += inverse_mass[j]
@@ -121,7 +121,7 @@ def solve_once(
             across_mass += inverse_mass[j] + inverse_moment[j] * b * b
             vx += velocity[j, 0]
             vy += velocity[j, 1]
-            rub -= spin[j] * b
+            slip_of_spin -= spin[j] * b
             turn -= spin[j] * b_off
         if mass == 0.0:
             continue
@@ -129,14 +129,14 @@ def solve_once(
         old_normal, old_tangent = impulse[k, 0], impulse[k, 1]
         impulse[k, 0] = max(old_normal + along, 0.0)
         most = now.friction[k] * impulse[k, 0]
-        across = -(vy * nx - vx * ny + rub) / across_mass
+        across = -(vy * nx - vx * ny + slip_of_spin) / across_mass
         impulse[k, 1] = min(max(old_tangent + across, -most), most)
         normal, tangent = impulse[k, 0] - old_normal, impulse[k, 1] - old_tangent
-        _push(now, k, normal, tangent, velocity, spin, inverse_mass, inverse_moment)
+        _apply_impulse(now, k, normal, tangent, velocity, spin, inverse_mass, inverse_moment)
 
 
 @kernel
-def _push(
+def _apply_impulse(
     now: Manifolds,
     k: int,
     normal: float,
@@ -166,14 +166,14 @@ def work_at(now: Manifolds, k: int, impulse: FloatArray, velocity: FloatArray, s
     i, j = now.first[k], now.second[k]
     nx, ny = now.normal[k, 0], now.normal[k, 1]
     vx, vy = -velocity[i, 0], -velocity[i, 1]
-    rub, turn = -spin[i] * now.arm[k, 0], spin[i] * now.offset[k, 0]
+    slip_of_spin, turn = -spin[i] * now.arm[k, 0], spin[i] * now.offset[k, 0]
     if j >= 0:
         vx += velocity[j, 0]
         vy += velocity[j, 1]
-        rub -= spin[j] * now.arm[k, 1]
+        slip_of_spin -= spin[j] * now.arm[k, 1]
         turn -= spin[j] * now.offset[k, 1]
     along = impulse[k, 0] * (vx * nx + vy * ny + turn)
-    across = impulse[k, 1] * (vy * nx - vx * ny + rub)
+    across = impulse[k, 1] * (vy * nx - vx * ny + slip_of_spin)
     return along, across
 
 
@@ -199,7 +199,7 @@ def contact_work(now: Manifolds, impulse: FloatArray, velocity: FloatArray, spin
 def solve_overlaps(
     now: Manifolds,
     target: FloatArray,
-    push: FloatArray,
+    pseudo_velocity: FloatArray,
     inverse_mass: FloatArray,
     inverse_moment: FloatArray,
     total: FloatArray,
@@ -210,7 +210,7 @@ def solve_overlaps(
     Args:
         now: K contacts.
         target: (K,) m/s, how fast each is to part.
-        push: (N, 3) m/s and rad/s, changed.
+        pseudo_velocity: (N, 3) m/s and rad/s, changed.
         inverse_mass: (N,) 1/kg.
         inverse_moment: (N,) 1/(kg·m²).
         total: (K,) what each has given so far, kg·m/s; 0 at first.
@@ -222,24 +222,24 @@ def solve_overlaps(
             nx, ny = now.normal[k, 0], now.normal[k, 1]
             a_off, b_off = now.offset[k, 0], now.offset[k, 1]
             mass = inverse_mass[i] + inverse_moment[i] * a_off * a_off
-            vx, vy, turn = -push[i, 0], -push[i, 1], push[i, 2] * a_off
+            vx, vy, turn = -pseudo_velocity[i, 0], -pseudo_velocity[i, 1], pseudo_velocity[i, 2] * a_off
             if j >= 0:
                 mass += inverse_mass[j] + inverse_moment[j] * b_off * b_off
-                vx += push[j, 0]
-                vy += push[j, 1]
-                turn -= push[j, 2] * b_off
+                vx += pseudo_velocity[j, 0]
+                vy += pseudo_velocity[j, 1]
+                turn -= pseudo_velocity[j, 2] * b_off
             if mass == 0.0:
                 continue
             old = total[k]
             total[k] = max(old + (target[k] - (vx * nx + vy * ny) - turn) / mass, 0.0)
             change = total[k] - old
-            push[i, 0] -= inverse_mass[i] * change * nx
-            push[i, 1] -= inverse_mass[i] * change * ny
-            push[i, 2] += inverse_moment[i] * change * a_off
+            pseudo_velocity[i, 0] -= inverse_mass[i] * change * nx
+            pseudo_velocity[i, 1] -= inverse_mass[i] * change * ny
+            pseudo_velocity[i, 2] += inverse_moment[i] * change * a_off
             if j >= 0:
-                push[j, 0] += inverse_mass[j] * change * nx
-                push[j, 1] += inverse_mass[j] * change * ny
-                push[j, 2] -= inverse_moment[j] * change * b_off
+                pseudo_velocity[j, 0] += inverse_mass[j] * change * nx
+                pseudo_velocity[j, 1] += inverse_mass[j] * change * ny
+                pseudo_velocity[j, 2] -= inverse_moment[j] * change * b_off
 
 
 class AngularStops(NamedTuple):
@@ -274,7 +274,7 @@ def solve_together(
         now: K contacts.
         bounce: (K,) m/s, as `solve_velocities` takes it.
         rows: of the joints, prepared.
-        stops: one-sided: they push, and never pull.
+        stops: one-sided constraints.
         velocity: (N, 3) m/s and rad/s, changed.
         inverse_mass: (N,) 1/kg.
         inverse_moment: (N,) 1/(kg·m²).

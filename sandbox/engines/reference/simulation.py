@@ -11,7 +11,7 @@ from sandbox.engines.common.actions import apply_action
 from sandbox.engines.common.base import BEYOND, BaseSimulation
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, ContactLog, joined
-from sandbox.engines.common.kernel import tell_if_slow
+from sandbox.engines.common.kernel import warn_if_uncompiled
 from sandbox.engines.contract import Divergence, Exhaustion, Observer
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.reference.continuous import DETECTIONS
@@ -48,8 +48,8 @@ class ReferenceSimulation(BaseSimulation):
         assert settings.detection is not None
         super().__init__(settings)
         self._zoned = ZonedBodyStore(setup, settings.h) if setup.scene.zones else None
-        self._roster = self._zoned or BodyStore(setup, settings.h)
-        self._world = WorldState(self._roster, settings)
+        self._store = self._zoned or BodyStore(setup, settings.h)
+        self._world = WorldState(self._store, settings)
         self._detection = DETECTIONS[settings.detection]
         self._energy: StepEnergyLedger | None = None
         self._breaker = JointBreaker(setup.links) if np.isfinite(setup.links.strength).any() else None
@@ -62,27 +62,27 @@ class ReferenceSimulation(BaseSimulation):
         self._now = NO_CONTACTS  # what touched when last recorded
         self._came: ContactBatch | None = None  # bodies in zones when the recording began
         self._world.pipeline.check_limits(self._world.x[0])  # what takes too much is refused before the run begins
-        tell_if_slow(len(setup.bodies))
+        warn_if_uncompiled(len(setup.bodies))
 
     @property
     def setup(self) -> Setup:
         """State from which the simulation started, with the changes that actions have made to its scene."""
-        return self._roster.setup
+        return self._store.setup
 
     @property
     def bodies(self) -> Bodies:
         """Bodies at their start as arrays; spawned bodies are appended."""
-        return self._roster.bodies
+        return self._store.bodies
 
     @property
     def retired(self) -> Mapping[int, float]:
         """Time in s, by body index, at which bodies were removed, left `world.bounds` or ended their lifetime."""
-        return self._roster.retired
+        return self._store.retired
 
     @property
     def broken(self) -> Mapping[int, float]:
         """Time in s, by index in `setup.links`, at which joints broke."""
-        return self._roster.broken
+        return self._store.broken
 
     @property
     def work(self) -> Mapping[str, int]:
@@ -164,17 +164,17 @@ class ReferenceSimulation(BaseSimulation):
         if len(broken):
             self._world.write_state()
             with self._booked(Cause.PARTED):
-                self._roster.part(broken, time)
+                self._store.part(broken, time)
                 self._rebuild()
 
-    def _visit_zones(self, time: float, roster: ZonedBodyStore) -> None:
+    def _visit_zones(self, time: float, store: ZonedBodyStore) -> None:
         """Let zones act on the bodies that entered or left one, and log the visits at a time, s."""
-        if roster.look(self._world.centres(self._world.x)):
+        if store.look(self._world.centres(self._world.x)):
             self._world.write_state()
             with self._booked(Cause.DRIVES):
-                if roster.settle():
+                if store.settle():
                     self._rebuild()
-        visits = roster.visiting.drain_entries()
+        visits = store.visiting.drain_entries()
         if self._ledger is not None and visits is not None:
             # Contacts were logged with their impulses: they last, beside the visits.
             lasting = self._now._replace(impulse=np.zeros_like(self._now.impulse))
@@ -193,18 +193,18 @@ class ReferenceSimulation(BaseSimulation):
     def _settle(self) -> None:
         """Write the state to the body store, check that it is finite and bounded, remove bodies whose time is up."""
         self._world.write_state()
-        beyond = self._roster.beyond()
+        beyond = self._store.beyond()
         if beyond is not None:
             self._ended = True
             raise Divergence(self.time, self.bodies.names[beyond], BEYOND)
         if self._removes:
-            going = self._roster.expired(self.time)
+            going = self._store.expired(self.time)
             if len(going):
-                self._take_out(going)
+                self._remove_bodies(going)
 
-    def _take_out(self, numbers: IntArray) -> None:
+    def _remove_bodies(self, numbers: IntArray) -> None:
         with self._booked(Cause.RETIRED):
-            self._roster.take_out(numbers, self.time)
+            self._store.remove_bodies(numbers, self.time)
             self._rebuild()
 
     def apply(self, action: Action) -> None:
@@ -218,11 +218,11 @@ class ReferenceSimulation(BaseSimulation):
             if isinstance(action, Spawn):
                 self._check_shape(action.single)
             with self._booked(Cause.ACTIONS):
-                leaving = apply_action(action, self._roster)
+                leaving = apply_action(action, self._store)
                 if not (isinstance(action, Impulse) and self._world.read_velocities()):
                     self._rebuild()
             if leaving is not None:
-                self._take_out(np.asarray([leaving]))
+                self._remove_bodies(np.asarray([leaving]))
 
     def _check_shape(self, single: BodySpec) -> None:
         """Refuse a body that the chosen detection or response does not support.
@@ -237,7 +237,7 @@ class ReferenceSimulation(BaseSimulation):
 
     def frame(self) -> Frame:
         """Return the present state."""
-        r = self._roster
+        r = self._store
         position, velocity, angle, spin = (a.copy() for a in (r.position, r.velocity, r.angle, r.angular_velocity))
         layer = r.layer.copy() if len(r.scene.layers) > 1 else None
         visits = r.visits.copy() if r.scene.zones else None
@@ -248,7 +248,7 @@ class ReferenceSimulation(BaseSimulation):
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""
         if self._ledger is None:
-            self._ledger = ContactLog(len(self._roster.scene.fixed_names), can_repeat_pairs=True)
+            self._ledger = ContactLog(len(self._store.scene.fixed_names), can_repeat_pairs=True)
             overlaps = self._world.solver.detect(self._world.x)
             now = _touching(overlaps, np.zeros((overlaps.size, 2)))
             if self._zoned is not None:  # bodies in zones are logged now, and with the first substep
@@ -259,7 +259,7 @@ class ReferenceSimulation(BaseSimulation):
     def account(self) -> Mapping[Cause, float]:
         """Return the energy change, J, by each cause since the first call."""
         if self._energy is None:
-            self._energy = StepEnergyLedger(self._roster, self._world)
+            self._energy = StepEnergyLedger(self._store, self._world)
         return self._energy.account.entries()
 
     def watch(self, observer: Observer) -> None:
@@ -271,7 +271,7 @@ class ReferenceSimulation(BaseSimulation):
     def _log_contacts(self, log: ContactLog, record: StepRecord) -> None:
         """Log the contacts of a step, and call the observer."""
         end = self._world.time
-        self._now = now = _touching(*_real(*record.all_contacts(), record.after[1], self._roster.inverse_mass))
+        self._now = now = _touching(*_real(*record.all_contacts(), record.after[1], self._store.inverse_mass))
         visits, self._came = self._came, None
         log.record(end, now if visits is None else joined(now, visits))
         if self._observer is not None:

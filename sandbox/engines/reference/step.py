@@ -102,63 +102,63 @@ class WorldState:
     """State x of N bodies at `time`, what acts on them, and the solver that advances them.
 
     Args:
-        roster: the bodies.
+        store: the bodies.
         settings: with every choice filled in.
     """
 
-    def __init__(self, roster: BodyStore, settings: Settings) -> None:
+    def __init__(self, store: BodyStore, settings: Settings) -> None:
         assert settings.broad_phase and settings.slop is not None and settings.bias is not None
-        self._roster, self._settings = roster, settings
+        self._store, self._settings = store, settings
         self.work: Counter[str] = Counter(dict.fromkeys(WORK, 0))
         """how often each kind of work was done so far"""
         self.memory = ContactMemory(settings.h)
-        self.field = ForceField(roster)
+        self.field = ForceField(store)
         self.joints = self._new_joints()
         self._posed = self.joints is not None or not self.field.empty
-        self.filter = CollisionFilter(roster) if CollisionFilter.is_needed(roster.scene) else None
+        self.filter = CollisionFilter(store) if CollisionFilter.is_needed(store.scene) else None
         self.walls: OneWayWalls | None = None if self.filter is None else self.filter.walls
         self.pipeline = self._new_pipeline(self.work)
         self._penalty = self._new_penalty(self.pipeline)
-        self._fixtures = roster.fixtures
+        self._fixtures = store.fixtures
         self.drives: Drives | None = None
         self.time = 0.0
         self.rebuild()
 
     def _new_pipeline(self, work: Counter[str]) -> CollisionPipeline:
         assert self._settings.broad_phase
-        return make_pipeline(self._roster, self._settings.broad_phase, self.filter, work)
+        return make_pipeline(self._store, self._settings.broad_phase, self.filter, work)
 
     def _new_penalty(self, pipeline: CollisionPipeline) -> PenaltyContacts | None:
         penalty = self._settings.response == "penalty"
-        return PenaltyContacts(self._roster, self._settings, pipeline) if penalty else None
+        return PenaltyContacts(self._store, self._settings, pipeline) if penalty else None
 
     def _new_joints(self) -> JointSolver | None:
         """Return a solver of the scene's joints, if it has any."""
-        roster, settings = self._roster, self._settings
-        links = roster.setup.links
+        store, settings = self._store, self._settings
+        links = store.setup.links
         if not len(links):
             return None
         assert settings.joints is not None and settings.bias is not None
         cap = math.inf if settings.stretch is None else settings.stretch
-        inverse = roster.inverse_mass, roster.inverse_moment
+        inverse = store.inverse_mass, store.inverse_moment
         return JointSolver(links, *inverse, settings.bias, settings.iterations, settings.joints, cap)
 
     def rebuild(self) -> None:
         """Derive state, forces, collision data and solver anew from the body store."""
-        roster = self._roster
+        store = self._store
         self.x = self._stored_state()
         if self.filter is not None:
             self.filter.rebuild(self.x[0])  # centres: hinges take their places only below
-        self.drives = Drives.of(roster, self.drives)
+        self.drives = Drives.of(store, self.drives)
         if self.drives is not None:
             self.drives.enter(self.x)
-        self.memory.rebuild(roster.moving)
-        if not suits(self.pipeline, roster):  # keys mean other pairs from now on
+        self.memory.rebuild(store.moving)
+        if not suits(self.pipeline, store):  # keys mean other pairs from now on
             self.pipeline = self._new_pipeline(self.work)
             self._penalty = self._new_penalty(self.pipeline)
             self.memory.forget(self._settings.h)
-        if roster.fixtures is not self._fixtures:  # keys may mean other segments from now on
-            self._fixtures = roster.fixtures
+        if store.fixtures is not self._fixtures:  # keys may mean other segments from now on
+            self._fixtures = store.fixtures
             self.memory.forget(self._settings.h)
         self.pipeline.rebuild()
         self._choose_solver()
@@ -166,13 +166,13 @@ class WorldState:
             overlaps = self.pipeline.at_one_way_walls(self.x[0])
             self.walls.begin(overlaps, self.closing_speed(overlaps, self.x))
         if self.joints is not None:
-            self.joints.rebuild(roster.inverse_mass, roster.inverse_moment, roster.linked())
-        self.forces = forces_on(roster, self.field, self.joints, self.x.shape[2])
+            self.joints.rebuild(store.inverse_mass, store.inverse_moment, store.linked())
+        self.forces = forces_on(store, self.field, self.joints, self.x.shape[2])
 
     def _choose_solver(self) -> None:
         """Choose among the four solvers by the contact response and by whether a body is driven."""
-        roster, drives, penalty = self._roster, self.drives, self._penalty
-        given = roster, self._settings, self.pipeline, self.joints, self.memory
+        store, drives, penalty = self._store, self.drives, self._penalty
+        given = store, self._settings, self.pipeline, self.joints, self.memory
         self.impulses = ImpulseSolver(*given) if drives is None else DrivenSolver(drives, *given)
         self.solver: ImpulseSolver | PenaltySolver = self.impulses
         if penalty is not None:
@@ -183,24 +183,24 @@ class WorldState:
 
     def _stored_state(self) -> State:
         """Return the state in the body store, (2, N, D), with angles only if something can turn."""
-        roster = self._roster
+        store = self._store
         if not self._turns():
-            return np.stack((roster.position, roster.velocity))
-        poses = np.column_stack((roster.position, roster.angle))
-        return np.stack((poses, np.column_stack((roster.velocity, roster.angular_velocity))))
+            return np.stack((store.position, store.velocity))
+        poses = np.column_stack((store.position, store.angle))
+        return np.stack((poses, np.column_stack((store.velocity, store.angular_velocity))))
 
     def _turns(self) -> bool:
         """Return whether states need angles: a body turns, or a joint, drive, attraction or thrust may turn it."""
-        roster = self._roster
-        return bool(self._posed or roster.held or roster.inverse_moment.any() or roster.angular_velocity.any())
+        store = self._store
+        return bool(self._posed or store.held or store.inverse_moment.any() or store.angular_velocity.any())
 
     def read_velocities(self) -> bool:
         """Take velocities from the body store after an impulse; return False if `rebuild` has to do it.
 
-        One-way walls depend on velocities, zones release a body that is pushed, and angular velocities can change the
-        shape of states. Nothing else that `rebuild` derives depends on velocities.
+        One-way walls depend on velocities, zones release a body that gets a velocity, and angular velocities can change
+        the shape of states. Nothing else that `rebuild` derives depends on velocities.
         """
-        if self.walls is not None or self._roster.scene.zones or self._turns() != (self.x.shape[2] == 3):
+        if self.walls is not None or self._store.scene.zones or self._turns() != (self.x.shape[2] == 3):
             return False
         self.x = self._stored_state()
         if self.drives is not None:
@@ -209,10 +209,10 @@ class WorldState:
 
     def write_state(self) -> None:
         """Write the state into the body store."""
-        roster = self._roster
-        roster.position[:], roster.velocity[:] = self.x[0, :, :2], self.x[1, :, :2]
+        store = self._store
+        store.position[:], store.velocity[:] = self.x[0, :, :2], self.x[1, :, :2]
         if self.x.shape[2] == 3:
-            roster.angle[:], roster.angular_velocity[:] = self.x[0, :, 2], self.x[1, :, 2]
+            store.angle[:], store.angular_velocity[:] = self.x[0, :, 2], self.x[1, :, 2]
         if self.drives is not None:
             self.drives.leave(self.x)
 
@@ -229,7 +229,7 @@ class WorldState:
         """Return penalty contacts for the energy ledger, which are not counted as work; None for other responses."""
         if self._penalty is None:
             return None
-        own = PenaltyContacts(self._roster, self._settings, self._new_pipeline(Counter()))
+        own = PenaltyContacts(self._store, self._settings, self._new_pipeline(Counter()))
         own.rebuild(self.drives)
         return own
 

@@ -51,19 +51,19 @@ class Rebound(NamedTuple):
 class ReboundModel:
     """Rebound of contacts with kicks, or with restitution that depends on speed."""
 
-    def __init__(self, roster: BodyStore) -> None:
-        self._roster = roster
-        self._kicks = {k: thing for k, thing in enumerate(roster.scene.fixed) if _kick_of(thing) is not None}
+    def __init__(self, store: BodyStore) -> None:
+        self._store = store
+        self._kicks = {k: collider for k, collider in enumerate(store.scene.fixed) if _kick_of(collider) is not None}
 
     @staticmethod
-    def is_needed(roster: BodyStore) -> bool:
+    def is_needed(store: BodyStore) -> bool:
         """Return whether a pair that can touch has a kick, or restitution that depends on speed."""
-        return bool((roster.meet.touching & ~roster.meet.surfaces.fixed_coefficients).any())
+        return bool((store.contact_matrix.touching & ~store.contact_matrix.surfaces.fixed_coefficients).any())
 
     def bounce(self, contacts: Manifolds, approach: FloatArray) -> Rebound:
         """Return the restitution targets of contacts that approach at (K,) m/s, negative."""
         pair = contacts.surface_pair
-        restitution, falloff = self._roster.restitution.ravel()[pair], self._roster.falloff.ravel()[pair]
+        restitution, falloff = self._store.restitution.ravel()[pair], self._store.falloff.ravel()[pair]
         speed = np.empty(contacts.size)
         _rebounds(restitution, falloff, approach, speed)
         kick = np.zeros(contacts.size)
@@ -82,21 +82,21 @@ class ReboundModel:
         return Rebound(speed - kick, energy)
 
     def _gain(self, number: int, point: Point, restitution: float, falloff: float, closing: float) -> float:
-        """Return by how much a fixed thing that is hit at a point raises the speed of parting, m/s."""
-        thing = self._kicks[number]
-        kick = _kick_of(thing)
+        """Return the separation speed, m/s, that the kick of a static collider adds at a contact point."""
+        collider = self._kicks[number]
+        kick = _kick_of(collider)
         assert kick is not None
         fraction, middle = 0.5, kick.profile == "middle"
-        if middle and isinstance(thing, Wall):
-            ends = (*thing.points, thing.points[0]) if thing.closed else thing.points
+        if middle and isinstance(collider, Wall):
+            ends = (*collider.points, collider.points[0]) if collider.closed else collider.points
             each = zip(ends[:-1], ends[1:], segment_fractions(ends), strict=True)
             fraction = min((_away(a, b, point), fraction_at(a, b, part, point)) for a, b, part in each)[1]
         speed = kicked(kick.speed, kick.threshold, middle, fraction, closing)
         return kick_gain(restitution, falloff, speed, kick.adds_to == "approach", closing)
 
 
-def _kick_of(thing: object) -> Kick | None:
-    return thing.kick if isinstance(thing, Wall | Post) else None
+def _kick_of(collider: object) -> Kick | None:
+    return collider.kick if isinstance(collider, Wall | Post) else None
 
 
 def _away(a: Point, b: Point, point: Point) -> float:
@@ -165,9 +165,9 @@ class ContactMemory:
 
     def __init__(self, h: float) -> None:
         self.forget(h)
-        self.push: FloatArray = np.zeros((0, 3))
+        self.pseudo_velocity: FloatArray = np.zeros((0, 3))
         """(N, 3) m/s and rad/s, by which overlap is undone in the next step; no part of the motion"""
-        self.pushes = False
+        self.has_pseudo_velocity = False
         """whether any of these is not 0"""
 
     def forget(self, h: float) -> None:
@@ -179,16 +179,16 @@ class ContactMemory:
     def rebuild(self, moving: BoolArray) -> None:
         """Adapt to more bodies, or to bodies that no longer move: (N,) which do."""
         kept = np.zeros((len(moving), 3))
-        kept[: len(self.push)] = self.push
-        self.push = np.where(moving[:, None], kept, 0.0)
-        self.pushes = bool(self.push.any())
+        kept[: len(self.pseudo_velocity)] = self.pseudo_velocity
+        self.pseudo_velocity = np.where(moving[:, None], kept, 0.0)
+        self.has_pseudo_velocity = bool(self.pseudo_velocity.any())
 
 
 class ImpulseSolver:
     """Solver by sequential impulses (Catto 2005). Its verbs, in the order of a step: integrate, detect, solve, correct.
 
     Args:
-        roster: the bodies.
+        store: the bodies.
         settings: with every choice filled in.
         pipeline: detects collisions; its work counters count the iterations, too.
         joints: solver of the scene's joints, if it has any.
@@ -197,7 +197,7 @@ class ImpulseSolver:
 
     def __init__(
         self,
-        roster: BodyStore,
+        store: BodyStore,
         settings: Settings,
         pipeline: CollisionPipeline,
         joints: JointSolver | None,
@@ -211,15 +211,15 @@ class ImpulseSolver:
         self._position_joints = None if by_impulses else joints
         self._always = by_impulses
         """whether there is something to solve without any contact"""
-        self._inverse = roster.inverse_mass, roster.inverse_moment
+        self._inverse = store.inverse_mass, store.inverse_moment
         self._inverse_overlap = self._inverse
         """inverse masses and moments with which overlap is undone"""
         self._iterations, self._slop, self._bias = settings.iterations, settings.slop, settings.bias
         self._dissipative = settings.impact == "dissipative"
         self._substeps, self._max_work = settings.substeps, STEP_WORK.value // settings.substeps
-        self._no_spin: FloatArray = np.zeros((len(roster.position), 3))
-        self._restitution: FloatArray = roster.restitution.ravel()
-        self._rebound_model = ReboundModel(roster) if ReboundModel.is_needed(roster) else None
+        self._no_spin: FloatArray = np.zeros((len(store.position), 3))
+        self._restitution: FloatArray = store.restitution.ravel()
+        self._rebound_model = ReboundModel(store) if ReboundModel.is_needed(store) else None
         """for kicks and velocity-dependent restitution; None if every pair has constant restitution and no kick"""
 
     @property
@@ -234,8 +234,8 @@ class ImpulseSolver:
     def place(self, start: State, free: State, h: float) -> Motion:
         """Return a motion that ends at `free`, with overlap undone and joints held that are solved by positions."""
         shift, placed = None, free
-        if self._memory.pushes:
-            shift = h * self._memory.push[:, : free.shape[2]]
+        if self._memory.has_pseudo_velocity:
+            shift = h * self._memory.pseudo_velocity[:, : free.shape[2]]
             placed = np.empty_like(free)
             np.add(free[0], shift, out=placed[0])
             placed[1] = free[1]
@@ -293,19 +293,21 @@ class ImpulseSolver:
     def correct(self, solution: Solution, h: float) -> None:
         """Find the velocities that undo overlap in the next step; keep the impulses of this one, of h, s, for it."""
         contacts, memory = solution.contacts, self._memory
-        if memory.pushes:
-            memory.pushes = False
-            memory.push[:] = 0.0
+        if memory.has_pseudo_velocity:
+            memory.has_pseudo_velocity = False
+            memory.pseudo_velocity[:] = 0.0
         memory.key, memory.impulse, memory.h = contacts.key, solution.impulse, h
         if len(contacts.key):
             memory.key = contacts.key.copy()
             # One substep undoes a fraction of the overlap beyond the slop, by the motion of the next.
             target = -(1.0 - self._bias**h) / h * np.minimum(contacts.separation + self._slop, 0.0)
-            memory.pushes = bool(target.any())
-            if memory.pushes:
+            memory.has_pseudo_velocity = bool(target.any())
+            if memory.has_pseudo_velocity:
                 self._work["contact_iterations"] += contacts.size * self._iterations
                 total = np.zeros_like(target)
-                solve_overlaps(contacts, target, memory.push, *self._inverse_overlap, total, self._iterations)
+                solve_overlaps(
+                    contacts, target, memory.pseudo_velocity, *self._inverse_overlap, total, self._iterations
+                )
 
     def finish(self, after: State) -> State:
         """Return the state to begin the next step with."""
@@ -441,11 +443,11 @@ class ImpulseSolver:
         spin, works = self._spin, Bilinear(contacts, *self._inverse)
         kicks = np.zeros(contacts.size) if bounce.kick_energy is None else bounce.kick_energy
 
-        def work(push: FloatArray, rates: FloatArray) -> FloatArray:
-            return works.work(push, rates, spin(rates))[0]
+        def work(impulses: FloatArray, rates: FloatArray) -> FloatArray:
+            return works.work(impulses, rates, spin(rates))[0]
 
-        def kicked_by(push: FloatArray) -> FloatArray:
-            return np.asarray(np.bincount(works.of_contact, push[:, 0] * kicks, len(works.group)), np.float64)
+        def kicked_by(impulses: FloatArray) -> FloatArray:
+            return np.asarray(np.bincount(works.of_contact, impulses[:, 0] * kicks, len(works.group)), np.float64)
 
         given, turnover = works.work(impulse, mean := 0.5 * (start + velocity), spin(mean))
         gains = given - kicked_by(impulse) > ROUNDING * turnover
@@ -458,16 +460,16 @@ class ImpulseSolver:
         least = np.where(gains, least, 1.0)
         warm *= least[works.of_contact][:, None]
         kicked[:] = free + least[works.group][:, None] * (kicked - free)
-        push, change = impulse - warm, velocity - kicked
+        impulses, change = impulse - warm, velocity - kicked
         fraction = largest_fractions(
             work(warm, 0.5 * (start + kicked)) - kicked_by(warm),
-            work(push, 0.5 * (start + kicked)) + work(warm, 0.5 * change) - kicked_by(push),
-            work(push, 0.5 * change),
+            work(impulses, 0.5 * (start + kicked)) + work(warm, 0.5 * change) - kicked_by(impulses),
+            work(impulses, 0.5 * change),
         )
         fraction = np.where(gains, fraction, 1.0)
         of_contact, of_body = fraction[works.of_contact][:, None], fraction[works.group][:, None]
         cut = of_contact[:, 0] < 1.0
-        impulse[cut] = (warm + of_contact * push)[cut]
+        impulse[cut] = (warm + of_contact * impulses)[cut]
         cut = of_body[:, 0] < 1.0
         velocity[cut] = (kicked + of_body * change)[cut]
 

@@ -132,15 +132,15 @@ class ZonedBodyStore(BodyStore):
         self._changed = False
         self.visiting = ZoneTracker(scene, self)
         self._rebuild_zones()
-        self.visiting.begin(np.flatnonzero(self.meet.noted).tolist(), anew=setup.time == 0.0)
+        self.visiting.begin(np.flatnonzero(self.contact_matrix.noted).tolist(), anew=setup.time == 0.0)
 
     def _rebuild_zones(self) -> None:
         more = np.zeros((len(self.visits) - len(self._inside), self.visits.shape[1]), np.bool_)
         self._inside = np.vstack((self._inside, more))
         self._stirred: BoolArray = np.zeros(len(self.visits), np.bool_)
-        self._noted: BoolArray = self.meet.noted & self.present
+        self._noted: BoolArray = self.contact_matrix.noted & self.present
         self.visiting.set_arrays(self.position, self.velocity, self.angular_velocity, self.layer, self.visits)
-        self.visiting.rebuild(self.meet)
+        self.visiting.rebuild(self.contact_matrix)
 
     def look(self, position: FloatArray) -> bool:
         """Find the zones of (N, ≥ 2) centres, m, at the end of a substep; return whether zones have to act."""
@@ -203,7 +203,7 @@ class ZonedBodyStore(BodyStore):
     def _stands(self, number: int, held: bool) -> None:
         self.velocity[number], self.angular_velocity[number] = 0.0, 0.0
         self.caught[number], self._changed = held, True
-        self._rebuild(self.setup, self.bodies, self.meet)
+        self._rebuild(self.setup, self.bodies, self.contact_matrix)
 
     def set_gravity(self, number: int, gravity: Point | None) -> None:
         """Set the gravity of a body, m/s²; None restores that of the world."""
@@ -220,15 +220,15 @@ class ZonedBodyStore(BodyStore):
         self.visiting.release_body(number)
         super().set_velocity(number, velocity)
 
-    def push(self, number: int, force: FloatArray, torque: float) -> None:
+    def set_constant_force(self, number: int, force: FloatArray, torque: float) -> None:
         """Set the constant force (N) and torque (N·m) on a body; a zone that holds it releases it."""
         if force.any() or torque:
             self.visiting.release_body(number)
-        super().push(number, force, torque)
+        super().set_constant_force(number, force, torque)
 
-    def put(self, number: int, position: FloatArray) -> None:
+    def move_body(self, number: int, position: FloatArray) -> None:
         """Set the position of a body, m; a zone that holds it releases it."""
-        super().put(number, position)
+        super().move_body(number, position)
         self.visiting.release_body(number)
         self.visiting.update_position(number)
 
@@ -244,9 +244,9 @@ class ZonedBodyStore(BodyStore):
         self.visiting.update_position(number)
         return number
 
-    def take_out(self, numbers: IntArray, time: float) -> None:
+    def remove_bodies(self, numbers: IntArray, time: float) -> None:
         """Remove bodies at a time, s, also from their zones."""
-        super().take_out(numbers, time)
+        super().remove_bodies(numbers, time)
         self.visiting.forget(numbers)
         for number in numbers.tolist():
             self._lifts.pop(number, None)

@@ -59,17 +59,17 @@ def mathavan2010(
         along, up = x + q * sin - r * cos, p - y * sin
         slip = math.sqrt(along * along + up * up)
         ca, cu = (along / slip, up / slip) if slip > NO_SLIP else (0.0, 0.0)
-        rub = min(friction, max_friction * slip)  # a step can end slip, but not reverse it
+        friction_impulse = min(friction, max_friction * slip)  # a step can end slip, but not reverse it
         under_x, under_y = x - q, y + p
         under = math.sqrt(under_x * under_x + under_y * under_y)
         fx, fy = (under_x / under, under_y / under) if under > NO_SLIP else (0.0, 0.0)
-        weight = sin + rub * cu * cos  # part of the impulse that presses the ball onto the surface
+        weight = sin + friction_impulse * cu * cos  # part of the impulse that presses the ball onto the surface
         grip = min(sliding * max(weight, 0.0), max_friction * under)
-        dx = -rub * ca - grip * fx
-        dy = -cos + rub * sin * cu - grip * fy
-        dp = -2.5 * (rub * cu + grip * fy)
-        dq = -2.5 * (rub * ca * sin - grip * fx)
-        dr = 2.5 * rub * ca * cos
+        dx = -friction_impulse * ca - grip * fx
+        dy = -cos + friction_impulse * sin * cu - grip * fy
+        dp = -2.5 * (friction_impulse * cu + grip * fy)
+        dq = -2.5 * (friction_impulse * ca * sin - grip * fx)
+        dr = 2.5 * friction_impulse * ca * cos
         # The last steps of compression and of restitution are shortened to end exactly.
         part = step
         ends = False
@@ -147,8 +147,8 @@ def collide_balls(
         slip = math.sqrt(along * along + up * up)
         if slip > 0.0:
             # Coulomb's law, up to the impulse that ends the slip: the effective inverse mass is 7/2 of the sum.
-            rub = min(ball_friction(slip) * impulse, slip / (3.5 * (la + lb))) / slip
-            dt, dz = -rub * along, -rub * up
+            friction_impulse = min(ball_friction(slip) * impulse, slip / (3.5 * (la + lb))) / slip
+            dt, dz = -friction_impulse * along, -friction_impulse * up
             turn = 2.5 / radius
             avx, avy = avx - la * dt * ny, avy + la * dt * nx
             bvx, bvy = bvx + lb * dt * ny, bvy - lb * dt * nx
@@ -190,8 +190,8 @@ def collide_cushion(
         vx, vy, wx, wy, wz = mathavan2010(restitution, friction, sliding, a, radius, height, nx, ny)
     else:
         vx, vy, wx, wy, wz = a
-        push = (1.0 + restitution) * (vx * nx + vy * ny)
-        return vx - push * nx, vy - push * ny, wx, wy, wz
+        normal_impulse = (1.0 + restitution) * (vx * nx + vy * ny)
+        return vx - normal_impulse * nx, vy - normal_impulse * ny, wx, wy, wz
     still = max(vx * nx + vy * ny, 0.0)  # a nose far above the centre does not stop it completely
     return vx - still * nx, vy - still * ny, wx, wy, wz
 
@@ -207,11 +207,11 @@ def _han2005(restitution: float, friction: float, a: Five, radius: float, height
     cos = math.sqrt(1.0 - sin * sin)
     along, across = x * sin + radius * wb, -y - radius * wz * cos + radius * wa * sin
     slip = math.sqrt(along * along + across * across)
-    push = (1.0 + restitution) * x * cos
-    rub = min(slip / 3.5, friction * push) / slip if slip > 0.0 else 0.0
-    p, q = rub * along, rub * across
+    normal_impulse = (1.0 + restitution) * x * cos
+    friction_impulse = min(slip / 3.5, friction * normal_impulse) / slip if slip > 0.0 else 0.0
+    p, q = friction_impulse * along, friction_impulse * across
     turn = 2.5 / radius
-    x, y = x - p * sin - push * cos, y + q
+    x, y = x - p * sin - normal_impulse * cos, y + q
     wa, wb, wz = wa - turn * q * sin, wb - turn * p, wz + turn * q * cos
     return x * nx - y * ny, x * ny + y * nx, wa * nx - wb * ny, wa * ny + wb * nx, wz
 
@@ -245,13 +245,13 @@ def collide_pucks(
     avx, avy, _, _, aw = a
     bvx, bvy, _, _, bw = b
     (la, lb), (ra, rb) = inverse_mass, radii
-    push = (1.0 + restitution) * ((avx - bvx) * nx + (avy - bvy) * ny) / (la + lb)
+    normal_impulse = (1.0 + restitution) * ((avx - bvx) * nx + (avy - bvy) * ny) / (la + lb)
     # Slip of the first over the second, along t = (−n_y, n_x), the direction in which spin moves each rim.
     slip = (avy - bvy) * nx - (avx - bvx) * ny + ra * aw + rb * bw
-    rub = math.copysign(min(friction * push, abs(slip) / (3.0 * (la + lb))), slip)
-    jx, jy = push * nx - rub * ny, push * ny + rub * nx
+    friction_impulse = math.copysign(min(friction * normal_impulse, abs(slip) / (3.0 * (la + lb))), slip)
+    jx, jy = normal_impulse * nx - friction_impulse * ny, normal_impulse * ny + friction_impulse * nx
     if la > 0.0:
-        avx, avy, aw = avx - la * jx, avy - la * jy, aw - 2.0 * la * rub / ra
+        avx, avy, aw = avx - la * jx, avy - la * jy, aw - 2.0 * la * friction_impulse / ra
     if lb > 0.0:
-        bvx, bvy, bw = bvx + lb * jx, bvy + lb * jy, bw - 2.0 * lb * rub / rb
+        bvx, bvy, bw = bvx + lb * jx, bvy + lb * jy, bw - 2.0 * lb * friction_impulse / rb
     return (avx, avy, 0.0, 0.0, aw), (bvx, bvy, 0.0, 0.0, bw)

@@ -40,8 +40,8 @@ class Cushions(NamedTuple):
 def cushions_of(scene: Scene, surface: IntArray) -> Cushions:
     """Return a scene's static colliders as arrays; `surface` (F,) are their surfaces."""
     fixtures = static_colliders(scene)
-    first = np.searchsorted(fixtures.segment_thing, np.arange(len(scene.fixed) + 1))
-    height = [thing.height or 0.0 if isinstance(thing, Wall | Post) else 0.0 for thing in scene.fixed]
+    first = np.searchsorted(fixtures.segment_collider, np.arange(len(scene.fixed) + 1))
+    height = [collider.height or 0.0 if isinstance(collider, Wall | Post) else 0.0 for collider in scene.fixed]
     return Cushions(fixtures.planes, fixtures.segments, first, np.asarray(height, dtype=np.float64), surface)
 
 
@@ -208,10 +208,14 @@ def append_new_pairs(
         if k < 0:
             near = approach(balls, cushions, i, k, 0.0)[0] < SKIN * balls.radius[i]
         else:
-            meets = k != i and balls.meets[k] == ALL and (balls.meets[i] == ALL or balls.inverse_mass[k] == 0.0)
+            can_collide = (
+                k != i
+                and balls.collision_mask[k] == ALL
+                and (balls.collision_mask[i] == ALL or balls.inverse_mass[k] == 0.0)
+            )
             dx, dy = balls.position[k, 0] - x, balls.position[k, 1] - y
             contact_distance = (1.0 + SKIN) * (balls.radius[i] + balls.radius[k])
-            near = meets and dx * dx + dy * dy < contact_distance * contact_distance
+            near = can_collide and dx * dx + dy * dy < contact_distance * contact_distance
         if near and not is_listed(pairs, count, i, k):
             pairs[count, 0], pairs[count, 1] = i, k
             rows[count, DUE] = -1.0

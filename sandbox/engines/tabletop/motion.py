@@ -198,8 +198,8 @@ class TabletopBalls(NamedTuple):
     """(N,) whether it was moved by a collision within the substep, or out of an overlap"""
     in_play: BoolArray
     """(N,) whether it is present, not fixed, and in no pocket"""
-    meets: IntArray
-    """(N,) collision mask, as in `BodyStore.meets`"""
+    collision_mask: IntArray
+    """(N,) collision mask, as in `BodyStore.collision_mask`"""
     radius: FloatArray
     """(N,) m"""
     inverse_mass: FloatArray

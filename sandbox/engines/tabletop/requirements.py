@@ -23,8 +23,8 @@ def unlevel(start: Scene | Setup, bodies: Bodies | None = None) -> Iterator[str]
         yield "it does not model world.gravity in the plane of a floor"
     if does := demands(setup) & SURFACES:
         yield f"it does not model {', '.join(sorted(does))} on a floor"
-    meets = np.asarray([element.collides == "all" for element in bodies.elements], np.bool_)[bodies.element]
-    if scene.surface is not None and bodies.spheres and len(np.unique(bodies.radius[meets & bodies.round])) > 1:
+    collides = np.asarray([element.collides == "all" for element in bodies.elements], np.bool_)[bodies.element]
+    if scene.surface is not None and bodies.spheres and len(np.unique(bodies.radius[collides & bodies.round])) > 1:
         yield "it does not model collisions of balls with different radii on a floor"
 
 

@@ -16,8 +16,7 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from sandbox.engines.common.base import BEYOND, FARTHEST, FASTEST
-from sandbox.engines.common.body_store import MEETS
-from sandbox.engines.common.body_store import NOTHING as NOTHING_AT_ALL
+from sandbox.engines.common.body_store import COLLISION_MASKS, NOTHING
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, joined
 from sandbox.engines.contract import Exhaustion
 from sandbox.engines.energy_ledger import Cause, EnergyLedger
@@ -95,9 +94,9 @@ class TabletopStepper:
         self._balls: TabletopBalls | None = None
         self._captures: ContactBatch = NO_CONTACTS
 
-    def rebuild(self, scene: Scene, meet: ContactMatrix) -> None:
+    def rebuild(self, scene: Scene, matrix: ContactMatrix) -> None:
         """Update after a change of the scene's coefficients or surfaces."""
-        surfaces, models = meet.surfaces, scene.contact_models
+        surfaces, models = matrix.surfaces, scene.contact_models
         self._floor = figures_of(scene.surface)
         self._parameters = HitParameters(
             BALL_BALL[models.ball_ball],
@@ -117,7 +116,7 @@ class TabletopStepper:
         pocket = np.full(index, -1, np.int64)
         pocket[: len(self.pocket)] = self.pocket
         self.pocket = pocket
-        self._masks = np.asarray([MEETS[each.collides] for each in bodies.elements], np.int64)[bodies.element]
+        self._masks = np.asarray([COLLISION_MASKS[each.collides] for each in bodies.elements], np.int64)[bodies.element]
         self._moment = np.where(bodies.fixed, 0.0, bodies.moment)
         self._mass = np.where(bodies.fixed, 0.0, bodies.mass)
         self._displacement, self._which = np.zeros((index, 2)), np.zeros(index, np.int64)
@@ -127,7 +126,7 @@ class TabletopStepper:
             age=np.zeros(index),
             moved=np.zeros(index, np.bool_),
             in_play=present & ~bodies.fixed & (pocket < 0),
-            meets=np.where(present & (pocket < 0), self._masks, NOTHING_AT_ALL),
+            collision_mask=np.where(present & (pocket < 0), self._masks, NOTHING),
             radius=bodies.radius,
             inverse_mass=np.where(bodies.fixed, 0.0, 1.0 / bodies.mass),
             surface=self._surface,
@@ -144,12 +143,12 @@ class TabletopStepper:
         """Return a ball from its pocket to play."""
         self.pocket[index] = -1
         self.balls.in_play[index] = True
-        self.balls.meets[index] = self._masks[index]
+        self.balls.collision_mask[index] = self._masks[index]
 
     def remove(self, indices: IntArray) -> None:
         """Remove balls that have left the scene."""
         self.balls.in_play[indices] = False
-        self.balls.meets[indices] = NOTHING_AT_ALL
+        self.balls.collision_mask[indices] = NOTHING
         self.pocket[indices] = -1
 
     def step(
@@ -220,7 +219,7 @@ class TabletopStepper:
         self._captures = joined(self._captures, captures)
         self.pocket[indices] = which
         balls.in_play[indices] = False
-        balls.meets[indices] = NOTHING_AT_ALL
+        balls.collision_mask[indices] = NOTHING
         balls.position[indices] = centre
         for array in (balls.velocity, balls.roll, balls.spin):
             array[indices] = 0.0

@@ -104,8 +104,8 @@ def spelled(scene: Scene, whole: bool = False) -> Spelled:
 
 def _numbers(scene: Scene) -> list[list[int]]:
     """Return the numbers of the bodies of each mover."""
-    numbers: list[list[int]] = [[] for _ in scene.movers]
-    mover = [scene.mover_of(element) for element in range(len(scene.elements))]
+    numbers: list[list[int]] = [[] for _ in scene.body_sources]
+    mover = [scene.source_index(element) for element in range(len(scene.elements))]
     for number, element in enumerate(scene.bodies.element.tolist()):
         numbers[mover[element]].append(number)
     return numbers

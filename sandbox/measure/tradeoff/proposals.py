@@ -196,7 +196,7 @@ def _simplifications(judges: Sequence[Judge]) -> Iterator[Simplification]:
             )
     if world.linear_drag or world.quadratic_drag:
         yield Simplification("no drag", "the scene can also be simulated without drag", _without_drag)
-    if any(each.friction for each in (*scene.materials, *scene.pairs, *scene.movers, *scene.fixed)):
+    if any(each.friction for each in (*scene.materials, *scene.pairs, *scene.body_sources, *scene.fixed)):
         yield Simplification("no friction", "the scene can also be simulated without friction", _without_friction)
 
 

@@ -134,7 +134,7 @@ def _dressed(part: HasMaterial, body: HasMaterial) -> HasMaterial:
 
 
 def numbered(
-    scene: Scene, things: Sequence[HasMaterial], known: tuple[ContactMaterial, ...] = ()
+    scene: Scene, elements: Sequence[HasMaterial], known: tuple[ContactMaterial, ...] = ()
 ) -> tuple[tuple[ContactMaterial, ...], IntArray]:
     """Return the known surfaces followed by the new distinct ones, and the index of each element's surface.
 
@@ -145,20 +145,20 @@ def numbered(
     paired = {name for p in scene.pairs for name in p.between}
     numbers = {surface: k for k, surface in enumerate(known)}
 
-    def number(thing: HasMaterial) -> int:
-        material = None if thing.material is None else materials[thing.material]
-        restitution, friction, falloff = thing.restitution, thing.friction, thing.restitution_falloff
+    def number(element: HasMaterial) -> int:
+        material = None if element.material is None else materials[element.material]
+        restitution, friction, falloff = element.restitution, element.friction, element.restitution_falloff
         if material is not None:
             restitution = material.restitution if restitution is None else restitution
             friction = material.friction if friction is None else friction
             falloff = material.restitution_falloff if falloff is None else falloff
-        kept = thing.material if thing.material in paired else None
-        kick = thing.kick if isinstance(thing, Wall | Post) else None
-        one_way = isinstance(thing, Wall) and thing.one_way
+        kept = element.material if element.material in paired else None
+        kick = element.kick if isinstance(element, Wall | Post) else None
+        one_way = isinstance(element, Wall) and element.one_way
         return numbers.setdefault(ContactMaterial(kept, restitution, friction, falloff, kick, one_way), len(numbers))
 
-    of_thing = np.asarray([number(thing) for thing in things], dtype=np.int64)
-    return tuple(numbers)[len(known) :], of_thing
+    of_element = np.asarray([number(element) for element in elements], dtype=np.int64)
+    return tuple(numbers)[len(known) :], of_element
 
 
 def _mixed(stated: list[float | None]) -> FloatArray:
@@ -260,10 +260,10 @@ def contact_matrix(start: Scene | Setup, bodies: Bodies | None = None) -> Contac
     touching[surface[rows], surface[columns]] = True
     rubs = surfaces.friction > 0
     ground = [(moving & ((kinds.layers & mask) != 0), rows) for mask, rows in _by_layers(scene)]
-    meets: BoolArray = np.asarray(pair.any(axis=1))
+    can_touch: BoolArray = np.asarray(pair.any(axis=1))
     for able, _ in ground:
-        meets |= able
-    turned = np.asarray((pair & rubs[np.ix_(surface, surface)]).any(axis=1)) | (meets & ~kinds.ball)
+        can_touch |= able
+    turned = np.asarray((pair & rubs[np.ix_(surface, surface)]).any(axis=1)) | (can_touch & ~kinds.ball)
 
     for able, rows in ground:
         fixed_surface = np.unique(surfaces.of_fixed[rows])
@@ -276,13 +276,13 @@ def contact_matrix(start: Scene | Setup, bodies: Bodies | None = None) -> Contac
     turnable = _any_of(body, (turned & moving)[kinds.of_piece], len(bodies)) | links.turned(len(bodies))
     return ContactMatrix(
         surfaces=surfaces,
-        touches=_any_of(body, meets[kinds.of_piece], len(bodies)),
+        touches=_any_of(body, can_touch[kinds.of_piece], len(bodies)),
         held=links.held(len(bodies)),
         noted=_noted(scene, bodies, reached) & ~driven_in(scene, bodies),
         turnable=(turnable | _thrust_turned(scene, bodies) | driven_in(scene, bodies, turning=True)) & ~bodies.fixed,
         mutual=bool(pair.any()),
         ball_ball=bool((pair & np.outer(kinds.ball, kinds.ball)).any()),
-        solid=np.isin(np.arange(size), surface[meets & ~kinds.ball]),
+        solid=np.isin(np.arange(size), surface[can_touch & ~kinds.ball]),
         ball_fixed={
             kind: any(
                 bool((able & kinds.ball).any()) and any(isinstance(scene.fixed[k], kind) for k in rows.tolist())
@@ -327,16 +327,21 @@ def _noted(scene: Scene, bodies: Bodies, reached: IntArray) -> BoolArray:
 
 def _by_layers(scene: Scene) -> list[tuple[int, IntArray]]:
     """Return each bit mask of layers of static colliders, with the indices of those that have it."""
-    masks = np.asarray([mask_of(thing.layers, scene.layers) for thing in scene.fixed], dtype=np.int64)
+    masks = np.asarray([mask_of(collider.layers, scene.layers) for collider in scene.fixed], dtype=np.int64)
     return [(mask, np.flatnonzero(masks == mask)) for mask in np.unique(masks).tolist()]
 
 
 def _kinds(bodies: Bodies, surfaces: PairTable, reached: IntArray) -> Kinds:
     """Group pieces by (surface, layers, ball, fixed, collides with all, collides with any)."""
     collides = [element.collides for element in bodies.elements]
-    meets_all = np.asarray([c == "all" for c in collides], dtype=np.int64)[bodies.element]
-    meets_any = np.asarray([c != "none" for c in collides], dtype=np.int64)[bodies.element]
-    traits = bodies.round.astype(np.int64) << 3 | bodies.fixed.astype(np.int64) << 2 | meets_all << 1 | meets_any
+    collides_with_all = np.asarray([c == "all" for c in collides], dtype=np.int64)[bodies.element]
+    collides_with_any = np.asarray([c != "none" for c in collides], dtype=np.int64)[bodies.element]
+    traits = (
+        bodies.round.astype(np.int64) << 3
+        | bodies.fixed.astype(np.int64) << 2
+        | collides_with_all << 1
+        | collides_with_any
+    )
     body = _body_of_piece(bodies)
     masks, layers = np.unique(reached, return_inverse=True)
     traits |= layers.reshape(-1) << 4

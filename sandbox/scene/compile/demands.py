@@ -117,13 +117,13 @@ def bill(start: Scene | Setup) -> tuple[Item, ...]:
 
 
 def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
-    scene, bodies, meet = setup.scene, setup.bodies, contact_matrix(setup)
+    scene, bodies, matrix = setup.scene, setup.bodies, contact_matrix(setup)
     world = scene.world
     moving = int((~bodies.fixed).sum())
     yield Demand.TRANSLATION, moving > 0, _count(moving, "body moves", "bodies move", "nothing moves")
 
     spinning = int(np.count_nonzero(bodies.angular_velocity))
-    turned = int(meet.turnable.sum())
+    turned = int(matrix.turnable.sum())
     if spinning:
         why = _count(spinning, "body starts with a spin", "bodies start with a spin", "")
     else:
@@ -137,31 +137,31 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     why = f"linear {world.linear_drag:g} 1/s, quadratic {world.quadratic_drag:g} 1/m"
     yield Demand.DRAG, drag, why if drag else "no drag"
 
-    free = int((meet.free & ~bodies.fixed).sum())
+    free = int((matrix.free & ~bodies.fixed).sum())
     alone = f"; {free:,} of {moving:,} cannot collide with anything" if free else ""
-    why = f"{'balls' if meet.ball_ball else 'no two balls'} can collide{alone}"
-    yield Demand.BALL_BALL, meet.ball_ball, why
+    why = f"{'balls' if matrix.ball_ball else 'no two balls'} can collide{alone}"
+    yield Demand.BALL_BALL, matrix.ball_ball, why
 
-    for demand, kind, things in (
+    for demand, kind, colliders in (
         (Demand.BALL_PLANE, Plane, scene.planes),
         (Demand.BALL_SEGMENT, Wall, scene.walls),
         (Demand.BALL_POST, Post, scene.posts),
     ):
         word = kind.__name__.lower()
-        why = "no moving body can touch one" if things else f"no {word}"
-        count = _count(len(things), word, f"{word}s", "")
-        yield demand, meet.ball_fixed[kind], count if meet.ball_fixed[kind] else why
+        why = "no moving body can touch one" if colliders else f"no {word}"
+        count = _count(len(colliders), word, f"{word}s", "")
+        yield demand, matrix.ball_fixed[kind], count if matrix.ball_fixed[kind] else why
 
-    others = int((~bodies.round & meet.touches & ~bodies.fixed).sum())
+    others = int((~bodies.round & matrix.touches & ~bodies.fixed).sum())
     why = _count(int((~bodies.round).sum()), "body is not a ball", "bodies are not balls", "all bodies are balls")
-    yield Demand.POLYGONS, meet.solids, f"{why}, {others:,} of them can collide" if meet.solids else why
+    yield Demand.POLYGONS, matrix.solids, f"{why}, {others:,} of them can collide" if matrix.solids else why
 
-    touch = bool(meet.touching.any())
-    for demand, most in ((Demand.RESTITUTION, meet.restitution), (Demand.FRICTION, meet.friction)):
+    touch = bool(matrix.touching.any())
+    for demand, most in ((Demand.RESTITUTION, matrix.restitution), (Demand.FRICTION, matrix.friction)):
         why = f"up to {most:g}" if most else "0 for every pair that can collide"
         yield demand, most > 0, why if touch else "no collisions possible"
 
-    yield from _surfaces(scene, meet)
+    yield from _surfaces(scene, matrix)
     yield from _joints(setup)
     yield from _floor(setup)
     apart = len(scene.layers) > 1
@@ -176,12 +176,12 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     )
 
 
-def _surfaces(scene: Scene, meet: ContactMatrix) -> Iterator[tuple[Demand, bool, str]]:
-    surfaces = meet.surfaces
-    most = float(np.max(surfaces.falloff[meet.touching & (surfaces.restitution > 0.0)], initial=0.0))
+def _surfaces(scene: Scene, matrix: ContactMatrix) -> Iterator[tuple[Demand, bool, str]]:
+    surfaces = matrix.surfaces
+    most = float(np.max(surfaces.falloff[matrix.touching & (surfaces.restitution > 0.0)], initial=0.0))
     why = f"up to {most:g} s/m" if most else "restitution does not depend on speed"
     yield Demand.FALLOFF, most > 0.0, why
-    touched = np.asarray(meet.touching.any(axis=1))
+    touched = np.asarray(matrix.touching.any(axis=1))
     of_fixed = touched[surfaces.of_fixed]
     for demand, does, one, many, none in (
         (Demand.KICKS, surfaces.kicks, "wall or post kicks", "walls and posts kick", "no wall or post kicks"),
@@ -189,8 +189,8 @@ def _surfaces(scene: Scene, meet: ContactMatrix) -> Iterator[tuple[Demand, bool,
     ):
         count = int(np.count_nonzero(does[surfaces.of_fixed] & of_fixed)) if len(does) else 0
         yield demand, count > 0, _count(count, one, many, none)
-    things: tuple[Wall | Post, ...] = (*scene.walls, *scene.posts)
-    open_ = sum(not thing.solid for thing in things)
+    colliders: tuple[Wall | Post, ...] = (*scene.walls, *scene.posts)
+    open_ = sum(not collider.solid for collider in colliders)
     yield Demand.PASSABLE, open_ > 0, _count(open_, "wall or post", "walls and posts", "all walls and posts are solid")
 
 
@@ -199,12 +199,12 @@ def _joints(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     for kind, demand in OF_LINKS.items():
         count = int(np.count_nonzero(setup.links.kind == kind))
         yield demand, count > 0, f"{count:,}" if count else "none"
-    for demand, things in (
+    for demand, those in (
         (Demand.ATTRACTION, scene.attractions),
         (Demand.THRUST, scene.thrusts),
         (Demand.DRIVES, scene.drives),
     ):
-        yield demand, bool(things), f"{len(things):,}" if things else "none"
+        yield demand, bool(those), f"{len(those):,}" if those else "none"
 
 
 def _floor(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:

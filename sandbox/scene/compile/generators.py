@@ -138,19 +138,19 @@ def stacked(stack: Stack, random: np.random.Generator) -> Layout:
     return alike(position, stack.velocity, stack.angle, stack.angular_velocity)
 
 
-def count_of(mover: BodySource) -> int:
+def count_of(source: BodySource) -> int:
     """Return the number of bodies of an element."""
-    match mover:
+    match source:
         case Grid() | Scatter() | Emitter():
-            return size(mover)
+            return size(source)
         case Stack():
-            return mover.count
+            return source.count
         case Rope():
-            return node_count(mover)
+            return node_count(source)
         case Cloth():
-            return mover.columns * mover.rows
+            return source.columns * source.rows
         case Ragdoll():
-            return len(segments(mover))
+            return len(segments(source))
         case _:
             return 1
 

@@ -40,27 +40,27 @@ def seams_of(scene: SceneDescription, bodies: Bodies) -> Links:
     if not (scene.ropes or scene.cloths or scene.ragdolls):
         return links
     first, still = 0, np.append(unmoved(scene, bodies), True)  # the world, −1, selects the last row
-    for kind, movers in scene.kinds.items():
-        for k, mover in enumerate(movers):
-            own = _own(mover, first, bodies)
-            first += count_of(mover)
+    for kind, sources in scene.kinds.items():
+        for k, source in enumerate(sources):
+            own = _own(source, first, bodies)
+            first += count_of(source)
             own = own.some(~(still[own.a] & still[own.b]))
-            if isinstance(mover, Woven) and mover.strength is not None:
-                own = replace(own, strength=np.full(len(own), mover.strength))
-            stem = mover.name or default_name(kind, k)
+            if isinstance(source, Woven) and source.strength is not None:
+                own = replace(own, strength=np.full(len(own), source.strength))
+            stem = source.name or default_name(kind, k)
             links = links.joined(replace(own, names=tuple(f"{stem}-joint-{n}" for n in range(1, len(own) + 1))))
     return links
 
 
-def _own(mover: BodySource, first: int, bodies: Bodies) -> Links:
+def _own(source: BodySource, first: int, bodies: Bodies) -> Links:
     """Return the joints of one generator, given the index of its first body."""
-    match mover:
+    match source:
         case Rope():
-            return _tied(_numbered(rope_links(mover), first), mover, bodies)
+            return _tied(_numbered(rope_links(source), first), source, bodies)
         case Cloth():
-            return _numbered(cloth_links(mover), first)
+            return _numbered(cloth_links(source), first)
         case Ragdoll():
-            return _numbered(limb_links(mover), first)
+            return _numbered(limb_links(source), first)
         case _:
             return Links.none()
 

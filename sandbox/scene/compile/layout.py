@@ -88,23 +88,23 @@ def turned(offset: FloatArray, angle: float) -> FloatArray:
 SURFACE = ("material", "restitution", "restitution_falloff", "friction", "colour", "collides", "layer")
 
 
-def elements_of(mover: BodySource) -> tuple[BodySource, ...]:
+def elements_of(source: BodySource) -> tuple[BodySource, ...]:
     """Return the prototypes of an element: itself, a rope's node or plank, a cloth's node, a ragdoll's segments."""
-    match mover:
+    match source:
         case Rope(kind="planks"):
-            plank = Capsule(position=(0.0, 0.0), length=pitch(mover), radius=mover.radius, **_matter(mover))
+            plank = Capsule(position=(0.0, 0.0), length=pitch(source), radius=source.radius, **_matter(source))
             return (plank,)
         case Rope() | Cloth():
-            return (Ball(position=(0.0, 0.0), radius=mover.radius, **_matter(mover)),)
+            return (Ball(position=(0.0, 0.0), radius=source.radius, **_matter(source)),)
         case Ragdoll():
-            return _figure(mover)
+            return _figure(source)
         case _:
-            return (mover,)
+            return (source,)
 
 
 def elements_in(scene: SceneDescription) -> tuple[BodySource, ...]:
     """Return shape and material of the bodies of a scene, in scene order."""
-    return tuple(element for mover in scene.movers for element in elements_of(mover))
+    return tuple(element for source in scene.body_sources for element in elements_of(source))
 
 
 def pitch(rope: Rope) -> float:
@@ -112,12 +112,12 @@ def pitch(rope: Rope) -> float:
     return (math.dist(rope.start, rope.end) if rope.length is None else rope.length) / rope.links
 
 
-def _surface(mover: BodySource) -> dict[str, Any]:
-    return {key: getattr(mover, key) for key in SURFACE}
+def _surface(source: BodySource) -> dict[str, Any]:
+    return {key: getattr(source, key) for key in SURFACE}
 
 
-def _matter(mover: BodySource) -> dict[str, Any]:
-    return {"mass": mover.mass, "density": mover.density, **_surface(mover)}
+def _matter(source: BodySource) -> dict[str, Any]:
+    return {"mass": source.mass, "density": source.density, **_surface(source)}
 
 
 @lru_cache(maxsize=256)

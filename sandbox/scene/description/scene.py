@@ -98,7 +98,7 @@ class SceneDescription(_Header):
         }
 
     @property
-    def movers(self) -> tuple[BodySource, ...]:
+    def body_sources(self) -> tuple[BodySource, ...]:
         """Elements with bodies, in scene order."""
         return tuple(each for those in self.kinds.values() for each in those)
 
@@ -117,8 +117,8 @@ class SceneDescription(_Header):
             named |= dict.fromkeys(zone.layers)
             if zone.to_layer is not None:
                 named[zone.to_layer] = None
-        for mover in self.movers:
-            named[mover.layer] = None
+        for source in self.body_sources:
+            named[source.layer] = None
         return tuple(named)
 
     @cached_property

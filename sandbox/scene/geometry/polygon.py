@@ -151,7 +151,7 @@ def _crossing(points: Sequence[Point]) -> tuple[int, int] | None:
             one, two = along * (cy - ay) - up * (cx - ax), along * (dy - ay) - up * (dx - ax)
             if (one > doubt and two > doubt) or (one < -doubt and two < -doubt):
                 continue
-            if _edges_meet(points, min(i, j), max(i, j)):
+            if _edges_intersect(points, min(i, j), max(i, j)):
                 return min(i, j), max(i, j)
         along, up = dx - cx, dy - cy
         doubt = (
@@ -161,7 +161,7 @@ def _crossing(points: Sequence[Point]) -> tuple[int, int] | None:
     return None
 
 
-def _edges_meet(points: Sequence[Point], i: int, j: int) -> bool:
+def _edges_intersect(points: Sequence[Point], i: int, j: int) -> bool:
     """Return whether edges i < j intersect; adjacent edges do not count."""
     n = len(points)
     a, b, c, d = points[i], points[(i + 1) % n], points[j], points[(j + 1) % n]

@@ -54,9 +54,9 @@ def check_start_positions(
             key = PLACES.get(str(location[0]), "position")
             yield (*location, key), message
 
-    movers = np.asarray([e.collides == "all" for e in bodies.elements], dtype=bool)[bodies.element] & ~bodies.fixed
-    most = MAX_OVERLAPS + MAX_OVERLAPS_EACH * int(movers.sum())
-    overlaps = count_overlaps(bodies.position[movers], bodies.core[movers], most)
+    movable = np.asarray([e.collides == "all" for e in bodies.elements], dtype=bool)[bodies.element] & ~bodies.fixed
+    most = MAX_OVERLAPS + MAX_OVERLAPS_EACH * int(movable.sum())
+    overlaps = count_overlaps(bodies.position[movable], bodies.core[movable], most)
     location = max(elements, key=lambda e: count_of(e[1]))[0] if elements else ()
     if overlaps > most:
         message = (
@@ -65,7 +65,7 @@ def check_start_positions(
         )
         yield location, message
         return
-    if _is_crowded(bodies, movers):
+    if _is_crowded(bodies, movable):
         message = (
             f"the scene starts with more than {OVERLAPS.value:,} pairs of pieces so close that an engine must test "
             "them at every step. Spread the bodies, or use fewer pieces; "
@@ -74,7 +74,7 @@ def check_start_positions(
         yield location, message
     passing = touches & ~bodies.fixed
     most = max(most, OVERLAPS.value)
-    if passing.sum() > movers.sum() and count_overlaps(bodies.position[passing], bodies.core[passing], most) > most:
+    if passing.sum() > movable.sum() and count_overlaps(bodies.position[passing], bodies.core[passing], most) > most:
         message = (
             f"the scene starts with more than {most:,} overlapping pairs of bodies that pass through each other, which "
             "must be tested at every step. Spread them, use fewer, or switch off all their collisions with "
@@ -87,9 +87,9 @@ def check_start_positions(
         yield ("zone", 0), refusal
 
 
-def _is_crowded(bodies: Bodies, movers: BoolArray) -> bool:
+def _is_crowded(bodies: Bodies, movable: BoolArray) -> bool:
     """Return whether pieces of bodies other than balls have too many close pairs."""
-    among = movers & ~bodies.round
+    among = movable & ~bodies.round
     if not among.any():
         return False
     shapes = bodies.shapes
@@ -214,9 +214,9 @@ def check_generators(scene: Scene) -> Iterator[Found]:
 
 def _check_counts(scene: Scene) -> Iterator[Found]:
     total, last = 0, ("", 0)
-    for kind, movers in scene.kinds.items():
-        for k, mover in enumerate(movers):
-            total, last = total + max(count_of(mover), 0), (kind, k)
+    for kind, sources in scene.kinds.items():
+        for k, source in enumerate(sources):
+            total, last = total + max(count_of(source), 0), (kind, k)
     if total > MAX_BODIES:
         yield last, f"the scene would have {total:,} bodies; the limit is {MAX_BODIES:,}"
     taken = total * len(scene.zones) * BYTES_PER_VISIT

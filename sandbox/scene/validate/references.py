@@ -178,10 +178,10 @@ def generator_names(scene: Scene) -> tuple[str, ...]:
 
 def generators(scene: Scene) -> Iterator[tuple[str, int, BodySource]]:
     """Yield name, index within its kind, and specification of each generator, in scene order."""
-    for kind, movers in scene.kinds.items():
-        for k, mover in enumerate(movers):
-            if not isinstance(mover, BodySpec):
-                yield mover.name or default_name(kind, k), k, mover
+    for kind, sources in scene.kinds.items():
+        for k, source in enumerate(sources):
+            if not isinstance(source, BodySpec):
+                yield source.name or default_name(kind, k), k, source
 
 
 def _some(names: tuple[str, ...]) -> str:

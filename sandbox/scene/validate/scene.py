@@ -90,7 +90,7 @@ def _elements(scene: Scene) -> list[tuple[Location, BodySource]]:
 
 def _prototypes(scene: Scene) -> list[tuple[Location, BodySource]]:
     """Return `Bodies.elements`, each with the location of its element."""
-    return [(location, each) for location, mover in _elements(scene) for each in elements_of(mover)]
+    return [(location, each) for location, source in _elements(scene) for each in elements_of(source)]
 
 
 def _static_colliders(scene: Scene) -> list[tuple[Location, HasMaterial]]:

@@ -188,10 +188,10 @@ def _surface(live: LiveView, file: Scene, picked: int | None, key: str, high: fl
     """
     scene = live.scene
     place = _place(live, picked)
-    if place >= len(scene.movers) and picked is None:
+    if place >= len(scene.body_sources) and picked is None:
         return Parameter(key, key, 0.0, high, 0.0, enabled=False, why="the scene has no body")
-    disc = live.bodies.elements[live.bodies.element[picked or 0]] if place >= len(scene.movers) else scene.movers[place]
-    name = disc.name if picked is None or place < len(scene.movers) else live.bodies.names[picked]
+    disc = live.bodies.elements[live.bodies.element[picked or 0]] if place >= len(scene.body_sources) else scene.body_sources[place]
+    name = disc.name if picked is None or place < len(scene.body_sources) else live.bodies.names[picked]
     label = key if picked is None else f"{key} of {name or 'this body'}"
     default = None
     pairs = _pairs(scene, disc if picked is not None else None)
@@ -202,14 +202,14 @@ def _surface(live: LiveView, file: Scene, picked: int | None, key: str, high: fl
         if picked is not None:
             label = f"{key} of {disc.material}"
         return Parameter(key, label, 0.0, high, value, default=default)
-    if place < len(file.movers):
-        default = stated(file, file.movers[place], key)
+    if place < len(file.body_sources):
+        default = stated(file, file.body_sources[place], key)
     return Parameter(key, label, 0.0, high, stated(scene, disc, key), default=default)
 
 
 def _place(live: LiveView, picked: int | None) -> int:
     """Return the place among the scene's movers of a picked body's, or else of the first."""
-    return 0 if picked is None else live.scene.mover_of(int(live.bodies.element[picked]))
+    return 0 if picked is None else live.scene.source_index(int(live.bodies.element[picked]))
 
 
 def _pairs(scene: Scene, disc: BodySource | None) -> list[int]:
@@ -240,14 +240,14 @@ def _paths(live: LiveView, key: str, picked: int | None) -> list[str]:
     """Return where a figure stands: of the picked body or its material, or of all pairs, balls and generators."""
     scene = live.scene
     place = _place(live, picked)
-    if picked is not None and place >= len(scene.movers):
+    if picked is not None and place >= len(scene.body_sources):
         element = live.bodies.elements[int(live.bodies.element[picked])]
         pairs = _pairs(scene, element)
         if pairs:
             return [f"pair.{n}.{key}" for n in pairs]
         return [f"{heading_of(element)}.{_quoted(live.bodies.names[picked])}.{key}"]
-    if place < len(scene.movers):
-        pairs = _pairs(scene, scene.movers[place] if picked is not None else None)
+    if place < len(scene.body_sources):
+        pairs = _pairs(scene, scene.body_sources[place] if picked is not None else None)
         if pairs:
             return [f"pair.{n}.{key}" for n in pairs] if picked is not None else [f"pair.*.{key}"]
     lists: list[tuple[str, Sequence[BodySource]]] = list(scene.kinds.items())

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from scipy.spatial import ConvexHull
 
-from sandbox.engines.reference.polygon import meet_half_plane, meet_pieces
+from sandbox.engines.reference.polygon import collide_half_plane, collide_pieces
 
 Outline = tuple[np.ndarray, float]
 """corners (n, 2), counter-clockwise, and radius"""
@@ -22,15 +22,15 @@ def laid_out(*outlines: Outline) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def met(p: Outline, q: Outline, reach: float = math.inf) -> np.ndarray:
-    """Return the rows that meet_pieces writes."""
+    """Return the rows that collide_pieces writes."""
     out = np.full((2, 6), math.nan)
-    return out[: meet_pieces(*laid_out(p, q), 0, 1, reach, out)]
+    return out[: collide_pieces(*laid_out(p, q), 0, 1, reach, out)]
 
 
 def met_plane(p: Outline, point: tuple[float, float], normal: tuple[float, float], reach: float) -> np.ndarray:
-    """Return the rows that meet_half_plane writes."""
+    """Return the rows that collide_half_plane writes."""
     out = np.full((2, 6), math.nan)
-    return out[: meet_half_plane(*laid_out(p), 0, *point, *normal, reach, out)]
+    return out[: collide_half_plane(*laid_out(p), 0, *point, *normal, reach, out)]
 
 
 def moved(outline: Outline, x: float, y: float, angle: float = 0.0) -> Outline:

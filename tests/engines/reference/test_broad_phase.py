@@ -9,7 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from pieces import ball, roster_of, running, scene_of, shipped, small_pile, stepped
 
-from sandbox.engines.reference.broad_phase import BROAD_PHASES, FIRST, SECOND, cell_of, may_meet, pair_key
+from sandbox.engines.reference.broad_phase import BROAD_PHASES, FIRST, SECOND, can_collide, cell_of, pair_key
 from sandbox.engines.reference.collision import CirclePipeline
 
 WORDS = st.sampled_from(["all", "fixed", "none"])
@@ -49,8 +49,8 @@ def found(finder, position, margin=0.0):
 
 @given(crowds())
 def test_all_find_the_same_manifolds(balls):
-    roster = roster_of(scene_of(*balls))
-    results = [found(CirclePipeline(roster, name), roster.position) for name in BROAD_PHASES]
+    store = roster_of(scene_of(*balls))
+    results = [found(CirclePipeline(store, name), store.position) for name in BROAD_PHASES]
     assert all(result == results[0] for result in results)
     overlapping = [
         pair_key(i, j)
@@ -62,25 +62,25 @@ def test_all_find_the_same_manifolds(balls):
 
 @given(crowds(), st.floats(0, 5))
 def test_none_loses_a_pair_nearer_than_the_margin(balls, margin):
-    roster = roster_of(scene_of(*balls))
+    store = roster_of(scene_of(*balls))
     near = {
         pair_key(i, j)
         for (i, a), (j, b) in combinations(enumerate(balls), 2)
         if meets(a, b) and math.dist(a["position"], b["position"]) < a["radius"] + b["radius"] + margin * (1 - 1e-12)
     }
     for name in BROAD_PHASES:
-        keys = CirclePipeline(roster, name).candidates(roster.position, margin).balls.tolist()
+        keys = CirclePipeline(store, name).candidates(store.position, margin).balls.tolist()
         assert keys == sorted(set(keys))
         assert near <= set(keys)
 
 
 @given(crowds(), st.randoms(use_true_random=False))
 def test_the_order_kept_from_step_to_step_changes_nothing(balls, random):
-    roster = roster_of(scene_of(*balls))
-    used = CirclePipeline(roster, "sweep")
+    store = roster_of(scene_of(*balls))
+    used = CirclePipeline(store, "sweep")
     for _ in range(3):
-        moved = roster.position + np.array([[random.uniform(-3, 3), random.uniform(-3, 3)] for _ in balls])
-        assert found(used, moved) == found(CirclePipeline(roster, "all_pairs"), moved)
+        moved = store.position + np.array([[random.uniform(-3, 3), random.uniform(-3, 3)] for _ in balls])
+        assert found(used, moved) == found(CirclePipeline(store, "all_pairs"), moved)
 
 
 def touching_within_rounding(count):
@@ -98,8 +98,8 @@ def touching_within_rounding(count):
 def test_touches_within_the_rounding_of_a_far_place_are_not_lost(name):
     for x, a, other, b in touching_within_rounding(300):
         balls = [ball(x, 0.0, radius=a), ball(other, 0.0, radius=b)]
-        roster = roster_of(scene_of(*balls))
-        assert found(CirclePipeline(roster, name), roster.position)[0] == [pair_key(0, 1)]
+        store = roster_of(scene_of(*balls))
+        assert found(CirclePipeline(store, name), store.position)[0] == [pair_key(0, 1)]
 
 
 @pytest.mark.parametrize("name", BROAD_PHASES)
@@ -109,8 +109,8 @@ def test_balls_near_the_end_of_doubles_are_neighbours_if_they_touch(name):
     start = 2.0**52 * wide
     for k in range(-40, 40):
         x = start + 2.0 * k
-        roster = roster_of(scene_of(ball(x, 0.0, radius=wide / 2), ball(x + 2.0, 0.0, radius=wide / 2)))
-        assert found(CirclePipeline(roster, name), roster.position)[0] == [pair_key(0, 1)]
+        store = roster_of(scene_of(ball(x, 0.0, radius=wide / 2), ball(x + 2.0, 0.0, radius=wide / 2)))
+        assert found(CirclePipeline(store, name), store.position)[0] == [pair_key(0, 1)]
 
 
 @pytest.mark.parametrize("name", BROAD_PHASES)
@@ -122,42 +122,42 @@ def test_empty_and_smallest_scenes(name, balls):
         finder = CirclePipeline(roster_of(scene_of(**document)), name)
         assert found(finder, np.empty((0, 2)))[0] == []
         return
-    roster = roster_of(scene_of(*balls))
+    store = roster_of(scene_of(*balls))
     expected = [pair_key(0, 1)] if len(balls) == 2 else []
-    assert found(CirclePipeline(roster, name), roster.position)[0] == expected
+    assert found(CirclePipeline(store, name), store.position)[0] == expected
 
 
 @pytest.mark.parametrize("name", BROAD_PHASES)
 def test_coincident_centres_have_the_normal_of_munk(name):
-    roster = roster_of(scene_of(ball(3, 4), ball(3, 4)))
-    contacts = CirclePipeline(roster, name).overlaps(roster.position)
+    store = roster_of(scene_of(ball(3, 4), ball(3, 4)))
+    contacts = CirclePipeline(store, name).overlaps(store.position)
     assert (contacts.separation.tolist(), contacts.normal.tolist()) == ([-1.0], [[1.0, 0.0]])
 
 
 @pytest.mark.parametrize("name", BROAD_PHASES)
 def test_more_pairs_than_there_is_room_for_are_all_kept(name):
     balls = [ball(0.001 * k, 0.0, name=f"b{k}") for k in range(40)]
-    roster = roster_of(scene_of(*balls))
-    assert len(CirclePipeline(roster, name).overlaps(roster.position).key) == 40 * 39 // 2
+    store = roster_of(scene_of(*balls))
+    assert len(CirclePipeline(store, name).overlaps(store.position).key) == 40 * 39 // 2
 
 
 @pytest.mark.parametrize("name", BROAD_PHASES)
 def test_a_position_that_is_no_number_meets_nobody_and_hides_nobody(name):
-    roster = roster_of(scene_of(ball(0, 0), ball(0.5, 0), ball(0.2, 0.2)))
-    position = roster.position.copy()
+    store = roster_of(scene_of(ball(0, 0), ball(0.5, 0), ball(0.2, 0.2)))
+    position = store.position.copy()
     position[2] = np.nan
-    keys = found(CirclePipeline(roster, name), position)[0]
+    keys = found(CirclePipeline(store, name), position)[0]
     assert set(keys) <= {pair_key(0, 1)}
     assert name == "sweep" or keys == [pair_key(0, 1)]
 
 
 def test_circles_tests_every_pair_that_may_meet_and_the_others_far_fewer():
     wide = [ball(3.0 * k, 0.1 * (k % 7), name=f"b{k}") for k in range(400)]
-    roster = roster_of(scene_of(*wide, ball(0, 50, fixed=True), ball(9, 50, fixed=True), ball(4, 50, collides="fixed")))
+    store = roster_of(scene_of(*wide, ball(0, 50, fixed=True), ball(9, 50, fixed=True), ball(4, 50, collides="fixed")))
     tests = {}
     for name in BROAD_PHASES:
-        finder = CirclePipeline(roster, name)
-        finder.overlaps(roster.position)
+        finder = CirclePipeline(store, name)
+        finder.overlaps(store.position)
         tests[name] = finder.work["broad_tests"]
     assert tests["all_pairs"] == 0
     assert tests["circles"] == 400 * 399 // 2 + 400 * 2 + 2
@@ -167,11 +167,11 @@ def test_circles_tests_every_pair_that_may_meet_and_the_others_far_fewer():
 
 def test_one_huge_ball_spoils_the_grid_and_not_the_sweep():
     small = [ball(3.0 * k, 0.0, name=f"b{k}") for k in range(200)]
-    roster = roster_of(scene_of(*small, ball(300, -1e4 - 1, radius=1e4)))
+    store = roster_of(scene_of(*small, ball(300, -1e4 - 1, radius=1e4)))
     tests = {}
     for name in ("grid", "sweep"):
-        finder = CirclePipeline(roster, name)
-        finder.overlaps(roster.position)
+        finder = CirclePipeline(store, name)
+        finder.overlaps(store.position)
         tests[name] = finder.work["broad_tests"]
     assert tests["grid"] == 201 * 200 // 2  # all are in one cell, or in the next
     assert tests["sweep"] < 500
@@ -218,9 +218,9 @@ def test_keys_hold_both_numbers_and_ascend_as_pairs_do():
 
 @given(st.integers(0, 2), st.booleans(), st.integers(0, 2), st.booleans())
 def test_meeting_does_not_depend_on_who_is_asked_first(a, a_moves, b, b_moves):
-    assert may_meet(a, a_moves, b, b_moves) == may_meet(b, b_moves, a, a_moves)
+    assert can_collide(a, a_moves, b, b_moves) == can_collide(b, b_moves, a, a_moves)
     assume(not (a_moves or b_moves))
-    assert not may_meet(a, a_moves, b, b_moves)
+    assert not can_collide(a, a_moves, b, b_moves)
 
 
 def test_cells_are_numbered_from_left_to_right_as_far_as_numbers_go():

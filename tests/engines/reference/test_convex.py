@@ -181,7 +181,16 @@ def test_a_disc_meets_a_box_in_the_region_its_centre_is_in(x, y, normal, separat
 def test_the_tests_taken_are_those_that_fit(monkeypatch):
     """A disc takes the faces of the polygon, two discs none, and a first axis that parts two boxes is the last."""
     plain = {}
-    for name in ("meet_pieces", "meet_disc", "disc_polygon", "meet_faces", "facing", "widest_gap", "clip", "write"):
+    for name in (
+        "collide_pieces",
+        "collide_disc",
+        "disc_polygon",
+        "collide_faces",
+        "facing",
+        "widest_gap",
+        "clip",
+        "write",
+    ):
         plain[name] = getattr(getattr(convex, name), "py_func", getattr(convex, name))
         monkeypatch.setattr(convex, name, plain[name])
     calls = []
@@ -194,7 +203,7 @@ def test_the_tests_taken_are_those_that_fit(monkeypatch):
 
     def taken(p, q):
         calls.clear()
-        plain["meet_pieces"](*laid_out(p, q), 0, 1, 0.01, np.zeros((2, 6)))
+        plain["collide_pieces"](*laid_out(p, q), 0, 1, 0.01, np.zeros((2, 6)))
         return calls
 
     ball, bar = disc(0, 0, 1), capsule(0.5, 0, 1, 1, 0.1)

@@ -39,8 +39,8 @@ def test_the_tutorials_circle_touches_its_half_plane_as_it_says(height):
 @pytest.mark.parametrize("height", TUTORIAL)
 def test_a_scene_touches_as_the_tutorial_says(height):
     scene = scene_of(ball(0, height, radius=1), plane=[{"point": [0, 0], "normal": [0, 1]}])
-    roster = roster_of(scene)
-    contacts = CirclePipeline(roster, "all_pairs").overlaps(roster.position)
+    store = roster_of(scene)
+    contacts = CirclePipeline(store, "all_pairs").overlaps(store.position)
     assert (contacts.size == 1) is TUTORIAL[height]
 
 
@@ -144,8 +144,8 @@ def test_points_lie_midway_in_the_overlap(x, y, radius, angle, near):
         {"ball": [ball(x, y, radius=radius, name="a"), ball(bx, by, radius=other, name="b")]},
         {"ball": [ball(x, y, radius=radius)], "post": [{"position": [bx, by], "radius": other}]},
     ):
-        roster = roster_of(scene_of(*document.pop("ball"), **document))
-        contacts = CirclePipeline(roster, "all_pairs").overlaps(roster.position)
+        store = roster_of(scene_of(*document.pop("ball"), **document))
+        contacts = CirclePipeline(store, "all_pairs").overlaps(store.position)
         px, py = contacts.point[0]
         depth_a, depth_b = radius - math.dist((px, py), (x, y)), other - math.dist((px, py), (bx, by))
         assert depth_a == pytest.approx(depth_b, abs=1e-12)  # ulps of 140 m

@@ -52,9 +52,9 @@ def crowds(draw):
 
 
 def found(scene, broad_phase):
-    roster = BodyStore(Setup.of(scene), 0.01)
-    finder = ConvexPipeline(roster, broad_phase)
-    contacts = finder.overlaps(np.column_stack((roster.position, roster.angle)))
+    store = BodyStore(Setup.of(scene), 0.01)
+    finder = ConvexPipeline(store, broad_phase)
+    contacts = finder.overlaps(np.column_stack((store.position, store.angle)))
     return [column.copy() for column in contacts], finder.work
 
 
@@ -104,9 +104,9 @@ def test_the_test_that_fits_looks_at_least():
     """The tutorial's claim, by counts: discs around planks hold 26 neighbours each, boxes along them none."""
     looked = {}
     for broad_phase in ("circles", "oriented"):
-        roster = BodyStore(Setup.of(planks()), 0.01)
-        finder = ConvexPipeline(roster, broad_phase)
-        finder.overlaps(np.column_stack((roster.position, roster.angle)))
+        store = BodyStore(Setup.of(planks()), 0.01)
+        finder = ConvexPipeline(store, broad_phase)
+        finder.overlaps(np.column_stack((store.position, store.angle)))
         looked[broad_phase] = finder.work["pair_tests"]
     assert looked["oriented"] == 0
     assert looked["circles"] == sum(1 for i in range(40) for j in range(i) if 0.13 * (i - j) <= math.hypot(0.1, 5.0))

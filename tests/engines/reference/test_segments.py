@@ -40,28 +40,29 @@ WORDS = ["all", "fixed", "none"]
 
 @given(courts(), st.floats(0, 4))
 def test_none_nearer_than_the_margin_is_lost(scene, margin):
-    roster = roster_of(scene)
+    store = roster_of(scene)
     near = {
         pair_key(i, s)
-        for i, (x, y) in enumerate(roster.position)
-        for s, (ax, ay, bx, by, half) in enumerate(roster.fixtures.segments)
-        if roster.meets[i] and circle_segment(x, y, roster.radius[i], ax, ay, bx, by, half)[0] < margin * (1 - 1e-12)
+        for i, (x, y) in enumerate(store.position)
+        for s, (ax, ay, bx, by, half) in enumerate(store.fixtures.segments)
+        if store.collision_mask[i]
+        and circle_segment(x, y, store.radius[i], ax, ay, bx, by, half)[0] < margin * (1 - 1e-12)
     }
-    keys = CirclePipeline(roster, "grid").candidates(roster.position, margin).segments.tolist()
+    keys = CirclePipeline(store, "grid").candidates(store.position, margin).segments.tolist()
     assert keys == sorted(set(keys))
     assert near <= set(keys)
 
 
 @given(courts())
 def test_contacts_are_those_that_overlap(scene):
-    roster = roster_of(scene)
-    contacts = CirclePipeline(roster, "grid").overlaps(roster.position)
+    store = roster_of(scene)
+    contacts = CirclePipeline(store, "grid").overlaps(store.position)
     walls = contacts.second < 0
     expected = {
-        (i, -1 - int(roster.fixtures.segment_thing[s]))
-        for i, (x, y) in enumerate(roster.position)
-        for s, (ax, ay, bx, by, half) in enumerate(roster.fixtures.segments)
-        if roster.meets[i] and circle_segment(x, y, roster.radius[i], ax, ay, bx, by, half)[0] < 0
+        (i, -1 - int(store.fixtures.segment_collider[s]))
+        for i, (x, y) in enumerate(store.position)
+        for s, (ax, ay, bx, by, half) in enumerate(store.fixtures.segments)
+        if store.collision_mask[i] and circle_segment(x, y, store.radius[i], ax, ay, bx, by, half)[0] < 0
     }
     # An end is left out where the next segment of the wall is nearer: the wall itself is never lost.
     assert set(zip(contacts.first[walls].tolist(), contacts.second[walls].tolist(), strict=True)) == expected
@@ -78,15 +79,15 @@ def test_walls_far_out_are_not_lost_to_rounding():
             continue
         seen += 1
         wall = {"points": [[place, -1.0], [place, 1.0]], "thickness": 2 * half}
-        roster = roster_of(scene_of(ball(x, 0, radius=r), wall=[wall]))
-        assert CirclePipeline(roster, "grid").overlaps(roster.position).size == 1
+        store = roster_of(scene_of(ball(x, 0, radius=r), wall=[wall]))
+        assert CirclePipeline(store, "grid").overlaps(store.position).size == 1
 
 
 def test_a_long_street_is_not_looked_at_as_a_whole():
     posts = [{"position": [3.0 * k, 0.0], "radius": 0.5} for k in range(1000)]
-    roster = roster_of(scene_of(ball(1500, 0.2), post=posts))
-    finder = CirclePipeline(roster, "grid")
-    assert finder.overlaps(roster.position).size == 1
+    store = roster_of(scene_of(ball(1500, 0.2), post=posts))
+    finder = CirclePipeline(store, "grid")
+    assert finder.overlaps(store.position).size == 1
     assert finder.work["broad_tests"] <= 3
 
 

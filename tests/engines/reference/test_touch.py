@@ -196,8 +196,8 @@ def test_a_segment_of_no_length_is_touched_as_a_circle(x, y, mx, my, ax, ay, dis
 
 
 def finder(*balls, **document):
-    roster = roster_of(scene_of(*balls, **document))
-    return CirclePipeline(roster, "grid"), roster.position
+    store = roster_of(scene_of(*balls, **document))
+    return CirclePipeline(store, "grid"), store.position
 
 
 def test_the_first_of_several_is_found_and_told_by_its_key():

@@ -181,10 +181,10 @@ def account_hit(data: TabletopState, i: int, mine: Five, k: int, theirs: Five, n
 
 
 @kernel
-def account_micro_bounce(data: TabletopState, push: float, separation: float, micro_bounce: float) -> None:
+def account_micro_bounce(data: TabletopState, impulse: float, separation: float, micro_bounce: float) -> None:
     """Add the energy of a micro-bounce to the ledger: impulse, N·s, and speeds of separation before and after."""
     if data.counts[c.ACCOUNTING] != 0:
-        data.world[c.BY_MICRO_BOUNCES] += 0.5 * push * (separation + micro_bounce)
+        data.world[c.BY_MICRO_BOUNCES] += 0.5 * impulse * (separation + micro_bounce)
 
 
 @kernel
@@ -348,12 +348,12 @@ def hit_ball(data: TabletopState, i: int, k: int) -> None:
     pressed = (state[i, c.AX] - state[k, c.AX]) * nx + (state[i, c.AY] - state[k, c.AY]) * ny
     driven = speed_to_gain(data, i, nx, ny) - speed_to_gain(data, k, nx, ny)
     if would_return(separation, driven, pressed, min(state[i, c.PHASE_END], state[k, c.PHASE_END]) - state[i, c.T]):
-        push = (MICRO_BOUNCE - separation) / (li + lk)
-        account_micro_bounce(data, push, separation, MICRO_BOUNCE)
-        state[i, c.VX] -= push * li * nx
-        state[i, c.VY] -= push * li * ny
-        state[k, c.VX] += push * lk * nx
-        state[k, c.VY] += push * lk * ny
+        impulse = (MICRO_BOUNCE - separation) / (li + lk)
+        account_micro_bounce(data, impulse, separation, MICRO_BOUNCE)
+        state[i, c.VX] -= impulse * li * nx
+        state[i, c.VY] -= impulse * li * ny
+        state[k, c.VX] += impulse * lk * nx
+        state[k, c.VY] += impulse * lk * ny
         start_phase(data, i)
         start_phase(data, k)
     if data.counts[c.RECORDING] != 0:

@@ -117,7 +117,7 @@ class TabletopSimulation(EventDrivenSimulation[TabletopState]):
     def _remove(self, numbers: IntArray) -> None:
         """Remove bodies by index; they keep their positions and have no velocity."""
         with booked(self._ledger, Cause.RETIRED, self), np.errstate(all="ignore"):
-            self._store.take_out(numbers, self.time)
+            self._store.remove_bodies(numbers, self.time)
         self._load_bodies()
 
     def _load_bodies(self) -> None:

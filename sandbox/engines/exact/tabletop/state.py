@@ -32,7 +32,7 @@ SPIN_DECAY, PHASE_END, ANGLE, RADIUS, MASS, INVERSE_MASS, ENERGY_UNTIL, STATE_CO
 """
 
 PHASE, COLLISION_MASK, SURFACE, TAG_COLUMNS = range(4)
-"""Columns of `tags`: phase of the motion; collision mask as in `BodyStore.meets`; row of the material in
+"""Columns of `tags`: phase of the motion; collision mask as in `BodyStore.collision_mask`; row of the material in
 `coefficients`."""
 
 PX, PY, NX, NY, UX, UY, LENGTH, LINE_NOSE = range(8)
@@ -183,7 +183,7 @@ def rebuilt(data: TabletopState, store: BodyStore) -> TabletopState:
     state[:, RADIUS], state[:, MASS], state[:, INVERSE_MASS] = store.radius, store.bodies.mass, store.inverse_mass
     floor = figures_of(store.scene.surface)
     state[:, SPIN_DECAY] = floor.spinning / state[:, RADIUS]
-    tags[:, COLLISION_MASK], tags[:, SURFACE] = store.meets, store.surface
+    tags[:, COLLISION_MASK], tags[:, SURFACE] = store.collision_mask, store.surface
     for collider_tags in (data.line_tags, data.vertex_tags):
         collider_tags[:, COLLIDER_SURFACE] = store.fixed_surface[collider_tags[:, COLLIDER]]
     coefficients = np.stack((store.restitution, store.friction))
