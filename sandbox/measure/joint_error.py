@@ -6,8 +6,8 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.joint_arrays import LinkKind, Links
-from sandbox.scene.compile.potential import both_there, ends_over_time, parted, turned_by
+from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
+from sandbox.scene.compile.potential import both_present, ends_over_time, is_broken_at, turned_by
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
@@ -44,7 +44,7 @@ def joint_errors(trajectory: Trajectory, start: Scene | Setup) -> FloatArray:
     step = max(1, CHUNK // max(1, len(links)))
     for begin in range(0, len(found), step):
         rows = slice(begin, begin + step)
-        there = both_there(links, trajectory.time[rows, None] < gone) & ~parted(breaks, trajectory.time[rows])
+        there = both_present(links, trajectory.time[rows, None] < gone) & ~is_broken_at(breaks, trajectory.time[rows])
         found[rows] = _errors(links, trajectory.position[rows], trajectory.angle[rows], there)
     return found
 
@@ -72,7 +72,7 @@ def joint_error(trajectory: Trajectory, start: Scene | Setup) -> float | None:
     return float(there.max()) if len(there) else None
 
 
-def sizes(links: Links, bodies: Bodies) -> FloatArray:
+def sizes(links: JointArrays, bodies: Bodies) -> FloatArray:
     """Return what the error of each link is a share of, (J,): a length in m, or 1 rad."""
     own = 2.0 * np.minimum(bodies.radius[links.b], np.where(links.a >= 0, bodies.radius[links.a], np.inf))
     length = np.where(links.kind == LinkKind.ROD, links.figures[:, 0], 0.0)
@@ -81,7 +81,7 @@ def sizes(links: Links, bodies: Bodies) -> FloatArray:
     return np.asarray(np.where(turning, 1.0, np.where(length > 0.0, length, own)))
 
 
-def _errors(links: Links, position: FloatArray, angle: FloatArray, there: BoolArray) -> FloatArray:
+def _errors(links: JointArrays, position: FloatArray, angle: FloatArray, there: BoolArray) -> FloatArray:
     x, y, _ = links.figures.T
     # A diverged state has no finite distance: that is its error, not a fault.
     with np.errstate(over="ignore", invalid="ignore"):
@@ -102,7 +102,7 @@ def _errors(links: Links, position: FloatArray, angle: FloatArray, there: BoolAr
     return np.where(there, found, np.nan)
 
 
-def _from_groove(links: Links, position: FloatArray, angle: FloatArray, point: FloatArray) -> FloatArray:
+def _from_groove(links: JointArrays, position: FloatArray, angle: FloatArray, point: FloatArray) -> FloatArray:
     """Return the distance of points (T, J, 2) from the grooves of their links, (T, J) m."""
     near, _ = ends_over_time(links, position, angle)
     turn, along = np.where(links.a >= 0, angle[:, links.a], 0.0), links.figures[:, :2] - links.anchor_a

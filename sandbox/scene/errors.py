@@ -14,6 +14,9 @@ Key = str | int
 Location = tuple[Key, ...]
 """Position in a document: keys of tables and indices of arrays, as in `("ball", 0, "velocity", 1)`."""
 
+LocatedMessage = tuple[Location, str]
+"""Location of a fault, and its description."""
+
 
 @dataclass(frozen=True)
 class Fault:

@@ -10,7 +10,7 @@ from sandbox.scene.description.scene import SceneDescription
 
 if TYPE_CHECKING:  # reading a file needs no numpy
     from sandbox.scene.compile.bodies import Bodies
-    from sandbox.scene.compile.joint_arrays import Links
+    from sandbox.scene.compile.joint_arrays import JointArrays
 
 
 class Scene(SceneDescription, HtmlRepr):
@@ -24,11 +24,11 @@ class Scene(SceneDescription, HtmlRepr):
         return start_bodies(self)
 
     @cached_property
-    def links(self) -> "Links":
+    def links(self) -> "JointArrays":
         """Joints as arrays; they refer to the indices of `bodies`."""
-        from sandbox.scene.compile.joints import links_of
+        from sandbox.scene.compile.joints import compile_joints
 
-        return links_of(self, self.bodies)
+        return compile_joints(self, self.bodies)
 
     @cached_property
     def elements(self) -> tuple[BodySource, ...]:

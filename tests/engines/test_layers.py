@@ -138,7 +138,7 @@ def test_meetings_count_every_layer_that_can_be_got_to() -> None:
     assert got == [{"ground", "a", "b"}, {"b"}, {"far", "farther"}, {"ground"}, {"none"}]
     meet = contact_matrix(scene)
     assert meet.touches.tolist() == [True, True, False, False, False]
-    assert meet.noted.tolist() == [True, False, True, False, False]
+    assert meet.can_enter_zone.tolist() == [True, False, True, False, False]
     assert meet.free.tolist() == [False, False, False, True, True]
 
 

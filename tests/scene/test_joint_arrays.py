@@ -1,4 +1,4 @@
-"""Links: joints as arrays, by the numbers of bodies and about their centres of mass."""
+"""Joints as arrays, by the indices of their bodies and about their centres of mass."""
 
 import math
 
@@ -7,7 +7,7 @@ import pytest
 import strategies
 from hypothesis import given, settings
 
-from sandbox.scene.compile.joint_arrays import WORLD, LinkKind, Links
+from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
 from sandbox.scene.files.load import from_document
 from sandbox.scene.scene import Scene
 
@@ -85,4 +85,4 @@ def test_links_follow_their_bodies_into_a_smaller_cast(scene: Scene) -> None:
         assert (name in still) is not gone
         if not gone:
             assert fewer[still[name]] == b
-    assert len(scene.links.joined(Links.none())) == len(scene.links)
+    assert len(scene.links.joined(JointArrays.none())) == len(scene.links)

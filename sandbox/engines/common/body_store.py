@@ -17,7 +17,7 @@ from sandbox.engines.common.motors import rate_after_level_change
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
 from sandbox.scene.compile.drives import Mount, about_hinge, mounts
-from sandbox.scene.compile.joint_arrays import Links
+from sandbox.scene.compile.joint_arrays import JointArrays
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource, BodySpec, Collides
 from sandbox.scene.description.forces import PlungerDrive, TorqueDrive
@@ -54,7 +54,7 @@ class BodyStore:
         """(N,) collision layer of each body, by its index in the scene's `layers`"""
         self.visits: IntArray = bodies.visits.copy()
         """(N, Z) state of each body with regard to each zone"""
-        self.caught: BoolArray = np.zeros(len(bodies), dtype=np.bool_)
+        self.held_by_zone: BoolArray = np.zeros(len(bodies), dtype=np.bool_)
         """(N,) whether a zone holds the body in place"""
         self.drives: FloatArray = setup.drives.copy()
         """(D, 3) state of each drive, as in `Frame.drives`"""
@@ -108,7 +108,7 @@ class BodyStore:
             self.inverse_mass[n], self.inverse_moment[n] = 0.0, 0.0 if self.led[n] else 1.0 / about
 
     @property
-    def links(self) -> Links:
+    def links(self) -> JointArrays:
         """The joints that are intact and whose bodies are present."""
         return self.setup.links.some(self.linked())
 
@@ -138,7 +138,7 @@ class BodyStore:
     @property
     def moving(self) -> BoolArray:
         """(N,) whether each body is present, not fixed, and not held by a zone."""
-        return self.mobile & ~self.caught
+        return self.mobile & ~self.held_by_zone
 
     @property
     def gravity(self) -> FloatArray:
@@ -221,7 +221,7 @@ class BodyStore:
         self.angular_velocity = np.append(self.angular_velocity, bodies.angular_velocity[-1])
         self.present = np.append(self.present, True)
         self.force, self.torque = np.vstack((self.force, np.zeros((1, 2)))), np.append(self.torque, 0.0)
-        self._has_torque, self.caught = np.append(self._has_torque, False), np.append(self.caught, False)
+        self._has_torque, self.held_by_zone = np.append(self._has_torque, False), np.append(self.held_by_zone, False)
         self.layer = np.append(self.layer, bodies.layer[-1])
         self.visits = np.vstack((self.visits, bodies.visits[-1:]))
         self._rebuild(self.setup, bodies, matrix)
@@ -232,7 +232,7 @@ class BodyStore:
         self.present[indices] = False
         self.velocity[indices], self.angular_velocity[indices], self.roll[indices] = 0.0, 0.0, 0.0
         self.force[indices], self.torque[indices] = 0.0, 0.0
-        self.caught[indices] = False
+        self.held_by_zone[indices] = False
         self._retired |= dict.fromkeys(indices.tolist(), time)
         self._rebuild(self.setup, self.bodies, self.contact_matrix)
 

@@ -93,7 +93,7 @@ class ContactBatch(NamedTuple):
     """(K,) contact point, m, midway in the overlap"""
 
 
-def joined(some: ContactBatch, more: ContactBatch) -> ContactBatch:
+def join_batches(some: ContactBatch, more: ContactBatch) -> ContactBatch:
     """Return the contacts of two batches as one."""
     return ContactBatch(*(np.concatenate(both) for both in zip(some, more, strict=True)))
 

@@ -64,7 +64,7 @@ def total_energy(simulation: Simulation) -> float:
 
 
 @contextmanager
-def booked(account: EnergyLedger | None, cause: Cause, simulation: Simulation) -> Iterator[None]:
+def record_energy_change(account: EnergyLedger | None, cause: Cause, simulation: Simulation) -> Iterator[None]:
     """Attribute the energy change of a simulation within the context to a cause. Without an account do nothing.
 
     If the body of the context raises, nothing is entered: the simulation is unchanged then.

@@ -8,7 +8,7 @@ from sandbox.engines.common.actions import has_same_bodies
 from sandbox.engines.common.body_store import ALL, COLLISION_MASKS, FIXED, NOTHING, BodyStore
 from sandbox.engines.common.colliders import static_colliders
 from sandbox.engines.exact.start_overlaps import overlap_message, overlapping_collider, touch_tolerance
-from sandbox.engines.tabletop.requirements import caught, unlevel
+from sandbox.engines.tabletop.requirements import pockets_at, unsupported_on_surface
 from sandbox.scene.compile.demands import curls, on_floor
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource, BodySpec
@@ -90,7 +90,7 @@ class EventDrivenBodies(BodyStore):
         if scene.world.linear_drag or scene.world.quadratic_drag:
             raise ActionError("exact does not model drag; pymunk and reference do")
         checked = scene.world is self.scene.world and has_same_bodies(scene, self.scene)
-        if not checked and on_floor(setup) and (lacks := next(unlevel(setup, self.bodies), None)):
+        if not checked and on_floor(setup) and (lacks := next(unsupported_on_surface(setup, self.bodies), None)):
             raise ActionError(lacks)
         if curls(setup):
             raise ActionError("exact does not model curl; pymunk does")
@@ -116,7 +116,9 @@ class EventDrivenBodies(BodyStore):
             others = np.ones(len(self.bodies), dtype=np.bool_)
             position, kind = np.asarray(single.position), COLLISION_MASKS[single.collides]
             self._check_free(name, position, single.radius, kind, single.fixed, others)
-            if on_floor(self.setup) and (lacks := next(unlevel(self.setup, self.bodies.joined_by(single, name)), None)):
+            if on_floor(self.setup) and (
+                lacks := next(unsupported_on_surface(self.setup, self.bodies.joined_by(single, name)), None)
+            ):
                 raise ActionError(lacks)
         elif single.collides != "none":
             raise ActionError(f"exact does not model polygons, such as {name!r}; pymunk and reference do")
@@ -132,7 +134,7 @@ class EventDrivenBodies(BodyStore):
         """
         if number in self.position_set or self.collision_mask[number] == NOTHING:
             return
-        if caught(self.scene, self.position[number : number + 1])[0] >= 0:
+        if pockets_at(self.scene, self.position[number : number + 1])[0] >= 0:
             raise ActionError(f"{self.bodies.names[number]!r} is in a pocket; move it back into play first")
 
     def _check_free(
@@ -146,9 +148,9 @@ class EventDrivenBodies(BodyStore):
         if kind == NOTHING:
             return
         still = self.bodies.fixed
-        if caught(self.scene, position[None, :])[0] >= 0:
+        if pockets_at(self.scene, position[None, :])[0] >= 0:
             return
-        others = others & (caught(self.scene, self.position) < 0)  # captured balls do not collide
+        others = others & (pockets_at(self.scene, self.position) < 0)  # captured balls do not collide
         collides = others & (self.collision_mask == ALL) & ~still if kind == ALL else np.zeros_like(others)
         collides |= others & (self.collision_mask == FIXED) & ~still if fixed and kind == ALL else False
         collides |= others & (self.collision_mask == ALL) & still & (not fixed)

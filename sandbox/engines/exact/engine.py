@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sandbox.arrays import FloatArray
-from sandbox.engines.tabletop.requirements import unlevel
+from sandbox.engines.tabletop.requirements import unsupported_on_surface
 from sandbox.scene.compile.demands import BALLS, FLOOR, SURFACES, Demand, on_floor, unmodelled
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
@@ -53,7 +53,7 @@ class ExactEngine:
         if settings.half_kick:
             lacks.append("half_kick is not supported (it uses no time steps; remove it)")
         if on_floor(setup):
-            lacks += unlevel(setup)
+            lacks += unsupported_on_surface(setup)
         overload = too_many_pairs(setup)
         if overload is not None:
             return (*lacks, overload)
@@ -107,14 +107,14 @@ def overlap_of(start: Scene | Setup, position: FloatArray) -> str | None:
     """Return a message naming two overlapping objects with the bodies at positions (N, 2), m; None without overlap."""
     from sandbox.engines.common.colliders import static_colliders
     from sandbox.engines.exact.start_overlaps import overlap_message, overlapping_balls, overlapping_collider
-    from sandbox.engines.tabletop.requirements import caught
+    from sandbox.engines.tabletop.requirements import pockets_at
 
     setup = Setup.of(start)
     scene, bodies = setup.scene, setup.bodies
     if not bodies.round.any():
         return None
     kinds = np.asarray([element.collides for element in bodies.elements])[bodies.element]
-    in_play = bodies.round & (caught(scene, position) < 0)  # captured balls do not collide
+    in_play = bodies.round & (pockets_at(scene, position) < 0)  # captured balls do not collide
     to_all, to_fixed = (kinds == "all") & in_play, (kinds == "fixed") & in_play
     pair = overlapping_balls(position, bodies.radius, to_all, to_fixed, bodies.fixed)
     if pair is not None:

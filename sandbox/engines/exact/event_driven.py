@@ -13,7 +13,7 @@ from sandbox.engines.common.actions import apply_action
 from sandbox.engines.common.base import BEYOND, BaseSimulation
 from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 from sandbox.engines.common.contact_log import too_many_contacts
-from sandbox.engines.common.energy_balance import booked
+from sandbox.engines.common.energy_balance import record_energy_change
 from sandbox.engines.common.kernel import warn_if_uncompiled
 from sandbox.engines.contract import Divergence, Exhaustion, Observer
 from sandbox.engines.energy_ledger import Cause, EnergyLedger
@@ -126,7 +126,7 @@ class EventDrivenSimulation(BaseSimulation, Generic[Data]):
         with self._turn, np.errstate(all="ignore"):
             self._check_running()
             self._store.clear_changes()
-            with booked(self._ledger, Cause.ACTIONS, self):
+            with record_energy_change(self._ledger, Cause.ACTIONS, self):
                 leaving = apply_action(action, self._store)
             self._load_bodies()
             if leaving is not None:

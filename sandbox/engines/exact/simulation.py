@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from sandbox.arrays import IntArray
-from sandbox.engines.common.energy_balance import booked
+from sandbox.engines.common.energy_balance import record_energy_change
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.exact import state as c
 from sandbox.engines.exact.bodies import EventDrivenBodies
@@ -156,7 +156,7 @@ class ExactSimulation(EventDrivenSimulation[EventState]):
                 self._data.state[i, c.VX : c.SPIN + 2] = 0.0
                 self._data.next_time[i] = np.inf
                 self._data.tags[i, c.VERSION] += 1
-        with booked(self._ledger, Cause.RETIRED, self):
+        with record_energy_change(self._ledger, Cause.RETIRED, self):
             self._store.remove_bodies(numbers, now)
         self._data = rebuilt(self._data, self._store)
 

@@ -16,7 +16,7 @@ from sandbox.engines.common.zones import ZoneTracker
 from sandbox.engines.pymunk_adapter.particles import Particles
 from sandbox.engines.pymunk_adapter.space import SpaceBodies
 from sandbox.engines.tabletop.contacts import SKIN
-from sandbox.engines.tabletop.requirements import of_floors, on_floor
+from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_steppers
 from sandbox.engines.tabletop.stepper import BallArrays, TabletopStepper
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
@@ -152,7 +152,7 @@ class PymunkBodies:
         self.capture()
         if self.zone_tracker is not None:
             here = filter(
-                self.space_bodies.is_sensed, np.flatnonzero(self._contact_matrix.noted).tolist()
+                self.space_bodies.is_sensed, np.flatnonzero(self._contact_matrix.can_enter_zone).tolist()
             )  # others may lie in pockets
             self.zone_tracker.begin(here, anew=setup.time == 0.0)
 
@@ -283,7 +283,7 @@ class PymunkBodies:
         bodies, matrix = self.bodies, self._contact_matrix
         same = spawned is None and has_same_bodies(scene, self.scene)
         checked = same and scene.world is self.scene.world
-        if self.tabletop is not None and not checked and (lacks := next(of_floors(setup), None)):
+        if self.tabletop is not None and not checked and (lacks := next(unsupported_by_steppers(setup), None)):
             raise ActionError(lacks)
         if not same:
             spawned = bodies.elements[len(self.scene.elements) :] if spawned is None else spawned
@@ -313,7 +313,7 @@ class PymunkBodies:
         """
         scene = self.scene
         bodies = self.bodies.joined_by(single, name)
-        if self.tabletop is not None and (lacks := next(of_floors(self.setup, bodies), None)):
+        if self.tabletop is not None and (lacks := next(unsupported_by_steppers(self.setup, bodies), None)):
             raise ActionError(lacks)
         matrix = derive_contacts(self.setup, bodies)
         self.refresh()

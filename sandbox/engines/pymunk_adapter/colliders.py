@@ -46,7 +46,7 @@ def factors(wanted: FloatArray, touching: BoolArray, stated: list[float | None])
     plain = [1.0 if value is None else value for value in stated]
     if not wrong_pairs(wanted, touching, plain):
         return plain
-    solved = _solved(wanted, touching)
+    solved = _solve_factors(wanted, touching)
     return min(plain, solved, key=lambda f: len(wrong_pairs(wanted, touching, f)))
 
 
@@ -58,7 +58,7 @@ def wrong_pairs(wanted: FloatArray, touching: BoolArray, factor: list[float]) ->
     return list(zip(rows.tolist(), columns.tolist(), strict=True))
 
 
-def _solved(wanted: FloatArray, touching: BoolArray) -> list[float]:
+def _solve_factors(wanted: FloatArray, touching: BoolArray) -> list[float]:
     """Solve f_a·f_b = wanted over the pairs that can touch, as far as possible.
 
     Factors of surfaces that touch their own kind are fixed; from these, values spread along the pairs.

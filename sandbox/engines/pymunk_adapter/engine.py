@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from sandbox.engines.common.base import BIAS, slop_of
 from sandbox.engines.common.workload import overload
-from sandbox.engines.tabletop.requirements import of_floors, on_floor
+from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_steppers
 from sandbox.resource_limits import SPACE_SIZE
 from sandbox.scene.compile.demands import BALLS, FLOOR, JOINTS, SURFACES, Demand, unmodelled
 from sandbox.scene.compile.setup import Setup
@@ -70,7 +70,7 @@ class PymunkEngine:
         if scene.drives and scene.attractions:
             lacks.append("it does not model attraction and drives together")
         if on_floor(setup):
-            lacks += of_floors(setup)
+            lacks += unsupported_by_steppers(setup)
         return (*lacks, *overload(setup, settings), *_too_large(setup))
 
     def resolve(self, start: Scene | Setup, settings: Settings) -> Settings:

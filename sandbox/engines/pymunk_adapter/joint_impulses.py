@@ -7,7 +7,7 @@ import numpy as np
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.geometry import rotate
 from sandbox.engines.pymunk_adapter.joints import SpaceJoints, elastic, relative
-from sandbox.scene.compile.joint_arrays import LinkKind, Links
+from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
 
 
 class JointImpulses(NamedTuple):
@@ -128,7 +128,7 @@ def motors(joints: SpaceJoints, position: FloatArray, angle: FloatArray, given: 
     return JointImpulses(chosen.a, chosen.b, still, still, still, signs * np.abs(joints.impulses(chosen)))
 
 
-def _component_counts(links: Links) -> IntArray:
+def _component_counts(links: JointArrays) -> IntArray:
     """Return the number of components of the impulse of each joint, (K,)."""
     return np.where(np.isin(links.kind, (LinkKind.PIVOT, LinkKind.GROOVE)), 2, 1)
 
@@ -137,7 +137,7 @@ def _stacked(given: ImpulseSums) -> FloatArray:
     return np.column_stack((given.linear, given.angular))[:-1].reshape(-1)
 
 
-def _unit_responses(links: Links, position: FloatArray, angle: FloatArray) -> FloatArray:
+def _unit_responses(links: JointArrays, position: FloatArray, angle: FloatArray) -> FloatArray:
     """Return the effect of unit impulses of joints, (U,), on all bodies: (3N, U); x, y and angular for each body."""
     count = _component_counts(links)
     column = np.cumsum(count) - count

@@ -9,10 +9,10 @@ import pymunk
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.geometry import rotate
-from sandbox.scene.compile.joint_arrays import WORLD, LinkKind, Links
+from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
 
 
-def constraint_of(links: Links, k: int, a: pymunk.Body, b: pymunk.Body, bias: float) -> pymunk.Constraint:
+def constraint_of(links: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body, bias: float) -> pymunk.Constraint:
     """Create the constraint of joint k between two bodies of a space.
 
     Args:
@@ -22,7 +22,7 @@ def constraint_of(links: Links, k: int, a: pymunk.Body, b: pymunk.Body, bias: fl
         b: second body.
         bias: fraction of a joint's error that remains after one second.
     """
-    constraint = _made(links, k, a, b)
+    constraint = _new_constraint(links, k, a, b)
     constraint.collide_bodies = bool(links.collide[k])
     constraint.error_bias = bias
     constraint.max_bias = math.inf
@@ -30,7 +30,7 @@ def constraint_of(links: Links, k: int, a: pymunk.Body, b: pymunk.Body, bias: fl
     return constraint
 
 
-def _made(links: Links, k: int, a: pymunk.Body, b: pymunk.Body) -> pymunk.Constraint:
+def _new_constraint(links: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body) -> pymunk.Constraint:
     x, y, z = links.figures[k].tolist()
     at, on = tuple(links.anchor_a[k].tolist()), tuple(links.anchor_b[k].tolist())
     match LinkKind(int(links.kind[k])):
@@ -57,7 +57,7 @@ def _made(links: Links, k: int, a: pymunk.Body, b: pymunk.Body) -> pymunk.Constr
 
 
 def tension(
-    links: Links, position: FloatArray, velocity: FloatArray, angle: FloatArray, spin: FloatArray
+    links: JointArrays, position: FloatArray, velocity: FloatArray, angle: FloatArray, spin: FloatArray
 ) -> FloatArray:
     """Return the magnitude of the force of springs, (K,) N.
 
@@ -77,7 +77,7 @@ def tension(
     return np.asarray(np.abs(links.figures[:, 2] * rate - elastic(links, length)))
 
 
-def spring_forces(links: Links, position: FloatArray, angle: FloatArray) -> FloatArray:
+def spring_forces(links: JointArrays, position: FloatArray, angle: FloatArray) -> FloatArray:
     """Return the forces (N, 2), N, of springs on bodies, without their dampers.
 
     Args:
@@ -98,13 +98,13 @@ def spring_forces(links: Links, position: FloatArray, angle: FloatArray) -> Floa
     return total[:-1]
 
 
-def torsion(links: Links, angle: FloatArray, spin: FloatArray) -> FloatArray:
+def torsion(links: JointArrays, angle: FloatArray, spin: FloatArray) -> FloatArray:
     """Return the magnitude of the torque of rotary springs, (K,) N·m."""
     turned, rate = relative(links, angle), relative(links, spin)
     return np.asarray(np.abs(links.figures[:, 2] * rate - elastic(links, turned)))
 
 
-def elastic(links: Links, extent: FloatArray) -> FloatArray:
+def elastic(links: JointArrays, extent: FloatArray) -> FloatArray:
     """Return the force, N, of springs at lengths (K,), m, or the torque, N·m, of rotary springs at angles (K,), rad.
 
     It is stiffness · (rest − extent), without the damper, and positive where it increases the extent.
@@ -113,7 +113,7 @@ def elastic(links: Links, extent: FloatArray) -> FloatArray:
     return np.asarray(stiffness * (rest - extent))
 
 
-def relative(links: Links, values: FloatArray) -> FloatArray:
+def relative(links: JointArrays, values: FloatArray) -> FloatArray:
     """Return values (N,) of second bodies minus those of first bodies, (K,); 0 for the world."""
     return np.asarray(values[links.b] - np.where(links.a >= 0, values[links.a], 0.0))
 
@@ -143,12 +143,12 @@ def _anchors(
 class JointsByKind(NamedTuple):
     """Joints by kind."""
 
-    springs: Links
-    rotary: Links
+    springs: JointArrays
+    rotary: JointArrays
     """rotary springs"""
-    rigid: Links
+    rigid: JointArrays
     """all but springs and rotary springs"""
-    motors: Links
+    motors: JointArrays
     """the motors among the rigid joints"""
 
     def __bool__(self) -> bool:
@@ -161,14 +161,14 @@ class SpaceJoints:
 
     def __init__(self, space: pymunk.Space) -> None:
         self._space = space
-        self._links: Links | None = None
+        self._links: JointArrays | None = None
         self._constraints: dict[int, pymunk.Constraint] = {}
         self._by_kind: JointsByKind | None = None
         self.count = 0
         """number of constraints"""
-        self._rebuild(Links.none())
+        self._rebuild(JointArrays.none())
 
-    def add(self, links: Links, body: Callable[[int], pymunk.Body], bias: float) -> None:
+    def add(self, links: JointArrays, body: Callable[[int], pymunk.Body], bias: float) -> None:
         """Add the joints of a scene, once.
 
         Args:
@@ -231,7 +231,7 @@ class SpaceJoints:
             self._by_kind = JointsByKind(present.of(springs), present.of(rotary), rigid, rigid.of(LinkKind.MOTOR))
         return self._by_kind
 
-    def impulses(self, links: Links) -> FloatArray:
+    def impulses(self, links: JointArrays) -> FloatArray:
         """Return pymunk's impulse of each of some joints in the last substep, (K,) N·s or N·m·s.
 
         For joints it is the magnitude; for springs it is signed, positive if it pushes the bodies apart.
@@ -246,10 +246,10 @@ class SpaceJoints:
         assert self._links is not None
         self._rebuild(self._links.counted().some(np.asarray(sorted(self._constraints), dtype=np.int64)))
 
-    def _rebuild(self, links: Links) -> None:
+    def _rebuild(self, links: JointArrays) -> None:
         """Update the lists of present joints, and of those that can break."""
         self.count = len(self._constraints)
-        self._present: Links = links
+        self._present: JointArrays = links
         self._by_kind = None
         breakable = links.some(np.isfinite(links.strength))
         kinds = LinkKind.SPRING, LinkKind.ROTARY_SPRING

@@ -9,8 +9,8 @@ from sandbox.action import Action
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.actions import apply_action
 from sandbox.engines.common.base import BaseSimulation
-from sandbox.engines.common.contact_log import ContactBatch, ContactLog, joined
-from sandbox.engines.common.energy_balance import booked
+from sandbox.engines.common.contact_log import ContactBatch, ContactLog, join_batches
+from sandbox.engines.common.energy_balance import record_energy_change
 from sandbox.engines.common.lifetimes import Lifetimes
 from sandbox.engines.contract import Divergence, Exhaustion, Observer
 from sandbox.engines.energy_ledger import Cause, EnergyLedger
@@ -41,7 +41,7 @@ class EventRecorder:
         steady = log.steady and entries is None
         now = self._population.space_bodies.touching(steady) if tabletop is None else tabletop.drain_contacts()
         if isinstance(now, ContactBatch):
-            log.record(time, now if entries is None else joined(now, entries))
+            log.record(time, now if entries is None else join_batches(now, entries))
             self.contacts += len(now.a)
         else:
             log.add_impulses(now)
@@ -196,7 +196,7 @@ class PymunkSimulation(BaseSimulation):
         with self._turn:
             self._check_running()
             self._shared_angles = None
-            with booked(self._action_ledger, Cause.ACTIONS, self):
+            with record_energy_change(self._action_ledger, Cause.ACTIONS, self):
                 leaving = apply_action(action, self._population)
                 self._population.invalidate()
                 self._shared_angles = None
@@ -324,7 +324,7 @@ class PymunkSimulation(BaseSimulation):
 
     def _update_zones(self) -> None:
         """Apply the effects of zones that bodies have entered."""
-        with booked(self._action_ledger, Cause.DRIVES, self):
+        with record_energy_change(self._action_ledger, Cause.DRIVES, self):
             self._population.update_zones()
         zone_tracker = self._population.zone_tracker
         if self._recorder is None and zone_tracker is not None:
@@ -375,7 +375,7 @@ class PymunkSimulation(BaseSimulation):
             self._remove_bodies(removed)
 
     def _remove_bodies(self, indices: IntArray) -> None:
-        with booked(self._action_ledger, Cause.RETIRED, self):
+        with record_energy_change(self._action_ledger, Cause.RETIRED, self):
             self._shared_angles = None
             self._population.remove_bodies(indices)
         self._shared_angles = None

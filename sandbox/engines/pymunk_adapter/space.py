@@ -29,7 +29,7 @@ from sandbox.engines.pymunk_adapter.reader import SpaceReader
 from sandbox.engines.pymunk_adapter.zones import ZoneSensors
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix
-from sandbox.scene.compile.joint_arrays import WORLD, Links
+from sandbox.scene.compile.joint_arrays import WORLD, JointArrays
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.fixed import PlaneReach
 from sandbox.scene.description.world import Settings, World
@@ -393,7 +393,7 @@ class SpaceBodies(SpaceBodyTable):
         self._reader.invalidate_order()
         self._state = None
 
-    def link(self, links: Links) -> None:
+    def link(self, links: JointArrays) -> None:
         """Add the scene's joints, once; jointed bodies are always in the space."""
         assert self._settings.bias is not None
         if self._members:
@@ -417,7 +417,7 @@ class SpaceBodies(SpaceBodyTable):
             self._has_single_contacts = False  # contacts with the removed shapes vanish without being listed as ended
         self.rebuild_world(scene)
         self._surface_of, self._surface_of_fixed = matrix.surfaces.of_shape, matrix.surfaces.of_fixed
-        self._can_touch, self._sensed = matrix.touches, matrix.noted
+        self._can_touch, self._sensed = matrix.touches, matrix.can_enter_zone
         self._surface_setter.rebuild(matrix, jointed_surfaces(scene, self._surface_of_fixed))
         for index, (_, own) in self._members.items():
             for piece, shape in own:

@@ -53,7 +53,7 @@ def pair_key(i: int, j: int) -> int:
 
 
 @bare_kernel
-def listed(keys: IntArray, key: int) -> bool:
+def contains_key(keys: IntArray, key: int) -> bool:
     """Return whether a key is among ascending keys (K,)."""
     low, high = 0, len(keys)
     while low < high:

@@ -304,8 +304,8 @@ class CirclePipeline(CollisionPipeline):
 
     def max_displacement(self, start: FloatArray, end: FloatArray) -> float:
         """Return the longest way, m, between two sets of (N, ≥ 2) centres, of those that can touch anything."""
-        way = (end - start)[self.can_touch, :2]
-        return float(np.sqrt((way * way).sum(axis=1)).max(initial=0.0))
+        displacement = (end - start)[self.can_touch, :2]
+        return float(np.sqrt((displacement * displacement).sum(axis=1)).max(initial=0.0))
 
     def first_touch(self, start: FloatArray, end: FloatArray, rest: IntArray) -> tuple[float, int]:
         """Return the fraction of straight ways at which a pair first touches, and its key; −1 for none.
@@ -396,13 +396,13 @@ class ConvexPipeline(CollisionPipeline):
 
     def max_displacement(self, start: FloatArray, end: FloatArray) -> float:
         """Return the longest way, m, of any point of those that can touch anything, between two sets of poses."""
-        way = (end - start)[self.can_touch]
-        length = np.sqrt((way[:, :2] ** 2).sum(axis=1))
-        if way.shape[1] == 3:
+        displacement = (end - start)[self.can_touch]
+        length = np.sqrt((displacement[:, :2] ** 2).sum(axis=1))
+        if displacement.shape[1] == 3:
             reach = self._store.radius[self.can_touch]
             if self._store.held:
                 reach = reach + np.hypot(*self._store.hinge[self.can_touch].T)
-            length += np.abs(way[:, 2]) * reach
+            length += np.abs(displacement[:, 2]) * reach
         return float(length.max(initial=0.0))
 
 
@@ -417,17 +417,17 @@ def make_pipeline(
         collision_filter: None if every candidate pair may touch.
         work: counters of the work done, shared with the solvers.
     """
-    kind = ConvexPipeline if pieced(store) else CirclePipeline
+    kind = ConvexPipeline if needs_pieces(store) else CirclePipeline
     pipeline = kind(store, broad_phase, work)
     pipeline.filter = collision_filter
     return pipeline
 
 
-def suits(pipeline: CollisionPipeline, store: BodyStore) -> bool:
+def is_suitable(pipeline: CollisionPipeline, store: BodyStore) -> bool:
     """Return whether a pipeline is of the kind that a body store needs; if not, its keys mean other pairs."""
-    return isinstance(pipeline, ConvexPipeline) == pieced(store)
+    return isinstance(pipeline, ConvexPipeline) == needs_pieces(store)
 
 
-def pieced(store: BodyStore) -> bool:
+def needs_pieces(store: BodyStore) -> bool:
     """Return whether collisions are detected by convex pieces: not all bodies are discs about their centres."""
     return store.contact_matrix.solids or len(store.drives) > 0

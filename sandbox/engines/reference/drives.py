@@ -258,7 +258,7 @@ class DrivenPlunger(DrivenBody):
         return -self.mass * float(np.dot(self.gravity, pose[self.number, :2]))
 
 
-def lead_of(store: BodyStore, number: int, mount: Mount) -> DrivenBody:
+def make_driven_body(store: BodyStore, number: int, mount: Mount) -> DrivenBody:
     """Return the driven body with an index."""
     kinds: dict[str, type[HingeMotor] | type[KinematicHinge] | type[DrivenPlunger]]
     kinds = {"torque": HingeMotor, "stroke": KinematicHinge, "plunger": DrivenPlunger}
@@ -281,7 +281,7 @@ class Drives:
 
     def __init__(self, store: BodyStore) -> None:
         self._store = store
-        self.leads: list[DrivenBody] = [lead_of(store, number, mount) for number, mount in store.held.items()]
+        self.leads: list[DrivenBody] = [make_driven_body(store, number, mount) for number, mount in store.held.items()]
         self._hinges = [lead for lead in self.leads if isinstance(lead, HingeMotor)]
         self._numbers: IntArray = np.asarray([lead.number for lead in self.leads], np.int64)
         self._turning = not store.led[self._numbers].all()
@@ -419,7 +419,7 @@ class Drives:
         for lead in self.leads:
             lead.done(after)
 
-    def taken(self, contacts: Manifolds, impulse: FloatArray, mean: FloatArray) -> float:
+    def contact_work(self, contacts: Manifolds, impulse: FloatArray, mean: FloatArray) -> float:
         """Return the work of impulses (K, 2), N·s, on driven bodies at mean rates (N, 3), J."""
         if not contacts.size:
             return 0.0

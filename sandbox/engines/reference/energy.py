@@ -97,10 +97,10 @@ class StepEnergyLedger:
     def _book_drives(self, drives: Drives, record: StepRecord, mean: FloatArray) -> None:
         """Book drives: what driven bodies gained, less what contacts and weight gave them."""
         work = drives.work(record.before, record.after, record.h)
-        taken = drives.taken(record.contacts, record.impulse, mean)
+        contact_work = drives.contact_work(record.contacts, record.impulse, mean)
         if self._penalty is not None:  # its forces are booked whole, and against freely moving bodies alone
-            self.account.enter(Cause.INTEGRATOR, taken)
-        self.account.enter(Cause.DRIVES, work.gained - taken - work.weight)
+            self.account.enter(Cause.INTEGRATOR, contact_work)
+        self.account.enter(Cause.DRIVES, work.gained - contact_work - work.weight)
         self.account.enter(Cause.INTEGRATOR, work.weight + work.lifted)
 
     def _book_contacts(

@@ -23,14 +23,14 @@ def drives_lack(setup: Setup, wanted: frozenset[Demand], settings: Settings) -> 
         lacks.append(f"detection {settings.detection!r} does not support drives; 'discrete' and 'shrink' do")
     if Demand.ATTRACTION in wanted:
         lacks.append("it does not model attraction and drives together")
-    held = _joined(setup)
+    held = _fixed_joint_with_drive(setup)
     if held is not None:
         body, drive = held
         lacks.append(f"it does not model a joint to {body!r}, whose motion the drive {drive!r} prescribes")
     return lacks
 
 
-def _joined(setup: Setup) -> tuple[str, str] | None:
+def _fixed_joint_with_drive(setup: Setup) -> tuple[str, str] | None:
     """Return a driven body that a joint holds as well, and its drive."""
     scene, numbers = setup.scene, setup.bodies.number_of
     joined = setup.links.held(len(setup.bodies))

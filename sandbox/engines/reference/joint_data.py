@@ -18,7 +18,7 @@ import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.kernel import bare_kernel
-from sandbox.scene.compile.joint_arrays import LinkKind, Links
+from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
 
 # Plain numbers: compiled code compares them without an enumeration's detour.
 ROD, PIVOT, SLIDE = int(LinkKind.ROD), int(LinkKind.PIVOT), int(LinkKind.SLIDE)
@@ -60,7 +60,7 @@ class JointData(NamedTuple):
         return JointData._make(np.concatenate(pair) for pair in zip(self, more, strict=True))
 
 
-def ties_of(links: Links, *kinds: LinkKind, among: IntArray | None = None) -> JointData:
+def ties_of(links: JointArrays, *kinds: LinkKind, among: IntArray | None = None) -> JointData:
     """Return the joints of some kinds, in their order; with `among`, only those with these indices."""
     which = np.isin(links.kind, kinds)
     if among is not None:

@@ -46,7 +46,7 @@ from sandbox.engines.reference.joint_rows import (
     warm_start,
 )
 from sandbox.engines.reference.position_joints import project
-from sandbox.scene.compile.joint_arrays import LinkKind, Links
+from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
 
 LACKING = (LinkKind.GROOVE, LinkKind.MOTOR, LinkKind.GEAR)
 """Kinds that are not modelled here."""
@@ -72,7 +72,7 @@ class JointSolver:
 
     def __init__(
         self,
-        links: Links,
+        links: JointArrays,
         inverse_mass: FloatArray,
         inverse_moment: FloatArray,
         bias: float,
@@ -178,7 +178,7 @@ class JointSolver:
     def _align(self, moved: State) -> None:
         """Remove the velocity components that would separate the corrected joint ends: the second stage of RATTLE."""
         given, bound, h = self.rows.impulse.copy(), self.rows.bound, self._h
-        # No bias: positions are corrected already. A row with an impulse is active, whichever side of its bound it is on.
+        # No bias: positions are already corrected. A row with an impulse is active, on whichever side of its bound.
         prepare(self.rows, self._held, moved[0], h, h, 1.0, self.inverse_mass, self.inverse_moment)
         either = np.isin(self._held.kind, (LinkKind.ROD, LinkKind.PIVOT))
         bound[:, 0] = np.where(either | (given[:, 0] < 0.0), -h * self._held.most_force, 0.0)
@@ -221,7 +221,7 @@ class JointBreaker:
     The mean is not taken over the pieces that impacts cut a substep into: the shorter a piece, the larger its forces.
     """
 
-    def __init__(self, links: Links) -> None:
+    def __init__(self, links: JointArrays) -> None:
         self._strength = links.strength
         self._breakable: IntArray = np.flatnonzero(np.isfinite(links.strength))
         self._given: FloatArray = np.zeros((len(links), 2))  # N·s or N·m·s, in this substep

@@ -117,7 +117,7 @@ STRAIGHT = 1e-9
 
 
 @kernel
-def following(start: int, end: int, k: int) -> int:
+def next_corner(start: int, end: int, k: int) -> int:
     """Return the corner after k, going round."""
     return k + 1 if k + 1 < end else start
 
@@ -138,7 +138,7 @@ def widest_gap(
     """
     best, face, nearest = -math.inf, start, other
     for k in range(start, end):
-        after = following(start, end, k)
+        after = next_corner(start, end, k)
         x, y = corner[k, 0], corner[k, 1]
         along_x, along_y = corner[after, 0] - x, corner[after, 1] - y
         length = math.sqrt(along_x * along_x + along_y * along_y)
@@ -165,7 +165,7 @@ def whole_face(corner: FloatArray, start: int, end: int, one: int, two: int) -> 
     dx, dy = corner[two, 0] - corner[one, 0], corner[two, 1] - corner[one, 1]
     limit = STRAIGHT * STRAIGHT * (dx * dx + dy * dy)
     while True:
-        far = following(start, end, two)
+        far = next_corner(start, end, two)
         ex, ey = corner[far, 0] - corner[two, 0], corner[far, 1] - corner[two, 1]
         cross = dx * ey - dy * ex
         if far == one or dx * ex + dy * ey < 0.0 or cross * cross > limit * (ex * ex + ey * ey):
@@ -190,7 +190,7 @@ def face_at(corner: FloatArray, start: int, end: int, k: int, nx: float, ny: flo
     after, out_x, out_y, out_length = k, 0.0, 0.0, 0.0
     before, in_x, in_y, in_length = k, 0.0, 0.0, 0.0
     for _ in range(start, end):
-        after = following(start, end, after)
+        after = next_corner(start, end, after)
         out_x, out_y = corner[after, 0] - x, corner[after, 1] - y
         out_length = math.sqrt(out_x * out_x + out_y * out_y)
         if out_length > shortest:
@@ -283,7 +283,7 @@ def disc_polygon(
     gap, k, _ = widest_gap(corner, start, end, c, c + 1, reach + wide)
     if gap == -math.inf:  # no larger than rounding: a disc
         return circle_circle(x, y, disc_radius, corner[start, 0], corner[start, 1], piece_radius)
-    one, two = whole_face(corner, start, end, k, following(start, end, k))
+    one, two = whole_face(corner, start, end, k, next_corner(start, end, k))
     tx, ty = corner[two, 0] - corner[one, 0], corner[two, 1] - corner[one, 1]
     length = math.sqrt(tx * tx + ty * ty)
     tx, ty = tx / length, ty / length
@@ -380,9 +380,9 @@ def facing(
     b_corner: int,
 ) -> tuple[bool, int, int, int, int]:
     """Return whether the second piece has the reference face, the ends of that, and those of the incident face."""
-    a_one, a_two = whole_face(corner, a, a_end, a_face, following(a, a_end, a_face))
+    a_one, a_two = whole_face(corner, a, a_end, a_face, next_corner(a, a_end, a_face))
     if b_gap > a_gap:
-        b_one, b_two = whole_face(corner, b, b_end, b_face, following(b, b_end, b_face))
+        b_one, b_two = whole_face(corner, b, b_end, b_face, next_corner(b, b_end, b_face))
         dx, dy = corner[b_two, 0] - corner[b_one, 0], corner[b_two, 1] - corner[b_one, 1]
         incident, other = face_at(corner, a, a_end, a_corner, -dy, dx)
         ex, ey = corner[a_two, 0] - corner[a_one, 0], corner[a_two, 1] - corner[a_one, 1]

@@ -18,12 +18,12 @@ from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.body_store import NOTHING, BodyStore
 from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.contract import Exhaustion
-from sandbox.engines.reference.broad_phase import FIRST, ROUNDING, SECOND, listed, pair_key
+from sandbox.engines.reference.broad_phase import FIRST, ROUNDING, SECOND, contains_key, pair_key
 from sandbox.engines.reference.internal_edges import smooth
 from sandbox.engines.reference.manifold import KIND, Manifolds, is_covered
-from sandbox.engines.reference.polygon import collide_half_plane, collide_pieces, following
+from sandbox.engines.reference.polygon import collide_half_plane, collide_pieces, next_corner
 from sandbox.resource_limits import MEMORY
-from sandbox.scene.compile.joint_arrays import Links
+from sandbox.scene.compile.joint_arrays import JointArrays
 
 BYTES_PER_PAIR = 6 * 8
 """Both numbers, the key, and sorting it."""
@@ -85,7 +85,7 @@ class WorldPieces:
         lay_out(self.body, self.first, self.local, self.local_middle, position, angle, self.corner, self.middle)
 
 
-def apart_keys(links: Links) -> IntArray:
+def apart_keys(links: JointArrays) -> IntArray:
     """Return the keys of the pairs of bodies that joints exclude from collision, (K,), ascending."""
     return np.sort([pair_key(a, b) for a, b in links.apart().tolist()]).astype(np.int64)
 
@@ -143,7 +143,7 @@ def box_of(corner: FloatArray, first: IntArray, radius: FloatArray, p: int) -> O
     start, end, wide = first[p], first[p + 1], radius[p]
     longest, ax, ay = 0.0, 1.0, 0.0
     for k in range(start, end):
-        after = following(start, end, k)
+        after = next_corner(start, end, k)
         dx, dy = corner[after, 0] - corner[k, 0], corner[after, 1] - corner[k, 1]
         length = math.sqrt(dx * dx + dy * dy)
         if length > longest:
@@ -206,7 +206,7 @@ def drop(keys: IntArray, body: IntArray, apart: IntArray, group: IntArray) -> in
         a, b = body[keys[k] >> FIRST], body[keys[k] & SECOND]
         if a == b or (group[a] != 0 and group[a] == group[b]):
             continue
-        if not listed(apart, pair_key(min(a, b), max(a, b))):
+        if not contains_key(apart, pair_key(min(a, b), max(a, b))):
             keys[kept] = keys[k]
             kept += 1
     return kept

@@ -10,7 +10,7 @@ from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.actions import apply_action
 from sandbox.engines.common.base import BEYOND, BaseSimulation
 from sandbox.engines.common.body_store import BodyStore
-from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, ContactLog, joined
+from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, ContactLog, join_batches
 from sandbox.engines.common.kernel import warn_if_uncompiled
 from sandbox.engines.contract import Divergence, Exhaustion, Observer
 from sandbox.engines.energy_ledger import Cause
@@ -178,7 +178,7 @@ class ReferenceSimulation(BaseSimulation):
         if self._ledger is not None and visits is not None:
             # Contacts were logged with their impulses: they last, beside the visits.
             lasting = self._now._replace(impulse=np.zeros_like(self._now.impulse))
-            self._ledger.record(time, joined(lasting, visits))
+            self._ledger.record(time, join_batches(lasting, visits))
 
     def _rebuild(self) -> None:
         """Derive the world and the energy ledger anew from the body store."""
@@ -253,7 +253,7 @@ class ReferenceSimulation(BaseSimulation):
             now = _touching(overlaps, np.zeros((overlaps.size, 2)))
             if self._zoned is not None:  # bodies in zones are logged now, and with the first substep
                 self._came = self._zoned.visiting.drain_entries()
-            self._ledger.record(self.time, now if self._came is None else joined(now, self._came))
+            self._ledger.record(self.time, now if self._came is None else join_batches(now, self._came))
         return self._ledger.take()
 
     def account(self) -> Mapping[Cause, float]:
@@ -273,7 +273,7 @@ class ReferenceSimulation(BaseSimulation):
         end = self._world.time
         self._now = now = _touching(*_real(*record.all_contacts(), record.after[1], self._store.inverse_mass))
         visits, self._came = self._came, None
-        log.record(end, now if visits is None else joined(now, visits))
+        log.record(end, now if visits is None else join_batches(now, visits))
         if self._observer is not None:
             # The observer may keep what it is given: these arrays are never written to again.
             centres = self._world.centres

@@ -18,7 +18,7 @@ import numpy as np
 
 from sandbox.arrays import FloatArray
 from sandbox.engines.common.body_store import BodyStore
-from sandbox.engines.reference.collision import WORK, CollisionPipeline, make_pipeline, suits
+from sandbox.engines.reference.collision import WORK, CollisionPipeline, is_suitable, make_pipeline
 from sandbox.engines.reference.drives import DrivenSolver, Drives
 from sandbox.engines.reference.filtering import CollisionFilter, OneWayWalls
 from sandbox.engines.reference.forces import ForceField, forces_on
@@ -153,7 +153,7 @@ class WorldState:
         if self.drives is not None:
             self.drives.enter(self.x)
         self.memory.rebuild(store.moving)
-        if not suits(self.pipeline, store):  # keys mean other pairs from now on
+        if not is_suitable(self.pipeline, store):  # keys mean other pairs from now on
             self.pipeline = self._new_pipeline(self.work)
             self._penalty = self._new_penalty(self.pipeline)
             self.memory.forget(self._settings.h)

@@ -8,7 +8,7 @@ import math
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.kernel import bare_kernel as kernel
-from sandbox.engines.reference.broad_phase import FIRST, SECOND, listed, pair_key
+from sandbox.engines.reference.broad_phase import FIRST, SECOND, contains_key, pair_key
 from sandbox.engines.reference.manifold import KIND, circle_segment, is_covered
 
 NEVER = 2.0
@@ -110,7 +110,7 @@ def first_touch(
         x, y = start[j, 0] - start[i, 0], start[j, 1] - start[i, 1]
         mx, my = end[j, 0] - end[i, 0] - x, end[j, 1] - end[i, 1] - y
         fraction = touch_circle(x, y, mx, my, radius[i] + radius[j])
-        if fraction < first and not listed(rest, balls[k]):
+        if fraction < first and not contains_key(rest, balls[k]):
             first, found = fraction, balls[k]
     for i in range(len(start)):
         if can_touch[i]:
@@ -120,7 +120,7 @@ def first_touch(
                 gap = (start[i, 0] - planes[p, 0]) * nx + (start[i, 1] - planes[p, 1]) * ny - radius[i]
                 fraction = touch_line(gap, -(mx * nx + my * ny))
                 key = (1 << KIND) + pair_key(i, p)
-                if fraction < first and not listed(rest, key):
+                if fraction < first and not contains_key(rest, key):
                     first, found = fraction, key
     for k in range(len(segment_keys)):
         i, s = segment_keys[k] >> FIRST, segment_keys[k] & SECOND
@@ -128,7 +128,7 @@ def first_touch(
         ax, ay, bx, by = segments[s, 0], segments[s, 1], segments[s, 2], segments[s, 3]
         fraction = touch_segment(x, y, end[i, 0] - x, end[i, 1] - y, ax, ay, bx, by, radius[i] + segments[s, 4])
         key = (2 << KIND) + segment_keys[k]
-        if fraction < first and not listed(rest, key):
+        if fraction < first and not contains_key(rest, key):
             x, y = x + fraction * (end[i, 0] - x), y + fraction * (end[i, 1] - y)
             _, nx, ny = circle_segment(x, y, radius[i], ax, ay, bx, by, segments[s, 4])
             before_x, before_y, after_x, after_y = joints[s, 0], joints[s, 1], joints[s, 2], joints[s, 3]

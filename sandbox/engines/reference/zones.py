@@ -78,7 +78,7 @@ def within(edge: FloatArray, first: int, end: int, reach: float, x: float, y: fl
 @kernel
 def look_around(
     position: FloatArray,
-    noted: BoolArray,
+    can_enter_zone: BoolArray,
     edge: FloatArray,
     first: IntArray,
     reach: FloatArray,
@@ -90,7 +90,7 @@ def look_around(
 
     Args:
         position: (N, ≥ 2) centres, m.
-        noted: (N,) whether zones detect the body; others are inside of none.
+        can_enter_zone: (N,) whether zones detect the body; others are inside of none.
         edge: (E, 4), and so on, of `ZoneShapes`.
         first: (Z + 1,).
         reach: (Z,) m.
@@ -104,7 +104,7 @@ def look_around(
         pending[i] = False
         for z in range(len(reach)):
             now = False
-            if noted[i] and box[z, 0] <= x and x <= box[z, 2] and box[z, 1] <= y and y <= box[z, 3]:
+            if can_enter_zone[i] and box[z, 0] <= x and x <= box[z, 2] and box[z, 1] <= y and y <= box[z, 3]:
                 now = within(edge, first[z], first[z + 1], reach[z], x, y)
             if now != inside[i, z]:
                 inside[i, z] = now
@@ -132,19 +132,19 @@ class ZonedBodyStore(BodyStore):
         self._changed = False
         self.visiting = ZoneTracker(scene, self)
         self._rebuild_zones()
-        self.visiting.begin(np.flatnonzero(self.contact_matrix.noted).tolist(), anew=setup.time == 0.0)
+        self.visiting.begin(np.flatnonzero(self.contact_matrix.can_enter_zone).tolist(), anew=setup.time == 0.0)
 
     def _rebuild_zones(self) -> None:
         more = np.zeros((len(self.visits) - len(self._inside), self.visits.shape[1]), np.bool_)
         self._inside = np.vstack((self._inside, more))
         self._stirred: BoolArray = np.zeros(len(self.visits), np.bool_)
-        self._noted: BoolArray = self.contact_matrix.noted & self.present
+        self._can_enter_zone: BoolArray = self.contact_matrix.can_enter_zone & self.present
         self.visiting.set_arrays(self.position, self.velocity, self.angular_velocity, self.layer, self.visits)
         self.visiting.rebuild(self.contact_matrix)
 
     def look(self, position: FloatArray) -> bool:
         """Find the zones of (N, ≥ 2) centres, m, at the end of a substep; return whether zones have to act."""
-        if look_around(position, self._noted, *self._precincts, self._inside, self._stirred):
+        if look_around(position, self._can_enter_zone, *self._precincts, self._inside, self._stirred):
             self.pending.update(np.flatnonzero(self._stirred).tolist())
         return bool(self.pending)
 
@@ -166,7 +166,7 @@ class ZonedBodyStore(BodyStore):
 
     def is_sensed(self, number: int) -> bool:
         """Return whether a body is present, and zones detect it."""
-        return bool(self._noted[number])
+        return bool(self._can_enter_zone[number])
 
     @property
     def with_own_gravity(self) -> list[int]:
@@ -202,7 +202,7 @@ class ZonedBodyStore(BodyStore):
 
     def _stands(self, number: int, held: bool) -> None:
         self.velocity[number], self.angular_velocity[number] = 0.0, 0.0
-        self.caught[number], self._changed = held, True
+        self.held_by_zone[number], self._changed = held, True
         self._rebuild(self.setup, self.bodies, self.contact_matrix)
 
     def set_gravity(self, number: int, gravity: Point | None) -> None:

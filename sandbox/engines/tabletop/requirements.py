@@ -12,7 +12,7 @@ from sandbox.scene.compile.setup import Setup
 from sandbox.scene.scene import Scene
 
 
-def unlevel(start: Scene | Setup, bodies: Bodies | None = None) -> Iterator[str]:
+def unsupported_on_surface(start: Scene | Setup, bodies: Bodies | None = None) -> Iterator[str]:
     """Yield what is not supported on a surface by any engine, with the scene's bodies and those spawned since.
 
     Sides of pucks are upright, so that pucks of different radii collide horizontally; balls of different radii do not.
@@ -28,7 +28,7 @@ def unlevel(start: Scene | Setup, bodies: Bodies | None = None) -> Iterator[str]
         yield "it does not model collisions of balls with different radii on a floor"
 
 
-def caught(scene: Scene, position: FloatArray) -> IntArray:
+def pockets_at(scene: Scene, position: FloatArray) -> IntArray:
     """Return the index of the pocket that contains each of N centres (N, 2), m, (N,); −1 for none.
 
     Where pockets overlap it is the first of them.
@@ -46,12 +46,12 @@ def on_floor(start: Scene | Setup) -> bool:
     return (scene.surface is not None or bool(scene.pockets)) and has_floor(start)
 
 
-def of_floors(start: Scene | Setup, bodies: Bodies | None = None) -> Iterator[str]:
+def unsupported_by_steppers(start: Scene | Setup, bodies: Bodies | None = None) -> Iterator[str]:
     """Yield what is not supported on a surface by time-step solvers, with the scene's bodies or with given ones."""
     setup = Setup.of(start)
     scene, bodies = setup.scene, setup.bodies if bodies is None else bodies
     world = scene.world
-    yield from unlevel(setup, bodies)
+    yield from unsupported_on_surface(setup, bodies)
     if world.linear_drag or world.quadratic_drag:
         yield "it does not model drag on a floor"
     if len(setup.links) or scene.attractions or scene.thrusts or scene.drives:

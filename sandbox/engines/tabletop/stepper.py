@@ -17,7 +17,7 @@ import numpy as np
 from sandbox.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from sandbox.engines.common.base import BEYOND, FARTHEST, FASTEST
 from sandbox.engines.common.body_store import COLLISION_MASKS, NOTHING
-from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, joined
+from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, join_batches
 from sandbox.engines.contract import Exhaustion
 from sandbox.engines.energy_ledger import Cause, EnergyLedger
 from sandbox.engines.tabletop.collisions import BALL_BALL, CUSHION
@@ -216,7 +216,7 @@ class TabletopStepper:
         given = balls.velocity[indices] * self._mass[indices, None]
         normal = (centre - place) / reach[:, None]
         captures = ContactBatch(indices, -1 - self._collider_count - which, *map(_complex, (-given, normal, place)))
-        self._captures = joined(self._captures, captures)
+        self._captures = join_batches(self._captures, captures)
         self.pocket[indices] = which
         balls.in_play[indices] = False
         balls.collision_mask[indices] = NOTHING
@@ -231,7 +231,7 @@ class TabletopStepper:
         captures, self._captures = self._captures, NO_CONTACTS
         if not len(captures.a):
             return self.touching
-        return joined(self.touching, captures)
+        return join_batches(self.touching, captures)
 
     def beyond(self) -> tuple[int, str] | None:
         """Return a ball that is not finite or out of bounds, and a description; else None."""

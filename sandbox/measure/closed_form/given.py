@@ -9,7 +9,7 @@ import numpy as np
 from sandbox.arrays import BoolArray, FloatArray
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
-from sandbox.scene.compile.joint_arrays import WORLD, LinkKind, Links
+from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
 from sandbox.scene.description.fixed import Plane
 from sandbox.scene.description.world import World
 from sandbox.scene.scene import Scene
@@ -39,7 +39,7 @@ class Given:
     scene: Scene
     bodies: Bodies
     meet: ContactMatrix
-    links: Links
+    links: JointArrays
     thrust: BoolArray
     """(N,) carries a thrust, or has a drive"""
 

@@ -11,7 +11,7 @@ from sandbox.measure.distance import hull_distance
 from sandbox.measure.lying import gap_above, pieces_over_time
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import contact_matrix
-from sandbox.scene.compile.drives import driven_in
+from sandbox.scene.compile.drives import is_driven
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.fixed import Plane, Post, Wall, Zone
 from sandbox.scene.geometry.neighbours import near_pairs
@@ -64,7 +64,7 @@ def close_pairs(start: Scene | Setup, reach: float = 0.0) -> list[tuple[Pair, fl
     """
     setup = Setup.of(start)
     scene, bodies, meet = setup.scene, setup.bodies, contact_matrix(setup)
-    still = bodies.fixed | driven_in(scene, bodies)
+    still = bodies.fixed | is_driven(scene, bodies)
     meeting = meet.touches | bodies.fixed
     found = []
     for i, j in _near(bodies, meeting, reach):

@@ -10,7 +10,7 @@ from sandbox.measure.compare.errors import errors
 from sandbox.measure.compare.gaps import Pair, close_pairs, gap
 from sandbox.measure.joint_error import HOLDING
 from sandbox.scene.compile.contacts import contact_matrix
-from sandbox.scene.compile.drives import driven_in
+from sandbox.scene.compile.drives import is_driven
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
@@ -44,7 +44,7 @@ def perturb(start: Scene | Setup, amount: float = NUDGE, seed: int = 0) -> Setup
     """
     setup = Setup.of(start)
     scene, bodies, meet = setup.scene, setup.bodies, contact_matrix(setup)
-    still = bodies.fixed | driven_in(scene, bodies)
+    still = bodies.fixed | is_driven(scene, bodies)
     able = ~still & (~meet.free | bool(scene.attractions))
     if not able.any():
         return None
@@ -95,7 +95,7 @@ def touching_pairs(start: Scene | Setup, touch: float = TOUCH) -> list[tuple[Pai
         touch: m; a gap or an overlap of no more is a touch.
     """
     setup = Setup.of(start)
-    still = setup.bodies.fixed | driven_in(setup.scene, setup.bodies)
+    still = setup.bodies.fixed | is_driven(setup.scene, setup.bodies)
     pairs = [pair for pair, clear in close_pairs(setup, touch) if clear >= -touch]
     return [((i, j), _normal(setup, j if still[i] else i, (i, j))) for i, j in pairs]
 

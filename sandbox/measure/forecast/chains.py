@@ -24,7 +24,7 @@ from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.base import BIAS
 from sandbox.measure.forecast.modes import Product, extremes, groups
 from sandbox.measure.forecast.warning import ROUNDING, Figures, Warning, at_most, enough_work
-from sandbox.scene.compile.joint_arrays import LinkKind, Links
+from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
 from sandbox.scene.description.world import Settings
 from sandbox.scene.scene import Scene
 
@@ -80,7 +80,7 @@ def chain_warnings(scene: Scene, settings: Settings) -> Iterator[Warning]:
             yield Warning("chain", message, figures)
 
 
-def slowest(links: Links, inverse_mass: FloatArray) -> float:
+def slowest(links: JointArrays, inverse_mass: FloatArray) -> float:
     """Return λ, the least eigenvalue but 0 of the matrix of joints that hang together, its diagonal scaled to 1.
 
     They are taken to lie in one line, as they do where it matters: then one joint is one row, with 1/m at its bodies
@@ -124,7 +124,7 @@ def _among(product: Product, moving: IntArray, count: int) -> Product:
     return inner
 
 
-def _most_unequal(links: Links, inverse_mass: FloatArray) -> tuple[int, float]:
+def _most_unequal(links: JointArrays, inverse_mass: FloatArray) -> tuple[int, float]:
     """Return which joint is between the most unequal masses that move, and their ratio."""
     first = np.where(links.a >= 0, inverse_mass[links.a], 0.0)
     second = inverse_mass[links.b]

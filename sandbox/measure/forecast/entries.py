@@ -15,7 +15,7 @@ from sandbox.scene.scene import Scene
 
 def entry_warnings(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterator[Warning]:
     """Yield a warning for each zone that the fastest body can fly through, where it is narrowest, in a substep."""
-    noted = np.flatnonzero(meet.noted)
+    noted = np.flatnonzero(meet.can_enter_zone)
     if not len(noted):
         return
     speeds, layers = top_speeds(scene, meet)[noted], reach(scene, scene.bodies)[noted]

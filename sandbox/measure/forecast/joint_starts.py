@@ -7,7 +7,7 @@ import numpy as np
 from sandbox.arrays import BoolArray
 from sandbox.measure.forecast.warning import Figures, Warning
 from sandbox.measure.joint_error import sizes, starting_errors
-from sandbox.scene.compile.joint_arrays import WORLD, LinkKind, Links
+from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
 from sandbox.scene.scene import Scene
 
 LOOSE = 0.01
@@ -49,7 +49,7 @@ def joint_start_warnings(scene: Scene) -> Iterator[Warning]:
         yield Warning("anchors", message, {"joint": name, "body": body, "others": others})
 
 
-def _off(links: Links, k: int, error: float, others: int) -> Warning:
+def _off(links: JointArrays, k: int, error: float, others: int) -> Warning:
     """Return the warning for a joint that starts off by an error, m or rad."""
     unit, name = "rad" if links.kind[k] in ANGLES else "m", links.names[k]
     message = (
@@ -64,7 +64,7 @@ def _and_others(count: int) -> str:
     return f" (and {count:,} other{'s' if count > 1 else ''})" if count else ""
 
 
-def _swapped(scene: Scene, links: Links) -> BoolArray:
+def _swapped(scene: Scene, links: JointArrays) -> BoolArray:
     """Tell which joints of one body with the world have anchors that would fit in the other order, (J,)."""
     radius = scene.bodies.radius[links.b]
     own, other = np.hypot(*links.anchor_b.T), np.hypot(*links.anchor_a.T)

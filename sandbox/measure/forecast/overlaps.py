@@ -12,7 +12,7 @@ from sandbox.measure.forecast.passages import meet_each_other
 from sandbox.measure.forecast.warning import Warning
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix, reach
-from sandbox.scene.compile.drives import driven_in
+from sandbox.scene.compile.drives import is_driven
 from sandbox.scene.description.fixed import Plane, Post, Wall, mask_of
 from sandbox.scene.geometry.neighbours import near_pairs
 from sandbox.scene.scene import Scene
@@ -115,7 +115,7 @@ def _in_fixed(scene: Scene, meet: ContactMatrix) -> Iterator[Overlap]:
     if scene.surface is not None:
         return
     bodies, layers = scene.bodies, reach(scene, scene.bodies)
-    able = meet.touches & ~bodies.fixed & (bodies.thin > 0.0) & ~driven_in(scene, bodies)
+    able = meet.touches & ~bodies.fixed & (bodies.thin > 0.0) & ~is_driven(scene, bodies)
     looked_at = measured = 0
     for k, (thing, name) in enumerate(zip(scene.fixed, scene.fixed_names, strict=False)):
         if (not isinstance(thing, Plane) and not thing.solid) or (isinstance(thing, Wall) and thing.one_way):

@@ -9,7 +9,7 @@ import numpy as np
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.measure.forecast.modes import extremes, groups
 from sandbox.measure.forecast.warning import ROUNDING, Figures, Warning, at_most
-from sandbox.scene.compile.joint_arrays import LinkKind, Links
+from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
 from sandbox.scene.description.world import Settings
 from sandbox.scene.scene import Scene
 
@@ -150,7 +150,7 @@ def fastest(scene: Scene) -> list[Mode]:
     return found
 
 
-def _largest(links: Links, rows: FloatArray, weight: FloatArray, root: FloatArray) -> float:
+def _largest(links: JointArrays, rows: FloatArray, weight: FloatArray, root: FloatArray) -> float:
     """Return the largest eigenvalue of M⁻¹·Jᵀ·W·J of one group; `root` (N, 3) is M^−½."""
     known, place = np.unique(np.concatenate((np.where(links.a >= 0, links.a, links.b), links.b)), return_inverse=True)
     place = place.reshape(-1)
@@ -176,7 +176,7 @@ def _gathered(first: IntArray, on_a: FloatArray, second: IntArray, on_b: FloatAr
     return total.reshape(-1)
 
 
-def _rows(links: Links, position: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _rows(links: JointArrays, position: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return how x, y, angle of both bodies strain each spring along, across, about it, (3J, 6), and k, c, (3J,)."""
     first, second = links.ends(position, angle)
     arm_a = np.where((links.a >= 0)[:, None], first - position[links.a], 0.0)

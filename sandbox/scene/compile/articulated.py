@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.arrays import FloatArray
-from sandbox.scene.compile.joint_arrays import WORLD, LinkKind, Links
+from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
 from sandbox.scene.compile.layout import Layout, alike, pitch, turned
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.generators import ENDS, STRIDE, BodySegment, Cloth, End, Ragdoll, Rope, segments
@@ -39,15 +39,15 @@ def rope_layout(rope: Rope, gravity: Point) -> Layout:
 def course(rope: Rope, gravity: Point) -> FloatArray:
     """Return the ends of a rope's links, (links + 1, 2) m: on a straight line, or on an arc for a longer rope."""
     start, end = np.asarray(rope.start), np.asarray(rope.end)
-    way = end - start
-    distance, length = float(math.hypot(*way)), pitch(rope)
-    share = np.arange(rope.links + 1)[:, None] / rope.links
+    chord = end - start
+    distance, length = float(math.hypot(*chord)), pitch(rope)
+    fraction = np.arange(rope.links + 1)[:, None] / rope.links
     half = half_turn(rope.links, distance / length)
     if half == 0.0:
-        return start * (1.0 - share) + end * share
+        return start * (1.0 - fraction) + end * fraction
     down = np.asarray(gravity) if any(gravity) else np.asarray((0.0, -1.0))
     apart = distance >= sys.float_info.min  # smaller values have too few digits for a direction
-    along = way / distance if apart else np.asarray((-down[1], down[0])) / math.hypot(*down)
+    along = chord / distance if apart else np.asarray((-down[1], down[0])) / math.hypot(*down)
     across = np.asarray((along[1], -along[0]))  # to the right of the chord, for an arc that turns left
     if across @ down < 0.0:
         across = -across
@@ -77,28 +77,28 @@ def half_turn(links: int, ratio: float) -> float:
             high = middle
 
 
-def rope_links(rope: Rope) -> Links:
+def rope_joints(rope: Rope) -> JointArrays:
     """Return the joints of a rope by the indices of its own bodies, with `STARTS_AT` and `ENDS_AT` for other bodies."""
     length, count = pitch(rope), node_count(rope)
     if rope.kind != "planks":
         first, last = (rope.tied(end) is not None for end in ENDS)
         node = np.concatenate(([STARTS_AT] * first, np.arange(count), [ENDS_AT] * last)).astype(np.int64)
         if rope.kind == "rods":
-            return Links.alike(LinkKind.ROD, node[:-1], node[1:], figures=(length, 0.0, 0.0))
+            return JointArrays.alike(LinkKind.ROD, node[:-1], node[1:], figures=(length, 0.0, 0.0))
         assert rope.stiffness is not None
         figures = length, rope.stiffness, rope.damping
-        return Links.alike(LinkKind.SPRING, node[:-1], node[1:], figures=figures)
+        return JointArrays.alike(LinkKind.SPRING, node[:-1], node[1:], figures=figures)
     half, plank = 0.5 * length, np.arange(count)
-    links = Links.alike(LinkKind.PIVOT, plank[:-1], plank[1:], (half, 0.0), (-half, 0.0))
+    links = JointArrays.alike(LinkKind.PIVOT, plank[:-1], plank[1:], (half, 0.0), (-half, 0.0))
     ends: tuple[tuple[End, int, Point, int, float], ...] = (
         ("start", 0, rope.start, STARTS_AT, -half),
         ("end", count - 1, rope.end, ENDS_AT, half),
     )
     for end, body, place, stand_in, anchor in ends:
         if rope.tied(end) is not None:
-            held = Links.alike(LinkKind.PIVOT, [stand_in], [body], (0.0, 0.0), (anchor, 0.0))
+            held = JointArrays.alike(LinkKind.PIVOT, [stand_in], [body], (0.0, 0.0), (anchor, 0.0))
         elif rope.holds(end):
-            held = Links.alike(LinkKind.PIVOT, [WORLD], [body], place, (anchor, 0.0))
+            held = JointArrays.alike(LinkKind.PIVOT, [WORLD], [body], place, (anchor, 0.0))
         else:
             continue
         links = links.joined(held)
@@ -114,7 +114,7 @@ def cloth_layout(cloth: Cloth) -> Layout:
     return alike(position, cloth.velocity, cloth.angle, cloth.angular_velocity, fixed)
 
 
-def cloth_links(cloth: Cloth) -> Links:
+def cloth_joints(cloth: Cloth) -> JointArrays:
     """Return the joints of a cloth by the indices of its nodes: rows, columns, diagonals, then next-but-one nodes."""
     across, down = cloth.spacing
     if cloth.kind == "rods":
@@ -122,15 +122,15 @@ def cloth_links(cloth: Cloth) -> Links:
     else:
         links = _mesh(cloth, 1, 0, across, cloth.stiffness).joined(_mesh(cloth, 0, 1, down, cloth.stiffness))
     if cloth.shear is not None:
-        for way in (1, -1):
-            links = links.joined(_mesh(cloth, way, 1, math.hypot(across, down), cloth.shear))
+        for direction in (1, -1):
+            links = links.joined(_mesh(cloth, direction, 1, math.hypot(across, down), cloth.shear))
     if cloth.bend is not None:
         links = links.joined(_mesh(cloth, 2, 0, 2.0 * across, cloth.bend))
         links = links.joined(_mesh(cloth, 0, 2, 2.0 * down, cloth.bend))
     return links
 
 
-def _mesh(cloth: Cloth, right: int, down: int, length: float, stiffness: float | None = None) -> Links:
+def _mesh(cloth: Cloth, right: int, down: int, length: float, stiffness: float | None = None) -> JointArrays:
     """Join every node to the one at an offset of columns and rows: by springs, or by rods without a stiffness."""
     number = np.arange(cloth.columns * cloth.rows).reshape(cloth.rows, cloth.columns)
     height, width = max(cloth.rows - down, 0), max(cloth.columns - abs(right), 0)
@@ -138,8 +138,8 @@ def _mesh(cloth: Cloth, right: int, down: int, length: float, stiffness: float |
     a = number[:height, left : left + width].ravel()
     b = number[down : down + height, other : other + width].ravel()
     if stiffness is None:
-        return Links.alike(LinkKind.ROD, a, b, figures=(length, 0.0, 0.0))
-    return Links.alike(LinkKind.SPRING, a, b, figures=(length, stiffness, cloth.damping))
+        return JointArrays.alike(LinkKind.ROD, a, b, figures=(length, 0.0, 0.0))
+    return JointArrays.alike(LinkKind.SPRING, a, b, figures=(length, stiffness, cloth.damping))
 
 
 class Pose(NamedTuple):
@@ -178,7 +178,7 @@ def limb_layout(ragdoll: Ragdoll) -> Layout:
     )
 
 
-def limb_links(ragdoll: Ragdoll) -> Links:
+def limb_joints(ragdoll: Ragdoll) -> JointArrays:
     """Return the pivots of a ragdoll, then the limits of the same joints, by the indices of its segments."""
     parts, flip = segments(ragdoll), _flip(ragdoll)
     number = {name: k for k, name in enumerate(parts)}
@@ -186,9 +186,9 @@ def limb_links(ragdoll: Ragdoll) -> Links:
     a, b = [number[part.parent] for _, part in joined], [number[name] for name, _ in joined]
     anchor_a = [_anchor(parts[part.parent], part.joint, flip, ragdoll.height) for _, part in joined]
     anchor_b = [_anchor(part, part.joint, flip, ragdoll.height) for _, part in joined]
-    pivots = Links.alike(LinkKind.PIVOT, a, b, np.asarray(anchor_a), np.asarray(anchor_b))
+    pivots = JointArrays.alike(LinkKind.PIVOT, a, b, np.asarray(anchor_a), np.asarray(anchor_b))
     bounds = [_bounds(part, parts[part.parent], flip) for _, part in joined]
-    return pivots.joined(Links.alike(LinkKind.ROTARY_LIMIT, a, b, figures=np.asarray(bounds)))
+    return pivots.joined(JointArrays.alike(LinkKind.ROTARY_LIMIT, a, b, figures=np.asarray(bounds)))
 
 
 def _flip(ragdoll: Ragdoll) -> float:

@@ -185,7 +185,7 @@ def join_layouts(
         core=of_form([form.core for form in forms]),
         thin=of_form([form.thin for form in forms]),
         mass=of_form([form.mass for form in forms]),
-        moment=of_form([form.moment * share for form, share in zip(forms, of_sphere, strict=True)]),
+        moment=of_form([form.moment * fraction for form, fraction in zip(forms, of_sphere, strict=True)]),
         group=np.concatenate(group),
         born=np.zeros(len(names)),
         lifetime=np.concatenate(lives),

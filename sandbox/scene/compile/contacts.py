@@ -17,7 +17,7 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.drives import driven_in
+from sandbox.scene.compile.drives import is_driven
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource, HasMaterial
 from sandbox.scene.description.bodies import Compound
@@ -86,10 +86,10 @@ def pair_table(scene: Scene, bodies: Bodies) -> PairTable:
     Raises:
         KeyError: an element names a material that the scene does not declare.
     """
-    surfaces, of_bearer = numbered(scene, bearers_of(bodies.elements))
-    more, of_fixed = numbered(scene, scene.fixed, surfaces)
+    surfaces, of_bearer = index_surfaces(scene, bearers_of(bodies.elements))
+    more, of_fixed = index_surfaces(scene, scene.fixed, surfaces)
     surfaces = (*surfaces, *more)
-    restitution, friction = _mixed([s.restitution for s in surfaces]), _mixed([s.friction for s in surfaces])
+    restitution, friction = _mix_pairs([s.restitution for s in surfaces]), _mix_pairs([s.friction for s in surfaces])
     falloff = np.add.outer(*[np.asarray([s.falloff or 0.0 for s in surfaces], dtype=np.float64)] * 2)
     bearers: dict[str | None, list[int]] = {}
     for number, surface in enumerate(surfaces):
@@ -118,10 +118,10 @@ def bearers_of(elements: Sequence[BodySource]) -> list[HasMaterial]:
 def _bearers(element: BodySource) -> Sequence[HasMaterial]:
     if not isinstance(element, Compound):
         return (element,)
-    return [_dressed(part, element) for part in element.parts]
+    return [_with_body_surface(part, element) for part in element.parts]
 
 
-def _dressed(part: HasMaterial, body: HasMaterial) -> HasMaterial:
+def _with_body_surface(part: HasMaterial, body: HasMaterial) -> HasMaterial:
     """Return a part with the surface of its body where it states none; a material of its own replaces all of it."""
     if part.material is not None:
         return part
@@ -133,7 +133,7 @@ def _dressed(part: HasMaterial, body: HasMaterial) -> HasMaterial:
     )
 
 
-def numbered(
+def index_surfaces(
     scene: Scene, elements: Sequence[HasMaterial], known: tuple[ContactMaterial, ...] = ()
 ) -> tuple[tuple[ContactMaterial, ...], IntArray]:
     """Return the known surfaces followed by the new distinct ones, and the index of each element's surface.
@@ -161,7 +161,7 @@ def numbered(
     return tuple(numbers)[len(known) :], of_element
 
 
-def _mixed(stated: list[float | None]) -> FloatArray:
+def _mix_pairs(stated: list[float | None]) -> FloatArray:
     """Return `mix` of all pairs of S values, (S, S)."""
     table = np.asarray([[mix(a, b) for b in stated] for a in stated], dtype=np.float64)
     return table.reshape(len(stated), len(stated))
@@ -179,7 +179,7 @@ class ContactMatrix:
     """(N,) can touch something"""
     held: BoolArray
     """(N,) has a joint"""
-    noted: BoolArray
+    can_enter_zone: BoolArray
     """(N,) can enter a zone; driven bodies are not detected"""
     turnable: BoolArray
     """(N,) can rotate: by friction; for other shapes than balls by any contact; by joints, thrusts or drives"""
@@ -202,7 +202,7 @@ class ContactMatrix:
     @property
     def free(self) -> BoolArray:
         """(N,) can touch nothing, enters no zone, and has no joint."""
-        return ~self.touches & ~self.held & ~self.noted
+        return ~self.touches & ~self.held & ~self.can_enter_zone
 
     @property
     def restitution(self) -> float:
@@ -278,8 +278,8 @@ def contact_matrix(start: Scene | Setup, bodies: Bodies | None = None) -> Contac
         surfaces=surfaces,
         touches=_any_of(body, can_touch[kinds.of_piece], len(bodies)),
         held=links.held(len(bodies)),
-        noted=_noted(scene, bodies, reached) & ~driven_in(scene, bodies),
-        turnable=(turnable | _thrust_turned(scene, bodies) | driven_in(scene, bodies, turning=True)) & ~bodies.fixed,
+        can_enter_zone=_can_enter_zone(scene, bodies, reached) & ~is_driven(scene, bodies),
+        turnable=(turnable | _thrust_turned(scene, bodies) | is_driven(scene, bodies, turning=True)) & ~bodies.fixed,
         mutual=bool(pair.any()),
         ball_ball=bool((pair & np.outer(kinds.ball, kinds.ball)).any()),
         solid=np.isin(np.arange(size), surface[can_touch & ~kinds.ball]),
@@ -313,7 +313,7 @@ def bits_of(layer: IntArray | None, count: int) -> IntArray:
     return np.ones(count, np.int64) if layer is None else 1 << layer
 
 
-def _noted(scene: Scene, bodies: Bodies, reached: IntArray) -> BoolArray:
+def _can_enter_zone(scene: Scene, bodies: Bodies, reached: IntArray) -> BoolArray:
     """Return which bodies zones can detect, (N,)."""
     if not scene.zones:
         return np.zeros(len(bodies), np.bool_)

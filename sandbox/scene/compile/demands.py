@@ -82,7 +82,7 @@ SURFACES = frozenset({Demand.FALLOFF, Demand.KICKS, Demand.ONE_WAY, Demand.PASSA
 FLOOR = frozenset({Demand.SURFACE, Demand.SPIN, Demand.POCKETS, Demand.PUCKS})
 """Demands of spheres and pucks on a `[surface]`; curl of pucks is a demand of its own."""
 
-OF_LINKS = {
+DEMAND_OF_JOINT = {
     LinkKind.ROD: Demand.RODS,
     LinkKind.PIVOT: Demand.PIVOTS,
     LinkKind.SLIDE: Demand.SLIDES,
@@ -95,7 +95,7 @@ OF_LINKS = {
 }
 """Demands of each kind of joint."""
 
-JOINTS = frozenset(OF_LINKS.values())
+JOINTS = frozenset(DEMAND_OF_JOINT.values())
 
 
 class Item(NamedTuple):
@@ -196,7 +196,7 @@ def _surfaces(scene: Scene, matrix: ContactMatrix) -> Iterator[tuple[Demand, boo
 
 def _joints(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     scene = setup.scene
-    for kind, demand in OF_LINKS.items():
+    for kind, demand in DEMAND_OF_JOINT.items():
         count = int(np.count_nonzero(setup.links.kind == kind))
         yield demand, count > 0, f"{count:,}" if count else "none"
     for demand, those in (

@@ -1,7 +1,6 @@
-"""How drives hold their bodies, and the checks of drives."""
+"""How drives hold their bodies."""
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -10,12 +9,8 @@ import numpy as np
 from sandbox.arrays import BoolArray, FloatArray
 from sandbox.scene.compile.bodies import Bodies, centre_of
 from sandbox.scene.description.base import BodySpec, Point
-from sandbox.scene.description.forces import Drive, Driven, PlungerDrive, TorqueDrive
+from sandbox.scene.description.forces import Drive, PlungerDrive, TorqueDrive
 from sandbox.scene.description.scene import SceneDescription, default_name
-from sandbox.scene.errors import Location
-
-ROUNDED = 1e-9
-"""rad, tolerance of the start angle beyond its stops, for rounding in a file."""
 
 
 class Mount(NamedTuple):
@@ -39,87 +34,39 @@ def mounts(scene: SceneDescription) -> dict[str, Mount]:
     """Return how each driven body is held, by its name."""
     if not scene.drives:
         return {}
-    found, singles = {}, _singles(scene)
+    found, singles = {}, single_bodies(scene)
     for k, drive in enumerate(scene.drives):
         if drive.body in singles:
             single = singles[drive.body]
-            found[drive.body] = _mount(k, drive, single)
+            found[drive.body] = mount_of(k, drive, single)
     return found
 
 
-def driven_in(scene: SceneDescription, bodies: Bodies, *, turning: bool = False) -> BoolArray:
+def is_driven(scene: SceneDescription, bodies: Bodies, *, turning: bool = False) -> BoolArray:
     """Return which bodies are driven, (N,); optionally only those that rotate."""
     those = [drive.body for drive in scene.drives if not (turning and isinstance(drive, PlungerDrive))]
     return np.isin(bodies.names, those) if those else np.zeros(len(bodies), dtype=np.bool_)
 
 
-def unmoved(scene: SceneDescription, bodies: Bodies) -> BoolArray:
+def is_immovable(scene: SceneDescription, bodies: Bodies) -> BoolArray:
     """Return which bodies no joint can move, (N,): fixed ones, and those led by a stroke or a plunger."""
     led = [drive.body for drive in scene.drives if not isinstance(drive, TorqueDrive)]
     return bodies.fixed | np.isin(bodies.names, led) if led else bodies.fixed
 
 
-def weighed(scene: SceneDescription, bodies: Bodies) -> Bodies:
+def with_drive_moments(scene: SceneDescription, bodies: Bodies) -> Bodies:
     """Return bodies with the moments of inertia that their drives state: I about the hinge minus m d²."""
     moment = bodies.moment.copy()
     for name, mount in mounts(scene).items():
         if isinstance(mount.drive, TorqueDrive) and mount.drive.moment is not None:
             number = bodies.number_of[name]
-            least = _least(mount, float(bodies.mass[number]))
+            least = moment_of_mass(mount, float(bodies.mass[number]))
             moment[number] = max(mount.drive.moment - least, 0.0)
     return replace(bodies, moment=moment)
 
 
-def driven(scene: SceneDescription, bodies: Bodies) -> Iterator[tuple[Location, str]]:
-    """Yield the faults of drives."""
-    singles, seen = _singles(scene), set[str]()
-    for k, drive in enumerate(scene.drives):
-        if drive.body not in bodies.number_of:
-            known = ", ".join(map(repr, [*singles][:5])) or "none"
-            yield ("drive", k, "body"), f"no body is named {drive.body!r}; bodies with a table of their own: {known}"
-        elif drive.body not in singles:
-            yield (
-                ("drive", k, "body"),
-                f"{drive.body!r} is made by a generator; a drive needs a body with a table of its own",
-            )
-        else:
-            single = singles[drive.body]
-            faults = *_of_body(drive, single, scene, drive.body in seen), *_of_figures(drive, single, bodies)
-            yield from ((("drive", k, key), why) for key, why in faults)
-            seen.add(drive.body)
-
-
-def _of_body(drive: Driven, single: BodySpec, scene: SceneDescription, twice: bool) -> Iterator[tuple[str, str]]:
-    if twice:
-        yield "body", f"{drive.body!r} already has a drive; a body can have one drive only"
-    if single.fixed:
-        yield "body", f"{drive.body!r} is fixed; remove `fixed`, because the drive holds the body"
-    if any(single.velocity) or single.angular_velocity:
-        yield "body", f"{drive.body!r} has an initial velocity; a driven body must start at rest"
-    if any(thrust.body == drive.body for thrust in scene.thrusts):
-        yield "body", f"{drive.body!r} has a thrust; only its drive can move a driven body"
-
-
-def _of_figures(drive: Drive, single: BodySpec, bodies: Bodies) -> Iterator[tuple[str, str]]:
-    if isinstance(drive, PlungerDrive):
-        if not math.hypot(*drive.direction) > 0.0:
-            yield "direction", f"{list(drive.direction)} has no direction; use a vector such as [0, 1] for upwards"
-        return
-    low, high = sorted(drive.stops)
-    if low == high:
-        yield "stops", "must be two different angles: the rest angle and the driven angle"
-    elif not low - ROUNDED <= single.angle <= high + ROUNDED:
-        yield (
-            "stops",
-            f"{drive.body!r} starts at {single.angle:g} rad; the angle must be between {low:g} and {high:g} rad",
-        )
-    if isinstance(drive, TorqueDrive) and drive.moment is not None:
-        least = _least(_mount(0, drive, single), float(bodies.mass[bodies.number_of[drive.body]]))
-        if drive.moment <= least:
-            yield "moment", f"must be greater than {least:.3g} kg·m², the moment of the body's mass about this pivot"
-
-
-def _singles(scene: SceneDescription) -> dict[str, BodySpec]:
+def single_bodies(scene: SceneDescription) -> dict[str, BodySpec]:
+    """Return the bodies with a table of their own, by name."""
     return {
         each.name or default_name(kind, k): each
         for kind, those in scene.kinds.items()
@@ -136,21 +83,22 @@ def _hinge(drive: Drive, single: BodySpec, home: Point) -> Point:
     return cos * x + sin * y, cos * y - sin * x
 
 
-def _mount(number: int, drive: Drive, single: BodySpec) -> Mount:
+def mount_of(number: int, drive: Drive, single: BodySpec) -> Mount:
+    """Return how a drive holds a body, given the index of the drive."""
     home = centre_of(single)
     return Mount(number, drive, home, _hinge(drive, single, home))
 
 
-def _least(mount: Mount, mass: float) -> float:
+def moment_of_mass(mount: Mount, mass: float) -> float:
     """Return m d², kg·m²: the smallest moment of inertia about the hinge for a mass."""
     return mass * (mount.hinge[0] ** 2 + mount.hinge[1] ** 2)
 
 
 def about_hinge(mount: Mount, mass: float, moment: float) -> float:
     """Return the moment of inertia about the hinge, kg·m², from mass and moment about the centre."""
-    return moment + _least(mount, mass)
+    return moment + moment_of_mass(mount, mass)
 
 
-def at_rest(scene: SceneDescription) -> FloatArray:
+def initial_drive_states(scene: SceneDescription) -> FloatArray:
     """Return the initial state of each drive, (D, 3): level, torque or pull, rate of the pull."""
     return np.zeros((len(scene.drives), 3))

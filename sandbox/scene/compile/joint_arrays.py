@@ -42,7 +42,7 @@ TURNING = (LinkKind.GROOVE, LinkKind.ROTARY_LIMIT, LinkKind.MOTOR, LinkKind.GEAR
 
 
 @dataclass(frozen=True, eq=False)
-class Links:
+class JointArrays:
     """The joints of a scene: those of the file in their order, then those of its generators."""
 
     kind: IntArray

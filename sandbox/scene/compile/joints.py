@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 
 from sandbox.arrays import FloatArray
-from sandbox.scene.compile.articulated import ENDS_AT, STARTS_AT, cloth_links, limb_links, rope_links
+from sandbox.scene.compile.articulated import ENDS_AT, STARTS_AT, cloth_joints, limb_joints, rope_joints
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.drives import unmoved
+from sandbox.scene.compile.drives import is_immovable
 from sandbox.scene.compile.generators import count_of
-from sandbox.scene.compile.joint_arrays import WORLD, LinkKind, Links
+from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
 from sandbox.scene.compile.layout import turned
 from sandbox.scene.description.base import BodySource, Point
 from sandbox.scene.description.generators import ENDS, Cloth, Ragdoll, Rope, Woven
@@ -31,18 +31,18 @@ from sandbox.scene.description.scene import SceneDescription, default_name
 from sandbox.scene.geometry.shapes import form_of
 
 
-def seams_of(scene: SceneDescription, bodies: Bodies) -> Links:
+def generator_joints(scene: SceneDescription, bodies: Bodies) -> JointArrays:
     """Return the joints of a scene's generators, in their order, each numbered from 0.
 
     The bodies that ropes are tied to must exist. Joints between bodies that cannot move are omitted.
     """
-    links = Links.none()
+    links = JointArrays.none()
     if not (scene.ropes or scene.cloths or scene.ragdolls):
         return links
-    first, still = 0, np.append(unmoved(scene, bodies), True)  # the world, −1, selects the last row
+    first, still = 0, np.append(is_immovable(scene, bodies), True)  # the world, −1, selects the last row
     for kind, sources in scene.kinds.items():
         for k, source in enumerate(sources):
-            own = _own(source, first, bodies)
+            own = _joints_of(source, first, bodies)
             first += count_of(source)
             own = own.some(~(still[own.a] & still[own.b]))
             if isinstance(source, Woven) and source.strength is not None:
@@ -52,33 +52,33 @@ def seams_of(scene: SceneDescription, bodies: Bodies) -> Links:
     return links
 
 
-def _own(source: BodySource, first: int, bodies: Bodies) -> Links:
+def _joints_of(source: BodySource, first: int, bodies: Bodies) -> JointArrays:
     """Return the joints of one generator, given the index of its first body."""
     match source:
         case Rope():
-            return _tied(_numbered(rope_links(source), first), source, bodies)
+            return _attach_rope_ends(_with_body_indices(rope_joints(source), first), source, bodies)
         case Cloth():
-            return _numbered(cloth_links(source), first)
+            return _with_body_indices(cloth_joints(source), first)
         case Ragdoll():
-            return _numbered(limb_links(source), first)
+            return _with_body_indices(limb_joints(source), first)
         case _:
-            return Links.none()
+            return JointArrays.none()
 
 
-def _numbered(links: Links, first: int) -> Links:
+def _with_body_indices(links: JointArrays, first: int) -> JointArrays:
     """Return joints by the indices of a scene's bodies; negative indices stand for something else."""
     return replace(
         links, a=np.where(links.a < 0, links.a, links.a + first), b=np.where(links.b < 0, links.b, links.b + first)
     )
 
 
-def _tied(links: Links, rope: Rope, bodies: Bodies) -> Links:
+def _attach_rope_ends(links: JointArrays, rope: Rope, bodies: Bodies) -> JointArrays:
     """Return the joints of a rope with the bodies at its ends, anchored where the ends start."""
     for end, place, stand_in in zip(ENDS, (rope.start, rope.end), (STARTS_AT, ENDS_AT), strict=True):
         name = rope.tied(end)
         if name is not None:
             number = bodies.number_of[name]
-            anchor = _seen(place, number, bodies)
+            anchor = _to_body_frame(place, number, bodies)
             first, second = links.a == stand_in, links.b == stand_in
             links = replace(
                 links,
@@ -90,7 +90,7 @@ def _tied(links: Links, rope: Rope, bodies: Bodies) -> Links:
     return links
 
 
-def _seen(place: Point, number: int, bodies: Bodies) -> FloatArray:
+def _to_body_frame(place: Point, number: int, bodies: Bodies) -> FloatArray:
     """Return a position in the world in the frame of a body about its centre of mass, (2,) m."""
     return turned(np.asarray([place]) - bodies.position[number], -float(bodies.angle[number])).reshape(2)
 
@@ -108,21 +108,21 @@ KINDS: dict[type, LinkKind] = {
 }
 
 
-def links_of(scene: SceneDescription, bodies: Bodies) -> Links:
+def compile_joints(scene: SceneDescription, bodies: Bodies) -> JointArrays:
     """Return the joints of a scene between its bodies: those of the file, then those of generators."""
-    return _stated(scene, bodies).joined(seams_of(scene, bodies)).counted()
+    return _file_joints(scene, bodies).joined(generator_joints(scene, bodies)).counted()
 
 
-def _stated(scene: SceneDescription, bodies: Bodies) -> Links:
+def _file_joints(scene: SceneDescription, bodies: Bodies) -> JointArrays:
     """Return the joints of the file."""
     if not scene.joints:
-        return Links.none()
+        return JointArrays.none()
     number = {name: k for k, name in enumerate(bodies.names)}
     rows = [_row(joint, bodies, number) for joint in scene.joints]
     a, b, anchor_a, anchor_b, figures = (list(column) for column in zip(*rows, strict=True))
     motors = [joint.max_torque if isinstance(joint, Motor) else None for joint in scene.joints]
     strengths = [joint.strength for joint in scene.joints]
-    return Links(
+    return JointArrays(
         kind=np.asarray([KINDS[type(joint)] for joint in scene.joints], dtype=np.int64),
         a=np.asarray(a, dtype=np.int64),
         b=np.asarray(b, dtype=np.int64),

@@ -123,7 +123,7 @@ def _matter(source: BodySource) -> dict[str, Any]:
 @lru_cache(maxsize=256)
 def _figure(ragdoll: Ragdoll) -> tuple[BodySource, ...]:
     """Return the segments of a ragdoll: capsules, and a ball as its head."""
-    made: list[BodySource] = []
+    elements: list[BodySource] = []
     parts, height = segments(ragdoll), ragdoll.height
     behind = next(iter(parts)).partition("-")[0]
     whole = DEFAULT_MASS if ragdoll.mass is None else ragdoll.mass
@@ -131,13 +131,13 @@ def _figure(ragdoll: Ragdoll) -> tuple[BodySource, ...]:
         more: dict[str, Any] = {
             "position": (0.0, 0.0),
             "radius": segment.radius * height,
-            "mass": segment.share * 0.01 * whole,
+            "mass": segment.mass_percent * 0.01 * whole,
         }
         more |= _surface(ragdoll)
         if ragdoll.colour is None:
             more["colour"] = FAR if name.startswith(behind) else NEAR
         if len(segment.ends) == 1:
-            made.append(Ball(**more))
+            elements.append(Ball(**more))
         else:
-            made.append(Capsule(length=math.dist(*segment.ends) * height, **more))
-    return tuple(made)
+            elements.append(Capsule(length=math.dist(*segment.ends) * height, **more))
+    return tuple(elements)

@@ -4,7 +4,7 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.joint_arrays import LinkKind, Links
+from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.forces import Attraction
 from sandbox.scene.scene import Scene
@@ -78,8 +78,8 @@ class Potential:
         for links, breaks, strain in self._springs:
             if len(links):
                 energy = 0.5 * links.figures[:, 1] * np.square(strain(links, position, angle) - links.figures[:, 0])
-                holds = both_there(links, there) & ~parted(breaks, time)
-                stored += np.where(holds, energy, 0.0) @ self._share(links.a, links.b)
+                holds = both_present(links, there) & ~is_broken_at(breaks, time)
+                stored += np.where(holds, energy, 0.0) @ self._fraction(links.a, links.b)
         return stored
 
     def of_attraction(self, position: FloatArray, there: BoolArray) -> FloatArray:
@@ -97,21 +97,21 @@ class Potential:
         drawn = np.flatnonzero(self._mass)
         if toward is None:
             place = np.asarray(attraction.toward, dtype=np.float64)
-            share = np.ones(len(drawn)) if self._body is None else (drawn == self._body).astype(np.float64)
+            fraction = np.ones(len(drawn)) if self._body is None else (drawn == self._body).astype(np.float64)
             counts = there[:, drawn]
         else:
             drawn = drawn[drawn != toward]
             place = position[:, toward, None]
-            share = self._share(np.full(len(drawn), toward), drawn)
+            fraction = self._fraction(np.full(len(drawn), toward), drawn)
             counts = there[:, drawn] & there[:, toward, None]
-        counts = counts & (share > 0.0)
+        counts = counts & (fraction > 0.0)
         away = position[:, drawn] - place
         distance, soft = np.hypot(away[..., 0], away[..., 1]), attraction.softening
         with np.errstate(divide="ignore"):
             depth = np.arctan2(soft, distance) / soft if soft > 0.0 else 1.0 / distance
-        return np.asarray(np.where(counts, -attraction.strength * depth, 0.0) @ (self._mass[drawn] * share))
+        return np.asarray(np.where(counts, -attraction.strength * depth, 0.0) @ (self._mass[drawn] * fraction))
 
-    def _share(self, a: IntArray, b: IntArray) -> FloatArray:
+    def _fraction(self, a: IntArray, b: IntArray) -> FloatArray:
         """Return the fraction of the energy of each pair that counts, (K,)."""
         if self._body is None:
             return np.ones(len(b))
@@ -120,12 +120,12 @@ class Potential:
         return np.asarray(mine / np.maximum(first.astype(np.float64) + second, 1.0))
 
 
-def both_there(links: Links, there: BoolArray) -> BoolArray:
+def both_present(links: JointArrays, there: BoolArray) -> BoolArray:
     """Return which joints still have both bodies, (T, J), from the presence of bodies, (T, N)."""
     return np.asarray(there[:, links.b] & (there[:, links.a] | (links.a < 0)))
 
 
-def parted(breaks: FloatArray, time: FloatArray) -> BoolArray:
+def is_broken_at(breaks: FloatArray, time: FloatArray) -> BoolArray:
     """Return which joints have broken by each of some times, (T, J).
 
     Args:
@@ -135,7 +135,7 @@ def parted(breaks: FloatArray, time: FloatArray) -> BoolArray:
     return np.asarray(breaks * (1.0 - ROUNDING) <= time[:, None])
 
 
-def ends_over_time(links: Links, position: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+def ends_over_time(links: JointArrays, position: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the anchors of joints in the world, (T, J, 2) m each, in T frames."""
     return (
         _placed(links.a, links.anchor_a, position, angle),
@@ -143,17 +143,17 @@ def ends_over_time(links: Links, position: FloatArray, angle: FloatArray) -> tup
     )
 
 
-def turned_by(links: Links, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+def turned_by(links: JointArrays, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the angles of the first and second bodies of joints, (T, J) rad each; the world's is 0."""
     return np.where(links.a >= 0, angle[:, links.a], 0.0), angle[:, links.b]
 
 
-def _stretch(links: Links, position: FloatArray, angle: FloatArray) -> FloatArray:
+def _stretch(links: JointArrays, position: FloatArray, angle: FloatArray) -> FloatArray:
     first, second = ends_over_time(links, position, angle)
     return np.asarray(np.hypot(*np.moveaxis(second - first, 2, 0)))
 
 
-def _turn(links: Links, _: FloatArray, angle: FloatArray) -> FloatArray:
+def _turn(links: JointArrays, _: FloatArray, angle: FloatArray) -> FloatArray:
     first, second = turned_by(links, angle)
     return np.asarray(second - first)
 

@@ -6,8 +6,8 @@ from typing import Self, Union
 
 from sandbox.arrays import FloatArray
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.drives import at_rest
-from sandbox.scene.compile.joint_arrays import Links
+from sandbox.scene.compile.drives import initial_drive_states
+from sandbox.scene.compile.joint_arrays import JointArrays
 from sandbox.scene.description.fixed import Passing, PlaneReach
 from sandbox.scene.scene import Scene
 
@@ -23,7 +23,7 @@ class Setup:
     """the scene; its own `bodies` and `links` are those of its start"""
     bodies: Bodies
     """the N bodies that are present, in their state at `time`"""
-    links: Links
+    links: JointArrays
     """the J joints that hold, with indices into `bodies`"""
     drives: FloatArray
     """(D, 3) state of each drive: level, torque or pull, rate of the pull"""
@@ -37,7 +37,7 @@ class Setup:
     @classmethod
     def of(cls, start: Union[Scene, "Setup"]) -> "Setup":
         """Return the start state of a scene, or a setup as it is."""
-        return start if isinstance(start, Setup) else cls(start, start.bodies, start.links, at_rest(start))
+        return start if isinstance(start, Setup) else cls(start, start.bodies, start.links, initial_drive_states(start))
 
     def placed(
         self,
@@ -59,7 +59,7 @@ class Setup:
             plane_reach: extent of half-planes.
         """
         links = self.links.without(broken).among(bodies.names, self.bodies.names)
-        drives = at_rest(self.scene) if drives is None else drives
+        drives = initial_drive_states(self.scene) if drives is None else drives
         return replace(
             self, bodies=bodies, links=links, drives=drives, time=time, passing=passing, plane_reach=plane_reach
         )

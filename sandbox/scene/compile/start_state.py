@@ -1,7 +1,7 @@
 """Start state of the bodies of a scene: generators expanded, cue strokes applied, moments of inertia set by drives."""
 
 from sandbox.scene.compile.bodies import Bodies, join_layouts, layout_of_singles
-from sandbox.scene.compile.drives import weighed
+from sandbox.scene.compile.drives import with_drive_moments
 from sandbox.scene.compile.generators import layout_of
 from sandbox.scene.compile.layout import Layout, elements_in
 from sandbox.scene.description.base import BodySpec
@@ -38,7 +38,7 @@ def start_bodies(scene: SceneDescription) -> Bodies:
     for shot in scene.shots:
         if shot.ball in names:
             _strike(bodies, names.index(shot.ball), shot)
-    return weighed(scene, bodies) if scene.drives else bodies
+    return with_drive_moments(scene, bodies) if scene.drives else bodies
 
 
 def _strike(bodies: Bodies, index: int, stroke: Stroke) -> None:

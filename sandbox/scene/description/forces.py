@@ -19,7 +19,7 @@ DriveKey = Literal[
 Turned = Annotated[float, Field(ge=-1e9, le=1e9)]
 Torque = Annotated[float, Field(gt=0, le=1e30)]
 Moment = Annotated[float, Field(gt=0, le=1e30)]
-Share = Annotated[float, Field(ge=0, le=1)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
 Second = Annotated[float, Field(ge=0, le=1e9)]
 Rate = Annotated[float, Field(gt=0, le=1e9)]
 
@@ -53,13 +53,13 @@ class TorqueDrive(Driven):
     """N·m"""
     ramp: Second = 0.0
     """time in which the torque rises from 0 to its full value, s"""
-    return_ratio: Share = 0.1
+    return_ratio: Fraction = 0.1
     """fraction of the torque that returns it at level 0"""
-    hold_ratio: Share = 1.0
+    hold_ratio: Fraction = 1.0
     """fraction of the torque that remains at the end of the stroke"""
     hold_within: Annotated[float, Field(ge=0, le=1e9)] = 0.0
     """angle before the end of the stroke within which the torque falls to that fraction, rad"""
-    bounce: Share = 0.0
+    bounce: Fraction = 0.0
     """restitution at the stops"""
     moment: Moment | None = None
     """moment of inertia about the hinge, kg·m²; default: from the shape and mass of the body"""

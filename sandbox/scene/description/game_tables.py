@@ -101,7 +101,7 @@ def with_game_tables(within: str = "") -> Callable[[type[Model]], type[Model]]:
     return extend
 
 
-def is_made(model: type) -> bool:
+def is_generated(model: type) -> bool:
     """Return whether `with_game_tables` made a model: it has no source text."""
     return model.__module__ == __name__
 

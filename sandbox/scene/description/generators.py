@@ -172,8 +172,8 @@ class BodySegment(NamedTuple):
     All lengths are fractions of the height.
     """
 
-    share: float
-    """of the mass, %"""
+    mass_percent: float
+    """percentage of the mass of the body"""
     ends: tuple[Point, ...]
     """the centres of its capsule's half discs; of the head the one of its ball"""
     radius: float

@@ -13,12 +13,12 @@ from pydantic import ValidationError
 from sandbox.echo import shorten
 from sandbox.scene.description.base import Wording
 from sandbox.scene.description.game_tables import PRESETS
-from sandbox.scene.errors import Location
+from sandbox.scene.errors import LocatedMessage, Location
 from sandbox.scene.files.document import read_model
 from sandbox.scene.files.presets import has_preset, place_of, written_out
 from sandbox.scene.files.tables import TAGGED, keys_of, list_tables, model_at
 from sandbox.scene.scene import Scene
-from sandbox.scene.validate.scene import Found, crosscheck
+from sandbox.scene.validate.scene import crosscheck
 
 _EXPECTED = {
     "float_type": "a number",
@@ -52,7 +52,7 @@ _RAD = re.compile(r"\brad\b(?!/)")
 """rad, but not rad/s"""
 
 
-def explain(details: Any) -> tuple[Location, str]:
+def explain(details: Any) -> LocatedMessage:
     """Return the location of a pydantic error, and a message with the fault and the valid values."""
     location = location_of(details)
     kind, value, context = details["type"], details["input"], details.get("ctx", {})
@@ -100,7 +100,7 @@ def explain(details: Any) -> tuple[Location, str]:
     return location, message
 
 
-def explained(error: ValidationError, location: Location) -> list[tuple[Location, str]]:
+def explained(error: ValidationError, location: Location) -> list[LocatedMessage]:
     """Return location and message of each error of a part of a scene that was validated by itself.
 
     Args:
@@ -323,7 +323,7 @@ INDEPENDENT_KEYS = {("material",), ("name",), ("between",)}
 """Keys that no placeholder affects: their faults are reported even for an element with other faults."""
 
 
-def check_valid_remainder(document: dict[str, Any], wrong: Iterable[Location]) -> list[Found]:
+def check_valid_remainder(document: dict[str, Any], wrong: Iterable[Location]) -> list[LocatedMessage]:
     """Cross-check a document whose values at `wrong` are faulty.
 
     These values are removed, or replaced by placeholders if required. Faults of the elements that they belong to are

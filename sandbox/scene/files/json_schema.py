@@ -12,7 +12,7 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from sandbox.scene.description.base import Part
-from sandbox.scene.description.game_tables import game_table, is_made, lazy_table
+from sandbox.scene.description.game_tables import game_table, is_generated, lazy_table
 from sandbox.scene.scene import Scene
 
 
@@ -21,7 +21,7 @@ def docstrings(model: type[BaseModel]) -> dict[str, str]:
     """Return the docstrings of the fields of a model and of its base classes."""
     found: dict[str, str] = {}
     for part in reversed(model.__mro__):
-        if issubclass(part, BaseModel) and part is not BaseModel and not is_made(part):
+        if issubclass(part, BaseModel) and part is not BaseModel and not is_generated(part):
             (definition,) = ast.parse(textwrap.dedent(inspect.getsource(part))).body
             assert isinstance(definition, ast.ClassDef)
             for field, text in zip(definition.body, definition.body[1:], strict=False):

@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from sandbox.resource_limits import FILE_SIZE
-from sandbox.scene.errors import Fault, Lines, Location, SceneError, path_of
+from sandbox.scene.errors import Fault, Lines, LocatedMessage, Location, SceneError, path_of
 from sandbox.scene.files import presets
 from sandbox.scene.files.document import read_model, to_document
 from sandbox.scene.files.nesting import NestingError, check_text, check_value
@@ -126,7 +126,7 @@ def from_document(
     if faults:
         raise SceneError(faults)
 
-    found: list[tuple[Location, str]]
+    found: list[LocatedMessage]
     try:
         scene = read_model(document)
     except ValidationError as error:

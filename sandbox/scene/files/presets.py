@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from sandbox.scene.description.game_tables import PRESETS, GameTable, game_table
-from sandbox.scene.errors import Location
+from sandbox.scene.errors import LocatedMessage, Location
 from sandbox.scene.files.document import read_model, to_document
 from sandbox.scene.files.overrides import AddressError, assign, parse_path
 from sandbox.scene.scene import Scene
@@ -17,7 +17,7 @@ from sandbox.scene.scene import Scene
 class Preset(GameTable):
     """Table of a game that expands to elements. Two tables that expand together have the same functions."""
 
-    faults_of: Callable[[Scene], Iterable[tuple[Location, str]]]
+    faults_of: Callable[[Scene], Iterable[LocatedMessage]]
     """returns the reasons why a scene with the table cannot be expanded"""
     expanded: Callable[[Scene], Scene]
     """returns the scene of elements that a scene with the table, which has no faults, stands for"""
@@ -104,7 +104,7 @@ def _is_written(location: Location, stated: dict[str, Any]) -> bool:
     return here is None
 
 
-def faults_of(scene: Scene) -> Iterator[tuple[Location, str]]:
+def faults_of(scene: Scene) -> Iterator[LocatedMessage]:
     """Yield the reasons why presets of a scene cannot be expanded."""
     found = False
     for fault in stated_faults_of(scene):
@@ -120,7 +120,7 @@ def faults_of(scene: Scene) -> Iterator[tuple[Location, str]]:
                 yield (preset,), f"one of its parts is out of range: {path}: {each['msg'].lower()}"
 
 
-def stated_faults_of(scene: Scene) -> Iterator[tuple[Location, str]]:
+def stated_faults_of(scene: Scene) -> Iterator[LocatedMessage]:
     """Yield the faults of presets that are found without expanding them."""
     presets = presets_of(_stated(scene))
     for key, preset in presets.items():

@@ -82,14 +82,14 @@ def form_of(element: BodySource) -> Form:
 @lru_cache(maxsize=4096)
 def _solid_form(element: BodySource) -> Form:
     drawn = tuple(_drawn(element))
-    shares = [_moments(piece) for piece, _ in drawn]
-    density = _densities(element, [stated for _, stated in drawn], [fraction.area for fraction in shares])
-    weight = [rho * fraction.area for rho, fraction in zip(density, shares, strict=True)]
+    moments = [_moments(piece) for piece, _ in drawn]
+    density = _densities(element, [stated for _, stated in drawn], [fraction.area for fraction in moments])
+    weight = [rho * fraction.area for rho, fraction in zip(density, moments, strict=True)]
     mass = math.fsum(weight)
-    x, y = (math.fsum(w * s.centroid[k] for w, s in zip(weight, shares, strict=True)) / mass for k in (0, 1))
+    x, y = (math.fsum(w * s.centroid[k] for w, s in zip(weight, moments, strict=True)) / mass for k in (0, 1))
     moment = math.fsum(
         rho * s.second + w * math.dist(s.centroid, (x, y)) ** 2
-        for rho, w, s in zip(density, weight, shares, strict=True)
+        for rho, w, s in zip(density, weight, moments, strict=True)
     )
     pieces = tuple(p._replace(corners=tuple((a - x, b - y) for a, b in p.corners)) for p, _ in drawn)
     reach = max(math.hypot(*corner) + p.radius for p in pieces for corner in p.corners)

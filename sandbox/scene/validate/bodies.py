@@ -14,7 +14,7 @@ from sandbox.scene.description.base import BACKING, MAX_BODIES, BodySource
 from sandbox.scene.description.discs import Emitter
 from sandbox.scene.description.fixed import Plane
 from sandbox.scene.description.generators import ENDS, Cloth, Rope
-from sandbox.scene.errors import Location
+from sandbox.scene.errors import LocatedMessage, Location
 from sandbox.scene.geometry.neighbours import near_pairs
 from sandbox.scene.scene import Scene
 
@@ -30,7 +30,7 @@ PLACES = {"grid": "origin", "scatter": "lower", "stack": "base", "rope": "start"
 
 def check_start_positions(
     scene: Scene, bodies: Bodies, elements: list[LocatedElement], prototypes: list[LocatedElement]
-) -> Iterator[tuple[Location, str]]:
+) -> Iterator[LocatedMessage]:
     """Yield the faults of start positions.
 
     Args:
@@ -169,8 +169,6 @@ def _overlaps(position: FloatArray, radius: FloatArray, owner: IntArray, enough:
     return overlaps
 
 
-Found = tuple[Location, str]
-
 BYTES_PER_VISIT = 4 * 8
 """Bytes for a body and a zone: the scene, the engine and two frames hold the state of every such pair."""
 
@@ -178,7 +176,7 @@ SHORTEST, LONGEST = 1e-9, 1e9
 """m, smallest and largest length of a link"""
 
 
-def check_generators(scene: Scene) -> Iterator[Found]:
+def check_generators(scene: Scene) -> Iterator[LocatedMessage]:
     """Yield the faults of generators."""
     for k, scatter in enumerate(scene.scatters):
         if any(low > high for low, high in zip(scatter.lower, scatter.upper, strict=True)):
@@ -212,7 +210,7 @@ def check_generators(scene: Scene) -> Iterator[Found]:
     yield from _check_counts(scene)
 
 
-def _check_counts(scene: Scene) -> Iterator[Found]:
+def _check_counts(scene: Scene) -> Iterator[LocatedMessage]:
     total, last = 0, ("", 0)
     for kind, sources in scene.kinds.items():
         for k, source in enumerate(sources):
@@ -295,7 +293,7 @@ def _check_pins(cloth: Cloth) -> Iterator[tuple[str | tuple[str | int, ...], str
         yield "radius", f'makes neighbours overlap; use at most {0.5 * min(cloth.spacing):g} m, or collides = "fixed"'
 
 
-def check_rope_ties(scene: Scene, bodies: Bodies) -> Iterator[Found]:
+def check_rope_ties(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
     """Yield the faults of the bodies that ropes are tied to."""
     first = len(bodies) - sum(map(count_of, (*scene.ropes, *scene.cloths, *scene.ragdolls)))
     for k, rope in enumerate(scene.ropes):

@@ -13,7 +13,7 @@ from sandbox.scene.description.base import BodySpec, Point
 from sandbox.scene.description.bodies import AnyPart, BallPart, BoxPart, CapsulePart, Compound, PolygonPart
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import MAX_LAYERS, MAX_ZONES, Plane, Wall, Zone
-from sandbox.scene.errors import Location
+from sandbox.scene.errors import LocatedMessage, Location
 from sandbox.scene.geometry.polygon import OutlineError, anticlockwise, extent_of, outline_fault, signed_area
 from sandbox.scene.geometry.shapes import contains, form_of, middle_of
 from sandbox.scene.geometry.triangulation import convex_parts
@@ -23,7 +23,7 @@ MIN_THICKNESS = 1e-9
 """Smallest thickness of a part, as a fraction of the body's extent from its position."""
 
 
-def check_outlines(scene: Scene) -> Iterator[tuple[Location, str]]:
+def check_outlines(scene: Scene) -> Iterator[LocatedMessage]:
     """Yield the faults of polygons, and of bodies without parts."""
     for location, points in polygon_outlines(scene):
         fault = outline_fault(points)
@@ -50,7 +50,7 @@ def _is_sound(points: tuple[Point, ...]) -> bool:
         return False
 
 
-def _check_part_thickness(k: int, compound: Compound) -> Iterator[tuple[Location, str]]:
+def _check_part_thickness(k: int, compound: Compound) -> Iterator[LocatedMessage]:
     """Yield the parts of a body that rounding would reduce to nothing at their position and angle."""
     polygon_outlines = [(location, *_part_size(part)) for location, part in _parts(compound)]
     far = max((math.hypot(*part.position) + reach for _, part, reach, _ in polygon_outlines), default=0.0)
@@ -118,9 +118,9 @@ MAX_REPEATS = 5_000
 Key = tuple[float | str, ...]
 
 
-def check_repeats(scene: Scene) -> list[tuple[Location, str]]:
+def check_repeats(scene: Scene) -> list[LocatedMessage]:
     """Return a fault for every kind of static collider that is repeated too often."""
-    found: list[tuple[Location, str]] = []
+    found: list[LocatedMessage] = []
     seen: Counter[Key] = Counter()
     for location, key in _shapes(scene):
         seen[key] += 1
@@ -178,13 +178,11 @@ def _segments(wall: Wall) -> Iterator[Key]:
         yield "segment", *low, *high, wall.thickness
 
 
-Found = tuple[Location, str]
-
 SHORTEST = 1e-9
 """m, smallest length of a segment of a strip"""
 
 
-def check_zones(scene: Scene) -> Iterator[Found]:
+def check_zones(scene: Scene) -> Iterator[LocatedMessage]:
     """Yield the faults of zones."""
     if len(scene.zones) > MAX_ZONES:
         yield ("zone", MAX_ZONES), f"a scene has at most {MAX_ZONES:,} zones"
@@ -198,7 +196,7 @@ def check_zones(scene: Scene) -> Iterator[Found]:
         yield ("zone", 0), "zones are not supported in a scene with a [surface]; remove one of the two"
 
 
-def check_layers(scene: Scene) -> Iterator[Found]:
+def check_layers(scene: Scene) -> Iterator[LocatedMessage]:
     """Yield the faults of collision layers."""
     layers = scene.layers
     if len(layers) > MAX_LAYERS:
@@ -207,7 +205,7 @@ def check_layers(scene: Scene) -> Iterator[Found]:
         yield (), f"has a [surface] and the layer {layers[1]!r}; a scene with a [surface] has a single layer"
 
 
-def _check_zone_shape(k: int, zone: Zone) -> Iterator[Found]:
+def _check_zone_shape(k: int, zone: Zone) -> Iterator[LocatedMessage]:
     at: Location = ("zone", k)
     if zone.points is None:
         if zone.position is None or zone.radius is None:

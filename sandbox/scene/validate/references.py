@@ -4,20 +4,21 @@ import math
 from collections.abc import Iterator, Sequence
 
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.drives import driven, unmoved
+from sandbox.scene.compile.drives import is_immovable, moment_of_mass, mount_of, single_bodies
 from sandbox.scene.compile.joints import ends_of
 from sandbox.scene.description.base import BodySource, BodySpec
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import Post, Wall
-from sandbox.scene.description.forces import Attraction, Driven, Thrust
+from sandbox.scene.description.forces import Attraction, Drive, Driven, PlungerDrive, Thrust, TorqueDrive
 from sandbox.scene.description.joints import Gear, Groove, Joint, Pivot, Rod, RotaryLimit, Slide
 from sandbox.scene.description.play import marking_fault
 from sandbox.scene.description.scene import default_name
 from sandbox.scene.description.surface import MISCUE, Floor, Shot, miscues
-from sandbox.scene.errors import Location
+from sandbox.scene.errors import LocatedMessage
 from sandbox.scene.scene import Scene
 
-Found = tuple[Location, str]
+ANGLE_ROUNDING = 1e-9
+"""rad, tolerance of the start angle beyond the stops of a drive, for rounding in a file"""
 
 SHORTEST = 1e-9
 """m, smallest length of rods and grooves"""
@@ -26,7 +27,7 @@ LEAST_RATIO = 1e-6
 """Smallest magnitude of a gear ratio; engines divide by it."""
 
 
-def check_attachments(scene: Scene, bodies: Bodies) -> list[Found]:
+def check_attachments(scene: Scene, bodies: Bodies) -> list[LocatedMessage]:
     """Return the faults of joints, thrusts, attractions and drives."""
     return [
         *_check_joints(scene, bodies),
@@ -36,8 +37,8 @@ def check_attachments(scene: Scene, bodies: Bodies) -> list[Found]:
     ]
 
 
-def _check_joints(scene: Scene, bodies: Bodies) -> Iterator[Found]:
-    index, is_driven = {name: k for k, name in enumerate(bodies.names)}, unmoved(scene, bodies)
+def _check_joints(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
+    index, is_driven = {name: k for k, name in enumerate(bodies.names)}, is_immovable(scene, bodies)
     yield from _check_names("joint", scene.joints)
     for k, joint in enumerate(scene.joints):
         for side, name in enumerate(joint.between):
@@ -57,7 +58,7 @@ def _check_joints(scene: Scene, bodies: Bodies) -> Iterator[Found]:
             yield ("joint", k, where), message
 
 
-def _check_names(kind: str, those: Sequence[Joint | Thrust | Attraction | Driven]) -> Iterator[Found]:
+def _check_names(kind: str, those: Sequence[Joint | Thrust | Attraction | Driven]) -> Iterator[LocatedMessage]:
     """Yield the elements whose name, stated or by default, is used twice within their kind."""
     seen: set[str] = set()
     for k, each in enumerate(those):
@@ -67,7 +68,7 @@ def _check_names(kind: str, those: Sequence[Joint | Thrust | Attraction | Driven
         seen.add(name)
 
 
-def _check_rod(k: int, joint: Joint, bodies: Bodies, number: dict[str, int]) -> Iterator[Found]:
+def _check_rod(k: int, joint: Joint, bodies: Bodies, number: dict[str, int]) -> Iterator[LocatedMessage]:
     """Yield a rod whose ends start at one point, where it has no direction."""
     if not isinstance(joint, Rod) or any(name not in number for name in joint.between) or joint.length == 0.0:
         return
@@ -105,7 +106,7 @@ def _check_joint(joint: Joint) -> Iterator[tuple[str, str]]:
             pass
 
 
-def _check_thrusts(scene: Scene, bodies: Bodies) -> Iterator[Found]:
+def _check_thrusts(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
     yield from _check_names("thrust", scene.thrusts)
     for k, thrust in enumerate(scene.thrusts):
         if thrust.body not in bodies.number_of:
@@ -116,7 +117,7 @@ def _check_thrusts(scene: Scene, bodies: Bodies) -> Iterator[Found]:
             yield ("thrust", k, "end"), "must be later than `begin`"
 
 
-def _check_attractions(scene: Scene, bodies: Bodies) -> Iterator[Found]:
+def _check_attractions(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
     yield from _check_names("attraction", scene.attractions)
     for k, attraction in enumerate(scene.attractions):
         toward = attraction.toward
@@ -124,9 +125,56 @@ def _check_attractions(scene: Scene, bodies: Bodies) -> Iterator[Found]:
             yield ("attraction", k, "toward"), f"no body is named {toward!r}; {_known(bodies)}"
 
 
-def _check_drives(scene: Scene, bodies: Bodies) -> Iterator[Found]:
+def _check_drives(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
     yield from _check_names("drive", scene.drives)
-    yield from driven(scene, bodies)
+    singles, seen = single_bodies(scene), set[str]()
+    for k, drive in enumerate(scene.drives):
+        if drive.body not in bodies.number_of:
+            known = ", ".join(map(repr, [*singles][:5])) or "none"
+            yield ("drive", k, "body"), f"no body is named {drive.body!r}; bodies with a table of their own: {known}"
+        elif drive.body not in singles:
+            yield (
+                ("drive", k, "body"),
+                f"{drive.body!r} is made by a generator; a drive needs a body with a table of its own",
+            )
+        else:
+            single = singles[drive.body]
+            faults = (
+                *_check_driven_body(drive, single, scene, drive.body in seen),
+                *_check_drive_values(drive, single, bodies),
+            )
+            yield from ((("drive", k, key), why) for key, why in faults)
+            seen.add(drive.body)
+
+
+def _check_driven_body(drive: Driven, single: BodySpec, scene: Scene, twice: bool) -> Iterator[tuple[str, str]]:
+    if twice:
+        yield "body", f"{drive.body!r} already has a drive; a body can have one drive only"
+    if single.fixed:
+        yield "body", f"{drive.body!r} is fixed; remove `fixed`, because the drive holds the body"
+    if any(single.velocity) or single.angular_velocity:
+        yield "body", f"{drive.body!r} has an initial velocity; a driven body must start at rest"
+    if any(thrust.body == drive.body for thrust in scene.thrusts):
+        yield "body", f"{drive.body!r} has a thrust; only its drive can move a driven body"
+
+
+def _check_drive_values(drive: Drive, single: BodySpec, bodies: Bodies) -> Iterator[tuple[str, str]]:
+    if isinstance(drive, PlungerDrive):
+        if not math.hypot(*drive.direction) > 0.0:
+            yield "direction", f"{list(drive.direction)} has no direction; use a vector such as [0, 1] for upwards"
+        return
+    low, high = sorted(drive.stops)
+    if low == high:
+        yield "stops", "must be two different angles: the rest angle and the driven angle"
+    elif not low - ANGLE_ROUNDING <= single.angle <= high + ANGLE_ROUNDING:
+        yield (
+            "stops",
+            f"{drive.body!r} starts at {single.angle:g} rad; the angle must be between {low:g} and {high:g} rad",
+        )
+    if isinstance(drive, TorqueDrive) and drive.moment is not None:
+        least = moment_of_mass(mount_of(0, drive, single), float(bodies.mass[bodies.number_of[drive.body]]))
+        if drive.moment <= least:
+            yield "moment", f"must be greater than {least:.3g} kg·m², the moment of the body's mass about this pivot"
 
 
 def _known(bodies: Bodies) -> str:
@@ -138,7 +186,7 @@ def _known(bodies: Bodies) -> str:
     )
 
 
-def check_play(scene: Scene, bodies: Bodies) -> Iterator[tuple[Location, str]]:
+def check_play(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
     """Yield the faults of `[play]`."""
     arrows, relaunch = scene.play.arrows, scene.play.relaunch
     if arrows is not None and arrows not in bodies.names:
@@ -160,7 +208,7 @@ def check_play(scene: Scene, bodies: Bodies) -> Iterator[tuple[Location, str]]:
     yield from _check_parts(scene, bodies)
 
 
-def _check_parts(scene: Scene, bodies: Bodies) -> Iterator[tuple[Location, str]]:
+def _check_parts(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
     """Check that each part names an existing body, collider or zone, and that no name occurs twice."""
     known, seen = {*bodies.names, *scene.fixed_names}, set[str]()
     for k, part in enumerate(scene.play.parts):
@@ -194,7 +242,7 @@ OR_SPHERES = 'Remove it, or set bodies = "spheres" in the [surface]'
 NEEDS_FLOOR = "applies to balls on a floor only; add a [surface]"
 
 
-def check_surface(scene: Scene, bodies: Bodies) -> Iterator[Found]:
+def check_surface(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
     """Yield the faults of settings that need a `[surface]`."""
     if scene.surface is not None:
         yield from _check_body_kind(scene, scene.surface)
@@ -223,7 +271,7 @@ def check_surface(scene: Scene, bodies: Bodies) -> Iterator[Found]:
         yield from _check_shot(scene, bodies, k, shot)
 
 
-def _check_body_kind(scene: Scene, floor: Floor) -> Iterator[Found]:
+def _check_body_kind(scene: Scene, floor: Floor) -> Iterator[LocatedMessage]:
     """Check that spheres have no settings of pucks, and the reverse."""
     if floor.bodies == "spheres":
         if floor.curl:
@@ -251,7 +299,7 @@ def _check_body_kind(scene: Scene, floor: Floor) -> Iterator[Found]:
         yield ("shot", k), f"a cue can strike spheres only; give the puck a velocity. {OR_SPHERES}"
 
 
-def _check_nose_heights(scene: Scene) -> Iterator[Found]:
+def _check_nose_heights(scene: Scene) -> Iterator[LocatedMessage]:
     """Check the heights of cushions: a nose must touch the balls, and some cushion models need it."""
     model = scene.contact_models.cushion
     radii = sorted({ball.radius for ball in scene.balls if not ball.fixed and ball.collides != "none"})
@@ -272,7 +320,7 @@ def _check_nose_heights(scene: Scene) -> Iterator[Found]:
                 yield (kind, k, "height"), message
 
 
-def _check_shot(scene: Scene, bodies: Bodies, k: int, shot: Shot) -> Iterator[Found]:
+def _check_shot(scene: Scene, bodies: Bodies, k: int, shot: Shot) -> Iterator[LocatedMessage]:
     if miscues(shot):
         off = math.hypot(shot.side, shot.height)
         yield (

@@ -6,13 +6,13 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.contacts import bearers_of, numbered
+from sandbox.scene.compile.contacts import bearers_of, index_surfaces
 from sandbox.scene.compile.generators import GeneratorError
 from sandbox.scene.compile.layout import elements_of
 from sandbox.scene.description.base import MAX_POSITION, MAX_SPEED, MAX_STEPS, BodySource, BodySpec, HasMaterial
 from sandbox.scene.description.fixed import Wall
 from sandbox.scene.description.world import Material, Pair
-from sandbox.scene.errors import Location
+from sandbox.scene.errors import LocatedMessage, Location
 from sandbox.scene.geometry.shapes import form_of
 from sandbox.scene.scene import Scene
 from sandbox.scene.validate.bodies import (
@@ -31,8 +31,6 @@ from sandbox.scene.validate.geometry import (
 )
 from sandbox.scene.validate.references import check_attachments, check_play, check_surface
 
-Found = tuple[Location, str]
-
 MAX_SURFACES = 256
 MAX_NAMES = 10
 """Largest number of materials listed in a message."""
@@ -40,7 +38,7 @@ SHORTEST = 1e-9
 """m, smallest length of a wall's segment"""
 
 
-def crosscheck(scene: Scene) -> list[Found]:
+def crosscheck(scene: Scene) -> list[LocatedMessage]:
     """Return every fault across the elements of a scene; an empty list means that it can be run."""
     materials, shapeless = list(_check_materials(scene)), [*check_generators(scene), *check_outlines(scene)]
     found = [
@@ -69,7 +67,7 @@ def crosscheck(scene: Scene) -> list[Found]:
     return found if materials else [*found, *_check_surface_count(scene, bodies)]
 
 
-def _check_names_only(scene: Scene, wrong: set[Location]) -> list[Found]:
+def _check_names_only(scene: Scene, wrong: set[Location]) -> list[LocatedMessage]:
     """Return the faults of names and references in a scene with invalid outlines, using placeholder shapes."""
     substitute = with_placeholder_shapes(scene)
     if any(check_generators(substitute)):
@@ -108,7 +106,7 @@ def _parts(scene: Scene) -> Iterator[tuple[Location, HasMaterial]]:
                 yield ("body", k, kind, n), part
 
 
-def _check_materials(scene: Scene) -> Iterator[Found]:
+def _check_materials(scene: Scene) -> Iterator[LocatedMessage]:
     declared: set[str] = set()
     for k, material in enumerate(scene.materials):
         if material.name in declared:
@@ -133,7 +131,7 @@ def _check_materials(scene: Scene) -> Iterator[Found]:
             yield (*location, "material"), f"no material is named {collider.material!r}; {known}"
 
 
-def _check_masses(scene: Scene) -> Iterator[Found]:
+def _check_masses(scene: Scene) -> Iterator[LocatedMessage]:
     for location, element in _prototypes(scene):
         if element.mass is not None and element.density is not None:
             yield (*location, "density"), "cannot be combined with `mass`; remove one of the two"
@@ -150,7 +148,7 @@ def _check_masses(scene: Scene) -> Iterator[Found]:
             yield (*location, key), "a fixed body cannot move; remove this key, or `fixed`"
 
 
-def _check_planes_and_walls(scene: Scene) -> Iterator[Found]:
+def _check_planes_and_walls(scene: Scene) -> Iterator[LocatedMessage]:
     for k, plane in enumerate(scene.planes):
         if not has_direction(plane):
             yield (
@@ -163,7 +161,7 @@ def _check_planes_and_walls(scene: Scene) -> Iterator[Found]:
     yield from _check_wall_options(scene)
 
 
-def _check_wall_options(scene: Scene) -> Iterator[Found]:
+def _check_wall_options(scene: Scene) -> Iterator[LocatedMessage]:
     """Check kicks, one-way and non-solid walls: some need the length of a wall, none works with a `[surface]`."""
     for k, post in enumerate(scene.posts):
         if post.kick is not None and post.kick.profile != "even":
@@ -192,7 +190,7 @@ def _check_wall_options(scene: Scene) -> Iterator[Found]:
                 )
 
 
-def check_wall_points(wall: Wall) -> Iterator[Found]:
+def check_wall_points(wall: Wall) -> Iterator[LocatedMessage]:
     """Yield the faults of a wall's points, located within the wall."""
     if wall.closed and len(wall.points) < 3:
         yield ("closed",), "a closed wall needs at least three points"
@@ -202,7 +200,7 @@ def check_wall_points(wall: Wall) -> Iterator[Found]:
             yield ("points", n), f"is at the same place as the next point; they must be at least {SHORTEST:g} m apart"
 
 
-def _check_world(scene: Scene) -> Iterator[Found]:
+def _check_world(scene: Scene) -> Iterator[LocatedMessage]:
     if scene.world.bounds is not None:
         lower, upper = scene.world.bounds
         if not all(low < high for low, high in zip(lower, upper, strict=True)):
@@ -217,7 +215,7 @@ def _check_world(scene: Scene) -> Iterator[Found]:
         yield ("solver", "dt"), message
 
 
-def _check_names(scene: Scene, bodies: Bodies) -> Iterator[Found]:
+def _check_names(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
     seen: set[str] = set()
     prototypes, twice = _prototypes(scene), set[Location]()
     for name, element in zip(bodies.names, bodies.element.tolist(), strict=True):
@@ -239,12 +237,12 @@ def _name_taken(name: str) -> str:
     return f"another body or fixed object is also named {name!r}; names must be unique"
 
 
-def _check_surface_count(scene: Scene, bodies: Bodies) -> Iterator[Found]:
-    if len(numbered(scene, (*bearers_of(bodies.elements), *scene.fixed))[0]) > MAX_SURFACES:
+def _check_surface_count(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
+    if len(index_surfaces(scene, (*bearers_of(bodies.elements), *scene.fixed))[0]) > MAX_SURFACES:
         yield (), f"more than {MAX_SURFACES} different surfaces; share materials between bodies"
 
 
-def _check_initial_state(scene: Scene, bodies: Bodies) -> Iterator[Found]:
+def _check_initial_state(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
     """Check positions and speeds, which a generator may have put out of range."""
     prototypes = _prototypes(scene)
     for wrong, message in (

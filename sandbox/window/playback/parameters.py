@@ -190,7 +190,11 @@ def _surface(live: LiveView, file: Scene, picked: int | None, key: str, high: fl
     place = _place(live, picked)
     if place >= len(scene.body_sources) and picked is None:
         return Parameter(key, key, 0.0, high, 0.0, enabled=False, why="the scene has no body")
-    disc = live.bodies.elements[live.bodies.element[picked or 0]] if place >= len(scene.body_sources) else scene.body_sources[place]
+    disc = (
+        live.bodies.elements[live.bodies.element[picked or 0]]
+        if place >= len(scene.body_sources)
+        else scene.body_sources[place]
+    )
     name = disc.name if picked is None or place < len(scene.body_sources) else live.bodies.names[picked]
     label = key if picked is None else f"{key} of {name or 'this body'}"
     default = None

@@ -18,8 +18,8 @@ from sandbox.arrays import BoolArray, FloatArray
 from sandbox.games.artillery.view_state import ArtilleryViewState
 from sandbox.games.billiards.view.prediction import CueAim
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.joint_arrays import Links
-from sandbox.scene.compile.potential import parted
+from sandbox.scene.compile.joint_arrays import JointArrays
+from sandbox.scene.compile.potential import is_broken_at
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource, Point
 from sandbox.scene.description.forces import Thrust
@@ -34,7 +34,7 @@ NOTIFY_EVERY = 1.0
 
 def broken_joints(breaks: FloatArray, time: float) -> list[int]:
     """Return the numbers of the joints that have broken by a time, s; `breaks` (J,) says when each does."""
-    return np.flatnonzero(parted(breaks, np.asarray([time]))[0]).tolist() if len(breaks) else []
+    return np.flatnonzero(is_broken_at(breaks, np.asarray([time]))[0]).tolist() if len(breaks) else []
 
 
 class BreakTimes:
@@ -151,7 +151,7 @@ class Snapshot:
     """of the running session; None where `bodies` are those of the scene or of a recorded run"""
 
     @cached_property
-    def links(self) -> Links:
+    def links(self) -> JointArrays:
         """The joints that are whole."""
         return (self.setup or self.scene).links.without(self.broken)
 

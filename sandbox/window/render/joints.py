@@ -19,7 +19,7 @@ import pygame
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.scene.compile.drives import Mount, mounts
-from sandbox.scene.compile.joint_arrays import LinkKind, Links
+from sandbox.scene.compile.joint_arrays import LinkKind, JointArrays
 from sandbox.scene.description.forces import PlungerDrive
 from sandbox.window.render.body_geometry import clipped_box, outline_distance
 from sandbox.window.render.circles import CircleRenderer, CircleStyle
@@ -69,7 +69,7 @@ SHADES = np.asarray(
 class JointSegments:
     """The joints in sight, J of them, and where they hold their bodies."""
 
-    links: Links
+    links: JointArrays
     ends: FloatArray
     """(J, 4) px: of the first body, or the world, and of the second"""
 

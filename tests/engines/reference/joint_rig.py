@@ -7,7 +7,7 @@ import numpy as np
 
 from sandbox.engines.reference.integrators import INTEGRATORS, Inputs, transition
 from sandbox.engines.reference.joints import JointSolver, kick_pose
-from sandbox.scene.compile.joint_arrays import LinkKind, Links
+from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
 
 G = 9.81
 BIAS = 0.9**60
@@ -18,11 +18,11 @@ def link(kind: LinkKind, a: int, b: int, *figures: float, **more: Any) -> dict[s
     return {"kind": kind, "a": a, "b": b, "figures": [*figures, 0.0, 0.0, 0.0][:3], **more}
 
 
-def links_of(*some: dict[str, Any]) -> Links:
+def compile_joints(*some: dict[str, Any]) -> JointArrays:
     def column(name: str, default: Any, kind: type = np.float64) -> Any:
         return np.array([one.get(name, default) for one in some], dtype=kind)
 
-    return Links(
+    return JointArrays(
         kind=column("kind", 0, np.int64),
         a=column("a", -1, np.int64),
         b=column("b", 0, np.int64),
@@ -42,7 +42,7 @@ class Rig:
 
     def __init__(
         self,
-        links: Links,
+        links: JointArrays,
         pose: Any,
         rates: Any = 0.0,
         mass: Any = 1.0,
@@ -118,7 +118,7 @@ class Rig:
 def pendulum(angle: float, **more: Any) -> Rig:
     """Return a ball on a rod of 1 m that hangs from the origin, `angle` degrees from straight down, at rest."""
     a = math.radians(angle)
-    return Rig(links_of(link(LinkKind.ROD, -1, 0, 1.0)), [math.sin(a), -math.cos(a)], **more)
+    return Rig(compile_joints(link(LinkKind.ROD, -1, 0, 1.0)), [math.sin(a), -math.cos(a)], **more)
 
 
 def period(rig: Rig, h: float, swings: int = 1) -> float:

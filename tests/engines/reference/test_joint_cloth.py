@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from joint_rig import G, Rig, link, links_of
+from joint_rig import G, Rig, compile_joints, link
 from scipy.optimize import brentq
 
 from sandbox.engines.reference.joints import CAP
@@ -43,7 +43,7 @@ def test_a_chain_comes_to_rest_in_its_catenary(how, integrator, iterations, accu
     piece, depth = 0.07, math.sqrt(0.7**2 - 0.5**2)
     place = np.arange(1, 21) / 20
     start = np.column_stack((place, -depth * np.minimum(2 * place, 2 - 2 * place)))  # two straight halves
-    held = links_of(*(link(LinkKind.ROD, k - 1, k, piece) for k in range(20)))
+    held = compile_joints(*(link(LinkKind.ROD, k - 1, k, piece) for k in range(20)))
     mass = [0.05] * 19 + [math.inf]
     rig = Rig(held, start, mass=mass, drag=3.0, how=how, integrator=integrator, iterations=iterations)
     rig.run(12.0, 1 / 120)
@@ -53,7 +53,7 @@ def test_a_chain_comes_to_rest_in_its_catenary(how, integrator, iterations, accu
 def hanging(how, iterations, kind=LinkKind.SPRING, count=10, cap=math.inf, stiffness=400.0):
     """Return how far a chain hangs down, beyond its length, once drag has brought it to rest."""
     figures = (0.1, stiffness, 1.0) if kind == LinkKind.SPRING else (0.1,)
-    held = links_of(*(link(kind, k - 1, k, *figures) for k in range(count)))
+    held = compile_joints(*(link(kind, k - 1, k, *figures) for k in range(count)))
     pose = [[0.0, -0.1 * (k + 1)] for k in range(count)]
     rig = Rig(held, pose, mass=0.1, drag=3.0, how=how, iterations=iterations, cap=cap).run(8.0, 1 / 120)
     length = np.hypot(*np.diff(rig.pose[:, :2], axis=0, prepend=0.0).T)
@@ -79,7 +79,7 @@ def test_capped_springs_stretch_to_their_cap_and_no_farther():
 
 
 def test_springs_of_no_rest_length_have_no_cap():
-    held = links_of(link(LinkKind.SPRING, -1, 0, 0.0, 10.0))
+    held = compile_joints(link(LinkKind.SPRING, -1, 0, 0.0, 10.0))
     one = Rig(held, [1, 0], how="relaxation", cap=CAP).run(0.3, 0.01)
     other = Rig(held, [1, 0], how="relaxation").run(0.3, 0.01)
     assert np.array_equal(one.x, other.x)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from joint_rig import Rig, links_of
+from joint_rig import Rig, compile_joints
 
 from sandbox.engines.reference.forces import attract, thrust
 
@@ -23,7 +23,7 @@ def pull(inverse_mass, *, target=-1, place=(0.0, 0.0), strength=1.0, softening=0
 
 def orbit(integrator):
     """Return a body at the near point of an orbit of e = ½ and half-axis 1 around a sun of GM = 1."""
-    return Rig(links_of(), [0.5, 0], [[0, math.sqrt(3), 0]], gravity=0, integrator=integrator, forces=pull([1.0]))
+    return Rig(compile_joints(), [0.5, 0], [[0, math.sqrt(3), 0]], gravity=0, integrator=integrator, forces=pull([1.0]))
 
 
 def energy_of(rig):
@@ -56,7 +56,7 @@ def test_two_bodies_go_round_each_other_and_keep_their_momentum():
     """Strength G·m₂ on the first, and its answer: relative motion as around G (m₁ + m₂)."""
     mass = np.array([1.0, 3.0])
     rig = Rig(
-        links_of(),
+        compile_joints(),
         [[0.75, 0], [-0.25, 0]],
         [[0, 0.75, 0], [0, -0.25, 0]],
         mass=mass,
@@ -90,7 +90,9 @@ def push_of(throttle, *, force, point=(0.0, 0.0), inverse_mass=0.5, inverse_mome
 def test_thrust_turns_with_its_body():
     """At a steady spin ω, v = F/(m ω) (sin ωt, 1 − cos ωt)."""
     spin, speed = 3.0, 2.0 * 0.5 / 3.0
-    rig = Rig(links_of(), [0, 0], [[0, 0, spin]], gravity=0, integrator="rk4", forces=push_of(1.0, force=(2.0, 0.0)))
+    rig = Rig(
+        compile_joints(), [0, 0], [[0, 0, spin]], gravity=0, integrator="rk4", forces=push_of(1.0, force=(2.0, 0.0))
+    )
     rig.run(1.0, 0.01)
     expected = [speed * math.sin(spin), speed * (1 - math.cos(spin)), spin]
     assert rig.rates[0] == pytest.approx(expected, abs=1e-8)  # fourth order at ω h = .03
@@ -98,6 +100,6 @@ def test_thrust_turns_with_its_body():
 
 def test_thrust_off_the_centre_turns_its_body_by_its_throttle():
     acting = push_of(0.5, force=(2.0, 0.0), point=(0.0, -0.1))
-    rig = Rig(links_of(), [0, 0], gravity=0, integrator="rk4", forces=acting).run(1.0, 0.01)
+    rig = Rig(compile_joints(), [0, 0], gravity=0, integrator="rk4", forces=acting).run(1.0, 0.01)
     assert rig.rates[0, 2] == pytest.approx(0.4, rel=1e-13)  # τ/I = .5 · .1 · 2 · 4, at any angle
     assert rig.pose[0, 2] == pytest.approx(0.2, rel=1e-13)  # half of that, at t = 1

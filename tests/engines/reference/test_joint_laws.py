@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from joint_rig import BIAS, G, Rig, link, links_of
+from joint_rig import BIAS, G, Rig, compile_joints, link
 
 from sandbox.engines.reference.integrators import INTEGRATORS
 from sandbox.engines.reference.joints import LACKING, METHODS, JointSolver
@@ -19,7 +19,7 @@ HOW = [
 
 def tumbling(how, integrator, *more):
     """Return three bodies in a row, joined off their centres, tumbling freely."""
-    held = links_of(
+    held = compile_joints(
         link(LinkKind.ROD, 0, 1, 0.6, anchor_a=(0.2, 0.0), anchor_b=(-0.2, 0.0)),
         link(LinkKind.ROD, 1, 2, 0.6, anchor_a=(0.2, 0.0), anchor_b=(-0.2, 0.0)),
         link(LinkKind.ROTARY_LIMIT, 0, 1, -0.3, 0.3),
@@ -62,7 +62,7 @@ def test_pushes_along_the_lines_of_the_end_lose_angular_momentum_with_the_step(h
 @pytest.mark.parametrize(("how", "integrator"), HOW)
 def test_a_rotary_limit_holds(how, integrator):
     """A beam on a pivot falls onto its limit at −½ and stays: the torque there is its weight's."""
-    held = links_of(
+    held = compile_joints(
         link(LinkKind.PIVOT, -1, 0, anchor_b=(-0.5, 0.0)),
         link(LinkKind.ROTARY_LIMIT, -1, 0, -0.5, 1.0),
     )
@@ -76,15 +76,15 @@ def test_a_rotary_limit_holds(how, integrator):
 
 @pytest.mark.parametrize(("how", "integrator"), HOW)
 def test_a_slack_slide_does_nothing(how, integrator):
-    held = links_of(link(LinkKind.SLIDE, -1, 0, 0.1, 2.0))
+    held = compile_joints(link(LinkKind.SLIDE, -1, 0, 0.1, 2.0))
     with_it = Rig(held, [1, 0], [[0.3, 1, 0]], how=how, integrator=integrator).run(0.5, 1 / 240)
-    free = Rig(links_of(), [1, 0], [[0.3, 1, 0]], how=how, integrator=integrator).run(0.5, 1 / 240)
+    free = Rig(compile_joints(), [1, 0], [[0.3, 1, 0]], how=how, integrator=integrator).run(0.5, 1 / 240)
     assert np.array_equal(with_it.x, free.x)
 
 
 @pytest.mark.parametrize(("how", "integrator"), HOW)
 def test_a_slide_holds_as_a_string_and_keeps_off(how, integrator):
-    held = links_of(link(LinkKind.SLIDE, -1, 0, 0.4, 1.0))
+    held = compile_joints(link(LinkKind.SLIDE, -1, 0, 0.4, 1.0))
     rig = Rig(held, [0.8, 0.0], [[0.0, 2.0, 0]], how=how, integrator=integrator)
     for _ in range(960):
         rig.step(1 / 240)
@@ -102,7 +102,7 @@ def test_a_joint_gives_no_more_than_its_most_force(how, integrator, kind):
     """Straight down, it falls with g − F/m."""
     figures = (1.0,) if kind == LinkKind.ROD else ()
     anchor = (0.0, 0.0) if kind == LinkKind.ROD else (0.0, 1.0)
-    held = links_of(link(kind, -1, 0, *figures, anchor_b=anchor, most_force=4.0))
+    held = compile_joints(link(kind, -1, 0, *figures, anchor_b=anchor, most_force=4.0))
     rig = Rig(held, [0, -1], mass=2.0, how=how, integrator=integrator).run(1.0, 1 / 100)
     assert rig.rates[0, 1] == pytest.approx(-(G - 2.0), rel=1e-12)  # rounding of 100 steps
     assert rig.solver.load(rig.x)[0] == pytest.approx([0.0, 4.0], abs=1e-12)  # as above
@@ -110,7 +110,9 @@ def test_a_joint_gives_no_more_than_its_most_force(how, integrator, kind):
 
 @pytest.mark.parametrize(("how", "integrator"), HOW)
 def test_a_hanging_load_is_the_weight(how, integrator):
-    held = links_of(link(LinkKind.ROD, -1, 0, 1.0), link(LinkKind.PIVOT, 0, 1, anchor_a=(0, -0.5), anchor_b=(0, 0.5)))
+    held = compile_joints(
+        link(LinkKind.ROD, -1, 0, 1.0), link(LinkKind.PIVOT, 0, 1, anchor_a=(0, -0.5), anchor_b=(0, 0.5))
+    )
     rig = Rig(held, [[0, -1], [0, -2]], mass=[1, 2], moment=1.0, how=how, integrator=integrator, iterations=60)
     rig.run(2.0, 1 / 240)
     assert rig.solver.load(rig.x)[:, 1] == pytest.approx([3 * G, 2 * G], rel=1e-3)  # settled, as far as 60 passes go
@@ -120,7 +122,7 @@ def test_a_hanging_load_is_the_weight(how, integrator):
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize("how", METHODS)
 def test_what_hangs_at_rest_has_the_velocity_that_its_positions_have_yet_to_follow(how, integrator):
-    rig = Rig(links_of(link(LinkKind.ROD, -1, 0, 1.0)), [0, -1], how=how, integrator=integrator).run(2, 1 / 240)
+    rig = Rig(compile_joints(link(LinkKind.ROD, -1, 0, 1.0)), [0, -1], how=how, integrator=integrator).run(2, 1 / 240)
     unseen = 1.0 - INTEGRATORS[integrator].fraction if how in ("relaxation", "xpbd") else 0.0
     assert rig.rates[0, 1] == pytest.approx(-unseen * G / 240, abs=1e-12)  # rounding over h
     assert rig.pose[0, 1] == pytest.approx(
@@ -130,7 +132,7 @@ def test_what_hangs_at_rest_has_the_velocity_that_its_positions_have_yet_to_foll
 
 @pytest.mark.parametrize(("how", "integrator"), HOW)
 def test_what_is_torn_lets_go_and_the_rest_keeps_its_impulses(how, integrator):
-    held = links_of(link(LinkKind.ROD, -1, 0, 1.0), link(LinkKind.ROD, -1, 1, 1.0))
+    held = compile_joints(link(LinkKind.ROD, -1, 0, 1.0), link(LinkKind.ROD, -1, 1, 1.0))
     rig = Rig(held, [[0, -1], [0, -1]], how=how, integrator=integrator).run(1.0, 1 / 100)
     kept = rig.solver.impulse()[1].copy()
     assert kept[1] != 0.0
@@ -147,7 +149,7 @@ def test_what_is_torn_lets_go_and_the_rest_keeps_its_impulses(how, integrator):
 @pytest.mark.parametrize(("how", "integrator"), HOW)
 def test_joints_between_what_is_fixed_do_nothing(how, integrator):
     kinds = [(LinkKind.ROD, 0.3), (LinkKind.PIVOT, 0), (LinkKind.SLIDE, 0, 0.1), (LinkKind.ROTARY_LIMIT, 1, 2)]
-    held = links_of(*(link(kind, 0, 1, *figures) for kind, *figures in kinds))
+    held = compile_joints(*(link(kind, 0, 1, *figures) for kind, *figures in kinds))
     rig = Rig(held, [[0, 0], [1, 0]], mass=math.inf, how=how, integrator=integrator)
     before = rig.x.copy()
     rig.run(0.1, 0.01)
@@ -156,7 +158,7 @@ def test_joints_between_what_is_fixed_do_nothing(how, integrator):
 
 @pytest.mark.parametrize(("how", "integrator"), HOW)
 def test_a_rod_of_no_length_between_coincident_ends_does_no_harm(how, integrator):
-    rig = Rig(links_of(link(LinkKind.ROD, -1, 0, 1.0)), [0, 0], gravity=0, how=how, integrator=integrator).run(
+    rig = Rig(compile_joints(link(LinkKind.ROD, -1, 0, 1.0)), [0, 0], gravity=0, how=how, integrator=integrator).run(
         0.1, 0.01
     )
     assert np.array_equal(rig.x, np.zeros((2, 1, 3)))  # no line to push along, as in Munk2D
@@ -164,7 +166,7 @@ def test_a_rod_of_no_length_between_coincident_ends_does_no_harm(how, integrator
 
 def test_a_single_short_step_between_long_ones_is_no_blow():
     """A shorter step starts from less; the long one after it does not start from more than that."""
-    held = links_of(*(link(LinkKind.ROD, k - 1, k, 0.1) for k in range(20)))
+    held = compile_joints(*(link(LinkKind.ROD, k - 1, k, 0.1) for k in range(20)))
     rig = Rig(held, [[0.0, -0.1 * (k + 1)] for k in range(20)], mass=np.linspace(1, 5, 20)).run(3.0, 1 / 120)
     quiet = np.abs(rig.rates).max()
     rig.step(1e-6)
@@ -175,9 +177,9 @@ def test_a_single_short_step_between_long_ones_is_no_blow():
 @pytest.mark.parametrize("kind", LACKING)
 def test_kinds_that_are_lacking_are_refused_by_name(kind):
     with pytest.raises(ValueError, match=kind.name.lower()):
-        JointSolver(links_of(link(kind, -1, 0)), np.ones(1), np.ones(1), BIAS, 10, "impulses")
+        JointSolver(compile_joints(link(kind, -1, 0)), np.ones(1), np.ones(1), BIAS, 10, "impulses")
 
 
 def test_an_unknown_way_is_refused():
     with pytest.raises(ValueError, match="glue"):
-        JointSolver(links_of(), np.ones(1), np.ones(1), BIAS, 10, "glue")
+        JointSolver(compile_joints(), np.ones(1), np.ones(1), BIAS, 10, "glue")

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pymunk
 import pytest
-from joint_rig import BIAS, G, Rig, link, links_of, pendulum
+from joint_rig import BIAS, G, Rig, compile_joints, link, pendulum
 from scipy.special import ellipk
 
 from sandbox.scene.compile.joint_arrays import LinkKind
@@ -120,7 +120,7 @@ def test_impulses_keep_the_length_within_their_bias(angle):
 )
 def test_a_rod_on_a_pivot_at_its_end_swings_by_its_moment(how, integrator, accuracy):
     """A physical pendulum: 1 m long, I = 1/12 about its centre, d = ½, m g d sinθ = −(I + m d²) θ̈, from 90°."""
-    held = links_of(link(LinkKind.PIVOT, -1, 0, anchor_b=(0.0, 0.5)))
+    held = compile_joints(link(LinkKind.PIVOT, -1, 0, anchor_b=(0.0, 0.5)))
     rig = Rig(held, [0.5, 0.0, math.pi / 2], moment=1 / 12, how=how, integrator=integrator, iterations=20)
     period = 4 * math.sqrt((1 / 12 + 1 / 4) / (G / 2)) * ellipk(0.5)
     assert measured(rig, 1 / 480) == pytest.approx(period, rel=accuracy)
@@ -139,7 +139,7 @@ def test_a_rod_on_a_pivot_at_its_end_swings_by_its_moment(how, integrator, accur
     ],
 )
 def test_a_double_pendulum_keeps_its_energy_as_its_way_allows(how, integrator, band):
-    held = links_of(link(LinkKind.ROD, -1, 0, 1.0), link(LinkKind.ROD, 0, 1, 1.0))
+    held = compile_joints(link(LinkKind.ROD, -1, 0, 1.0), link(LinkKind.ROD, 0, 1, 1.0))
     rig = Rig(held, [[1, 0], [2, 0]], how=how, integrator=integrator, iterations=20)
     before, worst = rig.energy, 0.0
     for _ in range(5 * 960):
@@ -181,7 +181,9 @@ def test_impulses_are_pymunks_step_by_step(name, most_force):
     joint = theirs(space, body)
     joint.error_bias, joint.max_force = BIAS, most_force
     space.add(body, joint)
-    rig = Rig(links_of({**ours, "most_force": most_force}), [1, 0], [0, 0, 2], moment=0.4, integrator="explicit_euler")
+    rig = Rig(
+        compile_joints({**ours, "most_force": most_force}), [1, 0], [0, 0, 2], moment=0.4, integrator="explicit_euler"
+    )
     for _ in range(1000):
         space.step(1 / 240)
         rig.step(1 / 240)
@@ -201,7 +203,7 @@ def test_a_chain_of_three_is_pymunks_step_by_step():
         space.add(body, joint)
         bodies.append(body)
         before = body
-    held = links_of(*(link(LinkKind.ROD, k - 1, k, 1.0) for k in range(3)))
+    held = compile_joints(*(link(LinkKind.ROD, k - 1, k, 1.0) for k in range(3)))
     rig = Rig(held, [[1, 0], [2, 0], [3, 0]], mass=[1, 2, 3], integrator="explicit_euler", iterations=7)
     for _ in range(240):
         space.step(1 / 240)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from joint_rig import G, Rig, link, links_of
+from joint_rig import G, Rig, compile_joints, link
 
 from sandbox.scene.compile.joint_arrays import LinkKind
 
@@ -13,7 +13,7 @@ OMEGA = 2 * math.pi
 
 def oscillator(h: float, steps: int, **how) -> tuple[np.ndarray, np.ndarray]:
     """Return the displacements of a ball on a spring of 1 m, from .1 m, and its energies, as parts of the first."""
-    held = links_of(link(LinkKind.SPRING, -1, 0, 1.0, OMEGA**2))
+    held = compile_joints(link(LinkKind.SPRING, -1, 0, 1.0, OMEGA**2))
     rig = Rig(held, [1.1, 0.0], gravity=0.0, **how)
     x, energy = [0.1], []
     for _ in range(steps):
@@ -56,7 +56,7 @@ def test_xpbd_is_backward_euler():
 def test_xpbd_dampers_take_what_a_backward_euler_step_takes():
     """It is linear, so that one iteration is enough: x' = x + h v', v' = v − h (ω² x' + c v')."""
     c, h = 3.0, 0.01
-    rig = Rig(links_of(link(LinkKind.SPRING, -1, 0, 1.0, OMEGA**2, c)), [1.1, 0.0], gravity=0.0, how="xpbd")
+    rig = Rig(compile_joints(link(LinkKind.SPRING, -1, 0, 1.0, OMEGA**2, c)), [1.1, 0.0], gravity=0.0, how="xpbd")
     x, v = 0.1, 0.0
     for _ in range(100):
         rig.step(h)
@@ -66,13 +66,13 @@ def test_xpbd_dampers_take_what_a_backward_euler_step_takes():
 
 
 def test_xpbd_holds_any_stiffness():
-    rig = Rig(links_of(link(LinkKind.SPRING, -1, 0, 1.0, 1e12)), [0.0, -1.0], how="xpbd").run(1.0, 0.01)
+    rig = Rig(compile_joints(link(LinkKind.SPRING, -1, 0, 1.0, 1e12)), [0.0, -1.0], how="xpbd").run(1.0, 0.01)
     assert rig.pose[0, 1] == pytest.approx(-1.0, abs=1e-10)  # m g/k is 1e-11 m
 
 
 @pytest.mark.parametrize("integrator", ["velocity_verlet", "leapfrog", "rk4"])
 def test_two_bodies_swing_by_their_reduced_mass(integrator):
-    held = links_of(link(LinkKind.SPRING, 0, 1, 1.0, OMEGA**2 * 0.75))
+    held = compile_joints(link(LinkKind.SPRING, 0, 1, 1.0, OMEGA**2 * 0.75))
     rig = Rig(held, [[0, 0], [1.1, 0]], mass=[1, 3], gravity=0.0, integrator=integrator).run(10.0, 1e-3)
     # Ten periods on, back where it was: the frequency is off by (ωh)²/24 of itself, and more is in rounding.
     assert rig.pose[:, 0] == pytest.approx([0.0, 1.1], abs=1e-7)
@@ -81,7 +81,7 @@ def test_two_bodies_swing_by_their_reduced_mass(integrator):
 
 def test_a_spring_off_the_centres_turns_what_it_pulls():
     """Force and torque against a derivative of the energy ½ k (l − l₀)² by central differences."""
-    held = links_of(link(LinkKind.SPRING, 0, 1, 0.7, 40.0, anchor_a=(0.2, 0.1), anchor_b=(-0.1, 0.3)))
+    held = compile_joints(link(LinkKind.SPRING, 0, 1, 0.7, 40.0, anchor_a=(0.2, 0.1), anchor_b=(-0.1, 0.3)))
     pose = np.array([[0.1, -0.2, 0.4], [0.9, 0.5, -1.1]])
     mass, moment = np.array([1.0, 3.0]), np.array([0.2, 0.5])
     rig = Rig(held, pose, mass=mass, moment=moment)
@@ -101,7 +101,7 @@ def test_a_spring_off_the_centres_turns_what_it_pulls():
 
 def test_a_spring_of_no_rest_length_swings_through_its_anchor():
     """F = −k r is linear in both directions, so that Verlet's frequency is exact, also at r = 0."""
-    held = links_of(link(LinkKind.SPRING, -1, 0, 0.0, OMEGA**2))
+    held = compile_joints(link(LinkKind.SPRING, -1, 0, 0.0, OMEGA**2))
     rig = Rig(held, [0.3, 0.0], [[0.0, 0.5, 0.0]], gravity=0.0, integrator="velocity_verlet")
     omega = 2 / 0.01 * math.asin(OMEGA * 0.01 / 2)
     for k in range(1, 201):
@@ -110,7 +110,7 @@ def test_a_spring_of_no_rest_length_swings_through_its_anchor():
 
 
 def test_a_damped_spring_of_no_rest_length_brakes_what_passes_its_anchor():
-    held = links_of(link(LinkKind.SPRING, -1, 0, 0.0, 10.0, 3.0))
+    held = compile_joints(link(LinkKind.SPRING, -1, 0, 0.0, 10.0, 3.0))
     rig = Rig(held, [0.0, 0.0], [[0.3, -0.4, 0.0]], mass=2.0)
     assert rig.solver.forces(rig.x)[0, :2] == pytest.approx([-0.45, 0.6], rel=1e-15)  # −c v/m
     rig.x[1] = 0.0
@@ -119,7 +119,7 @@ def test_a_damped_spring_of_no_rest_length_brakes_what_passes_its_anchor():
 
 @pytest.mark.parametrize("how", ["impulses", "xpbd"])
 def test_rotary_springs_swing_by_moments(how):
-    held = links_of(link(LinkKind.ROTARY_SPRING, 0, 1, 0.5, OMEGA**2 * 0.75))
+    held = compile_joints(link(LinkKind.ROTARY_SPRING, 0, 1, 0.5, OMEGA**2 * 0.75))
     pose = [[0, 0, 0], [1, 0, 0.6]]
     rig = Rig(held, pose, moment=[1, 3], gravity=0.0, integrator="velocity_verlet", how=how).run(1.0, 1e-4)
     # One period on: by forces, Verlet's (ωh)²/24 squared; in XPBD the amplitude falls by ω² h t/2 at first order.
@@ -129,7 +129,7 @@ def test_rotary_springs_swing_by_moments(how):
 
 
 def test_rotary_dampers_brake():
-    held = links_of(link(LinkKind.ROTARY_SPRING, -1, 0, 0.0, 1e-30, 0.5))
+    held = compile_joints(link(LinkKind.ROTARY_SPRING, -1, 0, 0.0, 1e-30, 0.5))
     rig = Rig(held, [0, 0, 0], [[0, 0, 2.0]], moment=0.25, gravity=0.0, integrator="rk4").run(1.0, 0.01)
     assert rig.rates[0, 2] == pytest.approx(2 * math.exp(-2.0), rel=1e-7)  # RK4 at c h/I = .02: 2e-9 a second, ample
 
@@ -138,7 +138,7 @@ def test_rotary_dampers_brake():
 def test_a_hanging_chain_of_springs_stretches_by_the_sum_of_weights(how, accuracy):
     """By n (n + 1)/2 · m g/k, once drag has brought it to rest."""
     n, k, m = 8, 500.0, 0.2
-    held = links_of(*(link(LinkKind.SPRING, j - 1, j, 0.1, k, 2.0) for j in range(n)))
+    held = compile_joints(*(link(LinkKind.SPRING, j - 1, j, 0.1, k, 2.0) for j in range(n)))
     pose = [[0.0, -0.1 * (j + 1)] for j in range(n)]
     rig = Rig(held, pose, mass=m, drag=2.0, how=how, iterations=100).run(20.0, 1 / 200)
     stretch = -rig.pose[-1, 1] - 0.1 * n
@@ -154,7 +154,7 @@ def test_a_stretched_string_swings_in_its_modes(mode):
     ends = [[0.0, 0.0], [length * (count + 1), 0.0]]
     shape = 1e-7 * np.sin(mode * math.pi * np.arange(1, count + 1) / (count + 1))
     pose = [*([length * (j + 1), y] for j, y in enumerate(shape)), ends[1]]
-    held = links_of(*(link(LinkKind.SPRING, j - 1, j, 0.5 * length, k) for j in range(count + 1)))
+    held = compile_joints(*(link(LinkKind.SPRING, j - 1, j, 0.5 * length, k) for j in range(count + 1)))
     mass = [m] * count + [math.inf]
     rig = Rig(held, pose, mass=mass, gravity=0.0, integrator="velocity_verlet")
     tension = k * 0.5 * length

@@ -92,14 +92,14 @@ class ShotResult(HtmlRepr):
         """All events in order of time."""
         columns = self.log[:, c.EVENT_TIME], self.what, self.log[:, c.POINT_X : c.POINT_X + 2]
         rows = zip(*(column.tolist() for column in columns), strict=True)
-        made = []
+        events = []
         for time, (kind, ball, other), (x, y) in rows:
             if kind == c.PHASE_CHANGE:
-                made.append(ShotEvent(time, PHASES[other], self.names[ball], None, (x, y)))
+                events.append(ShotEvent(time, PHASES[other], self.names[ball], None, (x, y)))
             else:
                 partner = self.names[other] if other >= 0 else self.fixed_names[-1 - other]
-                made.append(ShotEvent(time, KINDS[kind], self.names[ball], partner, (x, y)))
-        return made
+                events.append(ShotEvent(time, KINDS[kind], self.names[ball], partner, (x, y)))
+        return events
 
     @property
     def contacts(self) -> Contacts:

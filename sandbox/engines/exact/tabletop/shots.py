@@ -30,7 +30,7 @@ from sandbox.engines.exact.tabletop.shot_result import ShotResult
 from sandbox.engines.exact.tabletop.simulation import TabletopSimulation, too_many_events, with_log_rows, with_path_rows
 from sandbox.engines.exact.tabletop.state import TabletopState
 from sandbox.engines.tabletop.motion import CAPTURED, RESTING
-from sandbox.engines.tabletop.requirements import caught
+from sandbox.engines.tabletop.requirements import pockets_at
 from sandbox.resource_limits import EVENTS as EVENT_LIMIT
 from sandbox.scene.compile.demands import on_floor
 from sandbox.scene.compile.setup import Setup
@@ -342,7 +342,7 @@ class Table:
             ValueError: a position is not finite, or a ball overlaps another object there.
         """
         other = self._copy()
-        down = caught(self.scene, np.array(list(position.values()), dtype=float).reshape(-1, 2)) >= 0
+        down = pockets_at(self.scene, np.array(list(position.values()), dtype=float).reshape(-1, 2)) >= 0
         for (name, place), inside in zip(position.items(), down.tolist(), strict=True):
             number = self._number[name]
             other._state[number, c.X : c.Y + 1] = place

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
-from sandbox.engines.common.energy_balance import booked
+from sandbox.engines.common.energy_balance import record_energy_change
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.exact.bodies import EventDrivenBodies
 from sandbox.engines.exact.event_driven import FIRST_LOG_ROWS, EventDrivenSimulation, last_event_bodies
@@ -116,7 +116,7 @@ class TabletopSimulation(EventDrivenSimulation[TabletopState]):
 
     def _remove(self, numbers: IntArray) -> None:
         """Remove bodies by index; they keep their positions and have no velocity."""
-        with booked(self._ledger, Cause.RETIRED, self), np.errstate(all="ignore"):
+        with record_energy_change(self._ledger, Cause.RETIRED, self), np.errstate(all="ignore"):
             self._store.remove_bodies(numbers, self.time)
         self._load_bodies()
 
