@@ -264,8 +264,10 @@ def start_segment(
             simulation.apply(each)
         except ActionError as error:
             simulation.close()
-            what = f"the constant force on {each.body!r}" if isinstance(each, Force) else f"the thrust {each.thrust!r}"
-            raise ActionError(f"{engine} cannot continue with {what}: {error}") from None
+            description = (
+                f"the constant force on {each.body!r}" if isinstance(each, Force) else f"the thrust {each.thrust!r}"
+            )
+            raise ActionError(f"{engine} cannot continue with {description}: {error}") from None
     body_indices = None if frame.present.all() else np.flatnonzero(frame.present)
     columns = ("position", "velocity", "angle", "angular_velocity")
     everyone = replace(bodies, **{column: getattr(frame, column) for column in columns})

@@ -360,8 +360,8 @@ class PymunkSimulation(BaseSimulation):
             beyond = part.beyond()
             if beyond is not None:
                 self._population.end()
-                index, what = beyond
-                raise Divergence(self.time, self.bodies.names[index], what)
+                index, description = beyond
+                raise Divergence(self.time, self.bodies.names[index], description)
 
     def _retire(self) -> None:
         """Remove bodies whose lifetime has ended or that are outside of world.bounds."""

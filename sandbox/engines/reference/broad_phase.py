@@ -39,7 +39,7 @@ SECOND = (1 << FIRST) - 1
 """The bits of the second."""
 
 ROUNDING = 1e-15
-"""What two edges, x ± r, can be off by together, as a part of what is added up in them: four roundings, and a bit.
+"""Rounding error of two edges, x ± r, relative to their terms: four roundings, and a margin.
 Boxes are widened by it, or far from the origin they would lose pairs whose centres are near enough."""
 
 EXCEEDED, UNSORTED = -1, -2

@@ -85,10 +85,10 @@ class CollisionPipeline(ABC):
         self._plane_tests = self._planes * int(np.count_nonzero(self.can_touch))
         touching = store.radius[self.can_touch]
         self.widest = float(store.radius[store.collision_mask > NOTHING].max(initial=0.0))
-        """m; the largest radius of what can touch anything"""
+        """m; largest radius of bodies that can touch anything"""
         alone = not (store.contact_matrix.ball_ball or self._planes or len(self._boxes))
         self.thinnest = np.inf if alone else float(touching.min(initial=np.inf))
-        """m; the smallest radius of what moves and can touch anything"""
+        """m; smallest radius of moving bodies that can touch anything"""
 
     @abstractmethod
     def candidates(self, position: FloatArray, margin: float = 0.0, walls_alone: bool = False) -> CandidatePairs:
@@ -154,7 +154,7 @@ class CollisionPipeline(ABC):
         return some
 
     def _filled(self, room: IntArray, search: Callable[[IntArray], tuple[int, int]]) -> tuple[IntArray, IntArray]:
-        """Return what a search finds, sorted, and the room that it took: more where there was too little.
+        """Return the sorted keys that a search finds, and its buffer, enlarged if it was too small.
 
         Raises:
             Exhaustion: there are too many pairs to look at, or to keep.
@@ -217,7 +217,7 @@ class CollisionPipeline(ABC):
 
     @abstractmethod
     def max_displacement(self, start: FloatArray, end: FloatArray) -> float:
-        """Return the longest way, m, of any point of those that can touch anything, between two sets of poses."""
+        """Return the largest displacement, m, of any point of bodies that can touch anything, between two poses."""
 
     def overlaps(self, position: FloatArray) -> Manifolds:
         """Return all contacts at (N, ≥ 2) positions, m. They are good until the next look."""
@@ -225,7 +225,7 @@ class CollisionPipeline(ABC):
 
 
 def _require(refusal: str | None) -> None:
-    """Raise what a resource limit says.
+    """Raise the refusal of a resource limit, if there is one.
 
     Raises:
         Exhaustion: it says something.
@@ -303,7 +303,7 @@ class CirclePipeline(CollisionPipeline):
         return size
 
     def max_displacement(self, start: FloatArray, end: FloatArray) -> float:
-        """Return the longest way, m, between two sets of (N, ≥ 2) centres, of those that can touch anything."""
+        """Return the largest displacement, m, of bodies that can touch anything, between centres (N, ≥ 2)."""
         displacement = (end - start)[self.can_touch, :2]
         return float(np.sqrt((displacement * displacement).sum(axis=1)).max(initial=0.0))
 
@@ -395,7 +395,7 @@ class ConvexPipeline(CollisionPipeline):
         return size
 
     def max_displacement(self, start: FloatArray, end: FloatArray) -> float:
-        """Return the longest way, m, of any point of those that can touch anything, between two sets of poses."""
+        """Return the largest displacement, m, of any point of bodies that can touch anything, between two poses."""
         displacement = (end - start)[self.can_touch]
         length = np.sqrt((displacement[:, :2] ** 2).sum(axis=1))
         if displacement.shape[1] == 3:

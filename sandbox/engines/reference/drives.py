@@ -1,14 +1,13 @@
 """Driven bodies: motors, flippers and plungers, and how they take part in the solver.
 
-DrivenBody: a body that a drive holds, as a stage has it. What turns about a hinge has its hinge for a centre there.
+DrivenBody: a body that a drive holds. In states of the solver, the position of a body on a hinge is that of its hinge.
+Lever arms of its contacts start there: the hinge cannot move, and the body has its moment of inertia about the hinge.
 
-So contacts have their levers from the hinge: its mass nothing can move, and about it the body has one moment.
+Drives: all driven bodies of a simulation, for the solver.
 
-Drives: the driven bodies of a stage, and how contacts find them.
-
-A body on a hinge has its moment about that, and is held by its stops as by one-sided joints. Where all that it meets
-presses it onto its stop as well, it is immovable for that substep: contact and stop in turn would not get there in
-10 iterations. What a stroke or a plunger leads is moved by nothing, and has its velocity all through a substep.
+The stops of a hinge act as one-sided joints. If all contacts of a body press it onto its stop as well, it is immovable
+for that substep: contacts and stop, solved alternately, would not converge in 10 iterations. A body led by a stroke or
+a plunger is kinematic, and has its planned velocity during the whole substep.
 """
 
 from abc import ABC, abstractmethod
@@ -48,7 +47,7 @@ STILL = 1e-9
 
 
 class DrivenBody(ABC):
-    """Base of driven bodies. A substep calls `plan`, `begin`, `place`, and after the contacts `done`."""
+    """Base of driven bodies. A substep calls `plan`, `begin`, `place`, and after the contacts `commit`."""
 
     def __init__(self, store: BodyStore, number: int, mount: Mount) -> None:
         self.number, self.mount = number, mount
@@ -81,10 +80,10 @@ class DrivenBody(ABC):
         """Write the end of the planned substep into a state."""
 
     @abstractmethod
-    def done(self, after: State) -> None:
+    def commit(self, after: State) -> None:
         """Commit the planned substep, after its contacts are solved."""
 
-    def enter(self, x: State) -> None:
+    def use_hinges(self, x: State) -> None:
         """Replace the centre of mass by the hinge in a state."""
         n = self.number
         x[0, n, 0], x[0, n, 1] = self._seat
@@ -128,16 +127,16 @@ class HingeMotor(DrivenBody):
         return self.turned.stop * self._law.sense
 
     @property
-    def given(self) -> float:
+    def stop_impulse(self) -> float:
         """Impulse of the stop to begin with, N·m·s: that of the last substep, scaled to a shorter one."""
         at, impulse, h = self._held
         return impulse * min(self._h / h, 1.0) if at and at == self.turned.stop else 0.0
 
-    def hold(self, given: float) -> None:
+    def store_stop_impulse(self, given: float) -> None:
         """Remember the impulse of the stop, N·m·s."""
         self._held = self.turned.stop, given, self._h
 
-    def follow(self, old: "HingeMotor") -> None:
+    def copy_stop_impulse(self, old: "HingeMotor") -> None:
         """Take over the impulse of the stop from another body object."""
         self._held = old._held
 
@@ -155,26 +154,26 @@ class HingeMotor(DrivenBody):
     def place(self, moved: State) -> None:
         """Write the end of the planned substep; the stop later removes the angular velocity that presses onto it."""
         n, turned = self.number, self.turned
-        self.enter(moved)
+        self.use_hinges(moved)
         moved[0, n, 2] = turned.angle
         moved[1, n, 2] = turned.spin + turned.press * self._h / self.moment
 
     @property
-    def stands(self) -> bool:
+    def is_at_stop(self) -> bool:
         """Whether the body is pressed onto a stop during the whole planned substep."""
         return self.turned.stop != 0 and not self._planned[1] and self._planned[0] == self.turned.angle
 
-    def sprung(self, spun: float) -> bool:
+    def apply_spring_torque(self, spun: float) -> bool:
         """Count the change of angular velocity by springs in the planned substep, rad/s, as a torque.
 
         Return whether that leaves it pressed onto a stop on which it stands.
         """
-        stood = self.stands
+        stood = self.is_at_stop
         turned = self._law.turn(*self._planned, self.fall + self.moment * spun / self._h, self._h)
         self.turned = turned._replace(press=0.0)
-        return stood and self.stands
+        return stood and self.is_at_stop
 
-    def done(self, after: State) -> None:
+    def commit(self, after: State) -> None:
         """Keep the body between the stops, also if a contact changed its motion, and at rest on a stop."""
         n = self.number
         after[0, n, 2] = min(max(after[0, n, 2], self._low), self._high)
@@ -197,10 +196,10 @@ class KinematicHinge(DrivenBody):
 
     def place(self, moved: State) -> None:
         """Write the end of the planned substep."""
-        self.enter(moved)
+        self.use_hinges(moved)
         moved[0, self.number, 2], moved[1, self.number, 2] = self._planned.angle, self._planned.spin
 
-    def done(self, after: State) -> None:
+    def commit(self, after: State) -> None:
         """Set the rate to 0 at a stop."""
         if self._planned.arrives:
             after[1, self.number, 2] = 0.0
@@ -220,7 +219,7 @@ class DrivenPlunger(DrivenBody):
         level, pull, rate = self.state.tolist()
         self._planned = advance_plunger(self._drive, level, pull, rate, h)
 
-    def enter(self, x: State) -> None:
+    def use_hinges(self, x: State) -> None:
         """Do nothing: the pose is that of the centre already."""
 
     def begin(self, x: State) -> None:
@@ -236,7 +235,7 @@ class DrivenPlunger(DrivenBody):
         moved[0, n, :2], moved[1, n, :2] = self._where()
         moved[1, n, 2] = 0.0
 
-    def done(self, after: State) -> None:
+    def commit(self, after: State) -> None:
         """Set the velocity to 0 at the target."""
         rate = 0.0 if self._planned.arrives else self._planned.rate
         if not rate:
@@ -281,14 +280,16 @@ class Drives:
 
     def __init__(self, store: BodyStore) -> None:
         self._store = store
-        self.leads: list[DrivenBody] = [make_driven_body(store, number, mount) for number, mount in store.held.items()]
-        self._hinges = [lead for lead in self.leads if isinstance(lead, HingeMotor)]
-        self._numbers: IntArray = np.asarray([lead.number for lead in self.leads], np.int64)
+        self.driven_bodies: list[DrivenBody] = [
+            make_driven_body(store, number, mount) for number, mount in store.held.items()
+        ]
+        self._hinges = [driven for driven in self.driven_bodies if isinstance(driven, HingeMotor)]
+        self._numbers: IntArray = np.asarray([driven.number for driven in self.driven_bodies], np.int64)
         self._turning = not store.led[self._numbers].all()
-        self.firm: FloatArray = store.inverse_moment.copy()
+        self.inverse_moment_overlap: FloatArray = store.inverse_moment.copy()
         """(N,) 1/(kg·m²), inverse moments for the correction of overlaps: 0 for driven bodies, which keep their pose"""
-        self.firm[self._numbers] = 0.0
-        self.yielding: FloatArray = store.inverse_moment
+        self.inverse_moment_overlap[self._numbers] = 0.0
+        self.inverse_moment_forces: FloatArray = store.inverse_moment
         """(N,) 1/(kg·m²), inverse moments for forces in the planned substep: 0 for a body pressed onto a stop"""
         self._no_rows: VelocityConstraints = rows_of(ties_of(store.setup.links, among=np.empty(0, np.int64)))
 
@@ -301,68 +302,70 @@ class Drives:
         stopped = {} if old is None else {hinge.number: hinge for hinge in old._hinges}
         for hinge in new._hinges:
             if hinge.number in stopped:
-                hinge.follow(stopped[hinge.number])
+                hinge.copy_stop_impulse(stopped[hinge.number])
         return new
 
-    def enter(self, x: State) -> None:
+    def use_hinges(self, x: State) -> None:
         """Replace centres of mass by hinges in a state (2, N, 3)."""
-        for lead in self.leads:
-            lead.enter(x)
+        for driven in self.driven_bodies:
+            driven.use_hinges(x)
 
-    def leave(self, x: State) -> None:
+    def write_centres(self, x: State) -> None:
         """Write the centres of mass of a state into the body store."""
         store = self._store
-        for lead in self.leads:
-            store.position[lead.number], store.velocity[lead.number] = lead.centre(*x)
+        for driven in self.driven_bodies:
+            store.position[driven.number], store.velocity[driven.number] = driven.centre(*x)
 
-    def centred(self, x: State) -> FloatArray:
+    def centres(self, x: State) -> FloatArray:
         """Return the centres of mass of all bodies in a state, (N, 2) m."""
         position = x[0, :, :2].copy()
-        for lead in self.leads:
-            position[lead.number] = lead.centre(*x)[0]
+        for driven in self.driven_bodies:
+            position[driven.number] = driven.centre(*x)[0]
         return position
 
     def begin(self, x: State, h: float) -> State:
         """Plan a substep of h, s, from a state; return the state with the velocities of kinematic bodies during it."""
         self.start = x.copy()
         """(2, N, 3) state at the beginning of the planned substep"""
-        for lead in self.leads:
-            lead.plan(x, h)
-            lead.begin(self.start)
+        for driven in self.driven_bodies:
+            driven.plan(x, h)
+            driven.begin(self.start)
         return self.start
 
-    def spring(self, x: State, h: float, spring: Callable[[State], tuple[State, Manifolds, FloatArray]]) -> State:
-        """Return the state h, s, ahead, under contacts that are forces all the way.
+    def advance_with_springs(
+        self, x: State, h: float, advance: Callable[[State], tuple[State, Manifolds, FloatArray]]
+    ) -> State:
+        """Return the state h, s, ahead, under contacts that act as forces during the whole substep.
 
-        What stands on a stop stands still as long as they, too, press it there, or less off than its drive presses.
-        Whatever else is on a hinge goes evenly, and they turn it besides; how far, with stops, is its drive's matter.
+        A body on a stop stays at rest while the contacts press it onto the stop, or off it less than its drive presses.
+        Other bodies on hinges move at a constant rate, changed by the contacts; their drives apply the stops.
 
         Args:
             x: (2, N, 3) the state.
             h: s.
-            spring: the way of all bodies from a state, with the contacts and what each gave, (K, 2) N·s.
+            advance: returns the end state from a start state, the contacts, and their impulses (K, 2), N·s.
         """
         self.begin(x, h)
-        for lead in self.leads:
-            lead.glide(self.start, h)
-        self.yielding = self._store.inverse_moment.copy()
-        standing = [hinge for hinge in self._hinges if hinge.stands]
-        self.yielding[[hinge.number for hinge in standing]] = 0.0
+        for driven in self.driven_bodies:
+            driven.glide(self.start, h)
+        self.inverse_moment_forces = self._store.inverse_moment.copy()
+        standing = [hinge for hinge in self._hinges if hinge.is_at_stop]
+        self.inverse_moment_forces[[hinge.number for hinge in standing]] = 0.0
         while True:  # at most once for each of them
-            moved, contacts, given = spring(self.start)
-            loose = [each for each in standing if not each.sprung(self._turn(each, contacts, given))]
+            moved, contacts, impulse = advance(self.start)
+            loose = [each for each in standing if not each.apply_spring_torque(self._turn(each, contacts, impulse))]
             if not loose:
                 break
             for hinge in loose:
                 hinge.plan(x, h)
-                self.yielding[hinge.number] = 1.0 / hinge.moment
+                self.inverse_moment_forces[hinge.number] = 1.0 / hinge.moment
             standing = [hinge for hinge in standing if hinge not in loose]
             for hinge in standing:
                 hinge.plan(x, h)
         for hinge in self._hinges:
             if hinge not in standing:
                 n = hinge.number
-                hinge.sprung(float(moved[1, n, 2] - self.start[1, n, 2]))
+                hinge.apply_spring_torque(float(moved[1, n, 2] - self.start[1, n, 2]))
         return moved
 
     def _turn(self, hinge: HingeMotor, contacts: Manifolds, impulse: FloatArray) -> float:
@@ -376,10 +379,10 @@ class Drives:
 
     def place(self, moved: State) -> None:
         """Write the end of the planned substep into a state."""
-        for lead in self.leads:
-            lead.place(moved)
+        for driven in self.driven_bodies:
+            driven.place(moved)
 
-    def released(self, rates: FloatArray) -> FloatArray:
+    def with_stops(self, rates: FloatArray) -> FloatArray:
         """Return rates (N, 3) after the planned substep, without the part that presses onto stops."""
         rates = rates.copy()
         for hinge in self._hinges:
@@ -405,21 +408,21 @@ class Drives:
         stops = AngularStops(
             np.asarray([hinge.number for hinge in stopped], np.int64),
             np.asarray([hinge.direction for hinge in stopped]),
-            np.asarray([hinge.given for hinge in stopped]),
+            np.asarray([hinge.stop_impulse for hinge in stopped]),
         )
         rows = self._no_rows if rows is None else rows
         inverse = self._store.inverse_mass, inverse_moment
         solve_together(contacts, bounce, rows, stops, velocity, *inverse, impulse, iterations)
-        given = dict(zip(stops.body.tolist(), stops.given.tolist(), strict=True))
+        given = dict(zip(stops.body.tolist(), stops.impulse.tolist(), strict=True))
         for hinge in self._hinges:
-            hinge.hold(given.get(hinge.number, 0.0))
+            hinge.store_stop_impulse(given.get(hinge.number, 0.0))
 
-    def done(self, after: State) -> None:
+    def commit(self, after: State) -> None:
         """Commit the planned substep."""
-        for lead in self.leads:
-            lead.done(after)
+        for driven in self.driven_bodies:
+            driven.commit(after)
 
-    def contact_work(self, contacts: Manifolds, impulse: FloatArray, mean: FloatArray) -> float:
+    def impulse_work(self, contacts: Manifolds, impulse: FloatArray, mean: FloatArray) -> float:
         """Return the work of impulses (K, 2), N·s, on driven bodies at mean rates (N, 3), J."""
         if not contacts.size:
             return 0.0
@@ -436,12 +439,12 @@ class Drives:
     def work(self, before: State, after: State, h: float) -> DriveWork:
         """Return the energy that a substep of h, s, between two states gave to driven bodies."""
         gained = weight = lifted = 0.0
-        for lead in self.leads:
-            gained += lead.kinetic(after[1]) - lead.kinetic(before[1])
-            rise = lead.height(after[0]) - lead.height(before[0])
-            if isinstance(lead, HingeMotor):
-                n = lead.number
-                weight += lead.fall * h * 0.5 * float(before[1, n, 2] + after[1, n, 2])
+        for driven in self.driven_bodies:
+            gained += driven.kinetic(after[1]) - driven.kinetic(before[1])
+            rise = driven.height(after[0]) - driven.height(before[0])
+            if isinstance(driven, HingeMotor):
+                n = driven.number
+                weight += driven.fall * h * 0.5 * float(before[1, n, 2] + after[1, n, 2])
                 lifted += rise
             else:
                 gained += rise
@@ -471,7 +474,7 @@ class DrivenSolver(ImpulseSolver):
     ) -> None:
         super().__init__(store, settings, pipeline, joints, memory)
         self._drives, self._always = drives, True
-        self._inverse_overlap = store.inverse_mass, drives.firm
+        self._inverse_overlap = store.inverse_mass, drives.inverse_moment_overlap
 
     def integrate(self, x: State, forces: Inputs, time: float, h: float) -> Motion:
         """Return the motion from a state at a time, s, over h, s, as if nothing were hit."""
@@ -483,11 +486,11 @@ class DrivenSolver(ImpulseSolver):
     def finish(self, after: State) -> State:
         """Return the start state of the next step: driven bodies are between their stops, and at rest on a stop."""
         after = after.copy()
-        self._drives.done(after)
+        self._drives.commit(after)
         return after
 
-    def _released(self, rates: FloatArray) -> FloatArray:
-        return self._drives.released(rates)
+    def _with_stops(self, rates: FloatArray) -> FloatArray:
+        return self._drives.with_stops(rates)
 
     def _iterate(
         self,

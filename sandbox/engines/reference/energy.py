@@ -1,16 +1,15 @@
-"""Energy ledger of a reference run: what each stage of a step does to the energy, by cause.
+"""Energy ledger of a reference run: the energy change in each stage of a step, by cause.
 
-A contact, or a joint, acts through the whole of a step, and is not to be blamed for the kick that the step's forces
-give before it can answer. So its impulse J is booked with the mean of the velocities u at the step's two ends,
+A contact or a joint acts during the whole step. The kick by the step's forces, which precedes its impulse, is not
+attributed to it. So the work of its impulse J is that at the mean of the velocities u at both ends of the step,
 
     work = J·(u_start + u_end)/2,
 
-which is ½μ(1 − e²)u² for an impact, μ m g s for a slide, and nothing at all for what rests. The rest of what it did to
-the kinetic energy, J·(kick)/2, it took back from the integrator, and so did positions that follow velocities: both are
-the integrator's. Joints that are held by positions are booked likewise, by the velocities that they give; where they
-shift positions beyond what follows from those, that is position correction. An impact at a moment of its own is booked
-with the velocities just before and after it. What acts from afar, in the air or by design is booked with its work along
-the way that each body really went.
+which is ½μ(1 − e²)u² for an impact, μ m g s for sliding, and 0 for a resting contact. The rest of its change of the
+kinetic energy, J·(kick)/2, reverses a change by the integrator; it is attributed to the integrator, as are positions
+that follow velocities. Joints solved by positions are treated in the same way, by their change of velocity; position
+changes beyond that count as position correction. An impact within a step is entered with the velocities just before and
+after it. Attraction, drag and drives are entered with their work along the actual path of each body.
 """
 
 import math
@@ -95,12 +94,12 @@ class StepEnergyLedger:
         self._book_motion(record)
 
     def _book_drives(self, drives: Drives, record: StepRecord, mean: FloatArray) -> None:
-        """Book drives: what driven bodies gained, less what contacts and weight gave them."""
+        """Enter the work of drives: the energy gain of driven bodies less the work of contacts and weight."""
         work = drives.work(record.before, record.after, record.h)
-        contact_work = drives.contact_work(record.contacts, record.impulse, mean)
+        impulse_work = drives.impulse_work(record.contacts, record.impulse, mean)
         if self._penalty is not None:  # its forces are booked whole, and against freely moving bodies alone
-            self.account.enter(Cause.INTEGRATOR, contact_work)
-        self.account.enter(Cause.DRIVES, work.gained - contact_work - work.weight)
+            self.account.enter(Cause.INTEGRATOR, impulse_work)
+        self.account.enter(Cause.DRIVES, work.gained - impulse_work - work.weight)
         self.account.enter(Cause.INTEGRATOR, work.weight + work.lifted)
 
     def _book_contacts(
@@ -128,7 +127,7 @@ class StepEnergyLedger:
         corrected = free[0] if motion.shift is None else free[0] + shift
         followed = corrected + (self._fraction * h) * (end - free[1]) if displaced else after[0]
         drift = self._kinetic(start[1], free[1]) + self._lift(start[0], free[0]) + self._lift(corrected, followed)
-        # What contacts and joints took back of the kick that they were not given time to withstand.
+        # The part of the kick that contacts and joints reversed.
         drift += 0.5 * self._product(joint_change, free[1] - start[1] + placed[1] - end)
         drift += 0.5 * self._product(end - placed[1], placed[1] - start[1])
         correction = self._lift(free[0], corrected) + self._strain(free[0], corrected) + self._lift(followed, after[0])
@@ -136,7 +135,7 @@ class StepEnergyLedger:
         if displaced:
             strain_after = self._strain(followed, after[0])
         joints = 0.5 * self._product(joint_change, start[1] + end)
-        if self._compliant:  # springs are held as joints are: what they store is theirs, but for what dampers take
+        if self._compliant:  # springs are solved as joints are: their stored energy counts, except for damping
             joints += strain + strain_after - work[Cause.DAMPING]
         else:
             drift, correction, forces = drift + strain, correction + strain_after, forces + work[Cause.DAMPING]
@@ -154,7 +153,7 @@ class StepEnergyLedger:
         return given_back + work[Cause.RESTITUTION] + work[Cause.FRICTION]
 
     def _work(self, time: float, start: State, end: State, h: float) -> dict[Cause, float]:
-        """Return the work, J, of what takes or gives along the way of a step, a parabola between its ends."""
+        """Return the work, J, of drag, damping and drives along the path of a step, a parabola between its ends."""
         work = dict.fromkeys(Cause, 0.0)
         if h <= 0.0 or not self._worked:
             return work
@@ -178,7 +177,7 @@ class StepEnergyLedger:
         if store.force.any() or store.torque.any():
             yield Cause.DRIVES, float((store.force * rate[:, :2]).sum())
             yield Cause.DRIVES, float(store.torque @ rate[:, 2]) if rate.shape[1] == 3 else 0.0
-        if self._lifted.any():  # what zones give beyond the world's gravity
+        if self._lifted.any():  # gravity of zones in excess of the world's
             yield Cause.DRIVES, float((self._lifted * rate[:, :2]).sum())
         if self._field.thrusting:
             yield Cause.DRIVES, self._product(self._field.thrusts(time, x), rate)
@@ -196,7 +195,7 @@ class StepEnergyLedger:
         return 0.5 * self._product(after - before, after + before)
 
     def _lift(self, before: FloatArray, after: FloatArray) -> float:
-        """Return the change, J, of what gravity and attraction store, between two sets of poses."""
+        """Return the change of the potential energy of gravity and attraction, J, between two sets of poses."""
         if before is after:
             return 0.0
         change = -float((self._weight * (after[:, :2] - before[:, :2])).sum())
@@ -205,7 +204,7 @@ class StepEnergyLedger:
         return change
 
     def _strain(self, before: FloatArray, after: FloatArray) -> float:
-        """Return the change, J, of what springs store, between two sets of poses."""
+        """Return the change of the energy stored in springs, J, between two sets of poses."""
         if before is after or not self._potential.springs:
             return 0.0
         return self._strained(after) - self._strained(before)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def drives_lack(setup: Setup, wanted: frozenset[Demand], settings: Settings) -> list[str]:
-    """Return what a scene with drives, which demands this, asks for beyond what can be had."""
+    """Return the demands and settings of a scene with drives that are not supported."""
     lacks = []
     if settings.detection in ("bisect", "swept"):
         lacks.append(f"detection {settings.detection!r} does not support drives; 'discrete' and 'shrink' do")
@@ -41,7 +41,7 @@ def _fixed_joint_with_drive(setup: Setup) -> tuple[str, str] | None:
 
 
 WORDS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse"}
-"""What is chosen where nothing is stated: what pymunk does, and the tutorial."""
+"""Default methods: those of pymunk and of the tutorial."""
 
 SUITED = {"relaxation": "semi_implicit_euler", "xpbd": "semi_implicit_euler", "rattle": "velocity_verlet"}
 """Integrators that suit position-based joint methods: kicks come before position correction."""
@@ -86,7 +86,7 @@ class ReferenceEngine:
     }
 
     def missing(self, start: Scene | Setup, settings: Settings) -> tuple[str, ...]:
-        """Return what scene and settings ask for that the reference lacks."""
+        """Return the demands and settings that the engine does not support."""
         setup = Setup.of(start)
         wanted = demands(setup)
         lacks = unmodelled(setup, self.capabilities)
@@ -119,7 +119,7 @@ class ReferenceEngine:
         return (*lacks, *overload(setup, settings))
 
     def _detection_lacks(self, wanted: frozenset[Demand], settings: Settings) -> list[str]:
-        """Say what a detection of impacts in time cannot do."""
+        """Yield the demands that detection of impacts within a step does not support."""
         lacks = []
         if settings.detection == "swept" and Demand.POLYGONS in wanted:
             lacks.append("detection 'swept' supports balls only; 'bisect' supports polygons too")
@@ -147,7 +147,7 @@ class ReferenceEngine:
         if len(setup.links):
             own["joints"] = "impulses"
         if demands(setup) & {Demand.SPRINGS, Demand.ROTARY_SPRINGS, Demand.ATTRACTION}:
-            own["integrator"] = "semi_implicit_euler"  # explicit Euler makes what swings gain energy
+            own["integrator"] = "semi_implicit_euler"  # with explicit Euler, oscillations gain energy
         own["integrator"] = SUITED.get(settings.joints or "impulses", own["integrator"])
         if settings.response == "penalty":
             from sandbox.engines.reference.penalty import suited
@@ -163,7 +163,7 @@ class ReferenceEngine:
         """Set a scene up.
 
         Raises:
-            Refusal: the reference lacks something that is asked for, or the first look at what is near takes too much.
+            Refusal: a demand is not supported, or the first collision detection exceeds a resource limit.
         """
         from sandbox.engines.contract import Exhaustion, Refusal
         from sandbox.engines.reference.simulation import ReferenceSimulation

@@ -25,7 +25,7 @@ def attract(
     inverse_mass: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Add the accelerations of N bodies by A attractions, and what they give back to the bodies that attract.
+    """Add the accelerations of N bodies by A attractions, and the reactions on the attracting bodies.
 
     A strength is G·M. The attracting body's own mass counts only in its answer: it is pulled with the force that it
     gives. What coincides with its target is not pulled. Costs A·N.
@@ -75,7 +75,7 @@ def thrust(
         body: (T,) index of the body that each drives.
         point: (T, 2) m, where it acts, in the body's own frame about its centre of mass.
         force: (T, 2) N, in that frame, at full throttle.
-        throttle: (T,) the share of it that acts.
+        throttle: (T,) fraction of the force that acts.
         inverse_mass: (N,) 1/kg.
         inverse_moment: (N,) 1/(kg·m²).
         out: (N, 3) m/s² and rad/s², added to.
@@ -156,13 +156,13 @@ def forces_on(store: BodyStore, field: ForceField, joints: JointSolver | None, c
 
     Args:
         store: the bodies, and the steady forces on them.
-        field: what acts from afar and from within.
-        joints: what holds the scene's links, if it has any.
+        field: attractions and thrusts.
+        joints: solver of the joints, if there are any.
         coordinates: of a state: 2, or 3 where something turns.
     """
     world = store.scene.world
     moving = store.moving[:, None]
-    if store.held:  # what acts on them is their drives' concern
+    if store.held:  # their drives apply the forces on them
         moving = moving.copy()
         moving[list(store.held)] = False
     steady: FloatArray = np.zeros((len(moving), coordinates))

@@ -126,8 +126,8 @@ def integrate(
         except (TypeError, ValueError) as error:
             raise ValueError(f"f returns {short_repr(returned)}; an array of shape {shape} is expected") from error
         if returned is None or found.shape != shape:
-            what = "None" if returned is None else f"the shape {found.shape}"
-            raise ValueError(f"f returns {what}; x has the shape {shape}")
+            description = "None" if returned is None else f"the shape {found.shape}"
+            raise ValueError(f"f returns {description}; x has the shape {shape}")
         return found
 
     given: Any = _Input(u)

@@ -15,7 +15,7 @@ time T, and for an oscillator of angular frequency ω:
 Motion: the state vector x of a scene, and the state transition function ẋ = f(t, x, u).
 
 x is one array (2, N, D): x[0] the poses, x[1] their rates. D is 2 (x, y) where nothing turns, else 3 (x, y, angle).
-u is what acts on it from outside: gravity, air, steady forces, and penalty contacts where those are chosen.
+u holds the external forces: gravity, drag, constant forces, and penalty contacts if they are chosen.
 """
 
 from collections.abc import Callable
@@ -36,7 +36,7 @@ class Inputs(NamedTuple):
     """u: all that acts on N bodies during one substep."""
 
     steady: FloatArray
-    """(N, D) acceleration by gravity, steady forces and torques, m/s² and rad/s²; 0 for what is fixed"""
+    """(N, D) acceleration by gravity, steady forces and torques, m/s² and rad/s²; 0 for fixed bodies"""
     linear_drag: float = 0.0
     """1/s"""
     quadratic_drag: float = 0.0
@@ -44,7 +44,7 @@ class Inputs(NamedTuple):
     wind: tuple[float, float] = (0.0, 0.0)
     """m/s"""
     mobile: FloatArray = _ALL
-    """(N, 1) or (1, 1): 1 for what air can brake, 0 for what is fixed or gone"""
+    """(N, 1) or (1, 1): 1 for bodies with drag, 0 for fixed or removed ones"""
     contacts: Callable[[State], FloatArray] | None = None
     """Penalty contacts: the acceleration (N, D) that they add in a state."""
     forces: tuple[Callable[[float, State], FloatArray], ...] = ()
@@ -73,7 +73,7 @@ def transition(t: float, x: State, u: Inputs) -> State:
     Args:
         t: s.
         x: (2, N, D).
-        u: what acts.
+        u: external forces.
 
     Returns:
         (2, N, D).

@@ -206,7 +206,7 @@ def spring_forces(
         ties: of them, the springs and rotary springs.
         pose: (N, 3) m and rad.
         rates: (N, 3) m/s and rad/s.
-        inverse_mass: (N,) 1/kg, 0 for what is fixed.
+        inverse_mass: (N,) 1/kg, 0 for fixed bodies.
         inverse_moment: (N,) 1/(kg·m²).
         out: (N, 3) m/s² and rad/s², added to.
     """
@@ -270,7 +270,7 @@ def damper_power(ties: JointData, pose: FloatArray, rates: FloatArray) -> float:
 
 @bare_kernel
 def spring_loads(ties: JointData, pose: FloatArray, rates: FloatArray, load: FloatArray) -> None:
-    """Write what each spring gives its second body into its link's row: force, N, or torque, N·m, and 0.
+    """Write the load of each spring on its second body into its row: force, N, or torque, N·m, and 0.
 
     Args:
         ties: of them, the springs and rotary springs.

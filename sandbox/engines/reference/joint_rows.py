@@ -1,6 +1,6 @@
 """Velocity constraints of joints, and their sequential impulses.
 
-VelocityConstraints: what holds two bodies as demands on their velocities, for sequential impulses to fulfil.
+VelocityConstraints: joints as constraints on velocities, for sequential impulses.
 
 As in Munk2D (`cpPinJoint.c`, `cpPivotJoint.c`, `cpSlideJoint.c`, `cpRotaryLimitJoint.c`): a row asks for the velocity
 that undoes the fraction 1 − bias^h of its error within a step. Other than there, that velocity has no bound of its own.
@@ -52,7 +52,7 @@ class VelocityConstraints(NamedTuple):
     target: FloatArray
     """(K, 2) m/s or rad/s, the wanted velocity of the second end as seen from the first"""
     bound: FloatArray
-    """(K, 2) N·s or N·m·s, least and most sum of impulses; 0, 0 for what holds nothing now"""
+    """(K, 2) N·s or N·m·s, least and most sum of impulses; 0, 0 if inactive"""
     impulse: FloatArray
     """(K, 2) N·s or N·m·s, the sum so far, along the normal, or x and y, or the angular one"""
 
@@ -88,7 +88,7 @@ def prepare(
     inverse_mass: FloatArray,
     inverse_moment: FloatArray,
 ) -> None:
-    """Bring rows up to date with where the bodies are; their impulses become what to start from.
+    """Update rows to the present poses; their impulses become the warm start.
 
     An impulse is in proportion to its time, so that a shorter step starts from a smaller one. A longer one does not
     start from more: what was a blow does not grow with time, and after a very short step it would be a large one.
@@ -182,7 +182,7 @@ def one_pass(
     Args:
         rows: K of them; their impulses are changed.
         velocity: (N, 3) m/s and rad/s, changed.
-        inverse_mass: (N,) 1/kg, 0 for what is fixed.
+        inverse_mass: (N,) 1/kg, 0 for fixed bodies.
         inverse_moment: (N,) 1/(kg·m²).
     """
     for k in range(len(rows.holds)):

@@ -2,7 +2,7 @@
 
 JointSolver: the links of a running scene, held in one of four ways.
 
-    x' = step(f, t, x, u, h)                          with `forces` among what acts, then, by impulses:
+    x' = step(f, t, x, u, h)                          with `forces` among the external forces, then, by impulses:
     solver.prepare(kick_pose(x', fraction, h), h)     where the step's kick takes place
     solver.solve(x'[1])                               and positions follow by fraction·h·Δv
                                                       or, by positions, velocities with them:
@@ -84,8 +84,8 @@ class JointSolver:
 
         Args:
             links: none of a kind in `LACKING`.
-            inverse_mass: (N,) 1/kg, 0 for what is fixed.
-            inverse_moment: (N,) 1/(kg·m²), 0 for what does not turn.
+            inverse_mass: (N,) 1/kg, 0 for fixed bodies.
+            inverse_moment: (N,) 1/(kg·m²), 0 for bodies that do not turn.
             bias: the fraction of a joint's error that impulses leave after a second, 0 to 1.
             iterations: passes over all links.
             method: one of `METHODS`. In xpbd springs are compliant links, else forces.
@@ -183,12 +183,12 @@ class JointSolver:
         either = np.isin(self._held.kind, (LinkKind.ROD, LinkKind.PIVOT))
         bound[:, 0] = np.where(either | (given[:, 0] < 0.0), -h * self._held.most_force, 0.0)
         bound[:, 1] = np.where(either | (given[:, 0] > 0.0), h * self._held.most_force, 0.0)
-        self.rows.impulse[:], self.rows.target[:] = given, 0.0  # given already: what counts is the sum
+        self.rows.impulse[:], self.rows.target[:] = given, 0.0  # applied already; the sum counts
         for _ in range(self._iterations):
             self.one_pass(moved[1])
 
     def work(self, velocity: FloatArray) -> float:
-        """Return the work of the rows' impulses, J, at velocities (N, 3): their mean over what the impulses did."""
+        """Return the work of the rows' impulses, J, at the mean (N, 3) of the velocities before and after them."""
         return row_work(self.rows, velocity)
 
     def damper_power(self, x: State) -> float:
@@ -196,7 +196,7 @@ class JointSolver:
         return damper_power(self._springs, x[0], x[1])
 
     def impulse(self) -> FloatArray:
-        """Return what each link gave its second body in the last step (J, 2): x and y, N·s, or N·m·s and 0.
+        """Return the impulse of each joint on its second body in the last step (J, 2): x and y, N·s, or N·m·s and 0.
 
         Of springs that act as forces there is nothing here: see `load`.
         """

@@ -230,10 +230,10 @@ class PenaltyContacts:
 
     @property
     def _inverse_moment(self) -> FloatArray:
-        return self._store.inverse_moment if self._drives is None else self._drives.yielding
+        return self._store.inverse_moment if self._drives is None else self._drives.inverse_moment_forces
 
     def stored(self, pose: FloatArray) -> float:
-        """Return what the springs of all contacts at (N, ≥ 2) poses store, ½ k overlap² each, J."""
+        """Return the energy, J, stored in the springs of all contacts at poses (N, ≥ 2): ½ k overlap² each."""
         return 0.5 * self._stiffness * float(np.square(self._finder.overlaps(pose).separation).sum())
 
     def losses(self, x: State) -> tuple[float, float]:
@@ -255,8 +255,8 @@ class PenaltyContacts:
         along, across = given[:, 0] * nx + given[:, 1] * ny, given[:, 1] * nx - given[:, 0] * ny
         self._given = contacts, np.column_stack((along, across))
 
-    def given(self) -> tuple[Manifolds, FloatArray]:
-        """Return the contacts of the last step and what each gave (K, 2), along its normal and across, N·s."""
+    def last_contacts(self) -> tuple[Manifolds, FloatArray]:
+        """Return the contacts of the last step and their impulses (K, 2), N·s, normal and tangential."""
         return self._given
 
 
@@ -276,11 +276,11 @@ class PenaltySolver:
     def detect(self, x: State) -> Manifolds:
         """Return the contacts of the last motion."""
         del x
-        return self._penalty.given()[0]
+        return self._penalty.last_contacts()[0]
 
     def solve(self, motion: Motion, contacts: Manifolds, h: float) -> Solution:
         """Return the state at the end of a motion over h, s, with joints and stops solved by impulses."""
-        contacts, impulse = self._penalty.given()
+        contacts, impulse = self._penalty.last_contacts()
         return self._impulses.solve(motion, contacts.of(slice(0)), h)._replace(contacts=contacts, impulse=impulse)
 
     def correct(self, solution: Solution, h: float) -> None:
@@ -302,10 +302,10 @@ class DrivenPenaltySolver(PenaltySolver):
         """Return the motion from a state at a time, s, over h, s, with contacts acting all the way."""
         penalty, scheme = self._penalty, self._impulses.scheme
 
-        def spring(start: State) -> tuple[State, Manifolds, FloatArray]:
-            return penalty.moved(scheme, time, start, forces, h), *penalty.given()
+        def advance(start: State) -> tuple[State, Manifolds, FloatArray]:
+            return penalty.moved(scheme, time, start, forces, h), *penalty.last_contacts()
 
-        free = self._drives.spring(x, h, spring)
+        free = self._drives.advance_with_springs(x, h, advance)
         self._drives.place(free)
         return self._impulses.place(self._drives.start, free, h)
 

@@ -40,7 +40,7 @@ def write(
 def clip(
     corner: FloatArray, one: int, two: int, first: int, second: int, slack: float
 ) -> tuple[bool, float, float, float, float, float, float]:
-    """Cut a face to what lies over another, as Sutherland and Hodgman (1974) do to one edge.
+    """Clip a face to the extent of another, as Sutherland and Hodgman (1974) do to one edge.
 
     Args:
         corner: (V, 2) m.

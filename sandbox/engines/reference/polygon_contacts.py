@@ -77,7 +77,7 @@ class WorldPieces:
 
     @property
     def hulls(self) -> ConvexHulls:
-        """Where and what they are, as they were last laid out."""
+        """Present positions and shapes."""
         return ConvexHulls(self.corner, self.first, self.radius, self.body, self.surface)
 
     def lay_out(self, position: FloatArray, angle: FloatArray) -> None:
@@ -190,7 +190,7 @@ class NarrowPhaseInput(NamedTuple):
     friction: FloatArray
     """(S, S) of pairs of surfaces"""
     reach: float
-    """m, below which what parts two pieces is a contact"""
+    """m, separation of two pieces below which there is a contact"""
     scratch: FloatArray
     """(2, 6)"""
 
@@ -343,7 +343,7 @@ def _write(
         if at < len(out.key):
             nx, ny, separation = look.scratch[n, 0], look.scratch[n, 1], look.scratch[n, 2]
             x, y, half = look.scratch[n, 3], look.scratch[n, 4], 0.5 * separation
-            bx, by = x, y  # what is fixed has no centre to turn about
+            bx, by = x, y  # static bodies do not turn
             if second >= 0:
                 bx, by = position[second, 0], position[second, 1]
             out.key[at] = key + int(look.scratch[n, 5])

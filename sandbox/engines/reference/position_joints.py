@@ -58,7 +58,7 @@ def project(
         h: step, s.
         iterations: passes over all ties.
         lagged: apply impulses along the lines as they were at the start; else as they are.
-        inverse_mass: (N,) 1/kg, 0 for what is fixed.
+        inverse_mass: (N,) 1/kg, 0 for fixed bodies.
         inverse_moment: (N,) 1/(kg·m²).
         shift: (N, 3) how far each was moved and turned; written. Taken from poses, it would have their rounding: that
             of a place far out, over h, is a velocity.

@@ -2,7 +2,7 @@
 
 Sequential impulses: contacts solved one after the other, again and again, until they agree (Catto 2005).
 
-As in Munk2D (`cpArbiter.c`): accumulated impulses clamped to what a contact can give, warm-started by those of the
+As in Munk2D (`cpArbiter.c`): accumulated impulses clamped to the friction cone, warm-started by those of the
 last substep; overlap corrected by velocities of their own, which move bodies but are no part of their motion.
 """
 
@@ -43,7 +43,7 @@ def rebound_speeds(
 
 @kernel
 def remembered(key: IntArray, old_key: IntArray, old: FloatArray, impulse: FloatArray) -> None:
-    """Write into impulse (K, 2) what the same contacts had in the last substep; both keys ascend."""
+    """Write the impulses of the same contacts in the last substep into impulse (K, 2); both keys ascend."""
     place = 0
     for k in range(len(key)):
         while place < len(old_key) and old_key[place] < key[k]:
@@ -213,7 +213,7 @@ def solve_overlaps(
         pseudo_velocity: (N, 3) m/s and rad/s, changed.
         inverse_mass: (N,) 1/kg.
         inverse_moment: (N,) 1/(kg·m²).
-        total: (K,) what each has given so far, kg·m/s; 0 at first.
+        total: (K,) accumulated impulse of each, kg·m/s; 0 at first.
         iterations: passes over all contacts.
     """
     for _ in range(iterations):
@@ -249,7 +249,7 @@ class AngularStops(NamedTuple):
     """(S,)"""
     direction: FloatArray
     """(S,) 1 or −1: the sense in which the stop lets it turn no further"""
-    given: FloatArray
+    impulse: FloatArray
     """(S,) N·m·s, against that sense; that to start with, and then the sum"""
 
 
@@ -285,11 +285,11 @@ def solve_together(
     start_with(now, velocity, spin, inverse_mass, inverse_moment, impulse)
     warm_start(rows, velocity, inverse_mass, inverse_moment)
     for k in range(len(stops.body)):
-        spin[stops.body[k]] -= stops.direction[k] * stops.given[k] * inverse_moment[stops.body[k]]
+        spin[stops.body[k]] -= stops.direction[k] * stops.impulse[k] * inverse_moment[stops.body[k]]
     for _ in range(iterations):
         solve_once(now, bounce, velocity, spin, inverse_mass, inverse_moment, impulse)
         one_pass(rows, velocity, inverse_mass, inverse_moment)
         for k in range(len(stops.body)):
-            n, direction, old = stops.body[k], stops.direction[k], stops.given[k]
-            stops.given[k] = max(old + direction * spin[n] / inverse_moment[n], 0.0)
-            spin[n] -= direction * (stops.given[k] - old) * inverse_moment[n]
+            n, direction, old = stops.body[k], stops.direction[k], stops.impulse[k]
+            stops.impulse[k] = max(old + direction * spin[n] / inverse_moment[n], 0.0)
+            spin[n] -= direction * (stops.impulse[k] - old) * inverse_moment[n]

@@ -59,9 +59,9 @@ class ReferenceSimulation(BaseSimulation):
         self._h = settings.h
         self._ledger: ContactLog | None = None
         self._observer: Observer | None = None
-        self._now = NO_CONTACTS  # what touched when last recorded
+        self._now = NO_CONTACTS  # contacts at the last record
         self._came: ContactBatch | None = None  # bodies in zones when the recording began
-        self._world.pipeline.check_limits(self._world.x[0])  # what takes too much is refused before the run begins
+        self._world.pipeline.check_limits(self._world.x[0])  # exceeding a limit raises before the run begins
         warn_if_uncompiled(len(setup.bodies))
 
     @property
@@ -130,7 +130,7 @@ class ReferenceSimulation(BaseSimulation):
             self._end_substep(rest * h, end, end)
 
     def _substep(self, time: float, h: float) -> None:
-        """Advance by h, s, from a time, s, and read what each step of it did."""
+        """Advance by h, s, from a time, s, and read the record of each step."""
         self._world.time = time
         try:
             for record in self._detection(self._world, h):

@@ -66,13 +66,13 @@ class StepRecord(NamedTuple):
 
 
 def step(world: "WorldState", h: float) -> StepRecord:
-    """Advance a world by h, s, with discrete collision detection; return what was done.
+    """Advance a world by h, s, with discrete collision detection; return its record.
 
-    Contacts are looked for at the end of the step alone. A thin wall is tunnelled through when v·h > r + half its
-    thickness, a ball by a ball when v·h > r₁ + r₂.
+    Contacts are detected at the end of the step only. A ball tunnels through a thin wall when v·h > r + half its
+    thickness, and through another ball when v·h > r₁ + r₂.
 
-    The rebound is e times the approach before the step's forces, as in Munk2D: what rests does not bounce by the kick
-    of gravity. Positions follow a change of velocity as far as the integrator moves them within the step.
+    The rebound is e times the approach before the step's forces, as in Munk2D, so that the kick of gravity does not make
+    a resting body bounce. Positions follow a change of velocity as far as the integrator moves them within the step.
 
     Raises:
         Exhaustion: there are too many contacts for the limits of work or memory.
@@ -99,7 +99,7 @@ Detection = Callable[["WorldState", float], Iterator[StepRecord]]
 
 
 class WorldState:
-    """State x of N bodies at `time`, what acts on them, and the solver that advances them.
+    """State x of N bodies at `time`, the forces on them, and the solver that advances them.
 
     Args:
         store: the bodies.
@@ -151,7 +151,7 @@ class WorldState:
             self.filter.rebuild(self.x[0])  # centres: hinges take their places only below
         self.drives = Drives.of(store, self.drives)
         if self.drives is not None:
-            self.drives.enter(self.x)
+            self.drives.use_hinges(self.x)
         self.memory.rebuild(store.moving)
         if not is_suitable(self.pipeline, store):  # keys mean other pairs from now on
             self.pipeline = self._new_pipeline(self.work)
@@ -204,7 +204,7 @@ class WorldState:
             return False
         self.x = self._stored_state()
         if self.drives is not None:
-            self.drives.enter(self.x)
+            self.drives.use_hinges(self.x)
         return True
 
     def write_state(self) -> None:
@@ -214,7 +214,7 @@ class WorldState:
         if self.x.shape[2] == 3:
             store.angle[:], store.angular_velocity[:] = self.x[0, :, 2], self.x[1, :, 2]
         if self.drives is not None:
-            self.drives.leave(self.x)
+            self.drives.write_centres(self.x)
 
     @property
     def substeps(self) -> int:
@@ -223,7 +223,7 @@ class WorldState:
 
     def centres(self, x: State) -> FloatArray:
         """Return the centres of mass of all bodies in a state, (N, 2) m."""
-        return x[0, :, :2] if self.drives is None else self.drives.centred(x)
+        return x[0, :, :2] if self.drives is None else self.drives.centres(x)
 
     def ledger_penalty(self) -> PenaltyContacts | None:
         """Return penalty contacts for the energy ledger, which are not counted as work; None for other responses."""

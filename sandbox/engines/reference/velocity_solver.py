@@ -274,7 +274,7 @@ class ImpulseSolver:
         impulse *= min(h / memory.h, 1.0)
         self._resolve(contacts, bounce, motion.start[1], after[1], impulse, joined=True)
         if fraction:
-            change = after[1] - self._released(placed[1])
+            change = after[1] - self._with_stops(placed[1])
             after[0] += (fraction * h) * change
             contacts.separation[:] += (fraction * h) * self.approach(contacts, change)
         return Solution(after, after[1], contacts, impulse, bounce.kick_energy)
@@ -313,7 +313,7 @@ class ImpulseSolver:
         """Return the state to begin the next step with."""
         return after
 
-    def _released(self, rates: FloatArray) -> FloatArray:
+    def _with_stops(self, rates: FloatArray) -> FloatArray:
         """Return rates (N, D) at the end of a motion without those that a stop is to take away."""
         return rates
 
@@ -402,7 +402,7 @@ class ImpulseSolver:
         """Change velocities and impulses as `_solve` or, if settled, `_settle` does, by the chosen law of impact.
 
         Args:
-            contacts: what touches.
+            contacts: the contacts.
             bounce: how fast each is to part.
             start: (N, D) velocities at the beginning of the substep, to which energy is compared.
             velocity: (N, D), changed.
@@ -432,7 +432,7 @@ class ImpulseSolver:
         """Cut the restitution of groups of bodies whose contacts would give energy.
 
         Args:
-            contacts: what touches.
+            contacts: the contacts.
             bounce: how fast each is to part.
             start: (N, D) velocities at the beginning of the substep.
             kicked: (N, D) velocities before the solution by Newton's law; overwritten.

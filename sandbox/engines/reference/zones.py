@@ -1,4 +1,4 @@
-"""State of bodies in scenes with zones: what is inside, and what zones do to it.
+"""State of bodies in scenes with zones: bodies inside zones, and the effects of zones on them.
 
 ZoneShapes: which centres lie in which zones, by the zones' own outlines.
 

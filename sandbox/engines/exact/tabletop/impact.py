@@ -258,7 +258,7 @@ def log_event(
 ) -> None:
     """Add an event to the log."""
     row = data.counts[c.LOG_ROWS]
-    line, what = data.log[row], data.log_tags[row]
+    line, tags = data.log[row], data.log_tags[row]
     line[c.POINT_X], line[c.POINT_Y], line[c.NORMAL_X], line[c.NORMAL_Y], line[c.IMPULSE_X], line[c.IMPULSE_Y] = (
         x,
         y,
@@ -267,7 +267,7 @@ def log_event(
         jx,
         jy,
     )
-    what[0], what[1], what[2] = kind, a, b
+    tags[0], tags[1], tags[2] = kind, a, b
     data.counts[c.LOG_ROWS] += 1
 
 
