@@ -88,16 +88,16 @@ class SpaceForceField:
         def kick(body: pymunk.Body, gravity: tuple[float, float], damping: float, dt: float) -> None:
             x, y = body.position
             ax, ay = self._attraction(name, x, y, body.mass, members) if self.attracts else (0.0, 0.0)
-            pull, applied, torque = (ax, ay), (0.0, 0.0), 0.0
+            pull, thrust, torque = (ax, ay), (0.0, 0.0), 0.0
             if thrusts:
                 cos, sin = body.rotation_vector  # math.cos would raise if the angle is not finite
                 fx, fy, torque = self._thrust(thrusts)
-                applied = cos * fx - sin * fy, sin * fx + cos * fy
-                ax += applied[0] / body.mass
-                ay += applied[1] / body.mass
+                thrust = cos * fx - sin * fy, sin * fx + cos * fy
+                ax += thrust[0] / body.mass
+                ay += thrust[1] / body.mass
                 body.torque += torque
             if self.applied is not None:
-                self.applied[name] = (*pull, *applied, torque)
+                self.applied[name] = (*pull, *thrust, torque)
             if self.fractions:
                 fraction = self.fractions[name]
                 ax, ay = ax * fraction, ay * fraction

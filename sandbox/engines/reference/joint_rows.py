@@ -91,7 +91,7 @@ def prepare(
     """Update rows to the present poses; their impulses become the warm start.
 
     An impulse is in proportion to its time, so that a shorter step starts from a smaller one. A longer one does not
-    start from more: what was a blow does not grow with time, and after a very short step it would be a large one.
+    start from more: the impulse of an impact does not grow with time, and would be too large after a very short step.
 
     Args:
         rows: K of them, changed.

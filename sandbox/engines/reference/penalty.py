@@ -188,7 +188,7 @@ class PenaltyContacts:
         self._damping: FloatArray = damping.ravel()
 
     def moved(self, step: Step, t: float, x: State, u: Inputs, h: float) -> State:
-        """Return the state a time h, s, ahead, contacts acting all the way."""
+        """Return the state a time h, s, ahead, with contacts acting during the whole step."""
         count = x.shape[1]
         fastest = float(np.sqrt((x[1, :, :2] ** 2).sum(axis=1)).max(initial=0.0))
         strongest = float(np.abs(u.steady[:, :2]).max(initial=0.0))
@@ -270,7 +270,7 @@ class PenaltySolver:
         self._penalty, self._impulses = penalty, impulses
 
     def integrate(self, x: State, forces: Inputs, time: float, h: float) -> Motion:
-        """Return the motion from a state at a time, s, over h, s, with contacts acting all the way."""
+        """Return the motion from a state at a time, s, over h, s, with contacts acting during the whole step."""
         return self._impulses.place(x, self._penalty.moved(self._impulses.scheme, time, x, forces, h), h)
 
     def detect(self, x: State) -> Manifolds:
@@ -299,7 +299,7 @@ class DrivenPenaltySolver(PenaltySolver):
         self._drives = drives
 
     def integrate(self, x: State, forces: Inputs, time: float, h: float) -> Motion:
-        """Return the motion from a state at a time, s, over h, s, with contacts acting all the way."""
+        """Return the motion from a state at a time, s, over h, s, with contacts acting during the whole step."""
         penalty, scheme = self._penalty, self._impulses.scheme
 
         def advance(start: State) -> tuple[State, Manifolds, FloatArray]:

@@ -51,7 +51,7 @@ def clip(
         slack: how far beside the reference face the incident one may lie, and no end is cut, m.
 
     Returns:
-        Whether anything is left; then x, y and height over the reference face, m, of the two ends of what is left, in
+        Whether a part remains; then x, y and height over the reference face, m, of the two ends of that part, in
         the order in which the reference face runs.
     """
     x, y = corner[one, 0], corner[one, 1]
@@ -389,7 +389,7 @@ def facing(
         own, its = math.sqrt(dx * dx + dy * dy), math.sqrt(ex * ex + ey * ey)
         if b_gap > a_gap + FAVOUR * min(own, its):
             return True, b_one, b_two, incident, other
-        # Apart, the normal must remain the way between the nearest points: only faces across from each other, and
+        # Apart, the normal must remain the direction between the nearest points: only faces across from each other, and
         # level, change roles.
         if b_gap > 0.0:
             if incident != a_one or other != a_two or abs(dx * ey - dy * ex) > LEVEL * own * its:

@@ -6,7 +6,7 @@ Keys hold the pair and, in the lowest bit, which of its two points: the points o
 
 Oriented boxes: a rectangle around each convex piece, turned with it, and whether two of them are apart.
 
-Tighter than a disc or an upright box around what is long, and four axes are tested whatever the number of corners.
+Tighter than a disc or an axis-aligned box around a long piece, and four axes are tested whatever the number of corners.
 """
 
 import math
@@ -62,7 +62,7 @@ class WorldPieces:
         ends = segments[:, :4].reshape(-1, 2)
         self.first: IntArray = np.concatenate((shapes.first, shapes.first[-1] + 2 * np.arange(1, len(segments) + 1)))
         self.corner: FloatArray = np.concatenate((self.local, ends))
-        """(V + 2G, 2) m, in the world as it was last laid out"""
+        """(V + 2G, 2) m, in the world, at the poses of the last call of `lay_out`"""
         self.middle: FloatArray = np.empty((self.count, 2))
         """(S, 2) m, likewise"""
         self.collision_mask: IntArray = store.collision_mask[self.body]

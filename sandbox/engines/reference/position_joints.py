@@ -54,7 +54,7 @@ def project(
     Args:
         ties: K of them.
         pose: (N, 3) m and rad where the bodies would go, changed.
-        start: (N, 3) where they were at the start of the step: dampers resist the way from there.
+        start: (N, 3) where they were at the start of the step: dampers resist the displacement from there.
         h: step, s.
         iterations: passes over all ties.
         lagged: apply impulses along the lines as they were at the start; else as they are.

@@ -71,8 +71,8 @@ def step(world: "WorldState", h: float) -> StepRecord:
     Contacts are detected at the end of the step only. A ball tunnels through a thin wall when v·h > r + half its
     thickness, and through another ball when v·h > r₁ + r₂.
 
-    The rebound is e times the approach before the step's forces, as in Munk2D, so that the kick of gravity does not make
-    a resting body bounce. Positions follow a change of velocity as far as the integrator moves them within the step.
+    The rebound is e times the approach before the step's forces, as in Munk2D, so that a resting body does not bounce
+    by the kick of gravity. Positions follow a change of velocity as far as the integrator moves them within the step.
 
     Raises:
         Exhaustion: there are too many contacts for the limits of work or memory.

@@ -37,7 +37,7 @@ def touch_circle(x: float, y: float, mx: float, my: float, distance: float) -> f
 
 @kernel
 def touch_line(gap: float, approach: float) -> float:
-    """Return when a gap, m, that shrinks by `approach`, m, over the whole way is closed."""
+    """Return when a gap, m, that shrinks by `approach`, m, over the whole displacement is closed."""
     if approach <= 0.0:
         return NEVER
     fraction = max(gap, 0.0) / approach
@@ -90,7 +90,7 @@ def first_touch(
     joints: FloatArray,
     rest: IntArray,
 ) -> tuple[float, int]:
-    """Return the fraction of the way, and the key, of the first touch among candidates; key −1 for none.
+    """Return the fraction of the displacement, and the key, of the first touch among candidates; key −1 for none.
 
     Args:
         start: (N, ≥ 2) centres, m.

@@ -59,17 +59,17 @@ def mathavan2010(
         along, up = x + q * sin - r * cos, p - y * sin
         slip = math.sqrt(along * along + up * up)
         ca, cu = (along / slip, up / slip) if slip > NO_SLIP else (0.0, 0.0)
-        friction_impulse = min(friction, max_friction * slip)  # a step can end slip, but not reverse it
+        effective_friction = min(friction, max_friction * slip)  # a step can end slip, but not reverse it
         under_x, under_y = x - q, y + p
         under = math.sqrt(under_x * under_x + under_y * under_y)
         fx, fy = (under_x / under, under_y / under) if under > NO_SLIP else (0.0, 0.0)
-        weight = sin + friction_impulse * cu * cos  # part of the impulse that presses the ball onto the surface
+        weight = sin + effective_friction * cu * cos  # part of the impulse that presses the ball onto the surface
         grip = min(sliding * max(weight, 0.0), max_friction * under)
-        dx = -friction_impulse * ca - grip * fx
-        dy = -cos + friction_impulse * sin * cu - grip * fy
-        dp = -2.5 * (friction_impulse * cu + grip * fy)
-        dq = -2.5 * (friction_impulse * ca * sin - grip * fx)
-        dr = 2.5 * friction_impulse * ca * cos
+        dx = -effective_friction * ca - grip * fx
+        dy = -cos + effective_friction * sin * cu - grip * fy
+        dp = -2.5 * (effective_friction * cu + grip * fy)
+        dq = -2.5 * (effective_friction * ca * sin - grip * fx)
+        dr = 2.5 * effective_friction * ca * cos
         # The last steps of compression and of restitution are shortened to end exactly.
         part = step
         ends = False
@@ -147,8 +147,8 @@ def collide_balls(
         slip = math.sqrt(along * along + up * up)
         if slip > 0.0:
             # Coulomb's law, up to the impulse that ends the slip: the effective inverse mass is 7/2 of the sum.
-            friction_impulse = min(ball_friction(slip) * impulse, slip / (3.5 * (la + lb))) / slip
-            dt, dz = -friction_impulse * along, -friction_impulse * up
+            friction_per_slip = min(ball_friction(slip) * impulse, slip / (3.5 * (la + lb))) / slip
+            dt, dz = -friction_per_slip * along, -friction_per_slip * up
             turn = 2.5 / radius
             avx, avy = avx - la * dt * ny, avy + la * dt * nx
             bvx, bvy = bvx + lb * dt * ny, bvy - lb * dt * nx
@@ -208,8 +208,8 @@ def _han2005(restitution: float, friction: float, a: Five, radius: float, height
     along, across = x * sin + radius * wb, -y - radius * wz * cos + radius * wa * sin
     slip = math.sqrt(along * along + across * across)
     normal_impulse = (1.0 + restitution) * x * cos
-    friction_impulse = min(slip / 3.5, friction * normal_impulse) / slip if slip > 0.0 else 0.0
-    p, q = friction_impulse * along, friction_impulse * across
+    friction_per_slip = min(slip / 3.5, friction * normal_impulse) / slip if slip > 0.0 else 0.0
+    p, q = friction_per_slip * along, friction_per_slip * across
     turn = 2.5 / radius
     x, y = x - p * sin - normal_impulse * cos, y + q
     wa, wb, wz = wa - turn * q * sin, wb - turn * p, wz + turn * q * cos
