@@ -19,7 +19,7 @@ import pygame
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.scene.compile.drives import Mount, mounts
-from sandbox.scene.compile.joint_arrays import LinkKind, JointArrays
+from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
 from sandbox.scene.description.forces import PlungerDrive
 from sandbox.window.render.body_geometry import clipped_box, outline_distance
 from sandbox.window.render.circles import CircleRenderer, CircleStyle
