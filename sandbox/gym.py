@@ -28,6 +28,7 @@ from sandbox.arrays import FloatArray
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import able, engine_named
 from sandbox.games.contract import HasObservation, Rules
+from sandbox.games.names import environments
 from sandbox.games.registry import required_rules
 from sandbox.measure.episode import Episode
 from sandbox.measure.seeds import seeded
@@ -35,14 +36,7 @@ from sandbox.recording import Recording
 from sandbox.scene.files.load import load
 from sandbox.scene.scene import Scene
 
-GAMES = {
-    "ArtilleryDuel": ("artillery/duel", 10),
-    "ArtilleryFour": ("artillery/four", 10),
-    "Curling": ("games/curling", 10),
-    "Landing": ("games/landing", 5),
-    "PinballClassic": ("pinball/classic", 2),
-    "PinballFull": ("pinball/full", 2),
-}
+GAMES = {each.name: (each.scene, each.frame_skip) for each in environments()}
 """Shipped scene and number of steps per action, by the name in the environment id."""
 LIMIT = 1e6
 """bound of each observed number, to which it is clipped: unbounded spaces are ill-suited to learning"""
@@ -171,7 +165,7 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         except (Divergence, Exhaustion, ActionError) as error:
             failed = str(error)
         info = self._info() | ({} if failed is None else {"failed": failed})
-        over = episode.rules.over is not None
+        over = episode.rules.game_over is not None
         late = not over and (episode.late or failed is not None)
         self._ended = over or late
         return self._observation(), float(episode.rules.score - before), over, late, info
@@ -214,8 +208,8 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         return {
             "time": episode.time,
             "score": rules.score,
-            "over": rules.over,
-            "lines": dict(rules.lines()),
+            "over": rules.game_over,
+            "lines": dict(rules.display_lines()),
             "seed": episode.scene.world.seed,
         }
 
@@ -262,7 +256,7 @@ def _steps(every: int) -> int:
 
 
 def _gauges(rules: Rules) -> Sequence[tuple[str, float]]:
-    return rules.gauges() if isinstance(rules, HasObservation) else ()
+    return rules.observation() if isinstance(rules, HasObservation) else ()
 
 
 def _numbers(scene: Scene, names: Sequence[str] | None) -> list[int]:

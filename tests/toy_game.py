@@ -47,23 +47,23 @@ class Toy:
         assert bodies.names[0] == "a"
         self._chance = random.Random(scene.world.seed)  # copied with all else, unlike a module's
         self.score = 0.0
-        self.over: str | None = None
+        self.game_over: str | None = None
         self._aim, self._bounces, self._last = 0.5, 0, -1.0
         self._cues: list[str] = []
         self.ends_at = math.inf
 
-    def control(self, name: str, value: float) -> Sequence[Action]:
-        if name == "aim":  # nothing comes of it now, but of the next kick
+    def on_input(self, control: str, value: float) -> Sequence[Action]:
+        if control == "aim":  # nothing comes of it now, but of the next kick
             self._aim = value
             return ()
         return (Impulse(time=99.0, body="a", impulse=(0.0, 3.0 * self._aim)),) if value else ()
 
-    def look(self, seen: StepInfo) -> Sequence[Action]:
-        self.score += sum(0.5 for action in seen.actions if isinstance(action, Impulse))
+    def on_step(self, info: StepInfo) -> Sequence[Action]:
+        self.score += sum(0.5 for action in info.actions if isinstance(action, Impulse))
         acts: list[Action] = []
-        if seen.time == 0.0:
+        if info.time == 0.0:
             acts.append(Impulse(time=0.0, body="a", impulse=(self._chance.uniform(-0.1, 0.1), 0.0)))
-        for contact in seen.contacts:
+        for contact in info.contacts:
             if contact.pair == (0, -1) and contact.time > self._last:
                 self._last, self._bounces = contact.time, self._bounces + 1
                 self.score += 1
@@ -72,13 +72,13 @@ class Toy:
                 if self._bounces % 3 == 0:
                     acts.append(Spawn(time=0.0, ball=Ball(position=(5.0 + self._bounces, 3.0), radius=0.1)))
         if self.score >= self.ends_at:
-            self.over = "enough"
+            self.game_over = "enough"
         return acts
 
-    def lines(self) -> Sequence[tuple[str, str]]:
+    def display_lines(self) -> Sequence[tuple[str, str]]:
         return (("bounces", str(self._bounces)), ("aim", f"{self._aim:.2f}"))
 
-    def cues(self) -> Sequence[str]:
+    def sounds(self) -> Sequence[str]:
         cues, self._cues = self._cues, []
         return cues
 

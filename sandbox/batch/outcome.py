@@ -183,7 +183,7 @@ def execute(
                     done(outcome)
                 return outcome
             audit = audit or bool(stored.info["audited"])  # what was known stays known
-    bout = None if job.player is None else job.player.bout(job.scene, job.label)
+    bout = None if job.player is None else job.player.start_game(job.scene, job.label)
     trajectory = run(
         job.scene, job.engine, actions=job.actions, audit=audit, account=account, progress=progress, bout=bout
     )
@@ -256,5 +256,5 @@ def _identified(job: Job) -> tuple[Settings, str]:
     settings = job.scene.solver
     if not engine.missing(job.scene, settings):
         settings = engine.resolve(job.scene, settings)
-    game = None if job.player is None else job.player.document(job.scene)
+    game = None if job.player is None else job.player.to_dict(job.scene)
     return settings, run_id(job.scene, job.engine, settings, job.scene.world.seed, versions(), job.actions, game)

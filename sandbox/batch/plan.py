@@ -207,8 +207,8 @@ def _player(session: Recording, path: str, player: PlayerSpec | None) -> PlayerS
     """
     if not has_rules(session.scene):
         return None
-    plays = PlayerSpec.of(session) if _is_recording(path) else player or PlayerSpec()
-    plays.bout(session.scene, path)
+    plays = PlayerSpec.from_recording(session) if _is_recording(path) else player or PlayerSpec()
+    plays.start_game(session.scene, path)
     return plays
 
 

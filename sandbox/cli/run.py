@@ -121,7 +121,7 @@ def command(
     faults += repeated_keys(overrides, sound, seeds)
     plays: PlayerSpec | None = None
     with gathering(faults):
-        plays = None if player is None else PlayerSpec.named(player)
+        plays = None if player is None else PlayerSpec.parse(player)
     jobs: list[Job] = []
     with gathering(faults, "--sweep", (AddressError,)), telling(quiet or as_json) as told:
         jobs = plan(found, names, overrides, sound, seeds, plays, told)

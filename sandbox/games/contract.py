@@ -1,17 +1,19 @@
-"""Rules: the seam between a game and whatever plays it: a headless run, the window, an environment for learning.
+"""Rules: the interface between a game and its hosts: headless runs, the window, and Gymnasium environments.
 
-A game is a scene and rules. The rules see what happened, step by step, and say what happens next, as actions; they
-know no engine and no window. Whoever plays them (the host) does, at the start and after every step:
+A game is a scene and rules. After every step the rules see the state and the contacts, and return actions; they know
+neither engine nor window. A host calls, at the start and after every step:
 
-    look(seen)                            what the game itself does
-    control(name, value), for each press  what the player does
-    then applies what look said, then what the controls said, and steps
+    on_step(info)                          actions of the game itself
+    on_input(control, value)               actions of the player, for each control that changed
 
-and stamps the present time on every action. Once `over` says why, the last look's actions are applied, and no rules
-are asked any more. Rules are plain objects that `copy.deepcopy` copies: rewinding restores a copy. They are
-deterministic; all chance comes from the scene's seed.
+It sets the time of all actions to the present, applies those of `on_step` first, then those of `on_input`, and makes
+the next step. Once `game_over` is not None, the actions of the last `on_step` are applied and the rules are not called
+any more. Rules are plain objects that `copy.deepcopy` copies, as going back in time restores a copy. They are
+deterministic: all random numbers come from the seed of the scene.
 
-Skill: how well a player plays that is a program, from 0 to 1.
+Optional members, each with a protocol: `log`, `observation()`, `lit_lamps()`, `waiting`, `view_state(time)`.
+
+The skill of a bot is a number from 0 to 1.
 """
 
 from collections.abc import Sequence
@@ -26,6 +28,8 @@ __all__ = [
     "HasLamps",
     "HasLog",
     "HasObservation",
+    "HasViewState",
+    "HasWaiting",
     "Policy",
     "Press",
     "Rules",
@@ -83,25 +87,25 @@ class Rules(Protocol):
         """Score of the present player, or the best score."""
 
     @property
-    def over(self) -> str | None:
+    def game_over(self) -> str | None:
         """Reason why the game is over; None while it runs."""
 
-    def control(self, name: str, value: float) -> Sequence[Action]:
+    def on_input(self, control: str, value: float) -> Sequence[Action]:
         """Return the actions of pressing a control now (`value` > 0), or of releasing it (0)."""
 
-    def look(self, seen: StepInfo) -> Sequence[Action]:
+    def on_step(self, info: StepInfo) -> Sequence[Action]:
         """Update the rules after a step, and return the actions of the game itself for the next step."""
 
-    def lines(self) -> Sequence[tuple[str, str]]:
+    def display_lines(self) -> Sequence[tuple[str, str]]:
         """Return the lines of the score panel, as labels and texts, the most important first."""
 
-    def cues(self) -> Sequence[str]:
+    def sounds(self) -> Sequence[str]:
         """Return the names of the sounds since the last call."""
 
 
 @runtime_checkable
 class HasLog(Protocol):
-    """Rules that also keep a log of events."""
+    """Rules that keep a log of events."""
 
     @property
     def log(self) -> Sequence[tuple[float, str]]:
@@ -110,32 +114,53 @@ class HasLog(Protocol):
 
 @runtime_checkable
 class HasObservation(Protocol):
-    """Rules that also have gauges: numbers that a player reads off the window, for learning agents."""
+    """Rules that return numbers for learning agents: state that a player reads from the window."""
 
-    def gauges(self) -> Sequence[tuple[str, float]]:
+    def observation(self) -> Sequence[tuple[str, float]]:
         """Return names and finite values; names and order are constant during a game, for every seed."""
 
 
 @runtime_checkable
 class HasLamps(Protocol):
-    """Rules that also light lamps."""
+    """Rules that light lamps."""
 
-    def lit(self) -> frozenset[str]:
+    def lit_lamps(self) -> frozenset[str]:
         """Return the names of the parts, `[[play.part]]`, whose lamps are lit."""
+
+
+@runtime_checkable
+class HasWaiting(Protocol):
+    """Rules of a game in which time stops until the player acts."""
+
+    @property
+    def waiting(self) -> bool:
+        """Whether the host makes no step until an input or an action of the player."""
+
+
+@runtime_checkable
+class HasViewState(Protocol):
+    """Rules that pass values to the `GameView` of their game."""
+
+    def view_state(self, time: float) -> object | None:
+        """Return the values to draw at a time, s, at most the present; None for none.
+
+        Times between the last two steps are interpolated. Before that, the state is of the past, which the rules may
+        not know.
+        """
 
 
 class Policy(Protocol):
     """Player of a game."""
 
-    def decide(self, seen: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:
+    def decide(self, info: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:
         """Return the controls to set now and their values; called once a step, after `Rules.look`."""
 
 
 def checked_skill(skill: float) -> float:
-    """Return a skill as it is.
+    """Return a valid skill unchanged.
 
     Raises:
-        ValueError: it is not from 0 to 1.
+        ValueError: the skill is not from 0 to 1.
     """
     if not 0.0 <= skill <= 1.0:
         raise ValueError(f"skill {skill:g} is out of range; it should be 0 to 1")

@@ -1,17 +1,20 @@
-"""Names of games: those of this package, and those that other packages register.
+"""Games by name: the specs of this package's games, and the games that other packages register.
 
 Another package registers a game by an entry point of the group `sandbox.games`, in its pyproject.toml:
 
     [project.entry-points."sandbox.games"]
-    keepy-uppy = "keepy_uppy:KeepyUppy"
+    keepy-uppy = "keepy_uppy:GAME"
 
-The object is called with a scene and its bodies, and returns rules, as those in `games.registry.RULES` do. Scenes that
-name no game of another package do not look for entry points.
+The object is a `GameSpec`, or rules: a class or function that is called with a scene and its bodies. It is imported
+when the game is needed. Entry points are read only if a scene names a game that is not in this package.
 """
 
 import sys
-from functools import lru_cache
-from typing import TYPE_CHECKING, Literal, get_args
+from functools import cache, lru_cache
+from typing import TYPE_CHECKING, Literal
+
+from sandbox.games import GAMES as SPECS
+from sandbox.games.spec import Environment, GameSpec, import_part
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -22,8 +25,32 @@ GROUP = "sandbox.games"
 TableGame = Literal["8-ball", "9-ball", "three-cushion", "straight-rail", "snooker", "free"]
 """Games of billiards, which need a table."""
 
-GAMES = (*get_args(TableGame), "artillery", "curling", "landing", "pinball")
-"""Games of this package; those that need no table are in `games.registry.RULES` too."""
+
+@cache
+def game_specs() -> tuple[GameSpec, ...]:
+    """Return the specs of the games of this package."""
+    specs = tuple(import_part(path) for path in SPECS.values())
+    assert all(isinstance(spec, GameSpec) for spec in specs)
+    return specs
+
+
+GAMES = tuple(name for spec in game_specs() for name in spec.names)
+"""Names of the games of this package."""
+
+
+def game_tables() -> dict[str, str]:
+    """Return the import strings of the tables that games add to scene files, by heading."""
+    return {heading: path for spec in game_specs() for heading, path in spec.tables.items()}
+
+
+def environments() -> tuple[Environment, ...]:
+    """Return the Gymnasium environments of the games of this package."""
+    return tuple(environment for spec in game_specs() for environment in spec.environments)
+
+
+def games_with_bot() -> tuple[str, ...]:
+    """Return the names of the games of this package that the player `skilled` plays."""
+    return tuple(name for spec in game_specs() if spec.bot is not None for name in spec.names)
 
 
 def game_names() -> tuple[str, ...]:
@@ -34,6 +61,28 @@ def game_names() -> tuple[str, ...]:
 def is_game(name: str) -> bool:
     """Return whether there is a game of this name."""
     return name in GAMES or name in registered_games()
+
+
+def spec_of(game: str | None) -> GameSpec | None:
+    """Return the spec of a game; None if there is no such game.
+
+    Rules that another package registers without a spec get one that has only the rules.
+
+    Raises:
+        ImportError: the game is of another package, whose module cannot be imported.
+        AttributeError: the game is of another package, whose module lacks the object.
+    """
+    if game is None:
+        return None
+    if game in GAMES:
+        return next(spec for spec in game_specs() if game in spec.names)
+    entry = registered_games().get(game)
+    if entry is None:
+        return None
+    found = entry.load()
+    if isinstance(found, GameSpec):
+        return found
+    return GameSpec(names=(game,), rules=entry.value, real_time=bool(getattr(found, "real_time", False)))
 
 
 def registered_games() -> "dict[str, EntryPoint]":

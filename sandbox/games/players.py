@@ -14,14 +14,12 @@ from typing import Any, Self
 import numpy as np
 
 from sandbox.echo import short_repr, shorten
-from sandbox.games.artillery.scene import Artillery
 from sandbox.games.contract import Control, Policy, Press, Rules, StepInfo, UnsuitableSceneError
-from sandbox.games.curling.scene import CurlingMatch
-from sandbox.games.pinball.bot import PinballBot
-from sandbox.games.registry import fitting_rules
+from sandbox.games.names import games_with_bot
+from sandbox.games.registry import find_spec, fitting_rules
 from sandbox.games.session import HeadlessGame
+from sandbox.games.spec import import_part
 from sandbox.recording import Recording
-from sandbox.scene.description.game_tables import table_of
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.random_streams import Stream, draws
 from sandbox.scene.scene import Scene
@@ -38,7 +36,7 @@ FULL = 0.5
 class NoInput:
     """Presses nothing."""
 
-    def decide(self, seen: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:  # noqa: ARG002
+    def decide(self, info: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:  # noqa: ARG002
         """Return nothing."""
         return ()
 
@@ -52,21 +50,21 @@ class RandomInput:
         self._pauses: dict[str, float] = {}  # s between presses, on average
         self._next = -math.inf  # when anything changes, s
 
-    def decide(self, seen: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:
+    def decide(self, info: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:
         """Return what changes now."""
-        if seen.time < self._next:
+        if info.time < self._next:
             return ()
         if not self._turns:
-            self._begin(rules.controls, seen.time)
+            self._begin(rules.controls, info.time)
         found = []
         for control in rules.controls:
             due, down = self._turns[control.name]
-            if due > seen.time:
+            if due > info.time:
                 continue
             down = not down
             # No sooner than the next step: a control changes once a step.
             lasts = self._drawn(HOLDS) if down else float(self._chance.exponential(self._pauses[control.name]))
-            self._turns[control.name] = seen.time + lasts, down
+            self._turns[control.name] = info.time + lasts, down
             found.append((control.name, self._level(control) if down else 0.0))
         self._next = min((due for due, _ in self._turns.values()), default=math.inf)
         return found
@@ -93,54 +91,44 @@ class ScriptedInput:
         self._presses = sorted(presses, key=lambda press: press.time)
         self._done = 0
 
-    def decide(self, seen: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:  # noqa: ARG002
+    def decide(self, info: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:  # noqa: ARG002
         """Return what is due."""
         begin = self._done
-        while self._done < len(self._presses) and self._presses[self._done].time <= seen.time + 1e-9:  # rounding
+        while self._done < len(self._presses) and self._presses[self._done].time <= info.time + 1e-9:  # rounding
             self._done += 1
         return [(press.control, press.value) for press in self._presses[begin : self._done]]
 
 
-def _nobody(scene: Scene) -> Policy:
+def _no_input(scene: Scene) -> Policy:
     """Return the player that presses nothing.
 
     Raises:
-        UnfitError: the game stands still until a person delivers a stone, or fires.
+        UnsuitableSceneError: the game waits for input before anything happens.
     """
-    play = scene.play
-    if play.game == "curling" and (table_of(play, CurlingMatch) or CurlingMatch()).people:
-        raise UnsuitableSceneError(
-            "player 'none' delivers no stone, so nothing would move; use random or a script, or let both teams play by "
-            "themselves with --set play.curling.people=0"
-        )
-    artillery = table_of(scene, Artillery)
-    if play.game == "artillery" and artillery is not None:
-        waits = next((player.name for player in artillery.players if player.bot is None), None)
-        if waits is not None:
-            raise UnsuitableSceneError(
-                f"player 'none' fires no gun, so {waits} would never play; use random, skilled or a script"
-            )
+    spec = find_spec(scene.play.game)
+    reason = None if spec is None or spec.needs_player is None else import_part(spec.needs_player)(scene)
+    if reason is not None:
+        raise UnsuitableSceneError(reason)
     return NoInput()
 
 
 def _skilled(scene: Scene) -> Policy:
-    """Return a player who watches the ball, or aims a gun.
+    """Return the bot of a game.
 
     Raises:
-        UnfitError: it is a game that none knows.
+        UnsuitableSceneError: the game has none.
     """
-    if scene.play.game == "artillery":
-        from sandbox.games.artillery.bot import ArtilleryBot  # an engine's integrators, which others do without
-
-        return ArtilleryBot(scene.world.seed)
-    if scene.play.game != "pinball":
-        raise UnsuitableSceneError(f"player 'skilled' plays pinball and artillery, not {scene.play.game}; use random")
-    return PinballBot(scene.world.seed)
+    spec = find_spec(scene.play.game)
+    if spec is None or spec.bot is None:
+        games = " and ".join(games_with_bot())
+        raise UnsuitableSceneError(f"player 'skilled' plays {games}, not {scene.play.game}; use random")
+    bot: Policy = import_part(spec.bot)(scene.world.seed)
+    return bot
 
 
 POLICIES: dict[str, Callable[[Scene], Policy]] = {
     "random": lambda scene: RandomInput(scene.world.seed),
-    "none": _nobody,
+    "none": _no_input,
     "skilled": _skilled,
 }
 """Those that need no script, by name."""
@@ -246,7 +234,7 @@ class PlayerSpec:
     """of a script or a session"""
 
     @classmethod
-    def named(cls, text: str) -> Self:
+    def parse(cls, text: str) -> Self:
         """Return the player that a text names: one of `POLICIES`, or else the file of a script.
 
         Raises:
@@ -264,11 +252,11 @@ class PlayerSpec:
         return cls(text, read_script(text))
 
     @classmethod
-    def of(cls, session: Recording) -> Self:
+    def from_recording(cls, session: Recording) -> Self:
         """Return who played a session: what was done is known, and the rules look on."""
         return cls(RECORDED, session.presses)
 
-    def bout(self, scene: Scene, file: str = "<scene>") -> HeadlessGame | None:
+    def start_game(self, scene: Scene, file: str = "<scene>") -> HeadlessGame | None:
         """Begin the game of a scene; none where it has no game with rules.
 
         Args:
@@ -293,7 +281,7 @@ class PlayerSpec:
             raise SceneError(faults)
         return HeadlessGame(rules, ScriptedInput(self.presses), self.name)
 
-    def document(self, scene: Scene) -> dict[str, Any]:
+    def to_dict(self, scene: Scene) -> dict[str, Any]:
         """Return what of the player decides how a game goes, as JSON values."""
         name = self.name if self.name in (*POLICIES, RECORDED) else "script"
         return {"game": scene.play.game, "player": name, "presses": [list(press) for press in self.presses]}

@@ -1,88 +1,100 @@
-"""RULES: every game by the name that `[play] game` calls it by, but billiards, which have a host of their own."""
+"""Rules of games by name, and the start of a game for a scene."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from sandbox.games.contract import Rules, UnsuitableSceneError
-from sandbox.games.curling.rules import Curling
-from sandbox.games.landing.rules import Landing
-from sandbox.games.names import GAMES, registered_games
-from sandbox.games.pinball.rules import Pinball
+from sandbox.games.names import GAMES, game_specs, registered_games, spec_of
+from sandbox.games.spec import GameSpec, import_part
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.errors import Fault, Lines, SceneError
 from sandbox.scene.scene import Scene
 
-REAL_TIME = frozenset({"landing", "pinball"})
-"""Games of this package in which time matters from the first step: a window starts them at a key press."""
 
+@dataclass(frozen=True)
+class RulesFactory:
+    """Starts a game; imports its rules when it is called."""
 
-def _artillery(scene: Scene, bodies: Bodies) -> Rules:
-    from sandbox.games.artillery.rules import ArtilleryRules  # numpy, and the integrators of an engine
+    path: str
+    """import string"""
 
-    return ArtilleryRules(scene, bodies)
+    def __call__(self, scene: Scene, bodies: Bodies) -> Rules:
+        """Return the rules of a new game.
+
+        Raises:
+            UnsuitableSceneError: the scene lacks an element that the game needs.
+        """
+        rules: Rules = import_part(self.path)(scene, bodies)
+        return rules
 
 
 RULES: dict[str, Callable[[Scene, Bodies], Rules]] = {
-    "artillery": _artillery,
-    "curling": Curling,
-    "landing": Landing,
-    "pinball": Pinball,
+    name: RulesFactory(spec.rules) for spec in game_specs() if spec.rules is not None for name in spec.names
 }
-"""Each begins a game. A game of this package is one line here, and its name in `games.names.GAMES`."""
+"""Games of this package that have rules, by name."""
 
 
-def _rules_named(game: str | None) -> Callable[[Scene, Bodies], Rules] | None:
-    """Return the rules of a game of this package or another.
+def find_spec(game: str | None) -> GameSpec | None:
+    """Return the spec of a game of this package or another; None if there is no such game.
 
     Raises:
-        UnfitError: those of another package cannot be imported.
+        UnsuitableSceneError: a game of another package cannot be imported.
     """
-    if game is None or game in RULES or game in GAMES:
-        return RULES.get(game or "")
-    entry = registered_games().get(game)
-    if entry is None:
-        return None
     try:
-        rules: Callable[[Scene, Bodies], Rules] = entry.load()
+        return spec_of(game)
     except (ImportError, AttributeError) as error:
-        raise UnsuitableSceneError(f"the game {game!r} cannot be imported from {entry.value}: {error}") from error
-    return rules
+        source = registered_games()[game or ""].value
+        raise UnsuitableSceneError(f"the game {game!r} cannot be imported from {source}: {error}") from error
+
+
+def _find_rules(game: str | None) -> Callable[[Scene, Bodies], Rules] | None:
+    """Return the factory of the rules of a game; None if it has no rules.
+
+    Raises:
+        UnsuitableSceneError: a game of another package cannot be imported.
+    """
+    if game is None or game in RULES:
+        return RULES.get(game or "")
+    spec = find_spec(game)
+    return None if spec is None or spec.rules is None else RulesFactory(spec.rules)
 
 
 def rules_of(scene: Scene, bodies: Bodies | None = None) -> Rules | None:
-    """Begin the game that a scene names; none where it names none that has rules here.
+    """Start the game that a scene names; return None if it names no game with rules.
 
     Args:
-        scene: as it is played.
-        bodies: its bodies; by default as it starts them.
+        scene: expanded scene.
+        bodies: its bodies; default: those of the scene.
 
     Raises:
-        UnfitError: the scene lacks what the game needs.
+        UnsuitableSceneError: the scene lacks an element that the game needs.
     """
-    begin = _rules_named(scene.play.game)
-    return None if begin is None else begin(scene, scene.bodies if bodies is None else bodies)
+    start = _find_rules(scene.play.game)
+    return None if start is None else start(scene, scene.bodies if bodies is None else bodies)
 
 
 def is_real_time(game: str | None) -> bool:
-    """Return whether time matters from the first step of a game; rules of other packages state it as `real_time`.
+    """Return whether time matters from the first step of a game: the window waits for a key press to start it.
 
     Raises:
-        UnfitError: the rules are of another package and cannot be imported.
+        UnsuitableSceneError: the game is of another package and cannot be imported.
     """
-    return game in REAL_TIME or bool(getattr(_rules_named(game), "real_time", False))
+    spec = find_spec(game)
+    return spec is not None and spec.real_time
 
 
 def has_rules(scene: Scene) -> bool:
-    """Return whether a scene names a game that has rules here."""
+    """Return whether a scene names a game with rules. Games of other packages have rules."""
     game = scene.play.game
     return game in RULES or (game is not None and game not in GAMES)
 
 
 def required_rules(scene: Scene) -> Rules:
-    """Begin the game that a scene names.
+    """Start the game that a scene names.
 
     Raises:
-        UnfitError: it names none that has rules here, or lacks what the game needs.
+        UnsuitableSceneError: it names no game with rules, or lacks an element that the game needs.
     """
     rules = rules_of(scene)
     if rules is None:
@@ -91,16 +103,16 @@ def required_rules(scene: Scene) -> Rules:
 
 
 def fitting_rules(scene: Scene, file: str) -> Rules | None:
-    """Begin the game that the scene of a file names; none where it names none that has rules here.
+    """Start the game that the scene of a file names; return None if it names no game with rules.
 
     Raises:
-        SceneError: the scene lacks what the game needs; it names file and line.
+        SceneError: the scene lacks an element that the game needs; the error has the file and line.
     """
     try:
         return rules_of(scene)
     except UnsuitableSceneError as error:
         try:
             line = Lines(Path(file).read_text(encoding="utf-8")).find(("play", "game"))
-        except (OSError, ValueError):  # it was read from elsewhere, or is a session
+        except (OSError, ValueError):  # the scene is not from a readable file, or is part of a session
             line = None
         raise SceneError([Fault(file, line, "play.game", str(error))]) from None

@@ -35,17 +35,17 @@ class LampState:
         self._next = 0.0
         self._changes: list[tuple[float, list[str]]] = []
 
-    def look(self, time: float) -> None:
+    def update(self, time: float) -> None:
         """Look, if it is time to, s."""
         if self._rules is None or time < self._next - TIME_ROUNDING:
             return
         self._next = time + MIN_LAMP_INTERVAL
-        lit = self._rules.lit()
+        lit = self._rules.lit_lamps()
         if lit != self._lit:
             self._changes.append((time, sorted(lit ^ self._lit)))
             self._lit = lit
 
-    def told(self) -> list[list[Any]]:
+    def changes(self) -> list[list[Any]]:
         """Return as JSON values when, s, which lamps were lit or went out."""
         return [list(change) for change in self._changes]
 
@@ -59,7 +59,7 @@ class LampLog(NamedTuple):
     """from then on"""
 
     @classmethod
-    def of(cls, told: Sequence[Any]) -> "LampLog":
+    def from_changes(cls, changes: Sequence[Any]) -> "LampLog":
         """Read what `Lighting.told` has returned.
 
         Raises:
@@ -68,7 +68,7 @@ class LampLog(NamedTuple):
         times, states = list[float](), list[frozenset[str]]()
         now: frozenset[str] = frozenset()
         try:
-            for time, names in told:
+            for time, names in changes:
                 now = now.symmetric_difference(names)
                 times.append(float(time))
                 states.append(now)
@@ -100,9 +100,9 @@ class GameSession:
         self._presses = sorted(presses, key=lambda press: press.time)
         self._pressed = 0
         self._done: list[Action] = []  # by the player since the last look
-        self.seen: StepInfo | None = None
+        self.step_info: StepInfo | None = None
         """what the rules have looked at last"""
-        self.otherwise: float | None = None
+        self.diverged_at: float | None = None
         """when the rules, as onlookers, would first have done something else than was done, s"""
 
     def copy(self) -> Self:
@@ -115,7 +115,7 @@ class GameSession:
         return tuple(self._presses[: self._pressed])
 
     @property
-    def coming(self) -> tuple[Press, ...]:
+    def future_presses(self) -> tuple[Press, ...]:
         """What was pressed later than now, in a game that is seen again."""
         return tuple(self._presses[self._pressed :])
 
@@ -124,33 +124,33 @@ class GameSession:
         """What was pressed, also later than now in a game that is seen again."""
         return tuple(self._presses)
 
-    def expect(self, presses: Sequence[Press]) -> None:
+    def set_presses(self, presses: Sequence[Press]) -> None:
         """Take over all that was pressed, from a game that is this one up to now."""
         self._presses = [*presses]
 
-    def forget(self) -> None:
+    def discard_future(self) -> None:
         """Forget what was pressed later than now: it goes another way."""
         del self._presses[self._pressed :]
 
-    def look(self, time: float, frame: Frame, contacts: Contacts) -> tuple[Action, ...]:
+    def on_step(self, time: float, frame: Frame, contacts: Contacts) -> tuple[Action, ...]:
         """Let the rules see a state, and return what they do, with its time; once the game is over, nothing."""
-        self.seen, self._done = StepInfo(time, frame, contacts, tuple(self._done)), []
-        return () if self.rules.over is not None else _stamped(self.rules.look(self.seen), time)
+        self.step_info, self._done = StepInfo(time, frame, contacts, tuple(self._done)), []
+        return () if self.rules.game_over is not None else _stamped(self.rules.on_step(self.step_info), time)
 
     def press(self, time: float, control: str, value: float) -> tuple[Action, ...]:
         """Set a control now, and return what comes of it; whatever was pressed later is forgotten."""
-        if self.rules.over is not None:
+        if self.rules.game_over is not None:
             return ()
-        self.forget()
+        self.discard_future()
         self._presses.append(Press(time, control, value))
         self._pressed += 1
-        return _stamped(self.rules.control(control, value), time)
+        return _stamped(self.rules.on_input(control, value), time)
 
-    def saw(self, actions: Iterable[Action]) -> None:
+    def note_actions(self, actions: Iterable[Action]) -> None:
         """Take note of what the player has done; another engine going on is no doing of his."""
         self._done += [action for action in actions if not isinstance(action, Switch)]
 
-    def watch(self, time: float, own: Sequence[Action], done: Sequence[Action]) -> None:
+    def replay(self, time: float, own: Sequence[Action], done: Sequence[Action]) -> None:
         """Hold what was done at a time against what the rules do, and press again what was pressed then.
 
         Args:
@@ -162,24 +162,24 @@ class GameSession:
         if left[: len(theirs)] == theirs:
             del left[: len(theirs)]
         else:
-            self._note(time)
+            self._note_divergence(time)
             left = [action for action in left if action not in theirs]
-        self.watch_player(time, left)
+        self.replay_player(time, left)
 
-    def watch_player(self, time: float, done: Sequence[Action]) -> None:
+    def replay_player(self, time: float, done: Sequence[Action]) -> None:
         """Hold what a player did at a time against what was pressed then."""
         pressed: list[Action] = []
         while self._pressed < len(self._presses) and self._presses[self._pressed].time <= time + REPLAY_ROUNDING:
             press = self._presses[self._pressed]
             self._pressed += 1
-            if self.rules.over is None:
-                pressed += _stamped(self.rules.control(press.control, press.value), time)
+            if self.rules.game_over is None:
+                pressed += _stamped(self.rules.on_input(press.control, press.value), time)
         if any(action not in done for action in pressed):
-            self._note(time)
-        self.saw(done)
+            self._note_divergence(time)
+        self.note_actions(done)
 
-    def _note(self, time: float) -> None:
-        self.otherwise = time if self.otherwise is None else self.otherwise
+    def _note_divergence(self, time: float) -> None:
+        self.diverged_at = time if self.diverged_at is None else self.diverged_at
 
 
 def _stamped(actions: Iterable[Action], time: float) -> tuple[Action, ...]:
@@ -199,15 +199,15 @@ class HeadlessGame:
             presses: of a game that is seen again.
         """
         self.player = player
-        self._referee, self._policy = GameSession(rules, presses), policy
-        self._lighting = LampState(rules)
+        self._session, self._policy = GameSession(rules, presses), policy
+        self._lamps = LampState(rules)
 
     @property
-    def stops(self) -> bool:
+    def finished(self) -> bool:
         """Whether the run is to end here; a game that is seen again is seen to the end of what was recorded."""
-        return self._policy is not None and self._referee.rules.over is not None
+        return self._policy is not None and self._session.rules.game_over is not None
 
-    def turn(
+    def actions_between_steps(
         self, time: float, frame: Frame, contacts: Contacts, given: Sequence[Action], last: bool
     ) -> Sequence[Action]:
         """Let all who may act between two steps, and return what is to be done, in order.
@@ -219,52 +219,52 @@ class HeadlessGame:
             given: what is to be done at this time in any case.
             last: no step comes after it, so that nobody is asked to play.
         """
-        referee, policy = self._referee, self._policy
-        own = referee.look(time, frame, contacts)
-        self._lighting.look(time)
+        session, policy = self._session, self._policy
+        own = session.on_step(time, frame, contacts)
+        self._lamps.update(time)
         if policy is None:
-            referee.watch(time, own, given)
+            session.replay(time, own, given)
             return given
         pressed: list[Action] = []
-        if not last and referee.rules.over is None and referee.seen is not None:
-            for control, value in policy.decide(referee.seen, referee.rules):
-                pressed += referee.press(time, control, value)
+        if not last and session.rules.game_over is None and session.step_info is not None:
+            for control, value in policy.decide(session.step_info, session.rules):
+                pressed += session.press(time, control, value)
         played = [*pressed, *given]
-        referee.saw(played)
+        session.note_actions(played)
         return [*own, *played]
 
     @property
     def presses(self) -> tuple[Press, ...]:
         """What was pressed."""
-        return self._referee.presses
+        return self._session.presses
 
     @property
-    def otherwise(self) -> float | None:
+    def diverged_at(self) -> float | None:
         """When the rules would first have done something else than was done, s, in a game that is seen again."""
-        return self._referee.otherwise
+        return self._session.diverged_at
 
     @property
-    def over(self) -> str | None:
+    def game_over(self) -> str | None:
         """Why the game is over; None while it goes on."""
-        return self._referee.rules.over
+        return self._session.rules.game_over
 
     @property
     def score(self) -> int | float:
         """Of who plays."""
-        return self._referee.rules.score
+        return self._session.rules.score
 
-    def told(self, game: str) -> dict[str, Any]:
+    def to_dict(self, game: str) -> dict[str, Any]:
         """Return the outcome as JSON values."""
-        rules = self._referee.rules
+        rules = self._session.rules
         log = {"log": [list(entry) for entry in rules.log]} if isinstance(rules, HasLog) else {}
         return {
             "name": game,
             "player": self.player,
             "score": self.score,
-            "over": self.over,
-            "lines": [list(line) for line in rules.lines()],
+            "over": self.game_over,
+            "lines": [list(line) for line in rules.display_lines()],
             "presses": [list(press) for press in self.presses],
-            "otherwise": self.otherwise,
+            "otherwise": self.diverged_at,
             **log,
-            **({"lamps": lamps} if (lamps := self._lighting.told()) else {}),
+            **({"lamps": lamps} if (lamps := self._lamps.changes()) else {}),
         }

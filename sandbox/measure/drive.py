@@ -81,7 +81,7 @@ class _Doing:
             if len(self._heard) == HEARD:
                 self._heard = [Contacts.joined(self._heard).merged()]
         frame = simulation.frame() if self.frame is None else self.frame
-        return self._bout.turn(simulation.time, frame, contacts, given, last)
+        return self._bout.actions_between_steps(simulation.time, frame, contacts, given, last)
 
     @property
     def done(self) -> tuple[Action, ...]:
@@ -128,7 +128,7 @@ def drive(
             now = simulation.time + ROUNDING * dt
             if now >= doing.next:
                 doing.act(now)
-                if bout is not None and bout.stops:
+                if bout is not None and bout.finished:
                     break
             simulation.step()
             step += 1
@@ -143,7 +143,7 @@ def drive(
                     watch(step, simulation.work)
                 if progress is not None:
                     progress(step / (every + part))
-        if bout is not None and bout.stops:
+        if bout is not None and bout.finished:
             recorder.end(simulation.frame())
         elif part > 0.0:
             doing.act(simulation.time + ROUNDING * stretches[-1].dt)

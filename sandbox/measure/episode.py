@@ -49,7 +49,7 @@ class Episode:
     @property
     def ended(self) -> bool:
         """Whether nothing is left to decide."""
-        return self.late or self.rules.over is not None
+        return self.late or self.rules.game_over is not None
 
     def frame(self) -> Frame:
         """Return the present state."""
@@ -67,7 +67,7 @@ class Episode:
                 self._levels[k] = value
                 acts = self._referee.press(self.relay.time, control.name, value)
                 self._do(acts)
-                self._referee.saw(acts)
+                self._referee.note_actions(acts)
 
     def step(self) -> None:
         """Advance by one dt, and let the rules see what happened.
@@ -98,7 +98,7 @@ class Episode:
 
     def _look(self, contacts: Contacts) -> None:
         """Let the rules see the state, and do what they say."""
-        self._do(self._referee.look(self.relay.time, self.relay.frame(), contacts))
+        self._do(self._referee.on_step(self.relay.time, self.relay.frame(), contacts))
 
     def _do(self, acts: Sequence[Action]) -> None:
         for act in acts:

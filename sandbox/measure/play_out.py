@@ -56,13 +56,13 @@ def play_out(
     """
     rules = required_rules(scene)
     bout = (
-        PlayerSpec.named(player).bout(scene)
+        PlayerSpec.parse(player).start_game(scene)
         if isinstance(player, str)
         else HeadlessGame(rules, player, type(player).__name__)
     )
     assert bout is not None
     trajectory = run(scene, engine, audit=audit, progress=progress, bout=bout, **settings)
-    return Played(bout.score, bout.over, _recording(scene, engine, trajectory, bout.presses, settings), trajectory)
+    return Played(bout.score, bout.game_over, _recording(scene, engine, trajectory, bout.presses, settings), trajectory)
 
 
 def _recording(

@@ -116,7 +116,7 @@ def run(
     outcome |= {"state_hash": state_hash, "broken": len(simulation.broken)}
     info = _info(scene, engine, resolved, end.done, **outcome)
     if bout is not None:
-        info["game"] = bout.told(scene.play.game or "")
+        info["game"] = bout.to_dict(scene.play.game or "")
     if account:
         info["causes"] = [cause.value for cause in Cause]
     trajectory = _trajectory(recorder.arrays(len(bodies)), bodies, end.contacts, retired, broken, missed, info)

@@ -123,7 +123,7 @@ class GameHost:
 
     def _press(self, control: str, value: float) -> None:
         game = self.live.session.game
-        past = game is not None and bool(game.coming)
+        past = game is not None and bool(game.future_presses)
         self.live.press(control, value)
         if past:  # what was to be let go of later is forgotten, so it is let go of now, unless a hand holds it
             for name in self._pressed():
@@ -143,10 +143,10 @@ class GameHost:
     def _doubts(self) -> list[str]:
         """Return what is to be said, once, where a recorded game goes otherwise than the rules would have it."""
         game = self.live.session.game
-        if self._told or game is None or game.otherwise is None:
+        if self._told or game is None or game.diverged_at is None:
             return []
         self._told = True
-        return [f"from {game.otherwise:g} s on, the rules no longer reproduce the recording"]
+        return [f"from {game.diverged_at:g} s on, the rules no longer reproduce the recording"]
 
     def _news(self) -> list[str]:
         """Return what a game with a log has told since the last call; of what is taken back it may tell again."""
@@ -163,14 +163,14 @@ class GameHost:
         if then is not None:
             return then
         score = f"{rules.score:,}" if isinstance(rules.score, int) else f"{rules.score:,.1f}"
-        board = ScoreDisplay(score.replace(",", " "), tuple(rules.lines()), rules.over)
-        now = GameDisplay(board, rules.lit() if isinstance(rules, HasLamps) else frozenset())
+        board = ScoreDisplay(score.replace(",", " "), tuple(rules.display_lines()), rules.game_over)
+        now = GameDisplay(board, rules.lit_lamps() if isinstance(rules, HasLamps) else frozenset())
         if not live.peeking:
             self._past.note(live.frame.time, live.end, now)
         return now
 
     def cues(self) -> tuple[str, ...]:
         """Return the sounds of what happened since the last call; what is seen again on a way back is not heard."""
-        cues, game = tuple(self.rules.cues()), self.live.session.game
+        cues, game = tuple(self.rules.sounds()), self.live.session.game
         known, self._game = self._game is game, game
         return cues if known and self.live.busy is None else ()

@@ -168,7 +168,7 @@ def test_stored_game_is_played_again_in_the_window(
         pass
     assert live.session.game is not None
     assert live.session.game.rules.score == row["score"]
-    assert live.session.game.otherwise is None
+    assert live.session.game.diverged_at is None
     live.close()
 
 

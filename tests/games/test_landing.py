@@ -60,9 +60,9 @@ key = "up"
 class Autopilot:
     """Comes down on the pad by what the score panel's figures tell: it knows the rules, and no engine."""
 
-    def decide(self, seen: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:
+    def decide(self, info: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:
         assert isinstance(rules, Landing)
-        ship, frame = rules._ship, seen.frame
+        ship, frame = rules._ship, info.frame
         x, _ = frame.position[ship].tolist()
         vx, vy = frame.velocity[ship].tolist()
         angle, rate = math.remainder(float(frame.angle[ship]), math.tau), float(frame.angular_velocity[ship])
@@ -171,8 +171,8 @@ def test_panel_tells_what_would_be_a_crash() -> None:
     from sandbox.engines.switching import start
 
     relay = start(SCENE)
-    rules.look(StepInfo(0.0, relay.frame(), relay.contacts(), ()))
-    lines = dict(rules.lines())
+    rules.on_step(StepInfo(0.0, relay.frame(), relay.contacts(), ()))
+    lines = dict(rules.display_lines())
     assert lines["fuel"] == "100 %"
     assert lines["sideways"] == "+5.0 m/s !"
     assert lines["tilt"] == "+0°"

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from sandbox.cli.main import call
+from sandbox.games.landing.rules import Landing
 from sandbox.games.names import GAMES, GROUP, game_names
 from sandbox.games.registry import RULES, has_rules, is_real_time, rules_of
 from sandbox.measure.play_out import play_out
@@ -35,20 +36,20 @@ class Count:
     controls = (Control("kick", "up", ("up",)),)
 
     def __init__(self, scene, bodies):
-        self.score, self.over, self._touched = 0, None, set()
+        self.score, self.game_over, self._touched = 0, None, set()
 
-    def control(self, name, value):
+    def on_input(self, control, value):
         return ()
 
-    def look(self, seen):
-        self._touched |= {contact.time for contact in seen.contacts}
+    def on_step(self, info):
+        self._touched |= {contact.time for contact in info.contacts}
         self.score = len(self._touched)
         return ()
 
-    def lines(self):
+    def display_lines(self):
         return (("bounces", str(self.score)),)
 
-    def cues(self):
+    def sounds(self):
         return ()
 """
 
@@ -95,7 +96,7 @@ def test_game_that_cannot_be_imported_is_reported_with_its_line(scene: Path, cap
 
 
 def test_game_of_this_package_outranks_one_of_the_same_name(scene: Path) -> None:
-    assert type(rules_of(load("landing"))) is RULES["landing"]
+    assert type(rules_of(load("landing"))) is Landing
 
 
 def test_unknown_game_is_refused_with_all_names(scene: Path) -> None:
@@ -103,15 +104,15 @@ def test_unknown_game_is_refused_with_all_names(scene: Path) -> None:
         loads(SCENE.replace("count-bounces", "count"))
     (fault,) = caught.value.faults
     assert (fault.line, fault.path) == (4, "play.game")
-    assert fault.message.endswith("'landing', 'pinball', 'broken' or 'count-bounces', is \"count\"")
+    assert fault.message.endswith("'curling', 'landing', 'broken' or 'count-bounces', is \"count\"")
 
 
 def test_unknown_game_is_refused_without_other_packages() -> None:
     with pytest.raises(SceneError) as caught:
         loads(SCENE.replace("count-bounces", "pinbal"))
     assert caught.value.faults[0].message == (
-        "must be one of '8-ball', '9-ball', 'three-cushion', 'straight-rail', 'snooker', 'free', 'artillery', "
-        "'curling', 'landing' or 'pinball', is \"pinbal\""
+        "must be one of '8-ball', '9-ball', 'three-cushion', 'straight-rail', 'snooker', 'free', 'pinball', "
+        "'artillery', 'curling' or 'landing', is \"pinbal\""
     )
 
 

@@ -17,7 +17,7 @@ def test_lines_are_presses_in_order_of_time(tmp_path: Path) -> None:
     presses = read_script(file)
     assert presses == (Press(0.0, "plunger", 0.25), Press(1.5, "left flipper", 1.0))
     assert faults_of(presses, CONTROLS, "s.txt") == []
-    assert PlayerSpec.named(str(file)).presses == presses
+    assert PlayerSpec.parse(str(file)).presses == presses
 
 
 @pytest.mark.parametrize(
@@ -63,10 +63,10 @@ def test_what_a_game_does_not_have_is_told_where_it_is_first(tmp_path: Path) -> 
 
 def test_no_file_is_one_line(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="No such file; a player is random, none, skilled or a script file"):
-        PlayerSpec.named(str(tmp_path / "none.txt"))
+        PlayerSpec.parse(str(tmp_path / "none.txt"))
     (tmp_path / "bytes").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(SceneError, match="cannot be read"):
-        PlayerSpec.named(str(tmp_path / "bytes"))
+        PlayerSpec.parse(str(tmp_path / "bytes"))
 
 
 @pytest.mark.parametrize(
@@ -95,5 +95,5 @@ def test_what_is_no_script_is_one_line(name: str, tmp_path: Path, monkeypatch: p
     Path("folder").mkdir()
     Path("loop").symlink_to("loop")
     with pytest.raises(SceneError, match="cannot be read: ") as error:
-        PlayerSpec.named(name)
+        PlayerSpec.parse(name)
     assert len(str(error.value)) < 500

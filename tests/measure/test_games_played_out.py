@@ -106,7 +106,7 @@ def test_actions_that_are_given_are_the_players() -> None:
     given = Impulse(time=0.05, body="a", impulse=(0.0, 1.0))
     bout = HeadlessGame(rules, POLICIES["none"](scene), "none")
     told = run(scene, actions=[given], bout=bout, audit=False)
-    bounces = int(dict(rules.lines())["bounces"])
+    bounces = int(dict(rules.display_lines())["bounces"])
     assert bout.score == bounces + 0.5
     assert given.model_dump(mode="json") in told.info["actions"]
 

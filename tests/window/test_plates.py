@@ -94,8 +94,8 @@ def test_plates_leave_the_field_free(name: str, tmp_path: Path, monkeypatch: pyt
 def test_last_shot_is_told_whole_beside_four_tanks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     window = opened("four", tmp_path, monkeypatch)
     told = "at 172.07 m, exactly 171.94 m: off by 148 mm"
-    lines = ArtilleryRules.lines
-    monkeypatch.setattr(ArtilleryRules, "lines", lambda self: [*lines(self), ("last shot", told)])
+    lines = ArtilleryRules.display_lines
+    monkeypatch.setattr(ArtilleryRules, "display_lines", lambda self: [*lines(self), ("last shot", told)])
     try:
         resize(window, 1024, 700, 1.0)
         assert window.stage.host is not None

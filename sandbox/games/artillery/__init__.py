@@ -1,5 +1,18 @@
-"""Artillery: tanks on ground that shells dig up.
+"""Artillery: tanks take turns to fire shells over terrain that explosions deform."""
 
-`ground.py` takes circles out of columns, `flight.py` says where shells go, `aim.py` and `bot.py` find the shot that
-hits, `miss.py` says by how much an integrator misses, `tanks.py` keeps who has what, and `rules.py` plays it all.
-"""
+from sandbox.games.spec import Environment, GameSpec
+
+GAME = GameSpec(
+    names=("artillery",),
+    rules="sandbox.games.artillery.rules:ArtilleryRules",
+    tables={
+        "terrain": "sandbox.games.artillery.scene:TERRAIN",
+        "artillery": "sandbox.games.artillery.scene:ARTILLERY",
+    },
+    bot="sandbox.games.artillery.bot:ArtilleryBot",
+    environments=(
+        Environment("ArtilleryDuel", "artillery/duel", 10),
+        Environment("ArtilleryFour", "artillery/four", 10),
+    ),
+    needs_player="sandbox.games.artillery.scene:needs_player",
+)

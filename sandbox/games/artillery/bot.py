@@ -28,7 +28,7 @@ class ArtilleryBot:
         self._thought: BotPlanner | None = None
         self._down: set[str] = set()
 
-    def decide(self, seen: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:
+    def decide(self, info: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:
         """Return the controls that are pressed and let go of now.
 
         Raises:
@@ -36,7 +36,7 @@ class ArtilleryBot:
         """
         if not isinstance(rules, ArtilleryRules):
             raise UnsuitableSceneError("this player only plays artillery")
-        step, self._time = seen.time - self._time, seen.time
+        step, self._time = info.time - self._time, info.time
         wanted: set[str] = set()
         if rules.phase == "aim" and rules.shooter.player.bot is None:
             aim = self._thought_of(rules)

@@ -144,7 +144,7 @@ class ArtilleryRules:
         return persons[0] if persons else max(tank.points for tank in tanks)
 
     @property
-    def over(self) -> str | None:
+    def game_over(self) -> str | None:
         """Who has won."""
         return self._over
 
@@ -172,42 +172,42 @@ class ArtilleryRules:
         """Return how fast a shell leaves a tank as it is set, m/s."""
         return tank.power * self.artillery.speed
 
-    def control(self, name: str, value: float) -> Sequence[Action]:
+    def on_input(self, control: str, value: float) -> Sequence[Action]:
         """Turn the barrel, change the power or the weapon, or fire."""
-        self._gunner.press(name, value)
+        self._gunner.press(control, value)
         if self.phase != "aim" or self.shooter.player.bot is not None or value <= 0.0:
             return ()
-        if name == "fire":
+        if control == "fire":
             return self._fire()
-        self._gunner.touch(name, self.shooter)
-        if name == "weapon":
+        self._gunner.touch(control, self.shooter)
+        if control == "weapon":
             self.field.cues.append("click")
         return ()
 
-    def look(self, seen: StepInfo) -> Sequence[Action]:
+    def on_step(self, info: StepInfo) -> Sequence[Action]:
         """Go on with the turn: aim as long as keys are held, follow what flies, wait until all is still."""
-        passed, self._time = seen.time - self._time, seen.time
-        self._breathe(seen.actions)
-        self.barrage.know(seen)
-        self.field.tanks.see(seen.frame)
+        passed, self._time = info.time - self._time, info.time
+        self._breathe(info.actions)
+        self.barrage.know(info)
+        self.field.tanks.see(info.frame)
         match self.phase:
             case "begin":
                 return self._begin_turn()
             case "aim":
                 return self._set_gun(passed)
             case "fly":
-                actions = self.barrage.follow(seen, passed)
+                actions = self.barrage.follow(info, passed)
                 if not self.barrage.shells:
                     self.phase = "settle"
-                    self.field.begin_to_settle(seen.time)
+                    self.field.begin_to_settle(info.time)
                 return actions
             case "settle":
-                done, actions = self.field.settle(seen, self.shooter)
+                done, actions = self.field.settle(info, self.shooter)
                 if done:
                     self.phase = "begin"
                 return actions
 
-    def lines(self) -> Sequence[tuple[str, str]]:
+    def display_lines(self) -> Sequence[tuple[str, str]]:
         """Return who has what, how the gun is set, and what the last shot came to."""
         told = []
         for tank in self.field.tanks.every:
@@ -226,7 +226,7 @@ class ArtilleryRules:
             told.append(("last shot", self.shots[-1].brief.replace("exact solution", "exact")))
         return told
 
-    def gauges(self) -> Sequence[tuple[str, float]]:
+    def observation(self) -> Sequence[tuple[str, float]]:
         """Return whose turn it is, the wind, every gun and what its tank has, the last shot, and the ground."""
         field, last = self.field, next((shot.place for shot in reversed(self.shots) if shot.place is not None), None)
         person = self.phase == "aim" and self.shooter.player.bot is None
@@ -240,7 +240,7 @@ class ArtilleryRules:
         heights = field.ground.surface(np.linspace(0.0, field.ground.width, HEIGHTS))
         return [*found, *((f"height {k}", height) for k, height in enumerate(heights.tolist()))]
 
-    def cues(self) -> Sequence[str]:
+    def sounds(self) -> Sequence[str]:
         """Return the sounds since the last call."""
         cues, self.field.cues = self.field.cues, []
         return cues

@@ -336,3 +336,13 @@ TERRAIN = Preset(
 ARTILLERY = Preset(
     Artillery, "players and rules; the tanks are expanded to boxes", faults_of=faults_of, expanded=expanded
 )
+
+
+def needs_player(scene: Scene) -> str | None:
+    """Return why a game does not proceed without input: the first player without a bot has to fire."""
+    artillery = table_of(scene, Artillery)
+    players = () if artillery is None else artillery.players
+    name = next((player.name for player in players if player.bot is None), None)
+    if name is None:
+        return None
+    return f"player 'none' fires no gun, so {name} would never play; use random, skilled or a script"

@@ -350,7 +350,7 @@ def add_artillery(rules: Rules, sight: Snapshot, present: bool = True) -> Snapsh
 def artillery_view_state(rules: ArtilleryRules, time: float) -> ArtilleryViewState:
     """Return what is drawn at a time, s."""
     field, barrage = rules.field, rules.barrage
-    aiming = rules.phase == "aim" and rules.over is None
+    aiming = rules.phase == "aim" and rules.game_over is None
     guns = tuple(
         GunView(
             number=tank.number,

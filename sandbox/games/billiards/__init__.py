@@ -13,3 +13,10 @@
 So a session is a scene and its actions: `Strike` and `Move`. `Bot(skill, seed)` (bot/) decides and plans shots, and
 `play(match, players, engine)` (frame.py) plays a frame out between players and returns it with its session.
 """
+
+from sandbox.games.spec import GameSpec
+
+GAME = GameSpec(
+    names=("8-ball", "9-ball", "three-cushion", "straight-rail", "snooker", "free"),
+    tables={"billiards": "sandbox.games.billiards.scene:BILLIARDS"},
+)

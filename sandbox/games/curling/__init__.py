@@ -1,1 +1,11 @@
-"""Curling: two teams slide stones to the middle of a house, in ends of sixteen; a skip who aims by the closed form."""
+"""Curling: two teams slide sixteen stones an end towards a house; bots aim by a closed-form solution."""
+
+from sandbox.games.spec import Environment, GameSpec
+
+GAME = GameSpec(
+    names=("curling",),
+    rules="sandbox.games.curling.rules:Curling",
+    tables={"play.curling": "sandbox.games.curling.scene:MATCH"},
+    environments=(Environment("Curling", "games/curling", 10),),
+    needs_player="sandbox.games.curling.scene:needs_player",
+)

@@ -68,7 +68,7 @@ class CurlingScore(NamedTuple):
         return self.thrown == 2 * STONES
 
     @property
-    def over(self) -> str | None:
+    def game_over(self) -> str | None:
         """Why the match is over; None while it goes on."""
         red, yellow = self.points
         if self.played < self.ends or red == yellow:
@@ -155,9 +155,9 @@ class Curling:
         return red if self._people == 1 else max(red, yellow)
 
     @property
-    def over(self) -> str | None:
+    def game_over(self) -> str | None:
         """Why the match is over; None while it goes on."""
-        return self._score.over
+        return self._score.game_over
 
     @property
     def _current(self) -> int:
@@ -168,42 +168,42 @@ class Curling:
     def _by_itself(self) -> bool:
         return self._score.team >= self._people
 
-    def control(self, name: str, value: float) -> Sequence[Action]:
+    def on_input(self, control: str, value: float) -> Sequence[Action]:
         """Press or let go a control; a team that plays by itself cannot be helped."""
-        (self._held.add if value > 0.0 else self._held.discard)(name)
-        if name == "sweep":
+        (self._held.add if value > 0.0 else self._held.discard)(control)
+        if control == "sweep":
             return self._sweep(value > 0.0) if self._running and not self._by_itself else ()
         if value <= 0.0 or not self._ready or self._by_itself:
             return ()
-        if name == "turn":
+        if control == "turn":
             self._turn = -self._turn
-        if name == "throw":
+        if control == "throw":
             heading = math.atan2(self._broom, -RELEASE)
             speed = self._ice.speed_for(self._weight - RELEASE)
             return self._let_go(Delivery(speed, heading, self._turn))
         return ()
 
-    def look(self, seen: StepInfo) -> Sequence[Action]:
+    def on_step(self, info: StepInfo) -> Sequence[Action]:
         """Follow the stones, take out what is out of play, count ends, and bring the next stone."""
-        elapsed, self._time, self._frame = seen.time - self._time, seen.time, seen.frame
+        elapsed, self._time, self._frame = info.time - self._time, info.time, info.frame
         if self._running:
-            return self._follow(seen, elapsed)
+            return self._follow(info, elapsed)
         if not self._ready:
-            return self._next(seen) if seen.time - self._since >= PAUSE else ()
+            return self._next(info) if info.time - self._since >= PAUSE else ()
         if not self._by_itself:
             return self._aim(elapsed)
         if self._meant is None:
             return self._choose()
-        return self._let_go(self._meant) if seen.time - self._since >= THINKS else ()
+        return self._let_go(self._meant) if info.time - self._since >= THINKS else ()
 
-    def _next(self, seen: StepInfo) -> Sequence[Action]:
+    def _next(self, info: StepInfo) -> Sequence[Action]:
         """Bring the next stone to where it is let go; at the beginning of an end, all others to where they wait."""
         moves: list[Action] = []
         if self._score.thrown == 0:
             self._places, self._deemed = {}, set()
             moves = [self._put(k, parked_position(*divmod(k, STONES))) for k in range(2 * STONES)]
         moves.append(self._put(self._current, (RELEASE, 0.0)))
-        self._ready, self._meant, self._since, self._weight = True, None, seen.time, 0.0
+        self._ready, self._meant, self._since, self._weight = True, None, info.time, 0.0
         self._cues.append("next")
         return (*moves, self._hold(0.0))
 
@@ -240,10 +240,10 @@ class Curling:
             *sweeps,
         )
 
-    def _follow(self, seen: StepInfo, elapsed: float) -> Sequence[Action]:
+    def _follow(self, info: StepInfo, elapsed: float) -> Sequence[Action]:
         """See where the stones are, take out who leaves, and judge the shot once all rest."""
-        frame, moves = seen.frame, list[Action]()
-        self._hear(seen, elapsed)
+        frame, moves = info.frame, list[Action]()
+        self._hear(info, elapsed)
         for k in tuple(self._places):
             x, y = frame.position[self._numbers[k]].tolist()
             self._places[k] = (x, y)
@@ -252,18 +252,18 @@ class Curling:
                 moves.append(self._put(k, removed_position(*divmod(k, STONES))))
                 self._cues.append("gone")
         moving = [k for k in self._places if frame.velocity[self._numbers[k]].any()]
-        return moves if moving else [*moves, *self._judge(seen)]
+        return moves if moving else [*moves, *self._judge(info)]
 
-    def _hear(self, seen: StepInfo, elapsed: float) -> None:
+    def _hear(self, info: StepInfo, elapsed: float) -> None:
         """Note which stones have struck each other."""
         stones = {number: k for k, number in enumerate(self._numbers)}
-        pairs = seen.contacts.pair[seen.contacts.time > self._time - elapsed].tolist()  # others only touch on
+        pairs = info.contacts.pair[info.contacts.time > self._time - elapsed].tolist()  # others only touch on
         new = {(stones[a], stones[b]) for a, b in pairs if a in stones and b in stones}
         if new:
             self._hits |= new
             self._cues.append("hit")
 
-    def _judge(self, seen: StepInfo) -> Sequence[Action]:
+    def _judge(self, info: StepInfo) -> Sequence[Action]:
         """Judge a shot that has come to rest: hog line, free guard zone; and the end, where that was its last."""
         moves: list[Action] = []
         current, places = self._current, self._places
@@ -283,7 +283,7 @@ class Curling:
             self._deemed = {k for k in met | self._deemed if k in places and is_hogged(places[k])}
         if "sweep" in self._held:
             moves += self._sweep(False)
-        self._running, self._since = False, seen.time
+        self._running, self._since = False, info.time
         self._score = self._score.after_stone()
         if self._score.full:
             self._count()
@@ -294,7 +294,7 @@ class Curling:
         self._score = self._score.after_end(team, points)
         self._told = "blank end" if team is None else f"{TEAMS[team]} scores {points}"
         self._cues.append("score" if points else "blank")
-        if self._score.over is not None:
+        if self._score.game_over is not None:
             self._cues.append("win" if self._people != 1 or self._score.points[0] > self._score.points[1] else "lose")
 
     def _sweep(self, on: bool) -> Sequence[Action]:
@@ -313,15 +313,15 @@ class Curling:
         self._broom = min(max(aside, -WIDEST), WIDEST)
         return Move(time=0.0, body=BROOM, position=(0.0, self._broom))
 
-    def lines(self) -> Sequence[tuple[str, str]]:
+    def display_lines(self) -> Sequence[tuple[str, str]]:
         """Return the score, the end, whose turn it is and how it aims."""
         score = self._score
         red, yellow = score.points
         end = f"{min(score.played + 1, max(score.ends, score.played))} of {score.ends}"
-        if score.played >= score.ends and score.over is None:
+        if score.played >= score.ends and score.game_over is None:
             end = "extra"
         shown = [("red : yellow", f"{red} : {yellow}"), ("end", end)]
-        if score.over is None:
+        if score.game_over is None:
             shown += [
                 (f"{TEAMS[score.team]} throws", f"stone {score.number + 1} of {STONES}"),
                 ("weight", _weight(self._weight)),
@@ -329,7 +329,7 @@ class Curling:
             ]
         return [*shown, ("", self._told)] if self._told else shown
 
-    def gauges(self) -> Sequence[tuple[str, float]]:
+    def observation(self) -> Sequence[tuple[str, float]]:
         """Return how the stone is aimed, m, whether a person is to let it go, and how the match stands."""
         score = self._score
         return (
@@ -345,7 +345,7 @@ class Curling:
             *zip((f"{team} points" for team in TEAMS), score.points, strict=True),
         )
 
-    def cues(self) -> Sequence[str]:
+    def sounds(self) -> Sequence[str]:
         """Return the names of the sounds since the last call."""
         cues, self._cues = self._cues, []
         return cues

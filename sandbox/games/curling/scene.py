@@ -5,7 +5,8 @@ from typing import Annotated
 from pydantic import Field
 
 from sandbox.scene.description.base import Part
-from sandbox.scene.description.game_tables import GameTable
+from sandbox.scene.description.game_tables import GameTable, table_of
+from sandbox.scene.scene import Scene
 
 
 class CurlingMatch(Part):
@@ -20,3 +21,14 @@ class CurlingMatch(Part):
 
 
 MATCH = GameTable(CurlingMatch, "settings of a curling match")
+
+
+def needs_player(scene: Scene) -> str | None:
+    """Return why a match does not proceed without input: a person has to deliver stones."""
+    match = table_of(scene.play, CurlingMatch) or CurlingMatch()
+    if not match.people:
+        return None
+    return (
+        "player 'none' delivers no stone, so nothing would move; use random or a script, or let both teams play by "
+        "themselves with --set play.curling.people=0"
+    )

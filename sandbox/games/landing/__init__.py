@@ -1,1 +1,10 @@
-"""Landing: a lunar lander."""
+"""Landing: a lunar lander with a main engine and side thrusters, gusts of wind and a limited amount of fuel."""
+
+from sandbox.games.spec import Environment, GameSpec
+
+GAME = GameSpec(
+    names=("landing",),
+    rules="sandbox.games.landing.rules:Landing",
+    environments=(Environment("Landing", "games/landing", 5),),
+    real_time=True,
+)

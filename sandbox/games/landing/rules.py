@@ -63,7 +63,7 @@ class Landing:
             )
         self.controls = tuple(_control(name, thrust) for name, thrust in self._thrusts.items())
         self.score = 0
-        self.over: str | None = None
+        self.game_over: str | None = None
         self._ship, self._pad = bodies.names.index(SHIP), -1 - scene.fixed_names.index(PAD)
         self._place, self._solid = _place(scene), len(scene.fixed)
         form = form_of(bodies.elements[int(bodies.element[self._ship])])
@@ -77,28 +77,28 @@ class Landing:
         self._cues: list[str] = []
         self._touched = False
 
-    def control(self, name: str, value: float) -> Sequence[Action]:
+    def on_input(self, control: str, value: float) -> Sequence[Action]:
         """Open a thrust by so much, as long as there is anything in the tank."""
-        return (Throttle(time=0.0, thrust=name, level=min(value, 1.0)),) if self._tank > 0.0 else ()
+        return (Throttle(time=0.0, thrust=control, level=min(value, 1.0)),) if self._tank > 0.0 else ()
 
-    def look(self, seen: StepInfo) -> Sequence[Action]:
+    def on_step(self, info: StepInfo) -> Sequence[Action]:
         """Count what was burnt, and see whether the ship has come down, and how."""
         if self._now is None:
-            self._now = seen.frame
+            self._now = info.frame
             return (self._start,)
-        self._before, self._now = self._now, seen.frame
-        elapsed, self._time = seen.time - self._time, seen.time
-        stopped = self._burn(seen, elapsed)
-        self.over = self._ended(seen, elapsed)
-        if self.over is not None:
+        self._before, self._now = self._now, info.frame
+        elapsed, self._time = info.time - self._time, info.time
+        stopped = self._burn(info, elapsed)
+        self.game_over = self._ended(info, elapsed)
+        if self.game_over is not None:
             self.score = self.score or self._consolation()
-            self._cues.append("win" if self.over == LANDED else "lose")
+            self._cues.append("win" if self.game_over == LANDED else "lose")
             return tuple(Throttle(time=0.0, thrust=name, level=0.0) for name, level in self._levels.items() if level)
         return stopped
 
-    def _burn(self, seen: StepInfo, elapsed: float) -> Sequence[Action]:
+    def _burn(self, info: StepInfo, elapsed: float) -> Sequence[Action]:
         """Take from the tank what the engines gave; close them as it runs dry."""
-        for action in seen.actions:
+        for action in info.actions:
             if isinstance(action, Throttle) and action.thrust in self._levels:
                 self._levels[action.thrust] = action.level
         burnt = math.fsum(level * math.hypot(*self._thrusts[name].force) for name, level in self._levels.items())
@@ -110,12 +110,12 @@ class Landing:
         self._levels = dict.fromkeys(self._levels, 0.0)
         return tuple(Throttle(time=0.0, thrust=name, level=0.0) for name in opened)
 
-    def _ended(self, seen: StepInfo, elapsed: float) -> str | None:
+    def _ended(self, info: StepInfo, elapsed: float) -> str | None:
         """Return why the game is over now, and set the score; None where it goes on."""
-        frame, ship = seen.frame, self._ship
+        frame, ship = info.frame, self._ship
         if not frame.present[ship]:
             return "lost in space"
-        touched = {int(pair[1]) if pair[0] == ship else int(pair[0]) for pair in seen.contacts.pair if ship in pair}
+        touched = {int(pair[1]) if pair[0] == ship else int(pair[0]) for pair in info.contacts.pair if ship in pair}
         if any(number >= -self._solid for number in touched - {self._pad}):  # the others are no more than zones
             return "crashed outside the pad"
         if self._pad not in touched:
@@ -159,7 +159,7 @@ class Landing:
     def _tilt(self, frame: Frame) -> float:
         return math.remainder(float(frame.angle[self._ship]), math.tau)
 
-    def lines(self) -> Sequence[tuple[str, str]]:
+    def display_lines(self) -> Sequence[tuple[str, str]]:
         """Return fuel, height and speeds; what would be a crash is marked."""
         fuel = ("fuel", f"{100.0 * self._tank / self._full:.0f} %")
         if self._now is None or not self._now.present[self._ship]:
@@ -174,7 +174,7 @@ class Landing:
             ("tilt", _marked(f"{-round(math.degrees(tilt)):+d}°", abs(tilt) > TILT)),
         )
 
-    def gauges(self) -> Sequence[tuple[str, float]]:
+    def observation(self) -> Sequence[tuple[str, float]]:
         """Return how full the tank is, 0 to 1."""
         return (("fuel", self._tank / self._full),)
 
@@ -184,7 +184,7 @@ class Landing:
         lowest = min(x * sine + y * cosine - radius for x, y, radius in self._corners)
         return float(frame.position[self._ship, 1]) + lowest - self._place[1]
 
-    def cues(self) -> Sequence[str]:
+    def sounds(self) -> Sequence[str]:
         """Return the names of the sounds since the last call."""
         cues, self._cues = self._cues, []
         return cues

@@ -1,1 +1,15 @@
-"""Pinball: rules as small machines that read switches and answer with points, sounds and actions."""
+"""Pinball: tables of devices that read switches and answer with points, sounds and actions."""
+
+from sandbox.games.spec import Environment, GameSpec
+
+GAME = GameSpec(
+    names=("pinball",),
+    rules="sandbox.games.pinball.rules:Pinball",
+    tables={"pinball": "sandbox.games.pinball.scene:PINBALL"},
+    bot="sandbox.games.pinball.bot:PinballBot",
+    environments=(
+        Environment("PinballClassic", "pinball/classic", 2),
+        Environment("PinballFull", "pinball/full", 2),
+    ),
+    real_time=True,
+)

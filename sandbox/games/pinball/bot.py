@@ -34,7 +34,7 @@ IDLE = 0.7
 class PinballBot:
     """Flips when a ball is about to be within reach, plunges when one waits.
 
-    Skill is the part of the balls that are seen in time; it also takes away from how far the timing is off, and from
+    Skill is the part of the balls that are info in time; it also takes away from how far the timing is off, and from
     flipping for nothing. A table with other rules than pinball it cannot play.
     """
 
@@ -51,7 +51,7 @@ class PinballBot:
         self._rests: dict[str, float] = {}  # by control: until when it is not pressed again, s
         self._judged: dict[str, bool] = {}  # by control: whether the ball that is within reach was thought about
 
-    def decide(self, seen: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:
+    def decide(self, info: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:
         """Return what is pressed and let go now.
 
         Raises:
@@ -59,44 +59,44 @@ class PinballBot:
         """
         if not isinstance(rules, Pinball):
             raise UnsuitableSceneError("this player only plays pinball")
-        found = [(control, 0.0) for control, until in sorted(self._until.items()) if until <= seen.time]
+        found = [(control, 0.0) for control, until in sorted(self._until.items()) if until <= info.time]
         for control, _ in found:
             del self._until[control]
-            self._rests[control] = seen.time + (FLIGHT if control == PLUNGER else PAUSE)
+            self._rests[control] = info.time + (FLIGHT if control == PLUNGER else PAUSE)
         for control, side in FLIPPERS.items():
-            self._flip(control, rules.board.flippers(side), seen, rules)
-        self._plunge(seen, rules)
-        for control in sorted(control for control, due in self._due.items() if due <= seen.time):
+            self._flip(control, rules.board.flippers(side), info, rules)
+        self._plunge(info, rules)
+        for control in sorted(control for control, due in self._due.items() if due <= info.time):
             del self._due[control]
-            if control not in self._until and self._rests.get(control, 0.0) <= seen.time:
+            if control not in self._until and self._rests.get(control, 0.0) <= info.time:
                 plunges = control == PLUNGER
-                self._until[control] = seen.time + (PULL if plunges else HELD)
+                self._until[control] = info.time + (PULL if plunges else HELD)
                 found.append((control, float(self._chance.uniform(*STRENGTH)) if plunges else 1.0))
         return found
 
-    def _flip(self, control: str, flippers: tuple[PlayfieldElement, ...], seen: StepInfo, rules: Pinball) -> None:
+    def _flip(self, control: str, flippers: tuple[PlayfieldElement, ...], info: StepInfo, rules: Pinball) -> None:
         """Decide whether to flip, once for each ball that comes within reach."""
-        near = any(_reached(each, ball, seen, rules) for each in flippers for ball in rules.trough.live)
+        near = any(_reached(each, ball, info, rules) for each in flippers for ball in rules.trough.live)
         if near and not self._judged.get(control) and self._chance.random() < self.skill:
             late = self._chance.normal(0.0, JITTER * (1.0 - self.skill))
-            self._due.setdefault(control, seen.time + max(late, 0.0))
+            self._due.setdefault(control, info.time + max(late, 0.0))
         self._judged[control] = near
         if self._chance.random() < IDLE * (1.0 - self.skill) * rules.board.dt:
-            self._due.setdefault(control, seen.time)
+            self._due.setdefault(control, info.time)
 
-    def _plunge(self, seen: StepInfo, rules: Pinball) -> None:
-        position, velocity = seen.frame.position, seen.frame.velocity
+    def _plunge(self, info: StepInfo, rules: Pinball) -> None:
+        position, velocity = info.frame.position, info.frame.velocity
         waits = any(
             rules.board.in_lane(*position[ball].tolist()) and math.hypot(*velocity[ball].tolist()) < SLOW
             for ball in rules.trough.live
         )
         if waits and PLUNGER not in self._until:
-            self._due.setdefault(PLUNGER, seen.time)
+            self._due.setdefault(PLUNGER, info.time)
 
 
-def _reached(flipper: PlayfieldElement, ball: int, seen: StepInfo, rules: Pinball) -> bool:
+def _reached(flipper: PlayfieldElement, ball: int, info: StepInfo, rules: Pinball) -> bool:
     """Tell whether a ball will be where a flipper can strike it, by the time that it is up."""
-    (x, y), (vx, vy) = seen.frame.position[ball].tolist(), seen.frame.velocity[ball].tolist()
+    (x, y), (vx, vy) = info.frame.position[ball].tolist(), info.frame.velocity[ball].tolist()
     up = rules.board.up
     if vx * up[0] + vy * up[1] > 0.1:  # it goes up by itself
         return False

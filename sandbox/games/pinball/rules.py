@@ -190,13 +190,13 @@ class Pinball:
         return max(each.score for each in self.course.sheets) if self.course.phase == "over" else self.sheet.score
 
     @property
-    def over(self) -> str | None:
+    def game_over(self) -> str | None:
         """Why the game is over; None while it goes on."""
         if self.course.phase != "over":
             return None
         return "game over" if self.course.balls_left else "game over: no ball left on the table"
 
-    def control(self, name: str, value: float) -> Sequence[Action]:
+    def on_input(self, control: str, value: float) -> Sequence[Action]:
         """Do what a player asks for; a tilted table obeys nobody, but lets go, and its plunger is only a rod.
 
         Raises:
@@ -205,21 +205,21 @@ class Pinball:
         now, alive = self._now, self.course.alive
         if now is None:
             return ()
-        if name in FLIPPERS:
-            return self._flipped(FLIPPERS[name], value > 0.0 and alive, now)
-        if name == PLUNGER:
+        if control in FLIPPERS:
+            return self._flipped(FLIPPERS[control], value > 0.0 and alive, now)
+        if control == PLUNGER:
             return self._settled(self._plunged(value if self.course.phase == "play" else 0.0, now), now)
-        direction = NUDGES[name] * complex(*self.board.up)
+        direction = NUDGES[control] * complex(*self.board.up)
         return self._settled(self.nudge.jolt(direction, value, now), now) if alive and value > 0.0 else ()
 
-    def look(self, seen: StepInfo) -> Sequence[Action]:
+    def on_step(self, info: StepInfo) -> Sequence[Action]:
         """See what happened in a step."""
-        now = self._now = StepContext(seen.time, seen.frame, self.sheet)
-        actions = self._settled(self._happens(seen, now), now)
+        now = self._now = StepContext(info.time, info.frame, self.sheet)
+        actions = self._settled(self._happens(info, now), now)
         self._refresh(now)
         return actions
 
-    def lines(self) -> Sequence[tuple[str, str]]:
+    def display_lines(self) -> Sequence[tuple[str, str]]:
         """Return the score panel."""
         course, time = self.course, 0.0 if self._now is None else self._now.time
         message, until = self.said
@@ -227,12 +227,12 @@ class Pinball:
             message, until = "TILT!", time + SAID
         return display_lines(course.sheets, course.turn, self.modes, self._saved(time), message if time < until else "")
 
-    def gauges(self) -> Sequence[tuple[str, float]]:
+    def observation(self) -> Sequence[tuple[str, float]]:
         """Return what the panel and the lamps of lanes and targets show, as numbers."""
         saved = self._saved(0.0 if self._now is None else self._now.time)
         return list(observation(self.course, self.modes, self.multiball, self.lamps, self.banks, max(saved, 0.0)))
 
-    def lit(self) -> frozenset[str]:
+    def lit_lamps(self) -> frozenset[str]:
         """Return whose lamps are lit; a tilted table is dark."""
         now = self._now
         if now is None or self.nudge.tilted:
@@ -244,7 +244,7 @@ class Pinball:
         on = blinking if now.time % BLINK < 0.5 * BLINK else set[str]()
         return frozenset(on | {light.name for light in lights} - blinking)
 
-    def cues(self) -> Sequence[str]:
+    def sounds(self) -> Sequence[str]:
         """Return the sounds since the last call."""
         cues, self._cues = self._cues, []
         return cues
@@ -260,10 +260,10 @@ class Pinball:
         now.loose = tuple(ball for ball in trough.live if ball not in self.holes.held and not trough.in_lane(ball, now))
         now.up = frozenset(self.up)
 
-    def _happens(self, seen: StepInfo, now: StepContext) -> Iterator[Effect]:
+    def _happens(self, info: StepInfo, now: StepContext) -> Iterator[Effect]:
         """Yield what a step has brought, each effect after those before it were carried out."""
         self._refresh(now)
-        for hit in self.switches.read(seen):
+        for hit in self.switches.read(info):
             if hit.ball in now.live:
                 yield from self._hit(hit, now)
         yield from self.course.missed(now)

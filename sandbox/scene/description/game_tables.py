@@ -1,7 +1,7 @@
 """Tables of games in a scene file: a scene has a field for each, and imports the game whose table occurs.
 
-A game adds a table by a line in `GAME_TABLES`. Where the table expands to elements, the line names a
-`sandbox.scene.files.presets.Preset`, else a `GameTable`.
+A game adds tables by `GameSpec.tables`. A table that expands to elements is a `sandbox.scene.files.presets.Preset`,
+other tables are a `GameTable`.
 """
 
 import json
@@ -18,14 +18,11 @@ from pydantic_core import CoreSchema, core_schema
 
 from sandbox.scene.description.base import Part
 
-GAME_TABLES = {
-    "billiards": "sandbox.games.billiards.scene:BILLIARDS",
-    "pinball": "sandbox.games.pinball.scene:PINBALL",
-    "terrain": "sandbox.games.artillery.scene:TERRAIN",
-    "artillery": "sandbox.games.artillery.scene:ARTILLERY",
-    "play.curling": "sandbox.games.curling.scene:MATCH",
-}
-"""Tables by heading: `module:name` of each, a `GameTable`. Presets expand in this order."""
+GAMES = "sandbox.games.names"
+"""Module with the games, read through this import string: scenes import no game statically."""
+
+GAME_TABLES: dict[str, str] = import_module(GAMES).game_tables()
+"""Import string, `module:name`, of each table by heading; it names a `GameTable`. Presets expand in this order."""
 
 PRESETS = tuple(heading for heading in GAME_TABLES if "." not in heading)
 """Tables at the top of a document, which are fields of a scene and expand to its elements."""

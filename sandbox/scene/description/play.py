@@ -8,7 +8,7 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticKnownError, core_schema
 
 from sandbox.scene.description.base import Colour, Name, Part, Point, Radius, Velocity
-from sandbox.scene.description.game_tables import with_game_tables
+from sandbox.scene.description.game_tables import GAMES, with_game_tables
 
 Width = Annotated[float, Field(ge=0, le=1e9)]
 
@@ -74,10 +74,6 @@ class PlayPart(Part):
     """position of the lamp that shows whether it is lit, m"""
     colour: Colour | None = None
     """colour of the lamp"""
-
-
-GAMES = "sandbox.games.names"
-"""Module with the names of all games."""
 
 
 class _GameName:

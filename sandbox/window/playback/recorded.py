@@ -60,7 +60,7 @@ class RecordedRun:
         except ValueError as error:
             raise SceneError([Fault(name, None, "broken_time", str(error))]) from None
         try:
-            self._lamps = LampLog.of((trajectory.info.get("game") or {}).get("lamps", ()))
+            self._lamps = LampLog.from_changes((trajectory.info.get("game") or {}).get("lamps", ()))
         except ValueError as error:
             raise SceneError([Fault(name, None, "info.game", str(error))]) from None
 

@@ -153,9 +153,9 @@ class EngineRun:
             return
         contacts = relay.contacts()
         self._heard.append(contacts)
-        own, due = game.look(relay.time, relay.frame(), contacts), self._script.due(relay)
+        own, due = game.on_step(relay.time, relay.frame(), contacts), self._script.due(relay)
         if self._known:
-            game.watch(relay.time, own, due)
+            game.replay(relay.time, own, due)
             return
         try:
             for action in own:
@@ -197,7 +197,7 @@ class EngineRun:
         else:
             self._take_over(relay, mark.game)
             if self.game is not None:
-                self.game.watch_player(relay.time, self._script.due(relay))
+                self.game.replay_player(relay.time, self._script.due(relay))
             self._redo()
         return mark is not None
 
@@ -216,7 +216,7 @@ class EngineRun:
         self._heard.clear()
         before, self.game = self.game, None if game is None else game.copy()
         if self.game is not None and before is not None:
-            self.game.expect(before.all_presses)
+            self.game.set_presses(before.all_presses)
 
     def recording(self) -> Recording:
         """Return all up to now, to be replayed."""
@@ -440,8 +440,8 @@ class Session(EngineRun):
         self.relay.apply(timed)
         self._go_another_way(timed)
         if self.game is not None:
-            self.game.forget()
-            self.game.saw([timed])
+            self.game.discard_future()
+            self.game.note_actions([timed])
         return timed
 
     def press(self, control: str, value: float) -> tuple[Action, ...]:
@@ -453,7 +453,7 @@ class Session(EngineRun):
         Raises:
             ActionError: it cannot be done. Then it was not pressed.
         """
-        if self.game is None or self.game.rules.over is not None:
+        if self.game is None or self.game.rules.game_over is not None:
             return ()
         if self.ended is not None:
             raise ActionError("the run has ended; step back or restart")
@@ -466,10 +466,10 @@ class Session(EngineRun):
                 done += 1
         except ActionError:
             self.game = before
-            self.game.forget()
+            self.game.discard_future()
             raise
         finally:
-            self.game.saw(actions[:done])
+            self.game.note_actions(actions[:done])
         if not actions:
             self._go_another_way(None)
         return actions

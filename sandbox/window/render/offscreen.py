@@ -41,7 +41,7 @@ class OffscreenRenderer:
             throttles: that were set, by the names of their thrusts.
         """
         camera = Camera.fitting(view_bounds(scene), self._surface.get_size())
-        lit = rules.lit() if isinstance(rules, HasLamps) else frozenset[str]()
+        lit = rules.lit_lamps() if isinstance(rules, HasLamps) else frozenset[str]()
         seen = Snapshot(scene, bodies, frame, flames=active_thrusters(scene, bodies, throttles, frame.time), lit=lit)
         sight = add_artillery(rules, seen)
         if sight.gunnery is not None:

@@ -71,7 +71,7 @@ class HighScoreDialog:
 
     def update(self, host: GameHost | None) -> list[str]:
         """Open the dialog if the game has just ended with a score among the best; return the messages to show."""
-        if host is None or host.rules.over is None:
+        if host is None or host.rules.game_over is None:
             self._ended, self.entry = None, None
         elif host is not self._ended:
             self._ended = host

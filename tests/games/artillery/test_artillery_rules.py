@@ -54,8 +54,8 @@ def taps(*names: str, begin: float = 0.1) -> tuple[Press, ...]:
 def test_bots_fight_to_the_end_and_the_recording_ends_alike(engine: str) -> None:
     scene = loads(BOTS, overrides=["world.duration=120"])
     rules, made, bout = played(scene, engine=engine)
-    assert rules.over is not None
-    assert "wins" in rules.over
+    assert rules.game_over is not None
+    assert "wins" in rules.game_over
     assert len(rules.field.tanks.alive) == 1
     assert made.missed_contacts == 0
     shots = rules.shots
@@ -163,7 +163,7 @@ def test_air_that_a_hand_changes_is_the_exact_flights_too(time: float, disturbed
     assert isinstance(rules, ArtilleryRules)
     referee, contacts = GameSession(rules), Contacts.none()
     while not rules.shots:
-        for action in referee.look(relay.time, relay.frame(), contacts):
+        for action in referee.on_step(relay.time, relay.frame(), contacts):
             relay.apply(action)
         done: list[Action] = []
         if abs(relay.time - time) < 0.011:
@@ -173,7 +173,7 @@ def test_air_that_a_hand_changes_is_the_exact_flights_too(time: float, disturbed
             done += referee.press(relay.time, "fire", 1.0)
         for action in done:
             relay.apply(action)
-        referee.saw(done)
+        referee.note_actions(done)
         relay.step()
         contacts = relay.contacts()
     relay.close()
@@ -302,8 +302,8 @@ def test_rounds_end_a_game_that_nobody_wins() -> None:
     scene = loads(TEXT, overrides=["artillery.rounds=1", "world.duration=26"])
     away = taps("fire") + taps("fire", begin=12.0)
     rules, _, _ = played(scene, away)
-    assert rules.over is not None
-    assert rules.over.startswith("out of shells")
+    assert rules.game_over is not None
+    assert rules.game_over.startswith("out of shells")
 
 
 def test_a_copy_goes_on_by_itself() -> None:
@@ -319,13 +319,13 @@ def test_a_copy_goes_on_by_itself() -> None:
 
 def test_lines_and_cues_tell_what_goes_on() -> None:
     rules, _, _ = played(loads(TEXT), taps("fire"))
-    lines = dict(rules.lines())
+    lines = dict(rules.display_lines())
     assert set(lines) >= {"Red", "▸ Blue", "wind", "gun", "weapon", "last shot"}
     assert "exact" in lines["last shot"] or "gone" in lines["last shot"]
-    cues = rules.cues()
+    cues = rules.sounds()
     assert list(cues)[:2] == ["turn", "fire"]
     assert "blast" in cues
-    assert rules.cues() == []
+    assert rules.sounds() == []
 
 
 def test_a_scene_without_players_is_unfit() -> None:

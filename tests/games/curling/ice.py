@@ -30,11 +30,11 @@ class Rink:
 
     def step(self, *presses: tuple[str, float]) -> None:
         simulation = self.simulation
-        actions = [*self.referee.look(simulation.time, simulation.frame(), simulation.contacts())]
-        self.cues += self.rules.cues()
+        actions = [*self.referee.on_step(simulation.time, simulation.frame(), simulation.contacts())]
+        self.cues += self.rules.sounds()
         for control, value in presses:
             played = self.referee.press(simulation.time, control, value)
-            self.referee.saw(played)
+            self.referee.note_actions(played)
             actions += played
         for action in actions:
             simulation.apply(action)

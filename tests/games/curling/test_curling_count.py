@@ -108,6 +108,6 @@ def test_turns_alternate_and_the_hammer_goes_to_who_did_not_score() -> None:
     assert score.full
     assert score.after_end(None, 0).hammer == YELLOW
     won = score.after_end(YELLOW, 2)
-    assert (won.points, won.hammer, won.team, won.over) == ((0, 2), RED, YELLOW, None)
-    assert won.after_end(RED, 2).over is None  # even: another end
-    assert won.after_end(RED, 3).over == "red wins 3 : 2"
+    assert (won.points, won.hammer, won.team, won.game_over) == ((0, 2), RED, YELLOW, None)
+    assert won.after_end(RED, 2).game_over is None  # even: another end
+    assert won.after_end(RED, 3).game_over == "red wins 3 : 2"

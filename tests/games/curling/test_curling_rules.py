@@ -54,7 +54,7 @@ def test_the_other_turn_is_the_mirror_of_the_first(rink: Rink) -> None:
 def test_a_stone_short_of_the_hog_line_is_taken_away(rink: Rink) -> None:
     rink.throw(weight=-8.0)
     assert rink.place("red-1") == removed_position(0, 0)
-    assert ("", "stone removed: short of the hog line") in rink.rules.lines()
+    assert ("", "stone removed: short of the hog line") in rink.rules.display_lines()
 
 
 def test_a_stone_past_the_back_line_is_taken_away_as_it_passes(rink: Rink) -> None:
@@ -71,7 +71,7 @@ def test_a_guard_that_is_taken_out_too_soon_is_put_back(rink: Rink) -> None:
     rink.throw(weight=14.0)
     assert rink.place("yellow-1") == (-4.0, -0.55)
     assert rink.place("red-2") == removed_position(0, 1)
-    assert ("", "free guard zone: stones replaced") in rink.rules.lines()
+    assert ("", "free guard zone: stones replaced") in rink.rules.display_lines()
 
 
 def test_a_stone_short_of_the_hog_line_that_touched_a_guard_is_a_guard(rink: Rink) -> None:
@@ -90,7 +90,7 @@ def test_a_stone_short_of_the_hog_line_that_touched_a_guard_is_a_guard(rink: Rin
     rink.rules._broom = rink.rules._ice.through((x, y), 1, 3.2).heading * -RELEASE
     rink.throw(weight=14.0)
     assert rink.place("yellow-1") == (x, y)
-    assert ("", "free guard zone: stones replaced") in rink.rules.lines()
+    assert ("", "free guard zone: stones replaced") in rink.rules.display_lines()
 
 
 def test_the_sixth_stone_may_take_out_a_guard(rink: Rink) -> None:
@@ -133,8 +133,8 @@ def test_the_end_is_counted_and_the_next_one_begins(rink: Rink) -> None:
 
 def test_nothing_but_sweeping_helps_while_stones_run(rink: Rink) -> None:
     rink.step(("throw", 1.0))
-    assert rink.rules.control("throw", 1.0) == ()
-    assert [action.kind for action in rink.rules.control("sweep", 1.0)] == ["set", "set"]
+    assert rink.rules.on_input("throw", 1.0) == ()
+    assert [action.kind for action in rink.rules.on_input("sweep", 1.0)] == ["set", "set"]
 
 
 def test_a_copy_goes_on_by_itself(rink: Rink) -> None:

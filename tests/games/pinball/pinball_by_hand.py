@@ -99,9 +99,9 @@ class Table:
     def look(self, *hits: tuple[str, float] | tuple[str, float, int]) -> list[Action]:
         """Pass a step in which balls hit things at a speed, m/s; return what the rules do."""
         time = self.time
-        now = self.game.look(StepInfo(time, self.frame(), self._contacts(hits), ()))
+        now = self.game.on_step(StepInfo(time, self.frame(), self._contacts(hits), ()))
         self._obey(now)
-        self.cues += self.game.cues()
+        self.cues += self.game.sounds()
         self.step += 1
         return list(now)
 
@@ -111,9 +111,9 @@ class Table:
 
     def press(self, name: str, value: float = 1.0) -> list[Action]:
         """Set a control."""
-        now = self.game.control(name, value)
+        now = self.game.on_input(name, value)
         self._obey(now)
-        self.cues += self.game.cues()
+        self.cues += self.game.sounds()
         return list(now)
 
     def play(self, ball: int = 0) -> None:
@@ -135,7 +135,7 @@ class Table:
 
     def lines(self) -> dict[str, str]:
         """Return the score panel."""
-        return dict(self.game.lines())
+        return dict(self.game.display_lines())
 
     def _obey(self, actions: Iterable[Action]) -> None:
         for action in actions:

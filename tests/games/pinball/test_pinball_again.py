@@ -16,7 +16,7 @@ FULL = Path(__file__).parents[3] / "scenes" / "pinball" / "full.toml"
 def test_session_of_the_full_table_leads_to_the_same_score_and_state() -> None:
     scene = load(FULL)
     scene = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": 12.0})})
-    first = run(scene, "pymunk", audit=False, bout=PlayerSpec("skilled").bout(scene))
+    first = run(scene, "pymunk", audit=False, bout=PlayerSpec("skilled").start_game(scene))
     info = first.info
     assert {"drive", "move"} <= {action["kind"] for action in info["actions"]}
     session = Recording(
@@ -29,7 +29,7 @@ def test_session_of_the_full_table_leads_to_the_same_score_and_state() -> None:
         presses=tuple(Press(*press) for press in info["game"]["presses"]),
     )
     session = Recording.from_json(session.to_json())
-    bout = PlayerSpec.of(session).bout(session.scene)
+    bout = PlayerSpec.from_recording(session).start_game(session.scene)
     again = run(session.whole_scene, "pymunk", actions=session.actions, audit=False, bout=bout)
     assert again.info["state_hash"] == info["state_hash"]
     assert again.info["game"]["score"] == info["game"]["score"] > 0

@@ -30,7 +30,7 @@ def test_game_begins_with_a_ball_at_the_plunger() -> None:
     game = Table(table())
     assert moves(game.wait(0.02)) == [("ball 0", SERVE)]
     assert game.cues == ["serve"]
-    assert (game.lines()["Ball"], game.game.over) == ("1 of 3", None)
+    assert (game.lines()["Ball"], game.game.game_over) == ("1 of 3", None)
 
 
 def test_plunger_is_pulled_as_far_as_the_control() -> None:
@@ -116,16 +116,16 @@ def test_no_two_balls_are_ever_put_onto_each_other(balls: int) -> None:
                 game.look()
                 gaps = np.hypot(*(game.position[:, None] - game.position[None]).T) + np.eye(balls)
                 assert gaps.min() > 2.0 * game.game.board.radius
-            if game.game.over:
+            if game.game.game_over:
                 return
 
 
 def test_three_balls_are_a_game() -> None:
     game = Table(table())
     for _ in range(3):
-        assert game.game.over is None
+        assert game.game.game_over is None
         drained(game, next_ball(game) if game.game.trough.live else 0)
-    assert game.game.over == "game over"
+    assert game.game.game_over == "game over"
     assert "over" in game.cues
 
 
@@ -146,7 +146,7 @@ def test_players_play_in_turn_with_scores_of_their_own() -> None:
     bonus = [100 * (1 + 4 + 7), 100 * (2 + 5 + 8), 100 * (3 + 6 + 9)]
     scores = [7_000 * (1 + 4 + 7), 7_000 * (2 + 5 + 8), 7_000 * (3 + 6 + 9)]
     assert [each.score for each in game.game.course.sheets] == [a + b for a, b in zip(scores, bonus, strict=True)]
-    assert game.game.over
+    assert game.game.game_over
     assert game.game.score == scores[2] + bonus[2]  # the best
 
 
@@ -169,7 +169,7 @@ def test_one_ball_is_enough_for_a_game() -> None:
     game = Table(table(balls=1))
     for _ in range(3):
         drained(game)
-    assert game.game.over == "game over"
+    assert game.game.game_over == "game over"
 
 
 @pytest.mark.parametrize("where", [(0.2, -0.5), (9.0, 0.5), (float("nan"), 0.5), (0.2, float("inf"))])
@@ -191,7 +191,7 @@ def test_ball_that_is_gone_for_good_ends_the_ball_and_the_last_one_the_game() ->
         game.present[ball] = False
         game.look()
         game.wait(WAIT)
-    assert game.game.over == "game over: no ball left on the table"
+    assert game.game.game_over == "game over: no ball left on the table"
 
 
 def test_nothing_moves_but_by_the_player_between_balls() -> None:
@@ -224,4 +224,4 @@ def test_unknown_before_the_first_look_does_nothing() -> None:
     from sandbox.games.pinball.rules import Pinball
 
     scene = table()
-    assert Pinball(scene, scene.bodies).control("left flipper", 1.0) == ()
+    assert Pinball(scene, scene.bodies).on_input("left flipper", 1.0) == ()

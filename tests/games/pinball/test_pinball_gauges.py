@@ -2,11 +2,11 @@
 
 from pinball_by_hand import OPEN, Table, table
 
-NAMES = tuple(name for name, _ in Table(table()).game.gauges())
+NAMES = tuple(name for name, _ in Table(table()).game.observation())
 
 
 def gauges(game: Table) -> dict[str, float]:
-    return dict(game.game.gauges())
+    return dict(game.game.observation())
 
 
 def test_gauges_show_what_has_been_hit() -> None:
@@ -62,5 +62,5 @@ def test_names_stay_the_same() -> None:
     for _ in range(5):
         game.look(("lane 1", 0.5), ("drop 1", 0.5), ("drop 2", 0.5), ("hole", 0.5), ("drain", 0.5))
         game.wait(1.0)
-        assert tuple(name for name, _ in game.game.gauges()) == NAMES
+        assert tuple(name for name, _ in game.game.observation()) == NAMES
     assert len(set(NAMES)) == len(NAMES)

@@ -17,7 +17,7 @@ def played() -> Table:
     each = Table(table())
     each.play()
     assert isinstance(each.game, HasLamps)
-    assert each.game.lit() == frozenset()
+    assert each.game.lit_lamps() == frozenset()
     return each
 
 
@@ -26,23 +26,23 @@ def seen(played: Table, seconds: float = BLINK) -> list[frozenset[str]]:
     found = []
     for _ in range(round(seconds / DT)):
         played.look()
-        found.append(played.game.lit())
+        found.append(played.game.lit_lamps())
     return found
 
 
 @pytest.mark.parametrize("name", ["bumper a", "sling", "outlane"])
 def test_hit_is_a_flash(played: Table, name: str) -> None:
     played.look((name, 0.5))
-    assert played.game.lit() == {name}
+    assert played.game.lit_lamps() == {name}
     played.wait(FLASH + DT)
-    assert played.game.lit() == frozenset()
+    assert played.game.lit_lamps() == frozenset()
 
 
 def test_lamp_of_a_set_stays_lit_until_the_set_is_full(played: Table) -> None:
     played.look(("lane 2", 0.5))
     assert seen(played)[-1] == {"lane 2"}
     played.press("left flipper")
-    assert played.game.lit() == {"lane 1"}
+    assert played.game.lit_lamps() == {"lane 1"}
     played.look(("lane 2", 0.5))
     played.look(("lane 3", 0.5))
     assert not seen(played)[-1] & {"lane 1", "lane 2", "lane 3"}
@@ -75,14 +75,17 @@ def test_mode_blinks_at_what_it_counts(played: Table) -> None:
 
 def test_tilted_table_is_dark(played: Table) -> None:
     played.look(("lane 2", 0.5))
-    assert played.game.lit()
+    assert played.game.lit_lamps()
     played.game.nudge.tilted = True
-    assert played.game.lit() == frozenset()
+    assert played.game.lit_lamps() == frozenset()
 
 
 def test_looking_at_lamps_changes_nothing(played: Table) -> None:
     played.look(("lane 2", 0.5))
     other = copy.deepcopy(played.game)
     for _ in range(3):
-        other.lit()
-    assert [copy.deepcopy(other).lit(), other.lines()] == [played.game.lit(), played.game.lines()]
+        other.lit_lamps()
+    assert [copy.deepcopy(other).lit_lamps(), other.display_lines()] == [
+        played.game.lit_lamps(),
+        played.game.display_lines(),
+    ]

@@ -97,7 +97,7 @@ SHOOT = tuple(Press(t, "plunger", v) for k in range(20) for t, v in ((3.0 * k + 
 
 
 def play(scene: Scene, player: PlayerSpec) -> Trajectory:
-    return run(scene, "pymunk", audit=False, bout=player.bout(scene))
+    return run(scene, "pymunk", audit=False, bout=player.start_game(scene))
 
 
 @pytest.fixture(scope="module")
@@ -137,7 +137,11 @@ def test_session_replays_to_the_same_score_and_state(played: Trajectory) -> None
         presses=tuple(Press(*press) for press in info["game"]["presses"]),
     )
     again = run(
-        session.whole_scene, "pymunk", actions=session.actions, audit=False, bout=PlayerSpec.of(session).bout(scene)
+        session.whole_scene,
+        "pymunk",
+        actions=session.actions,
+        audit=False,
+        bout=PlayerSpec.from_recording(session).start_game(scene),
     )
     assert again.info["state_hash"] == info["state_hash"]
     assert again.info["game"]["score"] == info["game"]["score"]

@@ -93,18 +93,18 @@ def play(scene: Scene, policy: Policy, seconds: float, audit: bool = False) -> G
     if auditor is not None:
         simulation.watch(_Both(auditor, watch))
     referee, keeper, said = GameSession(rules), Keeper(rules, scene.solver.dt), list[tuple[float, str]]()
-    while rules.over is None and simulation.time < seconds:
+    while rules.game_over is None and simulation.time < seconds:
         frame = simulation.frame()
         keeper.look(frame)
-        own = referee.look(simulation.time, frame, simulation.contacts())
+        own = referee.on_step(simulation.time, frame, simulation.contacts())
         pressed = [
             action
-            for control, value in policy.decide(referee.seen, rules)
+            for control, value in policy.decide(referee.step_info, rules)
             for action in referee.press(simulation.time, control, value)
         ]
         if not said or said[-1][1] != rules.said[0]:
             said.append((simulation.time, rules.said[0]))
-        referee.saw(pressed)
+        referee.note_actions(pressed)
         for action in (*own, *pressed):
             simulation.apply(action)
         simulation.step()
@@ -142,7 +142,7 @@ def test_no_ball_is_stuck_lost_or_through_anything_in_an_hour_of_play(path: Path
         words = [text for _, text in game.said]
         for trouble in ("ball found", "ball returned", "ball gone"):
             assert trouble not in words, (seed, game.said)
-        games += game.rules.over is not None
+        games += game.rules.game_over is not None
         left, seed = left - game.seconds, seed + 1
     assert games >= 2  # of one to two minutes
 
@@ -164,11 +164,13 @@ def test_multiball_of_the_full_table_puts_all_balls_into_play() -> None:
     most = 0
     while simulation.time < 12.0:
         frame = simulation.frame()
-        own = referee.look(simulation.time, frame, simulation.contacts())
+        own = referee.on_step(simulation.time, frame, simulation.contacts())
         pressed = []
         if simulation.time > 2.0:
-            pressed = [a for c, v in hand.decide(referee.seen, rules) for a in referee.press(simulation.time, c, v)]
-        referee.saw(pressed)
+            pressed = [
+                a for c, v in hand.decide(referee.step_info, rules) for a in referee.press(simulation.time, c, v)
+            ]
+        referee.note_actions(pressed)
         for action in (*own, *pressed):
             simulation.apply(action)
         if abs(simulation.time - 1.0) < 1e-9:  # the third ball comes into the lock

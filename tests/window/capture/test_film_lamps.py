@@ -23,7 +23,7 @@ CLASSIC = Path(__file__).parents[3] / "scenes" / "pinball" / "classic.toml"
 @pytest.fixture(scope="module")
 def played() -> Trajectory:
     scene = load(CLASSIC, ("world.duration=8.0",))
-    return run(scene, audit=False, bout=PlayerSpec("skilled").bout(scene))
+    return run(scene, audit=False, bout=PlayerSpec("skilled").start_game(scene))
 
 
 def test_picture_of_a_run_shows_the_lamps_that_were_lit(played: Trajectory, tmp_path: Path) -> None:

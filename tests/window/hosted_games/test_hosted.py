@@ -40,7 +40,7 @@ class Buttons(Toy):
         Control("aim", "how far", ("left",), "lt", analogue=True),
     )
 
-    def lit(self) -> frozenset[str]:
+    def lit_lamps(self) -> frozenset[str]:
         return frozenset({"lamp"} if int(self.score) % 2 else ())
 
 
@@ -224,7 +224,7 @@ def test_panel_is_drawn_and_tells_the_end(window: App) -> None:
     going = pygame.surfarray.array3d(window.surface)
     rules = host.rules
     assert isinstance(rules, Toy)
-    rules.over = "enough"
+    rules.game_over = "enough"
     turned(window, elapsed=0.0)
     over = pygame.surfarray.array3d(window.surface)
     red = (np.abs(over.astype(int) - WARNING).sum(axis=2) < 20) & (going != over).any(axis=2)
@@ -256,14 +256,14 @@ def test_scene_makes_room_as_the_panel_grows_unless_somebody_moved_it(window: Ap
     turned(window)
     rules, before = host_of(window).rules, window.camera
     assert isinstance(rules, Toy)
-    rules.over = "enough, after a long time"
+    rules.game_over = "enough, after a long time"
     turned(window, elapsed=0.0)
     assert window.camera != before
     assert lies_clear(window)
-    rules.over = None
+    rules.game_over = None
     turned(window, elapsed=0.0)
     window.at_home, window.camera = False, before
-    rules.over = "enough"
+    rules.game_over = "enough"
     turned(window, elapsed=0.0)
     assert window.camera == before
 

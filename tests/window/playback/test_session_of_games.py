@@ -43,7 +43,7 @@ def rules_of(session: Session) -> Toy:
 
 def told(session: Session) -> tuple[Any, ...]:
     rules = rules_of(session)
-    return rules.score, tuple(rules.lines()), session.frame.state_hash(), session.game and session.game.presses
+    return rules.score, tuple(rules.display_lines()), session.frame.state_hash(), session.game and session.game.presses
 
 
 def session_of(engine: str = "pymunk") -> Session:
@@ -72,7 +72,7 @@ def assert_replays(session: Session) -> None:
     go(other, round(recording.duration / other.scene.solver.dt))
     assert other.recording() == recording
     assert other.game is not None
-    assert other.game.otherwise is None
+    assert other.game.diverged_at is None
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
@@ -128,7 +128,7 @@ def test_checkpoints_hold_the_game() -> None:
     session.press("kick", 1.0)
     session.advance(5)
     go(session, 149)
-    assert ("aim", "0.25") in rules_of(session).lines()
+    assert ("aim", "0.25") in rules_of(session).display_lines()
     session.press("kick", 1.0)  # another way
     session.advance(100)
     assert rules_of(session).score == 0.5
@@ -168,13 +168,13 @@ def test_game_that_is_over_stays_so() -> None:
     assert session._first_game is not None
     session._first_game.rules.ends_at = 1.0  # type: ignore[attr-defined]
     session.advance(150)
-    assert rules_of(session).over == "enough"
+    assert rules_of(session).game_over == "enough"
     assert session.press("kick", 1.0) == ()
     score = rules_of(session).score
     session.advance(100)
     assert rules_of(session).score == score
     go(session, 10)
-    assert rules_of(session).over is None
+    assert rules_of(session).game_over is None
 
 
 def test_press_that_cannot_be_done_was_not_pressed() -> None:
