@@ -129,7 +129,7 @@ class BilliardsRules:
         return state.scores[state.winner] if state.winner is not None else max(state.scores)
 
     @property
-    def over(self) -> str | None:
+    def game_over(self) -> str | None:
         """Who has won the frame; None while it runs."""
         state = self.match.state
         if not state.over:
@@ -149,26 +149,26 @@ class BilliardsRules:
         scale = MAX_TIP_OFFSET / max(math.hypot(side, height), 1.0)
         return Stroke(aim=self._aim, speed=MIN_CUE_SPEED, side=side * scale, height=height * scale)
 
-    def look(self, seen: StepInfo) -> Sequence[Action]:
+    def on_step(self, info: StepInfo) -> Sequence[Action]:
         """Take note of strikes and moves, and judge the shot once every ball is at rest."""
-        started, self._time = self._time, seen.time
-        for action in seen.actions:
+        started, self._time = self._time, info.time
+        for action in info.actions:
             if isinstance(action, Strike):
                 self._begin_shot(action, max(action.time, started))
             elif isinstance(action, Move) and self._shot_time is None and action.body in self.match.layout.number:
                 position = list(self.match.position)
                 position[self.match.layout.number[action.body]] = action.position
                 self.match = replace(self.match, position=tuple(position))
-        self._is_resting = is_at_rest(seen.frame)
+        self._is_resting = is_at_rest(info.frame)
         if self._shot_time is None:
             if self._is_resting:
-                self._accept_position(seen.frame)
+                self._accept_position(info.frame)
             return ()
-        if len(seen.contacts):
-            self._contacts.append(seen.contacts)
+        if len(info.contacts):
+            self._contacts.append(info.contacts)
             if len(self._contacts) == MAX_JOINED_CONTACTS:
                 self._contacts = [Contacts.joined(self._contacts).merged()]
-        return self._end_shot(seen.frame) if self._is_resting and seen.time > self._shot_time else ()
+        return self._end_shot(info.frame) if self._is_resting and info.time > self._shot_time else ()
 
     def _begin_shot(self, strike: Strike, time: float) -> None:
         if self._shot_time is not None or self.match.over:
@@ -211,20 +211,20 @@ class BilliardsRules:
             self._sounds.append("win")
         return match.moves(np.asarray(position, dtype=float), self._time)
 
-    def control(self, name: str, value: float) -> Sequence[Action]:
+    def on_input(self, control: str, value: float) -> Sequence[Action]:
         """Set up the stroke, call, decide, place, or shoot. What the rules do not allow now is ignored."""
-        if name in self._english:
-            self._english[name] = min(max(value, 0.0), 1.0)
-        elif name in ("call safety", "push out"):
-            self._announce(name, value > 0.0)
+        if control in self._english:
+            self._english[control] = min(max(value, 0.0), 1.0)
+        elif control in ("call safety", "push out"):
+            self._announce(control, value > 0.0)
         elif value <= 0.0:
             return ()
-        elif name == "aim":
+        elif control == "aim":
             self._aim = math.tau * value
-        elif name in ("place x", "place y"):
-            self._place[name == "place y"] = value
+        elif control in ("place x", "place y"):
+            self._place[control == "place y"] = value
         elif self.waiting:
-            return self._act(name, value)
+            return self._act(control, value)
         return ()
 
     def _announce(self, name: str, is_on: bool) -> None:
@@ -317,7 +317,7 @@ class BilliardsRules:
             ("shoot", 0.0),
         )
 
-    def lines(self) -> Sequence[tuple[str, str]]:
+    def display_lines(self) -> Sequence[tuple[str, str]]:
         """Return the scores of the players, the turn, and the result of the last shot."""
         state = self.match.state
         scores = [(player_name(number), str(score)) for number, score in enumerate(state.scores)]
@@ -328,12 +328,12 @@ class BilliardsRules:
         last = [("last shot", "; ".join(self.match.messages))] if self.match.messages else []
         return [*scores, *turn, *in_hand, *last]
 
-    def cues(self) -> Sequence[str]:
+    def sounds(self) -> Sequence[str]:
         """Return the names of the sounds since the last call."""
         sounds, self._sounds = tuple(self._sounds), []
         return sounds
 
-    def gauges(self) -> Sequence[tuple[str, float]]:
+    def observation(self) -> Sequence[tuple[str, float]]:
         """Return the state of the match as numbers."""
         state = self.match.state
         return (

@@ -246,7 +246,7 @@ class FrameTable:
             self._simulation.apply(action)
         self._actions += [*self._pending, *acts]
         self._pending = []
-        self._game.saw(acts)
+        self._game.note_actions(acts)
         limit = time + MAX_SHOT_TIME
         while True:
             self._simulation.step()
@@ -271,7 +271,7 @@ class FrameTable:
         self._pending += self._game.press(self._simulation.time, *control)
 
     def _look(self, contacts: Contacts) -> Sequence[Action]:
-        return self._game.look(self._simulation.time, self._simulation.frame(), contacts)
+        return self._game.on_step(self._simulation.time, self._simulation.frame(), contacts)
 
 
 _TURNS = TypeAdapter(tuple[FrameTurn, ...])
