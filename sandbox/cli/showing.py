@@ -120,7 +120,7 @@ def show_stage(
         if ghost:
             stage.toggle_ghost()
         if pick:
-            window.gui.open_picker(None)
+            window.gui.open_scene_browser(None)
         status = window.run()
         if record is not None and not _saved(stage, record):
             status = status or 1

@@ -110,7 +110,7 @@ class App(WindowContext):
         self.commands.settle()
         if self.leaving is not None:
             return
-        self.stage.covered = self.gui.covers or self.stage.question is not None
+        self.stage.covered = self.gui.covers_scene or self.stage.question is not None
         compiled = COMPILE_CLOCK.seconds
         self.stage.go_on(elapsed)
         if COMPILE_CLOCK.seconds > compiled:
@@ -125,7 +125,7 @@ class App(WindowContext):
     def draw(self) -> None:
         """Draw what is on, and what surrounds it."""
         self.make_room()
-        self.gui.out_of_sight = self.loses_sight
+        self.gui.bodies_out_of_view = self.loses_sight
         self.gui.draw(self.surface, self.camera, self.stage, self._clock.get_fps(), self.taking.told)
 
     def _wait(self, done: Callable[[float], bool]) -> None:
@@ -179,15 +179,15 @@ class App(WindowContext):
             return
         for error in self._gamepads.take(event, self.stage.host, lambda: self.commands.do(Command.PAUSE)):
             self.stage.messages.tell(str(error), "warning")
-        command = self._keyboard.command(event, self.gui.claimed(self.stage))
+        command = self._keyboard.command(event, self.gui.claimed_keys(self.stage))
         self._dismiss(event, command)
         self._let_go(event)
-        if self.gui.handle(event, self.stage):
+        if self.gui.handle_event(event, self.stage):
             return
         if command is not None:
             self.commands.do(command)
         elif event.type == pygame.KEYDOWN:
-            claims = self.gui.claims(self.stage)
+            claims = self.gui.key_bindings(self.stage)
             deed = claims.deed(event.key, self._keyboard.again)
             waits = self.stage.waits_for_start
             if deed is not None and not waits and not event.mod & (pygame.KMOD_CTRL | pygame.KMOD_ALT):
@@ -212,7 +212,7 @@ class App(WindowContext):
 
     def _starts(self, event: pygame.event.Event) -> bool:
         """Tell whether an event starts the game that waits for it: Space, or any button of a gamepad."""
-        if not self.stage.waits_for_start or self.gui.covers or self.stage.faults:
+        if not self.stage.waits_for_start or self.gui.covers_scene or self.stage.faults:
             return False
         space = event.type == pygame.KEYDOWN and event.key == pygame.K_SPACE
         return space or event.type == pygame.JOYBUTTONDOWN

@@ -129,7 +129,7 @@ class Commands:
 
     def _picker(self) -> None:
         self._let_go()
-        self._seat.gui.open_picker(self._seat.stage.path)
+        self._seat.gui.open_scene_browser(self._seat.stage.path)
 
     def _help(self) -> None:
         self._let_go()

@@ -72,7 +72,7 @@ class WindowContext:
             self.following = None if show is None else _steered(show.scene)
         if self.at_home:
             self.home()
-        self.gui.renew(same)
+        self.gui.on_scene_changed(self.stage, same)
         title = "" if show is None else f"{show.scene.title or self.name} - "
         pygame.display.set_caption(renderable(title + TITLE))
 
@@ -91,10 +91,12 @@ class WindowContext:
             return None
         size = self.surface.get_size()
         made = pygame.Surface(size, 0, self.surface)
-        free = size[0] - self.gui.panel.width, size[1] - self.gui.foot
+        free = size[0] - self.gui.panel.width, size[1] - self.gui.bottom_margin
         turned = should_rotate(scene, free)
-        camera = Camera.fitting(view_bounds(scene), size, inset=self.gui.panel.width, foot=self.gui.foot, turned=turned)
-        Renderer().draw(made, camera, Snapshot(scene, scene.bodies, frame_in_flight(scene)), unit=self.gui.unit)
+        camera = Camera.fitting(
+            view_bounds(scene), size, inset=self.gui.panel.width, foot=self.gui.bottom_margin, turned=turned
+        )
+        Renderer().draw(made, camera, Snapshot(scene, scene.bodies, frame_in_flight(scene)), unit=self.gui.ui_scale)
         self.gui.panel.draw(made)
         return made
 
@@ -155,8 +157,8 @@ class WindowContext:
     def _free(self) -> tuple[float, float, float, float]:
         """What nothing covers: left, top, right and bottom, px."""
         width, height = self.surface.get_size()
-        head, foot = self.gui.covered(self.stage)
-        return 0.0, float(head), float(width - self.gui.panel.width), float(height - foot - self.gui.foot)
+        head, foot = self.gui.score_margins(self.stage)
+        return 0.0, float(head), float(width - self.gui.panel.width), float(height - foot - self.gui.bottom_margin)
 
     def toggle_full_screen(self) -> None:
         """Fill the screen, or go back to the window as it was."""
@@ -188,17 +190,17 @@ class WindowContext:
 
     def _fitting(self, box: Box) -> Camera:
         """Return the camera that shows a box whole."""
-        size, room, show = self.surface.get_size(), self.gui.free, self.stage.show
-        self._covered = head, foot = self.gui.covered(self.stage)
+        size, room, show = self.surface.get_size(), self.gui.area, self.stage.show
+        self._covered = head, foot = self.gui.score_margins(self.stage)
         lies = show is not None and should_rotate(show.scene, room.size)
         if self._has_field:  # every part of it counts: plates lie beside it
             (left, bottom), (right, top) = box
             shape = max(right - left, 1e-9), max(top - bottom, 1e-9)
-            room = largest_area(shape[::-1] if lies else shape, room, self.gui.taken(self.stage))
+            room = largest_area(shape[::-1] if lies else shape, room, self.gui.permanent_plates(self.stage))
             camera = replace(Camera.fitting(box, room.size, FIELD_MARGIN, turned=lies), size=size)
             return camera.panned((room.centerx - size[0] / 2.0, room.centery - size[1] / 2.0))
         inset = self.gui.panel.width
-        return Camera.fitting(box, size, inset=inset, foot=foot + self.gui.foot, turned=lies, head=head)
+        return Camera.fitting(box, size, inset=inset, foot=foot + self.gui.bottom_margin, turned=lies, head=head)
 
     @property
     def _has_field(self) -> bool:
@@ -213,10 +215,10 @@ class WindowContext:
         """Come home again where a plate has grown, with another row or with how the game ended."""
         if not self.at_home or self.following is not None:
             return
-        covered, show = self.gui.covered(self.stage), self.stage.show
+        covered, show = self.gui.score_margins(self.stage), self.stage.show
         grown = any(now > then for now, then in zip(covered, self._covered, strict=True))
         if self._has_field and show is not None:
-            taken = self.gui.taken(self.stage)
+            taken = self.gui.permanent_plates(self.stage)
             if taken != self._taken:
                 corners = self.camera.to_screen(np.asarray(view_bounds(show.scene)))
                 (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()

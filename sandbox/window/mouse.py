@@ -62,7 +62,7 @@ class MouseController:
 
     def _look(self, place: tuple[int, int]) -> None:
         seat, show = self._seat, self._seat.stage.show
-        reach = PICK_RADIUS * seat.gui.unit / seat.camera.scale
+        reach = PICK_RADIUS * seat.gui.ui_scale / seat.camera.scale
         self._began = place
         if self._at_table(lambda table: table.press(seat.camera.to_world(place), reach)):
             return
@@ -85,7 +85,7 @@ class MouseController:
 
     def _release(self, place: tuple[int, int]) -> None:
         seat, began = self._seat, self._began
-        moved = began is not None and math.dist(began, place) > SLACK * seat.gui.unit
+        moved = began is not None and math.dist(began, place) > SLACK * seat.gui.ui_scale
         self._began = None
         picked = seat.stage.hands.picked if self._pressed is not None and not moved else None
         used = began is not None and self._at_table(lambda table: table.release(seat.camera.to_world(place), moved))
@@ -103,7 +103,7 @@ class MouseController:
             seat.at_home, seat.following = False, None
             return
         stage = seat.stage
-        if self._pressed is not None and math.dist(self._pressed, event.pos) > SLACK * seat.gui.unit:
+        if self._pressed is not None and math.dist(self._pressed, event.pos) > SLACK * seat.gui.ui_scale:
             self._pressed = None
             if stage.game is not None and stage.game.match.rules.name != "free":
                 stage.messages.tell("in a game, only the cue moves balls", "warning")
@@ -114,7 +114,7 @@ class MouseController:
 
     def _aim(self, before: tuple[int, int], now: tuple[int, int]) -> None:
         """Let the table know of a motion."""
-        camera, unit = self._seat.camera, self._seat.gui.unit
+        camera, unit = self._seat.camera, self._seat.gui.ui_scale
         pixels = (now[0] - before[0]) / unit, (now[1] - before[1]) / unit
         fine = bool(pygame.key.get_mods() & pygame.KMOD_SHIFT)
         time = pygame.time.get_ticks() / 1000.0

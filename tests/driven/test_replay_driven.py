@@ -47,7 +47,7 @@ def test_stored_run_is_played_to_its_end_and_scrubbed_by_clicks(drive: Play, tmp
     bar.draw(pygame.Surface(SIZE), AREA, 0.0, film.duration, film.duration)
     for share in (0.5, 0.3):
         place = round(AREA.left + share * AREA.width), AREA.centery
-        time = bar.handle(pygame.event.Event(pygame.MOUSEBUTTONDOWN, pos=place, button=1), AREA)
+        time = bar.handle_event(pygame.event.Event(pygame.MOUSEBUTTONDOWN, pos=place, button=1), AREA)
         assert time is not None
         window.click(place)
         ball_at(window, film, time)

@@ -47,7 +47,7 @@ def window(tmp_path: Path) -> Iterator[App]:
 def seen(window: App) -> list[bool]:
     """Return which bodies are in the part of the picture that nothing covers."""
     assert window.stage.show is not None
-    free = window.gui.free
+    free = window.gui.area
     return [free.collidepoint(place) for place in window.camera.to_screen(window.stage.show.drawn.position).tolist()]
 
 
@@ -84,12 +84,12 @@ def test_that_nothing_is_in_sight_is_said_until_something_is(window: App) -> Non
         turned(window, elapsed=0.1)
     assert window.camera == home
     assert window.loses_sight
-    text = window.gui._describe_absence(window.stage)
+    text = window.gui.describe_out_of_view(window.stage)
     assert text is not None
     assert "Home" in text
     strike(window, HOME)
     assert not window.loses_sight
-    assert window.gui._describe_absence(window.stage) is None
+    assert window.gui.describe_out_of_view(window.stage) is None
 
 
 def test_spent_fireworks_say_that_space_launches_them(tmp_path: Path) -> None:
@@ -99,7 +99,7 @@ def test_spent_fireworks_say_that_space_launches_them(tmp_path: Path) -> None:
         window.camera = Camera((1e6, 0.0), 10.0, (640, 480))
         window.at_home = False
         window.turn(0.0)
-        assert "Space relaunches" in str(window.gui._describe_absence(window.stage))
+        assert "Space relaunches" in str(window.gui.describe_out_of_view(window.stage))
     finally:
         window.close()
 

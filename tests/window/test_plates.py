@@ -45,7 +45,7 @@ def opened(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> App:
 
 
 def resize(window: App, width: int, height: int, unit: float) -> None:
-    window.gui.unit = unit
+    window.gui.ui_scale = unit
     surface = pygame.display.set_mode((width, height), pygame.RESIZABLE)
     pygame.event.clear()
     window.resize(surface)
@@ -66,7 +66,7 @@ def test_no_two_plates_overlap(name: str, tmp_path: Path, monkeypatch: pytest.Mo
         for width, height, unit in SIZES:
             resize(window, width, height, unit)
             assert overlaps(window) == [], (width, height, unit)
-            free = window.gui.free
+            free = window.gui.area
             assert 2 * free.width * free.height > width * height, (width, height, unit)
     finally:
         window.close()
@@ -100,7 +100,7 @@ def test_last_shot_is_told_whole_beside_four_tanks(tmp_path: Path, monkeypatch: 
         resize(window, 1024, 700, 1.0)
         assert window.stage.host is not None
         assert window.stage.show is not None
-        laid = score_panel.layout_score(window.stage.host.shown().board, window.gui.free, 300, 1.0)
+        laid = score_panel.layout_score(window.stage.host.shown().board, window.gui.area, 300, 1.0)
         texts = [text for cells, _ in laid.rows for _, text in cells]
         assert told in texts
         assert len(laid.rows) <= 4

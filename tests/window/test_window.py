@@ -20,6 +20,7 @@ from sandbox.window.messages import Messages
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.recorded import RecordedView
 from sandbox.window.render.palette import SKY, WARNING, Colour
+from sandbox.window.ui.status import hud_status
 
 SIZE = (900, 600)
 PICTURE = pygame.Rect(0, 165, 630, 235)
@@ -226,12 +227,12 @@ def test_all_that_is_held_is_let_go_before_something_hides_it(window: App, code:
 def test_nothing_hides_the_timeline_while_it_is_held(window: App) -> None:
     turn(window, elapsed=0.08)
     turn(window)
-    bar = window.surface.get_height() - window.gui.foot // 2
+    bar = window.surface.get_height() - window.gui.bottom_margin // 2
     turn(window, press(200, bar))
     step = live(window).step_number
     assert step < 8
     turn(window, key(pygame.K_o, pygame.KMOD_CTRL), key(pygame.K_F1), key(pygame.K_TAB))
-    assert (window.gui.picker, window.gui.manual.open, window.gui.panel.visible) == (None, False, True)
+    assert (window.gui.scene_browser, window.gui.help.open, window.gui.panel.visible) == (None, False, True)
     turn(window, release(200, bar))
     while live(window).busy is not None:
         turn(window)
@@ -242,7 +243,7 @@ def test_nothing_hides_the_timeline_while_it_is_held(window: App) -> None:
 
 def test_release_reaches_the_mouse_while_the_timeline_is_held(window: App) -> None:
     turn(window, elapsed=0.05)
-    bar = window.surface.get_height() - window.gui.foot // 2
+    bar = window.surface.get_height() - window.gui.bottom_margin // 2
     turn(window, press(300, 300, 2), press(200, bar), release(200, bar, 2), release(200, bar))
     home = window.camera
     turn(window, pygame.event.Event(pygame.MOUSEMOTION, pos=(320, 300), rel=(20, 0), buttons=(0, 0, 0)))
@@ -286,9 +287,9 @@ def test_end_is_told_until_one_goes_back(window: App) -> None:
     turn(window, elapsed=0.05)
     session = live(window).session
     session.ended = "at 0.05 s: it broke"
-    assert window.gui.status(window.stage, 60.0, None).ended == session.ended
+    assert hud_status(window.stage, (), 60.0, None).ended == session.ended
     live(window).scrub(0.0)
-    assert window.gui.status(window.stage, 60.0, None).ended is None
+    assert hud_status(window.stage, (), 60.0, None).ended is None
 
 
 def test_press_and_release_within_one_turn_pull_nothing(window: App) -> None:
@@ -414,9 +415,9 @@ def test_window_of_a_stored_run_tells_what_cannot_be_done(opened: Open, tmp_path
     show = RecordedView(RecordedRun(sandbox.run(sandbox.load(tmp_path / "room.toml"))))
     window.stage.put_on(show, None, show.scene)
     show.scrub(show.end)
-    assert window.gui.status(window.stage, 60.0, None).ended == "end of the run"
+    assert hud_status(window.stage, (), 60.0, None).ended == "end of the run"
     show.scrub(show.begin)
-    assert window.gui.status(window.stage, 60.0, None).ended is None
+    assert hud_status(window.stage, (), 60.0, None).ended is None
     for code in (pygame.K_e, pygame.K_g, pygame.K_t, pygame.K_b, pygame.K_n, pygame.K_DELETE):
         turn(window, key(code), key_up(code))
         assert window.stage.messages.shown()[-1][0] == "warning"

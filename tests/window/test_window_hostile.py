@@ -75,9 +75,9 @@ def test_any_letters_can_be_typed_for_a_scene(window: App, tmp_path: Path, typed
     control(window, pygame.K_o)
     for letter in typed:
         post(window, pygame.event.Event(pygame.KEYDOWN, key=pygame.K_a, mod=0, unicode=letter))
-    assert window.gui.picker is not None
-    assert len(window.gui.picker.typed) <= 60
-    assert window.gui.picker.typed.isprintable()
+    assert window.gui.scene_browser is not None
+    assert len(window.gui.scene_browser.typed) <= 60
+    assert window.gui.scene_browser.typed.isprintable()
 
 
 @pytest.mark.parametrize("is_file", [False, True], ids=["gone", "a file"])

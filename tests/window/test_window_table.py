@@ -80,10 +80,10 @@ def test_table_is_played_on_the_exact_engine_and_lies_down(window: App) -> None:
 
 
 def test_help_lists_the_keys_of_the_table(window: App) -> None:
-    told = dict(window.gui.claims(window.stage).told)
+    told = dict(window.gui.key_bindings(window.stage).told)
     for label in ("S (hold)", "E (hold)", "X (hold)", "Space", "G", "Z"):
         assert label in told
-    named = dict(help_groups(window.gui.claims(window.stage).told))
+    named = dict(help_groups(window.gui.key_bindings(window.stage).told))
     assert ("Space", "shoot") in named["This scene"]
     assert any(keys == "P" for keys, _ in named["Time"])  # Space is the table's
 
@@ -128,7 +128,7 @@ def test_x_and_arrows_set_the_power(window: App) -> None:
 def test_dial_and_power_can_be_clicked(window: App) -> None:
     game = game_in(window)
     window.draw()
-    (_, tip), (_, power) = window.gui.tools._rects()
+    (_, tip), (_, power) = window.gui.billiards_hud._rects()
     do(window, press(tip.centerx - 0.25 * tip.width / 2, tip.centery), release(tip.centerx, tip.centery))
     assert game.cue.side == pytest.approx(-0.25, abs=2.0 / tip.width)  # a pixel
     do(window, press(power.centerx, power.top + 1), release(power.centerx, power.top + 1))

@@ -1,7 +1,9 @@
-"""Desk: everything that is drawn, from the picture of the scene to the panel, and who takes which event first."""
+"""GUI: draws the scene and all widgets in z-order, and routes events to the topmost widget first."""
 
 from dataclasses import replace
+from operator import is_
 from pathlib import Path
+from typing import NamedTuple
 
 import pygame
 
@@ -10,13 +12,14 @@ from sandbox.games.billiards.view.hud import BilliardsHud
 from sandbox.games.billiards.view.table_game import PLAYERS
 from sandbox.window.app_state import AppState, scenes_to_pick
 from sandbox.window.camera import Camera
+from sandbox.window.game_host import GameDisplay, ScoreDisplay
 from sandbox.window.input.bindings import KeyBindings, key_bindings
 from sandbox.window.input.body_tools import describe_loss
 from sandbox.window.messages import MAX_MESSAGES
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.parameters import Parameter, SessionParameters
 from sandbox.window.playback.recorded import RecordedView
-from sandbox.window.playback.snapshot import OVERLAYS, HudStatus
+from sandbox.window.playback.snapshot import OVERLAYS
 from sandbox.window.render.palette import BACKGROUND, INK
 from sandbox.window.render.renderer import InsetRenderer, Renderer
 from sandbox.window.render.text import draw_box, draw_text, text_size
@@ -28,167 +31,192 @@ from sandbox.window.ui.high_score_dialog import HighScoreDialog
 from sandbox.window.ui.hud import hud_width
 from sandbox.window.ui.panel import SidePanel
 from sandbox.window.ui.scene_browser import SceneBrowser
-from sandbox.window.ui.score_panel import covered_area, draw_score, layout_score
+from sandbox.window.ui.score_panel import ScoreLayout, draw_score, layout_score
 from sandbox.window.ui.status import hud_status, settings_text
 from sandbox.window.ui.timeline import HEIGHT, Timeline
 
 GRAPH_SIZE = (300, 130)
-"""px at unit 1"""
+"""px at UI scale 1"""
+
+
+class _SceneKeys(NamedTuple):
+    """Key bindings of a scene, and the objects that they were made for."""
+
+    owner: object
+    bindings: KeyBindings
+    codes: frozenset[int]
 
 
 class Gui:
-    """What surrounds the picture, and what is switched on."""
+    """The scene's picture, the widgets around it, and the overlays that are switched on."""
 
-    def __init__(self, size: tuple[int, int], unit: float) -> None:
-        self.unit = unit
+    def __init__(self, size: tuple[int, int], ui_scale: float) -> None:
+        self.ui_scale = ui_scale
         self.overlays: set[str] = {"shapes"}
         """of `OVERLAYS`"""
         self.antialias = True
-        self.panel = SidePanel(size, unit)
-        self.manual = HelpOverlay()
-        self.picker: SceneBrowser | None = None
-        self.tools = BilliardsHud()
+        self.panel = SidePanel(size, ui_scale)
+        self.help = HelpOverlay()
+        self.scene_browser: SceneBrowser | None = None
+        """None while it is closed"""
+        self.billiards_hud = BilliardsHud()
         self._high_scores = HighScoreDialog()
         self._timeline = Timeline()
         self._graph = EnergyGraph()
-        self._picture, self._inset = Renderer(), InsetRenderer()
+        self._renderer, self._inset = Renderer(), InsetRenderer()
         self._sounds = Sounds()
-        self._knobs = SessionParameters()
+        self._parameters = SessionParameters()
         self._size = size
-        self._claims: tuple[object, KeyBindings] | None = None
-        self._heard: object = None
-        self.out_of_sight = False
-        """none of the bodies that move is in the picture"""
-        self._untold = False  # the keys that the scene claims
-        self._faults = pygame.Rect(0, 0, 0, 0)  # where they are shown
+        self._scene_keys: _SceneKeys | None = None
+        self._score: tuple[object, ScoreLayout] | None = None  # the arguments of the last layout, and the layout
+        self._panel_inputs: tuple[object, ...] = ()  # everything that the panel shows, as it was last shown
+        self._heard: object = None  # the contacts that were last turned into sound
+        self.bodies_out_of_view = False
+        """whether all moving bodies are outside the picture"""
+        self._faults = pygame.Rect(0, 0, 0, 0)  # the box that lists the faults of the scene file
         self._plates: dict[str, pygame.Rect] = {}
 
-    def renew(self, same: bool) -> None:
-        """Forget what was of the scene before."""
+    def on_scene_changed(self, stage: AppState, same: bool) -> None:
+        """Reset the state that belongs to the previous scene, and announce the keys of a new one."""
         self._graph.clear()
+        self._panel_inputs = ()
         if not same:
-            self._claims, self._untold = None, True
+            self._scene_keys = None
+            self.announce_keys(stage)
+
+    def announce_keys(self, stage: AppState) -> None:
+        """Post messages that name the keys of the scene."""
+        help_lines = self.key_bindings(stage).told
+        if stage.game is not None:
+            stage.messages.tell("aim with the mouse, shoot with Space; H lists all keys")
+        elif len(help_lines) > MAX_MESSAGES:  # more than are shown at a time
+            stage.messages.tell(f"keys: {', '.join(keys for keys, _ in help_lines)} (F1: help)")
+        else:
+            for keys, about in help_lines:
+                stage.messages.tell(f"{keys}: {about}")
 
     def resize(self, size: tuple[int, int]) -> None:
-        """Fit all to a window of another size, px."""
+        """Fit all widgets to a window of another size, px."""
         self._size = size
-        self.panel.resize(size, self.unit)
+        self._panel_inputs = ()
+        self.panel.resize(size, self.ui_scale)
 
     @property
-    def foot(self) -> int:
-        """What the timeline covers at the bottom of the window, px."""
-        return round(HEIGHT * self.unit) if self.panel.visible else 0
+    def bottom_margin(self) -> int:
+        """Height of the timeline at the bottom of the window, px."""
+        return round(HEIGHT * self.ui_scale) if self.panel.visible else 0
 
-    def taken(self, stage: AppState) -> list[pygame.Rect]:
-        """Return what plates cover of the picture for as long as the scene is on, px; messages come and go.
+    @property
+    def area(self) -> pygame.Rect:
+        """The part of the window that neither the panel nor the timeline covers, px."""
+        return pygame.Rect(0, 0, self._size[0] - self.panel.width, self._size[1] - self.bottom_margin)
 
-        Of the state of things that is with the line that says that it is paused, so that pausing moves nothing.
-        """
-        show, free = stage.show, self._free
-        if show is None:
-            return []
-        told = hud.layout_rows(replace(self.account(stage), paused=True, waits_for_start=False), free, self.unit)
-        found = [told.rect]
-        if stage.gestures is not None:
-            found += self.tools.taken(stage.gestures.person, free, self._hud_width(show), self.unit)
-        elif stage.host is not None:
-            found.append(layout_score(stage.host.shown().board, free, self._hud_width(show), self.unit).rect)
-        return found
+    @property
+    def _timeline_rect(self) -> pygame.Rect:
+        margin = self.bottom_margin
+        return pygame.Rect(0, self._size[1] - margin, self._size[0] - self.panel.width, margin)
 
     @property
     def plates(self) -> dict[str, pygame.Rect]:
-        """What each plate covers, px, as it was last drawn."""
+        """The rectangles of the plates as they were last drawn, px."""
         return {name: rect for name, rect in self._plates.items() if rect.width and rect.height}
 
-    def covered(self, stage: AppState) -> tuple[int, int]:
-        """Return what the score panel covers at the top and at the bottom of the window, px."""
+    def permanent_plates(self, stage: AppState) -> list[pygame.Rect]:
+        """Return the rectangles of the plates that stay while the scene is open, px; messages are left out.
+
+        The status plate is measured with its line for the pause, so that pausing moves nothing.
+        """
+        show, area = stage.show, self.area
+        if show is None:
+            return []
+        status = hud_status(stage, self.key_bindings(stage).told, 0.0, None)
+        rows = hud.layout_rows(replace(status, paused=True, waits_for_start=False), area, self.ui_scale)
+        found = [rows.rect]
+        if stage.gestures is not None:
+            found += self.billiards_hud.taken(stage.gestures.person, area, self._hud_width(show), self.ui_scale)
+        elif stage.host is not None:
+            found.append(self._layout_score(stage.host.shown().board, show).rect)
+        return found
+
+    def score_margins(self, stage: AppState) -> tuple[int, int]:
+        """Return the heights that the score panel takes at the top and at the bottom of the area, px."""
         if stage.host is None or stage.gestures is not None or stage.show is None:
             return 0, 0
-        return covered_area(stage.host.shown().board, self._free, self._hud_width(stage.show), self.unit)
+        return self._layout_score(stage.host.shown().board, stage.show).margins(self.area)
 
-    @property
-    def free(self) -> pygame.Rect:
-        """What neither the panel nor the timeline covers."""
-        return self._free
-
-    @property
-    def _free(self) -> pygame.Rect:
-        """What neither the panel nor the timeline covers."""
-        return pygame.Rect(0, 0, self._size[0] - self.panel.width, self._size[1] - self.foot)
+    def _layout_score(self, display: ScoreDisplay, show: LiveView | RecordedView) -> ScoreLayout:
+        """Return the layout of the score panel; it is computed again only if something in it changes."""
+        arguments = display, self.area, self._hud_width(show), self.ui_scale
+        if self._score is None or self._score[0] != arguments:
+            self._score = arguments, layout_score(*arguments)
+        return self._score[1]
 
     def _hud_width(self, show: LiveView | RecordedView) -> int:
-        """Return how far to the right the state of things reaches, px."""
-        return hud_width(f"{show.engine}  ·  {settings_text(show.settings)}", self.unit)
+        """Return the right edge of the status plate, px."""
+        return hud_width(f"{show.engine}  ·  {settings_text(show.settings)}", self.ui_scale)
+
+    def key_bindings(self, stage: AppState) -> KeyBindings:
+        """Return the key bindings of the scene."""
+        return self._keys(stage).bindings
+
+    def claimed_keys(self, stage: AppState) -> frozenset[int]:
+        """Return the codes of the keys that the scene binds."""
+        return self._keys(stage).codes
+
+    def _keys(self, stage: AppState) -> _SceneKeys:
+        """Return the scene's keys; they are computed again only if the scene or its game has changed."""
+        show = stage.show
+        if not isinstance(show, LiveView):
+            return _NO_KEYS
+        owner = stage.gestures or stage.host or show.scene.play
+        if self._scene_keys is None or self._scene_keys.owner is not owner:
+            bindings = key_bindings(show.scene, stage.hands, stage.gestures, stage.host)
+            self._scene_keys = _SceneKeys(owner, bindings, frozenset(bindings.deeds))
+        return self._scene_keys
 
     @property
-    def _area(self) -> pygame.Rect:
-        """Where the timeline lies."""
-        return pygame.Rect(0, self._size[1] - self.foot, self._size[0] - self.panel.width, self.foot)
+    def covers_scene(self) -> bool:
+        """Whether help or the scene browser covers the scene."""
+        return self.scene_browser is not None or self.help.open
 
-    def claims(self, stage: AppState) -> KeyBindings:
-        """Return the keys that the scene claims."""
-        if not isinstance(stage.show, LiveView):
-            return KeyBindings({}, (), {})
-        key = stage.gestures or stage.host or stage.show.scene.play
-        if self._claims is None or self._claims[0] is not key:
-            self._claims = key, key_bindings(stage.show.scene, stage.hands, stage.gestures, stage.host)
-        return self._claims[1]
-
-    def claimed(self, stage: AppState) -> frozenset[int]:
-        """Return the codes of those keys."""
-        return frozenset(self.claims(stage).deeds)
-
-    @property
-    def covers(self) -> bool:
-        """Whether help or the picker lies over the scene."""
-        return self.picker is not None or self.manual.open
-
-    def open_picker(self, path: Path | None) -> None:
-        """Offer the scenes."""
-        self.picker = SceneBrowser(scenes_to_pick(path))
+    def open_scene_browser(self, path: Path | None) -> None:
+        """Open the scene browser."""
+        self.scene_browser = SceneBrowser(scenes_to_pick(path))
         self.panel.release()
 
     def toggle_help(self) -> None:
-        """Show help, or close it."""
-        self.manual.open = not self.manual.open
+        """Open or close help."""
+        self.help.open = not self.help.open
 
     def toggle_sound(self) -> tuple[str, str]:
-        """Turn sound on or off; return what is to be said of it, and its level."""
+        """Turn sound on or off; return the text and the level of the message about it."""
         if self._sounds.enabled:
             self._sounds.disable()
             return "sound off", "info"
         return ("sound on", "info") if self._sounds.enable() else (self._sounds.why, "warning")
 
-    def handle(self, event: pygame.event.Event, stage: AppState) -> bool:
-        """Let what lies on top take an event in; return whether it was used up.
+    def handle_event(self, event: pygame.event.Event, stage: AppState) -> bool:
+        """Let the topmost widget process an event; return whether it was consumed.
 
-        What ends a drag never is: whoever else holds something has to learn of it.
+        Events that end a drag are never consumed, as they also end drags elsewhere.
         """
-        ends = event.type in (pygame.MOUSEBUTTONUP, pygame.WINDOWFOCUSLOST)
-        return self._use(event, stage) and not ends
+        ends_drag = event.type in (pygame.MOUSEBUTTONUP, pygame.WINDOWFOCUSLOST)
+        return self._route(event, stage) and not ends_drag
 
-    def _use(self, event: pygame.event.Event, stage: AppState) -> bool:
-        if self.picker is not None and event.type != pygame.QUIT:
-            path = self.picker.handle(event)
-            count = stage.count_unsaved()
-            if path is not None and count and self.picker.confirmed != path:
-                self.picker.ask(path, describe_loss(count, "choose it again to open it anyway"))
-                return True
-            if path is not None:
-                stage.take(path)
-            if path is not None or self.picker.closed:
-                self.picker = None
+    def _route(self, event: pygame.event.Event, stage: AppState) -> bool:
+        if self.scene_browser is not None and event.type != pygame.QUIT:
+            self._browse(self.scene_browser, event, stage)
             return True
         if stage.host is not None and self._high_scores.handle_event(event):
             return True
-        if self.manual.handle(event) or self._close_faults(event, stage) or self.panel.handle(event):
+        if self.help.handle_event(event) or self._close_faults(event, stage) or self.panel.handle_event(event):
             return True
         show = stage.show
-        if stage.gestures is not None and self.tools.handle(event, stage.gestures.person, stage.act):
+        if stage.gestures is not None and self.billiards_hud.handle(event, stage.gestures.person, stage.act):
             return True
-        if show is not None and self._area.height:
+        if show is not None and self._timeline_rect.height:
             held = self._timeline.held
-            time = self._timeline.handle(event, self._area)
+            time = self._timeline.handle_event(event, self._timeline_rect)
             if time is not None:
                 stage.paused = True
                 show.scrub(time)
@@ -196,6 +224,18 @@ class Gui:
                 stage.compute(show.settle)
             return held or self._timeline.held
         return False
+
+    def _browse(self, browser: SceneBrowser, event: pygame.event.Event, stage: AppState) -> None:
+        """Pass an event to the scene browser, and open the scene that was chosen."""
+        path = browser.handle_event(event)
+        unsaved = stage.count_unsaved()
+        if path is not None and unsaved and browser.confirmed != path:
+            browser.ask(path, describe_loss(unsaved, "choose it again to open it anyway"))
+            return
+        if path is not None:
+            stage.take(path)
+        if path is not None or browser.closed:
+            self.scene_browser = None
 
     def _close_faults(self, event: pygame.event.Event, stage: AppState) -> bool:
         escape = event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE
@@ -206,77 +246,103 @@ class Gui:
         return True
 
     def draw(
-        self, surface: pygame.Surface, camera: Camera, stage: AppState, rate: float, recording: str | None
+        self, surface: pygame.Surface, camera: Camera, stage: AppState, frame_rate: float, recording: str | None
     ) -> None:
-        """Draw all."""
+        """Draw the scene and all widgets.
+
+        Args:
+            surface: the window.
+            camera: its camera.
+            stage: the application state.
+            frame_rate: frames per second.
+            recording: length and format of the film that is being recorded.
+        """
         show = stage.show
-        if self.picker is not None:
-            self.picker.draw(surface, self.unit)
+        if self.scene_browser is not None:
+            self.scene_browser.draw(surface, self.ui_scale)
             return
         plates: dict[str, pygame.Rect] = {}
-        above, below = self.covered(stage)
-        foot = self.foot + below
+        display = stage.host.shown() if stage.host is not None else None
         if show is None:
             surface.fill(BACKGROUND)
         else:
-            pull = stage.hands.line(show) if isinstance(show, LiveView) else None
-            sight = show.snapshot(frozenset(self.overlays), stage.hands.picked, pull)
-            if stage.gestures is not None:
-                sight = stage.gestures.seen.over(sight)
-            if stage.host is not None:
-                lit = replace(sight, lit=stage.host.shown().lit)
-                sight = add_artillery(stage.host.rules, lit, present=not stage.host.live.peeking)
-            told = self._plates.get("state")
-            if told is not None:
-                sight = replace(sight, below=float(told.bottom))
-            depth = float(foot)
-            self._picture.draw(surface, camera, sight, antialias=self.antialias, unit=self.unit, foot=depth)
-            free = self._free
-            free = pygame.Rect(free.left, free.top + above, free.width, max(free.height - above - below, 0))
-            aside = round(GRAPH_SIZE[0] * self.unit) if "energy" in self.overlays else 0
-            near = self._inset.draw(surface, camera, sight, free, antialias=self.antialias, unit=self.unit, aside=aside)
-            if near is not None:
-                plates["inset"] = near
-            if show.contacts is not self._heard:
-                self._heard = show.contacts
-                self._sounds.hits(show.contacts, show.bodies)
-            for cue in stage.host.cues() if stage.host is not None else ():
-                self._sounds.cue(cue)
+            self._draw_scene(surface, camera, stage, show, display, plates)
+            self._play_sounds(stage, show)
         if stage.game is None:
-            self.tools.foot = 0
+            self.billiards_hud.foot = 0
         if show is not None:
-            if not self.manual.open:
-                self._draw_play(surface, stage, self._hud_width(show), plates)
+            if not self.help.open:
+                self._draw_game(surface, stage, show, display, plates)
             self._draw_graph(surface, stage, plates)
-        status = replace(self.status(stage, rate, recording), out_of_sight=self._describe_absence(stage))
+        status = hud_status(stage, self.key_bindings(stage).told, frame_rate, recording)
         self._faults = hud.draw_hud(
             surface,
-            status,
-            self.unit,
+            replace(status, out_of_sight=self.describe_out_of_view(stage)),
+            self.ui_scale,
             right=self.panel.width,
-            bottom=self.foot,
+            bottom=self.bottom_margin,
             taken=[rect for rect in plates.values() if rect.width and rect.height],
             plates=plates,
         )
         if show is not None:
-            if stage.host is not None and not self.manual.open:
-                self._high_scores.draw(surface, self._free, self.unit)
-            if self.foot:
-                plates["timeline"] = self._area
+            if stage.host is not None and not self.help.open:
+                self._high_scores.draw(surface, self.area, self.ui_scale)
+            if self.bottom_margin:
+                plates["timeline"] = rect = self._timeline_rect
                 now = show.frame.time
-                self._timeline.draw(surface, self._area, show.begin, now, show.end, show.marks, self.unit)
+                self._timeline.draw(surface, rect, show.begin, now, show.end, show.marks, self.ui_scale)
         self._plates = plates
         if self.panel.visible:
             plates["panel"] = pygame.Rect(self._size[0] - self.panel.width, 0, self.panel.width, self._size[1])
-            self._show_panel(stage, recording is not None)
+            self._update_panel(stage, recording is not None)
             self.panel.draw(surface)
-        if self.manual.open:
-            self.manual.draw(surface, self.unit, self.claims(stage).told)
+        if self.help.open:
+            self.help.draw(surface, self.ui_scale, self.key_bindings(stage).told)
 
-    def _describe_absence(self, stage: AppState) -> str | None:
-        """Return what can be done where nothing that moves is seen."""
+    def _draw_scene(
+        self,
+        surface: pygame.Surface,
+        camera: Camera,
+        stage: AppState,
+        show: LiveView | RecordedView,
+        display: GameDisplay | None,
+        plates: dict[str, pygame.Rect],
+    ) -> None:
+        """Draw the scene, and the inset of a game that has one."""
+        pull = stage.hands.line(show) if isinstance(show, LiveView) else None
+        snapshot = show.snapshot(frozenset(self.overlays), stage.hands.picked, pull)
+        if stage.gestures is not None:
+            snapshot = stage.gestures.seen.over(snapshot)
+        if stage.host is not None and display is not None:
+            snapshot = replace(snapshot, lit=display.lit)
+            snapshot = add_artillery(stage.host.rules, snapshot, present=not stage.host.live.peeking)
+        status_plate = self._plates.get("state")
+        if status_plate is not None:
+            snapshot = replace(snapshot, below=float(status_plate.bottom))
+        top, bottom = self.score_margins(stage)
+        antialias, ui_scale = self.antialias, self.ui_scale
+        foot = float(self.bottom_margin + bottom)
+        self._renderer.draw(surface, camera, snapshot, antialias=antialias, unit=ui_scale, foot=foot)
+        area = self.area
+        area = pygame.Rect(area.left, area.top + top, area.width, max(area.height - top - bottom, 0))
+        aside = round(GRAPH_SIZE[0] * ui_scale) if "energy" in self.overlays else 0
+        inset = self._inset.draw(surface, camera, snapshot, area, antialias=antialias, unit=ui_scale, aside=aside)
+        if inset is not None:
+            plates["inset"] = inset
+
+    def _play_sounds(self, stage: AppState, show: LiveView | RecordedView) -> None:
+        """Play the sounds of new contacts and of the game's events."""
+        if show.contacts is not self._heard:
+            self._heard = show.contacts
+            if self._sounds.enabled:
+                self._sounds.hits(show.contacts, show.bodies)
+        for cue in stage.host.cues() if stage.host is not None else ():
+            self._sounds.cue(cue)
+
+    def describe_out_of_view(self, stage: AppState) -> str | None:
+        """Return the notice to show while all moving bodies are outside the picture; None otherwise."""
         show = stage.show
-        if show is None or not self.out_of_sight:
+        if show is None or not self.bodies_out_of_view:
             return None
         moving = show.frame.present[: len(show.bodies)] & ~show.bodies.fixed[: len(show.frame.present)]
         words = ["All bodies are out of view: Home fits the view, F follows" if moving.any() else "No bodies are left"]
@@ -285,63 +351,68 @@ class Gui:
             words.append(f"Space relaunches {launched}")
         return " · ".join(words)
 
-    def _draw_play(self, surface: pygame.Surface, stage: AppState, left: int, plates: dict[str, pygame.Rect]) -> None:
-        """Draw how a game stands, and what a player has at hand."""
-        host = stage.host
+    def _draw_game(
+        self,
+        surface: pygame.Surface,
+        stage: AppState,
+        show: LiveView | RecordedView,
+        display: GameDisplay | None,
+        plates: dict[str, pygame.Rect],
+    ) -> None:
+        """Draw the score panel, or the controls of a billiards table."""
         if stage.gestures is not None:
-            self.tools.draw(surface, stage.gestures.person, self._free, left, self.unit)
-            plates |= self.tools.plates(self._free, self.unit)
-        elif host is not None:
-            plates["score"] = draw_score(surface, host.shown().board, self._free, left, self.unit)
-            for note in self._high_scores.update(host):
+            left = self._hud_width(show)
+            self.billiards_hud.draw(surface, stage.gestures.person, self.area, left, self.ui_scale)
+            plates |= self.billiards_hud.plates(self.area, self.ui_scale)
+        elif display is not None:
+            layout = self._layout_score(display.board, show)
+            draw_score(surface, layout)
+            plates["score"] = layout.rect
+            for note in self._high_scores.update(stage.host):
                 stage.messages.tell(note, "warning")
 
-    def draw_wait(self, surface: pygame.Surface, what: str) -> None:
-        """Say over whatever was drawn what everything waits for; who was drawing may have locked the surface."""
-        size = 15 * self.unit
-        width, height = text_size(what, size)
+    def draw_wait(self, surface: pygame.Surface, text: str) -> None:
+        """Draw a notice over the picture while the window waits; the surface may be locked by what was being drawn."""
+        size = 15 * self.ui_scale
+        width, height = text_size(text, size)
         note = pygame.Surface((round(width + 3 * size), round(height + 2 * size)), 0, surface)
         area = note.get_rect()
         note.fill(BACKGROUND)
         draw_box(note, area, round(0.5 * size))
-        draw_text(note, what, area.center, size, INK, "center")
+        draw_text(note, text, area.center, size, INK, "center")
         place = note.get_rect(center=surface.get_rect().center)
         if not surface.get_locked():
             surface.blit(note, place)
             return
-        # Nothing can be blitted; what locks it writes its pixels directly, and so can this.
+        # A locked surface cannot be blitted to, but its pixels can be written.
         seen = place.clip(surface.get_rect())
         area = seen.move(-place.x, -place.y)
         pixels = pygame.surfarray.array3d(note)[area.left : area.right, area.top : area.bottom]
         pygame.surfarray.pixels3d(surface)[seen.left : seen.right, seen.top : seen.bottom] = pixels
 
     def _draw_graph(self, surface: pygame.Surface, stage: AppState, plates: dict[str, pygame.Rect]) -> None:
-        """Draw the energies at the lower right, above what lies there; smaller where that leaves no room."""
+        """Draw the energy graph at the lower right, above other plates; smaller if there is no room."""
         show = stage.show
         if show is None or "energy" not in self.overlays:
             return
         self._graph.add(show.frame.time, *show.energy())
-        margin, free, taken = round(10 * self.unit), self._free, [*self.taken(stage), *plates.values()]
-        bottoms = sorted({free.bottom, *(rect.top for rect in taken if rect.height)}, reverse=True)
+        area, margin = self.area, round(10 * self.ui_scale)
+        taken = [*self.permanent_plates(stage), *plates.values()]
+        bottoms = sorted({area.bottom, *(rect.top for rect in taken if rect.height)}, reverse=True)
         for scale in (1.0, 0.8, 0.6, 0.45):
-            rect = pygame.Rect(0, 0, round(scale * GRAPH_SIZE[0] * self.unit), round(scale * GRAPH_SIZE[1] * self.unit))
+            rect = pygame.Rect(
+                0, 0, round(scale * GRAPH_SIZE[0] * self.ui_scale), round(scale * GRAPH_SIZE[1] * self.ui_scale)
+            )
             for bottom in bottoms:
-                rect.bottomright = free.right - margin, bottom - margin
-                if free.contains(rect) and rect.collidelist(taken) < 0:
+                rect.bottomright = area.right - margin, bottom - margin
+                if area.contains(rect) and rect.collidelist(taken) < 0:
                     plates["graph"] = rect
-                    self._graph.draw(surface, rect, self.unit)
+                    self._graph.draw(surface, rect, self.ui_scale)
                     return
 
-    def _show_panel(self, stage: AppState, recording: bool) -> None:
-        live = stage.live
-        shown = (
-            self._knobs.of(live, stage.file, stage.hands.picked) if live is not None and stage.file is not None else ()
-        )
-        if stage.game is not None:
-            shown = (*shown, Parameter("players", "players", value=stage.game.players, choices=PLAYERS))
-            if stage.game.match.rules.name == "snooker":
-                misses = "on" if stage.game.misses else "off"
-                shown = (*shown, Parameter("misses", "foul and a miss", value=misses, choices=("off", "on")))
+    def _update_panel(self, stage: AppState, recording: bool) -> None:
+        """Show the present values in the panel, if any of them has changed or a widget has been used."""
+        live, game = stage.live, stage.game
         toggles = {name: name in self.overlays for name in OVERLAYS}
         if live is not None:
             toggles |= {"ghost": live.company.ghosted, "trust": live.company.trust is not None}
@@ -357,26 +428,26 @@ class Gui:
             "picker",
             "help",
         )
-        self.panel.show(shown, toggles, buttons)
-
-    def status(self, stage: AppState, rate: float, recording: str | None) -> HudStatus:
-        """Return what is told in words."""
-        if self._untold:
-            self._untold = False
-            told = self.claims(stage).told
-            if stage.game is not None:
-                stage.messages.tell("aim with the mouse, shoot with Space; H lists all keys")
-            elif len(told) > MAX_MESSAGES:  # more than are seen at once
-                stage.messages.tell(f"keys: {', '.join(keys for keys, _ in told)} (F1: help)")
-            else:
-                for keys, what in told:
-                    stage.messages.tell(f"{keys}: {what}")
-        return hud_status(stage, self.claims(stage).told, rate, recording)
-
-    def account(self, stage: AppState) -> HudStatus:
-        """Return what is told in words, with no word of what is recorded and how many pictures there are."""
-        return hud_status(stage, self.claims(stage).told, 0.0, None)
+        session = () if live is None else (live.session, live.scene, live.settings, live.session.wanted, live.bodies)
+        table = () if game is None else (game, game.players, game.misses)
+        inputs = (*session, *table, stage.file, stage.hands.picked, *toggles.values(), *buttons)
+        same = len(inputs) == len(self._panel_inputs) and all(map(is_, inputs, self._panel_inputs))
+        if same and not self.panel.used:
+            return
+        self._panel_inputs, self.panel.used = inputs, False
+        parameters: tuple[Parameter, ...] = ()
+        if live is not None and stage.file is not None:
+            parameters = self._parameters.of(live, stage.file, stage.hands.picked)
+        if game is not None:
+            parameters = (*parameters, Parameter("players", "players", value=game.players, choices=PLAYERS))
+            if game.match.rules.name == "snooker":
+                misses = "on" if game.misses else "off"
+                parameters = (*parameters, Parameter("misses", "foul and a miss", value=misses, choices=("off", "on")))
+        self.panel.show(parameters, toggles, buttons)
 
     def close(self) -> None:
-        """Fall silent."""
+        """Stop all sound."""
         self._sounds.disable()
+
+
+_NO_KEYS = _SceneKeys(None, KeyBindings({}, (), {}), frozenset())

@@ -69,7 +69,7 @@ class HelpOverlay:
         self.open = False
         self._scroll = 0.0
 
-    def handle(self, event: pygame.event.Event) -> bool:
+    def handle_event(self, event: pygame.event.Event) -> bool:
         """Close at any key or click, scroll by the wheel; tell whether the event was used up. Closed, nothing is."""
         if not self.open:
             return False

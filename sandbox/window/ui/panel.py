@@ -156,6 +156,9 @@ class SidePanel:
         self._pointer: tuple[int, int] | None = None
         self._pressed: set[int] = set()
         self._bar_held = False
+        self.used = True
+        """an event or a resize may have changed a widget since this was last reset: `show` is needed"""
+        self._dirty = True  # the sheet has to be checked for changes
         self.resize(size, unit)
 
     @property
@@ -191,10 +194,12 @@ class SidePanel:
         self.size, self.unit = size, unit
         self._sheet = pygame.Surface((self._full, max(size[1], 1)))
         self._drawn = ()
+        self.used = True
         self._lay_out()
 
     def show(self, knobs: Sequence[Parameter], toggles: Mapping[str, bool], buttons: Sequence[str] = ()) -> None:
         """Show these knobs, switches and buttons, and call nobody back. What stays keeps being held."""
+        self._dirty = True
         before = [*self._dials, *self._switches, len(self._buttons)]
         dials: dict[str, ParameterWidget] = {}
         for knob in knobs:
@@ -231,6 +236,7 @@ class SidePanel:
 
     def _move(self) -> None:
         """Place the widgets as far as the content is scrolled."""
+        self._dirty = True
         self._scroll = min(max(self._scroll, 0), max(self._layout.height - self.size[1], 0))
         for widget, place in self._layout.places:
             widget.surface = self._sheet
@@ -238,6 +244,7 @@ class SidePanel:
 
     def release(self) -> None:
         """End whatever is being dragged, with its final report."""
+        self.used = self._dirty = True
         self._pressed.clear()
         self._bar_held = False
         self._pointer = None
@@ -245,7 +252,7 @@ class SidePanel:
             widget.release()
         self._call_back()
 
-    def handle(self, event: pygame.event.Event) -> bool:
+    def handle_event(self, event: pygame.event.Event) -> bool:
         """Take an event in, and tell whether it was used up. Pass every event, motion too: the wheel has no place.
 
         A press outside belongs to the picture, and so do the motion and release that follow it.
@@ -278,6 +285,7 @@ class SidePanel:
         return ours
 
     def _pass_on(self, event: pygame.event.Event, at: tuple[int, int]) -> None:
+        self.used = self._dirty = True
         if self._grab_bar(event, at):
             return
         moved = pygame.event.Event(event.type, {**event.dict, "pos": at})
@@ -300,6 +308,7 @@ class SidePanel:
     def _wheel(self, event: pygame.event.Event) -> bool:
         if self._pointer is None:
             return False
+        self.used = self._dirty = True
         notches = int(event.y)
         if notches and not any(dial.scroll(notches, self._pointer) for dial in self._dials.values()):
             self._scroll -= round(notches * SCROLL * self.unit)
@@ -325,10 +334,17 @@ class SidePanel:
         """Draw it at the right of the window, if it is visible."""
         if not self.visible:
             return
-        look = (self._scroll, self._bar_held, self._layout.headings, *(widget.draw_state for widget in self.widgets))
-        if look != self._drawn:
-            self._draw_sheet()
-            self._drawn = look
+        if self._dirty:
+            self._dirty = False
+            state = (
+                self._scroll,
+                self._bar_held,
+                self._layout.headings,
+                *(widget.draw_state for widget in self.widgets),
+            )
+            if state != self._drawn:
+                self._draw_sheet()
+                self._drawn = state
         surface.blit(self._sheet, (self.size[0] - self._full, 0))
         self._draw_hint(surface)
 

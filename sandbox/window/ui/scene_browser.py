@@ -193,7 +193,7 @@ class SceneBrowser:
         """Say what opening a scene would lose; chosen once more, it is opened."""
         self.confirmed, self._note = path, note
 
-    def handle(self, event: pygame.event.Event) -> Path | None:
+    def handle_event(self, event: pygame.event.Event) -> Path | None:
         """Take an event in, and return the file of the scene that it chooses, if it does."""
         if event.type == pygame.KEYDOWN:
             return self._key(event)

@@ -38,6 +38,10 @@ class ScoreLayout(NamedTuple):
     gap: int
     """px between cells"""
 
+    def margins(self, area: pygame.Rect) -> tuple[int, int]:
+        """Return the heights that the panel takes at the top and at the bottom of an area, px."""
+        return (self.rect.bottom - area.top, 0) if self.above else (0, area.bottom - self.rect.top)
+
 
 def layout_score(board: ScoreDisplay, free: pygame.Rect, left: int, unit: float) -> ScoreLayout:
     """Lay it at the top of what is free, or where that is too narrow, at the bottom.
@@ -79,9 +83,9 @@ def _fitted(
     return rows, size, gap, room
 
 
-def draw_score(surface: pygame.Surface, board: ScoreDisplay, free: pygame.Rect, left: int, unit: float) -> pygame.Rect:
-    """Draw it where it is laid, and return what it covers."""
-    rect, _, rows, end, size, gap = layout_score(board, free, left, unit)
+def draw_score(surface: pygame.Surface, layout: ScoreLayout) -> None:
+    """Draw the score panel."""
+    rect, _, rows, end, size, gap = layout
     draw_box(surface, rect, 0.57 * size)
     y = rect.top + round(0.45 * size)
     for cells, widths in rows:
@@ -92,13 +96,6 @@ def draw_score(surface: pygame.Surface, board: ScoreDisplay, free: pygame.Rect, 
         if k == 0:
             draw_disc(surface, (rect.left + _pad(size) + 0.4 * size, middle), 0.3 * size, WARNING)
         draw_text(surface, line, (rect.left + _pad(size) + 1.2 * size, middle), size, INK, "midleft", bold=k == 0)
-    return rect
-
-
-def covered_area(board: ScoreDisplay, free: pygame.Rect, left: int, unit: float) -> tuple[int, int]:
-    """Return how many px at the top and at the bottom of what is free it takes."""
-    place = layout_score(board, free, left, unit)
-    return (place.rect.bottom - free.top, 0) if place.above else (0, free.bottom - place.rect.top)
 
 
 def _pad(size: float) -> int:

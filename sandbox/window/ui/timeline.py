@@ -24,7 +24,7 @@ class Timeline:
         self._span = 0.0, 0.0
         self._unit = 1.0
 
-    def handle(self, event: pygame.event.Event, area: pygame.Rect) -> float | None:
+    def handle_event(self, event: pygame.event.Event, area: pygame.Rect) -> float | None:
         """Return the time that is asked for by a press or a drag, s, or None.
 
         Args:

@@ -26,7 +26,7 @@ from sandbox.window.input.gamepad import LAYOUTS, PLAYSTATION, RUNGS, XBOX, Game
 from sandbox.window.playback.live import LiveView
 from sandbox.window.render.palette import WARNING
 from sandbox.window.sound import CUE_NOTES, Sounds, cue_notes, cue_sound
-from sandbox.window.ui.score_panel import draw_score
+from sandbox.window.ui.score_panel import draw_score, layout_score
 from sandbox.window.view_bounds import view_bounds
 
 UP, LEFT, R, P = pygame.K_UP, pygame.K_LEFT, pygame.K_r, pygame.K_p
@@ -89,13 +89,13 @@ def test_who_looks_elsewhere_lets_go(window: App) -> None:
 
 
 def test_help_lists_controls_and_scene_keys_are_theirs(window: App) -> None:
-    claims = window.gui.claims(window.stage)
+    claims = window.gui.key_bindings(window.stage)
     assert claims.told == (
         ("Up or Left Shift", "kick it; gamepad: A, stick up"),
         ("Left", "how far; gamepad: LT"),
         ("Gamepad Start", "pause / resume"),
     )
-    assert {UP, LEFT, pygame.K_LSHIFT} <= window.gui.claimed(window.stage)
+    assert {UP, LEFT, pygame.K_LSHIFT} <= window.gui.claimed_keys(window.stage)
 
 
 def test_help_tells_the_cross_of_a_gamepad_from_its_stick() -> None:
@@ -238,7 +238,7 @@ def lies_clear(window: App) -> bool:
     corners = window.camera.to_screen(np.asarray(view_bounds(window.stage.show.scene)))
     (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
     field = pygame.Rect(round(left), round(top), int(right - left), int(bottom - top))
-    return window.gui.free.contains(field) and field.collidelist(window.gui.taken(window.stage)) < 0
+    return window.gui.area.contains(field) and field.collidelist(window.gui.permanent_plates(window.stage)) < 0
 
 
 @pytest.mark.parametrize("size", [(1280, 800), (1000, 300), (640, 480)])  # the last has the score at the bottom
@@ -276,7 +276,9 @@ def test_panel_stays_in_what_is_free(size: tuple[int, int], over: str | None) ->
     lines = tuple((f"label {k}", f"{10**k} m/s") for k in range(8))
     free = surface.get_rect()
     board = ScoreDisplay("1 234 567", lines, over)
-    rect = draw_score(surface, board, free, 100, 1.0)
+    layout = layout_score(board, free, 100, 1.0)
+    draw_score(surface, layout)
+    rect = layout.rect
     assert rect.width <= size[0]
     if min(size) > 200:
         assert free.contains(rect)

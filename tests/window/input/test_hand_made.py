@@ -177,10 +177,10 @@ def test_picker_asks_before_another_scene_takes_the_place(window: App) -> None:
     live = window.stage.live
     strike(window, pygame.K_o, pygame.KMOD_CTRL)
     strike(window, pygame.K_RETURN)
-    assert window.gui.picker is not None
+    assert window.gui.scene_browser is not None
     assert window.stage.live is live
     strike(window, pygame.K_RETURN)
-    assert window.gui.picker is None
+    assert window.gui.scene_browser is None
     assert window.stage.live is not live
 
 

@@ -76,4 +76,4 @@ def test_two_keys_fire_two_thrusts_and_one_of_them_turns_the_ship(window: App) -
 
 
 def test_keys_are_told_as_what_they_fire(window: App) -> None:
-    assert window.gui.claims(window.stage).told == (("Up", "fire main"), ("Right", "fire thrust-2"))
+    assert window.gui.key_bindings(window.stage).told == (("Up", "fire main"), ("Right", "fire thrust-2"))

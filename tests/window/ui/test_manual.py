@@ -52,9 +52,9 @@ def test_claim_on_a_global_key_takes_nothing() -> None:
 def test_any_key_or_click_closes_and_is_used_up() -> None:
     for event in (key(pygame.K_p), key(pygame.K_F1), key(pygame.K_ESCAPE), press(5, 5)):
         manual = HelpOverlay()
-        assert not manual.handle(event)
+        assert not manual.handle_event(event)
         manual.open = True
-        assert manual.handle(event)
+        assert manual.handle_event(event)
         assert not manual.open
 
 
@@ -63,8 +63,8 @@ def test_wheel_scrolls_where_the_window_is_too_small() -> None:
     manual.open = True
     first, later = pygame.Surface((300, 200)), pygame.Surface((300, 200))
     manual.draw(first, 1.0, CLAIMS)
-    assert manual.handle(wheel(-2))
-    assert manual.handle(press(5, 5, button=5))  # the same notch, told the old way
+    assert manual.handle_event(wheel(-2))
+    assert manual.handle_event(press(5, 5, button=5))  # the same notch, told the old way
     assert manual.open
     manual.draw(later, 1.0, CLAIMS)
     assert pygame.image.tobytes(first, "RGB") != pygame.image.tobytes(later, "RGB")
@@ -75,7 +75,7 @@ def test_wheel_changes_nothing_where_all_is_seen() -> None:
     manual.open = True
     first, later = pygame.Surface((1280, 800)), pygame.Surface((1280, 800))
     manual.draw(first, 1.0, CLAIMS)
-    manual.handle(wheel(-9))
+    manual.handle_event(wheel(-9))
     manual.draw(later, 1.0, CLAIMS)
     assert pygame.image.tobytes(first, "RGB") == pygame.image.tobytes(later, "RGB")
 

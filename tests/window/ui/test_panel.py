@@ -51,16 +51,16 @@ class Noted:
 def test_click_within_one_frame_calls_back_once() -> None:
     noted = Noted()
     for name in ("play", "trails", "integrator"):
-        assert noted.panel.handle(press(*noted.middle(name)))
-        assert noted.panel.handle(release(*noted.middle(name)))
+        assert noted.panel.handle_event(press(*noted.middle(name)))
+        assert noted.panel.handle_event(release(*noted.middle(name)))
     assert noted.calls == [("button", "play"), ("toggle", "trails", True), ("change", "integrator", "a", True)]
 
 
 @pytest.mark.parametrize("name", [*BUTTONS, *TOGGLES])
 def test_every_button_and_switch_can_be_reached(name: str) -> None:
     noted = Noted()
-    noted.panel.handle(press(*noted.middle(name)))
-    noted.panel.handle(release(*noted.middle(name)))
+    noted.panel.handle_event(press(*noted.middle(name)))
+    noted.panel.handle_event(release(*noted.middle(name)))
     assert [call[1] for call in noted.calls] == [name]
 
 
@@ -68,24 +68,24 @@ def test_slider_holds_while_the_mouse_is_over_the_picture() -> None:
     noted = Noted()
     panel = noted.panel
     x, y = noted.middle("gravity")
-    assert panel.handle(press(x, y))
-    assert panel.handle(move(10, 10, held=True))
-    assert panel.handle(release(10, 10))
+    assert panel.handle_event(press(x, y))
+    assert panel.handle_event(move(10, 10, held=True))
+    assert panel.handle_event(release(10, 10))
     assert noted.calls == [
         ("change", "gravity", 0.0, False),
         ("change", "gravity", -30, False),
         ("change", "gravity", -30, True),
     ]
-    assert not panel.handle(release(10, 10))
+    assert not panel.handle_event(release(10, 10))
 
 
 def test_drag_that_began_in_the_picture_is_not_consumed() -> None:
     panel = Noted().panel
     inside = SIZE[0] - 40
-    assert not panel.handle(press(100, 100))
-    assert not panel.handle(move(inside, 100, held=True))
-    assert not panel.handle(release(inside, 100))
-    assert panel.handle(move(inside, 100))
+    assert not panel.handle_event(press(100, 100))
+    assert not panel.handle_event(move(inside, 100, held=True))
+    assert not panel.handle_event(release(inside, 100))
+    assert panel.handle_event(move(inside, 100))
 
 
 def test_showing_values_calls_nobody_back_and_keeps_the_widgets() -> None:
@@ -103,11 +103,11 @@ def test_showing_values_calls_nobody_back_and_keeps_the_widgets() -> None:
 def test_drag_survives_what_is_shown_meanwhile() -> None:
     noted = Noted()
     x, y = noted.middle("gravity")
-    noted.panel.handle(press(x, y))
+    noted.panel.handle_event(press(x, y))
     noted.panel.show(KNOBS, TOGGLES, ("pause", *BUTTONS[1:]))
     noted.panel.show(KNOBS[:3], {"trails": True}, ())  # another layout
-    assert noted.panel.handle(move(5000, y, held=True))
-    noted.panel.handle(release(5000, y))
+    assert noted.panel.handle_event(move(5000, y, held=True))
+    noted.panel.handle_event(release(5000, y))
     assert noted.calls[-1] == ("change", "gravity", 30, True)
 
 
@@ -121,13 +121,13 @@ def test_panels_leave_nothing_behind() -> None:
 
 
 def test_lost_focus_and_hiding_end_a_drag_with_a_final_call() -> None:
-    for end in (lambda panel: panel.handle(FOCUS_LOST), lambda panel: setattr(panel, "visible", False)):
+    for end in (lambda panel: panel.handle_event(FOCUS_LOST), lambda panel: setattr(panel, "visible", False)):
         noted = Noted()
-        noted.panel.handle(press(*noted.middle("gravity")))
+        noted.panel.handle_event(press(*noted.middle("gravity")))
         end(noted.panel)
         assert noted.calls == [("change", "gravity", 0.0, False), ("change", "gravity", 0.0, True)]
         noted.panel.visible = True
-        noted.panel.handle(move(10, 10))
+        noted.panel.handle_event(move(10, 10))
         assert len(noted.calls) == 2
 
 
@@ -136,7 +136,7 @@ def test_hidden_panel_covers_and_takes_nothing() -> None:
     assert panel.width == 264
     panel.visible = False
     assert panel.width == 0
-    assert not panel.handle(press(SIZE[0] - 40, 100))
+    assert not panel.handle_event(press(SIZE[0] - 40, 100))
     surface = pygame.Surface(SIZE)
     panel.draw(surface)
     assert not pygame.surfarray.array3d(surface).any()
@@ -145,29 +145,29 @@ def test_hidden_panel_covers_and_takes_nothing() -> None:
 def test_wheel_turns_the_slider_below_it_and_scrolls_elsewhere() -> None:
     noted = Noted((640, 300))
     panel = noted.panel
-    panel.handle(move(*noted.middle("gravity")))
-    assert panel.handle(wheel(1))
+    panel.handle_event(move(*noted.middle("gravity")))
+    assert panel.handle_event(wheel(1))
     assert noted.calls == [("change", "gravity", -9.7, True)]
     top = noted.find("gravity").rect.top
-    panel.handle(move(640 - panel.width + 3, 150))
-    assert panel.handle(wheel(-1))
+    panel.handle_event(move(640 - panel.width + 3, 150))
+    assert panel.handle_event(wheel(-1))
     assert noted.find("gravity").rect.top < top
     for _ in range(50):
-        panel.handle(wheel(-1))
+        panel.handle_event(wheel(-1))
     assert noted.find("antialias").rect.bottom <= 300
     for _ in range(50):
-        panel.handle(wheel(1))
+        panel.handle_event(wheel(1))
     assert noted.find("gravity").rect.top == top
-    panel.handle(move(10, 10))
-    assert not panel.handle(wheel(-1))
+    panel.handle_event(move(10, 10))
+    assert not panel.handle_event(wheel(-1))
 
 
 def test_bar_at_the_edge_scrolls() -> None:
     noted = Noted((640, 300))
-    assert noted.panel.handle(press(637, 299))
+    assert noted.panel.handle_event(press(637, 299))
     assert noted.find("antialias").rect.bottom <= 300
-    assert noted.panel.handle(move(637, -50, held=True))
-    assert noted.panel.handle(release(637, -50))
+    assert noted.panel.handle_event(move(637, -50, held=True))
+    assert noted.panel.handle_event(release(637, -50))
     assert noted.find("play").rect.top > 0
     assert noted.calls == []
 
@@ -176,7 +176,7 @@ def test_reason_is_shown_beside_a_disabled_knob() -> None:
     noted = Noted()
     plain, hovered = pygame.Surface(SIZE), pygame.Surface(SIZE)
     noted.panel.draw(plain)
-    noted.panel.handle(move(*noted.middle("friction")))
+    noted.panel.handle_event(move(*noted.middle("friction")))
     noted.panel.draw(hovered)
     left = SIZE[0] - noted.panel.width
     assert noted.find("friction").hint == "nothing rubs here"
@@ -193,9 +193,9 @@ def test_kept_picture_is_drawn_anew_when_something_changes(change: str) -> None:
     panel.draw(same)
     assert pygame.image.tobytes(before, "RGB") == pygame.image.tobytes(same, "RGB")
     if change == "hover":
-        panel.handle(move(*noted.middle("gravity")))
+        panel.handle_event(move(*noted.middle("gravity")))
     elif change == "scroll":
-        panel.handle(press(637, 419))
+        panel.handle_event(press(637, 419))
     else:
         name = "height" if change == "label" else "gravity"
         knob = Parameter("gravity", name, -30, 30, 5.0 if change == "knob" else -9.8, step=0.1, unit="m/s²")
@@ -208,8 +208,8 @@ def test_kept_picture_is_drawn_anew_when_something_changes(change: str) -> None:
 def test_callback_may_show_something_else() -> None:
     noted = Noted()
     noted.panel.on_button = lambda name: noted.panel.show((), {}, ())
-    noted.panel.handle(press(*noted.middle("play")))
-    noted.panel.handle(release(*noted.middle("play")))
+    noted.panel.handle_event(press(*noted.middle("play")))
+    noted.panel.handle_event(release(*noted.middle("play")))
     assert noted.panel.widgets == ()
 
 
@@ -234,7 +234,7 @@ def test_panel_is_drawn_on_any_size(width: int, height: int, unit: float, count:
     panel.visible = True  # a small window folds it away
     panel.show(KNOBS[:count], TOGGLES, BUTTONS)
     surface = pygame.Surface((width, height))
-    panel.handle(move(width - 1, height // 2))
+    panel.handle_event(move(width - 1, height // 2))
     panel.draw(surface)
     panel.resize((height, width), unit / 2)
     panel.draw(pygame.Surface((height, width)))

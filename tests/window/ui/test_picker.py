@@ -36,7 +36,7 @@ def drawn(files: list[tuple[str, Path]], size: tuple[int, int] = (900, 700), tim
 
 def typed(picker: SceneBrowser, text: str) -> None:
     for letter in text:
-        picker.handle(key(ord(letter), unicode=letter))
+        picker.handle_event(key(ord(letter), unicode=letter))
 
 
 def place(picker: SceneBrowser, number: int) -> tuple[int, int]:
@@ -81,19 +81,19 @@ def test_arrows_and_enter_choose(files: list[tuple[str, Path]]) -> None:
     picker = drawn(files)
     columns = picker._columns
     assert columns > 1
-    picker.handle(key(pygame.K_RIGHT))
-    picker.handle(key(pygame.K_DOWN))
-    assert picker.handle(key(pygame.K_RETURN)) == files[1 + columns][1]
+    picker.handle_event(key(pygame.K_RIGHT))
+    picker.handle_event(key(pygame.K_DOWN))
+    assert picker.handle_event(key(pygame.K_RETURN)) == files[1 + columns][1]
     for _ in range(30):
-        picker.handle(key(pygame.K_LEFT))
-    assert picker.handle(key(pygame.K_KP_ENTER)) == files[0][1]
-    picker.handle(key(pygame.K_END))
-    assert picker.handle(key(pygame.K_RETURN)) == files[-1][1]
+        picker.handle_event(key(pygame.K_LEFT))
+    assert picker.handle_event(key(pygame.K_KP_ENTER)) == files[0][1]
+    picker.handle_event(key(pygame.K_END))
+    assert picker.handle_event(key(pygame.K_RETURN)) == files[-1][1]
 
 
 def test_chosen_card_is_scrolled_into_sight(files: list[tuple[str, Path]]) -> None:
     picker = drawn(files, (400, 400))
-    picker.handle(key(pygame.K_END))
+    picker.handle_event(key(pygame.K_END))
     picker.draw(pygame.Surface((400, 400)), 1.0)
     assert picker._places[-1][1].bottom <= 400
 
@@ -102,10 +102,10 @@ def test_typing_filters_by_title_and_about(files: list[tuple[str, Path]]) -> Non
     picker = drawn(files)
     typed(picker, "ODD scene 1")
     assert [card.title for card in picker.shown] == ["Scene 1", "Scene 11"]
-    assert picker.handle(key(pygame.K_RETURN)) == files[1][1]
-    picker.handle(key(pygame.K_BACKSPACE))
+    assert picker.handle_event(key(pygame.K_RETURN)) == files[1][1]
+    picker.handle_event(key(pygame.K_BACKSPACE))
     assert len(picker.shown) == 6
-    picker.handle(key(pygame.K_BACKSPACE, pygame.KMOD_LCTRL))
+    picker.handle_event(key(pygame.K_BACKSPACE, pygame.KMOD_LCTRL))
     assert len(picker.shown) == len(files)
 
 
@@ -114,31 +114,31 @@ def test_scene_that_is_called_as_typed_comes_first(files: list[tuple[str, Path]]
     picker = drawn([files[10], files[11], files[1]])
     typed(picker, text)
     assert [card.title for card in picker.shown] == ["Scene 1", "Scene 10", "Scene 11"]
-    assert picker.handle(key(pygame.K_RETURN)) == files[1][1]
+    assert picker.handle_event(key(pygame.K_RETURN)) == files[1][1]
 
 
 def test_enter_chooses_nothing_where_nothing_fits(files: list[tuple[str, Path]]) -> None:
     picker = drawn(files)
     typed(picker, "teapot")
     picker.draw(pygame.Surface((900, 700)), 1.0)
-    assert picker.handle(key(pygame.K_RETURN)) is None
+    assert picker.handle_event(key(pygame.K_RETURN)) is None
     assert not picker.closed
 
 
 def test_click_chooses_the_card_below(files: list[tuple[str, Path]]) -> None:
     picker = drawn(files)
-    assert picker.handle(press(*place(picker, 2))) is None
-    assert picker.handle(release(*place(picker, 2))) == files[2][1]
-    picker.handle(press(*place(picker, 2)))
-    assert picker.handle(release(*place(picker, 3))) is None
-    picker.handle(move(*place(picker, 4)))
+    assert picker.handle_event(press(*place(picker, 2))) is None
+    assert picker.handle_event(release(*place(picker, 2))) == files[2][1]
+    picker.handle_event(press(*place(picker, 2)))
+    assert picker.handle_event(release(*place(picker, 3))) is None
+    picker.handle_event(move(*place(picker, 4)))
     assert picker.chosen == 4
 
 
 def test_wheel_scrolls(files: list[tuple[str, Path]]) -> None:
     picker = drawn(files, (400, 400))
     top = picker._places[0][1].top
-    picker.handle(wheel(-1))
+    picker.handle_event(wheel(-1))
     picker.draw(pygame.Surface((400, 400)), 1.0)
     assert picker._places[0][1].top < top
 
@@ -146,14 +146,14 @@ def test_wheel_scrolls(files: list[tuple[str, Path]]) -> None:
 @pytest.mark.parametrize("event", [key(pygame.K_ESCAPE), key(pygame.K_o, pygame.KMOD_LCTRL)])
 def test_escape_and_its_own_key_close(files: list[tuple[str, Path]], event: pygame.event.Event) -> None:
     picker = SceneBrowser(files)
-    assert picker.handle(event) is None
+    assert picker.handle_event(event) is None
     assert picker.closed
 
 
 @pytest.mark.parametrize("size", [(1, 1), (30, 20), (200, 150), (640, 480)])
 def test_picker_is_drawn_on_any_size(files: list[tuple[str, Path]], size: tuple[int, int]) -> None:
     picker = drawn(files, size, 5)
-    assert picker.handle(key(pygame.K_DOWN)) is None
+    assert picker.handle_event(key(pygame.K_DOWN)) is None
     drawn([], size, 2)
 
 

@@ -21,44 +21,44 @@ def drawn(start: float = 0.0, now: float = 5.0, end: float = 10.0) -> Timeline:
 
 
 def test_press_in_the_middle_asks_for_the_middle() -> None:
-    asked = drawn().handle(press(AREA.centerx, AREA.centery), AREA)
+    asked = drawn().handle_event(press(AREA.centerx, AREA.centery), AREA)
     assert asked == pytest.approx(5.0, abs=0.02)  # a pixel of the line is 0.02 s or less
 
 
 def test_ends_are_exact_and_the_drag_holds_outside() -> None:
     timeline = drawn(start=0.1, end=9.7)
-    assert timeline.handle(press(*AREA.center), AREA) is not None
+    assert timeline.handle_event(press(*AREA.center), AREA) is not None
     assert timeline.held
-    assert timeline.handle(move(-500, 900, held=True), AREA) == 0.1
-    assert timeline.handle(move(5000, -900, held=True), AREA) == 9.7
-    assert timeline.handle(release(5000, -900), AREA) == 9.7
+    assert timeline.handle_event(move(-500, 900, held=True), AREA) == 0.1
+    assert timeline.handle_event(move(5000, -900, held=True), AREA) == 9.7
+    assert timeline.handle_event(release(5000, -900), AREA) == 9.7
     assert not timeline.held
 
 
 def test_press_and_release_at_once_ask_for_one_time() -> None:
     timeline = drawn()
-    asked = timeline.handle(press(300, 110), AREA)
-    assert asked == timeline.handle(release(300, 110), AREA)
-    assert timeline.handle(move(400, 110), AREA) is None
+    asked = timeline.handle_event(press(300, 110), AREA)
+    assert asked == timeline.handle_event(release(300, 110), AREA)
+    assert timeline.handle_event(move(400, 110), AREA) is None
 
 
 def test_press_outside_and_other_buttons_ask_for_nothing() -> None:
     timeline = drawn()
     for event in (press(300, 50), press(300, 110, button=3), move(300, 110), release(300, 110)):
-        assert timeline.handle(event, AREA) is None
+        assert timeline.handle_event(event, AREA) is None
     assert not timeline.held
 
 
 def test_lost_focus_ends_the_drag() -> None:
     timeline = drawn()
-    timeline.handle(press(300, 110), AREA)
-    timeline.handle(FOCUS_LOST, AREA)
+    timeline.handle_event(press(300, 110), AREA)
+    timeline.handle_event(FOCUS_LOST, AREA)
     assert not timeline.held
 
 
 def test_session_without_length_has_one_time() -> None:
     timeline = drawn(0.0, 0.0, 0.0)
-    assert timeline.handle(press(300, 110), AREA) == 0.0
+    assert timeline.handle_event(press(300, 110), AREA) == 0.0
 
 
 def test_keyframes_are_marked_where_they_lie() -> None:
@@ -70,7 +70,7 @@ def test_keyframes_are_marked_where_they_lie() -> None:
 
 def test_hover_shows_the_time_above_the_bar() -> None:
     timeline = drawn()
-    timeline.handle(move(*AREA.center), AREA)
+    timeline.handle_event(move(*AREA.center), AREA)
     surface = pygame.Surface((620, 150))
     timeline.draw(surface, AREA, 0.0, 5.0, 10.0)
     assert pygame.surfarray.array3d(surface)[:, : AREA.top].any()
@@ -86,7 +86,7 @@ def test_any_times_are_drawn_and_asked_times_lie_between(
     area = pygame.Rect(0, 0, width, height)
     timeline = Timeline()
     timeline.draw(pygame.Surface((300, 90)), area, start, now, end, keyframes, 1.5)
-    asked = timeline.handle(press(width // 2, height // 2), area)
+    asked = timeline.handle_event(press(width // 2, height // 2), area)
     assert asked is not None
     low = start if math.isfinite(start) else 0.0
     high = max(end if math.isfinite(end) else 0.0, low)

@@ -1,0 +1,117 @@
+"""GUI: work that a frame must not repeat while nothing changes, counted by calls."""
+
+from pathlib import Path
+from typing import Any
+
+import pygame
+import pytest
+from pressing import press, release
+from windowed import turned, window_on
+
+from sandbox.scene.files.shipped_scenes import find
+from sandbox.window.app import App
+from sandbox.window.app_state import AppState
+from sandbox.window.playback.parameters import SessionParameters
+from sandbox.window.ui import gui
+from sandbox.window.ui.panel import SidePanel
+
+ROOM = """
+[world]
+duration = 60.0
+[[ball]]
+name = "ball"
+position = [0.0, 1.0]
+radius = 0.4
+[play]
+relaunch = "rain"
+[[scatter]]
+name = "rain"
+count = 2
+radius = 0.1
+within = [[-3.0, 2.0], [3.0, 4.0]]
+"""
+
+
+def count_calls(monkeypatch: pytest.MonkeyPatch, owner: object, name: str) -> list[str]:
+    """Return a list that grows with every call."""
+    calls: list[str] = []
+    original: Any = getattr(owner, name)
+
+    def counted(*arguments: Any, **named: Any) -> Any:
+        calls.append(name)
+        return original(*arguments, **named)
+
+    monkeypatch.setattr(owner, name, counted)
+    return calls
+
+
+def open_game(name: str, folder: Path) -> App:
+    window = App(AppState(), size=(1280, 720), folder=folder, say=lambda _: None)
+    assert window.stage.open(find(name))
+    return window
+
+
+def test_key_bindings_are_computed_once_a_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = count_calls(monkeypatch, gui, "key_bindings")
+    with window_on(ROOM, tmp_path) as window:
+        for _ in range(3):
+            turned(window, press(100, 100), release(100, 100))
+        assert len(calls) == 1
+        assert window.gui.claimed_keys(window.stage) == {pygame.K_SPACE}
+
+
+def test_keys_are_announced_once_a_scene_and_not_by_a_restart(tmp_path: Path) -> None:
+    with window_on(ROOM, tmp_path) as window:
+        assert window.stage.messages.shown() == (("info", "Space: relaunch rain"),)
+        window.stage.messages = type(window.stage.messages)()
+        turned(window)
+        window.stage.restart()
+        turned(window)
+        assert window.stage.messages.shown() == ()
+
+
+def test_score_panel_is_laid_out_once_for_what_it_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = count_calls(monkeypatch, gui, "layout_score")
+    window = open_game("duel", tmp_path)
+    try:
+        window.turn(0.0)
+        calls.clear()
+        window.turn(0.0)
+        assert not calls
+        window.gui.panel.visible = False  # more room
+        window.turn(0.0)
+        assert len(calls) == 1
+    finally:
+        window.close()
+
+
+def test_parameters_are_asked_for_only_after_a_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = count_calls(monkeypatch, SessionParameters, "of")
+    shown = count_calls(monkeypatch, SidePanel, "show")
+    with window_on(ROOM, tmp_path, (1280, 720)) as window:
+        turned(window)
+        asked.clear()
+        shown.clear()
+        turned(window)
+        turned(window)
+        assert (asked, shown) == ([], [])
+        window.stage.paused = True  # another button
+        turned(window)
+        assert len(shown) == 1
+        live = window.stage.live
+        assert live is not None
+        window.stage.turn("gravity", -3.0)
+        turned(window)
+        assert len(asked) == 2
+        gravity = next(each for each in window.gui.panel.widgets if getattr(each, "parameter", None))
+        assert gravity.parameter.value == -3.0  # type: ignore[attr-defined]  # it has a parameter
+
+
+def test_widget_shows_the_present_value_again_after_a_refused_change(tmp_path: Path) -> None:
+    with window_on(ROOM, tmp_path, (1280, 720)) as window:
+        turned(window)
+        window.gui.panel.on_change = lambda *_: None  # as if it were refused
+        gravity = next(each for each in window.gui.panel.widgets if getattr(each, "parameter", None))
+        x, y = gravity.rect.left + window.gui.area.width + 5, gravity.rect.centery
+        turned(window, press(x, y), release(x, y))
+        assert gravity.value == gravity.parameter.value  # type: ignore[attr-defined]  # it has a parameter
