@@ -17,18 +17,21 @@ from sandbox.window.ui.panel import SidePanel
 
 ROOM = """
 [world]
+gravity = [0.0, -9.8]
 duration = 60.0
 [[ball]]
 name = "ball"
 position = [0.0, 1.0]
 radius = 0.4
+[[emitter]]
+name = "spark"
+position = [1.0, 0.0]
+count = 3
+velocity_min = [-1.0, -1.0]
+velocity_max = [1.0, 1.0]
+radius = 0.05
 [play]
-relaunch = "rain"
-[[scatter]]
-name = "rain"
-count = 2
-radius = 0.1
-within = [[-3.0, 2.0], [3.0, 4.0]]
+relaunch = "spark"
 """
 
 
@@ -62,7 +65,7 @@ def test_key_bindings_are_computed_once_a_scene(tmp_path: Path, monkeypatch: pyt
 
 def test_keys_are_announced_once_a_scene_and_not_by_a_restart(tmp_path: Path) -> None:
     with window_on(ROOM, tmp_path) as window:
-        assert window.stage.messages.shown() == (("info", "Space: relaunch rain"),)
+        assert window.stage.messages.shown() == (("info", "Space: relaunch spark"),)
         window.stage.messages = type(window.stage.messages)()
         turned(window)
         window.stage.restart()
