@@ -3,6 +3,7 @@
 import re
 import sys
 import threading
+from itertools import pairwise
 from pathlib import Path
 
 import imageio_ffmpeg
@@ -13,7 +14,7 @@ from films import gif_frames, mp4_frames
 from PIL import Image
 
 from sandbox.window.capture import recorder as capture
-from sandbox.window.capture.gif import FAR, PaletteQuantiser
+from sandbox.window.capture.gif import MAX_ERROR, PaletteQuantiser
 from sandbox.window.capture.image_files import CaptureError, fit_image, offscreen, rgb_pixels, safe_stem
 from sandbox.window.capture.recorder import Recorder, recorder_for, recorder_in, screenshot, size_within
 
@@ -169,7 +170,7 @@ def test_gif_of_many_colours_stays_close_and_does_not_flicker(tmp_path: Path) ->
         recorder.add(surface, 0.04)
     frames, _ = gif_frames(recorder.close())
     away = np.abs(frames[0][6:] - ramp[6:]).max()
-    assert away <= FAR  # 5,000 colours in 255 entries
+    assert away <= MAX_ERROR  # 5,000 colours in 255 entries
     for frame in frames[1:]:
         assert np.array_equal(frame[6:], frames[0][6:])  # what does not change keeps its very colour
 
@@ -185,9 +186,29 @@ def test_gif_gets_a_new_palette_for_new_colours(tmp_path: Path) -> None:
 
 
 def test_palette_is_kept_where_it_serves() -> None:
-    colours = PaletteQuantiser(255)
-    renewed = [colours.reduce(rgb_pixels(picture(x), SIZE))[2] for x in (20, 30, 40)]
-    assert renewed == [True, False, False]
+    quantiser = PaletteQuantiser(255)
+    tables = []
+    for colour in (BALL, BALL, (255, 40, 40), BALL):
+        pixels = rgb_pixels(picture(colour=colour), SIZE)
+        index = quantiser.quantise(pixels, pixels)
+        tables.append(quantiser.table)
+        assert np.array_equal(tables[-1][index], pixels)
+    assert [now is before for before, now in pairwise(tables)] == [True, False, True]
+
+
+def test_gif_does_not_flicker_where_its_palette_is_renewed(tmp_path: Path) -> None:
+    rows, columns = np.mgrid[:54, :96]
+    ramp = np.stack((columns * 2, rows * 4, 255 - columns - rows), axis=-1).astype(np.uint8)
+    ramp[:20] = BACK
+    recorder = recorder_for(tmp_path / "film.gif", SIZE, 30.0)
+    for colour in ((255, 255, 255), (255, 0, 0), (0, 255, 0)):  # none is near a colour of the ramp
+        surface = pygame.image.frombytes(ramp.tobytes(), SIZE, "RGB")
+        pygame.draw.rect(surface, colour, (10, 2, 16, 16))
+        recorder.add(surface, 0.04)
+    frames, _ = gif_frames(recorder.close())
+    for frame, colour in zip(frames, ((255, 255, 255), (255, 0, 0), (0, 255, 0)), strict=True):
+        assert tuple(frame[10, 15]) == colour
+        assert np.array_equal(frame[20:], frames[0][20:])
 
 
 def test_gif_has_a_limit_and_keeps_what_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
