@@ -163,7 +163,7 @@ class GameHost:
         if then is not None:
             return then
         score = f"{rules.score:,}" if isinstance(rules.score, int) else f"{rules.score:,.1f}"
-        board = ScoreDisplay(score.replace(",", " "), tuple(rules.display_lines()), rules.game_over)
+        board = ScoreDisplay(score, tuple(rules.display_lines()), rules.game_over)
         now = GameDisplay(board, rules.lit_lamps() if isinstance(rules, HasLamps) else frozenset())
         if not live.peeking:
             self._past.note(live.frame.time, live.end, now)

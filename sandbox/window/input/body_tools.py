@@ -207,7 +207,7 @@ def _beside_others(live: LiveView, made: Ball | Box) -> Ball | Box:
             there = [Hull(hull.corners + np.asarray(place), hull.radius) for hull in hulls]
             if is_free(live.scene, live.bodies, live.frame, there, made.layer):
                 return made.model_copy(update={"position": place})
-    raise ActionError("no room here; point at a free place")
+    raise ActionError("no room here; point at an empty spot")
 
 
 def count_changes(actions: Iterable[Action], moved_by_keys: str | None = None) -> int:

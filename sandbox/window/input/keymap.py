@@ -98,7 +98,9 @@ BINDINGS: tuple[Binding, ...] = (
     Binding((pygame.K_o, pygame.K_PERIOD), 0, Command.STEP, "step forward", "O or .", _TIME, ".", True),
     Binding((pygame.K_COMMA,), 0, Command.BACK, "step back", ",", _TIME, ",", True),
     Binding((pygame.K_r, pygame.K_BACKSPACE), 0, Command.RESTART, "restart", "R or Backspace", _TIME),
-    Binding((pygame.K_MINUS, pygame.K_KP_MINUS), 0, Command.SLOWER, "slower: 100, 80, 63 … %", "-", _TIME, "-", True),
+    Binding(
+        (pygame.K_MINUS, pygame.K_KP_MINUS), 0, Command.SLOWER, "slower: 80 %, 63 %, 50 % …", "-", _TIME, "-", True
+    ),
     Binding((pygame.K_EQUALS, pygame.K_PLUS, pygame.K_KP_PLUS), 0, Command.FASTER, "faster", "=", _TIME, "=+", True),
     Binding((pygame.K_LEFTBRACKET,), 0, Command.PREVIOUS, "previous scene", "[", _SCENE, "["),
     Binding((pygame.K_RIGHTBRACKET,), 0, Command.NEXT, "next scene", "]", _SCENE, "]"),

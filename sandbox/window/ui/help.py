@@ -19,7 +19,7 @@ LINE_STEP = 1.66
 """heights of a letter from line to line"""
 
 MOUSE = (
-    ("Wheel", "zoom about the cursor"),
+    ("Wheel", "zoom at the cursor"),
     ("Right-drag", "pan"),
     ("Left-drag", "pull a body"),
     ("Left-drag, paused", "move a body"),

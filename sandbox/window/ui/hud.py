@@ -55,7 +55,7 @@ def hud_rows(status: HudStatus) -> tuple[HudRow, ...]:
     found = [
         HudRow(title, bold=True, rank=4),
         HudRow(f"{status.engine}  ·  {status.settings}", FAINT, rank=1),
-        HudRow(f"step {status.step:,}   {format_time(status.time, step)}".replace(",", " "), mono=True, rank=0),
+        HudRow(f"step {status.step:,}   {format_time(status.time, step)}", mono=True, rank=0),
     ]
     if status.ended is not None:
         found.append(HudRow(f"ENDED: {status.ended} (R: restart)", WARNING, "triangle", bold=True, rank=2))

@@ -275,7 +275,7 @@ def test_panel_stays_in_what_is_free(size: tuple[int, int], over: str | None) ->
     surface = pygame.Surface(size)
     lines = tuple((f"label {k}", f"{10**k} m/s") for k in range(8))
     free = surface.get_rect()
-    board = ScoreDisplay("1 234 567", lines, over)
+    board = ScoreDisplay("1,234,567", lines, over)
     layout = layout_score(board, free, 100, 1.0)
     draw_score(surface, layout)
     rect = layout.rect

@@ -40,7 +40,7 @@ def texts(status: HudStatus) -> list[str]:
 
 
 def test_title_engine_settings_step_and_time_are_always_told() -> None:
-    assert texts(QUIET) == ["Bounce", "pymunk  ·  dt 10 ms · 1 × 10", "step 1 234   12.34 s"]
+    assert texts(QUIET) == ["Bounce", "pymunk  ·  dt 10 ms · 1 × 10", "step 1,234   12.34 s"]
 
 
 def test_pause_is_told_in_red_with_its_keys() -> None:

@@ -27,7 +27,7 @@ def test_help_names_every_key_of_the_table() -> None:
 
 def test_help_tells_what_the_mouse_does() -> None:
     mouse = dict(help_groups()[-1].lines)
-    assert mouse["Wheel"] == "zoom about the cursor"
+    assert mouse["Wheel"] == "zoom at the cursor"
     assert mouse["Right-drag"] == "pan"
     assert mouse["Left-drag"] == "pull a body"
     assert mouse["Left-drag, paused"] == "move a body"
