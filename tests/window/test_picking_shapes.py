@@ -206,7 +206,7 @@ def test_a_contact_of_a_box_is_shown_where_the_box_is_now(angle: float) -> None:
     camera = Camera((0.0, 0.0), 10.0, (100, 100))
     nobody = np.empty(0, np.int64)
     sight = Snapshot(which, which.bodies, start(which), contacts=stale)
-    view = DrawContext(pygame.Surface((100, 100)), camera, sight, 1.0, True, nobody, *(np.empty((0, 2)),) * 3)
+    view = DrawContext(pygame.Surface((100, 100)), camera, sight, 1.0, True, nobody, *(np.empty((0, 2)),) * 4)
     (place,), _ = contact_points(view)
     corners = [(5 + x * math.cos(angle) - y * math.sin(angle), x * math.sin(angle)) for x, y in ((-2, -1), (2, -1))]
     lowest = min(corners, key=lambda corner: corner[1])[0] if angle else 5.0

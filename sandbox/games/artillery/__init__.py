@@ -10,9 +10,11 @@ GAME = GameSpec(
         "artillery": "sandbox.games.artillery.scene:ARTILLERY",
     },
     bot="sandbox.games.artillery.bot:ArtilleryBot",
+    view="sandbox.games.artillery.view:ArtilleryView",
     environments=(
         Environment("ArtilleryDuel", "artillery/duel", 10),
         Environment("ArtilleryFour", "artillery/four", 10),
     ),
     needs_player="sandbox.games.artillery.scene:needs_player",
+    presents="sandbox.games.artillery.scene:presents",
 )

@@ -10,10 +10,19 @@ from typing import Literal
 import numpy as np
 
 from sandbox.action import Action, SetParameter
-from sandbox.games.artillery.battlefield import PAUSE, WEAPONS, Battlefield, Tank
+from sandbox.arrays import FloatArray
+from sandbox.games.artillery.ballistics import Flight, landing
+from sandbox.games.artillery.battlefield import PAUSE, WEAPONS, WHOLE, Battlefield, Tank
 from sandbox.games.artillery.bot_planner import BotPlanner, hit_probabilities
 from sandbox.games.artillery.shells import ArtilleryShot, Projectiles
 from sandbox.games.artillery.targeting import FiringSolution
+from sandbox.games.artillery.view_state import (
+    EXPLOSION_DURATION,
+    ArtilleryViewState,
+    ExplosionView,
+    FallingDirt,
+    GunView,
+)
 from sandbox.games.contract import Control, StepInfo
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.scene import Scene
@@ -104,6 +113,13 @@ HEIGHTS = 33
 AIR = frozenset({"gravity", "wind", "linear_drag", "quadratic_drag"})
 """Of the world, what decides how shells fly."""
 
+TRACER_STEP = 0.03
+"""s between two points of the tracer"""
+MAX_TRACER_TIME = 10.0
+"""s, length of the tracer of a shot that does not land"""
+TIME_ROUNDING = 1e-9
+"""s"""
+
 Phase = Literal["begin", "aim", "fly", "settle"]
 """Of a turn: the next player gets the gun, aims it; shells are in the air; ground and tanks come to rest."""
 
@@ -126,7 +142,7 @@ class ArtilleryRules:
         """counted from 1, of all players together"""
         self.phase: Phase = "begin"
         self._gunner = GunControls()
-        self._time, self._since, self._number = 0.0, 0.0, 0
+        self._time, self._previous_time, self._since, self._number = 0.0, 0.0, 0.0, 0
         self._thought: BotPlanner | None = None  # of a bot whose turn it is
         self._aim: FiringSolution | None = None
         self._over: str | None = None
@@ -186,7 +202,8 @@ class ArtilleryRules:
 
     def on_step(self, info: StepInfo) -> Sequence[Action]:
         """Go on with the turn: aim as long as keys are held, follow what flies, wait until all is still."""
-        passed, self._time = info.time - self._time, info.time
+        passed = info.time - self._time
+        self._previous_time, self._time = self._time, info.time
         self._breathe(info.actions)
         self.barrage.know(info)
         self.field.tanks.see(info.frame)
@@ -239,6 +256,62 @@ class ArtilleryRules:
         found += [("landed x", -1.0 if last is None else last[0])]
         heights = field.ground.surface(np.linspace(0.0, field.ground.width, HEIGHTS))
         return [*found, *((f"height {k}", height) for k, height in enumerate(heights.tolist()))]
+
+    def view_state(self, time: float) -> ArtilleryViewState:
+        """Return what is drawn at a time, s; of the past, guns alone as they are now: the rules know no more of it."""
+        tanks = self.field.tanks
+        if time < self._previous_time - TIME_ROUNDING:
+            guns = [GunView(tank.number, tank.name, tank.angle, tank.power, None, aiming=False) for tank in tanks.every]
+            return ArtilleryViewState(tuple(guns), tanks.size, wind=None)
+        aiming = self.phase == "aim" and self._over is None
+        shot = self.shots[-1] if self.shots else None
+        return ArtilleryViewState(
+            guns=tuple(
+                GunView(
+                    number=tank.number,
+                    name=tank.name,
+                    angle=tank.angle,
+                    power=tank.power,
+                    health=tank.health / WHOLE,
+                    aiming=aiming and tank is self.shooter,
+                )
+                for tank in tanks.alive
+            ),
+            size=tanks.size,
+            wind=self.world.wind[0],
+            ways=tuple(np.asarray(way) for way in self.barrage.ways.values() if len(way) > 1),
+            flying=tuple(shell.number for shell in self.barrage.shells if shell.number is not None),
+            bursts=tuple(
+                ExplosionView(max(time - each.time, 0.0), each.place, each.radius, each.dirt)
+                for each in self.field.blasts
+                if time - each.time <= EXPLOSION_DURATION
+            ),
+            clods=self._falling_dirt(time),
+            tracer=self._tracer() if aiming and self.artillery.tracer else None,
+            landed=None if shot is None or shot.place is None or shot.exact is None else (shot.place, shot.exact),
+        )
+
+    def _falling_dirt(self, time: float) -> tuple[FallingDirt, ...]:
+        """Return the dirt in the air at a time, s. It falls freely, without drag."""
+        ground, gravity = self.field.ground, math.hypot(*self.world.gravity)
+        dirt = []
+        for since, loose in self.field.falling:
+            fallen = 0.5 * gravity * max(time - since, 0.0) ** 2
+            for each in loose:
+                if fallen < each.drop:
+                    left = each.column * ground.each
+                    bottom, top = each.bottom - fallen, each.top - fallen
+                    dirt.append(FallingDirt(left, left + ground.each, bottom, top, each.bottom - each.drop))
+        return tuple(dirt)
+
+    def _tracer(self) -> FloatArray:
+        """Return the path of a shot with the present setting of the gun, up to the terrain or the first side."""
+        tank, field = self.shooter, self.field
+        start = field.tanks.muzzle(tank).at(np.array([tank.angle]))[0]
+        velocity = self.speed(tank) * np.array([math.cos(tank.angle), math.sin(tank.angle)])
+        flight, impact = Flight(self.world, start, velocity), landing(self.world, start, velocity, field.ground)
+        end = impact.time if impact is not None else MAX_TRACER_TIME
+        return np.stack([flight.at(float(time))[0] for time in np.arange(0.0, end, TRACER_STEP)])
 
     def sounds(self) -> Sequence[str]:
         """Return the sounds since the last call."""

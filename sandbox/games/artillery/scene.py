@@ -346,3 +346,8 @@ def needs_player(scene: Scene) -> str | None:
     if name is None:
         return None
     return f"player 'none' fires no gun, so {name} would never play; use random, skilled or a script"
+
+
+def presents(scene: Scene) -> bool:
+    """Return whether a scene is drawn as artillery: it has players."""
+    return table_of(scene, Artillery) is not None

@@ -12,25 +12,25 @@ Fire: ways of shells, blasts, dirt in the air, and the wind.
 """
 
 import math
-from dataclasses import replace
 from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 import pygame
 
-from sandbox.arrays import FloatArray
-from sandbox.games.artillery.ballistics import Flight, landing
-from sandbox.games.artillery.battlefield import WHOLE
-from sandbox.games.artillery.rules import ArtilleryRules
+from sandbox.arrays import FloatArray, IntArray
 from sandbox.games.artillery.scene import GROUND, Artillery, displaced
-from sandbox.games.artillery.view_state import ArtilleryViewState, ExplosionView, FallingDirt, GunView
-from sandbox.games.contract import Rules
+from sandbox.games.artillery.view_state import (
+    EXPLOSION_DURATION,
+    ArtilleryViewState,
+    ExplosionView,
+    FallingDirt,
+    GunView,
+)
 from sandbox.scene.description.fixed import Wall
 from sandbox.scene.description.game_tables import table_of
 from sandbox.scene.scene import Scene
 from sandbox.window.camera import Camera
-from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.draw_context import DrawContext
 from sandbox.window.render.lines import Pixel, draw_arrow, draw_dashes, draw_line, fill_polygon
 from sandbox.window.render.palette import (
@@ -43,6 +43,7 @@ from sandbox.window.render.palette import (
     WARNING,
     YELLOW,
     Colour,
+    ColourArray,
     hex_colour,
     mix_colours,
 )
@@ -322,89 +323,6 @@ def _sides(surface: pygame.Surface, camera: Camera, scene: Scene, wall: Wall, un
             draw_dashes(surface, [((px, foot), (px, -1.0))], FAINT, 9.0 * unit, antialias)
 
 
-EXPLOSION_DURATION = 0.7
-"""s that a blast is seen"""
-TRACER_STEPS = 0.03
-"""s between two points of a tracer"""
-MAX_TRACER_POINTS = 10.0
-"""s, of a shot that comes down nowhere"""
-
-
-def add_artillery(rules: Rules, sight: Snapshot, present: bool = True) -> Snapshot:
-    """Return a sight with what a game adds to it; of other games than artillery the sight as it is.
-
-    Args:
-        rules: as they stand.
-        sight: of the scene.
-        present: the sight is of now. The rules know no other time: then all that they add is what tanks look like.
-    """
-    if not isinstance(rules, ArtilleryRules):
-        return sight
-    if present:
-        return replace(sight, gunnery=artillery_view_state(rules, sight.frame.time))
-    tanks = rules.field.tanks
-    guns = tuple(GunView(tank.number, tank.name, tank.angle, tank.power, None, aiming=False) for tank in tanks.every)
-    return replace(sight, gunnery=ArtilleryViewState(guns, tanks.size, wind=None))
-
-
-def artillery_view_state(rules: ArtilleryRules, time: float) -> ArtilleryViewState:
-    """Return what is drawn at a time, s."""
-    field, barrage = rules.field, rules.barrage
-    aiming = rules.phase == "aim" and rules.game_over is None
-    guns = tuple(
-        GunView(
-            number=tank.number,
-            name=tank.name,
-            angle=tank.angle,
-            power=tank.power,
-            health=tank.health / WHOLE,
-            aiming=aiming and tank is rules.shooter,
-        )
-        for tank in field.tanks.alive
-    )
-    shot = rules.shots[-1] if rules.shots else None
-    landed = None if shot is None or shot.place is None or shot.exact is None else (shot.place, shot.exact)
-    return ArtilleryViewState(
-        guns=guns,
-        size=field.tanks.size,
-        wind=rules.world.wind[0],
-        ways=tuple(np.asarray(way) for way in barrage.ways.values() if len(way) > 1),
-        flying=tuple(shell.number for shell in barrage.shells if shell.number is not None),
-        bursts=tuple(
-            ExplosionView(max(time - each.time, 0.0), each.place, each.radius, each.dirt)
-            for each in field.blasts
-            if time - each.time <= EXPLOSION_DURATION
-        ),
-        clods=_clods(rules, time),
-        tracer=_tracer(rules) if aiming and rules.artillery.tracer else None,
-        landed=landed,
-    )
-
-
-def _clods(rules: ArtilleryRules, time: float) -> tuple[FallingDirt, ...]:
-    """Return the dirt that is in the air: it falls freely, whatever the air."""
-    ground, pull = rules.field.ground, math.hypot(*rules.world.gravity)
-    clods = []
-    for since, loose in rules.field.falling:
-        fallen = 0.5 * pull * max(time - since, 0.0) ** 2
-        for each in loose:
-            if fallen < each.drop:
-                left = each.column * ground.each
-                bottom, top = each.bottom - fallen, each.top - fallen
-                clods.append(FallingDirt(left, left + ground.each, bottom, top, each.bottom - each.drop))
-    return tuple(clods)
-
-
-def _tracer(rules: ArtilleryRules) -> FloatArray | None:
-    """Return the way of a shot as the gun is set now, as far as the first side or the ground."""
-    tank, field = rules.shooter, rules.field
-    start = field.tanks.muzzle(tank).at(np.array([tank.angle]))[0]
-    velocity = rules.speed(tank) * np.array([math.cos(tank.angle), math.sin(tank.angle)])
-    flight, down = Flight(rules.world, start, velocity), landing(rules.world, start, velocity, field.ground)
-    until = down.time if down is not None else MAX_TRACER_POINTS
-    return np.stack([flight.at(float(time))[0] for time in np.arange(0.0, until, TRACER_STEPS)])
-
-
 SMOKE: Colour = (214, 206, 200)
 FLAME: tuple[Colour, ...] = ((255, 250, 222), (255, 204, 92), (238, 116, 48), (96, 62, 58))
 """From the beginning of a blast to its end."""
@@ -426,7 +344,7 @@ def draw_below(view: DrawContext, gunnery: ArtilleryViewState) -> None:
 
 
 def draw_above(view: DrawContext, gunnery: ArtilleryViewState) -> None:
-    """Draw what lies in front of all: shells, blasts, where the last shot came down, and the wind."""
+    """Draw what lies in front of all: shells, blasts, and where the last shot came down."""
     frame = view.sight.frame
     for number in gunnery.flying:
         if number < len(frame.position) and frame.present[number]:
@@ -437,8 +355,6 @@ def draw_above(view: DrawContext, gunnery: ArtilleryViewState) -> None:
         _burst(view, burst)
     if gunnery.landed is not None and not gunnery.flying:
         _landed(view, gunnery.landed)
-    if gunnery.wind is not None:
-        _wind(view, gunnery.wind)
 
 
 def _way(view: DrawContext, way: FloatArray, flying: bool) -> None:
@@ -523,3 +439,41 @@ def _wind(view: DrawContext, wind: float) -> None:
         draw_arrow(
             view.surface, begin, end, mix_colours(SKY, INK, 0.35), 4.0 * view.unit, view.antialias, edge=BACKGROUND
         )
+
+
+class ArtilleryView:
+    """Draws sky and terrain, tanks with their guns, shells, explosions, and the wind."""
+
+    def background(self, ctx: DrawContext) -> bool:
+        """Draw sky, terrain and static bodies."""
+        draw_land(ctx.surface, ctx.camera, ctx.sight.scene, ctx.unit, ctx.antialias)
+        return True
+
+    def below(self, ctx: DrawContext) -> None:
+        """Draw falling dirt, paths of shells and the tracer."""
+        if isinstance(ctx.sight.game, ArtilleryViewState):
+            draw_below(ctx, ctx.sight.game)
+
+    def bodies(self, ctx: DrawContext) -> IntArray:
+        """Draw the tanks."""
+        state = ctx.sight.game
+        if not isinstance(state, ArtilleryViewState):
+            return np.empty(0, np.int64)
+        tanks = [gun.number for gun in state.guns]
+        draw_tanks(ctx, state, {number: _rgb(ctx.body_colours[number]) for number in tanks})
+        return np.asarray(tanks, np.int64)
+
+    def above(self, ctx: DrawContext) -> None:
+        """Draw shells, explosions, and where the last shot landed."""
+        if isinstance(ctx.sight.game, ArtilleryViewState):
+            draw_above(ctx, ctx.sight.game)
+
+    def hud(self, ctx: DrawContext) -> None:
+        """Draw the wind."""
+        if isinstance(ctx.sight.game, ArtilleryViewState) and ctx.sight.game.wind is not None:
+            _wind(ctx, ctx.sight.game.wind)
+
+
+def _rgb(colour: ColourArray) -> Colour:
+    red, green, blue = colour.tolist()
+    return red, green, blue

@@ -1,9 +1,12 @@
-"""Gunnery: what is drawn of a game of artillery besides its bodies, as values."""
+"""ArtilleryViewState: values that the view of artillery draws besides the bodies."""
 
 from dataclasses import dataclass
 
 from sandbox.arrays import FloatArray
 from sandbox.scene.description.base import Point
+
+EXPLOSION_DURATION = 0.7
+"""s for which an explosion is drawn"""
 
 
 @dataclass(frozen=True)

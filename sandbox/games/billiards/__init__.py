@@ -19,4 +19,6 @@ from sandbox.games.spec import GameSpec
 GAME = GameSpec(
     names=("8-ball", "9-ball", "three-cushion", "straight-rail", "snooker", "free"),
     tables={"billiards": "sandbox.games.billiards.scene:BILLIARDS"},
+    view="sandbox.games.billiards.view.view:BilliardsView",
+    presents="sandbox.games.billiards.scene:presents",
 )

@@ -161,3 +161,8 @@ BILLIARDS = Preset(
     faults_of=faults_of,
     expanded=expanded,
 )
+
+
+def presents(scene: Scene) -> bool:
+    """Return whether a scene is drawn as billiards: it has a table, or a surface on which balls roll."""
+    return scene.play.area is not None or (scene.surface is not None and scene.surface.bodies != "pucks")

@@ -6,6 +6,8 @@ GAME = GameSpec(
     names=("curling",),
     rules="sandbox.games.curling.rules:Curling",
     tables={"play.curling": "sandbox.games.curling.scene:MATCH"},
+    view="sandbox.games.curling.view:CurlingView",
     environments=(Environment("Curling", "games/curling", 10),),
     needs_player="sandbox.games.curling.scene:needs_player",
+    presents="sandbox.games.curling.scene:presents",
 )

@@ -32,3 +32,8 @@ def needs_player(scene: Scene) -> str | None:
         "player 'none' delivers no stone, so nothing would move; use random or a script, or let both teams play by "
         "themselves with --set play.curling.people=0"
     )
+
+
+def presents(scene: Scene) -> bool:
+    """Return whether the bodies of a scene are drawn as stones: they are pucks on a surface."""
+    return scene.surface is not None and scene.surface.bodies == "pucks"

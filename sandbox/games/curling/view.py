@@ -1,7 +1,8 @@
-"""Pucks: flat discs on a floor, of stone, with a coloured top and a handle that shows how they have turned."""
+"""View of curling: stones of granite with a coloured top, and a handle that shows their angle."""
 
 import numpy as np
 
+from sandbox.arrays import IntArray
 from sandbox.window.render.circles import SHORTEST_SPOKE, CircleRenderer, darken
 from sandbox.window.render.draw_context import DrawContext
 from sandbox.window.render.lines import draw_line
@@ -38,3 +39,27 @@ def draw_stones(view: DrawContext, discs: CircleRenderer) -> None:
 def _pale(colour: list[int]) -> Colour:
     red, green, blue = (round(part + (255 - part) * PALE) for part in colour)
     return red, green, blue
+
+
+class CurlingView:
+    """Draws the stones; the ice is drawn as the ground of other scenes."""
+
+    def __init__(self) -> None:
+        self._discs = CircleRenderer()
+
+    def background(self, ctx: DrawContext) -> bool:  # noqa: ARG002
+        """Leave the ground to the renderer."""
+        return False
+
+    def below(self, ctx: DrawContext) -> None:
+        """Draw nothing."""
+
+    def bodies(self, ctx: DrawContext) -> IntArray:
+        """Draw the stones, if all bodies are round and larger than points."""
+        if ctx.has_points or not ctx.sight.bodies.round.all():
+            return np.empty(0, np.int64)
+        draw_stones(ctx, self._discs)
+        return ctx.shown
+
+    def above(self, ctx: DrawContext) -> None:
+        """Draw nothing."""

@@ -7,9 +7,11 @@ GAME = GameSpec(
     rules="sandbox.games.pinball.rules:Pinball",
     tables={"pinball": "sandbox.games.pinball.scene:PINBALL"},
     bot="sandbox.games.pinball.bot:PinballBot",
+    view="sandbox.games.pinball.view:PinballView",
     environments=(
         Environment("PinballClassic", "pinball/classic", 2),
         Environment("PinballFull", "pinball/full", 2),
     ),
     real_time=True,
+    presents="sandbox.games.pinball.scene:presents",
 )

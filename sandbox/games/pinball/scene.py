@@ -253,3 +253,8 @@ PINBALL = Preset(
     origins=origins,
     excludes=("billiards",),
 )
+
+
+def presents(scene: Scene) -> bool:
+    """Return whether a scene is drawn as a pinball table."""
+    return scene.play.ground == "playfield"

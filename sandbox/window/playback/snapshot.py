@@ -15,8 +15,6 @@ import numpy as np
 
 from sandbox.action import Throttle
 from sandbox.arrays import BoolArray, FloatArray
-from sandbox.games.artillery.view_state import ArtilleryViewState
-from sandbox.games.billiards.view.prediction import CueAim
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.joint_arrays import JointArrays
 from sandbox.scene.compile.potential import is_broken_at
@@ -137,10 +135,8 @@ class Snapshot:
     """where a body is held, and the hand that pulls it, m"""
     broken: Collection[int] = ()
     """numbers of the scene's joints that have broken by then"""
-    aim: CueAim | None = None
-    """of the next stroke, at a table"""
-    gunnery: ArtilleryViewState | None = None
-    """what is drawn of a game of artillery besides its bodies"""
+    game: object | None = None
+    """values that the `GameView` of the game draws, see `Rules.view_state`"""
     lit: frozenset[str] = frozenset()
     """names of the parts, `[[play.part]]`, whose lamps are lit"""
     below: float = 0.0

@@ -1,6 +1,6 @@
 """View: one picture in the making: where, of what, and which bodies are in it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pygame
@@ -30,14 +30,23 @@ class DrawContext:
     """(K,) px"""
     colours: ColourArray
     """(K, 3)"""
+    body_colours: ColourArray
+    """(N, 3) of all bodies, by index"""
+    has_points: bool = False
+    """whether the smallest bodies are drawn as points, below everything else"""
 
     def first(self, most: int) -> "DrawContext":
         """Return this view with no more than so many bodies, spread over all of them."""
         if len(self.shown) <= most:
             return self
         kept = np.linspace(0, len(self.shown) - 1, most).astype(np.intp)
-        parts = self.shown[kept], self.centre[kept], self.radius[kept], self.colours[kept]
-        return DrawContext(self.surface, self.camera, self.sight, self.unit, self.antialias, *parts)
+        return replace(
+            self,
+            shown=self.shown[kept],
+            centre=self.centre[kept],
+            radius=self.radius[kept],
+            colours=self.colours[kept],
+        )
 
     def inside(self, pixels: FloatArray, margin: float = 0.0) -> IntArray:
         """Return which places (K, 2) px lie in the picture or no more than a margin outside it; none that is nan."""

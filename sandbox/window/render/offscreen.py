@@ -1,15 +1,13 @@
 """Canvas: pictures of states as arrays, without a window."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 import pygame
 
 from sandbox.action import Throttle
-from sandbox.games.artillery.view import add_artillery
-from sandbox.games.contract import HasLamps, Rules
+from sandbox.games.contract import HasLamps, HasViewState, Rules
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
@@ -42,10 +40,9 @@ class OffscreenRenderer:
         """
         camera = Camera.fitting(view_bounds(scene), self._surface.get_size())
         lit = rules.lit_lamps() if isinstance(rules, HasLamps) else frozenset[str]()
-        seen = Snapshot(scene, bodies, frame, flames=active_thrusters(scene, bodies, throttles, frame.time), lit=lit)
-        sight = add_artillery(rules, seen)
-        if sight.gunnery is not None:
-            sight = replace(sight, gunnery=replace(sight.gunnery, wind=None))  # its sign is the window's
-        self._picture.draw(self._surface, camera, sight)
+        game = rules.view_state(frame.time) if isinstance(rules, HasViewState) else None
+        flames = active_thrusters(scene, bodies, throttles, frame.time)
+        sight = Snapshot(scene, bodies, frame, flames=flames, lit=lit, game=game)
+        self._picture.draw(self._surface, camera, sight, hud=False)
         self._inset.draw(self._surface, camera, sight, self._surface.get_rect())
         return np.ascontiguousarray(pygame.surfarray.array3d(self._surface).swapaxes(0, 1))

@@ -9,22 +9,16 @@ import numpy as np
 import pygame
 
 from sandbox.arrays import BoolArray, IntArray
-from sandbox.games.artillery.scene import Artillery
-from sandbox.games.artillery.view import draw_above, draw_below, draw_land, draw_tanks
-from sandbox.games.billiards.view.aim import draw_aim, draw_paths
-from sandbox.games.billiards.view.balls import BallRenderer
-from sandbox.games.billiards.view.table import draw_table
-from sandbox.games.curling.view import draw_stones
-from sandbox.games.pinball.view import LampRenderer, draw_lamps, draw_playfield
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import contact_matrix
-from sandbox.scene.description.game_tables import table_of
 from sandbox.scene.scene import Scene
 from sandbox.window.camera import Box, Camera
 from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.circles import CircleRenderer, draw_rotation_marks
 from sandbox.window.render.draw_context import DrawContext
+from sandbox.window.render.game_view import GameViews, HasHud
 from sandbox.window.render.grid import draw_grid, draw_scale
+from sandbox.window.render.lamps import LampRenderer, draw_lamps
 from sandbox.window.render.overlays import OverlayRenderer
 from sandbox.window.render.palette import BACKGROUND, CLEAR, INK, SKY, TOUCHING, ColourArray, colour_of, mix_colours
 from sandbox.window.render.particles import MAX_POINT_SIZE, LifetimeColours, Packed, ParticleRenderer, packed_pixels
@@ -80,9 +74,9 @@ class Renderer:
         self._discs = CircleRenderer()
         self._points = ParticleRenderer()
         self._polygons = PolygonRenderer()
-        self._balls = BallRenderer()
         self._decks = LayerRenderer()
         self._lamps = LampRenderer()
+        self._games = GameViews()
         self._overlays = OverlayRenderer(self._discs, self._points, self._polygons)
         self._background: tuple[CachedBackground, pygame.Surface] | None = None
         self._sizes: BodySizes | None = None
@@ -102,6 +96,7 @@ class Renderer:
         unit: float = 1.0,
         foot: float = 0.0,
         scale: bool = True,
+        hud: bool = True,
     ) -> None:
         """Draw one moment over the whole of a surface.
 
@@ -113,6 +108,7 @@ class Renderer:
             unit: px, of a line that is one pixel wide on a 1080p display; all widths and letters grow with it.
             foot: px at the lower edge that something else will cover.
             scale: draw the bar that tells how long things are.
+            hud: whether the view of a game may draw its signs over the picture.
         """
         self._blit_background(surface, camera, sight, antialias, unit)
         if sight.lit:
@@ -137,33 +133,28 @@ class Renderer:
             centre=camera.to_screen(sight.frame.position[shown]),
             radius=sight.bodies.radius[shown] * camera.scale,
             colours=tint,
+            body_colours=self._colours,
+            has_points=sizes.side > 0,
         )
+        game = self._games.view_of(sight.scene)
         self._overlays.below(view)
-        if sight.aim is not None:
-            draw_paths(view, sight.aim, self._colours)
-        if sight.gunnery is not None:
-            draw_below(view, sight.gunnery)
-        if "shapes" in sight.overlays and sight.scene.surface is not None and not sizes.side:
-            if sight.scene.surface.bodies == "pucks" and sight.bodies.round.all():
-                draw_stones(view, self._discs)
-            else:
-                self._balls.draw(view)
-        elif "shapes" in sight.overlays:
-            own = _drawn_otherwise(sight)
-            large = np.flatnonzero(~sizes.tiny[shown]) if sizes.side else None
-            if len(own):
-                others = np.flatnonzero(~np.isin(shown, own))
-                large = others if large is None else np.intersect1d(large, others)
-            self._draw_layers(view, large)
-            if sight.gunnery is not None:
-                draw_tanks(view, sight.gunnery, {n: tuple(self._colours[n].tolist()) for n in own.tolist()})
+        if game is not None:
+            game.below(view)
+        if "shapes" in sight.overlays:
+            drawn = np.empty(0, np.int64) if game is None else game.bodies(view)
+            which = np.flatnonzero(~sizes.tiny[shown]) if sizes.side else None
+            if len(drawn):
+                others = np.flatnonzero(~np.isin(shown, drawn))
+                which = others if which is None else np.intersect1d(which, others)
+            if which is None or len(which):
+                self._draw_layers(view, which)
         self._overlays.above(view)
-        if sight.aim is not None:
-            draw_aim(view, sight.aim)
-        if sight.gunnery is not None:
-            draw_above(view, sight.gunnery)
+        if game is not None:
+            game.above(view)
         if scale:
             draw_scale(surface, camera, unit, foot)
+        if hud and isinstance(game, HasHud):
+            game.hud(view)
 
     def _draw_layers(self, view: DrawContext, which: IntArray | None) -> None:
         """Draw the bodies that are no points, from the ground up, with what is fixed on each layer above it."""
@@ -254,20 +245,14 @@ class Renderer:
         if known is None or known[0].scene is not wanted.scene or known[0][1:] != wanted[1:]:
             drawn = pygame.Surface(surface.get_size(), 0, surface)
             drawn.fill(BACKGROUND)
-            area = sight.scene.play.area
-            if sight.scene.play.ground == "playfield":
-                draw_playfield(drawn, camera, sight.scene, unit, antialias)
-            elif table_of(sight.scene, Artillery) is not None:
-                draw_land(drawn, camera, sight.scene, unit, antialias)
-            elif area is None:
+            game = self._games.view_of(sight.scene)
+            if game is None or not game.background(_background_context(drawn, camera, sight, antialias, unit)):
                 draw_grid(drawn, camera, unit)
                 draw_markings(drawn, camera, sight.scene, unit, antialias)
                 draw_lamps(drawn, camera, sight.scene, unit, antialias)
                 draw_zones(drawn, camera, sight.scene, unit, antialias)
                 ground = sight.scene if len(sight.scene.layers) == 1 else on_layer(sight.scene, 0)
                 draw_static_bodies(drawn, camera, ground, unit, antialias)
-            else:
-                draw_table(drawn, camera, sight.scene, area, unit, antialias)
             if wanted.bounds:
                 draw_bounds(drawn, camera, sight.scene.world.bounds, unit, antialias)
             self._background = known = (wanted, drawn)
@@ -289,9 +274,23 @@ def _in_sight(camera: Camera, sight: Snapshot, among: IntArray | None) -> IntArr
     return seen if among is None else among[seen]
 
 
-def _drawn_otherwise(sight: Snapshot) -> IntArray:
-    """Return the numbers of the bodies that are more than their shapes: tanks."""
-    return np.asarray([] if sight.gunnery is None else [gun.number for gun in sight.gunnery.guns], np.int64)
+def _background_context(
+    surface: pygame.Surface, camera: Camera, sight: Snapshot, antialias: bool, unit: float
+) -> DrawContext:
+    """Return a context without bodies, for what is cached."""
+    none = np.empty((0, 3), np.uint8)
+    return DrawContext(
+        surface=surface,
+        camera=camera,
+        sight=sight,
+        unit=unit,
+        antialias=antialias,
+        shown=np.empty(0, np.int64),
+        centre=np.empty((0, 2)),
+        radius=np.empty(0),
+        colours=none,
+        body_colours=none,
+    )
 
 
 def _by_contact(overlapping: BoolArray, count: int) -> ColourArray:
@@ -348,7 +347,7 @@ class InsetRenderer:
             return None
         if self._surface is None or self._surface.get_size() != place.size:
             self._surface = pygame.Surface(place.size, 0, surface)
-        self._picture.draw(self._surface, near, sight, antialias=antialias, unit=unit, scale=False)
+        self._picture.draw(self._surface, near, sight, antialias=antialias, unit=unit, scale=False, hud=False)
         surface.blit(self._surface, place)
         thick = max(round(1.5 * unit), 1)
         pygame.draw.rect(surface, EDGE, place, thick)

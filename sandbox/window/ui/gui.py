@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import pygame
 
-from sandbox.games.artillery.view import add_artillery
 from sandbox.games.billiards.view.hud import BilliardsHud
 from sandbox.games.billiards.view.table_game import PLAYERS
+from sandbox.games.contract import HasViewState
 from sandbox.window.app_state import AppState, scenes_to_pick
 from sandbox.window.camera import Camera
 from sandbox.window.game_host import GameDisplay, ScoreDisplay
@@ -315,7 +315,9 @@ class Gui:
             snapshot = stage.gestures.seen.over(snapshot)
         if stage.host is not None and display is not None:
             snapshot = replace(snapshot, lit=display.lit)
-            snapshot = add_artillery(stage.host.rules, snapshot, present=not stage.host.live.peeking)
+            rules = stage.host.rules
+            if isinstance(rules, HasViewState):
+                snapshot = replace(snapshot, game=rules.view_state(snapshot.frame.time))
         status_plate = self._plates.get("state")
         if status_plate is not None:
             snapshot = replace(snapshot, below=float(status_plate.bottom))

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sandbox.games.pinball.view import RADIUS
 from sandbox.games.players import PlayerSpec
 from sandbox.measure.run import run
 from sandbox.scene.errors import SceneError
@@ -16,6 +15,7 @@ from sandbox.window.camera import Camera
 from sandbox.window.capture.export import RunRenderer
 from sandbox.window.capture.image_files import offscreen, rgb_pixels
 from sandbox.window.playback.recorded import RecordedRun
+from sandbox.window.render.lamps import RADIUS
 
 CLASSIC = Path(__file__).parents[3] / "scenes" / "pinball" / "classic.toml"
 

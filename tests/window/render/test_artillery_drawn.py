@@ -12,7 +12,7 @@ from windowed import turned, window_on
 from sandbox.action import Reshape
 from sandbox.games.artillery.rules import ArtilleryRules
 from sandbox.games.artillery.scene import course_of
-from sandbox.games.artillery.view import artillery_view_state, sky_image, sky_tone
+from sandbox.games.artillery.view import sky_image, sky_tone
 from sandbox.games.artillery.view_state import ArtilleryViewState, ExplosionView, FallingDirt
 from sandbox.games.players import NoInput
 from sandbox.games.session import HeadlessGame
@@ -30,6 +30,8 @@ from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.renderer import Renderer
 
 SIZE = (400, 240)
+AIM_TIME = 0.05
+"""s"""
 TEXT = """
 [world]
 gravity = [0.0, -9.81]
@@ -67,7 +69,7 @@ def drawn(scene: Scene, gunnery: ArtilleryViewState | None = None, camera: Camer
     columns = bodies.position, bodies.velocity, bodies.angle, bodies.angular_velocity
     frame = Frame(0.0, *(each.copy() for each in columns), np.ones(len(bodies), np.bool_))
     surface = offscreen(SIZE)
-    Renderer().draw(surface, camera, Snapshot(scene, bodies, frame, gunnery=gunnery))
+    Renderer().draw(surface, camera, Snapshot(scene, bodies, frame, game=gunnery))
     return pygame.surfarray.array3d(surface).astype(int)
 
 
@@ -107,7 +109,7 @@ def test_sides_that_hold_shells_are_seen(edges: str) -> None:
 def test_dirt_in_the_air_hangs_over_sky() -> None:
     scene = duel()
     rules = ArtilleryRules(scene, scene.bodies)
-    plain = artillery_view_state(rules, 0.0)
+    plain = rules.view_state(0.0)
     clod = FallingDirt(left=48.0, right=52.0, bottom=22.0, top=26.0, floor=8.0)
     falling = ArtilleryViewState(plain.guns, plain.size, 0.0, clods=(clod,))
     picture, above = drawn(scene, falling), pygame.surfarray.array3d(sky_image(SIZE)).astype(int)
@@ -120,7 +122,7 @@ def test_tanks_guns_blasts_and_wind_are_drawn_where_they_are() -> None:
     scene = duel()
     rules = ArtilleryRules(scene, scene.bodies)
     run_to_aim(rules, scene)
-    gunnery = artillery_view_state(rules, 0.0)
+    gunnery = rules.view_state(AIM_TIME)
     assert [gun.name for gun in gunnery.guns] == ["Red", "Blue"]
     assert [gun.aiming for gun in gunnery.guns] == [True, False]
     assert gunnery.tracer is not None
@@ -134,8 +136,18 @@ def test_tanks_guns_blasts_and_wind_are_drawn_where_they_are() -> None:
     assert bright.sum() > plain[pixel(50.0, 30.0)].sum()
 
 
+def test_of_the_past_guns_alone_are_known() -> None:
+    scene = duel()
+    rules = ArtilleryRules(scene, scene.bodies)
+    run_to_aim(rules, scene)
+    past, between = rules.view_state(0.0), rules.view_state(AIM_TIME - 0.5 * scene.solver.dt)
+    assert [(gun.name, gun.health, gun.aiming) for gun in past.guns] == [("Red", None, False), ("Blue", None, False)]
+    assert (past.wind, past.tracer) == (None, None)
+    assert between.wind is not None
+
+
 def run_to_aim(rules: ArtilleryRules, scene: Scene) -> None:
-    short = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": 0.05})})
+    short = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": AIM_TIME})})
     run(short, bout=HeadlessGame(rules, NoInput(), "none"))
     assert rules.phase == "aim"
 
@@ -148,7 +160,7 @@ def test_no_camera_is_too_far_or_too_near(centre: tuple[float, float], scale: fl
     run_to_aim(rules, scene)
     clods = (FallingDirt(48.0, 52.0, 22.0, 26.0, 8.0),)
     way = np.array([[20.0, 12.0], [1e9, 1e9], [60.0, 12.0]])
-    told = artillery_view_state(rules, 0.0)
+    told = rules.view_state(AIM_TIME)
     wild = ArtilleryViewState(
         told.guns, told.size, 900.0, (way,), (0,), (ExplosionView(0.2, (50.0, 1e12), 5.0, True),), clods, way
     )

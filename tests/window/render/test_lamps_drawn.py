@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from drawn import SIZE, ball, scene, sight
 
-from sandbox.games.pinball.view import GLOW, MAX_LAMP_RADIUS, RADIUS
+from sandbox.games.pinball import view
 from sandbox.scene.scene import Scene
 from sandbox.window.camera import Camera
 from sandbox.window.capture.image_files import offscreen
-from sandbox.window.render import renderer as drawing
+from sandbox.window.render.lamps import GLOW, MAX_LAMP_RADIUS, RADIUS
 from sandbox.window.render.renderer import Renderer
 
 SCALE = 1000.0
@@ -59,8 +59,8 @@ def test_only_lamps_of_those_names_are_lit() -> None:
 
 def test_ground_is_kept_while_lamps_change(monkeypatch: pytest.MonkeyPatch) -> None:
     drawn = []
-    once = drawing.draw_playfield
-    monkeypatch.setattr(drawing, "draw_playfield", lambda *args: (drawn.append(1), once(*args)))
+    once = view.draw_playfield
+    monkeypatch.setattr(view, "draw_playfield", lambda *args: (drawn.append(1), once(*args)))
     which, by = lamps(), Renderer()
     dark = seen(which, by=by)
     lit = seen(which, "post-1", by=by)

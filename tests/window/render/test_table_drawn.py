@@ -36,7 +36,7 @@ def frame_of(scene: Scene, position: np.ndarray | None = None, time: float = 0.0
 def drawn(scene: Scene, frame: Frame, aim: CueAim | None = None, turned: bool = True) -> tuple[np.ndarray, Camera]:
     camera = Camera.fitting(view_bounds(scene), SIZE, turned=turned)
     surface = pygame.Surface(SIZE)
-    Renderer().draw(surface, camera, Snapshot(scene, scene.bodies, frame, aim=aim))
+    Renderer().draw(surface, camera, Snapshot(scene, scene.bodies, frame, game=aim))
     return pygame.surfarray.array3d(surface).astype(int), camera
 
 

@@ -183,10 +183,10 @@ class BilliardsOverlay:
         """Return a sight with the aim of a game, and with the ball that a hand carries where the hand is."""
         aim = self.aim()
         if aim is None or not aim.carried:
-            return replace(sight, aim=aim)
+            return replace(sight, game=aim)
         position = sight.frame.position.copy()
         position[aim.ball] = aim.place
-        return replace(sight, aim=aim, frame=replace(sight.frame, position=position))
+        return replace(sight, game=aim, frame=replace(sight.frame, position=position))
 
     def aim(self) -> CueAim | None:
         """Return what is drawn of the next stroke; nothing while balls roll or the bot looks for its shot."""

@@ -1,0 +1,42 @@
+"""View of billiards: the table, balls that roll, and the aim of the next stroke."""
+
+import numpy as np
+
+from sandbox.arrays import IntArray
+from sandbox.games.billiards.view.aim import draw_aim, draw_paths
+from sandbox.games.billiards.view.balls import BallRenderer
+from sandbox.games.billiards.view.prediction import CueAim
+from sandbox.games.billiards.view.table import draw_table
+from sandbox.window.render.draw_context import DrawContext
+
+
+class BilliardsView:
+    """Draws tables, and balls on any surface on which they roll."""
+
+    def __init__(self) -> None:
+        self._balls = BallRenderer()
+
+    def background(self, ctx: DrawContext) -> bool:
+        """Draw the table; a surface without a table is drawn as the ground of other scenes."""
+        scene = ctx.sight.scene
+        if scene.play.area is None:
+            return False
+        draw_table(ctx.surface, ctx.camera, scene, scene.play.area, ctx.unit, ctx.antialias)
+        return True
+
+    def below(self, ctx: DrawContext) -> None:
+        """Draw the predicted paths."""
+        if isinstance(ctx.sight.game, CueAim):
+            draw_paths(ctx, ctx.sight.game, ctx.body_colours)
+
+    def bodies(self, ctx: DrawContext) -> IntArray:
+        """Draw the balls, if they are larger than points."""
+        if ctx.sight.scene.surface is None or ctx.has_points:
+            return np.empty(0, np.int64)
+        self._balls.draw(ctx)
+        return ctx.shown
+
+    def above(self, ctx: DrawContext) -> None:
+        """Draw the cue."""
+        if isinstance(ctx.sight.game, CueAim):
+            draw_aim(ctx, ctx.sight.game)

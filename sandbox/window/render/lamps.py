@@ -1,0 +1,122 @@
+"""Lamps: dark discs on the ground where a part of a game, `[[play.part]]`, has its light, and the glow of lit ones.
+
+The dark lamps belong to the background, which is cached; lit lamps are drawn over it as cached sprites.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import pygame
+
+from sandbox.scene.description.base import Point
+from sandbox.scene.description.play import PlayPart
+from sandbox.scene.scene import Scene
+from sandbox.window.camera import Camera
+from sandbox.window.render.lines import clip_segment
+from sandbox.window.render.palette import BACKGROUND, Colour, hex_colour, mix_colours
+from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
+
+AMBER: Colour = (255, 196, 84)
+WHITE: Colour = (255, 255, 255)
+RADIUS = 0.0065
+"""m"""
+GLOW, STRENGTH = 6.5, 0.75
+"""how far the light reaches, in radii of the lamp, and how much it adds beside it"""
+MAX_LAMP_RADIUS = 400.0
+"""px, radius of a lamp so near that its glow would cost more than it shows"""
+MAX_SPRITES = 64
+"""sprites that are kept"""
+
+
+class LampSprite(NamedTuple):
+    """A lit lamp."""
+
+    glow: pygame.Surface
+    """added to what is below it"""
+    bulb: pygame.Surface
+    """laid over it"""
+
+
+def draw_lamps(
+    surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True
+) -> None:
+    """Draw all the lamps of a scene as they are while nobody lights them."""
+    for part in scene.play.parts:
+        if part.light is not None:
+            colour = _colour(part)
+            look = ShapeStyle(
+                mix_colours(BACKGROUND, colour, 0.35), mix_colours(BACKGROUND, colour, 0.7), 1.2 * unit, 1.0, antialias
+            )
+            draw_spot(surface, camera, part.light, RADIUS, look)
+
+
+def draw_spot(surface: pygame.Surface, camera: Camera, at: Point, radius: float, look: ShapeStyle) -> None:
+    """Draw a disc on the ground, as far as it is in sight; place and radius in m."""
+    ((x, y),), size = camera.to_screen(np.asarray([at])).tolist(), radius * camera.scale
+    if clip_segment((x, y), (x, y), surface.get_clip(), size + 4.0) is None:
+        return
+    reach = min(size, 1e6)
+    low, high = (min(max(v - reach, -1e6), 1e6) for v in (x, y)), (min(max(v + reach, -1e6), 1e6) for v in (x, y))
+    (left, top), (right, bottom) = low, high
+    within = pygame.Rect(int(left) - 3, int(top) - 3, int(right - left) + 7, int(bottom - top) + 7)
+    draw_sdf(surface, disc_distance(x, y, size), look, within)
+
+
+class LampRenderer:
+    """Draws what is lit, and keeps the sprites."""
+
+    def __init__(self) -> None:
+        self._sprites: dict[tuple[Colour, float], LampSprite] = {}
+
+    def draw(self, surface: pygame.Surface, camera: Camera, scene: Scene, lit: frozenset[str]) -> None:
+        """Draw the lamps of the parts of these names."""
+        radius = max(RADIUS * camera.scale, 1.0)
+        if not lit or radius > MAX_LAMP_RADIUS:
+            return
+        for part in scene.play.parts:
+            if part.light is None or part.name not in lit:
+                continue
+            x, y = camera.to_screen(np.asarray(part.light)).tolist()
+            if clip_segment((x, y), (x, y), surface.get_clip(), GLOW * radius + 2.0) is None:
+                continue
+            glow, bulb = self._sprite(_colour(part), radius)
+            surface.blit(glow, glow.get_rect(center=(round(x), round(y))), special_flags=pygame.BLEND_RGB_ADD)
+            surface.blit(bulb, bulb.get_rect(center=(round(x), round(y))))
+
+    def _sprite(self, colour: Colour, radius: float) -> LampSprite:
+        known = self._sprites.get((colour, radius))
+        if known is None:
+            if len(self._sprites) >= MAX_SPRITES:  # of a zoom before
+                self._sprites.clear()
+            self._sprites[colour, radius] = known = LampSprite(_glow(colour, radius), _bulb(colour, radius))
+        return known
+
+
+def _colour(part: PlayPart) -> Colour:
+    return AMBER if part.colour is None else hex_colour(part.colour)
+
+
+def _distances(reach: float) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":
+    """Return the distance of each pixel of a sprite from its middle, px."""
+    side = 2 * int(np.ceil(reach)) + 1
+    along = np.arange(side) - side // 2
+    return np.hypot(along[:, None], along[None, :])
+
+
+def _glow(colour: Colour, radius: float) -> pygame.Surface:
+    """Return light that fades with the square of what is left to its reach."""
+    share = STRENGTH * np.maximum(1.0 - _distances(GLOW * radius) / (GLOW * radius), 0.0) ** 2
+    surface = pygame.Surface(share.shape, 0, 32)
+    pygame.surfarray.blit_array(surface, np.rint(share[:, :, None] * colour).astype(np.uint8))
+    return surface
+
+
+def _bulb(colour: Colour, radius: float) -> pygame.Surface:
+    """Return a disc that is nearly white in its middle."""
+    size = radius + 1.0  # to cover the rim of the dark one, wherever in its pixel that has its middle
+    away = _distances(size + 1.0)
+    surface = pygame.Surface(away.shape, pygame.SRCALPHA, 32)
+    white = (0.8 * (1.0 - np.minimum(away / size, 1.0) ** 2))[:, :, None]
+    pygame.surfarray.pixels3d(surface)[:] = np.rint(white * WHITE + (1.0 - white) * colour).astype(np.uint8)
+    pygame.surfarray.pixels_alpha(surface)[:] = np.rint(255.0 * np.clip(size + 0.5 - away, 0.0, 1.0)).astype(np.uint8)
+    return surface
