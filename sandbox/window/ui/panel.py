@@ -1,6 +1,6 @@
-"""Panel: the column at the right, with buttons, knobs and switches. It knows nothing of what they do.
+"""Side panel: a column of buttons, parameters and check boxes at the right of the window, and its layout.
 
-Layout: where the widgets of the panel lie, one below the other.
+The panel does not know what its widgets do: it reports their use through three callbacks.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -24,7 +24,7 @@ from sandbox.window.ui.widgets import (
 
 
 class PanelHeading(NamedTuple):
-    """The name of a section, above it."""
+    """Heading of a section."""
 
     text: str
     top: int
@@ -32,9 +32,9 @@ class PanelHeading(NamedTuple):
 
 
 class PanelLayout(NamedTuple):
-    """Places in the content, whose upper left corner is (0, 0); px."""
+    """Positions of all widgets in the content, whose upper left corner is (0, 0); px."""
 
-    places: tuple[tuple[Widget, pygame.Rect], ...]
+    rects: tuple[tuple[Widget, pygame.Rect], ...]
     """from top to bottom"""
     headings: tuple[PanelHeading, ...]
     height: int
@@ -42,79 +42,79 @@ class PanelLayout(NamedTuple):
 
 def arrange_widgets(
     buttons: Sequence[PushButton],
-    dials: Sequence[ParameterWidget],
-    switches: Sequence[Checkbox],
+    parameter_widgets: Sequence[ParameterWidget],
+    checkboxes: Sequence[Checkbox],
     width: int,
-    unit: float,
+    ui_scale: float,
 ) -> PanelLayout:
-    """Lay widgets out in a column of a width: buttons, then dials, then switches in two columns where they fit."""
-    pad = round(14 * unit)
-    column = pygame.Rect(pad, pad, max(width - 2 * pad - round(4 * unit), 1), 0)
-    places: list[tuple[Widget, pygame.Rect]] = []
+    """Lay widgets out in a column: buttons, parameters, then check boxes, in two columns if they fit."""
+    pad = round(14 * ui_scale)
+    column = pygame.Rect(pad, pad, max(width - 2 * pad - round(4 * ui_scale), 1), 0)
+    rects: list[tuple[Widget, pygame.Rect]] = []
     headings: list[PanelHeading] = []
     y = pad
     if buttons:
-        y = _lay_buttons(buttons, column, y, unit, places) + round(8 * unit)
-    if dials:
+        y = _layout_buttons(buttons, column, y, ui_scale, rects) + round(8 * ui_scale)
+    if parameter_widgets:
         headings.append(PanelHeading("Settings", y))
-        y += round(24 * unit)
-        for dial in dials:
-            high = round((27 if isinstance(dial, OptionButton) else 38) * unit)
-            places.append((dial, pygame.Rect(column.left, y, column.width, high - round(4 * unit))))
-            y += high
-        y += round(8 * unit)
-    if switches:
+        y += round(24 * ui_scale)
+        for widget in parameter_widgets:
+            height = round((27 if isinstance(widget, OptionButton) else 38) * ui_scale)
+            rects.append((widget, pygame.Rect(column.left, y, column.width, height - round(4 * ui_scale))))
+            y += height
+        y += round(8 * ui_scale)
+    if checkboxes:
         headings.append(PanelHeading("Show", y))
-        y = _lay_switches(switches, column, y + round(24 * unit), unit, places)
-    return PanelLayout(tuple(places), tuple(headings), y + pad // 2)
+        y = _layout_checkboxes(checkboxes, column, y + round(24 * ui_scale), ui_scale, rects)
+    return PanelLayout(tuple(rects), tuple(headings), y + pad // 2)
 
 
-def _lay_buttons(
+def _layout_buttons(
     buttons: Sequence[PushButton],
     column: pygame.Rect,
     y: int,
-    unit: float,
-    places: list[tuple[Widget, pygame.Rect]],
+    ui_scale: float,
+    rects: list[tuple[Widget, pygame.Rect]],
 ) -> int:
-    """Place buttons in as few rows of equal length as they fit into, and return where they end."""
-    least, gap, high = round(30 * unit), round(5 * unit), round(32 * unit)
-    most = max((column.width + gap) // (least + gap), 1)
-    rows = -(-len(buttons) // most)
-    across = -(-len(buttons) // rows)
-    wide = (column.width + gap) / across - gap
+    """Lay out buttons in the fewest rows of equal length; return the y below them."""
+    min_width, gap, height = round(30 * ui_scale), round(5 * ui_scale), round(32 * ui_scale)
+    max_per_row = max((column.width + gap) // (min_width + gap), 1)
+    rows = -(-len(buttons) // max_per_row)
+    per_row = -(-len(buttons) // rows)
+    button_width = (column.width + gap) / per_row - gap
     for k, button in enumerate(buttons):
-        row, place = divmod(k, across)
-        left = column.left + round(place * (wide + gap))
-        places.append((button, pygame.Rect(left, y + row * (high + gap), max(round(wide), 1), high)))
-    return y + rows * (high + gap)
+        row, index = divmod(k, per_row)
+        left = column.left + round(index * (button_width + gap))
+        rects.append((button, pygame.Rect(left, y + row * (height + gap), max(round(button_width), 1), height)))
+    return y + rows * (height + gap)
 
 
-def _lay_switches(
-    switches: Sequence[Checkbox],
+def _layout_checkboxes(
+    checkboxes: Sequence[Checkbox],
     column: pygame.Rect,
     y: int,
-    unit: float,
-    places: list[tuple[Widget, pygame.Rect]],
+    ui_scale: float,
+    rects: list[tuple[Widget, pygame.Rect]],
 ) -> int:
-    """Place switches in columns, each read downwards, and return where they end."""
-    gap, high = round(14 * unit), round(23 * unit)
-    columns = 2 if column.width >= 200 * unit else 1
-    each = max((column.width - (columns - 1) * gap) // columns, 1)
-    rows = -(-len(switches) // columns)
-    for k, switch in enumerate(switches):
-        place, row = divmod(k, rows)
-        places.append((switch, pygame.Rect(column.left + place * (each + gap), y + row * high, each, high)))
-    return y + rows * high
+    """Lay out check boxes in columns, filled downwards; return the y below them."""
+    gap, height = round(14 * ui_scale), round(23 * ui_scale)
+    columns = 2 if column.width >= 200 * ui_scale else 1
+    width = max((column.width - (columns - 1) * gap) // columns, 1)
+    rows = -(-len(checkboxes) // columns)
+    for k, checkbox in enumerate(checkboxes):
+        index, row = divmod(k, rows)
+        rects.append((checkbox, pygame.Rect(column.left + index * (width + gap), y + row * height, width, height)))
+    return y + rows * height
 
 
 PANEL_WIDTH = 264
-"""px at unit 1"""
-WIDEST = 0.6
-"""share of a small window that it covers, at most"""
-FOLDS = 0.45
-"""share of a window beyond which it is folded away at first"""
-SCROLL = 48
-"""px at unit 1, a notch of the wheel"""
+"""px at UI scale 1"""
+MAX_WIDTH_FRACTION = 0.6
+"""largest fraction of the width of a small window"""
+FOLD_WIDTH_FRACTION = 0.45
+"""fraction of the window's width above which the panel is hidden at first"""
+SCROLL_STEP = 48
+"""px at UI scale 1, for a notch of the wheel"""
 
 _BUTTONS = {
     "play": ("Resume", Command.PAUSE),
@@ -130,132 +130,138 @@ _BUTTONS = {
     "picker": ("Open a scene", Command.PICKER),
 }
 _LABELS = {"trust": "horizon", "antialias": "antialiasing"}
-"""of switches that are not labelled by their names"""
-_MOUSE = (pygame.MOUSEMOTION, pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP)
+"""labels that differ from the name"""
+_MOUSE_EVENTS = (pygame.MOUSEMOTION, pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONUP)
 
 
 class SidePanel:
-    """A column of widgets that is told what to show, and calls back when somebody uses it."""
+    """A column of widgets. `show` sets its content; the callbacks report what the user does."""
 
-    def __init__(self, size: tuple[int, int], unit: float = 1.0) -> None:
-        """Make an empty panel for a window of a size in px."""
-        self.on_change: Callable[[str, ParameterValue, bool], None] = _nothing
-        """(key, value, final); values of whole knobs are floats too"""
-        self.on_toggle: Callable[[str, bool], None] = _nothing
-        self.on_button: Callable[[str], None] = _nothing
-        self.size, self.unit = size, unit
-        self._wanted: bool | None = None  # whether it was asked for, or to be hidden; else a small window hides it
-        self._dials: dict[str, ParameterWidget] = {}
-        self._switches: dict[str, Checkbox] = {}
+    def __init__(self, size: tuple[int, int], ui_scale: float = 1.0) -> None:
+        """Create an empty panel for a window of a size in px."""
+        self.on_change: Callable[[str, ParameterValue, bool], None] = _ignore
+        """(key, value, final); values of integer parameters are floats too"""
+        self.on_toggle: Callable[[str, bool], None] = _ignore
+        self.on_button: Callable[[str], None] = _ignore
+        self.size, self.ui_scale = size, ui_scale
+        self._visible: bool | None = None  # set by the user; None: shown unless the window is small
+        self._parameter_widgets: dict[str, ParameterWidget] = {}
+        self._checkboxes: dict[str, Checkbox] = {}
         self._buttons: list[PushButton] = []
         self._layout = PanelLayout((), (), 0)
         self._scroll = 0
         self._sheet = pygame.Surface((1, 1))
-        self._drawn: tuple[object, ...] = ()
-        """what the sheet shows"""
+        self._drawn_state: tuple[object, ...] = ()
+        """all values that the sheet was drawn from"""
         self._pointer: tuple[int, int] | None = None
         self._pressed: set[int] = set()
         self._bar_held = False
         self.used = True
         """an event or a resize may have changed a widget since this was last reset: `show` is needed"""
         self._dirty = True  # the sheet has to be checked for changes
-        self.resize(size, unit)
+        self.resize(size, ui_scale)
 
     @property
     def width(self) -> int:
-        """What it covers at the right of the window, px; 0 while it is hidden."""
-        return self._full if self.visible else 0
+        """Width that the panel covers at the right of the window, px; 0 while it is hidden."""
+        return self._full_width if self.visible else 0
 
     @property
-    def _full(self) -> int:
-        return max(min(round(PANEL_WIDTH * self.unit), round(WIDEST * self.size[0])), 1)
+    def _full_width(self) -> int:
+        return max(min(round(PANEL_WIDTH * self.ui_scale), round(MAX_WIDTH_FRACTION * self.size[0])), 1)
 
     @property
     def visible(self) -> bool:
-        """Whether it is shown: in a window that it would cover much of, only once it is asked for.
+        """Whether the panel is shown. In a small window it is hidden until the user shows it.
 
-        Hiding it ends what is being dragged.
+        Hiding the panel ends a drag.
         """
-        return self._wanted if self._wanted is not None else round(PANEL_WIDTH * self.unit) <= FOLDS * self.size[0]
+        if self._visible is not None:
+            return self._visible
+        return round(PANEL_WIDTH * self.ui_scale) <= FOLD_WIDTH_FRACTION * self.size[0]
 
     @visible.setter
     def visible(self, visible: bool) -> None:
-        self._wanted = visible
+        self._visible = visible
         if not visible:
             self.release()
 
     @property
     def widgets(self) -> tuple[Widget, ...]:
         """All widgets, from top to bottom."""
-        return tuple(widget for widget, _ in self._layout.places)
+        return tuple(widget for widget, _ in self._layout.rects)
 
-    def resize(self, size: tuple[int, int], unit: float) -> None:
-        """Fit it to a window of another size, px."""
-        self.size, self.unit = size, unit
-        self._sheet = pygame.Surface((self._full, max(size[1], 1)))
-        self._drawn = ()
+    def resize(self, size: tuple[int, int], ui_scale: float) -> None:
+        """Fit the panel to a window of another size, px."""
+        self.size, self.ui_scale = size, ui_scale
+        self._sheet = pygame.Surface((self._full_width, max(size[1], 1)))
+        self._drawn_state = ()
         self.used = True
-        self._lay_out()
+        self._layout_widgets()
 
-    def show(self, knobs: Sequence[Parameter], toggles: Mapping[str, bool], buttons: Sequence[str] = ()) -> None:
-        """Show these knobs, switches and buttons, and call nobody back. What stays keeps being held."""
+    def show(self, parameters: Sequence[Parameter], toggles: Mapping[str, bool], buttons: Sequence[str] = ()) -> None:
+        """Show these parameters, check boxes and buttons, without callbacks. A widget that stays keeps its drag."""
         self._dirty = True
-        before = [*self._dials, *self._switches, len(self._buttons)]
-        dials: dict[str, ParameterWidget] = {}
-        for knob in knobs:
-            kind = OptionButton if knob.choices else ParameterSlider
-            old = self._dials.get(knob.key)
-            dial = old if type(old) is kind else kind(self._sheet, knob)
-            dial.show_parameter(knob)
-            dials[knob.key] = dial
-        lay_out = any(self._dials.get(key) is not dial for key, dial in dials.items())
-        self._dials = dials
-        self._switches = {name: self._switch(name, on) for name, on in toggles.items()}
+        before = [*self._parameter_widgets, *self._checkboxes, len(self._buttons)]
+        parameter_widgets: dict[str, ParameterWidget] = {}
+        for parameter in parameters:
+            kind = OptionButton if parameter.choices else ParameterSlider
+            old = self._parameter_widgets.get(parameter.key)
+            widget = old if type(old) is kind else kind(self._sheet, parameter)
+            widget.show_parameter(parameter)
+            parameter_widgets[parameter.key] = widget
+        changed = any(self._parameter_widgets.get(key) is not widget for key, widget in parameter_widgets.items())
+        self._parameter_widgets = parameter_widgets
+        self._checkboxes = {name: self._checkbox(name, on) for name, on in toggles.items()}
         del self._buttons[len(buttons) :]
         for k, name in enumerate(buttons):
             if k == len(self._buttons):
                 self._buttons.append(PushButton(self._sheet, name))
-            self._buttons[k].name, self._buttons[k].hint = name, _told(name)
-        if lay_out or before != [*self._dials, *self._switches, len(self._buttons)]:
-            self._lay_out()
+            self._buttons[k].name, self._buttons[k].hint = name, _button_hint(name)
+        if changed or before != [*self._parameter_widgets, *self._checkboxes, len(self._buttons)]:
+            self._layout_widgets()
 
-    def _switch(self, name: str, on: bool) -> Checkbox:
-        switch = self._switches.get(name)
-        if switch is None:
+    def _checkbox(self, name: str, on: bool) -> Checkbox:
+        checkbox = self._checkboxes.get(name)
+        if checkbox is None:
             key = next((binding.label for binding in BINDINGS if binding.command == name), "")
-            switch = Checkbox(self._sheet, name, on, _LABELS.get(name, ""), key)
-        switch.on = on
-        return switch
+            checkbox = Checkbox(self._sheet, name, on, _LABELS.get(name, ""), key)
+        checkbox.on = on
+        return checkbox
 
-    def _lay_out(self) -> None:
-        """Give every widget its place in the content, whose top is at 0."""
+    def _layout_widgets(self) -> None:
+        """Lay out all widgets in the content, whose top is at 0."""
         self._layout = arrange_widgets(
-            self._buttons, list(self._dials.values()), list(self._switches.values()), self._full, self.unit
+            self._buttons,
+            list(self._parameter_widgets.values()),
+            list(self._checkboxes.values()),
+            self._full_width,
+            self.ui_scale,
         )
         self._move()
 
     def _move(self) -> None:
-        """Place the widgets as far as the content is scrolled."""
+        """Move the widgets to where the content is scrolled."""
         self._dirty = True
         self._scroll = min(max(self._scroll, 0), max(self._layout.height - self.size[1], 0))
-        for widget, place in self._layout.places:
+        for widget, rect in self._layout.rects:
             widget.surface = self._sheet
-            widget.set_rect(place.move(0, -self._scroll), self.unit)
+            widget.set_rect(rect.move(0, -self._scroll), self.ui_scale)
 
     def release(self) -> None:
-        """End whatever is being dragged, with its final report."""
+        """End a drag, with its final event."""
         self.used = self._dirty = True
         self._pressed.clear()
         self._bar_held = False
         self._pointer = None
         for widget in self.widgets:
             widget.release()
-        self._call_back()
+        self._report_events()
 
     def handle_event(self, event: pygame.event.Event) -> bool:
-        """Take an event in, and tell whether it was used up. Pass every event, motion too: the wheel has no place.
+        """Process an event; return whether it was consumed. Pass motion too: wheel events carry no position.
 
-        A press outside belongs to the picture, and so do the motion and release that follow it.
+        A press outside the panel belongs to the picture, and so do the motion and the release that follow it.
         """
         if event.type in (pygame.WINDOWFOCUSLOST, pygame.WINDOWLEAVE):
             if event.type == pygame.WINDOWFOCUSLOST or not self._pressed:
@@ -265,38 +271,38 @@ class SidePanel:
             return False
         if event.type == pygame.MOUSEWHEEL:
             return self._wheel(event)
-        if event.type not in _MOUSE:
+        if event.type not in _MOUSE_EVENTS:
             return False
-        at = event.pos[0] - (self.size[0] - self._full), event.pos[1]
-        inside = 0 <= at[0] < self._full and 0 <= at[1] < self.size[1]
+        at = event.pos[0] - (self.size[0] - self._full_width), event.pos[1]
+        inside = 0 <= at[0] < self._full_width and 0 <= at[1] < self.size[1]
         self._pointer = at if inside or self._pressed else None
         if event.type == pygame.MOUSEBUTTONUP:
             ours = event.button in self._pressed
             self._pressed.discard(event.button)
         elif event.type == pygame.MOUSEBUTTONDOWN:
             ours = inside
-            if ours and event.button <= 3:  # 4 and up are the wheel once more
+            if ours and event.button <= 3:  # 4 and up are the wheel again
                 self._pressed.add(event.button)
         else:
             foreign = any(getattr(event, "buttons", ())) and not self._pressed
             ours = bool(self._pressed) or (inside and not foreign)
         if ours or event.type == pygame.MOUSEMOTION:
-            self._pass_on(event, at)
+            self._dispatch(event, at)
         return ours
 
-    def _pass_on(self, event: pygame.event.Event, at: tuple[int, int]) -> None:
+    def _dispatch(self, event: pygame.event.Event, at: tuple[int, int]) -> None:
         self.used = self._dirty = True
-        if self._grab_bar(event, at):
+        if self._drag_bar(event, at):
             return
         moved = pygame.event.Event(event.type, {**event.dict, "pos": at})
         for widget in self.widgets:
             widget.handle_event(moved)
-        self._call_back()
+        self._report_events()
 
-    def _grab_bar(self, event: pygame.event.Event, at: tuple[int, int]) -> bool:
-        """Scroll by the bar at the right edge, and tell whether it is held."""
+    def _drag_bar(self, event: pygame.event.Event, at: tuple[int, int]) -> bool:
+        """Scroll by the bar at the right edge; return whether it is held."""
         if event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
-            self._bar_held = self._layout.height > self.size[1] and at[0] >= self._full - 9 * self.unit
+            self._bar_held = self._layout.height > self.size[1] and at[0] >= self._full_width - 9 * self.ui_scale
         if not self._bar_held:
             return False
         if event.type == pygame.MOUSEBUTTONUP and event.button == 1:
@@ -310,28 +316,28 @@ class SidePanel:
             return False
         self.used = self._dirty = True
         notches = int(event.y)
-        if notches and not any(dial.scroll(notches, self._pointer) for dial in self._dials.values()):
-            self._scroll -= round(notches * SCROLL * self.unit)
+        if notches and not any(widget.scroll(notches, self._pointer) for widget in self._parameter_widgets.values()):
+            self._scroll -= round(notches * SCROLL_STEP * self.ui_scale)
             self._move()
-        self._call_back()
+        self._report_events()
         return True
 
-    def _call_back(self) -> None:
-        """Tell what was done since the last call; a callback may show other things meanwhile."""
-        reports: list[WidgetEvent] = []
+    def _report_events(self) -> None:
+        """Report the events since the last call; a callback may change what is shown."""
+        events: list[WidgetEvent] = []
         for widget in self.widgets:
-            reports += widget.events
+            events += widget.events
             widget.events.clear()
-        for report in reports:
-            if report.kind == "button":
-                self.on_button(report.name)
-            elif isinstance(report.value, bool):
-                self.on_toggle(report.name, report.value)
+        for used in events:
+            if used.kind == "button":
+                self.on_button(used.name)
+            elif isinstance(used.value, bool):
+                self.on_toggle(used.name, used.value)
             else:
-                self.on_change(report.name, report.value, report.final)
+                self.on_change(used.name, used.value, used.final)
 
     def draw(self, surface: pygame.Surface) -> None:
-        """Draw it at the right of the window, if it is visible."""
+        """Draw the panel at the right of the window, if it is visible."""
         if not self.visible:
             return
         if self._dirty:
@@ -342,44 +348,44 @@ class SidePanel:
                 self._layout.headings,
                 *(widget.draw_state for widget in self.widgets),
             )
-            if state != self._drawn:
+            if state != self._drawn_state:
                 self._draw_sheet()
-                self._drawn = state
-        surface.blit(self._sheet, (self.size[0] - self._full, 0))
+                self._drawn_state = state
+        surface.blit(self._sheet, (self.size[0] - self._full_width, 0))
         self._draw_hint(surface)
 
     def _draw_sheet(self) -> None:
-        """Draw the whole column, off the window, as most pictures show it unchanged."""
-        sheet, unit = self._sheet, self.unit
+        """Draw the column on its own surface, which most frames blit unchanged."""
+        sheet, ui_scale = self._sheet, self.ui_scale
         sheet.fill(PANEL)
         for text, top in self._layout.headings:
-            y = top - self._scroll + 10 * unit
-            word = draw_text(sheet, text.upper(), (14 * unit, y), 10.5 * unit, FAINT, "midleft", bold=True)
-            start = word.right + 8 * unit
-            pygame.draw.line(sheet, LINE, (start, y), (self._full - 18 * unit, y), max(round(unit), 1))
+            y = top - self._scroll + 10 * ui_scale
+            word = draw_text(sheet, text.upper(), (14 * ui_scale, y), 10.5 * ui_scale, FAINT, "midleft", bold=True)
+            start = word.right + 8 * ui_scale
+            pygame.draw.line(sheet, LINE, (start, y), (self._full_width - 18 * ui_scale, y), max(round(ui_scale), 1))
         for widget in self.widgets:
-            if widget.rect.bottom >= -40 * unit and widget.rect.top <= self.size[1] + 40 * unit:
+            if widget.rect.bottom >= -40 * ui_scale and widget.rect.top <= self.size[1] + 40 * ui_scale:
                 widget.draw()
-        pygame.draw.line(sheet, LINE, (0, 0), (0, self.size[1]), max(round(unit), 1))
+        pygame.draw.line(sheet, LINE, (0, 0), (0, self.size[1]), max(round(ui_scale), 1))
         if self._layout.height > self.size[1]:
-            high = max(round(self.size[1] ** 2 / self._layout.height), round(16 * unit))
-            top = round(self._scroll / (self._layout.height - self.size[1]) * (self.size[1] - high))
-            wide = round(5 * unit)
-            bar = pygame.Rect(self._full - wide - round(2 * unit), top, wide, high)
-            pygame.draw.rect(sheet, LINE if self._bar_held else PANEL_RAISED, bar, border_radius=wide)
+            height = max(round(self.size[1] ** 2 / self._layout.height), round(16 * ui_scale))
+            top = round(self._scroll / (self._layout.height - self.size[1]) * (self.size[1] - height))
+            bar_width = round(5 * ui_scale)
+            bar = pygame.Rect(self._full_width - bar_width - round(2 * ui_scale), top, bar_width, height)
+            pygame.draw.rect(sheet, LINE if self._bar_held else PANEL_RAISED, bar, border_radius=bar_width)
 
     def _draw_hint(self, surface: pygame.Surface) -> None:
         hint = next((widget.hint for widget in self.widgets if widget.hovered and widget.hint), "")
         if hint and self._pointer is not None and not self._pressed:
             x, y = self._pointer
-            draw_hint(surface, hint, (self.size[0] - self._full + x, y), self.unit)
+            draw_hint(surface, hint, (self.size[0] - self._full_width + x, y), self.ui_scale)
 
 
-def _nothing(*_: object) -> None:
-    """Call nobody back."""
+def _ignore(*_: object) -> None:
+    """Default of the callbacks."""
 
 
-def _told(name: str) -> str:
+def _button_hint(name: str) -> str:
     about, command = _BUTTONS.get(name, ("", None))
     key = next((binding.label for binding in BINDINGS if binding.command == command), "")
     return f"{about} ({key})" if key else about
