@@ -1,4 +1,4 @@
-"""Score panel: how a game with rules stands, as a row of labelled figures, and how it ended."""
+"""Score panel: score and status of a game as rows of labelled values, and how the game ended."""
 
 from typing import NamedTuple
 
@@ -9,14 +9,16 @@ from sandbox.window.render.palette import FAINT, GREEN, INK, LINE, WARNING
 from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size, wrap_text
 from sandbox.window.ui.icons import draw_disc
 
-RIGHT = 66.0
-"""px at unit 1 beside it, for how many pictures a second there are"""
-NARROWEST = 300.0
+FRAME_RATE_WIDTH = 66.0
+"""px at UI scale 1, kept free at the right for the frame rate"""
+MIN_TOP_WIDTH = 300.0
+"""px at UI scale 1; in a narrower space the panel lies at the bottom"""
 TEXT_SIZES = (14.0, 12.5, 11.0)
-"""px at unit 1: the largest at which all stands in one row; else the smallest"""
-MOST_LINES = 8
-MOST_ROWS = 3
-"""beside the state of things; of more, it lies at the bottom, where it is wider"""
+"""px at UI scale 1: the largest that gives a single row, else the smallest"""
+MAX_LINES = 8
+"""values shown besides the score"""
+MAX_TOP_ROWS = 3
+"""beside the status plate; with more rows the panel lies at the bottom, where it is wider"""
 
 
 ScoreCell = tuple[str, str]
@@ -24,17 +26,17 @@ ScoreCell = tuple[str, str]
 
 
 class ScoreLayout(NamedTuple):
-    """Where it lies, and what stands in it."""
+    """Position and content of the score panel."""
 
     rect: pygame.Rect
     above: bool
-    """whether it lies at the top"""
+    """whether the panel lies at the top"""
     rows: list[tuple[list[ScoreCell], list[int]]]
-    """cells and their widths, px"""
+    """of each row, cells and their widths, px"""
     end: tuple[str, ...]
     """how the game ended"""
     size: float
-    """px, of letters"""
+    """text size, px"""
     gap: int
     """px between cells"""
 
@@ -43,44 +45,46 @@ class ScoreLayout(NamedTuple):
         return (self.rect.bottom - area.top, 0) if self.above else (0, area.bottom - self.rect.top)
 
 
-def layout_score(board: ScoreDisplay, free: pygame.Rect, left: int, unit: float) -> ScoreLayout:
-    """Lay it at the top of what is free, or where that is too narrow, at the bottom.
+def layout_score(display: ScoreDisplay, area: pygame.Rect, left: int, ui_scale: float) -> ScoreLayout:
+    """Lay the panel out at the top of an area, or at the bottom if the top is too narrow.
 
     Args:
-        board: what is shown.
-        free: px, what it may cover.
-        left: px, what else covers the top.
-        unit: px of a pixel at 1080 lines.
+        display: score and values.
+        area: px, the part of the window that the panel may cover.
+        left: px, right edge of the status plate at the top.
+        ui_scale: 1 on a display of 1080 lines.
     """
-    scale = unit * min(1.0, free.width / (520.0 * unit), free.height / (360.0 * unit))
+    scale = ui_scale * min(1.0, area.width / (520.0 * ui_scale), area.height / (360.0 * ui_scale))
     margin = round(10 * scale)
-    right = free.right - round(RIGHT * unit)
-    above = right - left >= NARROWEST * unit
-    rows, size, gap, room = _fitted(board, right - left, scale)
-    if not above or len(rows) > MOST_ROWS:  # at the bottom it has the whole width
-        above, left, right = False, free.left + margin, free.right - margin
-        rows, size, gap, room = _fitted(board, right - left, scale)
-    end = wrap_text(_told(board), size, room - 1.4 * size, 2, bold=True) if board.over is not None else ()
-    wide = max(max(sum(cells) + gap * (len(cells) - 1) for _, cells in rows), *(_wide(line, size) for line in end), 0)
-    high = _tall(size) * len(rows) + round(1.5 * size) * len(end) + round(0.9 * size)
-    rect = pygame.Rect(0, 0, wide + 2 * _pad(size), high)
-    rect.midtop = (left + right) // 2, free.top + margin
+    right = area.right - round(FRAME_RATE_WIDTH * ui_scale)
+    above = right - left >= MIN_TOP_WIDTH * ui_scale
+    rows, size, gap, max_width = _fit_rows(display, right - left, scale)
+    if not above or len(rows) > MAX_TOP_ROWS:  # the bottom has the full width
+        above, left, right = False, area.left + margin, area.right - margin
+        rows, size, gap, max_width = _fit_rows(display, right - left, scale)
+    end = wrap_text(_end_text(display), size, max_width - 1.4 * size, 2, bold=True) if display.over is not None else ()
+    width = max(
+        max(sum(cells) + gap * (len(cells) - 1) for _, cells in rows), *(_line_width(line, size) for line in end), 0
+    )
+    height = _row_height(size) * len(rows) + round(1.5 * size) * len(end) + round(0.9 * size)
+    rect = pygame.Rect(0, 0, width + 2 * _pad(size), height)
+    rect.midtop = (left + right) // 2, area.top + margin
     if not above:
-        rect.bottomleft = left, free.bottom - margin
+        rect.bottomleft = left, area.bottom - margin
     return ScoreLayout(rect, above, rows, tuple(end), size, gap)
 
 
-def _fitted(
-    board: ScoreDisplay, width: int, scale: float
+def _fit_rows(
+    display: ScoreDisplay, width: int, scale: float
 ) -> tuple[list[tuple[list[ScoreCell], list[int]]], float, int, int]:
-    """Return the rows, the size of their letters, the gap between cells and the room in a row, px."""
-    for letters in TEXT_SIZES:
-        size = letters * scale
-        gap, room = round(1.1 * size), width - 2 * _pad(size)
-        rows = _rows(board, room, size, gap)
+    """Return the rows, their text size, the gap between cells and the width available in a row, px."""
+    for letter_size in TEXT_SIZES:
+        size = letter_size * scale
+        gap, max_width = round(1.1 * size), width - 2 * _pad(size)
+        rows = _rows(display, max_width, size, gap)
         if len(rows) == 1:
             break
-    return rows, size, gap, room
+    return rows, size, gap, max_width
 
 
 def draw_score(surface: pygame.Surface, layout: ScoreLayout) -> None:
@@ -90,7 +94,7 @@ def draw_score(surface: pygame.Surface, layout: ScoreLayout) -> None:
     y = rect.top + round(0.45 * size)
     for cells, widths in rows:
         _draw_cells(surface, cells, widths, (rect.left + _pad(size), y), size, gap)
-        y += _tall(size)
+        y += _row_height(size)
     for k, line in enumerate(end):
         middle = y + (k + 0.5) * 1.5 * size
         if k == 0:
@@ -102,44 +106,52 @@ def _pad(size: float) -> int:
     return round(0.7 * size)
 
 
-def _tall(size: float) -> int:
+def _row_height(size: float) -> int:
     return round(2.75 * size)
 
 
-def _rows(board: ScoreDisplay, room: float, size: float, gap: int) -> list[tuple[list[ScoreCell], list[int]]]:
+def _rows(display: ScoreDisplay, max_width: float, size: float, gap: int) -> list[tuple[list[ScoreCell], list[int]]]:
     """Return the cells in rows that fit, each with their widths, px; the score comes first."""
-    cells = [("score", board.score), *board.lines[:MOST_LINES]]
+    cells = [("score", display.score), *display.lines[:MAX_LINES]]
     rows: list[tuple[list[ScoreCell], list[int]]] = [([], [])]
     for name, text in cells:
         label = name[:1].upper() + name[1:]
-        text = ellipsis(text, 1.25 * size, room, mono=True)
-        wide = max(text_size(label, 0.82 * size)[0], text_size(text, 1.25 * size, mono=True)[0])
-        wide += -wide % round(1.5 * size)  # figures that change their length do not make all others jump
-        if rows[-1][1] and sum(rows[-1][1]) + gap * len(rows[-1][1]) + wide > room:
+        text = ellipsis(text, 1.25 * size, max_width, mono=True)
+        width = max(text_size(label, 0.82 * size)[0], text_size(text, 1.25 * size, mono=True)[0])
+        width += -width % round(
+            1.5 * size
+        )  # rounded up, so that the other cells do not move when a value changes its length
+        if rows[-1][1] and sum(rows[-1][1]) + gap * len(rows[-1][1]) + width > max_width:
             rows.append(([], []))
         rows[-1][0].append((label, text))
-        rows[-1][1].append(wide)
+        rows[-1][1].append(width)
     return rows
 
 
 def _draw_cells(
-    surface: pygame.Surface, cells: list[ScoreCell], widths: list[int], at: tuple[int, float], size: float, gap: int
+    surface: pygame.Surface,
+    cells: list[ScoreCell],
+    widths: list[int],
+    position: tuple[int, float],
+    size: float,
+    gap: int,
 ) -> None:
-    x, y = at
-    for k, ((label, text), wide) in enumerate(zip(cells, widths, strict=True)):
+    x, y = position
+    for k, ((label, text), width) in enumerate(zip(cells, widths, strict=True)):
         draw_text(surface, label, (x, y + 0.55 * size), 0.82 * size, FAINT, "midleft")
         warns = text.endswith("!")
-        colour = WARNING if warns else GREEN if label == "score" else INK
-        draw_text(surface, text, (x, y + 1.75 * size), 1.25 * size, colour, "midleft", bold=label == "score", mono=True)
-        x += wide + gap
+        is_score = label == "Score"
+        colour = WARNING if warns else GREEN if is_score else INK
+        draw_text(surface, text, (x, y + 1.75 * size), 1.25 * size, colour, "midleft", bold=is_score, mono=True)
+        x += width + gap
         if k < len(cells) - 1:
             line = x - gap // 2
             pygame.draw.line(surface, LINE, (line, y + 0.2 * size), (line, y + 2.35 * size))
 
 
-def _told(board: ScoreDisplay) -> str:
-    return f"{board.over}  ·  R: new game"
+def _end_text(display: ScoreDisplay) -> str:
+    return f"{display.over}  ·  R: new game"
 
 
-def _wide(line: str, size: float) -> int:
+def _line_width(line: str, size: float) -> int:
     return text_size(line, size, bold=True)[0] + round(1.3 * size)
