@@ -97,7 +97,7 @@ def check_times(options: Options, end: float | None) -> None:
 
 def _most_pictures(options: Options) -> int | None:
     if ".gif" in options.suffixes:
-        from sandbox.window.capture.recorder import MAX_GIF_FRAMES
+        from sandbox.window.capture.limits import MAX_GIF_FRAMES
 
         return MAX_GIF_FRAMES
     return MOST_PICTURES if ".mp4" in options.suffixes else None
@@ -124,7 +124,7 @@ def _of_targets(options: Options) -> list[tuple[str, str]]:
 
         found += [] if can_write_parquet() else [("--to", NEEDS_PARQUET)]
     if ".mp4" in options.suffixes:
-        from sandbox.window.capture.recorder import NEEDS_VIDEO, can_make_mp4
+        from sandbox.window.capture.limits import NEEDS_VIDEO, can_make_mp4
 
         found += [] if can_make_mp4() else [("--to", NEEDS_VIDEO)]
     return found
@@ -179,7 +179,7 @@ def _of_values(options: Options) -> list[tuple[str, str]]:
 
 
 def _of_rate(options: Options) -> list[tuple[str, str]]:
-    from sandbox.window.capture.recorder import MAX_GIF_RATE
+    from sandbox.window.capture.limits import MAX_GIF_RATE
 
     if options.fps is None:
         return []

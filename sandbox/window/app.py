@@ -120,13 +120,13 @@ class App(WindowContext):
         if COMPILE_CLOCK.seconds > compiled:
             pygame.event.get(tuple(PRESSES))
         pygame.display.flip()
-        self.taking.roll(self.surface, elapsed)
+        self.taking.update(self.surface, elapsed)
 
     def draw(self) -> None:
         """Draw what is on, and what surrounds it."""
         self.make_room()
         self.gui.bodies_out_of_view = self.loses_sight
-        self.gui.draw(self.surface, self.camera, self.stage, self._clock.get_fps(), self.taking.told)
+        self.gui.draw(self.surface, self.camera, self.stage, self._clock.get_fps(), self.taking.status)
 
     def _wait(self, done: Callable[[float], bool]) -> None:
         """Stay alive until a job of the worker is done: show what is waited for, and close at Esc and the cross.
@@ -253,7 +253,7 @@ class App(WindowContext):
     def close(self) -> None:
         """Finish what is being recorded, and close the window."""
         COMPILE_CLOCK.on_begin = None
-        self.taking.end_film()
+        self.taking.stop_recording()
         self.gui.close()
         self.stage.compute = compute_here
         if not self._worker.is_busy:  # else the engine is in use, and the process ends anyway

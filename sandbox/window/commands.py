@@ -61,7 +61,7 @@ class Commands:
             Command.HELP: self._help,
             Command.SCREENSHOT: self._screenshot,
             Command.RECORD: self._record,
-            Command.SAVE: lambda: seat.taking.session(stage.show, seat.name),
+            Command.SAVE: lambda: seat.taking.save_session(stage.show, seat.name),
             Command.RELOAD: stage.reload,
             Command.SOUND: lambda: stage.messages.tell(*gui.toggle_sound()),
             Command.DELETE: lambda: stage.act(stage.hands.remove),
@@ -151,14 +151,14 @@ class Commands:
             self._seat.home()
 
     def _screenshot(self) -> None:
-        self._seat.taking.picture(self._seat.surface, self._seat.name)
+        self._seat.taking.save_screenshot(self._seat.surface, self._seat.name)
 
     def _record(self) -> None:
         taking = self._seat.taking
-        if taking.filming:
-            taking.end_film()
+        if taking.is_recording:
+            taking.stop_recording()
         else:
-            taking.begin_film(self._seat.surface.get_size(), self._seat.name)
+            taking.start_recording(self._seat.surface.get_size(), self._seat.name)
 
     def _add(self, *, box: bool) -> None:
         seat = self._seat

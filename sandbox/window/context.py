@@ -13,7 +13,7 @@ from sandbox.arrays import FloatArray
 from sandbox.scene.scene import Scene
 from sandbox.window.app_state import AppState
 from sandbox.window.camera import Box, Camera
-from sandbox.window.capture.recorder import CaptureController
+from sandbox.window.capture.controller import CaptureController
 from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.renderer import Renderer
 from sandbox.window.render.text import largest_area, renderable

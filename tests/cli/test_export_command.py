@@ -25,7 +25,7 @@ from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory
 from sandbox.window.camera import Camera
-from sandbox.window.capture import recorder as limits
+from sandbox.window.capture import limits
 from sandbox.window.playback.recorded import RecordedRun
 from sandbox.window.render.palette import SKY
 

@@ -11,8 +11,8 @@ import pygame
 from sandbox.arrays import FloatArray
 from sandbox.interrupt import uninterrupted
 from sandbox.window.camera import Camera
-from sandbox.window.capture.image_files import AtomicFile, Size, offscreen
-from sandbox.window.capture.recorder import Recorder, recorder_for, save_image
+from sandbox.window.capture.image_files import AtomicFile, Size, offscreen, save_image
+from sandbox.window.capture.recorder import Recorder, recorder_for
 from sandbox.window.playback.recorded import RecordedRun
 from sandbox.window.render.palette import FAINT, INK
 from sandbox.window.render.renderer import InsetRenderer, Renderer
@@ -21,8 +21,7 @@ from sandbox.window.ui.energy_plot import RunGraph
 from sandbox.window.view_bounds import should_rotate
 
 Progress = Callable[[float], None]
-"""Called with the share of the film that is done, 0 to 1."""
-
+"""Called with the fraction of the film that is done, 0 to 1."""
 
 MIN_CAPTION_WIDTH = 320
 """px; a caption would cover too much of a narrower picture"""
@@ -30,19 +29,19 @@ MIN_CAPTION_WIDTH = 320
 
 @dataclass(frozen=True)
 class ExportOptions:
-    """What is to be seen of a run."""
+    """Part of a run to export, and how it is shown."""
 
     start: float
     """s"""
     end: float
-    """s; a still shows this moment"""
+    """s; a still picture shows this time"""
     size: Size = (960, 540)
     fps: float = 30.0
     """pictures/s of a film"""
     speed: float = 1.0
-    """as a share of real time"""
+    """of playback, relative to real time"""
     overlays: frozenset[str] = frozenset({"shapes"})
-    """of `sight.OVERLAYS`"""
+    """of `snapoptions.OVERLAYS`"""
 
 
 class RunRenderer:
@@ -65,12 +64,12 @@ class RunRenderer:
         """Draw the state at a time, s.
 
         Args:
-            surface: where; it needs no display.
+            surface: to draw on; it needs no display.
             camera: which part of the world.
             time: of the run.
-            overlays: of `snapshot.OVERLAYS`.
-            speed: of the film, as a share of real time.
-            caption: write title, engine and time into the upper left corner, where there is room for them.
+            overlays: of `snapoptions.OVERLAYS`.
+            speed: of playback, relative to real time.
+            caption: write title, engine and time into the upper left corner, if the surface is wide enough.
         """
         unit = ui_scale_of(surface.get_size())
         snapshot = self.run.snapshot(time, overlays, speed)
@@ -86,24 +85,24 @@ class RunRenderer:
         title = self.run.scene.title or "untitled"
         draw_text(surface, title, (left, 12.0 * unit), size, INK, bold=True)
         digits = max(2, len(f"{self.run.duration:.2f}"))
-        words = f"{self.run.trajectory.info['engine']}   {time:{digits}.2f} s"
+        text = f"{self.run.trajectory.info['engine']}   {time:{digits}.2f} s"
         height = text_size(title, size, bold=True)[1]
-        draw_text(surface, words, (left, 12.0 * unit + 1.15 * height), 14.0 * unit, FAINT, mono=True)
+        draw_text(surface, text, (left, 12.0 * unit + 1.15 * height), 14.0 * unit, FAINT, mono=True)
 
 
 def ui_scale_of(size: tuple[int, int]) -> float:
-    """Return the factor by which lines and words of a picture are scaled: 1 where it is meant to be seen as it is."""
+    """Return the factor by which lines and text are scaled in a picture of a size, px; 1 at 960 x 540."""
     return max(0.75, min(size[0] / 960.0, size[1] / 540.0))
 
 
 def frame_times(start: float, end: float, fps: float, speed: float = 1.0) -> tuple[FloatArray, FloatArray]:
-    """Return when a film's pictures are, (K,) s of the run, and how long each is shown, (K,) s, on the whole exactly.
+    """Return the times of a film's pictures, (K,) s of the run, and their durations, (K,) s, with the exact sum.
 
     Args:
         start: of the film, s of the run.
         end: of the film, s of the run.
-        fps: pictures a second.
-        speed: seconds of the run a second.
+        fps: pictures/s.
+        speed: of playback, relative to real time.
     """
     seconds = (end - start) / speed
     count = max(1, math.ceil(seconds * fps - 0.5 - 1e-9))  # half a picture counts down, however it was rounded
@@ -113,28 +112,28 @@ def frame_times(start: float, end: float, fps: float, speed: float = 1.0) -> tup
     return np.asarray(start + np.arange(count) * (speed / fps)), shown
 
 
-def export_images(run: RecordedRun, shot: ExportOptions, path: Path, progress: Progress | None = None) -> int:
-    """Write a run to a `.png`, `.gif` or `.mp4`, and return how many pictures it has.
+def export_images(run: RecordedRun, options: ExportOptions, path: Path, progress: Progress | None = None) -> int:
+    """Write a run to a `.png`, `.gif` or `.mp4`, and return the number of pictures.
 
-    Needs no display, and leaves nothing behind where it is interrupted.
+    Needs no display. If it is interrupted, no file is left.
 
     Raises:
         CaptureError: the file cannot be made.
     """
     renderer = RunRenderer(run)
-    surface = offscreen(shot.size)
-    camera = Camera.fitting(run.bounds, shot.size, turned=should_rotate(run.scene, shot.size))
+    surface = offscreen(options.size)
+    camera = Camera.fitting(run.bounds, options.size, turned=should_rotate(run.scene, options.size))
     if path.suffix.lower() == ".png":
-        renderer.draw(surface, camera, shot.end, shot.overlays, shot.speed)
+        renderer.draw(surface, camera, options.end, options.overlays, options.speed)
         save_image(surface, AtomicFile.at(path))
         return 1
-    times, shown = frame_times(shot.start, shot.end, shot.fps, shot.speed)
+    times, shown = frame_times(options.start, options.end, options.fps, options.speed)
     recorder: Recorder | None = None
     try:
         with uninterrupted():
-            recorder = recorder_for(path, shot.size, shot.fps)
+            recorder = recorder_for(path, options.size, options.fps)
         for k, (time, seconds) in enumerate(zip(times.tolist(), shown.tolist(), strict=True)):
-            renderer.draw(surface, camera, time, shot.overlays, shot.speed)
+            renderer.draw(surface, camera, time, options.overlays, options.speed)
             recorder.add(surface, seconds)
             if progress is not None:
                 progress((k + 1) / len(times))

@@ -1,14 +1,9 @@
-"""Outfile: where a picture or film goes. It is written under a temporary name and takes its own once it is whole.
-
-Still: one picture taken from a surface, as bytes of a given size.
-"""
+"""Image files: atomic output files with free numbers in their names, pixels of surfaces, and PNGs."""
 
 import os
 import re
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
 from io import BytesIO
 from itertools import count
 from pathlib import Path
@@ -21,85 +16,86 @@ import pygame
 from sandbox.whole import temporary_path
 from sandbox.window.render.palette import BACKGROUND
 
-LONGEST_STEM = 60
-"""Letters of a scene's name that its files bear."""
-
-
-class CaptureError(Exception):
-    """A picture or film cannot be made; `str()` says why, and what would help."""
-
-
-@dataclass(frozen=True)
-class AtomicFile:
-    """A file to be: a temporary name beside it, and how that becomes the file."""
-
-    temporary: Path
-    _placed: Callable[[Path], Path]
-
-    @classmethod
-    def at(cls, path: Path) -> Self:
-        """Return an outfile that replaces what a path holds."""
-        return cls(temporary_path(path.parent), lambda temporary: temporary.replace(path))
-
-    @classmethod
-    def numbered(cls, folder: Path, stem: str, suffix: str) -> Self:
-        """Return an outfile that takes the first free of `sandbox-<stem>-1<suffix>`, `…-2<suffix>` and so on."""
-        return cls(temporary_path(folder), partial(_place_numbered, folder=folder, stem=safe_stem(stem), suffix=suffix))
-
-    def place(self) -> Path:
-        """Give the finished file its name, and return it.
-
-        Raises:
-            CaptureError: that cannot be done; the temporary file is gone then.
-        """
-        try:
-            return self._placed(self.temporary)
-        except OSError as error:
-            self.discard()
-            raise unwritable_reason(self.temporary.parent, error) from None
-
-    def discard(self) -> None:
-        """Remove the temporary file, where there is one."""
-        with suppress(NotADirectoryError):  # its folder has become a file
-            self.temporary.unlink(missing_ok=True)
-
-
-def safe_stem(name: str) -> str:
-    """Return a name of letters, digits, - and _ alone, fit for a file of any system."""
-    return re.sub(r"[^A-Za-z0-9_-]+", "-", name)[:LONGEST_STEM].strip("-") or "scene"
-
-
-def unwritable_reason(place: Path, error: OSError) -> CaptureError:
-    """Return what to say of a file that cannot be written."""
-    return CaptureError(f"{place}: cannot be written: {error.strerror or error}")
-
-
-def _place_numbered(temporary: Path, folder: Path, stem: str, suffix: str) -> Path:
-    """Move a file to the first free number. What another process puts there meanwhile stays."""
-    for number in count(1):
-        path = folder / f"sandbox-{stem}-{number}{suffix}"
-        try:
-            os.link(temporary, path)  # unlike a rename, it never replaces
-        except FileExistsError:
-            continue
-        except OSError:  # a file system without links: take the name by an empty file, then fill it at once
-            try:
-                path.open("xb").close()
-            except FileExistsError:
-                continue
-            return temporary.replace(path)
-        temporary.unlink()
-        return path
-    raise AssertionError("numbers do not end")
-
+MAX_STEM = 60
+"""characters of a scene's name in the names of its files"""
+MASKS = (0xFF0000, 0xFF00, 0xFF, 0)
+"""of a surface of 32 bits per pixel, in the order that SDL draws fastest; a stated order needs no display"""
 
 Size = tuple[int, int]
 """Width and height, px."""
 Pixels = npt.NDArray[np.uint8]
 """(height, width, 3), sRGB."""
 
-MASKS = (0xFF0000, 0xFF00, 0xFF, 0)
-"""Of a surface whose pixels are 32 bits, in the order that SDL draws fastest; stated, it needs no display."""
+
+class CaptureError(Exception):
+    """A picture or film cannot be made; the message states the reason and a remedy."""
+
+
+@dataclass(frozen=True)
+class AtomicFile:
+    """An output file that is written under a temporary name and gets its own name when it is complete."""
+
+    temporary: Path
+    """to write to"""
+    path: Path
+    """of the complete file"""
+    is_numbered: bool = False
+    """whether the first free number is appended to the name; else an existing file is replaced"""
+
+    @classmethod
+    def at(cls, path: Path) -> Self:
+        """Return a file that replaces an existing one."""
+        return cls(temporary_path(path.parent), path)
+
+    @classmethod
+    def numbered(cls, folder: Path, stem: str, suffix: str) -> Self:
+        """Return a file with the first free name of `sandbox-<stem>-1<suffix>`, `…-2<suffix>` and so on."""
+        return cls(temporary_path(folder), folder / f"sandbox-{safe_stem(stem)}{suffix}", is_numbered=True)
+
+    def place(self) -> Path:
+        """Give the complete file its name, and return its path.
+
+        Raises:
+            CaptureError: the file cannot be renamed; the temporary file is removed then.
+        """
+        try:
+            return self._link_numbered() if self.is_numbered else self.temporary.replace(self.path)
+        except OSError as error:
+            self.discard()
+            raise unwritable_reason(self.temporary.parent, error) from None
+
+    def discard(self) -> None:
+        """Remove the temporary file, if it exists."""
+        with suppress(NotADirectoryError):  # its folder has become a file
+            self.temporary.unlink(missing_ok=True)
+
+    def _link_numbered(self) -> Path:
+        """Move the file to the first free number; a file that another process creates meanwhile is kept."""
+        for number in count(1):
+            path = self.path.with_name(f"{self.path.stem}-{number}{self.path.suffix}")
+            try:
+                os.link(self.temporary, path)  # unlike a rename, it never replaces
+            except FileExistsError:
+                continue
+            except OSError:  # a file system without links: reserve the name by an empty file, then replace that
+                try:
+                    path.open("xb").close()
+                except FileExistsError:
+                    continue
+                return self.temporary.replace(path)
+            self.temporary.unlink()
+            return path
+        raise AssertionError("numbers do not end")
+
+
+def safe_stem(name: str) -> str:
+    """Return a name with each run of other characters than ASCII letters, digits, `-` and `_` replaced by `-`."""
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", name)[:MAX_STEM].strip("-") or "scene"
+
+
+def unwritable_reason(path: Path, error: OSError) -> CaptureError:
+    """Return the error for a file or folder that cannot be written."""
+    return CaptureError(f"{path}: cannot be written: {error.strerror or error}")
 
 
 def offscreen(size: Size) -> pygame.Surface:
@@ -108,23 +104,23 @@ def offscreen(size: Size) -> pygame.Surface:
 
 
 def fit_image(surface: pygame.Surface, size: Size) -> pygame.Surface:
-    """Return a picture in another size, averaged where it shrinks, with bars where the proportions differ."""
+    """Return a picture in another size, averaged if it shrinks, with bars if the proportions differ."""
     if surface.get_size() == size:
         return surface
     width, height = surface.get_size()
-    share = min(size[0] / max(width, 1), size[1] / max(height, 1))
-    inner = (min(max(round(width * share), 1), size[0]), min(max(round(height * share), 1), size[1]))
-    # Off by rounding alone, it is no bar but one row of pixels: stretch over it.
+    factor = min(size[0] / max(width, 1), size[1] / max(height, 1))
+    inner = (min(max(round(width * factor), 1), size[0]), min(max(round(height * factor), 1), size[1]))
+    # A bar of one row of pixels comes from rounding alone: stretch the picture over it.
     inner = (size[0] if size[0] - inner[0] < 2 else inner[0], size[1] if size[1] - inner[1] < 2 else inner[1])
-    plain = offscreen((width, height))  # what smoothscale takes, whatever the surface is like
-    plain.blit(surface, (0, 0))
-    small = pygame.transform.smoothscale(plain, inner)
+    source = offscreen((width, height))  # smoothscale accepts this pixel format, whatever the surface has
+    source.blit(surface, (0, 0))
+    scaled = pygame.transform.smoothscale(source, inner)
     if inner == size:
-        return small
-    whole = offscreen(size)
-    whole.fill(BACKGROUND)
-    whole.blit(small, ((size[0] - inner[0]) // 2, (size[1] - inner[1]) // 2))
-    return whole
+        return scaled
+    fitted = offscreen(size)
+    fitted.fill(BACKGROUND)
+    fitted.blit(scaled, ((size[0] - inner[0]) // 2, (size[1] - inner[1]) // 2))
+    return fitted
 
 
 def rgb_pixels(surface: pygame.Surface, size: Size) -> Pixels:
@@ -138,3 +134,35 @@ def png_bytes(surface: pygame.Surface) -> bytes:
     stream = BytesIO()
     pygame.image.save(surface, stream, ".png")
     return stream.getvalue()
+
+
+def save_image(surface: pygame.Surface, outfile: AtomicFile) -> Path:
+    """Write a surface as a complete PNG or not at all, and return its path.
+
+    Raises:
+        CaptureError: the file cannot be written.
+    """
+    try:
+        with outfile.temporary.open("xb") as stream:
+            stream.write(png_bytes(surface))
+    except OSError as error:
+        outfile.discard()
+        raise unwritable_reason(outfile.temporary.parent, error) from None
+    except BaseException:
+        outfile.discard()
+        raise
+    return outfile.place()
+
+
+def screenshot(surface: pygame.Surface, folder: Path, stem: str) -> Path:
+    """Write a surface as `sandbox-<stem>-<n>.png`, n being the first free number, and return its path.
+
+    Args:
+        surface: the picture.
+        folder: of the file.
+        stem: the scene's name; see `safe_stem`.
+
+    Raises:
+        CaptureError: the folder cannot be written to.
+    """
+    return save_image(surface, AtomicFile.numbered(folder, stem, ".png"))

@@ -15,8 +15,8 @@ from PIL import Image
 
 from sandbox.window.capture import recorder as capture
 from sandbox.window.capture.gif import MAX_ERROR, PaletteQuantiser
-from sandbox.window.capture.image_files import CaptureError, fit_image, offscreen, rgb_pixels, safe_stem
-from sandbox.window.capture.recorder import Recorder, recorder_for, recorder_in, screenshot, size_within
+from sandbox.window.capture.image_files import CaptureError, fit_image, offscreen, rgb_pixels, safe_stem, screenshot
+from sandbox.window.capture.recorder import Recorder, recorder_for, recorder_in, size_within
 
 SIZE = (96, 54)
 BACK, BALL = (20, 24, 31), (86, 180, 233)

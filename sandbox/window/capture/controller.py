@@ -1,0 +1,114 @@
+"""Capture controller: screenshots, films and session recordings of a window, each announced by a message."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pygame
+
+from sandbox.window.capture.image_files import AtomicFile, CaptureError, Size, screenshot, unwritable_reason
+from sandbox.window.capture.recorder import Recorder, recorder_in, size_within
+from sandbox.window.playback.live import LiveView
+from sandbox.window.playback.recorded import RecordedView
+
+FRAME_RATE = 25.0
+"""pictures/s of a film"""
+MAX_WIDTH = 960
+"""px of a film; a wider window is scaled down"""
+
+Notify = Callable[[str, str], None]
+"""(text, level)"""
+
+
+class CaptureController:
+    """Captures what a window shows.
+
+    Args:
+        folder: of the files.
+        film: suffix of films, `.gif` or `.mp4`.
+        notify: shows a message.
+    """
+
+    def __init__(self, folder: Path, film: str, notify: Notify) -> None:
+        self._folder, self._film, self._notify = folder, film, notify
+        self._recorder: Recorder | None = None
+        self._seconds, self._pending_seconds = 0.0, 0.0
+        self._seeking: tuple[LiveView, str] | None = None
+        """a session to save under a name once its jump in time is complete"""
+
+    @property
+    def status(self) -> str | None:
+        """Format and length of the film that is being recorded."""
+        return f"{self._film[1:]} {self._seconds:.1f} s" if self._recorder is not None else None
+
+    @property
+    def is_recording(self) -> bool:
+        """Whether a film is being recorded."""
+        return self._recorder is not None
+
+    def save_screenshot(self, surface: pygame.Surface, name: str) -> None:
+        """Save a surface as a numbered PNG."""
+        try:
+            self._notify(f"screenshot: {screenshot(surface, self._folder, name)}", "info")
+        except CaptureError as error:
+            self._notify(str(error), "error")
+
+    def start_recording(self, size: Size, name: str) -> None:
+        """Start a film of a window of a size, px."""
+        try:
+            self._recorder = recorder_in(self._folder, name, self._film, size_within(size, MAX_WIDTH), FRAME_RATE)
+        except CaptureError as error:
+            self._notify(str(error), "error")
+            return
+        self._seconds = self._pending_seconds = 0.0
+
+    def update(self, surface: pygame.Surface, elapsed: float) -> None:
+        """Add a picture to the film if it is due, and save a session whose jump in time is complete.
+
+        Args:
+            surface: of the window.
+            elapsed: since the last call, s.
+        """
+        if self._seeking is not None and self._seeking[0].busy is None:
+            (view, name), self._seeking = self._seeking, None
+            self.save_session(view, name)
+        if self._recorder is None:
+            return
+        self._seconds += elapsed
+        self._pending_seconds += elapsed
+        if self._pending_seconds < 1.0 / FRAME_RATE:
+            return
+        try:
+            self._recorder.add(surface, self._pending_seconds)
+        except CaptureError as error:
+            self._notify(str(error), "warning")
+            self.stop_recording()
+        self._pending_seconds = 0.0
+
+    def stop_recording(self) -> None:
+        """Finish the film, if one is being recorded."""
+        recorder, self._recorder = self._recorder, None
+        if recorder is None:
+            return
+        try:
+            self._notify(f"recorded: {recorder.close()}", "info")
+        except CaptureError as error:
+            self._notify(str(error), "error")
+
+    def save_session(self, view: LiveView | RecordedView | None, name: str) -> None:
+        """Save a live session as a recording that `sandbox replay` reads; during a jump in time, after it."""
+        if not isinstance(view, LiveView):
+            self._notify("a stored run is already saved" if view is not None else "no session to save", "warning")
+            return
+        if view.busy is not None:
+            self._seeking = view, name
+            self._notify("the session is saved once the jump in time is complete", "info")
+            return
+        outfile = AtomicFile.numbered(self._folder, name, ".json")
+        try:
+            view.session.recording().save(outfile.temporary)
+            self._notify(f"session: {outfile.place()}", "info")
+            view.session.note_saved()
+        except (CaptureError, OSError) as error:
+            outfile.discard()
+            why = str(error) if isinstance(error, CaptureError) else str(unwritable_reason(self._folder, error))
+            self._notify(f"cannot save the session: {why}", "error")
