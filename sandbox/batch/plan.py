@@ -205,7 +205,8 @@ def _player(session: Recording, path: str, player: PlayerSpec | None) -> PlayerS
     Raises:
         SceneError: the game cannot be played so.
     """
-    if not has_rules(session.scene):
+    is_requested = bool(session.presses) if _is_recording(path) else player is not None
+    if not has_rules(session.scene, on_request=is_requested):
         return None
     plays = PlayerSpec.from_recording(session) if _is_recording(path) else player or PlayerSpec()
     plays.start_game(session.scene, path)

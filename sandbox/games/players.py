@@ -120,7 +120,7 @@ def _skilled(scene: Scene) -> Policy:
     """
     spec = find_spec(scene.play.game)
     if spec is None or spec.bot is None:
-        games = " and ".join(games_with_bot())
+        games = ", ".join(games_with_bot())
         raise UnsuitableSceneError(f"player 'skilled' plays {games}, not {scene.play.game}; use random")
     bot: Policy = import_part(spec.bot)(scene.world.seed)
     return bot
@@ -266,7 +266,7 @@ class PlayerSpec:
         Raises:
             SceneError: the scene lacks what its game needs, or the game what the script presses.
         """
-        rules = fitting_rules(scene, file)
+        rules = fitting_rules(scene, file, on_request=True)
         if rules is None:
             return None
         if self.name == RECORDED:

@@ -30,9 +30,12 @@ class RulesFactory:
 
 
 RULES: dict[str, Callable[[Scene, Bodies], Rules]] = {
-    name: RulesFactory(spec.rules) for spec in game_specs() if spec.rules is not None for name in spec.names
+    name: RulesFactory(spec.rules)
+    for spec in game_specs()
+    if spec.rules is not None and not spec.rules_on_request
+    for name in spec.names
 }
-"""Games of this package that have rules, by name."""
+"""Games of this package whose rules always start with the scene, by name."""
 
 
 def find_spec(game: str | None) -> GameSpec | None:
@@ -48,7 +51,7 @@ def find_spec(game: str | None) -> GameSpec | None:
         raise UnsuitableSceneError(f"the game {game!r} cannot be imported from {source}: {error}") from error
 
 
-def _find_rules(game: str | None) -> Callable[[Scene, Bodies], Rules] | None:
+def _find_rules(game: str | None, on_request: bool) -> Callable[[Scene, Bodies], Rules] | None:
     """Return the factory of the rules of a game; None if it has no rules.
 
     Raises:
@@ -57,20 +60,23 @@ def _find_rules(game: str | None) -> Callable[[Scene, Bodies], Rules] | None:
     if game is None or game in RULES:
         return RULES.get(game or "")
     spec = find_spec(game)
-    return None if spec is None or spec.rules is None else RulesFactory(spec.rules)
+    if spec is None or spec.rules is None or (spec.rules_on_request and not on_request):
+        return None
+    return RulesFactory(spec.rules)
 
 
-def rules_of(scene: Scene, bodies: Bodies | None = None) -> Rules | None:
+def rules_of(scene: Scene, bodies: Bodies | None = None, *, on_request: bool = False) -> Rules | None:
     """Start the game that a scene names; return None if it names no game with rules.
 
     Args:
         scene: expanded scene.
         bodies: its bodies; default: those of the scene.
+        on_request: also start rules that start only on request, `GameSpec.rules_on_request`.
 
     Raises:
         UnsuitableSceneError: the scene lacks an element that the game needs.
     """
-    start = _find_rules(scene.play.game)
+    start = _find_rules(scene.play.game, on_request)
     return None if start is None else start(scene, scene.bodies if bodies is None else bodies)
 
 
@@ -84,10 +90,15 @@ def is_real_time(game: str | None) -> bool:
     return spec is not None and spec.real_time
 
 
-def has_rules(scene: Scene) -> bool:
-    """Return whether a scene names a game with rules. Games of other packages have rules."""
+def has_rules(scene: Scene, *, on_request: bool = False) -> bool:
+    """Return whether a scene names a game with rules; with `on_request` also one whose rules start only on request.
+
+    Games of other packages have rules.
+    """
     game = scene.play.game
-    return game in RULES or (game is not None and game not in GAMES)
+    if game is None or game in RULES:
+        return game is not None
+    return game not in GAMES or (on_request and _find_rules(game, on_request) is not None)
 
 
 def required_rules(scene: Scene) -> Rules:
@@ -96,20 +107,20 @@ def required_rules(scene: Scene) -> Rules:
     Raises:
         UnsuitableSceneError: it names no game with rules, or lacks an element that the game needs.
     """
-    rules = rules_of(scene)
+    rules = rules_of(scene, on_request=True)
     if rules is None:
         raise UnsuitableSceneError(f"the scene {scene.title!r} has no game with rules: state [play] game")
     return rules
 
 
-def fitting_rules(scene: Scene, file: str) -> Rules | None:
-    """Start the game that the scene of a file names; return None if it names no game with rules.
+def fitting_rules(scene: Scene, file: str, *, on_request: bool = False) -> Rules | None:
+    """Start the game that the scene of a file names; return None if it names no game with rules. As `rules_of`.
 
     Raises:
         SceneError: the scene lacks an element that the game needs; the error has the file and line.
     """
     try:
-        return rules_of(scene)
+        return rules_of(scene, on_request=on_request)
     except UnsuitableSceneError as error:
         try:
             line = Lines(Path(file).read_text(encoding="utf-8")).find(("play", "game"))

@@ -41,6 +41,9 @@ class GameSpec:
     """input handling of the window, for games whose input is more than the keys of `Rules.controls`"""
     environments: tuple[Environment, ...] = ()
     """Gymnasium environments; only for games of this package"""
+    rules_on_request: bool = False
+    """whether a scene also runs without the rules: commands start them only for a named player, or for a recording with
+    inputs"""
     real_time: bool = False
     """whether time matters from the first step: the window waits for a key press before it starts the game"""
     presents: str | None = None

@@ -70,7 +70,7 @@ def rerun(
         UnfitError: the scene lacks what the game that it names needs.
     """
     chosen = recording if engine is None else recording.on(engine)
-    rules = rules_of(chosen.scene)
+    rules = rules_of(chosen.scene, on_request=bool(chosen.presses))
     return run(
         chosen.whole_scene,
         chosen.engine,

@@ -197,3 +197,12 @@ def test_scene_that_its_game_does_not_fit_is_told_with_its_line(tmp_path: Path) 
         assert done.returncode == 2
         assert done.stderr.startswith(wanted)
         assert done.stderr.count("\n") == 1
+
+
+def test_billiards_have_rules_only_with_a_player(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    run = ("run", "9-ball", "--engine", "exact", "--no-audit")
+    assert "score" not in json_of(capfd, *run)[1]["runs"][0]
+    by_bot = ("--player", "skilled", "--set", "world.duration=25", "--out", str(tmp_path))
+    (row,) = json_of(capfd, *run, *by_bot)[1]["runs"]
+    assert (row["player"], row["status"], row["otherwise"]) == ("skilled", "ok", None)
+    assert row["score"] >= 0

@@ -1,24 +1,36 @@
-"""Billiards: pool, carom and snooker, played headless: no window, and any engine that rolls balls on a floor.
+"""Billiards: pool, carom and snooker on any engine that supports a `[surface]`.
 
-    match = Match.begin(load("scenes/billiards/9-ball.toml"))      # match.py: a frozen value between shots
-    match.turn, match.state.scores, match.targets, match.choices   # who, how it stands, what may be said
-    match = match.place(match.nearest((x, y)))                     # a ball in hand; match.refusal((x, y)) says why not
-    match = match.decide("play")                                   # where match.choices.decisions is not empty
+- `rules`: the rules of each game as state machines, which know neither engine nor table
+- `match`: `Match`, an immutable frame between two shots: rules, scores, positions
+- `game`: `BilliardsRules`, the `Rules` of running games
+- `bot`: `BilliardsBot`, which chooses shots, and `BilliardsPolicy`, which plays both players of a headless game
+- `headless`: frames between bots, for `sandbox match`
+- `tables`, `scene`: dimensions, and the `[billiards]` table of scene files
+- `view`: the window's part
+
+A match advances by itself, without `BilliardsRules`, as follows:
+
+    match = Match.begin(load("scenes/billiards/9-ball.toml"))
+    match = match.decide("play")                                   # if match.choices.decisions is not empty
+    match = match.place(match.nearest((x, y)))                     # if match.state.in_hand is not None
     simulation.apply(match.strike(Stroke(aim=1.57, speed=8.0), simulation.time))
-    …                                                              # step until all rest; frame.py's roll_out does
-    match = match.played(simulation.contacts(), simulation.frame().position, Call(), began)
-    for move in match.moves(simulation.frame().position, simulation.time): simulation.apply(move)
-    match.verdict.fouls, match.messages                            # to undo a shot, apply the moves of the match before
+    ...                                                            # step until every ball is at rest
+    match = match.played(simulation.contacts(), simulation.frame().position, ShotCall(), began)
+    for move in match.moves(simulation.frame().position, simulation.time):
+        simulation.apply(move)
 
-So a session is a scene and its actions: `Strike` and `Move`. `Bot(skill, seed)` (bot/) decides and plans shots, and
-`play(match, players, engine)` (frame.py) plays a frame out between players and returns it with its session.
+A shot is undone by applying the moves of the match before it.
 """
 
 from sandbox.games.spec import GameSpec
 
 GAME = GameSpec(
     names=("8-ball", "9-ball", "three-cushion", "straight-rail", "snooker", "free"),
+    rules="sandbox.games.billiards.game:start_game",
     tables={"billiards": "sandbox.games.billiards.scene:BILLIARDS"},
+    bot="sandbox.games.billiards.bot:BilliardsPolicy",
     view="sandbox.games.billiards.view.view:BilliardsView",
     presents="sandbox.games.billiards.scene:presents",
+    rules_on_request=True,
+    needs_player="sandbox.games.billiards.game:needs_player",
 )

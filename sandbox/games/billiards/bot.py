@@ -8,10 +8,12 @@ The bot: it looks for shots by geometry, tries them on the exact engine, and has
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from sandbox.echo import short_repr
 from sandbox.engines.exact.tabletop.shots import Table
+from sandbox.games.billiards.game import BilliardsRules
 from sandbox.games.billiards.headless import FramePlan
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.placement import spread
@@ -24,6 +26,7 @@ from sandbox.games.billiards.shot_search import (
     pot_candidates,
     straight,
 )
+from sandbox.games.contract import Rules, StepInfo
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.surface import Stroke
 from sandbox.scene.random_streams import Stream, draws
@@ -196,3 +199,30 @@ def parse_bots(text: str, seed: int = 0) -> tuple[BilliardsBot, ...]:
     if len(found) > 2:
         raise GameError(f"{len(found)} players cannot play; 1 or 2 can")
     return tuple(found)
+
+
+class BilliardsPolicy:
+    """Policy of headless games: bots of one skill play for every player, by the controls of `BilliardsRules`."""
+
+    def __init__(self, seed: int = 0, skill: float = DEFAULT_SKILL) -> None:
+        """Create a bot for each of two players.
+
+        Args:
+            seed: seed of their errors.
+            skill: 0 to 1.
+        """
+        self._bots = tuple(BilliardsBot(skill, 2 * seed + number) for number in range(2))
+        self._decided: tuple[int, int] | None = None  # shots and player of the last decision
+
+    def decide(self, info: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:  # noqa: ARG002
+        """Return the inputs of a decision, or of a call, a placement and a stroke, as soon as every ball is at rest."""
+        if not isinstance(rules, BilliardsRules) or not rules.waiting:
+            return ()
+        match = rules.match
+        bot = self._bots[match.turn]
+        if match.choices.decisions and match.rules.name != "free" and self._decided != (match.shots, match.turn):
+            self._decided = match.shots, match.turn
+            return (rules.decision_input(bot.decide(match)),)
+        plan = bot.plan(match)
+        place = rules.place_inputs(plan.place) if plan.place is not None else ()
+        return (*rules.call_inputs(plan.call), *place, *rules.stroke_inputs(plan.stroke))

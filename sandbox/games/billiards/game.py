@@ -102,18 +102,6 @@ class BilliardsRules:
         self._place = [0.5, 0.5]
         self._sounds: list[str] = []
 
-    @classmethod
-    def of_scene(cls, scene: Scene, bodies: Bodies) -> Self:  # noqa: ARG003, the factory's form
-        """Start the game that a scene names: free play alone, every other game with two players.
-
-        Raises:
-            UnsuitableSceneError: it cannot be played on this table.
-        """
-        try:
-            return cls(Match.begin(scene, players=1 if scene.play.game == "free" else 2), bool(scene.shots))
-        except GameError as error:
-            raise UnsuitableSceneError(str(error)) from None
-
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Return a copy; matches and contacts are immutable, and shared."""
         twin = copy.copy(self)
@@ -237,6 +225,7 @@ class BilliardsRules:
     def _act(self, name: str, value: float) -> Sequence[Action]:
         match = self.match
         if name == "shoot":
+            self._is_resting = False  # until the next step shows the effect, so that no second stroke follows at once
             speed = min(max(value * MAX_CUE_SPEED, MIN_CUE_SPEED), MAX_CUE_SPEED)
             return (match.strike(self.stroke.model_copy(update={"speed": speed})),)
         if name == "place":
@@ -343,6 +332,25 @@ class BilliardsRules:
             ("decisions offered", float(len(self.match.choices.decisions))),
             *((f"score of {player_name(number)}", float(score)) for number, score in enumerate(state.scores)),
         )
+
+
+def start_game(scene: Scene, bodies: Bodies) -> BilliardsRules:  # noqa: ARG001, the signature of `GameSpec.rules`
+    """Start the game that a scene names: free play with one player, every other game with two.
+
+    Raises:
+        UnsuitableSceneError: it cannot be played on this table.
+    """
+    try:
+        return BilliardsRules(Match.begin(scene, players=1 if scene.play.game == "free" else 2), bool(scene.shots))
+    except GameError as error:
+        raise UnsuitableSceneError(str(error)) from None
+
+
+def needs_player(scene: Scene) -> str | None:
+    """Return why a scene stays unchanged without input: it has no shot of its own."""
+    if scene.shots:
+        return None
+    return "player 'none' plays no shot, so nothing would move; use random, skilled or a script"
 
 
 def _points(position: Any) -> tuple[Point, ...]:

@@ -44,5 +44,5 @@ def test_skill_is_a_share_and_the_game_has_to_be_artillery() -> None:
     with pytest.raises(ValueError, match="0 to 1"):
         ArtilleryBot(1, skill=1.5)
     assert isinstance(POLICIES["skilled"](loads(FIELD)), ArtilleryBot)
-    with pytest.raises(UnsuitableSceneError, match="pinball and artillery"):
+    with pytest.raises(UnsuitableSceneError, match="not landing"):
         POLICIES["skilled"](load(find("landing")))
