@@ -26,6 +26,10 @@ TableGame = Literal["8-ball", "9-ball", "three-cushion", "straight-rail", "snook
 """Games of billiards, which need a table."""
 
 
+_ADDED: dict[str, GameSpec] = {}
+"""Games that `register_game` added, by name."""
+
+
 @cache
 def game_specs() -> tuple[GameSpec, ...]:
     """Return the specs of the games of this package."""
@@ -55,12 +59,12 @@ def games_with_bot() -> tuple[str, ...]:
 
 def game_names() -> tuple[str, ...]:
     """Return the names of all games, those of this package first."""
-    return (*GAMES, *(name for name in sorted(registered_games()) if name not in GAMES))
+    return (*GAMES, *(name for name in sorted({**registered_games(), **_ADDED}) if name not in GAMES))
 
 
 def is_game(name: str) -> bool:
     """Return whether there is a game of this name."""
-    return name in GAMES or name in registered_games()
+    return name in GAMES or name in _ADDED or name in registered_games()
 
 
 def spec_of(game: str | None) -> GameSpec | None:
@@ -76,6 +80,8 @@ def spec_of(game: str | None) -> GameSpec | None:
         return None
     if game in GAMES:
         return next(spec for spec in game_specs() if game in spec.names)
+    if game in _ADDED:
+        return _ADDED[game]
     entry = registered_games().get(game)
     if entry is None:
         return None
@@ -85,8 +91,20 @@ def spec_of(game: str | None) -> GameSpec | None:
     return GameSpec(names=(game,), rules=entry.value, real_time=bool(getattr(found, "real_time", False)))
 
 
+def register_game(spec: GameSpec) -> None:
+    """Add a game to the running program, without an entry point. A later one replaces an earlier one of its name.
+
+    Raises:
+        ValueError: the package has a game of that name.
+    """
+    taken = [name for name in spec.names if name in GAMES]
+    if taken:
+        raise ValueError(f"the sandbox has a game {taken[0]!r}")
+    _ADDED.update(dict.fromkeys(spec.names, spec))
+
+
 def registered_games() -> "dict[str, EntryPoint]":
-    """Return the games of other packages by name. They are imported when one is played."""
+    """Return the entry points of other packages' games by name. They are imported when one is played."""
     return _entry_points(tuple(sys.path))
 
 
