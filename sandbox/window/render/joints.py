@@ -21,7 +21,7 @@ from sandbox.arrays import FloatArray, IntArray
 from sandbox.scene.compile.drives import Mount, mounts
 from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
 from sandbox.scene.description.forces import PlungerDrive
-from sandbox.window.render.body_geometry import clipped_box, outline_distance
+from sandbox.window.render.body_geometry import clipped_box
 from sandbox.window.render.circles import CircleRenderer, CircleStyle
 from sandbox.window.render.draw_context import DrawContext
 from sandbox.window.render.lines import Pixel, draw_arrow, draw_dashes, draw_line, draw_thin_lines
@@ -38,7 +38,7 @@ from sandbox.window.render.palette import (
     mix_colours,
 )
 from sandbox.window.render.particles import packed_pixels
-from sandbox.window.render.sdf import ShapeStyle, draw_sdf
+from sandbox.window.render.sdf import ShapeStyle, SignedDistance, arc_distance, capsule_distance, draw_sdf
 
 COILED = 500
 """Springs up to which each is a zigzag."""
@@ -379,28 +379,27 @@ def arc(
 ) -> None:
     """Draw part of a circle, counted as in the world, with a dark edge that sets it off."""
     low, half = min(first, first + span), min(0.5 * abs(span), math.pi)
-    middle = low + half
-    row = [1.0, *centre, radius, math.cos(middle), -math.sin(middle), math.cos(half)]
-    tips = [[0.0, *tip, *tip, 0.0, 0.0] for tip in (spot(centre, radius, low), spot(centre, radius, low + 2 * half))]
-    _traced(view, np.asarray([row, *tips]), colour, width)
+    distance = arc_distance(*centre, radius, low + half, half)
+    (x, y) = centre
+    _trace(view, distance, (x - radius, y - radius, x + radius, y + radius), colour, width)
 
 
 def path(view: DrawContext, spots: list[Pixel], colour: Colour, width: float) -> None:
     """Draw a line through places, with a dark edge."""
-    rows = [[0.0, *a, *b, 0.0, 0.0] for a, b in pairwise(spots)]
-    _traced(view, np.asarray(rows), colour, width)
+    parts = [capsule_distance(a, b, 0.0) for a, b in pairwise(spots)]
+    columns, rows = zip(*spots, strict=True)
+    box = min(columns), min(rows), max(columns), max(rows)
+    _trace(view, lambda x, y: np.asarray(np.minimum.reduce([part(x, y) for part in parts])), box, colour, width)
 
 
-def _traced(view: DrawContext, edge: FloatArray, colour: Colour, width: float) -> None:
-    """Draw a line along an outline in px."""
+def _trace(
+    view: DrawContext, distance: SignedDistance, box: tuple[float, float, float, float], colour: Colour, width: float
+) -> None:
+    """Draw a line where a distance is 0, which is in a box (left, top, right, bottom), px."""
     half, halo = 0.5 * width * view.unit, 1.2 * view.unit
-    distance = outline_distance(edge)
-    reach = edge[:, 3].max() if edge[0, 0] == 1.0 else 0.0
-    spots = np.vstack((edge[:, 1:3], edge[edge[:, 0] == 0.0, 3:5]))  # of straight lines both ends
-    low, high = spots.min(axis=0) - reach, spots.max(axis=0) + reach
     margin = half + halo + 1.0
-    box = float(low[0] - margin), float(low[1] - margin), float(high[0] + margin), float(high[1] + margin)
-    within = clipped_box(box, view.surface.get_clip())
+    wide = box[0] - margin, box[1] - margin, box[2] + margin, box[3] + margin
+    within = clipped_box(wide, view.surface.get_clip())
     if within.width:
         look = ShapeStyle(colour, BACKGROUND, halo, antialias=view.antialias)
         draw_sdf(view.surface, lambda x, y: np.asarray(distance(x, y) - half - halo), look, within)

@@ -216,57 +216,25 @@ def _piece_distance(x: float, y: float, room: FloatArray, first: int, last: int,
 
 
 @bare_kernel
-def _outline_distance(x: float, y: float, edge: FloatArray, first: int, last: int, far: float) -> float:
-    """Return the distance from an outline, in its own units; some greater one where it is farther than `far`."""
-    best = np.inf
-    for k in range(first, last):
-        if edge[k, 0] == 0.0:
-            if x < min(edge[k, 1], edge[k, 3]) - far or x > max(edge[k, 1], edge[k, 3]) + far:
-                continue  # most of a long outline
-            away2 = _side_distance2(x, y, edge[k, 1], edge[k, 2], edge[k, 3], edge[k, 4])
-            best = min(best, away2)
-        else:
-            px, py = x - edge[k, 1], y - edge[k, 2]
-            length = math.sqrt(px * px + py * py)
-            if px * edge[k, 4] + py * edge[k, 5] >= length * edge[k, 6]:
-                best = min(best, (length - edge[k, 3]) ** 2)
-    return math.sqrt(best)
-
-
-@bare_kernel
 def _body_distance(
-    x: float,
-    y: float,
-    body: int,
-    pieces: ConvexPieces,
-    room: FloatArray,
-    pose: PolygonPose,
-    edges: tuple[int, int],
-    deep: float,
+    x: float, y: float, body: int, pieces: ConvexPieces, room: FloatArray, scale: float, grow: float, deep: float
 ) -> float:
-    """Return the signed distance from a body, px: `deep` where it is deeper than its rim, inf where it is not near."""
-    begin, end = pieces.piece[body], pieces.piece[body + 1]
+    """Return the least signed distance from the pieces of a body, enlarged by `grow`, px; `deep` where it is less."""
     away = np.inf
-    for piece in range(begin, end):
+    for piece in range(pieces.piece[body], pieces.piece[body + 1]):
         first, last = pieces.first[piece], pieces.first[piece + 1]
         if x < room[first, 7] or x > room[first, 8]:
             continue
-        away = min(away, _piece_distance(x, y, room, first, last, pieces.radius[piece] * pose.scale))
+        away = min(away, _piece_distance(x, y, room, first, last, pieces.radius[piece] * scale + grow))
         if away <= deep:
             return deep
-    if end - begin > 1 and away < 0.5:
-        if edges[0] == edges[1]:  # of too many pieces there is no outline, and no rim
-            return deep if away <= SEAM else away
-        px, py = (x - pose.x) / pose.scale, (pose.y - y) / pose.scale
-        along, across = pose.cos * px + pose.sin * py, pose.cos * py - pose.sin * px
-        far = (1.0 - deep) / pose.scale
-        near = pose.scale * _outline_distance(along, across, pieces.edge, edges[0], edges[1], far)
-        return -near if away <= SEAM else near
     return away
 
 
 @bare_kernel
-def _place(pieces: ConvexPieces, body: int, pose: PolygonPose, room: FloatArray) -> tuple[float, float, float, float]:
+def _place(
+    pieces: ConvexPieces, body: int, pose: PolygonPose, room: FloatArray, grow: float
+) -> tuple[float, float, float, float]:
     """Put a body's corners into the picture, each with the line of the side behind it: normal, outwards, and offset.
 
     Returns:
@@ -274,7 +242,7 @@ def _place(pieces: ConvexPieces, body: int, pose: PolygonPose, room: FloatArray)
     """
     left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
     for piece in range(pieces.piece[body], pieces.piece[body + 1]):
-        wide = pieces.radius[piece] * pose.scale + 1.0
+        wide = pieces.radius[piece] * pose.scale + grow + 1.0
         first, last = pieces.first[piece], pieces.first[piece + 1]
         for k in range(first, last):
             x, y = pieces.corner[k, 0], pieces.corner[k, 1]
@@ -374,14 +342,15 @@ def rasterise_polygons(
         body, here = who[k], PolygonPose(pose[k, 0], pose[k, 1], pose[k, 2], pose[k, 3], pose[k, 4])
         begin, end = pieces.piece[body], pieces.piece[body + 1]
         low, high = pieces.first[begin], pieces.first[end]
-        left, top, right, bottom = _place(pieces, body, here, room)
+        # The rim of a compound body lies outside: with the pieces enlarged by it, the fill covers them as they are.
+        grow = line[k] + SEAM if end - begin > 1 else 0.0
+        left, top, right, bottom = _place(pieces, body, here, room, grow)
         left, top = max(left, float(area[0])), max(top, float(area[1]))
         right, bottom = min(right, float(area[2])), min(bottom, float(area[3]))
         if not (left < right and top < bottom):
             continue
         polygon = pieces.radius[begin] == 0.0 and end - begin == 1 and high - low > 2
-        element, radius = pieces.element[body], pieces.radius[begin] * here.scale
-        edges = pieces.edge_first[element], pieces.edge_first[element + 1]
+        radius = pieces.radius[begin] * here.scale
         deep = -(line[k] + 0.5)
         inner, outer = int(fill[k]), int(rim[k])
         for row in range(int(top), math.ceil(bottom)):
@@ -390,7 +359,8 @@ def rasterise_polygons(
                 _polygon_row(pixels, start, y, room, (low, high), (left, right), deep, inner, outer, hollow, antialias)
                 continue
             for piece in range(begin, end):
-                first, last, wide = pieces.first[piece], pieces.first[piece + 1], pieces.radius[piece] * here.scale
+                first, last = pieces.first[piece], pieces.first[piece + 1]
+                wide = pieces.radius[piece] * here.scale + grow
                 room[first, 5], room[first, 6] = inner_span(y, room, first, last, wide + deep, left, right)
                 room[first, 7], room[first, 8] = outer_span(y, room, first, last, wide + 0.5, left, right)
             column, stop = int(left), math.ceil(right)
@@ -413,7 +383,7 @@ def rasterise_polygons(
                 if end - begin == 1:  # a call with all arrays takes longer than the rest
                     away = _piece_distance(x, y, room, low, high, radius)
                 else:
-                    away = _body_distance(x, y, body, pieces, room, here, edges, deep)
+                    away = _body_distance(x, y, body, pieces, room, here.scale, grow, deep)
                 pixel = int(pixels[start + column])
                 pixels[start + column] = _shaded(pixel, away, deep, inner, outer, hollow, antialias)
                 column += 1

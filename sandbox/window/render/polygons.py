@@ -1,9 +1,10 @@
-"""Polygons: bodies that are no lone discs, drawn whole: no seam shows where their pieces overlap or abut.
+"""Bodies that are no single discs: by a compiled rasteriser where numba is installed, else by pygame's polygons.
 
-A crowd is drawn in one compiled pass where numba is there; a few by their distance, as large discs are; a crowd
-without numba plainly. The first two look the same.
+The two differ by their antialiasing only. The rim of a body of one piece lies inside its edge, that of a compound body
+outside.
 """
 
+import math
 import sys
 
 import numpy as np
@@ -11,19 +12,24 @@ import pygame
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.window.hit_test import rounded_hull
-from sandbox.window.render.body_geometry import BodyGeometry, ScreenPose, clipped_box
+from sandbox.window.hit_test import Hull, rounded_hull
+from sandbox.window.render.body_geometry import SEAM, BodyGeometry, ScreenPose, clipped_box
 from sandbox.window.render.circles import DARK, CircleStyle, darken
 from sandbox.window.render.draw_context import DrawContext
-from sandbox.window.render.lines import fill_polygon
+from sandbox.window.render.lines import Pixel, clip_polygon, fill_polygon
 from sandbox.window.render.palette import BACKGROUND, Colour, ColourArray
 from sandbox.window.render.particles import flat_pixels, is_flat, packed_pixels
 from sandbox.window.render.sdf import ShapeStyle, draw_sdf
 
 FEW_POLYGONS = 8
-"""Bodies up to which numba is not imported for them alone"""
-SDL_COORDINATE_LIMIT = 1e6
-"""px: bodies farther away, or larger, are drawn by their distance, which knows no whole numbers"""
+"""Bodies up to which numba is not imported for them alone: its import takes 0.4 s"""
+MAX_RASTER_COORDINATE = 16_000.0
+"""px: bodies that reach farther are cut to the picture and drawn by pygame"""
+ARC_ERROR = 0.1
+"""px, the largest distance between an arc and its chords"""
+MAX_ARC_CHORDS = 256
+THIN_RIM = 2.0
+"""px: without the compiled rasteriser a narrower rim is a line of one pixel"""
 
 
 class PolygonRenderer:
@@ -68,23 +74,20 @@ class PolygonRenderer:
         line = anatomy.rims(who, scale, style.line)
         if style.hollow:
             line = np.full(len(who), style.line)
-        near = bool((np.abs(centre).max(axis=1) + bodies.radius[who] * scale < SDL_COORDINATE_LIMIT).all())
+        near = bool((np.abs(centre).max(axis=1) + bodies.radius[who] * scale < MAX_RASTER_COORDINATE).all())
         worth = len(who) > FEW_POLYGONS or "numba" in sys.modules
         if worth and near and _in_one_pass(surface, anatomy, who, centre, angle, scale, colours, line, style):
             return
-        plain = len(who) > FEW_POLYGONS and near
         rows = zip(
             who.tolist(), centre.tolist(), angle.tolist(), map(tuple, colours.tolist()), line.tolist(), strict=True
         )
         for number, (x, y), turned, colour, width in rows:
-            place = ScreenPose(x, y, turned, scale)
-            if plain:
-                _plain(surface, anatomy, number, place, colour, style)
-                continue
-            look = ShapeStyle(colour, darken(colour), width, antialias=style.antialias)
+            pose = ScreenPose(x, y, turned, scale)
             if style.hollow:
-                look = look._replace(fill=None, rim=colour)
-            _painted(surface, anatomy, number, place, look, 0.0)
+                outside = width + SEAM if anatomy.is_compound(number) else 0.0
+                self.ring(surface, bodies, number, pose, outside, colour, width, style.antialias)
+            else:
+                _draw_plain(surface, anatomy.hulls(number, pose), colour, width, style.antialias, near)
 
     def ring(
         self,
@@ -95,24 +98,21 @@ class PolygonRenderer:
         gap: float,
         colour: Colour,
         line: float,
+        antialias: bool = True,
     ) -> None:
-        """Draw a line around a body, so wide; its outer edge is a gap, px, away from it."""
-        _painted(surface, self.anatomy(bodies), number, place, ShapeStyle(None, colour, line), gap)
+        """Draw a line around a body, `line` px wide; its outer edge is `gap` px away from the body."""
+        anatomy = self.anatomy(bodies)
+        distance = anatomy.distance(number, place)
+        within = clipped_box(anatomy.within(number, place, gap + 2.0), surface.get_clip())
+        if within.width:
+            look = ShapeStyle(None, colour, line, antialias=antialias)
+            draw_sdf(surface, lambda x, y: np.asarray(distance(x, y) - gap), look, within)
 
     def boxes(self, view: DrawContext) -> FloatArray:
         """Return left, top, right and bottom of the boxes around the bodies of a view, (K, 4) px."""
         angle = view.sight.frame.angle[view.shown]
         angle = np.where(np.isfinite(angle), angle, 0.0)
         return self.anatomy(view.sight.bodies).boxes(view.shown, view.centre, angle, view.camera.scale)
-
-
-def _painted(
-    surface: pygame.Surface, anatomy: BodyGeometry, number: int, place: ScreenPose, look: ShapeStyle, gap: float
-) -> None:
-    distance = anatomy.distance(number, place)
-    within = clipped_box(anatomy.within(number, place, gap + 2.0), surface.get_clip())
-    if within.width:
-        draw_sdf(surface, lambda x, y: np.asarray(distance(x, y) - gap), look, within)
 
 
 def _in_one_pass(
@@ -156,16 +156,59 @@ def _in_one_pass(
     return True
 
 
-def _plain(
-    surface: pygame.Surface, anatomy: BodyGeometry, number: int, place: ScreenPose, colour: Colour, style: CircleStyle
+def _draw_plain(
+    surface: pygame.Surface, hulls: list[Hull], colour: Colour, line: float, antialias: bool, near: bool
 ) -> None:
-    """Draw a body with what pygame has: its pieces filled, and of a lone one its edge."""
-    hulls = anatomy.hulls(number, place)
-    line = pygame.draw.aalines if style.antialias else pygame.draw.lines
+    """Draw a body by polygons: its pieces in the colour of the rim, then its pieces in its own colour."""
+    reach = 2 * math.ceil(line) + 8
+    area = None if near else surface.get_clip().inflate(reach, reach)
+    if line <= 0.0:
+        _fill_hulls(surface, hulls, colour, antialias, area)
+    elif len(hulls) > 1:
+        _fill_hulls(
+            surface, [Hull(hull.corners, hull.radius + line) for hull in hulls], darken(colour), antialias, area
+        )
+        _fill_hulls(surface, hulls, colour, antialias, area)
+    elif line < THIN_RIM:
+        corners = _corners(hulls[0], area)
+        if corners:
+            fill_polygon(surface, corners, colour, antialias)
+            edge = pygame.draw.aalines if antialias else pygame.draw.lines
+            edge(surface, darken(colour), True, [(x - 0.5, y - 0.5) for x, y in corners])
+    else:
+        half = 0.5 if antialias else 0.0  # an antialiased edge adds half a pixel
+        _fill_hulls(surface, [_inset(hulls[0], half)], darken(colour), antialias, area)
+        _fill_hulls(surface, [_inset(hulls[0], half + line)], colour, antialias, area)
+
+
+def _fill_hulls(
+    surface: pygame.Surface, hulls: list[Hull], colour: Colour, antialias: bool, area: pygame.Rect | None
+) -> None:
     for hull in hulls:
-        corners = [(x, y) for x, y in rounded_hull(hull).tolist()]
-        if not style.hollow:
-            fill_polygon(surface, corners, colour, style.antialias)
-        if style.hollow or len(hulls) == 1:
-            edge = colour if style.hollow else darken(colour)
-            line(surface, edge, True, [(x - 0.5, y - 0.5) for x, y in corners])
+        corners = _corners(hull, area)
+        if corners:
+            fill_polygon(surface, corners, colour, antialias)
+
+
+def _corners(hull: Hull, area: pygame.Rect | None) -> list[Pixel]:
+    """Return the corners of a hull as a polygon, cut to an area if one is given; none if nothing is left of it."""
+    chords = math.ceil(math.pi * math.sqrt(hull.radius / (8.0 * ARC_ERROR)))
+    corners = [(x, y) for x, y in rounded_hull(hull, min(max(chords, 2), MAX_ARC_CHORDS)).tolist()]
+    return corners if area is None else clip_polygon(corners, area)
+
+
+def _inset(hull: Hull, depth: float) -> Hull:
+    """Return a hull made smaller by a depth, px, which is less than its inscribed radius."""
+    corners, radius = hull
+    if radius >= depth:
+        return Hull(corners, radius - depth)
+    depth -= radius
+    following = np.roll(corners, -1, axis=0)
+    along = following - corners
+    along /= np.maximum(np.hypot(along[:, 0], along[:, 1]), 1e-300)[:, None]
+    x, y = corners.T
+    sign = 1.0 if float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum()) >= 0.0 else -1.0
+    inwards = np.column_stack((-along[:, 1], along[:, 0])) * sign
+    before = np.roll(inwards, 1, axis=0)
+    cosine = (inwards * before).sum(axis=1)
+    return Hull(corners + depth * (inwards + before) / np.maximum(1.0 + cosine, 1e-3)[:, None], 0.0)

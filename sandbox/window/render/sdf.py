@@ -3,6 +3,7 @@
 A distance is in pixels, negative inside; pixel (i, j) is sampled at its middle (i + ½, j + ½).
 """
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -76,6 +77,28 @@ def capsule_distance(a: tuple[float, float], b: tuple[float, float], radius: flo
         x, y = px - a[0], py - a[1]
         share = np.clip((x * along[0] + y * along[1]) / squared, 0.0, 1.0)
         return np.asarray(np.sqrt((x - share * along[0]) ** 2 + (y - share * along[1]) ** 2) - radius)
+
+    return distance
+
+
+def arc_distance(x: float, y: float, radius: float, middle: float, half: float) -> SignedDistance:
+    """Return the distance from an arc of a circle, px, never negative.
+
+    Args:
+        x: of the centre, px.
+        y: of the centre, px.
+        radius: px.
+        middle: rad, direction of the middle of the arc, counted as in the world, where y is up.
+        half: rad, from its middle to each of its ends, 0 to π.
+    """
+    along, across, cosine = math.cos(middle), -math.sin(middle), math.cos(half)
+    ends = [(x + radius * math.cos(angle), y - radius * math.sin(angle)) for angle in (middle - half, middle + half)]
+
+    def distance(px: FloatArray, py: FloatArray) -> FloatArray:
+        right, down = px - x, py - y
+        length = np.sqrt(right * right + down * down)
+        beside = np.minimum.reduce([np.hypot(px - ex, py - ey) for ex, ey in ends])
+        return np.where(right * along + down * across >= length * cosine, np.abs(length - radius), beside)
 
     return distance
 
