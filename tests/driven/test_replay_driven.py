@@ -13,10 +13,10 @@ from sandbox.window.camera import Camera
 from sandbox.window.playback.recorded import RecordedRun
 from sandbox.window.render.palette import INK, SKY
 from sandbox.window.ui.panel import PANEL_WIDTH
-from sandbox.window.ui.timeline import HEIGHT, Timeline
+from sandbox.window.ui.timeline import TIMELINE_HEIGHT, Timeline
 from sandbox.window.view_bounds import view_bounds
 
-AREA = pygame.Rect(0, SIZE[1] - HEIGHT, SIZE[0] - PANEL_WIDTH, HEIGHT)
+AREA = pygame.Rect(0, SIZE[1] - TIMELINE_HEIGHT, SIZE[0] - PANEL_WIDTH, TIMELINE_HEIGHT)
 WITHIN = 2.0  # px: the mean over the pixels of a disc whose rim is antialiased
 
 
@@ -28,7 +28,7 @@ def stored(folder: Path, text: str) -> RecordedRun:
 
 
 def seen_by(film: RecordedRun) -> Camera:
-    return Camera.fitting(view_bounds(film.scene), SIZE, inset=PANEL_WIDTH, foot=HEIGHT)
+    return Camera.fitting(view_bounds(film.scene), SIZE, inset=PANEL_WIDTH, foot=TIMELINE_HEIGHT)
 
 
 def ball_at(window: Driven, film: RecordedRun, time: float) -> None:

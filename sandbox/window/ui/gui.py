@@ -33,7 +33,7 @@ from sandbox.window.ui.panel import SidePanel
 from sandbox.window.ui.scene_browser import SceneBrowser
 from sandbox.window.ui.score_panel import ScoreLayout, draw_score, layout_score
 from sandbox.window.ui.status import hud_status, settings_text
-from sandbox.window.ui.timeline import HEIGHT, Timeline
+from sandbox.window.ui.timeline import TIMELINE_HEIGHT, Timeline
 
 GRAPH_SIZE = (300, 130)
 """px at UI scale 1"""
@@ -104,7 +104,7 @@ class Gui:
     @property
     def bottom_margin(self) -> int:
         """Height of the timeline at the bottom of the window, px."""
-        return round(HEIGHT * self.ui_scale) if self.panel.visible else 0
+        return round(TIMELINE_HEIGHT * self.ui_scale) if self.panel.visible else 0
 
     @property
     def area(self) -> pygame.Rect:

@@ -1,4 +1,4 @@
-"""Icons: the pictures on the panel's buttons, drawn large and made small so that they are smooth."""
+"""Icons of the buttons and small discs, drawn oversampled and scaled down for smooth edges."""
 
 import math
 from functools import lru_cache
@@ -8,35 +8,35 @@ import pygame
 from sandbox.window.render.palette import Colour
 
 ICON_NAMES = ("play", "pause", "step", "back", "restart", "camera", "record", "stop", "save", "help", "picker")
-_OVER = 4
+_OVERSAMPLING = 4
 _GRID = 24
-"""Icons are drawn on a field of 24 by 24."""
+"""icons are drawn on a grid of 24 by 24"""
 
 
 @lru_cache(maxsize=128)
 def icon(name: str, side: int, colour: Colour) -> pygame.Surface | None:
-    """Return an icon of `NAMES`, side px wide and high, or None where there is no such icon."""
+    """Return an icon of `ICON_NAMES`, `side` px wide and high; None for another name."""
     if name not in ICON_NAMES:
         return None
     side = max(side, 1)
-    large = pygame.Surface((side * _OVER, side * _OVER), pygame.SRCALPHA)
-    large.fill((*colour, 0))  # so that edges do not darken towards black
-    _Pen(large, side * _OVER / _GRID, colour).draw(name)
+    large = pygame.Surface((side * _OVERSAMPLING, side * _OVERSAMPLING), pygame.SRCALPHA)
+    large.fill((*colour, 0))  # so that edges do not darken
+    _Pen(large, side * _OVERSAMPLING / _GRID, colour).draw(name)
     return pygame.transform.smoothscale(large, (side, side))
 
 
 def draw_disc(
-    surface: pygame.Surface, at: tuple[float, float], radius: float, colour: Colour, hole: float = 0.0
+    surface: pygame.Surface, position: tuple[float, float], radius: float, colour: Colour, hole: float = 0.0
 ) -> None:
-    """Draw a smooth small disc, or a ring where a hole of some radius is left; px."""
-    made = _disc(round(_OVER * max(radius, 0.5)), colour, round(_OVER * hole))
-    surface.blit(made, made.get_rect(center=(round(at[0]), round(at[1]))))
+    """Draw a small antialiased disc, or a ring if `hole`, the inner radius, is positive; px."""
+    image = _disc(round(_OVERSAMPLING * max(radius, 0.5)), colour, round(_OVERSAMPLING * hole))
+    surface.blit(image, image.get_rect(center=(round(position[0]), round(position[1]))))
 
 
 @lru_cache(maxsize=256)
 def _disc(radius: int, colour: Colour, hole: int) -> pygame.Surface:
-    side = 2 * (radius // _OVER) + 3  # odd, so that it has a middle pixel
-    large = pygame.Surface((side * _OVER, side * _OVER), pygame.SRCALPHA)
+    side = 2 * (radius // _OVERSAMPLING) + 3  # odd, for a centre pixel
+    large = pygame.Surface((side * _OVERSAMPLING, side * _OVERSAMPLING), pygame.SRCALPHA)
     large.fill((*colour, 0))
     middle = large.get_rect().center
     pygame.draw.circle(large, colour, middle, radius)
@@ -46,7 +46,7 @@ def _disc(radius: int, colour: Colour, hole: int) -> pygame.Surface:
 
 
 class _Pen:
-    """Draws on a field of 24 by 24."""
+    """Draws icons on a grid of 24 by 24."""
 
     def __init__(self, surface: pygame.Surface, scale: float, colour: Colour) -> None:
         self.surface, self.scale, self.colour = surface, scale, colour
@@ -101,16 +101,16 @@ class _Pen:
             angle = math.radians(degrees)
             self._disc(x + radius * math.cos(angle), y - radius * math.sin(angle), 1.4)
 
-    def _rect(self, x: float, y: float, wide: float, high: float) -> pygame.Rect:
-        return pygame.Rect(*(round(part * self.scale) for part in (x, y, wide, high)))
+    def _rect(self, x: float, y: float, width: float, height: float) -> pygame.Rect:
+        return pygame.Rect(*(round(part * self.scale) for part in (x, y, width, height)))
 
-    def _box(self, x: float, y: float, wide: float, high: float, radius: float = 0.8) -> None:
-        rect = self._rect(x, y, wide, high)
+    def _box(self, x: float, y: float, width: float, height: float, radius: float = 0.8) -> None:
+        rect = self._rect(x, y, width, height)
         pygame.draw.rect(self.surface, self.colour, rect, border_radius=round(radius * self.scale))
 
     def _disc(self, x: float, y: float, radius: float, colour: tuple[int, int, int, int] | None = None) -> None:
-        at = x * self.scale, y * self.scale
-        pygame.draw.circle(self.surface, self.colour if colour is None else colour, at, radius * self.scale)
+        position = x * self.scale, y * self.scale
+        pygame.draw.circle(self.surface, self.colour if colour is None else colour, position, radius * self.scale)
 
     def _polygon(self, *corners: tuple[float, float]) -> None:
         pygame.draw.polygon(self.surface, self.colour, [(x * self.scale, y * self.scale) for x, y in corners])

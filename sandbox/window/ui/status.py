@@ -1,7 +1,4 @@
-"""Facts: what is told in words of a body and of settings.
-
-Account: what the window tells in words of what is on.
-"""
+"""Status of the window as text: the HUD's values, the figures of a body, and the settings of an engine."""
 
 import math
 
@@ -18,17 +15,17 @@ from sandbox.window.playback.recorded import RecordedView
 from sandbox.window.playback.snapshot import HudStatus
 
 
-def body_facts(bodies: Bodies, frame: Frame, contacts: Contacts, number: int) -> tuple[str, ...]:
-    """Return lines about a body: its name, then its figures."""
-    if number >= len(frame.position):
+def body_facts(bodies: Bodies, frame: Frame, contacts: Contacts, body_index: int) -> tuple[str, ...]:
+    """Return lines about a body: its name, then its quantities."""
+    if body_index >= len(frame.position):
         return ()
-    (x, y), (vx, vy) = frame.position[number].tolist(), frame.velocity[number].tolist()
-    spin, angle = float(frame.angular_velocity[number]), float(frame.angle[number])
-    mass, moment = float(bodies.mass[number]), float(bodies.moment[number])
-    lines = [bodies.names[number]]
-    if not frame.present[number]:
+    (x, y), (vx, vy) = frame.position[body_index].tolist(), frame.velocity[body_index].tolist()
+    spin, angle = float(frame.angular_velocity[body_index]), float(frame.angle[body_index])
+    mass, moment = float(bodies.mass[body_index]), float(bodies.moment[body_index])
+    lines = [bodies.names[body_index]]
+    if not frame.present[body_index]:
         return (*lines, "removed")
-    if bodies.fixed[number]:
+    if bodies.fixed[body_index]:
         lines.append("fixed")
     else:
         speed = math.hypot(vx, vy)
@@ -40,30 +37,30 @@ def body_facts(bodies: Bodies, frame: Frame, contacts: Contacts, number: int) ->
             f"E kin {format_si(kinetic, 'J')}",
         ]
     lines.insert(1, f"x {format_si(x, 'm')}, {format_si(y, 'm')}")
-    lines.append(f"m {format_si(mass, 'kg')}, {_size(bodies, number)}")
-    if not (bodies.fixed[number] or bodies.round[number]):  # of a disc it is ½ m r²
+    lines.append(f"m {format_si(mass, 'kg')}, {_size(bodies, body_index)}")
+    if not (bodies.fixed[body_index] or bodies.round[body_index]):  # a disc has ½ m r²
         lines.append(f"I {format_si(moment, 'kg·m²')}")
     if angle:
         lines.append(f"angle {format_si(angle, 'rad')}")
-    touching = int((contacts.pair == number).any(axis=1).sum()) if len(contacts) else 0
+    touching = int((contacts.pair == body_index).any(axis=1).sum()) if len(contacts) else 0
     if touching:
         lines.append(f"{touching} contact{'s' if touching > 1 else ''}")
     return tuple(lines)
 
 
-def _size(bodies: Bodies, number: int) -> str:
-    """Return in words how large a body is, by what its kind is known by."""
-    element = bodies.elements[int(bodies.element[number])]
+def _size(bodies: Bodies, body_index: int) -> str:
+    """Return the size of a body as text, in the terms of its shape."""
+    element = bodies.elements[int(bodies.element[body_index])]
     if isinstance(element, Box | Stack):
         return f"{format_si(element.size[0], 'm')} × {format_si(element.size[1], 'm')}"
     if isinstance(element, Capsule):
         return f"l {format_si(element.length, 'm')}, r {format_si(element.radius, 'm')}"
-    word = "r" if bodies.round[number] else "reach"
-    return f"{word} {format_si(float(bodies.radius[number]), 'm')}"
+    word = "r" if bodies.round[body_index] else "reach"
+    return f"{word} {format_si(float(bodies.radius[body_index]), 'm')}"
 
 
 def settings_text(settings: Settings) -> str:
-    """Return settings in a few words; what an engine has no choice of is left out."""
+    """Return a one-line summary of settings, without those that the engine does not use."""
     words = [f"dt {format_si(settings.dt, 's')}"]
     if settings.integrator is not None:
         words.append(f"{settings.substeps} × {settings.iterations}")
@@ -75,23 +72,25 @@ def settings_text(settings: Settings) -> str:
     return " · ".join(words)
 
 
-def hud_status(stage: AppState, claimed: tuple[tuple[str, str], ...], rate: float, recording: str | None) -> HudStatus:
-    """Return what is told in words.
+def hud_status(
+    stage: AppState, scene_keys: tuple[tuple[str, str], ...], frame_rate: float, recording: str | None
+) -> HudStatus:
+    """Return the values that the head-up display shows.
 
     Args:
-        stage: what is on.
-        claimed: keys that the scene claims, and what each does.
-        rate: pictures a second.
-        recording: what is being recorded.
+        stage: the application state.
+        scene_keys: keys that the scene binds, and their functions.
+        frame_rate: frames per second.
+        recording: format and length of the film that is being recorded.
     """
     show, messages = stage.show, stage.messages.shown()
     if show is None:
         return HudStatus("No scene", "Ctrl+O", "opens a scene", 0, 0.0, messages=messages, faults=stage.faults)
     picked = stage.hands.picked
     live = stage.live
-    company = live.company if live is not None else None
-    touches = show.contacts.some(~zone_visits(show.contacts.pair, show.scene))
-    trust = company.trust if company is not None else None
+    diagnostics = live.company if live is not None else None
+    contacts = show.contacts.some(~zone_visits(show.contacts.pair, show.scene))
+    divergence = diagnostics.trust if diagnostics is not None else None
     return HudStatus(
         title=show.scene.title or (stage.path.stem if stage.path is not None else "scene"),
         engine=show.engine,
@@ -106,23 +105,23 @@ def hud_status(stage: AppState, claimed: tuple[tuple[str, str], ...], rate: floa
         replay=live is None,
         speed=show.pace.speed,
         real_speed=show.pace.real_speed,
-        frames_per_second=rate,
-        trust=trust.state if trust is not None else "unknown",
-        horizon=trust.horizon if trust is not None else None,
-        ghost=company.ghost_engine if company is not None else None,
-        distance=company.distance if company is not None else None,
+        frames_per_second=frame_rate,
+        trust=divergence.state if divergence is not None else "unknown",
+        horizon=divergence.horizon if divergence is not None else None,
+        ghost=diagnostics.ghost_engine if diagnostics is not None else None,
+        distance=diagnostics.distance if diagnostics is not None else None,
         missed=show.missed,
         recording=recording,
         busy=show.busy,
-        picked=body_facts(show.bodies, show.frame, touches, picked) if picked is not None else (),
+        picked=body_facts(show.bodies, show.frame, contacts, picked) if picked is not None else (),
         messages=messages,
         faults=stage.faults,
-        claimed=claimed,
+        claimed=scene_keys,
     )
 
 
 def _ended(show: LiveView | RecordedView) -> str | None:
-    """Return why nothing comes after the moment that is shown, or None."""
+    """Return the reason why the run ends at the moment that is shown; None if it continues."""
     if isinstance(show, LiveView):
         session = show.session
         return session.ended if show.step_number == session.step_number else None

@@ -1,4 +1,4 @@
-"""Timeline: the bar at the bottom that shows how far a session goes, and takes it to any moment."""
+"""Timeline: the seek bar at the bottom of the window."""
 
 import math
 from collections.abc import Sequence
@@ -10,26 +10,26 @@ from sandbox.window.render.palette import FAINT, INK, LINE, ORANGE, PANEL_RAISED
 from sandbox.window.render.text import draw_box, draw_text, text_size
 from sandbox.window.ui.icons import draw_disc
 
-HEIGHT = 34
-"""px at unit 1 that the bar likes to have"""
+TIMELINE_HEIGHT = 34
+"""px at UI scale 1"""
 
 
 class Timeline:
-    """A bar from the first to the last moment, with a knob at the present."""
+    """A seek bar from the first to the last moment of a session, with a knob at the present."""
 
     def __init__(self) -> None:
         self.held = False
-        """Somebody drags the knob."""
+        """whether the knob is being dragged"""
         self._pointer: tuple[int, int] | None = None
         self._span = 0.0, 0.0
-        self._unit = 1.0
+        self._ui_scale = 1.0
 
     def handle_event(self, event: pygame.event.Event, area: pygame.Rect) -> float | None:
-        """Return the time that is asked for by a press or a drag, s, or None.
+        """Return the time that a press or a drag selects, s, or None.
 
         Args:
-            event: any; whether it was used up follows from `held`, before and after.
-            area: where the bar was drawn.
+            event: any event; it was consumed if `held` was true before it or is true after it.
+            area: rectangle of the bar.
         """
         if event.type in (pygame.WINDOWFOCUSLOST, pygame.WINDOWLEAVE):
             self._pointer = None
@@ -53,42 +53,42 @@ class Timeline:
         now: float,
         end: float,
         keyframes: Sequence[float] = (),
-        unit: float = 1.0,
+        ui_scale: float = 1.0,
     ) -> None:
-        """Draw the bar; an area too small for it stays as it is.
+        """Draw the bar; nothing is drawn in an area that is too small.
 
         Args:
-            surface: the picture.
-            area: where.
+            surface: the window.
+            area: rectangle of the bar.
             start: the first moment, s.
             now: the present, s.
-            end: the last moment that is known, s.
-            keyframes: moments that are kept whole, s.
-            unit: px of a pixel at 1080 lines.
+            end: the last simulated moment, s.
+            keyframes: times of the keyframes, s.
+            ui_scale: 1 on a display of 1080 lines.
         """
         start, end = (time if math.isfinite(time) else 0.0 for time in (start, end))
-        self._span, self._unit = (start, max(start, end)), unit
+        self._span, self._ui_scale = (start, max(start, end)), ui_scale
         track = self._track(area)
         if area.height < 6 or track.width < 4:
             return
-        draw_box(surface, area, 6 * unit)
+        draw_box(surface, area, 6 * ui_scale)
         size = self._size(area)
-        if track.left - area.left > 2 * size:  # there is room for words
+        if track.left - area.left > 2 * size:  # there is room for labels
             draw_text(surface, format_time(now), (track.left - size, area.centery), size, INK, "midright", mono=True)
             draw_text(surface, format_time(end), (track.right + size, area.centery), size, FAINT, "midleft", mono=True)
-        thick = max(round(4 * unit), 2)
-        bar = pygame.Rect(track.left, area.centery - thick // 2, track.width, thick)
-        pygame.draw.rect(surface, PANEL_RAISED, bar, border_radius=thick)
-        pygame.draw.rect(surface, LINE, bar, 1, border_radius=thick)
-        at = self._place(now, track)
-        bar.width = at - bar.left
-        pygame.draw.rect(surface, SKY, bar, border_radius=thick)
-        tick = max(round(5 * unit), 2)
-        for x in {self._place(time, track) for time in keyframes if start <= time <= end}:
-            pygame.draw.line(surface, ORANGE, (x, bar.bottom + 1), (x, bar.bottom + tick), max(round(unit), 1))
-        radius = max(min(round((8 if self.held else 6.5) * unit), area.height // 2), 2)
-        draw_disc(surface, (at, area.centery), radius, SKY)
-        draw_disc(surface, (at, area.centery), max(radius - 2.4 * unit, 1), INK)
+        thickness = max(round(4 * ui_scale), 2)
+        bar = pygame.Rect(track.left, area.centery - thickness // 2, track.width, thickness)
+        pygame.draw.rect(surface, PANEL_RAISED, bar, border_radius=thickness)
+        pygame.draw.rect(surface, LINE, bar, 1, border_radius=thickness)
+        knob = self._x_of(now, track)
+        bar.width = knob - bar.left
+        pygame.draw.rect(surface, SKY, bar, border_radius=thickness)
+        tick = max(round(5 * ui_scale), 2)
+        for x in {self._x_of(time, track) for time in keyframes if start <= time <= end}:
+            pygame.draw.line(surface, ORANGE, (x, bar.bottom + 1), (x, bar.bottom + tick), max(round(ui_scale), 1))
+        radius = max(min(round((8 if self.held else 6.5) * ui_scale), area.height // 2), 2)
+        draw_disc(surface, (knob, area.centery), radius, SKY)
+        draw_disc(surface, (knob, area.centery), max(radius - 2.4 * ui_scale, 1), INK)
         self._draw_hover(surface, area, track, size)
 
     def _draw_hover(self, surface: pygame.Surface, area: pygame.Rect, track: pygame.Rect, size: float) -> None:
@@ -97,30 +97,30 @@ class Timeline:
         x = min(max(self._pointer[0], track.left), track.right)
         pygame.draw.line(surface, INK, (x, area.top + 3), (x, area.bottom - 4))
         text = format_time(self._time_at(x, area))
-        wide, high = text_size(text, size, mono=True)
-        box = pygame.Rect(0, 0, wide + round(size), high + round(0.5 * size))
-        box.midbottom = x, area.top - round(3 * self._unit)
+        width, height = text_size(text, size, mono=True)
+        box = pygame.Rect(0, 0, width + round(size), height + round(0.5 * size))
+        box.midbottom = x, area.top - round(3 * self._ui_scale)
         box.clamp_ip(surface.get_rect())
-        draw_box(surface, box, 4 * self._unit, opacity=240)
+        draw_box(surface, box, 4 * self._ui_scale, opacity=240)
         draw_text(surface, text, box.center, size, INK, "center", mono=True)
 
     def _size(self, area: pygame.Rect) -> float:
-        return min(12.5 * self._unit, 0.6 * area.height)
+        return min(12.5 * self._ui_scale, 0.6 * area.height)
 
     def _track(self, area: pygame.Rect) -> pygame.Rect:
-        """Return where the line lies: between the words, if they leave it half the bar."""
+        """Return the rectangle of the track: between the labels, if these leave it half of the bar."""
         size = self._size(area)
-        words = text_size(format_time(self._span[1]), size, mono=True)[0] + round(2 * size)
-        edge = words if 4 * words <= area.width else round(0.8 * size)
+        label_width = text_size(format_time(self._span[1]), size, mono=True)[0] + round(2 * size)
+        edge = label_width if 4 * label_width <= area.width else round(0.8 * size)
         return pygame.Rect(area.left + edge, area.top, max(area.width - 2 * edge, 0), area.height)
 
-    def _place(self, time: float, track: pygame.Rect) -> int:
+    def _x_of(self, time: float, track: pygame.Rect) -> int:
         start, end = self._span
-        share = (time - start) / (end - start) if end > start and math.isfinite(time) else 0.0
-        return track.left + round(min(max(share, 0.0), 1.0) * track.width)
+        fraction = (time - start) / (end - start) if end > start and math.isfinite(time) else 0.0
+        return track.left + round(min(max(fraction, 0.0), 1.0) * track.width)
 
     def _time_at(self, x: float, area: pygame.Rect) -> float:
         start, end = self._span
         track = self._track(area)
-        share = min(max((x - track.left) / max(track.width, 1), 0.0), 1.0)
-        return end if share == 1.0 else start + share * (end - start)
+        fraction = min(max((x - track.left) / max(track.width, 1), 0.0), 1.0)
+        return end if fraction == 1.0 else start + fraction * (end - start)

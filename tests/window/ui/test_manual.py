@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from pressing import key, press, wheel
 
 from sandbox.window.input.keymap import BINDINGS
-from sandbox.window.ui.help import CLAIMED, HelpOverlay, help_groups
+from sandbox.window.ui.help import SCENE_GROUP, HelpOverlay, help_groups
 
 CLAIMS = (("S (hold)", "stroke"), ("Space", "shoot"), ("G", "ball in hand"))
 
@@ -35,7 +35,7 @@ def test_help_tells_what_the_mouse_does() -> None:
 
 def test_claimed_keys_come_first_and_are_taken_from_ours() -> None:
     found = help_groups(CLAIMS)
-    assert found[0].title == CLAIMED
+    assert found[0].title == SCENE_GROUP
     assert found[0].lines == CLAIMS
     ours = {about: label for group in found[1:] for label, about in group.lines}
     assert ours["pause / resume"] == "P"
