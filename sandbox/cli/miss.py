@@ -88,7 +88,7 @@ def _print(name: str, scene: Scene, found: "MissTable", shot: str) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from sandbox.games.artillery.shells import length_text
+    from sandbox.games.artillery.shells import format_deviation
 
     world = scene.world
     air = f"drag {world.linear_drag:g} 1/s and {world.quadratic_drag:g} 1/m, wind {world.wind[0]:g} m/s"
@@ -102,7 +102,7 @@ def _print(name: str, scene: Scene, found: "MissTable", shot: str) -> None:
         table.add_column(f"dt {dt:.4g} s", justify="right", no_wrap=True)
     for engine, integrator in dict.fromkeys((row.engine, row.integrator) for row in found.rows):
         those = {row.dt: row.off for row in found.rows if (row.engine, row.integrator) == (engine, integrator)}
-        cells = [f"{'+' if those[dt] >= 0 else '−'}{length_text(abs(those[dt]))}" for dt in dts if dt in those]
+        cells = [f"{'+' if those[dt] >= 0 else '−'}{format_deviation(abs(those[dt]))}" for dt in dts if dt in those]
         table.add_row(engine, integrator or "", *(cell if cell[1:2] != "l" else cell[1:] for cell in cells))
     console = Console(width=None if sys.stdout.isatty() else WIDE)
     console.print(table)

@@ -18,6 +18,7 @@ import numpy as np
 
 from sandbox.action import Action, Move, Remove, Spawn
 from sandbox.arrays import FloatArray
+from sandbox.formatting import format_si
 from sandbox.games.artillery.ballistics import Landing, bracketed_root, crossing, first_strike, landing, times_past
 from sandbox.games.artillery.battlefield import FRAGMENTS, LIFT, SPREAD, Battlefield, Tank, Weapon
 from sandbox.games.artillery.scene import Edges
@@ -152,19 +153,16 @@ class ArtilleryShot(NamedTuple):
         exact = f"{landed}, exact solution {self.exact[0]:.2f} m"
         if self.place is None:
             return exact
-        across, up = (length_text(abs(a - b)) for a, b in zip(self.place, self.exact, strict=True))
+        across, up = (format_deviation(abs(a - b)) for a, b in zip(self.place, self.exact, strict=True))
         return f"{exact} (Δx {across}" + (")" if up == NOTHING else f", Δy {up})")
 
 
 NOTHING = "less than 1 nm"
 
 
-def length_text(metres: float) -> str:
-    """Return a length in words that has three digits."""
-    for least, factor, unit in ((1.0, 1.0, "m"), (1e-3, 1e3, "mm"), (1e-6, 1e6, "µm"), (1e-9, 1e9, "nm")):
-        if metres >= least:
-            return f"{f'{metres * factor:#.3g}'.rstrip('.')} {unit}" if metres < 100.0 else f"{metres:.0f} m"
-    return NOTHING
+def format_deviation(metres: float) -> str:
+    """Return the size of a deviation from the exact solution, m >= 0, as text; rounding errors are all alike."""
+    return NOTHING if metres < 1e-9 else format_si(metres, "m")
 
 
 ROLLER = 0.5

@@ -10,10 +10,10 @@ from typing import get_args
 
 from sandbox.action import Action, SetParameter, Switch, heading_of
 from sandbox.engines.registry import ENGINES
+from sandbox.formatting import format_percent, format_si
 from sandbox.scene.description.base import BodySource
 from sandbox.scene.description.world import Detection, Integrator, Settings
 from sandbox.scene.scene import Scene
-from sandbox.window.format import format_percent, format_si
 from sandbox.window.playback.live import LiveView
 
 ParameterValue = float | str

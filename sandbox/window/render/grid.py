@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pygame
 
+from sandbox.formatting import format_si
 from sandbox.window.camera import Camera
 from sandbox.window.render.palette import BACKGROUND, FAINT, GRID, GRID_STRONG
 from sandbox.window.render.text import draw_text
@@ -13,7 +14,6 @@ NARROWEST = 56.0
 """px, the least distance of two lines"""
 STRONG = 5
 """Every so many lines one is stronger."""
-UNITS = ((1e3, "km"), (1.0, "m"), (1e-2, "cm"), (1e-3, "mm"), (1e-6, "µm"), (1e-9, "nm"), (1e-12, "pm"))
 
 
 def step_of(camera: Camera, unit: float = 1.0) -> float:
@@ -21,14 +21,6 @@ def step_of(camera: Camera, unit: float = 1.0) -> float:
     least = NARROWEST * unit / camera.scale
     power = 10.0 ** math.floor(math.log10(least))
     return next((k * power for k in (1.0, 2.0, 5.0) if k * power >= least), 10.0 * power)
-
-
-def length_text(metres: float) -> str:
-    """Return a length in the unit that suits it, such as "20 cm"."""
-    size, name = next((u for u in UNITS if metres >= u[0] * 0.999), UNITS[-1])
-    if metres >= 1e7:
-        return f"{metres:.0e} m".replace("e+0", "e").replace("e+", "e")
-    return f"{metres / size:.6g} {name}"
 
 
 def draw_grid(surface: pygame.Surface, camera: Camera, unit: float = 1.0) -> None:
@@ -62,6 +54,6 @@ def draw_scale(surface: pygame.Surface, camera: Camera, unit: float = 1.0, foot:
     surface.fill(FAINT, pygame.Rect(left, base - thick, length, thick))
     for x in (left, left + length - thick):
         surface.fill(FAINT, pygame.Rect(x, base - thick - tick, thick, tick))
-    text, middle, above = length_text(step), left + length / 2.0, base - tick - 3 * unit
+    text, middle, above = format_si(step, "m", digits=1), left + length / 2.0, base - tick - 3 * unit
     draw_text(surface, text, (middle + 1, above + 1), 12 * unit, BACKGROUND, "midbottom")  # it may lie on a bright ball
     draw_text(surface, text, (middle, above), 12 * unit, FAINT, "midbottom")

@@ -10,11 +10,11 @@ from functools import cached_property
 import numpy as np
 import pygame
 
+from sandbox.formatting import format_si
 from sandbox.measure.energy import Energies, energies
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
-from sandbox.window.format import format_si
 from sandbox.window.render.palette import FAINT, INK, LINE, PURPLE, SKY, Colour
 from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size
 

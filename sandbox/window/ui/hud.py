@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 
 import pygame
 
-from sandbox.window.format import format_percent, format_si, format_time
+from sandbox.formatting import format_percent, format_si, format_time
 from sandbox.window.playback.snapshot import HudStatus
 from sandbox.window.render.palette import FAINT, GREEN, INK, ORANGE, PANEL, SKY, VERMILION, WARNING, Colour
 from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size, wrap_text

@@ -2,6 +2,7 @@
 
 import math
 
+from sandbox.formatting import format_si
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.description.bodies import Box, Capsule
 from sandbox.scene.description.generators import Stack
@@ -9,7 +10,6 @@ from sandbox.scene.description.scene import zone_visits
 from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Contacts, Frame
 from sandbox.window.app_state import AppState
-from sandbox.window.format import format_si
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.recorded import RecordedView
 from sandbox.window.playback.snapshot import HudStatus

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import pygame
 
-from sandbox.window.format import format_time
+from sandbox.formatting import format_time
 from sandbox.window.render.palette import FAINT, INK, LINE, ORANGE, PANEL_RAISED, SKY
 from sandbox.window.render.text import draw_box, draw_text, text_size
 from sandbox.window.ui.icons import draw_disc

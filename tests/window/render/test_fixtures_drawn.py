@@ -9,7 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from sandbox.window.camera import Camera
-from sandbox.window.render.grid import NARROWEST, draw_grid, draw_scale, length_text, step_of
+from sandbox.window.render.grid import NARROWEST, draw_grid, draw_scale, step_of
 from sandbox.window.render.palette import BACKGROUND, FAINT, GRID, GRID_STRONG, SOLID, SURFACE
 from sandbox.window.render.static_geometry import draw_static_bodies
 
@@ -160,22 +160,6 @@ def test_steps_are_1_2_or_5_and_wide_enough(power, unit):
     assert f"{step:.0e}"[0] in "125"
     assert step == pytest.approx(float(f"{step:.0e}"))
     assert NARROWEST * unit * (1 - 1e-9) <= step * 10.0**power <= 2.5 * NARROWEST * unit * (1 + 1e-9)  # rounding
-
-
-@pytest.mark.parametrize(
-    ("metres", "text"),
-    [
-        (1.0, "1 m"),
-        (0.2, "20 cm"),
-        (0.005, "5 mm"),
-        (2e-6, "2 µm"),
-        (500.0, "500 m"),
-        (5000.0, "5 km"),
-        (2e13, "2e13 m"),
-    ],
-)
-def test_lengths_are_told_in_the_unit_that_suits_them(metres, text):
-    assert length_text(metres) == text
 
 
 def test_grid_lines_lie_at_multiples_of_the_step():

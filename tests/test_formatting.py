@@ -1,4 +1,4 @@
-"""Figures: three significant digits, prefixes, and whatever a float can be."""
+"""Text of quantities: significant digits, prefixes, and any float."""
 
 import math
 
@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.window.format import format_percent, format_si, format_time
+from sandbox.formatting import format_percent, format_si, format_time
 
 
 @pytest.mark.parametrize(
@@ -35,6 +35,22 @@ from sandbox.window.format import format_percent, format_si, format_time
 )
 def test_figure_has_three_digits_and_a_prefix(value: float, unit: str, text: str) -> None:
     assert format_si(value, unit) == text
+
+
+@pytest.mark.parametrize(
+    ("metres", "text"),
+    [
+        (1.0, "1 m"),
+        (0.2, "200 mm"),
+        (0.005, "5 mm"),
+        (2e-6, "2 µm"),
+        (500.0, "500 m"),
+        (5000.0, "5 km"),
+        (2e13, "2e13 m"),
+    ],
+)
+def test_round_figures_need_one_digit(metres: float, text: str) -> None:
+    assert format_si(metres, "m", digits=1) == text
 
 
 @given(st.floats(1e-12, 9.99e11))
