@@ -46,11 +46,11 @@ def test_compare_that_has_nothing_yet_is_interrupted(
 def test_miss_keeps_the_flights_that_are_finished(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    interrupt_at(monkeypatch, missing, "flown", 3)
+    interrupt_at(monkeypatch, missing, "simulated_landing", 3)
     status, document, err = json_of(capfd, "miss", "duel")
     assert (status, document["interrupted"], len(document["rows"])) == (130, True, 2)
     assert err == ["interrupted: 2 flights are complete and kept"]
-    interrupt_at(monkeypatch, missing, "flown", 4)
+    interrupt_at(monkeypatch, missing, "simulated_landing", 4)
     status, out, _ = lines_of(capfd, "miss", "duel")
     assert status == 130
     assert "pymunk" in out[-1]

@@ -21,9 +21,8 @@ from __future__ import annotations  # `np.random` in an annotation would import 
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-import numpy as np
 from pydantic import Field
 
 from sandbox.games.names import TableGame
@@ -31,6 +30,9 @@ from sandbox.scene.description.base import Friction, Mass, Name, Part, Point, Ra
 from sandbox.scene.description.fixed import Post, Wall
 from sandbox.scene.description.surface import Pocket
 from sandbox.scene.random_streams import Stream, draws
+
+if TYPE_CHECKING:
+    import numpy as np
 
 TableName = Literal["pool-7ft", "pool-8ft", "pool-9ft", "snooker-12ft", "carom-10ft"]
 RackName = Literal["8-ball", "9-ball", "snooker", "carom", "none"]
