@@ -29,7 +29,6 @@ from sandbox.games.names import TableGame
 from sandbox.scene.description.base import Friction, Mass, Name, Part, Point, Radius, Restitution, Vector
 from sandbox.scene.description.fixed import Post, Wall
 from sandbox.scene.description.surface import Pocket
-from sandbox.scene.random_streams import Stream, draws
 
 if TYPE_CHECKING:
     import numpy as np
@@ -422,6 +421,8 @@ def rack_positions(rack: RackName, spots: dict[str, Point], radius: float, gap: 
         gap: the most that neighbours are apart, m.
         seed: the scene's.
     """
+    from sandbox.scene.random_streams import Stream, draws  # numpy, which the tables' models do without
+
     random = draws(Stream.RACK, seed)
     match rack:
         case "8-ball":
