@@ -1,8 +1,8 @@
-"""Policies: who plays where nobody sits at the window. But for the skilled they look at nothing: they press keys.
+"""Players of headless games: no input, random input, a script, or the bot of the game.
 
-Script files: who presses what when, a line each: `time, control, value`; what follows a # is a remark.
+Script files have one input per line: `time, control, value`, with the time in s; a comment starts with #.
 
-Player: who plays a headless game, as a value that a run can be known by.
+PlayerSpec: a player as a value, which is stored with a run.
 """
 
 import math
@@ -25,12 +25,13 @@ from sandbox.scene.random_streams import Stream, draws
 from sandbox.scene.scene import Scene
 from sandbox.whole import read_whole
 
-RATES = 0.2, 2.0
-"""1/s, how often a random player presses a usual control: one rate for each, drawn evenly by factors between these"""
-HOLDS = 0.05, 1.6
-"""s, how long it holds a control: drawn likewise, for each press anew; what takes a second to draw is drawn at times"""
-FULL = 0.5
-"""of the presses of what can be pressed by halves, those all the way, as keys do; others are even from 0 to 1"""
+RATE_BOUNDS = 0.2, 2.0
+"""1/s, bounds of the rate at which a random player presses an ordinary control; log-uniform, drawn once a control"""
+HOLD_BOUNDS = 0.05, 1.6
+"""s, bounds of the time for which it holds a control; log-uniform, drawn for each press. The longest are long enough to
+pull a plunger"""
+FULL_PRESS_PROBABILITY = 0.5
+"""probability that an analogue control is pressed fully, as by a key; other presses are uniform from 0 to 1"""
 
 
 class NoInput:
@@ -42,57 +43,57 @@ class NoInput:
 
 
 class RandomInput:
-    """Presses each control at random times, exponentially distributed at a rate of its own, and holds it a while."""
+    """Presses each control at random: the pauses are exponential, with a rate per control."""
 
     def __init__(self, seed: int) -> None:
-        self._chance = draws(Stream.KEYS, seed)
-        self._turns: dict[str, tuple[float, bool]] = {}  # by control: when it changes next, and whether it is down
-        self._pauses: dict[str, float] = {}  # s between presses, on average
-        self._next = -math.inf  # when anything changes, s
+        self._rng = draws(Stream.KEYS, seed)
+        self._changes: dict[str, tuple[float, bool]] = {}  # by control: time of the next change, whether it is down
+        self._pauses: dict[str, float] = {}  # mean time between presses, s
+        self._next = -math.inf  # time of the next change, s
 
     def decide(self, info: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:
-        """Return what changes now."""
+        """Return the controls that change now."""
         if info.time < self._next:
             return ()
-        if not self._turns:
+        if not self._changes:
             self._begin(rules.controls, info.time)
         found = []
         for control in rules.controls:
-            due, down = self._turns[control.name]
+            due, down = self._changes[control.name]
             if due > info.time:
                 continue
             down = not down
-            # No sooner than the next step: a control changes once a step.
-            lasts = self._drawn(HOLDS) if down else float(self._chance.exponential(self._pauses[control.name]))
-            self._turns[control.name] = info.time + lasts, down
+            # A control changes at most once a step: the next change is at the next step at the earliest.
+            lasts = self._draw(HOLD_BOUNDS) if down else float(self._rng.exponential(self._pauses[control.name]))
+            self._changes[control.name] = info.time + lasts, down
             found.append((control.name, self._level(control) if down else 0.0))
-        self._next = min((due for due, _ in self._turns.values()), default=math.inf)
+        self._next = min((due for due, _ in self._changes.values()), default=math.inf)
         return found
 
     def _begin(self, controls: Sequence[Control], time: float) -> None:
         for control in controls:
-            pause = self._pauses[control.name] = 1.0 / (self._drawn(RATES) * control.often)
-            self._turns[control.name] = time + self._chance.exponential(pause), False
+            pause = self._pauses[control.name] = 1.0 / (self._draw(RATE_BOUNDS) * control.often)
+            self._changes[control.name] = time + self._rng.exponential(pause), False
 
-    def _drawn(self, bounds: tuple[float, float]) -> float:
-        return float(np.exp(self._chance.uniform(*np.log(bounds))))
+    def _draw(self, bounds: tuple[float, float]) -> float:
+        return float(np.exp(self._rng.uniform(*np.log(bounds))))
 
     def _level(self, control: Control) -> float:
-        """Return how far a control is pressed."""
-        if not control.analogue or self._chance.uniform() < FULL:
+        """Return the value of a press."""
+        if not control.analogue or self._rng.uniform() < FULL_PRESS_PROBABILITY:
             return 1.0
-        return float(self._chance.uniform())
+        return float(self._rng.uniform())
 
 
 class ScriptedInput:
-    """Presses what a script says, each before the first step that starts at its time or later."""
+    """Presses the inputs of a script, each before the first step that starts at its time or later."""
 
     def __init__(self, presses: Iterable[Press]) -> None:
         self._presses = sorted(presses, key=lambda press: press.time)
         self._done = 0
 
     def decide(self, info: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:  # noqa: ARG002
-        """Return what is due."""
+        """Return the inputs whose time has come."""
         begin = self._done
         while self._done < len(self._presses) and self._presses[self._done].time <= info.time + 1e-9:  # rounding
             self._done += 1
@@ -131,42 +132,43 @@ POLICIES: dict[str, Callable[[Scene], Policy]] = {
     "none": _no_input,
     "skilled": _skilled,
 }
-"""Those that need no script, by name."""
+"""Players that need no script, by name."""
 
 
 MAX_SCRIPT_TIME = 1e9
-"""s, as of a scene"""
+"""s, the longest duration of a scene"""
 
-MAX_BYTES = 16 * 2**20
+MAX_SCRIPT_SIZE = 16 * 2**20
+"""bytes"""
 
 MAX_FAULTS = 20
-"""Faults that are reported; of a file that is no script, every line is wrong."""
+"""Number of faults reported: in a file that is not a script, every line is one."""
 
 
 def read_script(path: str | Path) -> tuple[Press, ...]:
     """Read a script.
 
     Raises:
-        SceneError: it cannot be read, or lines are wrong; all of them are told.
+        SceneError: the file cannot be read, or has faults; the error lists them.
     """
     try:
-        lines = read_whole(Path(path), MAX_BYTES).decode("utf-8").splitlines()
+        lines = read_whole(Path(path), MAX_SCRIPT_SIZE).decode("utf-8").splitlines()
     except (OSError, ValueError) as error:
         reason = (error.strerror if isinstance(error, OSError) else None) or error
         raise SceneError([Fault(str(path), None, "", f"cannot be read: {reason}")]) from None
     presses, faults = [], []
-    for number, text in _said(lines):
+    for number, text in _statements(lines):
         try:
             presses.append(_press(text))
         except ValueError as error:
             faults.append(Fault(str(path), number, "", str(error)))
     if faults:
-        raise SceneError(_some(faults, str(path)))
+        raise SceneError(_limit_faults(faults, str(path)))
     return tuple(sorted(presses, key=lambda press: press.time))
 
 
-def _said(lines: Iterable[str]) -> Iterator[tuple[int, str]]:
-    """Yield the lines that say something, without remarks, and their numbers from 1 on."""
+def _statements(lines: Iterable[str]) -> Iterator[tuple[int, str]]:
+    """Yield the numbers, from 1, and texts of the lines that are not empty, without comments."""
     for number, line in enumerate(lines, 1):
         text = line.partition("#")[0].strip()
         if text:
@@ -189,7 +191,7 @@ def _press(text: str) -> Press:
 
 
 def faults_of(presses: Sequence[Press], controls: Sequence[Control], file: str) -> list[Fault]:
-    """Return what of a script a game cannot do, each fault once, with the line where it is first."""
+    """Return the inputs of a script that a game does not have; each fault once, with the first line that has it."""
     known = {control.name: control for control in controls}
     names = ", ".join(map(repr, known))
     found: dict[str, Press] = {}
@@ -200,11 +202,11 @@ def faults_of(presses: Sequence[Press], controls: Sequence[Control], file: str) 
             found.setdefault(f"{short_repr(press.control)} is 0 or 1, not {press.value:g}", press)
     lines = _lines(file) if found else {}
     faults = [Fault(file, lines.get(press), "", message) for message, press in found.items()]
-    return _some(faults, file)
+    return _limit_faults(faults, file)
 
 
-def _some(faults: list[Fault], file: str) -> list[Fault]:
-    """Return the first `MAX_FAULTS` faults, and one that stands for the others."""
+def _limit_faults(faults: list[Fault], file: str) -> list[Fault]:
+    """Return the first `MAX_FAULTS` faults, and one with the number of the others."""
     more = len(faults) - MAX_FAULTS
     if more <= 0:
         return faults
@@ -212,33 +214,33 @@ def _some(faults: list[Fault], file: str) -> list[Fault]:
 
 
 def _lines(file: str) -> dict[Press, int]:
-    """Return the line of each press; none where the file has gone since it was read."""
+    """Return the line of each input; empty if the file can no longer be read."""
     try:
-        said = [*_said(read_whole(Path(file), MAX_BYTES).decode("utf-8").splitlines())]
-        return {_press(text): number for number, text in reversed(said)}  # of equals the first
+        statements = [*_statements(read_whole(Path(file), MAX_SCRIPT_SIZE).decode("utf-8").splitlines())]
+        return {_press(text): number for number, text in reversed(statements)}  # of equal inputs, the first
     except (OSError, ValueError):
         return {}
 
 
 RECORDED = "as recorded"
-"""What the player of a session is called that is seen again."""
+"""Name of the player in the replay of a recorded session."""
 
 
 @dataclass(frozen=True)
 class PlayerSpec:
-    """One of the policies, who presses what a script says, or whoever played a session."""
+    """A player: one of `POLICIES`, a script, or the inputs of a recorded session."""
 
     name: str = "random"
-    """of `POLICIES`, a script's file, or `RECORDED`"""
+    """a name in `POLICIES`, the path of a script, or `RECORDED`"""
     presses: tuple[Press, ...] = ()
-    """of a script or a session"""
+    """inputs of the script or the session"""
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """Return the player that a text names: one of `POLICIES`, or else the file of a script.
+        """Return the player of a name in `POLICIES`, or of the path of a script.
 
         Raises:
-            SceneError: there is none, or the script cannot be read, or has faults.
+            SceneError: there is no such player or file, or the script has faults.
         """
         if text in POLICIES:
             return cls(text)
@@ -253,18 +255,18 @@ class PlayerSpec:
 
     @classmethod
     def from_recording(cls, session: Recording) -> Self:
-        """Return who played a session: what was done is known, and the rules look on."""
+        """Return the player that repeats the inputs of a session, whose actions are applied as recorded."""
         return cls(RECORDED, session.presses)
 
     def start_game(self, scene: Scene, file: str = "<scene>") -> HeadlessGame | None:
-        """Begin the game of a scene; none where it has no game with rules.
+        """Start the game of a scene; return None if it has no game with rules.
 
         Args:
-            scene: as it is run.
-            file: what faults call it.
+            scene: expanded scene.
+            file: name of the scene in faults.
 
         Raises:
-            SceneError: the scene lacks what its game needs, or the game what the script presses.
+            SceneError: the scene lacks an element that its game needs, or the game lacks a control of the script.
         """
         rules = fitting_rules(scene, file, on_request=True)
         if rules is None:
@@ -282,6 +284,6 @@ class PlayerSpec:
         return HeadlessGame(rules, ScriptedInput(self.presses), self.name)
 
     def to_dict(self, scene: Scene) -> dict[str, Any]:
-        """Return what of the player decides how a game goes, as JSON values."""
+        """Return the game, the player and its inputs as JSON values."""
         name = self.name if self.name in (*POLICIES, RECORDED) else "script"
         return {"game": scene.play.game, "player": name, "presses": [list(press) for press in self.presses]}

@@ -1,11 +1,11 @@
-"""Referee: rules at work between the steps of one game, whoever runs it, and whoever plays.
+"""GameSession: the rules of one game between the steps of a simulation.
 
-It stamps times, keeps what the player did until the rules look, knows which presses are still to come where a game is
-seen again, and notices where the rules would have done something else than was done then.
+It sets the times of actions, passes the player's actions to the rules, keeps the inputs, and when a recorded game is
+replayed, repeats its inputs and detects when the rules act differently than in the recording.
 
-Lighting: which lamps of a game were lit when, kept with a run: who sees it again has no rules that would tell.
+HeadlessGame: a game that a policy plays between the steps of a run without a window, or the replay of a recorded game.
 
-Bout: a game between the steps of a headless run, played by a policy or seen again.
+LampRecorder and LampLog: which lamps were lit when. They are stored with a run, because viewing it involves no rules.
 """
 
 import copy
@@ -17,53 +17,53 @@ from sandbox.action import Action, Switch
 from sandbox.games.contract import HasLamps, HasLog, Policy, Press, Rules, StepInfo
 from sandbox.trajectory import Contacts, Frame
 
-MIN_LAMP_INTERVAL = 0.04
-"""s between two looks, as between the pictures of a film; a flash lasts longer, and a look at each step would tell in
-a game's time"""
+LAMP_INTERVAL = 0.04
+"""s between two samples of the lamps: the interval between pictures of a film. Flashes last longer, and sampling every
+step would be slow"""
 
 TIME_ROUNDING = 1e-9
-"""s, of times of steps"""
+"""s, rounding error of the times of steps"""
 
 
-class LampState:
-    """Looks at the lamps of a game from time to time, and keeps what has changed; of a game without lamps nothing."""
+class LampRecorder:
+    """Samples the lamps of a game at intervals and keeps the changes; records nothing for a game without lamps."""
 
     def __init__(self, rules: Rules) -> None:
-        """Begin, with all of them dark."""
+        """Start with all lamps off."""
         self._rules = rules if isinstance(rules, HasLamps) else None
         self._lit: frozenset[str] = frozenset()
         self._next = 0.0
         self._changes: list[tuple[float, list[str]]] = []
 
     def update(self, time: float) -> None:
-        """Look, if it is time to, s."""
+        """Sample the lamps at a time, s, if the interval has passed."""
         if self._rules is None or time < self._next - TIME_ROUNDING:
             return
-        self._next = time + MIN_LAMP_INTERVAL
+        self._next = time + LAMP_INTERVAL
         lit = self._rules.lit_lamps()
         if lit != self._lit:
             self._changes.append((time, sorted(lit ^ self._lit)))
             self._lit = lit
 
     def changes(self) -> list[list[Any]]:
-        """Return as JSON values when, s, which lamps were lit or went out."""
+        """Return, as JSON values, the time, s, and the names of the lamps that changed, for each change."""
         return [list(change) for change in self._changes]
 
 
 class LampLog(NamedTuple):
-    """The same to be looked up."""
+    """Lit lamps as a function of time."""
 
     times: list[float]
-    """s, in order"""
+    """s, of the changes, in order"""
     lit: list[frozenset[str]]
-    """from then on"""
+    """names of the lit lamps from each of these times"""
 
     @classmethod
     def from_changes(cls, changes: Sequence[Any]) -> "LampLog":
-        """Read what `Lighting.told` has returned.
+        """Read the JSON values of `LampRecorder.changes`.
 
         Raises:
-            ValueError: it is something else.
+            ValueError: the values are invalid.
         """
         times, states = list[float](), list[frozenset[str]]()
         now: frozenset[str] = frozenset()
@@ -78,146 +78,146 @@ class LampLog(NamedTuple):
 
     def at(self, time: float) -> frozenset[str]:
         """Return the lamps that are lit at a time, s."""
-        place = bisect_right(self.times, time) - 1
-        return self.lit[place] if place >= 0 else frozenset()
+        index = bisect_right(self.times, time) - 1
+        return self.lit[index] if index >= 0 else frozenset()
 
 
 REPLAY_ROUNDING = 1e-9
-"""s by which the time of a press may miss that of a step, which another engine counts otherwise"""
+"""s by which the time of a recorded input may differ from that of its step: engines add up steps differently"""
 
 
 class GameSession:
-    """A game under way. A copy goes on from here by itself."""
+    """A running game. A copy is independent of the original."""
 
     def __init__(self, rules: Rules, presses: Iterable[Press] = ()) -> None:
-        """Begin.
+        """Start a session.
 
         Args:
-            rules: of a game that has just begun.
-            presses: of a game that was played, to be seen again.
+            rules: rules of a new game.
+            presses: inputs of a recorded game, to be replayed.
         """
         self.rules = rules
         self._presses = sorted(presses, key=lambda press: press.time)
         self._pressed = 0
-        self._done: list[Action] = []  # by the player since the last look
+        self._done: list[Action] = []  # actions of the player since the last step
         self.step_info: StepInfo | None = None
-        """what the rules have looked at last"""
+        """input of the last `Rules.on_step`"""
         self.diverged_at: float | None = None
-        """when the rules, as onlookers, would first have done something else than was done, s"""
+        """s, first time at which the rules acted differently than in the recording; None if they never did"""
 
     def copy(self) -> Self:
-        """Return a copy; what is put into one later is not in the other."""
+        """Return an independent copy."""
         return copy.deepcopy(self)
 
     @property
     def presses(self) -> tuple[Press, ...]:
-        """What was pressed up to now."""
+        """Inputs up to now."""
         return tuple(self._presses[: self._pressed])
 
     @property
     def future_presses(self) -> tuple[Press, ...]:
-        """What was pressed later than now, in a game that is seen again."""
+        """Inputs of the replayed game after now."""
         return tuple(self._presses[self._pressed :])
 
     @property
     def all_presses(self) -> tuple[Press, ...]:
-        """What was pressed, also later than now in a game that is seen again."""
+        """Inputs up to now, and those of the replayed game after now."""
         return tuple(self._presses)
 
     def set_presses(self, presses: Sequence[Press]) -> None:
-        """Take over all that was pressed, from a game that is this one up to now."""
+        """Replace all inputs by those of a session that is equal to this one up to now."""
         self._presses = [*presses]
 
     def discard_future(self) -> None:
-        """Forget what was pressed later than now: it goes another way."""
+        """Discard the inputs after now."""
         del self._presses[self._pressed :]
 
     def on_step(self, time: float, frame: Frame, contacts: Contacts) -> tuple[Action, ...]:
-        """Let the rules see a state, and return what they do, with its time; once the game is over, nothing."""
+        """Call the rules after a step, and return their actions, timed; none once the game is over."""
         self.step_info, self._done = StepInfo(time, frame, contacts, tuple(self._done)), []
-        return () if self.rules.game_over is not None else _stamped(self.rules.on_step(self.step_info), time)
+        return () if self.rules.game_over is not None else _timed(self.rules.on_step(self.step_info), time)
 
     def press(self, time: float, control: str, value: float) -> tuple[Action, ...]:
-        """Set a control now, and return what comes of it; whatever was pressed later is forgotten."""
+        """Set a control now, and return the actions that result; inputs after now are discarded."""
         if self.rules.game_over is not None:
             return ()
         self.discard_future()
         self._presses.append(Press(time, control, value))
         self._pressed += 1
-        return _stamped(self.rules.on_input(control, value), time)
+        return _timed(self.rules.on_input(control, value), time)
 
     def note_actions(self, actions: Iterable[Action]) -> None:
-        """Take note of what the player has done; another engine going on is no doing of his."""
+        """Add actions of the player to the input of the next step; a switch of engines is not one."""
         self._done += [action for action in actions if not isinstance(action, Switch)]
 
-    def replay(self, time: float, own: Sequence[Action], done: Sequence[Action]) -> None:
-        """Hold what was done at a time against what the rules do, and press again what was pressed then.
+    def replay(self, time: float, own: Sequence[Action], recorded: Sequence[Action]) -> None:
+        """Compare the actions of the rules with the recording, and repeat the recorded inputs of a time.
 
         Args:
             time: s.
-            own: what the rules did as they looked just now.
-            done: what was done then, theirs before the player's.
+            own: actions of the rules from the `on_step` at this time.
+            recorded: recorded actions of this time, those of the rules before those of the player.
         """
-        theirs, left = list(own), list(done)
-        if left[: len(theirs)] == theirs:
-            del left[: len(theirs)]
+        left = list(recorded)
+        if left[: len(own)] == list(own):
+            del left[: len(own)]
         else:
             self._note_divergence(time)
-            left = [action for action in left if action not in theirs]
+            left = [action for action in left if action not in own]
         self.replay_player(time, left)
 
-    def replay_player(self, time: float, done: Sequence[Action]) -> None:
-        """Hold what a player did at a time against what was pressed then."""
-        pressed: list[Action] = []
+    def replay_player(self, time: float, recorded: Sequence[Action]) -> None:
+        """Repeat the recorded inputs of a time, s, and compare the results with the player's recorded actions."""
+        actions: list[Action] = []
         while self._pressed < len(self._presses) and self._presses[self._pressed].time <= time + REPLAY_ROUNDING:
             press = self._presses[self._pressed]
             self._pressed += 1
             if self.rules.game_over is None:
-                pressed += _stamped(self.rules.on_input(press.control, press.value), time)
-        if any(action not in done for action in pressed):
+                actions += _timed(self.rules.on_input(press.control, press.value), time)
+        if any(action not in recorded for action in actions):
             self._note_divergence(time)
-        self.note_actions(done)
+        self.note_actions(recorded)
 
     def _note_divergence(self, time: float) -> None:
         self.diverged_at = time if self.diverged_at is None else self.diverged_at
 
 
-def _stamped(actions: Iterable[Action], time: float) -> tuple[Action, ...]:
+def _timed(actions: Iterable[Action], time: float) -> tuple[Action, ...]:
     return tuple(action.model_copy(update={"time": time}) for action in actions)
 
 
 class HeadlessGame:
-    """Asked between any two steps what is to be done. One bout is of one run."""
+    """A game between the steps of one run without a window."""
 
     def __init__(self, rules: Rules, policy: Policy | None, player: str, presses: Iterable[Press] = ()) -> None:
-        """Begin a game.
+        """Start a game.
 
         Args:
-            rules: of a game that has just begun.
-            policy: who plays; none where a game is seen again, in which all that was done is given.
-            player: what he is called.
-            presses: of a game that is seen again.
+            rules: rules of a new game.
+            policy: the player; None for the replay of a recorded game, all actions of which are given.
+            player: name of the player.
+            presses: inputs of the recorded game.
         """
         self.player = player
         self._session, self._policy = GameSession(rules, presses), policy
-        self._lamps = LampState(rules)
+        self._lamps = LampRecorder(rules)
 
     @property
     def finished(self) -> bool:
-        """Whether the run is to end here; a game that is seen again is seen to the end of what was recorded."""
+        """Whether the run may end; a replay runs to the end of the recording."""
         return self._policy is not None and self._session.rules.game_over is not None
 
     def actions_between_steps(
         self, time: float, frame: Frame, contacts: Contacts, given: Sequence[Action], last: bool
     ) -> Sequence[Action]:
-        """Let all who may act between two steps, and return what is to be done, in order.
+        """Return the actions to apply between two steps, in order: those of rules, player, and the given ones.
 
         Args:
             time: s.
-            frame: the state.
-            contacts: of the last step.
-            given: what is to be done at this time in any case.
-            last: no step comes after it, so that nobody is asked to play.
+            frame: the present state.
+            contacts: contacts of the last step.
+            given: actions that are applied in any case; in a replay these are all.
+            last: whether no step follows; the player is not asked then.
         """
         session, policy = self._session, self._policy
         own = session.on_step(time, frame, contacts)
@@ -235,26 +235,26 @@ class HeadlessGame:
 
     @property
     def presses(self) -> tuple[Press, ...]:
-        """What was pressed."""
+        """Inputs up to now."""
         return self._session.presses
 
     @property
     def diverged_at(self) -> float | None:
-        """When the rules would first have done something else than was done, s, in a game that is seen again."""
+        """s, first time at which the rules acted differently than in the recording; None if they never did."""
         return self._session.diverged_at
 
     @property
     def game_over(self) -> str | None:
-        """Why the game is over; None while it goes on."""
+        """Reason why the game is over; None while it runs."""
         return self._session.rules.game_over
 
     @property
     def score(self) -> int | float:
-        """Of who plays."""
+        """Present score."""
         return self._session.rules.score
 
     def to_dict(self, game: str) -> dict[str, Any]:
-        """Return the outcome as JSON values."""
+        """Return the result as JSON values."""
         rules = self._session.rules
         log = {"log": [list(entry) for entry in rules.log]} if isinstance(rules, HasLog) else {}
         return {

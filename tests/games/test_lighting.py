@@ -5,7 +5,7 @@ import json
 import pytest
 from toy_game import Toy, toy_scene
 
-from sandbox.games.session import MIN_LAMP_INTERVAL, LampLog, LampState
+from sandbox.games.session import LAMP_INTERVAL, LampLog, LampRecorder
 
 STEP = 0.01
 
@@ -24,7 +24,7 @@ class Lamped(Toy):
 def test_lamps_are_those_that_were_lit_at_each_look() -> None:
     scene = toy_scene()
     rules = Lamped(scene, scene.bodies)
-    lighting, lit = LampState(rules), {}
+    lighting, lit = LampRecorder(rules), {}
     for k in range(200):
         rules.now = frozenset({"a", "b"} if k % 40 < 20 else {"c"} if k % 80 < 60 else ())
         lighting.update(k * STEP)
@@ -32,13 +32,13 @@ def test_lamps_are_those_that_were_lit_at_each_look() -> None:
     kept = LampLog.from_changes(json.loads(json.dumps(lighting.changes())))
     assert all(kept.at(time) == those for time, those in lit.items())  # they change only when it looks
     assert kept.at(-1.0) == frozenset()
-    assert rules.asked == pytest.approx(200 * STEP / MIN_LAMP_INTERVAL, abs=1)
+    assert rules.asked == pytest.approx(200 * STEP / LAMP_INTERVAL, abs=1)
     assert len(lighting.changes()) == 10  # they change every 20 steps, and no line is written where nothing has changed
 
 
 def test_game_without_lamps_tells_none() -> None:
     scene = toy_scene()
-    lighting = LampState(Toy(scene, scene.bodies))
+    lighting = LampRecorder(Toy(scene, scene.bodies))
     lighting.update(0.0)
     assert lighting.changes() == []
 
