@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sandbox.window.render.palette import INK, PURPLE, SKY
-from sandbox.window.ui.energy_plot import MAX_SAMPLES, EnergyGraph, value_limits
+from sandbox.window.ui.energy_plot import MAX_SAMPLES, EnergyGraph, spread_labels
 
 RECT = pygame.Rect(10, 10, 340, 150)
 
@@ -67,18 +67,18 @@ def test_samples_stay_bounded_and_the_span_stays_covered() -> None:
 
 def test_scale_keeps_still_while_the_lines_need_most_of_it() -> None:
     graph = EnergyGraph()
-    first = graph.rescaled([(0.0, 9.0, 0.0, 9.0)])
+    first = graph.fit_limits([(0.0, 9.0, 0.0, 9.0)])
     graph.limits = first
     assert first[0] == 0.0
     assert first[1] >= 9.0
-    assert graph.rescaled([(0.0, 5.0, 0.0, 5.0)]) == first
-    assert graph.rescaled([(0.0, 1.0, 0.0, 1.0)])[1] < first[1]
-    assert graph.rescaled([(0.0, 90.0, 0.0, 90.0)])[1] >= 90.0
+    assert graph.fit_limits([(0.0, 5.0, 0.0, 5.0)]) == first
+    assert graph.fit_limits([(0.0, 1.0, 0.0, 1.0)])[1] < first[1]
+    assert graph.fit_limits([(0.0, 90.0, 0.0, 90.0)])[1] >= 90.0
 
 
 @given(st.lists(st.tuples(st.just(0.0), st.floats(), st.floats(), st.floats()), max_size=8))
 def test_limits_hold_all_finite_values_and_zero(samples: list[tuple[float, float, float, float]]) -> None:
-    low, high = EnergyGraph().rescaled(samples)
+    low, high = EnergyGraph().fit_limits(samples)
     assert low <= 0.0 <= high
     assert low < high
     values = [value for sample in samples for value in sample[1:] if abs(value) < 1e306]
@@ -129,7 +129,7 @@ def test_any_energies_are_drawn(samples: list[tuple[float, float, float, float]]
 
 @given(st.lists(st.floats(0, 100), min_size=1, max_size=4))
 def test_labels_keep_apart_and_in_order(wanted: list[float]) -> None:
-    places = value_limits(wanted, 15.0, 0.0, 100.0)
+    places = spread_labels(wanted, 15.0, 0.0, 100.0)
     ordered = sorted(places)
     assert all(b - a >= 15.0 - 1e-9 for a, b in pairwise(ordered))  # rounding of sums
     assert all(-1e-9 <= place <= 100.0 for place in places)  # rounding of sums; 4 labels fit

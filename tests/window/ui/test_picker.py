@@ -40,7 +40,7 @@ def typed(picker: SceneBrowser, text: str) -> None:
 
 
 def place(picker: SceneBrowser, number: int) -> tuple[int, int]:
-    return picker._places[number][1].center
+    return picker._rects[number][1].center
 
 
 def test_one_file_is_read_or_pictured_each_time(files: list[tuple[str, Path]]) -> None:
@@ -48,16 +48,16 @@ def test_one_file_is_read_or_pictured_each_time(files: list[tuple[str, Path]]) -
     done = 0
     for _ in range(10):
         picker.draw(pygame.Surface((900, 700)), 1.0)
-        now = sum((card.found is not None) + (card.picture is not None) for card in picker.cards)
+        now = sum((card.thumbnail is not None) + (card.image is not None) for card in picker.cards)
         assert now == done + 1
         done = now
 
 
 def test_all_files_are_read_and_those_in_sight_pictured(files: list[tuple[str, Path]]) -> None:
     picker = drawn(files)
-    assert all(card.found is not None for card in picker.cards)
-    assert picker.cards[0].picture is not None
-    assert picker.cards[-1].picture is None
+    assert all(card.thumbnail is not None for card in picker.cards)
+    assert picker.cards[0].image is not None
+    assert picker.cards[-1].image is None
     assert (picker.cards[3].title, picker.cards[3].folder, picker.cards[3].about) == ("Scene 3", "mine", "odd")
 
 
@@ -95,7 +95,7 @@ def test_chosen_card_is_scrolled_into_sight(files: list[tuple[str, Path]]) -> No
     picker = drawn(files, (400, 400))
     picker.handle_event(key(pygame.K_END))
     picker.draw(pygame.Surface((400, 400)), 1.0)
-    assert picker._places[-1][1].bottom <= 400
+    assert picker._rects[-1][1].bottom <= 400
 
 
 def test_typing_filters_by_title_and_about(files: list[tuple[str, Path]]) -> None:
@@ -137,10 +137,10 @@ def test_click_chooses_the_card_below(files: list[tuple[str, Path]]) -> None:
 
 def test_wheel_scrolls(files: list[tuple[str, Path]]) -> None:
     picker = drawn(files, (400, 400))
-    top = picker._places[0][1].top
+    top = picker._rects[0][1].top
     picker.handle_event(wheel(-1))
     picker.draw(pygame.Surface((400, 400)), 1.0)
-    assert picker._places[0][1].top < top
+    assert picker._rects[0][1].top < top
 
 
 @pytest.mark.parametrize("event", [key(pygame.K_ESCAPE), key(pygame.K_o, pygame.KMOD_LCTRL)])
