@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as st_numpy
 
 from sandbox.window.camera import Camera
-from sandbox.window.render.particles import PIECE, ParticleRenderer, packed_pixels
+from sandbox.window.render.particles import ParticleRenderer, packed_pixels
 
 CAMERA = Camera((3.0, -2.0), 10.0, (64, 48))
 
@@ -35,9 +35,7 @@ def expected(position: np.ndarray, camera: Camera, side: int) -> np.ndarray:
 
 @pytest.mark.parametrize("side", [1, 2, 3])
 def test_pixels_are_exactly_where_the_camera_says(side):
-    position = np.random.default_rng(1).uniform((-1.0, -6.0), (7.0, 2.0), (3 * PIECE + 7, 2))[
-        : 200 if side > 1 else None
-    ]
+    position = np.random.default_rng(1).uniform((-1.0, -6.0), (7.0, 2.0), (50_000, 2))[: 200 if side > 1 else None]
     picture = painted(pygame.Surface(CAMERA.size), position, side=side)
     assert ((picture > 0).all(2) == expected(position, CAMERA, side)).all()
 

@@ -115,7 +115,7 @@ def test_the_rim_of_a_compound_body_lies_outside(few, monkeypatch):
     picture = drawn(sight(scene(body=[{"position": [0, 0], "box": boxes}])))
     assert at(picture, 0.0, 1.46) == ACCENTS[0]
     assert at(picture, 0.0, 1.58) == pytest.approx(darken(ACCENTS[0]), abs=2)  # rounded twice
-    assert at(picture, 0.0, 1.65) == at(drawn(sight(scene(world={}))), 0.0, 1.65)
+    assert at(picture, 0.0, 1.72) == at(drawn(sight(scene(world={}))), 0.0, 1.72)
 
 
 @pytest.mark.parametrize("antialias", [True, False])
