@@ -8,7 +8,7 @@ import numpy as np
 from sandbox.arrays import BoolArray, FloatArray
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import UnknownEngineError, start
-from sandbox.games.billiards.view.table import table_bounds
+from sandbox.games.billiards.table_geometry import table_bounds
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.joint_arrays import LinkKind
 from sandbox.scene.description.world import Settings

@@ -19,6 +19,11 @@ TOUCH = 1e-6
 HAIR = 1e-5
 """m: as close as balls are put to each other, so that none touches that nobody has played there"""
 
+RAIL = 0.115
+"""of a table's width: from the nose of a cushion to the outside of the wood"""
+
+Area = tuple[Point, Point]
+"""Lower-left and upper-right corner, m."""
 PlacedDisc = tuple[float, float, float]
 """x, y and radius, m"""
 
@@ -173,3 +178,16 @@ class TableGeometry:
 def _those(apart: FloatArray, whose: list[int]) -> list[tuple[int, int]]:
     """Return pairs that touch, of (M, K) distances between bodies and fixed things."""
     return [(i, whose[k]) for i, k in np.argwhere(apart <= TOUCH).tolist()]
+
+
+def table_width(area: Area) -> float:
+    """Return the shorter side of a playing area, m."""
+    (left, bottom), (right, top) = area
+    return min(right - left, top - bottom)
+
+
+def table_bounds(area: Area) -> Area:
+    """Return the bounding box of a table with its wooden rails, m."""
+    rail = RAIL * table_width(area)
+    (left, bottom), (right, top) = area
+    return (left - rail, bottom - rail), (right + rail, top + rail)

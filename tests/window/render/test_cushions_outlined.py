@@ -4,12 +4,11 @@ import math
 
 import pytest
 
+from sandbox.games.billiards.table_geometry import table_bounds, table_width
 from sandbox.games.billiards.tables import TABLES
 from sandbox.games.billiards.view.table import (
     DEPTH,
     cushion_outlines,
-    rail_width,
-    table_bounds,
     walls_that_are_no_cushions,
 )
 from sandbox.scene.files.load import loads
@@ -29,7 +28,7 @@ def test_every_cushion_is_found_and_lies_between_area_and_wood(name: str) -> Non
     found = cushion_outlines(scene, area)
     assert len(found) == (4 if name.startswith("carom") else 6)
     (left, bottom), (right, top) = area
-    depth = DEPTH * rail_width(area)
+    depth = DEPTH * table_width(area)
     for each in found:
         for x, y in each.outline:
             # A facing may end behind the line of the wood, where its hole is.

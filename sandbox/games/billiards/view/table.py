@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import pygame
 
+from sandbox.games.billiards.table_geometry import RAIL, table_width
 from sandbox.scene.description.base import Point, Vector
 from sandbox.scene.description.fixed import Post, Wall
 from sandbox.scene.scene import Scene
@@ -24,8 +25,6 @@ from sandbox.window.render.static_geometry import draw_static_bodies
 
 DEPTH = 0.036
 """of a table's width, from the nose of a cushion to the wood"""
-RIM = 0.115
-"""likewise, to the outside of the wood"""
 TOUCH = 1e-6
 """m: what is nearer touches"""
 ARC = math.radians(6.0)
@@ -43,22 +42,9 @@ class CushionOutline(NamedTuple):
     """away from the playing area"""
 
 
-def rail_width(area: Box) -> float:
-    """Return the shorter side of a playing area, m."""
-    (left, bottom), (right, top) = area
-    return min(right - left, top - bottom)
-
-
-def table_bounds(area: Box) -> Box:
-    """Return the box of a whole table, with its wood, m."""
-    rim = RIM * rail_width(area)
-    (left, bottom), (right, top) = area
-    return (left - rim, bottom - rim), (right + rim, top + rim)
-
-
 def cushion_outlines(scene: Scene, area: Box) -> tuple[CushionOutline, ...]:
     """Return the cushions of a table, as far as its fixed things are such."""
-    depth = DEPTH * rail_width(area)
+    depth = DEPTH * table_width(area)
     noses = {k: out for k, wall in enumerate(scene.walls) if (out := _out(wall, area)) is not None}
     facings = [wall for k, wall in enumerate(scene.walls) if k not in noses and len(wall.points) == 2]
     return tuple(_cushion(scene.walls[k], out, scene, facings, depth) for k, out in noses.items())
@@ -185,7 +171,7 @@ def draw_table(
     """Draw a table, as far as it is in sight."""
     felt = felt_of(scene)
     pen = _TablePen(surface, camera, unit, antialias)
-    rubber, width = cushion_outlines(scene, area), rail_width(area)
+    rubber, width = cushion_outlines(scene, area), table_width(area)
     _wood(pen, area, width)
     for hole in scene.pockets:
         pen.disc(hole.position, hole.radius + 0.016 * width, IRON, rim=mix_colours(IRON, PEARL, 0.25), line=1.0)
@@ -254,7 +240,7 @@ def _corners(camera: Camera, box: Box) -> tuple[Pixel, Pixel]:
 
 def _wood(pen: _TablePen, area: Box, width: float) -> None:
     """Draw the rails: dark without, a bevel of light within."""
-    rim, depth = RIM * width, DEPTH * width
+    rim, depth = RAIL * width, DEPTH * width
     for out, colour in (
         (rim, WOOD_DARK),
         (rim - 0.004 * width, WOOD_LIGHT),
@@ -270,7 +256,7 @@ def _throat(
     pen: _TablePen, hole: Point, radius: float, rubber: tuple[CushionOutline, ...], area: Box, colour: Colour
 ) -> None:
     """Draw the cloth between the two cushions that a pocket cuts."""
-    reach = 3.0 * radius + 0.1 * rail_width(area)
+    reach = 3.0 * radius + 0.1 * table_width(area)
     ends = [nose for each in rubber for nose in (each.nose, each.nose[::-1]) if math.dist(nose[0], hole) < reach]
     ends.sort(key=lambda nose: math.dist(nose[0], hole))
     if len(ends) >= 2:
@@ -282,7 +268,7 @@ def _throat(
 def _light(surface: pygame.Surface, camera: Camera, area: Box) -> None:
     """Light the bed from above its middle."""
     (left, top), (right, bottom) = _corners(camera, area)
-    depth = DEPTH * rail_width(area) * camera.scale
+    depth = DEPTH * table_width(area) * camera.scale
     seen = surface.get_rect()
     rect = pygame.Rect(0, 0, 0, 0)
     rect.left, rect.top = max(math.floor(left - depth), 0), max(math.floor(top - depth), 0)
@@ -318,7 +304,7 @@ def _marks(pen: _TablePen, scene: Scene, area: Box, felt: ClothColours) -> None:
     elif "head" in spots and scene.pockets:
         x, y = spots["head"]
         pen.line(((left, y), (right, y)) if tall else ((x, bottom), (x, top)), mix_colours(felt.bed, CHALK, 0.2), thin)
-    size = 0.0042 * rail_width(area)
+    size = 0.0042 * table_width(area)
     for place in spots.values():
         pen.disc(place, max(size, 1.2 * pen.unit / pen.camera.scale), mix_colours(felt.bed, CHALK, 0.5))
 
@@ -337,7 +323,7 @@ def _diamonds(pen: _TablePen, scene: Scene, area: Box, width: float) -> None:
         return
     (left, bottom), (right, top) = area
     tall = top - bottom > right - left
-    off, size = (RIM + DEPTH) / 2.0 * width, 0.0062 * width
+    off, size = (RAIL + DEPTH) / 2.0 * width, 0.0062 * width
     wide, high = (4, 8) if tall else (8, 4)
     places = [(left + (right - left) * k / wide, y) for k in range(1, wide) for y in (bottom - off, top + off)]
     places += [(x, bottom + (top - bottom) * k / high) for k in range(1, high) for x in (left - off, right + off)]
