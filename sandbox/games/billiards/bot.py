@@ -1,10 +1,8 @@
-"""Bot: a player of some skill, who plans on the exact engine and errs as people do.
+"""Bots that play billiards.
 
-Players by name, as a command line tells them: `bot:0.5`.
-
-The bot: it looks for shots by geometry, tries them on the exact engine, and has the rules judge them.
-
-`ease.py` tells how easy a shot is, `aims.py` which strokes to try, `trial.py` what they lead to, `bot.py` chooses.
+A bot lists candidate strokes by geometry, simulates them on the exact engine, lets the rules judge the results, and
+plays the stroke that is best on average with its own aiming error. `shot_search` has the candidates and their values.
+`parse_bots` reads players such as `bot:0.5`; `BilliardsPolicy` plays headless games.
 """
 
 import math
@@ -31,27 +29,27 @@ from sandbox.scene.description.base import Point
 from sandbox.scene.description.surface import Stroke
 from sandbox.scene.random_streams import Stream, draws
 
-WORST, BEST = 0.03, 0.0003
-"""rad: the error of the aim, one standard deviation, at skill 0 and 1; in between by its logarithm"""
+MAX_AIM_ERROR, MIN_AIM_ERROR = 0.03, 0.0003
+"""rad: standard deviation of the aim at skill 0 and at skill 1; geometric interpolation in between"""
 
-OFF = 0.1
-"""of the speed, likewise, at skill 0; 0.01 at skill 1"""
+MAX_SPEED_ERROR = 0.1
+"""relative standard deviation of the speed at skill 0; a tenth of it at skill 1"""
 
 FINALISTS = 10
-"""strokes that are tried with errors"""
+"""number of the best candidates that are simulated with errors"""
 
-ERRORS = 8
-"""times each"""
+ERROR_SAMPLES = 8
+"""number of simulations with errors per candidate"""
 
-GOOD = 0.45
-"""worth above which no more than straight pots are looked at"""
+GOOD_VALUE = 0.45
+"""value of a pot above which no other strokes are searched"""
 
 
 @dataclass(frozen=True)
 class BilliardsBot:
-    """A player who aims by geometry, tries strokes on the exact engine, and plays what is best on average.
+    """Player that searches for the stroke that is best on average with its own error.
 
-    The same match, skill and seed lead to the same shot. It knows its own error, and chooses by it.
+    The same match, skill and seed lead to the same shot.
     """
 
     skill: float = 0.7
@@ -65,16 +63,16 @@ class BilliardsBot:
 
     @property
     def sigma(self) -> float:
-        """The error of the aim, rad, one standard deviation."""
-        return WORST * math.pow(BEST / WORST, self.skill)
+        """Standard deviation of the aim, rad."""
+        return MAX_AIM_ERROR * math.pow(MIN_AIM_ERROR / MAX_AIM_ERROR, self.skill)
 
     @property
-    def off(self) -> float:
-        """The error of the speed, as a share of it."""
-        return OFF * math.pow(0.1, self.skill)
+    def speed_error(self) -> float:
+        """Relative standard deviation of the speed."""
+        return MAX_SPEED_ERROR * math.pow(0.1, self.skill)
 
     def decide(self, match: Match) -> Decision:
-        """Return the decision after which the table is best for this player, by how easy the next shot is."""
+        """Return the decision with the best result for this player, by the ease of the next shot."""
         me, best, top = match.turn, match.choices.decisions[0], -math.inf
         for decision in match.choices.decisions:
             if decision == "claim":
@@ -88,12 +86,12 @@ class BilliardsBot:
         return best
 
     def plan(self, match: Match) -> FramePlan:
-        """Return the shot that it plays, its error in it."""
+        """Return the next shot, with the error of the player."""
         plan = self.intend(match)
-        return replace(plan, stroke=self.erred(plan.stroke, match.shots))
+        return replace(plan, stroke=self.with_error(plan.stroke, match.shots))
 
     def intend(self, match: Match) -> FramePlan:
-        """Return the shot that it means to play."""
+        """Return the intended shot, without error."""
         table, place = self._table(match), None
         if match.state.in_hand is not None:
             place = self._best_place(match)
@@ -102,17 +100,17 @@ class BilliardsBot:
         trial = ShotEvaluator(match, table, self.sigma)
         strokes = self._strokes(trial)
         ranked = self._ranked(trial, strokes)
-        if match.layout.pockets and not match.state.opening and (not ranked or ranked[0][0] < GOOD):
+        if match.layout.pockets and not match.state.opening and (not ranked or ranked[0][0] < GOOD_VALUE):
             ranked += self._ranked(trial, list(directions_all_around(trial, 60, (1.5, 3.0))))
         ranked.sort(key=lambda each: -each[0])
         best = self._steadiest(trial, ranked[:FINALISTS])
         return FramePlan(best[0], best[1], place)
 
-    def erred(self, stroke: Stroke, number: int) -> Stroke:
-        """Return a stroke as it is really played, the number-th of a frame."""
+    def with_error(self, stroke: Stroke, number: int) -> Stroke:
+        """Return a stroke with the random error of the shot `number` of a frame."""
         random = draws(Stream.STROKE, self.seed, number)
         aside, faster = random.standard_normal(2).tolist()
-        return _off(stroke, aside * self.sigma, faster * self.off)
+        return _with_error(stroke, aside * self.sigma, faster * self.speed_error)
 
     def _strokes(self, trial: ShotEvaluator) -> list[Stroke]:
         match = trial.match
@@ -127,7 +125,7 @@ class BilliardsBot:
         return pot_candidates(trial)
 
     def _ranked(self, trial: ShotEvaluator, strokes: list[Stroke]) -> list[tuple[float, Stroke, ShotCall]]:
-        """Return strokes with what they are worth without an error, the best first."""
+        """Return the value without error, the stroke and its call, best first."""
         found = []
         for stroke in strokes:
             made = trial.outcome(stroke)
@@ -135,19 +133,19 @@ class BilliardsBot:
         return sorted(found, key=lambda each: -each[0])
 
     def _steadiest(self, trial: ShotEvaluator, ranked: list[tuple[float, Stroke, ShotCall]]) -> tuple[Stroke, ShotCall]:
-        """Return the stroke that is worth most on average, with errors as this player makes them."""
+        """Return the stroke and call with the highest mean value over random errors of this player."""
         random = draws(Stream.TRIAL, self.seed, trial.match.shots)
-        errors = random.standard_normal((ERRORS, 2)) * (self.sigma, self.off)
+        errors = random.standard_normal((ERROR_SAMPLES, 2)) * (self.sigma, self.speed_error)
         best, top = ranked[0], -math.inf
         for good, stroke, call in ranked:
-            tried = [trial.worth(trial.outcome(_off(stroke, *error), call)) for error in errors.tolist()]
-            mean = (good + sum(tried)) / (1 + ERRORS)
+            tried = [trial.worth(trial.outcome(_with_error(stroke, *error), call)) for error in errors.tolist()]
+            mean = (good + sum(tried)) / (1 + ERROR_SAMPLES)
             if mean > top:
                 best, top = (good, stroke, call), mean
         return best[1], best[2]
 
     def _best_place(self, match: Match) -> Point:
-        """Return where to put a cue ball in hand: from where the best straight shot is easiest."""
+        """Return the place of a cue ball in hand, m, from which the best straight shot is easiest."""
         at = match.position[match.layout.number[match.cue]]
         place = match.state.in_hand
         if match.state.opening or place is None or not match.layout.pockets:
@@ -162,7 +160,7 @@ class BilliardsBot:
         return best
 
     def _table(self, match: Match) -> Table:
-        """Return the match's table on the exact engine, made ready once."""
+        """Return the table on the exact engine; it is compiled once per layout."""
         key = id(match.layout)
         if key not in self._tables or self._tables[key][0].layout is not match.layout:
             self._tables.clear()
@@ -170,21 +168,21 @@ class BilliardsBot:
         return self._tables[key][1]
 
 
-def _off(stroke: Stroke, aside: float, faster: float) -> Stroke:
-    """Return a stroke with an error of aim, rad, and of speed, as a share."""
+def _with_error(stroke: Stroke, aside: float, faster: float) -> Stroke:
+    """Return a stroke with an error of the aim, rad, and a relative error of the speed."""
     speed = min(max(stroke.speed * (1.0 + faster), 1e-3), 100.0)
     return stroke.model_copy(update={"aim": stroke.aim + aside, "speed": speed})
 
 
 DEFAULT_SKILL = 0.7
-"""skill of a bot of which none is told"""
+"""skill of `bot` without a number"""
 
 
 def parse_bots(text: str, seed: int = 0) -> tuple[BilliardsBot, ...]:
-    """Return the players of `bot:SKILL,bot:SKILL`, one or two, each with chances of its own.
+    """Return the players of `bot:SKILL,bot:SKILL`, one or two, each with a seed of its own.
 
     Raises:
-        GameError: it names something else.
+        GameError: the text is invalid.
     """
     found = []
     for number, each in enumerate(text.split(",")):

@@ -1,4 +1,8 @@
-"""Frame: a game played out between players, on any engine, and the session that it leaves."""
+"""Frames between bots without a window, and their recordings: what `sandbox match` runs.
+
+`play_frame` runs `BilliardsRules` in a `GameSession`, as every headless game, with two differences: time advances only
+during shots, and each player decides with a `Match` of its own turn.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -20,31 +24,31 @@ from sandbox.scene.description.surface import Stroke
 from sandbox.trajectory import Contacts
 
 MAX_SHOT_TIME = 300.0
-"""s, that a shot may take"""
+"""s, simulated; a longer shot is abandoned"""
 
 MAX_TURNS = 1000
-"""of a frame, decisions and shots: one that has no end by then is given up, without a winner"""
+"""decisions and shots; a longer frame is abandoned without a winner"""
 
 
 class NoRestError(GameError):
-    """A shot does not come to rest."""
+    """A shot does not come to rest within `MAX_SHOT_TIME`."""
 
 
 @dataclass(frozen=True)
 class FramePlan:
-    """What a player does at the table."""
+    """Next shot of a player."""
 
     stroke: Stroke
     call: ShotCall = field(default_factory=ShotCall)
     place: Point | None = None
-    """where a cue ball in hand is put, m; without one it stays"""
+    """place of a cue ball in hand, m; None leaves it where it is"""
 
 
 class FramePlayer(Protocol):
-    """Whoever decides and shoots: a bot, or a script."""
+    """Player of a frame."""
 
     def decide(self, match: Match) -> Decision:
-        """Return one of `match.choices.decisions`; asked for where there are some."""
+        """Return one of `match.choices.decisions`; called if there are any."""
 
     def plan(self, match: Match) -> FramePlan:
         """Return the next shot."""
@@ -52,43 +56,43 @@ class FramePlayer(Protocol):
 
 @dataclass(frozen=True)
 class FrameTurn:
-    """What a player decided or played, and what came of it."""
+    """Decision or shot of a player, and its result."""
 
     player: int
-    """from 0"""
+    """index, from 0"""
     decision: Decision | None
     plan: FramePlan | None
-    """where nothing was decided"""
+    """None for a decision"""
     fouls: tuple[str, ...]
     points: tuple[int, ...]
-    """what each player gained"""
+    """points gained by each player"""
     messages: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class FrameRecord:
-    """A frame that was played."""
+    """A frame that was played, as an immutable value."""
 
     first: Match
-    """how it began"""
+    """match at the start"""
     match: Match
-    """how it ended"""
+    """match at the end"""
     turns: tuple[FrameTurn, ...]
     session: Recording
-    """scene and actions: the same engine gets to the same state again, bit for bit"""
+    """scene and actions; a replay on the same engine and versions ends in the same state, bit for bit"""
     unfinished: str | None = None
-    """why it was given up; none where it came to its end"""
+    """reason why the frame was abandoned; None if it is complete"""
 
     @property
     def shots(self) -> tuple[FrameTurn, ...]:
-        """The turns in which somebody shot."""
+        """The turns with a shot."""
         return tuple(turn for turn in self.turns if turn.plan is not None)
 
     def replayed(self) -> "FrameRecord":
-        """Return the frame as a fresh simulation and the same turns lead to it.
+        """Return the frame that the same turns lead to in a new simulation.
 
         Raises:
-            GameError: what was done cannot be done again: the versions differ.
+            GameError: the turns cannot be repeated, because the versions differ.
         """
         script = FrameScript(self.turns)
         return play_frame(self.first, (script, script), self.session.engine, most=len(self.turns))
@@ -111,7 +115,7 @@ class FrameRecord:
 
 
 class FrameScript:
-    """A player who does what was done."""
+    """Player that repeats recorded turns."""
 
     def __init__(self, turns: Sequence[FrameTurn]) -> None:
         self._turns = iter(turns)
@@ -143,19 +147,19 @@ def play_frame(
     """Play a match to its end.
 
     Args:
-        match: how it begins; the balls lie where its scene has them.
-        players: one for each.
-        engine: by name.
-        most: how many turns.
-        time_limit: s of the clock after which no further turn is begun; none by default.
+        match: its start, with the balls where the scene has them.
+        players: one for each player of the match.
+        engine: name of the engine.
+        most: limit of turns.
+        time_limit: wall time, s, after which no further turn begins; default: no limit.
         told: called after every turn.
 
     Returns:
-        The frame, `unfinished` where it was given up: by one of the two limits, or as a shot did not come to rest, left
-        all bounds, or was too much for the engine.
+        The frame. It is `unfinished` if a limit was reached, or if a shot did not come to rest, left all bounds or
+        exceeded a limit of the engine.
 
     Raises:
-        GameError: a player does what may not be done.
+        GameError: a player does something that the rules do not allow.
         Refusal: the engine cannot play this table.
     """
     if len(players) != match.state.players:
@@ -241,7 +245,7 @@ class FrameTable:
         for control in self._rules.call_inputs(plan.call):
             self._press(control)
         acts.append(match.strike(plan.stroke, time))
-        # Not before: an action counts from the step that follows it.
+        # Not earlier: an action is recorded with the step that follows it.
         for action in (*self._pending, *acts):
             self._simulation.apply(action)
         self._actions += [*self._pending, *acts]

@@ -1,6 +1,6 @@
-"""Match: a game on a table, as a frozen value: rules, turn, score, and where every ball lies.
+"""Match: a frame of billiards between two shots, as an immutable value: rules, turn, scores, positions.
 
-Needs: what a table must have for a game.
+`require_suitable_table` checks that a table has the balls, spots and pockets that a game needs.
 """
 
 from collections.abc import Iterator
@@ -40,16 +40,16 @@ from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts
 
 SPOTS = {"8-ball": ("head", "foot"), "9-ball": ("head", "foot"), "carom": ("head", "centre", "foot")}
-"""What a table needs for a rack; for snooker, the colours' own."""
+"""Spots that a rack needs; snooker needs the spots of `COLOURS`."""
 
 COLOURS = ("yellow", "green", "brown", "blue", "pink", "black")
 
 
 def require_suitable_table(layout: TableGeometry, rules: Ruleset[Any], state: RulesState) -> None:
-    """Refuse a table on which a game cannot be played.
+    """Check that a game can be played on a table.
 
     Raises:
-        GameError: with all that is wrong.
+        GameError: it cannot; the message names every reason.
     """
     wanted = {*state.table, *(rules.cue_balls if rules.name != "free" else (rules.cue_ball(state),))}
     missing, idle = sorted(wanted - set(layout.names)), sorted(set(layout.names) - wanted)
@@ -68,32 +68,32 @@ def require_suitable_table(layout: TableGeometry, rules: Ruleset[Any], state: Ru
 
 @dataclass(frozen=True)
 class Match:
-    """A frame of a game on a table, between shots.
+    """A frame of a game on a table, between two shots.
 
-    What a method leads to is another match; `moves` tells what that asks for at the table.
+    Methods return another match; `moves` returns the actions that bring the table into its state.
     """
 
     layout: TableGeometry = field(repr=False, compare=False)
     rules: Ruleset[Any] = field(repr=False)
     state: RulesState
     position: tuple[Point, ...] = field(repr=False)
-    """of every body, by number, m; a ball that is down lies in its pocket"""
+    """position of every body, m; a pocketed ball lies in its pocket"""
     before: tuple[Point, ...] | None = field(default=None, repr=False)
-    """the positions before the last shot, to which a miss can be taken back"""
+    """positions before the last shot, m, which can be restored after a miss in snooker"""
     shots: int = 0
-    """how many were played"""
+    """number of shots played"""
     verdict: ShotResult[Any] | None = field(default=None, repr=False, compare=False)
-    """of what led here: fouls, points, messages"""
+    """result of the last shot or decision: fouls, points, messages"""
 
     @classmethod
     def begin(cls, scene: Scene, game: str | None = None, players: int = 2, **terms: Any) -> Self:
-        """Return the match with which a frame begins, all balls where the scene has them.
+        """Return the match at the start of a frame, with all balls where the scene has them.
 
         Args:
-            scene: a table with its balls; its own shots are left out.
-            game: by name; without one, the scene's own.
+            scene: table with its balls; its shots are ignored.
+            game: name of the game; default: the game of the scene.
             players: 1 or 2.
-            terms: what else the game's `start` takes: `distance` of carom, `misses` of snooker.
+            terms: further arguments of the game's `start`: `distance` of carom, `misses` of snooker.
 
         Raises:
             GameError: there is no such game, or it cannot be played on this table.
@@ -111,7 +111,7 @@ class Match:
 
     @property
     def scene(self) -> Scene:
-        """The table, without shots of its own: what a session starts from."""
+        """The scene without its shots, from which a session starts."""
         return self.layout.scene
 
     @property
@@ -141,25 +141,25 @@ class Match:
 
     @property
     def messages(self) -> tuple[str, ...]:
-        """Lines for the players on what led here."""
+        """Messages about the last shot or decision."""
         return () if self.verdict is None else self.verdict.messages
 
     @property
     def on_table(self) -> dict[str, PlacedDisc]:
-        """The balls that are not down, the cue ball too."""
+        """The balls that are not pocketed, with the cue ball."""
         here = {*self.state.table, self.cue}
         return {
             name: (*self.position[k], self.layout.radius[k]) for name, k in self.layout.number.items() if name in here
         }
 
     def refusal(self, at: Point) -> str | None:
-        """Return why the cue ball may not be put somewhere, m; None where it may."""
+        """Return why the cue ball may not be placed at a point, m; None if it may."""
         if self.state.in_hand is None:
             return "the cue ball is not in hand"
         return placement_refusal(self.layout, self.state.in_hand, at, self._cue_radius, self._others)
 
     def nearest(self, at: Point) -> Point:
-        """Return the place nearest to a point, m, where the cue ball may be put.
+        """Return the allowed place of the cue ball that is nearest to a point, m.
 
         Raises:
             GameError: it is not in hand, or there is no room.
@@ -172,10 +172,10 @@ class Match:
         return place
 
     def place(self, at: Point) -> Self:
-        """Return the match with the cue ball, which is in hand, put somewhere.
+        """Return the match with the cue ball, which is in hand, placed at a point, m.
 
         Raises:
-            GameError: it may not be put there; the text says why.
+            GameError: the place is not allowed; the message has the reason.
         """
         why = self.refusal(at)
         if why is not None:
@@ -183,10 +183,10 @@ class Match:
         return replace(self, position=self._with({self.cue: at}), verdict=None)
 
     def decide(self, decision: Decision) -> Self:
-        """Return what a decision leads to.
+        """Return the match after a decision.
 
         Raises:
-            GameError: it is not to be had now.
+            GameError: the decision is not offered now.
         """
         return self._done(self.rules.decide(self.state, decision))
 
@@ -201,19 +201,19 @@ class Match:
         return Strike(time=time, ball=self.cue, **stroke.model_dump(exclude_defaults=True))
 
     def happenings(self, contacts: Contacts, began: float = 0.0) -> tuple[ShotEvent, ...]:
-        """Return what the rules see of a shot from here, of its contacts, from any engine, and when it began, s."""
+        """Return the events of a shot from this match, by its contacts on any engine and its start time, s."""
         return shot_events(self.layout, contacts, began, self.against, self.cue)
 
     def played(
         self, contacts: Contacts, position: FloatArray, call: ShotCall | None = None, began: float = 0.0
     ) -> Self:
-        """Return what a shot has led to, once every ball is at rest.
+        """Return the match after a shot, once every ball is at rest.
 
         Args:
-            contacts: of the shot, from any engine.
-            position: (N, 2) m, where the bodies have come to rest.
-            call: what was said before it.
-            began: the time of the stroke, s.
+            contacts: contacts of the shot on any engine.
+            position: (N, 2) m, positions of the bodies at rest.
+            call: call before the shot.
+            began: time of the stroke, s.
 
         Raises:
             GameError: the frame is over, or the call could not be made.
@@ -225,13 +225,13 @@ class Match:
         return after._done(verdict)
 
     def moves(self, position: FloatArray, time: float = 0.0) -> tuple[Move, ...]:
-        """Return the actions that put the balls where this match has them.
+        """Return the actions that move the balls to the positions of this match.
 
-        So a shot is taken back too: by those of the match before it. In their order no ball is put onto another.
+        The moves of the match before a shot undo that shot. In their order no ball is moved onto another.
 
         Args:
-            position: (N, 2) m, where the bodies are now.
-            time: of the actions, s.
+            position: (N, 2) m, present positions of the bodies.
+            time: time of the actions, s.
         """
         now = [(x, y) for x, y in position.tolist()]
         return tuple(
@@ -254,7 +254,7 @@ class Match:
         """Return the match of a JSON object on its scene, the inverse of `document`.
 
         Raises:
-            GameError: it is none.
+            GameError: the object is not a match of this scene.
         """
         try:
             rules, layout = ruleset_named(plain["game"]), TableGeometry.of(scene)
@@ -267,7 +267,7 @@ class Match:
 
     @cached_property
     def against(self) -> frozenset[tuple[int, int]]:
-        """What touches before the shot, as pairs of numbers: looked for once for all the shots that are tried."""
+        """Pairs of body indices that touch before the shot; computed once for all candidate shots."""
         return touching_pairs(self.layout, self.position)
 
     @property
@@ -303,14 +303,14 @@ class Match:
         return first is not None
 
     def _with(self, places: dict[str, Point]) -> tuple[Point, ...]:
-        """Return the positions with some balls elsewhere."""
+        """Return the positions with some balls at other places."""
         position = list(self.position)
         for name, at in places.items():
             position[self.layout.number[name]] = at
         return tuple(position)
 
     def _done(self, verdict: ShotResult[Any]) -> Self:
-        """Return the match once all is done at the table that a verdict asks for, and the lie is looked at."""
+        """Return the match after the reracking, restoring and respotting of a result, with its situation settled."""
         position = self.position
         if verdict.rerack:
             position = rerack_moves(self.layout, self.rules, verdict.state)
@@ -327,7 +327,7 @@ class Match:
         return replace(after, state=settled.state, verdict=verdict.followed_by(settled))
 
     def _in_hand(self) -> Self:
-        """Return the match with a cue ball in hand at the legal place nearest to where it is, or to the head spot."""
+        """Return the match with a cue ball in hand at the allowed place nearest to it, or to its initial position."""
         if self.state.in_hand is None or self.over:
             return self
         at = self.position[self.layout.number[self.cue]]
@@ -338,13 +338,13 @@ class Match:
         return replace(self, position=self._with({self.cue: self.nearest(at)}))
 
     def _lie(self) -> Situation:
-        """Return how the balls lie for the one to shoot."""
+        """Return the situation of the player to shoot."""
         cue = self.cue
         others = {name: disc for name, disc in self.on_table.items() if name != cue}
         return situation_of(self._cues(), others, self.targets, self.state.in_hand is not None)
 
     def _cues(self) -> Iterator[PlacedDisc]:
-        """Yield where the cue ball lies; where it is in hand, then also all over where it may be put."""
+        """Yield the cue ball; if it is in hand, also at places all over the allowed area."""
         radius, place = self._cue_radius, self.state.in_hand
         yield (*self.position[self.layout.number[self.cue]], radius)
         if place is not None:

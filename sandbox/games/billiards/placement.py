@@ -1,4 +1,4 @@
-"""Placing: where a ball in hand may be put, and the nearest place where it may."""
+"""Ball in hand: the allowed places, and the nearest of them to a point."""
 
 import math
 from collections.abc import Sequence
@@ -11,27 +11,27 @@ from sandbox.games.billiards.table_geometry import HAIR, PlacedDisc, TableGeomet
 from sandbox.scene.description.base import Point
 
 ROUNDING = 1e-9
-"""m, that a place may be beyond a line"""
+"""m by which a place may exceed a bound, for rounding"""
 
 AROUND = 72
-"""Places that are tried around each ball, and along each bound."""
+"""Number of candidate places around each ball, and along each bound."""
 
 
 GRID = 16
-"""Columns and rows of places that are tried all over."""
+"""Columns and rows of candidate places over the allowed area."""
 
 
 def placement_refusal(
     layout: TableGeometry, place: Place, at: Point, radius: float, others: Sequence[PlacedDisc]
 ) -> str | None:
-    """Return why a ball in hand may not be put somewhere; None where it may.
+    """Return why a ball in hand may not be placed at a point; None if it may.
 
     Args:
-        layout: of the table.
-        place: where the rules allow it.
-        at: where its centre would be, m.
-        radius: of the ball, m.
-        others: the balls on the table.
+        layout: geometry of the table.
+        place: area that the rules allow.
+        at: centre of the ball, m.
+        radius: radius of the ball, m.
+        others: other balls on the table.
     """
     point = np.array([at])
     if not np.all(np.isfinite(point)) or layout.room(point)[0] < radius - ROUNDING:
@@ -46,7 +46,7 @@ def placement_refusal(
 def allowed(
     layout: TableGeometry, place: Place, points: FloatArray, radius: float, others: Sequence[PlacedDisc]
 ) -> BoolArray:
-    """Tell of (M, 2) places, m, whether a ball may be put there, (M,)."""
+    """Return whether a ball may be placed at (M, 2) points, m, as (M,) booleans."""
     free = (layout.room(points) >= radius - ROUNDING) & (_apart(points, radius, others) >= -ROUNDING)
     return np.asarray(free & _within(layout, place, points))
 
@@ -54,9 +54,9 @@ def allowed(
 def nearest(
     layout: TableGeometry, place: Place, at: Point, radius: float, others: Sequence[PlacedDisc]
 ) -> Point | None:
-    """Return the nearest place where a ball may be put; within a millimetre or so of it beside curves.
+    """Return the nearest allowed place, exact to about a millimetre beside curves; None if there is no room.
 
-    None where there is no room at all. Takes the same arguments as `refusal`.
+    Takes the same arguments as `placement_refusal`.
     """
     if placement_refusal(layout, place, at, radius, others) is None:
         return at
@@ -78,7 +78,7 @@ def nearest(
 
 
 def spread(layout: TableGeometry, place: Place, radius: float, others: Sequence[PlacedDisc]) -> list[Point]:
-    """Return places all over where a ball in hand may be put, m."""
+    """Return allowed places of a ball in hand, m, spread over the allowed area."""
     points = layout.places.get((place, radius))
     if points is None:
         points = _bounds(layout, place, radius)
@@ -89,7 +89,7 @@ def spread(layout: TableGeometry, place: Place, radius: float, others: Sequence[
 
 
 def _within(layout: TableGeometry, place: Place, points: FloatArray) -> BoolArray:
-    """Tell of (M, 2) points whether they are where the rules say, (M,)."""
+    """Return whether (M, 2) points are in the area that the rules allow, as (M,) booleans."""
     if place == "anywhere":
         return np.ones(len(points), dtype=bool)
     home, along = np.array(layout.home), np.array(layout.along)
@@ -100,7 +100,7 @@ def _within(layout: TableGeometry, place: Place, points: FloatArray) -> BoolArra
 
 
 def _into(layout: TableGeometry, place: Place, points: FloatArray, radius: float) -> FloatArray:
-    """Return (M, 2) points moved into the cushions, and into where the rules say."""
+    """Return (M, 2) points clamped to the playing area and to the area that the rules allow."""
     (x0, y0), (x1, y1) = layout.area
     inside = np.clip(points, (x0 + radius, y0 + radius), (x1 - radius, y1 - radius))
     if place == "anywhere":
@@ -115,7 +115,7 @@ def _into(layout: TableGeometry, place: Place, points: FloatArray, radius: float
 
 
 def _bounds(layout: TableGeometry, place: Place, radius: float) -> FloatArray:
-    """Return points all over where the rules say, (M, 2): a place to fall back on."""
+    """Return points spread over the area that the rules allow, (M, 2), as a fallback."""
     (x0, y0), (x1, y1) = layout.area
     if place == "in the D" and layout.d_radius:
         (x, y), reach = layout.home, layout.d_radius + radius
@@ -126,7 +126,7 @@ def _bounds(layout: TableGeometry, place: Place, radius: float) -> FloatArray:
 
 
 def _apart(points: FloatArray, radius: float, others: Sequence[PlacedDisc]) -> FloatArray:
-    """Return how far a ball at each of (M, 2) points is from the nearest other, (M,) m; negative in overlap."""
+    """Return the gap between a ball at (M, 2) points and the nearest other ball, (M,) m; negative for overlap."""
     least = np.full(len(points), np.inf)
     for x, y, r in others:
         least = np.minimum(least, np.hypot(points[:, 0] - x, points[:, 1] - y) - radius - r)
@@ -134,7 +134,7 @@ def _apart(points: FloatArray, radius: float, others: Sequence[PlacedDisc]) -> F
 
 
 def _between(others: FloatArray, radius: float) -> FloatArray:
-    """Return where a ball would lie against two others, (M, 2)."""
+    """Return the centres of a ball that touches two others, (M, 2) m."""
     found = []
     for i, (ax, ay, ar) in enumerate(others.tolist()):
         for bx, by, br in others[i + 1 :].tolist():

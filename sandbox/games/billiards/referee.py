@@ -1,10 +1,8 @@
-"""Upkeep: what a referee does between shots: racks the balls anew, and puts single ones back.
+"""Referee: translates between the engine's view of a table and that of the rules.
 
-Lying: how the balls lie for the player to shoot: what touches the cue ball, and whether it is snookered.
-
-Spotting: where a ball goes that is put back, once it is known which balls are in the way.
-
-Telling: what an engine saw of a shot, as the rules read it: by names.
+- Events: the contacts of a shot as the rules read them, by names (`shot_events`).
+- Situation: balls that touch the cue ball, and whether it is snookered (`situation_of`).
+- Spotting: positions of balls that are respotted or reracked, and the moves that bring balls to their positions.
 """
 
 import math
@@ -18,7 +16,7 @@ from sandbox.trajectory import Contacts
 
 
 def touches_ball(cue: PlacedDisc, others: dict[str, PlacedDisc]) -> tuple[str, ...]:
-    """Return the balls that lie against the cue ball."""
+    """Return the balls that touch the cue ball."""
     x, y, radius = cue
     return tuple(name for name, (bx, by, r) in others.items() if math.hypot(bx - x, by - y) - radius - r <= TOUCH)
 
@@ -26,13 +24,13 @@ def touches_ball(cue: PlacedDisc, others: dict[str, PlacedDisc]) -> tuple[str, .
 def situation_of(
     cues: Iterable[PlacedDisc], others: dict[str, PlacedDisc], targets: frozenset[str], placed: bool
 ) -> Situation:
-    """Return how the balls lie.
+    """Return the situation of the player to shoot.
 
     Args:
-        cues: where the cue ball lies; of one in hand, the places that it may be put.
+        cues: the cue ball; for a ball in hand, the cue ball at each allowed place.
         others: the object balls on the table.
-        targets: those that are on.
-        placed: whether the ball is in hand, so that it touches none.
+        targets: names of the balls on.
+        placed: whether the cue ball is in hand, so that it touches no ball.
 
     Source: WPBSA 2, Snookered: a ball is on where both its edges can be hit straight; the ball in the way that is
     nearest to the cue ball snookers it.
@@ -53,7 +51,7 @@ def situation_of(
 
 
 def _hidden(cue: PlacedDisc, target: PlacedDisc, others: dict[str, PlacedDisc]) -> str | None:
-    """Return the ball that keeps one from hitting some edge of a target, the nearest of them; None where none does."""
+    """Return the nearest ball that blocks the way to either edge of a target; None if both edges can be hit."""
     in_way = {}
     for edge in _edges(cue, target):
         for name, disc in others.items():
@@ -63,7 +61,7 @@ def _hidden(cue: PlacedDisc, target: PlacedDisc, others: dict[str, PlacedDisc]) 
 
 
 def _edges(cue: PlacedDisc, target: PlacedDisc) -> tuple[Point, Point]:
-    """Return where the cue ball's centre is when it just touches each edge of a target."""
+    """Return the centres of the cue ball as it just touches each edge of a target, m."""
     dx, dy, reach = target[0] - cue[0], target[1] - cue[1], cue[2] + target[2]
     far = math.hypot(dx, dy)
     reach = min(reach, far)
@@ -77,7 +75,7 @@ def _edges(cue: PlacedDisc, target: PlacedDisc) -> tuple[Point, Point]:
 
 
 def _beside(begin: Point, end: Point, point: Point) -> float:
-    """Return how far a point is from a straight way, m."""
+    """Return the distance of a point from a line segment, m."""
     dx, dy = end[0] - begin[0], end[1] - begin[1]
     px, py = point[0] - begin[0], point[1] - begin[1]
     size = dx * dx + dy * dy
@@ -86,19 +84,19 @@ def _beside(begin: Point, end: Point, point: Point) -> float:
 
 
 def respotted_position(layout: TableGeometry, respot: Respot, radius: float, others: Sequence[PlacedDisc]) -> Point:
-    """Return where a ball goes: on the first of its spots that is free, else behind the first, as near as can be.
+    """Return the position of a respotted ball: the first of its spots that is free, else as near behind the first spot.
 
-    Behind is along the table, towards its foot; where that is full up to the cushion, before the spot (WPA 1.4;
-    WPBSA 3, Spotting Colours). Balls are put 0.01 mm from each other: they do not touch.
+    Behind is along the table, towards its foot; if there is no room up to the cushion, in front of the spot (WPA 1.4;
+    WPBSA 3, Spotting Colours). Respotted balls keep a gap of 0.01 mm, so that they do not touch.
 
     Args:
-        layout: of the table.
-        respot: which ball, and its spots.
-        radius: of the ball, m.
+        layout: geometry of the table.
+        respot: the ball and its spots.
+        radius: radius of the ball, m.
         others: the balls on the table.
 
     Raises:
-        GameError: the table has none of the spots, or there is no room on the whole line.
+        GameError: the table has none of the spots, or there is no room on the line.
     """
     spots = [layout.spots[name] for name in respot.spots if name in layout.spots]
     if not spots:
@@ -108,7 +106,7 @@ def respotted_position(layout: TableGeometry, respot: Respot, radius: float, oth
             return spot
     (x, y), (ux, uy) = spots[0], layout.along
     for way in (1.0, -1.0):
-        far = _is_spot_free(spots[0], (way * ux, way * uy), radius, others)
+        far = _distance_to_room(spots[0], (way * ux, way * uy), radius, others)
         place = (x + way * ux * far, y + way * uy * far)
         (x0, y0), (x1, y1) = layout.area
         if x0 + radius <= place[0] <= x1 - radius and y0 + radius <= place[1] <= y1 - radius:
@@ -116,8 +114,8 @@ def respotted_position(layout: TableGeometry, respot: Respot, radius: float, oth
     raise GameError(f"there is no room to spot the {respot.ball}")
 
 
-def _is_spot_free(spot: Point, way: Point, radius: float, others: Sequence[PlacedDisc]) -> float:
-    """Return how far along a way from a spot a ball first finds room, m."""
+def _distance_to_room(spot: Point, way: Point, radius: float, others: Sequence[PlacedDisc]) -> float:
+    """Return the distance from a spot, in a direction, to the first room for a ball, m."""
     taken = []
     for x, y, r in others:
         forth = (x - spot[0]) * way[0] + (y - spot[1]) * way[1]
@@ -134,7 +132,7 @@ def _is_spot_free(spot: Point, way: Point, radius: float, others: Sequence[Place
 
 
 SIMULTANEOUS = 5e-3
-"""s after a ball was set in motion: a contact with what it touched at the start, seen so soon, was never left"""
+"""s after a ball was set in motion within which a contact with something that it touched at the start never ended"""
 
 
 def shot_events(
@@ -144,14 +142,14 @@ def shot_events(
     against: frozenset[tuple[int, int]] = frozenset(),
     cue: str | None = None,
 ) -> tuple[ShotEvent, ...]:
-    """Return what happened in a shot.
+    """Return the events of a shot.
 
     Args:
-        layout: of the table.
-        contacts: of any engine, since the stroke. What began before it is left out.
-        began: the time of the stroke, s.
-        against: what touched when the shot began, as `touching_pairs` returns it; it counts once it was left (WPA 8.4).
-        cue: the ball that was struck.
+        layout: geometry of the table.
+        contacts: contacts on any engine since the stroke. Contacts that began before it are ignored.
+        began: time of the stroke, s.
+        against: pairs that touched when the shot began, from `touching_pairs`; they count after a separation (WPA 8.4).
+        cue: name of the ball that was struck.
     """
     names, fixed, solid = layout.names, layout.scene.fixed_names, len(layout.scene.fixed)
     frozen = any(b < 0 for _, b in against)
@@ -173,7 +171,7 @@ def shot_events(
 def _set_in_motion(
     contacts: Contacts, began: float, against: frozenset[tuple[int, int]], cue: int | None
 ) -> dict[int, float]:
-    """Return when each ball was set in motion, s of the shot: itself, or another through balls that touch it."""
+    """Return when each ball was set in motion, s since the stroke, directly or through balls that touch it."""
     group: dict[int, set[int]] = {}
     for a, b in against:
         if b >= 0:
@@ -188,7 +186,7 @@ def _set_in_motion(
 
 
 def touching_pairs(layout: TableGeometry, position: tuple[Point, ...]) -> frozenset[tuple[int, int]]:
-    """Return what touches, as pairs of numbers: of bodies the lower first; fixed things are −1 − k."""
+    """Return the pairs that touch, as body indices, the lower first; fixed objects are −1 − k."""
     found = []
     ordered = sorted(range(len(position)), key=lambda k: position[k][0])
     widest = 2.0 * max(layout.radius, default=0.0) + TOUCH
@@ -204,13 +202,13 @@ def touching_pairs(layout: TableGeometry, position: tuple[Point, ...]) -> frozen
 
 
 ASIDE = 1.0
-"""m, from the playing area's corner: where balls wait"""
+"""m from the corner of the playing area to the first place where balls wait during a move"""
 
 
 def rerack_moves(layout: TableGeometry, rules: Ruleset[Any], state: RulesState) -> tuple[Point, ...]:
-    """Return where the balls lie when all begins anew, by number, m: as the scene has them.
+    """Return the positions after a rerack, m: those of the scene.
 
-    Where players strike balls of their own, the one to shoot has the place of the first.
+    In games in which each player has a cue ball, the player to shoot gets the position of the first cue ball.
     """
     position = list(layout.start)
     cue, first = rules.cue_ball(state), rules.cue_balls[0]
@@ -223,13 +221,13 @@ def rerack_moves(layout: TableGeometry, rules: Ruleset[Any], state: RulesState) 
 def respot_moves(
     layout: TableGeometry, respots: Sequence[Respot], position: tuple[Point, ...], here: Iterable[int]
 ) -> tuple[Point, ...]:
-    """Return where the balls lie once some were put back, one after the other, by number, m.
+    """Return the positions after some balls are respotted, one after the other, m.
 
     Args:
-        layout: of the table.
-        respots: what is put back, in this order.
-        position: where the balls are before, by number, m.
-        here: the numbers of those on the table, which are in the way unless they lie in a pocket.
+        layout: geometry of the table.
+        respots: the balls and their spots, in order.
+        position: positions before, m.
+        here: indices of the balls on the table, which block spots unless they lie in a pocket.
 
     Raises:
         GameError: there is no room.
@@ -245,14 +243,14 @@ def respot_moves(
 
 
 def collision_free_moves(layout: TableGeometry, now: Sequence[Point], then: Sequence[Point]) -> list[tuple[int, Point]]:
-    """Return who is put where, one after the other, so that balls go from one position to another, m, by number.
+    """Return the moves, as index and position in m, that bring balls from some positions to others.
 
-    No ball is put onto another on the way: where they stand in each other's places, one waits beside the table.
+    No ball is moved onto another: of balls that block each other in a cycle, one waits beside the table.
     """
     at, left, found = list(now), [k for k in range(len(now)) if now[k] != then[k]], list[tuple[int, Point]]()
     (x0, y0), _ = layout.area
     while left:
-        # Only who is still to be moved is in the way: where balls are to end is none of our business.
+        # Only balls that are still to be moved can block: the final positions are the caller's.
         ready = next((k for k in left if _are_places_free(layout, k, then[k], at, left)), None)
         number = left[0] if ready is None else ready
         far = 4.0 * layout.radius[number] * (number + 1) + ASIDE
@@ -268,7 +266,7 @@ def collision_free_moves(layout: TableGeometry, now: Sequence[Point], then: Sequ
 def _are_places_free(
     layout: TableGeometry, number: int, place: Point, at: Sequence[Point], others: Sequence[int]
 ) -> bool:
-    """Tell whether a ball can be put somewhere, for others; in a pocket it meets nobody."""
+    """Return whether a ball can be moved to a place without touching others; in a pocket it touches none."""
     if layout.pocket_at(place) is not None:
         return True
     radius = layout.radius

@@ -1,4 +1,4 @@
-"""Expanding: `[billiards]` to surface, walls, posts, pockets, balls and spots, of which everything else is made."""
+"""Expansion of the `[billiards]` table of a scene to surface, walls, posts, pockets, balls and spots."""
 
 import math
 from collections.abc import Iterator
@@ -29,7 +29,7 @@ from sandbox.scene.files.presets import Preset
 from sandbox.scene.scene import Scene
 
 BALL = "phenolic"
-"""The material of the balls."""
+"""material of the balls"""
 
 RACKS: dict[TableGame, RackName] = {
     "8-ball": "8-ball",
@@ -39,7 +39,7 @@ RACKS: dict[TableGame, RackName] = {
     "snooker": "snooker",
     "free": "none",
 }
-"""What each game is racked as."""
+"""rack of each game"""
 
 DURATION = 20.0
 """s: a hard break rolls out in 10 to 15"""
@@ -48,7 +48,7 @@ SUBSTEPS = 10
 
 
 def faults_of(scene: Scene) -> Iterator[tuple[Location, str]]:
-    """Yield why a scene's `[billiards]` stands for nothing."""
+    """Yield the faults of a scene's `[billiards]`."""
     billiards = table_of(scene, Billiards)
     if billiards is None:
         return
@@ -71,9 +71,9 @@ def faults_of(scene: Scene) -> Iterator[tuple[Location, str]]:
 
 
 def expanded(scene: Scene) -> Scene:
-    """Return the scene of primitives that a scene with a sound `[billiards]` stands for; another as it is.
+    """Return a scene with its valid `[billiards]` expanded to primitives; without `[billiards]`, the scene itself.
 
-    What the scene states itself comes first in each list, and outranks what is of the same name.
+    Elements that the scene states come first in each list, and take precedence over elements of the same name.
     """
     billiards = table_of(scene, Billiards)
     if billiards is None:

@@ -1,4 +1,4 @@
-"""Layout: a table's geometry as games ask about it: spots, cushions, pockets, and where balls may lie."""
+"""Geometry of a billiard table as games use it: spots, cushions, pockets, distances."""
 
 import math
 from collections.abc import Iterable
@@ -14,10 +14,10 @@ from sandbox.scene.description.base import Point, Vector
 from sandbox.scene.scene import Scene
 
 TOUCH = 1e-6
-"""m: balls no farther apart touch, for the rules; an engine's own rounding is far below"""
+"""m: gap up to which balls touch, for the rules; the rounding of engines is far below"""
 
 HAIR = 1e-5
-"""m: as close as balls are put to each other, so that none touches that nobody has played there"""
+"""m: gap between balls that the referee places, above `TOUCH`, so that they do not touch"""
 
 RAIL = 0.115
 """of a table's width: from the nose of a cushion to the outside of the wood"""
@@ -30,35 +30,35 @@ PlacedDisc = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class TableGeometry:
-    """The geometry of a scene with a floor."""
+    """Geometry of a scene with a `[surface]`."""
 
     scene: Scene
     places: dict[tuple[str, float], FloatArray] = field(default_factory=dict, repr=False)
-    """(M, 2) m, all over where a ball of some radius may be put, by what rules call it; kept for the next time"""
+    """cache: (M, 2) m, allowed places of a ball, by the name of the area and the radius"""
 
     @classmethod
     def of(cls, scene: Scene) -> Self:
-        """Return the layout of a scene, its own shots left out: in a game players make them."""
+        """Return the geometry of a scene without its shots, which the players make in a game."""
         return cls(scene.model_copy(update={"shots": ()}))
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """The bodies, by number."""
+        """Names of the bodies, by index."""
         return self.scene.bodies.names
 
     @cached_property
     def number(self) -> dict[str, int]:
-        """Each body's number."""
+        """Index of each body."""
         return {name: k for k, name in enumerate(self.names)}
 
     @cached_property
     def start(self) -> tuple[Point, ...]:
-        """Where the bodies begin, by number, m."""
+        """Initial positions of the bodies, m."""
         return tuple((x, y) for x, y in self.scene.bodies.position.tolist())
 
     @cached_property
     def radius(self) -> tuple[float, ...]:
-        """Of the bodies, by number, m."""
+        """Radii of the bodies, m."""
         return tuple(self.scene.bodies.radius.tolist())
 
     @cached_property
@@ -74,7 +74,7 @@ class TableGeometry:
 
     @cached_property
     def area(self) -> tuple[Point, Point]:
-        """Lower left and upper right corner of the playing area, m: stated, else what walls and planes enclose."""
+        """Lower left and upper right corner of the playing area, m; default: the bounding box of walls and planes."""
         if self.scene.play.area is not None:
             return self.scene.play.area
         points = [point for wall in self.scene.walls for point in wall.points]
@@ -85,7 +85,7 @@ class TableGeometry:
 
     @cached_property
     def along(self) -> Vector:
-        """The way from the head of the table to its foot, of length 1; +y where no spots tell."""
+        """Unit vector from the head of the table to its foot; +y without spots."""
         for head, foot in (("head", "foot"), ("brown", "blue")):
             if head in self.spots and foot in self.spots and self.spots[head] != self.spots[foot]:
                 (ax, ay), (bx, by) = self.spots[head], self.spots[foot]
@@ -95,20 +95,20 @@ class TableGeometry:
 
     @cached_property
     def home(self) -> Point:
-        """The head spot, in snooker the brown's, else the middle of the playing area, m."""
+        """The head spot, in snooker the brown spot, else the centre of the playing area, m."""
         (x0, y0), (x1, y1) = self.area
         middle = (0.5 * (x0 + x1), 0.5 * (y0 + y1))
         return self.spots.get("head", self.spots.get("brown", middle))
 
     @cached_property
     def d_radius(self) -> float:
-        """Radius of the D, m: from the brown spot to the yellow; 0 where there is none."""
+        """Radius of the D, m: from the brown spot to the yellow; 0 without these."""
         if "brown" not in self.spots or "yellow" not in self.spots:
             return 0.0
         return math.dist(self.spots["brown"], self.spots["yellow"])
 
     def before_head(self, point: Point) -> float:
-        """Return how far a point is from the head string (the baulk line) towards the foot, m; negative behind it."""
+        """Return the distance of a point from the head string (baulk line) towards the foot, m; negative behind it."""
         x, y = self.home
         return (point[0] - x) * self.along[0] + (point[1] - y) * self.along[1]
 
@@ -117,14 +117,14 @@ class TableGeometry:
         return [(*position[k], self.radius[k]) for k in numbers]
 
     def pocket_at(self, point: Point) -> str | None:
-        """Return the pocket in which a centre lies."""
+        """Return the name of the pocket that contains a point; None if none does."""
         for name, (x, y, radius) in self.pockets.items():
             if math.hypot(point[0] - x, point[1] - y) < radius:
                 return name
         return None
 
     def room(self, points: FloatArray) -> FloatArray:
-        """Return how far (M, 2) points are from whatever is fixed, (M,) m; negative outside the playing area."""
+        """Return the distance of (M, 2) points from the nearest fixed object, (M,) m; negative outside the area."""
         (x0, y0), (x1, y1) = self.area
         x, y = points[:, 0], points[:, 1]
         least = np.minimum(np.minimum(x - x0, x1 - x), np.minimum(y - y0, y1 - y))
@@ -137,7 +137,7 @@ class TableGeometry:
 
     @cached_property
     def segments(self) -> tuple[FloatArray, FloatArray, list[int]]:
-        """The walls' segments, (K, 4) m, half their thickness, (K,) m, and which fixed thing each is of, −1 − k."""
+        """Segments of the walls, (K, 4) m, half their thickness, (K,) m, and the fixed object of each, −1 − k."""
         rows, whose = [], []
         for k, wall in enumerate(self.scene.walls, len(self.scene.planes)):
             points = (*wall.points, wall.points[0]) if wall.closed else wall.points
@@ -147,7 +147,7 @@ class TableGeometry:
         return table[:, :4], table[:, 4], whose
 
     def from_segments(self, points: FloatArray) -> FloatArray:
-        """Return how far (M, 2) points are from the faces of the walls' segments, (M, K) m."""
+        """Return the distance of (M, 2) points from the faces of the wall segments, (M, K) m."""
         ends, half, _ = self.segments
         a, way = ends[:, :2], ends[:, 2:] - ends[:, :2]
         from_a = points[:, None] - a
@@ -156,14 +156,14 @@ class TableGeometry:
         return np.asarray(np.hypot(apart[..., 0], apart[..., 1]) - half)
 
     def from_planes(self, points: FloatArray) -> FloatArray:
-        """Return how far (M, 2) points are before each plane, (M, K) m."""
+        """Return the distance of (M, 2) points from each plane, (M, K) m."""
         planes = [(*plane.point, *plane.normal) for plane in self.scene.planes]
         table = np.array(planes, dtype=float).reshape(-1, 4)
         normal = table[:, 2:] / np.maximum(np.hypot(table[:, 2], table[:, 3]), 1e-300)[:, None]
         return np.asarray(np.einsum("mkc,kc->mk", points[:, None] - table[:, :2], normal))
 
     def against_fixed(self, position: tuple[Point, ...]) -> list[tuple[int, int]]:
-        """Return which bodies touch which planes, walls and posts, as pairs of numbers; fixed things are −1 − k."""
+        """Return the pairs of bodies and planes, walls or posts that touch; fixed objects are −1 − k."""
         points, radius = np.array(position).reshape(-1, 2), np.array(self.radius)[:, None]
         planes = [-1 - k for k in range(len(self.scene.planes))]
         found = _those(self.from_planes(points) - radius, planes)
@@ -176,7 +176,7 @@ class TableGeometry:
 
 
 def _those(apart: FloatArray, whose: list[int]) -> list[tuple[int, int]]:
-    """Return pairs that touch, of (M, K) distances between bodies and fixed things."""
+    """Return the pairs that touch, from (M, K) distances between bodies and fixed objects."""
     return [(i, whose[k]) for i, k in np.argwhere(apart <= TOUCH).tolist()]
 
 

@@ -1,20 +1,16 @@
-"""`[billiards]`, dimensions of tables, and sets of balls.
+"""Billiard tables: the `[billiards]` table of scene files, dimensions, sets of balls, cushions, and racks.
 
-Tables: their figures, each from a governing body's rules where these give one.
+Dimensions are those of the governing bodies where their rules state them.
 
 WPA: World Pool Association, Tournament Table and Equipment Specifications. BCA: Billiard Congress of America,
 Equipment Specifications. WPBSA: World Professional Billiards and Snooker Association, Official Rules of Snooker,
 section 1. UMB: Union Mondiale de Billard, World Rules of Carom Billiard, articles 11–13 and 23.
 
-Cushions: the walls, jaws and pockets of a table.
+Cushions: a pocket is a gap between two cushions. Each cushion ends at a lip: its nose line and its facing, the line
+that leads into the pocket, are joined by a jaw, a round post tangent to both. A facing ends where it meets the hole.
 
-A pocket cuts two cushions. Each ends at a lip: its nose line and its facing, the line that leads into the pocket, are
-rounded into each other by a jaw, a post tangent to both. A facing ends where it meets the hole.
-
-Racks: where the balls of a game begin.
-
-Balls of a rack lie on a triangular lattice. With a gap g the lattice is g/2 wider than the balls and each ball lies
-anywhere within g/4 of its place: neighbours are 0 to g apart, and never overlap.
+Racks: balls lie on a triangular lattice. With a gap g the lattice is g/2 wider than the balls, and each ball lies
+at random within g/4 of its lattice point: the gaps of neighbours are 0 to g, and no balls overlap.
 """
 
 from __future__ import annotations  # `np.random` in an annotation would import it wherever scenes are read

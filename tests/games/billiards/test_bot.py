@@ -5,7 +5,7 @@ import pytest
 from tables_by_hand import lying, match, table
 
 from sandbox.engines.exact.tabletop.shots import Table
-from sandbox.games.billiards.bot import BEST, WORST, BilliardsBot, parse_bots
+from sandbox.games.billiards.bot import MAX_AIM_ERROR, MIN_AIM_ERROR, BilliardsBot, parse_bots
 from sandbox.games.billiards.headless import play_frame
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.base import GameError
@@ -56,12 +56,14 @@ def test_same_seed_plays_the_same_and_errors_are_as_told() -> None:
     assert bot.plan(now) != BilliardsBot(0.3, 8).plan(now)
     meant = bot.intend(now).stroke
     erred = np.array(
-        [(s.aim - meant.aim, s.speed / meant.speed - 1.0) for k in range(4000) if (s := bot.erred(meant, k))]
+        [(s.aim - meant.aim, s.speed / meant.speed - 1.0) for k in range(4000) if (s := bot.with_error(meant, k))]
     )
     # the spread of n = 4000 normal errors is known to 1/√(2n) = 1.1 %, here within four times that
-    assert erred.std(axis=0) == pytest.approx((bot.sigma, bot.off), rel=0.045)
-    assert erred.mean(axis=0) == pytest.approx((0.0, 0.0), abs=4.0 * bot.off / 4000**0.5)
-    assert (BilliardsBot(0.0).sigma, BilliardsBot(1.0).sigma) == pytest.approx((WORST, BEST), rel=1e-12)
+    assert erred.std(axis=0) == pytest.approx((bot.sigma, bot.speed_error), rel=0.045)
+    assert erred.mean(axis=0) == pytest.approx((0.0, 0.0), abs=4.0 * bot.speed_error / 4000**0.5)
+    assert (BilliardsBot(0.0).sigma, BilliardsBot(1.0).sigma) == pytest.approx(
+        (MAX_AIM_ERROR, MIN_AIM_ERROR), rel=1e-12
+    )
 
 
 def test_ball_in_hand_is_put_where_a_pot_is_easy() -> None:

@@ -1,13 +1,4 @@
-"""Rules: what every game answers.
-
-What rules see of one shot: who touched whom, by names, in time.
-
-Calls: what a player says before a shot, and what may be said now.
-
-State: where a frame stands, as a frozen value.
-
-Verdict: what came of a shot.
-"""
+"""Base of the rules of billiards games: shot events, calls and decisions, states, results, and `Ruleset`."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
@@ -19,38 +10,38 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 
 class GameError(ValueError):
-    """What no game can take; `str()` says why. The state is as it was."""
+    """An invalid input of a game; `str()` has the reason. The state is unchanged."""
 
 
 @dataclass(frozen=True)
 class ShotEvent:
     """A ball touched a ball or a cushion, or fell into a pocket.
 
-    A cushion is a wall or a jaw. One that a ball is frozen to when the shot begins counts only once the ball has left
-    it and come back (WPA 8.4); so does a ball that the cue ball touches from the start.
+    A cushion is a wall or a jaw. A cushion to which a ball is frozen when the shot begins counts only after the ball
+    has left it and returned (WPA 8.4). The same holds for a ball that the cue ball touches at the start.
     """
 
     time: float
-    """s, of the shot"""
+    """s since the stroke"""
     ball: str
     kind: Literal["ball", "cushion", "pocket"]
     other: str
-    """the name of the ball, cushion or pocket"""
+    """name of the ball, cushion or pocket"""
 
 
 @dataclass(frozen=True)
 class ShotSummary:
-    """A shot as rules ask about it."""
+    """Summary of a shot as rules need it."""
 
     cue: str
     happenings: tuple[ShotEvent, ...]
     """in order of time"""
     first: tuple[str, ...]
-    """what the cue ball touched first: several, where it touched them at one time"""
+    """balls that the cue ball touched first; several if it touched them at the same time"""
     fell: tuple[tuple[str, str], ...]
-    """balls and their pockets, in order of time, the cue ball too"""
+    """pocketed balls with their pockets, in order of time, including the cue ball"""
     driven: frozenset[str]
-    """balls that came to a cushion or fell once the cue ball had touched one"""
+    """balls that reached a cushion or a pocket after the first contact of the cue ball"""
     stayed_behind: bool = False
     """whether a cue ball in hand behind the head string first touched a ball there without having crossed it"""
 
@@ -72,16 +63,16 @@ class ShotSummary:
 def summarise(
     happenings: Iterable[ShotEvent], cue: str, table: tuple[str, ...], stayed_behind: bool = False
 ) -> ShotSummary:
-    """Read a shot.
+    """Return the summary of a shot.
 
     Args:
-        happenings: in any order.
-        cue: the ball that was struck.
+        happenings: events, in any order.
+        cue: name of the ball that was struck.
         table: the other balls on the table.
-        stayed_behind: as in `Shot`.
+        stayed_behind: as in `ShotSummary`.
 
     Raises:
-        GameError: a happening names a ball that is not on the table.
+        GameError: an event names a ball that is not on the table.
     """
     ordered = tuple(sorted(happenings, key=lambda each: each.time))
     here = {cue, *table}
@@ -100,59 +91,59 @@ def summarise(
 
 
 def balls_touched_by(cue: str, each: ShotEvent) -> str | None:
-    """Return the ball that a cue ball touched in a happening, whichever of the two it names first."""
+    """Return the ball that a cue ball touched in an event; None for other events."""
     if each.kind != "ball" or cue not in (each.ball, each.other) or each.ball == each.other:
         return None
     return each.other if each.ball == cue else each.ball
 
 
 def first_ball_hit(shot: ShotSummary) -> str:
-    """Return what the cue ball touched first as the beginning of a sentence."""
+    """Return the first contact of the cue ball as the start of a sentence."""
     return f"the {' and the '.join(shot.first)} {'was' if len(shot.first) == 1 else 'were'}"
 
 
 Decision = Literal["play", "pass", "in hand", "rerack", "rerack and pass", "spot", "restore", "claim"]
-"""What is settled before a shot.
+"""Decision before a shot.
 
-play: take the table as it is · pass: the other player plays · in hand: as it is, but with the cue ball in hand ·
-rerack: all anew, and break · rerack and pass: all anew, and the other breaks · spot: balls that touch go to their
-spots · restore: the balls go back to where they were, and the one who missed plays again · claim: the frame is won.
+play: accept the table · pass: the other player plays · in hand: accept the table, with the cue ball in hand ·
+rerack: rerack and break · rerack and pass: rerack, the other player breaks · spot: touching balls go to their
+spots · restore: restore the positions, the player who missed plays again · claim: the frame is won.
 """
 
 
 @dataclass(frozen=True)
 class ShotCall:
-    """What is said of one shot."""
+    """Call before a shot."""
 
     ball: str | None = None
-    """meant to fall; in snooker the colour that is nominated, or the free ball"""
+    """ball to be pocketed; in snooker the nominated colour, or the free ball"""
     pocket: str | None = None
-    """in which it is to fall"""
+    """pocket for the ball"""
     safety: bool = False
-    """the turn is to end, whatever falls"""
+    """the turn ends even if a ball is pocketed"""
     push_out: bool = False
 
 
 @dataclass(frozen=True)
 class ShotChoices:
-    """What a player may say now."""
+    """Decisions and calls that are possible now."""
 
     decisions: tuple[Decision, ...] = ()
-    """before the shot; who shoots without having decided plays"""
+    """decisions before the shot; a shot without a decision counts as `play`"""
     balls: tuple[str, ...] = ()
-    """that may be called or nominated"""
+    """balls that may be called or nominated"""
     pocket: bool = False
     """whether a pocket may be called"""
     needed: bool = False
-    """whether a pocket must be, for a ball to count"""
+    """whether a pocket must be called for a ball to count"""
     safety: bool = False
     push_out: bool = False
 
     def check(self, call: ShotCall) -> None:
-        """Refuse a call that cannot be made now.
+        """Check a call.
 
         Raises:
-            GameError: with all that is wrong.
+            GameError: it cannot be made now; the message names every reason.
         """
         wrong = [
             *(
@@ -178,10 +169,10 @@ Place = Literal["anywhere", "behind the head string", "in the D"]
 
 @dataclass(frozen=True, kw_only=True)
 class RulesState:
-    """What every game keeps.
+    """State that every game has.
 
     Raises:
-        GameError: neither one nor two play, or it is nobody's turn.
+        GameError: the number of players is not 1 or 2, or does not fit turn and scores.
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(extra="forbid")
@@ -192,16 +183,16 @@ class RulesState:
     """the player to shoot, from 0"""
     scores: tuple[int, ...]
     table: tuple[str, ...]
-    """the object balls that are not down"""
+    """object balls that are not pocketed"""
     opening: bool = True
     """whether the next shot opens the frame"""
     in_hand: Place | None = None
-    """where the cue ball may be put before the shot"""
+    """area in which the cue ball may be placed before the shot; None if it is not in hand"""
     decisions: tuple[Decision, ...] = ()
-    """one of which is to be taken before the shot; the first is always to play"""
+    """decisions that are offered before the shot; the first is always `play`"""
     over: bool = False
     winner: int | None = None
-    """nobody's where it is a draw, or where one who plays alone has lost"""
+    """index of the winner; None for a draw, or if a single player has lost"""
 
     def __post_init__(self) -> None:
         counted(self.players)
@@ -210,28 +201,28 @@ class RulesState:
 
     @property
     def other(self) -> int:
-        """The player who is next; the same, where one plays alone."""
+        """The next player; with one player, the same."""
         return (self.turn + 1) % self.players
 
     @property
     def opponent(self) -> int | None:
-        """The other player, or None where one plays alone."""
+        """The other player; None with one player."""
         return None if self.players == 1 else self.other
 
     def scored(self, player: int | None, points: int) -> tuple[int, ...]:
-        """Return the scores with points added for a player; nobody's points go nowhere."""
+        """Return the scores with points added for a player; unchanged if `player` is None."""
         return tuple(score + points if each == player else score for each, score in enumerate(self.scores))
 
     def without(self, balls: tuple[str, ...]) -> tuple[str, ...]:
-        """Return the object balls left once some are down."""
+        """Return the object balls on the table without some balls."""
         return tuple(ball for ball in self.table if ball not in balls)
 
 
 def counted(players: int) -> int:
-    """Return how many play.
+    """Return a valid number of players unchanged.
 
     Raises:
-        GameError: neither one nor two.
+        GameError: it is not 1 or 2.
     """
     if players not in (1, 2):
         raise GameError(f"{players} players cannot play; 1 or 2 can")
@@ -243,35 +234,35 @@ S = TypeVar("S", bound=RulesState)
 
 @dataclass(frozen=True)
 class Respot:
-    """A ball to be put back: on the first of its spots that is free, else as near to the first as it can be."""
+    """A ball to respot: on the first of its spots that is free, else as near as possible to the first."""
 
     ball: str
     spots: tuple[str, ...]
-    """`foot`, `head`, `centre`; in snooker the colours' own, by their names"""
+    """`foot`, `head`, `centre`; in snooker the names of the colours"""
 
 
 @dataclass(frozen=True)
 class ShotResult(Generic[S]):
-    """A new state, why it is so, and what is to be done at the table."""
+    """Result of a shot or a decision: the new state, its reasons, and the changes to make on the table."""
 
     state: S
     fouls: tuple[str, ...] = ()
-    """why it was foul, in plain words; none where it was fair"""
+    """descriptions of the fouls; empty for a fair shot"""
     points: tuple[int, ...] = ()
-    """what each player gained; none where nothing was played"""
+    """points gained by each player; empty for a decision"""
     respot: tuple[Respot, ...] = ()
-    """in the order in which they are put back"""
+    """balls to respot, in order"""
     rerack: bool = False
-    """all balls go to where the game begins"""
+    """whether all balls return to their initial positions"""
     restore: bool = False
-    """all balls go back to where they were before the last shot"""
+    """whether all balls return to their positions before the last shot"""
     goes_on: bool = False
-    """whether the one who shot shoots again by right"""
+    """whether the player continues the turn"""
     messages: tuple[str, ...] = ()
-    """lines for the players"""
+    """messages for the players"""
 
     def followed_by(self, settled: Self) -> Self:
-        """Return it with what the lie of the balls, looked at after it, has brought besides."""
+        """Return the result combined with that of `Ruleset.settle`."""
         return replace(
             self,
             state=settled.state,
@@ -283,14 +274,14 @@ class ShotResult(Generic[S]):
 
 @dataclass(frozen=True)
 class Situation:
-    """How the balls lie, once all are at rest and spotted; for a cue ball in hand, what its best place would give."""
+    """Situation once all balls are at rest and respotted; for a ball in hand, that of its best place."""
 
     touching: tuple[str, ...] = ()
-    """object balls that the cue ball of the player to shoot touches"""
+    """object balls that touch the cue ball of the player to shoot"""
     snookered: bool = False
-    """whether no legal target touches or can be hit straight at both its edges, for balls that are no targets"""
+    """whether no ball on touches the cue ball or can be hit straight at both edges, because others block the way"""
     by: tuple[str, ...] = ()
-    """the nearest of the balls in the way, if it is one for all targets"""
+    """the nearest blocking ball, if it is the same for all balls on"""
 
 
 def _summed(one: tuple[int, ...], other: tuple[int, ...]) -> tuple[int, ...]:
@@ -300,33 +291,33 @@ def _summed(one: tuple[int, ...], other: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def player_name(number: int) -> str:
-    """Return what a player is called in messages."""
+    """Return the name of a player in messages."""
     return f"player {number + 1}"
 
 
 def renamed(message: str, names: tuple[str, ...]) -> str:
-    """Return a message with the players called by names of their own."""
+    """Return a message with other names for the players."""
     for number, name in enumerate(names):
         message = message.replace(player_name(number), name)
     return message
 
 
 class Ruleset(ABC, Generic[S]):
-    """A game. It keeps nothing: all there is to know of a frame is in its state."""
+    """Rules of a game. They are stateless: a frame is a state."""
 
     name: str
     rack: str
-    """how the balls lie at the start: `8-ball`, `9-ball`, `carom`, `snooker`"""
+    """name of the rack: `8-ball`, `9-ball`, `carom`, `snooker`"""
     cue_balls: tuple[str, ...] = ("cue",)
     kind: type[S]
-    """of its states"""
+    """class of its states"""
 
     @abstractmethod
     def start(self, players: int = 2) -> S:
-        """Return the state in which a frame begins.
+        """Return the state at the start of a frame.
 
         Raises:
-            GameError: neither one nor two play.
+            GameError: the number of players is not 1 or 2.
         """
 
     @abstractmethod
@@ -338,18 +329,18 @@ class Ruleset(ABC, Generic[S]):
         return self.cue_balls[state.turn % len(self.cue_balls)]
 
     def choices(self, state: S) -> ShotChoices:
-        """Return what may be decided and called before the next shot."""
+        """Return the decisions and calls that are possible before the next shot."""
         return ShotChoices(decisions=() if state.over else state.decisions)
 
     def judge(
         self, state: S, call: ShotCall, happenings: Iterable[ShotEvent], stayed_behind: bool = False
     ) -> ShotResult[S]:
-        """Return what came of a shot. What was still to be decided is taken as `play`.
+        """Return the result of a shot. A decision that was not taken counts as `play`.
 
         Args:
-            state: before the shot.
-            call: what was said of it.
-            happenings: in any order.
+            state: state before the shot.
+            call: call before the shot.
+            happenings: events, in any order.
             stayed_behind: whether a cue ball in hand behind the head string first touched a ball there, and had not
                 crossed the head string before.
 
@@ -364,10 +355,10 @@ class Ruleset(ABC, Generic[S]):
         return self._judge(replace(state, decisions=()), call, shot)
 
     def decide(self, state: S, decision: Decision) -> ShotResult[S]:
-        """Return what a decision leads to.
+        """Return the result of a decision.
 
         Raises:
-            GameError: it is not to be had now.
+            GameError: it is not offered now.
         """
         offered = self.choices(state).decisions
         if decision not in offered:
@@ -375,7 +366,7 @@ class Ruleset(ABC, Generic[S]):
         return self._decide(replace(state, decisions=()), decision)
 
     def settle(self, state: S, lie: Situation) -> ShotResult[S]:  # noqa: ARG002
-        """Return the state with what follows from how the balls lie now, called after each shot and each spotting."""
+        """Return the consequences of the situation after a shot, a decision and respotting."""
         return ShotResult(state)
 
     def document(self, state: S) -> dict[str, Any]:
@@ -387,7 +378,7 @@ class Ruleset(ABC, Generic[S]):
         """Return the state of a JSON object, the inverse of `document`.
 
         Raises:
-            GameError: it is not a state of this game, with all that is wrong.
+            GameError: it is not a state of this game; the message names every fault.
         """
         try:
             return self._adapter.validate_python(plain)

@@ -1,7 +1,7 @@
 """Carom: three-cushion and straight rail (UMB): touch both other balls, for a point and another shot.
 
-A miss is no foul: it ends the turn. Who began and comes to the distance first has the other play one last turn from the
-starting position, so that both have had as many; who draws level shares the frame.
+A miss is no foul; it ends the turn. If the player who began reaches the distance first, the other player has one last
+turn from the starting position, so that both have the same number of turns; equal scores are a draw.
 """
 
 from dataclasses import dataclass, replace
@@ -31,31 +31,31 @@ class CaromState(RulesState):
     """A score is the number of caroms. `table` names all three balls."""
 
     distance: int
-    """points to be made"""
+    """points to win"""
     innings: tuple[int, ...]
-    """turns that each player has ended"""
+    """turns that each player has completed"""
     run: int = 0
     """points of this turn so far"""
     touching: tuple[str, ...] = ()
-    """balls that lie against the cue ball"""
+    """balls that touch the cue ball"""
     last: bool = False
-    """whether this is the turn with which the frame ends"""
+    """whether the frame ends with this turn"""
 
 
 class Carom(Ruleset[CaromState]):
-    """A game of caroms."""
+    """Rules of a carom game."""
 
     rack = "carom"
     cue_balls = WHITES
     kind = CaromState
 
     def __init__(self, name: str, cushions: int, distance: int) -> None:
-        """Make a game.
+        """Define a game.
 
         Args:
-            name: of the game.
-            cushions: how many times the cue ball must have come to one before it touches the second ball.
-            distance: points to be made, where a frame states none.
+            name: name of the game.
+            cushions: number of cushion contacts of the cue ball before it touches the second ball.
+            distance: default points to win.
         """
         self.name, self.cushions, self.distance = name, cushions, distance
 
@@ -63,7 +63,7 @@ class Carom(Ruleset[CaromState]):
         """Return the state before the opening shot.
 
         Raises:
-            GameError: neither one nor two play, or the distance is less than a point.
+            GameError: the number of players is not 1 or 2, or the distance is less than a point.
         """
         points = self.distance if distance is None else distance
         if points < 1:
@@ -117,7 +117,7 @@ class Carom(Ruleset[CaromState]):
         return ShotResult(after, points=points, goes_on=True)
 
     def _made(self, shot: ShotSummary) -> bool:
-        """Tell whether the cue ball touched both, with its cushions before the second; one cushion counts each time."""
+        """Return whether the cue ball touched both balls, with enough cushion contacts, also of one cushion, before."""
         touched: set[str] = set()
         cushions = 0
         for each in shot.happenings:
@@ -131,7 +131,7 @@ class Carom(Ruleset[CaromState]):
         return False
 
     def _ended(self, state: CaromState, fouls: tuple[str, ...], full: bool = False) -> ShotResult[CaromState]:
-        """Return what the end of a turn leads to: the other's, the last, or none."""
+        """Return the result of the end of a turn: the other player's turn, the last turn, or the end of the frame."""
         none = (0,) * state.players
         told = tuple(f"foul: {each}" for each in fouls)
         innings = tuple(count + (each == state.turn) for each, count in enumerate(state.innings))

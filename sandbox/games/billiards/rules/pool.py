@@ -1,14 +1,14 @@
-"""What 8-ball and 9-ball share: standard fouls (WPA 6), and the break.
+"""Pool: 8-ball, 9-ball and free play, with the standard fouls (WPA 6).
 
-8-ball (WPA 3): one group each, then the eight, in the pocket that was called.
+8-ball (WPA 3): each player pockets a group, then the eight in the called pocket.
 
-A ball other than the eight need not be called (WPA 1.6: what is obvious need not be): without a call whatever falls of
-the shooter's own group counts, and on an open table the first ball to fall chooses the group. With a call only that
-ball counts, in that pocket where one is named.
+Balls other than the eight need not be called (WPA 1.6: obvious shots need not be). Without a call, every pocketed ball
+of the shooter's group counts, and on an open table the first pocketed ball chooses the group. With a call only that
+ball counts, and only in the called pocket if one is named.
 
-9-ball (WPA 2): the lowest ball first; who makes the nine fairly wins.
+9-ball (WPA 2): the lowest ball must be hit first; a fair shot that pockets the nine wins.
 
-Free play: no rules but turns. Who makes a ball goes on; a cue ball that fell is in hand.
+Free play: turns without further rules. A pocketed ball continues the turn; a pocketed cue ball is in hand.
 """
 
 from dataclasses import dataclass, replace
@@ -34,12 +34,12 @@ DRIVEN = 4
 
 
 def scratch(shot: ShotSummary) -> list[str]:
-    """Return the foul of a cue ball that fell (WPA 6.1)."""
+    """Return the foul of a pocketed cue ball (WPA 6.1)."""
     return ["scratch"] if shot.scratched else []
 
 
 def wrong_ball(shot: ShotSummary, targets: frozenset[str]) -> list[str]:
-    """Return the foul of what was touched first (WPA 6.2); of two at one time, one that is right will do."""
+    """Return the foul of a wrong first contact (WPA 6.2); of two simultaneous contacts, one must be right."""
     if not shot.first:
         return ["the cue ball hit no ball"]
     if targets.isdisjoint(shot.first):
@@ -48,7 +48,7 @@ def wrong_ball(shot: ShotSummary, targets: frozenset[str]) -> list[str]:
 
 
 def no_rail(shot: ShotSummary) -> list[str]:
-    """Return the foul of a touch after which no ball fell or came to a cushion (WPA 6.3)."""
+    """Return the foul of a contact after which no ball reached a pocket or a cushion (WPA 6.3)."""
     return ["no rail after contact"] if shot.first and not shot.driven else []
 
 
@@ -65,12 +65,12 @@ def standard(shot: ShotSummary, targets: frozenset[str]) -> tuple[str, ...]:
 
 
 def broke(shot: ShotSummary) -> bool:
-    """Tell whether a break was strong enough."""
+    """Return whether a break was strong enough."""
     return bool(shot.down) or len(shot.driven - {shot.cue}) >= DRIVEN
 
 
 def at_foot(ball: str) -> Respot:
-    """Return a ball to be spotted on the long string, from the foot spot on (WPA 1.4)."""
+    """Return the respot of a ball on the long string, from the foot spot (WPA 1.4)."""
     return Respot(ball, ("foot",))
 
 
@@ -87,14 +87,14 @@ GROUPS: dict[Group, tuple[str, ...]] = {"solids": EIGHT_BALL_NAMES[:7], "stripes
 
 @dataclass(frozen=True, kw_only=True)
 class EightBallState(RulesState):
-    """A score is the number of the player's own balls that are down."""
+    """State of 8-ball; a score is the number of pocketed balls of the player's group."""
 
     groups: tuple[Group | None, ...]
-    """each player's; none while the table is open"""
+    """group of each player; None while the table is open"""
 
 
 class EightBall(Ruleset[EightBallState]):
-    """8-ball."""
+    """Rules of 8-ball."""
 
     name = "8-ball"
     rack = "8-ball"
@@ -111,7 +111,7 @@ class EightBall(Ruleset[EightBallState]):
         )
 
     def legal_targets(self, state: EightBallState) -> frozenset[str]:
-        """Return what is on: any ball on the break, any but the eight on an open table, one's own, then the eight."""
+        """Return the balls on: all on the break, all but the eight on an open table, the own group, then the eight."""
         if state.over:
             return frozenset()
         if state.opening:
@@ -121,7 +121,7 @@ class EightBall(Ruleset[EightBallState]):
         return frozenset(mine).intersection(state.table) or frozenset((EIGHT,))
 
     def choices(self, state: EightBallState) -> ShotChoices:
-        """Return what may be said; on the eight a pocket must be (WPA 3.6)."""
+        """Return the possible calls; on the eight a pocket must be called (WPA 3.6)."""
         if state.over or state.opening:
             return super().choices(state)
         balls = self.legal_targets(state)
@@ -153,7 +153,7 @@ class EightBall(Ruleset[EightBallState]):
         return ShotResult(after, goes_on=True, messages=(f"{player_name(state.turn)} plays {mine}",))
 
     def _made(self, state: EightBallState, call: ShotCall, shot: ShotSummary) -> str | None:
-        """Return a ball that fell as it was to: the one that was called, else the first of one's own."""
+        """Return a pocketed ball that counts: the called ball, else the first of the own group."""
         able = (call.ball,) if call.ball is not None else tuple(self.legal_targets(state))
         for ball in shot.down:
             if ball in able and call.pocket in (None, shot.pocket_of(ball)):
@@ -161,7 +161,7 @@ class EightBall(Ruleset[EightBallState]):
         return None
 
     def _break(self, state: EightBallState, shot: ShotSummary, fouls: tuple[str, ...]) -> ShotResult[EightBallState]:
-        """Judge a break (WPA 3.3). Too weak a break is no foul, but the other player may have all racked anew."""
+        """Judge a break (WPA 3.3). A weak break is no foul, but the other player may ask for a rerack."""
         respot = (at_foot(EIGHT),) if EIGHT in shot.down else ()
         table = state.without(tuple(ball for ball in shot.down if ball != EIGHT))
         place: Literal["behind the head string"] | None = "behind the head string" if scratch(shot) else None
@@ -183,7 +183,7 @@ class EightBall(Ruleset[EightBallState]):
     def _eight(
         self, state: EightBallState, call: ShotCall, shot: ShotSummary, fouls: tuple[str, ...]
     ) -> ShotResult[EightBallState]:
-        """Judge a shot on which the eight fell: it wins, or it loses (WPA 3.8)."""
+        """Judge a shot that pockets the eight: it wins or loses (WPA 3.8)."""
         lost = None
         if fouls:
             lost = f"the 8 was pocketed on a foul: {fouls[0]}"
@@ -207,7 +207,7 @@ class EightBall(Ruleset[EightBallState]):
 
 
 def _counted(before: EightBallState, verdict: ShotResult[EightBallState]) -> ShotResult[EightBallState]:
-    """Return a verdict with the scores that follow from the table."""
+    """Return a result with the scores that follow from the table."""
     after = verdict.state
     scores = tuple(
         0 if group is None else sum(ball not in after.table for ball in GROUPS[group]) for group in after.groups
@@ -219,21 +219,21 @@ def _counted(before: EightBallState, verdict: ShotResult[EightBallState]) -> Sho
 NINE = "9"
 NINE_BALL_NAMES = tuple(str(number) for number in range(1, 10))
 MAX_CONSECUTIVE_FOULS = 3
-"""in a row that lose the rack (WPA 6.14)"""
+"""consecutive fouls that lose the rack (WPA 6.14)"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class NineBallState(RulesState):
-    """A score is the number of balls that the player has made."""
+    """A score is the number of balls that the player has pocketed."""
 
     fouls: tuple[int, ...]
-    """of each player, without a fair shot between"""
+    """consecutive fouls of each player"""
     push_out: bool = False
     """whether the next shot may be a push-out"""
 
 
 class NineBall(Ruleset[NineBallState]):
-    """9-ball."""
+    """Rules of 9-ball."""
 
     name = "9-ball"
     rack = "9-ball"
@@ -251,7 +251,7 @@ class NineBall(Ruleset[NineBallState]):
         return frozenset() if state.over else frozenset((min(state.table, key=int),))
 
     def choices(self, state: NineBallState) -> ShotChoices:
-        """Return what may be said: nothing but a push-out, on the shot after a fair break (WPA 2.4)."""
+        """Return the possible calls: only a push-out, on the shot after a fair break (WPA 2.4)."""
         return replace(super().choices(state), push_out=state.push_out and not state.over)
 
     def _judge(self, state: NineBallState, call: ShotCall, shot: ShotSummary) -> ShotResult[NineBallState]:
@@ -288,7 +288,7 @@ class NineBall(Ruleset[NineBallState]):
         return ShotResult(after if goes_on else replace(after, turn=state.other), points=points, goes_on=goes_on)
 
     def _fouls(self, state: NineBallState, call: ShotCall, shot: ShotSummary) -> tuple[str, ...]:
-        """Return what was foul: of a push-out a scratch alone (WPA 2.4), of a break also that it was too weak (2.3)."""
+        """Return the fouls: on a push-out only a scratch (WPA 2.4), on a break also a weak break (2.3)."""
         if call.push_out:
             return tuple(scratch(shot))
         wrong = [*scratch(shot), *wrong_ball(shot, self.legal_targets(state))]
@@ -298,7 +298,7 @@ class NineBall(Ruleset[NineBallState]):
 
 
 def _foul(after: NineBallState, fouls: tuple[str, ...]) -> ShotResult[NineBallState]:
-    """Return what a foul leads to: the ball in hand for the other, or the end."""
+    """Return the result of a foul: ball in hand for the other player, or the end of the frame."""
     row, who = after.fouls[after.turn], player_name(after.turn)
     if row >= MAX_CONSECUTIVE_FOULS:
         winner = after.opponent
@@ -315,19 +315,19 @@ def _foul(after: NineBallState, fouls: tuple[str, ...]) -> ShotResult[NineBallSt
 
 @dataclass(frozen=True, kw_only=True)
 class FreePlayState(RulesState):
-    """A score is the number of balls that the player has made."""
+    """A score is the number of balls that the player has pocketed."""
 
     rack: tuple[str, ...]
     """the object balls at the start"""
     cue: str
-    """the ball that is struck"""
+    """the cue ball"""
 
 
 ALWAYS: tuple[Decision, ...] = ("play", "in hand", "rerack")
 
 
 class FreePlay(Ruleset[FreePlayState]):
-    """Free play."""
+    """Rules of free play."""
 
     name = "free"
     rack = "8-ball"
@@ -338,11 +338,11 @@ class FreePlay(Ruleset[FreePlayState]):
 
         Args:
             players: 1 or 2.
-            balls: the object balls, of any rack; on a table without pockets they are never made.
-            cue: the ball that both strike.
+            balls: the object balls, of any rack; on a table without pockets they are never pocketed.
+            cue: the cue ball of both players.
 
         Raises:
-            GameError: neither one nor two play, or the cue ball is one of the others.
+            GameError: the number of players is not 1 or 2, or the cue ball is an object ball.
         """
         scores = (0,) * counted(players)
         if cue in balls:
@@ -352,7 +352,7 @@ class FreePlay(Ruleset[FreePlayState]):
         )
 
     def cue_ball(self, state: FreePlayState) -> str:
-        """Return the ball that is struck."""
+        """Return the cue ball."""
         return state.cue
 
     def legal_targets(self, state: FreePlayState) -> frozenset[str]:

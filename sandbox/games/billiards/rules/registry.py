@@ -1,4 +1,4 @@
-"""RULES: every game by name."""
+"""The rules of every game, by name."""
 
 from typing import Any
 
@@ -19,10 +19,10 @@ RULESETS: dict[str, Ruleset[Any]] = {
 
 
 def ruleset_named(name: str) -> Ruleset[Any]:
-    """Return a game by name.
+    """Return the rules of a game.
 
     Raises:
-        GameError: with the names there are.
+        GameError: there is no such game; the message lists the names.
     """
     try:
         return RULESETS[name]

@@ -1,12 +1,8 @@
 """Snooker (WPBSA 3): a red, a colour, a red …, then the colours in order.
 
-Who plays alone scores what is made; the points of fouls go to nobody. A miss is called, where the frame is played with
-it, of every first touch that was wrong, unless a player needed points of fouls before or after (Foul and a Miss);
-whether the attempt was good is for nobody here to say.
-
-The balls of snooker: their names, values and spots.
-
-A stroke of snooker: what was on, what it scored, and what was foul.
+A single player scores for pocketed balls; foul points are not awarded then. With the foul-and-a-miss rule, a miss is
+called for every wrong first contact, unless a player needed foul points before or after (Foul and a Miss); the quality
+of the attempt is not judged.
 """
 
 from dataclasses import dataclass, replace
@@ -29,15 +25,15 @@ from sandbox.games.billiards.rules.base import (
 
 REDS = tuple(f"red-{number}" for number in range(1, 16))
 VALUES = {"yellow": 2, "green": 3, "brown": 4, "blue": 5, "pink": 6, "black": 7}
-"""of the colours, in the order in which they are played once the reds are gone"""
+"""values of the colours, in the order in which they are played after the reds"""
 COLOURS = tuple(VALUES)
 SNOOKER_NAMES = (*REDS, *COLOURS)
 MIN_FOUL_POINTS = 4
-"""points of a foul, at least"""
+"""least points of a foul"""
 
 
 def value(ball: str) -> int:
-    """Return the points of a ball; 1 of a red."""
+    """Return the value of a ball; 1 for a red."""
     return VALUES.get(ball, 1)
 
 
@@ -52,28 +48,28 @@ def colours(table: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def respots(balls: tuple[str, ...]) -> tuple[Respot, ...]:
-    """Return colours to be spotted, the highest first, each on its own spot, else on the highest that is free."""
+    """Return the respots of colours, the highest first: its own spot, else the highest free spot."""
     down = COLOURS[::-1]
     return tuple(Respot(ball, (ball, *(spot for spot in down if spot != ball))) for ball in down if ball in balls)
 
 
 @dataclass(frozen=True)
 class SnookerShot:
-    """A shot, with what was on."""
+    """A shot with the balls on."""
 
     shot: ShotSummary
     on: frozenset[str]
-    """the balls on, without a free ball; none where no colour was nominated"""
+    """the balls on, without a free ball; empty if no colour was nominated"""
     worth: int
     """points of a ball on"""
     free: str | None
-    """the ball that stands for a ball on"""
+    """the free ball, which counts as a ball on"""
     touching: tuple[str, ...]
-    """what lay against the cue ball before"""
+    """balls that touched the cue ball before the shot"""
 
     @property
     def fair(self) -> frozenset[str]:
-        """What may fall: the balls on, and the free ball."""
+        """Balls that may be pocketed: the balls on and the free ball."""
         return self.on if self.free is None else self.on | {self.free}
 
     @property
@@ -89,12 +85,12 @@ class SnookerShot:
         return bool(first) and first <= self.fair and (self.free is None or self.free in first)
 
     def value(self, ball: str) -> int:
-        """Return the points of a ball, a free one being worth what it stands for."""
+        """Return the points of a ball; a free ball has the value of the ball on."""
         return self.worth if ball == self.free else value(ball)
 
     @property
     def fouls(self) -> tuple[tuple[int, str], ...]:
-        """What was foul, each with its points (Penalties): those of a ball on or concerned, and 4 at least."""
+        """Fouls with their points (Penalties): the value of the ball on or concerned, at least 4."""
         shot, least = self.shot, max(MIN_FOUL_POINTS, self.worth)
         found: list[tuple[int, str]] = []
         if shot.scratched:
@@ -116,7 +112,7 @@ class SnookerShot:
 
     @property
     def points(self) -> int:
-        """What a fair stroke scores: each red, but of a free ball and the colour on only one."""
+        """Points of a fair shot: all reds, but only one of a free ball and the colour on."""
         made = [ball for ball in self.shot.down if ball in self.fair]
         if not made:
             return 0
@@ -126,16 +122,16 @@ class SnookerShot:
 def judge_snooker_shot(
     shot: ShotSummary, on: str, table: tuple[str, ...], named: str | None, free: bool, touching: tuple[str, ...]
 ) -> SnookerShot:
-    """Return a stroke.
+    """Return a shot with the balls on.
 
     Args:
-        shot: what happened.
+        shot: summary of the shot.
         on: `red`, `colour`, or the name of the colour on.
         table: the balls that were on the table.
-        named: the colour that was nominated, or the free ball. A colour that is hit first, or from which the cue
-            ball is played away, is nominated by that.
+        named: the nominated colour, or the free ball. Without it, the colour that is hit first, or that the cue ball
+            is played away from, counts as nominated.
         free: whether a free ball might be nominated.
-        touching: what lay against the cue ball before.
+        touching: balls that touched the cue ball before the shot.
     """
     if on == "red":
         return SnookerShot(shot, frozenset(reds(table)), 1, named if free else None, touching)
@@ -153,14 +149,14 @@ On = Literal["red", "colour", "yellow", "green", "brown", "blue", "pink", "black
 
 @dataclass(frozen=True, kw_only=True)
 class SnookerState(RulesState):
-    """Where a frame of snooker stands."""
+    """State of snooker."""
 
     on: On = "red"
     """`colour` is any, after a red"""
     run: int = 0
     """points of this turn so far: the break"""
     misses: bool = False
-    """whether the frame is played with the miss"""
+    """whether the foul-and-a-miss rule applies"""
     fouled: bool = False
     """whether the last stroke was foul"""
     free: bool = False
@@ -168,9 +164,9 @@ class SnookerState(RulesState):
     freed: str | None = None
     """the free ball of the last stroke, if nothing fell"""
     touching: tuple[str, ...] = ()
-    """balls that lie against the cue ball"""
+    """balls that touch the cue ball"""
     before: "SnookerState | None" = None
-    """the state to which a miss can be taken back"""
+    """state that can be restored after a miss"""
 
 
 def remaining(state: SnookerState) -> int:
@@ -181,7 +177,7 @@ def remaining(state: SnookerState) -> int:
 
 
 class Snooker(Ruleset[SnookerState]):
-    """Snooker."""
+    """Rules of snooker."""
 
     name = "snooker"
     rack = "snooker"
@@ -308,20 +304,20 @@ def balls_on(state: SnookerState) -> frozenset[str]:
 
 
 def _next(table: tuple[str, ...]) -> On:
-    """Return what is on for one who comes to the table: red, else the lowest colour."""
+    """Return the ball on at the start of a turn: red, else the lowest colour."""
     left: tuple[On, ...] = ("yellow", "green", "brown", "blue", "pink", "black")
     return "red" if reds(table) else next(ball for ball in left if ball in table)
 
 
 def _answers(state: SnookerState, missed: bool) -> tuple[Decision, ...]:
-    """Return what the other may answer to a foul."""
+    """Return the decisions of the other player after a foul."""
     if state.players == 1:
         return ()
     return ("play", "pass", "restore") if missed else ("play", "pass")
 
 
 def _needed(state: SnookerState) -> bool:
-    """Tell whether somebody needs points of fouls to draw level."""
+    """Return whether a player needs foul points to draw level."""
     return max(state.scores) - min(state.scores) > remaining(state)
 
 
@@ -335,7 +331,7 @@ def _claimable(state: SnookerState) -> SnookerState:
 
 
 def _ended(state: SnookerState) -> ShotResult[SnookerState]:
-    """Return the end; with level scores the black is spotted, and the other player says who plays at it."""
+    """Return the end of the frame; with level scores the black is respotted, and the other player decides who plays."""
     if state.players == 2 and state.scores[0] == state.scores[1]:
         after = replace(
             state, table=("black",), on="black", turn=state.other, in_hand="in the D", run=0, decisions=("play", "pass")
