@@ -1,6 +1,6 @@
-"""Hulls: convex pieces of bodies where they are now; how far places and one another are from them.
+"""Hit tests: the body at a point, and overlaps of bodies with static geometry and each other.
 
-Picking: which body lies under the hand, and which overlap something.
+A body is a set of rounded convex hulls: the convex hull of some corners, widened by a radius.
 """
 
 import math
@@ -19,33 +19,33 @@ from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 
 Distance = Callable[[FloatArray, FloatArray], FloatArray]
-"""Takes x and y, that broadcast, and returns the signed distance there, negative inside."""
+"""Signed distance at points x, y, which broadcast; negative inside."""
 
 
 class Hull(NamedTuple):
-    """The hull of some corners, widened by a radius; in metres or in pixels, whichever way round."""
+    """Convex hull of corners, widened by a radius; in m or px, clockwise or counter-clockwise."""
 
     corners: FloatArray
-    """(n, 2); one is a disc, two are a capsule"""
+    """(n, 2); one corner makes a disc, two make a capsule"""
     radius: float
 
 
-def hulls_of(bodies: Bodies, frame: Frame, number: int) -> list[Hull]:
-    """Return the pieces of a body where they are, m."""
+def hulls_of(bodies: Bodies, frame: Frame, index: int) -> list[Hull]:
+    """Return the hulls of a body at its pose in a frame, m."""
     shapes = bodies.shapes
-    first, last = np.searchsorted(shapes.body, (number, number + 1)).tolist()
-    angle = float(frame.angle[number])
+    first, last = np.searchsorted(shapes.body, (index, index + 1)).tolist()
+    angle = float(frame.angle[index])
     cos, sin = math.cos(angle), math.sin(angle)
-    turn, place = np.asarray(((cos, sin), (-sin, cos))), frame.position[number]
+    rotation, position = np.asarray(((cos, sin), (-sin, cos))), frame.position[index]
     found = []
     for piece in range(first, last):
         corners = shapes.corner[int(shapes.first[piece]) : int(shapes.first[piece + 1])]
-        found.append(Hull(place + corners @ turn, float(shapes.radius[piece])))
+        found.append(Hull(position + corners @ rotation, float(shapes.radius[piece])))
     return found
 
 
 def hull_distance(hull: Hull) -> Distance:
-    """Return the distance from one hull, exact inside and outside."""
+    """Return the signed distance function of a hull, exact inside and outside."""
     corners, radius = hull
     if len(corners) == 1:
         x, y = corners[0].tolist()
@@ -54,61 +54,61 @@ def hull_distance(hull: Hull) -> Distance:
     if len(corners) == 2:
         away = segment_distance(sides[0])
         return lambda px, py: away(px, py) - radius
-    turned = 1.0 if _area(corners) >= 0.0 else -1.0
+    orientation = 1.0 if _area(corners) >= 0.0 else -1.0
     lines = []
     for (ax, ay), (bx, by) in sides:
-        length = max(math.hypot(bx - ax, by - ay), 1e-300) * turned
+        length = max(math.hypot(bx - ax, by - ay), 1e-300) * orientation
         x, y = (by - ay) / length, (ax - bx) / length
         lines.append((x, y, -(ax * x + ay * y)))
-    rims = [segment_distance(side) for side in sides]
+    edges = [segment_distance(side) for side in sides]
 
     def distance(px: FloatArray, py: FloatArray) -> FloatArray:
-        most = np.asarray(np.maximum.reduce([px * x + (py * y + offset) for x, y, offset in lines]))
-        beyond = most > 0.0
-        if beyond.any():  # near corners its sides' lines are nearer than the hull itself
-            x, y = (np.broadcast_to(each, most.shape)[beyond] for each in (px, py))
-            most[beyond] = np.minimum.reduce([rim(x, y) for rim in rims])
-        return np.asarray(most - radius)
+        signed = np.asarray(np.maximum.reduce([px * x + (py * y + offset) for x, y, offset in lines]))
+        outside = signed > 0.0
+        if outside.any():  # near a corner the lines through the edges are nearer than the hull
+            x, y = (np.broadcast_to(each, signed.shape)[outside] for each in (px, py))
+            signed[outside] = np.minimum.reduce([edge(x, y) for edge in edges])
+        return np.asarray(signed - radius)
 
     return distance
 
 
 def segment_distance(ends: Sequence[Sequence[float]]) -> Distance:
-    """Return the distance from a segment, never negative."""
+    """Return the distance function of a segment, never negative."""
     (ax, ay), (bx, by) = ends
     dx, dy = bx - ax, by - ay
     squared = max(dx * dx + dy * dy, 1e-300)
 
     def distance(px: FloatArray, py: FloatArray) -> FloatArray:
         x, y = px - ax, py - ay
-        share = np.clip(x * (dx / squared) + y * (dy / squared), 0.0, 1.0)
-        return np.asarray(np.sqrt((x - share * dx) ** 2 + (y - share * dy) ** 2))
+        t = np.clip(x * (dx / squared) + y * (dy / squared), 0.0, 1.0)
+        return np.asarray(np.sqrt((x - t * dx) ** 2 + (y - t * dy) ** 2))
 
     return distance
 
 
 def rounded_hull(hull: Hull, steps: int = 6) -> FloatArray:
-    """Return the corners of a polygon that is about a hull, (K, 2): around each corner so many and one more."""
+    """Return a polygon that approximates a rounded hull, (K, 2), with `steps` + 1 points around each corner."""
     corners, radius = hull
     if radius == 0.0:
         return corners
     if len(corners) == 1:
         spots = np.linspace(0.0, 2.0 * math.pi, 4 * steps, endpoint=False)
         return np.asarray(corners + radius * np.column_stack((np.cos(spots), np.sin(spots))))
-    way = np.roll(corners, -1, axis=0) - corners
+    edge = np.roll(corners, -1, axis=0) - corners
     sign = 1.0 if _area(corners) >= 0.0 else -1.0
-    out = np.arctan2(-way[:, 0] * sign, way[:, 1] * sign)  # of each side's outward normal
+    out = np.arctan2(-edge[:, 0] * sign, edge[:, 1] * sign)  # of each side's outward normal
     before = np.roll(out, 1)
     turn = np.mod((out - before) * sign, 2.0 * math.pi) * sign
     spots = before[:, None] + turn[:, None] * np.linspace(0.0, 1.0, steps + 1)
     return np.asarray((corners[:, None] + radius * np.stack((np.cos(spots), np.sin(spots)), axis=-1)).reshape(-1, 2))
 
 
-def area_of(hull: Hull) -> float:
+def hull_area(hull: Hull) -> float:
     """Return the area of a hull."""
     corners, radius = hull
-    around = float(np.hypot(*(np.roll(corners, -1, axis=0) - corners).T).sum())  # of a segment, there and back
-    return abs(_area(corners)) / 2.0 + around * radius + math.pi * radius**2
+    perimeter = float(np.hypot(*(np.roll(corners, -1, axis=0) - corners).T).sum())  # of a segment twice its length
+    return abs(_area(corners)) / 2.0 + perimeter * radius + math.pi * radius**2
 
 
 def _area(corners: FloatArray) -> float:
@@ -116,28 +116,28 @@ def _area(corners: FloatArray) -> float:
     return float(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
 
 
-def closest_points(hulls: list[Hull], x: float, y: float) -> float:
-    """Return the signed distance of a place from the nearest of some hulls."""
-    place = np.asarray(x), np.asarray(y)
-    return min((float(hull_distance(hull)(*place)) for hull in hulls), default=math.inf)
+def signed_distance(hulls: list[Hull], x: float, y: float) -> float:
+    """Return the signed distance of a point from the nearest of some hulls; inf without hulls."""
+    point = np.asarray(x), np.asarray(y)
+    return min((float(hull_distance(hull)(*point)) for hull in hulls), default=math.inf)
 
 
 def hulls_overlap(a: Hull, b: Hull, tolerance: float = 0.0) -> tuple[float, FloatArray]:
-    """Return how far two hulls are apart, negative where they overlap, and where they are nearest, (2,).
+    """Return the gap of two hulls, negative if they overlap, and the point of contact or closest approach, (2,).
 
     Args:
-        a: one.
-        b: the other.
-        tolerance: places that are farther by no more count as nearest as well; theirs is the mean of all.
+        a: a hull.
+        b: another.
+        tolerance: points whose gap exceeds the least by at most this count as closest too; their mean is returned.
     """
     gaps, places = [], []
     for one, other in ((a, b), (b, a)):
-        foot = _foot(one.corners, other.corners)
+        foot = _closest(one.corners, other.corners)
         away = one.corners - foot
         length = np.hypot(away[:, 0], away[:, 1])[:, None]
-        # Between the two surfaces, in the middle of what is left, or of what overlaps.
-        share = 0.5 * (length + other.radius - one.radius)
-        places.append(foot + away / np.maximum(length, 1e-300) * share)
+        # The middle of the gap, or of the overlap, of the two surfaces.
+        offset = 0.5 * (length + other.radius - one.radius)
+        places.append(foot + away / np.maximum(length, 1e-300) * offset)
         gaps.append(length[:, 0])
     gap, place = np.concatenate(gaps), np.concatenate(places)
     kept = gap <= float(gap.min()) + tolerance
@@ -146,31 +146,31 @@ def hulls_overlap(a: Hull, b: Hull, tolerance: float = 0.0) -> tuple[float, Floa
     return least - a.radius - b.radius, np.asarray(place[kept].mean(axis=0))
 
 
-def _sides(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return where sides begin and how they go, (n, 2) each; of one corner, a side of no length."""
+def _edges(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return starts and vectors of the edges, (n, 2) each; of one corner, an edge of length 0."""
     if len(corners) < 3:
         return corners[:1], corners[-1:] - corners[:1]
     return corners, np.roll(corners, -1, axis=0) - corners
 
 
-def _foot(places: FloatArray, corners: FloatArray) -> FloatArray:
-    """Return the point on the sides of a hull that is nearest to each of some places, (K, 2)."""
-    start, along = _sides(corners)
-    way = places[:, None] - start[None]
-    share = np.clip((way * along).sum(-1) / np.maximum((along**2).sum(-1), 1e-300), 0.0, 1.0)
-    foot = start + share[..., None] * along
-    best = np.argmin(((places[:, None] - foot) ** 2).sum(-1), axis=1)
-    return np.asarray(foot[np.arange(len(places)), best])
+def _closest(points: FloatArray, corners: FloatArray) -> FloatArray:
+    """Return the point on the edges of a hull that is closest to each of some points, (K, 2)."""
+    start, along = _edges(corners)
+    offset = points[:, None] - start[None]
+    t = np.clip((offset * along).sum(-1) / np.maximum((along**2).sum(-1), 1e-300), 0.0, 1.0)
+    foot = start + t[..., None] * along
+    best = np.argmin(((points[:, None] - foot) ** 2).sum(-1), axis=1)
+    return np.asarray(foot[np.arange(len(points)), best])
 
 
 def _separation(a: FloatArray, b: FloatArray) -> float:
-    """Return how far two hulls without radius are apart along the side that parts them best; negative: they overlap.
+    """Return the largest separation of two hulls of radius 0 along an edge normal; negative if they overlap.
 
-    The separating axis theorem. Of places alone, which have no sides, it knows nothing: −inf.
+    Separating axis theorem. Two single corners have no edges: −inf.
     """
     best = -math.inf
     for one, other in ((a, b), (b, a)):
-        start, along = _sides(one)
+        start, along = _edges(one)
         length = np.hypot(along[:, 0], along[:, 1])
         normal = (np.column_stack((along[:, 1], -along[:, 0])) / np.maximum(length, 1e-300)[:, None])[length > 0.0]
         if not len(normal):
@@ -183,32 +183,34 @@ def _separation(a: FloatArray, b: FloatArray) -> float:
     return best
 
 
-def pick_body(bodies: Bodies, frame: Frame, place: tuple[float, float], reach: float = 0.0) -> int | None:
-    """Return the body at a place, m; of several the one whose centre is nearest for its size, else one within reach.
+def pick_body(bodies: Bodies, frame: Frame, point: tuple[float, float], reach: float = 0.0) -> int | None:
+    """Return the index of the body at a point, or of the nearest one within reach, or None.
+
+    Of several bodies at the point, the one with the least distance of its centre relative to its radius.
 
     Args:
         bodies: N of them.
-        frame: where they are.
-        place: m.
-        reach: how far beside a body one may point, m.
+        frame: their state.
+        point: m.
+        reach: distance from the outline up to which a body is picked, m.
     """
     count = min(len(bodies), len(frame.position))
     with np.errstate(all="ignore"):
-        distance = np.hypot(*(frame.position[:count] - np.asarray(place)).T)
+        distance = np.hypot(*(frame.position[:count] - np.asarray(point)).T)
         radius = bodies.radius[:count]
         able = frame.present[:count] & (distance <= radius + reach)
-        beside = distance - radius
+        gap = distance - radius
         for number in np.flatnonzero(able & ~bodies.round[:count]).tolist():
-            beside[number] = closest_points(hulls_of(bodies, frame, number), *place)
-        able &= beside <= reach
+            gap[number] = signed_distance(hulls_of(bodies, frame, number), *point)
+        able &= gap <= reach
         if not able.any():
             return None
-        score = np.where(able, np.where(beside <= 0.0, distance / radius, 1.0 + beside), np.inf)
+        score = np.where(able, np.where(gap <= 0.0, distance / radius, 1.0 + gap), np.inf)
     return int(np.argmin(score))
 
 
 def overlapping_bodies(scene: Scene, bodies: Bodies, frame: Frame) -> BoolArray:
-    """Tell which bodies overlap a plane, wall, post or one another, (N,); what just touches does not."""
+    """Return which bodies overlap a plane, wall, post or another body, (N,); bodies that only touch do not."""
     position, there = frame.position, frame.present
     count = min(len(position), len(bodies))
     radius, lone = bodies.radius[: len(position)], bodies.round[:count]
@@ -227,14 +229,14 @@ def overlapping_bodies(scene: Scene, bodies: Bodies, frame: Frame) -> BoolArray:
             on = lies & mask_of(wall.layers, layers) != 0
             points = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points)
             for a, b in pairwise(points):
-                near = on & (_to_segment(position, a, b) < radius + wall.thickness / 2.0)
+                near = on & (segment_distance((a, b))(*position.T) < radius + wall.thickness / 2.0)
                 found |= near & lone
-                _meet_fixed(found, near, solids, Hull(np.asarray((a, b)), wall.thickness / 2.0))
+                _mark_overlaps(found, near, solids, Hull(np.asarray((a, b)), wall.thickness / 2.0))
         for post in (post for post in scene.posts if post.solid):
             near = np.hypot(*(position - np.asarray(post.position)).T) < radius + post.radius
             near &= lies & mask_of(post.layers, layers) != 0
             found |= near & lone
-            _meet_fixed(found, near, solids, Hull(np.asarray((post.position,)), post.radius))
+            _mark_overlaps(found, near, solids, Hull(np.asarray((post.position,)), post.radius))
     able = np.flatnonzero(sound)
     reach = 2.0 * float(radius[able].max()) if len(able) else 0.0
     for i, j in near_pairs(position[able], reach):
@@ -248,7 +250,7 @@ def overlapping_bodies(scene: Scene, bodies: Bodies, frame: Frame) -> BoolArray:
 
 
 def is_free(scene: Scene, bodies: Bodies, frame: Frame, hulls: list[Hull], layer: str) -> bool:
-    """Tell whether nothing solid of a layer overlaps some hulls, m; what just touches does not."""
+    """Return whether nothing solid of a layer overlaps some hulls, m; touching is no overlap."""
     bit, layers = 1 << scene.layers.index(layer), scene.layers
     for plane in scene.planes:
         normal = np.asarray(plane.normal) / np.hypot(*plane.normal)
@@ -279,14 +281,8 @@ def is_free(scene: Scene, bodies: Bodies, frame: Frame, hulls: list[Hull], layer
     return all(hulls_overlap(hull, other)[0] >= 0.0 for hull in hulls for other in (*fixed, *others))
 
 
-def _meet_fixed(found: BoolArray, near: BoolArray, solids: dict[int, list[Hull]], fixed: Hull) -> None:
-    """Note which bodies near a fixed thing overlap it."""
+def _mark_overlaps(found: BoolArray, near: BoolArray, solids: dict[int, list[Hull]], fixed: Hull) -> None:
+    """Set the entries of the bodies near a static shape that overlap it."""
     for number, hulls in solids.items():
         if near[number] and not found[number]:
             found[number] = any(hulls_overlap(hull, fixed)[0] < 0.0 for hull in hulls)
-
-
-def _to_segment(position: FloatArray, a: FloatArray, b: FloatArray) -> FloatArray:
-    along = b - a
-    share = np.clip((position - a) @ along / (along @ along), 0.0, 1.0)
-    return np.asarray(np.hypot(*(position - a - share[:, None] * along).T))

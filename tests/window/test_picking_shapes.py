@@ -14,7 +14,7 @@ from sandbox.trajectory import Contacts, Frame
 from sandbox.window.camera import Camera
 from sandbox.window.hit_test import (
     Hull,
-    area_of,
+    hull_area,
     hull_distance,
     hulls_overlap,
     overlapping_bodies,
@@ -117,9 +117,9 @@ def test_distance_is_that_from_a_finely_drawn_outline(count: int, radius: float)
 
 def test_area_of_hulls() -> None:
     corners = np.asarray([(0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (0.0, 1.0)])
-    assert area_of(Hull(corners, 0.5)) == pytest.approx(2.0 + 6.0 * 0.5 + math.pi * 0.25, rel=1e-12)  # rounding
-    assert area_of(Hull(corners[:2], 0.5)) == pytest.approx(2.0 + math.pi * 0.25, rel=1e-12)  # rounding
-    assert area_of(Hull(corners[:1], 2.0)) == pytest.approx(4.0 * math.pi, rel=1e-12)  # rounding
+    assert hull_area(Hull(corners, 0.5)) == pytest.approx(2.0 + 6.0 * 0.5 + math.pi * 0.25, rel=1e-12)  # rounding
+    assert hull_area(Hull(corners[:2], 0.5)) == pytest.approx(2.0 + math.pi * 0.25, rel=1e-12)  # rounding
+    assert hull_area(Hull(corners[:1], 2.0)) == pytest.approx(4.0 * math.pi, rel=1e-12)  # rounding
 
 
 def test_boxes_meet_in_the_middle_of_what_touches() -> None:

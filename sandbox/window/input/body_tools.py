@@ -11,7 +11,7 @@ from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.description.bodies import Box
 from sandbox.scene.description.discs import Ball, Disc
 from sandbox.scene.geometry.shapes import form_of
-from sandbox.window.hit_test import Hull, area_of, is_free, pick_body
+from sandbox.window.hit_test import Hull, hull_area, is_free, pick_body
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.recorded import RecordedView
 
@@ -251,7 +251,7 @@ def _like(bodies: Bodies, number: int, place: Place, box: bool) -> Ball | Box:
         return Ball(position=place, radius=element.radius, mass=element.mass, density=element.density, **surface)
     if box and isinstance(element, Box):
         return Box(position=place, size=element.size, mass=element.mass, density=element.density, **surface)
-    area = sum(area_of(Hull(np.asarray(piece.corners), piece.radius)) for piece in form_of(element).pieces)
+    area = sum(hull_area(Hull(np.asarray(piece.corners), piece.radius)) for piece in form_of(element).pieces)
     radius = math.sqrt(area / math.pi)
     density = float(bodies.mass[number]) / area
     return _made(place, radius, box, density=density, **surface)
