@@ -5,8 +5,8 @@ import math
 import pytest
 from seated import FREE, NINE, game_of
 
+from sandbox.games.billiards.game import MAX_CUE_SPEED, MAX_TIP_OFFSET
 from sandbox.games.billiards.view.controls import DIAL, FINE, ROOM, CueControls, HumanPlayer
-from sandbox.games.billiards.view.prediction import EDGE, FASTEST
 from sandbox.games.billiards.view.table_game import BilliardsGame
 
 CUE = (0.5, 0.5)
@@ -53,7 +53,7 @@ def test_english_stays_within_the_circle_beyond_which_tips_slip() -> None:
     hand.motion(CUE, AWAY, (0.2 * DIAL, -0.1 * DIAL), False, 0.0)
     assert (game.cue.side, game.cue.height) == pytest.approx((0.2, 0.1), abs=1e-12)  # rounding
     hand.motion(CUE, AWAY, (5.0 * DIAL, 5.0 * DIAL), False, 0.0)
-    assert math.hypot(game.cue.side, game.cue.height) == pytest.approx(EDGE, abs=1e-12)  # rounding
+    assert math.hypot(game.cue.side, game.cue.height) == pytest.approx(MAX_TIP_OFFSET, abs=1e-12)  # rounding
     hand.end()
     game.shoot()  # which no engine refuses
 
@@ -105,7 +105,7 @@ def test_drawing_the_cue_back_and_letting_go_strokes_by_how_far() -> None:
     move(hand, AWAY, back)
     assert hand.release(back, moved=True)
     assert game.strokes == 1
-    assert game.cue.speed == pytest.approx(0.5 * FASTEST, abs=1e-9)  # rounding
+    assert game.cue.speed == pytest.approx(0.5 * MAX_CUE_SPEED, abs=1e-9)  # rounding
 
 
 def test_click_on_the_cloth_strokes_nothing() -> None:

@@ -1,4 +1,4 @@
-"""Opponent: a bot at the window's table. It thinks beside the picture, takes aim to be seen, and strokes."""
+"""Bot as a player in the window: it searches on a worker thread, then moves the cue visibly and strokes."""
 
 import math
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -13,22 +13,22 @@ from sandbox.games.billiards.view.prediction import CueState
 from sandbox.scene.description.surface import Stroke
 
 TURNING, DRAWING = 0.9, 0.45
-"""s that it takes to aim, and to draw the cue back"""
+"""s, duration of the aiming and of the draw-back animation"""
 STROKE_ANIMATION = 0.02
-"""m that the cue is drawn back, for each m/s"""
+"""m of draw-back per m/s of cue speed"""
 
 
 class BotThought(NamedTuple):
-    """What it has come to."""
+    """Result of a search."""
 
     decision: Decision | None
-    """before the stroke"""
+    """decision before the stroke"""
     plan: FramePlan | None
-    """none where what it decided leaves the table to the other"""
+    """None if the decision gives the turn to the other player"""
 
 
 class BotPlayer:
-    """A bot, and where it is with its shot."""
+    """A bot with the progress of its shot."""
 
     def __init__(self, skill: float = 0.7, seed: int = 0) -> None:
         self._bot = BilliardsBot(skill, seed)
@@ -40,11 +40,11 @@ class BotPlayer:
 
     @property
     def is_aiming(self) -> bool:
-        """Whether it has found a shot, and moves the cue to it."""
+        """Whether the search is complete and the cue moves to the shot."""
         return self._since >= 0.0
 
     def thought(self, match: Match) -> BotThought | None:
-        """Return what it does with a table; it begins to think where it has not yet."""
+        """Return the result of the search for a match; None while it runs. The first call starts it."""
         if self._match is not match or self._future is None:
             if self._future is not None and not self._future.done():
                 return None  # of a table that is no more; it cannot be told to stop
@@ -63,7 +63,7 @@ class BotPlayer:
         return BotThought(decision, self._bot.plan(match))
 
     def moves(self, cue: CueState, stroke: Stroke, elapsed: float) -> bool:
-        """Let the cue come to a stroke while real time passes, s; tell whether it is to be played."""
+        """Move the cue towards a stroke by some real time, s; return whether the animation is complete."""
         if self._since < 0.0:
             self._since, self._from = 0.0, (cue.aim, cue.side, cue.height)
         self._since += elapsed
@@ -78,7 +78,7 @@ class BotPlayer:
         return self._since > TURNING + 1.15 * DRAWING
 
     def stays(self, match: Match) -> None:
-        """Keep to what it has come to, now that the table is as it wanted it."""
+        """Keep the result for a match in which its decision and placement are done."""
         if self._future is None:
             return
         self._match, thought = match, self._future.result()
@@ -86,9 +86,9 @@ class BotPlayer:
         self._future.set_result(BotThought(None, thought.plan and replace(thought.plan, place=None)))
 
     def forget(self) -> None:
-        """Begin anew with the next table."""
+        """Discard the result."""
         self._match, self._since = None, -1.0
 
     def close(self) -> None:
-        """Stop; a thought that is under way is let go of."""
+        """Stop the worker thread; a running search is abandoned."""
         self._pool.shutdown(wait=False, cancel_futures=True)

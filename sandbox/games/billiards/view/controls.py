@@ -1,12 +1,7 @@
-"""Gestures: what the mouse does at a table: it aims, strokes, sets english and power, and carries the cue ball.
+"""Input at a billiard table: mouse and keys that aim, stroke, set english and power, call, decide and place.
 
-Person: what one who plays at the table decides, calls, and does with a cue ball in hand.
-
-Seen: what a game adds to the sight of a moment.
-
-Cue keys: what a table claims of the keyboard.
-
-Seats: who sits at the table that is on, if one is.
+`HumanPlayer` checks and applies the decisions of a player, `CueControls` interprets the mouse, `cue_key_handlers` the
+keys. `BilliardsOverlay` adds cue and prediction to a snapshot. `TableGameHost` owns the game of the open scene.
 """
 
 import math
@@ -19,10 +14,11 @@ from typing import Literal, get_args
 import pygame
 
 from sandbox.action import ActionError
+from sandbox.games.billiards.game import MAX_CUE_SPEED, MIN_CUE_SPEED
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.base import Decision, GameError, ShotCall
 from sandbox.games.billiards.table_geometry import TableGeometry
-from sandbox.games.billiards.view.prediction import FASTEST, SLOWEST, CueAim, ShotPredictor
+from sandbox.games.billiards.view.prediction import CueAim, ShotPredictor
 from sandbox.games.billiards.view.table_game import BilliardsGame, Players, plays
 from sandbox.games.names import TableGame
 from sandbox.scene.description.base import Point
@@ -32,30 +28,30 @@ from sandbox.window.playback.snapshot import Snapshot
 
 
 class HumanPlayer:
-    """Who sits at the window."""
+    """Person who plays at the window."""
 
     def __init__(self, game: BilliardsGame) -> None:
         self.game = game
         self._carried: tuple[int, Point] | None = None  # after how many strokes, and where
         self.refused = False
-        """the cue ball may not be put where the hand is"""
+        """whether the cue ball may not be placed under the pointer"""
         self._chosen: tuple[Match, int] | None = None
 
     @property
     def carried(self) -> Point | None:
-        """Where the hand holds the cue ball, m."""
+        """Position of a cue ball that is being placed, m; None if none is."""
         if self._carried is None or self._carried[0] != self.game.strokes or not self.game.mine:
             return None
         return self._carried[1]
 
     @property
     def place(self) -> Point:
-        """Where the ball is that is struck next, m."""
+        """Position of the ball that is struck next, m."""
         return self.carried or self.game.position[self.game.ball]
 
     @property
     def choice(self) -> Decision | None:
-        """The decision that Enter would take; none where nothing is to be decided."""
+        """The decision that Enter takes; None if none is offered."""
         match = self.game.match
         decisions = match.choices.decisions
         if not decisions:
@@ -64,7 +60,7 @@ class HumanPlayer:
         return decisions[chosen % len(decisions)]
 
     def choose_next(self) -> None:
-        """Look at the next of the decisions.
+        """Select the next of the offered decisions.
 
         Raises:
             ActionError: there are none.
@@ -76,7 +72,7 @@ class HumanPlayer:
         self._chosen = match, match.choices.decisions.index(now) + 1
 
     def take_choice(self) -> None:
-        """Take the decision that was looked at last.
+        """Take the selected decision.
 
         Raises:
             ActionError: there is none.
@@ -87,10 +83,10 @@ class HumanPlayer:
         self.decide(self.choice)
 
     def decide(self, decision: Decision) -> None:
-        """Decide what is to be decided before a stroke.
+        """Take a decision.
 
         Raises:
-            ActionError: it cannot be decided now.
+            ActionError: it is not offered now.
         """
         self.game.check()
         try:
@@ -113,7 +109,7 @@ class HumanPlayer:
         self.game.say(call)
 
     def call_safety(self) -> None:
-        """Call a safety, or take that back.
+        """Call a safety, or withdraw the call.
 
         Raises:
             ActionError: it cannot be called now.
@@ -121,7 +117,7 @@ class HumanPlayer:
         self.say(replace(self.game.call, safety=not self.game.call.safety))
 
     def shoot(self, speed: float | None = None) -> None:
-        """Play the stroke; a ball in the hand is put down before.
+        """Play the stroke; a ball that is being placed is put down first.
 
         Raises:
             ActionError: it cannot be played now.
@@ -146,7 +142,7 @@ class HumanPlayer:
         self._carried, self.refused = (self.game.strokes, self.place), False
 
     def carry(self, at: Point) -> None:
-        """Move the hand that holds the cue ball, m; the ball goes where it may be put, as near as can be."""
+        """Move a cue ball that is being placed to the allowed place nearest to a point, m."""
         match = self.game.match
         if self.carried is None or match.state.in_hand is None:
             return
@@ -157,7 +153,7 @@ class HumanPlayer:
             self.refused = True
 
     def put_down(self) -> None:
-        """Put a ball that is carried down.
+        """Put down a ball that is being placed.
 
         Raises:
             ActionError: it cannot be put there.
@@ -173,14 +169,14 @@ class HumanPlayer:
 
 
 class BilliardsOverlay:
-    """Works out what is drawn of the next stroke."""
+    """Computes the values to draw of the next stroke."""
 
     def __init__(self, person: HumanPlayer) -> None:
         self._person = person
         self._forecaster = ShotPredictor(person.game.match.scene)
 
     def over(self, sight: Snapshot) -> Snapshot:
-        """Return a sight with the aim of a game, and with the ball that a hand carries where the hand is."""
+        """Return a snapshot with the aim, and with a ball that is being placed at the pointer."""
         aim = self.aim()
         if aim is None or not aim.carried:
             return replace(sight, game=aim)
@@ -189,7 +185,7 @@ class BilliardsOverlay:
         return replace(sight, game=aim, frame=replace(sight.frame, position=position))
 
     def aim(self) -> CueAim | None:
-        """Return what is drawn of the next stroke; nothing while balls roll or the bot looks for its shot."""
+        """Return the values to draw of the next stroke; None while balls roll or the bot searches."""
         person, game = self._person, self._person.game
         if not game.aiming or game.bot_is_thinking:
             return None
@@ -213,40 +209,40 @@ class BilliardsOverlay:
 CueMode = Literal["aim", "stroke", "draw", "english", "power"]
 
 FINE = 0.08
-"""of the turn that the mouse asks for, with Shift"""
+"""factor of mouse movements with Shift"""
 ROOM = 0.5
-"""m that the cue can be drawn back"""
+"""m, greatest draw-back of the cue"""
 DRAWN = 0.015
-"""m: a cue drawn back less strokes nothing"""
+"""m, least draw-back for a stroke"""
 RECENT = 0.07
 """s over which the speed of a stroke is measured"""
 DIAL = 90.0
-"""px at unit 1 that the mouse moves from the ball's middle to its edge, and for half of the power"""
+"""px at unit 1 of mouse movement from the centre of the ball to its edge, and for half of the power"""
 NEAR = 1.5
-"""radii: nearer to the cue ball the mouse points nowhere"""
+"""distance of the pointer from the cue ball, in radii, below which it does not aim"""
 
 
 class CueControls:
-    """What a hand is doing at the table."""
+    """Interprets mouse and keys at the table."""
 
     def __init__(self, person: HumanPlayer) -> None:
         self.person, self.game = person, person.game
         self.seen = BilliardsOverlay(person)
         self.mode: CueMode = "aim"
         self._offset: float | None = None
-        """rad, from where the mouse points to where the cue does; none before the mouse has moved"""
+        """rad from the direction of the pointer to that of the cue; None before the mouse has moved"""
         self._strokes = 0
         self._drawn = 0.0
         self._deepest = 0.0
         self._recent: deque[tuple[float, float]] = deque()
 
     def begin(self, mode: CueMode) -> None:
-        """Begin to stroke, or to set english or power: a key is held."""
+        """Start a mode of the mouse, stroke, english or power, while its key is held."""
         self._end()
         self.mode = mode
 
     def end(self) -> None:
-        """A key was let go of."""
+        """End the mode: its key was released."""
         self._end()
 
     def _end(self) -> None:
@@ -255,14 +251,14 @@ class CueControls:
         self.game.cue.back = 0.0
 
     def motion(self, before: Point, now: Point, pixels: tuple[float, float], fine: bool, time: float) -> None:
-        """Let the mouse move.
+        """Handle a movement of the mouse.
 
         Args:
-            before: where it pointed, m.
-            now: where it points, m.
-            pixels: how far it has moved, px at unit 1, to the right and downwards.
-            fine: whether it is to move things a little only.
-            time: of the motion, s.
+            before: previous position, m.
+            now: present position, m.
+            pixels: movement to the right and downwards, px at unit 1.
+            fine: whether the effect is reduced, `FINE`.
+            time: time of the event, s.
 
         Raises:
             ActionError: a stroke cannot be played.
@@ -298,18 +294,18 @@ class CueControls:
         cue.aim = angle + self._offset
 
     def nudge(self, by: float) -> None:
-        """Turn the cue a little, rad."""
+        """Turn the cue by an angle, rad."""
         if self.game.mine:
             self.game.cue.aim += by
             self._offset = (self._offset or 0.0) + by
 
     def strengthen(self, by: float) -> None:
-        """Change the power by a share of the greatest."""
+        """Change the power by a fraction of the greatest."""
         if self.game.mine:
             self.game.cue.power += by
 
     def _push(self, forth: float, time: float) -> None:
-        """Let the cue follow the hand along its way; what passes through the ball is a stroke."""
+        """Move the cue along its direction, m; reaching the ball after a draw-back is a stroke."""
         self._drawn = min(self._drawn - forth, ROOM)
         self._deepest = max(self._deepest, self._drawn)
         self._recent.append((time, forth))
@@ -321,14 +317,14 @@ class CueControls:
         elif self._drawn <= 0.0 and self._deepest >= DRAWN:
             speed = sum(each for _, each in self._recent) / RECENT
             self._end()
-            self.person.shoot(min(max(speed, SLOWEST), FASTEST))
+            self.person.shoot(min(max(speed, MIN_CUE_SPEED), MAX_CUE_SPEED))
         self._drawn = max(self._drawn, 0.0)
 
     def press(self, at: Point, reach: float) -> bool:
-        """Take the left button's press at a place; return whether the table has a use for it.
+        """Handle a press of the left button at a point, m; return whether it is used.
 
-        On the cue ball, in hand, it takes it; beside all balls it takes the cue, to be drawn back and let go; while
-        the ball is carried it puts it down.
+        On a cue ball in hand it starts to place the ball; away from all balls it starts to draw back the cue; while
+        a ball is being placed it puts the ball down.
 
         Raises:
             ActionError: the ball cannot be put there.
@@ -352,7 +348,7 @@ class CueControls:
         return True
 
     def release(self, at: Point, moved: bool) -> bool:
-        """Take the left button's release; return whether it ended something here.
+        """Handle a release of the left button at a point, m; return whether it is used.
 
         Raises:
             ActionError: a stroke cannot be played, or a ball put down.
@@ -378,7 +374,7 @@ class CueControls:
             self.person.say(replace(call, pocket=None if pocket == call.pocket else pocket))
 
     def name_ball(self, number: int) -> bool:
-        """Call the ball that was clicked, where the rules ask for one; return whether they did.
+        """Call a clicked ball if the rules offer it; return whether they do.
 
         Raises:
             ActionError: it cannot be called now.
@@ -394,9 +390,9 @@ class CueControls:
 KeyHandler = Callable[[LiveView], object]
 
 TURN, FINER = 0.002, 0.0001
-"""rad that an arrow key turns the cue, and with Shift"""
+"""rad by which an arrow key turns the cue, and with Shift"""
 POWER_STEP = 0.02
-"""of the greatest, that an arrow key adds"""
+"""fraction of the greatest power by which an arrow key changes it"""
 
 CUE_KEY_HELP = (
     ("Mouse", "aim; Shift: fine"),
@@ -414,11 +410,11 @@ CUE_KEY_HELP = (
     ("D", "next choice, if any"),
     ("Enter", "confirm the choice"),
 )
-"""as help lists them"""
+"""keys and their descriptions in the help overlay"""
 
 
 def cue_key_handlers(gestures: CueControls) -> tuple[dict[int, KeyHandler], dict[int, KeyHandler]]:
-    """Return what keys do, and what is done when they are let go."""
+    """Return the handlers of pressed and of released keys."""
     game, person = gestures.game, gestures.person
     pressed: dict[int, KeyHandler] = {
         pygame.K_SPACE: lambda _: person.shoot(),
@@ -457,39 +453,39 @@ def _step() -> float:
 
 
 def prepared_scene(scene: Scene) -> Scene:
-    """Return a scene as it is played: of one that names a game the shots are the players'."""
+    """Return a scene as it is played: a scene that names a game starts without its own shots."""
     return TableGeometry.of(scene).scene if scene.play.game in get_args(TableGame) else scene
 
 
 class TableGameHost:
-    """The game that is played, and what a hand does at it; none where what is on is no table."""
+    """Owner of the game and its controls; both are None if the open scene is no table."""
 
     def __init__(self) -> None:
         self.game: BilliardsGame | None = None
-        """who plays"""
+        """the game; None if the scene is no table"""
         self.gestures: CueControls | None = None
-        """what a hand does"""
+        """its controls"""
         self.players: Players | None = None
-        """who is asked to play, from the next game on; None leaves it to the game"""
+        """players of the next game; None for the default of the game"""
         self.misses = False
-        """whether snooker is played with the foul and a miss, from the next game on"""
+        """whether the foul-and-a-miss rule applies, from the next game of snooker"""
 
     @property
     def waits(self) -> bool:
-        """Whether time stands still until somebody strikes."""
+        """Whether time stops until a player acts."""
         return self.game is not None and self.game.waits
 
     def take(self, live: LiveView, file: Scene, tell: Callable[[str, str], None]) -> None:
-        """Begin a game, where a session is of a table.
+        """Start a game if the scene of a session is a table.
 
         Args:
             live: the session.
-            file: its scene, as the file has it.
-            tell: told of what cannot be played, with its level.
+            file: its scene as in the file.
+            tell: receives the reason and its level if the game cannot be played.
         """
         if not plays(live.scene):
             return
-        # A scene that starts by its own shot has been struck already.
+        # A scene that starts with its own shot needs no cue prepared for it.
         shot = file.shots[0] if file.shots and not live.scene.shots else None
         try:
             self.game = BilliardsGame(live, self.players, shot, self.misses)

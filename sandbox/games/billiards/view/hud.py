@@ -12,12 +12,13 @@ from typing import NamedTuple
 
 import pygame
 
+from sandbox.games.billiards.game import MAX_CUE_SPEED
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.base import Decision, renamed
 from sandbox.games.billiards.rules.pool import EightBallState
 from sandbox.games.billiards.view.balls import IVORY, BallTexture, texture_of
 from sandbox.games.billiards.view.controls import HumanPlayer
-from sandbox.games.billiards.view.prediction import FASTEST, CueState
+from sandbox.games.billiards.view.prediction import CueState
 from sandbox.games.billiards.view.table_game import BOT, BilliardsGame
 from sandbox.scene.description.surface import MISCUE
 from sandbox.window.playback.live import LiveView
@@ -298,7 +299,7 @@ def draw_power(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, unit: 
     for k in range(1, MARKS):
         level = rect.bottom - rect.height * k / MARKS
         pygame.draw.line(surface, PANEL, (rect.left, level), (rect.left + rect.width // 3, level))
-    shown = f"{cue.power * FASTEST:.1f}"
+    shown = f"{cue.power * MAX_CUE_SPEED:.1f}"
     draw_text(surface, shown, (rect.centerx, rect.top - 8 * unit), 11 * unit, INK, "midbottom", mono=True)
 
 

@@ -1,9 +1,4 @@
-"""Forecast: what the exact engine says a stroke would lead to, for the lines that are drawn while aiming.
-
-Cue: how the next stroke would be.
-
-Aim: what is drawn of the next stroke, as a plain value.
-"""
+"""Shot prediction on the exact engine for the lines that are drawn while aiming, and the state of the cue."""
 
 import math
 from dataclasses import dataclass
@@ -12,16 +7,13 @@ from typing import NamedTuple
 from sandbox.arrays import FloatArray
 from sandbox.engines.contract import Exhaustion, Refusal
 from sandbox.engines.exact.tabletop.shots import Table
+from sandbox.games.billiards.game import MAX_CUE_SPEED, MAX_TIP_OFFSET, MIN_CUE_SPEED
 from sandbox.scene.description.base import Point
-from sandbox.scene.description.surface import MISCUE, Shot, Stroke
+from sandbox.scene.description.surface import Shot, Stroke
 from sandbox.scene.scene import Scene
 
-SLOWEST, FASTEST = 0.05, 10.0
-"""m/s, of the cue: the least that is a stroke, and a hard break"""
-EDGE = 0.999 * MISCUE
-"""of the radius, how far from the middle the tip may be"""
 DEFAULT_SPEED = 2.5
-"""m/s, with which a game begins"""
+"""m/s, cue speed at the start of a game"""
 
 
 @dataclass
@@ -31,70 +23,70 @@ class CueState:
     aim: float = 0.0
     """rad, from +x"""
     speed: float = DEFAULT_SPEED
-    """m/s, of the stroke that Space plays"""
+    """m/s, speed of the stroke that Space plays"""
     side: float = 0.0
-    """of the radius, to the right"""
+    """offset of the tip to the right, in radii"""
     height: float = 0.0
-    """of the radius, above the middle"""
+    """offset of the tip above the centre, in radii"""
     back: float = 0.0
-    """m, how far it is drawn back just now"""
+    """m by which the cue is drawn back"""
 
     @classmethod
     def laid(cls, shot: Shot) -> "CueState":
-        """Return a cue laid ready for a shot of the scene."""
-        return cls(shot.aim, min(max(shot.speed, SLOWEST), FASTEST), shot.side, shot.height)
+        """Return the state of the cue for a shot of the scene."""
+        return cls(shot.aim, min(max(shot.speed, MIN_CUE_SPEED), MAX_CUE_SPEED), shot.side, shot.height)
 
     @property
     def stroke(self) -> Stroke:
-        """The stroke that it would play."""
+        """The stroke that the cue would play."""
         return Stroke(aim=self.aim, speed=self.speed, side=self.side, height=self.height)
 
     @property
     def power(self) -> float:
-        """The speed as a share of the greatest."""
-        return self.speed / FASTEST
+        """The speed as a fraction of the greatest."""
+        return self.speed / MAX_CUE_SPEED
 
     @power.setter
     def power(self, share: float) -> None:
-        self.speed = min(max(share * FASTEST, SLOWEST), FASTEST)
+        self.speed = min(max(share * MAX_CUE_SPEED, MIN_CUE_SPEED), MAX_CUE_SPEED)
 
     @property
     def way(self) -> tuple[float, float]:
-        """Where it points, of length 1."""
+        """Unit vector of the direction."""
         return math.cos(self.aim), math.sin(self.aim)
 
     def tip_at(self, side: float, height: float) -> None:
-        """Set where the tip meets the ball, no farther out than it would hold."""
+        """Set the offset of the tip in radii, limited to `MAX_TIP_OFFSET`."""
         off = math.hypot(side, height)
-        share = min(1.0, EDGE / off) if off > 0.0 else 1.0
+        share = min(1.0, MAX_TIP_OFFSET / off) if off > 0.0 else 1.0
         self.side, self.height = side * share, height * share
 
     def centre(self) -> None:
-        """Forget the english of the last stroke."""
+        """Reset english and draw-back."""
         self.side = self.height = self.back = 0.0
 
 
 SPACING = 0.05
-"""m between the points of a way"""
+"""m between the points of a path"""
 
 
 class ShotPrediction(NamedTuple):
-    """A stroke that was tried."""
+    """Predicted result of a stroke."""
 
     way: FloatArray
-    """(K, 2) m, of the cue ball"""
+    """(K, 2) m, path of the cue ball"""
     ghost: Point | None
-    """where its centre is as it first touches another ball, m"""
+    """centre of the cue ball at its first contact with another ball, m"""
     hit: int | None
-    """number of that ball"""
+    """index of that ball"""
     onward: FloatArray | None
-    """(K, 2) m, the way of that ball"""
+    """(K, 2) m, path of that ball"""
     falls: tuple[int, ...]
-    """numbers of these two that fall"""
+    """indices of those of the two balls that are pocketed"""
 
 
 class ShotPredictor:
-    """Tries strokes on the exact engine, whichever plays. One that cannot play a scene forecasts nothing."""
+    """Predicts strokes on the exact engine, on any playing engine; None if the exact engine refuses the scene."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -103,12 +95,12 @@ class ShotPredictor:
         self._known: tuple[object, ShotPrediction | None] | None = None
 
     def of(self, stroke: Stroke, ball: int, position: tuple[Point, ...]) -> ShotPrediction | None:
-        """Return what a stroke leads to.
+        """Return the prediction of a stroke.
 
         Args:
-            stroke: how.
-            ball: number of the one that is struck.
-            position: of every body, m; all are at rest.
+            stroke: the stroke.
+            ball: index of the ball that is struck.
+            position: positions of all bodies at rest, m.
         """
         key = (stroke, ball, position)
         if self._known is None or self._known[0] != key:
@@ -151,24 +143,24 @@ class ShotPredictor:
 
 @dataclass(frozen=True, eq=False)
 class CueAim:
-    """A cue behind a ball, and what its stroke would lead to."""
+    """Values to draw of the next stroke: the cue, its ball, and the prediction."""
 
     ball: int
-    """number of the one that is struck"""
+    """index of the ball that is struck"""
     place: Point
-    """of its centre, m"""
+    """centre of the ball, m"""
     angle: float
-    """rad, of the cue's way, from +x"""
+    """direction of the cue, rad from +x"""
     side: float
-    """of the radius, where the tip is to the right of the middle"""
+    """offset of the tip to the right, in radii"""
     back: float
-    """m, how far the cue is drawn back"""
+    """m by which the cue is drawn back"""
     forecast: ShotPrediction | None = None
     carried: bool = False
-    """the ball is in a hand: no cue is behind it"""
+    """whether the ball is being placed by hand; no cue is drawn then"""
     refused: bool = False
-    """it may not be put where the hand is"""
+    """whether the place under the pointer is not allowed"""
     called: tuple[Point, float] | None = None
-    """centre and radius of the pocket that was called, m"""
+    """centre and radius of the called pocket, m"""
     nominated: int | None = None
-    """number of the ball that was called"""
+    """index of the called ball"""

@@ -1,11 +1,7 @@
-"""Game: who plays what at the table in the window, stroke by stroke.
+"""Game of billiards in the window: players, turns, and undo.
 
-Hearing: the contacts of a stroke, as a session tells them bit by bit.
-
-Turns: what the rules have made of each stroke, by the number of strokes before it.
-
-A session is its scene and its actions; so is a game. Whoever goes back in the session finds the turn of then, and who
-strikes there goes another way.
+The match after each stroke is kept by the number of strokes in the session, so that stepping back in the session shows
+the match of that time, and a stroke played there discards the later ones.
 """
 
 import math
@@ -30,7 +26,7 @@ from sandbox.window.playback.live import LiveView
 
 
 class ShotContacts:
-    """All contacts since a stroke."""
+    """Contacts since the last stroke, collected from a session."""
 
     def __init__(self, live: LiveView) -> None:
         self._live = live
@@ -38,7 +34,7 @@ class ShotContacts:
         live.on_contacts = self._parts.append
 
     def since(self, began: float) -> Contacts:
-        """Return the contacts since a time, s, each once: those that last, or were seen twice, are told again."""
+        """Return the contacts since a time, s, each once; lasting and replayed contacts are reported repeatedly."""
         if not self._parts:
             return Contacts.none()
         whole = Contacts.joined(self._parts)
@@ -47,16 +43,16 @@ class ShotContacts:
         return Contacts(whole.time[kept], whole.pair[kept], whole.point[kept], whole.normal[kept], whole.impulse[kept])
 
     def clear(self) -> None:
-        """Forget all: a stroke begins."""
+        """Discard all contacts, at the start of a stroke."""
         self._parts.clear()
 
     def close(self) -> None:
-        """Listen no longer."""
+        """Stop collecting."""
         self._live.on_contacts = len
 
 
 class MatchHistory:
-    """Matches as they stood before each stroke, and what was called of it."""
+    """Match and call before each stroke."""
 
     def __init__(self, first: Match) -> None:
         self._matches, self._calls = [first], [ShotCall()]
@@ -65,48 +61,48 @@ class MatchHistory:
         return len(self._matches)
 
     def match(self, strokes: int) -> Match:
-        """Return the match as it stands after so many strokes, or as far as it is known."""
+        """Return the match after a number of strokes, or the last known one."""
         return self._matches[min(strokes, len(self._matches) - 1)]
 
     def call(self, strokes: int) -> ShotCall:
-        """Return what is called of the next stroke."""
+        """Return the call for the next stroke."""
         return self._calls[min(strokes, len(self._calls) - 1)]
 
     def go_another_way(self, strokes: int, match: Match) -> None:
-        """Go on with another match after so many strokes; what came later is forgotten."""
+        """Replace the match after a number of strokes; later matches are discarded."""
         call = self.call(strokes) if match.state is self.match(strokes).state else ShotCall()
         self._matches[strokes:], self._calls[strokes:] = [match], [call]
 
     def say(self, strokes: int, call: ShotCall) -> None:
-        """Call something of the next stroke."""
+        """Set the call for the next stroke."""
         self._matches[strokes + 1 :] = []
         self._calls[strokes:] = [call]
 
     def lie(self, strokes: int, position: tuple[Point, ...]) -> None:
-        """Take over where the balls are, m; hands may have moved them."""
+        """Accept the positions of the balls, m, which may have been moved by hand."""
         match = self._matches[strokes]
         if match.position != position:
             self._matches[strokes] = replace(match, position=position)
 
     def judge(self, strokes: int, contacts: Contacts, position: FloatArray, began: float) -> Match:
-        """Let the rules say what came of the last of so many strokes, and return the match after it.
+        """Judge the last stroke and return the match after it.
 
-        Strokes that nobody has judged, of a session that was opened again, count as this one.
+        Earlier strokes that were not judged, of a session that was reopened, get the same match.
 
         Args:
-            strokes: that have been played.
-            contacts: since the last.
-            position: (N, 2) m, where the balls have come to rest.
-            began: when that stroke was, s.
+            strokes: number of strokes played.
+            contacts: contacts since the last stroke.
+            position: (N, 2) m, positions at rest.
+            began: time of the last stroke, s.
 
         Raises:
-            GameError: it was none that could be played.
+            GameError: the rules do not allow the stroke.
         """
         before, call = self.match(strokes - 1), self.call(strokes - 1)
         return self.record(strokes, before.played(contacts, position, call, began))
 
     def record(self, strokes: int, match: Match) -> Match:
-        """Keep a match as that after so many strokes."""
+        """Store the match after a number of strokes."""
         missing = strokes + 1 - len(self._matches)
         self._matches += [match] * missing
         self._calls += [ShotCall()] * (strokes + 1 - len(self._calls))
@@ -117,18 +113,18 @@ Players = Literal["one player", "two players", "you vs bot"]
 PLAYERS: tuple[Players, ...] = get_args(Players)
 
 BOT = 1
-"""the bot's number"""
+"""index of the bot's player"""
 
 
 def plays(scene: Scene) -> bool:
-    """Tell whether a scene is a table to play at: it names a game, or has a floor and a ball to strike."""
+    """Return whether a scene can be played: it has a surface, and names a game or has a ball named `cue`."""
     if scene.surface is None or scene.play.game not in (None, *get_args(TableGame)):
         return False
     return scene.play.game is not None or any(ball.name == "cue" for ball in scene.balls)
 
 
 class BilliardsGame:
-    """A game that is played in a session. Time stands still at the table until somebody strikes."""
+    """A game that is played in a session. Time stops between strokes."""
 
     def __init__(
         self, live: LiveView, players: Players | None = None, shot: Shot | None = None, misses: bool = False
@@ -136,10 +132,10 @@ class BilliardsGame:
         """Begin.
 
         Args:
-            live: the session; its scene has no shots of its own where it names a game.
-            players: by default two, and one where there are no rules.
-            shot: with which the scene would have begun: the cue is laid ready for it.
-            misses: whether snooker is played with the foul and a miss.
+            live: session of a scene without shots.
+            players: default: two, in free play one.
+            shot: shot for which the cue is prepared; default: along the table.
+            misses: whether the foul-and-a-miss rule of snooker applies.
 
         Raises:
             GameError: the game that the scene names cannot be played on its table.
@@ -147,7 +143,7 @@ class BilliardsGame:
         game = live.scene.play.game or "free"
         self.players: Players = players or ("one player" if game == "free" else "two players")
         self.misses = misses and game == "snooker"
-        """whether a miss may be played again, in snooker"""
+        """whether the foul-and-a-miss rule applies, in snooker"""
         self.live = live
         terms = {"misses": True} if self.misses else {}
         first = Match.begin(live.scene, game, 1 if self.players == "one player" else 2, **terms)
@@ -157,11 +153,11 @@ class BilliardsGame:
         self.opponent = BotPlayer(seed=live.scene.world.seed) if self.players == "you vs bot" else None
         self._hearing = ShotContacts(live)
         self.notes: list[tuple[str, str]] = []
-        """(level, text) of what happened; whoever tells it empties the list"""
+        """messages, as level and text; the reader empties the list"""
 
     @property
     def strokes(self) -> int:
-        """How many have been played up to now."""
+        """Number of strokes played."""
         return len(self._strikes())
 
     def _strikes(self) -> list[Strike]:
@@ -169,28 +165,28 @@ class BilliardsGame:
 
     @property
     def match(self) -> Match:
-        """The game as it stands; while balls roll, as it stood before the stroke."""
+        """The present match; while balls roll, the match before the stroke."""
         strokes = self.strokes
         return self._turns.match(strokes if self.resting else max(strokes - 1, 0))
 
     @property
     def call(self) -> ShotCall:
-        """What is called of the next stroke."""
+        """The call for the next stroke."""
         return self._turns.call(self.strokes)
 
     @property
     def resting(self) -> bool:
-        """Whether all balls are at rest, in what is shown."""
+        """Whether all balls are at rest in the shown frame."""
         return self.live.busy is None and is_at_rest(self.live.frame)
 
     @property
     def _known(self) -> bool:
-        """Whether the rules have seen the last stroke."""
+        """Whether the last stroke is judged."""
         return self.strokes < len(self._turns)
 
     @property
     def waits(self) -> bool:
-        """Whether time stands still until somebody does something; not where what was done is seen again."""
+        """Whether time stops until a player acts; not during a replay."""
         session = self.live.session
         last = not session.ahead and session.step_number >= session.history.furthest
         return last and session.ended is None and self.resting and self._known
@@ -208,7 +204,7 @@ class BilliardsGame:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What the players are called."""
+        """Names of the players."""
         called = [player_name(number) for number in range(self.match.state.players)]
         if self.players == "you vs bot":
             called[BOT] = "bot"
@@ -216,7 +212,7 @@ class BilliardsGame:
 
     @property
     def bot_is_thinking(self) -> bool:
-        """Whether it is the bot's stroke, and the cue still lies as the last player left it."""
+        """Whether the bot searches for its shot."""
         return self.opponent is not None and not self.opponent.is_aiming and self._bots(self.match)
 
     def _bots(self, match: Match) -> bool:
@@ -224,20 +220,20 @@ class BilliardsGame:
 
     @property
     def ball(self) -> int:
-        """Number of the ball that is struck next."""
+        """Index of the ball that is struck next."""
         match = self.match
         return match.layout.number[match.cue]
 
     @property
     def position(self) -> tuple[Point, ...]:
-        """Where the balls are, m, by number."""
+        """Positions of the bodies, m."""
         return tuple((x, y) for x, y in self.live.frame.position.tolist())
 
     def go_on(self, elapsed: float) -> None:
-        """Look at what has become of the table, and let a bot play, in so much real time, s.
+        """Judge a completed stroke, and let a bot play for some real time, s.
 
         Raises:
-            ActionError: what the rules or the bot ask for cannot be done.
+            ActionError: an action of the rules or the bot cannot be applied.
         """
         if not self.resting or self.live.frame is not self.live.session.frame:
             return
@@ -249,7 +245,7 @@ class BilliardsGame:
             self._let_play(self.opponent, elapsed)
 
     def _judge(self) -> None:
-        """Let the rules say what came of the last stroke."""
+        """Judge the last stroke."""
         strikes = self._strikes()
         began = strikes[-1].time
         try:
@@ -261,13 +257,13 @@ class BilliardsGame:
         self._lay(after)
 
     def _lay(self, match: Match) -> None:
-        """Put the balls where the game has them; in what is seen again that was done."""
+        """Move the balls to the positions of a match; in a replay the session contains these moves."""
         if not self.live.session.ahead:
             for move in match.moves(self.live.frame.position):
                 self.live.act(move)
 
     def _let_play(self, opponent: BotPlayer, elapsed: float) -> None:
-        """Go on with the bot's turn."""
+        """Continue the bot's turn."""
         match = self.match
         thought = opponent.thought(match)
         if thought is None:
@@ -289,19 +285,19 @@ class BilliardsGame:
             self._strike()
 
     def go_another_way(self, match: Match) -> None:
-        """Go on with another match from here, and put the balls where it has them."""
+        """Continue with another match, and move the balls to its positions."""
         self._turns.go_another_way(self.strokes, match)
         self._lay(match)
 
     def say(self, call: ShotCall) -> None:
-        """Call a ball or a pocket of the next stroke."""
+        """Set the call for the next stroke."""
         self._turns.say(self.strokes, call)
 
     def check(self) -> None:
-        """Refuse what only the one whose stroke it is may do.
+        """Check that a person can play now.
 
         Raises:
-            ActionError: it is nobody's here.
+            ActionError: it is not a person's turn, or no stroke can be played.
         """
         if self.resting and self.match.over:
             raise ActionError("the frame is over; press R for a new one")
@@ -311,7 +307,7 @@ class BilliardsGame:
             raise ActionError("it is the bot's turn")
 
     def shoot(self, speed: float | None = None) -> None:
-        """Play the stroke, with its own power or another speed of the cue, m/s.
+        """Play the stroke, with the power of the cue or another cue speed, m/s.
 
         Raises:
             ActionError: it cannot be played now.
@@ -334,7 +330,7 @@ class BilliardsGame:
         self.live.act(match.strike(self.cue.stroke))
 
     def undo(self) -> None:
-        """Take back a person's last stroke, and what followed.
+        """Undo the last stroke of a person and everything after it.
 
         Raises:
             ActionError: none was played.
@@ -356,7 +352,7 @@ class BilliardsGame:
         self.notes.append(("info", "shot undone"))
 
     def close(self) -> None:
-        """Let go of the bot."""
+        """Stop the bot."""
         self._hearing.close()
         if self.opponent is not None:
             self.opponent.close()
