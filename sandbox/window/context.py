@@ -72,7 +72,7 @@ class WindowContext:
             self.following = None if show is None else _steered(show.scene)
         if self.at_home:
             self.home()
-        self.gui.on_scene_changed(self.stage, same)
+        self.gui.on_scene_changed(same)
         title = "" if show is None else f"{show.scene.title or self.name} - "
         pygame.display.set_caption(renderable(title + TITLE))
 

@@ -68,6 +68,7 @@ class Gui:
         self._parameters = SessionParameters()
         self._size = size
         self._scene_keys: _SceneKeys | None = None
+        self._announces_keys = False  # the keys of a new scene have still to be announced
         self._score: tuple[object, ScoreLayout] | None = None  # the arguments of the last layout, and the layout
         self._panel_inputs: tuple[object, ...] = ()  # everything that the panel shows, as it was last shown
         self._heard: object = None  # the contacts that were last turned into sound
@@ -76,13 +77,15 @@ class Gui:
         self._faults = pygame.Rect(0, 0, 0, 0)  # the box that lists the faults of the scene file
         self._plates: dict[str, pygame.Rect] = {}
 
-    def on_scene_changed(self, stage: AppState, same: bool) -> None:
-        """Reset the state that belongs to the previous scene, and announce the keys of a new one."""
+    def on_scene_changed(self, same: bool) -> None:
+        """Reset the state that belongs to the previous scene; the keys of a new one are announced at its first frame.
+
+        Not earlier, as the first frame may compile kernels for longer than a message is shown.
+        """
         self._graph.clear()
         self._panel_inputs = ()
         if not same:
-            self._scene_keys = None
-            self.announce_keys(stage)
+            self._scene_keys, self._announces_keys = None, True
 
     def announce_keys(self, stage: AppState) -> None:
         """Post messages that name the keys of the scene."""
@@ -274,6 +277,9 @@ class Gui:
             if not self.help.open:
                 self._draw_game(surface, stage, show, display, plates)
             self._draw_graph(surface, stage, plates)
+        if self._announces_keys:
+            self._announces_keys = False
+            self.announce_keys(stage)
         status = hud_status(stage, self.key_bindings(stage).told, frame_rate, recording)
         self._faults = hud.draw_hud(
             surface,

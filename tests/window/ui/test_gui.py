@@ -65,6 +65,7 @@ def test_key_bindings_are_computed_once_a_scene(tmp_path: Path, monkeypatch: pyt
 
 def test_keys_are_announced_once_a_scene_and_not_by_a_restart(tmp_path: Path) -> None:
     with window_on(ROOM, tmp_path) as window:
+        turned(window)
         assert window.stage.messages.shown() == (("info", "Space: relaunch spark"),)
         window.stage.messages = type(window.stage.messages)()
         turned(window)
