@@ -1,8 +1,8 @@
-"""Delivery: how a stone has to be let go to come to a place, by the closed form of a puck that curls.
+"""Delivery: speed and heading of a stone that reaches a target, by the closed form of a puck that curls.
 
-As complex numbers a stone that leaves at v goes v² / (μg) · (1 − s^(2−iκ)) / (2 − iκ), s the share of its speed that is
-left; `engines.tabletop.motion` says where that is from. So where it stops, what it takes to get there is known at once;
-and for a stone that only passes a place, the share of its speed there is sought.
+In complex numbers, a stone released at v travels v² / (μg) · (1 − s^(2−iκ)) / (2 − iκ), where s is the remaining
+fraction of its speed; `engines.tabletop.motion` derives it. The delivery to a resting place follows directly.
+For a stone that passes a point, s at that point is found by bisection.
 """
 
 import cmath
@@ -14,34 +14,34 @@ from sandbox.scene.description.base import Point
 from sandbox.scene.description.surface import Floor
 
 SPIN = 1.0
-"""rad/s with which stones are let go: some two turns and a half until they rest"""
-CLOSE = 1e-12
-"""Share of the speed to which that at a place is sought."""
+"""rad/s at release: about two and a half turns until the stone rests"""
+FRACTION_TOLERANCE = 1e-12
+"""tolerance of the fraction of the speed, a few rounding errors"""
 
 
 class Delivery(NamedTuple):
-    """How a stone is let go."""
+    """Release of a stone."""
 
     speed: float
     """m/s"""
     heading: float
-    """rad, from the way along the sheet, to its left"""
+    """rad, anticlockwise from the direction along the sheet"""
     turn: int
-    """1 turns anti-clockwise and curls to the left, −1 the other way"""
+    """1: turns anticlockwise and curls to the left; −1: clockwise and to the right"""
 
     @property
     def velocity(self) -> tuple[float, float]:
-        """m/s at first."""
+        """m/s, at release."""
         return self.speed * math.cos(self.heading), self.speed * math.sin(self.heading)
 
     @property
     def spin(self) -> float:
-        """rad/s at first."""
+        """rad/s, at release."""
         return self.turn * SPIN
 
 
 class Ice(NamedTuple):
-    """What a sheet does to stones."""
+    """Properties of the ice."""
 
     slowing: float
     """μ·g, m/s²"""
@@ -50,33 +50,33 @@ class Ice(NamedTuple):
 
     @classmethod
     def of(cls, floor: Floor) -> "Ice":
-        """Return that of a scene's floor."""
+        """Return the ice of a surface."""
         return cls(floor.sliding_friction * floor.gravity, floor.curl)
 
     def way(self, delivery: Delivery, share: float) -> complex:
-        """Return how far a stone has come when a share of its speed is left, m, along the sheet and to its left."""
+        """Return the displacement at a remaining fraction of the speed, m: along the sheet, and to its left."""
         power = 2.0 - 1j * self.curl * delivery.turn
         gone = 1.0 - (cmath.exp(power * math.log(share)) if share > 0.0 else 0.0)
         return delivery.speed**2 / self.slowing * gone / power * cmath.exp(1j * delivery.heading)
 
     def speed_for(self, distance: float) -> float:
-        """Return the speed with which a stone comes to rest so far away as the crow flies, m/s."""
+        """Return the speed, m/s, of a stone that rests at a distance, m, in a straight line from its release."""
         return math.sqrt(distance * self.slowing * abs(2.0 - 1j * self.curl))
 
     def to_rest(self, target: Point, turn: int) -> Delivery:
-        """Return the delivery after which a stone comes to rest at a place, m."""
+        """Return the delivery of a stone that rests at a position, m."""
         far = complex(target[0] - RELEASE, target[1])
         speed = self.speed_for(abs(far))
         return self._turned(Delivery(speed, 0.0, turn), far, 0.0)
 
     def through(self, target: Point, turn: int, speed: float) -> Delivery:
-        """Return the delivery with a speed, m/s, that passes a place, m; or comes to rest there, if it is too slow."""
+        """Return the delivery with a speed, m/s, that passes a position, m; if too slow, the one that rests there."""
         far = complex(target[0] - RELEASE, target[1])
         straight = Delivery(speed, 0.0, turn)
         if abs(self.way(straight, 0.0)) <= abs(far):
             return self.to_rest(target, turn)
-        low, high = 0.0, 1.0  # the distance grows as the share falls
-        while high - low > CLOSE:
+        low, high = 0.0, 1.0  # the distance grows as the fraction falls
+        while high - low > FRACTION_TOLERANCE:
             middle = 0.5 * (low + high)
             if abs(self.way(straight, middle)) > abs(far):
                 low = middle
@@ -85,7 +85,7 @@ class Ice(NamedTuple):
         return self._turned(straight, far, high)
 
     def _turned(self, delivery: Delivery, far: complex, share: float) -> Delivery:
-        """Return a delivery headed so that its way leads to a place."""
+        """Return a delivery rotated such that its path leads to a displacement, at a fraction of the speed."""
         way = self.way(delivery, share)
         # not `cmath.phase`, which raises where an angle is too small for a float
         heading = math.atan2(far.imag, far.real) - math.atan2(way.imag, way.real)

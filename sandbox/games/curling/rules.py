@@ -1,12 +1,12 @@
-"""Curling: the rules of a match, between the steps of a scene with sixteen stones on ice.
+"""Rules of curling: a match on a scene with sixteen stones on ice.
 
-The scene has a [surface] of pucks, stones `red-1` to `red-8` and `yellow-1` to `yellow-8`, and a body `broom` that
-meets nothing: it stands on the tee line where the skip holds it, and stones are let go towards it. A stone curls away
-from that line, so the broom is held beside the place that is meant.
+The scene has a [surface] of pucks, the stones `red-1` to `red-8` and `yellow-1` to `yellow-8`, and a body `broom`
+without collisions. The broom is on the tee line and is the aim of the delivery. A stone curls away from the line of aim, so
+the broom is placed beside the target.
 
-Not modelled: stones that are touched by people, time clocks, and the measuring of ends that are nearly even.
+Not modelled: touched stones, time clocks, and the measurement of nearly equal distances.
 
-Score: how a match stands, end by end. The hammer, the last stone of an end, goes to the team that did not score.
+CurlingScore: score by ends. The hammer, the last stone of an end, goes to the team that did not score.
 """
 
 import math
@@ -40,36 +40,36 @@ from sandbox.trajectory import Frame
 
 
 class CurlingScore(NamedTuple):
-    """How a match stands."""
+    """Score of a match."""
 
     ends: int
-    """that are to be played; more where it is even then"""
+    """number of ends of the match; a tie adds ends"""
     points: tuple[int, int] = (0, 0)
     played: int = 0
-    """ends"""
+    """number of ends played"""
     hammer: int = 1
-    """the team that throws last in the present end"""
+    """team that has the last stone of the present end"""
     thrown: int = 0
-    """stones of the present end"""
+    """stones delivered in the present end"""
 
     @property
     def team(self) -> int:
-        """Whose turn it is: the team without the hammer begins."""
+        """Team that delivers next: the team without the hammer begins."""
         return (1 - self.hammer + self.thrown) % 2
 
     @property
     def number(self) -> int:
-        """Which of its stones that team throws, from 0."""
+        """Index of the stone that the team delivers next."""
         return self.thrown // 2
 
     @property
     def full(self) -> bool:
-        """Whether all stones of the end have been thrown."""
+        """Whether all stones of the end have been delivered."""
         return self.thrown == 2 * STONES
 
     @property
     def game_over(self) -> str | None:
-        """Why the match is over; None while it goes on."""
+        """Reason why the match is over; None while it runs."""
         red, yellow = self.points
         if self.played < self.ends or red == yellow:
             return None
@@ -80,7 +80,7 @@ class CurlingScore(NamedTuple):
         return self._replace(thrown=self.thrown + 1)
 
     def after_end(self, team: int | None, points: int) -> "CurlingScore":
-        """Return the score after an end that a team has won, or nobody."""
+        """Return the score after an end; `team` is None for a blank end."""
         red, yellow = self.points
         total = (red + points * (team == 0), yellow + points * (team == 1))
         hammer = self.hammer if team is None else 1 - team
@@ -89,15 +89,15 @@ class CurlingScore(NamedTuple):
 
 BROOM = "broom"
 SIDEWAYS, HARDER = 0.5, 2.5
-"""m/s at which the broom moves, and at which the weight grows, while a key is held"""
+"""m/s, speed of the broom, and rate of change of the weight, while a key is held"""
 WEIGHTS = -8.0, 14.0
-"""m, the least and the most that a delivery is meant for, beyond the tee; the least stays short of the hog line"""
-WIDEST = 0.5 * WIDTH - 0.2
-"""m, how far the broom goes to either side"""
-SWEPT, STRAIGHTER = 0.88, 0.6
-"""Of the friction and of the curl, what sweeping leaves: figures of this game, for some 3 m more."""
-PAUSE, THINKS = 1.5, 1.0
-"""s between two stones, and that a team that plays by itself holds its broom before it delivers"""
+"""m, bounds of the distance past the tee for which a delivery is meant; the lower one is short of the hog line"""
+MAX_BROOM_OFFSET = 0.5 * WIDTH - 0.2
+"""m, from the centre line"""
+SWEEP_FRICTION, SWEEP_CURL = 0.88, 0.6
+"""Factors of friction and curl on swept ice. They are chosen for this game: a swept stone runs about 3 m farther."""
+PAUSE, BOT_PAUSE = 1.5, 1.0
+"""s between two stones, and before a bot delivers"""
 
 CONTROLS = (
     Control("left", "move the broom left", ("left",), "left -leftx"),
@@ -111,15 +111,15 @@ CONTROLS = (
 
 
 class Curling:
-    """The rules of one match."""
+    """Rules of a match."""
 
     controls = CONTROLS
 
     def __init__(self, scene: Scene, bodies: Bodies) -> None:
-        """Begin.
+        """Start a match.
 
         Raises:
-            UnfitError: the scene has no ice, or lacks stones or the broom.
+            UnsuitableSceneError: the scene has no ice, or lacks stones or the broom.
         """
         floor, match = scene.surface, table_of(scene.play, CurlingMatch) or CurlingMatch()
         self._names = [stone_name(team, k) for team in (0, 1) for k in range(STONES)]
@@ -135,72 +135,72 @@ class Curling:
         self._teams = [CurlingBot(team, self._ice, match.error, scene.world.seed) for team in (0, 1)]
         self._people = match.people
         self._score = CurlingScore(match.ends)
-        self._places: dict[int, Point] = {}  # of the stones that are in play, by their places in `_names`
-        self._before: dict[int, Point] = {}  # as they lay before the last delivery
-        self._hits: set[tuple[int, int]] = set()  # pairs of stones that met since the delivery
-        self._deemed: set[int] = set()  # short of the hog line, but in the free guard zone by the rules
+        self._places: dict[int, Point] = {}  # positions of stones in play, by index in `_names`
+        self._before: dict[int, Point] = {}  # positions before the last delivery
+        self._hits: set[tuple[int, int]] = set()  # pairs of stones that collided since the delivery
+        self._counted_as_guards: set[int] = set()  # stones short of the hog line that count as in the free guard zone
         self._running, self._ready = False, False
         self._broom, self._weight, self._turn = 0.0, 0.0, 1
         self._meant: Delivery | None = None
         self._held: set[str] = set()
         self._time, self._since = 0.0, -PAUSE
         self._frame: Frame | None = None
-        self._told = ""
+        self._message = ""
         self._cues: list[str] = []
 
     @property
     def score(self) -> int:
-        """Of the red team where one person plays, else of the best."""
+        """Points of the red team in a match of one person, otherwise the higher points."""
         red, yellow = self._score.points
         return red if self._people == 1 else max(red, yellow)
 
     @property
     def game_over(self) -> str | None:
-        """Why the match is over; None while it goes on."""
+        """Reason why the match is over; None while it runs."""
         return self._score.game_over
 
     @property
     def _current(self) -> int:
-        """The stone whose turn it is."""
+        """Index of the stone to deliver."""
         return self._score.team * STONES + self._score.number
 
     @property
-    def _by_itself(self) -> bool:
+    def _is_bot_turn(self) -> bool:
         return self._score.team >= self._people
 
     def on_input(self, control: str, value: float) -> Sequence[Action]:
-        """Press or let go a control; a team that plays by itself cannot be helped."""
+        """Return the actions of an input; it has no effect in a turn of a bot."""
         (self._held.add if value > 0.0 else self._held.discard)(control)
         if control == "sweep":
-            return self._sweep(value > 0.0) if self._running and not self._by_itself else ()
-        if value <= 0.0 or not self._ready or self._by_itself:
+            return self._sweep(value > 0.0) if self._running and not self._is_bot_turn else ()
+        if value <= 0.0 or not self._ready or self._is_bot_turn:
             return ()
         if control == "turn":
             self._turn = -self._turn
         if control == "throw":
             heading = math.atan2(self._broom, -RELEASE)
             speed = self._ice.speed_for(self._weight - RELEASE)
-            return self._let_go(Delivery(speed, heading, self._turn))
+            return self._deliver(Delivery(speed, heading, self._turn))
         return ()
 
     def on_step(self, info: StepInfo) -> Sequence[Action]:
-        """Follow the stones, take out what is out of play, count ends, and bring the next stone."""
+        """Track the stones, remove those out of play, score ends, and place the next stone."""
         elapsed, self._time, self._frame = info.time - self._time, info.time, info.frame
         if self._running:
             return self._follow(info, elapsed)
         if not self._ready:
             return self._next(info) if info.time - self._since >= PAUSE else ()
-        if not self._by_itself:
+        if not self._is_bot_turn:
             return self._aim(elapsed)
         if self._meant is None:
             return self._choose()
-        return self._let_go(self._meant) if info.time - self._since >= THINKS else ()
+        return self._deliver(self._meant) if info.time - self._since >= BOT_PAUSE else ()
 
     def _next(self, info: StepInfo) -> Sequence[Action]:
-        """Bring the next stone to where it is let go; at the beginning of an end, all others to where they wait."""
+        """Place the next stone at its release point; at the start of an end, park all others."""
         moves: list[Action] = []
         if self._score.thrown == 0:
-            self._places, self._deemed = {}, set()
+            self._places, self._counted_as_guards = {}, set()
             moves = [self._put(k, parked_position(*divmod(k, STONES))) for k in range(2 * STONES)]
         moves.append(self._put(self._current, (RELEASE, 0.0)))
         self._ready, self._meant, self._since, self._weight = True, None, info.time, 0.0
@@ -208,7 +208,7 @@ class Curling:
         return (*moves, self._hold(0.0))
 
     def _aim(self, elapsed: float) -> Sequence[Action]:
-        """Move broom and weight as long as their keys are held."""
+        """Move broom and weight while their keys are held."""
         held = self._held
         self._weight += HARDER * elapsed * (("harder" in held) - ("softer" in held))
         self._weight = min(max(self._weight, WEIGHTS[0]), WEIGHTS[1])
@@ -216,7 +216,7 @@ class Curling:
         return (self._hold(self._broom + SIDEWAYS * elapsed * aside),) if aside else ()
 
     def _choose(self) -> Sequence[Action]:
-        """Let a team that plays by itself choose, and show its broom."""
+        """Choose the delivery of a bot, and place its broom."""
         stones = [(k // STONES, place) for k, place in self._places.items()]
         last = self._score.hammer == self._score.team
         self._meant = self._teams[self._score.team].delivery(stones, self._score.thrown, last)
@@ -224,16 +224,16 @@ class Curling:
         self._weight = self._meant.speed**2 / self._ice.speed_for(1.0) ** 2 + RELEASE
         return (self._hold(-RELEASE * math.tan(self._meant.heading)),)
 
-    def _let_go(self, delivery: Delivery) -> Sequence[Action]:
+    def _deliver(self, delivery: Delivery) -> Sequence[Action]:
         assert self._frame is not None
         name, moment = self._names[self._current], self._moment[self._current]
         spin = delivery.spin - float(self._frame.angular_velocity[self._numbers[self._current]])
         self._before = dict(self._places)
         self._places[self._current] = (RELEASE, 0.0)
-        self._running, self._ready, self._told = True, False, ""
+        self._running, self._ready, self._message = True, False, ""
         self._hits.clear()
         self._cues.append("throw")
-        sweeps = self._sweep(True) if "sweep" in self._held and not self._by_itself else ()
+        sweeps = self._sweep(True) if "sweep" in self._held and not self._is_bot_turn else ()
         return (
             Move(time=0.0, body=name, position=(RELEASE, 0.0), velocity=delivery.velocity),
             Impulse(time=0.0, body=name, impulse=(0.0, 0.0), angular=moment * spin),
@@ -241,9 +241,9 @@ class Curling:
         )
 
     def _follow(self, info: StepInfo, elapsed: float) -> Sequence[Action]:
-        """See where the stones are, take out who leaves, and judge the shot once all rest."""
+        """Update the positions, remove stones that leave play, and judge the shot once all stones rest."""
         frame, moves = info.frame, list[Action]()
-        self._hear(info, elapsed)
+        self._record_hits(info, elapsed)
         for k in tuple(self._places):
             x, y = frame.position[self._numbers[k]].tolist()
             self._places[k] = (x, y)
@@ -254,33 +254,33 @@ class Curling:
         moving = [k for k in self._places if frame.velocity[self._numbers[k]].any()]
         return moves if moving else [*moves, *self._judge(info)]
 
-    def _hear(self, info: StepInfo, elapsed: float) -> None:
-        """Note which stones have struck each other."""
+    def _record_hits(self, info: StepInfo, elapsed: float) -> None:
+        """Record collisions between stones."""
         stones = {number: k for k, number in enumerate(self._numbers)}
-        pairs = info.contacts.pair[info.contacts.time > self._time - elapsed].tolist()  # others only touch on
+        pairs = info.contacts.pair[info.contacts.time > self._time - elapsed].tolist()  # older contacts persist
         new = {(stones[a], stones[b]) for a, b in pairs if a in stones and b in stones}
         if new:
             self._hits |= new
             self._cues.append("hit")
 
     def _judge(self, info: StepInfo) -> Sequence[Action]:
-        """Judge a shot that has come to rest: hog line, free guard zone; and the end, where that was its last."""
+        """Apply hog line and free guard zone to a shot at rest; score the end after its last stone."""
         moves: list[Action] = []
         current, places = self._current, self._places
         if current in places and is_hogged(places[current]) and not self._hits:
             del places[current]
             moves.append(self._put(current, removed_position(*divmod(current, STONES))))
-            self._told = "stone removed: short of the hog line"
-        zone = {k for k, place in self._before.items() if in_free_guard_zone(place)} | self._deemed
+            self._message = "stone removed: short of the hog line"
+        zone = {k for k, place in self._before.items() if in_free_guard_zone(place)} | self._counted_as_guards
         theirs = [k for k in zone if k // STONES != self._score.team]
         if self._score.thrown < PROTECTED and any(k not in places for k in theirs):
             moves += [self._put(k, place) for k, place in self._before.items()]
             moves.append(self._put(current, removed_position(*divmod(current, STONES))))
             self._places = dict(self._before)
-            self._told = "free guard zone: stones replaced"
+            self._message = "free guard zone: stones replaced"
         else:
             met = {k for pair in self._hits if not zone.isdisjoint(pair) for k in pair}
-            self._deemed = {k for k in met | self._deemed if k in places and is_hogged(places[k])}
+            self._counted_as_guards = {k for k in met | self._counted_as_guards if k in places and is_hogged(places[k])}
         if "sweep" in self._held:
             moves += self._sweep(False)
         self._running, self._since = False, info.time
@@ -292,15 +292,18 @@ class Curling:
     def _count(self) -> None:
         team, points = end_score([(k // STONES, place) for k, place in self._places.items()])
         self._score = self._score.after_end(team, points)
-        self._told = "blank end" if team is None else f"{TEAMS[team]} scores {points}"
+        self._message = "blank end" if team is None else f"{TEAMS[team]} scores {points}"
         self._cues.append("score" if points else "blank")
         if self._score.game_over is not None:
             self._cues.append("win" if self._people != 1 or self._score.points[0] > self._score.points[1] else "lose")
 
     def _sweep(self, on: bool) -> Sequence[Action]:
-        """Return what sweeping does to the ice, or that it is as it was."""
+        """Return the actions that set friction and curl of swept ice, or reset them."""
         friction, curl = self._floor.sliding_friction, self._floor.curl
-        values = {"sliding_friction": friction * (SWEPT if on else 1.0), "curl": curl * (STRAIGHTER if on else 1.0)}
+        values = {
+            "sliding_friction": friction * (SWEEP_FRICTION if on else 1.0),
+            "curl": curl * (SWEEP_CURL if on else 1.0),
+        }
         if not curl:
             del values["curl"]
         return [SetParameter(time=0.0, path=f"surface.{key}", value=value) for key, value in values.items()]
@@ -309,12 +312,12 @@ class Curling:
         return Move(time=0.0, body=self._names[k], position=place, velocity=(0.0, 0.0))
 
     def _hold(self, aside: float) -> Move:
-        """Hold the broom at a place on the tee line, m to the left."""
-        self._broom = min(max(aside, -WIDEST), WIDEST)
+        """Place the broom on the tee line, m to the left of the centre line."""
+        self._broom = min(max(aside, -MAX_BROOM_OFFSET), MAX_BROOM_OFFSET)
         return Move(time=0.0, body=BROOM, position=(0.0, self._broom))
 
     def display_lines(self) -> Sequence[tuple[str, str]]:
-        """Return the score, the end, whose turn it is and how it aims."""
+        """Return score, end, turn and aim."""
         score = self._score
         red, yellow = score.points
         end = f"{min(score.played + 1, max(score.ends, score.played))} of {score.ends}"
@@ -327,16 +330,16 @@ class Curling:
                 ("weight", _weight(self._weight)),
                 ("curls", "left" if self._turn > 0 else "right"),
             ]
-        return [*shown, ("", self._told)] if self._told else shown
+        return [*shown, ("", self._message)] if self._message else shown
 
     def observation(self) -> Sequence[tuple[str, float]]:
-        """Return how the stone is aimed, m, whether a person is to let it go, and how the match stands."""
+        """Return aim, m, whether a person may deliver, and the score."""
         score = self._score
         return (
             ("broom", self._broom),
             ("weight", self._weight),
             ("turn", self._turn),
-            ("may throw", self._ready and not self._by_itself),
+            ("may throw", self._ready and not self._is_bot_turn),
             ("stones run", self._running),
             ("team", score.team),
             ("hammer", score.hammer),

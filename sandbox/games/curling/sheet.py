@@ -1,11 +1,9 @@
-"""Sheet: the lines and rings of a curling sheet, and where stones lie that are not in play.
+"""Geometry of a curling sheet, positions of stones that are not in play, and the score of an end.
 
-The origin is the tee that is played to, x the way of the stones. Measures are those of World Curling, The Rules of
+The origin is the tee that is played to; x is the direction of play. Measures are those of World Curling, The Rules of
 Curling, of sheet and stones: length 45.720 m, width at most 5.000 m; from the tee line to the hog line 6.401 m and to
 the back line 1.829 m, tee lines 34.747 m apart, so that hog lines are 21.945 m apart; rings of 12, 8 and 4 feet and a
 button; stones of at most 19.96 kg and a circumference of at most 91.44 cm.
-
-Count: which stones are in play, which are guards, and what an end is worth, by the places of stones alone.
 
 Source: World Curling, The Rules of Curling, on stones in play, the free guard zone and scoring.
 """
@@ -23,11 +21,11 @@ RINGS = 1.829, 1.219, 0.610, 0.152
 STONE, WEIGHT = 0.9144 / math.tau, 19.96
 """m, radius of a stone, and kg"""
 RELEASE = HOG - TEES - STONE
-"""m, where a stone is let go at the latest: before the nearer hog line"""
+"""m, latest release of a stone: before the nearer hog line"""
 
 TEAMS = "red", "yellow"
 STONES = 8
-"""of each team"""
+"""stones of each team"""
 _PITCH = 2.0 * STONE + 0.05
 
 
@@ -37,12 +35,12 @@ def stone_name(team: int, number: int) -> str:
 
 
 def parked_position(team: int, number: int) -> Point:
-    """Return where a stone lies until it is thrown, beside the sheet, m: red to the left of the way."""
+    """Return the position of a stone before its delivery, beside the sheet, m: red on the left."""
     return RELEASE + (STONES - number) * _PITCH, _aside(team)
 
 
 def removed_position(team: int, number: int) -> Point:
-    """Return where a stone lies that is out of play, m."""
+    """Return the position of a stone that is out of play, m."""
     return BACK + 3.2 - (STONES - number) * _PITCH, _aside(team)
 
 
@@ -51,40 +49,40 @@ def _aside(team: int) -> float:
 
 
 PROTECTED = 5
-"""Deliveries of an end in which no guard of the other team may be put out of play."""
+"""first deliveries of an end, in which guards of the other team must stay in play"""
 
 
 def is_out_of_play(place: Point) -> bool:
-    """Tell whether a stone is out of play wherever it goes on to: it touches a side line, or is wholly past the back.
+    """Return whether a stone is out of play: it touches a side line, or is completely past the back line.
 
     Args:
-        place: of its centre, m.
+        place: position of its centre, m.
     """
     x, y = place
     return abs(y) + STONE >= 0.5 * WIDTH or x - STONE > BACK
 
 
 def is_hogged(place: Point) -> bool:
-    """Tell whether a stone that rests has not come wholly past the hog line."""
+    """Return whether a stone at rest is not completely past the hog line."""
     return place[0] - STONE <= -HOG
 
 
 def in_house(place: Point) -> bool:
-    """Tell whether a stone touches the house."""
+    """Return whether a stone touches the house."""
     return math.hypot(*place) - STONE <= RINGS[0]
 
 
 def in_free_guard_zone(place: Point) -> bool:
-    """Tell whether a stone that rests lies in the free guard zone: before the tee line, and not in the house."""
+    """Return whether a stone at rest is in the free guard zone: before the tee line, and not in the house."""
     return not is_hogged(place) and place[0] + STONE < 0.0 and not in_house(place)
 
 
 def end_score(stones: Sequence[tuple[int, Point]]) -> tuple[int | None, int]:
-    """Return who scores in an end, and how much: a blank end is nobody's.
+    """Return the team that scores in an end, and its points; None and 0 for a blank end.
 
     The team with the stone nearest to the tee counts each of its stones that touches the house and is nearer than the
-    best of the other team. Two that are equally near, to the last bit, leave an end blank, as stones do that no
-    measure can tell apart.
+    best stone of the other team. Two best stones at exactly equal distances make a blank end, as stones whose distances
+    cannot be measured apart do.
 
     Args:
         stones: team and centre, m, of each stone in play.

@@ -165,12 +165,12 @@ class BallSearch(Device):
         """drive that is on → when it goes off, s"""
         self.chance = draws(Stream.BALL_SEARCH, board.seed)
 
-    def hit(self, hit: Hit, now: StepContext) -> Iterator[Effect]:
+    def on_hit(self, hit: Hit, now: StepContext) -> Iterator[Effect]:
         """Be content: the ball is about."""
         self._content(now.time)
         return iter(())
 
-    def begin(self, now: StepContext) -> Iterator[Effect]:
+    def start_ball(self, now: StepContext) -> Iterator[Effect]:
         """Be content."""
         self._content(now.time)
         return iter(())

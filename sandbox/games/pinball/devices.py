@@ -16,7 +16,7 @@ from collections.abc import Iterator
 
 from sandbox.action import Move
 from sandbox.games.pinball.events import (
-    MOST,
+    MAX_BONUS_MULTIPLIER,
     POINTS,
     Award,
     Device,
@@ -69,7 +69,7 @@ class Kickers(Device):
         self.held: dict[int, tuple[PlayfieldElement, float]] = {}
         """ball → its hole, and when it is thrown out, s"""
 
-    def hit(self, hit: Hit, now: StepContext) -> Iterator[Effect]:
+    def on_hit(self, hit: Hit, now: StepContext) -> Iterator[Effect]:
         """Hold a ball."""
         if hit.element.role != "kicker" or hit.ball in self.held:
             return
@@ -122,7 +122,7 @@ class LaneLights(Device):
         self.names = tuple(each.name for each in members)
         self.lit = [False] * len(members)
 
-    def hit(self, hit: Hit, now: StepContext) -> Iterator[Effect]:
+    def on_hit(self, hit: Hit, now: StepContext) -> Iterator[Effect]:
         """Light what was hit."""
         if hit.element.name not in self.names:
             return
@@ -134,7 +134,7 @@ class LaneLights(Device):
         if not all(self.lit):
             return
         self.lit = [False] * len(self.lit)
-        if self.role == "rollover" and now.sheet.times < MOST:
+        if self.role == "rollover" and now.sheet.times < MAX_BONUS_MULTIPLIER:
             now.sheet.times += 1
             yield ShowMessage(f"bonus × {now.sheet.times}")
             if now.sheet.times == RELIGHT_DELAY:
@@ -148,7 +148,7 @@ class LaneLights(Device):
             by = 1 if side == "left" else -1
             self.lit = self.lit[by:] + self.lit[:by]
 
-    def begin(self, now: StepContext) -> Iterator[Effect]:
+    def start_ball(self, now: StepContext) -> Iterator[Effect]:
         """Darken everything."""
         self.lit = [False] * len(self.lit)
         return iter(())
@@ -184,7 +184,7 @@ class Ramps(Device):
         self.entered: dict[tuple[str, int], float] = {}
         """group and ball → when, s"""
 
-    def hit(self, hit: Hit, now: StepContext) -> Iterator[Effect]:
+    def on_hit(self, hit: Hit, now: StepContext) -> Iterator[Effect]:
         """Follow a ball on a ramp."""
         element = hit.element
         if element.role != "ramp":
@@ -199,7 +199,7 @@ class Ramps(Device):
             if began is not None and hit.time - began <= MAX_RAMP_TIME:
                 yield from _made(hit)
 
-    def begin(self, now: StepContext) -> Iterator[Effect]:
+    def start_ball(self, now: StepContext) -> Iterator[Effect]:
         """Forget balls that did not arrive."""
         self.entered.clear()
         return iter(())
@@ -236,7 +236,7 @@ class Spinner(Device):
         self.time = 0.0
         """of both, s"""
 
-    def hit(self, hit: Hit, now: StepContext) -> Iterator[Effect]:
+    def on_hit(self, hit: Hit, now: StepContext) -> Iterator[Effect]:
         """Set the plate turning."""
         if hit.element is self.element:
             yield from self._turned(hit.time)
@@ -277,7 +277,7 @@ class ScoringSwitches(Device):
         self.struck: dict[str, float] = {}
         """what was hit → when last, s"""
 
-    def hit(self, hit: Hit, now: StepContext) -> Iterator[Effect]:
+    def on_hit(self, hit: Hit, now: StepContext) -> Iterator[Effect]:
         """Score a hit."""
         role = hit.element.role
         if role not in ROLES:

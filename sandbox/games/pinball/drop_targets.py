@@ -33,7 +33,7 @@ class DropTargetBanks(Device):
         self.rise: float | None = None
         """when the bank rises, s, if nothing lies on it"""
 
-    def hit(self, hit: Hit, now: StepContext) -> Iterator[Effect]:
+    def on_hit(self, hit: Hit, now: StepContext) -> Iterator[Effect]:
         """Let a target fall."""
         place = next((k for k, each in enumerate(self.members) if each is hit.element), None)
         if place is None or place in self.down or place in self.falling:
@@ -67,7 +67,7 @@ class DropTargetBanks(Device):
             yield Toggle(time=now.time, thing=self.members[place].name, solid=True)
         self.down.clear()
 
-    def begin(self, now: StepContext) -> Iterator[Effect]:
+    def start_ball(self, now: StepContext) -> Iterator[Effect]:
         """Raise the bank for a new ball, also where it was not full."""
         for place in sorted(self.falling):
             self.down.add(place)

@@ -1,8 +1,8 @@
-"""Effects: what machines answer with, and the one shape that all machines have.
+"""Device, the base class of everything on a table that has state, and the effects that devices return.
 
-Sheet: where one player stands.
+PlayerState: score, balls and locks of one player.
 
-Switches: the hits in what an engine noted of a step, each told once.
+Switches: detects hits in the contacts of a step; each is reported once.
 """
 
 import math
@@ -17,41 +17,40 @@ from sandbox.scene.description.play import Role
 from sandbox.trajectory import Frame
 
 BALLS = 3
-"""of a game"""
+"""number of balls of a game"""
 
-MOST = 6
-"""times that a bonus counts"""
+MAX_BONUS_MULTIPLIER = 6
 
 
 @dataclass
 class PlayerState:
-    """What a player has."""
+    """Score, balls and locks of a player."""
 
     score: int = 0
     ball: int = 1
-    """which is played, from 1; one more than there are once all were played"""
+    """number of the ball, from 1; `BALLS` + 1 after the last one"""
     again: int = 0
-    """how often the player shoots again"""
+    """number of extra balls"""
     bonus: int = 0
-    """points that are counted at the end of the ball"""
+    """points that are added at the end of the ball"""
     times: int = 1
-    """how often the bonus counts"""
+    """multiplier of the bonus"""
     locked: int = 0
-    """balls waiting for multiball"""
+    """balls locked for multiball"""
     lit: bool = False
-    """whether the next ball in the lock counts"""
+    """whether the lock is lit"""
     modes: int = 0
-    """how many were begun"""
+    """number of modes started"""
     had: set[str] = field(default_factory=set)
-    """reasons for which an extra ball was given"""
+    """reasons for which extra balls were awarded"""
 
     @property
     def done(self) -> bool:
-        """Whether all balls were played."""
+        """Whether all balls have been played."""
         return self.ball > BALLS
 
-    def ended(self) -> None:
-        """Go on to the next ball, or shoot again."""
+    def end_ball(self) -> None:
+        """Advance to the next ball, or use an extra ball."""
         if self.again:
             self.again -= 1
         else:
@@ -59,9 +58,9 @@ class PlayerState:
         self.bonus, self.times = 0, 1
 
 
-LOOKS = 2
-"""In so many looks from its first touch a hit gives its impulse: one, or two where it spans the end of a step. What
-comes later is the weight of a ball that leans."""
+IMPACT_STEPS = 2
+"""Steps from the first touch in which an impact gives its impulse: one, or two if it spans the end of a step. Later
+impulses are the weight of a ball that rests on the element."""
 
 
 class Hit(NamedTuple):
@@ -77,41 +76,46 @@ class Hit(NamedTuple):
 
 
 class Touch(NamedTuple):
-    """A contact that has been seen: how often, and what it has given, as impulse over mass along its normal, m/s."""
+    """An open contact."""
 
-    looks: int
-    given: float
-    told: bool
+    steps: int
+    """number of steps since the first touch"""
+    impulse: float
+    """sum of the impulses along the normal, over the mass of the ball, m/s"""
+    is_reported: bool
+    """whether it has closed its switch"""
 
 
 class Switches:
-    """Reads hits. A contact is known by its first touch and its pair, as engines tell one that lasts again.
+    """Detects hits. A contact is identified by its pair and the time of its first touch.
 
-    Whether a struck switch closes is a matter of the speed v with which the ball came, which neither frame shows: a
-    ball may meet three things in one step. The contact's impulse does: J/m = (1 + e)·v, and more where the thing
-    kicks, but a thing kicks only above its threshold. So the switch closes where J/m exceeds (1 + e) times its own.
+    A switch closes above a threshold of the impact speed v. Frames do not show v, because a ball may hit three elements
+    in one step. The impulse of the contact does: J/m = (1 + e)·v, and more if the element kicks, which it does only
+    above its threshold. So the switch closes if J/m exceeds (1 + e) times the threshold.
     """
 
     def __init__(self, board: Playfield) -> None:
         self._board = board
         self._open: dict[tuple[float, int, int], Touch] = {}
 
-    def read(self, seen: StepInfo) -> list[Hit]:
-        """Return the switches that closed since the last look, in the order of their first touch."""
+    def read(self, info: StepInfo) -> list[Hit]:
+        """Return the switches that closed in the last step, in the order of their first touch."""
         now: dict[tuple[float, int, int], Touch] = {}
         hits = []
-        for time, (first, second), _, normal, impulse in seen.contacts:
+        for time, (first, second), _, normal, impulse in info.contacts:
             element = self._board.switches.get(second)
             mass = self._board.mass.get(first)
             if element is None or mass is None:
                 continue
             key = (time, first, second)
             touch = now.get(key) or self._open.get(key) or Touch(0, 0.0, False)
-            given = touch.given + (impulse[0] * normal[0] + impulse[1] * normal[1]) / mass
-            closes = not touch.told and touch.looks < LOOKS and (not element.least or given > element.least)
-            now[key] = Touch(touch.looks + 1, given, touch.told or closes)
+            given = touch.impulse + (impulse[0] * normal[0] + impulse[1] * normal[1]) / mass
+            closes = (
+                not touch.is_reported and touch.steps < IMPACT_STEPS and (not element.least or given > element.least)
+            )
+            now[key] = Touch(touch.steps + 1, given, touch.is_reported or closes)
             if closes:
-                hits.append(Hit(time, first, element, math.hypot(*seen.frame.velocity[first].tolist())))
+                hits.append(Hit(time, first, element, math.hypot(*info.frame.velocity[first].tolist())))
         self._open = now
         return hits
 
@@ -126,20 +130,20 @@ POINTS: dict[Role, int] = {
     "spinner": 250,
     "standup": 2_000,
 }
-"""of elements that state none"""
+"""points of elements without `score`"""
 
 
 class Award(NamedTuple):
-    """Points, and the news of what they are for, which every machine hears."""
+    """Points and their reason; every device is notified of it."""
 
     kind: str
-    """a role, or what a machine makes of several: `bank`, `lanes`, `standups`, `jackpot` …"""
+    """a role, or a combination that a device detects: `bank`, `lanes`, `standups`, `jackpot` …"""
     points: int
     group: str | None = None
     bonus: int = 0
-    """added to what is counted at the end of the ball"""
+    """points added to the bonus"""
     ball: int | None = None
-    """whose deed it was"""
+    """index of the ball that scored"""
 
 
 class PlaySound(NamedTuple):
@@ -149,31 +153,31 @@ class PlaySound(NamedTuple):
 
 
 class ShowMessage(NamedTuple):
-    """A line for the player, for a few seconds."""
+    """Message shown to the player for a few seconds."""
 
     text: str
 
 
 class RemoveBall(NamedTuple):
-    """A ball goes from the table to the trough, at once."""
+    """Moves a ball from the table to the trough."""
 
     ball: int
 
 
 class ServeBalls(NamedTuple):
-    """Balls are put onto the table, one after the other, and launched by themselves."""
+    """Puts balls onto the table, one after the other, and launches them automatically."""
 
     balls: int
 
 
 class BallSave(NamedTuple):
-    """Balls that drain within a time, s, come back."""
+    """Returns balls that drain within a time, s."""
 
     seconds: float
 
 
 class ExtraBall(NamedTuple):
-    """The player shoots again after this ball, for a reason that counts once a game."""
+    """Awards an extra ball; each reason counts once a game."""
 
     reason: str
 
@@ -182,59 +186,59 @@ Effect: TypeAlias = Award | PlaySound | ShowMessage | RemoveBall | ServeBalls | 
 
 
 class Light(NamedTuple):
-    """That a lamp is lit."""
+    """A lit lamp."""
 
     name: str
-    """of its element"""
+    """name of its element"""
     blinks: bool = False
-    """Call for the player; for half of the time such a lamp is dark, also where another machine has lit it."""
+    """whether the lamp blinks, to draw the player's attention; it is then dark half of the time"""
 
 
 @dataclass
 class StepContext:
-    """How things stand at a look."""
+    """State of the table in one step."""
 
     time: float
     """s"""
     frame: Frame
     sheet: PlayerState
-    """of who plays"""
+    """state of the present player"""
     live: tuple[int, ...] = ()
-    """the balls in play, in the lane too"""
+    """balls in play, including the plunger lane"""
     loose: tuple[int, ...] = ()
-    """of these, the ones that neither wait in the lane nor are held in a hole"""
+    """live balls that are neither in the lane nor held by a kicker"""
     lane: dict[int, bool] = field(default_factory=dict)
-    """whether a ball lies where the plunger is, of those that were asked about"""
+    """ball → whether it is in the plunger lane; cache"""
     waiting: int = 0
-    """balls that are about to be served"""
+    """number of balls to be served"""
     up: frozenset[str] = field(default_factory=frozenset)
-    """the sides whose flippers are held up"""
+    """sides whose flippers are up"""
 
 
 class Device:
-    """Something on the table that has a state. Each method yields what comes of it; none is a must."""
+    """Element or mechanism of a table with state. Each method yields effects; all are optional."""
 
-    def hit(self, hit: Hit, now: StepContext) -> Iterator[Effect]:
-        """Answer a switch that closed."""
+    def on_hit(self, hit: Hit, now: StepContext) -> Iterator[Effect]:
+        """Respond to a switch that closed."""
         return iter(())
 
-    def heard(self, award: Award, now: StepContext) -> Iterator[Effect]:
-        """Answer what any machine has awarded."""
+    def on_award(self, award: Award, now: StepContext) -> Iterator[Effect]:
+        """Respond to an award of any device."""
         return iter(())
 
     def tick(self, now: StepContext) -> Iterator[Effect]:
-        """Let time pass."""
+        """Advance by one step."""
         return iter(())
 
-    def begin(self, now: StepContext) -> Iterator[Effect]:
-        """Make ready for a new ball."""
+    def start_ball(self, now: StepContext) -> Iterator[Effect]:
+        """Reset for a new ball."""
         return iter(())
 
     def lights(self, now: StepContext) -> Iterator[Light]:
-        """Tell which lamps are lit by it."""
+        """Return the lamps that the device lights."""
         return iter(())
 
 
 def points_of(hit: Hit) -> int:
-    """Return what an element states, or what its role is worth."""
+    """Return the score of an element, by default that of its role."""
     return hit.element.score or POINTS.get(hit.element.role, 0)

@@ -1,7 +1,4 @@
-"""Modes: an objective against the clock, with points of its own.
-
-Multiball: balls that are locked one by one, and come back all at once.
-"""
+"""Modes: timed objectives with points of their own. Multiball: locked balls that are released together."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -22,40 +19,40 @@ from sandbox.games.pinball.playfield import Playfield
 from sandbox.scene.description.play import Role
 
 MAX_LOCKED = 3
-"""balls, of a table that has so many"""
+"""balls of multiball, if the table has as many"""
 
 LOCK = 10_000
-"""points of a locked ball"""
+"""points for locking a ball"""
 
 JACKPOT = 50_000
 
 MULTIBALL_SAVE = 12.0
-"""s, in which drained balls come back at first"""
+"""s, ball save at the start of multiball"""
 
-NEXT = 6.0
-"""s, in which the ball that follows a locked one comes back"""
+BALL_SAVE_AFTER_LOCK = 6.0
+"""s, ball save of the ball that follows a locked one"""
 
-LOCKS = "lock"
-"""the group of the holes that lock"""
+LOCK_GROUP = "lock"
+"""group of the kickers that lock balls"""
 
 
 class Multiball(Device):
     """Locks and jackpots.
 
-    A full bank or set of targets lights the lock; a ball that enters it lit is locked: it goes below the table, and
-    another comes to the plunger by itself. With the last one all are there. A player keeps locked balls from turn to
-    turn, as a number: the balls themselves are in the trough, and anybody's.
+    A completed bank or set of targets lights the lock. A ball that enters the lit lock is locked: it is removed, and
+    another is served and launched automatically. The last lock starts multiball. Each player keeps a number of locked
+    balls from turn to turn; the balls themselves are in the trough and shared.
     """
 
     def __init__(self, board: Playfield) -> None:
-        self.holes = tuple(each.name for each in board.of_role("kicker") if each.group == LOCKS)
+        self.holes = tuple(each.name for each in board.of_role("kicker") if each.group == LOCK_GROUP)
         self.locks = bool(self.holes)
         self.size = min(MAX_LOCKED, len(board.balls)) if self.locks else 1
         self.jackpots = "ramp" if board.of_role("ramp") else "bank" if board.of_role("drop") else "standups"
         self.on = False
 
-    def heard(self, award: Award, now: StepContext) -> Iterator[Effect]:
-        """Light the lock, lock a ball, begin, or score a jackpot."""
+    def on_award(self, award: Award, now: StepContext) -> Iterator[Effect]:
+        """Light the lock, lock a ball, start multiball, or score a jackpot."""
         if self.size < 2:
             return
         if self.on:
@@ -67,7 +64,7 @@ class Multiball(Device):
             now.sheet.lit = True
             yield PlaySound("ready")
             yield ShowMessage("lock is lit")
-        elif award.kind == "kicker" and award.group == LOCKS and now.sheet.lit and award.ball is not None:
+        elif award.kind == "kicker" and award.group == LOCK_GROUP and now.sheet.lit and award.ball is not None:
             now.sheet.lit = False
             now.sheet.locked += 1
             yield Award("lock", LOCK)
@@ -76,27 +73,27 @@ class Multiball(Device):
                 yield ShowMessage(f"ball {now.sheet.locked} of {self.size} locked")
                 yield RemoveBall(award.ball)
                 yield ServeBalls(1)
-                yield BallSave(NEXT)
+                yield BallSave(BALL_SAVE_AFTER_LOCK)
             else:
-                yield from self._begun(now)
+                yield from self._start(now)
 
     def tick(self, now: StepContext) -> Iterator[Effect]:
-        """End with the last ball but one."""
+        """End multiball when one ball is left."""
         if self.on and len(now.live) + now.waiting <= 1:
             self.on = False
             yield ShowMessage("multiball is over")
 
-    def begin(self, now: StepContext) -> Iterator[Effect]:
-        """Begin a ball with one."""
+    def start_ball(self, now: StepContext) -> Iterator[Effect]:
+        """End multiball."""
         self.on = False
         return iter(())
 
     def lights(self, now: StepContext) -> Iterator[Light]:
-        """Show the holes that lock."""
+        """Light the lock."""
         return (Light(name) for name in self.holes if now.sheet.lit and not self.on)
 
-    def _begun(self, now: StepContext) -> Iterator[Effect]:
-        """Let out all the balls; the one in the hole is the last."""
+    def _start(self, now: StepContext) -> Iterator[Effect]:
+        """Start multiball: serve all other balls; the kicker releases its ball."""
         self.on, now.sheet.locked = True, 0
         yield PlaySound("multiball")
         yield ShowMessage("multiball")
@@ -105,17 +102,17 @@ class Multiball(Device):
 
 
 class Mode(NamedTuple):
-    """What is to be done."""
+    """A timed objective."""
 
     name: str
     roles: tuple[Role, ...]
-    """of which each hit counts; a table that has none of them does without this mode"""
+    """roles whose hits count; a table without them does not have this mode"""
     needed: int
     seconds: float
     each: int
-    """points, beside those of the hit itself"""
+    """points of each hit, in addition to those of the element"""
     reward: int
-    """points, once all is done"""
+    """points for completing the mode"""
 
 
 MODES = (
@@ -125,15 +122,15 @@ MODES = (
     Mode("spinner storm", ("spinner",), 20, 30.0, 500, 60_000),
 )
 
-LIGHTS = ("bank", "lanes", "standups")
-"""what makes the next mode ready"""
+READYING_AWARDS = ("bank", "lanes", "standups")
+"""awards that make the next mode ready"""
 
-LATE = 1e-9
-"""s, of rounding in sums of steps"""
+TIME_ROUNDING = 1e-9
+"""s, rounding error of sums of steps"""
 
 
 class Modes(Device):
-    """The one mode that runs, if any. The next is readied by a full set, and begun by a hole, where there is one."""
+    """The running mode, if any. A completed set makes the next one ready; a kicker starts it, if the table has one."""
 
     def __init__(self, board: Playfield) -> None:
         self.board = board
@@ -145,46 +142,46 @@ class Modes(Device):
         """s"""
         self.to_go = 0
 
-    def heard(self, award: Award, now: StepContext) -> Iterator[Effect]:
-        """Ready a mode, begin it, or count towards its end."""
+    def on_award(self, award: Award, now: StepContext) -> Iterator[Effect]:
+        """Make a mode ready, start it, or count a hit."""
         if self.mode is not None and award.kind in self.mode.roles:
-            yield from self._counted(self.mode, now)
+            yield from self._count_hit(self.mode, now)
         elif self.mode is None and self.modes:
-            if award.kind in LIGHTS and not self.ready:
+            if award.kind in READYING_AWARDS and not self.ready:
                 self.ready = True
                 yield PlaySound("ready")
                 yield ShowMessage("shoot the hole" if self.holes else "mode ready")
             if self.ready and (award.kind == "kicker" or not self.holes):
-                yield from self._begun(now)
+                yield from self._start(now)
 
     def tick(self, now: StepContext) -> Iterator[Effect]:
-        """Run the clock, while a ball is loose."""
+        """Advance the clock while a ball is loose."""
         if self.mode is None or not now.loose:
             return
         self.left -= self.board.dt
-        if self.left <= LATE:
+        if self.left <= TIME_ROUNDING:
             yield ShowMessage(f"{self.mode.name} is over")
             self.mode = None
 
-    def begin(self, now: StepContext) -> Iterator[Effect]:
-        """End what runs with the ball."""
+    def start_ball(self, now: StepContext) -> Iterator[Effect]:
+        """End the mode with the ball."""
         self.mode, self.ready = None, False
         return iter(())
 
     def lights(self, now: StepContext) -> Iterator[Light]:
-        """Show what to shoot at: what the mode counts, or the holes that begin one."""
+        """Light the elements that the mode counts, or the kickers that start a mode."""
         if self.mode is not None:
             return (Light(each.name, True) for each in self.board.of_role(*self.mode.roles))
         return (Light(each.name, True) for each in self.board.of_role("kicker") if self.ready)
 
-    def _begun(self, now: StepContext) -> Iterator[Effect]:
+    def _start(self, now: StepContext) -> Iterator[Effect]:
         self.mode = self.modes[now.sheet.modes % len(self.modes)]
         self.left, self.to_go, self.ready = self.mode.seconds, self.mode.needed, False
         now.sheet.modes += 1
         yield PlaySound("mode")
         yield ShowMessage(self.mode.name)
 
-    def _counted(self, mode: Mode, now: StepContext) -> Iterator[Effect]:
+    def _count_hit(self, mode: Mode, now: StepContext) -> Iterator[Effect]:
         self.to_go -= 1
         yield Award("mode", mode.each)
         if not self.to_go:

@@ -1,11 +1,4 @@
-"""Pinball: the game that the machines of a table make together, as rules that any host can play.
-
-Controls: what a player of pinball can do.
-
-Gauges: what a player of pinball reads off the table and its panel, as numbers for who learns to play.
-
-Panel: the lines of the score panel.
-"""
+"""Rules of pinball: controls, score panel, observation of learning agents, and the rules that run the devices."""
 
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -43,18 +36,18 @@ FLIPPERS = {LEFT: "left", RIGHT: "right"}
 """control → side"""
 
 NUDGES = {"nudge": 1.0 + 0j, "nudge left": 1j, "nudge right": -1j}
-"""control → where the balls go, as a turn from up the table"""
+"""control → direction of the balls, as a rotation from the upward direction of the table"""
 
-SELDOM = 0.05
-"""of the presses of other controls, those of a nudge by whoever presses at chance: three of a ball are a tilt"""
+NUDGE_FREQUENCY = 0.05
+"""frequency of random nudges, relative to other controls: the third of a ball tilts the table"""
 
 CONTROLS = (
     Control(LEFT, "left flipper; lane lights move left", ("left shift", "z"), "lb lt"),
     Control(RIGHT, "right flipper; lane lights move right", ("right shift", "/"), "rb rt"),
     Control(PLUNGER, "hold to pull the plunger, release to shoot", ("enter",), "a +righty", True),
-    Control("nudge", "nudge the table: balls move up", ("space",), "y up", True, SELDOM),
-    Control("nudge left", "nudge the table: balls move left", ("left",), "left", True, SELDOM),
-    Control("nudge right", "nudge the table: balls move right", ("right",), "right", True, SELDOM),
+    Control("nudge", "nudge the table: balls move up", ("space",), "y up", True, NUDGE_FREQUENCY),
+    Control("nudge left", "nudge the table: balls move left", ("left",), "left", True, NUDGE_FREQUENCY),
+    Control("nudge right", "nudge the table: balls move right", ("right",), "right", True, NUDGE_FREQUENCY),
 )
 
 
@@ -62,31 +55,31 @@ Gauge = tuple[str, float]
 
 
 def observation(
-    course: GameFlow,
+    flow: GameFlow,
     modes: Modes,
     multiball: Multiball,
     lamps: Sequence[LaneLights],
     banks: Sequence[DropTargetBanks],
     saved: float,
 ) -> Iterator[Gauge]:
-    """Yield names and values, always the same names in the same order.
+    """Yield names and values; names and order are constant.
 
     Args:
-        course: of the game.
+        flow: of the game.
         modes: what runs.
         multiball: whether it is on.
         lamps: the sets of lanes and standing targets.
         banks: of drop targets.
         saved: s, in which drained balls come back; 0 for none.
     """
-    sheet, nudge = course.sheet, course.nudge
-    yield "player", course.turn
+    sheet, nudge = flow.sheet, flow.nudge
+    yield "player", flow.turn
     yield "ball", sheet.ball
     yield "shoot again", sheet.again
     yield "bonus", sheet.bonus
     yield "bonus times", sheet.times
     yield "ball save", saved
-    yield "balls in play", len(course.trough.live)
+    yield "balls in play", len(flow.trough.live)
     yield "locked", sheet.locked
     yield "lock lit", sheet.lit
     yield "multiball", multiball.on
@@ -107,7 +100,7 @@ Line = tuple[str, str]
 
 
 def display_lines(sheets: Sequence[PlayerState], turn: int, modes: Modes, saved: float, message: str) -> list[Line]:
-    """Return labels and texts, the most important first, without the score: whoever shows them has that.
+    """Return labels and texts, the most important first, without the score, which the host shows.
 
     Args:
         sheets: of the players.
@@ -137,11 +130,11 @@ def display_lines(sheets: Sequence[PlayerState], turn: int, modes: Modes, saved:
     return lines
 
 
-SAID = 3.0
-"""s, that a message stays"""
+MESSAGE_TIME = 3.0
+"""s for which a message is shown"""
 
-BLINK = 0.4
-"""s, from one blink to the next"""
+BLINK_PERIOD = 0.4
+"""s"""
 
 
 class Pinball:
@@ -153,95 +146,95 @@ class Pinball:
         """Begin a game.
 
         Raises:
-            UnfitError: there is no ball.
+            UnsuitableSceneError: the scene has no ball.
         """
         self.board = board = Playfield.of(scene, bodies)
         self.switches, self.holes, self.nudge = Switches(board), Kickers(board), NudgeAndTilt(board)
         self.banks, self.lamps = banks_of(board), lane_lights_of(board)
         self.modes, self.multiball = Modes(board), Multiball(board)
-        self.machines: tuple[Device, ...] = (
+        self.devices: tuple[Device, ...] = (
             ScoringSwitches(), *self.lamps, *self.banks, *(Spinner(each) for each in board.of_role("spinner")),
             self.holes, Ramps(board), self.modes, self.multiball, self.nudge,
             BallSearch(board, self.holes, self.banks),
         )  # fmt: skip
-        self._ticking = tuple(each for each in self.machines if type(each).tick is not Device.tick)
-        self._lamped = tuple(each for each in self.machines if type(each).lights is not Device.lights)
-        self.course = GameFlow(board, self.holes, self.nudge)
-        self.course.machines = self.machines
+        self._ticking = tuple(each for each in self.devices if type(each).tick is not Device.tick)
+        self._lamped = tuple(each for each in self.devices if type(each).lights is not Device.lights)
+        self.flow = GameFlow(board, self.holes, self.nudge)
+        self.flow.devices = self.devices
         self.up: set[str] = set()
-        """the sides whose flippers are held up"""
+        """sides whose flippers are up"""
         self.said = ("", 0.0)
         self._cues: list[str] = []
         self._now: StepContext | None = None
 
     @property
     def trough(self) -> Trough:
-        """Where every ball is."""
-        return self.course.trough
+        """Trough, which knows where each ball is."""
+        return self.flow.trough
 
     @property
     def sheet(self) -> PlayerState:
-        """Of who plays."""
-        return self.course.sheet
+        """State of the present player."""
+        return self.flow.sheet
 
     @property
     def score(self) -> int:
-        """Of who plays; at the end, the best."""
-        return max(each.score for each in self.course.sheets) if self.course.phase == "over" else self.sheet.score
+        """Score of the present player; after the game, the best score."""
+        return max(each.score for each in self.flow.sheets) if self.flow.phase == "over" else self.sheet.score
 
     @property
     def game_over(self) -> str | None:
-        """Why the game is over; None while it goes on."""
-        if self.course.phase != "over":
+        """Reason why the game is over; None while it runs."""
+        if self.flow.phase != "over":
             return None
-        return "game over" if self.course.balls_left else "game over: no ball left on the table"
+        return "game over" if self.flow.balls_left else "game over: no ball left on the table"
 
     def on_input(self, control: str, value: float) -> Sequence[Action]:
-        """Do what a player asks for; a tilted table obeys nobody, but lets go, and its plunger is only a rod.
+        """Return the actions of an input. While tilted, flippers only fall, nudges do nothing, and the plunger works.
 
         Raises:
             KeyError: there is no such control.
         """
-        now, alive = self._now, self.course.alive
+        now, alive = self._now, self.flow.alive
         if now is None:
             return ()
         if control in FLIPPERS:
-            return self._flipped(FLIPPERS[control], value > 0.0 and alive, now)
+            return self._set_flippers(FLIPPERS[control], value > 0.0 and alive, now)
         if control == PLUNGER:
-            return self._settled(self._plunged(value if self.course.phase == "play" else 0.0, now), now)
+            return self._apply(self._set_plunger(value if self.flow.phase == "play" else 0.0, now), now)
         direction = NUDGES[control] * complex(*self.board.up)
-        return self._settled(self.nudge.jolt(direction, value, now), now) if alive and value > 0.0 else ()
+        return self._apply(self.nudge.jolt(direction, value, now), now) if alive and value > 0.0 else ()
 
     def on_step(self, info: StepInfo) -> Sequence[Action]:
-        """See what happened in a step."""
+        """Run the devices on a step, and return their actions."""
         now = self._now = StepContext(info.time, info.frame, self.sheet)
-        actions = self._settled(self._happens(info, now), now)
-        self._refresh(now)
+        actions = self._apply(self._step(info, now), now)
+        self._update_context(now)
         return actions
 
     def display_lines(self) -> Sequence[tuple[str, str]]:
-        """Return the score panel."""
-        course, time = self.course, 0.0 if self._now is None else self._now.time
+        """Return the lines of the score panel."""
+        flow, time = self.flow, 0.0 if self._now is None else self._now.time
         message, until = self.said
         if self.nudge.tilted:
-            message, until = "TILT!", time + SAID
-        return display_lines(course.sheets, course.turn, self.modes, self._saved(time), message if time < until else "")
+            message, until = "TILT!", time + MESSAGE_TIME
+        return display_lines(flow.sheets, flow.turn, self.modes, self._saved(time), message if time < until else "")
 
     def observation(self) -> Sequence[tuple[str, float]]:
-        """Return what the panel and the lamps of lanes and targets show, as numbers."""
+        """Return the state that panel and lamps show, as numbers."""
         saved = self._saved(0.0 if self._now is None else self._now.time)
-        return list(observation(self.course, self.modes, self.multiball, self.lamps, self.banks, max(saved, 0.0)))
+        return list(observation(self.flow, self.modes, self.multiball, self.lamps, self.banks, max(saved, 0.0)))
 
     def lit_lamps(self) -> frozenset[str]:
-        """Return whose lamps are lit; a tilted table is dark."""
+        """Return the names of the parts whose lamps are lit; a tilted table is dark."""
         now = self._now
         if now is None or self.nudge.tilted:
             return frozenset()
-        lights = [light for machine in self._lamped for light in machine.lights(now)]
+        lights = [light for device in self._lamped for light in device.lights(now)]
         if not lights:
             return frozenset()
         blinking = {light.name for light in lights if light.blinks}
-        on = blinking if now.time % BLINK < 0.5 * BLINK else set[str]()
+        on = blinking if now.time % BLINK_PERIOD < 0.5 * BLINK_PERIOD else set[str]()
         return frozenset(on | {light.name for light in lights} - blinking)
 
     def sounds(self) -> Sequence[str]:
@@ -250,56 +243,56 @@ class Pinball:
         return cues
 
     def _saved(self, time: float) -> float:
-        """Return for how long drained balls come back, from a time on, s; 0 or less for none."""
-        return 0.0 if self.course.fresh else self.course.saved - time
+        """Return the remaining ball save at a time, s; 0 or less for none."""
+        return 0.0 if self.flow.fresh else self.flow.saved - time
 
-    def _refresh(self, now: StepContext) -> None:
-        """Bring up to date what others than the engine change."""
+    def _update_context(self, now: StepContext) -> None:
+        """Update the context by the state of trough and kickers."""
         trough = self.trough
         now.sheet, now.live, now.waiting = self.sheet, tuple(trough.live), len(trough.queue)
         now.loose = tuple(ball for ball in trough.live if ball not in self.holes.held and not trough.in_lane(ball, now))
         now.up = frozenset(self.up)
 
-    def _happens(self, info: StepInfo, now: StepContext) -> Iterator[Effect]:
-        """Yield what a step has brought, each effect after those before it were carried out."""
-        self._refresh(now)
+    def _step(self, info: StepInfo, now: StepContext) -> Iterator[Effect]:
+        """Yield the effects of a step; each is applied before the next is computed."""
+        self._update_context(now)
         for hit in self.switches.read(info):
             if hit.ball in now.live:
                 yield from self._hit(hit, now)
-        yield from self.course.missed(now)
-        self._refresh(now)
+        yield from self.flow.recover_balls(now)
+        self._update_context(now)
         tilted = self.nudge.tilted
-        for machine in self._ticking:
-            yield from machine.tick(now)
+        for device in self._ticking:
+            yield from device.tick(now)
         if self.nudge.tilted and not tilted:
-            self.course.save(0.0)
+            self.flow.save(0.0)
             for side in sorted(self.up):
-                yield from self._flipped(side, False, now)
+                yield from self._set_flippers(side, False, now)
         yield from self.trough.tick(now)
-        yield from self.course.went_on(now)
+        yield from self.flow.update(now)
 
     def _hit(self, hit: Hit, now: StepContext) -> Iterator[Effect]:
-        if hit.ball not in self.trough.live:  # an earlier hit of this step has taken it
+        if hit.ball not in self.trough.live:  # an earlier hit of this step removed it
             return
-        self.course.touched = True
+        self.flow.touched = True
         if hit.element.role == "drain":
-            yield from self.course.drained(hit.ball, now)
+            yield from self.flow.on_drain(hit.ball, now)
             return
-        for machine in self.machines:
-            yield from machine.hit(hit, now)
+        for device in self.devices:
+            yield from device.on_hit(hit, now)
 
-    def _flipped(self, side: str, up: bool, now: StepContext) -> list[Action]:
-        """Raise the flippers of a side, or let them go."""
+    def _set_flippers(self, side: str, up: bool, now: StepContext) -> list[Action]:
+        """Raise or release the flippers of a side."""
         if up and side not in self.up:
             self._cues.append("flipper")
             for lamps in self.lamps:
                 lamps.rotate(side)
         (self.up.add if up else self.up.discard)(side)
-        self._refresh(now)
+        self._update_context(now)
         return [Drive(time=now.time, drive=each.name, level=float(up)) for each in self.board.flippers(side)]
 
-    def _plunged(self, value: float, now: StepContext) -> Iterator[Effect]:
-        """Pull the plunger, or let it go; a table without one launches the ball when it is let go."""
+    def _set_plunger(self, value: float, now: StepContext) -> Iterator[Effect]:
+        """Pull or release the plunger; a table without one launches the ball on release."""
         plungers = self.board.of_role("plunger")
         if plungers:
             yield from (Drive(time=now.time, drive=each.name, level=value) for each in plungers)
@@ -308,36 +301,36 @@ class Pinball:
                 if self.trough.in_lane(ball, now):
                     yield from self.trough.launched(ball, now)
 
-    def _settled(self, effects: Iterable[Effect], now: StepContext) -> list[Action]:
-        """Carry out effects, in order, and what machines make of them; return the actions among them."""
+    def _apply(self, effects: Iterable[Effect], now: StepContext) -> list[Action]:
+        """Apply effects in order, and the effects that follow from them; return the actions among them."""
         actions: list[Action] = []
         for effect in effects:
             match effect:
                 case Award():
-                    actions += self._settled(self._awarded(effect, now), now)
+                    actions += self._apply(self._award(effect, now), now)
                 case PlaySound():
                     self._cues.append(effect.name)
                 case ShowMessage():
-                    self.said = (effect.text, now.time + SAID)
+                    self.said = (effect.text, now.time + MESSAGE_TIME)
                 case RemoveBall():
-                    actions += self._settled(self.course.take(effect.ball, now), now)
+                    actions += self._apply(self.flow.remove_ball(effect.ball, now), now)
                 case ServeBalls():
                     for _ in range(effect.balls):
                         self.trough.serve(alone=True)
                 case BallSave():
-                    self.course.save(now.time + effect.seconds)
+                    self.flow.save(now.time + effect.seconds)
                 case ExtraBall():
-                    if self.course.again(effect.reason):
+                    if self.flow.award_extra_ball(effect.reason):
                         self._cues.append("extra ball")
-                        self.said = ("shoot again", now.time + SAID)
+                        self.said = ("shoot again", now.time + MESSAGE_TIME)
                 case _:
                     actions.append(effect)
         return actions
 
-    def _awarded(self, award: Award, now: StepContext) -> Iterator[Effect]:
-        """Score, unless the table is tilted, and let every machine hear of it."""
+    def _award(self, award: Award, now: StepContext) -> Iterator[Effect]:
+        """Add an award to the score, and notify every device; nothing happens if the table is tilted."""
         if self.nudge.tilted:
             return
-        yield from self.course.scored(award.points, award.bonus)
-        for machine in self.machines:
-            yield from machine.heard(award, now)
+        yield from self.flow.add_points(award.points, award.bonus)
+        for device in self.devices:
+            yield from device.on_award(award, now)

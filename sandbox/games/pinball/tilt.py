@@ -1,7 +1,4 @@
-"""Nudge: the table is jolted, its balls lag behind, and a bob tells when it was too much.
-
-Bob: the pendulum that tells how hard a table was pushed.
-"""
+"""Nudging and tilt: jolts of the table accelerate its balls; a pendulum in a ring, the tilt bob, detects excess."""
 
 import cmath
 import math
@@ -12,26 +9,26 @@ from sandbox.action import Force
 from sandbox.games.pinball.events import Device, Effect, PlaySound, ShowMessage, StepContext
 from sandbox.games.pinball.playfield import Playfield
 
-LENGTH = 0.10
-"""m"""
+BOB_LENGTH = 0.10
+"""m, length of the pendulum"""
 
 TRIP = math.radians(1.0)
-"""rad from the plumb, where the ring is"""
+"""rad from the vertical, position of the ring"""
 
 DAMPING = 0.05
-"""of critical: a free swing has lost nine tenths after seven periods"""
+"""damping ratio: a free swing loses nine tenths of its amplitude in seven periods"""
 
-BOUNCE = 0.3
-"""of its speed is left to a bob that has struck the ring"""
+BOB_RESTITUTION = 0.3
+"""restitution of the bob at the ring"""
 
 GRAVITY = 9.81
 """m/s²"""
 
 SUBSTEP = 1e-3
-"""s, between looks at the ring: at the greatest speed of a nudge, 1.25 rad/s, the bob is seen .07° too late at most"""
+"""s between tests of the ring: at the largest speed of a nudge, 1.25 rad/s, the bob overshoots by at most 0.07°"""
 
 REST_SPEED = 1e-5
-"""rad, and as much speed over ω: a bob that swings less is at rest"""
+"""rad, for the angle and the speed over ω, below which the bob is at rest"""
 
 
 class TiltBob:
@@ -43,20 +40,20 @@ class TiltBob:
     """
 
     def __init__(self, damping: float = DAMPING, trip: float = TRIP) -> None:
-        """Hang it at rest; a trip of inf is no ring."""
+        """Create a bob at rest; `trip=inf` removes the ring."""
         self.damping, self.trip = damping, trip
-        self.omega = math.sqrt(GRAVITY / LENGTH)
+        self.omega = math.sqrt(GRAVITY / BOB_LENGTH)
         self.angle = 0j
         self.rate = 0j
         """rad/s"""
 
     @property
     def still(self) -> bool:
-        """Whether nothing moves, so that time need not pass."""
+        """Whether the bob is at rest, so that it need not be stepped."""
         return abs(self.angle) < REST_SPEED and abs(self.rate) < REST_SPEED * self.omega
 
     def swing(self, seconds: float, acceleration: complex) -> int:
-        """Let time pass under a constant acceleration of the table, m/s²; return how often the bob struck the ring."""
+        """Step under a constant acceleration of the table, m/s²; return the number of strikes on the ring."""
         struck, parts = 0, max(1, math.ceil(seconds / SUBSTEP - 1e-9))
         for _ in range(parts):
             self._step(seconds / parts, acceleration)
@@ -66,7 +63,7 @@ class TiltBob:
             way = (self.rate * out.conjugate()).real
             self.angle = self.trip * out
             if way > 0.0:
-                self.rate -= (1.0 + BOUNCE) * way * out
+                self.rate -= (1.0 + BOB_RESTITUTION) * way * out
                 struck += 1
         return struck
 
@@ -82,56 +79,56 @@ class TiltBob:
 
 
 JOLT = 0.5 * GRAVITY
-"""m/s², of the table. Source, as of the time: Visual Pinball's nudge of a key"""
+"""m/s², acceleration of the table. Source, as of the duration: the keyboard nudge of Visual Pinball"""
 
-SECONDS = 0.025
-"""of a jolt: a free ball gains .123 m/s"""
+JOLT_TIME = 0.025
+"""s, duration of a jolt: a free ball gains 0.123 m/s"""
 
-AGAIN = 0.3
-"""s, in which the bob's further strokes on the ring are of the same push"""
+SAME_PUSH_TIME = 0.3
+"""s in which further strikes on the ring count as the same push"""
 
 WARNINGS = 2
-"""of a ball; the next stroke is a tilt"""
+"""warnings per ball; the next strike is a tilt"""
 
-_AWAKE = 1e-12  # s, of rounding in the ends of jolts
+_TIME_ROUNDING = 1e-12  # s, rounding error of the ends of jolts
 
 
 class NudgeAndTilt(Device):
     """Jolts and the tilt.
 
-    In the table's frame a jolt is an inertial force on what can move. That force is laid on each loose ball by itself:
-    a change of `world.gravity` would have the whole scene checked anew, four times a jolt, and would not reach a ball
-    in a zone with a gravity of its own. A jolt need not be a multiple of the step: the force in a step is the mean.
+    In the frame of the table a jolt is an inertial force on movable bodies. It is applied to each loose ball: changing
+    `world.gravity` would validate the scene four times per jolt, and not affect balls in a zone with its own gravity.
+    A jolt need not be a multiple of the step: the force of a step is the mean.
     """
 
     def __init__(self, board: Playfield) -> None:
         self.board = board
         self.jolts: list[tuple[float, complex]] = []
-        """when each began, s, and how its balls are accelerated, m/s²"""
+        """start, s, and acceleration of the balls, m/s², of each jolt"""
         self.pushed: dict[int, complex] = {}
-        """ball → acceleration that acts on it now, m/s²"""
+        """ball → its present acceleration, m/s²"""
         self.bob = TiltBob()
         self.time = 0.0
-        """until which the bob has swung, s"""
+        """s, time up to which the bob has been stepped"""
         self.quiet = 0.0
-        """until then strokes are of the last push, s"""
+        """s, time until which strikes count as the last push"""
         self.warnings = 0
         self.tilted = False
 
     def jolt(self, direction: complex, strength: float, now: StepContext) -> Iterator[Effect]:
-        """Jolt the table from now on, so that its balls go in a direction, of length 1, with a strength from 0 to 1."""
+        """Start a jolt that accelerates the balls in a direction, of length 1, with a strength from 0 to 1."""
         self.jolts.append((now.time, direction * strength * JOLT))
         yield PlaySound("nudge")
-        yield from self._pushes(now)
+        yield from self._forces(now)
 
     def tick(self, now: StepContext) -> Iterator[Effect]:
-        """Swing the bob until now; push the balls from now on."""
-        struck = self._swung(now.time)
-        self.jolts = [(began, a) for began, a in self.jolts if began + SECONDS > now.time + _AWAKE]
-        yield from self._pushes(now)
-        if not struck or self.tilted or now.time < self.quiet or not now.loose:  # a ball that waits gains nothing
+        """Step the bob up to now, and set the forces on the balls."""
+        struck = self._step_bob(now.time)
+        self.jolts = [(began, a) for began, a in self.jolts if began + JOLT_TIME > now.time + _TIME_ROUNDING]
+        yield from self._forces(now)
+        if not struck or self.tilted or now.time < self.quiet or not now.loose:
             return
-        self.quiet = now.time + AGAIN
+        self.quiet = now.time + SAME_PUSH_TIME
         self.warnings += 1
         if self.warnings <= WARNINGS:
             yield PlaySound("warning")
@@ -141,29 +138,29 @@ class NudgeAndTilt(Device):
             yield PlaySound("tilt")
             yield ShowMessage("tilt")
 
-    def begin(self, now: StepContext) -> Iterator[Effect]:
-        """Forgive, and let the bob hang still."""
+    def start_ball(self, now: StepContext) -> Iterator[Effect]:
+        """Reset warnings, tilt and bob."""
         self.warnings, self.tilted, self.bob = 0, False, TiltBob()
         return iter(())
 
-    def _swung(self, until: float) -> int:
-        """Swing the bob from edge to edge of the jolts; return how often it struck the ring."""
+    def _step_bob(self, until: float) -> int:
+        """Step the bob between the starts and ends of jolts; return the number of strikes on the ring."""
         began, self.time = self.time, until
         if not self.jolts and self.bob.still:
             return 0
-        edges = {edge for start, _ in self.jolts for edge in (start, start + SECONDS) if began < edge < until}
+        edges = {edge for start, _ in self.jolts for edge in (start, start + JOLT_TIME) if began < edge < until}
         times = [began, *sorted(edges), until]
-        # The balls lag behind: the table itself goes the other way.
-        return sum(self.bob.swing(b - a, -self._mean(a, b)) for a, b in pairwise(times) if b > a)
+        # The table moves opposite to the balls.
+        return sum(self.bob.swing(b - a, -self._mean_acceleration(a, b)) for a, b in pairwise(times) if b > a)
 
-    def _mean(self, begin: float, end: float) -> complex:
-        """Return how balls are accelerated between two times, on average, m/s²."""
-        parts = ((min(start + SECONDS, end) - max(start, begin), a) for start, a in self.jolts)
+    def _mean_acceleration(self, begin: float, end: float) -> complex:
+        """Return the mean acceleration of the balls between two times, m/s²."""
+        parts = ((min(start + JOLT_TIME, end) - max(start, begin), a) for start, a in self.jolts)
         return sum((max(overlap, 0.0) * a for overlap, a in parts), 0j) / (end - begin)
 
-    def _pushes(self, now: StepContext) -> Iterator[Effect]:
-        """Yield the forces that differ from those that act."""
-        wanted = self._mean(now.time, now.time + self.board.dt) if self.jolts else 0j
+    def _forces(self, now: StepContext) -> Iterator[Effect]:
+        """Yield the forces that change."""
+        wanted = self._mean_acceleration(now.time, now.time + self.board.dt) if self.jolts else 0j
         for ball in sorted({*self.pushed, *now.loose}) if wanted or self.pushed else ():
             push = wanted if ball in now.loose else 0j
             if push == self.pushed.get(ball, 0j):

@@ -7,9 +7,9 @@ import pytest
 from pinball_by_hand import OPEN, SERVE, Table, drives, moves, table, thrown
 
 from sandbox.action import Move
-from sandbox.games.pinball.game_flow import COUNT, SAVED
+from sandbox.games.pinball.game_flow import BALL_SAVE_TIME, BONUS_TIME
 
-WAIT = COUNT + 0.05
+WAIT = BONUS_TIME + 0.05
 """s, until the next ball is there"""
 
 
@@ -47,7 +47,7 @@ def test_table_without_plunger_launches_when_the_control_is_let_go() -> None:
     assert thrown(launch, (0.0, 3.0))
 
 
-@pytest.mark.parametrize(("after", "saved"), [(SAVED - 0.5, True), (SAVED + 0.5, False)])
+@pytest.mark.parametrize(("after", "saved"), [(BALL_SAVE_TIME - 0.5, True), (BALL_SAVE_TIME + 0.5, False)])
 def test_ball_that_drains_soon_after_the_launch_comes_back_by_itself(after: float, saved: bool) -> None:
     game = Table(table())
     game.wait(20.0)  # in the lane: the save does not run yet
@@ -69,7 +69,7 @@ def test_save_begins_anew_with_a_shot_that_fell_back() -> None:
     game.put(0, SERVE)
     game.wait(20.0)
     game.put(0, OPEN)
-    game.wait(SAVED - 0.5)
+    game.wait(BALL_SAVE_TIME - 0.5)
     game.look(("drain", 0.0))
     assert "save" in game.cues
 
@@ -78,7 +78,7 @@ def test_saved_ball_is_not_saved_for_longer() -> None:
     game = Table(table())
     game.wait(0.02)
     game.put(0, OPEN)
-    game.wait(SAVED - 1.0)
+    game.wait(BALL_SAVE_TIME - 1.0)
     game.look(("drain", 0.0))
     game.wait(1.5)
     ball = next_ball(game)
@@ -95,7 +95,7 @@ def test_bonus_counts_at_the_end_as_often_as_lanes_say() -> None:
     before, sheet = game.game.score, game.game.sheet
     assert (sheet.bonus, sheet.times) == (3 * 100 + 2_000 + 200, 2)
     game.look(("drain", 0.0))
-    game.wait(COUNT - 0.1)
+    game.wait(BONUS_TIME - 0.1)
     assert game.game.score == before
     game.wait(0.15)
     assert game.game.score == before + 2 * 2_500
@@ -145,7 +145,7 @@ def test_players_play_in_turn_with_scores_of_their_own() -> None:
     assert seen[:4] == [("1 of 3", "1 of 3"), ("2 of 3", "1 of 3"), ("3 of 3", "1 of 3"), ("1 of 3", "2 of 3")]
     bonus = [100 * (1 + 4 + 7), 100 * (2 + 5 + 8), 100 * (3 + 6 + 9)]
     scores = [7_000 * (1 + 4 + 7), 7_000 * (2 + 5 + 8), 7_000 * (3 + 6 + 9)]
-    assert [each.score for each in game.game.course.sheets] == [a + b for a, b in zip(scores, bonus, strict=True)]
+    assert [each.score for each in game.game.flow.sheets] == [a + b for a, b in zip(scores, bonus, strict=True)]
     assert game.game.game_over
     assert game.game.score == scores[2] + bonus[2]  # the best
 

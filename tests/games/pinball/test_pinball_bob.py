@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from sandbox.games.pinball.tilt import DAMPING, GRAVITY, JOLT, LENGTH, SECONDS, TRIP, TiltBob
+from sandbox.games.pinball.tilt import BOB_LENGTH, DAMPING, GRAVITY, JOLT, JOLT_TIME, TRIP, TiltBob
 
-OMEGA = math.sqrt(GRAVITY / LENGTH)
+OMEGA = math.sqrt(GRAVITY / BOB_LENGTH)
 PERIOD = 2.0 * math.pi / OMEGA
 
 
@@ -34,47 +34,47 @@ def test_push_leaves_the_amplitude_of_the_closed_form(push: float, seconds: floa
 
 def test_swing_is_that_of_an_integrator() -> None:
     bob = TiltBob(DAMPING, math.inf)
-    bob.swing(SECONDS, complex(3.0, -2.0))
+    bob.swing(JOLT_TIME, complex(3.0, -2.0))
     bob.swing(0.3, 0j)
     for axis, push in (("real", 3.0), ("imag", -2.0)):
 
         def rates(t: float, y: np.ndarray, push: float = push) -> list[float]:
-            drive = push if t < SECONDS else 0.0
-            return [y[1], -(OMEGA**2) * y[0] - 2.0 * DAMPING * OMEGA * y[1] - drive / LENGTH]
+            drive = push if t < JOLT_TIME else 0.0
+            return [y[1], -(OMEGA**2) * y[0] - 2.0 * DAMPING * OMEGA * y[1] - drive / BOB_LENGTH]
 
-        pushed = solve_ivp(rates, (0.0, SECONDS), [0.0, 0.0], rtol=1e-11, atol=1e-13, max_step=SECONDS / 10)
+        pushed = solve_ivp(rates, (0.0, JOLT_TIME), [0.0, 0.0], rtol=1e-11, atol=1e-13, max_step=JOLT_TIME / 10)
         end = solve_ivp(
-            lambda t, y: rates(SECONDS, y), (0.0, 0.3), pushed.y[:, -1], rtol=1e-11, atol=1e-13
+            lambda t, y: rates(JOLT_TIME, y), (0.0, 0.3), pushed.y[:, -1], rtol=1e-11, atol=1e-13
         )  # fmt: skip
         assert getattr(bob.angle, axis) == pytest.approx(end.y[0, -1], abs=1e-7)  # of the integrator: its edge at 25 ms
 
 
 def test_one_whole_nudge_would_swing_it_by_seven_degrees_and_strikes_the_ring_as_it_ends() -> None:
     bob = free()
-    bob.swing(SECONDS, JOLT)
+    bob.swing(JOLT_TIME, JOLT)
     assert math.degrees(amplitude(bob)) == pytest.approx(7.08, abs=0.01)  # rounding of the figure
     assert math.degrees(abs(bob.angle)) == pytest.approx(0.874, abs=0.001)  # rounding of the figure
     ringed = TiltBob(0.0)
-    assert ringed.swing(SECONDS, JOLT) == 0
+    assert ringed.swing(JOLT_TIME, JOLT) == 0
     assert ringed.swing(0.005, 0j) == 1
 
 
 def test_least_push_that_trips_is_a_seventh_of_a_nudge() -> None:
-    least = TRIP * GRAVITY / (2.0 * math.sin(OMEGA * SECONDS / 2.0))
+    least = TRIP * GRAVITY / (2.0 * math.sin(OMEGA * JOLT_TIME / 2.0))
     assert least / JOLT == pytest.approx(0.1413, abs=1e-4)  # rounding of the figure
     for share, strokes in ((0.995, 0), (1.005, 1)):  # the ring is looked at every 1 ms, the swing is flat at its top
         bob = TiltBob(0.0)
-        bob.swing(SECONDS, share * least)
+        bob.swing(JOLT_TIME, share * least)
         assert bob.swing(PERIOD / 2.0, 0j) == strokes
 
 
 @pytest.mark.parametrize(("later", "trips"), [(PERIOD, True), (PERIOD / 2.0, False)])
 def test_two_small_pushes_trip_in_phase_alone(later: float, trips: bool) -> None:
-    small = 0.6 * TRIP * GRAVITY / (2.0 * math.sin(OMEGA * SECONDS / 2.0))
+    small = 0.6 * TRIP * GRAVITY / (2.0 * math.sin(OMEGA * JOLT_TIME / 2.0))
     bob = TiltBob(0.0)
-    struck = bob.swing(SECONDS, small) + bob.swing(later - SECONDS, 0j)
+    struck = bob.swing(JOLT_TIME, small) + bob.swing(later - JOLT_TIME, 0j)
     assert struck == 0
-    struck = bob.swing(SECONDS, small) + bob.swing(PERIOD, 0j)
+    struck = bob.swing(JOLT_TIME, small) + bob.swing(PERIOD, 0j)
     assert (struck > 0) is trips
 
 
@@ -88,7 +88,7 @@ def test_bob_never_leaves_the_ring(push: complex, seconds: float) -> None:
 
 def test_bob_comes_to_rest() -> None:
     bob = TiltBob()
-    bob.swing(SECONDS, JOLT)
+    bob.swing(JOLT_TIME, JOLT)
     assert not bob.still
     bob.swing(15.0 * PERIOD, 0j)  # e^(−2π·.05·15) = .9 %, of at most the .017 rad of the ring
     assert abs(bob.angle) < 0.01 * TRIP

@@ -8,7 +8,7 @@ from pinball_by_hand import DT, OPEN, Table, table
 from sandbox.games.contract import HasLamps
 from sandbox.games.pinball.devices import FLASH
 from sandbox.games.pinball.drop_targets import FALL
-from sandbox.games.pinball.rules import BLINK
+from sandbox.games.pinball.rules import BLINK_PERIOD
 
 
 @pytest.fixture
@@ -21,7 +21,7 @@ def played() -> Table:
     return each
 
 
-def seen(played: Table, seconds: float = BLINK) -> list[frozenset[str]]:
+def seen(played: Table, seconds: float = BLINK_PERIOD) -> list[frozenset[str]]:
     """Return what is lit at every step of a time."""
     found = []
     for _ in range(round(seconds / DT)):

@@ -5,7 +5,7 @@ import pytest
 from pinball_by_hand import MASS, OPEN, SERVE, Table, drives, moves, table
 
 from sandbox.action import Action, Force, Impulse
-from sandbox.games.pinball.tilt import AGAIN, GRAVITY, JOLT, SECONDS, TiltBob
+from sandbox.games.pinball.tilt import GRAVITY, JOLT, JOLT_TIME, SAME_PUSH_TIME, TiltBob
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ DIRECTIONS = {"nudge": (0.0, 1.0), "nudge left": (-1.0, 0.0), "nudge right": (1.
 @pytest.mark.parametrize("strength", [1.0, 0.3])
 def test_nudge_gives_a_ball_half_g_for_25_ms(played: Table, control: str, strength: float) -> None:
     actions = played.press(control, strength) + played.wait(0.1)
-    expected = strength * 0.5 * GRAVITY * SECONDS * np.asarray(DIRECTIONS[control])
+    expected = strength * 0.5 * GRAVITY * JOLT_TIME * np.asarray(DIRECTIONS[control])
     # Though 25 ms are two steps and a half; rounding of times near 8 s against 25 ms.
     np.testing.assert_allclose(given(actions), expected, atol=1e-12)
 
@@ -75,7 +75,7 @@ def test_light_nudges_cost_nothing(played: Table) -> None:
 
 def test_strokes_of_one_push_count_once(played: Table) -> None:
     played.press("nudge")
-    played.wait(AGAIN)
+    played.wait(SAME_PUSH_TIME)
     assert played.cues.count("warning") == 1
 
 
@@ -120,8 +120,8 @@ def test_bob_is_driven_as_hard_as_the_balls(played: Table) -> None:
     played.wait(0.04)
     # In looks of 10 ms, though the push is over in the middle of one; the table itself goes to the left.
     expected = TiltBob(trip=np.inf)
-    expected.swing(SECONDS, -JOLT)
-    expected.swing(0.04 - SECONDS, 0j)
+    expected.swing(JOLT_TIME, -JOLT)
+    expected.swing(0.04 - JOLT_TIME, 0j)
     assert played.game.nudge.bob.angle == pytest.approx(expected.angle, rel=1e-9)  # times near 8 s, rounded
 
 
