@@ -1,8 +1,8 @@
 """Rules of curling: a match on a scene with sixteen stones on ice.
 
 The scene has a [surface] of pucks, the stones `red-1` to `red-8` and `yellow-1` to `yellow-8`, and a body `broom`
-without collisions. The broom is on the tee line and is the aim of the delivery. A stone curls away from the line of aim, so
-the broom is placed beside the target.
+without collisions. The broom is on the tee line and is the aim of the delivery. A stone curls away from the line of
+aim, so the broom is placed beside the target.
 
 Not modelled: touched stones, time clocks, and the measurement of nearly equal distances.
 
