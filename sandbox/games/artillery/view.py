@@ -32,7 +32,7 @@ from sandbox.scene.description.game_tables import table_of
 from sandbox.scene.scene import Scene
 from sandbox.window.camera import Camera
 from sandbox.window.render.draw_context import DrawContext
-from sandbox.window.render.lines import Pixel, draw_arrow, draw_dashes, draw_line, fill_polygon
+from sandbox.window.render.lines import SDL_COORDINATE_LIMIT, Pixel, draw_arrow, draw_dashes, draw_line, fill_polygon
 from sandbox.window.render.palette import (
     BACKGROUND,
     FAINT,
@@ -49,9 +49,6 @@ from sandbox.window.render.palette import (
 )
 from sandbox.window.render.static_geometry import draw_static_bodies
 from sandbox.window.render.text import draw_text
-
-SDL_COORDINATE_LIMIT = 1e4
-"""px from a picture's corner, beyond which SDL is not asked"""
 
 
 def draw_dot(surface: pygame.Surface, at: Pixel, radius: float, colour: Colour, line: float = 0.0) -> None:

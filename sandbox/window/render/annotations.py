@@ -10,7 +10,7 @@ import pygame
 from sandbox.window.render.body_geometry import ScreenPose
 from sandbox.window.render.circles import CircleRenderer, CircleStyle
 from sandbox.window.render.draw_context import DrawContext
-from sandbox.window.render.lines import draw_line
+from sandbox.window.render.lines import SDL_COORDINATE_LIMIT, draw_line
 from sandbox.window.render.palette import BACKGROUND, FAINT, INK, WARNING, YELLOW
 from sandbox.window.render.polygons import PolygonRenderer
 from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
@@ -27,11 +27,11 @@ def draw_boxes(view: DrawContext, polygons: PolygonRenderer) -> None:
     lone = some.sight.bodies.round[some.shown]
     if not lone.all():
         for left, top, right, bottom in polygons.boxes(some)[~lone].tolist():
-            if max(abs(left), abs(top), abs(right), abs(bottom)) < 16_000.0:
+            if max(abs(left), abs(top), abs(right), abs(bottom)) < SDL_COORDINATE_LIMIT:
                 box = pygame.Rect(math.floor(left), math.floor(top), math.ceil(right - left), math.ceil(bottom - top))
                 pygame.draw.rect(view.surface, FAINT, box, max(1, round(view.unit)))
     for (x, y), radius in zip(some.centre[lone].tolist(), some.radius[lone].tolist(), strict=True):
-        if radius < 8000.0:
+        if 2.0 * radius < SDL_COORDINATE_LIMIT:
             side = math.ceil(2.0 * radius)
             box = pygame.Rect(math.floor(x - radius), math.floor(y - radius), side, side)
             pygame.draw.rect(view.surface, FAINT, box, max(1, round(view.unit)))
@@ -45,7 +45,7 @@ def draw_centres(view: DrawContext) -> None:
     half = mark.get_width() / 2.0
     quartered, dots = [], []
     for (x, y), radius in zip(some.centre.tolist(), some.radius.tolist(), strict=True):
-        if abs(x) > 30_000 or abs(y) > 30_000:
+        if abs(x) > SDL_COORDINATE_LIMIT or abs(y) > SDL_COORDINATE_LIMIT:
             continue
         if radius >= 1.6 * size:
             quartered.append((mark, (round(x - half), round(y - half))))
@@ -86,7 +86,7 @@ def draw_names(view: DrawContext, polygons: PolygonRenderer) -> None:
         name = name if len(name) <= 24 else name[:23] + "…"
         width, height = text_size(name, size)
         above = top - 3.0 * view.unit
-        if not (abs(x) < 30_000 and abs(above) < 30_000):
+        if not (abs(x) < SDL_COORDINATE_LIMIT and abs(above) < SDL_COORDINATE_LIMIT):
             continue
         place = pygame.Rect(round(x - width / 2), round(above - height), width, height)
         if place.top < 0 or radius > 3 * height:
@@ -121,7 +121,7 @@ def draw_flashes(view: DrawContext) -> None:
         share = flash.age / FLASH
         with np.errstate(invalid="ignore", over="ignore"):
             x, y = view.camera.to_screen(np.asarray(flash.position)).tolist()
-        if not (0.0 <= share < 1.0 and abs(x) < 30_000 and abs(y) < 30_000):
+        if not (0.0 <= share < 1.0 and abs(x) < SDL_COORDINATE_LIMIT and abs(y) < SDL_COORDINATE_LIMIT):
             continue
         radius = (8.0 + 40.0 * math.sqrt(share)) * view.unit
         look = ShapeStyle(None, WARNING, 3.0 * view.unit, opacity=1.0 - share, antialias=view.antialias)
@@ -156,7 +156,7 @@ def draw_pull(view: DrawContext, discs: CircleRenderer) -> None:
     with np.errstate(invalid="ignore", over="ignore"):
         (ax, ay), (bx, by) = view.camera.to_screen(np.asarray(view.sight.pull)).tolist()
         length = math.hypot(bx - ax, by - ay)
-    if not length < 30_000.0 or not (abs(ax) < 30_000.0 and abs(ay) < 30_000.0):
+    if not length < SDL_COORDINATE_LIMIT or not (abs(ax) < SDL_COORDINATE_LIMIT and abs(ay) < SDL_COORDINATE_LIMIT):
         return
     unit = view.unit
     if length > 30.0 * unit:

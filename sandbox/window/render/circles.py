@@ -7,7 +7,7 @@ import numpy as np
 import pygame
 
 from sandbox.arrays import FloatArray, IntArray
-from sandbox.window.render.lines import draw_line
+from sandbox.window.render.lines import SDL_COORDINATE_LIMIT, draw_line
 from sandbox.window.render.palette import BACKGROUND, Colour, ColourArray
 from sandbox.window.render.particles import packed_pixels
 from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf, sdf_surface, shade_sdf
@@ -129,7 +129,7 @@ def _paint(
 ) -> None:
     """Draw a disc that is too large for a sprite."""
     area = surface.get_clip()
-    if plain and radius < 16_000.0:
+    if plain and radius < SDL_COORDINATE_LIMIT:
         pygame.draw.circle(surface, colour, (round(x), round(y)), round(radius), 2 if style.hollow else 0)
         return
     low = max(x - radius - 1.0, -1.0), max(y - radius - 1.0, -1.0)

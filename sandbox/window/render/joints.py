@@ -24,7 +24,7 @@ from sandbox.scene.description.forces import PlungerDrive
 from sandbox.window.render.body_geometry import clipped_box
 from sandbox.window.render.circles import CircleRenderer, CircleStyle
 from sandbox.window.render.draw_context import DrawContext
-from sandbox.window.render.lines import Pixel, draw_arrow, draw_dashes, draw_line, draw_thin_lines
+from sandbox.window.render.lines import SDL_COORDINATE_LIMIT, Pixel, draw_arrow, draw_dashes, draw_line, draw_thin_lines
 from sandbox.window.render.palette import (
     BACKGROUND,
     GREEN,
@@ -290,7 +290,7 @@ def _grooves(view: DrawContext, grooves: JointSegments) -> None:
     half = 5.0 * view.unit
     for (ax, ay, *_), (bx, by) in zip(grooves.ends.tolist(), far.tolist(), strict=True):
         length = math.hypot(bx - ax, by - ay)
-        if not 0.0 < length < 30_000.0 or max(abs(ax), abs(ay)) > 30_000.0:
+        if not 0.0 < length < SDL_COORDINATE_LIMIT or max(abs(ax), abs(ay)) > SDL_COORDINATE_LIMIT:
             continue
         ux, uy = (bx - ax) / length, (by - ay) / length
         for side in (-half, half):
@@ -354,7 +354,7 @@ def _dials(view: DrawContext, joints: JointSegments) -> list[AngleDial]:
         x, y = view.camera.to_screen(place).tolist()
         base = 0.0 if a < 0 else float(frame.angle[a])
         turned = float(frame.angle[b]) - base
-        if max(abs(x), abs(y)) < 30_000.0 and math.isfinite(base) and math.isfinite(turned):
+        if max(abs(x), abs(y)) < SDL_COORDINATE_LIMIT and math.isfinite(base) and math.isfinite(turned):
             room = float(bodies.core[b]) * view.camera.scale
             size = min(max(0.6 * room, SMALL_SYMBOL * view.unit), LARGE_SYMBOL * view.unit)
             found.append(AngleDial((x, y), size, base, turned, (figures[0], figures[1], figures[2])))

@@ -13,6 +13,9 @@ from sandbox.arrays import BoolArray, FloatArray
 from sandbox.window.render.palette import Colour
 from sandbox.window.render.particles import Packed, flat_pixels, is_flat
 
+SDL_COORDINATE_LIMIT = 16_000.0
+"""px, the largest coordinate or length that is passed to SDL: it counts in 32 bits, and its polygons in 16"""
+
 Pixel = tuple[float, float]
 """A place in a picture, px from its upper left corner; a pixel's middle lies at a half."""
 

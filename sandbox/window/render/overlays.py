@@ -25,7 +25,7 @@ from sandbox.window.render.annotations import (
 from sandbox.window.render.circles import CircleRenderer
 from sandbox.window.render.draw_context import DrawContext
 from sandbox.window.render.joints import draw_hinges, draw_joint_symbols, draw_joints, draw_stops, joint_segments
-from sandbox.window.render.lines import draw_line
+from sandbox.window.render.lines import SDL_COORDINATE_LIMIT, draw_line
 from sandbox.window.render.palette import BACKGROUND, FAINT, INK, ORANGE, YELLOW, Colour, ColourArray, mix_colours
 from sandbox.window.render.particles import ParticleRenderer, packed_pixels
 from sandbox.window.render.polygons import PolygonRenderer
@@ -53,7 +53,7 @@ def draw_flames(view: DrawContext) -> None:
         out = way[0] * cosine - way[1] * sine, way[0] * sine + way[1] * cosine
         begin, end = camera.to_screen(np.array((root, (root[0] + out[0], root[1] + out[1])))).tolist()
         along = end[0] - begin[0], end[1] - begin[1]
-        if math.hypot(*along) >= MIN_FLAME and max(map(abs, (*begin, *end))) < 30_000.0:
+        if math.hypot(*along) >= MIN_FLAME and max(map(abs, (*begin, *end))) < SDL_COORDINATE_LIMIT:
             _tongue(view, begin, along, 1.0, ORANGE)
             _tongue(view, begin, along, INNER, YELLOW)
 
@@ -202,7 +202,8 @@ class OverlayRenderer:
             seen = seen[np.linspace(0, len(seen) - 1, MAX_GHOSTS).astype(np.intp)]
         if not len(seen):
             return
-        centre, own = camera.to_screen(place[seen]), camera.to_screen(frame.position[seen])
+        with np.errstate(invalid="ignore", over="ignore"):  # the body itself may be anywhere
+            centre, own = camera.to_screen(place[seen]), camera.to_screen(frame.position[seen])
         tint = np.broadcast_to(np.asarray(INK, np.uint8), (len(seen), 3))
         style = view.style(1.5)._replace(hollow=True)
         size, bodies = radius[seen] * camera.scale, view.sight.bodies

@@ -16,15 +16,13 @@ from sandbox.window.hit_test import Hull, rounded_hull
 from sandbox.window.render.body_geometry import SEAM, BodyGeometry, ScreenPose, clipped_box
 from sandbox.window.render.circles import DARK, CircleStyle, darken
 from sandbox.window.render.draw_context import DrawContext
-from sandbox.window.render.lines import Pixel, clip_polygon, fill_polygon
+from sandbox.window.render.lines import SDL_COORDINATE_LIMIT, Pixel, clip_polygon, fill_polygon
 from sandbox.window.render.palette import BACKGROUND, Colour, ColourArray
 from sandbox.window.render.particles import flat_pixels, is_flat, packed_pixels
 from sandbox.window.render.sdf import ShapeStyle, draw_sdf
 
 FEW_POLYGONS = 8
 """Bodies up to which numba is not imported for them alone: its import takes 0.4 s"""
-MAX_RASTER_COORDINATE = 16_000.0
-"""px: bodies that reach farther are cut to the picture and drawn by pygame"""
 ARC_ERROR = 0.1
 """px, the largest distance between an arc and its chords"""
 MAX_ARC_CHORDS = 256
@@ -74,7 +72,7 @@ class PolygonRenderer:
         line = anatomy.rims(who, scale, style.line)
         if style.hollow:
             line = np.full(len(who), style.line)
-        near = bool((np.abs(centre).max(axis=1) + bodies.radius[who] * scale < MAX_RASTER_COORDINATE).all())
+        near = bool((np.abs(centre).max(axis=1) + bodies.radius[who] * scale < SDL_COORDINATE_LIMIT).all())
         worth = len(who) > FEW_POLYGONS or "numba" in sys.modules
         if worth and near and _in_one_pass(surface, anatomy, who, centre, angle, scale, colours, line, style):
             return

@@ -209,7 +209,7 @@ class Renderer:
         frame = sight.frame
         count = min(len(frame.position), len(colours))
         who = None if sizes.all_tiny and frame.present.all() else frame.present[:count] & sizes.tiny[:count]
-        self._points.draw(surface, camera, frame.position[:count], self._tones[2], who, sizes.side)
+        self._points.draw(surface, camera, frame.position[:count], self._tones[2][:count], who, sizes.side)
 
     def _sized(self, bodies: Bodies, scale: float, unit: float) -> "BodySizes":
         """Return who is drawn how at a scale; it is worked out when that changes."""

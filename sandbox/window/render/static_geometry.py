@@ -21,7 +21,15 @@ from sandbox.scene.description.play import Marking
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 from sandbox.window.camera import Box, Camera
-from sandbox.window.render.lines import Pixel, clip_polygon, clip_segment, draw_dashes, draw_line, fill_polygon
+from sandbox.window.render.lines import (
+    SDL_COORDINATE_LIMIT,
+    Pixel,
+    clip_polygon,
+    clip_segment,
+    draw_dashes,
+    draw_line,
+    fill_polygon,
+)
 from sandbox.window.render.palette import (
     BACKGROUND,
     FAINT,
@@ -288,7 +296,10 @@ def _deck(surface: pygame.Surface, camera: Camera, deck: Scene, unit: float, ant
         return None
     pixels = np.asarray(camera.to_screen(np.asarray([place for place, _ in places])))
     reach = np.asarray([[size * camera.scale] for _, size in places]) + MARGIN * unit
-    low, high = (pixels - reach).min(axis=0).clip(-1e6, 1e6), (pixels + reach).max(axis=0).clip(-1e6, 1e6)
+    low, high = (
+        (pixels - reach).min(axis=0).clip(-SDL_COORDINATE_LIMIT, SDL_COORDINATE_LIMIT),
+        (pixels + reach).max(axis=0).clip(-SDL_COORDINATE_LIMIT, SDL_COORDINATE_LIMIT),
+    )
     box = pygame.Rect(*low.astype(int).tolist(), *(high - low + 2.0).astype(int).tolist()).clip(surface.get_rect())
     if not box.width or not box.height:
         return None
@@ -307,10 +318,6 @@ def _deck(surface: pygame.Surface, camera: Camera, deck: Scene, unit: float, ant
     return picture, box.topleft
 
 
-BEYOND = 16_000.0
-"""px to which widths of lines are cut: SDL counts in 32 bits, and draws all of it"""
-
-
 def draw_markings(
     surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True
 ) -> None:
@@ -326,7 +333,7 @@ def draw_markings(
                 fill_polygon(surface, kept, colour, antialias)
         else:
             places: list[Pixel] = [(x, y) for x, y in camera.to_screen(np.asarray(marking.points)).tolist()]
-            width = min(max(marking.width * camera.scale, unit), BEYOND)
+            width = min(max(marking.width * camera.scale, unit), SDL_COORDINATE_LIMIT)
             for a, b in pairwise(places):
                 draw_line(surface, a, b, colour, width, antialias)
 
@@ -426,5 +433,8 @@ def _pixels(points: tuple[Point, ...], camera: Camera) -> FloatArray:
 
 def _box(corners: FloatArray, reach: float) -> pygame.Rect:
     """Return the box of places (K, 2) and so much around them, px, cut to what SDL can count."""
-    low, high = (corners.min(axis=0) - reach).clip(-1e6, 1e6), (corners.max(axis=0) + reach).clip(-1e6, 1e6)
+    low, high = (
+        (corners.min(axis=0) - reach).clip(-SDL_COORDINATE_LIMIT, SDL_COORDINATE_LIMIT),
+        (corners.max(axis=0) + reach).clip(-SDL_COORDINATE_LIMIT, SDL_COORDINATE_LIMIT),
+    )
     return pygame.Rect(*np.floor(low).astype(int).tolist(), *np.ceil(high - low + 1.0).astype(int).tolist())

@@ -12,14 +12,13 @@ from pathlib import Path
 
 import pygame
 
+from sandbox.window.render.lines import SDL_COORDINATE_LIMIT
 from sandbox.window.render.palette import INK, LINE, PANEL, Colour
 
 MAX_TEXT_LENGTH = 400
 """Letters of one line that are rendered; no surface grows beyond what SDL takes."""
 SMALLEST, MAX_TEXT_SIZE = 4, 128
 """px, the sizes that are rendered"""
-FARTHEST = 30_000
-"""px, how far outside a picture a place may be for its text to be tried at all"""
 
 
 def draw_text(
@@ -48,7 +47,7 @@ def draw_text(
         The place that the text covers, whether in the picture or not.
     """
     x, y = at
-    if not (abs(x) < FARTHEST and abs(y) < FARTHEST):  # nor where it is nan
+    if not (abs(x) < SDL_COORDINATE_LIMIT and abs(y) < SDL_COORDINATE_LIMIT):  # nor where it is nan
         return pygame.Rect(0, 0, 0, 0)
     words = _rendered(renderable(text), _whole(size), colour, bold, mono)
     rect = words.get_rect(**{anchor: (round(x), round(y))})

@@ -80,6 +80,11 @@ def test_nothing_raises_whatever_is_drawn(what, centre, power, size, antialias, 
 @example(
     what=sight(WHICH, *OVERLAYS, contacts=contact((COUNT, -5), (0.0, 0.0), (1e308, 0.0))), power=4.0, antialias=True
 )
+@example(
+    what=sight(WHICH, ghost=frame(WHICH), frame=frame(WHICH, position=np.full((COUNT, 2), 1e307))),
+    power=4.0,
+    antialias=True,
+)
 def test_nothing_raises_near_the_origin(what, power, antialias):
     assert drawn(what, Camera((0.0, 0.0), 10.0**power, (90, 70)), antialias=antialias).any()
 
