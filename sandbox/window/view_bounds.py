@@ -1,7 +1,4 @@
-"""Framing: the part of the world that a scene is about, for the camera to begin with.
-
-Crowd: the place where a run happens, for a camera to show it whole.
-"""
+"""View bounds: the box that the camera initially shows, of a scene before it runs or of a recorded run."""
 
 import numpy as np
 
@@ -15,35 +12,35 @@ from sandbox.scene.description.world import Settings
 from sandbox.scene.scene import Scene
 from sandbox.window.camera import Box
 
-LOOK_STEPS, LOOK_WORK = 12_000, 30_000
-"""Steps, and steps times moving bodies, that a look ahead takes at most: about half a second on pymunk."""
-LOOKS = 17
-"""Moments of free flight that are looked at."""
-ROLLING = 1.2
-"""s: where balls on a floor fly for longer says little, as the floor brakes them and they meet each other"""
-BESIDE = 0.12
-"""of its size, so much is seen beside where balls on a floor are"""
-OUTLIERS = 0.5
-"""Per cent of the places at each side that need not be seen, where there are many."""
+MAX_STEPS, MAX_BODY_STEPS = 12_000, 30_000
+"""Steps, and steps times moving bodies, of `predict_bounds`: about half a second on pymunk"""
+FLIGHT_SAMPLES = 17
+"""Times at which positions in free flight are computed"""
+MAX_ROLLING_TIME = 1.2
+"""s of free flight that is considered on a surface, where friction and collisions end it"""
+SURFACE_MARGIN = 0.12
+"""Margin beside bodies on a surface, relative to the size of their box"""
+OUTLIER_PERCENT = 0.5
+"""of the positions at each side that are left out if there are more than `MANY`"""
 MANY = 1000
 ANCHORED = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.GROOVE, LinkKind.SPRING)
-"""Joints that hold in a point."""
+"""Joints that are anchored in a point"""
 MAX_VIEW = 1e15
-"""m: what lies beyond does not count"""
+"""m: coordinates beyond it are ignored"""
 NEAR = 0.1
-"""Fixed things count so near to where bodies are or fly, as a share of its size."""
+"""Distance of static geometry from the bodies' box up to which it is shown, relative to the size of the box"""
 FAR = 20.0
-"""Fixed things, and where bodies fly, count up to so many times the size of what is there at the start."""
+"""Static geometry and flights are considered up to this multiple of the size of the initial box"""
 
 
 def view_bounds(scene: Scene, reach: Box | None = None) -> Box:
-    """Return the box that shows a scene's bodies, where they fly freely, and the fixed things they may meet there.
+    """Return the box with a scene's bodies, their free flights, and the static geometry near them, m.
 
-    Of a table that is the table; a scene may state its own.
+    For a table it is the box of the table. A view that the scene states takes precedence.
 
     Args:
-        scene: what is seen.
-        reach: where the bodies are known to come, m; by `look_ahead`, or from a stored run.
+        scene: to show.
+        reach: box of the positions that the bodies reach, m, by `predict_bounds` or from a recorded run.
     """
     if scene.play.view is not None:
         return scene.play.view
@@ -51,7 +48,7 @@ def view_bounds(scene: Scene, reach: Box | None = None) -> Box:
         return table_bounds(scene.play.area)
     bodies = scene.bodies
     things = [corners for corners in _things(scene) if (np.abs(corners) < MAX_VIEW).all()]
-    discs = bodies.round | ~bodies.fixed  # what turns is anywhere within its circle; what stands is where it is
+    discs = bodies.round | ~bodies.fixed  # a moving body may rotate within its circle; a static one does not
     seen = bounding_box(bodies.position[discs], bodies.radius[discs])
     stands = [(corners.min(axis=0), corners.max(axis=0)) for corners in _solids(bodies)]
     if seen is None and not stands:
@@ -67,12 +64,12 @@ def view_bounds(scene: Scene, reach: Box | None = None) -> Box:
     met = [each for each in met if (each[0] <= flown[1] + near).all() and (each[1] >= flown[0] - near).all()]
     low, high = _union([start, *met]) if met else flown
     if scene.surface is not None:  # room to roll on
-        low, high = low - BESIDE * (high - low).max(), high + BESIDE * (high - low).max()
+        low, high = low - SURFACE_MARGIN * (high - low).max(), high + SURFACE_MARGIN * (high - low).max()
     if scene.play.arrows is not None:  # room to move it
         low, high = low - 2.0 * scene.play.arrow_step, high + 2.0 * scene.play.arrow_step
     if not (high - low).max() > 0.0:
         low, high = low - UNIT_BOX, high + UNIT_BOX
-    for plane in scene.planes:  # the nearest bit of its surface, if it is not far
+    for plane in scene.planes:  # the closest point of its surface, if it is not far
         normal = np.asarray(plane.normal) / np.hypot(*plane.normal)
         middle = (low + high) / 2.0
         foot = middle - ((middle - np.asarray(plane.point)) @ normal) * normal
@@ -82,17 +79,17 @@ def view_bounds(scene: Scene, reach: Box | None = None) -> Box:
 
 
 def predict_bounds(scene: Scene, engine: str, settings: Settings | None = None) -> Box | None:
-    """Return the box in which the moving bodies stay when a scene runs without a hand, by running it.
+    """Return the box in which the moving bodies stay during a run without actions, by running the scene.
 
-    The look is bounded by counted work, so that it is the same on every machine: `LOOK_STEPS` steps, and `LOOK_WORK`
-    steps times bodies. It ends early where the scene ends, and where a body flies off `FAR` times the size of what is
-    there at the start. None where nothing moves, the view is stated, or the engine cannot run the scene.
+    Work is limited by counts, so that the result is the same on every machine: `MAX_STEPS` steps, and `MAX_BODY_STEPS`
+    steps times bodies. The run ends early at the scene's duration, or if the box exceeds `FAR` times the initial view.
+    None if nothing moves, the scene states its view, or the engine cannot run the scene.
     """
     bodies, world, solver = scene.bodies, scene.world, scene.solver if settings is None else settings
     moving = np.flatnonzero(~bodies.fixed)
     if scene.play.view is not None or scene.play.area is not None or not len(moving):
         return None
-    steps = min(round(world.duration / solver.dt), LOOK_STEPS, LOOK_WORK // len(moving))
+    steps = min(round(world.duration / solver.dt), MAX_STEPS, MAX_BODY_STEPS // len(moving))
     try:
         simulation = start(scene, engine, settings)
     except (Refusal, UnknownEngineError):
@@ -122,12 +119,12 @@ def predict_bounds(scene: Scene, engine: str, settings: Settings | None = None) 
     return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
 
 
-def should_rotate(scene: Scene, free: tuple[int, int]) -> bool:
-    """Tell whether a scene is a table that is seen larger when turned, in a picture of so many px."""
+def should_rotate(scene: Scene, size: tuple[int, int]) -> bool:
+    """Return whether a scene is a table that a rotated camera shows larger in a picture of a size, px."""
     if scene.play.area is None or scene.planes:
         return False
     (left, bottom), (right, top) = scene.play.area
-    return (top - bottom > right - left) == (free[0] > free[1])
+    return (top - bottom > right - left) == (size[0] > size[1])
 
 
 UNIT_BOX = np.ones(2)
@@ -140,45 +137,45 @@ def _union(boxes: list[Corners]) -> Corners:
 
 
 def bounding_box(position: FloatArray, radius: FloatArray) -> Corners | None:
-    """Return the box around circles at (M, 2) m; of many, without the outermost."""
+    """Return the box around circles at (M, 2) m; of more than `MANY`, without outliers; None without circles."""
     counts = (np.abs(position) < MAX_VIEW).all(axis=1)
     position, radius = position[counts], radius[counts]
     if not len(position):
         return None
     if len(position) > MANY:
         size = float(np.median(radius))
-        low, high = np.percentile(position, (OUTLIERS, 100.0 - OUTLIERS), axis=0)
+        low, high = np.percentile(position, (OUTLIER_PERCENT, 100.0 - OUTLIER_PERCENT), axis=0)
         return low - size, high + size
     return (position - radius[:, None]).min(axis=0), (position + radius[:, None]).max(axis=0)
 
 
 def _flight(scene: Scene, bodies: Bodies) -> list[Corners]:
-    """Return the box in which the bodies fly, as far as planes and bounds let them."""
+    """Return the box of the bodies' free flights, which end at planes and world bounds."""
     world = scene.world
     chosen = np.flatnonzero(~_tethered(scene, bodies))
-    chosen = chosen[:: max(1, len(chosen) // 5000)]  # so many are enough to tell
-    duration = world.duration if scene.surface is None else min(world.duration, ROLLING)
-    time = np.linspace(0.0, duration, LOOKS)[:, None, None]
+    chosen = chosen[:: max(1, len(chosen) // 5000)]  # a sample suffices
+    duration = world.duration if scene.surface is None else min(world.duration, MAX_ROLLING_TIME)
+    time = np.linspace(0.0, duration, FLIGHT_SAMPLES)[:, None, None]
     start, velocity = bodies.position[chosen], bodies.velocity[chosen]
     with np.errstate(all="ignore"):
-        place = start + velocity * time + 0.5 * np.asarray(world.gravity) * time**2
-    radius = np.broadcast_to(bodies.radius[chosen], place.shape[:2])
+        position = start + velocity * time + 0.5 * np.asarray(world.gravity) * time**2
+    radius = np.broadcast_to(bodies.radius[chosen], position.shape[:2])
     with np.errstate(all="ignore"):
-        counts = (np.abs(place) < MAX_VIEW).all(axis=2)
+        counts = (np.abs(position) < MAX_VIEW).all(axis=2)
         for plane in scene.planes:
             normal = np.asarray(plane.normal) / np.hypot(*plane.normal)
-            counts &= (place - np.asarray(plane.point)) @ normal >= -radius
+            counts &= (position - np.asarray(plane.point)) @ normal >= -radius
         if world.bounds is not None:
-            counts &= ((place >= world.bounds[0]) & (place <= world.bounds[1])).all(axis=2)
-        counts &= ~_falls(scene, bodies, place)
-    # Once stopped, it does not come out on the far side.
+            counts &= ((position >= world.bounds[0]) & (position <= world.bounds[1])).all(axis=2)
+        counts &= ~_falls(scene, bodies, position)
+    # A flight ends where it first leaves the allowed region.
     counts = np.logical_and.accumulate(counts, axis=0)
-    found = bounding_box(place[counts], radius[counts])
+    found = bounding_box(position[counts], radius[counts])
     return [] if found is None else [found]
 
 
 def _orbits(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
-    """Return the boxes around what attracts, as far out as the bodies can come that are bound to it alone."""
+    """Return the boxes around attractors out to the apoapsis of each body's two-body orbit."""
     found, size = [], float((start[1] - start[0]).max())
     for each in scene.attractions:
         if isinstance(each.toward, str):
@@ -201,21 +198,21 @@ def _orbits(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
     return found
 
 
-def _falls(scene: Scene, bodies: Bodies, place: FloatArray) -> BoolArray:
-    """Return which places (T, M, 2) are past everything fixed that the bodies could have fallen on, (T, M)."""
+def _falls(scene: Scene, bodies: Bodies, position: FloatArray) -> BoolArray:
+    """Return which positions (T, M, 2) are below all static geometry, on which the body would have landed, (T, M)."""
     gravity = np.asarray(scene.world.gravity)
     fixed = [*_things(scene), *_solids(bodies)]
     if not fixed or not gravity.any():
-        return np.zeros(place.shape[:2], np.bool_)
+        return np.zeros(position.shape[:2], np.bool_)
     down = gravity / np.hypot(*gravity)
     ground = max(float((corners @ down).max()) for corners in fixed)
     with np.errstate(all="ignore"):
-        depth = place @ down
-    return np.asarray((depth > ground) & (depth[0] <= ground))  # one that starts below it does not fall on it
+        depth = position @ down
+    return np.asarray((depth > ground) & (depth[0] <= ground))  # a body that starts below never lands
 
 
 def _solids(bodies: Bodies) -> list[FloatArray]:
-    """Return the corners (P, 2), m, of each fixed body that is no ball, as it stands."""
+    """Return the corners (P, 2), m, of each piece of the static bodies other than balls."""
     shapes, found = bodies.shapes, []
     for piece in np.flatnonzero((bodies.fixed & ~bodies.round)[shapes.body]).tolist():
         body, radius = int(shapes.body[piece]), float(shapes.radius[piece])
@@ -228,7 +225,7 @@ def _solids(bodies: Bodies) -> list[FloatArray]:
 
 
 def _tethered(scene: Scene, bodies: Bodies) -> BoolArray:
-    """Return which bodies are fixed, or joined to the world or to such a body, or to one joined so, (N,)."""
+    """Return which bodies are static or connected by joints to the world or a static body, (N,)."""
     links, found = scene.links.of(*ANCHORED), bodies.fixed.copy()
     found[links.b[links.a < 0]] = True
     a, b = links.a[links.a >= 0], links.b[links.a >= 0]
@@ -240,18 +237,18 @@ def _tethered(scene: Scene, bodies: Bodies) -> BoolArray:
 
 
 def _swings(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
-    """Return the boxes of where the world holds bodies, and of how far those on rods and strings swing to and fro."""
+    """Return the box of world anchors, and of the swings of bodies that hang from them by rods and strings."""
     links = scene.links
     if not len(links):
         return []
-    nails = links.some((links.a < 0) & np.isin(links.kind, ANCHORED))
-    anchor, held = nails.anchor_a, bodies.position[nails.b]
+    anchored = links.some((links.a < 0) & np.isin(links.kind, ANCHORED))
+    anchor, held = anchored.anchor_a, bodies.position[anchored.b]
     size = float((start[1] - start[0]).max())
     near = ((anchor >= start[0] - FAR * size) & (anchor <= start[1] + FAR * size)).all(axis=1)
     places = [anchor[near]]
     if scene.world.gravity[0] == 0.0 and scene.world.gravity[1] < 0.0:
-        swing = near & np.isin(nails.kind, (LinkKind.ROD, LinkKind.SLIDE)) & ~bodies.fixed[nails.b]
-        anchor, held, radius = anchor[swing], held[swing], bodies.radius[nails.b[swing]][:, None]
+        swing = near & np.isin(anchored.kind, (LinkKind.ROD, LinkKind.SLIDE)) & ~bodies.fixed[anchored.b]
+        anchor, held, radius = anchor[swing], held[swing], bodies.radius[anchored.b[swing]][:, None]
         length = np.hypot(*(held - anchor).T)
         other = np.column_stack((2.0 * anchor[:, 0] - held[:, 0], held[:, 1]))
         lowest = anchor - np.column_stack((np.zeros(len(length)), length))
@@ -272,16 +269,16 @@ def _things(scene: Scene) -> list[FloatArray]:
 
 
 STRAY_FRACTION = 3.0
-"""Sizes of the middle of a crowd that a body may go beyond it and still be shown."""
+"""Distance from the central 80 % of positions, relative to their size, up to which a body is shown"""
 
 
 def crowd_bounds(position: FloatArray, radius: FloatArray, anchors: FloatArray) -> Box:
-    """Return the box that a crowd moves in, m, leaving out those who stray.
+    """Return the box of the positions in a run without bodies far from the others, m.
 
     Args:
-        position: (T, N, 2) m; what is not finite counts nothing.
+        position: (T, N, 2) m; positions that are not finite are ignored.
         radius: (N,) m
-        anchors: (K, 2) m, places of fixed things, shown where they are not far from the crowd.
+        anchors: (K, 2) m, points of static geometry, included if they are not far.
     """
     lower, upper = np.fmin.reduce(position, axis=0), np.fmax.reduce(position, axis=0)
     fine = np.isfinite(lower).all(axis=1) & np.isfinite(upper).all(axis=1)
@@ -301,7 +298,7 @@ def crowd_bounds(position: FloatArray, radius: FloatArray, anchors: FloatArray) 
 
 
 def anchor_points(scene: Scene) -> FloatArray:
-    """Return the places of fixed things, (K, 2) m: ends of walls, edges of posts, nails of joints; of planes none."""
+    """Return points of static geometry, (K, 2) m: ends of walls, boxes of posts, world anchors of joints; no planes."""
     places = [point for wall in scene.walls for point in wall.points]
     for post in scene.posts:
         (x, y), r = post.position, post.radius

@@ -18,7 +18,7 @@ def test_y_is_to_the_right_and_x_downwards() -> None:
 
 
 def test_it_turns_and_does_not_mirror() -> None:
-    right, up = CAMERA.ways(np.eye(2))
+    right, up = CAMERA.vectors_to_screen(np.eye(2))
     assert right[0] * up[1] - right[1] * up[0] < 0.0  # as an upright camera's, whose y is down
 
 

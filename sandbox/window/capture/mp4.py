@@ -1,4 +1,8 @@
-"""Mp4: films in h264, which every player shows; pixels are piped to ffmpeg."""
+"""MP4 recorder: films in H.264, which all players support; pixels are piped to ffmpeg.
+
+`imageio_ffmpeg.write_frames` is not used: it ignores the exit status of ffmpeg and leaves its messages to the terminal,
+so a film cut short by a full disk would count as complete.
+"""
 
 import math
 import subprocess
@@ -11,22 +15,22 @@ import pygame
 
 from sandbox.window.capture.image_files import AtomicFile, CaptureError, Size, rgb_pixels, unwritable_reason
 
-QUALITY = 18
-"""ffmpeg's constant rate factor, from 0, lossless, to 51; at 18 no loss is seen."""
+RATE_FACTOR = 18
+"""ffmpeg's constant rate factor, 0 (lossless) to 51; at 18 no loss is visible"""
 NEW_GROUP = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
-"""Windows alone has it. Ctrl-C is for the sandbox, which then tells ffmpeg."""
+"""Windows only. Ctrl-C must reach the sandbox alone, which then ends ffmpeg"""
 
 
 class Mp4Recorder:
-    """A film of a constant rate: each picture is shown as often as its seconds fill, on the whole exactly.
+    """Writes a film of constant frame rate: pictures are repeated or dropped so that the total time is exact.
 
     Args:
-        outfile: where it goes.
-        size: px; an odd side loses its last row or column, as h264's colours are shared by 2 x 2 pixels.
-        fps: pictures a second.
+        outfile: the file.
+        size: px; an odd side loses its last row or column, as 2 x 2 pixels share a colour in yuv420p.
+        fps: pictures/s.
 
     Raises:
-        CaptureError: ffmpeg is not there, or the file cannot be written.
+        CaptureError: ffmpeg is missing, or the file cannot be written.
     """
 
     def __init__(self, outfile: AtomicFile, size: Size, fps: float) -> None:
@@ -43,32 +47,32 @@ class Mp4Recorder:
         command = [
             *(program, "-v", "error", "-y", "-nostdin"),
             *("-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{even[0]}x{even[1]}", "-r", f"{fps:.9g}", "-i", "-"),
-            *("-vf", "scale=out_color_matrix=bt709:out_range=tv", "-c:v", "libx264", "-crf", str(QUALITY)),
+            *("-vf", "scale=out_color_matrix=bt709:out_range=tv", "-c:v", "libx264", "-crf", str(RATE_FACTOR)),
             *("-pix_fmt", "yuv420p", "-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709"),
             *("-movflags", "+faststart", "-f", "mp4", str(outfile.temporary.absolute())),
         ]
         try:
-            outfile.temporary.open("xb").close()  # what cannot be written shows now, in words better than ffmpeg's
-            self._complaint = tempfile.TemporaryFile()  # noqa: SIM115, lives as long as the recorder
+            outfile.temporary.open("xb").close()  # if it cannot be written, this error is clearer than ffmpeg's
+            self._messages = tempfile.TemporaryFile()  # noqa: SIM115, lives as long as the recorder
             self._process = subprocess.Popen(
                 command,
                 stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
-                stderr=self._complaint,
+                stderr=self._messages,
                 start_new_session=True,
                 creationflags=NEW_GROUP,
             )
         except OSError as error:
             outfile.discard()
             raise unwritable_reason(outfile.temporary.parent, error) from None
-        assert self._process.stdin is not None  # it was asked for
+        assert self._process.stdin is not None  # stdin=PIPE
         self._pipe = self._process.stdin
 
     def add(self, surface: pygame.Surface, seconds: float) -> None:
-        """Add a picture that is shown for so long.
+        """Add a picture and its duration, s.
 
         Raises:
-            CaptureError: ffmpeg takes no more.
+            CaptureError: ffmpeg has ended.
         """
         self._seconds += seconds
         due = math.floor(self._seconds * self._fps + 0.5) - self._written
@@ -80,17 +84,17 @@ class Mp4Recorder:
             for _ in range(due):
                 self._pipe.write(picture)
                 self._written += 1
-        except (OSError, ValueError) as error:  # it has ended; a closed pipe is a ValueError
+        except (OSError, ValueError) as error:  # ffmpeg has ended; a closed pipe raises ValueError
             raise self._failure(str(error)) from None
 
     def close(self) -> Path:
         """Finish the file and return its path.
 
         Raises:
-            CaptureError: ffmpeg failed, or not a single picture was added. Nothing is left then.
+            CaptureError: ffmpeg failed, or no picture was added. Nothing is left then.
         """
         try:
-            with suppress(OSError):  # it has ended already, and its status says how
+            with suppress(OSError):  # ffmpeg has ended already; its exit status is checked below
                 self._pipe.close()
             status = self._process.wait()
             if not self._written:
@@ -102,18 +106,18 @@ class Mp4Recorder:
             self.cancel()
 
     def cancel(self) -> None:
-        """End ffmpeg and leave nothing behind."""
+        """End ffmpeg and remove the temporary file."""
         if self._process.poll() is None:
             self._process.kill()
             self._process.wait()
-        with suppress(OSError):  # what it still held has nowhere to go
+        with suppress(OSError):  # buffered pixels cannot be written any more
             self._pipe.close()
-        self._complaint.close()
+        self._messages.close()
         self._outfile.discard()
 
-    def _failure(self, otherwise: str) -> CaptureError:
-        """Return what ffmpeg complains of, in one line."""
-        self._complaint.seek(0)
-        lines = self._complaint.read().decode("utf-8", "replace").split("\n")
-        said = "; ".join(line.strip() for line in lines if line.strip())
-        return CaptureError(f"ffmpeg: {said[:300] or otherwise}")
+    def _failure(self, default: str) -> CaptureError:
+        """Return an error with ffmpeg's messages in one line."""
+        self._messages.seek(0)
+        lines = self._messages.read().decode("utf-8", "replace").split("\n")
+        messages = "; ".join(line.strip() for line in lines if line.strip())
+        return CaptureError(f"ffmpeg: {messages[:300] or default}")

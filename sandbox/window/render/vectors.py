@@ -142,7 +142,7 @@ def draw_velocities(view: DrawContext) -> None:
     some = view.first(MAX_ARROWS)
     longest = max(min(view.camera.size) / 3.0, 1.0)
     with np.errstate(invalid="ignore", over="ignore"):
-        way = view.camera.ways(view.sight.frame.velocity[some.shown] * SPAN)
+        way = view.camera.vectors_to_screen(view.sight.frame.velocity[some.shown] * SPAN)
         length = np.hypot(way[:, 0], way[:, 1])
         way = way * np.minimum(1.0, longest / np.maximum(length, 1e-300))[:, None]
     for k in np.flatnonzero((length > 2.0 * view.unit) & np.isfinite(length)).tolist():
@@ -160,7 +160,7 @@ def _in_sight(view: DrawContext, most: int) -> tuple[IntArray, FloatArray, Float
     if len(seen) > most:
         seen = seen[np.linspace(0, len(seen) - 1, most).astype(np.intp)]
     with np.errstate(over="ignore"):  # a recorded normal may have any length
-        return seen, pixels[seen], view.camera.ways(normal[seen]) / view.camera.scale
+        return seen, pixels[seen], view.camera.vectors_to_screen(normal[seen]) / view.camera.scale
 
 
 def draw_contacts(view: DrawContext, discs: CircleRenderer) -> None:
