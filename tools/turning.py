@@ -33,22 +33,22 @@ def turns(scene: str, hand: bool) -> Callable[[], float]:
         window = App(stage)
         stage.open(find(scene))
         stage.paused = True
-        window.turn(FRAME)
-        found = [turn(window, k) if hand else timed(lambda: window.turn(FRAME)) for k in range(TURNS)]
+        window.run_frame(FRAME)
+        found = [turn(window, k) if hand else timed(lambda: window.run_frame(FRAME)) for k in range(TURNS)]
         window.close()
         return statistics.median(found)
 
     def turn(window: App, k: int) -> float:
-        live = window.stage.live
+        live = window.app_state.live
         assert live is not None
-        x, y = window.camera.to_screen(live.frame.position[0]).round().tolist()
+        x, y = window.context.camera.to_screen(live.frame.position[0]).round().tolist()
         there = (int(x) + (7 if k % 2 else -7), int(y))
         for kind, at in ((pygame.MOUSEBUTTONDOWN, (int(x), int(y))), (pygame.MOUSEMOTION, there)):
             about = {"rel": (0, 0), "buttons": (1, 0, 0)} if kind == pygame.MOUSEMOTION else {"button": 1}
             pygame.event.post(pygame.event.Event(kind, pos=at, **about))
         pygame.event.post(pygame.event.Event(pygame.MOUSEBUTTONUP, pos=there, button=1))
-        seconds = timed(lambda: window.turn(FRAME))
-        now = window.camera.to_screen(live.frame.position[0])
+        seconds = timed(lambda: window.run_frame(FRAME))
+        now = window.context.camera.to_screen(live.frame.position[0])
         assert np.abs(now - there).max() <= 1.0, "the body is not where the hand is"
         return seconds
 

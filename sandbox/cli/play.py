@@ -7,7 +7,7 @@ import click
 
 from sandbox.cli.naming import with_other_engine
 from sandbox.cli.reading import gathering, path_of, refused
-from sandbox.cli.showing import show_stage, window_options
+from sandbox.cli.showing import run_window, window_options
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import USUAL, UnknownEngineError, able, engine_named, usual
 from sandbox.games.registry import fitting_rules
@@ -49,5 +49,5 @@ def command(scene: str | None, engine: str | None, overrides: tuple[str, ...], *
 
     from sandbox.window.app_state import AppState
 
-    stage = AppState(engine, overrides)
-    return show_stage(stage, lambda: path is None or stage.open(path), **window, pick=path is None)
+    app_state = AppState(engine, overrides)
+    return run_window(app_state, lambda: path is None or app_state.open(path), **window, pick=path is None)

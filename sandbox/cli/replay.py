@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sandbox.cli.reading import gathering, refused
-from sandbox.cli.showing import show_stage, window_options
+from sandbox.cli.showing import run_window, window_options
 from sandbox.cli.stored import find_run, read_run
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import UnknownEngineError, engine_named
@@ -55,10 +55,10 @@ def command(run: str, engine: str | None, **window: Any) -> int:
 
     from sandbox.window.app_state import AppState
 
-    stage, first, known = AppState(show.engine), show, source
-    return show_stage(
-        stage,
-        lambda: stage.put_on(first, None, first.scene, again=lambda: _shown(known, engine)),
+    app_state, first, known = AppState(show.engine), show, source
+    return run_window(
+        app_state,
+        lambda: app_state.show(first, None, first.scene, again=lambda: _shown(known, engine)),
         **window,
     )
 

@@ -69,8 +69,8 @@ def window_options(command: Command) -> Command:
     return command
 
 
-def show_stage(
-    stage: "AppState",
+def run_window(
+    app_state: "AppState",
     begin: Callable[[], object],
     *,
     size: tuple[int, int] | None,
@@ -84,7 +84,7 @@ def show_stage(
     """Open the window, play, and return the exit status.
 
     Args:
-        stage: what is played.
+        app_state: what is played.
         begin: called once the window is open; what it puts on is seen first.
         size: px.
         paused: begin so.
@@ -100,7 +100,7 @@ def show_stage(
     reasons = [] if record is None else reasons_against(record)
     if reasons:
         return refused([Fault("--record", None, "", f"{shorten(str(record), MAX_NAMED)}: {reasons[0]}")])
-    stage.paused, stage.saves_at_end = paused, record is not None
+    app_state.paused, app_state.saves_at_end = paused, record is not None
     failures: list[OutputError] = []
 
     def say(message: str) -> None:
@@ -110,19 +110,19 @@ def show_stage(
             failures.append(error)
 
     try:
-        window = App(stage, size=size, film=f".{film}", say=say)
+        window = App(app_state, size=size, film=f".{film}", say=say)
     except NoDisplayError as error:
         click.echo(f"{error}; `sandbox run` and `sandbox export` work without a display", err=True)
         return 1
     try:
         begin()
-        window.gui.overlays |= set(overlays)
+        window.context.gui.overlays |= set(overlays)
         if ghost:
-            stage.toggle_ghost()
+            app_state.toggle_ghost()
         if pick:
-            window.gui.open_scene_browser(None)
+            window.context.gui.open_scene_browser(None)
         status = window.run()
-        if record is not None and not _saved(stage, record):
+        if record is not None and not _saved(app_state, record):
             status = status or 1
         if failures:
             raise failures[0]
@@ -131,14 +131,14 @@ def show_stage(
         window.close()
 
 
-def _saved(stage: "AppState", record: Path) -> bool:
+def _saved(app_state: "AppState", record: Path) -> bool:
     """Save the session that is on, and say so; return whether that could be done."""
-    if stage.live is None:
+    if app_state.live is None:
         click.echo(f"--record: {record}: there is no session to save", err=True)
         return False
     try:
-        stage.live.arrive()
-        stage.live.session.recording().save(record)
+        app_state.live.arrive()
+        app_state.live.session.recording().save(record)
     except OSError as error:
         click.echo(f"--record: {record}: {error.strerror or error}", err=True)
         return False

@@ -1,7 +1,6 @@
-"""Window: the loop that turns events into deeds, and what is on into pictures.
+"""The window: main loop, event dispatch and signals.
 
-One turn is: wait, take the events in, let time pass, draw, show. What a hand does is so seen in the very next
-picture.
+A frame handles the events, advances the session and draws, so that input is visible in the next picture.
 """
 
 import signal
@@ -14,22 +13,22 @@ from types import FrameType
 import pygame
 
 from sandbox.engines.common.compile_clock import COMPILE_CLOCK
-from sandbox.games.billiards.view.controls import KeyHandler
 from sandbox.window.app_state import AppState
 from sandbox.window.commands import Commands
 from sandbox.window.context import TITLE, WindowContext
 from sandbox.window.display import close_screen, open_screen, ui_scale
+from sandbox.window.input.bindings import KeyHandler
 from sandbox.window.input.gamepad import Gamepads
 from sandbox.window.input.keymap import Command, Keyboard
 from sandbox.window.mouse import MouseController
 from sandbox.window.worker import Wait, Worker, compute_here
 
-RATE = 60
-"""pictures a second, at most"""
+MAX_FRAME_RATE = 60
+"""frames per second"""
 WAIT_RATE = 20
-"""pictures a second while something compiles"""
+"""frames per second while a job compiles or takes long"""
 
-MODIFIERS = frozenset(
+MODIFIER_KEYS = frozenset(
     {
         pygame.K_LCTRL,
         pygame.K_RCTRL,
@@ -41,9 +40,9 @@ MODIFIERS = frozenset(
         pygame.K_RMETA,
     }
 )
-"""Keys that ask for nothing by themselves."""
+"""keys that have no command of their own"""
 
-PRESSES = frozenset(
+INPUT_EVENTS = frozenset(
     {
         pygame.KEYDOWN,
         pygame.TEXTINPUT,
@@ -53,15 +52,26 @@ PRESSES = frozenset(
         pygame.JOYHATMOTION,
     }
 )
-"""Input events that are discarded after a compile."""
+"""events that are discarded after a compilation"""
+
+GAMEPAD_EVENTS = frozenset(
+    {
+        pygame.JOYAXISMOTION,
+        pygame.JOYBUTTONDOWN,
+        pygame.JOYBUTTONUP,
+        pygame.JOYDEVICEADDED,
+        pygame.JOYDEVICEREMOVED,
+        pygame.JOYHATMOTION,
+    }
+)
 
 
-class App(WindowContext):
-    """The window. It owns the display from `open` to `close`."""
+class App:
+    """The window: it opens the display, and owns it until `close`."""
 
     def __init__(
         self,
-        stage: AppState,
+        app_state: AppState,
         *,
         size: tuple[int, int] | None = None,
         folder: Path | None = None,
@@ -71,177 +81,190 @@ class App(WindowContext):
         """Open the window.
 
         Args:
-            stage: what is played.
-            size: px; by default what suits the desktop.
-            folder: where screenshots, films and sessions go; by default the working folder.
-            film: what Ctrl+R records, `.gif` or `.mp4`.
-            say: who prints a line on the terminal.
+            app_state: the open scene and its operations.
+            size: px; by default derived from the desktop.
+            folder: where screenshots, films and sessions are saved; by default the working folder.
+            film: format of films, `.gif` or `.mp4`.
+            say: prints a line on the terminal.
 
         Raises:
             NoDisplayError: there is no display.
         """
-        super().__init__(open_screen(size, TITLE), ui_scale(), stage, folder or Path(), film, say)
+        surface = open_screen(size, TITLE)
+        self.app_state = app_state
+        self.context = WindowContext(surface, ui_scale(), app_state, folder or Path(), film, say)
         self._keyboard = Keyboard()
-        self._held: dict[int, KeyHandler] = {}  # claimed keys that are down, and what is done when they are let go
-        self._gamepads = Gamepads(self.tell)
-        self._gamepads.begin()
-        self.mouse = MouseController(self)
-        self.commands = Commands(self, self.mouse)
+        self._release_handlers: dict[int, KeyHandler] = {}  # of bound keys that are down
+        self._gamepads = Gamepads(self.context.notify)
+        self._gamepads.start()
+        self.mouse = MouseController(self.context)
+        self.commands = Commands(self.context, self.mouse)
         self._clock = pygame.time.Clock()
-        stage.on_new = self.renew
+        app_state.on_scene_changed = self._on_scene_changed
         self._worker = Worker(self._wait)
-        stage.compute = self._worker.compute
+        app_state.compute = self._worker.compute
         COMPILE_CLOCK.on_begin = self._note_compiling
-        if stage.show is not None:
-            self.renew(False)
+        if app_state.view is not None:
+            self.context.on_scene_changed(False)
 
     def run(self) -> int:
-        """Play until the window is closed; return the exit status."""
+        """Run the main loop until the window is closed; return the exit status."""
         with self._signals():
             self._clock.tick()
-            while self.leaving is None:
-                self.turn(self._clock.tick(RATE) / 1000.0)
-        return self.leaving
+            while self.context.exit_status is None:
+                self.run_frame(self._clock.tick(MAX_FRAME_RATE) / 1000.0)
+        return self.context.exit_status
 
-    def turn(self, elapsed: float) -> None:
-        """Take events in, let so much real time pass, s, draw, and show."""
+    def run_frame(self, elapsed: float) -> None:
+        """Handle events, advance by an interval of real time, s, and draw."""
         for event in pygame.event.get():
-            self.take(event)
-        self.commands.settle()
-        if self.leaving is not None:
+            self.handle_event(event)
+        self.commands.flush()
+        if self.context.exit_status is not None:
             return
-        self.stage.covered = self.gui.covers_scene or self.stage.question is not None
+        self.app_state.covered = self.context.gui.covers_scene or self.app_state.question is not None
         compiled = COMPILE_CLOCK.seconds
-        self.stage.go_on(elapsed)
+        self.app_state.update(elapsed)
         if COMPILE_CLOCK.seconds > compiled:
-            self._clock.tick()  # that time was not the scene's
-        self.follow(elapsed)
+            self._clock.tick()  # compile time does not advance the scene
+        self.context.update_camera(elapsed)
         self.draw()
         if COMPILE_CLOCK.seconds > compiled:
-            pygame.event.get(tuple(PRESSES))
+            pygame.event.get(tuple(INPUT_EVENTS))
         pygame.display.flip()
-        self.taking.update(self.surface, elapsed)
+        self.context.capture.update(self.context.surface, elapsed)
 
     def draw(self) -> None:
-        """Draw what is on, and what surrounds it."""
-        self.make_room()
-        self.gui.bodies_out_of_view = self.loses_sight
-        self.gui.draw(self.surface, self.camera, self.stage, self._clock.get_fps(), self.taking.status)
+        """Draw the scene and the GUI."""
+        context = self.context
+        context.refit_if_covered()
+        context.gui.bodies_out_of_view = context.is_out_of_view
+        context.gui.draw(context.surface, context.camera, self.app_state, self._clock.get_fps(), context.capture.status)
 
     def _wait(self, done: Callable[[float], bool]) -> None:
-        """Stay alive until a job of the worker is done: show what is waited for, and close at Esc and the cross.
+        """Show progress until a job of the worker is done; Esc and the close button still close the window.
 
-        What compiles takes seconds: keys and buttons that were pressed meanwhile are dropped. Other events come later.
+        After a compilation, which takes seconds, key and button presses are dropped. Other events are posted again.
         """
         wait, later = Wait(self._worker), []
-        asks = not self.stage.saves_at_end and self.stage.count_unsaved() > 0
-        behind = self.preview() or self.surface.copy()
+        asks = not self.app_state.saves_at_end and self.app_state.count_unsaved() > 0
+        behind = self.context.render_preview() or self.context.surface.copy()
         while not done(1.0 / WAIT_RATE):
-            surface = pygame.display.get_surface() or self.surface
+            surface = pygame.display.get_surface() or self.context.surface
             surface.blit(behind, (0, 0))
-            self.gui.draw_wait(surface, wait.told())
+            self.context.gui.draw_wait(surface, wait.text())
             pygame.display.flip()
             for event in pygame.event.get():
                 escape = event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE
                 if (escape or event.type == pygame.QUIT) and not asks:
-                    self.leaving = 0
+                    self.context.exit_status = 0
                 later.append(event)
-            if self.leaving is not None:
+            if self.context.exit_status is not None:
                 pygame.display.iconify()
         for event in later:
             escape = event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE
-            if escape or not (wait.compiled and event.type in PRESSES):
+            if escape or not (wait.compiled and event.type in INPUT_EVENTS):
                 pygame.event.post(event)
         if wait.compiled:
             self._clock.tick()
 
     def _note_compiling(self, what: str) -> None:
-        """Take note that a kernel is being compiled. What other threads wait for keeps none waiting."""
+        """Show that a kernel is being compiled, if the main thread compiles it."""
         self._worker.note_compiling(what)
         if threading.current_thread() is not threading.main_thread():
             return
-        self.gui.draw_wait(self.surface, what)
+        self.context.gui.draw_wait(self.context.surface, what)
         pygame.display.flip()
         pygame.event.pump()  # keeps the window manager from marking the window as unresponsive
 
-    def take(self, event: pygame.event.Event) -> None:
-        """Take one event in."""
+    def handle_event(self, event: pygame.event.Event) -> None:
+        """Handle an event: window events, start of a game, gamepads, then keys and mouse, topmost part first."""
+        app_state, gui = self.app_state, self.context.gui
         if event.type == pygame.QUIT:
-            self.commands.do(Command.QUIT)
+            self.commands.run(Command.QUIT)
         elif event.type == pygame.WINDOWFOCUSLOST:
-            self.stage.unfocused = True
+            app_state.unfocused = True
         elif event.type in (pygame.WINDOWFOCUSGAINED, pygame.KEYDOWN, pygame.MOUSEBUTTONDOWN):
-            self.stage.unfocused = False
+            app_state.unfocused = False
         elif event.type in (pygame.VIDEORESIZE, pygame.WINDOWSIZECHANGED):
             self._resize()
-        if self._starts(event):
-            self.stage.start_game()
+        if self._starts_game(event):
+            app_state.start_game()
             return
-        for error in self._gamepads.take(event, self.stage.host, lambda: self.commands.do(Command.PAUSE)):
-            self.stage.messages.tell(str(error), "warning")
-        command = self._keyboard.command(event, self.gui.claimed_keys(self.stage))
-        self._dismiss(event, command)
-        self._let_go(event)
-        if self.gui.handle_event(event, self.stage):
+        if event.type in GAMEPAD_EVENTS:
+            for error in self._gamepads.handle_event(event, app_state.host, lambda: self.commands.run(Command.PAUSE)):
+                app_state.messages.add(str(error), "warning")
+        command = self._keyboard.command(event, app_state.key_bindings.pressed.keys())
+        self._cancel_confirmation(event, command)
+        self._release_keys(event)
+        if gui.handle_event(event, app_state):
             return
         if command is not None:
-            self.commands.do(command)
+            self.commands.run(command)
         elif event.type == pygame.KEYDOWN:
-            claims = self.gui.key_bindings(self.stage)
-            deed = claims.deed(event.key, self._keyboard.again)
-            waits = self.stage.waits_for_start
-            if deed is not None and not waits and not event.mod & (pygame.KMOD_CTRL | pygame.KMOD_ALT):
-                self.stage.act(deed)
-                if event.key in claims.releases:
-                    self._held[event.key] = claims.releases[event.key]
+            self._press_key(event)
         else:
-            self.mouse.take(event)
+            self.mouse.handle_event(event)
 
-    def _dismiss(self, event: pygame.event.Event, command: Command | None) -> None:
-        """Take back a question that is answered by doing something else; the panel may ask and confirm as well."""
-        asked = self.commands.asked
-        if asked is None:
+    def _press_key(self, event: pygame.event.Event) -> None:
+        """Run the handler that the scene or its game binds to a key."""
+        if self.app_state.waits_for_start or event.mod & (pygame.KMOD_CTRL | pygame.KMOD_ALT):
+            return
+        bindings = self.app_state.key_bindings
+        handler = bindings.handler_for(event.key, self._keyboard.is_repeat)
+        if handler is not None:
+            self.app_state.run_handler(handler)
+            if event.key in bindings.released:
+                self._release_handlers[event.key] = bindings.released[event.key]
+
+    def _cancel_confirmation(self, event: pygame.event.Event, command: Command | None) -> None:
+        """Withdraw a question if the event is another key or a click on the scene; the panel may confirm it as well."""
+        pending = self.commands.pending
+        if pending is None:
             return
         if event.type == pygame.KEYDOWN:
-            other = command != asked and event.key not in MODIFIERS and not self._keyboard.again
+            other = command != pending and event.key not in MODIFIER_KEYS and not self._keyboard.is_repeat
         else:
-            left = self.surface.get_width() - self.gui.panel.width
+            left = self.context.surface.get_width() - self.context.gui.panel.width
             other = event.type == pygame.MOUSEBUTTONDOWN and event.pos[0] < left
         if other:
-            self.commands.dismiss()
+            self.commands.cancel_confirmation()
 
-    def _starts(self, event: pygame.event.Event) -> bool:
-        """Tell whether an event starts the game that waits for it: Space, or any button of a gamepad."""
-        if not self.stage.waits_for_start or self.gui.covers_scene or self.stage.faults:
+    def _starts_game(self, event: pygame.event.Event) -> bool:
+        """Return whether an event starts the game that waits for it: Space, or any button of a gamepad."""
+        if not self.app_state.waits_for_start or self.context.gui.covers_scene or self.app_state.faults:
             return False
         space = event.type == pygame.KEYDOWN and event.key == pygame.K_SPACE
         return space or event.type == pygame.JOYBUTTONDOWN
 
-    def _let_go(self, event: pygame.event.Event) -> None:
-        """Do what the release of a claimed key asks for, also where the release itself will go elsewhere."""
+    def _release_keys(self, event: pygame.event.Event) -> None:
+        """Run the release handlers of bound keys, also if the event itself is consumed elsewhere."""
         if event.type == pygame.WINDOWFOCUSLOST:
-            gone = list(self._held)
+            keys = list(self._release_handlers)
         else:
-            gone = [event.key] if event.type == pygame.KEYUP else []
-        for key in gone:
-            deed = self._held.pop(key, None)
-            if deed is not None and self.stage.live is not None:
-                self.stage.act(deed)
+            keys = [event.key] if event.type == pygame.KEYUP else []
+        for key in keys:
+            handler = self._release_handlers.pop(key, None)
+            if handler is not None:
+                self.app_state.run_handler(handler)
+
+    def _on_scene_changed(self, same: bool) -> None:
+        self._release_handlers.clear()  # they act on the former session
+        self.context.on_scene_changed(same)
 
     def _resize(self) -> None:
         surface = pygame.display.get_surface()
-        if surface is None or surface.get_size() == self.camera.size:
-            return
-        self.resize(surface)
+        if surface is not None and surface.get_size() != self.context.camera.size:
+            self.context.resize(surface)
 
     @contextmanager
     def _signals(self) -> Iterator[None]:
         """Close cleanly on Ctrl+C and SIGTERM; at a second signal raise KeyboardInterrupt at once."""
 
         def leave(number: int, _: FrameType | None) -> None:
-            if self.leaving is not None:
+            if self.context.exit_status is not None:
                 raise KeyboardInterrupt
-            self.leaving = 130 if number == signal.SIGINT else 0
+            self.context.exit_status = 130 if number == signal.SIGINT else 0
 
         before = {number: signal.signal(number, leave) for number in (signal.SIGINT, signal.SIGTERM)}
         try:
@@ -251,12 +274,12 @@ class App(WindowContext):
                 signal.signal(number, handler)
 
     def close(self) -> None:
-        """Finish what is being recorded, and close the window."""
+        """Finish a film that is being recorded, and close the window."""
         COMPILE_CLOCK.on_begin = None
-        self.taking.stop_recording()
-        self.gui.close()
-        self.stage.compute = compute_here
-        if not self._worker.is_busy:  # else the engine is in use, and the process ends anyway
-            self.stage.close()
+        self.context.capture.stop_recording()
+        self.context.gui.close()
+        self.app_state.compute = compute_here
+        if not self._worker.is_busy:  # otherwise the engine is in use, and the process ends anyway
+            self.app_state.close()
         self._worker.close()
         close_screen()

@@ -1,18 +1,12 @@
-"""Stage: what is on, where it came from, and all that can be asked of it; no pygame, so that it can be tried without.
+"""Application state: the open scene or stored run, its game, pause, engine and preferences. It draws nothing.
 
-Whatever fails is told as a message, and what was on goes on.
-
-Shelf: the scene files that lie beside the one that was opened, and the shipped ones.
-
-Wishes: what somebody has chosen, which what is on next is to keep.
-
-Beginning: a scene becomes a session that is watched, on the engine that is wished for or one that can.
+An operation that fails adds a message and leaves the open scene as it was.
 """
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Concatenate, ParamSpec
 
 from sandbox.action import ActionError, SetParameter
 from sandbox.engines.contract import Refusal
@@ -30,6 +24,7 @@ from sandbox.scene.files.shipped_scenes import shipped
 from sandbox.scene.scene import Scene
 from sandbox.window.camera import Box
 from sandbox.window.game_host import GameHost, game_session_of, host_of
+from sandbox.window.input.bindings import NO_BINDINGS, KeyBindings, KeyHandler, key_bindings
 from sandbox.window.input.body_tools import BodyTools, count_changes
 from sandbox.window.messages import Messages
 from sandbox.window.playback.diagnostics import Diagnostics
@@ -40,21 +35,26 @@ from sandbox.window.playback.session import Session
 from sandbox.window.view_bounds import predict_bounds
 from sandbox.window.worker import Compute, compute_here
 
+P = ParamSpec("P")
+
+MAX_TWIN_BODIES = 64
+"""Scenes of at most this many bodies start with the divergence monitor on."""
+
 
 def scenes_beside(path: Path | None) -> tuple[Path, ...]:
-    """Return the scene files to walk through from one: those of its folder, or where none is open, the shipped."""
+    """Return the scene files of a file's folder; without a file, the shipped scenes."""
     if path is None:
         return tuple(scene.path for scene in shipped())
     try:
         found = sorted(path.parent.glob("*.toml"))
-    except OSError:  # the folder has gone, or may not be read: what is open can still be played
+    except OSError:  # the folder is gone or unreadable: the open scene can still be played
         found = []
     known = {file.resolve() for file in found}
     return tuple(found) if path.resolve() in known else (path, *found)
 
 
 def neighbouring_scene(path: Path | None, by: int) -> Path | None:
-    """Return the scene file so many places on, round and round; None where there is none."""
+    """Return the scene file `by` positions further, cyclically; None if there is none."""
     files = scenes_beside(path)
     if not files:
         return None
@@ -65,7 +65,7 @@ def neighbouring_scene(path: Path | None, by: int) -> Path | None:
 
 
 def scenes_to_pick(path: Path | None) -> list[tuple[str, Path]]:
-    """Return what a picker offers, by name: the shipped scenes, and those beside the one that is open."""
+    """Return (name, file) of the scenes beside the open one, and of the shipped scenes."""
     own = [(scene.name, scene.path) for scene in shipped()]
     known = {file.resolve() for _, file in own}
     others = [file for file in (scenes_beside(path) if path is not None else ()) if file.resolve() not in known]
@@ -74,50 +74,50 @@ def scenes_to_pick(path: Path | None) -> list[tuple[str, Path]]:
 
 @dataclass
 class Preferences:
-    """What is chosen for every scene, and what was turned of the present one."""
+    """Choices that are kept when another scene is opened, and parameters of the open scene that a restart keeps."""
 
     engine: str | None
-    """what plays may be another"""
+    """preferred engine; a session may run on another one that supports its scene"""
     overrides: tuple[Override, ...]
     """values set in every scene that is opened"""
     ghosted: bool = False
     trusting: bool | None = None
-    """None: nobody has said"""
-    turned: dict[str, Any] = field(default_factory=dict)
-    """values of the present scene by path, for a restart to keep"""
+    """None: not chosen"""
+    parameters: dict[str, Any] = field(default_factory=dict)
+    """values of the open scene by path"""
 
-    def begin(self, company: Diagnostics, trusting: bool) -> None:
-        """Show beside a session what is wished; a twin, where nobody has said, as told."""
+    def apply(self, company: Diagnostics, trusting: bool) -> None:
+        """Apply the ghost and twin preferences to a new session; `trusting` is the default of the twin."""
         company.show_trust(trusting if self.trusting is None else self.trusting)
         if self.ghosted and not company.ghosted:
             company.show_ghost(True)
 
     def toggle_ghost(self, company: Diagnostics) -> None:
-        """Begin a ghost from here, or end it; from now on that is wished."""
+        """Start or stop the ghost, and keep that for later scenes."""
         self.ghosted = not company.ghosted
         company.show_ghost(self.ghosted)
 
     def toggle_trust(self, company: Diagnostics) -> None:
-        """Begin to watch a twin from here, or end it; from now on that is wished."""
+        """Start or stop the perturbed twin, and keep that for later scenes."""
         self.trusting = company.trust is None
         company.show_trust(self.trusting)
 
-    def turn(self, action: SetParameter) -> None:
+    def store_parameter(self, action: SetParameter) -> None:
         """Keep a value for a restart."""
-        self.turned.pop(action.path, None)  # what is turned last is set last
-        self.turned[action.path] = action.value
+        self.parameters.pop(action.path, None)  # the value set last is applied last
+        self.parameters[action.path] = action.value
 
-    def as_turned(self, file: Scene) -> Scene:
-        """Return the scene as its file has it, with what was turned.
+    def with_parameters(self, file: Scene) -> Scene:
+        """Return the scene of a file with the stored parameter values.
 
         Raises:
-            SceneError: what was turned does not go together.
+            SceneError: the values contradict each other.
         """
-        return from_document(to_document(file), "<scene>", self.turned.items())
+        return from_document(to_document(file), "<scene>", self.parameters.items())
 
 
 def session_of_recording(recording: Recording) -> LiveView:
-    """Return a session that has done again all that was done in another, and goes on from there."""
+    """Return a session that has repeated a recording and continues from its end."""
     rules = rules_of(recording.scene)
     game = None if rules is None else GameSession(rules, recording.presses)
     session = Session(
@@ -130,13 +130,13 @@ def session_of_recording(recording: Recording) -> LiveView:
 
 
 def create_session(scene: Scene, engine: str, settings: Settings | None, messages: Messages) -> LiveView | None:
-    """Begin a session of a scene, with its game where it has one; None where no engine can, which is told.
+    """Return a new session of a scene, with its game if it has one; None if no engine supports the scene.
 
     Args:
-        scene: as its file has it.
-        engine: the wish; where it cannot, one that can takes its place, and that is told.
-        settings: by default the scene's own.
-        messages: told of what is not as wished.
+        scene: as read from its file.
+        engine: preferred engine; if it does not support the scene, another one is used and a warning added.
+        settings: by default those of the scene.
+        messages: receives warnings and errors.
     """
     scene = prepared_scene(scene)
     game = game_session_of(scene, messages)
@@ -145,143 +145,144 @@ def create_session(scene: Scene, engine: str, settings: Settings | None, message
     except Refusal as refusal:
         others = able(scene)
         if not others:
-            messages.tell(str(refusal), "error")
+            messages.add(str(refusal), "error")
             return None
-        messages.tell(f"{refusal}; opened with {others[0]}", "warning")
+        messages.add(f"{refusal}; opened with {others[0]}", "warning")
         return LiveView(Session(scene, others[0], game=game))
 
 
-FEW = 64
-"""Bodies up to which a twin is watched from the beginning."""
-
-
 class AppState:
-    """What the window shows, and what is done to it."""
+    """The open scene or run, and the operations on it."""
 
     def __init__(self, engine: str | None = None, overrides: Iterable[Override] = ()) -> None:
-        """Start with nothing on.
+        """Start without a scene.
 
         Args:
-            engine: whose name is tried first for every scene, until another is chosen; by default the exact one
-                for tables, and pymunk for all else.
+            engine: preferred engine of every scene, until another is chosen; by default `exact` for tables and
+                `pymunk` for all other scenes.
             overrides: values set in every scene that is opened.
         """
-        self.show: LiveView | RecordedView | None = None
+        self.view: LiveView | RecordedView | None = None
         self.path: Path | None = None
         self.reach: Box | None = None
-        """where the bodies come without a hand, m, as far as that is known"""
+        """bounds of the bodies' predicted motion without user input, m; None if unknown"""
         self.file: Scene | None = None
-        """the scene as its file has it"""
-        self._seats = TableGameHost()
+        """the scene as read from its file"""
+        self._table_host = TableGameHost()
         self.host: GameHost | None = None
-        """of the game with rules that is on"""
+        """host of the scene's game, if it has one"""
+        self.key_bindings: KeyBindings = NO_BINDINGS
+        """keys that the scene and its game bind"""
         self._paused = False
         self.waits_for_start = False
-        """a real-time game has been opened, and no key has started it yet"""
+        """a real-time game is open and has not been started yet"""
         self.covered = False
-        """help or the picker covers the scene; time stands still meanwhile"""
+        """help, the scene browser or a question covers the scene, which pauses it"""
         self.unfocused = False
-        """another window has the keyboard; time stands still meanwhile"""
+        """another window has the keyboard focus, which pauses the scene"""
         self.compute: Compute = compute_here
-        """calls all that may have to compile; the window lets it run beside itself"""
+        """runs jobs that may compile kernels; the window runs them on a worker thread"""
         self.question: str | None = None
-        """what is asked before hand-made changes are lost"""
+        """the question that is shown before hand-made changes are lost"""
         self.saves_at_end = False
         """the session is saved when the window closes"""
-        self._lost: Recording | None = None  # what Ctrl+Z brings back
+        self._lost: Recording | None = None  # restored by Ctrl+Z
         self.opening: Scene | None = None
         """the scene whose session is being started"""
-        self.hands = BodyTools()
+        self.body_tools = BodyTools()
         self.messages = Messages()
         self.faults: tuple[str, ...] = ()
-        self.on_new: Callable[[bool], object] = bool
-        """Called when something else is on; with whether it is the same scene, for the camera to stay."""
-        self._wishes = Preferences(engine, tuple(overrides))
+        self.on_scene_changed: Callable[[bool], None] | None = None
+        """Called after another view is shown; its argument tells whether it is of the same scene."""
+        self._preferences = Preferences(engine, tuple(overrides))
         self._again: Callable[[], LiveView | RecordedView] | None = None
-        self._tried: Path | None = None  # the file that was not opened after the present one, for its faults
+        self._tried: Path | None = None  # the faulty file that was tried after the open one
 
     @property
     def live(self) -> LiveView | None:
-        """What is on, where it can be changed."""
-        return self.show if isinstance(self.show, LiveView) else None
+        """The interactive session; None if nothing or a stored run is shown."""
+        return self.view if isinstance(self.view, LiveView) else None
 
     @property
     def game(self) -> BilliardsGame | None:
-        """Who plays at the table, where one is on."""
-        return self._seats.game
+        """The billiards game, if there is one."""
+        return self._table_host.game
 
     @property
     def gestures(self) -> CueControls | None:
-        """What a hand does at it."""
-        return self._seats.gestures
+        """The cue controls of the billiards game."""
+        return self._table_host.gestures
 
     @property
     def engine(self) -> str:
         """The present engine's name."""
-        return self.show.engine if self.show is not None else self._wishes.engine or USUAL
+        return self.view.engine if self.view is not None else self._preferences.engine or USUAL
 
     @property
     def paused(self) -> bool:
-        """Whether time stands still; a stored run that goes on at its end starts over."""
+        """Whether the user has paused; a stored run that is resumed at its end starts over."""
         return self._paused
 
     @paused.setter
     def paused(self, paused: bool) -> None:
-        if self._paused and not paused and isinstance(self.show, RecordedView) and self.show.at_end:
-            self.show.scrub(self.show.begin)
+        if self._paused and not paused and isinstance(self.view, RecordedView) and self.view.at_end:
+            self.view.scrub(self.view.begin)
         self._paused = paused
 
-    def put_on(
+    def show(
         self,
-        show: LiveView | RecordedView,
+        view: LiveView | RecordedView,
         path: Path | None,
         file: Scene,
         same: bool = False,
         again: Callable[[], LiveView | RecordedView] | None = None,
     ) -> None:
-        """Show something, and let go of what was on.
+        """Show a session or a stored run in place of the present one.
 
         Args:
-            show: what is on from now.
+            view: the session or run.
             path: its scene file.
-            file: the scene as its file has it.
-            same: it is the scene that was on.
-            again: makes it anew for a restart, where scene and settings are not all of it, as of a recording.
+            file: the scene as read from its file.
+            same: it is of the scene that is open.
+            again: creates the view anew for a restart, if scene and settings do not suffice, as for a recording.
         """
-        self._seats.leave()
-        self.host = host_of(show) if isinstance(show, LiveView) else None
-        if self.show is not None:
-            self.show.close()
-        self.show, self.path, self.file = show, path, file
-        if isinstance(show, RecordedView):
-            self.reach = show.run.bounds
+        self._table_host.leave()
+        self.host = host_of(view) if isinstance(view, LiveView) else None
+        if self.view is not None:
+            self.view.close()
+        self.view, self.path, self.file = view, path, file
+        if isinstance(view, RecordedView):
+            self.reach = view.run.bounds
         elif again is not None and not same:
             self.reach = None
         self._again, self._tried = again, None
-        self.hands.forget()
+        self.body_tools.reset()
         self.faults, self.question, self._lost = (), None, None
         if not same:
             self.waits_for_start = again is None and self.host is not None and is_real_time(file.play.game)
-        if isinstance(show, LiveView):
-            # What rules and hands do next, no twin can tell.
-            self._wishes.begin(show.company, trusting=len(show.bodies) <= FEW and self.host is None)
-            self.compute(lambda: self._seats.take(show, file, self.messages.tell))
-        self.on_new(same)
+        self.key_bindings = NO_BINDINGS
+        if isinstance(view, LiveView):
+            # A twin cannot predict the next input of rules and players.
+            self._preferences.apply(view.company, trusting=len(view.bodies) <= MAX_TWIN_BODIES and self.host is None)
+            self.compute(lambda: self._table_host.take(view, file, self.messages.add))
+            self.key_bindings = key_bindings(view, self.body_tools, self.gestures, self.host)
+        if self.on_scene_changed is not None:
+            self.on_scene_changed(same)
 
-    def seat(self, players: Players) -> None:
-        """Begin the game anew with other players."""
-        self._seats.players = players
+    def set_players(self, players: Players) -> None:
+        """Restart the game with other players."""
+        self._table_host.players = players
         self.restart()
 
     def open(self, path: Path, same: bool = False, engine: str | None = None) -> bool:
-        """Open a scene file; one with faults is told, and what was on goes on. Return whether it was opened."""
+        """Open a scene file and return whether that succeeded; faults are stored in `faults`."""
         try:
-            scene = load(path, self._wishes.overrides)
+            scene = load(path, self._preferences.overrides)
         except SceneError as error:
-            # By the file's own name: its folders would take the place of what is wrong.
+            # The file name without its folders leaves room for the fault.
             self.faults = tuple(str(Fault(path.name, f.line, f.path, f.message)) for f in error.faults)
             return False
-        return self._start(scene, path, scene, engine or self._wishes.engine or usual(scene), None, same)
+        return self._start(scene, path, scene, engine or self._preferences.engine or usual(scene), None, same)
 
     def _start(
         self, scene: Scene, path: Path | None, file: Scene, engine: str, settings: Settings | None, same: bool
@@ -295,30 +296,30 @@ class AppState:
         finally:
             self.opening = None
         if live is not None:
-            self.put_on(live, path, file, same)
+            self.show(live, path, file, same)
         return live is not None
 
     def restart(self) -> None:
-        """Start the same scene at 0, with what was turned, and with the same engine."""
-        if isinstance(self.show, RecordedView):
-            self.show.scrub(self.show.begin)
+        """Start the scene again at time 0, with the same engine and the parameters that were set."""
+        if isinstance(self.view, RecordedView):
+            self.view.scrub(self.view.begin)
         elif self._again is not None and self.file is not None:
-            self.put_on(self.compute(self._again), self.path, self.file, same=True, again=self._again)
-        elif self.show is not None and self.file is not None:
+            self.show(self.compute(self._again), self.path, self.file, same=True, again=self._again)
+        elif self.view is not None and self.file is not None:
             try:
-                scene = self._wishes.as_turned(self.file)
+                scene = self._preferences.with_parameters(self.file)
             except SceneError as error:
-                self.messages.tell(str(error), "error")
+                self.messages.add(str(error), "error")
                 return
-            lost = self._recorded() if self.count_unsaved(restart=True) else self._lost
-            self._start(scene, self.path, self.file, self.show.engine, self.show.session.wanted, same=True)
+            lost = self._current_recording() if self.count_unsaved(restart=True) else self._lost
+            self._start(scene, self.path, self.file, self.view.engine, self.view.session.wanted, same=True)
             self._lost = lost
 
     def count_unsaved(self, restart: bool = False) -> int:
-        """Return how many hand-made changes would be lost; those of a game are its own.
+        """Return the number of hand-made changes that would be lost; 0 for games.
 
         Args:
-            restart: by a restart, which keeps the values that were set.
+            restart: count those that a restart loses; it keeps parameters.
         """
         live = self.live
         if live is None or self.host is not None or self.game is not None:
@@ -327,23 +328,23 @@ class AppState:
         actions = [action for action in live.session.unsaved if not isinstance(action, kept)]
         return count_changes(actions, live.scene.play.arrows)
 
-    def bring_back(self) -> None:
-        """Go back to the session as it was before a restart, or before something later was replaced."""
+    def restore_session(self) -> None:
+        """Restore the session as it was before a restart, or before an action in its past replaced its future."""
         live = self.live
         lost = self._lost
         if live is not None and live.session.replaced is not None:
             lost = live.session.replaced.recording
         if lost is None or live is None or self.file is None:
-            self.messages.tell("there is nothing to restore", "warning")
+            self.messages.add("there is nothing to restore", "warning")
             return
-        known, present = lost, self._recorded() if self.count_unsaved() else None
-        self.put_on(self.compute(lambda: session_of_recording(known)), self.path, self.file, same=True)
+        known, present = lost, self._current_recording() if self.count_unsaved() else None
+        self.show(self.compute(lambda: session_of_recording(known)), self.path, self.file, same=True)
         self._lost = present
         again = "" if present is None else " (Ctrl+Z again: the later one)"
-        self.messages.tell(f"previous session restored{again}")
+        self.messages.add(f"previous session restored{again}")
 
-    def _recorded(self) -> Recording | None:
-        """Return the session as it is, whole; one that is being replayed is first played to where it is wanted."""
+    def _current_recording(self) -> Recording | None:
+        """Return the recording of the session, after a seek that is under way is finished."""
         live = self.live
         if live is None:
             return None
@@ -352,169 +353,173 @@ class AppState:
         return live.session.recording()
 
     def reload(self) -> None:
-        """Read the scene's file again, and start it at 0."""
-        if self.path is None or not isinstance(self.show, LiveView):
-            self.messages.tell("there is no scene file to reload", "warning")
+        """Read the scene's file again and start it at time 0."""
+        if self.path is None or not isinstance(self.view, LiveView):
+            self.messages.add("there is no scene file to reload", "warning")
             return
-        if self.open(self.path, same=True, engine=self.show.engine):
-            self._wishes.turned.clear()
-            self.messages.tell(f"{self.path.name} reloaded")
+        if self.open(self.path, same=True, engine=self.view.engine):
+            self._preferences.parameters.clear()
+            self.messages.add(f"{self.path.name} reloaded")
 
-    def walk(self, by: int) -> None:
-        """Open the scene file before or after the one that is on, or after the faulty one that was tried last."""
+    def open_neighbour(self, by: int) -> None:
+        """Open the scene file `by` positions after the open one, or after the faulty one that was tried last."""
         path = neighbouring_scene(self._tried or self.path, by)
         if path is None:
-            self.messages.tell("there is no other scene", "warning")
+            self.messages.add("there is no other scene", "warning")
         elif self._tried is not None and self.path is not None and path.resolve() == self.path.resolve():
-            self.faults, self._tried = (), None  # back to what is on: it goes on
+            self.faults, self._tried = (), None  # back to the open scene
         else:
-            self.take(path)
+            self.open_other(path)
 
-    def take(self, path: Path) -> None:
-        """Open another scene file."""
+    def open_other(self, path: Path) -> None:
+        """Open another scene file and drop the parameters that were set."""
         if self.open(path):
-            self._wishes.turned.clear()
+            self._preferences.parameters.clear()
         else:
             self._tried = path
 
     def toggle_ghost(self) -> None:
-        """Begin a ghost from here, or end it."""
+        """Start the ghost at the present time, or stop it."""
         if self.live is None:
-            self._tell_why_not("has no ghost; replay it with --engine NAME")
+            self._warn_no_session("has no ghost; replay it with --engine NAME")
             return
         company = self.live.company
-        self.compute(lambda: self._wishes.toggle_ghost(company))
+        self.compute(lambda: self._preferences.toggle_ghost(company))
 
     def toggle_trust(self) -> None:
-        """Begin to watch a twin from here, or end it."""
+        """Start the divergence monitor at the present time, or stop it."""
         if self.live is None:
-            self._tell_why_not("has no predictability horizon; open its scene with `sandbox play`")
+            self._warn_no_session("has no predictability horizon; open its scene with `sandbox play`")
             return
         company = self.live.company
-        self.compute(lambda: self._wishes.toggle_trust(company))
+        self.compute(lambda: self._preferences.toggle_trust(company))
 
-    def next_engine(self) -> None:
-        """Go on with the next engine that can, from the same state; who cannot says why."""
-        if not isinstance(self.show, LiveView):
-            self._tell_why_not("cannot change its engine; replay it with --engine NAME")
+    def switch_to_next_engine(self) -> None:
+        """Continue on the next engine that supports the scene; the others add the reason as a warning."""
+        if not isinstance(self.view, LiveView):
+            self._warn_no_session("cannot change its engine; replay it with --engine NAME")
             return
         names = list(ENGINES)
-        here = names.index(self.show.engine)
+        here = names.index(self.view.engine)
         for name in names[here + 1 :] + names[:here]:
-            if self.switch(name):
+            if self.switch_engine(name):
                 return
 
-    def switch(self, engine: str) -> bool:
-        """Go on with an engine; return whether it could."""
+    def switch_engine(self, engine: str) -> bool:
+        """Continue on an engine from the present state; return whether that succeeded."""
         live = self.live
         if live is None or engine == live.engine:
             return False
         try:
             note = self.compute(lambda: live.switch(engine))
         except ActionError as error:
-            self.messages.tell(str(error), "warning")
+            self.messages.add(str(error), "warning")
             return False
-        self._wishes.engine = engine
-        self.messages.tell(f"{engine}: {engine_named(engine).about}" + (f" ({note})" if note else ""))
+        self._preferences.engine = engine
+        self.messages.add(f"{engine}: {engine_named(engine).about}" + (f" ({note})" if note else ""))
         return True
 
-    def turn(self, key: str, value: ParameterValue) -> None:
-        """Turn a knob."""
+    def set_parameter(self, key: str, value: ParameterValue) -> None:
+        """Set a parameter of the session by its key."""
         live = self.live
         if live is None:
             return
         if key == "engine":
-            self.switch(str(value))
+            self.switch_engine(str(value))
             return
         players = next((each for each in PLAYERS if each == value), None)
         if key == "players" and players is not None:
-            self.seat(players)
+            self.set_players(players)
             return
         if key == "misses":
-            self._seats.misses = value == "on"
+            self._table_host.misses = value == "on"
             self.restart()
             return
 
-        def turn(live: LiveView) -> None:
-            for action in turned(live, key, value, self.hands.picked_of(live)):
+        def apply() -> None:
+            for action in turned(live, key, value, self.body_tools.picked_index(live)):
                 live.act(action)
                 if isinstance(action, SetParameter):
-                    self._wishes.turn(action)
+                    self._preferences.store_parameter(action)
 
-        self.act(turn)
+        self.run_handler(apply)
 
-    def _tell_why_not(self, what: str) -> None:
-        """Say that what is on is no session."""
-        self.messages.tell(f"a stored run {what}" if self.show is not None else "no scene is open", "warning")
+    def _warn_no_session(self, what: str) -> None:
+        """Add the warning that a stored run, or nothing, is shown."""
+        self.messages.add(f"a stored run {what}" if self.view is not None else "no scene is open", "warning")
 
-    def act(self, deed: Callable[[LiveView], object]) -> bool:
-        """Do something to what is on, and say so where it cannot be done; return whether it could."""
-        live = self.live
-        if live is None:
-            self._tell_why_not("cannot be changed; open its scene with `sandbox play`")
+    def run_handler(self, handler: KeyHandler) -> bool:
+        """Run a handler that acts on the session; return whether it succeeded. A refused action adds a warning."""
+        if self.live is None:
+            self._warn_no_session("cannot be changed; open its scene with `sandbox play`")
             return False
         try:
-            self.compute(lambda: deed(live))
+            self.compute(handler)
         except ActionError as error:
-            self.messages.tell(str(error), "warning")
+            self.messages.add(str(error), "warning")
             return False
         return True
 
-    def go_on(self, elapsed: float) -> None:
-        """Let real time pass, s."""
-        show = self.show
-        if show is None:
+    def use_tool(self, tool: Callable[Concatenate[LiveView, P], object], *args: P.args, **kwargs: P.kwargs) -> bool:
+        """Run a tool of `body_tools` on the session, as `run_handler` does."""
+        live = self.live
+        return self.run_handler(lambda: tool(live, *args, **kwargs) if live is not None else None)
+
+    def update(self, elapsed: float) -> None:
+        """Advance the session by an interval of real time, s, unless it is paused."""
+        view = self.view
+        if view is None:
             return
-        game, still = self.game, self._seats.waits and not self.hands.holding
-        stands = self.paused or self.waits_for_start or self.covered or self.unfocused or still
-        self.compute(lambda: show.go_on(elapsed, stands))
+        game, table_waits = self.game, self._table_host.waits and not self.body_tools.is_holding
+        halted = self.paused or self.waits_for_start or self.covered or self.unfocused or table_waits
+        self.compute(lambda: view.go_on(elapsed, halted))
         if game is not None:
-            self.act(lambda _: game.go_on(elapsed))
-            self.messages.take(game.notes)
+            self.run_handler(lambda: game.go_on(elapsed))
+            self.messages.extend(game.notes)
         if self.host is not None:
-            self.messages.take(self.host.notes())
-        if isinstance(show, LiveView) and show.wants_pause:
-            self.paused, show.wants_pause = True, False
-        elif isinstance(show, RecordedView) and show.at_end:
+            self.messages.extend(self.host.notes())
+        if isinstance(view, LiveView) and view.wants_pause:
+            self.paused, view.wants_pause = True, False
+        elif isinstance(view, RecordedView) and view.at_end:
             self.paused = True
-        self.messages.take(show.notes)
+        self.messages.extend(view.notes)
 
     def start_game(self) -> None:
-        """Let the time of a real-time game begin."""
+        """Start the clock of a real-time game."""
         self.waits_for_start = self.paused = False
 
     def toggle_pause(self) -> None:
-        """Pause, or resume; a game that has not begun begins."""
+        """Pause or resume; a game that waits for its start is started."""
         if self.waits_for_start:
             self.start_game()
         else:
             self.paused = not self.paused
 
     def step(self) -> None:
-        """Make one step; a running scene pauses."""
+        """Pause and advance by one step."""
         self.paused, self.waits_for_start = True, False
-        if self.show is not None:
-            self.compute(self.show.step)
+        if self.view is not None:
+            self.compute(self.view.step)
 
-    def back(self) -> None:
-        """Go one step back; a running scene pauses."""
+    def step_back(self) -> None:
+        """Pause and go back by one step."""
         self.paused, self.waits_for_start = True, False
-        if self.show is not None:
-            self.compute(self.show.back)
+        if self.view is not None:
+            self.compute(self.view.back)
 
     def slower(self) -> None:
-        """Go one rung slower."""
-        if self.show is not None:
-            self.show.pace.slower()
+        """Select the next slower playback speed."""
+        if self.view is not None:
+            self.view.pace.slower()
 
     def faster(self) -> None:
-        """Go one rung faster."""
-        if self.show is not None:
-            self.show.pace.faster()
+        """Select the next faster playback speed."""
+        if self.view is not None:
+            self.view.pace.faster()
 
     def close(self) -> None:
-        """Let go of what is on."""
-        self._seats.leave()
-        if self.show is not None:
-            self.show.close()
-            self.show = None
+        """Close the session or run."""
+        self._table_host.leave()
+        if self.view is not None:
+            self.view.close()
+            self.view = None

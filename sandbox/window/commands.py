@@ -1,4 +1,4 @@
-"""Commands: what each key and button does."""
+"""Command dispatch: the handler of each command of keys and panel buttons."""
 
 from collections.abc import Callable
 
@@ -21,150 +21,148 @@ BUTTONS = {
     "picker": Command.PICKER,
     "help": Command.HELP,
 }
-"""What the panel's buttons stand for."""
+"""Commands of the panel's buttons."""
 
-
-LOSING = {
+CONFIRMATIONS = {
     Command.RESTART: "press R again to restart",
     Command.PREVIOUS: "press [ again to open the other scene",
     Command.NEXT: "press ] again to open the other scene",
     Command.RELOAD: "press Ctrl+L again to reload",
     Command.QUIT: "press Esc again to quit",
 }
-"""What ends a session, and how that is confirmed where something hand-made would be lost."""
+"""How to confirm the commands that end a session, if hand-made changes would be lost."""
 
 
 class Commands:
-    """One function for each command."""
+    """Handlers of commands, and of the panel's widgets."""
 
-    def __init__(self, seat: WindowContext, mouse: MouseController) -> None:
-        self._seat, self._mouse = seat, mouse
-        self._turned: dict[str, ParameterValue] = {}  # knobs since the last `settle`, the last turned last
-        self.asked: Command | None = None
-        """what was not done at once, as something would be lost"""
-        stage, gui = seat.stage, seat.gui
-        self._deeds: dict[Command, Callable[[], object]] = {
-            Command.PAUSE: stage.toggle_pause,
-            Command.STEP: stage.step,
-            Command.BACK: stage.back,
-            Command.RESTART: stage.restart,
-            Command.PREVIOUS: lambda: stage.walk(-1),
-            Command.NEXT: lambda: stage.walk(1),
-            Command.PICKER: self._picker,
-            Command.SLOWER: stage.slower,
-            Command.FASTER: stage.faster,
-            Command.ENGINE: stage.next_engine,
-            Command.GHOST: stage.toggle_ghost,
-            Command.TRUST: stage.toggle_trust,
-            Command.HOME: self._home,
-            Command.PANEL: self._panel,
-            Command.HELP: self._help,
-            Command.SCREENSHOT: self._screenshot,
-            Command.RECORD: self._record,
-            Command.SAVE: lambda: seat.taking.save_session(stage.show, seat.name),
-            Command.RELOAD: stage.reload,
-            Command.SOUND: lambda: stage.messages.tell(*gui.toggle_sound()),
-            Command.DELETE: lambda: stage.act(stage.hands.remove),
-            Command.NUDGE: lambda: stage.act(stage.hands.nudge),
-            Command.ADD_BALL: lambda: self._add(box=False),
-            Command.ADD_BOX: lambda: self._add(box=True),
+    def __init__(self, context: WindowContext, mouse: MouseController) -> None:
+        self._context, self._mouse = context, mouse
+        self._changed: dict[str, ParameterValue] = {}  # parameters changed since the last `flush`, the latest last
+        self.pending: Command | None = None
+        """command that waits for confirmation"""
+        app_state, gui = context.app_state, context.gui
+        self._handlers: dict[Command, Callable[[], object]] = {
+            Command.PAUSE: app_state.toggle_pause,
+            Command.STEP: app_state.step,
+            Command.BACK: app_state.step_back,
+            Command.RESTART: app_state.restart,
+            Command.PREVIOUS: lambda: app_state.open_neighbour(-1),
+            Command.NEXT: lambda: app_state.open_neighbour(1),
+            Command.PICKER: self._open_scene_browser,
+            Command.SLOWER: app_state.slower,
+            Command.FASTER: app_state.faster,
+            Command.ENGINE: app_state.switch_to_next_engine,
+            Command.GHOST: app_state.toggle_ghost,
+            Command.TRUST: app_state.toggle_trust,
+            Command.HOME: self._fit_view,
+            Command.PANEL: self._toggle_panel,
+            Command.HELP: self._toggle_help,
+            Command.SCREENSHOT: self._save_screenshot,
+            Command.RECORD: self._toggle_recording,
+            Command.SAVE: lambda: context.capture.save_session(app_state.view, context.name),
+            Command.RELOAD: app_state.reload,
+            Command.SOUND: lambda: app_state.messages.add(*gui.toggle_sound()),
+            Command.DELETE: lambda: app_state.use_tool(app_state.body_tools.remove),
+            Command.NUDGE: lambda: app_state.use_tool(app_state.body_tools.nudge),
+            Command.ADD_BALL: lambda: self._add_body(box=False),
+            Command.ADD_BOX: lambda: self._add_body(box=True),
             Command.QUIT: self._quit,
-            Command.UNDO: stage.bring_back,
-            Command.FOLLOW: seat.toggle_follow,
-            Command.FULL_SCREEN: seat.toggle_full_screen,
+            Command.UNDO: app_state.restore_session,
+            Command.FOLLOW: context.toggle_follow,
+            Command.FULL_SCREEN: context.toggle_full_screen,
         }
-        gui.panel.on_button = lambda name: self.do(BUTTONS[name])
+        gui.panel.on_button = lambda name: self.run(BUTTONS[name])
         gui.panel.on_toggle = lambda name, _: self.toggle(name)
-        gui.panel.on_change = self._turn
+        gui.panel.on_change = self._store_parameter
 
-    def do(self, command: Command) -> None:
-        """Do what a command says, after what came before it."""
-        self.settle()
-        if self._asks(command):
+    def run(self, command: Command) -> None:
+        """Run a command, after the pending changes of parameters and of the mouse."""
+        self.flush()
+        if self._needs_confirmation(command):
             return
         if command.overlay is not None:
-            self._seat.gui.overlays ^= {command.overlay}
+            self._context.gui.overlays ^= {command.overlay}
         else:
-            self._deeds[command]()
+            self._handlers[command]()
 
-    def _asks(self, command: Command) -> bool:
-        """Ask before hand-made changes are lost; return whether that was asked now. Asked twice, it is done."""
-        stage, confirmed = self._seat.stage, command == self.asked
-        self.dismiss()
-        if command not in LOSING or confirmed or (command is Command.QUIT and stage.saves_at_end):
+    def _needs_confirmation(self, command: Command) -> bool:
+        """Show the question before hand-made changes are lost; return False if a repeated command confirms it."""
+        app_state, confirmed = self._context.app_state, command == self.pending
+        self.cancel_confirmation()
+        if command not in CONFIRMATIONS or confirmed or (command is Command.QUIT and app_state.saves_at_end):
             return False
-        count = stage.count_unsaved(restart=command is Command.RESTART)
+        count = app_state.count_unsaved(restart=command is Command.RESTART)
         if not count:
             return False
-        self.asked, stage.question = command, describe_loss(count, LOSING[command])
+        self.pending, app_state.question = command, describe_loss(count, CONFIRMATIONS[command])
         return True
 
-    def dismiss(self) -> None:
-        """Take back what was asked."""
-        self.asked = self._seat.stage.question = None
+    def cancel_confirmation(self) -> None:
+        """Withdraw the question."""
+        self.pending = self._context.app_state.question = None
 
     def toggle(self, name: str) -> None:
-        """Turn one of the panel's switches."""
+        """Toggle one of the panel's checkboxes."""
         if name == "antialias":
-            self._seat.gui.antialias = not self._seat.gui.antialias
+            self._context.gui.antialias = not self._context.gui.antialias
         else:
-            self.do(Command(name))
+            self.run(Command(name))
 
-    def settle(self) -> None:
-        """Act on where knobs and the mouse are by now: once a turn, however many motions led there."""
-        turned, self._turned = self._turned, {}
-        for key, value in turned.items():
-            self._seat.stage.turn(key, value)
-        self._mouse.settle()
+    def flush(self) -> None:
+        """Apply the latest values of sliders and of a drag: once a frame, however many motion events there were."""
+        changed, self._changed = self._changed, {}
+        for key, value in changed.items():
+            self._context.app_state.set_parameter(key, value)
+        self._mouse.flush()
 
-    def _turn(self, key: str, value: ParameterValue, _: bool) -> None:
-        self._turned.pop(key, None)
-        self._turned[key] = value
+    def _store_parameter(self, key: str, value: ParameterValue, _: bool) -> None:
+        self._changed.pop(key, None)
+        self._changed[key] = value
 
-    def _let_go(self) -> None:
-        """Let go of everything, as something comes that hides the releases."""
-        self._mouse.let_go()
-        self._seat.gui.panel.release()
-        self.settle()
+    def _release_all(self) -> None:
+        """End all drags, before something covers the scene and consumes their releases."""
+        self._mouse.release_all()
+        self._context.gui.panel.release()
+        self.flush()
 
-    def _picker(self) -> None:
-        self._let_go()
-        self._seat.gui.open_scene_browser(self._seat.stage.path)
+    def _open_scene_browser(self) -> None:
+        self._release_all()
+        self._context.gui.open_scene_browser(self._context.app_state.path)
 
-    def _help(self) -> None:
-        self._let_go()
-        self._seat.gui.toggle_help()
+    def _toggle_help(self) -> None:
+        self._release_all()
+        self._context.gui.toggle_help()
 
-    def _home(self) -> None:
-        """Show the scene as it began; where that is seen already, the bodies where they are now."""
-        self._seat.following = None
-        if self._seat.at_home:
-            self._seat.find()
+    def _fit_view(self) -> None:
+        """Fit the scene; if it is fitted already, the present positions of the bodies."""
+        self._context.following = None
+        if self._context.is_fitted:
+            self._context.fit_bodies()
         else:
-            self._seat.home()
+            self._context.fit_scene()
 
-    def _panel(self) -> None:
-        self._let_go()
-        gui = self._seat.gui
+    def _toggle_panel(self) -> None:
+        self._release_all()
+        gui = self._context.gui
         gui.panel.visible = not gui.panel.visible
-        if self._seat.at_home:
-            self._seat.home()
+        if self._context.is_fitted:
+            self._context.fit_scene()
 
-    def _screenshot(self) -> None:
-        self._seat.taking.save_screenshot(self._seat.surface, self._seat.name)
+    def _save_screenshot(self) -> None:
+        self._context.capture.save_screenshot(self._context.surface, self._context.name)
 
-    def _record(self) -> None:
-        taking = self._seat.taking
-        if taking.is_recording:
-            taking.stop_recording()
+    def _toggle_recording(self) -> None:
+        capture = self._context.capture
+        if capture.is_recording:
+            capture.stop_recording()
         else:
-            taking.start_recording(self._seat.surface.get_size(), self._seat.name)
+            capture.start_recording(self._context.surface.get_size(), self._context.name)
 
-    def _add(self, *, box: bool) -> None:
-        seat = self._seat
-        place = self._mouse.world()
-        size = min(seat.camera.size) / seat.camera.scale
-        seat.stage.act(lambda live: seat.stage.hands.add(live, place, size, box=box))
+    def _add_body(self, *, box: bool) -> None:
+        camera, app_state = self._context.camera, self._context.app_state
+        view_size = min(camera.size) / camera.scale
+        app_state.use_tool(app_state.body_tools.add, self._mouse.world_position(), view_size, box=box)
 
     def _quit(self) -> None:
-        self._seat.leaving = 0
+        self._context.exit_status = 0

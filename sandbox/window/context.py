@@ -22,72 +22,78 @@ from sandbox.window.ui.scene_browser import frame_in_flight
 from sandbox.window.view_bounds import Corners, bounding_box, should_rotate, view_bounds
 
 TITLE = "sandbox"
-CLOSER = 1.5
-"""A camera that follows all moving bodies is at most so many times as close as at first."""
+MAX_FOLLOW_ZOOM = 1.5
+"""largest zoom of a camera that follows all moving bodies, relative to the fitted scene"""
 FIELD_MARGIN = 0.02
-"""of what plates leave free, so much is left on each side of a table or the field of a game"""
-BESIDE_BODIES = 12.0
-"""radii: what the camera shows at least of where bodies are"""
+"""margin on each side of a table or playing field, as a fraction of the area that plates leave free"""
+MIN_VIEW_RADII = 12.0
+"""median body radii that the camera shows at least when it fits bodies"""
 
 
 class WindowContext:
-    """All that commands and the mouse have to do with. It opens no window."""
+    """Surface, camera and title of the window, and the parts that commands and the mouse use. It opens no window."""
 
     def __init__(
-        self, surface: pygame.Surface, unit: float, stage: AppState, folder: Path, film: str, say: Callable[[str], None]
+        self,
+        surface: pygame.Surface,
+        unit: float,
+        app_state: AppState,
+        folder: Path,
+        film: str,
+        say: Callable[[str], None],
     ) -> None:
-        """Take place.
+        """Create the GUI and the camera of a window.
 
         Args:
-            surface: what is drawn on.
-            unit: by how much things are larger than on a display of 1080 lines.
-            stage: what is played.
-            folder: where screenshots, films and sessions go.
-            film: what Ctrl+R records, `.gif` or `.mp4`.
-            say: who prints a line on the terminal.
+            surface: surface of the window.
+            unit: UI scale, relative to a display of 1080 lines.
+            app_state: the open scene and its operations.
+            folder: where screenshots, films and sessions are saved.
+            film: format of films, `.gif` or `.mp4`.
+            say: prints a line on the terminal.
         """
-        self.surface, self.stage, self._say = surface, stage, say
-        self.taking = CaptureController(folder, film, self.tell)
+        self.surface, self.app_state, self._print_line = surface, app_state, say
+        self.capture = CaptureController(folder, film, self.notify)
         self.gui = Gui(surface.get_size(), unit)
         self.camera = Camera((0.0, 0.0), 100.0, surface.get_size())
-        self.at_home = True
-        """whether the camera is where Home puts it; a new scene is then seen whole"""
+        self.is_fitted = True
+        """the camera shows the whole scene, and is fitted again to a new scene or size"""
         self.following: int | Literal["all"] | None = None
-        """number of the body that the camera follows, or all that move"""
-        self._window_size: tuple[int, int] | None = None  # before it filled the screen
-        self._taken: list[pygame.Rect] = []  # what plates covered as it came home
-        self._covered = (0, 0)  # px at the top and bottom that the score panel took as it came home
-        self.leaving: int | None = None
-        """the exit status, once the window is to close"""
+        """index of the body that the camera follows, or all moving bodies"""
+        self._window_size: tuple[int, int] | None = None  # before full screen
+        self._plates: list[pygame.Rect] = []  # areas of plates when the camera was fitted
+        self._covered = (0, 0)  # px at the top and bottom covered by the score panel when the camera was fitted
+        self.exit_status: int | None = None
+        """set when the window is to close"""
 
-    def tell(self, text: str, level: str = "info") -> None:
-        """Say something in the window and on the terminal."""
-        self.stage.messages.tell(text, level)
-        self._say(text)
+    def notify(self, text: str, level: str = "info") -> None:
+        """Show a message in the window and print it on the terminal."""
+        self.app_state.messages.add(text, level)
+        self._print_line(text)
 
-    def renew(self, same: bool) -> None:
-        """Look at what is on now; the same scene as before is seen from where it was seen."""
-        show = self.stage.show
+    def on_scene_changed(self, same: bool) -> None:
+        """Fit the camera, GUI and title to another view; of the same scene the camera stays."""
+        show = self.app_state.view
         if not same:
-            self.following = None if show is None else _steered(show.scene)
-        if self.at_home:
-            self.home()
+            self.following = None if show is None else _thrust_body(show.scene)
+        if self.is_fitted:
+            self.fit_scene()
         self.gui.on_scene_changed(same)
         title = "" if show is None else f"{show.scene.title or self.name} - "
         pygame.display.set_caption(renderable(title + TITLE))
 
     @property
     def name(self) -> str:
-        """What files of this scene are called by: its file, or where it has none, its title."""
-        if self.stage.path is not None:
-            return self.stage.path.stem
-        show = self.stage.show
+        """Base name of saved files: that of the scene file, or without one, the title."""
+        if self.app_state.path is not None:
+            return self.app_state.path.stem
+        show = self.app_state.view
         return (show.scene.title if show is not None else "") or "scene"
 
-    def preview(self) -> pygame.Surface | None:
-        """Return a picture of the scene that is being opened, as it will begin; None where none is."""
-        scene = self.stage.opening
-        if scene is None or (self.stage.show is not None and self.stage.show.scene is scene):
+    def render_preview(self) -> pygame.Surface | None:
+        """Return a picture of the initial state of the scene that is being opened; None if none is."""
+        scene = self.app_state.opening
+        if scene is None or (self.app_state.view is not None and self.app_state.view.scene is scene):
             return None
         size = self.surface.get_size()
         made = pygame.Surface(size, 0, self.surface)
@@ -100,17 +106,17 @@ class WindowContext:
         self.gui.panel.draw(made)
         return made
 
-    def home(self) -> None:
-        """Show the scene whole."""
-        self.at_home = True
-        show = self.stage.show
+    def fit_scene(self) -> None:
+        """Fit the camera to the whole scene."""
+        self.is_fitted = True
+        show = self.app_state.view
         if show is not None:
-            self._fit(view_bounds(show.scene, self.stage.reach))
+            self._fit(view_bounds(show.scene, self.app_state.reach))
 
     @property
-    def loses_sight(self) -> bool:
-        """Whether none of the bodies that move is in the picture."""
-        show = self.stage.show
+    def is_out_of_view(self) -> bool:
+        """Whether all moving bodies are outside the view."""
+        show = self.app_state.view
         if show is None:
             return False
         frame, bodies = show.drawn, show.bodies
@@ -120,22 +126,22 @@ class WindowContext:
         return bool((~bodies.fixed).any()) and not seen.any()
 
     def toggle_follow(self) -> None:
-        """Let the camera follow the picked body, or all that move; or let it stay where it is."""
-        show, messages = self.stage.show, self.stage.messages
+        """Follow the picked body or all moving bodies with the camera, or stop following."""
+        show, messages = self.app_state.view, self.app_state.messages
         if show is None:
             return
         if self.following is not None:
             self.following = None
-            messages.tell("the camera stays here; Home fits the view")
+            messages.add("the camera stays here; Home fits the view")
             return
-        picked = self.stage.hands.picked
-        self.following, self.at_home = "all" if picked is None else picked, False
+        picked = self.app_state.body_tools.picked
+        self.following, self.is_fitted = "all" if picked is None else picked, False
         name = "all moving bodies" if picked is None else show.bodies.names[picked]
-        messages.tell(f"the camera follows {name} (F: stop)")
+        messages.add(f"the camera follows {name} (F: stop)")
 
-    def follow(self, elapsed: float) -> None:
-        """Move the camera after what it follows, by so much real time, s."""
-        show = self.stage.show
+    def update_camera(self, elapsed: float) -> None:
+        """Move the camera towards what it follows; `elapsed` is real time, s."""
+        show = self.app_state.view
         if show is None or self.following is None:
             return
         frame, bodies = show.drawn, show.bodies
@@ -144,59 +150,59 @@ class WindowContext:
             chosen = frame.present[:count] & ~bodies.fixed[:count] & np.isfinite(frame.position[:count]).all(axis=1)
             box = bounding_box(frame.position[:count][chosen], bodies.radius[:count][chosen])
             if box is not None:
-                target = self._fitting(_widened(box, bodies.radius[:count][chosen]))
-                closest = CLOSER * self._fitting(view_bounds(show.scene, self.stage.reach)).scale
+                target = self._fitted_camera(_enlarge_box(box, bodies.radius[:count][chosen]))
+                closest = MAX_FOLLOW_ZOOM * self._fitted_camera(view_bounds(show.scene, self.app_state.reach)).scale
                 self.camera = self.camera.eased(target.zoomed_to(min(target.scale, closest)), elapsed)
         elif self.following < len(frame.position) and frame.present[self.following]:
             place = frame.position[self.following]
             if np.isfinite(place).all():
-                before, self.camera = self.camera, self.camera.keeping(place, self._free, elapsed)
-                self.at_home &= before == self.camera
+                before, self.camera = self.camera, self.camera.keeping(place, self._free_area, elapsed)
+                self.is_fitted &= before == self.camera
 
     @property
-    def _free(self) -> tuple[float, float, float, float]:
-        """What nothing covers: left, top, right and bottom, px."""
+    def _free_area(self) -> tuple[float, float, float, float]:
+        """Left, top, right and bottom of the area that nothing covers, px."""
         width, height = self.surface.get_size()
-        head, foot = self.gui.score_margins(self.stage)
+        head, foot = self.gui.score_margins(self.app_state)
         return 0.0, float(head), float(width - self.gui.panel.width), float(height - foot - self.gui.bottom_margin)
 
     def toggle_full_screen(self) -> None:
-        """Fill the screen, or go back to the window as it was."""
+        """Switch between full screen and the former window size."""
         if self._window_size is None:
             self._window_size = self.surface.get_size()
             surface = pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
         else:
             surface = pygame.display.set_mode(self._window_size, pygame.RESIZABLE)
-            if surface.get_size() != self._window_size:  # some drivers only leave full screen at first
+            if surface.get_size() != self._window_size:  # with some drivers the first call only leaves full screen
                 surface = pygame.display.set_mode(self._window_size, pygame.RESIZABLE)
             self._window_size = None
         self.resize(surface)
 
-    def find(self) -> None:
-        """Show the bodies where they are now."""
-        show = self.stage.show
+    def fit_bodies(self) -> None:
+        """Fit the camera to the present positions of the bodies."""
+        show = self.app_state.view
         if show is None:
             return
         frame = show.frame
         there = frame.present & np.isfinite(frame.position).all(axis=1)
         box = bounding_box(frame.position[there], show.bodies.radius[: len(there)][there])
         if box is not None:
-            self._fit(_widened(box, show.bodies.radius[: len(there)][there]))
-            self.at_home = False
+            self._fit(_enlarge_box(box, show.bodies.radius[: len(there)][there]))
+            self.is_fitted = False
 
     def _fit(self, box: Box) -> None:
-        """Show a box whole, beside what the panels and the timeline cover."""
-        self.camera = self._fitting(box)
+        """Fit the camera to a box, m."""
+        self.camera = self._fitted_camera(box)
 
-    def _fitting(self, box: Box) -> Camera:
-        """Return the camera that shows a box whole."""
-        size, room, show = self.surface.get_size(), self.gui.area, self.stage.show
-        self._covered = head, foot = self.gui.score_margins(self.stage)
+    def _fitted_camera(self, box: Box) -> Camera:
+        """Return a camera that shows a box, m, in the area that panels and timeline leave free."""
+        size, room, show = self.surface.get_size(), self.gui.area, self.app_state.view
+        self._covered = head, foot = self.gui.score_margins(self.app_state)
         lies = show is not None and should_rotate(show.scene, room.size)
-        if self._has_field:  # every part of it counts: plates lie beside it
+        if self._has_field:  # plates must not cover any part of it
             (left, bottom), (right, top) = box
             shape = max(right - left, 1e-9), max(top - bottom, 1e-9)
-            room = largest_area(shape[::-1] if lies else shape, room, self.gui.permanent_plates(self.stage))
+            room = largest_area(shape[::-1] if lies else shape, room, self.gui.permanent_plates(self.app_state))
             camera = replace(Camera.fitting(box, room.size, FIELD_MARGIN, turned=lies), size=size)
             return camera.panned((room.centerx - size[0] / 2.0, room.centery - size[1] / 2.0))
         inset = self.gui.panel.width
@@ -205,47 +211,47 @@ class WindowContext:
     @property
     def _has_field(self) -> bool:
         """Whether all of what is seen counts: a table, the field of a game, or a view that the scene states."""
-        show = self.stage.show
+        show = self.app_state.view
         if show is None:
             return False
         play = show.scene.play
         return play.area is not None or play.view is not None or play.game is not None
 
-    def make_room(self) -> None:
-        """Come home again where a plate has grown, with another row or with how the game ended."""
-        if not self.at_home or self.following is not None:
+    def refit_if_covered(self) -> None:
+        """Fit the scene again if a plate has grown over it, as with a new row or the result of a game."""
+        if not self.is_fitted or self.following is not None:
             return
-        covered, show = self.gui.score_margins(self.stage), self.stage.show
+        covered, show = self.gui.score_margins(self.app_state), self.app_state.view
         grown = any(now > then for now, then in zip(covered, self._covered, strict=True))
         if self._has_field and show is not None:
-            taken = self.gui.permanent_plates(self.stage)
-            if taken != self._taken:
+            taken = self.gui.permanent_plates(self.app_state)
+            if taken != self._plates:
                 corners = self.camera.to_screen(np.asarray(view_bounds(show.scene)))
                 (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
                 field = pygame.Rect(math.ceil(left), math.ceil(top), int(right - left), int(bottom - top))
-                grown, self._taken = field.collidelist(taken) >= 0, taken
+                grown, self._plates = field.collidelist(taken) >= 0, taken
         if grown:
-            self.home()
+            self.fit_scene()
 
     def resize(self, surface: pygame.Surface) -> None:
-        """Go on with a surface of another size."""
+        """Use a surface of another size."""
         self.surface = surface
         self.gui.resize(surface.get_size())
         self.camera = self.camera.resized(surface.get_size())
-        if self.at_home:
-            self.home()
+        if self.is_fitted:
+            self.fit_scene()
 
 
-def _steered(scene: Scene) -> int | None:
-    """Return the number of the body that thrusts on keys move, where the scene states no view: it may go anywhere."""
+def _thrust_body(scene: Scene) -> int | None:
+    """Return the index of the body that thrust keys move; None if the scene has no such body or sets its own view."""
     names = [thrust.body for thrust in scene.thrusts if thrust.key is not None]
     return scene.bodies.names.index(names[0]) if names and scene.play.view is None else None
 
 
-def _widened(box: Corners, radius: FloatArray) -> Box:
-    """Return a box that is at least some bodies wide: of one body, its surroundings are seen too."""
+def _enlarge_box(box: Corners, radius: FloatArray) -> Box:
+    """Return a box, m, that is at least `MIN_VIEW_RADII` median radii wide and high."""
     low, high = box
-    least = BESIDE_BODIES * float(np.median(radius)) if len(radius) else 1.0
+    least = MIN_VIEW_RADII * float(np.median(radius)) if len(radius) else 1.0
     grown = np.maximum(least - (high - low), 0.0) / 2.0
     low, high = low - grown, high + grown
     return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))

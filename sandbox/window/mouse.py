@@ -1,6 +1,6 @@
-"""Mouse: what it does to the picture and the bodies in it.
+"""Mouse controller: zoom, pan, pick and drag bodies, and cue gestures at a billiard table.
 
-A press only picks a body, so that its figures can be read without a touch; who goes on to move the mouse takes hold.
+A press only picks a body, so that it can be inspected; a drag starts when the mouse moves further than a click allows.
 """
 
 import math
@@ -10,46 +10,45 @@ import pygame
 
 from sandbox.games.billiards.view.controls import CueControls
 from sandbox.window.context import WindowContext
-from sandbox.window.playback.live import LiveView
 
-NOTCH = 1.15
-"""by which the wheel brings things closer"""
-MOST_NOTCHES = 100.0
-"""of one event of the wheel: more than these zoom from any end to the other"""
-PICK_RADIUS = 6.0
-"""px at unit 1 beside a body that still point at it"""
-SLACK = 4.0
+ZOOM_PER_NOTCH = 1.15
+"""zoom factor of one notch of the wheel"""
+MAX_NOTCHES = 100.0
+"""notches of one wheel event that are used; fewer zoom from one limit to the other"""
+PICK_TOLERANCE = 6.0
+"""px at unit 1 beside a body within which a press still picks it"""
+CLICK_TOLERANCE = 4.0
 """px at unit 1 that the mouse may move between press and release of a click"""
 
 
 class MouseController:
-    """Zooms, pans, picks, pulls and moves."""
+    """Handles the mouse events that no part of the GUI consumed."""
 
-    def __init__(self, seat: WindowContext) -> None:
-        self._seat = seat
+    def __init__(self, context: WindowContext) -> None:
+        self._context = context
         self._panning = False
-        self._pressed: tuple[int, int] | None = None  # on a body that nobody has taken hold of yet
-        self._began: tuple[int, int] | None = None  # where the left button came down
-        self._drag: tuple[int, int] | None = None  # where what is held is to go
-        self.place: tuple[int, int] | None = None
-        """where it is, px; None before it was over the picture"""
+        self._pressed: tuple[int, int] | None = None  # px, of a press on a body that is not dragged yet
+        self._began: tuple[int, int] | None = None  # px, of the left button's press
+        self._drag: tuple[int, int] | None = None  # px, latest target of the dragged body
+        self.position: tuple[int, int] | None = None
+        """px; None before the first event"""
 
-    def take(self, event: pygame.event.Event) -> None:
-        """Take an event in that nobody else wanted."""
-        seat = self._seat
+    def handle_event(self, event: pygame.event.Event) -> None:
+        """Handle an event."""
+        context = self._context
         if event.type == pygame.MOUSEWHEEL:
             notches = getattr(event, "precise_y", 0.0) or float(event.y)
-            notches = min(max(notches, -MOST_NOTCHES), MOST_NOTCHES)
-            seat.camera = seat.camera.zoomed(NOTCH**notches, pygame.mouse.get_pos())
-            seat.at_home = False
-            if seat.following == "all":
-                seat.following = None
+            notches = min(max(notches, -MAX_NOTCHES), MAX_NOTCHES)
+            context.camera = context.camera.zoomed(ZOOM_PER_NOTCH**notches, pygame.mouse.get_pos())
+            context.is_fitted = False
+            if context.following == "all":
+                context.following = None
         elif event.type == pygame.MOUSEBUTTONDOWN:
-            self.place = event.pos
+            self.position = event.pos
             if event.button in (2, 3):
                 self._panning = True
             elif event.button == 1:
-                self._look(event.pos)
+                self._press(event.pos)
         elif event.type == pygame.MOUSEMOTION:
             self._move(event)
         elif event.type == pygame.MOUSEBUTTONUP:
@@ -57,97 +56,98 @@ class MouseController:
                 self._panning = False
             elif event.button == 1:
                 self._release(event.pos)
-        elif event.type == pygame.WINDOWFOCUSLOST:  # the release goes elsewhere
-            self.let_go()
+        elif event.type == pygame.WINDOWFOCUSLOST:  # another window receives the release
+            self.release_all()
 
-    def _look(self, place: tuple[int, int]) -> None:
-        seat, show = self._seat, self._seat.stage.show
-        reach = PICK_RADIUS * seat.gui.ui_scale / seat.camera.scale
-        self._began = place
-        if self._at_table(lambda table: table.press(seat.camera.to_world(place), reach)):
+    def _press(self, pixel: tuple[int, int]) -> None:
+        context, app_state = self._context, self._context.app_state
+        position = context.camera.to_world(pixel)
+        tolerance = PICK_TOLERANCE * context.gui.ui_scale / context.camera.scale
+        self._began = pixel
+        if self._use_cue(lambda cue: cue.press(position, tolerance)):
             return
-        there = show is not None and seat.stage.hands.look(show, seat.camera.to_world(place), reach)
-        self._pressed = place if there else None
+        view = app_state.view
+        found = view is not None and app_state.body_tools.pick(view, position, tolerance)
+        self._pressed = pixel if found else None
 
-    def _at_table(self, deed: Callable[[CueControls], bool]) -> bool:
-        """Let the hand do something at the table, where one is on; return whether that was all that was meant."""
-        stage, done = self._seat.stage, [False]
-        gestures = stage.gestures
-        if gestures is None:
+    def _use_cue(self, gesture: Callable[[CueControls], bool]) -> bool:
+        """Pass a gesture to the cue controls, if there are any; return whether they used or refused it."""
+        cue = self._context.app_state.gestures
+        if cue is None:
             return False
+        used = True  # also of a refused gesture, which adds a message
 
-        def do(_: LiveView) -> None:
-            done[0] = True  # also where it cannot be done, which is said
-            done[0] = deed(gestures)
+        def run() -> None:
+            nonlocal used
+            used = gesture(cue)
 
-        stage.act(do)
-        return done[0]
+        self._context.app_state.run_handler(run)
+        return used
 
-    def _release(self, place: tuple[int, int]) -> None:
-        seat, began = self._seat, self._began
-        moved = began is not None and math.dist(began, place) > SLACK * seat.gui.ui_scale
+    def _release(self, pixel: tuple[int, int]) -> None:
+        context, began = self._context, self._began
+        moved = began is not None and math.dist(began, pixel) > CLICK_TOLERANCE * context.gui.ui_scale
         self._began = None
-        picked = seat.stage.hands.picked if self._pressed is not None and not moved else None
-        used = began is not None and self._at_table(lambda table: table.release(seat.camera.to_world(place), moved))
+        picked = context.app_state.body_tools.picked if self._pressed is not None and not moved else None
+        used = began is not None and self._use_cue(lambda cue: cue.release(context.camera.to_world(pixel), moved))
         if picked is not None and not used:
-            self._at_table(lambda table: table.name_ball(picked))
-        self._open_hand()
+            self._use_cue(lambda cue: cue.name_ball(picked))
+        self._end_drag()
 
     def _move(self, event: pygame.event.Event) -> None:
-        seat = self._seat
-        before, self.place = self.place, event.pos
-        if not self._panning and not seat.stage.hands.holding and self._pressed is None:
+        context, app_state, tools = self._context, self._context.app_state, self._context.app_state.body_tools
+        before, self.position = self.position, event.pos
+        if not self._panning and not tools.is_holding and self._pressed is None:
             self._aim(event.pos if before is None else before, event.pos)
         if self._panning:
-            seat.camera = seat.camera.panned(event.rel)
-            seat.at_home, seat.following = False, None
+            context.camera = context.camera.panned(event.rel)
+            context.is_fitted, context.following = False, None
             return
-        stage = seat.stage
-        if self._pressed is not None and math.dist(self._pressed, event.pos) > SLACK * seat.gui.ui_scale:
+        if self._pressed is not None and math.dist(self._pressed, event.pos) > CLICK_TOLERANCE * context.gui.ui_scale:
             self._pressed = None
-            if stage.game is not None and stage.game.match.rules.name != "free":
-                stage.messages.tell("in a game, only the cue moves balls", "warning")
+            if app_state.game is not None and app_state.game.match.rules.name != "free":
+                app_state.messages.add("in a game, only the cue moves balls", "warning")
             else:
-                stage.act(lambda live: stage.hands.hold(live, stage.paused))
-        if stage.hands.holding:
+                app_state.use_tool(tools.grab, app_state.paused)
+        if tools.is_holding:
             self._drag = event.pos
 
     def _aim(self, before: tuple[int, int], now: tuple[int, int]) -> None:
-        """Let the table know of a motion."""
-        camera, unit = self._seat.camera, self._seat.gui.ui_scale
+        """Pass a motion, from one pixel to another, to the cue controls."""
+        camera, unit = self._context.camera, self._context.gui.ui_scale
         pixels = (now[0] - before[0]) / unit, (now[1] - before[1]) / unit
         fine = bool(pygame.key.get_mods() & pygame.KMOD_SHIFT)
         time = pygame.time.get_ticks() / 1000.0
 
-        def aim(table: CueControls) -> bool:
-            table.motion(camera.to_world(before), camera.to_world(now), pixels, fine, time)
+        def aim(cue: CueControls) -> bool:
+            cue.motion(camera.to_world(before), camera.to_world(now), pixels, fine, time)
             return True
 
-        self._at_table(aim)
+        self._use_cue(aim)
 
-    def settle(self) -> None:
-        """Bring what is held to where the mouse is by now: one action, however many motions led there."""
+    def flush(self) -> None:
+        """Drag the held body to the latest position: one action, however many motion events there were."""
         pixel, self._drag = self._drag, None
-        stage = self._seat.stage
-        if pixel is None or not stage.hands.holding:
+        app_state = self._context.app_state
+        tools = app_state.body_tools
+        if pixel is None or not tools.is_holding:
             return
-        place = self._seat.camera.to_world(pixel)
-        if not stage.act(lambda live: stage.hands.drag(live, place)):
-            stage.hands.drop()
+        if not app_state.use_tool(tools.drag, self._context.camera.to_world(pixel)):
+            tools.drop()
 
-    def let_go(self) -> None:
-        """Let go of the body that is held, and of the picture."""
+    def release_all(self) -> None:
+        """End panning and dragging."""
         self._panning = False
-        self._open_hand()
+        self._end_drag()
 
-    def _open_hand(self) -> None:
-        self.settle()
+    def _end_drag(self) -> None:
+        self.flush()
         self._pressed = None
-        stage = self._seat.stage
-        if stage.hands.holding and not stage.act(stage.hands.let_go):
-            stage.hands.drop()
+        tools = self._context.app_state.body_tools
+        if tools.is_holding and not self._context.app_state.use_tool(tools.release):
+            tools.drop()
 
-    def world(self) -> tuple[float, float]:
-        """Return the place that it points at, m; before it points at any, the middle of the picture."""
-        camera = self._seat.camera
-        return camera.centre if self.place is None else camera.to_world(self.place)
+    def world_position(self) -> tuple[float, float]:
+        """Return the position of the cursor, m; before its first event, the centre of the view."""
+        camera = self._context.camera
+        return camera.centre if self.position is None else camera.to_world(self.position)

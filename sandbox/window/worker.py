@@ -1,7 +1,7 @@
-"""Worker: computes on a thread of its own, so that the window stays alive while kernels compile.
+"""Worker thread for jobs that may compile kernels, so that the window stays responsive.
 
-Nothing runs at the same time: the window's thread waits for each job. Only while a job compiles, or takes long, does
-it draw a progress note and take events in; it touches nothing of what is being computed then.
+There is no concurrent access: the main thread waits for each job. While a job compiles or takes long, it draws a
+progress note and handles events, but does not touch the session.
 """
 
 import threading
@@ -15,47 +15,47 @@ from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 
 T = TypeVar("T")
 
-LONG = 0.5
-"""s that a job may take before the window looks after itself"""
+MAX_SILENT_WAIT = 0.5
+"""s after which a job counts as long, and the main thread shows progress"""
 
 
 class Compute(Protocol):
-    """Calls a function that may have to compile or to compute for long, and returns what it returns."""
+    """Runs a job that may compile or take long, and returns its result."""
 
     def __call__(self, job: Callable[[], T]) -> T:
-        """Call it; what it raises is raised here."""
+        """Run the job; its exceptions are raised here."""
 
 
 def compute_here(job: Callable[[], T]) -> T:
-    """Call a function on the present thread."""
+    """Run a job on the present thread."""
     return job()
 
 
 class Worker:
-    """A thread that computes while its owner waits."""
+    """A thread that runs jobs while its owner waits."""
 
     def __init__(self, on_wait: Callable[[Callable[[float], bool]], None]) -> None:
         """Start the thread.
 
         Args:
-            on_wait: called on the owner's thread when a job compiles or takes long. It has to call its argument, which
-                waits for some seconds and returns whether the job is done, until that is so.
+            on_wait: called on the owner's thread when a job compiles or takes long. Its argument waits for a number of
+                seconds and returns whether the job is done; `on_wait` must call it until that is so.
         """
         self._on_wait = on_wait
         self._jobs: SimpleQueue[Callable[[], None] | None] = SimpleQueue()
-        self._stirred, self._done = threading.Event(), threading.Event()
+        self._woken, self._done = threading.Event(), threading.Event()
         self._done.set()
         self.kernels = 0
-        """kernels that the present job has begun to compile"""
+        """kernels whose compilation the present job has started"""
         # A daemon: a second Ctrl+C ends the process without waiting for it.
         self._thread = threading.Thread(target=self._work, name="sandbox worker", daemon=True)
         self._thread.start()
 
     def compute(self, job: Callable[[], T]) -> T:
-        """Run a job to its end and return its result; raise what it raises."""
+        """Run a job and return its result; its exceptions are raised here."""
         if threading.current_thread() is self._thread:
             return job()
-        self._stirred.clear()
+        self._woken.clear()
         self._done.clear()
         self.kernels = 0
         found: Future[T] = Future()
@@ -63,50 +63,50 @@ class Worker:
         def run() -> None:
             try:
                 found.set_result(job())
-            except BaseException as error:  # noqa: BLE001, raised again where the owner waits
+            except BaseException as error:  # noqa: BLE001, raised again on the owner's thread
                 found.set_exception(error)
 
         self._jobs.put(run)
-        self._stirred.wait(LONG)
+        self._woken.wait(MAX_SILENT_WAIT)
         if not self._done.is_set():
             self._on_wait(self._done.wait)
         return found.result()
 
     @property
     def is_busy(self) -> bool:
-        """Whether a job is under way, as after its owner was interrupted while waiting."""
+        """Whether a job is running, as after its owner was interrupted while waiting."""
         return not self._done.is_set()
 
     def note_compiling(self, _: str) -> None:
-        """Take note that a kernel is about to be compiled; `COMPILE_CLOCK.on_begin`."""
+        """Count a kernel that is about to be compiled; `COMPILE_CLOCK.on_begin`."""
         if threading.current_thread() is self._thread:
             self.kernels += 1
-            self._stirred.set()
+            self._woken.set()
 
     def _work(self) -> None:
         while (job := self._jobs.get()) is not None:
             job()
             self._done.set()
-            self._stirred.set()
+            self._woken.set()
 
     def close(self) -> None:
-        """End the thread once it has nothing to do."""
+        """End the thread after its last job."""
         self._jobs.put(None)
 
 
 class Wait:
-    """How long the window has waited for a job."""
+    """Progress of the job that the window waits for."""
 
     def __init__(self, worker: Worker) -> None:
         self._worker, self._began, self._compiled = worker, perf_counter(), COMPILE_CLOCK.seconds
 
     @property
     def compiled(self) -> bool:
-        """Whether anything was compiled meanwhile."""
+        """Whether a kernel was compiled since the start of the wait."""
         return self._worker.kernels > 0 or COMPILE_CLOCK.seconds > self._compiled
 
-    def told(self) -> str:
-        """Return what is being done, and for how long."""
+    def text(self) -> str:
+        """Return the progress note."""
         seconds = f"{perf_counter() - self._began:.0f} s"
         if not self._worker.kernels:
             return f"computing … {seconds}"

@@ -56,28 +56,28 @@ def test_restart_of_a_replay_plays_what_was_recorded_again() -> None:
     session.advance(30, None)
     source = session.recording()
     stage, first = AppState(source.engine), live(_shown(source, None))
-    stage.put_on(first, None, first.scene, again=lambda: _shown(source, None))
+    stage.show(first, None, first.scene, again=lambda: _shown(source, None))
     stage.paused = True
     for _ in range(2):
         stage.restart()
-        again = live(stage.show)
+        again = live(stage.view)
         assert (again.step_number, stage.paused) == (0, True)
         again.session.advance(30, None)
         assert again.session.recording() == source
     stage.restart()
     stage.paused = False
     for _ in range(60):
-        stage.go_on(0.02)
+        stage.update(0.02)
     assert stage.paused  # at the end of what was recorded
-    assert live(stage.show).session.time == pytest.approx(source.duration)
+    assert live(stage.view).session.time == pytest.approx(source.duration)
 
 
 def test_restart_keeps_the_stored_ghost() -> None:
     source = run(SCENE, "pymunk", actions=(KICK,))
     stage, first = AppState(), live(_shown(source, "reference"))
-    stage.put_on(first, None, first.scene, again=lambda: _shown(source, "reference"))
+    stage.show(first, None, first.scene, again=lambda: _shown(source, "reference"))
     stage.restart()
-    again = live(stage.show)
+    again = live(stage.view)
     assert again is not first
     assert again.company.ghosted
     again.session.advance(20, None)

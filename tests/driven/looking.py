@@ -38,13 +38,13 @@ def laid_out(path: Path) -> Laid:
     window = App(stage, size=SIZE, say=lambda _: None)
     try:
         assert stage.open(path)
-        window.turn(0.0)
-        left = SIZE[0] - window.gui.panel.width
+        window.run_frame(0.0)
+        left = SIZE[0] - window.context.gui.panel.width
         rects = {}
-        for widget in window.gui.panel.widgets:
+        for widget in window.context.gui.panel.widgets:
             name = widget.parameter.key if hasattr(widget, "parameter") else widget.name
             rects[name] = widget.rect.move(left, 0)
-        return Laid(rects, window.camera)
+        return Laid(rects, window.context.camera)
     finally:
         window.close()
 

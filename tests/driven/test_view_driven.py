@@ -9,7 +9,7 @@ from looking import count, differ, laid_out, middle, near, on_screen, paused
 from rooms import AT_REST, RESTING, written
 
 from sandbox.window.camera import Camera
-from sandbox.window.mouse import NOTCH
+from sandbox.window.mouse import ZOOM_PER_NOTCH
 from sandbox.window.playback.snapshot import OVERLAYS
 from sandbox.window.render.palette import PANEL, SKY
 
@@ -41,7 +41,7 @@ def test_wheel_drag_and_home_move_the_camera(drive: Play, tmp_path: Path) -> Non
     seen_at(window, home, "the ball as at first")
 
     window.wheel((400, 300), -2)
-    camera = home.zoomed(NOTCH**-2, (400, 300))
+    camera = home.zoomed(ZOOM_PER_NOTCH**-2, (400, 300))
     seen_at(window, camera, "a smaller ball")
     window.drag((400, 300), (440, 330), button=3)
     camera = camera.panned((40, 30))

@@ -46,9 +46,12 @@ def window(tmp_path: Path) -> Iterator[App]:
 
 def seen(window: App) -> list[bool]:
     """Return which bodies are in the part of the picture that nothing covers."""
-    assert window.stage.show is not None
-    free = window.gui.area
-    return [free.collidepoint(place) for place in window.camera.to_screen(window.stage.show.drawn.position).tolist()]
+    assert window.app_state.view is not None
+    free = window.context.gui.area
+    return [
+        free.collidepoint(place)
+        for place in window.context.camera.to_screen(window.app_state.view.drawn.position).tolist()
+    ]
 
 
 def strike(window: App, code: int) -> None:
@@ -64,42 +67,42 @@ def test_all_that_moves_stays_in_the_picture(window: App, elapsed: float) -> Non
 
 
 def test_picked_body_stays_in_the_picture_at_the_same_scale(window: App) -> None:
-    x, y = window.camera.to_screen(np.zeros(2)).tolist()
+    x, y = window.context.camera.to_screen(np.zeros(2)).tolist()
     turned(window, press(x, y), release(x, y), elapsed=0.0)
     strike(window, F)
-    scale = window.camera.scale
+    scale = window.context.camera.scale
     for _ in range(40):
         turned(window, elapsed=0.1)
         assert seen(window)[0]
-    assert window.camera.scale == scale
+    assert window.context.camera.scale == scale
     assert not seen(window)[1]
     strike(window, HOME)
-    assert window.following is None
-    assert window.at_home
+    assert window.context.following is None
+    assert window.context.is_fitted
 
 
 def test_that_nothing_is_in_sight_is_said_until_something_is(window: App) -> None:
-    home = window.camera
+    home = window.context.camera
     for _ in range(40):
         turned(window, elapsed=0.1)
-    assert window.camera == home
-    assert window.loses_sight
-    text = window.gui.describe_out_of_view(window.stage)
+    assert window.context.camera == home
+    assert window.context.is_out_of_view
+    text = window.context.gui.describe_out_of_view(window.app_state)
     assert text is not None
     assert "Home" in text
     strike(window, HOME)
-    assert not window.loses_sight
-    assert window.gui.describe_out_of_view(window.stage) is None
+    assert not window.context.is_out_of_view
+    assert window.context.gui.describe_out_of_view(window.app_state) is None
 
 
 def test_spent_fireworks_say_that_space_launches_them(tmp_path: Path) -> None:
     window = App(AppState(), size=(640, 480), folder=tmp_path, say=lambda _: None)
     try:
-        assert window.stage.open(find("fireworks"))
-        window.camera = Camera((1e6, 0.0), 10.0, (640, 480))
-        window.at_home = False
-        window.turn(0.0)
-        assert "Space relaunches" in str(window.gui.describe_out_of_view(window.stage))
+        assert window.app_state.open(find("fireworks"))
+        window.context.camera = Camera((1e6, 0.0), 10.0, (640, 480))
+        window.context.is_fitted = False
+        window.run_frame(0.0)
+        assert "Space relaunches" in str(window.context.gui.describe_out_of_view(window.app_state))
     finally:
         window.close()
 
@@ -107,12 +110,12 @@ def test_spent_fireworks_say_that_space_launches_them(tmp_path: Path) -> None:
 def test_ship_that_a_key_drives_is_followed_from_the_start(tmp_path: Path) -> None:
     window = App(AppState(), size=(640, 480), folder=tmp_path, say=lambda _: None)
     try:
-        assert window.stage.open(find("spaceship"))
+        assert window.app_state.open(find("spaceship"))
         pygame.event.clear()
-        scene = window.stage.file
+        scene = window.app_state.file
         assert scene is not None
         ship = scene.bodies.names.index(scene.thrusts[0].body)
-        assert window.following == ship
+        assert window.context.following == ship
         turned(window, key(pygame.K_UP), elapsed=0.0)
         for _ in range(60):
             turned(window, elapsed=0.1)
@@ -123,10 +126,10 @@ def test_ship_that_a_key_drives_is_followed_from_the_start(tmp_path: Path) -> No
 
 def test_full_screen_and_back(window: App) -> None:
     turned(window, elapsed=0.0)
-    size = window.surface.get_size()
+    size = window.context.surface.get_size()
     strike(window, pygame.K_F11)
-    assert window.surface.get_flags() & pygame.FULLSCREEN
+    assert window.context.surface.get_flags() & pygame.FULLSCREEN
     strike(window, pygame.K_F11)
-    assert not window.surface.get_flags() & pygame.FULLSCREEN
-    assert window.surface.get_size() == size
-    assert window.camera.size == size
+    assert not window.context.surface.get_flags() & pygame.FULLSCREEN
+    assert window.context.surface.get_size() == size
+    assert window.context.camera.size == size

@@ -31,7 +31,7 @@ FIELD_SCENES = [
 
 def overlaps(window: App) -> list[str]:
     """Return the pairs of plates that lie over each other."""
-    plates = window.gui.plates.items()
+    plates = window.context.gui.plates.items()
     return [f"{a}{p} {b}{q}" for (a, p), (b, q) in combinations(plates, 2) if p.colliderect(q)]
 
 
@@ -39,17 +39,17 @@ def opened(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> App:
     # What is laid out does not depend on what flies where: the look ahead is left out.
     monkeypatch.setattr("sandbox.window.app_state.predict_bounds", lambda *_: None)
     window = App(AppState(), size=(1280, 720), folder=folder, say=lambda _: None)
-    assert window.stage.open(find(name))
+    assert window.app_state.open(find(name))
     pygame.event.clear()
     return window
 
 
 def resize(window: App, width: int, height: int, unit: float) -> None:
-    window.gui.ui_scale = unit
+    window.context.gui.ui_scale = unit
     surface = pygame.display.set_mode((width, height), pygame.RESIZABLE)
     pygame.event.clear()
-    window.resize(surface)
-    window.turn(0.0)
+    window.context.resize(surface)
+    window.run_frame(0.0)
     pygame.event.clear()
 
 
@@ -57,16 +57,16 @@ def resize(window: App, width: int, height: int, unit: float) -> None:
 def test_no_two_plates_overlap(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     window = opened(name, tmp_path, monkeypatch)
     try:
-        window.turn(0.0)
-        window.stage.paused = True  # from here on all that can be told at once
-        window.gui.overlays = set(OVERLAYS)
-        window.stage.hands.picked = 0
-        window.stage.messages.tell("a message that is long enough to need more than one line of a small window")
-        window.stage.messages.tell("another one", "warning")
+        window.run_frame(0.0)
+        window.app_state.paused = True  # from here on all that can be told at once
+        window.context.gui.overlays = set(OVERLAYS)
+        window.app_state.body_tools.picked = 0
+        window.app_state.messages.add("a message that is long enough to need more than one line of a small window")
+        window.app_state.messages.add("another one", "warning")
         for width, height, unit in SIZES:
             resize(window, width, height, unit)
             assert overlaps(window) == [], (width, height, unit)
-            free = window.gui.area
+            free = window.context.gui.area
             assert 2 * free.width * free.height > width * height, (width, height, unit)
     finally:
         window.close()
@@ -77,14 +77,16 @@ def test_plates_leave_the_field_free(name: str, tmp_path: Path, monkeypatch: pyt
     """Of tables and games: what their files state as the view, which is all that counts there."""
     window = opened(name, tmp_path, monkeypatch)
     try:
-        scene = window.stage.show.scene if window.stage.show is not None else None
+        scene = window.app_state.view.scene if window.app_state.view is not None else None
         assert scene is not None
         for width, height, unit in SIZES[1:]:  # at 400 × 300 there is room for either alone
             resize(window, width, height, unit)
-            corners = window.camera.to_screen(np.asarray(view_bounds(scene)))
+            corners = window.context.camera.to_screen(np.asarray(view_bounds(scene)))
             (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
             field = pygame.Rect(math.ceil(left), math.ceil(top), int(right - left), int(bottom - top))
-            covering = {k: r for k, r in window.gui.plates.items() if not k.startswith(("message", "rate", "inset"))}
+            covering = {
+                k: r for k, r in window.context.gui.plates.items() if not k.startswith(("message", "rate", "inset"))
+            }
             assert [k for k, rect in covering.items() if rect.colliderect(field)] == [], (width, height, unit)
             assert field.width * field.height > 0.08 * width * height  # it is not driven into a corner either
     finally:
@@ -98,9 +100,9 @@ def test_last_shot_is_told_whole_beside_four_tanks(tmp_path: Path, monkeypatch: 
     monkeypatch.setattr(ArtilleryRules, "display_lines", lambda self: [*lines(self), ("last shot", told)])
     try:
         resize(window, 1024, 700, 1.0)
-        assert window.stage.host is not None
-        assert window.stage.show is not None
-        laid = score_panel.layout_score(window.stage.host.shown().board, window.gui.area, 300, 1.0)
+        assert window.app_state.host is not None
+        assert window.app_state.view is not None
+        laid = score_panel.layout_score(window.app_state.host.shown().board, window.context.gui.area, 300, 1.0)
         texts = [text for cells, _ in laid.rows for _, text in cells]
         assert told in texts
         assert len(laid.rows) <= 4

@@ -69,20 +69,20 @@ def test_messages_last_their_time_and_are_told_once(monkeypatch: pytest.MonkeyPa
     now = [100.0]
     monkeypatch.setattr(module, "perf_counter", lambda: now[0])
     messages = Messages()
-    messages.tell("one")
-    messages.tell("two", "error")
+    messages.add("one")
+    messages.add("two", "error")
     now[0] += 2.0
-    messages.tell("one")
-    assert messages.shown() == (("error", "two"), ("info", "one"))
+    messages.add("one")
+    assert messages.visible() == (("error", "two"), ("info", "one"))
     now[0] += 2.9
-    assert messages.shown() == (("error", "two"), ("info", "one"))
+    assert messages.visible() == (("error", "two"), ("info", "one"))
     now[0] += 0.2
-    assert messages.shown() == (("error", "two"),)
+    assert messages.visible() == (("error", "two"),)
     now[0] += 6.0
-    assert messages.shown() == ()
+    assert messages.visible() == ()
     for k in range(9):
-        messages.tell(str(k))
-    assert [text for _, text in messages.shown()] == ["4", "5", "6", "7", "8"][-MAX_MESSAGES:]
+        messages.add(str(k))
+    assert [text for _, text in messages.visible()] == ["4", "5", "6", "7", "8"][-MAX_MESSAGES:]
 
 
 def test_facts_of_a_body_are_its_figures() -> None:

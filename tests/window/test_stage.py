@@ -74,20 +74,20 @@ def live(stage: AppState) -> LiveView:
 
 
 def told(stage: AppState, level: str) -> str:
-    return "\n".join(text for each, text in stage.messages.shown() if each == level)
+    return "\n".join(text for each, text in stage.messages.visible() if each == level)
 
 
 def test_faulty_file_keeps_the_old_scene_and_tells_the_faults_with_their_lines(folder: Path) -> None:
     stage = opened(folder / "a.toml")
-    stage.go_on(0.05)
+    stage.update(0.05)
     show, step = live(stage), live(stage).step_number
     (folder / "a.toml").write_text(BAD)
     stage.reload()
-    assert stage.show is show
+    assert stage.view is show
     assert live(stage).step_number == step
     assert len(stage.faults) == 2
     assert [fault.split("a.toml:")[1].split(":")[0] for fault in stage.faults] == ["4", "5"]
-    stage.go_on(0.05)
+    stage.update(0.05)
     assert live(stage).step_number > step
     (folder / "a.toml").write_text(GOOD.format(name="mended"))
     stage.reload()
@@ -109,15 +109,15 @@ def test_file_that_is_gone_or_is_a_folder_is_a_fault(folder: Path) -> None:
 
 def test_restart_keeps_engine_settings_and_what_was_turned(folder: Path) -> None:
     stage = opened(folder / "a.toml")
-    stage.go_on(0.05)
-    stage.switch("reference")
-    stage.turn("gravity", -1.5)
-    stage.turn("dt", 0.002)
-    stage.turn("integrator", "leapfrog")
-    stage.turn("restitution", 0.5)
-    stage.hands.picked = 1
-    stage.turn("restitution", 0.75)
-    stage.hands.picked = None
+    stage.update(0.05)
+    stage.switch_engine("reference")
+    stage.set_parameter("gravity", -1.5)
+    stage.set_parameter("dt", 0.002)
+    stage.set_parameter("integrator", "leapfrog")
+    stage.set_parameter("restitution", 0.5)
+    stage.body_tools.picked = 1
+    stage.set_parameter("restitution", 0.75)
+    stage.body_tools.picked = None
     stage.paused = True
     stage.restart()
     show = live(stage)
@@ -126,7 +126,7 @@ def test_restart_keeps_engine_settings_and_what_was_turned(folder: Path) -> None
     assert show.scene.world.gravity == (0.0, -1.5)
     assert (show.settings.dt, show.settings.integrator) == (0.002, "leapfrog")
     assert [ball.restitution for ball in show.scene.balls] == [0.5, 0.75]
-    stage.turn("restitution", 0.125)  # of all, after that of one
+    stage.set_parameter("restitution", 0.125)  # of all, after that of one
     stage.restart()
     assert [ball.restitution for ball in live(stage).scene.balls] == [0.125, 0.125]
     stage.reload()
@@ -138,11 +138,11 @@ def test_restart_keeps_engine_settings_and_what_was_turned(folder: Path) -> None
 def test_walk_goes_through_the_folder_and_keeps_engine_and_pause(folder: Path) -> None:
     stage = opened(folder / "b.toml", "reference")
     told_of: list[bool] = []
-    stage.on_new = told_of.append
+    stage.on_scene_changed = told_of.append
     stage.paused = True
     titles = []
     for by in (1, 1, 1, -1, -1):
-        stage.walk(by)
+        stage.open_neighbour(by)
         titles.append(live(stage).scene.title)
     assert titles == ["c", "a", "b", "a", "c"]
     assert stage.paused
@@ -156,15 +156,15 @@ def test_walk_goes_through_the_folder_and_keeps_engine_and_pause(folder: Path) -
 def test_walk_tells_a_faulty_file_and_passes_it(folder: Path) -> None:
     (folder / "b.toml").write_text(BAD)
     stage = opened(folder / "a.toml")
-    stage.walk(1)
+    stage.open_neighbour(1)
     assert live(stage).scene.title == "a"
     assert stage.faults
-    stage.walk(1)
+    stage.open_neighbour(1)
     assert live(stage).scene.title == "c"
     assert stage.faults == ()
-    stage.walk(-1)
+    stage.open_neighbour(-1)
     assert stage.faults
-    stage.walk(-1)
+    stage.open_neighbour(-1)
     assert live(stage).scene.title == "a"
     assert stage.faults == ()
 
@@ -172,43 +172,43 @@ def test_walk_tells_a_faulty_file_and_passes_it(folder: Path) -> None:
 def test_walk_back_from_a_faulty_file_goes_on_with_what_is_on(folder: Path) -> None:
     (folder / "b.toml").write_text(BAD)
     stage = opened(folder / "a.toml")
-    stage.walk(1)
-    show = stage.show
-    stage.walk(-1)
-    assert stage.show is show
+    stage.open_neighbour(1)
+    show = stage.view
+    stage.open_neighbour(-1)
+    assert stage.view is show
     assert stage.faults == ()
-    stage.walk(-1)
+    stage.open_neighbour(-1)
     assert live(stage).scene.title == "c"
 
 
 def test_engine_that_was_asked_for_comes_back_after_a_scene_that_it_refuses(folder: Path) -> None:
     (folder / "b.toml").write_text(OVERLAPPING)
     stage = opened(folder / "a.toml", "exact")
-    stage.walk(1)
+    stage.open_neighbour(1)
     assert stage.engine == "pymunk"
     stage.restart()
     assert stage.engine == "pymunk"
-    stage.walk(1)
+    stage.open_neighbour(1)
     assert stage.engine == "exact"
-    stage.walk(-1)
-    stage.switch("reference")
-    stage.walk(1)
+    stage.open_neighbour(-1)
+    stage.switch_engine("reference")
+    stage.open_neighbour(1)
     assert stage.engine == "reference"
 
 
 def test_stored_run_pauses_at_its_end_and_starts_over_from_there() -> None:
     stage = AppState()
     show = RecordedView(RecordedRun(run(load(find("bounce")), "pymunk", dt=0.01)))
-    stage.put_on(show, None, show.scene)
+    stage.show(show, None, show.scene)
     for _ in range(200):
-        stage.go_on(0.05)
+        stage.update(0.05)
     assert stage.paused
     assert show.at_end
     stage.paused = True  # again: that is no going on
     assert show.at_end
     stage.paused = False
     assert show.step_number == 0
-    stage.go_on(0.05)
+    stage.update(0.05)
     assert show.step_number > 0
     stage.paused = True
     step = show.step_number
@@ -219,7 +219,7 @@ def test_stored_run_pauses_at_its_end_and_starts_over_from_there() -> None:
 def test_scene_that_the_engine_refuses_is_played_by_one_that_does_not(folder: Path) -> None:
     (folder / "b.toml").write_text(OVERLAPPING)
     stage = opened(folder / "a.toml", "exact")
-    stage.walk(1)
+    stage.open_neighbour(1)
     assert live(stage).engine == "pymunk"
     assert "exact refuses" in told(stage, "warning")
     assert "opened with pymunk" in told(stage, "warning")
@@ -227,17 +227,17 @@ def test_scene_that_the_engine_refuses_is_played_by_one_that_does_not(folder: Pa
 
 def test_next_engine_goes_round_and_skips_who_refuses_and_says_why(folder: Path) -> None:
     stage, seen = opened(folder / "a.toml"), []
-    stage.go_on(0.05)
+    stage.update(0.05)
     before = live(stage).frame
     for _ in range(len(ENGINES)):
-        stage.next_engine()
+        stage.switch_to_next_engine()
         seen.append(live(stage).engine)
         assert live(stage).frame.state_hash() == before.state_hash()
     assert seen == [*list(ENGINES)[1:], next(iter(ENGINES))]
     (folder / "b.toml").write_text(OVERLAPPING)
-    stage.walk(1)
+    stage.open_neighbour(1)
     assert live(stage).engine == "pymunk"
-    stage.next_engine()
+    stage.switch_to_next_engine()
     assert live(stage).engine == "reference"
     assert "exact refuses" in told(stage, "warning")
 
@@ -245,10 +245,10 @@ def test_next_engine_goes_round_and_skips_who_refuses_and_says_why(folder: Path)
 def test_refused_switch_leaves_all_as_it_was(folder: Path) -> None:
     (folder / "b.toml").write_text(OVERLAPPING)
     stage = opened(folder / "b.toml")
-    stage.go_on(0.03)
+    stage.update(0.03)
     before = live(stage).frame.state_hash()
     for engine in ("exact", "zzz", "pymunk"):
-        assert not stage.switch(engine)
+        assert not stage.switch_engine(engine)
     assert (live(stage).engine, live(stage).frame.state_hash()) == ("pymunk", before)
     assert live(stage).session.actions == ()
     assert "zzz" in told(stage, "warning")
@@ -256,7 +256,7 @@ def test_refused_switch_leaves_all_as_it_was(folder: Path) -> None:
 
 def test_overrides_hold_in_every_scene_that_is_opened(folder: Path) -> None:
     stage = opened(folder / "a.toml", overrides=["solver.dt=0.005"])
-    stage.walk(1)
+    stage.open_neighbour(1)
     stage.reload()
     assert live(stage).settings.dt == 0.005
 
@@ -266,7 +266,7 @@ def test_ghost_and_trust_stay_wanted_in_the_next_scene(folder: Path) -> None:
     assert live(stage).company.trust is not None
     stage.toggle_ghost()
     stage.toggle_trust()
-    stage.walk(1)
+    stage.open_neighbour(1)
     assert live(stage).company.ghost_engine == "exact"
     assert live(stage).company.trust is None
     stage.restart()
@@ -284,11 +284,11 @@ def test_many_bodies_have_no_twin_unless_asked_for() -> None:
 
 def test_what_cannot_be_done_is_a_message(folder: Path) -> None:
     stage = opened(folder / "a.toml")
-    assert stage.hands.look(live(stage), (0.0, 5.0), 0.0)
-    stage.act(stage.hands.remove)
+    assert stage.body_tools.pick(live(stage), (0.0, 5.0), 0.0)
+    stage.use_tool(stage.body_tools.remove)
     assert not live(stage).frame.present[0]
-    assert not stage.hands.look(live(stage), (0.0, 5.0), 0.0)
-    assert not stage.act(lambda live: live.relaunch("zzz"))
+    assert not stage.body_tools.pick(live(stage), (0.0, 5.0), 0.0)
+    assert not stage.use_tool(lambda live: live.relaunch("zzz"))
     assert "zzz" in told(stage, "warning")
 
 
@@ -296,16 +296,16 @@ def test_stored_run_refuses_every_change_with_a_message() -> None:
     scene = load(find("bounce"))
     stage = AppState()
     show = RecordedView(RecordedRun(run(scene, "pymunk", dt=0.01)))
-    stage.put_on(show, None, scene)
+    stage.show(show, None, scene)
     before = show.frame
-    assert stage.hands.look(show, (0.0, 5.5), 0.0)  # one may look
-    assert stage.hands.picked == 0
+    assert stage.body_tools.pick(show, (0.0, 5.5), 0.0)  # one may look
+    assert stage.body_tools.picked == 0
     for deed in (
-        lambda: stage.act(stage.hands.nudge),
-        lambda: stage.act(stage.hands.remove),
-        lambda: stage.act(lambda live: stage.hands.add(live, (0.0, 0.0), 1.0)),
-        lambda: stage.act(lambda live: stage.hands.drag(live, (0.0, 0.0))),
-        stage.next_engine,
+        lambda: stage.use_tool(stage.body_tools.nudge),
+        lambda: stage.use_tool(stage.body_tools.remove),
+        lambda: stage.use_tool(lambda live: stage.body_tools.add(live, (0.0, 0.0), 1.0)),
+        lambda: stage.use_tool(lambda live: stage.body_tools.drag(live, (0.0, 0.0))),
+        stage.switch_to_next_engine,
         stage.toggle_ghost,
         stage.toggle_trust,
         stage.reload,
@@ -313,43 +313,51 @@ def test_stored_run_refuses_every_change_with_a_message() -> None:
         stage.messages = type(stage.messages)()
         deed()
         assert told(stage, "warning")
-    stage.turn("gravity", 1.0)
-    assert not stage.switch("exact")
+    stage.set_parameter("gravity", 1.0)
+    assert not stage.switch_engine("exact")
     assert show.frame.state_hash() == before.state_hash()
     stage.step()
     assert stage.paused
     assert show.step_number == 1
-    stage.back()
+    stage.step_back()
     stage.faster()
     stage.slower()
     stage.restart()
     assert show.step_number == 0
-    stage.walk(1)  # the shipped scenes
+    stage.open_neighbour(1)  # the shipped scenes
     assert stage.live is not None
     stage.close()
 
 
 def test_empty_stage_does_nothing_and_says_so() -> None:
     stage = AppState("exact")
-    stage.go_on(1.0)
-    for deed in (stage.step, stage.back, stage.slower, stage.faster, stage.restart, stage.next_engine, stage.close):
+    stage.update(1.0)
+    for deed in (
+        stage.step,
+        stage.step_back,
+        stage.slower,
+        stage.faster,
+        stage.restart,
+        stage.switch_to_next_engine,
+        stage.close,
+    ):
         deed()
-    stage.turn("gravity", 1.0)
+    stage.set_parameter("gravity", 1.0)
     stage.reload()
     assert stage.engine == "exact"
 
 
 def test_step_and_back_pause(folder: Path) -> None:
     stage = opened(folder / "a.toml")
-    stage.go_on(0.05)
+    stage.update(0.05)
     stage.step()
     assert stage.paused
     step = live(stage).step_number
     stage.paused = False
-    stage.back()
+    stage.step_back()
     assert stage.paused
     while live(stage).busy is not None:
-        stage.go_on(0.01)
+        stage.update(0.01)
     assert live(stage).step_number == step - 1
 
 
@@ -422,8 +430,8 @@ def test_knobs_of_a_scene_without_balls_or_of_a_ball_that_has_not_come_are_harml
 
 def test_default_is_the_files(folder: Path) -> None:
     stage = opened(folder / "a.toml")
-    stage.turn("restitution", 0.75)
-    stage.turn("gravity", 3.0)
+    stage.set_parameter("restitution", 0.75)
+    stage.set_parameter("gravity", 3.0)
     assert stage.file is not None
     knobs = {each.key: each for each in SessionParameters().of(live(stage), stage.file, None)}
     assert (knobs["restitution"].value, knobs["restitution"].default) == (0.75, 0.25)

@@ -77,7 +77,7 @@ def opened(tmp_path: Path, said: list[str], monkeypatch: pytest.MonkeyPatch) -> 
         path.write_text(text, encoding="utf-8")
         window = App(AppState(), size=SIZE, folder=tmp_path, say=said.append)
         windows.append(window)
-        assert window.stage.open(path)
+        assert window.app_state.open(path)
         pygame.event.clear()  # those of its opening
         return window
 
@@ -96,12 +96,12 @@ def turn(window: App, *events: pygame.event.Event, elapsed: float = 0.0) -> None
     """Post events, and let the window make one turn."""
     for event in events:
         pygame.event.post(event)
-    window.turn(elapsed)
+    window.run_frame(elapsed)
 
 
 def live(window: App) -> LiveView:
-    assert window.stage.live is not None
-    return window.stage.live
+    assert window.app_state.live is not None
+    return window.app_state.live
 
 
 def places(
@@ -114,18 +114,18 @@ def places(
 
 
 def ball_seen(window: App) -> tuple[float, float]:
-    x, y = (places(window.surface, SKY, PICTURE).mean(axis=0) + 0.5).tolist()
+    x, y = (places(window.context.surface, SKY, PICTURE).mean(axis=0) + 0.5).tolist()
     return x, y
 
 
 def on_screen(window: App, place: tuple[float, float]) -> tuple[float, float]:
-    x, y = window.camera.to_screen(np.asarray(place)).tolist()
+    x, y = window.context.camera.to_screen(np.asarray(place)).tolist()
     return x, y
 
 
 def paused(window: App) -> bool:
     """Tell whether PAUSED stands there in red."""
-    return len(places(window.surface, WARNING, HUD)) > 60
+    return len(places(window.context.surface, WARNING, HUD)) > 60
 
 
 def test_key_is_seen_in_the_picture_of_the_same_turn(window: App) -> None:
@@ -133,13 +133,13 @@ def test_key_is_seen_in_the_picture_of_the_same_turn(window: App) -> None:
     assert not paused(window)
     turn(window, key(pygame.K_p), key_up(pygame.K_p))
     assert paused(window)
-    assert pygame.display.get_surface() is window.surface
+    assert pygame.display.get_surface() is window.context.surface
     turn(window, key(pygame.K_SPACE), key_up(pygame.K_SPACE))
     assert not paused(window)
 
 
 def test_ball_moved_while_paused_is_seen_there_in_the_same_turn(window: App) -> None:
-    window.stage.paused = True
+    window.app_state.paused = True
     turn(window)
     here, there = on_screen(window, BALL), on_screen(window, THERE)
     assert ball_seen(window) == pytest.approx(here, abs=1.0)  # a pixel
@@ -160,50 +160,54 @@ def test_pull_moves_the_ball_in_the_same_turn(window: App) -> None:
 
 def test_pull_ends_when_the_window_loses_the_keyboard(window: App) -> None:
     turn(window, press(*on_screen(window, BALL)), move(*on_screen(window, THERE), held=True), elapsed=DT)
-    assert window.stage.hands.holding
+    assert window.app_state.body_tools.is_holding
     turn(window, FOCUS_LOST)
-    assert not window.stage.hands.holding
+    assert not window.app_state.body_tools.is_holding
     assert getattr(live(window).session.actions[-1], "target", 0) is None
 
 
 @pytest.mark.parametrize("stopped", [True, False])
 def test_click_with_a_trembling_hand_only_picks(window: App, stopped: bool) -> None:
     turn(window, elapsed=3 * DT)
-    window.stage.paused = stopped
+    window.app_state.paused = stopped
     end, (x, y) = live(window).end, on_screen(window, BALL)
     turn(window, press(x, y), move(x + 1, y + 1, held=True), elapsed=DT)
     turn(window, move(x + 3, y, held=True), release(x + 3, y), elapsed=DT)
     turn(window, move(x + 90, y), elapsed=DT)
-    assert window.stage.hands.picked == 0
-    assert not window.stage.hands.holding
+    assert window.app_state.body_tools.picked == 0
+    assert not window.app_state.body_tools.is_holding
     assert live(window).session.actions == ()
     assert live(window).end >= end
 
 
 def test_drag_takes_the_body_where_it_was_pressed(window: App) -> None:
-    window.stage.paused = True
+    window.app_state.paused = True
     (x, y), (right, down) = on_screen(window, BALL), on_screen(window, THERE)
     turn(window, press(x + 10, y), move(x + 13, y, held=True))
     turn(window, move(right + 10, down, held=True))
-    assert live(window).frame.position[0] == pytest.approx(THERE, abs=1.5 / window.camera.scale)  # rounding to pixels
+    assert live(window).frame.position[0] == pytest.approx(
+        THERE, abs=1.5 / window.context.camera.scale
+    )  # rounding to pixels
 
 
 def test_many_motions_of_a_turn_are_one_action(window: App) -> None:
-    window.stage.paused = True
+    window.app_state.paused = True
     (x, y), (right, down) = on_screen(window, BALL), on_screen(window, THERE)
     turn(window, press(x, y), *(move(x + k, y, held=True) for k in range(1, 60)), move(right, down, held=True))
     assert [action.kind for action in live(window).session.actions] == ["move"]
     turn(window, move(x, y, held=True), move(x + 50, y, held=True), release(x + 50, y), move(x, y))
     assert [action.kind for action in live(window).session.actions] == ["move", "move"]
-    assert live(window).frame.position[0, 0] == pytest.approx(BALL[0] + 50 / window.camera.scale, abs=0.02)  # 2 pixels
+    assert live(window).frame.position[0, 0] == pytest.approx(
+        BALL[0] + 50 / window.context.camera.scale, abs=0.02
+    )  # 2 pixels
 
 
 def test_many_motions_of_a_knob_are_one_action_before_the_next_command(window: App) -> None:
     turn(window)
-    change = window.gui.panel.on_change
+    change = window.context.gui.panel.on_change
     for value in (1.0, 2.0, -4.0):
         change("gravity", value, False)
-    window.commands.do(Command.PAUSE)
+    window.commands.run(Command.PAUSE)
     turn(window)
     (action,) = live(window).session.actions
     assert isinstance(action, SetParameter)
@@ -213,26 +217,30 @@ def test_many_motions_of_a_knob_are_one_action_before_the_next_command(window: A
 @pytest.mark.parametrize("code", [pygame.K_o, pygame.K_F1])
 def test_all_that_is_held_is_let_go_before_something_hides_it(window: App, code: int) -> None:
     turn(window, press(*on_screen(window, BALL)), move(*on_screen(window, THERE), held=True), press(5, 300, 3))
-    assert window.stage.hands.holding
+    assert window.app_state.body_tools.is_holding
     turn(window, key(code, pygame.KMOD_CTRL if code == pygame.K_o else 0))
-    assert not window.stage.hands.holding
+    assert not window.app_state.body_tools.is_holding
     assert getattr(live(window).session.actions[-1], "target", 0) is None
-    home = window.camera
+    home = window.context.camera
     turn(window, key(pygame.K_ESCAPE), key_up(pygame.K_ESCAPE))
     turn(window, move(400, 400))
     turn(window, pygame.event.Event(pygame.MOUSEMOTION, pos=(450, 400), rel=(50, 0), buttons=(0, 0, 0)))
-    assert window.camera == home
+    assert window.context.camera == home
 
 
 def test_nothing_hides_the_timeline_while_it_is_held(window: App) -> None:
     turn(window, elapsed=0.08)
     turn(window)
-    bar = window.surface.get_height() - window.gui.bottom_margin // 2
+    bar = window.context.surface.get_height() - window.context.gui.bottom_margin // 2
     turn(window, press(200, bar))
     step = live(window).step_number
     assert step < 8
     turn(window, key(pygame.K_o, pygame.KMOD_CTRL), key(pygame.K_F1), key(pygame.K_TAB))
-    assert (window.gui.scene_browser, window.gui.help.open, window.gui.panel.visible) == (None, False, True)
+    assert (window.context.gui.scene_browser, window.context.gui.help.open, window.context.gui.panel.visible) == (
+        None,
+        False,
+        True,
+    )
     turn(window, release(200, bar))
     while live(window).busy is not None:
         turn(window)
@@ -243,60 +251,60 @@ def test_nothing_hides_the_timeline_while_it_is_held(window: App) -> None:
 
 def test_release_reaches_the_mouse_while_the_timeline_is_held(window: App) -> None:
     turn(window, elapsed=0.05)
-    bar = window.surface.get_height() - window.gui.bottom_margin // 2
+    bar = window.context.surface.get_height() - window.context.gui.bottom_margin // 2
     turn(window, press(300, 300, 2), press(200, bar), release(200, bar, 2), release(200, bar))
-    home = window.camera
+    home = window.context.camera
     turn(window, pygame.event.Event(pygame.MOUSEMOTION, pos=(320, 300), rel=(20, 0), buttons=(0, 0, 0)))
-    assert window.camera == home
+    assert window.context.camera == home
 
 
 def test_claimed_keys_are_told_once_and_only_arrows_repeat(opened: Open) -> None:
     window = opened(ROOM + CLAIMS)
     turn(window)
-    told = [text for _, text in window.stage.messages.shown()]
+    told = [text for _, text in window.app_state.messages.visible()]
     assert told == ["Arrows: move a by 0.25 m", "Space: relaunch spark"]
-    window.stage.messages = Messages()
+    window.app_state.messages = Messages()
     turn(window, key(pygame.K_SPACE), key(pygame.K_SPACE), key(pygame.K_SPACE))
     assert [action.kind for action in live(window).session.actions] == ["launch"]
     turn(window, key_up(pygame.K_SPACE), key(pygame.K_SPACE), *(key(pygame.K_UP) for _ in range(3)))
     assert [action.kind for action in live(window).session.actions] == ["launch"] * 2 + ["move"] * 3
     turn(window, key(pygame.K_r))
-    assert not window.stage.messages.shown()
+    assert not window.app_state.messages.visible()
 
 
 @pytest.mark.parametrize("code", [pygame.K_n, pygame.K_DELETE])
 def test_key_for_a_picked_body_says_that_none_is(window: App, code: int) -> None:
     turn(window, key(code))
-    assert window.stage.messages.shown() == (("warning", "select a body first: click it"),)
+    assert window.app_state.messages.visible() == (("warning", "select a body first: click it"),)
 
 
 def test_faults_are_closed_by_a_click_on_them_or_by_escape(window: App) -> None:
-    for event in (press(*window.surface.get_rect().move(-130, 0).center), key(pygame.K_ESCAPE)):
-        window.stage.faults = ("room.toml:3: ball: wrong",)
+    for event in (press(*window.context.surface.get_rect().move(-130, 0).center), key(pygame.K_ESCAPE)):
+        window.app_state.faults = ("room.toml:3: ball: wrong",)
         turn(window)
         turn(window, press(5, 300), release(5, 300))
-        assert window.stage.faults
+        assert window.app_state.faults
         turn(window, event, release(5, 300))
-        assert not window.stage.faults
-        assert window.leaving is None
+        assert not window.app_state.faults
+        assert window.context.exit_status is None
     turn(window, key_up(pygame.K_ESCAPE), key(pygame.K_ESCAPE))
-    assert window.leaving == 0
+    assert window.context.exit_status == 0
 
 
 def test_end_is_told_until_one_goes_back(window: App) -> None:
     turn(window, elapsed=0.05)
     session = live(window).session
     session.ended = "at 0.05 s: it broke"
-    assert hud_status(window.stage, (), 60.0, None).ended == session.ended
+    assert hud_status(window.app_state, (), 60.0, None).ended == session.ended
     live(window).scrub(0.0)
-    assert hud_status(window.stage, (), 60.0, None).ended is None
+    assert hud_status(window.app_state, (), 60.0, None).ended is None
 
 
 def test_press_and_release_within_one_turn_pull_nothing(window: App) -> None:
     here = on_screen(window, BALL)
     turn(window, press(*here), release(*here), elapsed=DT)
-    assert not window.stage.hands.holding
-    assert window.stage.hands.picked == 0
+    assert not window.app_state.body_tools.is_holding
+    assert window.app_state.body_tools.picked == 0
     assert live(window).session.actions == ()
 
 
@@ -317,12 +325,12 @@ def test_step_keys_make_one_step_each_however_many_come_in_a_turn(window: App) -
     strokes = [event for _ in range(5) for event in (key(pygame.K_o), key_up(pygame.K_o))]
     turn(window, *strokes, elapsed=1.0)
     assert live(window).step_number == 5
-    assert window.stage.paused
+    assert window.app_state.paused
 
 
 def test_picture_of_a_step_is_that_step(opened: Open) -> None:
     window = opened(ROOM + "velocity = [20.0, 0.0]\n")
-    window.stage.paused = True
+    window.app_state.paused = True
     turn(window)
     for number in (1, 2, 3):
         turn(window, key(pygame.K_PERIOD, unicode="."), key_up(pygame.K_PERIOD))
@@ -347,54 +355,54 @@ def test_held_key_pauses_once(window: App) -> None:
     turn(window, key(pygame.K_p))
     for _ in range(4):
         turn(window, key(pygame.K_p))
-    assert window.stage.paused
+    assert window.app_state.paused
     turn(window, key_up(pygame.K_p), key(pygame.K_p))
-    assert not window.stage.paused
+    assert not window.app_state.paused
 
 
 def test_camera_stays_where_it_was_put_and_home_brings_it_back(window: App) -> None:
-    home = window.camera
+    home = window.context.camera
     turn(
         window,
         press(300, 300, 3),
         pygame.event.Event(pygame.MOUSEMOTION, pos=(340, 330), rel=(40, 30), buttons=(0, 0, 1)),
     )
     turn(window, release(340, 330, 3))
-    moved = window.camera
+    moved = window.context.camera
     assert moved == home.panned((40, 30))
     turn(window, key(pygame.K_r), key_up(pygame.K_r))
-    assert window.camera == moved
+    assert window.context.camera == moved
     turn(window, key(pygame.K_HOME), key_up(pygame.K_HOME))
-    assert window.camera == home
+    assert window.context.camera == home
 
 
 def test_home_once_more_finds_the_bodies_where_they_are_now(opened: Open) -> None:
     away = opened(ROOM.replace("radius = 0.4", "radius = 0.4\nvelocity = [0.0, 50.0]\ncollides = 'none'"))
-    home = away.camera
+    home = away.context.camera
     turn(away, elapsed=0.1)
     for _ in range(30):
         turn(away, elapsed=0.1)
-    assert not len(places(away.surface, SKY, PICTURE))
+    assert not len(places(away.context.surface, SKY, PICTURE))
     turn(away, key(pygame.K_HOME), key_up(pygame.K_HOME))
-    assert len(places(away.surface, SKY, PICTURE))
+    assert len(places(away.context.surface, SKY, PICTURE))
     turn(away, key(pygame.K_HOME), key_up(pygame.K_HOME))
-    assert away.camera == home
+    assert away.context.camera == home
 
 
 def test_ball_is_added_under_the_mouse_or_before_it_came_in_the_middle(window: App) -> None:
     beside = (1.2, 1.0)  # of the first one
-    for place, told in ((window.camera.centre, ()), (beside, (move(*on_screen(window, beside)),))):
+    for place, told in ((window.context.camera.centre, ()), (beside, (move(*on_screen(window, beside)),))):
         turn(window, *told, key(pygame.K_b, unicode="b"), key_up(pygame.K_b))
         spawn = live(window).session.actions[-1]
         assert isinstance(spawn, Spawn)
-        assert spawn.ball.position == pytest.approx(place, abs=1.0 / window.camera.scale)  # a pixel
+        assert spawn.ball.position == pytest.approx(place, abs=1.0 / window.context.camera.scale)  # a pixel
 
 
 def test_resized_window_is_drawn_whole(window: App) -> None:
     for size in ((200, 150), (1, 1), (1500, 400), SIZE):
         pygame.display.set_mode(size, pygame.RESIZABLE)
         turn(window, pygame.event.Event(pygame.VIDEORESIZE, size=size, w=size[0], h=size[1]))
-        assert window.surface.get_size() == window.camera.size == size
+        assert window.context.surface.get_size() == window.context.camera.size == size
     assert ball_seen(window) == pytest.approx(on_screen(window, BALL), abs=1.0)  # a pixel
 
 
@@ -403,7 +411,7 @@ def test_files_are_told_in_the_window_and_on_the_terminal(window: App, said: lis
     turn(window, key(pygame.K_p, pygame.KMOD_CTRL), key_up(pygame.K_p))
     path = tmp_path / "sandbox-room-1.png"
     assert said == [f"screenshot: {path}"]
-    assert ("info", said[0]) in window.stage.messages.shown()
+    assert ("info", said[0]) in window.app_state.messages.visible()
     assert pygame.image.load(path).get_size() == SIZE
 
 
@@ -413,21 +421,21 @@ def test_window_of_a_stored_run_tells_what_cannot_be_done(opened: Open, tmp_path
 
     window = opened(ROOM)
     show = RecordedView(RecordedRun(sandbox.run(sandbox.load(tmp_path / "room.toml"))))
-    window.stage.put_on(show, None, show.scene)
+    window.app_state.show(show, None, show.scene)
     show.scrub(show.end)
-    assert hud_status(window.stage, (), 60.0, None).ended == "end of the run"
+    assert hud_status(window.app_state, (), 60.0, None).ended == "end of the run"
     show.scrub(show.begin)
-    assert hud_status(window.stage, (), 60.0, None).ended is None
+    assert hud_status(window.app_state, (), 60.0, None).ended is None
     for code in (pygame.K_e, pygame.K_g, pygame.K_t, pygame.K_b, pygame.K_n, pygame.K_DELETE):
         turn(window, key(code), key_up(code))
-        assert window.stage.messages.shown()[-1][0] == "warning"
-    assert window.stage.show is show
+        assert window.app_state.messages.visible()[-1][0] == "warning"
+    assert window.app_state.view is show
 
 
 def test_quit_and_escape_end_the_loop(window: App) -> None:
     pygame.event.post(pygame.event.Event(pygame.QUIT))
     assert window.run() == 0
-    window.leaving = None
+    window.context.exit_status = None
     pygame.event.post(key(pygame.K_ESCAPE))
     assert window.run() == 0
 
@@ -459,13 +467,13 @@ def test_no_display_is_told(monkeypatch: pytest.MonkeyPatch, capfd: pytest.Captu
 
 def test_wait_while_the_picture_is_locked(window: App) -> None:
     """A kernel that draws may have to be compiled while it holds the pixels; saying so needs them too."""
-    window.turn(0.0)
-    before = pygame.surfarray.array3d(window.surface)
-    lock = memoryview(window.surface.get_buffer())  # type: ignore[arg-type]  # it is a buffer, which its stub leaves out
-    assert window.surface.get_locked()
-    window.gui.draw_wait(window.surface, "compiling")
+    window.run_frame(0.0)
+    before = pygame.surfarray.array3d(window.context.surface)
+    lock = memoryview(window.context.surface.get_buffer())  # type: ignore[arg-type]  # it is a buffer, which its stub leaves out
+    assert window.context.surface.get_locked()
+    window.context.gui.draw_wait(window.context.surface, "compiling")
     lock.release()
-    locked = pygame.surfarray.array3d(window.surface)
-    window.gui.draw_wait(window.surface, "compiling")
+    locked = pygame.surfarray.array3d(window.context.surface)
+    window.context.gui.draw_wait(window.context.surface, "compiling")
     assert (locked != before).any()
-    assert (pygame.surfarray.array3d(window.surface) == locked).all()
+    assert (pygame.surfarray.array3d(window.context.surface) == locked).all()

@@ -50,7 +50,7 @@ def room(folder: Path, title: str = "Room", name: str = "a") -> Path:
 def post(window: App, *events: pygame.event.Event) -> None:
     for event in events:
         pygame.event.post(event)
-    window.turn(0.02)
+    window.run_frame(0.02)
 
 
 def control(window: App, code: int) -> None:
@@ -60,8 +60,8 @@ def control(window: App, code: int) -> None:
 @pytest.mark.parametrize("text", ODD)
 def test_any_title_and_name_are_shown_and_saved_under_a_plain_name(window: App, tmp_path: Path, text: str) -> None:
     name = text if text.isprintable() else "a"
-    assert window.stage.open(room(tmp_path, text, name))
-    window.gui.overlays |= {"names"}
+    assert window.app_state.open(room(tmp_path, text, name))
+    window.context.gui.overlays |= {"names"}
     control(window, pygame.K_p)
     control(window, pygame.K_s)
     written = sorted(path.name for path in (tmp_path / "out").iterdir())
@@ -71,18 +71,18 @@ def test_any_title_and_name_are_shown_and_saved_under_a_plain_name(window: App, 
 
 @pytest.mark.parametrize("typed", ["x" * 500, "\0\x1b\ud800\u200b", "👩\U0010ffff\u202e", "../../etc", "%s{}\\"])
 def test_any_letters_can_be_typed_for_a_scene(window: App, tmp_path: Path, typed: str) -> None:
-    window.stage.open(room(tmp_path))
+    window.app_state.open(room(tmp_path))
     control(window, pygame.K_o)
     for letter in typed:
         post(window, pygame.event.Event(pygame.KEYDOWN, key=pygame.K_a, mod=0, unicode=letter))
-    assert window.gui.scene_browser is not None
-    assert len(window.gui.scene_browser.typed) <= 60
-    assert window.gui.scene_browser.typed.isprintable()
+    assert window.context.gui.scene_browser is not None
+    assert len(window.context.gui.scene_browser.typed) <= 60
+    assert window.context.gui.scene_browser.typed.isprintable()
 
 
 @pytest.mark.parametrize("is_file", [False, True], ids=["gone", "a file"])
 def test_folder_that_cannot_be_written_is_told(window: App, tmp_path: Path, is_file: bool) -> None:
-    window.stage.open(room(tmp_path))
+    window.app_state.open(room(tmp_path))
     (tmp_path / "out").rmdir()
     if is_file:
         (tmp_path / "out").write_text("", encoding="utf-8")
@@ -94,21 +94,21 @@ def test_folder_that_cannot_be_written_is_told(window: App, tmp_path: Path, is_f
 
 @pytest.mark.parametrize("notches", [1e9, -1e9, 10_000, -10_000])
 def test_wheel_that_spins_wildly_only_zooms(window: App, tmp_path: Path, notches: float) -> None:
-    window.stage.open(room(tmp_path))
+    window.app_state.open(room(tmp_path))
     turned = {"x": 0, "y": int(notches), "precise_y": float(notches), "flipped": False}
     post(window, pygame.event.Event(pygame.MOUSEWHEEL, **turned))
     post(window, pygame.event.Event(pygame.MOUSEWHEEL, **turned))
-    assert 0.0 < window.camera.scale < float("inf")
+    assert 0.0 < window.context.camera.scale < float("inf")
 
 
 @pytest.mark.parametrize("what", [pygame.DROPFILE, pygame.DROPTEXT])
 @pytest.mark.parametrize("dropped", ["/", "../x", "\0", "x" * 10_000])
 def test_what_is_dropped_on_the_window_does_nothing(window: App, tmp_path: Path, what: int, dropped: str) -> None:
-    window.stage.open(room(tmp_path))
-    show = window.stage.show
+    window.app_state.open(room(tmp_path))
+    show = window.app_state.view
     post(window, pygame.event.Event(what, file=dropped, text=dropped))
-    assert window.stage.show is show
-    assert window.leaving is None
+    assert window.app_state.view is show
+    assert window.context.exit_status is None
 
 
 @pytest.mark.parametrize("score", [10**16, -(10**16), 10**4000, 1e300])

@@ -37,53 +37,53 @@ def window(tmp_path: Path) -> Iterator[App]:
     path = tmp_path / "table.toml"
     path.write_text(TABLE, encoding="utf-8")
     opened = App(AppState(), size=SIZE, folder=tmp_path, say=lambda _: None)
-    assert opened.stage.open(path)
+    assert opened.app_state.open(path)
     pygame.event.clear()
-    opened.turn(TURN)
+    opened.run_frame(TURN)
     yield opened
     opened.close()
 
 
 def game_in(window: App) -> BilliardsGame:
-    assert window.stage.game is not None
-    return window.stage.game
+    assert window.app_state.game is not None
+    return window.app_state.game
 
 
 def do(window: App, *events: pygame.event.Event) -> None:
     for event in events:
-        window.take(event)
-    window.turn(TURN)
+        window.handle_event(event)
+    window.run_frame(TURN)
 
 
 def at(window: App, x: float, y: float) -> tuple[float, float]:
-    across, down = window.camera.to_screen(np.array([x, y])).tolist()
+    across, down = window.context.camera.to_screen(np.array([x, y])).tolist()
     return across, down
 
 
 def roll_out(window: App) -> None:
     game = game_in(window)
-    window.turn(TURN)
+    window.run_frame(TURN)
     for _ in range(5000):
         if game.waits:
             return
         game.live.step()
-        window.turn(TURN)
+        window.run_frame(TURN)
     raise AssertionError("the balls never rest")
 
 
 def test_table_is_played_on_the_exact_engine_and_lies_down(window: App) -> None:
-    assert window.stage.engine == "exact"
-    assert window.camera.turned
-    corners = window.camera.to_screen(np.array([[0.0, 0.0], [39.0 * INCH, 78.0 * INCH]]))
+    assert window.app_state.engine == "exact"
+    assert window.context.camera.turned
+    corners = window.context.camera.to_screen(np.array([[0.0, 0.0], [39.0 * INCH, 78.0 * INCH]]))
     assert corners.min() > 0.0
-    assert corners[:, 0].max() < SIZE[0] - window.gui.panel.width
+    assert corners[:, 0].max() < SIZE[0] - window.context.gui.panel.width
 
 
 def test_help_lists_the_keys_of_the_table(window: App) -> None:
-    told = dict(window.gui.key_bindings(window.stage).told)
+    told = dict(window.app_state.key_bindings.help_rows)
     for label in ("S (hold)", "E (hold)", "X (hold)", "Space", "G", "Z"):
         assert label in told
-    named = dict(help_groups(window.gui.key_bindings(window.stage).told))
+    named = dict(help_groups(window.app_state.key_bindings.help_rows))
     assert ("Space", "shoot") in named["This scene"]
     assert any(keys == "P" for keys, _ in named["Time"])  # Space is the table's
 
@@ -93,11 +93,11 @@ def test_mouse_aims_and_space_shoots(window: App) -> None:
     x, y = game.position[game.ball]
     do(window, move(*at(window, x + 0.2, y + 0.3)))
     # A pixel at 0.36 m
-    assert game.cue.aim == pytest.approx(math.atan2(0.3, 0.2), abs=1.5 / (0.36 * window.camera.scale))
+    assert game.cue.aim == pytest.approx(math.atan2(0.3, 0.2), abs=1.5 / (0.36 * window.context.camera.scale))
     do(window, key(pygame.K_SPACE))
     (strike,) = (action for action in game.live.session.actions if isinstance(action, Strike))
     assert strike.aim == game.cue.aim
-    assert not window.stage.paused
+    assert not window.app_state.paused
 
 
 def test_e_sets_english_and_leaves_the_engine(window: App) -> None:
@@ -108,7 +108,7 @@ def test_e_sets_english_and_leaves_the_engine(window: App) -> None:
     do(window, key_up(pygame.K_e))
     assert game.cue.side > 0.0
     assert game.cue.height > 0.0
-    assert window.stage.engine == "exact"
+    assert window.app_state.engine == "exact"
     english = game.cue.side
     do(window, move(480, 200))
     assert game.cue.side == english
@@ -128,7 +128,7 @@ def test_x_and_arrows_set_the_power(window: App) -> None:
 def test_dial_and_power_can_be_clicked(window: App) -> None:
     game = game_in(window)
     window.draw()
-    (_, tip), (_, power) = window.gui.billiards_hud._rects()
+    (_, tip), (_, power) = window.context.gui.billiards_hud._rects()
     do(window, press(tip.centerx - 0.25 * tip.width / 2, tip.centery), release(tip.centerx, tip.centery))
     assert game.cue.side == pytest.approx(-0.25, abs=2.0 / tip.width)  # a pixel
     do(window, press(power.centerx, power.top + 1), release(power.centerx, power.top + 1))
@@ -142,7 +142,7 @@ def test_g_and_a_click_put_the_ball_in_hand_down(window: App) -> None:
     do(window, press(*at(window, 0.3, 0.25)), release(*at(window, 0.3, 0.25)))
     (moved,) = game.live.session.actions
     assert isinstance(moved, Move)
-    assert game.position[game.ball] == pytest.approx((0.3, 0.25), abs=1.0 / window.camera.scale)  # a pixel
+    assert game.position[game.ball] == pytest.approx((0.3, 0.25), abs=1.0 / window.context.camera.scale)  # a pixel
     assert game.strokes == 0
 
 
@@ -157,7 +157,7 @@ def test_foul_is_said_and_z_takes_the_stroke_back(window: App) -> None:
     assert "the cue ball hit no ball" in "; ".join(game.match.messages)
     assert game.match.turn == 1
     do(window, key(pygame.K_z))
-    window.turn(TURN)
+    window.run_frame(TURN)
     assert game.strokes == 0
     assert game.match.turn == 0
     assert game.position[game.ball] == (x, y)
@@ -174,18 +174,18 @@ def test_stroke_works_while_paused_and_goes_on_by_steps(window: App) -> None:
 
 def test_players_are_chosen_in_the_panel(window: App) -> None:
     do(window, key(pygame.K_SPACE))
-    window.stage.turn("players", "you vs bot")
+    window.app_state.set_parameter("players", "you vs bot")
     game = game_in(window)
     assert game.players == "you vs bot"
     assert game.strokes == 0
-    window.stage.turn("players", "one player")
+    window.app_state.set_parameter("players", "one player")
     assert game_in(window).match.state.players == 1
 
 
 def test_snooker_may_be_played_with_the_miss(window: App) -> None:
-    assert window.stage.open(find("snooker"))
+    assert window.app_state.open(find("snooker"))
     for value, misses in (("on", True), ("off", False)):
-        window.stage.turn("misses", value)
+        window.app_state.set_parameter("misses", value)
         state = game_in(window).match.state
         assert isinstance(state, SnookerState)
         assert state.misses is misses
@@ -193,7 +193,7 @@ def test_snooker_may_be_played_with_the_miss(window: App) -> None:
 
 def test_window_without_room_draws_the_table_all_the_same(window: App) -> None:
     for size in ((320, 240), (200, 900), (1600, 400)):
-        window.resize(pygame.Surface(size))
+        window.context.resize(pygame.Surface(size))
         window.draw()
         do(window, move(5, 5), press(5, 5), release(5, 5))
 
@@ -213,4 +213,4 @@ def test_balls_of_a_game_are_moved_by_the_cue_alone(window: App) -> None:
     start, end = at(window, x, y), at(window, x - 0.2, y)
     do(window, move(*start), press(*start), move(*end, held=True), release(*end))
     assert game.live.session.actions == ()
-    assert "the cue moves balls" in window.stage.messages.shown()[-1][1]
+    assert "the cue moves balls" in window.app_state.messages.visible()[-1][1]

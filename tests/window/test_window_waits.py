@@ -55,11 +55,11 @@ def game(tmp_path: Path) -> Iterator[Callable[[str], App]]:
 
 def steps(window: App) -> int:
     """Let the window make three turns; return how many steps were made."""
-    assert window.stage.show is not None
-    before = window.stage.show.step_number
+    assert window.app_state.view is not None
+    before = window.app_state.view.step_number
     for _ in range(3):
         turned(window)
-    return window.stage.show.step_number - before
+    return window.app_state.view.step_number - before
 
 
 @pytest.mark.parametrize("paused", [False, True])
@@ -75,13 +75,13 @@ def steps(window: App) -> int:
 def test_time_stands_still_behind_what_hides_the_scene(
     window: App, hides: pygame.event.Event, shows: pygame.event.Event, paused: bool
 ) -> None:
-    window.stage.paused = paused
+    window.app_state.paused = paused
     assert (steps(window) > 0) is not paused
     turned(window, hides)
     assert steps(window) == 0
     turned(window, shows)
     assert (steps(window) > 0) is not paused
-    assert window.leaving is None
+    assert window.context.exit_status is None
 
 
 @pytest.mark.parametrize("name", ["landing", "pinball/classic"])
@@ -106,8 +106,8 @@ def test_step_begins_a_game_paused(game: Callable[[str], App]) -> None:
     window = game("landing")
     live = turned(window, key(pygame.K_o), key_up(pygame.K_o))
     assert live.step_number == 1
-    assert window.stage.paused
-    assert not window.stage.waits_for_start
+    assert window.app_state.paused
+    assert not window.app_state.waits_for_start
 
 
 def compile_for(window: App, *meanwhile: pygame.event.Event) -> None:
@@ -117,11 +117,11 @@ def compile_for(window: App, *meanwhile: pygame.event.Event) -> None:
         COMPILE_CLOCK.begin("sandbox.test")
         for event in meanwhile:
             pygame.event.post(event)
-        while pygame.event.peek([event.type for event in meanwhile]) and window.leaving is None:
+        while pygame.event.peek([event.type for event in meanwhile]) and window.context.exit_status is None:
             threading.Event().wait(0.01)
         COMPILE_CLOCK.end()
 
-    window.stage.compute(job)
+    window.app_state.compute(job)
 
 
 def test_presses_while_compiling_are_dropped_and_releases_are_not(window: App) -> None:
@@ -130,29 +130,29 @@ def test_presses_while_compiling_are_dropped_and_releases_are_not(window: App) -
     kept = {event.type for event in pygame.event.get()}
     assert pygame.KEYUP in kept
     assert not kept & {pygame.KEYDOWN, pygame.MOUSEBUTTONDOWN}
-    assert window.leaving is None
-    assert not window.stage.paused
+    assert window.context.exit_status is None
+    assert not window.app_state.paused
 
 
 @pytest.mark.parametrize("event", [key(pygame.K_ESCAPE), pygame.event.Event(pygame.QUIT)], ids=["escape", "cross"])
 def test_window_closes_while_something_compiles(window: App, event: pygame.event.Event) -> None:
     turned(window)
     compile_for(window, event)
-    assert window.leaving == 0
+    assert window.context.exit_status == 0
 
 
 def test_scene_is_seen_while_its_session_is_being_started(window: App, tmp_path: Path) -> None:
     seen: list[int] = []
-    drawn = window.gui.draw_wait
+    drawn = window.context.gui.draw_wait
 
     def look(surface: pygame.Surface, what: str) -> None:
         seen.append(len({surface.get_at((x, 240))[:3] for x in range(0, 360, 4)}))
         drawn(surface, what)
 
-    window.gui.draw_wait = look  # type: ignore[method-assign]
+    window.context.gui.draw_wait = look  # type: ignore[method-assign]
     other = tmp_path / "other.toml"
     other.write_text(MOVING.replace("Moving", "Other"), encoding="utf-8")
-    begin = window.stage.compute
+    begin = window.app_state.compute
 
     def compute(job: Callable[[], object]) -> object:
         def slow() -> object:
@@ -164,11 +164,11 @@ def test_scene_is_seen_while_its_session_is_being_started(window: App, tmp_path:
 
         return begin(slow)
 
-    window.stage.compute = compute  # type: ignore[assignment]
-    window.stage.take(other)
+    window.app_state.compute = compute  # type: ignore[assignment]
+    window.app_state.open_other(other)
     assert seen[0] > 2  # a ball over the ground, not one colour
-    assert window.stage.show is not None
-    assert window.stage.show.scene.title == "Other"
+    assert window.app_state.view is not None
+    assert window.app_state.view.scene.title == "Other"
 
 
 def test_worker_raises_what_its_job_raises_and_goes_on() -> None:

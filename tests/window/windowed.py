@@ -17,7 +17,7 @@ def window_on(text: str, folder: Path, size: tuple[int, int] = (640, 480)) -> It
     file = folder / "scene.toml"
     file.write_text(text, encoding="utf-8")
     stage = AppState()
-    stage.take(file)
+    stage.open_other(file)
     opened = App(stage, size=size, folder=folder, say=lambda _: None)
     try:
         yield opened
@@ -29,6 +29,6 @@ def turned(window: App, *events: pygame.event.Event, elapsed: float = 0.05) -> L
     """Post events, let the window make one turn, and return what is live in it."""
     for event in events:
         pygame.event.post(event)
-    window.turn(elapsed)
-    assert isinstance(window.stage.show, LiveView)
-    return window.stage.show
+    window.run_frame(elapsed)
+    assert isinstance(window.app_state.view, LiveView)
+    return window.app_state.view

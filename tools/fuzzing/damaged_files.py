@@ -278,8 +278,8 @@ def _shown(*words: str) -> Callable[[str, str], int]:
 
         def few_frames(window: App) -> int:
             for elapsed in (0.0, 0.05, 1.0):
-                window.turn(elapsed)
-            return window.leaving or 0
+                window.run_frame(elapsed)
+            return window.context.exit_status or 0
 
         with mock.patch.object(App, "run", few_frames), mock.patch.dict(os.environ, DUMMY):
             return _called(words[0], path, *words[1:])[0]

@@ -56,13 +56,13 @@ def _open(scene: str, size: tuple[int, int], *overrides: str) -> App:
     stage = AppState(overrides=list(overrides))
     opened = App(stage, size=size)
     stage.open(find(scene))
-    opened.turn(FRAME)
+    opened.run_frame(FRAME)
     stage.messages = Messages()
     return opened
 
 
 def _close(opened: App, path: Path, colours: int = COLOURS) -> None:
-    image = image_of(opened.surface)
+    image = image_of(opened.context.surface)
     opened.close()
     save_png(image, path, colours)
 
@@ -70,13 +70,13 @@ def _close(opened: App, path: Path, colours: int = COLOURS) -> None:
 def ghost(path: Path) -> None:
     """Play the gas on pymunk, with the ghost of the exact engine."""
     opened = _open("gas", SIZE)
-    opened.gui.overlays |= {"energy"}
-    opened.stage.toggle_ghost()
-    live = opened.stage.live
+    opened.context.gui.overlays |= {"energy"}
+    opened.app_state.toggle_ghost()
+    live = opened.app_state.live
     assert live is not None
     live.company.show_trust(True)
     while live.frame.time < 1.6:
-        opened.turn(FRAME)
+        opened.run_frame(FRAME)
     _close(opened, path)
 
 
@@ -90,7 +90,7 @@ def artillery_thumbnail(scene: str) -> Callable[[Path], None]:
 
     def make(path: Path) -> None:
         opened = _duel(scene, SIZE)
-        image = image_of(opened.surface).crop(LAND)
+        image = image_of(opened.context.surface).crop(LAND)
         opened.close()
         save_thumbnail(image.resize(THUMBNAIL, Image.Resampling.LANCZOS), path)
 
@@ -99,44 +99,44 @@ def artillery_thumbnail(scene: str) -> Callable[[Path], None]:
 
 def _duel(scene: str, size: tuple[int, int]) -> App:
     opened = _open(scene, size)
-    opened.gui.panel.visible = False
-    opened.home()
-    opened.stage.start_game()
-    host, live = opened.stage.host, opened.stage.live
+    opened.context.gui.panel.visible = False
+    opened.context.fit_scene()
+    opened.app_state.start_game()
+    host, live = opened.app_state.host, opened.app_state.live
     assert host is not None
     assert live is not None
     while live.frame.time < AFTER_FIRE:
         for control, begin, end in TRIGGER:
             host.hold("script", control, float(begin <= live.frame.time < end))
-        opened.turn(FRAME)
+        opened.run_frame(FRAME)
     return opened
 
 
 def landing(path: Path) -> None:
     """Descend towards the pad by a script of throttles."""
     opened = _open("landing", SIZE, "world.seed=9")
-    opened.gui.overlays |= {"trails"}
-    opened.stage.start_game()
-    host, live = opened.stage.host, opened.stage.live
+    opened.context.gui.overlays |= {"trails"}
+    opened.app_state.start_game()
+    host, live = opened.app_state.host, opened.app_state.live
     assert host is not None
     assert live is not None
     for seconds, control, value in FLIGHT:
         while live.frame.time < seconds:
-            opened.turn(FRAME)
+            opened.run_frame(FRAME)
         host.hold("script", control, value)
     for _ in range(12):
-        opened.turn(FRAME)
+        opened.run_frame(FRAME)
     _close(opened, path)
 
 
 def pinball(path: Path) -> None:
     """Let a player who watches the ball play for half a minute."""
     opened = _open("pinball/full", UPRIGHT)
-    opened.gui.panel.visible = False
-    opened.gui.overlays |= {"trails"}
-    opened.home()
-    opened.stage.start_game()
-    live, host = opened.stage.live, opened.stage.host
+    opened.context.gui.panel.visible = False
+    opened.context.gui.overlays |= {"trails"}
+    opened.context.fit_scene()
+    opened.app_state.start_game()
+    live, host = opened.app_state.live, opened.app_state.host
     assert live is not None
     assert host is not None
     live.company.show_trust(False)
@@ -145,7 +145,7 @@ def pinball(path: Path) -> None:
     while live.frame.time < LIT or not _plays(live.frame, (bottom + top) / 2.0):
         for control, value in player.decide(StepInfo(live.frame.time, live.frame, live.contacts, ()), host.rules):
             host.hold("player", control, value)
-        opened.turn(FRAME)
+        opened.run_frame(FRAME)
     _close(opened, path)
 
 
@@ -159,30 +159,30 @@ def _plays(frame: sandbox.Frame, height: float) -> bool:
 def table(path: Path) -> None:
     """Break, and aim the next shot as a good player would; the numbers of the bot are those of its seed."""
     opened = _open("8-ball", SIZE)
-    game = opened.stage.game
+    game = opened.app_state.game
     assert game is not None
     game.shoot()
-    opened.turn(FRAME)
+    opened.run_frame(FRAME)
     while not game.waits:
-        opened.turn(FRAME)
+        opened.run_frame(FRAME)
     plan = BilliardsBot(1.0, 1).intend(game.match).stroke
     game.cue.aim, game.cue.speed = plan.aim, plan.speed
     game.cue.tip_at(plan.side, plan.height)
-    opened.stage.messages = Messages()
-    opened.turn(FRAME)
+    opened.app_state.messages = Messages()
+    opened.run_frame(FRAME)
     _close(opened, path)
 
 
 def rolling(path: Path) -> None:
     """Break at 9-ball, and film the table."""
     opened = _open("9-ball", SIZE)
-    opened.gui.panel.visible = False
-    opened.home()
-    opened.take(pygame.event.Event(pygame.KEYDOWN, key=pygame.K_SPACE, mod=0, unicode=" ", scancode=0))
+    opened.context.gui.panel.visible = False
+    opened.context.fit_scene()
+    opened.handle_event(pygame.event.Event(pygame.KEYDOWN, key=pygame.K_SPACE, mod=0, unicode=" ", scancode=0))
     frames = []
     for k in range(round(2.6 / FRAME)):
-        opened.turn(FRAME)
+        opened.run_frame(FRAME)
         if k % 3 == 0:
-            frames.append(image_of(opened.surface).crop(CLOTH).resize((640, 362), Image.Resampling.LANCZOS))
+            frames.append(image_of(opened.context.surface).crop(CLOTH).resize((640, 362), Image.Resampling.LANCZOS))
     opened.close()
     save_gif(frames, path, 20.0, 128, 0.8)

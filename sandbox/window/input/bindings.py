@@ -1,9 +1,9 @@
-"""Claims: the keys that a scene takes for itself, and what they do.
+"""Key bindings of a scene: arrow keys and Space of `[play]`, keys of thrusts and drives, and the controls of a game.
 
-Control keys: the keys of a game's controls, from the names that rules give them to what the keyboard sends.
+They are computed once for each session; a key that a scene binds no longer gives its command of the window.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ import pygame
 
 from sandbox.action import Action, Drive, Throttle
 from sandbox.games.billiards.view import controls as cue_keys
-from sandbox.games.billiards.view.controls import CueControls, KeyHandler
+from sandbox.games.billiards.view.controls import CueControls
 from sandbox.games.contract import Control
 from sandbox.scene.compile.drives import names_of
 from sandbox.scene.description.scene import default_name
@@ -35,21 +35,24 @@ NAMED: dict[str, tuple[int, ...]] = {
     "left ctrl": (pygame.K_LCTRL,),
     "right ctrl": (pygame.K_RCTRL,),
 }
-"""Keys that write nothing; all others are called by what they write."""
+"""Names of keys that write no character; any other key is named by its character."""
 
-DIRECTIONS = ("left", "right", "up", "down")
-"""of a gamepad's cross"""
+PAD_DIRECTIONS = ("left", "right", "up", "down")
+"""directions of a gamepad's D-pad"""
+
+KeyHandler = Callable[[], object]
+"""Called when a key is pressed or released; it may raise `ActionError`, and its result is ignored."""
 
 
 class KeyNameError(ValueError):
-    """Rules call a key by a name that there is not, or claim one that no scene can."""
+    """A control names an unknown key, or one that is reserved for the window."""
 
 
 def codes_of(name: str) -> tuple[int, ...]:
-    """Return the codes of a key by its name.
+    """Return the pygame codes of a key by its name.
 
     Raises:
-        KeyNameError: no key is called so, or it is none that can be claimed.
+        KeyNameError: the name is unknown, or the key is reserved for the window.
     """
     codes = NAMED.get(name) or ((ord(name),) if len(name) == 1 and name.isprintable() and name == name.lower() else ())
     if not codes or GLOBAL & set(codes):
@@ -58,23 +61,18 @@ def codes_of(name: str) -> tuple[int, ...]:
 
 
 def control_handlers(host: GameHost) -> tuple[dict[int, KeyHandler], dict[int, KeyHandler]]:
-    """Return what keys do, and what is done when they are let go."""
+    """Return the handlers of a game's keys by key code: of presses, and of releases."""
     pressed: dict[int, KeyHandler] = {}
     released: dict[int, KeyHandler] = {}
     for control in host.controls:
         for code in (code for key in control.keys for code in codes_of(key)):
-            pressed[code] = partial(_hold, host=host, code=code, control=control.name, value=1.0)
-            released[code] = partial(_hold, host=host, code=code, control=control.name, value=0.0)
+            pressed[code] = partial(host.hold, code, control.name, 1.0)
+            released[code] = partial(host.hold, code, control.name, 0.0)
     return pressed, released
 
 
-def _hold(live: LiveView, host: GameHost, code: int, control: str, value: float) -> None:
-    if live is host.live:  # a key may be let go in another game than it was pressed in
-        host.hold(code, control, value)
-
-
 def control_help(controls: tuple[Control, ...]) -> tuple[tuple[str, str], ...]:
-    """Return the keys and what they do, as help lists them."""
+    """Return (keys, action) rows of a game's controls for the help page."""
     rows = []
     for control in controls:
         keys = " or ".join(" ".join(word.capitalize() for word in key.split()) for key in control.keys)
@@ -93,7 +91,7 @@ def _buttons(pad: str) -> str:
             which = "right stick" if word[1:-1] == "right" else "stick"
             words.append(f"{which} {sticks[word[-1]][word[0] == '+']}")
         else:
-            words.append(f"D-pad {word}" if word in DIRECTIONS else word.upper() if len(word) <= 2 else word)
+            words.append(f"D-pad {word}" if word in PAD_DIRECTIONS else word.upper() if len(word) <= 2 else word)
     return ", ".join(words)
 
 
@@ -116,61 +114,65 @@ KEYS = {
     "slash": pygame.K_SLASH,
     "return": pygame.K_RETURN,
 }
-"""The keys that thrusts and drives may have, as scenes call them."""
+"""Keys of thrusts and drives by their names in scene files."""
 
 
 class KeyBindings(NamedTuple):
-    """What a scene's `[play]` asks for."""
+    """Handlers of the keys that a scene or its game binds."""
 
-    deeds: dict[int, KeyHandler]
-    """by key"""
-    told: tuple[tuple[str, str], ...]
-    """keys and what they do, as help names them"""
-    releases: dict[int, KeyHandler]
-    """by key, what is done when it is let go"""
+    pressed: dict[int, KeyHandler]
+    """by key code"""
+    help_rows: tuple[tuple[str, str], ...]
+    """(keys, action) for the help page"""
+    released: dict[int, KeyHandler]
+    """by key code"""
 
-    def deed(self, key: int, again: bool) -> KeyHandler | None:
-        """Return what a key does; held, and so pressed again and again, only arrows that move something go on."""
-        return None if again and (key not in ARROWS or key in self.releases) else self.deeds.get(key)
+    def handler_for(self, key: int, repeated: bool) -> KeyHandler | None:
+        """Return the handler of a pressed key. Only arrows that move a body by steps repeat while they are held."""
+        return None if repeated and (key not in ARROWS or key in self.released) else self.pressed.get(key)
+
+
+NO_BINDINGS = KeyBindings({}, (), {})
 
 
 def key_bindings(
-    scene: Scene, hands: BodyTools, gestures: CueControls | None = None, host: GameHost | None = None
+    live: LiveView, tools: BodyTools, gestures: CueControls | None = None, host: GameHost | None = None
 ) -> KeyBindings:
-    """Return the keys that a scene claims, those of a table or of a game's controls among them."""
-    deeds: dict[int, KeyHandler] = {}
-    told: list[tuple[str, str]] = []
+    """Return the keys that a session's scene binds, with those of a billiard table and of a game's controls."""
+    scene = live.scene
+    pressed: dict[int, KeyHandler] = {}
+    released: dict[int, KeyHandler] = {}
+    rows: list[tuple[str, str]] = []
     body, step, generator = scene.play.arrows, scene.play.arrow_step, scene.play.relaunch
     if body is not None:
         for key, (x, y) in ARROWS.items():
-            deeds[key] = partial(_shift, hands=hands, body=body, by=(x * step, y * step))
-        told.append(("Arrows", f"move {body} by {step:g} m"))
+            pressed[key] = partial(tools.shift, live, body, (x * step, y * step))
+        rows.append(("Arrows", f"move {body} by {step:g} m"))
     if generator is not None:
-        deeds[pygame.K_SPACE] = partial(_relaunch, generator=generator)
-        told.append(("Space", f"relaunch {generator}"))
-    releases: dict[int, KeyHandler] = {}
-    played, played_out = ({}, {}) if host is None else control_handlers(host)
-    for called, verb, pressed, released in held(scene):
-        key = KEYS[called]
-        if key in played:  # it is the rules' to press
+        pressed[pygame.K_SPACE] = partial(live.relaunch, generator)
+        rows.append(("Space", f"relaunch {generator}"))
+    control_pressed, control_released = ({}, {}) if host is None else control_handlers(host)
+    for name, verb, on_press, on_release in thrust_and_drive_keys(scene):
+        key = KEYS[name]
+        if key in control_pressed:  # the rules of the game apply these actions
             continue
-        deeds[key] = partial(_act, action=pressed, also=deeds.get(key))
-        releases[key] = partial(_act, action=released, also=releases.get(key))
-        told.append((called.capitalize(), verb))
+        pressed[key] = partial(_apply, live, on_press, pressed.get(key))
+        released[key] = partial(_apply, live, on_release, released.get(key))
+        rows.append((name.capitalize(), verb))
     if host is not None:
-        deeds |= played
-        releases |= played_out
-        told += control_help(host.controls)
+        pressed |= control_pressed
+        released |= control_released
+        rows += control_help(host.controls)
     if gestures is not None:
-        cue, let_go = cue_keys.cue_key_handlers(gestures)
-        deeds |= cue
-        releases |= let_go
-        told += cue_keys.CUE_KEY_HELP
-    return KeyBindings(deeds, tuple(told), releases)
+        cue_pressed, cue_released = cue_keys.cue_key_handlers(gestures)
+        pressed |= cue_pressed
+        released |= cue_released
+        rows += cue_keys.CUE_KEY_HELP
+    return KeyBindings(pressed, tuple(rows), released)
 
 
-def held(scene: Scene) -> Iterator[tuple[str, str, Action, Action]]:
-    """Yield the keys that a scene's thrusts and drives have, what each does, and the actions of both its ends."""
+def thrust_and_drive_keys(scene: Scene) -> Iterator[tuple[str, str, Action, Action]]:
+    """Yield (key name, help text, action of a press, action of a release) of a scene's thrusts and drives."""
     for k, thrust in enumerate(scene.thrusts):
         if thrust.key is not None:
             name = thrust.name or default_name("thrust", k)
@@ -182,16 +184,8 @@ def held(scene: Scene) -> Iterator[tuple[str, str, Action, Action]]:
             yield drive.key, f"drive {name}", on, off
 
 
-def _act(live: LiveView, action: Action, also: KeyHandler | None) -> None:
-    """Do what a key asks for, after another thing that has the same key."""
-    if also is not None:
-        also(live)
+def _apply(live: LiveView, action: Action, first: KeyHandler | None) -> None:
+    """Apply an action, after that of another thrust or drive with the same key."""
+    if first is not None:
+        first()
     live.act(action)
-
-
-def _shift(live: LiveView, hands: BodyTools, body: str, by: tuple[float, float]) -> None:
-    hands.shift(live, body, by)
-
-
-def _relaunch(live: LiveView, generator: str) -> None:
-    live.relaunch(generator)

@@ -1,4 +1,4 @@
-"""Hands: what pointing, dragging and keys do to the bodies of a session. Places are in the world, m."""
+"""Mouse tools on the bodies of a session: pick, drag, nudge, add, remove. Positions are in world coordinates, m."""
 
 import math
 from collections.abc import Iterable
@@ -15,86 +15,87 @@ from sandbox.window.hit_test import Hull, hull_area, is_free, pick_body
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.recorded import RecordedView
 
-Place = tuple[float, float]
+Position = tuple[float, float]
 
-NUDGE = 1.0
-"""m/s that a nudge adds, or in a small scene, a few radii a second"""
+NUDGE_SPEED = 1.0
+"""m/s that a nudge adds to a body; in small scenes 10 radii/s"""
 
 
 class BodyTools:
-    """What is held, and what was picked last."""
+    """The picked body, and the body that is being dragged."""
 
     def __init__(self) -> None:
         self.picked: int | None = None
-        """number of the body whose figures are shown"""
-        self._held: str | None = None
-        self._spot: Place = (0.0, 0.0)
-        self._offset: Place = (0.0, 0.0)
-        self._angle = 0.0
-        self._grip: Place = (0.0, 0.0)
-        self._moving = False
-        self._hand: Place = (0.0, 0.0)
+        """index of the body that is selected"""
+        self._held: str | None = None  # name
+        self._pick_position: Position = (0.0, 0.0)
+        self._offset: Position = (0.0, 0.0)  # from the body's centre to the picked point, when it was picked
+        self._angle = 0.0  # rad, of the body when it was picked
+        self._grip: Position = (0.0, 0.0)  # picked point: in the body's frame, or while paused relative to its centre
+        self._moving = False  # dragged while paused: placed, not pulled by a spring
+        self._target: Position = (0.0, 0.0)
 
     @property
-    def holding(self) -> bool:
-        """Whether a body is held."""
+    def is_holding(self) -> bool:
+        """Whether a body is being dragged."""
         return self._held is not None
 
-    def picked_of(self, live: LiveView) -> int | None:
-        """Return the picked body's number, unless that body has not come yet: the session may have gone back."""
+    def picked_index(self, live: LiveView) -> int | None:
+        """Return the index of the picked body; None if it does not exist at the present time, as after a step back."""
         return self.picked if self.picked is not None and self.picked < len(live.bodies) else None
 
-    def look(self, show: LiveView | RecordedView, place: Place, reach: float) -> bool:
-        """Pick the body at a place, and do nothing to it; return whether there is one."""
-        frame = show.frame
-        self.picked = number = pick_body(show.bodies, frame, place, reach)
-        if number is None:
+    def pick(self, view: LiveView | RecordedView, position: Position, tolerance: float) -> bool:
+        """Select the body at a position, or within a tolerance, m, of it; return whether there is one."""
+        frame = view.frame
+        self.picked = index = pick_body(view.bodies, frame, position, tolerance)
+        if index is None:
             return False
-        x, y = frame.position[number].tolist()
-        self._spot, self._offset, self._angle = place, (place[0] - x, place[1] - y), float(frame.angle[number])
+        x, y = frame.position[index].tolist()
+        self._pick_position, self._offset = position, (position[0] - x, position[1] - y)
+        self._angle = float(frame.angle[index])
         return True
 
-    def hold(self, live: LiveView, paused: bool) -> None:
-        """Take hold of the picked body, at the point of it that was looked at, however far it has gone since.
+    def grab(self, live: LiveView, paused: bool) -> None:
+        """Start to drag the picked body at its picked point, which may have moved since.
 
-        While paused a held body is moved, else it is pulled by a spring; a fixed one cannot be pulled, and stays.
+        While paused a drag moves the body; otherwise a spring pulls it. A fixed body cannot be pulled.
 
         Raises:
-            ActionError: it cannot be held.
+            ActionError: the body cannot be dragged.
         """
-        number = self.picked_of(live)
-        if number is None:
+        index = self.picked_index(live)
+        if index is None:
             return
-        name = live.bodies.names[number]
+        name = live.bodies.names[index]
         if any(drive.body == name for drive in live.scene.drives):
             raise ActionError(f"{name} cannot be dragged; its key moves it (H: help)")
-        self._moving, self._hand = paused, self._spot
+        self._moving, self._target = paused, self._pick_position
         if paused:
-            self._grip = _turned(self._offset, float(live.frame.angle[number]) - self._angle)
-        elif live.bodies.fixed[number]:
+            self._grip = _rotated(self._offset, float(live.frame.angle[index]) - self._angle)
+        elif live.bodies.fixed[index]:
             return
         else:
-            self._grip = _turned(self._offset, -self._angle)
-            live.act(Pull(time=0.0, body=name, grip=self._grip, target=self._spot))
+            self._grip = _rotated(self._offset, -self._angle)
+            live.act(Pull(time=0.0, body=name, grip=self._grip, target=self._pick_position))
         self._held = name
 
-    def drag(self, live: LiveView, place: Place) -> None:
-        """Move the hand.
+    def drag(self, live: LiveView, position: Position) -> None:
+        """Drag the held body to a position.
 
         Raises:
-            ActionError: what is held cannot go there.
+            ActionError: the body cannot be moved there.
         """
-        self._hand = place
+        self._target = position
         if self._held is None:
             return
         if self._moving:
-            there = place[0] - self._grip[0], place[1] - self._grip[1]
-            live.act(Move(time=0.0, body=self._held, position=there))
+            centre = position[0] - self._grip[0], position[1] - self._grip[1]
+            live.act(Move(time=0.0, body=self._held, position=centre))
         else:
-            live.act(Pull(time=0.0, body=self._held, grip=self._grip, target=place))
+            live.act(Pull(time=0.0, body=self._held, grip=self._grip, target=position))
 
-    def let_go(self, live: LiveView) -> None:
-        """Open the hand.
+    def release(self, live: LiveView) -> None:
+        """Release the held body.
 
         Raises:
             ActionError: the session has ended.
@@ -104,95 +105,95 @@ class BodyTools:
             live.act(Pull(time=0.0, body=held))
 
     def drop(self) -> None:
-        """Let go without telling the session, which cannot be told; what was picked stays so."""
+        """Discard the drag without an action on the session; the selection stays."""
         self._held = None
 
-    def forget(self) -> None:
-        """Let go without telling a session, which has gone or will be told by another way; nothing is picked."""
+    def reset(self) -> None:
+        """Discard the drag and the selection."""
         self._held = self.picked = None
 
-    def line(self, live: LiveView) -> tuple[Place, Place] | None:
-        """Return from where a body is held to the hand, while one is pulled."""
+    def spring_line(self, live: LiveView) -> tuple[Position, Position] | None:
+        """Return both ends of the spring that pulls a body; None if no body is pulled."""
         if self._held is None or self._moving or self._held not in live.bodies.names:
             return None
-        number = live.bodies.names.index(self._held)
+        index = live.bodies.names.index(self._held)
         frame = live.frame
-        if number >= len(frame.position) or not frame.present[number]:
+        if index >= len(frame.position) or not frame.present[index]:
             return None
-        right, up = _turned(self._grip, float(frame.angle[number]))
-        x, y = frame.position[number].tolist()
-        return (x + right, y + up), self._hand
+        right, up = _rotated(self._grip, float(frame.angle[index]))
+        x, y = frame.position[index].tolist()
+        return (x + right, y + up), self._target
 
     def remove(self, live: LiveView) -> None:
-        """Take the picked body out.
+        """Remove the picked body.
 
         Raises:
-            ActionError: it cannot be, or none is picked.
+            ActionError: no body is picked, or the engine refuses.
         """
-        live.act(Remove(time=0.0, body=live.bodies.names[self._chosen(live)]))
-        self.forget()
+        live.act(Remove(time=0.0, body=live.bodies.names[self._require_picked(live)]))
+        self.reset()
 
-    def _chosen(self, live: LiveView) -> int:
-        number = self.picked_of(live)
-        if number is None:
+    def _require_picked(self, live: LiveView) -> int:
+        index = self.picked_index(live)
+        if index is None:
             raise ActionError("select a body first: click it")
-        return number
+        return index
 
     def nudge(self, live: LiveView) -> None:
-        """Kick the picked body upwards and to the right.
+        """Apply an impulse up and to the right to the picked body.
 
         Raises:
-            ActionError: it cannot be, or none is picked.
+            ActionError: no body is picked, or the engine refuses.
         """
-        number = self._chosen(live)
-        mass, radius = float(live.bodies.mass[number]), float(live.bodies.radius[number])
-        kick = mass * min(NUDGE, 10.0 * radius)
-        live.act(Impulse(time=0.0, body=live.bodies.names[number], impulse=(0.6 * kick, 0.8 * kick)))
+        index = self._require_picked(live)
+        mass, radius = float(live.bodies.mass[index]), float(live.bodies.radius[index])
+        kick = mass * min(NUDGE_SPEED, 10.0 * radius)
+        live.act(Impulse(time=0.0, body=live.bodies.names[index], impulse=(0.6 * kick, 0.8 * kick)))
 
-    def add(self, live: LiveView, place: Place, size: float, *, box: bool = False) -> None:
-        """Put a new ball or box at a place: like the picked body, or like the first, else as suits the view.
+    def add(self, live: LiveView, position: Position, view_size: float, *, box: bool = False) -> None:
+        """Add a ball or box like the picked body or the first one; without bodies, of a size that suits the view.
 
-        What is like a body of another shape is about as large as it, and of its density.
+        If the model has another shape, the new body has its area and density.
 
         Args:
-            live: where.
-            place: m.
-            size: of what is in sight, m.
-            box: instead of a ball.
+            live: session to add to.
+            position: of the new body, m.
+            view_size: shorter side of the visible area, m.
+            box: add a box in place of a ball.
 
         Raises:
-            ActionError: there is no room, or the engine cannot.
+            ActionError: there is no free space, or the engine refuses.
         """
         bodies = live.bodies
-        picked = self.picked_of(live)
+        picked = self.picked_index(live)
         like = picked if picked is not None else (0 if len(bodies) else None)
         if like is None:
-            made = _made(place, min(max(size / 40.0, 1e-9), 1e9), box, restitution=0.5, friction=0.5)
+            made = _new_body(position, min(max(view_size / 40.0, 1e-9), 1e9), box, restitution=0.5, friction=0.5)
         else:
-            made = _like(bodies, like, place, box)
-        made = _beside_others(live, made)
+            made = _new_body_like(bodies, like, position, box)
+        made = _find_free_position(live, made)
         live.act(Spawn(time=0.0, box=made) if isinstance(made, Box) else Spawn(time=0.0, ball=made))
 
-    def shift(self, live: LiveView, body: str, by: Place) -> None:
-        """Put a body a little elsewhere, at rest, as the arrow keys do.
+    def shift(self, live: LiveView, body: str, by: Position) -> None:
+        """Move a body by an offset, m, and stop it, as the arrow keys do.
 
         Raises:
-            ActionError: there is none, or no room.
+            ActionError: the engine refuses.
         """
         if body in live.bodies.names:
             x, y = live.frame.position[live.bodies.names.index(body)].tolist()
             live.act(Move(time=0.0, body=body, position=(x + by[0], y + by[1]), velocity=(0.0, 0.0)))
 
 
-RINGS, DIRECTIONS = 24, 16
-"""Places around the one that is pointed at that are tried, half a radius from ring to ring."""
+MAX_RINGS, RING_POSITIONS = 24, 16
+"""Positions tried around the cursor: rings half a body radius apart, and positions on each ring."""
 
 
-def _beside_others(live: LiveView, made: Ball | Box) -> Ball | Box:
-    """Return a new body at the nearest place where it overlaps nothing.
+def _find_free_position(live: LiveView, made: Ball | Box) -> Ball | Box:
+    """Return a new body at the nearest position where it overlaps nothing.
 
     Raises:
-        ActionError: there is none nearby.
+        ActionError: there is no such position nearby.
     """
     if made.collides == "none":
         return made
@@ -200,22 +201,22 @@ def _beside_others(live: LiveView, made: Ball | Box) -> Ball | Box:
     hulls = [Hull(np.asarray(piece.corners), piece.radius) for piece in form.pieces]
     step = 0.5 * max(float(np.hypot(*hull.corners.T).max()) + hull.radius for hull in hulls)
     x, y = made.position
-    for ring in range(RINGS):
-        for k in range(DIRECTIONS if ring else 1):
-            turn = math.tau * k / DIRECTIONS
-            place = x - ring * step * math.sin(turn), y + ring * step * math.cos(turn)
-            there = [Hull(hull.corners + np.asarray(place), hull.radius) for hull in hulls]
+    for ring in range(MAX_RINGS):
+        for k in range(RING_POSITIONS if ring else 1):
+            turn = math.tau * k / RING_POSITIONS
+            position = x - ring * step * math.sin(turn), y + ring * step * math.cos(turn)
+            there = [Hull(hull.corners + np.asarray(position), hull.radius) for hull in hulls]
             if is_free(live.scene, live.bodies, live.frame, there, made.layer):
-                return made.model_copy(update={"position": place})
+                return made.model_copy(update={"position": position})
     raise ActionError("no room here; point at an empty spot")
 
 
 def count_changes(actions: Iterable[Action], moved_by_keys: str | None = None) -> int:
-    """Count what hands have changed of a scene: bodies added, removed and moved, values set.
+    """Return the number of hand-made changes: bodies added, removed and moved, values set.
 
     Args:
         actions: of a session.
-        moved_by_keys: a body whose moves are part of the scene, which gives it the arrow keys.
+        moved_by_keys: name of the body that the arrow keys move as part of the scene; its moves do not count.
     """
     count, last = 0, ""
     for action in actions:
@@ -236,36 +237,36 @@ def count_changes(actions: Iterable[Action], moved_by_keys: str | None = None) -
 
 
 def describe_loss(count: int, how: str) -> str:
-    """Return the question before so many hand-made changes are lost."""
+    """Return the question that is shown before `count` hand-made changes are lost."""
     changes = "1 hand-made change" if count == 1 else f"{count:,} hand-made changes"
     return f"{changes} will be lost: {how}, Ctrl+S saves the session"
 
 
-def _like(bodies: Bodies, number: int, place: Place, box: bool) -> Ball | Box:
-    """Return a ball or box at a place that is like a body."""
-    element = bodies.elements[int(bodies.element[number])]
+def _new_body_like(bodies: Bodies, index: int, position: Position, box: bool) -> Ball | Box:
+    """Return a ball or box with the surface, area and density of a body."""
+    element = bodies.elements[int(bodies.element[index])]
     surface = {
         key: getattr(element, key) for key in ("material", "restitution", "restitution_falloff", "friction", "collides")
     }
     if not box and isinstance(element, Disc):
-        return Ball(position=place, radius=element.radius, mass=element.mass, density=element.density, **surface)
+        return Ball(position=position, radius=element.radius, mass=element.mass, density=element.density, **surface)
     if box and isinstance(element, Box):
-        return Box(position=place, size=element.size, mass=element.mass, density=element.density, **surface)
+        return Box(position=position, size=element.size, mass=element.mass, density=element.density, **surface)
     area = sum(hull_area(Hull(np.asarray(piece.corners), piece.radius)) for piece in form_of(element).pieces)
     radius = math.sqrt(area / math.pi)
-    density = float(bodies.mass[number]) / area
-    return _made(place, radius, box, density=density, **surface)
+    density = float(bodies.mass[index]) / area
+    return _new_body(position, radius, box, density=density, **surface)
 
 
-def _made(place: Place, radius: float, box: bool, **more: Any) -> Ball | Box:
-    """Return a ball, or a square box of about its area."""
+def _new_body(position: Position, radius: float, box: bool, **more: Any) -> Ball | Box:
+    """Return a ball, or a square box of the same area."""
     if not box:
-        return Ball(position=place, radius=radius, **more)
+        return Ball(position=position, radius=radius, **more)
     side = math.sqrt(math.pi) * radius
-    return Box(position=place, size=(side, side), **more)
+    return Box(position=position, size=(side, side), **more)
 
 
-def _turned(way: Place, angle: float) -> Place:
-    """Return a vector turned by an angle, rad."""
+def _rotated(vector: Position, angle: float) -> Position:
+    """Return a vector rotated by an angle, rad."""
     cos, sin = math.cos(angle), math.sin(angle)
-    return cos * way[0] - sin * way[1], sin * way[0] + cos * way[1]
+    return cos * vector[0] - sin * vector[1], sin * vector[0] + cos * vector[1]

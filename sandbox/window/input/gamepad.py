@@ -1,4 +1,4 @@
-"""Gamepads: what they are called by, which button or axis is which, and what they hold of a game's controls.
+"""Gamepads: layouts by name, and the controls of a game that their buttons and axes hold.
 
 Layouts: the tables of "Common Controller Axis Mappings" in the documentation of pygame.joystick, for pygame 2.
 """
@@ -13,21 +13,21 @@ from sandbox.games.contract import Control
 from sandbox.window.game_host import GameHost
 
 DEAD_ZONE = 0.2
-"""Share of a stick's way that counts as none: few rest in their middle."""
-RUNGS = 16
-"""Values of an analogue control are whole shares of this: a stick sends hundreds of motions a second."""
-HALF = 0.5
-"""From where on a stick or trigger is a button."""
+"""Fraction of a stick's deflection that counts as zero: few sticks rest exactly at their centre."""
+ANALOGUE_LEVELS = 16
+"""Analogue values are rounded to 1/16: a stick sends hundreds of events per second, and each change is an action."""
+BUTTON_THRESHOLD = 0.5
+"""deflection of a stick or trigger above which it counts as a pressed button"""
 
 
 class GamepadLayout(NamedTuple):
-    """Which number of what is which button, by the words of `Control.pad`."""
+    """Names of buttons and axes by index, as in `Control.pad`."""
 
     buttons: dict[int, str]
     triggers: dict[int, str]
     """axes that rest at −1"""
     sticks: dict[int, str]
-    """axes that rest at 0: `leftx` is − to the left, `lefty` − upwards"""
+    """axes that rest at 0; `leftx` is negative to the left, `lefty` negative upwards"""
     start: int
 
 
@@ -37,7 +37,7 @@ XBOX = GamepadLayout(
     {0: "leftx", 1: "lefty", 3: "rightx", 4: "righty"},
     7,
 )
-"""Also of whatever is not known better; its cross is a hat."""
+"""Also the default layout; its D-pad is a hat."""
 PLAYSTATION = GamepadLayout(
     {0: "a", 1: "b", 2: "x", 3: "y", 9: "lb", 10: "rb", 11: "up", 12: "down", 13: "left", 14: "right"},
     {4: "lt", 5: "rt"},
@@ -46,17 +46,17 @@ PLAYSTATION = GamepadLayout(
 )
 LAYOUTS = {"ps4": PLAYSTATION, "ps5": PLAYSTATION, "dualshock": PLAYSTATION, "dualsense": PLAYSTATION}
 LAYOUTS |= {"sony": PLAYSTATION, "playstation": PLAYSTATION, "nintendo switch pro": PLAYSTATION}
-"""By what the name of a gamepad has in it. That of the Switch differs only in what is written on its buttons."""
+"""Layouts by a part of the gamepad's name. The Switch controller differs only in its button labels."""
 
 
 class GamepadDevice(Protocol):
-    """What is needed of a `pygame.joystick.Joystick`."""
+    """The part of `pygame.joystick.Joystick` that is used."""
 
     def get_name(self) -> str:
-        """What it is called."""
+        """Name of the model."""
 
     def get_instance_id(self) -> int:
-        """What its events call it."""
+        """Id of the device in events."""
 
 
 def layout_of(name: str) -> GamepadLayout:
@@ -65,82 +65,87 @@ def layout_of(name: str) -> GamepadLayout:
 
 
 class Gamepads:
-    """All gamepads that are plugged in."""
+    """All connected gamepads."""
 
     def __init__(
-        self, tell: Callable[[str], object], plug: Callable[[int], GamepadDevice] = pygame.joystick.Joystick
+        self, notify: Callable[[str], object], open_device: Callable[[int], GamepadDevice] = pygame.joystick.Joystick
     ) -> None:
-        """Look for none yet.
+        """Create the registry; `start` looks for devices.
 
         Args:
-            tell: told of what comes and goes.
-            plug: opens the n-th.
+            notify: shows a message when a gamepad is connected or disconnected.
+            open_device: opens a device by its index.
         """
-        self._tell, self._plug = tell, plug
+        self._notify, self._open_device = notify, open_device
         self._devices: dict[int, tuple[GamepadDevice, GamepadLayout]] = {}
 
-    def begin(self) -> None:
-        """Begin to listen; those that are there already are told of as new. Without any support there are none."""
+    def start(self) -> None:
+        """Start to receive events, also of connected devices; without joystick support, add a message."""
         try:
             pygame.joystick.init()
         except (pygame.error, NotImplementedError) as error:
-            self._tell(f"no gamepads: {error}")
+            self._notify(f"no gamepads: {error}")
 
-    def take(self, event: pygame.event.Event, host: GameHost | None, pause: Callable[[], object]) -> list[ActionError]:
-        """Take an event in, and return what could not be done of it.
+    def handle_event(
+        self, event: pygame.event.Event, host: GameHost | None, pause: Callable[[], object]
+    ) -> list[ActionError]:
+        """Handle an event, and return the errors of refused actions.
 
         Args:
-            event: any.
-            host: of the game that is on.
-            pause: what Start does.
+            event: any event.
+            host: host of the present game.
+            pause: called for the Start button.
         """
         if event.type == pygame.JOYDEVICEADDED:
-            self._come(event.device_index)
+            self._connect(event.device_index)
         elif event.type == pygame.JOYDEVICEREMOVED:
-            return self._go(event.instance_id, host)
+            return self._disconnect(event.instance_id, host)
         known = self._devices.get(getattr(event, "instance_id", -1))
         if known is None:
             return []
         device, layout = known[0].get_instance_id(), known[1]
         if event.type == pygame.JOYBUTTONDOWN and event.button == layout.start:
             pause()
-        return [] if host is None else _held(host, device, _words(event, layout))
+        return [] if host is None else _hold_controls(host, device, _words(event, layout))
 
-    def _come(self, index: int) -> None:
+    def _connect(self, index: int) -> None:
         try:
-            device = self._plug(index)
+            device = self._open_device(index)
             number, name = device.get_instance_id(), device.get_name()
-        except pygame.error:  # it is gone again
+        except pygame.error:  # already disconnected
             return
         if number not in self._devices:
             self._devices[number] = device, layout_of(name)
-            self._tell(f"gamepad connected: {name}")
+            self._notify(f"gamepad connected: {name}")
 
-    def _go(self, number: int, host: GameHost | None) -> list[ActionError]:
+    def _disconnect(self, number: int, host: GameHost | None) -> list[ActionError]:
         gone = self._devices.pop(number, None)
         if gone is None:
             return []
-        self._tell(f"gamepad disconnected: {gone[0].get_name()}")
+        self._notify(f"gamepad disconnected: {gone[0].get_name()}")
         if host is None:
             return []
         words = {word for control in host.controls for word in (control.pad or "").split()}
-        return _held(host, number, dict.fromkeys(words, 0.0))
+        return _hold_controls(host, number, dict.fromkeys(words, 0.0))
 
 
 def _words(event: pygame.event.Event, layout: GamepadLayout) -> dict[str, float]:
-    """Return what an event says of which words, 0 to 1."""
+    """Return the values, 0 to 1, of the button and axis names that an event changes."""
     if event.type in (pygame.JOYBUTTONDOWN, pygame.JOYBUTTONUP):
         word = layout.buttons.get(event.button)
         return {} if word is None else {word: float(event.type == pygame.JOYBUTTONDOWN)}
     if event.type == pygame.JOYAXISMOTION:
         if event.axis in layout.triggers:
-            return {layout.triggers[event.axis]: _shared(0.5 * (event.value + 1.0))}
+            return {layout.triggers[event.axis]: _quantise(0.5 * (event.value + 1.0))}
         stick = layout.sticks.get(event.axis)
-        way = 0.0 if stick is None else (abs(event.value) - DEAD_ZONE) / (1.0 - DEAD_ZONE)
+        deflection = 0.0 if stick is None else (abs(event.value) - DEAD_ZONE) / (1.0 - DEAD_ZONE)
         return (
             {}
             if stick is None
-            else {f"{sign}{stick}": _shared(way if (event.value > 0.0) == (sign == "+") else 0.0) for sign in "+-"}
+            else {
+                f"{sign}{stick}": _quantise(deflection if (event.value > 0.0) == (sign == "+") else 0.0)
+                for sign in "+-"
+            }
         )
     if event.type == pygame.JOYHATMOTION:
         x, y = event.value
@@ -148,12 +153,12 @@ def _words(event: pygame.event.Event, layout: GamepadLayout) -> dict[str, float]
     return {}
 
 
-def _shared(value: float) -> float:
-    return round(min(max(value, 0.0), 1.0) * RUNGS) / RUNGS
+def _quantise(value: float) -> float:
+    return round(min(max(value, 0.0), 1.0) * ANALOGUE_LEVELS) / ANALOGUE_LEVELS
 
 
-def _held(host: GameHost, device: int, words: dict[str, float]) -> list[ActionError]:
-    """Let a game know of what is held."""
+def _hold_controls(host: GameHost, device: int, words: dict[str, float]) -> list[ActionError]:
+    """Apply values to the controls of a game; return the errors of refused actions."""
     failed = []
     for control in host.controls:
         for word in (control.pad or "").split():
@@ -166,4 +171,4 @@ def _held(host: GameHost, device: int, words: dict[str, float]) -> list[ActionEr
 
 
 def _level(control: Control, value: float) -> float:
-    return value if control.analogue else float(value > HALF)
+    return value if control.analogue else float(value > BUTTON_THRESHOLD)

@@ -1,9 +1,10 @@
-"""Keys: the one table of what each key does.
+"""Keymap: the table of all key bindings of the window, and the keyboard state.
 
-A key is known by its code or by the character it writes, so that `[` is found where a layout hides it behind AltGr,
-and by its place on the board where a layout has no Latin letters.
+A key is matched by its code or by its character, so that `[` also works on layouts that need AltGr for it, and by its
+scan code on layouts without Latin letters.
 """
 
+from collections.abc import Set as AbstractSet
 from enum import StrEnum
 from typing import NamedTuple
 
@@ -13,7 +14,7 @@ from sandbox.window.playback.snapshot import OVERLAYS
 
 
 class Command(StrEnum):
-    """What a key asks the window to do. Those that toggle an overlay are called as in `OVERLAYS`."""
+    """A command of the window. Commands that toggle an overlay have its name in `OVERLAYS`."""
 
     PAUSE = "pause"
     STEP = "step"
@@ -56,12 +57,12 @@ class Command(StrEnum):
 
     @property
     def overlay(self) -> str | None:
-        """The overlay that it toggles, of `OVERLAYS`."""
+        """The overlay that the command toggles, one of `OVERLAYS`."""
         return self.value if self.value in OVERLAYS else None
 
 
 class Binding(NamedTuple):
-    """Keys that give one command."""
+    """Keys of one command."""
 
     keys: tuple[int, ...]
     """codes, `pygame.K_…`"""
@@ -70,12 +71,12 @@ class Binding(NamedTuple):
     command: Command
     about: str
     label: str
-    """the keys as help names them"""
+    """the keys as the help page names them"""
     group: str
     characters: str = ""
-    """any of these gives it as well, whichever key writes them"""
+    """characters that also give the command, on any key"""
     repeats: bool = False
-    """again and again while the key is held"""
+    """whether the command repeats while the key is held"""
 
 
 _TIME, _VIEW, _SCENE, _BODIES, _SHOW, _WINDOW = "Time", "View", "Scene", "Bodies", "Show", "Save and share"
@@ -129,10 +130,10 @@ BINDINGS: tuple[Binding, ...] = (
     Binding((pygame.K_F1, pygame.K_h), 0, Command.HELP, "this help", "F1 or H", _WINDOW),
     Binding((pygame.K_ESCAPE,), 0, Command.QUIT, "quit", "Esc", _WINDOW),
 )
-"""Every binding, in the order in which help lists them."""
+"""All bindings, in the order of the help page."""
 
 GLOBAL = frozenset({pygame.K_p, pygame.K_o, pygame.K_F1, pygame.K_ESCAPE})
-"""Keys that no scene can claim."""
+"""Keys that a scene cannot bind."""
 
 REPEATING = frozenset(binding.command for binding in BINDINGS if binding.repeats)
 
@@ -140,7 +141,7 @@ _BY_KEY = {(key, binding.modifiers): binding.command for binding in BINDINGS for
 _BY_CHARACTER = {character: binding.command for binding in BINDINGS for character in binding.characters}
 
 _NAMED = 1 << 30
-"""SDL's mark of a key that writes nothing, such as F1"""
+"""SDL's bit of key codes without a character, such as F1"""
 _BOARD = {
     **{pygame.KSCAN_A + k: pygame.K_a + k for k in range(26)},
     pygame.KSCAN_LEFTBRACKET: pygame.K_LEFTBRACKET,
@@ -148,15 +149,15 @@ _BOARD = {
     pygame.KSCAN_PERIOD: pygame.K_PERIOD,
     pygame.KSCAN_COMMA: pygame.K_COMMA,
 }
-"""Keys by their place, as an American board has them."""
+"""Key codes by scan code, of the US layout."""
 
 
-def command_for(event: pygame.event.Event, claimed: frozenset[int] = frozenset()) -> Command | None:
-    """Return what a pressed key asks for, or None.
+def command_for(event: pygame.event.Event, claimed: AbstractSet[int] = frozenset()) -> Command | None:
+    """Return the command of a pressed key, or None.
 
     Args:
-        event: any event; only KEYDOWN asks for something.
-        claimed: codes of the keys that the scene takes for itself. Ctrl with a key is never claimed.
+        event: any event; only KEYDOWN gives a command.
+        claimed: codes of the keys that the scene binds. Ctrl with a key is never bound by a scene.
     """
     if event.type != pygame.KEYDOWN:
         return None
@@ -168,7 +169,7 @@ def command_for(event: pygame.event.Event, claimed: frozenset[int] = frozenset()
         return None
     if control and not alt:
         return _BY_KEY.get((key, _CTRL))
-    if {key, event.key} & claimed - GLOBAL:
+    if any(code in claimed and code not in GLOBAL for code in (key, event.key)):
         return None
     plain = not (control or alt)
     if character in _BY_CHARACTER and (plain or ord(character) != key):
@@ -178,29 +179,29 @@ def command_for(event: pygame.event.Event, claimed: frozenset[int] = frozenset()
 
 
 def _latin(event: pygame.event.Event) -> int:
-    """Return the key's code, or that of its place where the layout writes other letters there."""
+    """Return the key code, or on a layout without Latin letters, the US key code of the scan code."""
     key = int(event.key)
     foreign = key > 0x24F and not key & _NAMED  # past the Latin blocks of Unicode
     return _BOARD.get(int(getattr(event, "scancode", 0)), key) if foreign else key
 
 
 class Keyboard:
-    """Which keys are down, so that a held key gives its command once where it should not repeat."""
+    """Keys that are down, so that a held key gives its command once unless the command repeats."""
 
     def __init__(self) -> None:
         self._held: set[int] = set()
-        self.again = False
-        """the last key that came down was down already"""
+        self.is_repeat = False
+        """the last KEYDOWN was of a key that was down already"""
 
-    def command(self, event: pygame.event.Event, claimed: frozenset[int] = frozenset()) -> Command | None:
-        """Return what an event asks for, or None; pass every event, so that releases are seen."""
+    def command(self, event: pygame.event.Event, claimed: AbstractSet[int] = frozenset()) -> Command | None:
+        """Return the command of an event, or None. Every event must be passed, to keep track of releases."""
         if event.type == pygame.KEYUP:
             self._held.discard(event.key)
-        elif event.type == pygame.WINDOWFOCUSLOST:  # releases go elsewhere from now on
+        elif event.type == pygame.WINDOWFOCUSLOST:  # another window receives the releases
             self._held.clear()
         if event.type != pygame.KEYDOWN:
             return None
-        self.again = event.key in self._held
+        self.is_repeat = event.key in self._held
         self._held.add(event.key)
         command = command_for(event, claimed)
-        return None if self.again and command not in REPEATING else command
+        return None if self.is_repeat and command not in REPEATING else command

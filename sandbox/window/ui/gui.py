@@ -3,7 +3,6 @@
 from dataclasses import replace
 from operator import is_
 from pathlib import Path
-from typing import NamedTuple
 
 import pygame
 
@@ -13,7 +12,6 @@ from sandbox.games.contract import HasViewState
 from sandbox.window.app_state import AppState, scenes_to_pick
 from sandbox.window.camera import Camera
 from sandbox.window.game_host import GameDisplay, ScoreDisplay
-from sandbox.window.input.bindings import KeyBindings, key_bindings
 from sandbox.window.input.body_tools import describe_loss
 from sandbox.window.messages import MAX_MESSAGES
 from sandbox.window.playback.live import LiveView
@@ -39,14 +37,6 @@ GRAPH_SIZE = (300, 130)
 """px at UI scale 1"""
 
 
-class _SceneKeys(NamedTuple):
-    """Key bindings of a scene, and the objects that they were made for."""
-
-    owner: object
-    bindings: KeyBindings
-    codes: frozenset[int]
-
-
 class Gui:
     """The scene's picture, the widgets around it, and the overlays that are switched on."""
 
@@ -67,7 +57,6 @@ class Gui:
         self._sounds = Sounds()
         self._parameters = SessionParameters()
         self._size = size
-        self._scene_keys: _SceneKeys | None = None
         self._announces_keys = False  # the keys of a new scene have still to be announced
         self._score: tuple[object, ScoreLayout] | None = None  # the arguments of the last layout, and the layout
         self._panel_inputs: tuple[object, ...] = ()  # everything that the panel shows, as it was last shown
@@ -85,18 +74,18 @@ class Gui:
         self._graph.clear()
         self._panel_inputs = ()
         if not same:
-            self._scene_keys, self._announces_keys = None, True
+            self._announces_keys = True
 
     def announce_keys(self, stage: AppState) -> None:
         """Post messages that name the keys of the scene."""
-        help_lines = self.key_bindings(stage).told
+        help_lines = stage.key_bindings.help_rows
         if stage.game is not None:
-            stage.messages.tell("aim with the mouse, shoot with Space; H lists all keys")
+            stage.messages.add("aim with the mouse, shoot with Space; H lists all keys")
         elif len(help_lines) > MAX_MESSAGES:  # more than are shown at a time
-            stage.messages.tell(f"keys: {', '.join(keys for keys, _ in help_lines)} (F1: help)")
+            stage.messages.add(f"keys: {', '.join(keys for keys, _ in help_lines)} (F1: help)")
         else:
             for keys, about in help_lines:
-                stage.messages.tell(f"{keys}: {about}")
+                stage.messages.add(f"{keys}: {about}")
 
     def resize(self, size: tuple[int, int]) -> None:
         """Fit all widgets to a window of another size, px."""
@@ -129,10 +118,10 @@ class Gui:
 
         The status plate is measured with its line for the pause, so that pausing moves nothing.
         """
-        show, area = stage.show, self.area
+        show, area = stage.view, self.area
         if show is None:
             return []
-        status = hud_status(stage, self.key_bindings(stage).told, 0.0, None)
+        status = hud_status(stage, stage.key_bindings.help_rows, 0.0, None)
         rows = hud.layout_rows(replace(status, paused=True, waits_for_start=False), area, self.ui_scale)
         found = [rows.rect]
         if stage.gestures is not None:
@@ -143,9 +132,9 @@ class Gui:
 
     def score_margins(self, stage: AppState) -> tuple[int, int]:
         """Return the heights that the score panel takes at the top and at the bottom of the area, px."""
-        if stage.host is None or stage.gestures is not None or stage.show is None:
+        if stage.host is None or stage.gestures is not None or stage.view is None:
             return 0, 0
-        return self._layout_score(stage.host.shown().board, stage.show).margins(self.area)
+        return self._layout_score(stage.host.shown().board, stage.view).margins(self.area)
 
     def _layout_score(self, display: ScoreDisplay, show: LiveView | RecordedView) -> ScoreLayout:
         """Return the layout of the score panel; it is computed again only if something in it changes."""
@@ -157,25 +146,6 @@ class Gui:
     def _hud_width(self, show: LiveView | RecordedView) -> int:
         """Return the right edge of the status plate, px."""
         return hud_width(f"{show.engine}  ·  {settings_text(show.settings)}", self.ui_scale)
-
-    def key_bindings(self, stage: AppState) -> KeyBindings:
-        """Return the key bindings of the scene."""
-        return self._keys(stage).bindings
-
-    def claimed_keys(self, stage: AppState) -> frozenset[int]:
-        """Return the codes of the keys that the scene binds."""
-        return self._keys(stage).codes
-
-    def _keys(self, stage: AppState) -> _SceneKeys:
-        """Return the scene's keys; they are computed again only if the scene or its game has changed."""
-        show = stage.show
-        if not isinstance(show, LiveView):
-            return _NO_KEYS
-        owner = stage.gestures or stage.host or show.scene.play
-        if self._scene_keys is None or self._scene_keys.owner is not owner:
-            bindings = key_bindings(show.scene, stage.hands, stage.gestures, stage.host)
-            self._scene_keys = _SceneKeys(owner, bindings, frozenset(bindings.deeds))
-        return self._scene_keys
 
     @property
     def covers_scene(self) -> bool:
@@ -214,8 +184,8 @@ class Gui:
             return True
         if self.help.handle_event(event) or self._close_faults(event, stage) or self.panel.handle_event(event):
             return True
-        show = stage.show
-        if stage.gestures is not None and self.billiards_hud.handle(event, stage.gestures.person, stage.act):
+        show = stage.view
+        if stage.gestures is not None and self.billiards_hud.handle(event, stage.gestures.person, stage.run_handler):
             return True
         if show is not None and self._timeline_rect.height:
             held = self._timeline.held
@@ -236,7 +206,7 @@ class Gui:
             browser.ask(path, describe_loss(unsaved, "choose it again to open it anyway"))
             return
         if path is not None:
-            stage.take(path)
+            stage.open_other(path)
         if path is not None or browser.closed:
             self.scene_browser = None
 
@@ -260,7 +230,7 @@ class Gui:
             frame_rate: frames per second.
             recording: length and format of the film that is being recorded.
         """
-        show = stage.show
+        show = stage.view
         if self.scene_browser is not None:
             self.scene_browser.draw(surface, self.ui_scale)
             return
@@ -280,7 +250,7 @@ class Gui:
         if self._announces_keys:
             self._announces_keys = False
             self.announce_keys(stage)
-        status = hud_status(stage, self.key_bindings(stage).told, frame_rate, recording)
+        status = hud_status(stage, stage.key_bindings.help_rows, frame_rate, recording)
         self._faults = hud.draw_hud(
             surface,
             replace(status, out_of_sight=self.describe_out_of_view(stage)),
@@ -303,7 +273,7 @@ class Gui:
             self._update_panel(stage, recording is not None)
             self.panel.draw(surface)
         if self.help.open:
-            self.help.draw(surface, self.ui_scale, self.key_bindings(stage).told)
+            self.help.draw(surface, self.ui_scale, stage.key_bindings.help_rows)
 
     def _draw_scene(
         self,
@@ -315,8 +285,8 @@ class Gui:
         plates: dict[str, pygame.Rect],
     ) -> None:
         """Draw the scene, and the inset of a game that has one."""
-        pull = stage.hands.line(show) if isinstance(show, LiveView) else None
-        snapshot = show.snapshot(frozenset(self.overlays), stage.hands.picked, pull)
+        pull = stage.body_tools.spring_line(show) if isinstance(show, LiveView) else None
+        snapshot = show.snapshot(frozenset(self.overlays), stage.body_tools.picked, pull)
         if stage.gestures is not None:
             snapshot = stage.gestures.seen.over(snapshot)
         if stage.host is not None and display is not None:
@@ -349,7 +319,7 @@ class Gui:
 
     def describe_out_of_view(self, stage: AppState) -> str | None:
         """Return the notice to show while all moving bodies are outside the picture; None otherwise."""
-        show = stage.show
+        show = stage.view
         if show is None or not self.bodies_out_of_view:
             return None
         moving = show.frame.present[: len(show.bodies)] & ~show.bodies.fixed[: len(show.frame.present)]
@@ -377,7 +347,7 @@ class Gui:
             draw_score(surface, layout)
             plates["score"] = layout.rect
             for note in self._high_scores.update(stage.host):
-                stage.messages.tell(note, "warning")
+                stage.messages.add(note, "warning")
 
     def draw_wait(self, surface: pygame.Surface, text: str) -> None:
         """Draw a notice over the picture while the window waits; the surface may be locked by what was being drawn."""
@@ -400,7 +370,7 @@ class Gui:
 
     def _draw_graph(self, surface: pygame.Surface, stage: AppState, plates: dict[str, pygame.Rect]) -> None:
         """Draw the energy graph at the lower right, above other plates; smaller if there is no room."""
-        show = stage.show
+        show = stage.view
         if show is None or "energy" not in self.overlays:
             return
         self._graph.add(show.frame.time, *show.energy())
@@ -438,14 +408,14 @@ class Gui:
         )
         session = () if live is None else (live.session, live.scene, live.settings, live.session.wanted, live.bodies)
         table = () if game is None else (game, game.players, game.misses)
-        inputs = (*session, *table, stage.file, stage.hands.picked, *toggles.values(), *buttons)
+        inputs = (*session, *table, stage.file, stage.body_tools.picked, *toggles.values(), *buttons)
         same = len(inputs) == len(self._panel_inputs) and all(map(is_, inputs, self._panel_inputs))
         if same and not self.panel.used:
             return
         self._panel_inputs, self.panel.used = inputs, False
         parameters: tuple[Parameter, ...] = ()
         if live is not None and stage.file is not None:
-            parameters = self._parameters.of(live, stage.file, stage.hands.picked)
+            parameters = self._parameters.of(live, stage.file, stage.body_tools.picked)
         if game is not None:
             parameters = (*parameters, Parameter("players", "players", value=game.players, choices=PLAYERS))
             if game.match.rules.name == "snooker":
@@ -456,6 +426,3 @@ class Gui:
     def close(self) -> None:
         """Stop all sound."""
         self._sounds.disable()
-
-
-_NO_KEYS = _SceneKeys(None, KeyBindings({}, (), {}), frozenset())

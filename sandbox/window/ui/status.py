@@ -83,10 +83,10 @@ def hud_status(
         frame_rate: frames per second.
         recording: format and length of the film that is being recorded.
     """
-    show, messages = stage.show, stage.messages.shown()
+    show, messages = stage.view, stage.messages.visible()
     if show is None:
         return HudStatus("No scene", "Ctrl+O", "opens a scene", 0, 0.0, messages=messages, faults=stage.faults)
-    picked = stage.hands.picked
+    picked = stage.body_tools.picked
     live = stage.live
     diagnostics = live.company if live is not None else None
     contacts = show.contacts.some(~zone_visits(show.contacts.pair, show.scene))

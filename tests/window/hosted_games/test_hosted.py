@@ -22,7 +22,7 @@ from sandbox.window.app import App
 from sandbox.window.app_state import AppState
 from sandbox.window.game_host import MAX_ENTRIES, DisplayHistory, GameDisplay, GameHost, ScoreDisplay
 from sandbox.window.input.bindings import KeyNameError, codes_of, control_help
-from sandbox.window.input.gamepad import LAYOUTS, PLAYSTATION, RUNGS, XBOX, Gamepads, layout_of
+from sandbox.window.input.gamepad import ANALOGUE_LEVELS, LAYOUTS, PLAYSTATION, XBOX, Gamepads, layout_of
 from sandbox.window.playback.live import LiveView
 from sandbox.window.render.palette import WARNING
 from sandbox.window.sound import CUE_NOTES, Sounds, cue_notes, cue_sound
@@ -52,7 +52,7 @@ def toy_rules(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def window(tmp_path: Path) -> Iterator[App]:
     with window_on(TOY, tmp_path, (1000, 640)) as opened:
-        opened.stage.start_game()
+        opened.app_state.start_game()
         yield opened
 
 
@@ -62,8 +62,8 @@ def presses_of(live: LiveView) -> list[tuple[str, float]]:
 
 
 def host_of(window: App) -> GameHost:
-    assert window.stage.host is not None
-    return window.stage.host
+    assert window.app_state.host is not None
+    return window.app_state.host
 
 
 def test_keys_set_controls_until_they_are_let_go(window: App) -> None:
@@ -89,13 +89,13 @@ def test_who_looks_elsewhere_lets_go(window: App) -> None:
 
 
 def test_help_lists_controls_and_scene_keys_are_theirs(window: App) -> None:
-    claims = window.gui.key_bindings(window.stage)
-    assert claims.told == (
+    claims = window.app_state.key_bindings
+    assert claims.help_rows == (
         ("Up or Left Shift", "kick it; gamepad: A, stick up"),
         ("Left", "how far; gamepad: LT"),
         ("Gamepad Start", "pause / resume"),
     )
-    assert {UP, LEFT, pygame.K_LSHIFT} <= window.gui.claimed_keys(window.stage)
+    assert {UP, LEFT, pygame.K_LSHIFT} <= window.app_state.key_bindings.pressed.keys()
 
 
 def test_help_tells_the_cross_of_a_gamepad_from_its_stick() -> None:
@@ -156,18 +156,18 @@ def test_past_of_another_way_is_forgotten() -> None:
     past = DisplayHistory()
     assert past.at(1.0) is None
     for time in range(10):
-        past.note(float(time), float(time), shown(str(time // 2)))
+        past.add(float(time), float(time), shown(str(time // 2)))
     assert [past.at(time) for time in (-1.0, 4.0, 5.5, 99.0)] == [shown(score) for score in ("0", "2", "2", "4")]
-    past.note(5.0, 9.0, shown("2"))  # seen again
+    past.add(5.0, 9.0, shown("2"))  # seen again
     assert past.at(9.0) == shown("4")
-    past.note(5.0, 5.0, shown("three"))  # played on from there
+    past.add(5.0, 5.0, shown("three"))  # played on from there
     assert [past.at(time) for time in (4.9, 5.0, 9.0)] == [shown("2"), shown("three"), shown("three")]
 
 
 def test_past_of_a_long_game_is_thinned_where_it_is_long_ago() -> None:
     past = DisplayHistory()
     for time in range(3 * MAX_ENTRIES):
-        past.note(float(time), float(time), GameDisplay(ScoreDisplay(str(time), (), None), frozenset()))
+        past.add(float(time), float(time), GameDisplay(ScoreDisplay(str(time), (), None), frozenset()))
     found = [int(then.board.score) for time in range(3 * MAX_ENTRIES) if (then := past.at(float(time)))]
     assert len(set(found)) <= MAX_ENTRIES
     assert found[-100:] == list(range(3 * MAX_ENTRIES - 100, 3 * MAX_ENTRIES))
@@ -197,7 +197,7 @@ def test_pause_and_steps_keep_the_game(window: App) -> None:
 
 def test_engine_changes_and_the_game_goes_on(window: App) -> None:
     turned(window, key(UP), key_up(UP), elapsed=0.3)
-    assert window.stage.switch("reference")
+    assert window.app_state.switch_engine("reference")
     live = turned(window, key(UP), key_up(UP), elapsed=0.3)
     assert host_of(window).rules.score == 1.0
     recording = live.session.recording()
@@ -221,12 +221,12 @@ def test_panel_is_drawn_and_tells_the_end(window: App) -> None:
     turned(window)
     host = host_of(window)
     assert host.shown().board == ScoreDisplay("0.0", (("bounces", "0"), ("aim", "0.50")), None)
-    going = pygame.surfarray.array3d(window.surface)
+    going = pygame.surfarray.array3d(window.context.surface)
     rules = host.rules
     assert isinstance(rules, Toy)
     rules.game_over = "enough"
     turned(window, elapsed=0.0)
-    over = pygame.surfarray.array3d(window.surface)
+    over = pygame.surfarray.array3d(window.context.surface)
     red = (np.abs(over.astype(int) - WARNING).sum(axis=2) < 20) & (going != over).any(axis=2)
     assert red.any()  # the mark before the words
     assert presses_of(turned(window, key(UP))) == []  # nobody plays any more
@@ -234,38 +234,41 @@ def test_panel_is_drawn_and_tells_the_end(window: App) -> None:
 
 def lies_clear(window: App) -> bool:
     """Tell whether the whole scene is seen beside the score panel and the state of things."""
-    assert window.stage.show is not None
-    corners = window.camera.to_screen(np.asarray(view_bounds(window.stage.show.scene)))
+    assert window.app_state.view is not None
+    corners = window.context.camera.to_screen(np.asarray(view_bounds(window.app_state.view.scene)))
     (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
     field = pygame.Rect(round(left), round(top), int(right - left), int(bottom - top))
-    return window.gui.area.contains(field) and field.collidelist(window.gui.permanent_plates(window.stage)) < 0
+    return (
+        window.context.gui.area.contains(field)
+        and field.collidelist(window.context.gui.permanent_plates(window.app_state)) < 0
+    )
 
 
 @pytest.mark.parametrize("size", [(1280, 800), (1000, 300), (640, 480)])  # the last has the score at the bottom
 def test_scene_lies_clear_of_the_score_panel(window: App, size: tuple[int, int]) -> None:
     turned(window)
     assert lies_clear(window)
-    window.resize(pygame.Surface(size))
+    window.context.resize(pygame.Surface(size))
     assert lies_clear(window)
-    before = window.camera
-    window.make_room()
-    assert window.camera == before  # nothing has grown
+    before = window.context.camera
+    window.context.refit_if_covered()
+    assert window.context.camera == before  # nothing has grown
 
 
 def test_scene_makes_room_as_the_panel_grows_unless_somebody_moved_it(window: App) -> None:
     turned(window)
-    rules, before = host_of(window).rules, window.camera
+    rules, before = host_of(window).rules, window.context.camera
     assert isinstance(rules, Toy)
     rules.game_over = "enough, after a long time"
     turned(window, elapsed=0.0)
-    assert window.camera != before
+    assert window.context.camera != before
     assert lies_clear(window)
     rules.game_over = None
     turned(window, elapsed=0.0)
-    window.at_home, window.camera = False, before
+    window.context.is_fitted, window.context.camera = False, before
     rules.game_over = "enough"
     turned(window, elapsed=0.0)
-    assert window.camera == before
+    assert window.context.camera == before
 
 
 @pytest.mark.parametrize("size", [(1280, 800), (900, 300), (420, 300), (200, 150), (60, 40)])
@@ -304,7 +307,7 @@ def plugged(window: App) -> Callable[[str], None]:
     """Plug a gamepad in, as the hardware would."""
 
     def plug(name: str) -> None:
-        window._gamepads._plug = lambda _: Pad(7, name)
+        window._gamepads._open_device = lambda _: Pad(7, name)
         turned(window, pygame.event.Event(pygame.JOYDEVICEADDED, device_index=0), elapsed=0.0)
 
     return plug
@@ -312,7 +315,7 @@ def plugged(window: App) -> Callable[[str], None]:
 
 def test_gamepad_plays(window: App, plugged: Callable[[str], None]) -> None:
     plugged("Xbox 360 Controller")
-    assert ("info", "gamepad connected: Xbox 360 Controller") in window.stage.messages.shown()
+    assert ("info", "gamepad connected: Xbox 360 Controller") in window.app_state.messages.visible()
     live = turned(window, joy(pygame.JOYBUTTONDOWN, button=0))
     live = turned(window, joy(pygame.JOYBUTTONUP, button=0))
     assert presses_of(live) == [("kick", 1.0), ("kick", 0.0)]
@@ -340,9 +343,9 @@ def test_gamepad_that_is_pulled_out_lets_go(window: App, plugged: Callable[[str]
 def test_start_pauses(window: App, plugged: Callable[[str], None], name: str, start: int) -> None:
     plugged(name)
     turned(window, joy(pygame.JOYBUTTONDOWN, button=start))
-    assert window.stage.paused
+    assert window.app_state.paused
     turned(window, joy(pygame.JOYBUTTONUP, button=start), joy(pygame.JOYBUTTONDOWN, button=start))
-    assert not window.stage.paused
+    assert not window.app_state.paused
 
 
 def test_hats_and_crosses_are_the_same() -> None:
@@ -357,7 +360,7 @@ def test_hats_and_crosses_are_the_same() -> None:
     assert _words(joy(pygame.JOYBUTTONDOWN, button=13), PLAYSTATION) == {"left": 1.0}
     assert _words(joy(pygame.JOYBUTTONDOWN, button=99), PLAYSTATION) == {}
     half = _words(joy(pygame.JOYAXISMOTION, axis=0, value=0.6), XBOX)
-    assert half == {"-leftx": 0.0, "+leftx": pytest.approx(0.5, abs=0.5 / RUNGS)}  # (0.6 − 0.2) / 0.8
+    assert half == {"-leftx": 0.0, "+leftx": pytest.approx(0.5, abs=0.5 / ANALOGUE_LEVELS)}  # (0.6 − 0.2) / 0.8
     assert _words(joy(pygame.JOYAXISMOTION, axis=0, value=0.1), XBOX) == {"-leftx": 0.0, "+leftx": 0.0}
 
 
@@ -376,7 +379,7 @@ def test_gamepads_that_cannot_be_had_are_told(monkeypatch: pytest.MonkeyPatch) -
 
     heard: list[str] = []
     monkeypatch.setattr(pygame.joystick, "init", fails)
-    Gamepads(heard.append).begin()
+    Gamepads(heard.append).start()
     assert heard == ["no gamepads: no joysticks here"]
 
 
@@ -437,15 +440,15 @@ def test_scene_that_its_game_does_not_fit_is_shown_without(tmp_path: Path, monke
     assert stage.open(file)
     assert stage.host is None
     assert stage.live is not None
-    level, text = stage.messages.shown()[-1]
+    level, text = stage.messages.visible()[-1]
     assert (level, text.partition(",")[0]) == ("warning", "landing needs a body 'ship'")
     stage.close()
 
 
 def test_a_game_of_many_keys_says_where_they_are_told() -> None:
     opened = App(AppState(), size=(900, 600), say=lambda _: None)
-    opened.stage.open(find("duel"))
-    opened.turn(0.02)
-    said = [text for _, text in opened.stage.messages.shown()]
+    opened.app_state.open(find("duel"))
+    opened.run_frame(0.02)
+    said = [text for _, text in opened.app_state.messages.visible()]
     assert said == ["keys: Left, Right, Up, Down, W, Space, Gamepad Start (F1: help)"]
     opened.close()

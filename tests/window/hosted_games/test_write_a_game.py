@@ -71,19 +71,19 @@ def test_game_is_played_in_the_window(keepy: ModuleType, tmp_path: Path) -> None
     state.take(file)
     window = App(state, size=(640, 480), folder=tmp_path, say=lambda _: None)
     try:
-        live = window.stage.show
+        live = window.app_state.view
         assert isinstance(live, LiveView)
-        window.turn(0.02)
+        window.run_frame(0.02)
         assert live.session.time == 0.0  # a real-time game waits for a key
         pygame.event.post(key(pygame.K_SPACE))
         while live.session.time < 0.45:  # the ball falls from 1.5 m to below 0.6 m
-            window.turn(0.02)
-        x, y = window.camera.to_screen(live.frame.position[0]).tolist()
-        assert window.surface.get_at((round(x), round(y)))[:3] == GOLD
-        assert window.stage.host is not None
-        window.stage.host.hold("test", "kick", 1.0)
-        window.turn(0.02)
-        assert window.stage.host.rules.score == 1
+            window.run_frame(0.02)
+        x, y = window.context.camera.to_screen(live.frame.position[0]).tolist()
+        assert window.context.surface.get_at((round(x), round(y)))[:3] == GOLD
+        assert window.app_state.host is not None
+        window.app_state.host.hold("test", "kick", 1.0)
+        window.run_frame(0.02)
+        assert window.app_state.host.rules.score == 1
     finally:
         window.close()
 

@@ -6,7 +6,7 @@ import pytest
 from sandbox.action import Drive, Throttle
 from sandbox.scene.description.forces import DriveKey, ThrustKey
 from sandbox.scene.files.load import from_document
-from sandbox.window.input.bindings import KEYS, held, key_bindings
+from sandbox.window.input.bindings import KEYS, key_bindings, thrust_and_drive_keys
 from sandbox.window.input.body_tools import BodyTools
 
 BOX = {"name": "rod", "position": [0.0, 0.0], "size": [1.0, 1.0]}
@@ -16,8 +16,8 @@ PLUNGER = {"kind": "plunger", "body": "rod", "direction": [0.0, 1.0], "travel": 
 class Told:
     """Stands for a session, and keeps what it is told."""
 
-    def __init__(self):
-        self.actions = []
+    def __init__(self, scene):
+        self.scene, self.actions = scene, []
 
     def act(self, action):
         self.actions.append(action)
@@ -30,19 +30,20 @@ def test_every_key_that_a_scene_may_name_is_a_key_of_the_window():
 @pytest.mark.parametrize("key", KEYS)
 def test_key_that_is_held_is_level_1(key):
     scene = from_document({"box": [BOX], "drive": [{**PLUNGER, "key": key}]})
-    claimed, live = key_bindings(scene, BodyTools()), Told()
-    claimed.deeds[KEYS[key]](live)
-    claimed.releases[KEYS[key]](live)
+    live = Told(scene)
+    bindings = key_bindings(live, BodyTools())
+    bindings.pressed[KEYS[key]]()
+    bindings.released[KEYS[key]]()
     assert live.actions == [Drive(time=0.0, drive="drive-1", level=level) for level in (1.0, 0.0)]
-    assert claimed.deed(KEYS[key], again=True) is None  # a key that repeats is still held
-    assert claimed.told == ((key.capitalize(), "drive drive-1"),)
+    assert bindings.handler_for(KEYS[key], repeated=True) is None  # a key that repeats is still held
+    assert bindings.help_rows == ((key.capitalize(), "drive drive-1"),)
 
 
 def test_thrust_and_drive_on_one_key_both_act():
     ship = {"name": "ship", "position": [5.0, 0.0], "size": [1.0, 1.0]}
     thrust = {"name": "main", "body": "ship", "force": [1.0, 0.0], "key": "up"}
     scene = from_document({"box": [BOX, ship], "thrust": [thrust], "drive": [{**PLUNGER, "key": "up"}]})
-    live = Told()
-    key_bindings(scene, BodyTools()).deeds[pygame.K_UP](live)
+    live = Told(scene)
+    key_bindings(live, BodyTools()).pressed[pygame.K_UP]()
     assert [type(action) for action in live.actions] == [Throttle, Drive]
-    assert len([*held(scene)]) == 2
+    assert len([*thrust_and_drive_keys(scene)]) == 2

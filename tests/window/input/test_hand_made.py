@@ -67,83 +67,83 @@ def test_changes_are_counted_as_a_person_would() -> None:
 @pytest.mark.parametrize("code", [R, ESCAPE, pygame.K_LEFTBRACKET])
 def test_key_that_would_lose_a_body_asks_first(window: App, code: int) -> None:
     strike(window, B)
-    live = window.stage.live
+    live = window.app_state.live
     strike(window, code)
-    assert window.stage.question is not None
-    assert window.stage.question.startswith("1 hand-made change will be lost")
-    assert window.leaving is None
-    assert window.stage.live is live
+    assert window.app_state.question is not None
+    assert window.app_state.question.startswith("1 hand-made change will be lost")
+    assert window.context.exit_status is None
+    assert window.app_state.live is live
     strike(window, code)
-    assert window.leaving == 0 or window.stage.live is not live
-    assert window.stage.question is None
+    assert window.context.exit_status == 0 or window.app_state.live is not live
+    assert window.app_state.question is None
 
 
 def test_cross_asks_once(window: App) -> None:
     strike(window, B)
     turned(window, pygame.event.Event(pygame.QUIT))
-    assert window.leaving is None
+    assert window.context.exit_status is None
     turned(window, pygame.event.Event(pygame.QUIT))
-    assert window.leaving == 0
+    assert window.context.exit_status == 0
 
 
 def test_any_other_key_takes_the_question_back(window: App) -> None:
     strike(window, B)
     strike(window, R)
     strike(window, pygame.K_p)
-    assert window.stage.question is None
+    assert window.app_state.question is None
     strike(window, R)
-    assert window.stage.question is not None
+    assert window.app_state.question is not None
 
 
 @pytest.mark.parametrize("code", [R, ESCAPE])
 def test_nothing_is_asked_where_nothing_is_lost(window: App, code: int) -> None:
-    live = window.stage.live
+    live = window.app_state.live
     strike(window, code)
-    assert window.leaving == 0 or window.stage.live is not live
+    assert window.context.exit_status == 0 or window.app_state.live is not live
 
 
 def test_nothing_is_asked_once_the_session_is_saved(window: App) -> None:
     strike(window, B)
     strike(window, pygame.K_s, pygame.KMOD_CTRL)
     strike(window, ESCAPE)
-    assert window.leaving == 0
+    assert window.context.exit_status == 0
 
 
 def test_restart_keeps_values_and_so_does_not_ask_for_them(window: App) -> None:
-    window.commands._turn("gravity", -3.0, True)
+    window.commands._store_parameter("gravity", -3.0, True)
     turned(window)
-    live = window.stage.live
+    live = window.app_state.live
     strike(window, R)
-    assert window.stage.live is not live
-    window.commands._turn("gravity", -4.0, True)
+    assert window.app_state.live is not live
+    window.commands._store_parameter("gravity", -4.0, True)
     turned(window)
     strike(window, ESCAPE)
-    assert window.stage.question is not None
+    assert window.app_state.question is not None
 
 
 def test_undo_brings_back_what_a_restart_has_lost(window: App) -> None:
     strike(window, B)
     strike(window, R)
     strike(window, R)
-    assert window.stage.live is not None
-    assert len(window.stage.live.bodies) == 1
+    assert window.app_state.live is not None
+    assert len(window.app_state.live.bodies) == 1
     strike(window, pygame.K_z, pygame.KMOD_CTRL)
-    window.stage.live.arrive()
-    assert len(window.stage.live.bodies) == 2
+    window.app_state.live.arrive()
+    assert len(window.app_state.live.bodies) == 2
 
 
 def test_what_undo_brings_back_is_unsaved_and_undo_exchanges_the_two(window: App) -> None:
     def bodies() -> int:
-        assert window.stage.live is not None
-        window.stage.live.arrive()
-        return len(window.stage.live.bodies)
+        assert window.app_state.live is not None
+        window.app_state.live.arrive()
+        return len(window.app_state.live.bodies)
 
     strike(window, B)
     for _ in range(3):  # the third restarts what has nothing to lose
         strike(window, R)
     strike(window, pygame.K_z, pygame.KMOD_CTRL)
     assert bodies() == 2
-    assert window.stage.count_unsaved() == 1
+    assert window.app_state.count_unsaved() == 1
     strike(window, R)
     strike(window, R)
     turned(window, move(400, 300))
@@ -164,24 +164,24 @@ def test_undo_brings_back_what_was_replaced_at_an_earlier_moment(window: App) ->
         strike(window, pygame.K_COMMA)
     assert live.session.recording() == whole  # closing now keeps all of it
     strike(window, B)
-    assert any("is replaced" in text for _, text in window.stage.messages.shown())
+    assert any("is replaced" in text for _, text in window.app_state.messages.visible())
     strike(window, pygame.K_z, pygame.KMOD_CTRL)
-    assert window.stage.live is not None
-    window.stage.live.arrive()
-    assert window.stage.live.step_number == end
-    assert window.stage.live.session.recording().state_hash == whole.state_hash
+    assert window.app_state.live is not None
+    window.app_state.live.arrive()
+    assert window.app_state.live.step_number == end
+    assert window.app_state.live.session.recording().state_hash == whole.state_hash
 
 
 def test_picker_asks_before_another_scene_takes_the_place(window: App) -> None:
     strike(window, B)
-    live = window.stage.live
+    live = window.app_state.live
     strike(window, pygame.K_o, pygame.KMOD_CTRL)
     strike(window, pygame.K_RETURN)
-    assert window.gui.scene_browser is not None
-    assert window.stage.live is live
+    assert window.context.gui.scene_browser is not None
+    assert window.app_state.live is live
     strike(window, pygame.K_RETURN)
-    assert window.gui.scene_browser is None
-    assert window.stage.live is not live
+    assert window.context.gui.scene_browser is None
+    assert window.app_state.live is not live
 
 
 @pytest.mark.parametrize("box", [False, True], ids=["ball", "box"])

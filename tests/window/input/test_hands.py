@@ -28,8 +28,8 @@ def live(engine: str = "pymunk", **more: Any) -> LiveView:
 
 def grasp(hands: BodyTools, live: LiveView, place: tuple[float, float], reach: float, paused: bool) -> bool:
     """Pick the body at a place and take hold of it, as a drag does."""
-    found = hands.look(live, place, reach)
-    hands.hold(live, paused)
+    found = hands.pick(live, place, reach)
+    hands.grab(live, paused)
     return found
 
 
@@ -43,13 +43,13 @@ def passed(live: LiveView, steps: int) -> LiveView:
 def test_body_dragged_while_paused_is_exactly_under_the_hand(engine: str) -> None:
     show, hands = passed(live(engine), 3), BodyTools()
     assert grasp(hands, show, (0.25, -0.125), 0.0, paused=True)
-    assert (hands.picked, hands.holding) == (0, True)
+    assert (hands.picked, hands.is_holding) == (0, True)
     for place in ((1.25, 0.875), (-3.0, 2.0), (0.5, 0.5)):
         hands.drag(show, place)
         assert show.frame.position[0].tolist() == [place[0] - 0.25, place[1] + 0.125]
-    assert hands.line(show) is None
-    hands.let_go(show)
-    assert not hands.holding
+    assert hands.spring_line(show) is None
+    hands.release(show)
+    assert not hands.is_holding
     assert [type(action) for action in show.session.actions] == [Move] * 3
     assert passed(show, 5).frame.position[0].tolist() == [0.25, 0.625]
 
@@ -60,7 +60,7 @@ def test_driven_body_is_left_to_its_key(paused: bool) -> None:
     show, hands = live(drive=[drive]), BodyTools()
     with pytest.raises(ActionError, match=r"^a cannot be dragged; its key moves it"):
         grasp(hands, show, (0.25, 0.0), 0.0, paused)
-    assert not hands.holding
+    assert not hands.is_holding
     hands.drag(show, (1.0, 1.0))
     assert show.session.actions == ()
 
@@ -69,13 +69,13 @@ def test_fixed_body_can_be_moved_while_paused_and_not_pulled() -> None:
     show, hands = live(), BodyTools()
     assert grasp(hands, show, (5.0, 0.0), 0.0, paused=True)
     hands.drag(show, (5.0, 3.0))
-    hands.let_go(show)
+    hands.release(show)
     assert show.frame.position[1].tolist() == [5.0, 3.0]
     assert grasp(hands, show, (5.0, 3.0), 0.0, paused=False)
     assert hands.picked == 1
-    assert not hands.holding
+    assert not hands.is_holding
     hands.drag(show, (0.0, 9.0))
-    hands.let_go(show)
+    hands.release(show)
     assert passed(show, 5).frame.position[1].tolist() == [5.0, 3.0]
 
 
@@ -87,13 +87,13 @@ def test_body_that_went_on_is_held_where_it_was_looked_at(paused: bool) -> None:
     grasp(hands, show, (0.0, 0.25), 0.0, paused=False)
     hands.drag(show, (9.0, 3.0))
     passed(show, 40)
-    hands.let_go(show)
+    hands.release(show)
     (x, y), angle = show.frame.position[0].tolist(), float(show.frame.angle[0])
     before = len(show.session.actions)
-    assert hands.look(show, (x + 0.25, y), 0.0)
-    assert (len(show.session.actions), hands.holding) == (before, False)
+    assert hands.pick(show, (x + 0.25, y), 0.0)
+    assert (len(show.session.actions), hands.is_holding) == (before, False)
     passed(show, 20)
-    hands.hold(show, paused)
+    hands.grab(show, paused)
     hands.drag(show, (5.0, 5.0))
     turned = float(show.frame.angle[0]) - angle
     assert abs(turned) > 1e-3  # else this says nothing
@@ -102,23 +102,23 @@ def test_body_that_went_on_is_held_where_it_was_looked_at(paused: bool) -> None:
         assert show.frame.position[0] == pytest.approx((5.0 - spot[0], 5.0 - spot[1]), rel=1e-12)  # some roundings
     else:
         there = show.frame.position[0] + spot
-        assert (hands.line(show) or ((0.0, 0.0), None))[0] == pytest.approx(there, rel=1e-12)  # some roundings
+        assert (hands.spring_line(show) or ((0.0, 0.0), None))[0] == pytest.approx(there, rel=1e-12)  # some roundings
 
 
 def test_pulled_body_comes_under_the_hand_and_flies_on_when_let_go() -> None:
     show, hands = live(), BodyTools()
     grasp(hands, show, (0.0, 0.25), 0.0, paused=False)
-    assert hands.holding
+    assert hands.is_holding
     hands.drag(show, (2.0, 0.25))
     passed(show, 4)
-    held, hand = hands.line(show) or ((0.0, 0.0), (0.0, 0.0))
+    held, hand = hands.spring_line(show) or ((0.0, 0.0), (0.0, 0.0))
     assert hand == (2.0, 0.25)
     assert 0.0 < held[0] < 2.0
     passed(show, 1500)
-    held, hand = hands.line(show) or ((0.0, 0.0), (0.0, 0.0))
+    held, hand = hands.spring_line(show) or ((0.0, 0.0), (0.0, 0.0))
     assert held == pytest.approx((2.0, 0.25), abs=0.02)  # it goes on turning about the hand
-    hands.let_go(show)
-    assert hands.line(show) is None
+    hands.release(show)
+    assert hands.spring_line(show) is None
     velocity = show.frame.velocity[0].tolist()
     assert passed(show, 5).frame.velocity[0].tolist() == velocity
     kinds = [type(action) for action in show.session.actions]
@@ -132,9 +132,9 @@ def test_nothing_is_grasped_where_there_is_nothing() -> None:
     assert not grasp(hands, show, (0.0, 9.0), 0.1, paused=False)
     assert hands.picked is None
     hands.drag(show, (1.0, 1.0))
-    hands.let_go(show)
-    hands.hold(show, paused=True)
-    assert not hands.holding
+    hands.release(show)
+    hands.grab(show, paused=True)
+    assert not hands.is_holding
     for deed in (hands.remove, hands.nudge):
         with pytest.raises(ActionError, match="select a body first: click it"):
             deed(show)
@@ -193,9 +193,9 @@ def test_removed_body_is_gone_and_no_longer_picked_or_held() -> None:
     passed(show, 2)
     hands.remove(show)
     assert not show.frame.present[0]
-    assert (hands.picked, hands.holding) == (None, False)
+    assert (hands.picked, hands.is_holding) == (None, False)
     hands.drag(show, (1.0, 1.0))
-    hands.let_go(show)
+    hands.release(show)
     assert isinstance(show.session.actions[-1], Remove)
     passed(show, 2)
 
@@ -204,10 +204,10 @@ def test_body_that_was_removed_elsewhere_can_be_let_go() -> None:
     show, hands = live(), BodyTools()
     grasp(hands, show, (0.0, 0.0), 0.0, paused=False)
     show.act(Remove(time=0.0, body="a"))
-    assert hands.line(show) is None
+    assert hands.spring_line(show) is None
     with pytest.raises(ActionError, match="has been removed"):
         hands.drag(show, (1.0, 1.0))
-    hands.let_go(show)
+    hands.release(show)
     passed(show, 2)
 
 
@@ -216,12 +216,12 @@ def test_picked_body_that_has_not_come_yet_is_none() -> None:
     show, hands = passed(live(), 3), BodyTools()
     hands.add(show, (0.0, 9.0), 10.0)
     hands.picked = 3
-    assert hands.picked_of(show) == 3
+    assert hands.picked_index(show) == 3
     show.seek(1)
     while show.busy is not None:
         show.go_on(0.0, paused=True)
     assert len(show.bodies) == 3
-    assert hands.picked_of(show) is None
+    assert hands.picked_index(show) is None
     for deed in (hands.remove, hands.nudge):
         with pytest.raises(ActionError, match="select a body first: click it"):
             deed(show)

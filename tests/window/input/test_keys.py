@@ -175,7 +175,7 @@ def test_held_key_is_known_whoever_claims_it() -> None:
     known = []
     for event in (key(pygame.K_SPACE), key(pygame.K_SPACE), key_up(pygame.K_SPACE), key(pygame.K_SPACE)):
         keyboard.command(event, claimed)
-        known.append(keyboard.again)
+        known.append(keyboard.is_repeat)
     assert known == [False, True, True, False]
 
 

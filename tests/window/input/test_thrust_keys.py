@@ -76,4 +76,4 @@ def test_two_keys_fire_two_thrusts_and_one_of_them_turns_the_ship(window: App) -
 
 
 def test_keys_are_told_as_what_they_fire(window: App) -> None:
-    assert window.gui.key_bindings(window.stage).told == (("Up", "fire main"), ("Right", "fire thrust-2"))
+    assert window.app_state.key_bindings.help_rows == (("Up", "fire main"), ("Right", "fire thrust-2"))

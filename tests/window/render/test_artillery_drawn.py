@@ -189,8 +189,8 @@ def window(tmp_path: Path) -> Iterator[App]:
 
 def turn(window: App, *events: pygame.event.Event) -> ArtilleryRules:
     turned(window, *events)
-    assert window.stage.host is not None
-    rules = window.stage.host.rules
+    assert window.app_state.host is not None
+    rules = window.app_state.host.rules
     assert isinstance(rules, ArtilleryRules)
     return rules
 
@@ -206,16 +206,16 @@ def test_keys_aim_and_fire_and_going_back_takes_back(window: App, tmp_path: Path
     assert red.angle > angle
     assert red.power > power
     assert red.weapon == 1
-    fired = window.stage.show.step_number if window.stage.show is not None else 0
+    fired = window.app_state.view.step_number if window.app_state.view is not None else 0
     turn(window, key_up(pygame.K_w), key(pygame.K_SPACE))
     while (rules := turn(window)).phase == "fly":
         pass
-    live = window.stage.show
+    live = window.app_state.view
     assert isinstance(live, LiveView)
     crater = live.scene.walls[0].points
     assert rules.phase == "settle"
     assert rules.field.ground.points == crater
-    assert any("shell: landed at" in text for _, text in window.stage.messages.shown())
+    assert any("shell: landed at" in text for _, text in window.app_state.messages.visible())
     recording = tmp_path / "duel.json"
     kept = live.session.recording()
     kept.save(recording)

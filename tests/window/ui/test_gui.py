@@ -9,6 +9,7 @@ from pressing import press, release
 from windowed import turned, window_on
 
 from sandbox.scene.files.shipped_scenes import find
+from sandbox.window import app_state
 from sandbox.window.app import App
 from sandbox.window.app_state import AppState
 from sandbox.window.playback.parameters import SessionParameters
@@ -50,40 +51,40 @@ def count_calls(monkeypatch: pytest.MonkeyPatch, owner: object, name: str) -> li
 
 def open_game(name: str, folder: Path) -> App:
     window = App(AppState(), size=(1280, 720), folder=folder, say=lambda _: None)
-    assert window.stage.open(find(name))
+    assert window.app_state.open(find(name))
     return window
 
 
 def test_key_bindings_are_computed_once_a_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    calls = count_calls(monkeypatch, gui, "key_bindings")
+    calls = count_calls(monkeypatch, app_state, "key_bindings")
     with window_on(ROOM, tmp_path) as window:
         for _ in range(3):
             turned(window, press(100, 100), release(100, 100))
         assert len(calls) == 1
-        assert window.gui.claimed_keys(window.stage) == {pygame.K_SPACE}
+        assert window.app_state.key_bindings.pressed.keys() == {pygame.K_SPACE}
 
 
 def test_keys_are_announced_once_a_scene_and_not_by_a_restart(tmp_path: Path) -> None:
     with window_on(ROOM, tmp_path) as window:
         turned(window)
-        assert window.stage.messages.shown() == (("info", "Space: relaunch spark"),)
-        window.stage.messages = type(window.stage.messages)()
+        assert window.app_state.messages.visible() == (("info", "Space: relaunch spark"),)
+        window.app_state.messages = type(window.app_state.messages)()
         turned(window)
-        window.stage.restart()
+        window.app_state.restart()
         turned(window)
-        assert window.stage.messages.shown() == ()
+        assert window.app_state.messages.visible() == ()
 
 
 def test_score_panel_is_laid_out_once_for_what_it_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = count_calls(monkeypatch, gui, "layout_score")
     window = open_game("duel", tmp_path)
     try:
-        window.turn(0.0)
+        window.run_frame(0.0)
         calls.clear()
-        window.turn(0.0)
+        window.run_frame(0.0)
         assert not calls
-        window.gui.panel.visible = False  # more room
-        window.turn(0.0)
+        window.context.gui.panel.visible = False  # more room
+        window.run_frame(0.0)
         assert len(calls) == 1
     finally:
         window.close()
@@ -99,23 +100,23 @@ def test_parameters_are_asked_for_only_after_a_change(tmp_path: Path, monkeypatc
         turned(window)
         turned(window)
         assert (asked, shown) == ([], [])
-        window.stage.paused = True  # another button
+        window.app_state.paused = True  # another button
         turned(window)
         assert len(shown) == 1
-        live = window.stage.live
+        live = window.app_state.live
         assert live is not None
-        window.stage.turn("gravity", -3.0)
+        window.app_state.set_parameter("gravity", -3.0)
         turned(window)
         assert len(asked) == 2
-        gravity = next(each for each in window.gui.panel.widgets if getattr(each, "parameter", None))
+        gravity = next(each for each in window.context.gui.panel.widgets if getattr(each, "parameter", None))
         assert gravity.parameter.value == -3.0  # type: ignore[attr-defined]  # it has a parameter
 
 
 def test_widget_shows_the_present_value_again_after_a_refused_change(tmp_path: Path) -> None:
     with window_on(ROOM, tmp_path, (1280, 720)) as window:
         turned(window)
-        window.gui.panel.on_change = lambda *_: None  # as if it were refused
-        gravity = next(each for each in window.gui.panel.widgets if getattr(each, "parameter", None))
-        x, y = gravity.rect.left + window.gui.area.width + 5, gravity.rect.centery
+        window.context.gui.panel.on_change = lambda *_: None  # as if it were refused
+        gravity = next(each for each in window.context.gui.panel.widgets if getattr(each, "parameter", None))
+        x, y = gravity.rect.left + window.context.gui.area.width + 5, gravity.rect.centery
         turned(window, press(x, y), release(x, y))
         assert gravity.value == gravity.parameter.value  # type: ignore[attr-defined]  # it has a parameter

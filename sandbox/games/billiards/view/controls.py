@@ -387,8 +387,6 @@ class CueControls:
         return True
 
 
-KeyHandler = Callable[[LiveView], object]
-
 TURN, FINER = 0.002, 0.0001
 """rad by which an arrow key turns the cue, and with Shift"""
 POWER_STEP = 0.02
@@ -413,39 +411,31 @@ CUE_KEY_HELP = (
 """keys and their descriptions in the help overlay"""
 
 
-def cue_key_handlers(gestures: CueControls) -> tuple[dict[int, KeyHandler], dict[int, KeyHandler]]:
+def cue_key_handlers(gestures: CueControls) -> tuple[dict[int, Callable[[], object]], dict[int, Callable[[], object]]]:
     """Return the handlers of pressed and of released keys."""
     game, person = gestures.game, gestures.person
-    pressed: dict[int, KeyHandler] = {
-        pygame.K_SPACE: lambda _: person.shoot(),
-        pygame.K_g: lambda _: person.take_in_hand(),
-        pygame.K_z: lambda _: game.undo(),
-        pygame.K_LEFT: lambda _: gestures.nudge(_step()),
-        pygame.K_RIGHT: lambda _: gestures.nudge(-_step()),
-        pygame.K_UP: lambda _: gestures.strengthen(POWER_STEP),
-        pygame.K_DOWN: lambda _: gestures.strengthen(-POWER_STEP),
-        pygame.K_c: lambda _: person.call_safety(),
-        pygame.K_d: lambda _: person.choose_next(),
-        pygame.K_RETURN: lambda _: person.take_choice(),
+    pressed: dict[int, Callable[[], object]] = {
+        pygame.K_SPACE: person.shoot,
+        pygame.K_g: person.take_in_hand,
+        pygame.K_z: game.undo,
+        pygame.K_LEFT: lambda: gestures.nudge(_step()),
+        pygame.K_RIGHT: lambda: gestures.nudge(-_step()),
+        pygame.K_UP: lambda: gestures.strengthen(POWER_STEP),
+        pygame.K_DOWN: lambda: gestures.strengthen(-POWER_STEP),
+        pygame.K_c: person.call_safety,
+        pygame.K_d: person.choose_next,
+        pygame.K_RETURN: person.take_choice,
     }
-    released: dict[int, KeyHandler] = {}
+    released: dict[int, Callable[[], object]] = {}
     modes: tuple[tuple[int, CueMode], ...] = (
         (pygame.K_s, "stroke"),
         (pygame.K_e, "english"),
         (pygame.K_x, "power"),
     )
     for key, mode in modes:
-        pressed[key] = partial(_begin, gestures=gestures, mode=mode)
-        released[key] = partial(_end, gestures=gestures)
+        pressed[key] = partial(gestures.begin, mode)
+        released[key] = gestures.end
     return pressed, released
-
-
-def _begin(_: LiveView, gestures: CueControls, mode: CueMode) -> None:
-    gestures.begin(mode)
-
-
-def _end(_: LiveView, gestures: CueControls) -> None:
-    gestures.end()
 
 
 def _step() -> float:

@@ -21,7 +21,6 @@ from sandbox.games.billiards.view.controls import HumanPlayer
 from sandbox.games.billiards.view.prediction import CueState
 from sandbox.games.billiards.view.table_game import BOT, BilliardsGame
 from sandbox.scene.description.surface import MISCUE
-from sandbox.window.playback.live import LiveView
 from sandbox.window.render.palette import (
     FAINT,
     INK,
@@ -315,7 +314,7 @@ POWER_BAR = 18.0
 MIN_HUD = 420, 300
 """px at unit 1: a smaller picture has no room for them"""
 
-DecisionHandler = Callable[[Callable[[LiveView], object]], bool]
+DecisionHandler = Callable[[Callable[[], object]], bool]
 
 
 class BilliardsHud:
@@ -374,7 +373,7 @@ class BilliardsHud:
         if event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
             clicked = next((each for rect, each in self._choices if rect.collidepoint(event.pos)), None)
             if clicked is not None:
-                act(lambda _: person.decide(clicked))
+                act(lambda: person.decide(clicked))
                 return True
             self._held = next((name for name, rect in self._rects() if rect.collidepoint(event.pos)), "")
             if self._held and person.game.mine:
