@@ -26,7 +26,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 class Hosted:
     """The part of a host that the dialog uses."""
 
-    over: str | None = "game over"
+    game_over: str | None = "game over"
     score: int = 5_000
     touched: bool = True
     rules: Any = field(init=False)
@@ -53,11 +53,11 @@ def ended(host: Hosted | None = None) -> HighScoreDialog:
 
 
 def test_initials_are_asked_for_at_the_end_and_kept() -> None:
-    host, dialog = Hosted(over=None), HighScoreDialog()
+    host, dialog = Hosted(game_over=None), HighScoreDialog()
     dialog.update(host)
     assert dialog.entry is None
     assert press(dialog, "a") == [False]
-    host.over = "game over"
+    host.game_over = "game over"
     dialog.update(host)
     assert press(dialog, "a", "b", "*", "d", pygame.K_BACKSPACE, "c", "x", pygame.K_RETURN) == [True] * 8
     (best,) = opened().of(TABLE)
@@ -105,10 +105,10 @@ def test_own_row_shows_where_it_will_stand() -> None:
 def test_going_back_asks_anew() -> None:
     host = Hosted()
     dialog = ended(host)
-    host.over = None
+    host.game_over = None
     dialog.update(host)
     assert dialog.entry is None
-    host.over = "again"
+    host.game_over = "again"
     dialog.update(host)
     assert dialog.entry is not None
 
