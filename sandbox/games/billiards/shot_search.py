@@ -1,12 +1,11 @@
-"""Trial: what strokes lead to, on the exact engine and by the rules.
+"""Shot search: candidate strokes, their probability by geometry, and their value by simulation.
 
-Ease: how likely a straight shot at a ball on goes into a pocket, by geometry alone.
+The probability of a straight pot uses the ghost ball, the position of the cue ball at which the object ball leaves
+towards the pocket. An aiming error δ moves the contact by δ·d, where d is the distance to the ghost ball, and turns the
+path of the object ball by δ·d / (2R·cos φ), where φ is the cut angle. The pocket accepts an angle of its width, less
+the diameter of a ball, divided by the distance to it.
 
-With the ghost ball: where the cue ball is when it touches the object ball so that this leaves towards the pocket. An
-error δ of the aim moves the touch by δ·d, d being the way to the ghost ball, and turns the object ball's way by
-δ·d / (2R·cos φ), φ being the cut; the pocket takes so many rad as it is wide, less a ball, over the way to it.
-
-Aims: the strokes that are worth a trial.
+`ShotEvaluator` simulates strokes on the exact engine and lets the rules judge them.
 """
 
 import math
@@ -26,15 +25,15 @@ from sandbox.games.billiards.table_geometry import TableGeometry
 from sandbox.scene.description.surface import Stroke
 
 THINNEST = 0.2
-"""cos of the thinnest cut that is tried: 78°"""
+"""cosine of the thinnest candidate cut, 78°"""
 
 GRAZE = 0.98
-"""of two radii: who stands less in the way may be passed, as jaws and throw are not reckoned with"""
+"""fraction of two radii; a smaller overlap does not block a path, as jaws and throw are neglected"""
 
 
 @dataclass(frozen=True, eq=False)
 class PotOptions:
-    """T balls times P pockets, straight shots from one place."""
+    """Straight shots from one place at T balls to P pockets."""
 
     ghost: FloatArray
     """(T, P, 2) m, where the cue ball is to touch"""
@@ -58,7 +57,7 @@ def mouths(layout: TableGeometry, radius: float) -> tuple[FloatArray, FloatArray
 def pot_options(
     layout: TableGeometry, radius: float, cue: FloatArray, targets: FloatArray, others: FloatArray, sigma: float
 ) -> PotOptions:
-    """Return how the straight shots are.
+    """Return the straight shots.
 
     Args:
         layout: of the table.
@@ -93,7 +92,7 @@ def pot_options(
 
 
 def _blocked(begin: FloatArray, end: FloatArray, others: FloatArray, radius: float) -> bool:
-    """Tell whether a ball stands in the straight way of another."""
+    """Return whether a ball blocks the straight path of another."""
     way, apart = end - begin, others - begin
     share = np.clip(apart @ way / max(float(way @ way), 1e-18), 0.0, 1.0)
     away = apart - share[:, None] * way
@@ -107,12 +106,12 @@ def _erf(x: FloatArray) -> FloatArray:
 
 
 IN_HAND = 0.9
-"""the chance of a pot that a player with the ball in hand is taken to have"""
+"""assumed probability of a pot with the ball in hand"""
 
 
 @dataclass(frozen=True, eq=False)
 class ShotEvaluator:
-    """A match as a player looks at it who is to shoot."""
+    """Evaluates strokes of the player to shoot."""
 
     match: Match
     table: Table
@@ -163,7 +162,7 @@ class ShotEvaluator:
 
 
 UNIT = {"snooker": 0.04, "three-cushion": 0.5, "straight-rail": 0.4, "free": 0.1}
-"""what a point is worth, against the table"""
+"""value of a point, relative to that of the table"""
 
 
 def ease(match: Match, sigma: float) -> float:
@@ -215,19 +214,19 @@ def called(match: Match, happenings: tuple[ShotEvent, ...]) -> ShotCall:
 
 
 SPEEDS = (1.2, 2.0, 3.2)
-"""m/s, of the cue, for a pot"""
+"""m/s, cue speeds of candidate pots"""
 
 HEIGHTS = (-0.3, 0.0, 0.3)
 """draw, stun, follow"""
 
 THROWS = 7
-"""aims to either side of the ghost ball that are tried, for throw and spin turn the ball's way"""
+"""candidate aims to either side of the ghost ball, because throw and spin turn the path of the object ball"""
 
 ASIDE = 0.12
-"""rad, of the object ball's way, that these reach to either side"""
+"""rad, range of these aims to either side, as directions of the object ball"""
 
 COMBINATIONS = 5
-"""balls and pockets that are looked at closely"""
+"""number of pairs of ball and pocket that are simulated"""
 
 
 def pot_candidates(trial: ShotEvaluator, most: int = COMBINATIONS) -> list[Stroke]:
@@ -261,7 +260,7 @@ def pot_candidates(trial: ShotEvaluator, most: int = COMBINATIONS) -> list[Strok
 
 
 def _middle(row: Sequence[bool]) -> int | None:
-    """Return the middle of the longest run of trues."""
+    """Return the middle index of the longest run of true values."""
     best, begin, length = None, 0, 0
     for k, each in enumerate([*row, False]):
         if each:

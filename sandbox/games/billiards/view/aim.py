@@ -1,4 +1,4 @@
-"""Aiming: the ways that a stroke would lead to, the ghost of the cue ball at its first touch, and the cue."""
+"""Drawing of the aim: predicted paths, the ghost ball at the first contact, and the cue."""
 
 import math
 from itertools import pairwise

@@ -1,8 +1,6 @@
-"""Balls: spheres that lie on a table, lit, painted, and turned as they have rolled.
+"""Drawing of balls as lit spheres with numbers, stripes or spots, rotated as they have rolled.
 
-Coats: what balls are painted with: numbers, stripes, and the spots that show how a cue ball turns.
-
-Rolling: how balls on a floor lie, worked out from their spins; for their drawing alone.
+The rotation is integrated from the spins for drawing only.
 """
 
 import math

@@ -1,9 +1,4 @@
-"""Scoreboard: who plays, what for, how it stands, what is to be done; and what may be decided.
-
-Tip: the ball as the player sees it, with where the tip meets it; and the power of the stroke.
-
-Tools: what a player has beside the table: the ball with the tip's mark, the power, the scores.
-"""
+"""HUD of billiards: scoreboard with status line and decisions, dial of the tip's offset, power bar."""
 
 import math
 from collections.abc import Callable

@@ -1,9 +1,8 @@
-"""Cloth: a table as it stands, with wood, cushions, pockets, spots and strings; it changes with the camera alone.
+"""Drawing of a table: wood, cloth, cushions, pockets, spots and strings. It changes only with the camera.
 
-Cushions: the outlines of a table's rubber, worked out from walls, jaws and facings; in metres, no pygame.
-
-A cushion is a wall along an edge of the playing area. At each end it may be rounded by a jaw, a post that touches it
-where it ends, and go on along a facing, a wall that touches the same jaw.
+The outlines of cushions are computed from walls, jaws and facings, in metres. A cushion is a wall along an edge of the
+playing area. At each end it may be rounded by a jaw, a post that touches its end, and continue along a facing, a wall
+that touches the same jaw.
 """
 
 import math
