@@ -73,7 +73,7 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
 
     Raises:
         SceneError: the file has faults, or no file and no shipped scene has that name.
-        UnfitError: the scene has no game with rules, or lacks an element that its game needs.
+        UnsuitableSceneError: the scene has no game with rules, or lacks an element that its game needs.
         Refusal: the engine does not support the scene.
         ValueError: an engine, body or render mode does not exist, or `every` is not an integer of at least 1.
     """

@@ -1,9 +1,4 @@
-"""Field: the ground, and the tanks on it; what blasts do to both, and how both settle.
-
-Weapons: what can be fired, and at what price. WEAPONS is the table of them.
-
-Tanks: who fights, what each has left, and what blasts and falls do to them.
-"""
+"""Battlefield: terrain and tanks, and how explosions and falls change them. WEAPONS lists the weapons and prices."""
 
 import math
 from collections.abc import Sequence
@@ -24,21 +19,21 @@ from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 
 Kind = Literal["shell", "dirt", "cluster", "roller"]
-"""A shell digs where it strikes; dirt heaps up there; a cluster comes apart at its highest point; a roller goes on
-rolling until it is at rest, or meets a tank."""
+"""A shell digs a crater; dirt adds a heap; a cluster splits at its highest point; a roller rolls until it rests or
+hits a tank."""
 
 
 class Weapon(NamedTuple):
-    """One sort of shell."""
+    """A kind of shell."""
 
     name: str
     kind: Kind
     radius: float
     """m, of the crater or the disc of dirt"""
     damage: float
-    """to a tank that is struck, of 100 that it has; it falls to nothing at twice the radius"""
+    """health that a direct hit takes; it decreases to 0 at twice the radius"""
     cost: int
-    """each, of a player's money; a player without it fires shells"""
+    """price of a shot"""
 
 
 WEAPONS: tuple[Weapon, ...] = (
@@ -50,28 +45,28 @@ WEAPONS: tuple[Weapon, ...] = (
 )
 
 WRECK = Weapon("wreck", "shell", 4.0, 30.0, 0)
-"""What becomes of a tank that has no health left."""
+"""Explosion of a destroyed tank."""
 
 FRAGMENTS = 5
-"""of a cluster"""
+"""number of fragments of a cluster"""
 SPREAD = 3.0
-"""m/s, between neighbouring fragments, across"""
+"""m/s, difference of the horizontal velocities of neighbouring fragments"""
 
 
 WHOLE = 100.0
-"""health that a tank begins with"""
+"""initial health of a tank"""
 PER_KILL = 100
-"""points for the last hit, beside one for each point of health taken"""
+"""points for destroying a tank, in addition to one for each point of health"""
 PER_POINT = 5
-"""of money, for each point of health taken"""
+"""money for each point of health taken"""
 BARREL = 0.75
-"""of a tank's width, from its middle to the muzzle"""
+"""distance from centre to muzzle, in widths of a tank"""
 SAFE_FALL, PER_METRE = 1.0, 3.0
-"""m that a tank falls unharmed, and health that each more costs"""
+"""m that a tank falls without damage, and health lost per metre beyond that"""
 
 
 class Muzzle(NamedTuple):
-    """Where shells begin: on a circle about a gun."""
+    """Start points of shells: a circle about a gun."""
 
     centre: Point
     """m"""
@@ -79,7 +74,7 @@ class Muzzle(NamedTuple):
     """m"""
 
     def at(self, angle: FloatArray) -> FloatArray:
-        """Return where shells leave at angles (K,), rad; (K, 2) m."""
+        """Return the start points at angles (K,), rad; (K, 2) m."""
         return np.asarray(np.array(self.centre) + self.reach * np.column_stack((np.cos(angle), np.sin(angle))))
 
 
@@ -94,7 +89,7 @@ class Tank:
     angle: float
     """of the barrel, rad, anticlockwise from the right"""
     power: float = 0.6
-    """share of full speed"""
+    """fraction of full speed"""
     weapon: int = 0
     health: float = WHOLE
     points: int = 0
@@ -103,12 +98,12 @@ class Tank:
 
     @property
     def name(self) -> str:
-        """The player's."""
+        """Name of the player."""
         return self.player.name
 
     @property
     def alive(self) -> bool:
-        """Whether it still fights."""
+        """Whether the tank has health left."""
         return self.health > 0.0
 
 
@@ -116,10 +111,10 @@ class Tanks:
     """All tanks of a game, in the order of their turns."""
 
     def __init__(self, artillery: Artillery, names: tuple[str, ...]) -> None:
-        """Line them up; `names` are those of the scene's bodies."""
+        """Create the tanks; `names` are the names of the bodies of the scene."""
         self.size = artillery.tank
         self.radius = 0.5 * max(artillery.tank)
-        """m, of the disc that a shell has to strike"""
+        """m, radius of the disc that counts as a hit"""
         middle = sum(player.position for player in artillery.players) / len(artillery.players)
         self.every = [
             Tank(
@@ -133,32 +128,32 @@ class Tanks:
 
     @property
     def alive(self) -> list[Tank]:
-        """Those that still fight."""
+        """Tanks with health left."""
         return [tank for tank in self.every if tank.alive]
 
     @property
     def discs(self) -> FloatArray:
-        """(M, 3) centre and radius of those that still fight, m."""
+        """(M, 3) centre and radius of the tanks that are alive, m."""
         return np.array([(*tank.place, self.radius) for tank in self.alive]).reshape(-1, 3)
 
     def see(self, frame: Frame) -> None:
-        """Take note of where they are."""
+        """Update the positions."""
         for tank in self.every:
             if frame.present[tank.number]:
                 x, y = frame.position[tank.number].tolist()
                 tank.place = (x, y)
 
     def at_rest(self, frame: Frame, speed: float) -> bool:
-        """Tell whether none of those that fight moves faster than a speed, m/s."""
+        """Return whether no tank that is alive moves faster than a speed, m/s."""
         those = [tank.number for tank in self.alive]
         return bool((np.hypot(*frame.velocity[those].T) <= speed).all())
 
     def muzzle(self, tank: Tank) -> Muzzle:
-        """Return where a tank's shells leave."""
+        """Return the muzzle of a tank."""
         return Muzzle(tank.place, BARREL * self.size[0])
 
     def blast(self, shooter: Tank, place: Point, weapon: Weapon) -> list[Tank]:
-        """Hurt who stands near a blast, and reward the shooter; return who was hurt."""
+        """Damage the tanks near an explosion, and reward the shooter; return the damaged tanks."""
         hurt = []
         for tank in self.alive:
             far = max(math.dist(tank.place, place) - self.radius, 0.0)
@@ -169,7 +164,7 @@ class Tanks:
         return hurt
 
     def hurt(self, tank: Tank, damage: float, shooter: Tank) -> None:
-        """Take health from a tank. Who shoots at himself loses the points that others bring."""
+        """Take health from a tank, and reward the shooter; damage to its own tank costs the points instead."""
         taken = min(damage, tank.health)
         tank.health -= taken
         points = round(taken) + (0 if tank.alive else PER_KILL)
@@ -180,15 +175,15 @@ class Tanks:
 REST_SPEED = 0.1
 """m/s: slower, tanks count as at rest"""
 SETTLE_TIMEOUT = 8.0
-"""s that tanks are given to come to rest"""
+"""s after which settling ends even if tanks still move"""
 PAUSE = 0.5
-"""s that settling takes, at least"""
+"""s, minimum duration of settling"""
 LIFT = 0.01
-"""m above the ground: who was under it is put there"""
+"""m above the terrain, where buried tanks are placed"""
 
 
 class Explosion(NamedTuple):
-    """Where and when a shell went off, for who draws it."""
+    """An explosion, for the view."""
 
     time: float
     """s"""
@@ -200,13 +195,13 @@ class Explosion(NamedTuple):
 
 
 class Battlefield:
-    """A ground with tanks on it."""
+    """Terrain with tanks."""
 
     def __init__(self, scene: Scene, bodies: Bodies) -> None:
-        """Lay it out.
+        """Create the battlefield of a scene.
 
         Raises:
-            UnfitError: the scene has no `[artillery]`, or no ground and tanks for it.
+            UnsuitableSceneError: the scene has no `[artillery]`, or no ground and tanks for it.
         """
         wall = next((wall for wall in scene.walls if wall.name == GROUND), None)
         columns = None if wall is None else columns_of(wall.points)
@@ -217,18 +212,18 @@ class Battlefield:
         self.ground = Ground(np.asarray(columns[0]), columns[1])
         self.tanks = Tanks(artillery, bodies.names)
         self.falling: list[tuple[float, tuple[LooseDirt, ...]]] = []
-        """(s, dirt): since when it falls"""
+        """start of the fall, s, and the falling dirt"""
         self.blasts: list[Explosion] = []
-        """of this turn"""
+        """explosions of this turn"""
         self.cues: list[str] = []
         """names of sounds"""
         self.pull = math.hypot(*scene.world.gravity)
-        """m/s², with which dirt falls"""
+        """m/s², acceleration of falling dirt"""
         self._since = 0.0
-        self._stood: dict[str, float] = {}  # how high each tank stood when it began to fall, m
+        self._stood: dict[str, float] = {}  # height of each tank at the start of settling, m
 
     def blast(self, time: float, shooter: Tank, place: Point, weapon: Weapon) -> list[Action]:
-        """Take ground away or bring some, and hurt who is near; who is then out goes off as well."""
+        """Apply an explosion: carve or add terrain, and damage tanks in range; destroyed tanks explode in turn."""
         dirt = weapon.kind == "dirt"
         change = (self.ground.with_heap if dirt else self.ground.without)(place, weapon.radius)
         self.cues.append("dirt" if dirt else "blast")
@@ -238,7 +233,7 @@ class Battlefield:
         return actions + self._out(time, [tank for tank in hurt if not tank.alive])
 
     def _out(self, time: float, dead: Sequence[Tank]) -> list[Action]:
-        """Take tanks out that have no health left; each goes off itself, and may take others with it."""
+        """Remove destroyed tanks; each explodes, which may destroy others."""
         actions: list[Action] = []
         for tank in dead:
             actions.append(Remove(time=time, body=tank.name))
@@ -246,14 +241,14 @@ class Battlefield:
         return actions
 
     def _changed(self, time: float, change: Crater) -> list[Action]:
-        """Go on with another ground, and lift who would be under it."""
+        """Replace the terrain, and lift buried tanks."""
         self.ground = change.ground
         if change.loose:
             self.falling.append((time, change.loose))
         return [Reshape(time=time, thing=GROUND, points=self.ground.points), *self._lifted(time)]
 
     def _lifted(self, time: float) -> list[Action]:
-        """Put tanks on the ground that they are in."""
+        """Place buried tanks on the terrain."""
         actions: list[Action] = []
         for tank in self.tanks.alive:
             x, y = tank.place
@@ -264,16 +259,16 @@ class Battlefield:
         return actions
 
     def begin_to_settle(self, time: float) -> None:
-        """Note how high all stand who may fall now."""
+        """Start settling: record the heights from which tanks may fall."""
         self._since = time
         self._stood = {tank.name: tank.place[1] for tank in self.tanks.alive}
 
     def settle(self, seen: StepInfo, shooter: Tank) -> tuple[bool, list[Action]]:
-        """Wait until dirt has fallen and tanks stand; hurt who fell, end who left the ground; tell whether it is done.
+        """Wait until dirt and tanks are at rest, then apply falls; return whether settling is done, and the actions.
 
         Args:
-            seen: what there is now.
-            shooter: who has brought it about.
+            seen: input of the step.
+            shooter: tank whose shot caused the falls.
         """
         actions = self._lifted(seen.time)
         waited = seen.time - self._since
@@ -292,6 +287,6 @@ class Battlefield:
         return not dead, actions + self._out(seen.time, dead)
 
     def _fallen(self, time: float) -> bool:
-        """Tell whether all dirt has come down that falls."""
+        """Return whether all falling dirt has landed."""
         drops = [(since, each.drop) for since, loose in self.falling for each in loose]
         return not self.pull or all(0.5 * self.pull * (time - since) ** 2 >= drop for since, drop in drops)

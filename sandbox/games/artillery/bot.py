@@ -1,4 +1,4 @@
-"""Hand: a player of artillery at the keys, who aims as a bot does and brings the gun there by holding and tapping."""
+"""ArtilleryBot: a policy that finds a shot as `BotPlanner` does, and sets the gun by holding and tapping keys."""
 
 import math
 from collections.abc import Sequence
@@ -11,14 +11,14 @@ from sandbox.games.contract import Rules, StepInfo, UnsuitableSceneError, checke
 from sandbox.scene.random_streams import Stream, draws
 
 NEAR = 12.0
-"""Taps, from which on a key is no longer held but tapped."""
+"""taps: below this distance from the setting, a key is tapped instead of held"""
 
 
 class ArtilleryBot:
-    """Plays for whoever's turn it is and who is no bot. Other games than artillery it cannot play."""
+    """Plays all turns of players without a bot."""
 
     def __init__(self, seed: int, skill: float = 0.8) -> None:
-        """Sit down.
+        """Create a player.
 
         Raises:
             ValueError: the skill is not from 0 to 1.
@@ -29,10 +29,10 @@ class ArtilleryBot:
         self._down: set[str] = set()
 
     def decide(self, info: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:
-        """Return the controls that are pressed and let go of now.
+        """Return the controls that are pressed and released now.
 
         Raises:
-            UnfitError: the rules are those of another game.
+            UnsuitableSceneError: the rules are those of another game.
         """
         if not isinstance(rules, ArtilleryRules):
             raise UnsuitableSceneError("this player only plays artillery")
@@ -48,7 +48,7 @@ class ArtilleryBot:
         return changed
 
     def _thought_of(self, rules: ArtilleryRules) -> FiringSolution | None:
-        """Think on about this turn; return the shot once there is one."""
+        """Continue the search for the shot of this turn; return it once it is found."""
         if self._thought is None or self._turn != rules.turn:
             random = draws(Stream.AIM, self._seed, rules.turn)
             self._thought = BotPlanner(rules.world, rules.field, rules.shooter, random, self.skill)
@@ -56,7 +56,7 @@ class ArtilleryBot:
         return self._thought.go_on()
 
     def _wanted(self, rules: ArtilleryRules, aim: FiringSolution, step: float) -> set[str]:
-        """Return the keys that are to be down now; a key is tapped by being up every other time."""
+        """Return the keys to hold now; a key is tapped by releasing it at every second step."""
         tank, found = rules.shooter, set[str]()
         assert self._thought is not None
         if tank.weapon != self._thought.weapon:
@@ -72,7 +72,7 @@ class ArtilleryBot:
 
     @staticmethod
     def _lacks(rules: ArtilleryRules, tank: Tank, aim: FiringSolution) -> tuple[tuple[float, float, float], ...]:
-        """Return by how much angle and power are to grow, and by how much they do by a tap, and a second."""
+        """Return, for angle and power, the missing amount, the amount of a tap, and the amount per second."""
         power = aim.speed / rules.artillery.speed
         return (
             (min(max(aim.angle, 0.0), math.pi) - tank.angle, TURN, PER_SECOND[0]),

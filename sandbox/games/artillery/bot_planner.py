@@ -1,4 +1,4 @@
-"""Bot: whom it shoots at, with what, and how well. It errs by its skill, at random from the scene's seed."""
+"""BotPlanner: target, weapon and aim of a bot. Its random errors depend on its skill and the seed of the scene."""
 
 import math
 
@@ -10,22 +10,22 @@ from sandbox.scene.description.world import World
 from sandbox.scene.random_streams import Stream, draws
 
 ANGLE_ERROR, SPEED_ERROR = math.radians(6.0), 0.08
-"""Standard deviations of angle, rad, and speed, as a share of it, of who has no skill at all."""
+"""rad, and relative: standard deviations of angle and speed at skill 0"""
 NEAR = 0.2
-"""of the crater's radius: a shot that comes down as near to the target as this is as good as any"""
+"""fraction of the crater radius: shots that land nearer to the target than this are equally good"""
 BIG = 0.5
-"""the chance of a shot that costs, where there is money for it"""
+"""probability of a weapon that costs money, if the tank can pay for it"""
 WORK = 6_000
-"""of the search for a shot, at each look of the rules: 1 to 4 ms, so that a window stays smooth, and some 80 looks"""
+"""work of the search per step: 1 to 4 ms, so that a window stays smooth; a search takes about 80 steps"""
 
 
 def hit_probabilities(seed: int, turn: int) -> np.random.Generator:
-    """Return the chances of a turn, which are those of no other."""
+    """Return the random generator of a turn, which is independent of those of other turns."""
     return draws(Stream.SHELL, seed, turn)
 
 
 def choose_shot(tanks: Tanks, shooter: Tank, random: np.random.Generator) -> tuple[Tank, int]:
-    """Return whom to shoot at, the weakest, of equals the nearest; and the number of the weapon."""
+    """Return the target, which is the weakest tank and of equals the nearest, and the index of the weapon."""
     others = [tank for tank in tanks.alive if tank is not shooter]
     target = min(others, key=lambda tank: (tank.health, math.dist(tank.place, shooter.place)))
     able = [k for k, weapon in enumerate(WEAPONS) if weapon.kind == "shell" and 0 < weapon.cost <= shooter.money]
@@ -34,19 +34,19 @@ def choose_shot(tanks: Tanks, shooter: Tank, random: np.random.Generator) -> tup
 
 
 class BotPlanner:
-    """A bot's thought about its turn, by and by. A copy goes on by itself."""
+    """Incremental search for the shot of a turn. A copy is independent."""
 
     def __init__(
         self, world: World, field: Battlefield, shooter: Tank, random: np.random.Generator, skill: float | None = None
     ) -> None:
-        """Choose a target and a weapon, and begin to look for the shot.
+        """Choose target and weapon, and start the search.
 
         Args:
-            world: with the wind of the turn.
-            field: as it lies.
-            shooter: who thinks.
-            random: the chances of the turn.
-            skill: 0 to 1; by default that of the shooter, who is a bot.
+            world: world with the wind of the turn.
+            field: the present battlefield.
+            shooter: tank of the bot.
+            random: random generator of the turn.
+            skill: 0 to 1; default: that of the shooter.
         """
         target, self.weapon = choose_shot(field.tanks, shooter, random)
         self._full = field.artillery.speed
@@ -65,7 +65,7 @@ class BotPlanner:
         )
 
     def go_on(self, work: int = WORK) -> FiringSolution | None:
-        """Think on, for so much work; return the shot once there is one: the best, but for the bot's error."""
+        """Continue the search by an amount of work; return the shot once it is found, with the error of the bot."""
         aim = self._search.go_on(work)
         if aim is None:
             return None

@@ -1,6 +1,6 @@
-"""Artillery's rules: turns of aiming, flying and settling, until one tank is left.
+"""Rules of artillery: turns of aiming, flight and settling, until one tank is left.
 
-Gunner: how keys set a gun. A tap moves it a little, a key that is held moves it on, faster after a while.
+GunControls: how keys set a gun. A tap is one small step; a held key moves the gun, faster after a while.
 """
 
 import math
@@ -37,33 +37,33 @@ CONTROLS = (
 )
 
 TURN, POWER = math.radians(0.1), 0.001
-"""rad and share of full speed, by a tap"""
+"""rad, and fraction of full speed, of one tap"""
 SLOW, FAST = 1.0, 8.0
-"""how many times 5° or 5 % a second, at first and later"""
+"""multiples of `PER_SECOND`, before and after `LATER`"""
 LATER = 0.6
 """s"""
 PER_SECOND = math.radians(5.0), 0.05
 BRING = math.radians(90.0), 1.0
-"""rad/s and shares of full speed a second, by which a bot sets its gun"""
-LEAST = 0.02
-"""of full speed"""
+"""rad/s, and fraction of full speed per second, at which a bot sets its gun"""
+MIN_POWER = 0.02
+"""fraction of full speed"""
 
 
 class GunControls:
-    """Which keys are held, and for how long."""
+    """Held keys, and the time for which each has been held."""
 
     def __init__(self) -> None:
         self._held: dict[str, float] = {}
 
     def press(self, name: str, value: float) -> None:
-        """Take note of a key that goes down, or up."""
+        """Record a key press or release."""
         if value > 0.0:
             self._held[name] = 0.0
         else:
             self._held.pop(name, None)
 
     def touch(self, name: str, tank: Tank) -> None:
-        """Do what a tap does."""
+        """Apply one tap of a key."""
         match name:
             case "left" | "right":
                 set_gun(tank, TURN if name == "left" else -TURN, 0.0)
@@ -75,7 +75,7 @@ class GunControls:
                 tank.weapon = next(k for k in nexts if WEAPONS[k].cost <= tank.money)
 
     def hold(self, tank: Tank, time: float) -> None:
-        """Go on with what is held, for a time, s."""
+        """Move the gun by the held keys, for a time, s."""
         for name in self._held:
             self._held[name] += time
         turn, power = (self._way(more, less) for more, less in (("left", "right"), ("up", "down")))
@@ -90,7 +90,7 @@ class GunControls:
 
     @staticmethod
     def bring(tank: Tank, angle: float, power: float, time: float) -> bool:
-        """Bring a gun nearer to where it is to be, for a time, s; tell whether it is there."""
+        """Move a gun towards a setting, for a time, s; return whether it has reached it."""
         turn, more = angle - tank.angle, power - tank.power
         there = abs(turn) <= BRING[0] * time and abs(more) <= BRING[1] * time
         if there:
@@ -102,16 +102,16 @@ class GunControls:
 
 
 def set_gun(tank: Tank, turn: float, more: float) -> None:
-    """Turn a barrel, rad, and change its power, within what a gun can do."""
+    """Change angle, rad, and power of a gun within their limits."""
     tank.angle = min(max(tank.angle + turn, 0.0), math.pi)
-    tank.power = min(max(tank.power + more, LEAST), 1.0)
+    tank.power = min(max(tank.power + more, MIN_POWER), 1.0)
 
 
 HEIGHTS = 33
-"""of the ground, evenly from side to side, that gauges tell"""
+"""number of terrain heights in an observation, evenly spaced from side to side"""
 
 AIR = frozenset({"gravity", "wind", "linear_drag", "quadratic_drag"})
-"""Of the world, what decides how shells fly."""
+"""Parameters of the world on which the flight of shells depends."""
 
 TRACER_STEP = 0.03
 """s between two points of the tracer"""
@@ -121,25 +121,25 @@ TIME_ROUNDING = 1e-9
 """s"""
 
 Phase = Literal["begin", "aim", "fly", "settle"]
-"""Of a turn: the next player gets the gun, aims it; shells are in the air; ground and tanks come to rest."""
+"""Phases of a turn: the next player is chosen; the player aims; shells fly; terrain and tanks come to rest."""
 
 
 class ArtilleryRules:
-    """A game of artillery that is being played."""
+    """Rules and state of a game."""
 
     def __init__(self, scene: Scene, bodies: Bodies) -> None:
-        """Begin.
+        """Start a game.
 
         Raises:
-            UnfitError: the scene has no players, or no ground.
+            UnsuitableSceneError: the scene has no players, or no ground.
         """
         self.field = Battlefield(scene, bodies)
         self.artillery = self.field.artillery
         self.barrage = Projectiles(self.field)
         self.world = scene.world
-        """with the wind of the turn"""
+        """world with the wind of the present turn"""
         self.turn = 0
-        """counted from 1, of all players together"""
+        """number of the turn, from 1, counted over all players"""
         self.phase: Phase = "begin"
         self._gunner = GunControls()
         self._time, self._previous_time, self._since, self._number = 0.0, 0.0, 0.0, 0
@@ -149,47 +149,47 @@ class ArtilleryRules:
 
     @property
     def controls(self) -> tuple[Control, ...]:
-        """What a gunner can do."""
+        """Controls of the player."""
         return CONTROLS
 
     @property
     def score(self) -> int:
-        """Points of the first who is a person; where none is, of the best."""
+        """Points of the first player without a bot; if all have bots, the highest points."""
         tanks = self.field.tanks.every
         persons = [tank.points for tank in tanks if tank.player.bot is None]
         return persons[0] if persons else max(tank.points for tank in tanks)
 
     @property
     def game_over(self) -> str | None:
-        """Who has won."""
+        """Winner, or that it is a draw; None while the game runs."""
         return self._over
 
     @property
     def shooter(self) -> Tank:
-        """Whose turn it is."""
+        """Tank whose turn it is."""
         return self.field.tanks.every[self._number]
 
     @property
     def thinking(self) -> bool:
-        """Whether a bot has the gun, and does not know yet where to aim."""
+        """Whether a bot is searching for its shot."""
         return self._thought is not None and self._aim is None
 
     @property
     def shots(self) -> list[ArtilleryShot]:
-        """What all shots came to."""
+        """Results of all shots."""
         return self.barrage.shots
 
     @property
     def log(self) -> Sequence[tuple[float, str]]:
-        """What all shots came to, and when, s."""
+        """Time, s, and result of each shot."""
         return [(shot.time, f"{shot.shooter}, {shot.weapon}: {shot.told}") for shot in self.shots]
 
     def speed(self, tank: Tank) -> float:
-        """Return how fast a shell leaves a tank as it is set, m/s."""
+        """Return the muzzle speed at the present setting of a tank, m/s."""
         return tank.power * self.artillery.speed
 
     def on_input(self, control: str, value: float) -> Sequence[Action]:
-        """Turn the barrel, change the power or the weapon, or fire."""
+        """Set angle, power or weapon, or fire."""
         self._gunner.press(control, value)
         if self.phase != "aim" or self.shooter.player.bot is not None or value <= 0.0:
             return ()
@@ -201,7 +201,7 @@ class ArtilleryRules:
         return ()
 
     def on_step(self, info: StepInfo) -> Sequence[Action]:
-        """Go on with the turn: aim as long as keys are held, follow what flies, wait until all is still."""
+        """Advance the turn: move the gun by held keys, track shells, or wait until everything is at rest."""
         passed = info.time - self._time
         self._previous_time, self._time = self._time, info.time
         self._breathe(info.actions)
@@ -225,7 +225,7 @@ class ArtilleryRules:
                 return actions
 
     def display_lines(self) -> Sequence[tuple[str, str]]:
-        """Return who has what, how the gun is set, and what the last shot came to."""
+        """Return state of the tanks, setting of the gun, and result of the last shot."""
         told = []
         for tank in self.field.tanks.every:
             mark = "▸ " if tank is self.shooter and self._over is None else ""
@@ -244,7 +244,7 @@ class ArtilleryRules:
         return told
 
     def observation(self) -> Sequence[tuple[str, float]]:
-        """Return whose turn it is, the wind, every gun and what its tank has, the last shot, and the ground."""
+        """Return turn, wind, state of every tank and its gun, last impact, and terrain heights."""
         field, last = self.field, next((shot.place for shot in reversed(self.shots) if shot.place is not None), None)
         person = self.phase == "aim" and self.shooter.player.bot is None
         found = [("turn", float(self.turn)), ("shooter", self._number), ("may fire", person)]
@@ -319,7 +319,7 @@ class ArtilleryRules:
         return cues
 
     def _breathe(self, actions: Sequence[Action]) -> None:
-        """Go on in the air that a hand has made another; what flies through both has no exact flight."""
+        """Apply changes of air and gravity; shells in flight then have no exact solution."""
         for action in actions:
             key = action.path.removeprefix("world.") if isinstance(action, SetParameter) else ""
             if not isinstance(action, SetParameter) or key not in AIR:
@@ -330,7 +330,7 @@ class ArtilleryRules:
             self.barrage.disturb()
 
     def _begin_turn(self) -> list[Action]:
-        """Let the next who is alive have the gun, in a wind of the turn's own; or end the game."""
+        """Start the turn of the next tank, with a new wind; or end the game."""
         tanks, alive = self.field.tanks.every, self.field.tanks.alive
         if len(alive) < 2:
             return self._end(f"{alive[0].name} wins" if alive else "no tank is left: a draw")
@@ -359,7 +359,7 @@ class ArtilleryRules:
         return []
 
     def _set_gun(self, passed: float) -> list[Action]:
-        """Set the gun as long as keys are held; a bot thinks, then brings the gun there and fires."""
+        """Move the gun by held keys; a bot searches for a shot, moves the gun to it, and fires."""
         tank = self.shooter
         if tank.player.bot is None:
             self._gunner.hold(tank, passed)

@@ -50,7 +50,7 @@ class Landing:
         """Begin.
 
         Raises:
-            UnfitError: the scene has no ship, no pad or no engine.
+            UnsuitableSceneError: the scene has no ship, no pad or no engine.
         """
         self._thrusts = {
             thrust.name or default_name("thrust", k): thrust

@@ -55,7 +55,7 @@ class PinballBot:
         """Return what is pressed and let go now.
 
         Raises:
-            UnfitError: these are no rules of pinball.
+            UnsuitableSceneError: these are no rules of pinball.
         """
         if not isinstance(rules, Pinball):
             raise UnsuitableSceneError("this player only plays pinball")

@@ -97,7 +97,7 @@ class Playfield:
         """Read a scene.
 
         Raises:
-            UnfitError: it has no ball.
+            UnsuitableSceneError: it has no ball.
         """
         parts = scene.play.parts
         numbers = {name: k for k, name in enumerate(bodies.names)}
