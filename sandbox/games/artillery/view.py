@@ -82,12 +82,12 @@ AIM_REACH = 26.0
 
 def draw_tanks(view: DrawContext, gunnery: ArtilleryViewState, tints: dict[int, Colour]) -> None:
     """Draw all tanks that are in sight; `tints` are their colours by their bodies' numbers."""
-    frame = view.sight.frame
+    frame = view.snapshot.frame
     for gun in gunnery.guns:
         if gun.number >= len(frame.position) or not frame.present[gun.number]:
             continue
         x, y = view.camera.to_screen(frame.position[gun.number]).tolist()
-        width = max(gunnery.size[0] * view.camera.scale, MIN_TANK_SIZE * view.unit)
+        width = max(gunnery.size[0] * view.camera.scale, MIN_TANK_SIZE * view.ui_scale)
         if not (abs(x) < SDL_COORDINATE_LIMIT and abs(y) < SDL_COORDINATE_LIMIT and width < SDL_COORDINATE_LIMIT):
             continue
         height = width * gunnery.size[1] / gunnery.size[0]
@@ -122,7 +122,12 @@ class _Tank:
         muzzle = turret[0] + BARREL_WIDTH * width * way[0], turret[1] + BARREL_WIDTH * width * way[1]
         thick = max(0.10 * width, 2.0)
         draw_line(
-            view.surface, turret, muzzle, mix_colours(dark, BACKGROUND, 0.4), thick + 2.0 * view.unit, view.antialias
+            view.surface,
+            turret,
+            muzzle,
+            mix_colours(dark, BACKGROUND, 0.4),
+            thick + 2.0 * view.ui_scale,
+            view.antialias,
         )
         draw_line(view.surface, turret, muzzle, mix_colours(tint, (90, 94, 104), 0.5), thick, view.antialias)
         brake = turret[0] + 0.86 * BARREL_WIDTH * width * way[0], turret[1] + 0.86 * BARREL_WIDTH * width * way[1]
@@ -133,7 +138,7 @@ class _Tank:
         fill_polygon(view.surface, dome, mix_colours(tint, INK, 0.12), view.antialias)
         fill_polygon(view.surface, [self._place(x, y) for x, y in HULL], tint, view.antialias)
         draw_line(
-            view.surface, self._place(-0.40, 0.16), self._place(0.40, 0.16), light, 1.2 * view.unit, view.antialias
+            view.surface, self._place(-0.40, 0.16), self._place(0.40, 0.16), light, 1.2 * view.ui_scale, view.antialias
         )
         track = [
             self._place(x + 0.16 * math.cos(a), -0.24 + 0.26 * math.sin(a))
@@ -149,38 +154,40 @@ def _setting(view: DrawContext, gunnery: ArtilleryViewState, gun: GunView, at: P
     """Draw where the gun points, and how far its power goes: dots, and a bar below the tank."""
     turret = at[0], at[1] - 0.28 * width * gunnery.size[1] / gunnery.size[0]
     way = math.cos(gun.angle), -math.sin(gun.angle)
-    reach = max(AIM_REACH * view.camera.scale, 90.0 * view.unit)
-    first, count = BARREL_WIDTH * width + 6.0 * view.unit, 14
+    reach = max(AIM_REACH * view.camera.scale, 90.0 * view.ui_scale)
+    first, count = BARREL_WIDTH * width + 6.0 * view.ui_scale, 14
     for k in range(count):
         share = (k + 1) / count
         lit = share <= gun.power + 0.5 / count
         far = first + share * reach
         colour = mix_colours(YELLOW, ORANGE, share) if lit else (150, 150, 164)
-        size = (2.6 if lit else 1.4) * view.unit
+        size = (2.6 if lit else 1.4) * view.ui_scale
         draw_dot(view.surface, (turret[0] + far * way[0], turret[1] + far * way[1]), size, colour)
-    wide, high = 64.0 * view.unit, 7.0 * view.unit
+    wide, high = 64.0 * view.ui_scale, 7.0 * view.ui_scale
     box = pygame.Rect(round(at[0] - 0.5 * wide), round(at[1] + 0.42 * width), round(wide), round(high))
     pygame.draw.rect(view.surface, BACKGROUND, box.inflate(4, 4), border_radius=round(high))
     full = pygame.Rect(box.left, box.top, round(box.width * gun.power), box.height)
     pygame.draw.rect(view.surface, mix_colours(YELLOW, ORANGE, gun.power), full, border_radius=round(0.5 * high))
     told = f"{math.degrees(gun.angle):.1f}°   {100.0 * gun.power:.1f} %"
-    draw_text(view.surface, told, (box.centerx, box.bottom + 4 * view.unit), 12 * view.unit, INK, "midtop", bold=True)
+    draw_text(
+        view.surface, told, (box.centerx, box.bottom + 4 * view.ui_scale), 12 * view.ui_scale, INK, "midtop", bold=True
+    )
 
 
 def _label(view: DrawContext, gun: GunView, at: Pixel, tint: Colour) -> None:
     """Write a name, and draw what health is left under it."""
-    wide, high = 44.0 * view.unit, 4.0 * view.unit
+    wide, high = 44.0 * view.ui_scale, 4.0 * view.ui_scale
     box = pygame.Rect(round(at[0] - 0.5 * wide), round(at[1] - high), round(wide), round(high))
     if gun.health is not None:
         pygame.draw.rect(view.surface, BACKGROUND, box.inflate(3, 3), border_radius=3)
         colour = mix_colours(WARNING, GREEN, gun.health)
         pygame.draw.rect(view.surface, colour, pygame.Rect(box.topleft, (round(box.width * gun.health), box.height)))
-    size = 13.0 * view.unit
+    size = 13.0 * view.ui_scale
     name = mix_colours(tint, INK, 0.45)
     draw_text(
-        view.surface, gun.name, (at[0] + 1, box.top - 2 * view.unit + 1), size, BACKGROUND, "midbottom", bold=True
+        view.surface, gun.name, (at[0] + 1, box.top - 2 * view.ui_scale + 1), size, BACKGROUND, "midbottom", bold=True
     )
-    draw_text(view.surface, gun.name, (at[0], box.top - 2 * view.unit), size, name, "midbottom", bold=True)
+    draw_text(view.surface, gun.name, (at[0], box.top - 2 * view.ui_scale), size, name, "midbottom", bold=True)
 
 
 SKY_TONES: tuple[tuple[float, Colour], ...] = (
@@ -337,17 +344,17 @@ def draw_below(view: DrawContext, gunnery: ArtilleryViewState) -> None:
         _way(view, way, bool(gunnery.flying))
     if gunnery.tracer is not None:
         for x, y in view.camera.to_screen(gunnery.tracer[::4]).tolist():
-            draw_dot(view.surface, (x, y), 1.3 * view.unit, mix_colours(SKY, INK, 0.4))
+            draw_dot(view.surface, (x, y), 1.3 * view.ui_scale, mix_colours(SKY, INK, 0.4))
 
 
 def draw_above(view: DrawContext, gunnery: ArtilleryViewState) -> None:
     """Draw what lies in front of all: shells, blasts, and where the last shot came down."""
-    frame = view.sight.frame
+    frame = view.snapshot.frame
     for number in gunnery.flying:
         if number < len(frame.position) and frame.present[number]:
             x, y = view.camera.to_screen(frame.position[number]).tolist()
-            draw_glow(view.surface, (x, y), 7.0 * view.unit, (255, 190, 90), 90)
-            draw_dot(view.surface, (x, y), max(2.6 * view.unit, 2.0), (255, 246, 214))
+            draw_glow(view.surface, (x, y), 7.0 * view.ui_scale, (255, 190, 90), 90)
+            draw_dot(view.surface, (x, y), max(2.6 * view.ui_scale, 2.0), (255, 246, 214))
     for burst in gunnery.bursts:
         _burst(view, burst)
     if gunnery.landed is not None and not gunnery.flying:
@@ -365,7 +372,7 @@ def _way(view: DrawContext, way: FloatArray, flying: bool) -> None:
             continue  # a way that is over is dotted
         colour = mix_colours((70, 72, 104), SMOKE, share)
         (ax, ay), (bx, by) = places[k], places[k + 1]
-        draw_line(view.surface, (ax, ay), (bx, by), colour, (1.0 + 1.4 * share) * view.unit, view.antialias)
+        draw_line(view.surface, (ax, ay), (bx, by), colour, (1.0 + 1.4 * share) * view.ui_scale, view.antialias)
 
 
 def _clod(view: DrawContext, clod: FallingDirt) -> None:
@@ -383,7 +390,7 @@ def _clod(view: DrawContext, clod: FallingDirt) -> None:
     dirt = pygame.Rect(math.floor(left), math.floor(top), air.width, max(math.ceil(bottom) - math.floor(top), 1))
     dirt = dirt.clip(surface.get_rect())
     if dirt.width and dirt.height:
-        soil = soil_of(view.sight.scene)
+        soil = soil_of(view.snapshot.scene)
         surface.fill(mix_colours(soil, (0, 0, 0), 0.12), dirt)
         surface.fill(mix_colours(GRASS, soil, 0.4), pygame.Rect(dirt.left, dirt.top, dirt.width, min(2, dirt.height)))
 
@@ -406,35 +413,35 @@ def _landed(view: DrawContext, landed: tuple[tuple[float, float], tuple[float, f
     """Mark where the last shot came down, and, as a ring, where it would have exactly."""
     (x, y), (ex, ey) = view.camera.to_screen(np.asarray(landed)).tolist()
     if all(abs(each) < 1e4 for each in (x, y, ex, ey)):
-        size = 4.0 * view.unit
+        size = 4.0 * view.ui_scale
         for sign in (-1.0, 1.0):
-            draw_line(view.surface, (x - size, y - sign * size), (x + size, y + sign * size), INK, 1.6 * view.unit)
-        draw_dot(view.surface, (ex, ey), 7.0 * view.unit, YELLOW, 1.4 * view.unit)
+            draw_line(view.surface, (x - size, y - sign * size), (x + size, y + sign * size), INK, 1.6 * view.ui_scale)
+        draw_dot(view.surface, (ex, ey), 7.0 * view.ui_scale, YELLOW, 1.4 * view.ui_scale)
 
 
 def _back(view: DrawContext, middle: tuple[float, float], size: tuple[float, float]) -> None:
     """Darken what lies behind words."""
     box = pygame.Rect(0, 0, round(size[0]), round(size[1]))
     shade = pygame.Surface(box.size, pygame.SRCALPHA)
-    pygame.draw.rect(shade, (*BACKGROUND, 120), box, border_radius=round(6.0 * view.unit))
+    pygame.draw.rect(shade, (*BACKGROUND, 120), box, border_radius=round(6.0 * view.ui_scale))
     box.center = round(middle[0]), round(middle[1])
     view.surface.blit(shade, box)
 
 
 def _wind(view: DrawContext, wind: float) -> None:
     """Draw which way the wind blows, and how hard, at the left, below what is told of the run."""
-    size = 13.0 * view.unit
-    middle, top = 96.0 * view.unit, max(view.sight.below, 24.0 * view.unit) + 20.0 * view.unit
-    half = min(max(7.0 * abs(wind), 8.0), 84.0) * view.unit
+    size = 13.0 * view.ui_scale
+    middle, top = 96.0 * view.ui_scale, max(view.snapshot.below, 24.0 * view.ui_scale) + 20.0 * view.ui_scale
+    half = min(max(7.0 * abs(wind), 8.0), 84.0) * view.ui_scale
     told = f"wind {abs(wind):.1f} m/s" if wind else "no wind"
-    _back(view, (middle, top + 7.0 * view.unit), (172.0 * view.unit, 44.0 * view.unit))
-    draw_text(view.surface, told, (middle + 1, top + 9 * view.unit + 1), size, BACKGROUND, "midtop", bold=True)
-    draw_text(view.surface, told, (middle, top + 9 * view.unit), size, INK, "midtop", bold=True)
+    _back(view, (middle, top + 7.0 * view.ui_scale), (172.0 * view.ui_scale, 44.0 * view.ui_scale))
+    draw_text(view.surface, told, (middle + 1, top + 9 * view.ui_scale + 1), size, BACKGROUND, "midtop", bold=True)
+    draw_text(view.surface, told, (middle, top + 9 * view.ui_scale), size, INK, "midtop", bold=True)
     if wind:
         ends = (middle - half, top), (middle + half, top)
         begin, end = ends if wind > 0 else ends[::-1]
         draw_arrow(
-            view.surface, begin, end, mix_colours(SKY, INK, 0.35), 4.0 * view.unit, view.antialias, edge=BACKGROUND
+            view.surface, begin, end, mix_colours(SKY, INK, 0.35), 4.0 * view.ui_scale, view.antialias, edge=BACKGROUND
         )
 
 
@@ -443,17 +450,17 @@ class ArtilleryView:
 
     def background(self, ctx: DrawContext) -> bool:
         """Draw sky, terrain and static bodies."""
-        draw_land(ctx.surface, ctx.camera, ctx.sight.scene, ctx.unit, ctx.antialias)
+        draw_land(ctx.surface, ctx.camera, ctx.snapshot.scene, ctx.ui_scale, ctx.antialias)
         return True
 
     def below(self, ctx: DrawContext) -> None:
         """Draw falling dirt, paths of shells and the tracer."""
-        if isinstance(ctx.sight.game, ArtilleryViewState):
-            draw_below(ctx, ctx.sight.game)
+        if isinstance(ctx.snapshot.game, ArtilleryViewState):
+            draw_below(ctx, ctx.snapshot.game)
 
     def bodies(self, ctx: DrawContext) -> IntArray:
         """Draw the tanks."""
-        state = ctx.sight.game
+        state = ctx.snapshot.game
         if not isinstance(state, ArtilleryViewState):
             return np.empty(0, np.int64)
         tanks = [gun.number for gun in state.guns]
@@ -462,13 +469,13 @@ class ArtilleryView:
 
     def above(self, ctx: DrawContext) -> None:
         """Draw shells, explosions, and where the last shot landed."""
-        if isinstance(ctx.sight.game, ArtilleryViewState):
-            draw_above(ctx, ctx.sight.game)
+        if isinstance(ctx.snapshot.game, ArtilleryViewState):
+            draw_above(ctx, ctx.snapshot.game)
 
     def hud(self, ctx: DrawContext) -> None:
         """Draw the wind."""
-        if isinstance(ctx.sight.game, ArtilleryViewState) and ctx.sight.game.wind is not None:
-            _wind(ctx, ctx.sight.game.wind)
+        if isinstance(ctx.snapshot.game, ArtilleryViewState) and ctx.snapshot.game.wind is not None:
+            _wind(ctx, ctx.snapshot.game.wind)
 
 
 def _rgb(colour: ColourArray) -> Colour:

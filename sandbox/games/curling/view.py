@@ -17,14 +17,14 @@ PALE = 0.45
 
 def draw_stones(view: DrawContext, discs: CircleRenderer) -> None:
     """Draw the pucks in sight. What meets nothing only marks a place: it is a ring."""
-    bodies = view.sight.bodies
+    bodies = view.snapshot.bodies
     marks = np.asarray([element.collides == "none" for element in bodies.elements], np.bool_)[bodies.element]
     ring = marks[view.shown]
     centre, radius, colours = view.centre[~ring], view.radius[~ring], view.colours[~ring]
     stone = np.broadcast_to(np.asarray(GRANITE, np.uint8), colours.shape)
     discs.draw(view.surface, centre, radius, stone, view.style())
     discs.draw(view.surface, centre, TOP * radius, colours, view.style(1.0))
-    angle = view.sight.frame.angle[view.shown[~ring]]
+    angle = view.snapshot.frame.angle[view.shown[~ring]]
     for k in np.flatnonzero((radius >= SHORTEST_SPOKE) & (radius < 1e6) & np.isfinite(angle)).tolist():
         (x, y), reach = centre[k].tolist(), float(radius[k])
         dx, dy = HANDLE * reach * np.cos(angle[k]), -HANDLE * reach * np.sin(angle[k])
@@ -56,7 +56,7 @@ class CurlingView:
 
     def bodies(self, ctx: DrawContext) -> IntArray:
         """Draw the stones, if all bodies are round and larger than points."""
-        if ctx.has_points or not ctx.sight.bodies.round.all():
+        if ctx.has_points or not ctx.snapshot.bodies.round.all():
             return np.empty(0, np.int64)
         draw_stones(ctx, self._discs)
         return ctx.shown

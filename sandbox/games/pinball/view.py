@@ -96,7 +96,7 @@ class PinballView:
 
     def background(self, ctx: DrawContext) -> bool:
         """Draw the playfield."""
-        draw_playfield(ctx.surface, ctx.camera, ctx.sight.scene, ctx.unit, ctx.antialias)
+        draw_playfield(ctx.surface, ctx.camera, ctx.snapshot.scene, ctx.ui_scale, ctx.antialias)
         return True
 
     def below(self, ctx: DrawContext) -> None:

@@ -24,23 +24,23 @@ FLASH = 1.5
 def draw_boxes(view: DrawContext, polygons: PolygonRenderer) -> None:
     """Draw the box around each body."""
     some = view.first(MOST_BOXES)
-    lone = some.sight.bodies.round[some.shown]
+    lone = some.snapshot.bodies.round[some.shown]
     if not lone.all():
         for left, top, right, bottom in polygons.boxes(some)[~lone].tolist():
             if max(abs(left), abs(top), abs(right), abs(bottom)) < SDL_COORDINATE_LIMIT:
                 box = pygame.Rect(math.floor(left), math.floor(top), math.ceil(right - left), math.ceil(bottom - top))
-                pygame.draw.rect(view.surface, FAINT, box, max(1, round(view.unit)))
+                pygame.draw.rect(view.surface, FAINT, box, max(1, round(view.ui_scale)))
     for (x, y), radius in zip(some.centre[lone].tolist(), some.radius[lone].tolist(), strict=True):
         if 2.0 * radius < SDL_COORDINATE_LIMIT:
             side = math.ceil(2.0 * radius)
             box = pygame.Rect(math.floor(x - radius), math.floor(y - radius), side, side)
-            pygame.draw.rect(view.surface, FAINT, box, max(1, round(view.unit)))
+            pygame.draw.rect(view.surface, FAINT, box, max(1, round(view.ui_scale)))
 
 
 def draw_centres(view: DrawContext) -> None:
     """Draw each centre of mass as a quartered circle, or as a point where a body is small."""
     some = view.first(MOST_CENTRES)
-    size = 5.0 * view.unit
+    size = 5.0 * view.ui_scale
     mark = _quartered(size)
     half = mark.get_width() / 2.0
     quartered, dots = [], []
@@ -73,19 +73,19 @@ def _quartered(size: float) -> pygame.Surface:
 def draw_names(view: DrawContext, polygons: PolygonRenderer) -> None:
     """Write the names of bodies above them, as many as fit without covering one another."""
     taken: list[pygame.Rect] = []
-    size = 12 * view.unit
+    size = 12 * view.ui_scale
     some = view.first(4 * MOST_NAMES)
     area = view.surface.get_rect()
-    bodies = some.sight.bodies
+    bodies = some.snapshot.bodies
     lone = bodies.round[some.shown]
     tops = some.centre[:, 1] - some.radius if lone.all() else polygons.boxes(some)[:, 1]
     room = bodies.core[some.shown] * some.camera.scale
     rows = zip(some.shown.tolist(), some.centre.tolist(), tops.tolist(), room.tolist(), strict=True)
     for number, (x, y), top, radius in rows:
-        name = view.sight.bodies.names[number]
+        name = view.snapshot.bodies.names[number]
         name = name if len(name) <= 24 else name[:23] + "…"
         width, height = text_size(name, size)
-        above = top - 3.0 * view.unit
+        above = top - 3.0 * view.ui_scale
         if not (abs(x) < SDL_COORDINATE_LIMIT and abs(above) < SDL_COORDINATE_LIMIT):
             continue
         place = pygame.Rect(round(x - width / 2), round(above - height), width, height)
@@ -99,17 +99,20 @@ def draw_names(view: DrawContext, polygons: PolygonRenderer) -> None:
 
 def draw_verdicts(view: DrawContext) -> None:
     """Say of each body whether it overlaps something, so that it does not rest on colour alone."""
-    overlapping = view.sight.overlapping
+    overlapping = view.snapshot.overlapping
     assert overlapping is not None
     some = view.first(MOST_NAMES)
-    room = some.sight.bodies.core[some.shown] * some.camera.scale
+    room = some.snapshot.bodies.core[some.shown] * some.camera.scale
     for number, (x, y), radius in zip(some.shown.tolist(), some.centre.tolist(), room.tolist(), strict=True):
         touching = number < len(overlapping) and bool(overlapping[number])
-        word, size = "overlap" if touching else "clear", min(max(0.28 * radius, 11.0 * view.unit), 26.0 * view.unit)
+        word, size = (
+            "overlap" if touching else "clear",
+            min(max(0.28 * radius, 11.0 * view.ui_scale), 26.0 * view.ui_scale),
+        )
         place = y - 0.4 * radius  # above the mark of its centre and its name
         if text_size(word, size, bold=True)[0] > 1.6 * radius:
             place = y
-            word, size = "!", min(max(1.2 * radius, 9.0 * view.unit), 20.0 * view.unit)
+            word, size = "!", min(max(1.2 * radius, 9.0 * view.ui_scale), 20.0 * view.ui_scale)
             if not touching:
                 continue
         draw_text(view.surface, word, (x, place), size, INK, "center", bold=True)
@@ -117,14 +120,14 @@ def draw_verdicts(view: DrawContext) -> None:
 
 def draw_flashes(view: DrawContext) -> None:
     """Draw a ring that grows and fades about each contact that was missed a moment ago."""
-    for flash in view.sight.flashes[-MOST_FLASHES:]:
+    for flash in view.snapshot.flashes[-MOST_FLASHES:]:
         share = flash.age / FLASH
         with np.errstate(invalid="ignore", over="ignore"):
             x, y = view.camera.to_screen(np.asarray(flash.position)).tolist()
         if not (0.0 <= share < 1.0 and abs(x) < SDL_COORDINATE_LIMIT and abs(y) < SDL_COORDINATE_LIMIT):
             continue
-        radius = (8.0 + 40.0 * math.sqrt(share)) * view.unit
-        look = ShapeStyle(None, WARNING, 3.0 * view.unit, opacity=1.0 - share, antialias=view.antialias)
+        radius = (8.0 + 40.0 * math.sqrt(share)) * view.ui_scale
+        look = ShapeStyle(None, WARNING, 3.0 * view.ui_scale, opacity=1.0 - share, antialias=view.antialias)
         side = 2 * math.ceil(radius + 1.0)
         within = pygame.Rect(round(x) - side // 2, round(y) - side // 2, side, side)
         draw_sdf(view.surface, disc_distance(x, y, radius), look, within)
@@ -132,33 +135,35 @@ def draw_flashes(view: DrawContext) -> None:
 
 def draw_picked(view: DrawContext, discs: CircleRenderer, polygons: PolygonRenderer) -> None:
     """Draw a bright line around the picked body."""
-    number, frame = view.sight.picked, view.sight.frame
-    if number is None or not 0 <= number < min(len(frame.position), len(view.sight.bodies)):
+    number, frame = view.snapshot.picked, view.snapshot.frame
+    if number is None or not 0 <= number < min(len(frame.position), len(view.snapshot.bodies)):
         return
-    radius = float(view.sight.bodies.radius[number])
+    radius = float(view.snapshot.bodies.radius[number])
     with np.errstate(invalid="ignore", over="ignore"):
         place = frame.position[number : number + 1]
         if not frame.present[number] or not view.camera.in_sight(place, radius)[0]:
             return
-    (x, y), size = view.camera.to_screen(place)[0].tolist(), max(radius * view.camera.scale, 2.0) + 4.0 * view.unit
+    (x, y), size = view.camera.to_screen(place)[0].tolist(), max(radius * view.camera.scale, 2.0) + 4.0 * view.ui_scale
     angle = float(frame.angle[number])
-    if not view.sight.bodies.round[number] and size > 8.0 * view.unit and math.isfinite(angle):
+    if not view.snapshot.bodies.round[number] and size > 8.0 * view.ui_scale and math.isfinite(angle):
         spot = ScreenPose(x, y, angle, view.camera.scale)
-        polygons.ring(view.surface, view.sight.bodies, number, spot, 4.0 * view.unit, YELLOW, 2.0 * view.unit)
+        polygons.ring(
+            view.surface, view.snapshot.bodies, number, spot, 4.0 * view.ui_scale, YELLOW, 2.0 * view.ui_scale
+        )
         return
-    discs.ring(view.surface, (x, y), size, YELLOW, CircleStyle(2.0 * view.unit, antialias=view.antialias))
+    discs.ring(view.surface, (x, y), size, YELLOW, CircleStyle(2.0 * view.ui_scale, antialias=view.antialias))
 
 
 def draw_pull(view: DrawContext, discs: CircleRenderer) -> None:
     """Draw the spring between the held place and the hand."""
-    if view.sight.pull is None:
+    if view.snapshot.pull is None:
         return
     with np.errstate(invalid="ignore", over="ignore"):
-        (ax, ay), (bx, by) = view.camera.to_screen(np.asarray(view.sight.pull)).tolist()
+        (ax, ay), (bx, by) = view.camera.to_screen(np.asarray(view.snapshot.pull)).tolist()
         length = math.hypot(bx - ax, by - ay)
     if not length < SDL_COORDINATE_LIMIT or not (abs(ax) < SDL_COORDINATE_LIMIT and abs(ay) < SDL_COORDINATE_LIMIT):
         return
-    unit = view.unit
+    unit = view.ui_scale
     if length > 30.0 * unit:
         ux, uy = (bx - ax) / length, (by - ay) / length
         turns = 12

@@ -1,4 +1,4 @@
-"""View: one picture in the making: where, of what, and which bodies are in it."""
+"""DrawContext: the surface, camera and moment of a picture, and the bodies in it."""
 
 from dataclasses import dataclass, replace
 
@@ -14,16 +14,16 @@ from sandbox.window.render.palette import ColourArray
 
 @dataclass(frozen=True, eq=False)
 class DrawContext:
-    """What the parts of a picture share."""
+    """Target, camera, moment and style of a picture, passed to all functions that draw a part of it."""
 
     surface: pygame.Surface
     camera: Camera
-    sight: Snapshot
-    unit: float
+    snapshot: Snapshot
+    ui_scale: float
     """px, of a line that is one pixel wide on a 1080p display"""
     antialias: bool
     shown: IntArray
-    """(K,) numbers of the bodies that are present and in sight"""
+    """(K,) indices of the bodies that are present and in the picture"""
     centre: FloatArray
     """(K, 2) px"""
     radius: FloatArray
@@ -36,7 +36,7 @@ class DrawContext:
     """whether the smallest bodies are drawn as points, below everything else"""
 
     def first(self, most: int) -> "DrawContext":
-        """Return this view with no more than so many bodies, spread over all of them."""
+        """Return this context with at most `most` bodies, spread evenly over all of them."""
         if len(self.shown) <= most:
             return self
         kept = np.linspace(0, len(self.shown) - 1, most).astype(np.intp)
@@ -49,11 +49,11 @@ class DrawContext:
         )
 
     def inside(self, pixels: FloatArray, margin: float = 0.0) -> IntArray:
-        """Return which places (K, 2) px lie in the picture or no more than a margin outside it; none that is nan."""
+        """Return the indices of the places (K, 2) px in the picture or at most a margin outside it; nan is outside."""
         x, y = pixels[:, 0], pixels[:, 1]
         width, height = self.camera.size
         return np.flatnonzero((x >= -margin) & (x < width + margin) & (y >= -margin) & (y < height + margin))
 
     def style(self, line: float = 1.5) -> CircleStyle:
-        """Return the style of discs with a rim of so many px at unit 1."""
-        return CircleStyle(line * self.unit, antialias=self.antialias)
+        """Return the style of discs with a rim of `line` px at a UI scale of 1."""
+        return CircleStyle(line * self.ui_scale, antialias=self.antialias)

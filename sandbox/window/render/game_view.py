@@ -14,7 +14,7 @@ from sandbox.window.render.draw_context import DrawContext
 
 
 class GameView(Protocol):
-    """Draws the parts of a picture that are special to a game. `ctx.sight.game` is `Rules.view_state`, or None."""
+    """Draws the parts of a picture that are special to a game. `ctx.snapshot.game` is `Rules.view_state`, or None."""
 
     def background(self, ctx: DrawContext) -> bool:
         """Draw ground and static bodies on an empty surface; return False to have them drawn as in other scenes.

@@ -86,8 +86,8 @@ class JointSegments:
 
 def joint_segments(view: DrawContext) -> JointSegments:
     """Return the joints that are whole and whose bodies are present, those about the picture."""
-    links, frame = view.sight.links, view.sight.frame
-    count = min(len(frame.position), len(view.sight.bodies))
+    links, frame = view.snapshot.links, view.snapshot.frame
+    count = min(len(frame.position), len(view.snapshot.bodies))
     if not len(links):
         return JointSegments(links, np.empty((0, 4)))
     there = frame.present[:count]
@@ -99,7 +99,7 @@ def joint_segments(view: DrawContext) -> JointSegments:
         a, b = links.ends(frame.position, frame.angle)
         ends = np.hstack((view.camera.to_screen(a), view.camera.to_screen(b)))
         width, height = view.camera.size
-        margin = 100.0 * view.unit
+        margin = 100.0 * view.ui_scale
         low, high = np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])
         sound &= (high > -margin).all(axis=1) & (low < (width + margin, height + margin)).all(axis=1)
         sound &= np.isfinite(ends).all(axis=1)
@@ -111,7 +111,7 @@ def draw_joints(view: DrawContext, joints: JointSegments, discs: CircleRenderer)
     fast = joints.of(LinkKind.ROD, LinkKind.SLIDE, LinkKind.SPRING)
     nails = fast.ends[fast.links.a < 0, :2]
     tint = np.broadcast_to(np.asarray(SURFACE, np.uint8), (len(nails), 3))
-    size = np.full(len(nails), (NAIL if len(nails) <= SOLID_RODS else 0.5 * NAIL) * view.unit)
+    size = np.full(len(nails), (NAIL if len(nails) <= SOLID_RODS else 0.5 * NAIL) * view.ui_scale)
     discs.draw(view.surface, nails, size, tint, CircleStyle(0.0, antialias=view.antialias))
     _solid_rods(view, joints.of(LinkKind.ROD), ROD, 2.4)
     _solid_rods(view, joints.of(LinkKind.SLIDE), STRING, 1.4)
@@ -143,12 +143,12 @@ def _solid_rods(view: DrawContext, rods: JointSegments, colour: tuple[int, int, 
         draw_thin_lines(view.surface, rods.ends, packed_pixels(tones, view.surface), view.antialias)
         return
     for ax, ay, bx, by in rods.ends.tolist():
-        draw_line(view.surface, (ax, ay), (bx, by), colour, width * view.unit, view.antialias)
+        draw_line(view.surface, (ax, ay), (bx, by), colour, width * view.ui_scale, view.antialias)
 
 
 def _coil(view: DrawContext, a: Pixel, b: Pixel, rest: float, colour: tuple[int, int, int]) -> None:
     """Draw a spring: the wire of its zigzag is as long as ever, so its pitch widens and its width shrinks."""
-    length, unit = float(np.hypot(b[0] - a[0], b[1] - a[1])), view.unit
+    length, unit = float(np.hypot(b[0] - a[0], b[1] - a[1])), view.ui_scale
     reach = 4.0 * max(view.camera.size)
     far = max(map(abs, (*a, *b))) > reach
     if not SHORTEST * unit <= length or far:
@@ -235,9 +235,9 @@ def draw_joint_symbols(view: DrawContext, joints: JointSegments, discs: CircleRe
 
 
 def _dots(view: DrawContext, places: FloatArray, size: float, colour: Colour, discs: CircleRenderer) -> None:
-    kept = view.inside(places, 10.0 * view.unit)
+    kept = view.inside(places, 10.0 * view.ui_scale)
     for wide, tone in ((size + 1.2, BACKGROUND), (size, colour)):
-        radius = np.full(len(kept), wide * view.unit)
+        radius = np.full(len(kept), wide * view.ui_scale)
         tint = np.broadcast_to(np.asarray(tone, np.uint8), (len(kept), 3))
         discs.draw(view.surface, places[kept], radius, tint, CircleStyle(0.0, antialias=view.antialias))
 
@@ -245,29 +245,29 @@ def _dots(view: DrawContext, places: FloatArray, size: float, colour: Colour, di
 def _rings(view: DrawContext, places: FloatArray, colour: Colour, discs: CircleRenderer) -> None:
     """Draw what lets turn: a ring on a dark ground."""
     _dots(view, places, 5.0, BACKGROUND, discs)
-    kept = view.inside(places, 10.0 * view.unit)
-    radius = np.full(len(kept), 5.0 * view.unit)
+    kept = view.inside(places, 10.0 * view.ui_scale)
+    radius = np.full(len(kept), 5.0 * view.ui_scale)
     tint = np.broadcast_to(np.asarray(colour, np.uint8), (len(kept), 3))
-    style = CircleStyle(1.8 * view.unit, hollow=True, antialias=view.antialias)
+    style = CircleStyle(1.8 * view.ui_scale, hollow=True, antialias=view.antialias)
     discs.draw(view.surface, places[kept], radius, tint, style)
 
 
 def _rod_symbols(view: DrawContext, rods: JointSegments) -> None:
     for ax, ay, bx, by in rods.ends.tolist():
-        draw_line(view.surface, (ax, ay), (bx, by), INK, 1.4 * view.unit, view.antialias)
+        draw_line(view.surface, (ax, ay), (bx, by), INK, 1.4 * view.ui_scale, view.antialias)
 
 
 def _gears(view: DrawContext, gears: JointSegments) -> None:
     rows = _from_bodies(view, gears)
-    draw_dashes(view.surface, [((ax, ay), (bx, by)) for ax, ay, bx, by in rows.tolist()], INK, 2.0 * view.unit)
+    draw_dashes(view.surface, [((ax, ay), (bx, by)) for ax, ay, bx, by in rows.tolist()], INK, 2.0 * view.ui_scale)
     places = rows[:, 2:]
     for x, y in places[view.inside(places, 2.0 * LARGE_SYMBOL)][:MAX_DIALS].tolist():
-        arc(view, (x, y), 0.7 * SMALL_SYMBOL * view.unit, 0.0, math.tau, INK, 1.2)
+        arc(view, (x, y), 0.7 * SMALL_SYMBOL * view.ui_scale, 0.0, math.tau, INK, 1.2)
 
 
 def _slides(view: DrawContext, slides: JointSegments) -> None:
     """Draw strings dashed; a tick at each end lies across, both bright where the string is taut."""
-    scale, unit = view.camera.scale, view.unit
+    scale, unit = view.camera.scale, view.ui_scale
     rows = zip(slides.ends.tolist(), slides.links.figures.tolist(), slides.length.tolist(), strict=True)
     for (ax, ay, bx, by), (least, most, _), length in rows:
         taut = length >= 0.998 * most * scale or length <= 1.002 * least * scale
@@ -281,13 +281,13 @@ def _slides(view: DrawContext, slides: JointSegments) -> None:
 
 def _grooves(view: DrawContext, grooves: JointSegments) -> None:
     """Draw tracks: two lines and their round ends."""
-    links, frame = grooves.links, view.sight.frame
+    links, frame = grooves.links, view.snapshot.frame
     angle = np.where(links.a < 0, 0.0, frame.angle[links.a])
     place = np.where((links.a < 0)[:, None], 0.0, frame.position[links.a])
     (x, y, _), cos, sin = links.figures.T, np.cos(angle), np.sin(angle)
     with np.errstate(invalid="ignore", over="ignore"):
         far = view.camera.to_screen(place + np.column_stack((cos * x - sin * y, sin * x + cos * y)))
-    half = 5.0 * view.unit
+    half = 5.0 * view.ui_scale
     for (ax, ay, *_), (bx, by) in zip(grooves.ends.tolist(), far.tolist(), strict=True):
         length = math.hypot(bx - ax, by - ay)
         if not 0.0 < length < SDL_COORDINATE_LIMIT or max(abs(ax), abs(ay)) > SDL_COORDINATE_LIMIT:
@@ -296,7 +296,7 @@ def _grooves(view: DrawContext, grooves: JointSegments) -> None:
         for side in (-half, half):
             shift = -uy * side, ux * side
             start, end = (ax + shift[0], ay + shift[1]), (bx + shift[0], by + shift[1])
-            draw_line(view.surface, start, end, SKY, 1.4 * view.unit, view.antialias)
+            draw_line(view.surface, start, end, SKY, 1.4 * view.ui_scale, view.antialias)
         turned = math.atan2(-uy, ux)
         arc(view, (ax, ay), half, turned + 0.5 * math.pi, math.pi, SKY, 1.4)
         arc(view, (bx, by), half, turned - 0.5 * math.pi, math.pi, SKY, 1.4)
@@ -336,13 +336,13 @@ def _motors(view: DrawContext, motors: JointSegments) -> None:
         arc(view, (x, y), 1.15 * size, first, span, INK, 2.2)
         last = first + span
         neck, tip = spot((x, y), 1.15 * size, last - way * 0.15), spot((x, y), 1.15 * size, last + way * 0.35)
-        draw_arrow(view.surface, neck, tip, INK, 2.2 * view.unit, view.antialias, BACKGROUND)
+        draw_arrow(view.surface, neck, tip, INK, 2.2 * view.ui_scale, view.antialias, BACKGROUND)
 
 
 def _dials(view: DrawContext, joints: JointSegments) -> list[AngleDial]:
     """Return where joints that turn are drawn: where a pivot holds the same two, else in the second body's middle."""
-    frame, bodies, links = view.sight.frame, view.sight.bodies, joints.links
-    every, pivots = view.sight.links, {}
+    frame, bodies, links = view.snapshot.frame, view.snapshot.bodies, joints.links
+    every, pivots = view.snapshot.links, {}
     for k in np.flatnonzero(every.kind == LinkKind.PIVOT).tolist():
         pivots[int(every.a[k]), int(every.b[k])] = k
     _, hinge = every.ends(frame.position, frame.angle)
@@ -356,15 +356,17 @@ def _dials(view: DrawContext, joints: JointSegments) -> list[AngleDial]:
         turned = float(frame.angle[b]) - base
         if max(abs(x), abs(y)) < SDL_COORDINATE_LIMIT and math.isfinite(base) and math.isfinite(turned):
             room = float(bodies.core[b]) * view.camera.scale
-            size = min(max(0.6 * room, SMALL_SYMBOL * view.unit), LARGE_SYMBOL * view.unit)
+            size = min(max(0.6 * room, SMALL_SYMBOL * view.ui_scale), LARGE_SYMBOL * view.ui_scale)
             found.append(AngleDial((x, y), size, base, turned, (figures[0], figures[1], figures[2])))
     return found
 
 
 def _from_bodies(view: DrawContext, joints: JointSegments) -> FloatArray:
     """Return the centres of the bodies that joints hold, (J, 4) px; of the world, the place where it is held."""
-    first = np.where((joints.links.a < 0)[:, None], 0.0, view.sight.frame.position[joints.links.a])
-    ends = np.hstack((view.camera.to_screen(first), view.camera.to_screen(view.sight.frame.position[joints.links.b])))
+    first = np.where((joints.links.a < 0)[:, None], 0.0, view.snapshot.frame.position[joints.links.a])
+    ends = np.hstack(
+        (view.camera.to_screen(first), view.camera.to_screen(view.snapshot.frame.position[joints.links.b]))
+    )
     ends[:, :2] = np.where((joints.links.a < 0)[:, None], joints.ends[:, :2], ends[:, :2])
     return np.asarray(ends[np.isfinite(ends).all(axis=1)])
 
@@ -396,7 +398,7 @@ def _trace(
     view: DrawContext, distance: SignedDistance, box: tuple[float, float, float, float], colour: Colour, width: float
 ) -> None:
     """Draw a line where a distance is 0, which is in a box (left, top, right, bottom), px."""
-    half, halo = 0.5 * width * view.unit, 1.2 * view.unit
+    half, halo = 0.5 * width * view.ui_scale, 1.2 * view.ui_scale
     margin = half + halo + 1.0
     wide = box[0] - margin, box[1] - margin, box[2] + margin, box[3] + margin
     within = clipped_box(wide, view.surface.get_clip())
@@ -417,10 +419,10 @@ BEYOND = 1.0
 
 def draw_hinges(view: DrawContext, discs: CircleRenderer) -> None:
     """Draw the hinges on which drives turn bodies, where those are in sight."""
-    bodies = view.sight.bodies
+    bodies = view.snapshot.bodies
     for mount, number, place in _seen(view):
         if not isinstance(mount.drive, PlungerDrive):
-            size = min(PIN * view.unit, SHARE * float(bodies.core[number]) * view.camera.scale)
+            size = min(PIN * view.ui_scale, SHARE * float(bodies.core[number]) * view.camera.scale)
             for share, colour in ((1.0, BACKGROUND), (0.55, mix_colours(BACKGROUND, INK, 0.85))):
                 tint = np.asarray([colour], np.uint8)
                 style = CircleStyle(0.0, antialias=view.antialias)
@@ -429,7 +431,7 @@ def draw_hinges(view: DrawContext, discs: CircleRenderer) -> None:
 
 def draw_stops(view: DrawContext) -> None:
     """Draw the stops of drives, the way between them, and on it a hand where the body is."""
-    frame = view.sight.frame
+    frame = view.snapshot.frame
     for mount, number, place in _seen(view):
         level = 0.0 if frame.drives is None else float(frame.drives[mount.number, 0])
         colour = mix_colours(SKY, ORANGE, level)
@@ -439,8 +441,8 @@ def draw_stops(view: DrawContext) -> None:
             continue
         (x, y), (rest, end) = mount.hinge, drive.stops
         own = math.atan2(-y, -x) if x or y else 0.0  # of the arm from the hinge to the body's centre
-        length = (math.hypot(x, y) + BEYOND * float(view.sight.bodies.core[number])) * view.camera.scale
-        size = min(max(length, SMALL_PIN * view.unit), LARGE_PIN * view.unit)
+        length = (math.hypot(x, y) + BEYOND * float(view.snapshot.bodies.core[number])) * view.camera.scale
+        size = min(max(length, SMALL_PIN * view.ui_scale), LARGE_PIN * view.ui_scale)
         arc(view, place, size, own + rest, max(min(end - rest, math.tau), -math.tau), INK, 1.4)
         for stop in (rest, end):
             path(view, [spot(place, 0.92 * size, own + stop), spot(place, 1.08 * size, own + stop)], INK, 1.4)
@@ -456,7 +458,7 @@ def _slide(
     ux, uy = drive.direction[0] / length, -drive.direction[1] / length  # the screen's y is down
     far = drive.travel * view.camera.scale
     pulled = math.dist(now, home) * view.camera.scale
-    tick = 5.0 * view.unit
+    tick = 5.0 * view.ui_scale
     back = place[0] - far * ux, place[1] - far * uy
     path(view, [place, back], INK, 1.6)
     for (x, y), tone in ((place, INK), (back, INK), ((place[0] - pulled * ux, place[1] - pulled * uy), colour)):
@@ -465,9 +467,9 @@ def _slide(
 
 def _seen(view: DrawContext) -> Iterator[tuple[Mount, int, Pixel]]:
     """Yield how each driven body in sight is held, its number, and where its hinge or its stop is, px."""
-    names = view.sight.bodies.names
+    names = view.snapshot.bodies.names
     numbers = {names[number]: number for number in view.shown.tolist()}
-    for name, mount in mounts(view.sight.scene).items():
+    for name, mount in mounts(view.snapshot.scene).items():
         if name in numbers:
             drive = mount.drive
             seat = mount.home if isinstance(drive, PlungerDrive) else drive.pivot

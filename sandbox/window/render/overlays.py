@@ -41,8 +41,8 @@ MIN_FLAME = 2.0
 
 def draw_flames(view: DrawContext) -> None:
     """Draw all flames, which bodies cover where they begin."""
-    frame, camera = view.sight.frame, view.camera
-    for number, place, way in view.sight.flames:
+    frame, camera = view.snapshot.frame, view.camera
+    for number, place, way in view.snapshot.flames:
         if number >= len(frame.position) or not frame.present[number]:
             continue
         angle, (x, y) = float(frame.angle[number]), frame.position[number].tolist()
@@ -78,11 +78,11 @@ MAX_DRAWN_POINTS = 200_000
 
 def draw_trails(view: DrawContext, points: ParticleRenderer) -> None:
     """Draw the last places of the bodies in sight, the older the fainter."""
-    if not len(view.shown) or sum(len(piece) for piece in view.sight.trails) < 2:
+    if not len(view.shown) or sum(len(piece) for piece in view.snapshot.trails) < 2:
         return
     crowd = len(view.shown) > LINES
     some = view.first(MAX_DRAWN_POINTS // 16)
-    places = _joined(view.sight.trails, some.shown, max(MAX_DRAWN_POINTS // len(some.shown), 1) if crowd else PLACES)
+    places = _joined(view.snapshot.trails, some.shown, max(MAX_DRAWN_POINTS // len(some.shown), 1) if crowd else PLACES)
     shades = np.linspace(0.15, 0.85, SHADES)
     tints = [np.rint(np.asarray(BACKGROUND) * (1 - s) + some.colours * s).astype(np.uint8) for s in shades]
     bounds = np.linspace(0, len(places), SHADES + 1).astype(int).tolist()
@@ -153,29 +153,29 @@ class OverlayRenderer:
 
     def below(self, view: DrawContext) -> None:
         """Draw what bodies cover."""
-        if "trails" in view.sight.overlays:
+        if "trails" in view.snapshot.overlays:
             draw_trails(view, self._points)
-        if "shapes" in view.sight.overlays and view.sight.flames:
+        if "shapes" in view.snapshot.overlays and view.snapshot.flames:
             draw_flames(view)
-        if "shapes" in view.sight.overlays and len(view.sight.links):
+        if "shapes" in view.snapshot.overlays and len(view.snapshot.links):
             draw_joints(view, joint_segments(view), self._discs)
 
     def above(self, view: DrawContext) -> None:
         """Draw what covers bodies."""
-        overlays, drives = view.sight.overlays, view.sight.scene.drives
+        overlays, drives = view.snapshot.overlays, view.snapshot.scene.drives
         if drives and "shapes" in overlays:
             draw_hinges(view, self._discs)
-        if view.sight.ghost is not None:
+        if view.snapshot.ghost is not None:
             self._ghost(view)
         if "bounds" in overlays:
             draw_boxes(view, self._polygons)
-        if "joints" in overlays and len(view.sight.links):
+        if "joints" in overlays and len(view.snapshot.links):
             draw_joint_symbols(view, joint_segments(view), self._discs)
         if drives and "joints" in overlays:
             draw_stops(view)
         if "centres" in overlays:
             draw_centres(view)
-        if view.sight.overlapping is not None:
+        if view.snapshot.overlapping is not None:
             draw_verdicts(view)
         if "velocities" in overlays:
             draw_velocities(view)
@@ -191,13 +191,13 @@ class OverlayRenderer:
 
     def _ghost(self, view: DrawContext) -> None:
         """Draw the bodies of the other engine hollow, and join each to its own where they are apart."""
-        ghost, frame, camera = view.sight.ghost, view.sight.frame, view.camera
+        ghost, frame, camera = view.snapshot.ghost, view.snapshot.frame, view.camera
         assert ghost is not None
-        count = min(len(ghost.position), len(frame.position), len(view.sight.bodies))
-        place, radius = ghost.position[:count], view.sight.bodies.radius[:count]
+        count = min(len(ghost.position), len(frame.position), len(view.snapshot.bodies))
+        place, radius = ghost.position[:count], view.snapshot.bodies.radius[:count]
         with np.errstate(invalid="ignore", over="ignore"):
             there = camera.in_sight(place, radius) & ghost.present[:count]
-        seen = np.flatnonzero(there & ~view.sight.bodies.fixed[:count])  # what never moves never differs
+        seen = np.flatnonzero(there & ~view.snapshot.bodies.fixed[:count])  # what never moves never differs
         if len(seen) > MAX_GHOSTS:
             seen = seen[np.linspace(0, len(seen) - 1, MAX_GHOSTS).astype(np.intp)]
         if not len(seen):
@@ -206,13 +206,15 @@ class OverlayRenderer:
             centre, own = camera.to_screen(place[seen]), camera.to_screen(frame.position[seen])
         tint = np.broadcast_to(np.asarray(INK, np.uint8), (len(seen), 3))
         style = view.style(1.5)._replace(hollow=True)
-        size, bodies = radius[seen] * camera.scale, view.sight.bodies
-        lone = bodies.round[seen] | (size < 2.0 * view.unit)
-        self._discs.draw(view.surface, centre[lone], np.maximum(size[lone], 2.0 * view.unit), tint[lone], style)
+        size, bodies = radius[seen] * camera.scale, view.snapshot.bodies
+        lone = bodies.round[seen] | (size < 2.0 * view.ui_scale)
+        self._discs.draw(view.surface, centre[lone], np.maximum(size[lone], 2.0 * view.ui_scale), tint[lone], style)
         who, angle = seen[~lone], ghost.angle[seen[~lone]]
         self._polygons.draw(view.surface, bodies, who, centre[~lone], angle, camera.scale, tint[~lone], style)
         with np.errstate(invalid="ignore", over="ignore"):
             gap = np.hypot(*(centre - own).T)
-        for k in np.flatnonzero((gap > APART * view.unit) & frame.present[seen]).tolist():
+        for k in np.flatnonzero((gap > APART * view.ui_scale) & frame.present[seen]).tolist():
             (ax, ay), (bx, by) = own[k].tolist(), centre[k].tolist()
-            draw_line(view.surface, (ax, ay), (bx, by), mix_colours(FAINT, INK, 0.3), 1.0 * view.unit, view.antialias)
+            draw_line(
+                view.surface, (ax, ay), (bx, by), mix_colours(FAINT, INK, 0.3), 1.0 * view.ui_scale, view.antialias
+            )

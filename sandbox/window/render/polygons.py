@@ -108,9 +108,9 @@ class PolygonRenderer:
 
     def boxes(self, view: DrawContext) -> FloatArray:
         """Return left, top, right and bottom of the boxes around the bodies of a view, (K, 4) px."""
-        angle = view.sight.frame.angle[view.shown]
+        angle = view.snapshot.frame.angle[view.shown]
         angle = np.where(np.isfinite(angle), angle, 0.0)
-        return self.anatomy(view.sight.bodies).boxes(view.shown, view.centre, angle, view.camera.scale)
+        return self.anatomy(view.snapshot.bodies).boxes(view.shown, view.centre, angle, view.camera.scale)
 
 
 def _in_one_pass(

@@ -126,8 +126,8 @@ class Renderer:
         view = DrawContext(
             surface=surface,
             camera=camera,
-            sight=sight,
-            unit=unit,
+            snapshot=sight,
+            ui_scale=unit,
             antialias=antialias,
             shown=shown,
             centre=camera.to_screen(sight.frame.position[shown]),
@@ -158,15 +158,15 @@ class Renderer:
 
     def _draw_layers(self, view: DrawContext, which: IntArray | None) -> None:
         """Draw the bodies that are no points, from the ground up, with what is fixed on each layer above it."""
-        scene = view.sight.scene
+        scene = view.snapshot.scene
         if len(scene.layers) == 1:
             self._draw_bodies(view, which)
             return
         which = np.arange(len(view.shown)) if which is None else which
-        layer = layers_among(view.sight.frame, view.shown[which])
+        layer = layers_among(view.snapshot.frame, view.shown[which])
         for k in range(len(scene.layers)):
             if k > 0:
-                self._decks.draw(view.surface, view.camera, scene, k, view.unit, view.antialias)
+                self._decks.draw(view.surface, view.camera, scene, k, view.ui_scale, view.antialias)
             self._draw_bodies(view, which[layer == k])
 
     def _draw_bodies(self, view: DrawContext, which: IntArray | None) -> None:
@@ -174,7 +174,7 @@ class Renderer:
         centre, radius, colours, shown = view.centre, view.radius, view.colours, view.shown
         if which is not None:
             centre, radius, colours, shown = centre[which], radius[which], colours[which], shown[which]
-        bodies, frame = view.sight.bodies, view.sight.frame
+        bodies, frame = view.snapshot.bodies, view.snapshot.frame
         turning, lone = self._turning[shown], bodies.round[shown]
         if lone.all():
             self._discs.draw(view.surface, centre, radius, colours, view.style())
@@ -282,8 +282,8 @@ def _background_context(
     return DrawContext(
         surface=surface,
         camera=camera,
-        sight=sight,
-        unit=unit,
+        snapshot=sight,
+        ui_scale=unit,
         antialias=antialias,
         shown=np.empty(0, np.int64),
         centre=np.empty((0, 2)),

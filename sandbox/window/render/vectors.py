@@ -30,7 +30,7 @@ def contact_points(view: DrawContext) -> tuple[FloatArray, FloatArray]:
 
     Where a contact's bodies are unknown, or nowhere, its row is taken at its word.
     """
-    contacts, position, bodies = view.sight.contacts, view.sight.frame.position, view.sight.bodies
+    contacts, position, bodies = view.snapshot.contacts, view.snapshot.frame.position, view.snapshot.bodies
     count = min(len(position), len(bodies))
     first, second = contacts.pair[:, 0], contacts.pair[:, 1]
     known = (first >= 0) & (first < count)
@@ -56,8 +56,8 @@ def contact_points(view: DrawContext) -> tuple[FloatArray, FloatArray]:
 
 def _round(view: DrawContext, normal: FloatArray, rows: "np.ndarray[tuple[int], np.dtype[np.intp]]") -> None:
     """Turn the normals of contacts with walls and posts, which change as a ball rolls around them."""
-    fixed, position = view.sight.scene.fixed, view.sight.frame.position
-    for row, (number, thing) in zip(rows.tolist(), view.sight.contacts.pair[rows].tolist(), strict=True):
+    fixed, position = view.snapshot.scene.fixed, view.snapshot.frame.position
+    for row, (number, thing) in zip(rows.tolist(), view.snapshot.contacts.pair[rows].tolist(), strict=True):
         if -1 - thing >= len(fixed):
             continue
         solid, centre = fixed[-1 - thing], position[number]
@@ -74,8 +74,8 @@ def _solid(
     view: DrawContext, place: FloatArray, normal: FloatArray, rows: "np.ndarray[tuple[int], np.dtype[np.intp]]"
 ) -> None:
     """Find anew where bodies touch of which one is no lone disc: in the middle of where they are nearest."""
-    bodies, frame, fixed = view.sight.bodies, view.sight.frame, view.sight.scene.fixed
-    for row, (number, other) in zip(rows.tolist(), view.sight.contacts.pair[rows].tolist(), strict=True):
+    bodies, frame, fixed = view.snapshot.bodies, view.snapshot.frame, view.snapshot.scene.fixed
+    for row, (number, other) in zip(rows.tolist(), view.snapshot.contacts.pair[rows].tolist(), strict=True):
         if not np.isfinite(frame.position[number]).all() or not math.isfinite(float(frame.angle[number])):
             continue
         own = hulls_of(bodies, frame, number)
@@ -142,13 +142,13 @@ def draw_velocities(view: DrawContext) -> None:
     some = view.first(MAX_ARROWS)
     longest = max(min(view.camera.size) / 3.0, 1.0)
     with np.errstate(invalid="ignore", over="ignore"):
-        way = view.camera.vectors_to_screen(view.sight.frame.velocity[some.shown] * SPAN)
+        way = view.camera.vectors_to_screen(view.snapshot.frame.velocity[some.shown] * SPAN)
         length = np.hypot(way[:, 0], way[:, 1])
         way = way * np.minimum(1.0, longest / np.maximum(length, 1e-300))[:, None]
-    for k in np.flatnonzero((length > 2.0 * view.unit) & np.isfinite(length)).tolist():
+    for k in np.flatnonzero((length > 2.0 * view.ui_scale) & np.isfinite(length)).tolist():
         (x, y), (dx, dy) = some.centre[k].tolist(), way[k].tolist()
-        edge = BACKGROUND if len(some.shown) <= ARROW_CROWD and length[k] > 16.0 * view.unit else None
-        draw_arrow(view.surface, (x, y), (x + dx, y + dy), ORANGE, 2.0 * view.unit, view.antialias, edge)
+        edge = BACKGROUND if len(some.shown) <= ARROW_CROWD and length[k] > 16.0 * view.ui_scale else None
+        draw_arrow(view.surface, (x, y), (x + dx, y + dy), ORANGE, 2.0 * view.ui_scale, view.antialias, edge)
 
 
 def _in_sight(view: DrawContext, most: int) -> tuple[IntArray, FloatArray, FloatArray]:
@@ -156,7 +156,7 @@ def _in_sight(view: DrawContext, most: int) -> tuple[IntArray, FloatArray, Float
     place, normal = contact_points(view)
     with np.errstate(invalid="ignore", over="ignore"):
         pixels = view.camera.to_screen(place)
-    seen = view.inside(pixels, 20.0 * view.unit)
+    seen = view.inside(pixels, 20.0 * view.ui_scale)
     if len(seen) > most:
         seen = seen[np.linspace(0, len(seen) - 1, most).astype(np.intp)]
     with np.errstate(over="ignore"):  # a recorded normal may have any length
@@ -169,11 +169,11 @@ def draw_contacts(view: DrawContext, discs: CircleRenderer) -> None:
     if not len(seen):
         return
     crowded = len(seen) > ARROW_CROWD
-    reach = (0.5 if crowded else 1.0) * NORMAL * view.unit
+    reach = (0.5 if crowded else 1.0) * NORMAL * view.ui_scale
     for (x, y), (nx, ny) in zip(place.tolist(), normal.tolist(), strict=True):
-        draw_line(view.surface, (x, y), (x + nx * reach, y + ny * reach), INK, 1.0 * view.unit, view.antialias)
+        draw_line(view.surface, (x, y), (x + nx * reach, y + ny * reach), INK, 1.0 * view.ui_scale, view.antialias)
     tint = np.broadcast_to(np.asarray(ORANGE, np.uint8), (len(seen), 3))
-    size = np.full(len(seen), (1.8 if crowded else 3.0) * view.unit)
+    size = np.full(len(seen), (1.8 if crowded else 3.0) * view.ui_scale)
     discs.draw(view.surface, place, size, tint, CircleStyle(0.0, antialias=view.antialias))
 
 
@@ -184,36 +184,36 @@ def draw_impulses(view: DrawContext) -> None:
     that, or there is no gravity, it is that one which has.
     """
     seen, place, normal = _in_sight(view, 4 * MAX_ARROWS)
-    if not len(seen) or not view.sight.seconds > 0.0:
+    if not len(seen) or not view.snapshot.seconds > 0.0:
         return
-    contacts, gravity = view.sight.contacts, math.hypot(*view.sight.scene.world.gravity)
+    contacts, gravity = view.snapshot.contacts, math.hypot(*view.snapshot.scene.world.gravity)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        force = np.hypot(*contacts.impulse[seen].T) / view.sight.seconds
+        force = np.hypot(*contacts.impulse[seen].T) / view.snapshot.seconds
         force[~np.isfinite(force)] = 0.0
         share = force / max(float(force.max()), 1e-300)
         weights = (
             force / (_lighter(view, contacts.pair[seen]) * gravity) if gravity > 0.0 else np.full_like(force, np.inf)
         )
-        length = np.minimum(WEIGHT * float(np.max(weights)), LONGEST_ARROW) * share * view.unit
+        length = np.minimum(WEIGHT * float(np.max(weights)), LONGEST_ARROW) * share * view.ui_scale
     drawn = np.flatnonzero(length > 1.0)
     drawn = drawn[np.argsort(force[drawn], kind="stable")][-MAX_ARROWS:]  # the strongest last: they are looked for
     for k in drawn.tolist():
         (x, y), (nx, ny), half = place[k].tolist(), normal[k].tolist(), float(length[k]) / 2.0
         ends = (x - nx * half, y - ny * half), (x + nx * half, y + ny * half)
-        strength = min(2.0 * half / (LONGEST_ARROW * view.unit), 1.0)
-        width = (1.0 + 2.6 * strength) * view.unit
+        strength = min(2.0 * half / (LONGEST_ARROW * view.ui_scale), 1.0)
+        width = (1.0 + 2.6 * strength) * view.ui_scale
         draw_line(view.surface, *ends, HEAT[int(32.0 * strength)], width, view.antialias)
         if len(drawn) <= LABELS:
-            text, (right, down) = f"{float(force[k]):.3g} N", (10.0 * view.unit, 12.0 * view.unit)
+            text, (right, down) = f"{float(force[k]):.3g} N", (10.0 * view.ui_scale, 12.0 * view.ui_scale)
             draw_text(
-                view.surface, text, (x + right + 1, y + down + 1), 12 * view.unit, BACKGROUND, "midleft", mono=True
+                view.surface, text, (x + right + 1, y + down + 1), 12 * view.ui_scale, BACKGROUND, "midleft", mono=True
             )
-            draw_text(view.surface, text, (x + right, y + down), 12 * view.unit, INK, "midleft", mono=True)
+            draw_text(view.surface, text, (x + right, y + down), 12 * view.ui_scale, INK, "midleft", mono=True)
 
 
 def _lighter(view: DrawContext, pair: IntArray) -> FloatArray:
     """Return the mass of the lighter of two that can move, kg, (K,)."""
-    bodies = view.sight.bodies
+    bodies = view.snapshot.bodies
     mass = np.append(np.where(bodies.fixed, np.inf, bodies.mass), np.inf)  # the last stands for all fixed things
     sides = np.where((pair >= 0) & (pair < len(bodies)), pair, len(bodies))
     lighter = np.min(mass[sides], axis=1, initial=np.inf)

@@ -60,7 +60,7 @@ def draw_paths(view: DrawContext, aim: CueAim, colours: ColourArray) -> None:
 
 def _faded(view: DrawContext, colour: Colour, share: float) -> Colour:
     """Return a colour of which so much is seen, on what is below."""
-    scene = view.sight.scene
+    scene = view.snapshot.scene
     return mix_colours(BACKGROUND if scene.play.area is None else felt_of(scene).bed, colour, share)
 
 
@@ -70,12 +70,12 @@ def _way(view: DrawContext, points: FloatArray, colour: Colour, width: float) ->
     steps = np.hypot(*np.diff(points, axis=0).T)
     bright = np.maximum(0.5 ** (np.cumsum(steps) / FADE), FAINTEST).tolist()
     for (a, b), share in zip(pairwise(pixels), bright, strict=True):
-        draw_line(view.surface, a, b, _faded(view, colour, share), width * view.unit, view.antialias)
+        draw_line(view.surface, a, b, _faded(view, colour, share), width * view.ui_scale, view.antialias)
 
 
 def _end(view: DrawContext, points: FloatArray, aim: CueAim, falls: bool, colour: Colour) -> None:
     """Draw where a ball comes to rest, or that it falls."""
-    radius = float(view.sight.bodies.radius[aim.ball])
+    radius = float(view.snapshot.bodies.radius[aim.ball])
     tint = colour if falls else _faded(view, colour, 0.45)
     _ring(view, points[-1], (0.55 if falls else 1.0) * radius, tint, 2.2 if falls else 1.2)
 
@@ -84,17 +84,17 @@ def _ring(view: DrawContext, at: FloatArray, radius: float, colour: Colour, line
     (x, y), size = view.camera.to_screen(at).tolist(), radius * view.camera.scale
     side = math.ceil(size) + 3
     within = pygame.Rect(math.floor(x) - side, math.floor(y) - side, 2 * side + 1, 2 * side + 1)
-    look = ShapeStyle(None, colour, line * view.unit, opacity, antialias=view.antialias)
+    look = ShapeStyle(None, colour, line * view.ui_scale, opacity, antialias=view.antialias)
     draw_sdf(view.surface, disc_distance(x, y, size), look, within)
 
 
 def draw_aim(view: DrawContext, aim: CueAim) -> None:
     """Draw what lies above the balls: the ghost of the cue ball, what was called, the hand or the cue."""
-    radius = float(view.sight.bodies.radius[aim.ball])
+    radius = float(view.snapshot.bodies.radius[aim.ball])
     if aim.called is not None:
         _ring(view, np.asarray(aim.called[0]), aim.called[1] + 0.25 * radius, YELLOW, 2.5)
     if aim.nominated is not None:
-        _ring(view, view.sight.frame.position[aim.nominated], 1.35 * radius, YELLOW, 2.0)
+        _ring(view, view.snapshot.frame.position[aim.nominated], 1.35 * radius, YELLOW, 2.0)
     if aim.carried:
         _ring(view, np.asarray(aim.place), 1.5 * radius, WARNING if aim.refused else SKY, 2.0)
         return
@@ -110,7 +110,7 @@ def _straight(view: DrawContext, aim: CueAim) -> None:
     x, y = aim.place
     ends = np.asarray([(x, y), (x + 10.0 * math.cos(aim.angle), y + 10.0 * math.sin(aim.angle))])
     a, b = view.camera.to_screen(ends).tolist()
-    draw_line(view.surface, a, b, ORANGE, 1.2 * view.unit, view.antialias)
+    draw_line(view.surface, a, b, ORANGE, 1.2 * view.ui_scale, view.antialias)
 
 
 def _cue(view: DrawContext, aim: CueAim, radius: float) -> None:
@@ -137,7 +137,7 @@ def _cue(view: DrawContext, aim: CueAim, radius: float) -> None:
     scale = view.camera.scale * size
     for (first, last, wide, colour), wider in zip(PARTS, ends, strict=True):
         a, b = view.camera.to_screen(np.asarray([at(first, 0.0), at(last, 0.0)])).tolist()
-        thin, thick = (max(half * scale, 0.8 * view.unit) for half in (wide, wider))
+        thin, thick = (max(half * scale, 0.8 * view.ui_scale) for half in (wide, wider))
         _taper(view, a, b, (thin, thick), colour)
         if thin > 2.0:
             _taper(view, a, b, (0.3 * thin, 0.3 * thick), mix_colours(colour, INK, 0.12))

@@ -206,7 +206,7 @@ class BallRenderer:
 
     def draw(self, view: DrawContext) -> None:
         """Draw those that are in sight; who lies in a pocket is not seen."""
-        bodies, frame = view.sight.bodies, view.sight.frame
+        bodies, frame = view.snapshot.bodies, view.snapshot.frame
         self._know(view)
         self._rolling.go_on(frame)
         sunk = self._sunk(view)
@@ -226,7 +226,7 @@ class BallRenderer:
             self._ball(view, number, (x, y), size, bool(moving[number]) or depth > 0.0, 1.0 - depth)
 
     def _know(self, view: DrawContext) -> None:
-        bodies = view.sight.bodies
+        bodies = view.snapshot.bodies
         if self._known is bodies:
             return
         if self._known is None or self._known.names != bodies.names[: len(self._known.names)]:
@@ -234,7 +234,7 @@ class BallRenderer:
         self._known = bodies
         self._sprites.clear()
         struck = {name for name in STRUCK if name != "yellow" or "white" in bodies.names}
-        if view.sight.scene.play.game is None:  # a study of spin: all of it is to be seen
+        if view.snapshot.scene.play.game is None:  # a study of spin: all of it is to be seen
             struck = set(bodies.names)
         colours = dict(zip(view.shown.tolist(), view.colours.tolist(), strict=True))
         self._coats = tuple(
@@ -246,7 +246,7 @@ class BallRenderer:
 
     def _sunk(self, view: DrawContext) -> dict[int, float]:
         """Return how far balls have sunk that lie in a pocket, from 0 to 1."""
-        frame, scene = view.sight.frame, view.sight.scene
+        frame, scene = view.snapshot.frame, view.snapshot.scene
         found: dict[int, float] = {}
         for hole in scene.pockets:
             within = (frame.position == np.asarray(hole.position)).all(axis=1) & frame.present

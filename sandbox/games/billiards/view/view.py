@@ -18,25 +18,25 @@ class BilliardsView:
 
     def background(self, ctx: DrawContext) -> bool:
         """Draw the table; a surface without a table is drawn as the ground of other scenes."""
-        scene = ctx.sight.scene
+        scene = ctx.snapshot.scene
         if scene.play.area is None:
             return False
-        draw_table(ctx.surface, ctx.camera, scene, scene.play.area, ctx.unit, ctx.antialias)
+        draw_table(ctx.surface, ctx.camera, scene, scene.play.area, ctx.ui_scale, ctx.antialias)
         return True
 
     def below(self, ctx: DrawContext) -> None:
         """Draw the predicted paths."""
-        if isinstance(ctx.sight.game, CueAim):
-            draw_paths(ctx, ctx.sight.game, ctx.body_colours)
+        if isinstance(ctx.snapshot.game, CueAim):
+            draw_paths(ctx, ctx.snapshot.game, ctx.body_colours)
 
     def bodies(self, ctx: DrawContext) -> IntArray:
         """Draw the balls, if they are larger than points."""
-        if ctx.sight.scene.surface is None or ctx.has_points:
+        if ctx.snapshot.scene.surface is None or ctx.has_points:
             return np.empty(0, np.int64)
         self._balls.draw(ctx)
         return ctx.shown
 
     def above(self, ctx: DrawContext) -> None:
         """Draw the cue."""
-        if isinstance(ctx.sight.game, CueAim):
-            draw_aim(ctx, ctx.sight.game)
+        if isinstance(ctx.snapshot.game, CueAim):
+            draw_aim(ctx, ctx.snapshot.game)
