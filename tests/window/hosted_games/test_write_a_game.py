@@ -68,7 +68,7 @@ def test_game_is_played_in_the_window(keepy: ModuleType, tmp_path: Path) -> None
     file = tmp_path / "keepy.toml"
     file.write_text(keepy.SCENE, encoding="utf-8")
     state = AppState()
-    state.take(file)
+    state.open_other(file)
     window = App(state, size=(640, 480), folder=tmp_path, say=lambda _: None)
     try:
         live = window.app_state.view
