@@ -1,4 +1,4 @@
-"""Marks: centres, names, boxes, the picked body, the hand that pulls, missed contacts, words on contact."""
+"""Overlays that mark single bodies: centres, names, boxes, the picked body, mouse spring, missed contacts."""
 
 import math
 from functools import lru_cache

@@ -1,4 +1,4 @@
-"""Discs: many balls at once, from sprites that are made when first needed and kept."""
+"""Antialiased discs and rings, blitted from sprites that are cached."""
 
 import math
 from typing import NamedTuple

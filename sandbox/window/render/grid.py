@@ -1,4 +1,4 @@
-"""Grid: faint lines at round distances, and a bar that tells how long one of them is."""
+"""Grid lines at round distances, and the scale bar that gives the length of one of them."""
 
 import math
 

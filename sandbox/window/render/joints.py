@@ -1,11 +1,7 @@
-"""Joints: those that are part of what one sees, rods, strings and springs, as thin lines below the bodies.
+"""Joints and drives: rods, strings and springs below the bodies, and the symbols of the joints overlay above them.
 
-A spring's colour tells how far it is stretched: blue is short, grey at rest, orange long. Many of them, as those of a
-cloth, are plain lines.
-
-Fittings: the overlay of joints, each kind in its own way: where it holds, how far it lets go, what it drives.
-
-Drives: the hinges of what they turn, and in the overlay of joints, how far they let their bodies go.
+A spring's colour shows its strain: blue is short, grey at rest, orange long. Many springs, as of a cloth, are plain
+lines.
 """
 
 import math

@@ -1,14 +1,7 @@
-"""Stencil: bodies of convex pieces into pixels in one pass, compiled where it can be; antialiased by their distance.
+"""Rasterisers of particles, polygons and thin lines, compiled where numba is installed.
 
-Blend: colours between two, as surfaces of four bytes a pixel hold them, compiled where it can be.
-
-Scatter: particles into pixels in one pass, and their fading in another, compiled where it can be.
-
-Spans: the part of a row of pixels that lies in a piece, compiled where it can be.
-
-A piece's `room` is (V, 5 or more): x and y of each corner, px, then normal and offset of the side behind it.
-
-Wires: thin antialiased lines into pixels in one pass, thousands a picture, compiled where it can be.
+The workspace `room` of a piece is (V, 9): x and y of each corner, px, then normal and offset of the side behind it;
+in the first row of a piece also the inner and outer span of the current row of pixels.
 """
 
 import math

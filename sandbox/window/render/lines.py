@@ -1,7 +1,4 @@
-"""Strokes: lines and arrows of any length, cut to the picture before SDL, which counts in 32 bits, sees them.
-
-Threads: many thin lines at once, in one compiled pass where numba is there, else by pygame.
-"""
+"""Lines, dashes, arrows and polygons, clipped to the picture before they reach SDL, and many thin lines in one pass."""
 
 import math
 from collections.abc import Iterable

@@ -1,9 +1,4 @@
-"""Overlays: everything that is drawn about bodies besides their shapes, each part when it is asked for.
-
-Flames: the thrusts that fire, each as a flame within a flame.
-
-Trails: where bodies have been, fading with age; for a crowd as points.
-"""
+"""Overlays in their order: what bodies cover (trails, flames, joints) and what covers bodies (annotations, vectors)."""
 
 import math
 from itertools import pairwise

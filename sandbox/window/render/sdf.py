@@ -1,4 +1,4 @@
-"""Shade: shapes given by their signed distance, with antialiased edges, as sprites or straight onto a picture.
+"""Shapes given by their signed distance, painted with antialiased edges, as sprites or straight onto a surface.
 
 A distance is in pixels, negative inside; pixel (i, j) is sampled at its middle (i + ½, j + ½).
 """

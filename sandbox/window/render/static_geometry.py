@@ -1,11 +1,4 @@
-"""StaticColliders: planes, walls, posts and the world's bounds, which change with the camera alone.
-
-Decks: what is on other layers than the ground, drawn above the bodies there, and see-through.
-
-Markings: what a scene has painted on the ground, which changes with the camera alone.
-
-Zones: faint tinted areas beneath everything that moves, with a thin outline.
-"""
+"""Static geometry: planes, walls, posts, bounds, markings, zones and raised layers; it changes with the camera only."""
 
 import math
 from itertools import pairwise

@@ -1,7 +1,4 @@
-"""Text: words on a surface, in DejaVu Sans where it is installed, rendered once and kept.
-
-Plates: translucent backings that keep words readable over any picture, and lines fitted to a width.
-"""
+"""Text in DejaVu Sans if installed, rendered once and cached; translucent boxes behind it; text fitted to a width."""
 
 import math
 from collections.abc import Sequence

@@ -1,7 +1,4 @@
-"""Arrows: velocities, contacts with their normals, and impulses as mean forces.
-
-Touches: where contacts are now. A contact's row tells where it began, and its bodies have moved on since.
-"""
+"""Contacts, and velocities and forces as arrows."""
 
 import math
 from itertools import pairwise
