@@ -99,12 +99,11 @@ def interfering(r: random.Random) -> Timed:
 
 
 def play(running: SwitchableSimulation | Session, told: Timed, steps: int = STEPS) -> None:
-    act = running.act if isinstance(running, Session) else running.apply
     for k in range(steps):
         for when, action in told:
             if when == k:
                 try:
-                    act(action)
+                    running.apply(action)
                 except ActionError:  # of who is gone
                     continue
         running.advance() if isinstance(running, Session) else running.step()
@@ -165,9 +164,9 @@ def test_table_is_seen_again_as_it_was(seed: int) -> None:
     r = random.Random(seed)
     session = Session(from_document(table(r)))
     play(session, interfering(r))
-    there = session.relay.state_hash()
+    there = session.simulation.state_hash()
     for step in (10, 25, STEPS):
         assert all(0.0 < share <= 1.0 for share in session.seek(step))
-    assert session.relay.state_hash() == there
+    assert session.simulation.state_hash() == there
     recording = session.recording()
     assert rerun(recording, audit=False).info["state_hash"] == recording.state_hash == there

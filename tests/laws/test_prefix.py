@@ -90,7 +90,7 @@ def test_session_of_spawned_balls_and_boxes_replays_to_its_own_state(engine, tmp
     for k in range(6):
         x = 0.77 * k - 2.0
         single = Ball(position=(x, 1.0), radius=0.2) if k % 2 else Box(position=(x, 1.0), size=(0.5, 0.3))
-        session.act(Spawn(time=0.0, **{single.__class__.__name__.lower(): single}))
+        session.apply(Spawn(time=0.0, **{single.__class__.__name__.lower(): single}))
         session.advance(16)
     session.advance(2500)
     assert session.time > 25.0

@@ -89,7 +89,7 @@ def played(engine: str, plan: Played, scene: Scene = SCENE) -> Session:
                 pass
         if session.ended is None:
             try:
-                session.act(action)
+                session.apply(action)
             except ActionError as error:
                 assert str(error)
     session.advance(5)
@@ -113,7 +113,7 @@ def test_session_replays_to_the_same_state_through_json(engine: str, plan: Playe
     if recording.state_hash is not None:
         assert found.info["state_hash"] == recording.state_hash
     assert tuple(found.names.tolist()) == session.bodies.names
-    assert set(np.flatnonzero(~np.isnan(found.retired_time)).tolist()) == set(session.relay.retired)
+    assert set(np.flatnonzero(~np.isnan(found.retired_time)).tolist()) == set(session.simulation.retired)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -155,12 +155,12 @@ def test_session_that_was_just_started_replays(engine: str) -> None:
     recording = session.recording()
     assert recording.duration == 0.0
     assert rerun(recording).info["state_hash"] == recording.state_hash
-    session.act(Impulse(time=0.0, body="a", impulse=(1.0, 0.0)))
+    session.apply(Impulse(time=0.0, body="a", impulse=(1.0, 0.0)))
     recording = session.recording()
     found = rerun(recording)
     assert found.info["state_hash"] == recording.state_hash
     assert found.velocity[-1, 0, 0] == 4.0
-    session.act(SetParameter(time=0.0, path="world.gravity", value=[0.0, 1.0]))
+    session.apply(SetParameter(time=0.0, path="world.gravity", value=[0.0, 1.0]))
     recording = session.recording()
     found = rerun(recording)
     assert (found.status, found.reason) == ("ok", None)
@@ -171,7 +171,7 @@ def test_session_that_was_just_started_replays(engine: str) -> None:
 def test_what_is_done_at_the_very_end_is_in_the_last_frame(engine: str) -> None:
     session = Session(SCENE, engine)
     session.advance(10)
-    session.act(Move(time=0.0, body="a", position=(-5.0, 9.0), velocity=(0.0, 0.0)))
+    session.apply(Move(time=0.0, body="a", position=(-5.0, 9.0), velocity=(0.0, 0.0)))
     recording = session.recording()
     found = rerun(recording)
     assert found.info["state_hash"] == recording.state_hash
@@ -182,7 +182,7 @@ def test_what_is_done_at_the_very_end_is_in_the_last_frame(engine: str) -> None:
 def test_action_that_another_engine_cannot_do_ends_its_replay_with_the_reason() -> None:
     session = Session(SCENE, "reference")
     session.advance(10)
-    session.act(Switch(time=0.0, settings={"detection": "swept"}))
+    session.apply(Switch(time=0.0, settings={"detection": "swept"}))
     session.advance(10)
     found = rerun(session.recording(), "exact")
     assert found.status == "failed"

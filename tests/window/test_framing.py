@@ -16,7 +16,7 @@ from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 from sandbox.window.camera import Camera
 from sandbox.window.hit_test import overlapping_bodies, pick_body
-from sandbox.window.playback.history import MAX_TRAIL_POINTS, TRAIL_LENGTH, Trails
+from sandbox.window.playback.history import MAX_TRAIL_BODIES, TRAIL_LENGTH, Trails
 from sandbox.window.view_bounds import predict_bounds, view_bounds
 
 SHIPPED = [each.name for each in shipped()]
@@ -240,24 +240,24 @@ def test_trails_are_the_last_places_of_those_who_are_there() -> None:
     assert trails.pieces() == ()
     scene = scene_of(ball("a", 0, 0), ball("b", 5, 0))
     for k in range(TRAIL_LENGTH + 50):
-        trails.keep(frame_of(scene, float(k)))
+        trails.add(frame_of(scene, float(k)))
     (piece,) = trails.pieces()
     assert piece.shape == (TRAIL_LENGTH, 2, 2)
-    trails.keep(frame_of(scene_of(ball("a", 0, 0), ball("b", 5, 0), ball("c", 9, 0)), 1e3))
+    trails.add(frame_of(scene_of(ball("a", 0, 0), ball("b", 5, 0), ball("c", 9, 0)), 1e3))
     assert [piece.shape for piece in trails.pieces()] == [(TRAIL_LENGTH - 1, 2, 2), (1, 3, 2)]
-    trails.keep(frame_of(scene, 10.0))  # back in time
+    trails.add(frame_of(scene, 10.0))  # back in time
     assert [piece.shape for piece in trails.pieces()] == [(1, 2, 2)]
-    trails.keep(frame_of(scene_of(ball("a", 1, 0), ball("b", 5, 0)), 10.0))  # the same time again
+    trails.add(frame_of(scene_of(ball("a", 1, 0), ball("b", 5, 0)), 10.0))  # the same time again
     assert [piece.tolist() for piece in trails.pieces()] == [[[[1.0, 0.0], [5.0, 0.0]]]]
     frame = frame_of(scene, 11.0)
-    trails.keep(Frame(11.0, frame.position, frame.velocity, frame.angle, frame.angular_velocity, np.zeros(2, np.bool_)))
+    trails.add(Frame(11.0, frame.position, frame.velocity, frame.angle, frame.angular_velocity, np.zeros(2, np.bool_)))
     assert np.isnan(trails.pieces()[0][-1]).all()
 
 
 def test_of_too_many_bodies_none_leaves_a_trail() -> None:
-    trails, many = Trails(), np.zeros((MAX_TRAIL_POINTS + 1, 2))
-    one = np.zeros(MAX_TRAIL_POINTS + 1)
-    trails.keep(Frame(0.0, many, many, one, one, np.ones(MAX_TRAIL_POINTS + 1, np.bool_)))
+    trails, many = Trails(), np.zeros((MAX_TRAIL_BODIES + 1, 2))
+    one = np.zeros(MAX_TRAIL_BODIES + 1)
+    trails.add(Frame(0.0, many, many, one, one, np.ones(MAX_TRAIL_BODIES + 1, np.bool_)))
     assert trails.pieces() == ()
 
 

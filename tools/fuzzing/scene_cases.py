@@ -307,13 +307,13 @@ def _played(scene: Scene, acts: tuple[Action, ...], steps: int, engine: str | No
 def _session(scene: Scene, acts: tuple[Action, ...], steps: int, engine: str) -> Session:
     rules = rules_of(scene)
     session = Session(scene, engine, game=None if rules is None else GameSession(rules))
-    session.relay.patience = 2.0
+    session.simulation.patience = 2.0
     due, began = list(acts), time.process_time()
     controls = () if rules is None else rules.controls
     for step in range(steps):
         if due and session.ended is None:
             try:
-                session.act(due.pop(0))
+                session.apply(due.pop(0))
             except ActionError as error:
                 check_error(error)
         if session.game is not None and controls and session.ended is None:

@@ -1,107 +1,113 @@
-"""Script: all that is done in a session, in order, and how far it has been done.
-
-Scenery: a run's scene at any time, with the walls that were given another course and what was made solid or not.
-"""
+"""The actions of a session, with the position up to which they are applied, and the scene as they change it."""
 
 from bisect import bisect_right
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from sandbox.action import Action, Pull, Reshape, Switch, Toggle
 from sandbox.engines.switching import SwitchableSimulation
 from sandbox.scene.scene import Scene
 
-ROUNDING = 1e-9
-"""Shares of a step by which an action may be late."""
+TIME_ROUNDING = 1e-9
+"""fraction of a step by which the time of an action may exceed the present one: sums of dt are rounded"""
 
 
 class ActionLog:
-    """The actions of a session. What lies ahead was done before the session went back, and is done again."""
+    """The actions of a session in order of time. After a seek backwards those later than now are repeated."""
 
     def __init__(self, actions: tuple[Action, ...] = ()) -> None:
         self._actions = list(actions)
         self.done = 0
-        """how many have been done"""
+        """how many have been applied"""
 
     @property
-    def so_far(self) -> tuple[Action, ...]:
-        """What was done up to now."""
+    def past(self) -> tuple[Action, ...]:
+        """The actions up to now."""
         return tuple(self._actions[: self.done])
 
     @property
-    def whole(self) -> tuple[Action, ...]:
-        """What was done, also later than now."""
+    def all(self) -> tuple[Action, ...]:
+        """All actions, also those later than now."""
         return tuple(self._actions)
 
     @property
-    def ahead(self) -> bool:
-        """Whether more was done than up to now."""
+    def has_future(self) -> bool:
+        """Whether there are actions later than now."""
         return self.done < len(self._actions)
 
-    def cut(self, place: int) -> None:
-        """Forget the actions from a place in the order on."""
-        del self._actions[place:]
-        self.done = min(self.done, place)
+    def truncate(self, index: int) -> None:
+        """Discard the actions from an index on."""
+        del self._actions[index:]
+        self.done = min(self.done, index)
 
-    def due(self, relay: SwitchableSimulation) -> list[Action]:
-        """Return what was done at this time, and has not yet been done again."""
-        due = relay.time + ROUNDING * relay.settings.dt
+    def due(self, simulation: SwitchableSimulation) -> list[Action]:
+        """Return the actions up to the present time that are not yet applied."""
+        latest = simulation.time + TIME_ROUNDING * simulation.settings.dt
         end = self.done
-        while end < len(self._actions) and self._actions[end].time <= due:
+        while end < len(self._actions) and self._actions[end].time <= latest:
             end += 1
         return self._actions[self.done : end]
 
-    def redo(self, relay: SwitchableSimulation) -> list[Action]:
-        """Do what was done at this time, and return it.
+    def replay_due(self, simulation: SwitchableSimulation) -> list[Action]:
+        """Apply the due actions, and return them.
 
         Raises:
-            ActionError: the engine cannot do it, as may be with a recording of another.
+            ActionError: the engine refuses one, which can happen to a recording of another engine.
         """
-        due = self.due(relay)
+        due = self.due(simulation)
         for action in due:
-            relay.apply(action)
+            simulation.apply(action)
             self.done += 1
         return due
 
-    def add(self, action: Action | None, relay: SwitchableSimulation) -> None:
-        """Take note of what has just been done, if anything; what lay ahead is forgotten.
-
-        Who was to be let go of later is let go of now, unless the action says more of it.
-        """
-        ahead, self._actions[self.done :] = self._actions[self.done :], []
-        for each in ahead:
-            goes_on = isinstance(action, Pull) and isinstance(each, Pull) and action.body == each.body
-            if isinstance(each, Pull) and each.target is None and not goes_on:
-                release = each.model_copy(update={"time": relay.time})
-                relay.apply(release)
-                self._actions.append(release)
-        if action is not None:
-            self._actions.append(action)
+    def append(self, action: Action) -> None:
+        """Log an action that was just applied, where no later one is known."""
+        self._actions.append(action)
         self.done = len(self._actions)
 
-    def hand_over(self, place: int, time: float) -> bool:
-        """Make it part of the session that it was taken up at a checkpoint; return whether it was not yet.
+    def branch(self, actions: Sequence[Action], simulation: SwitchableSimulation) -> None:
+        """Discard the actions later than now, and log those that were just applied.
+
+        Pulls whose release was in the discarded part are released now, unless one of the actions pulls the same body.
+        """
+        future, self._actions[self.done :] = self._actions[self.done :], []
+        pulled = {action.body for action in actions if isinstance(action, Pull)}
+        for each in future:
+            if isinstance(each, Pull) and each.target is None and each.body not in pulled:
+                release = each.model_copy(update={"time": simulation.time})
+                simulation.apply(release)
+                self._actions.append(release)
+        self._actions += actions
+        self.done = len(self._actions)
+
+    def insert_switch(self, index: int, time: float) -> bool:
+        """Log that a checkpoint was restored; return False if that is in the log already.
 
         Args:
-            place: how many actions had been done there.
-            time: when that was, s.
+            index: how many actions had been applied there.
+            time: of the checkpoint, s.
         """
-        known = len(self._actions)
-        self._actions = [*switch_actions(tuple(self._actions), place, time)]
-        self.done += len(self._actions) - known
-        return len(self._actions) > known
+        before = len(self._actions)
+        self._actions = [*insert_switch(tuple(self._actions), index, time)]
+        self.done += len(self._actions) - before
+        return len(self._actions) > before
 
 
-def switch_actions(actions: tuple[Action, ...], place: int, time: float) -> tuple[Action, ...]:
-    """Return actions with the taking up of a checkpoint at a place and a time, s, where it is not there yet."""
+def insert_switch(actions: tuple[Action, ...], index: int, time: float) -> tuple[Action, ...]:
+    """Return actions with the restoring of a checkpoint at an index and a time, s, unless it is there already."""
     switch = Switch(time=time, resumes=True)
-    return actions if actions[:place][-1:] == (switch,) else (*actions[:place], switch, *actions[place:])
+    return actions if actions[:index][-1:] == (switch,) else (*actions[:index], switch, *actions[index:])
 
 
 class SceneHistory:
-    """The scenes that a run has been through. Each is one and the same object whenever it is asked for."""
+    """The scene of a run at any time, as actions change it. The same time always gives the same object."""
 
     def __init__(self, scene: Scene, actions: Iterable[Action]) -> None:
-        """Take a scene as it began, and what was done, in order of time."""
+        """Start.
+
+        Args:
+            scene: at the start.
+            actions: in order of time.
+        """
         self._times: list[float] = []
         self._scenes = [scene]
         for action in actions:
@@ -115,11 +121,11 @@ class SceneHistory:
 
 
 def _changed(scene: Scene, action: Reshape | Toggle) -> Scene:
-    """Return a scene with what an action changes of its walls and posts."""
+    """Return a scene with the change of an action to its walls and posts."""
     change = {"points": action.points} if isinstance(action, Reshape) else {"solid": action.solid}
-    names = dict(zip((id(thing) for thing in scene.fixed), scene.fixed_names, strict=False))  # pockets come last
+    names = dict(zip((id(each) for each in scene.fixed), scene.fixed_names, strict=False))  # pockets come last
     walls, posts = (
-        tuple(each.model_copy(update=change) if names[id(each)] == action.thing else each for each in those)
-        for those in (scene.walls, scene.posts)
+        tuple(each.model_copy(update=change) if names[id(each)] == action.thing else each for each in fixed)
+        for fixed in (scene.walls, scene.posts)
     )
     return scene.model_copy(update={"walls": walls, "posts": posts})

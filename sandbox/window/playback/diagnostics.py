@@ -286,12 +286,12 @@ class Diagnostics:
         session = self._session
         self._missed = [time for time in self._missed if time <= session.time]
         # What can meet nothing misses nothing.
-        meets = not bool(contact_matrix(session.relay.setup, session.bodies).free.all())
-        self._watch = MissedContactMonitor(session.relay) if meets else None
-        self.trails.keep(session.frame)
+        meets = not bool(contact_matrix(session.simulation.setup, session.bodies).free.all())
+        self._watch = MissedContactMonitor(session.simulation) if meets else None
+        self.trails.add(session.frame)
         if self.trust is not None:
             self.trust.look(session.frame, session.step_number)
-        session.redone()
+        session.take_replayed_actions()
         if anew:
             self._begin_companions()
 
@@ -308,7 +308,7 @@ class Diagnostics:
             redone: what it has done again on the way, each with the step after which it was.
         """
         frame, step = self._session.frame, self._session.step_number
-        self.trails.keep(frame)
+        self.trails.add(frame)
         if self._watch is not None:
             self._missed += [frame.time] * self._watch.look(frame)
         for each in (self._ghost, self.trust):
@@ -324,7 +324,7 @@ class Diagnostics:
             self.trust.look(frame, step)
         if self._ghost is not None:
             if self._ghost.frame is not None:
-                self._seen.keep(self._ghost.step, self._ghost.frame)
+                self._seen.store(self._ghost.step, self._ghost.frame)
             else:
                 self._replace_ghost(self._ghost)
 
@@ -339,7 +339,7 @@ class Diagnostics:
             self.show_trust(True)
         elif self.trust is not None:
             self._let(self.trust, action)
-        self._session.redone()
+        self._session.take_replayed_actions()
 
     def _let(self, each: ShadowRun | DivergenceMonitor, action: Action) -> None:
         """Let one do what the session has done; the ghost keeps its own engine."""
@@ -374,14 +374,14 @@ class Diagnostics:
         self._drop_ghost()
         try:
             self._ghost, note = ghost_setting(
-                self._session.relay.checkpoint(), self._session.step_number, self._given_up
+                self._session.simulation.checkpoint(), self._session.step_number, self._given_up
             )
         except ActionError as error:
             self.notes.append(("warning", f"no ghost: {error}"))
             return
         self._seen = History()
         if self._ghost.frame is not None:
-            self._seen.keep(self._ghost.step, self._ghost.frame)
+            self._seen.store(self._ghost.step, self._ghost.frame)
         if note:
             self.notes.append(("info", f"ghost computed by {self._ghost.engine}: {note}"))
 
@@ -403,7 +403,7 @@ class Diagnostics:
             self.trust = None
         if on:
             try:
-                self.trust = DivergenceMonitor(self._session.relay.checkpoint(), self._session.step_number)
+                self.trust = DivergenceMonitor(self._session.simulation.checkpoint(), self._session.step_number)
             except (Refusal, ActionError) as error:
                 self.notes.append(("warning", f"no predictability horizon: {error}"))
 

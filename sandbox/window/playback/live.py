@@ -23,7 +23,7 @@ from sandbox.window.playback.action_log import SceneHistory
 from sandbox.window.playback.clock import FixedStepClock, interpolate
 from sandbox.window.playback.diagnostics import Diagnostics
 from sandbox.window.playback.recorded import RecordedRun
-from sandbox.window.playback.session import Replaced, Session, WrongWayError
+from sandbox.window.playback.session import ReplacedFuture, ReplayMismatchError, Session
 from sandbox.window.playback.snapshot import BreakNotifier, Snapshot, active_thrusters, broken_joints
 
 SLICE = 0.04
@@ -81,7 +81,7 @@ class DisplayedStep:
         if self._peek is None:
             self._scenery = None
             return self.scene
-        self._scenery = self._scenery or self.session.scenery()
+        self._scenery = self._scenery or self.session.scene_history()
         return self._scenery.at(self._peek[1].time)
 
     @property
@@ -126,17 +126,17 @@ class DisplayedStep:
     @property
     def end(self) -> float:
         """The last time that was seen, s."""
-        return self.session.history.end
+        return self.session.history.end_time
 
     @property
     def marks(self) -> tuple[float, ...]:
         """Times of the checkpoints, s."""
-        return self.session.history.mark_times
+        return self.session.history.keyframe_times
 
     def energy(self) -> tuple[float, float, float]:
         """Return the kinetic, potential and total energy, J."""
         return energy_of(
-            self.frame, self.bodies, self.scene.world.gravity, self.session.relay.setup, self.session.breaks
+            self.frame, self.bodies, self.scene.world.gravity, self.session.simulation.setup, self.session.break_times
         )
 
 
@@ -152,14 +152,14 @@ def switch_engine(session: Session, engine: str) -> str | None:
         ActionError: the other engine cannot go on from here.
     """
     try:
-        session.act(Switch(time=0.0, engine=engine))
+        session.apply(Switch(time=0.0, engine=engine))
     except ActionError as error:
-        own = [key for key in session.wanted.model_dump(exclude_defaults=True) if key not in COMMON]
+        own = [key for key in session.simulation.wanted.model_dump(exclude_defaults=True) if key not in COMMON]
         if not own:
             raise
         free: dict[str, Value] = {key: False if key == "half_kick" else None for key in own}
         try:
-            session.act(Switch(time=0.0, engine=engine, settings=free))
+            session.apply(Switch(time=0.0, engine=engine, settings=free))
         except ActionError:
             raise error from None
         return f"chosen by {engine}: {', '.join(own)}"
@@ -221,7 +221,7 @@ class LiveView(DisplayedStep):
             return
         if paused or self.session.ended is not None:
             self.pace.rest()
-            self.session.rest()
+            self.session.reset_interpolation()
             return
         dt = self.session.settings.dt
         asked = self.pace.due(elapsed, dt)
@@ -247,21 +247,21 @@ class LiveView(DisplayedStep):
             self.seek(self._journey.target + 1)
             return
         self._advance(1, None)
-        self.session.rest()
+        self.session.reset_interpolation()
 
     def _advance(self, steps: int, until: float | None) -> int:
         before = self.session.time
         try:
             made = self.session.advance(steps, until)
-        except WrongWayError:
-            self.session.history.distrust()
+        except ReplayMismatchError:
+            self.session.history.disable_checkpoints()
             self.seek(self.session.step_number)
             return 0
         if made:
             self._since = self.session.time - before
             self._hear()
-            self.company.advance(self.session.redone())
-            self.company.notes += self._breaks.told(len(self.session.relay.broken), self.session.time)
+            self.company.advance(self.session.take_replayed_actions())
+            self.company.notes += self._breaks.told(len(self.session.simulation.broken), self.session.time)
         if self.session.ended is not None and not self._told_end:
             self._told_end = True
             self.company.notes.append(("error", self.session.ended))
@@ -275,7 +275,7 @@ class LiveView(DisplayedStep):
         """
         self._check_there()
         before = self.session.replaced
-        done = self.session.act(action)
+        done = self.session.apply(action)
         self.company.did(done)
         self._tell_replaced(before)
         self._hear()
@@ -288,12 +288,18 @@ class LiveView(DisplayedStep):
         """
         self._check_there()
         before = self.session.replaced
-        for action in self.session.press(control, value):
+        simulation = self.session.simulation
+        try:
+            actions = self.session.press(control, value)
+        finally:
+            if self.session.simulation is not simulation:  # the engine refused it, and the session was restored
+                self._begin()
+        for action in actions:
             self.company.did(action)
         self._tell_replaced(before)
         self._hear()
 
-    def _tell_replaced(self, before: Replaced | None) -> None:
+    def _tell_replaced(self, before: ReplacedFuture | None) -> None:
         """Say that what came later is replaced, where it has just been."""
         now = self.session.replaced
         if now is not None and now is not before:
@@ -343,7 +349,7 @@ class LiveView(DisplayedStep):
         """Set out for another step. It is reached in parts, one a picture; meanwhile what is known nearest is seen."""
         self.pace.rest()
         self._told_end = False
-        self._peek = self.session.history.closest(max(step, 0))
+        self._peek = self.session.history.last_at(max(step, 0))
         self._journey.set_out(self.session, max(step, 0))
         self._go_there()
 
@@ -374,7 +380,7 @@ class LiveView(DisplayedStep):
     def _go_there(self) -> None:
         if self._journey.go():
             self._peek = None
-            self.session.rest()
+            self.session.reset_interpolation()
             self._begin(self._anew)
             self._anew = False
 
@@ -421,11 +427,11 @@ class LiveView(DisplayedStep):
             flashes=self.company.flashes,
             picked=picked,
             pull=pull,
-            broken=broken_joints(session.breaks, frame.time),
-            flames=active_thrusters(session.scene, self.bodies, session.relay.throttles, session.time)
+            broken=broken_joints(session.break_times, frame.time),
+            flames=active_thrusters(session.scene, self.bodies, session.simulation.throttles, session.time)
             if present and session.scene.thrusts
             else (),
-            setup=session.relay.setup if scene is session.scene else None,
+            setup=session.simulation.setup if scene is session.scene else None,
         )
 
     def close(self) -> None:

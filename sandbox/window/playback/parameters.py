@@ -142,15 +142,13 @@ class SessionParameters:
 
     def _choice(self, live: LiveView, key: str, words: tuple[str, ...]) -> Parameter:
         """Return the knob of a choice, with those that the engine has."""
-        now = live.scene, live.engine, live.session.wanted
+        now = live.scene, live.engine, live.session.simulation.wanted
         if self._asked is None or any(a is not b for a, b in zip(self._asked, now, strict=True)):
             self._asked, self._able = now, {}
         if key not in self._able:
-            engine = ENGINES[live.engine]
+            engine, simulation = ENGINES[live.engine], live.session.simulation
             self._able[key] = tuple(
-                word
-                for word in words
-                if not engine.missing(live.session.relay.setup, live.session.wanted.replace(**{key: word}))
+                word for word in words if not engine.missing(simulation.setup, simulation.wanted.replace(**{key: word}))
             )
         able, value = self._able[key], getattr(live.settings, key)
         if len(able) < 2:

@@ -1,19 +1,17 @@
-"""Session: a scene being played. It goes on by steps, does what hands do, remembers it, and finds the way back.
+"""Interactive simulation with undo: steps an engine, logs actions, and seeks to any step by replay.
 
-A session is its scene and its actions; going back is to go there again. From a checkpoint that is shorter, but a
-state does not hold what an engine remembers of contacts: so checkpoints are made where nothing has touched for a
-while, and wherever a state is known from before, its hash must be the same. Where it is not, the way from the start
-is taken, which is the same every time.
+A session is its scene and its actions. Seeking backwards restores a checkpoint and replays the steps and actions from
+there. A checkpoint is shorter than a replay from the start, but it does not hold the contacts that an engine caches.
+So checkpoints are taken only after some time without contact, and wherever a state was seen before, the state hash of
+the replayed one must be the same. If it differs, checkpoints are disabled and the session is replayed from the start,
+which leads to the same states every time.
 
-What nobody has seen before cannot be checked so. Whatever is new on a way from a checkpoint therefore makes taking it
-up part of the session, as a switch that changes nothing: who replays the session hands over there too.
-
-Course: a relay driven by a script, step by step, from the start or from a checkpoint.
-
-It knows nothing of what was seen before: that is the session's.
+States that were not seen before cannot be checked so. If new steps follow a replay from a checkpoint, the restoring of
+that checkpoint therefore becomes an action of the session: a switch that changes no setting. A replay of the recording
+restores the engine at the same moment.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from time import perf_counter
 from typing import NamedTuple
@@ -28,16 +26,39 @@ from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.description.world import Settings
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
-from sandbox.window.playback.action_log import ROUNDING, ActionLog, SceneHistory, switch_actions
+from sandbox.window.playback.action_log import TIME_ROUNDING, ActionLog, SceneHistory, insert_switch
 from sandbox.window.playback.history import ContactFreeTimer, History, Keyframe
 from sandbox.window.playback.snapshot import BreakTimes
 
-PATIENCE = 2.0
-"""s that one step may take to compute, where an engine can tell."""
+STEP_TIMEOUT = 2.0
+"""s that one step may take to compute, on engines that can interrupt a step"""
+SEEK_BATCH = 16
+"""steps between two yields of `Session.seek`"""
+SEEK_FINE_STEPS = 64
+"""steps before the target of a seek that are stored one by one, so that stepping further back needs no replay"""
+MAX_PENDING_CONTACTS = 64
+"""steps whose contacts are kept until `Session.contacts` is called"""
 
 
-class EngineRun:
-    """A scene on an engine, and what is done in it. Steps are made with the actions of their times."""
+class ReplayMismatchError(Exception):
+    """A replay from a checkpoint leads to another state than was seen before."""
+
+
+class ReplacedFuture(NamedTuple):
+    """The part of a session after some moment, which a new action at that moment has replaced."""
+
+    time: float
+    """s, of that moment"""
+    recording: Recording
+    """the whole session before the action"""
+
+
+class Session:
+    """A scene on an engine, the actions on it, and the rules of a game.
+
+    After a seek backwards, steps are repeated with their logged actions until a new action is applied: it discards the
+    later ones.
+    """
 
     def __init__(
         self,
@@ -51,12 +72,13 @@ class EngineRun:
         """Start.
 
         Args:
-            scene: what is played.
+            scene: what is simulated.
             engine: its name.
-            settings: by default the scene's own.
-            actions: to be done on the way, in order of time.
-            game: one that has not yet begun, and what is to be pressed on the way.
-            until: up to when all that was done is known, that of the rules too, s: they look on till then.
+            settings: by default those of the scene.
+            actions: to be applied on the way, in order of time.
+            game: one that has not yet begun, with the inputs to be repeated on the way.
+            until: end of a recording, s: up to there the actions of the rules are among `actions`, so that those of
+                `game` are compared with them, not applied.
 
         Raises:
             UnknownEngineError: no engine has that name.
@@ -64,253 +86,58 @@ class EngineRun:
         """
         self._start = scene, engine, settings
         self.ended: str | None = None
-        """why it cannot go on: it diverged, or asks for more than can be had"""
+        """why no step can follow: divergence, exhaustion, or a logged action that the engine refuses"""
         self._exhausted = False
-        self._script = ActionLog(actions)
-        self._redone: list[tuple[int, Action]] = []
+        self._log = ActionLog(actions)
+        self._replayed: list[tuple[int, Action]] = []
         self._step = 0
-        self._first_game, self._until = game, until
+        self._initial_game, self._recorded_until = game, until
         self.game: GameSession | None = None
-        """the game that is played, as it stands"""
-        self._heard: list[Contacts] = []  # what the game has been told of, since somebody else asked
-        self._begin(SwitchableSimulation(*self._start))
+        """the game in its present state"""
+        self._game_contacts: list[Contacts] = []  # shown to the rules since the last state was stored
+        self.history = History()
+        self._start_simulation()
+
+        self._contact_free = ContactFreeTimer()
+        self._origin: Keyframe | None = None  # restored by the last seek, while all that followed was seen before
+        self._unconfirmed: list[int] = []
+        self._off_track = False  # the present state is not one of the session
+        self._contacts: list[Contacts] = []
+        self._complete: tuple[int, Recording] | None = None  # the last step and the recording, before a seek backwards
+        self.replaced: ReplacedFuture | None = None
+        """the last part of the session that was replaced"""
+        self._saved = self._log.all
+        self._all_bodies = self.bodies
+        self._breaks = BreakTimes(len(self.scene.links))
+        self._previous = self._frame = self.simulation.frame()
+        self.history.store(0, self._frame)
+
+    # --- State ---------------------------------------------------------------------------------------------------
 
     @property
     def scene(self) -> Scene:
-        """What runs, with all that was set since."""
-        return self.relay.scene
+        """The scene, with all changes since the start."""
+        return self.simulation.scene
 
     @property
     def engine(self) -> str:
-        """The present engine's name."""
-        return self.relay.engine
+        """Name of the present engine."""
+        return self.simulation.engine
 
     @property
     def settings(self) -> Settings:
-        """The present settings, with every choice filled in."""
-        return self.relay.settings
-
-    @property
-    def wanted(self) -> Settings:
-        """The present settings as they were asked for."""
-        return self.relay.wanted
+        """The present settings, with every default filled in."""
+        return self.simulation.settings
 
     @property
     def bodies(self) -> Bodies:
-        """The bodies by number; spawned ones at the end."""
-        return self.relay.bodies
+        """The bodies by index; spawned ones at the end."""
+        return self.simulation.bodies
 
     @property
     def step_number(self) -> int:
-        """Steps made since the start."""
+        """Steps since the start."""
         return self._step
-
-    @property
-    def actions(self) -> tuple[Action, ...]:
-        """All that was done, up to now."""
-        return self._script.so_far
-
-    def scenery(self) -> SceneHistory:
-        """Return what the scene is at any time, also later than now, as far as walls and posts go."""
-        return SceneHistory(self._start[0], self._script.whole)
-
-    @property
-    def ahead(self) -> bool:
-        """Whether something was done later than now, and will be done again on the way there."""
-        return self._script.ahead
-
-    def _make_step(self) -> bool:
-        """Make a step, and do what is to be done then; tell whether the step was made."""
-        try:
-            self.relay.step()
-        except Divergence as divergence:
-            self.ended = str(divergence)
-        except Exhaustion as exhaustion:
-            self.ended, self._exhausted = f"at {self.relay.time:g} s: {exhaustion}", True
-            return False
-        self._step += 1
-        if self.ended is None:
-            self._judge()
-            self._redo()
-        return True
-
-    def _redo(self) -> None:
-        """Do again what was done at this time."""
-        try:
-            self._redone += [(self._step, action) for action in self._script.redo(self.relay)]
-        except ActionError as error:
-            self.ended = f"at {self.relay.time:g} s: {error}"
-
-    @property
-    def _known(self) -> bool:
-        """Whether what the rules do now was done before, and is in the script."""
-        return self.ahead or self.relay.time <= self._until + ROUNDING * self.relay.settings.dt
-
-    def _judge(self) -> None:
-        """Let the rules look, and do what they say; where that was done before, hold it against what was done."""
-        game, relay = self.game, self.relay
-        if game is None:
-            return
-        contacts = relay.contacts()
-        self._heard.append(contacts)
-        own, due = game.on_step(relay.time, relay.frame(), contacts), self._script.due(relay)
-        if self._known:
-            game.replay(relay.time, own, due)
-            return
-        try:
-            for action in own:
-                relay.apply(action)
-                self._script.add(action, relay)
-                self._redone.append((self._step, action))
-        except ActionError as error:
-            self.ended = f"at {relay.time:g} s: {error}"
-
-    def _contacts_since(self) -> Contacts:
-        """Return the contacts since the last call, also those that the game has been told of."""
-        heard, self._heard = self._heard, []
-        last = self.relay.contacts()
-        return Contacts.joined([*heard, last]).merged() if heard else last
-
-    def redone(self) -> list[tuple[int, Action]]:
-        """Return what was done again since the last call, each with the step after which it was."""
-        parts, self._redone = self._redone, []
-        return parts
-
-    def _mark_here(self) -> Keyframe:
-        """Make a checkpoint of the present state."""
-        game = None if self.game is None else self.game.copy()
-        return Keyframe(self._step, self._script.done, self.relay.checkpoint(), game)
-
-    def _take_up(self, mark: Keyframe | None) -> bool:
-        """Go back to a checkpoint, or to the start; tell whether the checkpoint could be taken up."""
-        relay = None
-        if mark is not None:
-            try:
-                relay = SwitchableSimulation.resumed(mark.point)
-            except (Refusal, ActionError):
-                mark = None
-        self.relay.close()
-        self.ended, self._exhausted = None, False
-        self._step, self._script.done = (mark.step, mark.actions) if mark is not None else (0, 0)
-        if relay is None or mark is None:
-            self._begin(SwitchableSimulation(*self._start))
-        else:
-            self._take_over(relay, mark.game)
-            if self.game is not None:
-                self.game.replay_player(relay.time, self._script.due(relay))
-            self._redo()
-        return mark is not None
-
-    def _begin(self, relay: SwitchableSimulation) -> None:
-        """Begin at the start."""
-        self._take_over(relay, self._first_game)
-        self._judge()
-        self._redo()
-
-    def _take_over(self, relay: SwitchableSimulation, game: GameSession | None) -> None:
-        """Go on with a relay, and with a copy of a game; what was pressed later than now stays known."""
-        self.relay = relay
-        """what runs"""
-        relay.patience = PATIENCE
-        relay.contacts()
-        self._heard.clear()
-        before, self.game = self.game, None if game is None else game.copy()
-        if self.game is not None and before is not None:
-            self.game.set_presses(before.all_presses)
-
-    def recording(self) -> Recording:
-        """Return all up to now, to be replayed."""
-        scene, engine, settings = self._start
-        return Recording(
-            scene=scene,
-            engine=engine,
-            settings=scene.solver if settings is None else settings,
-            # A hand that is still holding lets go at the end: no replay is to hang from one that nobody sees.
-            actions=self.actions + tuple(Pull(time=self.relay.time, body=name) for name in self.relay.pulls),
-            duration=self.relay.time,
-            state_hash=None if self._exhausted else self.relay.state_hash(),
-            presses=() if self.game is None else self.game.presses,
-            score=None if self.game is None else self.game.rules.score,
-        )
-
-    def close(self) -> None:
-        """Release what the engine holds."""
-        self.relay.close()
-
-
-PACE = 16
-"""Steps made at a time on the way to another one."""
-FINE = 64
-"""Steps before the other one that are made one by one: each is seen, and so at hand for who steps further back."""
-
-
-class WrongWayError(Exception):
-    """The way from a checkpoint leads to another state than was seen before."""
-
-
-class Replaced(NamedTuple):
-    """What came after a moment of a session, before something else was done there."""
-
-    time: float
-    """s, of that moment"""
-    recording: Recording
-    """the whole session as it was"""
-
-
-class Session(EngineRun):
-    """A scene that is being played on an engine.
-
-    Steps that were made before are made again with the actions of then, until something else is done: from there on
-    what came later is forgotten.
-    """
-
-    def __init__(
-        self,
-        scene: Scene,
-        engine: str = "pymunk",
-        settings: Settings | None = None,
-        actions: tuple[Action, ...] = (),
-        game: GameSession | None = None,
-        until: float = -1.0,
-    ) -> None:
-        """Start; as `Course`."""
-        self.history = History()
-        super().__init__(scene, engine, settings, actions, game, until)
-        self._calm = ContactFreeTimer()
-        self._mark: Keyframe | None = None  # that the relay was taken up from, as long as all that followed was known
-        self._unsure: list[int] = []
-        self._astray = False
-        self._contacts: list[Contacts] = []
-        self._whole: tuple[int, Recording] | None = None  # the step it had come to, and all up to there
-        self.replaced: Replaced | None = None
-        """what came later, where something new was done at an earlier moment; the last that was replaced"""
-        self._saved = self._script.whole
-        self._everyone = self.bodies
-        self._breaks = BreakTimes(len(self.scene.links))
-        self._previous = self._frame = self.relay.frame()
-        self.history.keep(0, self._frame)
-
-    @property
-    def _known(self) -> bool:
-        seen = self.history.known(0) is not None and self._step <= self.history.furthest
-        return seen or super()._known
-
-    @property
-    def unsure(self) -> tuple[int, ...]:
-        """Steps first seen on a way from a checkpoint, and not yet confirmed by what follows.
-
-        Where what follows differs, they are forgotten: on the way from the start their last digits may be others.
-        """
-        return tuple(self._unsure)
-
-    def bodies_in(self, frame: Frame) -> Bodies:
-        """Return the bodies by number, with those of a state that was seen; it may lie ahead and have more."""
-        return self._everyone if len(frame.position) > len(self.bodies) else self.bodies
-
-    @property
-    def breaks(self) -> FloatArray:
-        """When each of the scene's joints broke, (J,) s, inf where it never did; also in states that lie ahead."""
-        return self._breaks.times
 
     @property
     def time(self) -> float:
@@ -324,12 +151,101 @@ class Session(EngineRun):
 
     @property
     def previous(self) -> Frame:
-        """The state one step before, or the present one where there is none to go by."""
+        """The state one step before; the present one after a seek or an action."""
         return self._previous
 
-    def rest(self) -> None:
-        """Forget the state before: until the next step, pictures show the present one."""
+    def reset_interpolation(self) -> None:
+        """Make the previous state the present one: until the next step, pictures show the present state."""
         self._previous = self._frame
+
+    @property
+    def actions(self) -> tuple[Action, ...]:
+        """The actions up to now."""
+        return self._log.past
+
+    @property
+    def has_future(self) -> bool:
+        """Whether the log holds actions later than now, which will be repeated."""
+        return self._log.has_future
+
+    @property
+    def break_times(self) -> FloatArray:
+        """When each joint of the scene breaks, (J,) s, inf if never; also in states later than now."""
+        return self._breaks.times
+
+    @property
+    def unconfirmed_steps(self) -> tuple[int, ...]:
+        """Steps first seen in a replay from a checkpoint, before a state that confirms that replay.
+
+        They are discarded if a later state differs: a replay from the start may differ in their last digits.
+        """
+        return tuple(self._unconfirmed)
+
+    def bodies_in(self, frame: Frame) -> Bodies:
+        """Return the bodies of a state in the history; it may be later than now and have more."""
+        return self._all_bodies if len(frame.position) > len(self.bodies) else self.bodies
+
+    def scene_history(self) -> SceneHistory:
+        """Return the scene at any time, also later than now, as far as walls and posts change."""
+        return SceneHistory(self._start[0], self._log.all)
+
+    def contacts(self) -> Contacts:
+        """Return the contacts of the steps since the last call."""
+        parts, self._contacts = self._contacts, []
+        return Contacts.joined(parts) if parts else Contacts.none()
+
+    def take_replayed_actions(self) -> list[tuple[int, Action]]:
+        """Return the logged actions that were repeated since the last call, each with its step."""
+        parts, self._replayed = self._replayed, []
+        return parts
+
+    def close(self) -> None:
+        """Release the resources of the engine."""
+        self.simulation.close()
+
+    # --- Recording -----------------------------------------------------------------------------------------------
+
+    def recording(self) -> Recording:
+        """Return the whole session: up to the last moment it has reached, also after a seek backwards.
+
+        If the present state is only reached from a checkpoint, the recording restores that checkpoint too.
+        """
+        if self._complete is not None and self._step < self._complete[0]:
+            return replace(self._complete[1], at=self.time)
+        actions, origin = self.actions, self._origin
+        # Mouse pulls are released at the end: in a replay no mouse would ever release them.
+        actions += tuple(Pull(time=self.simulation.time, body=name) for name in self.simulation.pulls)
+        if origin is not None and self._unconfirmed:
+            actions = insert_switch(actions, origin.actions, origin.point.frame.time)
+        scene, engine, settings = self._start
+        return Recording(
+            scene=scene,
+            engine=engine,
+            settings=scene.solver if settings is None else settings,
+            actions=actions,
+            duration=self.simulation.time,
+            state_hash=None if self._exhausted else self.simulation.state_hash(),
+            presses=() if self.game is None else self.game.presses,
+            score=None if self.game is None else self.game.rules.score,
+        )
+
+    @property
+    def unsaved_actions(self) -> tuple[Action, ...]:
+        """The actions since the start or the last save, also those later than now."""
+        saved, done = (
+            [action for action in actions if not _only_restores(action)] for actions in (self._saved, self._log.all)
+        )
+        return tuple(done[len(saved) :] if done[: len(saved)] == saved else done)
+
+    def mark_saved(self) -> None:
+        """Count all actions as saved."""
+        self._saved = self._log.all
+
+    def mark_unsaved(self) -> None:
+        """Count all actions as unsaved."""
+        self._saved = ()
+
+    # --- Stepping ------------------------------------------------------------------------------------------------
 
     def advance(self, steps: int = 1, until: float | None = None) -> int:
         """Make steps; return how many were made.
@@ -339,220 +255,295 @@ class Session(EngineRun):
             until: the time (`perf_counter`, s) by which to stop, after one step at least.
 
         Raises:
-            WrongWayError: it leads to another state than was seen before; `seek` knows the way.
+            ReplayMismatchError: a state differs from the one seen before; `seek` to the same step mends it.
         """
         made, last = 0, False
         while made < steps and self.ended is None and not last:
             last = made + 1 == steps or (made > 0 and until is not None and perf_counter() > until)
             if last:
-                self._previous = self.relay.frame()
-            if self._step >= self.history.furthest:
-                self._own_up()
+                self._previous = self.simulation.frame()
+            if self._step >= self.history.last_step:
+                self._commit_checkpoint()
             if not self._make_step():
                 break
             made += 1
-            if self._mark is not None and not last:
-                self._check(None)
+            if self._origin is not None and not last:
+                self._compare_with_history(None)
         if made:
-            self._see()
+            self._store_state()
         return made
 
-    def _see(self) -> None:
-        """Look at the present state: keep it, hold it against what was seen before, and make a checkpoint if due."""
-        self._frame = self.relay.frame()
-        if len(self.bodies) >= len(self._everyone):
-            self._everyone = self.bodies
-        self._breaks.note(self.relay.broken)
-        self._contacts.append(self._contacts_since())
-        del self._contacts[:-64]  # nobody asks
-        self._calm.look(self._contacts[-1], self.relay.settings)
-        if self._exhausted:  # within the step after this one: that state is none of the session's
+    def _make_step(self) -> bool:
+        """Make a step, then apply the actions of its time; return whether the step was made."""
+        try:
+            self.simulation.step()
+        except Divergence as divergence:
+            self.ended = str(divergence)
+        except Exhaustion as exhaustion:
+            self.ended, self._exhausted = f"at {self.simulation.time:g} s: {exhaustion}", True
+            return False
+        self._step += 1
+        if self.ended is None:
+            self._run_rules()
+            self._replay_actions()
+        return True
+
+    def _run_rules(self) -> None:
+        """Show the state to the rules, and apply their actions; in a replay, compare them with the logged ones."""
+        game, simulation = self.game, self.simulation
+        if game is None:
             return
-        self._check(self._frame)
-        if self._mark is not None and self.history.known(self._step) is None:
-            self._unsure.append(self._step)
-        self.history.keep(self._step, self._frame)
-        calm = self._calm.lasts(self.relay, self._frame)
-        if calm and self.ended is None and self.history.wants_mark(self._step):
-            self.history.mark(self._mark_here())
-
-    def _check(self, frame: Frame | None) -> None:
-        """Hold the present state against what was seen before."""
-        known = self.history.known(self._step)
-        if known is not None and known.state_hash() != (frame or self.relay.frame()).state_hash():
-            self._astray = True
-            self.history.forget(self._unsure)
-            self._unsure.clear()
-            raise WrongWayError(f"step {self._step} led to another state than before")
-        if known is not None:
-            self._unsure.clear()
-
-    def _own_up(self) -> None:
-        """Make the taking up of the checkpoint part of the session: from here on, what comes is new."""
-        mark, self._mark = self._mark, None
-        self._unsure.clear()
-        if mark is not None and self._script.hand_over(mark.actions, mark.point.frame.time):
-            self.history.inserted(mark.step)
+        contacts = simulation.contacts()
+        self._game_contacts.append(contacts)
+        own, due = game.on_step(simulation.time, simulation.frame(), contacts), self._log.due(simulation)
+        if self._is_replaying:
+            game.replay(simulation.time, own, due)
+            return
+        try:
+            for action in own:
+                simulation.apply(action)
+                self._log.append(action)
+                self._replayed.append((self._step, action))
+        except ActionError as error:
+            self.ended = f"at {simulation.time:g} s: {error}"
 
     @property
-    def unsaved(self) -> tuple[Action, ...]:
-        """What was done since the session began, or was last saved; also what lies later than now."""
-        saved, done = ([each for each in part if not _only_resumes(each)] for part in (self._saved, self._script.whole))
-        return tuple(done[len(saved) :] if done[: len(saved)] == saved else done)
+    def _is_replaying(self) -> bool:
+        """Whether the actions of the rules at the present step are in the log already."""
+        if self.history.get(0) is not None and self._step <= self.history.last_step:
+            return True
+        end = self._recorded_until + TIME_ROUNDING * self.simulation.settings.dt
+        return self.has_future or self.simulation.time <= end
 
-    def note_saved(self) -> None:
-        """Take note that all that was done has been saved."""
-        self._saved = self._script.whole
+    def _replay_actions(self) -> None:
+        """Apply the logged actions of the present time."""
+        try:
+            self._replayed += [(self._step, action) for action in self._log.replay_due(self.simulation)]
+        except ActionError as error:
+            self.ended = f"at {self.simulation.time:g} s: {error}"
 
-    def note_unsaved(self) -> None:
-        """Count all that was done as unsaved."""
-        self._saved = ()
+    def _store_state(self) -> None:
+        """Store the present state, compare it with the one seen before, and take a checkpoint if one is due."""
+        self._frame = self.simulation.frame()
+        if len(self.bodies) >= len(self._all_bodies):
+            self._all_bodies = self.bodies
+        self._breaks.update(self.simulation.broken)
+        self._contacts.append(self._contacts_of_step())
+        del self._contacts[:-MAX_PENDING_CONTACTS]
+        self._contact_free.update(self._contacts[-1], self.simulation.settings)
+        if self._exhausted:  # the state lies within a step, so it is none of the session's
+            return
+        self._compare_with_history(self._frame)
+        if self._origin is not None and self.history.get(self._step) is None:
+            self._unconfirmed.append(self._step)
+        self.history.store(self._step, self._frame)
+        exact = self._contact_free.allows_checkpoint(self.simulation, self._frame)
+        if exact and self.ended is None and self.history.wants_keyframe(self._step):
+            game = None if self.game is None else self.game.copy()
+            self.history.add_keyframe(Keyframe(self._step, self._log.done, self.simulation.checkpoint(), game))
 
-    def recording(self) -> Recording:
-        """Return the whole session, to be replayed: up to the last moment that it came to, also if it has gone back.
+    def _contacts_of_step(self) -> Contacts:
+        """Return the contacts since the last call, with those that the rules have been shown."""
+        shown, self._game_contacts = self._game_contacts, []
+        last = self.simulation.contacts()
+        return Contacts.joined([*shown, last]).merged() if shown else last
 
-        A state that only a way from a checkpoint has led to is recorded by that way.
-        """
-        if self._whole is not None and self._step < self._whole[0]:
-            return replace(self._whole[1], at=self.time)
-        recording, mark = super().recording(), self._mark
-        if mark is None or not self._unsure:
-            return recording
-        return replace(recording, actions=switch_actions(recording.actions, mark.actions, mark.point.frame.time))
+    def _compare_with_history(self, frame: Frame | None) -> None:
+        """Compare the state hash of the present state with that of the one seen before."""
+        known = self.history.get(self._step)
+        if known is not None and known.state_hash() != (frame or self.simulation.frame()).state_hash():
+            self._off_track = True
+            self.history.discard(self._unconfirmed)
+            self._unconfirmed.clear()
+            raise ReplayMismatchError(f"step {self._step} led to another state than before")
+        if known is not None:
+            self._unconfirmed.clear()
 
-    def contacts(self) -> Contacts:
-        """Return the contacts that were open since the last call."""
-        parts, self._contacts = self._contacts, []
-        return Contacts.joined(parts) if parts else Contacts.none()
+    def _commit_checkpoint(self) -> None:
+        """Make the restoring of the checkpoint an action of the session: the steps that follow are new."""
+        origin, self._origin = self._origin, None
+        self._unconfirmed.clear()
+        if origin is not None and self._log.insert_switch(origin.actions, origin.point.frame.time):
+            self.history.count_inserted_action(origin.step)
 
-    def act(self, action: Action) -> Action:
-        """Do something now, whatever its time says, and remember it; what came later is forgotten.
+    # --- Actions -------------------------------------------------------------------------------------------------
+
+    def apply(self, action: Action) -> Action:
+        """Apply an action now, whatever its time says, and log it; later actions are discarded.
 
         Returns:
             The action with its time.
 
         Raises:
-            ActionError: it cannot be done. Nothing has changed then.
+            ActionError: it cannot be applied; nothing has changed then.
         """
-        if self.ended is not None:
-            raise ActionError("the run has ended; step back or restart")
-        timed = action.model_copy(update={"time": self.relay.time})
-        self.relay.apply(timed)
-        self._go_another_way(timed)
+        self._check_not_ended()
+        timed = action.model_copy(update={"time": self.simulation.time})
+        self.simulation.apply(timed)
+        self._branch([timed])
         if self.game is not None:
             self.game.discard_future()
             self.game.note_actions([timed])
         return timed
 
     def press(self, control: str, value: float) -> tuple[Action, ...]:
-        """Set a control of the game now, and do what comes of it; what came later is forgotten.
+        """Set a control of the game now, and apply the actions of its rules; later actions are discarded.
 
         Returns:
-            What came of it.
+            Those actions.
 
         Raises:
-            ActionError: it cannot be done. Then it was not pressed.
+            ActionError: the engine refuses one of them. Game, inputs and state are then as before, restored by a
+                replay from the last checkpoint.
         """
         if self.game is None or self.game.rules.game_over is not None:
             return ()
-        if self.ended is not None:
-            raise ActionError("the run has ended; step back or restart")
-        before, done = self.game.copy(), 0
-        actions = self.game.press(self.relay.time, control, value)
+        self._check_not_ended()
+        presses = self.game.all_presses
+        actions = self.game.press(self.simulation.time, control, value)
         try:
             for action in actions:
-                self.relay.apply(action)
-                self._go_another_way(action)
-                done += 1
+                self.simulation.apply(action)
         except ActionError:
-            self.game = before
-            self.game.discard_future()
+            self.game.set_presses(presses)
+            for _ in self._replay_to(self._step):
+                pass
             raise
-        finally:
-            self.game.note_actions(actions[:done])
-        if not actions:
-            self._go_another_way(None)
+        self._branch(actions)
+        self.game.note_actions(actions)
         return actions
 
-    def _go_another_way(self, action: Action | None) -> None:
-        """Take note of what has just been done, if anything: what came later is forgotten."""
-        self._own_up()
-        self._replace_later()
-        self._script.add(action, self.relay)
-        self._until = min(self._until, self.relay.time)
-        self._forget_from(self._step)
-        self._breaks.note(self.relay.broken)
-        self._frame = self._previous = self.relay.frame()
-        self.history.keep(self._step, self._frame)
-        self._calm = ContactFreeTimer()
+    def _check_not_ended(self) -> None:
+        if self.ended is not None:
+            raise ActionError("the run has ended; step back or restart")
 
-    def _replace_later(self) -> None:
-        """Take note that what came after the present moment is replaced by something else."""
-        if self._whole is not None and self._step < self._whole[0]:
-            self.replaced = Replaced(self.relay.time, self._whole[1])
-        self._whole = None
+    def _branch(self, actions: Sequence[Action]) -> None:
+        """Log actions that were just applied, and discard all that came later."""
+        self._commit_checkpoint()
+        if self._complete is not None and self._step < self._complete[0]:
+            self.replaced = ReplacedFuture(self.simulation.time, self._complete[1])
+        self._complete = None
+        self._log.branch(actions, self.simulation)
+        self._recorded_until = min(self._recorded_until, self.simulation.time)
+        self._discard_from(self._step)
+        self._breaks.update(self.simulation.broken)
+        self._frame = self._previous = self.simulation.frame()
+        self.history.store(self._step, self._frame)
+        self._contact_free = ContactFreeTimer()
 
-    def _forget_from(self, step: int) -> None:
-        """Forget what was seen of a step and of all after it."""
-        self.history.cut(step - 1)
-        self._everyone = self.bodies
-        self._breaks.forget()
+    def _discard_from(self, step: int) -> None:
+        """Discard the stored states from a step on."""
+        self.history.truncate(step - 1)
+        self._all_bodies = self.bodies
+        self._breaks.reset()
 
-    def retract(self, place: int) -> int:
-        """Take back what was done from the place-th action on, and forget what came of it.
+    def retract(self, index: int) -> int:
+        """Remove the action of an index and all later ones from the log, and discard the states after it.
 
         Returns:
-            The step to seek: the one after which that action was done. Until it is there, the state is as it was.
+            The step to seek: the one after which that action was applied. The present state changes only then.
 
         Raises:
-            IndexError: not so much was done.
+            IndexError: the log is shorter.
         """
-        step = self.history.nearest(self.actions[place].time)[0]
-        self._script.cut(place)
-        self._whole = None
-        self._forget_from(step)
-        self._astray = True  # what is seen was never done
+        step = self.history.nearest(self.actions[index].time)[0]
+        self._log.truncate(index)
+        self._complete = None
+        self._discard_from(step)
+        self._off_track = True
         return step
 
-    def seek(self, step: int) -> Iterator[float]:
-        """Go to a step, back or forth. Yields the share that is done, after each part of the way.
+    # --- Seeking -------------------------------------------------------------------------------------------------
 
-        The session is in between while this is not finished; a caller may give up, and ask for another step.
+    def seek(self, step: int) -> Iterator[float]:
+        """Go to a step, backwards or forwards. Yields the fraction that is done, a few steps at a time.
+
+        Until it is finished the session is in between; a caller may abandon it and seek another step.
         """
         step = max(0, step)
-        if step < self._step and self._step >= self.history.furthest and not self._astray:
-            self._whole = self._step, self.recording()
-        if step < self._step or self._astray:
-            self._restore(self.history.before(step))
+        if step < self._step and self._step >= self.history.last_step and not self._off_track:
+            self._complete = self._step, self.recording()
+        if step < self._step or self._off_track:
+            yield from self._replay_to(step)
+            return
         try:
-            yield from self._forth(step)
-        except WrongWayError:
-            self.history.distrust()
-            self._restore(None)
-            yield from self._forth(step)
+            yield from self._advance_to(step)
+        except ReplayMismatchError:
+            yield from self._replay_from_start(step)
 
-    def _forth(self, step: int) -> Iterator[float]:
-        begin = self._step
+    def _replay_to(self, step: int) -> Iterator[float]:
+        """Restore the last checkpoint before a step, and go to that step."""
+        self._restore(self.history.keyframe_before(step))
+        try:
+            yield from self._advance_to(step)
+        except ReplayMismatchError:
+            yield from self._replay_from_start(step)
+
+    def _replay_from_start(self, step: int) -> Iterator[float]:
+        """Go to a step from the start, from now on without checkpoints."""
+        self.history.disable_checkpoints()
+        self._restore(None)
+        yield from self._advance_to(step)
+
+    def _advance_to(self, step: int) -> Iterator[float]:
+        start = self._step
         while self._step < step and self.ended is None:
-            known = self.history.next_known(self._step)  # to be held against
-            pace = PACE if step - self._step > FINE else 1
-            self.advance(min(pace, known - self._step if known is not None else pace))
-            yield (self._step - begin) / (step - begin)
+            batch = SEEK_BATCH if step - self._step > SEEK_FINE_STEPS else 1
+            stored = self.history.next_stored(self._step)  # to be compared with
+            self.advance(min(batch, stored - self._step if stored is not None else batch))
+            yield (self._step - start) / (step - start)
 
-    def _restore(self, mark: Keyframe | None) -> None:
-        """Take up the checkpoint, or start anew."""
-        taken = self._take_up(mark)
-        if mark is not None and not taken:
-            self.history.distrust()
-        self._mark = mark if taken else None
-        self._unsure.clear()
-        self._astray = False
-        self._calm = ContactFreeTimer()
+    def _restore(self, keyframe: Keyframe | None) -> None:
+        """Go back to a checkpoint, or to the start."""
+        restored = self._load(keyframe)
+        if keyframe is not None and not restored:
+            self.history.disable_checkpoints()
+        self._origin = keyframe if restored else None
+        self._unconfirmed.clear()
+        self._off_track = False
+        self._contact_free = ContactFreeTimer()
         self._contacts.clear()
-        self._previous = self._frame = self.relay.frame()
-        self.history.keep(self._step, self._frame)
+        self._previous = self._frame = self.simulation.frame()
+        self.history.store(self._step, self._frame)
+
+    def _load(self, keyframe: Keyframe | None) -> bool:
+        """Replace the simulation by one at a checkpoint, or at the start; return whether it is at the checkpoint."""
+        simulation = None
+        if keyframe is not None:
+            try:
+                simulation = SwitchableSimulation.resumed(keyframe.point)
+            except (Refusal, ActionError):
+                keyframe = None
+        self.simulation.close()
+        self.ended, self._exhausted = None, False
+        self._step, self._log.done = (keyframe.step, keyframe.actions) if keyframe is not None else (0, 0)
+        if simulation is None or keyframe is None:
+            self._start_simulation()
+            return False
+        self._set_simulation(simulation, keyframe.game)
+        if self.game is not None:
+            self.game.replay_player(simulation.time, self._log.due(simulation))
+        self._replay_actions()
+        return True
+
+    def _start_simulation(self) -> None:
+        """Replace the simulation by one at the start."""
+        self._set_simulation(SwitchableSimulation(*self._start), self._initial_game)
+        self._run_rules()
+        self._replay_actions()
+
+    def _set_simulation(self, simulation: SwitchableSimulation, game: GameSession | None) -> None:
+        """Continue with a simulation and a copy of a game; inputs later than now are kept, to be repeated."""
+        self.simulation = simulation
+        """the engine, with switches between engines"""
+        simulation.patience = STEP_TIMEOUT
+        simulation.contacts()  # discards those before
+        self._game_contacts.clear()
+        before, self.game = self.game, None if game is None else game.copy()
+        if self.game is not None and before is not None:
+            self.game.set_presses(before.all_presses)
 
 
-def _only_resumes(action: Action) -> bool:
-    """Tell whether an action is the taking up of a checkpoint, which changes nothing."""
+def _only_restores(action: Action) -> bool:
+    """Return whether an action restores a checkpoint, which changes nothing."""
     return isinstance(action, Switch) and action.engine is None and not action.settings

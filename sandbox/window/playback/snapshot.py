@@ -43,15 +43,15 @@ class BreakTimes:
         self.times: FloatArray = np.full(joints, np.inf)
         """(J,) s, inf where it never did; what was handed out does not change"""
 
-    def note(self, broken: Mapping[int, float]) -> None:
+    def update(self, broken: Mapping[int, float]) -> None:
         """Learn when joints broke, s. Those that broke later than now are kept: the same way leads there again."""
         numbers = list(broken)
         if numbers and not np.isfinite(self.times[numbers]).all():
             self.times = self.times.copy()
             self.times[numbers] = list(broken.values())
 
-    def forget(self) -> None:
-        """Forget all of them."""
+    def reset(self) -> None:
+        """Count all joints as whole."""
         self.times = np.full(len(self.times), np.inf)
 
 

@@ -50,11 +50,11 @@ def test_forecast_is_what_is_played() -> None:
 
 def test_forecast_does_not_change_the_table() -> None:
     game = game_of(FREE)
-    before = game.live.session.relay.state_hash()
+    before = game.live.session.simulation.state_hash()
     for k in range(5):
         game.cue.aim = 0.3 * k
         BilliardsOverlay(HumanPlayer(game)).aim()
-    assert game.live.session.relay.state_hash() == before
+    assert game.live.session.simulation.state_hash() == before
 
 
 def test_miss_is_a_foul_and_gives_the_ball_in_hand() -> None:
@@ -73,7 +73,7 @@ def test_miss_is_a_foul_and_gives_the_ball_in_hand() -> None:
 
 def test_undo_takes_a_stroke_back_while_the_balls_roll() -> None:
     game = game_of(FREE)
-    before = game.live.session.relay.state_hash()
+    before = game.live.session.simulation.state_hash()
     game.cue.aim = 1.4
     game.shoot(2.0)
     for _ in range(20):
@@ -82,7 +82,7 @@ def test_undo_takes_a_stroke_back_while_the_balls_roll() -> None:
     game.undo()
     game.live.arrive()
     assert game.strokes == 0
-    assert game.live.session.relay.state_hash() == before
+    assert game.live.session.simulation.state_hash() == before
     assert (game.cue.aim, game.cue.speed) == (1.4, 2.0)
     assert game.waits
 

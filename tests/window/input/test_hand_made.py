@@ -247,10 +247,10 @@ def test_knob_sets_the_surface_of_a_body_added_by_hand(engine: str, key: str, va
 )
 def test_surface_of_a_spawned_body_is_checked(path: str, value: float) -> None:
     session = Session(from_document({"ball": [{"name": "a", "position": [0, 2], "radius": 0.5}]}))
-    session.act(Spawn(time=0.0, ball=Ball(position=(5.0, 0.0), radius=1.0, name="spawned-1")))
+    session.apply(Spawn(time=0.0, ball=Ball(position=(5.0, 0.0), radius=1.0, name="spawned-1")))
     before = session.frame.state_hash()
     with pytest.raises(ActionError):
-        session.act(SetParameter(time=0.0, path=path, value=value))
+        session.apply(SetParameter(time=0.0, path=path, value=value))
     assert session.frame.state_hash() == before
     assert len(session.actions) == 1
     session.close()

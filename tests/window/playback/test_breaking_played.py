@@ -69,7 +69,7 @@ def test_joints_are_seen_until_they_break_and_again_on_the_way_back(engine: str)
     whole = [len(shown(at(show, step)).links) for step in range(0, 61, 5)]
     assert whole[0] == len(cloth().links) > whole[-1]
     assert whole == sorted(whole, reverse=True)
-    broke = show.session.breaks[np.isfinite(show.session.breaks)]
+    broke = show.session.break_times[np.isfinite(show.session.break_times)]
     assert len(broke) == whole[0] - whole[-1]
     for step in (10, 60, 0, 35):  # back and forth
         assert len(shown(at(show, step)).links) == whole[step // 5]
@@ -90,11 +90,11 @@ def test_energy_of_what_is_watched_leaves_out_what_broke() -> None:
 
 def test_doing_something_else_forgets_what_broke_later() -> None:
     show = at(LiveView(Session(cloth())), 60)
-    assert np.isfinite(show.session.breaks).any()
+    assert np.isfinite(show.session.break_times).any()
     at(show, 0)
-    assert np.isfinite(show.session.breaks).any()  # it would go the same way
+    assert np.isfinite(show.session.break_times).any()  # it would go the same way
     show.act(Force(time=0.0, body="rag-16", force=(0.0, 0.5)))
-    assert not np.isfinite(show.session.breaks).any()
+    assert not np.isfinite(show.session.break_times).any()
     show.close()
 
 

@@ -39,7 +39,7 @@ def pile() -> Scene:
 def together(session: Session, company: Diagnostics, steps: int) -> None:
     for _ in range(steps):
         session.advance()
-        company.advance(session.redone())
+        company.advance(session.take_replayed_actions())
 
 
 def beside(trust: DivergenceMonitor, session: Session) -> None:
@@ -49,7 +49,7 @@ def beside(trust: DivergenceMonitor, session: Session) -> None:
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_ghost_is_exact_where_it_can_be_else_another_engine(engine: str) -> None:
-    ghost, note = ghost_setting(Session(BOUNCE, engine).relay.checkpoint())
+    ghost, note = ghost_setting(Session(BOUNCE, engine).simulation.checkpoint())
     assert ghost.engine == ("reference" if engine == "exact" else "exact")
     assert note == ""
     ghost.close()
@@ -57,7 +57,7 @@ def test_ghost_is_exact_where_it_can_be_else_another_engine(engine: str) -> None
 
 def test_ghost_says_why_it_is_not_exact() -> None:
     session = Session(from_document({"ball": [{"position": [k * 0.5, 0], "radius": 1} for k in range(2)]}))
-    ghost, note = ghost_setting(session.relay.checkpoint())
+    ghost, note = ghost_setting(session.simulation.checkpoint())
     assert ghost.engine == "reference"
     assert "exact refuses" in note
     company = Diagnostics(session)
@@ -95,7 +95,7 @@ def test_ghost_does_what_the_session_does_and_keeps_its_engine() -> None:
         Switch(time=0.0, engine="reference", settings={"dt": 0.002, "integrator": "rk4"}),
         Remove(time=0.0, body="ball"),
     ):
-        company.did(session.act(action))
+        company.did(session.apply(action))
         together(session, company, 20)
         ghost = company.ghost_frame
         assert ghost is not None
@@ -117,7 +117,7 @@ def test_ghost_and_twin_do_all_that_was_done_after_one_step(at_once: int) -> Non
     company.show_trust(True)
     for _ in range(42 // at_once):
         session.advance(at_once)
-        company.advance(session.redone())
+        company.advance(session.take_replayed_actions())
     assert company.trust is not None
     assert company.trust.spread is not None
     ghost = company.ghost_frame
@@ -131,7 +131,7 @@ def test_ghost_that_cannot_follow_says_why_and_another_engine_goes_on() -> None:
     session = Session(BOUNCE, "pymunk")
     company = Diagnostics(session)
     company.show_ghost(True)
-    company.did(session.act(Spawn(time=0.0, ball=Ball(position=(0.3, 5.5), radius=0.5))))
+    company.did(session.apply(Spawn(time=0.0, ball=Ball(position=(0.3, 5.5), radius=0.5))))
     together(session, company, 1)
     assert company.ghost_engine == "reference"
     assert company.distance == 0.0
@@ -163,7 +163,7 @@ def test_twin_loses_trust_when_compare_says_so() -> None:
     assert truth.trusted_until < scene.world.duration
     for engine in ("pymunk", "exact"):
         session = Session(scene, engine)
-        trust = DivergenceMonitor(session.relay.checkpoint())
+        trust = DivergenceMonitor(session.simulation.checkpoint())
         assert trust.tolerance == usual_tolerance(scene)
         spreads = []
         while trust.state == "trusted" and session.time < 3.0 * truth.trusted_until:
@@ -184,7 +184,7 @@ def test_twin_loses_trust_when_compare_says_so() -> None:
 @pytest.mark.parametrize("engine", ENGINES)
 def test_bounce_is_trusted_to_its_end(engine: str) -> None:
     session = Session(BOUNCE, engine)
-    trust = DivergenceMonitor(session.relay.checkpoint())
+    trust = DivergenceMonitor(session.simulation.checkpoint())
     for _ in range(60):
         session.advance(100)
         beside(trust, session)
@@ -196,7 +196,7 @@ def test_bounce_is_trusted_to_its_end(engine: str) -> None:
 
 def test_what_meets_nothing_is_trusted_without_a_twin() -> None:
     session = Session(load(find("fireworks")))
-    trust = DivergenceMonitor(session.relay.checkpoint())
+    trust = DivergenceMonitor(session.simulation.checkpoint())
     assert not trust.able
     beside(trust, session)
     assert trust.state == "trusted"
@@ -208,7 +208,7 @@ def test_twin_that_ends_leaves_trust_unknown(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(companions, "CATCH_UP_TIME", 0.0)
     scene = load(find("gas"), [("grid.atom.velocity_jitter", 100.0), ("solver.dt", 10.0)])
     session = Session(scene, "exact")
-    trust = DivergenceMonitor(session.relay.checkpoint())
+    trust = DivergenceMonitor(session.simulation.checkpoint())
     trust.follow(1)
     trust.look(session.frame, 1)
     assert trust.state == "unknown"
@@ -224,7 +224,7 @@ def test_company_waits_while_the_session_goes_back_and_comes_again() -> None:
     company.show_trust(True)
     kick = Impulse(time=0.0, body="ball", impulse=(0.5, 1.0))
     together(session, company, 200)
-    company.did(session.act(kick))
+    company.did(session.apply(kick))
     distance = {}
     for _ in range(200):
         together(session, company, 1)
@@ -255,7 +255,7 @@ def test_company_begins_anew_where_the_past_is_changed() -> None:
     for _ in session.seek(100):
         pass
     company.begin()
-    company.did(session.act(Impulse(time=0.0, body="ball", impulse=(0.5, 1.0))))
+    company.did(session.apply(Impulse(time=0.0, body="ball", impulse=(0.5, 1.0))))
     assert company.distance == 0.0
     together(session, company, 10)
     assert company.trust is not None
@@ -267,7 +267,7 @@ def test_company_begins_anew_where_the_past_is_changed() -> None:
 def test_companions_do_what_a_recording_does_again() -> None:
     first = Session(BOUNCE, "pymunk")
     first.advance(300)
-    first.act(Impulse(time=0.0, body="ball", impulse=(3.0, 4.0)))
+    first.apply(Impulse(time=0.0, body="ball", impulse=(3.0, 4.0)))
     first.advance(300)
     session = Session(BOUNCE, "pymunk", actions=first.actions)
     company = Diagnostics(session)
@@ -275,7 +275,7 @@ def test_companions_do_what_a_recording_does_again() -> None:
     company.show_trust(True)
     for _ in range(12):
         session.advance(50)  # the kick lies within a batch
-        company.advance(session.redone())
+        company.advance(session.take_replayed_actions())
     assert company.distance is not None
     assert company.distance < 0.01  # g·h·t/2; without the kick it would be 1.5 m off
     assert company.trust is not None
@@ -345,7 +345,7 @@ def test_apart_is_the_largest_distance_of_those_in_both() -> None:
     two = Session(from_document({"ball": [{"position": [5.0 * k, 4.0 * k], "radius": 1} for k in range(3)]}))
     assert max_body_distance(one.frame, two.frame) == 4.0
     assert max_body_distance(two.frame, one.frame) == 4.0
-    two.act(Remove(time=0.0, body="ball-2"))
+    two.apply(Remove(time=0.0, body="ball-2"))
     assert max_body_distance(one.frame, two.frame) == 0.0
     empty = Session(from_document({"title": "t"}))
     assert max_body_distance(one.frame, empty.frame) is None
@@ -354,7 +354,7 @@ def test_apart_is_the_largest_distance_of_those_in_both() -> None:
 
 def test_ghost_takes_over_a_steady_force_or_leaves_it_to_who_can() -> None:
     session = Session(from_document({"ball": [{"name": "a", "position": [0, 0], "radius": 1}]}), "pymunk")
-    session.act(Force(time=0.0, body="a", force=(1.0, 0.0)))
+    session.apply(Force(time=0.0, body="a", force=(1.0, 0.0)))
     company = Diagnostics(session)
     company.show_ghost(True)
     together(session, company, 100)
@@ -366,7 +366,7 @@ def test_ghost_takes_over_a_steady_force_or_leaves_it_to_who_can() -> None:
 
 
 def test_companion_that_ended_is_quiet(monkeypatch: pytest.MonkeyPatch) -> None:
-    companion = ShadowRun(Session(BOUNCE).relay.checkpoint())
+    companion = ShadowRun(Session(BOUNCE).simulation.checkpoint())
     companion.act(Remove(time=0.0, body="zzz"))
     assert companion.ended is not None
     assert companion.frame is None
@@ -375,5 +375,5 @@ def test_companion_that_ended_is_quiet(monkeypatch: pytest.MonkeyPatch) -> None:
     companion.close()
     monkeypatch.setattr(companions, "ENGINES", {})
     with pytest.raises(ActionError, match="no other engine"):
-        ghost_setting(Session(BOUNCE).relay.checkpoint())
+        ghost_setting(Session(BOUNCE).simulation.checkpoint())
     assert np.isfinite(Session(BOUNCE).frame.position).all()

@@ -12,7 +12,14 @@ from sandbox.engines.switching import SwitchableSimulation
 from sandbox.scene.files.load import from_document
 from sandbox.trajectory import Frame
 from sandbox.window.playback import history as module
-from sandbox.window.playback.history import APART, BYTES_PER_BODY, BYTES_PER_FRAME, MAX_FRAMES, History, Keyframe
+from sandbox.window.playback.history import (
+    BYTES_PER_BODY,
+    BYTES_PER_FRAME,
+    MAX_KEYFRAMES,
+    MIN_KEYFRAME_INTERVAL,
+    History,
+    Keyframe,
+)
 
 
 def frame(time: float, bodies: int = 1) -> Frame:
@@ -27,27 +34,27 @@ def point() -> Checkpoint:
 def filled(steps: int, dt: float = 0.01) -> History:
     history = History()
     for k in range(steps):
-        history.keep(k, frame(k * dt))
+        history.store(k, frame(k * dt))
     return history
 
 
 def test_what_is_kept_is_known_and_stays_as_it_was() -> None:
     history = filled(5)
-    first = history.known(3)
-    history.keep(3, frame(99.0))
-    assert history.known(3) is first
-    assert history.known(5) is None
-    assert history.furthest == 4
-    assert history.end == 0.04
-    assert (history.next_known(2), history.next_known(4)) == (3, None)
+    first = history.get(3)
+    history.store(3, frame(99.0))
+    assert history.get(3) is first
+    assert history.get(5) is None
+    assert history.last_step == 4
+    assert history.end_time == 0.04
+    assert (history.next_stored(2), history.next_stored(4)) == (3, None)
 
 
 def test_empty_history_has_nothing() -> None:
     history = History()
-    assert (history.furthest, history.end, history.marks, history.mark_times) == (0, 0.0, (), ())
-    assert history.known(0) is None
-    assert history.next_known(0) is None
-    assert history.before(9) is None
+    assert (history.last_step, history.end_time, history.keyframe_steps, history.keyframe_times) == (0, 0.0, (), ())
+    assert history.get(0) is None
+    assert history.next_stored(0) is None
+    assert history.keyframe_before(9) is None
     with pytest.raises(LookupError):
         history.nearest(0.0)
 
@@ -59,26 +66,26 @@ def test_nearest_state_is_found(time: float, step: int) -> None:
     history = filled(5)
     found, state = history.nearest(time)
     assert found == step
-    assert state is history.known(step)
+    assert state is history.get(step)
 
 
 @given(st.integers(1, 40), st.integers(2, 400))
 def test_memory_stays_within_its_budget_and_first_and_last_stay(most: int, steps: int) -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "BUDGET", most * (100 * BYTES_PER_BODY + BYTES_PER_FRAME))
+        patch.setattr(module, "MAX_BYTES", most * (100 * BYTES_PER_BODY + BYTES_PER_FRAME))
         history = History()
         for k in range(steps):
-            history.keep(k, frame(float(k), 100))
-            known = [j for j in range(k + 1) if history.known(j) is not None]
+            history.store(k, frame(float(k), 100))
+            known = [j for j in range(k + 1) if history.get(j) is not None]
             assert len(known) <= max(most, 2)
             assert known[0] == 0
-            assert known[-1] == k == history.furthest
+            assert known[-1] == k == history.last_step
 
 
 def test_what_was_long_ago_is_thinned_out_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "BUDGET", 64 * (BYTES_PER_BODY + BYTES_PER_FRAME))
+    monkeypatch.setattr(module, "MAX_BYTES", 64 * (BYTES_PER_BODY + BYTES_PER_FRAME))
     history = filled(300)
-    known = [k for k in range(300) if history.known(k) is not None]
+    known = [k for k in range(300) if history.get(k) is not None]
     gaps = [b - a for a, b in pairwise(known)]
     assert gaps[0] > gaps[-1] == 1
     assert gaps == sorted(gaps, reverse=True)
@@ -88,45 +95,45 @@ def test_hundred_thousand_bodies_keep_within_256_megabytes() -> None:
     one = frame(0.0, 100_000)
     history = History()
     for k in range(200):
-        history.keep(k, one)
-    assert sum(history.known(k) is not None for k in range(200)) * 100_000 * BYTES_PER_BODY <= module.BUDGET
+        history.store(k, one)
+    assert sum(history.get(k) is not None for k in range(200)) * 100_000 * BYTES_PER_BODY <= module.MAX_BYTES
 
 
 def test_cut_forgets_what_came_later_and_makes_room_for_it() -> None:
     history = filled(10)
     for step in (2, 5, 8):
-        history.mark(Keyframe(step, 0, point()))
-    history.cut(5)
-    assert history.furthest == 5
-    assert history.marks == (2, 5)
-    history.keep(6, frame(9.0))
-    assert history.end == 9.0
-    history.cut(-1)
-    assert history.furthest == 0
-    assert history.marks == ()
+        history.add_keyframe(Keyframe(step, 0, point()))
+    history.truncate(5)
+    assert history.last_step == 5
+    assert history.keyframe_steps == (2, 5)
+    history.store(6, frame(9.0))
+    assert history.end_time == 9.0
+    history.truncate(-1)
+    assert history.last_step == 0
+    assert history.keyframe_steps == ()
 
 
 def test_checkpoints_stand_apart_and_are_found() -> None:
     history = History()
     for k in range(200):
-        history.keep(k, frame(float(k)))
-        if history.wants_mark(k):
-            history.mark(Keyframe(k, 0, point()))
-    assert len(history.marks) >= 5
-    assert all(b - a >= APART for a, b in pairwise((0, *history.marks)))
+        history.store(k, frame(float(k)))
+        if history.wants_keyframe(k):
+            history.add_keyframe(Keyframe(k, 0, point()))
+    assert len(history.keyframe_steps) >= 5
+    assert all(b - a >= MIN_KEYFRAME_INTERVAL for a, b in pairwise((0, *history.keyframe_steps)))
     for step in (0, 40, 100, 199):
-        mark = history.before(step)
-        assert (mark.step if mark else None) == max((m for m in history.marks if m <= step), default=None)
+        mark = history.keyframe_before(step)
+        assert (mark.step if mark else None) == max((m for m in history.keyframe_steps if m <= step), default=None)
 
 
 def test_checkpoints_are_no_more_than_there_may_be_and_go_on_over_all_time() -> None:
     history = History()
     for k in range(0, 10_000, 10):
-        history.mark(Keyframe(k, 0, point_of_nothing))
-    assert len(history.marks) <= MAX_FRAMES
-    assert list(history.marks) == sorted(history.marks)
-    assert history.marks[0] == 0
-    assert history.marks[-1] == 9990
+        history.add_keyframe(Keyframe(k, 0, point_of_nothing))
+    assert len(history.keyframe_steps) <= MAX_KEYFRAMES
+    assert list(history.keyframe_steps) == sorted(history.keyframe_steps)
+    assert history.keyframe_steps[0] == 0
+    assert history.keyframe_steps[-1] == 9990
 
 
 point_of_nothing = point()
@@ -134,16 +141,16 @@ point_of_nothing = point()
 
 def test_distrust_is_for_good() -> None:
     history = filled(100)
-    history.mark(Keyframe(50, 0, point()))
-    history.distrust()
-    assert history.marks == ()
-    assert not history.wants_mark(99)
+    history.add_keyframe(Keyframe(50, 0, point()))
+    history.disable_checkpoints()
+    assert history.keyframe_steps == ()
+    assert not history.wants_keyframe(99)
 
 
 def test_action_that_is_put_in_counts_for_its_step_and_all_later() -> None:
     history = filled(100)
     for step, actions in ((10, 1), (40, 2), (70, 2)):
-        history.mark(Keyframe(step, actions, point()))
-    history.inserted(40)
-    found = [history.before(step) for step in (10, 40, 70)]
+        history.add_keyframe(Keyframe(step, actions, point()))
+    history.count_inserted_action(40)
+    found = [history.keyframe_before(step) for step in (10, 40, 70)]
     assert [mark.actions for mark in found if mark is not None] == [1, 3, 3]

@@ -94,7 +94,7 @@ def test_machine_that_is_too_slow_drops_time(monkeypatch: pytest.MonkeyPatch) ->
 def test_recorded_part_ends_in_a_pause_once() -> None:
     first = Session(bounce())
     first.advance(100)
-    first.act(Impulse(time=0.0, body="ball", impulse=(1.0, 0.0)))
+    first.apply(Impulse(time=0.0, body="ball", impulse=(1.0, 0.0)))
     first.advance(50)
     recording = first.recording()
     show = LiveView(Session(bounce(), actions=recording.actions), until=recording.duration)
@@ -103,7 +103,7 @@ def test_recorded_part_ends_in_a_pause_once() -> None:
         if show.wants_pause:
             break
     assert show.wants_pause
-    assert show.session.relay.state_hash() == recording.state_hash
+    assert show.session.simulation.state_hash() == recording.state_hash
     show.wants_pause = False
     show.go_on(0.03, paused=False)
     assert not show.wants_pause
@@ -236,8 +236,8 @@ def test_way_that_leads_elsewhere_is_left_while_playing() -> None:
     show = live("newtons_cradle", "exact")
     for _ in range(200):
         show.step()
-    seen = {k: show.session.history.known(k) for k in range(201)}
-    for step in show.session.history.marks or (60,):
+    seen = {k: show.session.history.get(k) for k in range(201)}
+    for step in show.session.history.keyframe_steps or (60,):
         show.seek(step)
         arrived(show)
         while show.step_number < min(step + 20, 200):

@@ -23,7 +23,7 @@ from sandbox.trajectory import Frame
 from sandbox.window.playback import history as history_module
 from sandbox.window.playback.history import Keyframe
 from sandbox.window.playback.live import switch_engine
-from sandbox.window.playback.session import Session, WrongWayError
+from sandbox.window.playback.session import ReplayMismatchError, Session
 
 
 def shipped(name: str) -> Scene:
@@ -60,7 +60,7 @@ def played(session: Session, steps: int) -> Session:
 
 
 def hashes(session: Session) -> dict[int, str]:
-    kept = {k: session.history.known(k) for k in range(session.history.furthest + 1)}
+    kept = {k: session.history.get(k) for k in range(session.history.last_step + 1)}
     return {k: frame.state_hash() for k, frame in kept.items() if frame is not None}
 
 
@@ -75,7 +75,7 @@ def assert_replays(session: Session) -> None:
 def test_recording_keeps_what_came_after_the_moment_it_has_gone_back_to(name: str, engine: str) -> None:
     session = Session(SCENES[name], engine)
     played(session, 40)
-    session.act(Impulse(time=0.0, body=FIRST[name], impulse=(0.1 * float(session.bodies.mass[0]), 0.0)))
+    session.apply(Impulse(time=0.0, body=FIRST[name], impulse=(0.1 * float(session.bodies.mass[0]), 0.0)))
     played(session, 40)
     whole = session.recording()
     for step in (60, 20, 0, 50):
@@ -86,7 +86,7 @@ def test_recording_keeps_what_came_after_the_moment_it_has_gone_back_to(name: st
     assert whole.at is None
     assert_replays(session)
     assert session.replaced is None
-    session.act(Impulse(time=0.0, body=FIRST[name], impulse=(0.0, 0.0)))
+    session.apply(Impulse(time=0.0, body=FIRST[name], impulse=(0.0, 0.0)))
     assert session.replaced is not None
     assert session.replaced.recording == whole
     assert session.replaced.time == pytest.approx(50 * session.settings.dt)
@@ -104,7 +104,7 @@ def test_way_back_and_forth_leads_through_the_same_states(name: str, engine: str
         played(session, part)
         if acting and k in (1, 3, 4):
             kick = float(session.bodies.mass[0]) * 0.3
-            session.act(Impulse(time=0.0, body=FIRST[name], impulse=(kick, kick)))
+            session.apply(Impulse(time=0.0, body=FIRST[name], impulse=(kick, kick)))
     end, seen, actions = session.step_number, hashes(session), session.actions
     for step in (end - 1, end, 3, end // 2, 0, 2 * part + 1, 2 * part, 2 * part - 1, end):
         go(session, step)
@@ -130,14 +130,14 @@ def test_steps_one_by_one_and_many_at_once_are_the_same(name: str, engine: str) 
 
 def test_what_is_done_after_going_back_cuts_the_future() -> None:
     session = played(Session(SCENES["bounce"]), 50)
-    session.act(Impulse(time=0.0, body="ball", impulse=(1.0, 0.0)))
+    session.apply(Impulse(time=0.0, body="ball", impulse=(1.0, 0.0)))
     played(session, 50)
     go(session, 20)
     assert session.actions == ()
-    assert session.history.furthest == 100
-    done = session.act(Impulse(time=0.0, body="ball", impulse=(0.0, 2.0)))
+    assert session.history.last_step == 100
+    done = session.apply(Impulse(time=0.0, body="ball", impulse=(0.0, 2.0)))
     assert done.time == session.time
-    assert session.history.furthest == 20
+    assert session.history.last_step == 20
     assert session.actions == (done,)
     before = session.frame
     played(session, 100)
@@ -151,16 +151,16 @@ def test_refused_action_changes_nothing_and_keeps_the_future() -> None:
     seen = hashes(session)
     go(session, 20)
     with pytest.raises(ActionError, match="zzz"):
-        session.act(Remove(time=0.0, body="zzz"))
+        session.apply(Remove(time=0.0, body="zzz"))
     assert session.actions == ()
     assert hashes(session) == seen
 
 
 def test_actions_of_a_recording_are_done_again_on_the_way() -> None:
     first = played(Session(SCENES["gas"]), 20)
-    first.act(Move(time=0.0, body="atom-1", position=(0.6, 0.6), velocity=(0.0, 3.0)))
+    first.apply(Move(time=0.0, body="atom-1", position=(0.6, 0.6), velocity=(0.0, 3.0)))
     played(first, 20)
-    first.act(SetParameter(time=0.0, path="world.gravity", value=[0.0, -1.0]))
+    first.apply(SetParameter(time=0.0, path="world.gravity", value=[0.0, -1.0]))
     again = Session(SCENES["gas"], actions=first.actions)
     assert again.advance(40) == 40
     assert again.frame.state_hash() == first.frame.state_hash()
@@ -174,7 +174,7 @@ def test_recorded_action_that_the_engine_cannot_do_ends_the_session_and_says_so(
     assert "no body is named 'zzz'" in session.ended
     go(session, 5)
     assert session.ended is None
-    session.act(Impulse(time=0.0, body="ball", impulse=(1.0, 0.0)))
+    session.apply(Impulse(time=0.0, body="ball", impulse=(1.0, 0.0)))
     assert session.advance(50) == 50
 
 
@@ -191,18 +191,18 @@ def test_checkpoints_stand_where_nothing_touches() -> None:
         if len(session.contacts()):
             touched.append(session.step_number)
     assert len(touched) >= 5
-    assert len(session.history.marks) >= 8
-    assert all(step - 8 > max((t for t in touched if t <= step), default=-9) for step in session.history.marks)
+    assert len(session.history.keyframe_steps) >= 8
+    assert all(step - 8 > max((t for t in touched if t <= step), default=-9) for step in session.history.keyframe_steps)
     floor, world = [{"point": [0, 0], "normal": [0, 1]}], {"gravity": [0, -10]}
-    assert played(Session(scene_of(ball("a", 0, 0.25), plane=floor, world=world)), 200).history.marks == ()
+    assert played(Session(scene_of(ball("a", 0, 0.25), plane=floor, world=world)), 200).history.keyframe_steps == ()
 
 
 def test_way_from_a_checkpoint_is_shorter() -> None:
     session = Session(SCENES["bounce"])
     played(session, 400)
     go(session, 399)
-    assert 300 < session.relay.work["substeps"] + session.history.marks[-1] <= 400
-    assert session.relay.work["substeps"] < 60
+    assert 300 < session.simulation.work["substeps"] + session.history.keyframe_steps[-1] <= 400
+    assert session.simulation.work["substeps"] < 60
 
 
 def doctored(mark: Keyframe) -> Keyframe:
@@ -217,30 +217,30 @@ def doctored(mark: Keyframe) -> Keyframe:
 def test_checkpoint_that_leads_elsewhere_is_not_trusted_again() -> None:
     session = played(Session(SCENES["bounce"]), 200)
     seen = hashes(session)
-    mark = session.history.before(150)
+    mark = session.history.keyframe_before(150)
     assert mark is not None
-    session.history.cut(200)
-    session.history._marks = [doctored(mark)]
+    session.history.truncate(200)
+    session.history._keyframes = [doctored(mark)]
     go(session, 150)
     assert session.frame.state_hash() == seen[150]
-    assert session.history.marks == ()
+    assert session.history.keyframe_steps == ()
     go(session, 199)
     assert hashes(session) == seen
     played(session, 100)
-    assert session.history.marks == ()
+    assert session.history.keyframe_steps == ()
     assert_replays(session)
 
 
 def test_wrong_way_that_is_noticed_while_playing_is_left_by_seeking_the_same_step() -> None:
     session = played(Session(SCENES["bounce"]), 200)
     seen = hashes(session)
-    mark = session.history.before(150)
+    mark = session.history.keyframe_before(150)
     assert mark is not None
-    session.history._marks = [doctored(mark)]
+    session.history._keyframes = [doctored(mark)]
     go(session, mark.step)  # nothing can be noticed yet
-    with pytest.raises(WrongWayError):
+    with pytest.raises(ReplayMismatchError):
         session.advance(3)
-    session.history.distrust()
+    session.history.disable_checkpoints()
     step = session.step_number
     go(session, step)
     assert session.frame.state_hash() == seen[step]
@@ -253,10 +253,10 @@ def test_wrong_way_that_is_noticed_while_playing_is_left_by_seeking_the_same_ste
 def test_session_that_goes_on_from_a_checkpoint_can_be_found_again_and_replayed(engine: str, after: int) -> None:
     """`exact` rounds otherwise once it was taken up again; who acts there must not lose the way back."""
     session = played(Session(load(find("fireworks")), engine), 100)
-    mark = session.history.marks[-1] if session.history.marks else 90
+    mark = session.history.keyframe_steps[-1] if session.history.keyframe_steps else 90
     go(session, mark + after if mark + after < 100 else 99)
     here = session.step_number
-    session.act(Impulse(time=0.0, body="spark-1", impulse=(0.1, 0.3)))
+    session.apply(Impulse(time=0.0, body="spark-1", impulse=(0.1, 0.3)))
     played(session, 60)
     seen = hashes(session)
     assert_replays(session)
@@ -285,7 +285,7 @@ def test_what_nobody_has_seen_is_found_again_also_from_a_checkpoint(engine: str)
         }
     )  # fmt: skip
     session = Session(scene, engine)
-    while not session.history.marks and session.step_number < 100:
+    while not session.history.keyframe_steps and session.step_number < 100:
         session.advance()
     played(session, 3)
     go(session, session.step_number - 1)
@@ -299,18 +299,18 @@ def test_what_nobody_has_seen_is_found_again_also_from_a_checkpoint(engine: str)
 
 def test_hand_that_was_to_let_go_later_lets_go_when_that_is_forgotten() -> None:
     session = played(Session(scene_of(ball("a", 0, 0), ball("b", 9, 9))), 5)
-    session.act(Pull(time=0.0, body="a", target=(3.0, 0.0)))
+    session.apply(Pull(time=0.0, body="a", target=(3.0, 0.0)))
     played(session, 20)
-    session.act(Pull(time=0.0, body="a"))
+    session.apply(Pull(time=0.0, body="a"))
     played(session, 20)
     go(session, 10)
-    session.act(Impulse(time=0.0, body="b", impulse=(1.0, 0.0)))
+    session.apply(Impulse(time=0.0, body="b", impulse=(1.0, 0.0)))
     velocity = session.frame.velocity[0].tolist()
     assert velocity[0] > 0.0
     assert played(session, 50).frame.velocity[0].tolist() == velocity
     assert_replays(session)
     go(session, 10)
-    session.act(Pull(time=0.0, body="a", target=(1.0, 0.0)))  # who goes on pulling goes on
+    session.apply(Pull(time=0.0, body="a", target=(1.0, 0.0)))  # who goes on pulling goes on
     assert played(session, 150).frame.position[0] == pytest.approx([1.0, 0.0], abs=1e-9)  # (1 + ωt)·e^{−ωt}
 
 
@@ -318,7 +318,7 @@ def test_memory_is_bounded_with_many_bodies_and_the_way_back_is_found_all_the_sa
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(
-        history_module, "BUDGET", 20 * (225 * history_module.BYTES_PER_BODY + history_module.BYTES_PER_FRAME)
+        history_module, "MAX_BYTES", 20 * (225 * history_module.BYTES_PER_BODY + history_module.BYTES_PER_FRAME)
     )
     session = Session(SCENES["gas"])
     seen = {0: session.frame.state_hash()}
@@ -346,12 +346,12 @@ def test_session_that_diverged_can_go_back_and_elsewhere(engine: str) -> None:
     assert "out of range" in session.ended
     assert session.advance(5) == 0
     with pytest.raises(ActionError, match="ended"):
-        session.act(Remove(time=0.0, body="a"))
+        session.apply(Remove(time=0.0, body="a"))
     go(session, 20_000)  # it is still there
     assert session.step_number == 9011
     go(session, 9010)
     assert session.ended is None
-    session.act(Impulse(time=0.0, body="a", impulse=(-2e12, 0.0)))
+    session.apply(Impulse(time=0.0, body="a", impulse=(-2e12, 0.0)))
     assert session.advance(100) == 100
     assert session.frame.position[0, 0] < 1e17
 
@@ -368,22 +368,22 @@ def test_divergence_at_the_first_step_leaves_the_start() -> None:
     go(session, 0)
     assert session.ended is None
     assert session.frame.state_hash() == begin
-    session.act(SetParameter(time=0.0, path="world.quadratic_drag", value=0.0))
+    session.apply(SetParameter(time=0.0, path="world.quadratic_drag", value=0.0))
     assert session.advance(9) == 9
 
 
 def test_exhausted_step_is_none_of_the_sessions_and_it_can_go_back() -> None:
     gas = load(find("gas"), [("grid.atom.velocity_jitter", 100.0)])  # some 200,000 impacts in 10 s
     session = played(Session(gas, "exact"), 3)
-    session.act(Switch(time=0.0, settings={"dt": 10.0}))
+    session.apply(Switch(time=0.0, settings={"dt": 10.0}))
     seen = hashes(session)
-    session.relay.patience = 0.0
+    session.simulation.patience = 0.0
     assert session.advance(5) == 0
     assert session.ended is not None
     assert "takes longer" in session.ended
     assert hashes(session) == seen
     assert session.recording().state_hash is None
-    assert session.recording().duration == session.history.end
+    assert session.recording().duration == session.history.end_time
     go(session, 1)
     assert session.ended is None
     assert session.frame.state_hash() == seen[1]
@@ -397,7 +397,7 @@ def test_steps_before_an_exhausted_one_count(monkeypatch: pytest.MonkeyPatch) ->
     session = Session(gas, "exact")
     due = Switch(time=session.settings.dt * 3, settings={"dt": 10.0})
     session = Session(gas, "exact", actions=(due,))
-    session.relay.patience = 0.0
+    session.simulation.patience = 0.0
     assert session.advance(9) == 3
     assert session.ended is not None
     assert set(hashes(session)) == {0}
@@ -465,7 +465,7 @@ ODD: dict[str, Scene] = {
 def test_odd_scenes_are_played_back_and_forth(name: str, engine: str) -> None:
     session = played(Session(ODD[name], engine), 70)
     seen = hashes(session)
-    session.act(Spawn(time=0.0, ball=Ball(position=(0.0, 0.5), radius=0.1)))
+    session.apply(Spawn(time=0.0, ball=Ball(position=(0.0, 0.5), radius=0.1)))
     played(session, 5)
     assert_replays(session)
     go(session, 30)
@@ -512,13 +512,13 @@ TWO = scene_of(
 def test_in_any_order_of_moves_a_step_is_what_it_was(engine: str, plan: list[tuple[str, int]]) -> None:
     session = Session(TWO, engine)
     for kind, number in plan:
-        seen = {k: v for k, v in hashes(session).items() if k not in session.unsure}
+        seen = {k: v for k, v in hashes(session).items() if k not in session.unconfirmed_steps}
         match kind:
             case "on":
                 try:
                     assert session.advance(number) == number
-                except WrongWayError:
-                    session.history.distrust()
+                except ReplayMismatchError:
+                    session.history.disable_checkpoints()
                     go(session, session.step_number)
             case "to":
                 go(session, number)
@@ -527,14 +527,14 @@ def test_in_any_order_of_moves_a_step_is_what_it_was(engine: str, plan: list[tup
                 next(session.seek(number), None)
             case _:
                 try:
-                    session.act(DEEDS[number])
+                    session.apply(DEEDS[number])
                 except ActionError:
                     continue
                 seen = {k: v for k, v in seen.items() if k < session.step_number}
         assert session.ended is None
         now = hashes(session)
         assert {k: now[k] for k in seen} == seen
-        times = [frame.time for k in now if (frame := session.history.known(k)) is not None]
+        times = [frame.time for k in now if (frame := session.history.get(k)) is not None]
         assert all(a < b for a, b in pairwise(times))
         assert np.isfinite(session.frame.position).all()
     go(session, session.step_number + 1)
@@ -544,7 +544,7 @@ def test_in_any_order_of_moves_a_step_is_what_it_was(engine: str, plan: list[tup
 def struck(aim: float, speed: float, steps: int) -> Session:
     """Return a session of a table in which the cue ball was struck, and some steps made, not all of them looked at."""
     session = Session(TABLE, "exact")
-    session.act(Strike(time=0.0, ball="cue", aim=aim, speed=speed))
+    session.apply(Strike(time=0.0, ball="cue", aim=aim, speed=speed))
     while session.step_number < steps:
         session.advance(3)
     return session
@@ -555,7 +555,7 @@ def test_balls_on_a_floor_go_back_and_forth_to_the_same_states(seed: int) -> Non
     random = np.random.default_rng(seed)
     session = struck(1.5708 + random.uniform(-0.2, 0.2), random.uniform(2.0, 6.0), 600)
     before = hashes(session)
-    for target in random.integers(0, session.history.furthest, 6).tolist():
+    for target in random.integers(0, session.history.last_step, 6).tolist():
         go(session, target)
         assert all(hashes(session)[step] == state for step, state in before.items())
     assert_replays(session)
@@ -564,7 +564,7 @@ def test_balls_on_a_floor_go_back_and_forth_to_the_same_states(seed: int) -> Non
 def test_what_a_wrong_way_has_shown_is_forgotten() -> None:
     session = struck(1.5, 4.0, 300)
     before = hashes(session)
-    session.history.mark(Keyframe(150, 1, session.relay.checkpoint()))  # of quite another time
+    session.history.add_keyframe(Keyframe(150, 1, session.simulation.checkpoint()))  # of quite another time
     go(session, 200)
     assert all(hashes(session)[step] == state for step, state in before.items())
     go(session, 300)
@@ -573,18 +573,18 @@ def test_what_a_wrong_way_has_shown_is_forgotten() -> None:
 
 def test_retracted_action_and_what_it_led_to_are_gone() -> None:
     session = Session(TABLE, "exact")
-    untouched = session.relay.state_hash()
-    session.act(Move(time=0.0, body="cue", position=(0.4, 0.3)))
-    moved = session.relay.state_hash()
-    session.act(Strike(time=0.0, ball="cue", aim=1.5, speed=3.0))
+    untouched = session.simulation.state_hash()
+    session.apply(Move(time=0.0, body="cue", position=(0.4, 0.3)))
+    moved = session.simulation.state_hash()
+    session.apply(Strike(time=0.0, ball="cue", aim=1.5, speed=3.0))
     played(session, 50)
     go(session, session.retract(1))
-    assert session.relay.state_hash() == moved
+    assert session.simulation.state_hash() == moved
     assert len(session.actions) == 1
-    assert session.history.furthest == 0
+    assert session.history.last_step == 0
     played(session, 10)
     assert not session.frame.velocity.any()
     assert_replays(session)
     go(session, session.retract(0))
-    assert session.relay.state_hash() == untouched
+    assert session.simulation.state_hash() == untouched
     assert session.actions == ()

@@ -7,12 +7,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from toy_game import Toy, toy_game, toy_scene
 
-from sandbox.action import ActionError, Impulse, Remove, Switch
+from sandbox.action import Action, ActionError, Impulse, Remove, Switch
+from sandbox.engines.switching import SwitchableSimulation
 from sandbox.games import registry
 from sandbox.games.session import GameSession
 from sandbox.measure.replay import rerun
 from sandbox.recording import Recording
-from sandbox.window.playback.session import Session, WrongWayError
+from sandbox.window.playback.session import ReplayMismatchError, Session
 
 
 @pytest.fixture(autouse=True)
@@ -29,8 +30,8 @@ def on(session: Session, steps: int) -> None:
     """Make steps as the window does, which finds the way where a checkpoint has led astray."""
     try:
         session.advance(steps)
-    except WrongWayError:
-        session.history.distrust()
+    except ReplayMismatchError:
+        session.history.disable_checkpoints()
         go(session, session.step_number)
 
 
@@ -124,7 +125,7 @@ def test_checkpoints_hold_the_game() -> None:
     session.press("aim", 0.25)
     for _ in range(150):
         session.advance()
-    assert session.history.marks
+    assert session.history.keyframe_steps
     session.press("kick", 1.0)
     session.advance(5)
     go(session, 149)
@@ -152,9 +153,9 @@ def test_who_acts_in_the_past_forgets_what_was_pressed_later() -> None:
 def test_hands_and_engines_are_part_of_a_game() -> None:
     session = session_of()
     session.advance(30)
-    session.act(Impulse(time=0.0, body="a", impulse=(0.0, 1.0)))  # what a hand does
+    session.apply(Impulse(time=0.0, body="a", impulse=(0.0, 1.0)))  # what a hand does
     session.advance(30)
-    session.act(Switch(time=0.0, engine="reference"))
+    session.apply(Switch(time=0.0, engine="reference"))
     session.advance(60)
     score = rules_of(session).score
     assert score % 1.0 == 0.5
@@ -165,8 +166,8 @@ def test_game_that_is_over_stays_so() -> None:
     session = session_of()
     rules_of(session).ends_at = 1.0
     # The copy that a way back begins from has the same end.
-    assert session._first_game is not None
-    session._first_game.rules.ends_at = 1.0  # type: ignore[attr-defined]
+    assert session._initial_game is not None
+    session._initial_game.rules.ends_at = 1.0  # type: ignore[attr-defined]
     session.advance(150)
     assert rules_of(session).game_over == "enough"
     assert session.press("kick", 1.0) == ()
@@ -177,9 +178,60 @@ def test_game_that_is_over_stays_so() -> None:
     assert rules_of(session).game_over is None
 
 
+@pytest.mark.parametrize("steps", [0, 40])
+def test_refused_press_changes_nothing(steps: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    session = session_of()
+    session.press("aim", 0.3)
+    session.advance(30)
+    session.press("kick", 1.0)
+    session.advance(90)
+    session.press("aim", 0.7)  # at the same time as the refused one
+    go(session, 90)
+    go(session, 120 - steps)  # 0: the present; 40: with presses and actions later than now
+    before = told(session), session.actions, session.has_future, session.game and session.game.all_presses
+    recording = session.recording()
+    engine_applies = type(session.simulation).apply
+
+    def refuse(simulation: SwitchableSimulation, action: Action) -> None:
+        if isinstance(action, Impulse) and action.impulse == (9.0, 0.0):
+            raise ActionError("refused")
+        engine_applies(simulation, action)
+
+    def kick_twice(rules: Toy, control: str, value: float) -> tuple[Action, ...]:
+        rules.score += 100.0
+        return tuple(Impulse(time=0.0, body="a", impulse=(size, 0.0)) for size in (1.0, 9.0))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(SwitchableSimulation, "apply", refuse)
+        rules_before = Toy.on_input
+        # Only the press below asks for the refused action: presses repeated in the replay are as they were.
+        patch.setattr(
+            Toy,
+            "control",
+            lambda self, control, value: (
+                kick_twice(self, control, value) if value == 5.0 else rules_before(self, control, value)
+            ),
+        )
+        with pytest.raises(ActionError, match="refused"):
+            session.press("kick", 5.0)
+    assert (told(session), session.actions, session.has_future, session.game and session.game.all_presses) == before
+    assert session.recording() == recording
+    assert_replays(session)
+    on(session, 60)
+    assert_replays(session)
+
+
+def test_press_copies_no_game(monkeypatch: pytest.MonkeyPatch) -> None:
+    session = session_of()
+    session.advance(10)
+    monkeypatch.setattr(GameSession, "copy", lambda _: pytest.fail("copied"))
+    session.press("aim", 0.3)
+    session.press("kick", 1.0)
+
+
 def test_press_that_cannot_be_done_was_not_pressed() -> None:
     session = session_of()
-    session.act(Remove(time=0.0, body="a"))
+    session.apply(Remove(time=0.0, body="a"))
     with pytest.raises(ActionError):
         session.press("kick", 1.0)
     assert session.game is not None

@@ -26,7 +26,7 @@ def played(scene: Scene, steps: int, kick: int | None = None) -> Session:
     while session.step_number < steps:
         session.advance()
         if session.step_number == kick:
-            session.act(Impulse(time=0.0, body=session.bodies.names[0], impulse=(0.3, 0.1)))
+            session.apply(Impulse(time=0.0, body=session.bodies.names[0], impulse=(0.3, 0.1)))
     return session
 
 
@@ -39,8 +39,8 @@ def course() -> Scene:
 def test_way_back_and_forth_leads_through_the_same_visits(name: str) -> None:
     """Long enough that checkpoints are made, in zones too; each state that is passed is held against the first."""
     session = played(course() if name == "holes" else load(find(name)), 320, kick=200)
-    known = {k: session.history.known(k) for k in range(321)}
-    assert session.history.marks
+    known = {k: session.history.get(k) for k in range(321)}
+    assert session.history.keyframe_steps
     assert {int(mark) for frame in known.values() if frame is not None for mark in np.unique(frame.visits)} >= {0, 1}
     for step in (150, 40, 210, 199, 320, 0, 320):
         for _ in session.seek(step):
@@ -48,12 +48,12 @@ def test_way_back_and_forth_leads_through_the_same_visits(name: str) -> None:
         assert session.frame.state_hash() == known[step].state_hash()
         assert np.array_equal(session.frame.visits, known[step].visits)
         assert np.array_equal(session.frame.layer, known[step].layer)
-    assert session.history.marking  # no checkpoint has led elsewhere
+    assert session.history.checkpoints_enabled  # no checkpoint has led elsewhere
 
 
 def test_recording_leads_to_the_same_end() -> None:
     session = played(course(), 260, kick=200)
-    assert any(frame.visits[0, 2] == HELD for k in range(200) if (frame := session.history.known(k)) is not None)
+    assert any(frame.visits[0, 2] == HELD for k in range(200) if (frame := session.history.get(k)) is not None)
     recording = session.recording()
     again = Recording.from_json(recording.to_json())
     assert rerun(again, audit=False).info["state_hash"] == recording.state_hash
