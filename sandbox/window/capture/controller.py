@@ -107,7 +107,7 @@ class CaptureController:
         try:
             view.session.recording().save(outfile.temporary)
             self._notify(f"session: {outfile.place()}", "info")
-            view.session.note_saved()
+            view.session.mark_saved()
         except (CaptureError, OSError) as error:
             outfile.discard()
             why = str(error) if isinstance(error, CaptureError) else str(unwritable_reason(self._folder, error))

@@ -406,7 +406,11 @@ class Gui:
             "picker",
             "help",
         )
-        session = () if live is None else (live.session, live.scene, live.settings, live.session.wanted, live.bodies)
+        session = (
+            ()
+            if live is None
+            else (live.session, live.scene, live.settings, live.session.simulation.wanted, live.bodies)
+        )
         table = () if game is None else (game, game.players, game.misses)
         inputs = (*session, *table, stage.file, stage.body_tools.picked, *toggles.values(), *buttons)
         same = len(inputs) == len(self._panel_inputs) and all(map(is_, inputs, self._panel_inputs))
