@@ -119,7 +119,7 @@ class WindowContext:
         show = self.app_state.view
         if show is None:
             return False
-        frame, bodies = show.drawn, show.bodies
+        frame, bodies = show.displayed_frame, show.bodies
         count = min(len(bodies), len(frame.position))
         moving = frame.present[:count] & ~bodies.fixed[:count]
         seen = moving & self.camera.in_sight(frame.position[:count], bodies.radius[:count])
@@ -144,7 +144,7 @@ class WindowContext:
         show = self.app_state.view
         if show is None or self.following is None:
             return
-        frame, bodies = show.drawn, show.bodies
+        frame, bodies = show.displayed_frame, show.bodies
         if self.following == "all":
             count = min(len(bodies), len(frame.position))
             chosen = frame.present[:count] & ~bodies.fixed[:count] & np.isfinite(frame.position[:count]).all(axis=1)

@@ -24,7 +24,7 @@ KICK = Impulse(time=0.1, body="a", impulse=(1.0, 0.0))
 @pytest.fixture(autouse=True)
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """No test depends on how fast the machine is."""
-    for name in ("LEAST", "MOST"):
+    for name in ("MIN_STEP_BUDGET", "MAX_STEP_BUDGET"):
         monkeypatch.setattr(live_module, name, 1e9)
 
 
@@ -79,7 +79,7 @@ def test_restart_keeps_the_stored_ghost() -> None:
     stage.restart()
     again = live(stage.view)
     assert again is not first
-    assert again.company.ghosted
+    assert again.diagnostics.has_ghost
     again.session.advance(20, None)
     assert [action.kind for action in again.session.actions] == ["impulse"]
 

@@ -74,7 +74,7 @@ def ghost(path: Path) -> None:
     opened.app_state.toggle_ghost()
     live = opened.app_state.live
     assert live is not None
-    live.company.show_trust(True)
+    live.diagnostics.watch_divergence(True)
     while live.frame.time < 1.6:
         opened.run_frame(FRAME)
     _close(opened, path)
@@ -139,7 +139,7 @@ def pinball(path: Path) -> None:
     live, host = opened.app_state.live, opened.app_state.host
     assert live is not None
     assert host is not None
-    live.company.show_trust(False)
+    live.diagnostics.watch_divergence(False)
     player = PinballBot(live.scene.world.seed, SKILL)
     (_, bottom), (_, top) = view_bounds(live.scene)
     while live.frame.time < LIT or not _plays(live.frame, (bottom + top) / 2.0):

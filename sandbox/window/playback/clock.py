@@ -1,9 +1,7 @@
-"""Pace: how many steps of fixed length each picture needs, and how fast the scene really goes.
+"""Fixed-step clock: steps that are due per picture, simulation speed, and interpolation between two states.
 
-The accumulator of G. Fiedler, "Fix Your Timestep!" (2004): real time is saved up and spent in whole steps; what is
-left over says how far between two states the picture lies.
-
-Between: the picture that lies between two states.
+The accumulator of G. Fiedler, "Fix Your Timestep!" (2004): real time is accumulated and spent in whole steps; the
+remainder is the position of the picture between two states.
 """
 
 from collections import deque
@@ -15,32 +13,32 @@ from sandbox.arrays import FloatArray
 from sandbox.trajectory import Frame
 
 TELEPORT_FACTOR = 4.0
-"""Who is farther on than so many times what its speed explains was put there."""
+"""A body that moved more than this times speed × dt was placed, not simulated; it is not interpolated."""
 TELEPORT_MIN_SQUARED = 1e-18
-"""m²: who hardly moves is no leaper"""
+"""m², displacement² below which a body never counts as placed"""
 
 
-def interpolate(before: Frame, after: Frame, share: float) -> Frame:
-    """Return the state that lies a share (0 to 1) of the way from one to the next, on straight lines.
+def interpolate(before: Frame, after: Frame, alpha: float) -> Frame:
+    """Return the state at a fraction `alpha` (0 to 1) between two states, by linear interpolation.
 
-    A body that is not in both is as in the later one; so is one that was put elsewhere, farther than it flies.
+    A body that is not in both states, or that was placed elsewhere, has its later state.
     """
-    if share >= 1.0 or before is after:
+    if alpha >= 1.0 or before is after:
         return after
     known = min(len(before.position), len(after.position))
-    time = before.time + (after.time - before.time) * share
+    time = before.time + (after.time - before.time) * alpha
     dt = abs(after.time - before.time)
     with np.errstate(all="ignore"):
         moved = after.position[:known] - before.position[:known]
         fastest = np.maximum(_squared(before.velocity[:known]), _squared(after.velocity[:known]))
-        flew = _squared(moved) <= (TELEPORT_FACTOR * dt) ** 2 * fastest + TELEPORT_MIN_SQUARED
-        flew &= before.present[:known] & after.present[:known]
+        continuous = _squared(moved) <= (TELEPORT_FACTOR * dt) ** 2 * fastest + TELEPORT_MIN_SQUARED
+        continuous &= before.present[:known] & after.present[:known]
         position = after.position.copy()
-        position[:known] -= moved * (flew * (1.0 - share))[:, None]
+        position[:known] -= moved * (continuous * (1.0 - alpha))[:, None]
         angle = after.angle
-        if before.angle is not after.angle:  # which those share who cannot turn
+        if before.angle is not after.angle:  # states of bodies that cannot turn share one array
             angle = after.angle.copy()
-            angle[:known] -= (after.angle[:known] - before.angle[:known]) * (flew * (1.0 - share))
+            angle[:known] -= (after.angle[:known] - before.angle[:known]) * (continuous * (1.0 - alpha))
     return replace(after, time=time, position=position, angle=angle)
 
 
@@ -48,70 +46,71 @@ def _squared(vectors: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("nk,nk->n", vectors, vectors))
 
 
-STEPS_TO_TENTH = 10
-"""Speeds from one decade to the next: 100, 79, 63, 50, 40, 32, 25, 20, 16, 13, 10 %."""
-SLOWEST, FASTEST = -30, 10
+SPEEDS_PER_DECADE = 10
+"""100, 79, 63, 50, 40, 32, 25, 20, 16, 13, 10 %"""
+MIN_SPEED_LEVEL, MAX_SPEED_LEVEL = -30, 10
 """0.1 % to 1000 %"""
 MAX_FRAME_TIME = 0.1
-"""s of real time that one picture may ask for: after a pause of the machine the scene does not jump"""
-WINDOW = 0.5
+"""s of real time that one picture may ask for, so that the scene does not jump after the computer was suspended"""
+SPEED_WINDOW = 0.5
 """s over which the real speed is measured"""
 
 
 class FixedStepClock:
-    """Turns real time into steps."""
+    """Converts real time into steps."""
 
     def __init__(self) -> None:
-        self._rung = 0
-        self._saved = 0.0
-        self._seen: deque[tuple[float, float]] = deque()  # real and simulated time of each picture, s
+        self._level = 0
+        self._accumulated = 0.0  # s
+        self._samples: deque[tuple[float, float]] = deque()  # real and simulated time of each picture, s
 
     @property
     def speed(self) -> float:
-        """Asked, as a share of real time."""
-        return float(10.0 ** (self._rung / STEPS_TO_TENTH))
+        """Requested speed, as a multiple of real time."""
+        return float(10.0 ** (self._level / SPEEDS_PER_DECADE))
 
     @property
     def real_speed(self) -> float:
-        """Reached lately, as a share of real time; as asked, before anything is known."""
-        real = sum(each for each, _ in self._seen)
-        return sum(each for _, each in self._seen) / real if real > WINDOW / 2.0 else self.speed
+        """Speed reached lately, as a multiple of real time; the requested one until it is measured."""
+        real = sum(each for each, _ in self._samples)
+        return sum(each for _, each in self._samples) / real if real > SPEED_WINDOW / 2.0 else self.speed
 
     def slower(self) -> None:
-        """Go one rung down."""
-        self._rung = max(self._rung - 1, SLOWEST)
-        self._seen.clear()
+        """Decrease the speed by one level."""
+        self._level = max(self._level - 1, MIN_SPEED_LEVEL)
+        self._samples.clear()
 
     def faster(self) -> None:
-        """Go one rung up."""
-        self._rung = min(self._rung + 1, FASTEST)
-        self._seen.clear()
+        """Increase the speed by one level."""
+        self._level = min(self._level + 1, MAX_SPEED_LEVEL)
+        self._samples.clear()
 
-    def due(self, elapsed: float, dt: float) -> int:
-        """Save up real time, s, and return the whole steps of dt, s, that it is enough for."""
-        self._saved += min(elapsed, MAX_FRAME_TIME) * self.speed
-        return int(self._saved / dt * (1.0 + 1e-12))
+    def steps_due(self, elapsed: float, dt: float) -> int:
+        """Accumulate real time, s, and return how many whole steps of dt, s, are due."""
+        self._accumulated += min(elapsed, MAX_FRAME_TIME) * self.speed
+        return int(self._accumulated / dt * (1.0 + 1e-12))  # a sum of dt may lack some rounding errors
 
-    def spent(self, elapsed: float, steps: int, asked: int, dt: float) -> None:
-        """Take note of the steps that were made; those that could not be are dropped, and the scene is slower."""
-        self._saved = max(self._saved - max(steps, asked) * dt, 0.0)
-        self._seen.append((elapsed, steps * dt))
-        while len(self._seen) > 1 and sum(each for each, _ in self._seen) > WINDOW:
-            self._seen.popleft()
+    def record_steps(self, elapsed: float, steps: int, asked: int, dt: float) -> None:
+        """Subtract the steps that were made. Steps that were not are dropped: the scene is slower than requested."""
+        self._accumulated = max(self._accumulated - max(steps, asked) * dt, 0.0)
+        self._add_sample(elapsed, steps * dt)
 
-    def flow(self, elapsed: float) -> float:
-        """Return how much simulated time, s, real time is, where there are no steps to be made of it."""
+    def scale_time(self, elapsed: float) -> float:
+        """Return the simulated time, s, of real time, s, for a playback without steps."""
         time = min(elapsed, MAX_FRAME_TIME) * self.speed
-        self._seen.append((elapsed, time))
-        while len(self._seen) > 1 and sum(each for each, _ in self._seen) > WINDOW:
-            self._seen.popleft()
+        self._add_sample(elapsed, time)
         return time
 
-    def between(self, dt: float) -> float:
-        """Return how far the picture lies from the last state but one to the last, 0 to 1."""
-        return min(max(self._saved / dt, 0.0), 1.0)
+    def _add_sample(self, real: float, simulated: float) -> None:
+        self._samples.append((real, simulated))
+        while len(self._samples) > 1 and sum(each for each, _ in self._samples) > SPEED_WINDOW:
+            self._samples.popleft()
 
-    def rest(self) -> None:
-        """Forget what was saved up, as in a pause: the picture shows the last state."""
-        self._saved = 0.0
-        self._seen.clear()
+    def alpha(self, dt: float) -> float:
+        """Return the position of the picture between the last two states, 0 to 1."""
+        return min(max(self._accumulated / dt, 0.0), 1.0)
+
+    def reset(self) -> None:
+        """Discard the accumulated time, as in a pause: the picture shows the last state."""
+        self._accumulated = 0.0
+        self._samples.clear()

@@ -1,12 +1,4 @@
-"""Companions: runs beside the session, from the same state by the same actions: the ghost and the twin.
-
-The ghost is the scene as another engine has it, the twin the scene with every
-body moved by 1e-12 m. Each begins where the session is when it is asked for; while the session goes back, it waits.
-
-Watch: the contacts that the session's engine misses, noticed while it is played.
-
-Company: all that runs beside a session and tells how far it can be trusted.
-"""
+"""Diagnostics of a session: ghost on another engine, perturbed twin, audit of missed contacts, and trails."""
 
 from collections import deque
 from collections.abc import Collection
@@ -33,137 +25,139 @@ from sandbox.window.playback.session import Session
 from sandbox.window.playback.snapshot import MissedContactMarker
 
 CATCH_UP_TIME = 0.3
-"""s that the steps of a companion may take to compute for one picture."""
+"""s that the steps of a shadow run may take to compute for one picture"""
 
 
 class ShadowRun:
-    """A run beside a session. Where it fails it ends, and says why; the session goes on."""
+    """A second simulation with the actions of a session. An error ends it, not the session."""
 
     def __init__(self, point: Checkpoint, step: int = 0) -> None:
         """Start.
 
         Args:
-            point: where the session is.
-            step: how many steps that has made.
+            point: a checkpoint of the session.
+            step: of that checkpoint.
 
         Raises:
-            Refusal: its engine cannot begin from there.
-            ActionError: it cannot take over a steady force.
+            Refusal: its engine cannot continue from there.
+            ActionError: its engine refuses a persistent force.
         """
         self.step = step
-        """of the session, up to which it has come"""
-        self.relay = SwitchableSimulation.resumed(point)
-        self.relay.patience = CATCH_UP_TIME
-        self.frame: Frame | None = self.relay.frame()
-        self.begun = point.frame.time
+        """of the session that it has reached"""
+        self.simulation = SwitchableSimulation.resumed(point)
+        self.simulation.patience = CATCH_UP_TIME
+        self.frame: Frame | None = self.simulation.frame()
+        self.start_time = point.frame.time
         """s"""
         self.ended: str | None = None
+        """the error that ended it"""
 
     @property
     def engine(self) -> str:
-        """Its engine's name."""
-        return self.relay.engine
+        """Name of its engine."""
+        return self.simulation.engine
 
-    def act(self, action: Action) -> None:
-        """Do what the session does; it keeps its own engine."""
+    def apply(self, action: Action) -> None:
+        """Apply an action of the session."""
         if self.ended is None:
             try:
-                self.relay.apply(action)
-                self.frame = self.relay.frame()
+                self.simulation.apply(action)
+                self.frame = self.simulation.frame()
             except ActionError as error:
                 self._end(str(error))
 
     def follow(self, step: int) -> None:
-        """Make steps up to one of the session; where it has been there, it waits."""
+        """Make the steps up to a step of the session; none if it is ahead already."""
         steps, self.step = step - self.step, max(step, self.step)
         until, compiled = perf_counter() + CATCH_UP_TIME, COMPILE_CLOCK.seconds
         if self.ended is not None or steps <= 0:
             return
         try:
             for _ in range(steps):
-                self.relay.step()
+                self.simulation.step()
                 if perf_counter() > until + COMPILE_CLOCK.seconds - compiled:
                     raise Exhaustion(f"{self.engine} is too slow to keep up")
-            self.frame = self.relay.frame()
+            self.frame = self.simulation.frame()
         except (Divergence, Exhaustion) as error:
             self._end(str(error))
 
-    def _end(self, why: str) -> None:
-        self.ended, self.frame = why, None
+    def _end(self, reason: str) -> None:
+        self.ended, self.frame = reason, None
 
     def close(self) -> None:
-        """Release what its engine holds."""
-        self.relay.close()
+        """Release the resources of its engine."""
+        self.simulation.close()
 
 
-def ghost_setting(point: Checkpoint, step: int = 0, without: Collection[str] = ()) -> tuple[ShadowRun, str]:
-    """Return the ghost of a session, and what is to be said of it: `exact` where it can, else another engine.
+def create_ghost(point: Checkpoint, step: int = 0, excluded: Collection[str] = ()) -> tuple[ShadowRun, str]:
+    """Return the ghost of a session, on `exact` or else the first engine that can, and why others cannot.
 
     Args:
-        point: where the session is.
-        step: how many steps that has made.
-        without: engines that have been tried already.
+        point: a checkpoint of the session.
+        step: of that checkpoint.
+        excluded: engines that are not tried.
 
     Raises:
-        ActionError: no other engine can go on from here.
+        ActionError: no other engine can continue from here.
     """
-    why: list[str] = []
+    reasons: list[str] = []
     for name in ("exact", "reference", "pymunk", *ENGINES):
-        if name == point.engine or name in without or name not in ENGINES:
+        if name == point.engine or name in excluded or name not in ENGINES:
             continue
         try:
-            return ShadowRun(replace(point, engine=name, wanted=point.wanted.common()), step), "; ".join(why)
+            return ShadowRun(replace(point, engine=name, wanted=point.wanted.common()), step), "; ".join(reasons)
         except (Refusal, ActionError) as refusal:
-            why.append(str(refusal))
-    raise ActionError("; ".join(why) or "no other engine is available")
+            reasons.append(str(refusal))
+    raise ActionError("; ".join(reasons) or "no other engine is available")
 
 
 class DivergenceMonitor:
-    """Whether what is seen can still be trusted: a twin, moved by 1e-12 m at first, is still at the same places.
+    """Predictability horizon: the time at which a twin of the session, perturbed by 1e-12 m at first, departs from it.
 
-    Past that horizon what is seen is one of many things that might as well have happened: the scene is chaotic, or
-    the nudge decides in which step an engine that looks at steps alone sees a contact.
+    Beyond it the session shows one of many possible outcomes: either the scene is chaotic, or the perturbation decides
+    in which step an engine with discrete detection finds a contact.
     """
 
     def __init__(self, point: Checkpoint, step: int = 0) -> None:
         """Start the twin.
 
         Args:
-            point: where the session is.
-            step: how many steps that has made.
+            point: a checkpoint of the session.
+            step: of that checkpoint.
 
         Raises:
-            Refusal: the engine cannot begin from there.
-            ActionError: it cannot take over a steady force.
+            Refusal: the engine cannot continue from there.
+            ActionError: it refuses a persistent force.
         """
         self.tolerance = usual_tolerance(point.scene)
         self.time = point.frame.time
-        """s, what the session shows"""
+        """of the session, s"""
         self.horizon: float | None = None
-        """s, when the two had come apart; known as long as the session goes the same way"""
-        self.spread: float | None = None
+        """when the two had departed, s; valid until a new action"""
+        self.distance: float | None = None
+        """largest between a body and its twin, m"""
         perturbed = _perturbed(point)
-        self.able = perturbed is not None
-        """whether anything can grow at all"""
+        self.can_diverge = perturbed is not None
+        """whether any body can meet another or a wall"""
         self._twin = ShadowRun(perturbed, step) if perturbed is not None else None
 
     @property
     def step(self) -> int:
-        """Step of the session up to which the twin has come; 0 where there is none."""
+        """Step of the session that the twin has reached; 0 without a twin."""
         return self._twin.step if self._twin is not None else 0
 
-    def act(self, action: Action) -> None:
-        """Do what the session does."""
+    def apply(self, action: Action) -> None:
+        """Apply an action of the session."""
         if self._twin is not None:
-            self._twin.act(action)
+            self._twin.apply(action)
 
     def follow(self, step: int) -> None:
-        """Let the twin make steps up to one of the session."""
+        """Make the steps of the twin up to a step of the session."""
         if self._twin is not None:
             self._twin.follow(step)
 
-    def look(self, frame: Frame, step: int) -> None:
-        """Look how far the session, which shows this after so many steps, and the twin have come apart."""
+    def update(self, frame: Frame, step: int) -> None:
+        """Measure the distance between the twin and the session, whose state after a step is given."""
         self.time = frame.time
         if self._twin is None or self.horizon is not None or step != self._twin.step:
             return
@@ -171,8 +165,8 @@ class DivergenceMonitor:
             self._twin.close()
             self._twin = None
             return
-        self.spread = max_body_distance(frame, self._twin.frame)
-        if self.spread is None or not self.spread <= self.tolerance:
+        self.distance = max_body_distance(frame, self._twin.frame)
+        if self.distance is None or not self.distance <= self.tolerance:
             self.horizon = frame.time
 
     @property
@@ -180,16 +174,16 @@ class DivergenceMonitor:
         """`trusted`, `lost`, or `unknown`."""
         if self.horizon is not None:
             return "lost" if self.time >= self.horizon else "trusted"
-        return "trusted" if self._twin is not None or not self.able else "unknown"
+        return "trusted" if self._twin is not None or not self.can_diverge else "unknown"
 
     def close(self) -> None:
-        """Release what its engine holds."""
+        """Release the resources of its engine."""
         if self._twin is not None:
             self._twin.close()
 
 
 def max_body_distance(a: Frame, b: Frame) -> float | None:
-    """Return the largest distance between a body in one frame and in the other, m; None where none is in both."""
+    """Return the largest distance of a body between two frames, m; None if no body is in both."""
     known = min(len(a.position), len(b.position))
     both = a.present[:known] & b.present[:known]
     with np.errstate(all="ignore"):
@@ -198,19 +192,19 @@ def max_body_distance(a: Frame, b: Frame) -> float | None:
 
 
 def _perturbed(point: Checkpoint) -> Checkpoint | None:
-    """Return the moment with every body that can meet something moved a little (`perturb`); None without any."""
-    frame, there = point.frame, point.frame.present
+    """Return a checkpoint with every body perturbed that can have contacts; None if there is no such body."""
+    frame, present = point.frame, point.frame.present
     moved = perturb(point.present_setup())
     if moved is None:
         return None
     state = {key: getattr(frame, key).copy() for key in ("position", "velocity", "angle")}
     for key, array in state.items():
-        array[there] = getattr(moved.bodies, key)
+        array[present] = getattr(moved.bodies, key)
     return replace(point, frame=replace(frame, **state))
 
 
-def can_follow(action: Action) -> Action | None:
-    """Return a session's action as the ghost does it: the session's engine is not its own."""
+def ghost_action(action: Action) -> Action | None:
+    """Return an action of the session for the ghost, without switches of the engine; None if nothing remains."""
     if not isinstance(action, Switch):
         return action
     shared = {key: value for key, value in action.settings.items() if key in COMMON}
@@ -218,219 +212,218 @@ def can_follow(action: Action) -> Action | None:
 
 
 MARKER_DURATION = 1.5
-"""s that a flash is seen"""
+"""s of real time"""
 MAX_MARKERS = 50
-"""Flashes at a time."""
 
 
 class MissedContactMonitor:
-    """Audits a relay, and remembers where a miss was noticed."""
+    """Live audit of missed contacts of a simulation."""
 
-    def __init__(self, relay: SwitchableSimulation) -> None:
-        self._auditor = Auditor(relay.setup, relay)
-        self._told = 0
-        self._flashes: deque[tuple[tuple[float, float], float]] = deque(maxlen=MAX_MARKERS)
+    def __init__(self, simulation: SwitchableSimulation) -> None:
+        self._auditor = Auditor(simulation.setup, simulation)
+        self._counted = 0
+        self._markers: deque[tuple[tuple[float, float], float]] = deque(maxlen=MAX_MARKERS)
 
-    def look(self, frame: Frame) -> int:
-        """Take note of what was missed since the last look; return how many that are."""
+    def update(self, frame: Frame) -> int:
+        """Add the contacts missed since the last call; return how many they are."""
         _, pairs = self._auditor.missed
-        new = pairs[self._told :]
-        self._told = len(pairs)
-        for number in new[-MAX_MARKERS:, 0].tolist():
-            place = frame.position[number]
-            if np.isfinite(place).all():
-                self._flashes.append(((float(place[0]), float(place[1])), perf_counter()))
+        new = pairs[self._counted :]
+        self._counted = len(pairs)
+        for body_index in new[-MAX_MARKERS:, 0].tolist():
+            position = frame.position[body_index]
+            if np.isfinite(position).all():
+                self._markers.append(((float(position[0]), float(position[1])), perf_counter()))
         return len(new)
 
-    def flashes(self) -> tuple[MissedContactMarker, ...]:
-        """Return what was noticed a moment ago."""
+    def markers(self) -> tuple[MissedContactMarker, ...]:
+        """Return the markers of the last `MARKER_DURATION`."""
         now = perf_counter()
-        while self._flashes and now - self._flashes[0][1] > MARKER_DURATION:
-            self._flashes.popleft()
-        return tuple(MissedContactMarker(place, now - since) for place, since in self._flashes)
+        while self._markers and now - self._markers[0][1] > MARKER_DURATION:
+            self._markers.popleft()
+        return tuple(MissedContactMarker(position, now - since) for position, since in self._markers)
 
 
 class Diagnostics:
-    """The ghost, the twin, the audit and the trails of a session.
+    """The ghost, the divergence monitor, the missed-contact audit and the trails of a session.
 
-    All of them begin from where the session is, and anew whenever it has gone back or changed its engine.
+    Ghost and twin start from the present state of the session. While it has gone back they wait.
     """
 
-    def __init__(self, session: Session, film: RecordedRun | None = None) -> None:
-        """Begin.
+    def __init__(self, session: Session, recorded: RecordedRun | None = None) -> None:
+        """Start.
 
         Args:
-            session: what is played.
-            film: a stored run to be seen as the ghost, instead of another engine.
+            session: what is observed.
+            recorded: a recorded run that is the ghost, instead of another engine.
         """
-        self._session, self._film = session, film
+        self._session, self._recorded = session, recorded
         self.trails = Trails()
-        self.notes: list[tuple[str, str]] = []
-        """(level, text) of what happened; whoever tells it empties the list"""
-        self.trust: DivergenceMonitor | None = None
-        """the twin that is being watched"""
+        self.notifications: list[tuple[str, str]] = []
+        """(level, text) of events; the reader empties the list"""
+        self.divergence: DivergenceMonitor | None = None
         self._ghost: ShadowRun | None = None
-        self._seen = History()  # of the ghost
-        self._given_up: tuple[str, ...] = ()
-        self._watch: MissedContactMonitor | None = None
-        self._missed: list[float] = []
-        self.begin()
+        self._ghost_history = History()
+        self._failed_engines: tuple[str, ...] = ()
+        self._audit: MissedContactMonitor | None = None
+        self._missed_times: list[float] = []
+        self.restart()
 
-    def begin(self, anew: bool = False) -> None:
-        """Watch the session's relay, which is another one now.
+    def restart(self, companions: bool = False) -> None:
+        """Observe the simulation of the session, which was replaced.
 
         Args:
-            anew: begin the ghost and the twin anew, too, from where the session is. Else they wait where they are:
-                the session has gone back, and may come there again.
+            companions: restart ghost and twin too, from the present state. Otherwise they wait where they are: the
+                session has gone back, and may get there again.
         """
         session = self._session
-        self._missed = [time for time in self._missed if time <= session.time]
-        # What can meet nothing misses nothing.
-        meets = not bool(contact_matrix(session.simulation.setup, session.bodies).free.all())
-        self._watch = MissedContactMonitor(session.simulation) if meets else None
+        self._missed_times = [time for time in self._missed_times if time <= session.time]
+        can_miss = not bool(contact_matrix(session.simulation.setup, session.bodies).free.all())
+        self._audit = MissedContactMonitor(session.simulation) if can_miss else None
         self.trails.add(session.frame)
-        if self.trust is not None:
-            self.trust.look(session.frame, session.step_number)
+        if self.divergence is not None:
+            self.divergence.update(session.frame, session.step_number)
         session.take_replayed_actions()
-        if anew:
-            self._begin_companions()
+        if companions:
+            self._restart_companions()
 
-    def _begin_companions(self) -> None:
+    def _restart_companions(self) -> None:
         if self._ghost is not None:
-            self._begin_ghost()
-        if self.trust is not None:
-            self.show_trust(True)
+            self._start_ghost()
+        if self.divergence is not None:
+            self.watch_divergence(True)
 
-    def advance(self, redone: list[tuple[int, Action]]) -> None:
-        """Go where the session has gone.
+    def advance(self, replayed: list[tuple[int, Action]]) -> None:
+        """Follow the session to its present step.
 
         Args:
-            redone: what it has done again on the way, each with the step after which it was.
+            replayed: the actions that it has repeated on the way, each with its step.
         """
         frame, step = self._session.frame, self._session.step_number
         self.trails.add(frame)
-        if self._watch is not None:
-            self._missed += [frame.time] * self._watch.look(frame)
-        for each in (self._ghost, self.trust):
+        if self._audit is not None:
+            self._missed_times += [frame.time] * self._audit.update(frame)
+        for each in (self._ghost, self.divergence):
             if each is None:
                 continue
-            been = each.step  # all that was done up to then it has done; after one step there may be several things
-            for at, action in redone:
-                if at > been:
+            reached = each.step  # all actions up to there are applied; a step can have several
+            for at, action in replayed:
+                if at > reached:
                     each.follow(at)
-                    self._let(each, action)
+                    self._apply_to(each, action)
             each.follow(step)
-        if self.trust is not None:
-            self.trust.look(frame, step)
+        if self.divergence is not None:
+            self.divergence.update(frame, step)
         if self._ghost is not None:
             if self._ghost.frame is not None:
-                self._seen.store(self._ghost.step, self._ghost.frame)
+                self._ghost_history.store(self._ghost.step, self._ghost.frame)
             else:
                 self._replace_ghost(self._ghost)
 
-    def did(self, action: Action) -> None:
-        """Take note of something new that the session has done; where that is in the past, what came is no more."""
+    def apply(self, action: Action) -> None:
+        """Forward a new action of the session to ghost and twin; one that is ahead of the session is restarted."""
         step = self._session.step_number
         if self._ghost is not None and self._ghost.step > step:
-            self._begin_ghost()
+            self._start_ghost()
         elif self._ghost is not None:
-            self._let(self._ghost, action)
-        if self.trust is not None and (self.trust.step > step or self.trust.horizon is not None):
-            self.show_trust(True)
-        elif self.trust is not None:
-            self._let(self.trust, action)
+            self._apply_to(self._ghost, action)
+        if self.divergence is not None and (self.divergence.step > step or self.divergence.horizon is not None):
+            self.watch_divergence(True)
+        elif self.divergence is not None:
+            self._apply_to(self.divergence, action)
         self._session.take_replayed_actions()
 
-    def _let(self, each: ShadowRun | DivergenceMonitor, action: Action) -> None:
-        """Let one do what the session has done; the ghost keeps its own engine."""
-        followed = can_follow(action) if each is self._ghost else action
-        if followed is not None:
-            each.act(followed)
+    def _apply_to(self, each: ShadowRun | DivergenceMonitor, action: Action) -> None:
+        """Apply an action of the session; the ghost keeps its own engine."""
+        own = ghost_action(action) if each is self._ghost else action
+        if own is not None:
+            each.apply(own)
 
     @property
-    def missed(self) -> int | None:
-        """Contacts missed so far; None where none can be."""
-        return len(self._missed) if self._watch is not None else None
+    def missed_contacts(self) -> int | None:
+        """Contacts missed so far; None if none can be."""
+        return len(self._missed_times) if self._audit is not None else None
 
     @property
-    def flashes(self) -> tuple[MissedContactMarker, ...]:
-        """The misses of a moment ago."""
-        return self._watch.flashes() if self._watch is not None else ()
+    def missed_markers(self) -> tuple[MissedContactMarker, ...]:
+        """The contacts missed a moment ago."""
+        return self._audit.markers() if self._audit is not None else ()
 
     @property
-    def ghosted(self) -> bool:
+    def has_ghost(self) -> bool:
         """Whether there is a ghost."""
-        return self._ghost is not None or self._film is not None
+        return self._ghost is not None or self._recorded is not None
 
     def show_ghost(self, on: bool) -> None:
-        """Begin a ghost from here, or end it."""
-        self._film, self._given_up = None, ()
+        """Start a ghost from the present state, or end it."""
+        self._recorded, self._failed_engines = None, ()
         self._drop_ghost()
         if on:
-            self._begin_ghost()
+            self._start_ghost()
 
-    def _begin_ghost(self) -> None:
-        """Begin a ghost from here, on the first engine that can and has not been given up."""
+    def _start_ghost(self) -> None:
+        """Start a ghost from the present state, on the first engine that can and has not failed."""
         self._drop_ghost()
         try:
-            self._ghost, note = ghost_setting(
-                self._session.simulation.checkpoint(), self._session.step_number, self._given_up
+            self._ghost, note = create_ghost(
+                self._session.simulation.checkpoint(), self._session.step_number, self._failed_engines
             )
         except ActionError as error:
-            self.notes.append(("warning", f"no ghost: {error}"))
+            self.notifications.append(("warning", f"no ghost: {error}"))
             return
-        self._seen = History()
+        self._ghost_history = History()
         if self._ghost.frame is not None:
-            self._seen.store(self._ghost.step, self._ghost.frame)
+            self._ghost_history.store(self._ghost.step, self._ghost.frame)
         if note:
-            self.notes.append(("info", f"ghost computed by {self._ghost.engine}: {note}"))
+            self.notifications.append(("info", f"ghost computed by {self._ghost.engine}: {note}"))
 
     def _replace_ghost(self, ended: ShadowRun) -> None:
-        """Let another engine go on as the ghost, from here."""
-        self._given_up += (ended.engine,)
-        self.notes.append(("warning", f"ghost of {ended.engine} stopped: {ended.ended}"))
-        self._begin_ghost()
+        """Start a ghost on another engine from the present state."""
+        self._failed_engines += (ended.engine,)
+        self.notifications.append(("warning", f"ghost of {ended.engine} stopped: {ended.ended}"))
+        self._start_ghost()
 
     def _drop_ghost(self) -> None:
         if self._ghost is not None:
             self._ghost.close()
             self._ghost = None
 
-    def show_trust(self, on: bool) -> None:
-        """Begin to watch a twin from here, or end it."""
-        if self.trust is not None:
-            self.trust.close()
-            self.trust = None
+    def watch_divergence(self, on: bool) -> None:
+        """Start a divergence monitor from the present state, or end it."""
+        if self.divergence is not None:
+            self.divergence.close()
+            self.divergence = None
         if on:
             try:
-                self.trust = DivergenceMonitor(self._session.simulation.checkpoint(), self._session.step_number)
+                self.divergence = DivergenceMonitor(self._session.simulation.checkpoint(), self._session.step_number)
             except (Refusal, ActionError) as error:
-                self.notes.append(("warning", f"no predictability horizon: {error}"))
+                self.notifications.append(("warning", f"no predictability horizon: {error}"))
 
     @property
     def ghost_frame(self) -> Frame | None:
-        """The ghost's state."""
-        if self._film is not None:
-            return self._film.frame(self._session.time)
+        """State of the ghost; None without one, or at a time before its start."""
+        if self._recorded is not None:
+            return self._recorded.frame(self._session.time)
         time = self._session.time
-        if self._ghost is None or time < self._ghost.begun - 1e-12:
+        if self._ghost is None or time < self._ghost.start_time - 1e-12:
             return None
-        return self._ghost.frame if self._session.step_number == self._ghost.step else self._seen.nearest(time)[1]
+        return (
+            self._ghost.frame if self._session.step_number == self._ghost.step else self._ghost_history.nearest(time)[1]
+        )
 
     @property
     def ghost_engine(self) -> str | None:
-        """What computes the ghost."""
-        if self._film is not None:
-            return f"stored run ({self._film.trajectory.info['engine']})"
+        """Name of the engine of the ghost."""
+        if self._recorded is not None:
+            return f"stored run ({self._recorded.trajectory.info['engine']})"
         return self._ghost.engine if self._ghost is not None else None
 
     @property
-    def distance(self) -> float | None:
-        """How far the ghost is away at most, m."""
+    def ghost_distance(self) -> float | None:
+        """Largest distance between a body and its ghost, m."""
         ghost = self.ghost_frame
         return None if ghost is None else max_body_distance(self._session.frame, ghost)
 
     def close(self) -> None:
-        """Release all engines."""
+        """Release the resources of all engines."""
         self._drop_ghost()
-        self.show_trust(False)
+        self.watch_divergence(False)

@@ -224,8 +224,8 @@ class RecordedView:
             pydantic.ValidationError: the solver settings of the run are invalid.
         """
         self.run = run
-        self.pace = FixedStepClock()
-        self.notes: list[tuple[str, str]] = []
+        self.clock = FixedStepClock()
+        self.notifications: list[tuple[str, str]] = []
         self.settings = Settings.model_validate(run.trajectory.info["settings"])
         self._times = run.trajectory.time
         self._time = float(self._times[0])
@@ -257,48 +257,48 @@ class RecordedView:
         return self.run.frame(self._time)
 
     @property
-    def drawn(self) -> Frame:
+    def displayed_frame(self) -> Frame:
         """The state that is drawn."""
         return self.frame
 
     @property
-    def begin(self) -> float:
+    def start_time(self) -> float:
         """The first time, s."""
         return float(self._times[0])
 
     @property
-    def end(self) -> float:
+    def end_time(self) -> float:
         """The last time, s."""
         return float(self._times[-1])
 
     @property
     def at_end(self) -> bool:
         """Whether the present time is the last."""
-        return self._time >= self.end
+        return self._time >= self.end_time
 
     @property
-    def marks(self) -> tuple[float, ...]:
+    def keyframe_times(self) -> tuple[float, ...]:
         """Times of checkpoints, s: none, as every frame is stored."""
         return ()
 
     @property
-    def missed(self) -> int | None:
+    def missed_contacts(self) -> int | None:
         """Contacts missed so far; None if the run was not audited."""
         run = self.run.trajectory
         return int((run.missed_time <= self._time).sum()) if run.missed_contacts is not None else None
 
-    def go_on(self, elapsed: float, paused: bool) -> None:
+    def update(self, elapsed: float, paused: bool) -> None:
         """Advance the present time by elapsed real time, s."""
         if paused or self.at_end:
-            self.pace.rest()
+            self.clock.reset()
             return
-        self._time = min(self._time + self.pace.flow(elapsed), self.end)
+        self._time = min(self._time + self.clock.scale_time(elapsed), self.end_time)
 
     def step(self) -> None:
         """Go to the next stored frame."""
         self._time = float(self._times[min(self.step_number + 1, len(self._times) - 1)])
 
-    def back(self) -> None:
+    def step_back(self) -> None:
         """Go to the stored frame before the present time."""
         k = self.step_number
         earlier = k if float(self._times[k]) < self._time else max(k - 1, 0)
@@ -306,9 +306,9 @@ class RecordedView:
 
     def scrub(self, time: float) -> None:
         """Go to a time, s."""
-        self._time = min(max(time, self.begin), self.end)
+        self._time = min(max(time, self.start_time), self.end_time)
 
-    def settle(self) -> None:
+    def commit_scrub(self) -> None:
         """Do nothing: `scrub` has already changed the present time."""
 
     def energy(self) -> tuple[float, float, float]:
@@ -318,7 +318,7 @@ class RecordedView:
     @property
     def contacts(self) -> Contacts:
         """The contacts that are shown."""
-        return self.run.contacts(self._time, self.pace.speed)
+        return self.run.contacts(self._time, self.clock.speed)
 
     def snapshot(
         self,
@@ -333,7 +333,7 @@ class RecordedView:
             picked: index of the picked body.
             pull: ends of the mouse joint, m; None, as bodies of a recorded run cannot be pulled.
         """
-        return replace(self.run.snapshot(self._time, overlays, self.pace.speed), picked=picked, pull=pull)
+        return replace(self.run.snapshot(self._time, overlays, self.clock.speed), picked=picked, pull=pull)
 
     def close(self) -> None:
         """Do nothing: no engine runs."""

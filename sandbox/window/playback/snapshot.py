@@ -1,9 +1,4 @@
-"""Sight: what the window draws of one moment, as plain values; no engine, no pygame.
-
-Breaks: when joints broke, which have by a time, and what is to be said of it.
-
-Burning: the thrusts that fire at a moment, as the flames that are drawn of them.
-"""
+"""Snapshot: the values that are drawn of one frame, with joint breaks and thruster flames; no engine, no pygame."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -26,25 +21,25 @@ from sandbox.scene.geometry.shapes import form_of
 from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
 
-NOTIFY_EVERY = 1.0
-"""s of the scene between two notes"""
+NOTIFICATION_INTERVAL = 1.0
+"""s of the scene between two notifications of broken joints"""
 
 
 def broken_joints(breaks: FloatArray, time: float) -> list[int]:
-    """Return the numbers of the joints that have broken by a time, s; `breaks` (J,) says when each does."""
+    """Return the indices of the joints that have broken by a time, s; `breaks` (J,) holds their break times."""
     return np.flatnonzero(is_broken_at(breaks, np.asarray([time]))[0]).tolist() if len(breaks) else []
 
 
 class BreakTimes:
-    """When each joint broke, as far as it has been seen."""
+    """When each joint broke."""
 
     def __init__(self, joints: int) -> None:
-        """None of so many has."""
+        """Start with all joints whole."""
         self.times: FloatArray = np.full(joints, np.inf)
-        """(J,) s, inf where it never did; what was handed out does not change"""
+        """(J,) s, inf if it never did; replaced by an update, never changed in place"""
 
     def update(self, broken: Mapping[int, float]) -> None:
-        """Learn when joints broke, s. Those that broke later than now are kept: the same way leads there again."""
+        """Add the times at which joints broke, s. Times later than now stay: a replay leads there again."""
         numbers = list(broken)
         if numbers and not np.isfinite(self.times[numbers]).all():
             self.times = self.times.copy()
@@ -56,19 +51,19 @@ class BreakTimes:
 
 
 class BreakNotifier:
-    """Says how many joints broke, the first at once, then once a second: a cloth tears on and on."""
+    """Notifies of broken joints: of the first at once, then once a second, as a cloth tears in many steps."""
 
     def __init__(self) -> None:
-        self._told, self._when = 0, 0.0
+        self._notified, self._last_time = 0, 0.0
 
-    def told(self, broken: int, now: float) -> list[tuple[str, str]]:
-        """Return what is to be said, (level, text), where so many are broken at a time, s."""
-        if broken < self._told or now < self._when:  # it has gone back
-            self._told, self._when = broken, now
-        more = broken - self._told
-        if not more or not (self._told == 0 or now >= self._when + NOTIFY_EVERY):
+    def update(self, broken: int, now: float) -> list[tuple[str, str]]:
+        """Return notifications, (level, text), for a number of broken joints at a time, s."""
+        if broken < self._notified or now < self._last_time:  # after a seek backwards
+            self._notified, self._last_time = broken, now
+        more = broken - self._notified
+        if not more or not (self._notified == 0 or now >= self._last_time + NOTIFICATION_INTERVAL):
             return []
-        self._told, self._when = broken, now
+        self._notified, self._last_time = broken, now
         return [("info", "a joint broke" if more == 1 else f"{more:,} joints broke")]
 
 
@@ -84,71 +79,71 @@ OVERLAYS = (
     "trails",
     "energy",
 )
-"""What can be drawn besides fixed things, in the order of the keys 1 … 9, 0."""
+"""What can be drawn besides static geometry, in the order of the keys 1 … 9, 0."""
 
 
 @dataclass(frozen=True, eq=False)
 class MissedContactMarker:
-    """A missed contact that was noticed a moment ago."""
+    """A missed contact that was detected a moment ago."""
 
     position: tuple[float, float]
     """m"""
     age: float
-    """s of real time since it was noticed"""
+    """s of real time since it was detected"""
 
 
 class ThrusterFlame(NamedTuple):
-    """A thrust that fires."""
+    """Flame of a thruster that fires."""
 
     body: int
-    """its number"""
+    """index"""
     place: tuple[float, float]
-    """where it begins, from the centre of mass, in the body's own frame, m"""
+    """its origin, from the centre of mass, in the body frame, m"""
     way: tuple[float, float]
-    """from there to its tip, in the body's own frame, m"""
+    """from its origin to its tip, in the body frame, m"""
 
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """One moment of a scene, as it is drawn. Frames may lie between two steps."""
+    """State of a scene as it is drawn; it may lie between two steps."""
 
     scene: Scene
     bodies: Bodies
-    """N of them, with those that were spawned"""
+    """N, with those that were spawned"""
     frame: Frame
     overlays: frozenset[str] = frozenset({"shapes"})
     """of `OVERLAYS`"""
     contacts: Contacts = field(default_factory=Contacts.none)
-    """those open now, with their impulses since the last picture"""
+    """of the last steps, with their impulses"""
     seconds: float = 0.0
-    """simulated time in which those impulses were given, s"""
+    """simulated time of those steps, s"""
     ghost: Frame | None = None
-    """the same bodies as another engine has them, drawn hollow; it may know fewer"""
+    """state of the same bodies on another engine, drawn hollow; it may have fewer"""
     trails: tuple[FloatArray, ...] = ()
-    """(T, N, 2) m, the last places of the bodies, oldest first, nan where not there; any number of pieces"""
+    """(T, N, 2) m each, last positions of the bodies, oldest first, nan if not present; any number of pieces"""
     overlapping: BoolArray | None = None
-    """(N,) where the scene is one that shows contact by colour: who overlaps something"""
+    """(N,) which bodies overlap something, in scenes that show it by colour"""
     flashes: tuple[MissedContactMarker, ...] = ()
     picked: int | None = None
-    """number of the body whose figures are shown"""
+    """index of the body that is inspected"""
     pull: tuple[tuple[float, float], tuple[float, float]] | None = None
-    """where a body is held, and the hand that pulls it, m"""
+    """ends of the mouse joint: the grip on a body, and the pointer, m"""
     broken: Collection[int] = ()
-    """numbers of the scene's joints that have broken by then"""
+    """indices of the joints of the scene that have broken"""
     game: object | None = None
     """values that the `GameView` of the game draws, see `Rules.view_state`"""
     lit: frozenset[str] = frozenset()
     """names of the parts, `[[play.part]]`, whose lamps are lit"""
     below: float = 0.0
-    """px at the upper left that words over the picture cover"""
+    """px at the top left that are covered by text"""
     flames: tuple[ThrusterFlame, ...] = ()
-    """of the thrusts that fire"""
+    """of the thrusters that fire"""
     setup: Setup | None = None
     """of the running session; None where `bodies` are those of the scene or of a recorded run"""
 
     @cached_property
     def links(self) -> JointArrays:
-        """The joints that are whole."""
+        """The joints that are not broken."""
         return (self.setup or self.scene).links.without(self.broken)
 
 

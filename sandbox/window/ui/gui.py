@@ -194,7 +194,7 @@ class Gui:
                 stage.paused = True
                 show.scrub(time)
             if held and not self._timeline.held:
-                stage.compute(show.settle)
+                stage.compute(show.commit_scrub)
             return held or self._timeline.held
         return False
 
@@ -266,7 +266,9 @@ class Gui:
             if self.bottom_margin:
                 plates["timeline"] = rect = self._timeline_rect
                 now = show.frame.time
-                self._timeline.draw(surface, rect, show.begin, now, show.end, show.marks, self.ui_scale)
+                self._timeline.draw(
+                    surface, rect, show.start_time, now, show.end_time, show.keyframe_times, self.ui_scale
+                )
         self._plates = plates
         if self.panel.visible:
             plates["panel"] = pygame.Rect(self._size[0] - self.panel.width, 0, self.panel.width, self._size[1])
@@ -393,7 +395,7 @@ class Gui:
         live, game = stage.live, stage.game
         toggles = {name: name in self.overlays for name in OVERLAYS}
         if live is not None:
-            toggles |= {"ghost": live.company.ghosted, "trust": live.company.trust is not None}
+            toggles |= {"ghost": live.diagnostics.has_ghost, "trust": live.diagnostics.divergence is not None}
         toggles |= {"sound": self._sounds.enabled, "antialias": self.antialias}
         buttons = (
             "play" if stage.paused else "pause",

@@ -88,9 +88,9 @@ def hud_status(
         return HudStatus("No scene", "Ctrl+O", "opens a scene", 0, 0.0, messages=messages, faults=stage.faults)
     picked = stage.body_tools.picked
     live = stage.live
-    diagnostics = live.company if live is not None else None
+    diagnostics = live.diagnostics if live is not None else None
     contacts = show.contacts.some(~zone_visits(show.contacts.pair, show.scene))
-    divergence = diagnostics.trust if diagnostics is not None else None
+    divergence = diagnostics.divergence if diagnostics is not None else None
     return HudStatus(
         title=show.scene.title or (stage.path.stem if stage.path is not None else "scene"),
         engine=show.engine,
@@ -103,14 +103,14 @@ def hud_status(
         unfocused=stage.unfocused,
         ended=_ended(show),
         replay=live is None,
-        speed=show.pace.speed,
-        real_speed=show.pace.real_speed,
+        speed=show.clock.speed,
+        real_speed=show.clock.real_speed,
         frames_per_second=frame_rate,
         trust=divergence.state if divergence is not None else "unknown",
         horizon=divergence.horizon if divergence is not None else None,
         ghost=diagnostics.ghost_engine if diagnostics is not None else None,
-        distance=diagnostics.distance if diagnostics is not None else None,
-        missed=show.missed,
+        distance=diagnostics.ghost_distance if diagnostics is not None else None,
+        missed=show.missed_contacts,
         recording=recording,
         busy=show.busy,
         picked=body_facts(show.bodies, show.frame, contacts, picked) if picked is not None else (),
@@ -125,4 +125,4 @@ def _ended(show: LiveView | RecordedView) -> str | None:
     if isinstance(show, LiveView):
         session = show.session
         return session.ended if show.step_number == session.step_number else None
-    return "end of the run" if show.frame.time >= show.end else None
+    return "end of the run" if show.frame.time >= show.end_time else None

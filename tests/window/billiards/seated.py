@@ -40,7 +40,7 @@ def game_of(text: str, players: Players | None = None) -> BilliardsGame:
 
 def turn(game: BilliardsGame, elapsed: float = 1.0 / 60.0) -> None:
     """Let real time pass, s, as the stage does."""
-    game.live.go_on(elapsed, game.waits)
+    game.live.update(elapsed, game.waits)
     game.go_on(elapsed)
 
 

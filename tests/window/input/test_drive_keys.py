@@ -19,7 +19,7 @@ class Told:
     def __init__(self, scene):
         self.scene, self.actions = scene, []
 
-    def act(self, action):
+    def apply(self, action):
         self.actions.append(action)
 
 

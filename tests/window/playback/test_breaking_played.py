@@ -43,8 +43,8 @@ strength = 3.5
 @pytest.fixture(autouse=True)
 def patient(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """No test depends on how fast the machine is."""
-    monkeypatch.setattr(module, "LEAST", 1e9)
-    monkeypatch.setattr(module, "MOST", 1e9)
+    monkeypatch.setattr(module, "MIN_STEP_BUDGET", 1e9)
+    monkeypatch.setattr(module, "MAX_STEP_BUDGET", 1e9)
     return iter(())
 
 
@@ -58,7 +58,7 @@ def shown(show: LiveView | RecordedView) -> Snapshot:
 
 def at(show: LiveView, step: int) -> LiveView:
     show.seek(step)
-    show.arrive()
+    show.finish_seek()
     return show
 
 
@@ -93,7 +93,7 @@ def test_doing_something_else_forgets_what_broke_later() -> None:
     assert np.isfinite(show.session.break_times).any()
     at(show, 0)
     assert np.isfinite(show.session.break_times).any()  # it would go the same way
-    show.act(Force(time=0.0, body="rag-16", force=(0.0, 0.5)))
+    show.apply(Force(time=0.0, body="rag-16", force=(0.0, 0.5)))
     assert not np.isfinite(show.session.break_times).any()
     show.close()
 
@@ -101,7 +101,7 @@ def test_doing_something_else_forgets_what_broke_later() -> None:
 def test_joints_hold_the_same_bodies_after_a_switch_that_left_some_behind() -> None:
     show = at(LiveView(Session(cloth())), 60)
     links = shown(show).links
-    show.act(Switch(time=0.0, engine="reference"))
+    show.apply(Switch(time=0.0, engine="reference"))
     assert np.array_equal(shown(show).links.b, links.b)
     assert len(shown(at(show, 0)).links) == len(cloth().links)
     show.close()
@@ -110,8 +110,8 @@ def test_joints_hold_the_same_bodies_after_a_switch_that_left_some_behind() -> N
 def test_breaks_are_told_at_once_and_then_once_a_second() -> None:
     show = LiveView(Session(cloth()))
     for _ in range(60):
-        show.go_on(0.01, paused=False)
-    told = [text for _, text in show.notes if text.endswith("broke")]
+        show.update(0.01, paused=False)
+    told = [text for _, text in show.notifications if text.endswith("broke")]
     assert len(told) == 1
     show.close()
 

@@ -61,7 +61,7 @@ def test_thrust_of_a_time_burns_then() -> None:
 def test_window_shows_what_fires() -> None:
     live = LiveView(Session(SCENE))
     assert live.snapshot(frozenset({"shapes"})).flames == ()
-    live.act(Throttle(time=0.0, thrust="main", level=1.0))
+    live.apply(Throttle(time=0.0, thrust="main", level=1.0))
     (flame,) = live.snapshot(frozenset({"shapes"})).flames
     assert flame.way == pytest.approx((-LONG * REACH, 0.0))
     live.close()

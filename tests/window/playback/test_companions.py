@@ -19,8 +19,8 @@ from sandbox.window.playback.diagnostics import (
     Diagnostics,
     DivergenceMonitor,
     ShadowRun,
-    can_follow,
-    ghost_setting,
+    create_ghost,
+    ghost_action,
     max_body_distance,
 )
 from sandbox.window.playback.session import Session
@@ -44,12 +44,12 @@ def together(session: Session, company: Diagnostics, steps: int) -> None:
 
 def beside(trust: DivergenceMonitor, session: Session) -> None:
     trust.follow(session.step_number)
-    trust.look(session.frame, session.step_number)
+    trust.update(session.frame, session.step_number)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_ghost_is_exact_where_it_can_be_else_another_engine(engine: str) -> None:
-    ghost, note = ghost_setting(Session(BOUNCE, engine).simulation.checkpoint())
+    ghost, note = create_ghost(Session(BOUNCE, engine).simulation.checkpoint())
     assert ghost.engine == ("reference" if engine == "exact" else "exact")
     assert note == ""
     ghost.close()
@@ -57,13 +57,13 @@ def test_ghost_is_exact_where_it_can_be_else_another_engine(engine: str) -> None
 
 def test_ghost_says_why_it_is_not_exact() -> None:
     session = Session(from_document({"ball": [{"position": [k * 0.5, 0], "radius": 1} for k in range(2)]}))
-    ghost, note = ghost_setting(session.simulation.checkpoint())
+    ghost, note = create_ghost(session.simulation.checkpoint())
     assert ghost.engine == "reference"
     assert "exact refuses" in note
     company = Diagnostics(session)
     company.show_ghost(True)
     assert company.ghost_engine == "reference"
-    assert [level for level, _ in company.notes] == ["info"]
+    assert [level for level, _ in company.notifications] == ["info"]
 
 
 def test_distance_to_the_ghost_in_free_fall_is_the_error_of_explicit_euler() -> None:
@@ -71,17 +71,17 @@ def test_distance_to_the_ghost_in_free_fall_is_the_error_of_explicit_euler() -> 
     session, h = Session(BOUNCE, "pymunk"), BOUNCE.solver.dt
     company = Diagnostics(session)
     company.show_ghost(True)
-    assert company.distance == 0.0
+    assert company.ghost_distance == 0.0
     for k in range(1, 1000):
         together(session, company, 1)
-        assert company.distance == pytest.approx(0.5 * 9.81 * h * k * h, rel=1e-9)  # rounding of sums of ~5 m
+        assert company.ghost_distance == pytest.approx(0.5 * 9.81 * h * k * h, rel=1e-9)  # rounding of sums of ~5 m
     ghost = company.ghost_frame
     assert ghost is not None
     assert ghost.position[0, 1] == pytest.approx(5.5 - 0.5 * 9.81 * 0.999**2, rel=1e-14)  # rounding
     together(session, company, 3000)
-    assert company.distance is not None
-    assert company.distance < 0.2  # it lands within some steps of 1 ms at up to 10 m/s, and again at each bounce
-    assert company.notes == []
+    assert company.ghost_distance is not None
+    assert company.ghost_distance < 0.2  # it lands within some steps of 1 ms at up to 10 m/s, and again at each bounce
+    assert company.notifications == []
 
 
 def test_ghost_does_what_the_session_does_and_keeps_its_engine() -> None:
@@ -95,14 +95,14 @@ def test_ghost_does_what_the_session_does_and_keeps_its_engine() -> None:
         Switch(time=0.0, engine="reference", settings={"dt": 0.002, "integrator": "rk4"}),
         Remove(time=0.0, body="ball"),
     ):
-        company.did(session.apply(action))
+        company.apply(session.apply(action))
         together(session, company, 20)
         ghost = company.ghost_frame
         assert ghost is not None
         assert ghost.time == pytest.approx(session.time, rel=1e-14)  # counted in steps by each
         assert ghost.present.tolist() == session.frame.present.tolist()
-        assert company.distance is not None
-        assert company.distance < 1e-2  # of so short a time: g·h·t/2, and a pull of first order
+        assert company.ghost_distance is not None
+        assert company.ghost_distance < 1e-2  # of so short a time: g·h·t/2, and a pull of first order
     assert company.ghost_engine == "exact"
     assert session.engine == "reference"
 
@@ -114,30 +114,30 @@ def test_ghost_and_twin_do_all_that_was_done_after_one_step(at_once: int) -> Non
     session = Session(BOUNCE, "pymunk", actions=pushes)
     company = Diagnostics(session)
     company.show_ghost(True)
-    company.show_trust(True)
+    company.watch_divergence(True)
     for _ in range(42 // at_once):
         session.advance(at_once)
         company.advance(session.take_replayed_actions())
-    assert company.trust is not None
-    assert company.trust.spread is not None
+    assert company.divergence is not None
+    assert company.divergence.distance is not None
     ghost = company.ghost_frame
     assert ghost is not None
     np.testing.assert_allclose(ghost.velocity[0, 0], session.frame.velocity[0, 0], rtol=1e-12)  # all three pushes
     assert session.frame.velocity[0, 0] > 0.0
-    assert company.trust.spread < 1e-11  # of 1e-12 m at first: nothing has been hit
+    assert company.divergence.distance < 1e-11  # of 1e-12 m at first: nothing has been hit
 
 
 def test_ghost_that_cannot_follow_says_why_and_another_engine_goes_on() -> None:
     session = Session(BOUNCE, "pymunk")
     company = Diagnostics(session)
     company.show_ghost(True)
-    company.did(session.apply(Spawn(time=0.0, ball=Ball(position=(0.3, 5.5), radius=0.5))))
+    company.apply(session.apply(Spawn(time=0.0, ball=Ball(position=(0.3, 5.5), radius=0.5))))
     together(session, company, 1)
     assert company.ghost_engine == "reference"
-    assert company.distance == 0.0
-    assert [level for level, text in company.notes if "ghost of exact stopped" in text] == ["warning"]
+    assert company.ghost_distance == 0.0
+    assert [level for level, text in company.notifications if "ghost of exact stopped" in text] == ["warning"]
     together(session, company, 5)
-    assert company.distance is not None
+    assert company.ghost_distance is not None
 
 
 def test_exact_ghost_of_a_heap_gives_up_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -152,7 +152,7 @@ def test_exact_ghost_of_a_heap_gives_up_and_says_so(monkeypatch: pytest.MonkeyPa
         if company.ghost_engine != "exact":
             break
     assert company.ghost_engine == "reference" or company.ghost_engine is None  # which has no more patience either
-    assert any("ghost of exact stopped" in text for _, text in company.notes)
+    assert any("ghost of exact stopped" in text for _, text in company.notifications)
     together(session, company, 3)
 
 
@@ -169,7 +169,7 @@ def test_twin_loses_trust_when_compare_says_so() -> None:
         while trust.state == "trusted" and session.time < 3.0 * truth.trusted_until:
             session.advance(5)
             beside(trust, session)
-            spreads.append(trust.spread)
+            spreads.append(trust.distance)
         assert trust.state == "lost"
         assert trust.horizon == session.time
         # Another engine's impacts come a step later or so, and let errors grow as fast: by a factor a collision.
@@ -190,17 +190,17 @@ def test_bounce_is_trusted_to_its_end(engine: str) -> None:
         beside(trust, session)
     assert trust.state == "trusted"
     assert trust.horizon is None
-    assert trust.spread is not None
-    assert trust.spread < 1e-9
+    assert trust.distance is not None
+    assert trust.distance < 1e-9
 
 
 def test_what_meets_nothing_is_trusted_without_a_twin() -> None:
     session = Session(load(find("fireworks")))
     trust = DivergenceMonitor(session.simulation.checkpoint())
-    assert not trust.able
+    assert not trust.can_diverge
     beside(trust, session)
     assert trust.state == "trusted"
-    assert trust.spread is None
+    assert trust.distance is None
     trust.close()
 
 
@@ -210,10 +210,10 @@ def test_twin_that_ends_leaves_trust_unknown(monkeypatch: pytest.MonkeyPatch) ->
     session = Session(scene, "exact")
     trust = DivergenceMonitor(session.simulation.checkpoint())
     trust.follow(1)
-    trust.look(session.frame, 1)
+    trust.update(session.frame, 1)
     assert trust.state == "unknown"
     trust.follow(2)
-    trust.act(Impulse(time=0.0, body="atom-1", impulse=(1.0, 0.0)))
+    trust.apply(Impulse(time=0.0, body="atom-1", impulse=(1.0, 0.0)))
     trust.close()
 
 
@@ -221,47 +221,47 @@ def test_company_waits_while_the_session_goes_back_and_comes_again() -> None:
     session = Session(BOUNCE, "pymunk")
     company = Diagnostics(session)
     company.show_ghost(True)
-    company.show_trust(True)
+    company.watch_divergence(True)
     kick = Impulse(time=0.0, body="ball", impulse=(0.5, 1.0))
     together(session, company, 200)
-    company.did(session.apply(kick))
+    company.apply(session.apply(kick))
     distance = {}
     for _ in range(200):
         together(session, company, 1)
-        distance[session.step_number] = company.distance
+        distance[session.step_number] = company.ghost_distance
     for _ in session.seek(250):
         pass
-    company.begin()
-    assert company.distance == distance[250]
+    company.restart()
+    assert company.ghost_distance == distance[250]
     for _ in session.seek(100):
         pass
-    company.begin()
+    company.restart()
     for step in range(101, 401):
         together(session, company, 1)
-        assert company.distance == distance.get(step, company.distance)
+        assert company.ghost_distance == distance.get(step, company.ghost_distance)
     together(session, company, 100)  # and further than it had been
-    assert company.distance is not None
-    assert company.distance < 0.01  # g·h·t/2 is 2.5 mm at 0.5 s; had the ghost missed the kick, it would be 0.2 m off
-    assert company.trust is not None
-    assert company.trust.state == "trusted"
+    assert company.ghost_distance is not None
+    assert company.ghost_distance < 0.01  # g·h·t/2 is 2.5 mm at 0.5 s; 0.2 m without the kick
+    assert company.divergence is not None
+    assert company.divergence.state == "trusted"
 
 
 def test_company_begins_anew_where_the_past_is_changed() -> None:
     session = Session(BOUNCE, "pymunk")
     company = Diagnostics(session)
     company.show_ghost(True)
-    company.show_trust(True)
+    company.watch_divergence(True)
     together(session, company, 300)
     for _ in session.seek(100):
         pass
-    company.begin()
-    company.did(session.apply(Impulse(time=0.0, body="ball", impulse=(0.5, 1.0))))
-    assert company.distance == 0.0
+    company.restart()
+    company.apply(session.apply(Impulse(time=0.0, body="ball", impulse=(0.5, 1.0))))
+    assert company.ghost_distance == 0.0
     together(session, company, 10)
-    assert company.trust is not None
-    assert company.trust.state == "trusted"
-    assert company.trust.spread is not None
-    assert company.trust.spread < 1e-9  # m: ten steps of free flight add nothing to 1e-12
+    assert company.divergence is not None
+    assert company.divergence.state == "trusted"
+    assert company.divergence.distance is not None
+    assert company.divergence.distance < 1e-9  # m: ten steps of free flight add nothing to 1e-12
 
 
 def test_companions_do_what_a_recording_does_again() -> None:
@@ -272,32 +272,32 @@ def test_companions_do_what_a_recording_does_again() -> None:
     session = Session(BOUNCE, "pymunk", actions=first.actions)
     company = Diagnostics(session)
     company.show_ghost(True)
-    company.show_trust(True)
+    company.watch_divergence(True)
     for _ in range(12):
         session.advance(50)  # the kick lies within a batch
         company.advance(session.take_replayed_actions())
-    assert company.distance is not None
-    assert company.distance < 0.01  # g·h·t/2; without the kick it would be 1.5 m off
-    assert company.trust is not None
-    assert company.trust.state == "trusted"
+    assert company.ghost_distance is not None
+    assert company.ghost_distance < 0.01  # g·h·t/2; without the kick it would be 1.5 m off
+    assert company.divergence is not None
+    assert company.divergence.state == "trusted"
 
 
 def test_horizon_is_known_before_and_after_it_when_going_back() -> None:
     session = Session(gas(), "pymunk")
     company = Diagnostics(session)
-    company.show_trust(True)
-    assert company.trust is not None
-    company.trust.tolerance = 1e-11
-    while company.trust.state == "trusted" and session.time < 5.0:
+    company.watch_divergence(True)
+    assert company.divergence is not None
+    company.divergence.tolerance = 1e-11
+    while company.divergence.state == "trusted" and session.time < 5.0:
         together(session, company, 1)
-    horizon, lost = company.trust.horizon, session.step_number
+    horizon, lost = company.divergence.horizon, session.step_number
     assert horizon is not None
     together(session, company, 10)
     for step, state in ((lost - 10, "trusted"), (lost + 5, "lost"), (lost - 1, "trusted")):
         for _ in session.seek(step):
             pass
-        company.begin()
-        assert company.trust.state == state
+        company.restart()
+        assert company.divergence.state == state
     company.close()
 
 
@@ -312,30 +312,30 @@ def test_misses_are_counted_and_flash_and_those_of_the_future_are_forgotten() ->
     )
     session = Session(scene, "pymunk")
     company = Diagnostics(session)
-    assert company.missed == 0
+    assert company.missed_contacts == 0
     seen = []
     for _ in range(14):
         together(session, company, 1)
-        seen.append(company.missed)
+        seen.append(company.missed_contacts)
     assert seen[-1] == 2
     assert all(a is not None and b is not None and a <= b for a, b in pairwise(seen))
-    assert len(company.flashes) == 2
+    assert len(company.missed_markers) == 2
     for _ in session.seek(7):
         pass
-    company.begin()
-    assert company.missed == 1
+    company.restart()
+    assert company.missed_contacts == 1
     together(session, company, 7)
-    assert company.missed == 2
+    assert company.missed_contacts == 2
     sparks = Diagnostics(Session(load(find("fireworks"))))
-    assert sparks.missed is None
-    assert sparks.flashes == ()
+    assert sparks.missed_contacts is None
+    assert sparks.missed_markers == ()
 
 
 def test_follower_is_told_only_what_every_engine_knows() -> None:
-    assert can_follow(Switch(time=1.0, engine="exact", settings={"integrator": "rk4"})) is None
-    assert can_follow(Switch(time=1.0, settings={"dt": 0.1, "slop": 0.2})) == Switch(time=1.0, settings={"dt": 0.1})
+    assert ghost_action(Switch(time=1.0, engine="exact", settings={"integrator": "rk4"})) is None
+    assert ghost_action(Switch(time=1.0, settings={"dt": 0.1, "slop": 0.2})) == Switch(time=1.0, settings={"dt": 0.1})
     kick = Impulse(time=0.0, body="a", impulse=(1.0, 0.0))
-    assert can_follow(kick) is kick
+    assert ghost_action(kick) is kick
     wanted = Settings(dt=0.1, substeps=3, slop=0.1, integrator="rk4", half_kick=True)
     assert wanted.common() == Settings(dt=0.1, substeps=3)
 
@@ -349,7 +349,7 @@ def test_apart_is_the_largest_distance_of_those_in_both() -> None:
     assert max_body_distance(one.frame, two.frame) == 0.0
     empty = Session(from_document({"title": "t"}))
     assert max_body_distance(one.frame, empty.frame) is None
-    assert Diagnostics(empty).distance is None
+    assert Diagnostics(empty).ghost_distance is None
 
 
 def test_ghost_takes_over_a_steady_force_or_leaves_it_to_who_can() -> None:
@@ -361,19 +361,19 @@ def test_ghost_takes_over_a_steady_force_or_leaves_it_to_who_can() -> None:
     ghost = company.ghost_frame
     assert ghost is not None
     assert company.ghost_engine == "reference"
-    assert "exact cannot continue with the constant force on 'a'" in company.notes[0][1]
+    assert "exact cannot continue with the constant force on 'a'" in company.notifications[0][1]
     assert ghost.velocity[0] == pytest.approx([1.0, 0.0], rel=1e-12)  # a hundred sums
 
 
 def test_companion_that_ended_is_quiet(monkeypatch: pytest.MonkeyPatch) -> None:
     companion = ShadowRun(Session(BOUNCE).simulation.checkpoint())
-    companion.act(Remove(time=0.0, body="zzz"))
+    companion.apply(Remove(time=0.0, body="zzz"))
     assert companion.ended is not None
     assert companion.frame is None
     companion.follow(3)
-    companion.act(Remove(time=0.0, body="ball"))
+    companion.apply(Remove(time=0.0, body="ball"))
     companion.close()
     monkeypatch.setattr(companions, "ENGINES", {})
     with pytest.raises(ActionError, match="no other engine"):
-        ghost_setting(Session(BOUNCE).simulation.checkpoint())
+        create_ghost(Session(BOUNCE).simulation.checkpoint())
     assert np.isfinite(Session(BOUNCE).frame.position).all()

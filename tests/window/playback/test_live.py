@@ -27,8 +27,8 @@ ALL = frozenset({"shapes", "trails", "contacts"})
 @pytest.fixture(autouse=True)
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """No test depends on how fast the machine is."""
-    monkeypatch.setattr(module, "LEAST", 1e9)
-    monkeypatch.setattr(module, "MOST", 1e9)
+    monkeypatch.setattr(module, "MIN_STEP_BUDGET", 1e9)
+    monkeypatch.setattr(module, "MAX_STEP_BUDGET", 1e9)
 
 
 def bounce() -> Scene:
@@ -41,32 +41,32 @@ def live(name: str = "bounce", engine: str = "pymunk") -> LiveView:
 
 def arrived(show: LiveView) -> LiveView:
     while show.busy is not None:
-        show.go_on(1 / 60, paused=True)
+        show.update(1 / 60, paused=True)
     return show
 
 
 def test_real_time_makes_steps() -> None:
     show = live()
     for k in range(1, 61):
-        show.go_on(1 / 60, paused=False)
+        show.update(1 / 60, paused=False)
         assert show.session.time == pytest.approx(k / 60, abs=0.001)  # up to a step
     frame = show.snapshot(ALL).frame
     assert show.session.previous.time <= frame.time <= show.session.time
-    assert frame.time == pytest.approx(show.session.time - 0.001 + 0.001 * show.between_steps, abs=1e-12)  # rounding
+    assert frame.time == pytest.approx(show.session.time - 0.001 + 0.001 * show.alpha, abs=1e-12)  # rounding
 
 
 def test_pause_stands_still_and_a_step_is_one_step() -> None:
     show = live()
-    show.go_on(0.05, paused=False)
+    show.update(0.05, paused=False)
     step = show.step_number
-    show.go_on(9.0, paused=True)
+    show.update(9.0, paused=True)
     assert show.step_number == step
     show.step()
     assert show.step_number == step + 1
-    show.back()
+    show.step_back()
     arrived(show)
     assert show.step_number == step
-    show.go_on(9.0, paused=False)
+    show.update(9.0, paused=False)
     assert show.step_number <= step + 100  # 0.1 s at most after a pause of the machine
     assert show.step_number >= step + 99
 
@@ -74,21 +74,21 @@ def test_pause_stands_still_and_a_step_is_one_step() -> None:
 def test_slow_motion_makes_fewer_steps() -> None:
     show = live()
     for _ in range(10):
-        show.pace.slower()
+        show.clock.slower()
     for _ in range(60):
-        show.go_on(1 / 60, paused=False)
+        show.update(1 / 60, paused=False)
     assert show.session.time == pytest.approx(0.1, abs=0.001)  # up to a step
 
 
 def test_machine_that_is_too_slow_drops_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "LEAST", -1.0)  # one step is made, then it is late already
-    monkeypatch.setattr(module, "MOST", -1.0)
+    monkeypatch.setattr(module, "MIN_STEP_BUDGET", -1.0)  # one step is made, then it is late already
+    monkeypatch.setattr(module, "MAX_STEP_BUDGET", -1.0)
     show = live()
     for _ in range(20):
         before = show.step_number
-        show.go_on(0.05, paused=False)
+        show.update(0.05, paused=False)
         assert 1 <= show.step_number - before <= 2
-    assert show.pace.real_speed < 0.1
+    assert show.clock.real_speed < 0.1
 
 
 def test_recorded_part_ends_in_a_pause_once() -> None:
@@ -99,16 +99,16 @@ def test_recorded_part_ends_in_a_pause_once() -> None:
     recording = first.recording()
     show = LiveView(Session(bounce(), actions=recording.actions), until=recording.duration)
     for _ in range(9):
-        show.go_on(0.03, paused=False)
+        show.update(0.03, paused=False)
         if show.wants_pause:
             break
     assert show.wants_pause
     assert show.session.simulation.state_hash() == recording.state_hash
     show.wants_pause = False
-    show.go_on(0.03, paused=False)
+    show.update(0.03, paused=False)
     assert not show.wants_pause
     assert show.step_number > 150
-    assert len(show.notes) == 1
+    assert len(show.notifications) == 1
 
 
 def test_scrub_looks_and_settle_goes_there() -> None:
@@ -125,15 +125,15 @@ def test_scrub_looks_and_settle_goes_there() -> None:
     assert show.step_number == 0
     show.scrub(99.0)
     assert show.step_number == 150
-    show.settle()
+    show.commit_scrub()
     assert show.busy is None
     show.scrub(0.07)
     seen = show.frame.state_hash()
-    show.settle()
+    show.commit_scrub()
     arrived(show)
     assert (show.session.step_number, show.session.frame.state_hash()) == (70, seen)
-    show.settle()
-    assert show.end == pytest.approx(0.15, rel=1e-12)  # rounding
+    show.commit_scrub()
+    assert show.end_time == pytest.approx(0.15, rel=1e-12)  # rounding
 
 
 def test_scrub_shows_walls_as_they_were_then() -> None:
@@ -145,8 +145,8 @@ def test_scrub_shows_walls_as_they_were_then() -> None:
     for k in (1.0, 2.0):
         show.step()
         courses.append(((-1.0, k), (1.0, k)))
-        show.act(Reshape(time=0.0, thing="shelf", points=courses[-1]))
-        show.act(Toggle(time=0.0, thing="shelf", solid=k == 2.0))
+        show.apply(Reshape(time=0.0, thing="shelf", points=courses[-1]))
+        show.apply(Toggle(time=0.0, thing="shelf", solid=k == 2.0))
     show.step()
     dt = show.settings.dt
     for stand in (3, 0, 2):
@@ -159,7 +159,7 @@ def test_scrub_shows_walls_as_they_were_then() -> None:
             assert (seen[-1].walls[0].points, seen[-1].walls[0].solid) == (courses[min(step, 2)], step != 1)
         assert seen[0] is seen[-1]
         assert show.snapshot(ALL).scene is seen[0]
-    show.settle()
+    show.commit_scrub()
     arrived(show)
     assert show.snapshot(ALL).scene is show.scene
 
@@ -169,7 +169,7 @@ def test_scrub_shows_bodies_that_have_not_come_yet() -> None:
     show = live()
     for k in range(3):
         show.step()
-        show.act(Spawn(time=0.0, ball=Ball(position=(3.0 * k + 3.0, 5.0), radius=0.25, mass=2.0)))
+        show.apply(Spawn(time=0.0, ball=Ball(position=(3.0 * k + 3.0, 5.0), radius=0.25, mass=2.0)))
     show.step()
     show.seek(1)
     arrived(show)
@@ -181,13 +181,13 @@ def test_scrub_shows_bodies_that_have_not_come_yet() -> None:
         assert len(sight.bodies) >= count
         assert sight.bodies.radius[1:].tolist() == [0.25] * (len(sight.bodies) - 1)
         assert all(np.isfinite(show.energy()))
-    show.settle()
+    show.commit_scrub()
     arrived(show)
     assert len(show.session.bodies) == 4
 
 
 def test_on_the_way_nothing_can_be_done(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(journey, "SLICE", -1.0)  # no part of the way at once
+    monkeypatch.setattr(journey, "SEEK_BUDGET", -1.0)  # no part of the way at once
     show = live("gas")
     for _ in range(100):
         show.step()
@@ -195,14 +195,14 @@ def test_on_the_way_nothing_can_be_done(monkeypatch: pytest.MonkeyPatch) -> None
     assert show.busy == "replaying 0%"
     for _ in range(2):
         with pytest.raises(ActionError, match="wait"):
-            show.act(Remove(time=0.0, body="atom-1"))
+            show.apply(Remove(time=0.0, body="atom-1"))
         with pytest.raises(ActionError, match="wait"):
-            show.switch("exact")
-        show.back()  # is not heard
+            show.switch_engine("exact")
+        show.step_back()  # is not heard
     show.seek(20)  # another one before the first is done
     show.seek(99)
-    monkeypatch.setattr(journey, "SLICE", 1e9)
-    show.go_on(1.0, paused=False)
+    monkeypatch.setattr(journey, "SEEK_BUDGET", 1e9)
+    show.update(1.0, paused=False)
     assert show.busy is None
     assert show.step_number == 99
     show.act(Remove(time=0.0, body="atom-1"))
@@ -214,15 +214,15 @@ def test_session_that_ended_says_so_once_and_again_after_going_back() -> None:
     show.session.advance(9010)
     for _ in range(3):
         show.step()
-    assert [level for level, _ in show.notes] == ["error"]
-    show.go_on(1.0, paused=False)
+    assert [level for level, _ in show.notifications] == ["error"]
+    show.update(1.0, paused=False)
     assert show.step_number == 9011
-    show.notes.clear()
-    show.back()
+    show.notifications.clear()
+    show.step_back()
     arrived(show)
     assert show.step_number == 9010
     show.step()
-    assert [level for level, _ in show.notes] == ["error"]
+    assert [level for level, _ in show.notifications] == ["error"]
     show.seek(9999)
     arrived(show)
     assert show.step_number == 9011
@@ -266,10 +266,10 @@ def test_relaunch_is_another_firework_each_time_and_can_be_replayed() -> None:
 
 def test_switch_while_pulling_goes_on_pulling() -> None:
     show = LiveView(Session(from_document({"ball": [{"name": "a", "position": [0, 0], "radius": 1}]})))
-    show.act(Pull(time=0.0, body="a", target=(2.0, 0.0)))
+    show.apply(Pull(time=0.0, body="a", target=(2.0, 0.0)))
     for engine in ("exact", "reference", "pymunk"):
         show.step()
-        assert show.switch(engine) is None
+        assert show.switch_engine(engine) is None
         assert show.engine == engine
     for _ in range(150):
         show.step()
@@ -279,7 +279,7 @@ def test_switch_while_pulling_goes_on_pulling() -> None:
 def test_overlap_colours_are_those_of_the_scene_that_asks_for_them() -> None:
     show = live("circle_half_plane")
     assert show.snapshot(ALL).overlapping is not None
-    show.act(Move(time=0.0, body="circle", position=(0.0, 0.5)))
+    show.apply(Move(time=0.0, body="circle", position=(0.0, 0.5)))
     over = show.snapshot(ALL).overlapping
     assert over is not None
     assert over.tolist() == [True]
@@ -299,7 +299,7 @@ ODD: list[dict[str, Any]] = [
 
 moves = st.one_of(
     st.tuples(st.just("go"), st.floats(0.0, 0.2)),
-    st.tuples(st.sampled_from(["step", "back", "settle", "slower", "faster", "ghost", "trust"]), st.just(0.0)),
+    st.tuples(st.sampled_from(["step", "step_back", "commit_scrub", "slower", "faster", "ghost", "trust"]), st.just(0.0)),
     st.tuples(st.sampled_from(["scrub", "seek"]), st.floats(-1.0, 3.0)),
     st.tuples(st.just("act"), st.floats(0.0, 4.9)),
     st.tuples(st.just("switch"), st.floats(0.0, 2.9)),
@@ -322,23 +322,23 @@ def test_odd_scenes_can_be_played_in_any_order(which: int, plan: list[tuple[str,
         try:
             match kind:
                 case "go":
-                    show.go_on(number, paused=False)
-                case "step" | "back" | "settle":
+                    show.update(number, paused=False)
+                case "step" | "step_back" | "commit_scrub":
                     getattr(show, kind)()
                 case "slower" | "faster":
-                    getattr(show.pace, kind)()
+                    getattr(show.clock, kind)()
                 case "ghost":
-                    show.company.show_ghost(not show.company.ghosted)
+                    show.diagnostics.show_ghost(not show.diagnostics.has_ghost)
                 case "trust":
-                    show.company.show_trust(show.company.trust is None)
+                    show.diagnostics.watch_divergence(show.diagnostics.divergence is None)
                 case "scrub":
                     show.scrub(number)
                 case "seek":
                     show.seek(int(number * 20))
                 case "switch":
-                    show.switch(("pymunk", "reference", "exact")[int(number)])
+                    show.switch_engine(("pymunk", "reference", "exact")[int(number)])
                 case _:
-                    show.act(DEEDS[int(number)])
+                    show.apply(DEEDS[int(number)])
         except ActionError as error:
             assert str(error)
         sight = show.snapshot(ALL)
@@ -362,40 +362,40 @@ def stored(**more: Any) -> RecordedView:
 
 def test_stored_run_is_gone_through_by_frames() -> None:
     show = stored()
-    assert (show.begin, show.end, show.step_number) == (0.0, 6.0, 0)
-    show.back()
+    assert (show.start_time, show.end_time, show.step_number) == (0.0, 6.0, 0)
+    show.step_back()
     assert show.step_number == 0
     for k in range(1, 5):
         show.step()
         assert show.step_number == k
         assert show.frame.position[0].tolist() == show.run.trajectory.position[k, 0].tolist()
-    show.back()
+    show.step_back()
     assert show.step_number == 3
     show.scrub(0.034)
     assert show.step_number == 3
-    show.back()  # to the frame that was just passed
+    show.step_back()  # to the frame that was just passed
     assert show.frame.time == show.run.trajectory.time[3]
     show.scrub(-5.0)
     assert show.frame.time == 0.0
     show.scrub(99.0)
-    show.settle()
+    show.commit_scrub()
     assert (show.frame.time, show.step_number) == (6.0, 600)
     show.step()
-    show.go_on(1.0, paused=False)
+    show.update(1.0, paused=False)
     assert show.frame.time == 6.0
 
 
 def test_stored_run_goes_on_by_real_time_and_its_speed() -> None:
     show = stored()
-    show.go_on(0.05, paused=False)
+    show.update(0.05, paused=False)
     assert show.frame.time == pytest.approx(0.05, rel=1e-12)  # rounding
-    show.go_on(0.05, paused=True)
-    show.pace.faster()
-    show.go_on(0.05, paused=False)
+    show.update(0.05, paused=True)
+    show.clock.faster()
+    show.update(0.05, paused=False)
     assert show.frame.time == pytest.approx(0.05 * (1.0 + 10**0.1), rel=1e-12)  # rounding
     assert show.engine == "pymunk"
-    assert show.missed == 0
-    assert show.marks == ()
+    assert show.missed_contacts == 0
+    assert show.keyframe_times == ()
     assert sum(show.energy()[:2]) == pytest.approx(show.energy()[2], rel=1e-12)  # rounding
     show.close()
 
@@ -404,10 +404,10 @@ def test_stored_run_of_one_frame_stands_still() -> None:
     session = Session(bounce())
     show = RecordedView(RecordedRun(first_frame(session)))
     show.step()
-    show.back()
-    show.go_on(1.0, paused=False)
+    show.step_back()
+    show.update(1.0, paused=False)
     assert show.step_number == 0
-    assert show.begin == show.end == 0.0
+    assert show.start_time == show.end_time == 0.0
     assert show.snapshot(ALL).frame.position.tolist() == [[0.0, 5.5]]
 
 
@@ -421,10 +421,10 @@ def test_way_back_knows_what_was_solid_then() -> None:
     scene = from_document({"world": {"gravity": [0, -9.81], "duration": 5}, "ball": [ball], "wall": [shelf]})
     show = LiveView(Session(scene, "pymunk"))
     for _ in range(60):
-        show.go_on(1 / 60, paused=False)
-    show.act(Toggle(time=0.0, thing="shelf", solid=False))
+        show.update(1 / 60, paused=False)
+    show.apply(Toggle(time=0.0, thing="shelf", solid=False))
     for _ in range(60):
-        show.go_on(1 / 60, paused=False)
+        show.update(1 / 60, paused=False)
     fell, then = show.session.frame, show.session.step_number
     assert fell.position[0, 1] < -3.0
     show.seek(then // 4)

@@ -44,18 +44,18 @@ def test_simulated_time_is_real_time_by_the_speed_up_to_a_step(pictures: list[fl
         (pace.faster if rung > 0 else pace.slower)()
     real, steps = 0.0, 0
     for elapsed in pictures:
-        asked = pace.due(elapsed, dt)
-        pace.spent(elapsed, asked, asked, dt)
+        asked = pace.steps_due(elapsed, dt)
+        pace.record_steps(elapsed, asked, asked, dt)
         real, steps = real + elapsed, steps + asked
         behind = real * pace.speed - steps * dt
         assert -1e-9 <= behind <= dt * (1.0 + 1e-9) + 1e-9  # sums of up to 200 terms
-        assert 0.0 <= pace.between(dt) <= 1.0
-        assert pace.between(dt) == pytest.approx(min(max(behind / dt, 0.0), 1.0), abs=1e-6)  # as above, over dt of 1e-4
+        assert 0.0 <= pace.alpha(dt) <= 1.0
+        assert pace.alpha(dt) == pytest.approx(min(max(behind / dt, 0.0), 1.0), abs=1e-6)  # as above, over dt of 1e-4
 
 
 @given(elapsed=st.floats(0.0, 1e6), dt=st.floats(1e-6, 10.0))
 def test_no_picture_asks_for_more_than_the_cap(elapsed: float, dt: float) -> None:
-    asked = FixedStepClock().due(elapsed, dt)
+    asked = FixedStepClock().steps_due(elapsed, dt)
     assert asked * dt <= MAX_FRAME_TIME * (1.0 + 1e-9)  # rounding of the quotient
     assert asked == 0 or (asked + 1) * dt >= min(elapsed, MAX_FRAME_TIME) * (1.0 - 1e-9)  # as above
 
@@ -64,9 +64,9 @@ def test_steps_that_could_not_be_made_are_dropped_and_the_speed_says_so() -> Non
     """A machine that makes only 2 of 10 steps a picture: what is asked for does not grow."""
     pace = FixedStepClock()
     for _ in range(100):
-        asked = pace.due(0.1, 0.01)
+        asked = pace.steps_due(0.1, 0.01)
         assert asked in (9, 10)  # 0.1 / 0.01, after rounding
-        pace.spent(0.1, 2, asked, 0.01)
+        pace.record_steps(0.1, 2, asked, 0.01)
     assert pace.real_speed == pytest.approx(0.2, rel=1e-12)  # rounding
     assert pace.speed == 1.0
 
@@ -76,20 +76,20 @@ def test_real_speed_is_that_asked_for_until_it_is_known() -> None:
     pace.slower()
     assert pace.real_speed == pace.speed
     for _ in range(60):
-        asked = pace.due(1 / 60, 0.001)
-        pace.spent(1 / 60, asked, asked, 0.001)
+        asked = pace.steps_due(1 / 60, 0.001)
+        pace.record_steps(1 / 60, asked, asked, 0.001)
     assert pace.real_speed == pytest.approx(pace.speed, rel=0.01)  # a step of 1 ms in half a second
-    pace.rest()
+    pace.reset()
     assert pace.real_speed == pace.speed
-    assert pace.between(0.001) == 0.0
+    assert pace.alpha(0.001) == 0.0
 
 
 def test_flow_is_capped_real_time_by_the_speed() -> None:
     pace = FixedStepClock()
-    assert pace.flow(0.02) == 0.02
-    assert pace.flow(9.0) == MAX_FRAME_TIME
+    assert pace.scale_time(0.02) == 0.02
+    assert pace.scale_time(9.0) == MAX_FRAME_TIME
     pace.faster()
-    assert pace.flow(0.02) == 0.02 * pace.speed
+    assert pace.scale_time(0.02) == 0.02 * pace.speed
 
 
 @given(share=st.floats(0.0, 1.0))

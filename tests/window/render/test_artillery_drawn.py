@@ -222,7 +222,7 @@ def test_keys_aim_and_fire_and_going_back_takes_back(window: App, tmp_path: Path
     assert kept.score == rules.score
     assert Recording.load(recording).presses == kept.presses
     live.seek(fired)
-    live.arrive()
+    live.finish_seek()
     rules = turn(window)
     assert rules.shots == []
     assert live.scene.walls[0].points != crater

@@ -260,7 +260,7 @@ class BilliardsGame:
         """Move the balls to the positions of a match; in a replay the session contains these moves."""
         if not self.live.session.ahead:
             for move in match.moves(self.live.frame.position):
-                self.live.act(move)
+                self.live.apply(move)
 
     def _let_play(self, opponent: BotPlayer, elapsed: float) -> None:
         """Continue the bot's turn."""
@@ -327,7 +327,7 @@ class BilliardsGame:
         self._turns.say(strokes, self.call)
         self.cue.back = 0.0
         self._hearing.clear()
-        self.live.act(match.strike(self.cue.stroke))
+        self.live.apply(match.strike(self.cue.stroke))
 
     def undo(self) -> None:
         """Undo the last stroke of a person and everything after it.
