@@ -80,7 +80,7 @@ def test_undo_takes_a_stroke_back_while_the_balls_roll() -> None:
         turn(game)
     assert game.live.session.time > 0.0
     game.undo()
-    game.live.arrive()
+    game.live.finish_seek()
     assert game.strokes == 0
     assert game.live.session.simulation.state_hash() == before
     assert (game.cue.aim, game.cue.speed) == (1.4, 2.0)
@@ -92,7 +92,7 @@ def test_stroke_after_undo_goes_its_own_way_and_replays() -> None:
     game.shoot(2.0)
     roll_out(game)
     game.undo()
-    game.live.arrive()
+    game.live.finish_seek()
     game.cue.aim += 0.3
     game.shoot(1.0)
     roll_out(game)
@@ -122,8 +122,8 @@ def test_going_back_finds_the_turn_of_then_and_time_goes_on() -> None:
     roll_out(game)
     after, end = game.match, game.live.session.time
     game.live.scrub(0.5 * end)
-    game.live.settle()
-    game.live.arrive()
+    game.live.commit_scrub()
+    game.live.finish_seek()
     assert game.match.turn == 0
     assert game.match.state.opening
     assert not game.aiming
@@ -139,7 +139,7 @@ def test_strokes_of_a_hand_that_moves_balls_begin_where_they_lie() -> None:
     from sandbox.action import Move
 
     game = game_of(FREE)
-    game.live.act(Move(time=0.0, body="2", position=(0.7, 0.7), velocity=(0.0, 0.0)))
+    game.live.apply(Move(time=0.0, body="2", position=(0.7, 0.7), velocity=(0.0, 0.0)))
     turn(game)
     number = game.live.bodies.names.index("2")
     assert game.match.position[number] == (0.7, 0.7)
@@ -160,7 +160,7 @@ def test_bot_answers_the_break() -> None:
         session = game.live.session.recording()
         assert rerun(session).info["state_hash"] == session.state_hash
         game.undo()
-        game.live.arrive()
+        game.live.finish_seek()
         assert game.mine  # back at the person's stroke
     game.close()
 

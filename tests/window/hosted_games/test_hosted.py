@@ -126,11 +126,11 @@ def test_going_back_brings_the_score_of_then(window: App) -> None:
     scores = [host_of(window).rules.score]
     assert scores[0] >= 1
     live.seek(5)
-    live.arrive()
+    live.finish_seek()
     assert host_of(window).rules.score == 0
     assert host_of(window).cues() == ()  # nothing new happened
     live.seek(150)
-    live.arrive()
+    live.finish_seek()
     assert host_of(window).rules.score == scores[0]
 
 
@@ -144,8 +144,8 @@ def test_looking_back_shows_the_score_and_lamps_of_then(window: App) -> None:
         live.scrub(time)
         assert host_of(window).shown() == shown
     assert host_of(window).rules.score == float(shown.board.score)  # the game itself stays where it is
-    live.settle()
-    live.arrive()
+    live.commit_scrub()
+    live.finish_seek()
     assert host_of(window).shown() == shown
 
 
@@ -180,7 +180,7 @@ def test_what_was_held_later_is_let_go_of_on_another_way(window: App) -> None:
     held = turned(window, elapsed=0.2).session.step_number
     live = turned(window, key_up(LEFT), elapsed=0.2)
     live.seek(held // 2)
-    live.arrive()
+    live.finish_seek()
     live = turned(window, key(UP), key_up(UP))
     assert presses_of(live) == [("aim", 1.0), ("kick", 1.0), ("aim", 0.0), ("kick", 0.0)]
 

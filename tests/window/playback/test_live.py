@@ -205,7 +205,7 @@ def test_on_the_way_nothing_can_be_done(monkeypatch: pytest.MonkeyPatch) -> None
     show.update(1.0, paused=False)
     assert show.busy is None
     assert show.step_number == 99
-    show.act(Remove(time=0.0, body="atom-1"))
+    show.apply(Remove(time=0.0, body="atom-1"))
 
 
 def test_session_that_ended_says_so_once_and_again_after_going_back() -> None:
@@ -299,7 +299,9 @@ ODD: list[dict[str, Any]] = [
 
 moves = st.one_of(
     st.tuples(st.just("go"), st.floats(0.0, 0.2)),
-    st.tuples(st.sampled_from(["step", "step_back", "commit_scrub", "slower", "faster", "ghost", "trust"]), st.just(0.0)),
+    st.tuples(
+        st.sampled_from(["step", "step_back", "commit_scrub", "slower", "faster", "ghost", "trust"]), st.just(0.0)
+    ),
     st.tuples(st.sampled_from(["scrub", "seek"]), st.floats(-1.0, 3.0)),
     st.tuples(st.just("act"), st.floats(0.0, 4.9)),
     st.tuples(st.just("switch"), st.floats(0.0, 2.9)),
