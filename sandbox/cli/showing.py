@@ -137,7 +137,7 @@ def _saved(app_state: "AppState", record: Path) -> bool:
         click.echo(f"--record: {record}: there is no session to save", err=True)
         return False
     try:
-        app_state.live.arrive()
+        app_state.live.finish_seek()
         app_state.live.session.recording().save(record)
     except OSError as error:
         click.echo(f"--record: {record}: {error.strerror or error}", err=True)

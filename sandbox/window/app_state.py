@@ -88,19 +88,19 @@ class Preferences:
 
     def apply(self, company: Diagnostics, trusting: bool) -> None:
         """Apply the ghost and twin preferences to a new session; `trusting` is the default of the twin."""
-        company.show_trust(trusting if self.trusting is None else self.trusting)
-        if self.ghosted and not company.ghosted:
+        company.watch_divergence(trusting if self.trusting is None else self.trusting)
+        if self.ghosted and not company.has_ghost:
             company.show_ghost(True)
 
     def toggle_ghost(self, company: Diagnostics) -> None:
         """Start or stop the ghost, and keep that for later scenes."""
-        self.ghosted = not company.ghosted
+        self.ghosted = not company.has_ghost
         company.show_ghost(self.ghosted)
 
     def toggle_trust(self, company: Diagnostics) -> None:
         """Start or stop the perturbed twin, and keep that for later scenes."""
-        self.trusting = company.trust is None
-        company.show_trust(self.trusting)
+        self.trusting = company.divergence is None
+        company.watch_divergence(self.trusting)
 
     def store_parameter(self, action: SetParameter) -> None:
         """Keep a value for a restart."""
@@ -123,7 +123,7 @@ def session_of_recording(recording: Recording) -> LiveView:
     session = Session(
         recording.scene, recording.engine, recording.settings, recording.actions, game, recording.duration
     )
-    session.note_unsaved()
+    session.mark_unsaved()
     live = LiveView(session)
     live.seek(round(recording.duration / session.settings.dt))
     return live
@@ -226,7 +226,7 @@ class AppState:
     @paused.setter
     def paused(self, paused: bool) -> None:
         if self._paused and not paused and isinstance(self.view, RecordedView) and self.view.at_end:
-            self.view.scrub(self.view.begin)
+            self.view.scrub(self.view.start_time)
         self._paused = paused
 
     def show(
@@ -263,7 +263,9 @@ class AppState:
         self.key_bindings = NO_BINDINGS
         if isinstance(view, LiveView):
             # A twin cannot predict the next input of rules and players.
-            self._preferences.apply(view.company, trusting=len(view.bodies) <= MAX_TWIN_BODIES and self.host is None)
+            self._preferences.apply(
+                view.diagnostics, trusting=len(view.bodies) <= MAX_TWIN_BODIES and self.host is None
+            )
             self.compute(lambda: self._table_host.take(view, file, self.messages.add))
             self.key_bindings = key_bindings(view, self.body_tools, self.gestures, self.host)
         if self.on_scene_changed is not None:
@@ -302,7 +304,7 @@ class AppState:
     def restart(self) -> None:
         """Start the scene again at time 0, with the same engine and the parameters that were set."""
         if isinstance(self.view, RecordedView):
-            self.view.scrub(self.view.begin)
+            self.view.scrub(self.view.start_time)
         elif self._again is not None and self.file is not None:
             self.show(self.compute(self._again), self.path, self.file, same=True, again=self._again)
         elif self.view is not None and self.file is not None:
@@ -312,7 +314,7 @@ class AppState:
                 self.messages.add(str(error), "error")
                 return
             lost = self._current_recording() if self.count_unsaved(restart=True) else self._lost
-            self._start(scene, self.path, self.file, self.view.engine, self.view.session.wanted, same=True)
+            self._start(scene, self.path, self.file, self.view.engine, self.view.session.simulation.wanted, same=True)
             self._lost = lost
 
     def count_unsaved(self, restart: bool = False) -> int:
@@ -325,7 +327,7 @@ class AppState:
         if live is None or self.host is not None or self.game is not None:
             return 0
         kept = SetParameter if restart else ()
-        actions = [action for action in live.session.unsaved if not isinstance(action, kept)]
+        actions = [action for action in live.session.unsaved_actions if not isinstance(action, kept)]
         return count_changes(actions, live.scene.play.arrows)
 
     def restore_session(self) -> None:
@@ -349,7 +351,7 @@ class AppState:
         if live is None:
             return None
         if live.busy is not None:
-            self.compute(live.arrive)
+            self.compute(live.finish_seek)
         return live.session.recording()
 
     def reload(self) -> None:
@@ -383,7 +385,7 @@ class AppState:
         if self.live is None:
             self._warn_no_session("has no ghost; replay it with --engine NAME")
             return
-        company = self.live.company
+        company = self.live.diagnostics
         self.compute(lambda: self._preferences.toggle_ghost(company))
 
     def toggle_trust(self) -> None:
@@ -391,7 +393,7 @@ class AppState:
         if self.live is None:
             self._warn_no_session("has no predictability horizon; open its scene with `sandbox play`")
             return
-        company = self.live.company
+        company = self.live.diagnostics
         self.compute(lambda: self._preferences.toggle_trust(company))
 
     def switch_to_next_engine(self) -> None:
@@ -411,7 +413,7 @@ class AppState:
         if live is None or engine == live.engine:
             return False
         try:
-            note = self.compute(lambda: live.switch(engine))
+            note = self.compute(lambda: live.switch_engine(engine))
         except ActionError as error:
             self.messages.add(str(error), "warning")
             return False
@@ -438,7 +440,7 @@ class AppState:
 
         def apply() -> None:
             for action in turned(live, key, value, self.body_tools.picked_index(live)):
-                live.act(action)
+                live.apply(action)
                 if isinstance(action, SetParameter):
                     self._preferences.store_parameter(action)
 
@@ -472,7 +474,7 @@ class AppState:
             return
         game, table_waits = self.game, self._table_host.waits and not self.body_tools.is_holding
         halted = self.paused or self.waits_for_start or self.covered or self.unfocused or table_waits
-        self.compute(lambda: view.go_on(elapsed, halted))
+        self.compute(lambda: view.update(elapsed, halted))
         if game is not None:
             self.run_handler(lambda: game.go_on(elapsed))
             self.messages.extend(game.notes)
@@ -482,7 +484,7 @@ class AppState:
             self.paused, view.wants_pause = True, False
         elif isinstance(view, RecordedView) and view.at_end:
             self.paused = True
-        self.messages.extend(view.notes)
+        self.messages.extend(view.notifications)
 
     def start_game(self) -> None:
         """Start the clock of a real-time game."""
@@ -505,17 +507,17 @@ class AppState:
         """Pause and go back by one step."""
         self.paused, self.waits_for_start = True, False
         if self.view is not None:
-            self.compute(self.view.back)
+            self.compute(self.view.step_back)
 
     def slower(self) -> None:
         """Select the next slower playback speed."""
         if self.view is not None:
-            self.view.pace.slower()
+            self.view.clock.slower()
 
     def faster(self) -> None:
         """Select the next faster playback speed."""
         if self.view is not None:
-            self.view.pace.faster()
+            self.view.clock.faster()
 
     def close(self) -> None:
         """Close the session or run."""

@@ -160,14 +160,14 @@ class GameHost:
     def shown(self) -> GameDisplay:
         """Return the display of the game at the displayed time."""
         live, rules = self.live, self.rules
-        then = self._history.at(live.frame.time) if live.peeking else None
+        then = self._history.at(live.frame.time) if live.is_previewing else None
         if then is not None:
             return then
         score = f"{rules.score:,}" if isinstance(rules.score, int) else f"{rules.score:,.1f}"
         board = ScoreDisplay(score, tuple(rules.display_lines()), rules.game_over)
         now = GameDisplay(board, rules.lit_lamps() if isinstance(rules, HasLamps) else frozenset())
-        if not live.peeking:
-            self._history.add(live.frame.time, live.end, now)
+        if not live.is_previewing:
+            self._history.add(live.frame.time, live.end_time, now)
         return now
 
     def cues(self) -> tuple[str, ...]:

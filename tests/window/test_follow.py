@@ -50,7 +50,7 @@ def seen(window: App) -> list[bool]:
     free = window.context.gui.area
     return [
         free.collidepoint(place)
-        for place in window.context.camera.to_screen(window.app_state.view.drawn.position).tolist()
+        for place in window.context.camera.to_screen(window.app_state.view.displayed_frame.position).tolist()
     ]
 
 

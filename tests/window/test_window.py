@@ -68,8 +68,8 @@ def said() -> list[str]:
 @pytest.fixture
 def opened(tmp_path: Path, said: list[str], monkeypatch: pytest.MonkeyPatch) -> Iterator[Open]:
     """Open a window on a scene. However slow the machine is, no picture gives up steps for it."""
-    monkeypatch.setattr("sandbox.window.playback.live.LEAST", math.inf)
-    monkeypatch.setattr("sandbox.window.playback.live.MOST", math.inf)
+    monkeypatch.setattr("sandbox.window.playback.live.MIN_STEP_BUDGET", math.inf)
+    monkeypatch.setattr("sandbox.window.playback.live.MAX_STEP_BUDGET", math.inf)
     windows: list[App] = []
 
     def open_on(text: str) -> App:
@@ -170,14 +170,14 @@ def test_pull_ends_when_the_window_loses_the_keyboard(window: App) -> None:
 def test_click_with_a_trembling_hand_only_picks(window: App, stopped: bool) -> None:
     turn(window, elapsed=3 * DT)
     window.app_state.paused = stopped
-    end, (x, y) = live(window).end, on_screen(window, BALL)
+    end, (x, y) = live(window).end_time, on_screen(window, BALL)
     turn(window, press(x, y), move(x + 1, y + 1, held=True), elapsed=DT)
     turn(window, move(x + 3, y, held=True), release(x + 3, y), elapsed=DT)
     turn(window, move(x + 90, y), elapsed=DT)
     assert window.app_state.body_tools.picked == 0
     assert not window.app_state.body_tools.is_holding
     assert live(window).session.actions == ()
-    assert live(window).end >= end
+    assert live(window).end_time >= end
 
 
 def test_drag_takes_the_body_where_it_was_pressed(window: App) -> None:
@@ -422,9 +422,9 @@ def test_window_of_a_stored_run_tells_what_cannot_be_done(opened: Open, tmp_path
     window = opened(ROOM)
     show = RecordedView(RecordedRun(sandbox.run(sandbox.load(tmp_path / "room.toml"))))
     window.app_state.show(show, None, show.scene)
-    show.scrub(show.end)
+    show.scrub(show.end_time)
     assert hud_status(window.app_state, (), 60.0, None).ended == "end of the run"
-    show.scrub(show.begin)
+    show.scrub(show.start_time)
     assert hud_status(window.app_state, (), 60.0, None).ended is None
     for code in (pygame.K_e, pygame.K_g, pygame.K_t, pygame.K_b, pygame.K_n, pygame.K_DELETE):
         turn(window, key(code), key_up(code))

@@ -188,4 +188,4 @@ def _apply(live: LiveView, action: Action, first: KeyHandler | None) -> None:
     """Apply an action, after that of another thrust or drive with the same key."""
     if first is not None:
         first()
-    live.act(action)
+    live.apply(action)

@@ -76,7 +76,7 @@ class BodyTools:
             return
         else:
             self._grip = _rotated(self._offset, -self._angle)
-            live.act(Pull(time=0.0, body=name, grip=self._grip, target=self._pick_position))
+            live.apply(Pull(time=0.0, body=name, grip=self._grip, target=self._pick_position))
         self._held = name
 
     def drag(self, live: LiveView, position: Position) -> None:
@@ -90,9 +90,9 @@ class BodyTools:
             return
         if self._moving:
             centre = position[0] - self._grip[0], position[1] - self._grip[1]
-            live.act(Move(time=0.0, body=self._held, position=centre))
+            live.apply(Move(time=0.0, body=self._held, position=centre))
         else:
-            live.act(Pull(time=0.0, body=self._held, grip=self._grip, target=position))
+            live.apply(Pull(time=0.0, body=self._held, grip=self._grip, target=position))
 
     def release(self, live: LiveView) -> None:
         """Release the held body.
@@ -102,7 +102,7 @@ class BodyTools:
         """
         held, self._held = self._held, None
         if held is not None and not self._moving:
-            live.act(Pull(time=0.0, body=held))
+            live.apply(Pull(time=0.0, body=held))
 
     def drop(self) -> None:
         """Discard the drag without an action on the session; the selection stays."""
@@ -130,7 +130,7 @@ class BodyTools:
         Raises:
             ActionError: no body is picked, or the engine refuses.
         """
-        live.act(Remove(time=0.0, body=live.bodies.names[self._require_picked(live)]))
+        live.apply(Remove(time=0.0, body=live.bodies.names[self._require_picked(live)]))
         self.reset()
 
     def _require_picked(self, live: LiveView) -> int:
@@ -148,7 +148,7 @@ class BodyTools:
         index = self._require_picked(live)
         mass, radius = float(live.bodies.mass[index]), float(live.bodies.radius[index])
         kick = mass * min(NUDGE_SPEED, 10.0 * radius)
-        live.act(Impulse(time=0.0, body=live.bodies.names[index], impulse=(0.6 * kick, 0.8 * kick)))
+        live.apply(Impulse(time=0.0, body=live.bodies.names[index], impulse=(0.6 * kick, 0.8 * kick)))
 
     def add(self, live: LiveView, position: Position, view_size: float, *, box: bool = False) -> None:
         """Add a ball or box like the picked body or the first one; without bodies, of a size that suits the view.
@@ -172,7 +172,7 @@ class BodyTools:
         else:
             made = _new_body_like(bodies, like, position, box)
         made = _find_free_position(live, made)
-        live.act(Spawn(time=0.0, box=made) if isinstance(made, Box) else Spawn(time=0.0, ball=made))
+        live.apply(Spawn(time=0.0, box=made) if isinstance(made, Box) else Spawn(time=0.0, ball=made))
 
     def shift(self, live: LiveView, body: str, by: Position) -> None:
         """Move a body by an offset, m, and stop it, as the arrow keys do.
@@ -182,7 +182,7 @@ class BodyTools:
         """
         if body in live.bodies.names:
             x, y = live.frame.position[live.bodies.names.index(body)].tolist()
-            live.act(Move(time=0.0, body=body, position=(x + by[0], y + by[1]), velocity=(0.0, 0.0)))
+            live.apply(Move(time=0.0, body=body, position=(x + by[0], y + by[1]), velocity=(0.0, 0.0)))
 
 
 MAX_RINGS, RING_POSITIONS = 24, 16

@@ -128,14 +128,14 @@ def test_undo_brings_back_what_a_restart_has_lost(window: App) -> None:
     assert window.app_state.live is not None
     assert len(window.app_state.live.bodies) == 1
     strike(window, pygame.K_z, pygame.KMOD_CTRL)
-    window.app_state.live.arrive()
+    window.app_state.live.finish_seek()
     assert len(window.app_state.live.bodies) == 2
 
 
 def test_what_undo_brings_back_is_unsaved_and_undo_exchanges_the_two(window: App) -> None:
     def bodies() -> int:
         assert window.app_state.live is not None
-        window.app_state.live.arrive()
+        window.app_state.live.finish_seek()
         return len(window.app_state.live.bodies)
 
     strike(window, B)
@@ -167,7 +167,7 @@ def test_undo_brings_back_what_was_replaced_at_an_earlier_moment(window: App) ->
     assert any("is replaced" in text for _, text in window.app_state.messages.visible())
     strike(window, pygame.K_z, pygame.KMOD_CTRL)
     assert window.app_state.live is not None
-    window.app_state.live.arrive()
+    window.app_state.live.finish_seek()
     assert window.app_state.live.step_number == end
     assert window.app_state.live.session.recording().state_hash == whole.state_hash
 
@@ -227,7 +227,7 @@ def test_knob_sets_the_surface_of_a_body_added_by_hand(engine: str, key: str, va
     knob = next(each for each in SessionParameters().of(live, scene, 1) if each.key == key)
     assert knob.enabled
     for action in turned_knob(live, key, value, 1):
-        live.act(action)
+        live.apply(action)
     assert next(each for each in SessionParameters().of(live, scene, 1) if each.key == key).value == value
     assert next(each for each in SessionParameters().of(live, scene, 0) if each.key == key).value == (
         key == "restitution"

@@ -83,7 +83,7 @@ def test_fixed_body_can_be_moved_while_paused_and_not_pulled() -> None:
 def test_body_that_went_on_is_held_where_it_was_looked_at(paused: bool) -> None:
     """It flies and turns between the press and the first motion of the mouse."""
     show, hands = live(), BodyTools()
-    show.act(Impulse(time=0.0, body="a", impulse=(8.0, 0.0)))
+    show.apply(Impulse(time=0.0, body="a", impulse=(8.0, 0.0)))
     grasp(hands, show, (0.0, 0.25), 0.0, paused=False)
     hands.drag(show, (9.0, 3.0))
     passed(show, 40)
@@ -203,7 +203,7 @@ def test_removed_body_is_gone_and_no_longer_picked_or_held() -> None:
 def test_body_that_was_removed_elsewhere_can_be_let_go() -> None:
     show, hands = live(), BodyTools()
     grasp(hands, show, (0.0, 0.0), 0.0, paused=False)
-    show.act(Remove(time=0.0, body="a"))
+    show.apply(Remove(time=0.0, body="a"))
     assert hands.spring_line(show) is None
     with pytest.raises(ActionError, match="has been removed"):
         hands.drag(show, (1.0, 1.0))
@@ -219,7 +219,7 @@ def test_picked_body_that_has_not_come_yet_is_none() -> None:
     assert hands.picked_index(show) == 3
     show.seek(1)
     while show.busy is not None:
-        show.go_on(0.0, paused=True)
+        show.update(0.0, paused=True)
     assert len(show.bodies) == 3
     assert hands.picked_index(show) is None
     for deed in (hands.remove, hands.nudge):
@@ -232,7 +232,7 @@ def test_picked_body_that_has_not_come_yet_is_none() -> None:
 
 def test_arrows_put_a_body_elsewhere_at_rest() -> None:
     show, hands = live(), BodyTools()
-    show.act(Impulse(time=0.0, body="a", impulse=(1.0, 0.0)))
+    show.apply(Impulse(time=0.0, body="a", impulse=(1.0, 0.0)))
     hands.shift(show, "a", (0.0, 0.5))
     hands.shift(show, "a", (-0.5, 0.0))
     assert show.frame.position[0].tolist() == [-0.5, 0.5]

@@ -188,7 +188,7 @@ class BilliardsGame:
     def waits(self) -> bool:
         """Whether time stops until a player acts; not during a replay."""
         session = self.live.session
-        last = not session.ahead and session.step_number >= session.history.furthest
+        last = not session.has_future and session.step_number >= session.history.last_step
         return last and session.ended is None and self.resting and self._known
 
     @property
@@ -258,7 +258,7 @@ class BilliardsGame:
 
     def _lay(self, match: Match) -> None:
         """Move the balls to the positions of a match; in a replay the session contains these moves."""
-        if not self.live.session.ahead:
+        if not self.live.session.has_future:
             for move in match.moves(self.live.frame.position):
                 self.live.apply(move)
 
