@@ -182,7 +182,11 @@ class Gui:
             return True
         if stage.host is not None and self._high_scores.handle_event(event):
             return True
-        if self.help.handle_event(event) or self._close_faults(event, stage) or self.panel.handle_event(event):
+        if (self.help.open and self.help.handle_event(event)) or self._close_faults(event, stage):
+            return True
+        if event.type in (pygame.KEYDOWN, pygame.KEYUP):  # panel, HUD and timeline use the mouse only
+            return self._timeline.held
+        if self.panel.handle_event(event):
             return True
         show = stage.view
         if stage.gestures is not None and self.billiards_hud.handle(event, stage.gestures.person, stage.run_handler):
