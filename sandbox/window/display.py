@@ -1,4 +1,4 @@
-"""Screen: the display that the window opens, and how large things are on it."""
+"""Opens the display, and derives the UI scale from its height."""
 
 import os
 from collections.abc import Iterator
@@ -11,26 +11,26 @@ from sandbox.window.render.palette import BACKGROUND, INK, SKY
 SIZE = (1280, 800)
 MIN_SIZE = (160, 120)
 SHARE = 0.9
-"""of the desktop that a new window may take"""
+"""largest fraction of the desktop that a new window covers"""
 LINES = 1080
-"""of a display on which things are drawn at their own size"""
+"""height of a display, px, with UI scale 1"""
 
 
 class NoDisplayError(Exception):
-    """There is no display to open a window on; `str()` says why."""
+    """No display is available; `str()` gives the reason."""
 
 
 def open_screen(size: tuple[int, int] | None, title: str) -> pygame.Surface:
     """Open the window.
 
     Args:
-        size: px; by default what suits the desktop.
-        title: of the window.
+        size: px; by default derived from the desktop.
+        title: title of the window.
 
     Raises:
         NoDisplayError: there is no display.
     """
-    os.environ["SDL_VIDEO_X11_WMCLASS"] = "sandbox"  # pygame, when imported, names it after the script
+    os.environ["SDL_VIDEO_X11_WMCLASS"] = "sandbox"  # pygame sets it to the name of the script on import
     asked = "SDL_VIDEODRIVER" in os.environ
     try:
         with _silenced():
@@ -50,7 +50,7 @@ def open_screen(size: tuple[int, int] | None, title: str) -> pygame.Surface:
 
 @contextmanager
 def _silenced() -> Iterator[None]:
-    """Keep standard error from what libraries below SDL print as it looks for a display; a failure is raised."""
+    """Redirect standard error, as libraries used by SDL print to it while SDL looks for a display."""
     try:
         kept = os.dup(2)
     except OSError:  # it is closed
@@ -72,7 +72,7 @@ def close_screen() -> None:
 
 
 def ui_scale() -> float:
-    """Return by how much things are larger than on a display of 1080 lines, in quarters; at least 1."""
+    """Return the UI scale: display height over 1080 px, in quarters; at least 1."""
     try:
         heights = [height for _, height in pygame.display.get_desktop_sizes()]
     except pygame.error:
@@ -88,7 +88,7 @@ def _fitting() -> tuple[int, int]:
 
 
 def _icon() -> pygame.Surface:
-    """Return a ball on a plane, and the ring of its ghost."""
+    """Return the icon: a ball on a plane, with the ring of its ghost."""
     icon = pygame.Surface((64, 64), pygame.SRCALPHA)
     pygame.draw.rect(icon, BACKGROUND, icon.get_rect(), border_radius=12)
     pygame.draw.line(icon, INK, (8, 52), (56, 52), 4)

@@ -1,8 +1,7 @@
-"""Sound: collisions to be heard. It is off until asked for, and quietly absent where nothing can play it.
+"""Sound of impacts and of game events. It is off by default, and unavailable without an audio device.
 
-Chime: the sound of one body that is struck, synthesised from a few decaying partials and a click.
-
-Jingles: the sound of a cue of a game, a short figure of notes, synthesised like the chimes of collisions.
+The sound of an impact is synthesised from a few decaying partials and a click; the sound of a game event is a short
+sequence of such notes.
 """
 
 import math
@@ -22,28 +21,28 @@ Samples = npt.NDArray[np.int16]
 RATE = 44_100
 """samples/s"""
 LOWEST, HIGHEST = 80.0, 2000.0
-"""Hz, of the fundamental: small loudspeakers carry little below, and what lies above is shrill"""
+"""Hz, of the fundamental: small loudspeakers are weak below, and higher tones are shrill"""
 STEPS = 28
 """Pitches between the two, a whole tone apart: a few dozen sounds serve every body."""
 PARTIALS = ((1.0, 1.0), (2.756, 0.35), (5.404, 0.12))
 """Frequency over the fundamental's, and amplitude: those of a free bar, which sound like wood or stone.
 Source: L. D. Landau, E. M. Lifshitz, Theory of Elasticity, § 25: the roots of cos κl · cosh κl = 1."""
 CYCLES = 22.0
-"""of the fundamental, in which it falls to 1/e; a high sound is over sooner"""
+"""cycles of the fundamental in which it decays to 1/e; a high sound decays faster"""
 SLOWEST = 0.09
-"""s, the longest that any sound takes to fall to 1/e"""
+"""s, largest decay time to 1/e"""
 CLICK, CLICK_SECONDS = 0.25, 0.0015
 """Amplitude of the noise at the start, and the time in which it falls to 1/e, s"""
 SECONDS = 0.5
 """of a sound: by then it is 50 dB down"""
 PEAK = 0.6
-"""of full scale: room for a few sounds at once"""
+"""fraction of full scale, so that a few sounds can be mixed"""
 
 
 def impact_pitch(radius: float) -> float:
-    """Return the pitch of a body, Hz: it falls with the root of the radius, m, in whole tones.
+    """Return the pitch of a body, Hz: proportional to the inverse square root of the radius, m, in whole tones.
 
-    A real body's falls with the radius itself; so much would leave no two scenes in hearing range.
+    That of a real body is inversely proportional to the radius, which would exceed the range of hearing.
     """
     octaves = math.log2(HIGHEST / LOWEST)
     wanted = math.log2(220.0 / LOWEST) - 0.5 * math.log2(radius / 0.5)  # half a metre sounds an A
@@ -76,7 +75,7 @@ def _faded(count: int) -> FloatArray:
 
 
 NOTE = 0.09
-"""s from note to note"""
+"""s between notes"""
 HOME = 440.0
 """Hz, of the scale's first note"""
 SCALE = (0, 2, 4, 7, 9)
@@ -91,7 +90,7 @@ CUE_NOTES: dict[str, tuple[int, ...]] = {
 
 
 def cue_notes(cue: str) -> tuple[int, ...]:
-    """Return the notes of a cue, in semitones: always the same for a name, and two names hardly alike."""
+    """Return the notes of a game event, in semitones: fixed for a name, and usually different for different names."""
     if cue in CUE_NOTES:
         return CUE_NOTES[cue]
     number = zlib.crc32(cue.encode())
@@ -116,20 +115,20 @@ def cue_sound(cue: str) -> Samples:
 
 
 VOICES = 16
-"""Sounds at a time."""
+"""sounds at a time"""
 A_CALL = 5
-"""Sounds that one call starts, the loudest; more together are a noise."""
+"""loudest sounds that one call starts; more at once are noise"""
 CANDIDATES = 64
 """Contacts, the loudest, that are looked up among those of the last call."""
 GRAVITY = 9.81
-"""m/s²: what a hit is measured by; a scene without gravity is heard like any other"""
+"""m/s², reference of impact strength, also for scenes without gravity"""
 SILENT, LOUDEST = 0.1, 4.0
 """Impulse over m·√(2·g·r), that of a body which falls its own radius: below the first nothing is heard, from the
 second on it is not louder. A body at rest passes on m·g·dt a step, 0.05 of it for half a metre at 1/60 s."""
 CUE = 0.7
-"""volume of a game's cues, beside which hits are still heard"""
+"""volume of game sounds, at which impacts stay audible"""
 BUFFER = 512
-"""Samples between picture and sound: 12 ms."""
+"""samples of latency: 12 ms"""
 
 
 class Sounds:
@@ -162,7 +161,7 @@ class Sounds:
         return True
 
     def disable(self) -> None:
-        """Fall silent, and let the audio device go."""
+        """Stop all sounds and close the audio device."""
         if not self.enabled:
             return
         self.enabled = False
@@ -177,7 +176,7 @@ class Sounds:
 
         Args:
             contacts: those open now, with the impulses since the last call.
-            bodies: who they are between.
+            bodies: the bodies of the contacts.
         """
         if not self.enabled or pygame.mixer.get_init() is None:
             return 0
@@ -197,7 +196,7 @@ class Sounds:
                 continue
             pitch = impact_pitch(float(radius[row]))
             if pitch in played:
-                continue  # two of one sound at once are only louder
+                continue  # the same sound twice at once is only louder
             channel = pygame.mixer.find_channel()
             if channel is None:
                 break
@@ -222,7 +221,7 @@ class Sounds:
         if what not in self._sounds:
             rate, _, channels = pygame.mixer.get_init() or (RATE, -16, 2)
             samples = cue_sound(what) if isinstance(what, str) else impact_sound(what)
-            if rate != RATE:  # somebody else has opened the mixer
+            if rate != RATE:  # the mixer was opened with another rate
                 places = np.arange(0, len(samples), RATE / rate)
                 samples = np.interp(places, np.arange(len(samples)), samples).astype(np.int16)
             self._sounds[what] = pygame.mixer.Sound(buffer=np.repeat(samples, channels).tobytes())
@@ -239,7 +238,7 @@ def loudness(contacts: Contacts, bodies: Bodies) -> tuple[FloatArray, FloatArray
     heard = np.where(mass[first] <= mass[second], first, second)
     radius = np.append(bodies.radius, 1.0)[heard]
     unit = mass[heard] * np.sqrt(2.0 * GRAVITY * radius)
-    with np.errstate(over="ignore", invalid="ignore"):  # of a state that diverges
+    with np.errstate(over="ignore", invalid="ignore"):  # in a diverging state
         impulse = np.hypot(contacts.impulse[:, 0], contacts.impulse[:, 1])
         return np.nan_to_num(impulse / unit, nan=0.0, posinf=0.0), radius
 
