@@ -207,7 +207,7 @@ def test_refused_press_changes_nothing(steps: int, monkeypatch: pytest.MonkeyPat
         # Only the press below asks for the refused action: presses repeated in the replay are as they were.
         patch.setattr(
             Toy,
-            "control",
+            "on_input",
             lambda self, control, value: (
                 kick_twice(self, control, value) if value == 5.0 else rules_before(self, control, value)
             ),
