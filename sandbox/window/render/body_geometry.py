@@ -1,7 +1,8 @@
 """Geometry of the bodies of a scene for drawing: their convex pieces, on the screen and in kernels.
 
-Bodies of several pieces are painted in two passes, first all pieces enlarged in the colour of the rim, then all pieces
-in the fill colour. So no seam shows where pieces overlap or abut, and the rim of such a body lies outside its edge.
+The distance from a body of several pieces is that from its nearest piece. It is 0 along a seam, where two pieces abut,
+although a seam lies inside the body. So seams get patches, further convex pieces that lie within the body: a hexagon
+along each seam, and a disc where several meet. Rims then follow the edge of the whole body.
 """
 
 import math
@@ -14,8 +15,10 @@ from sandbox.arrays import FloatArray, IntArray
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.window.hit_test import Distance, Hull, hull_distance
 
-SEAM = 0.5
-"""px by which the pieces of a compound body are enlarged, so that antialiased edges that abut cover each other"""
+PATCH_DEPTH = 0.5
+"""Depth of a patch in each piece, as a fraction of half the thickness of the thinner one; a rim takes at most 0.16."""
+ABUTTING = 1e-6
+"""Distance between edges that abut, as a fraction of the size of a body: rounding of corners in scene files."""
 
 
 class ConvexPieces(NamedTuple):
@@ -49,27 +52,21 @@ class BodyGeometry:
     def __init__(self, bodies: Bodies) -> None:
         self._bodies = bodies
         shapes = bodies.shapes
-        self.pieces = ConvexPieces(
+        pieces = ConvexPieces(
             piece=np.searchsorted(shapes.body, np.arange(len(bodies) + 1)).astype(np.int64),
             first=shapes.first,
             corner=shapes.corner,
             radius=shapes.radius,
         )
-        self._girth = _girths(self.pieces)
-        self._compound = np.diff(self.pieces.piece) > 1
+        girth = _girths(pieces)
+        self._girth = np.zeros(len(bodies))
+        np.maximum.at(self._girth, np.repeat(np.arange(len(bodies)), np.diff(pieces.piece)), girth)
+        self.pieces = _with_patches(pieces, girth)
 
     def rims(self, who: IntArray, scale: float, line: float) -> FloatArray:
-        """Return the widths of the rims of bodies, (K,) px: as of discs of about the same thickness.
-
-        Rims of compound bodies lie outside, and do not become wider than `line`.
-        """
+        """Return the widths of the rims of bodies, (K,) px: as of discs of about the same thickness."""
         girth = self._girth[who] * scale
-        widest = np.where(self._compound[who], 1.0, np.minimum(1.0 + girth / 80.0, 2.5))
-        return np.asarray(np.minimum(0.16 * girth, line * widest))
-
-    def is_compound(self, number: int) -> bool:
-        """Tell whether a body has several pieces."""
-        return bool(self._compound[number])
+        return np.asarray(np.minimum(0.16 * girth, line * np.minimum(1.0 + girth / 80.0, 2.5)))
 
     def hulls(self, number: int, place: ScreenPose) -> list[Hull]:
         """Return the pieces of a body in the picture, px."""
@@ -124,7 +121,7 @@ def clipped_box(box: tuple[float, float, float, float], area: pygame.Rect) -> py
 
 
 def _girths(pieces: ConvexPieces) -> FloatArray:
-    """Return half of how thick each body is about, (N,) m: that of its thickest piece, area by half its perimeter."""
+    """Return half of the thickness of each piece, about, (S,) m: its area by half its perimeter."""
     start = pieces.first[:-1]
     count = np.diff(pieces.first)
     following = np.arange(len(pieces.corner)) + 1
@@ -132,7 +129,97 @@ def _girths(pieces: ConvexPieces) -> FloatArray:
     a, b = pieces.corner, pieces.corner[following]
     twice = np.add.reduceat(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], start) if len(start) else np.empty(0)
     around = np.add.reduceat(np.hypot(*(b - a).T), start) if len(start) else np.empty(0)
-    girth = pieces.radius + np.where(count > 2, twice / np.maximum(around, 1e-300), 0.0)
-    thickest = np.zeros(len(pieces.piece) - 1)
-    np.maximum.at(thickest, np.repeat(np.arange(len(pieces.piece) - 1), np.diff(pieces.piece)), girth)
-    return thickest
+    return np.asarray(pieces.radius + np.where(count > 2, twice / np.maximum(around, 1e-300), 0.0))
+
+
+def _with_patches(pieces: ConvexPieces, girth: FloatArray) -> ConvexPieces:
+    """Return the pieces of bodies, followed by the patches of their seams, body by body."""
+    compound = np.flatnonzero(np.diff(pieces.piece) > 1)
+    patches = {int(body): patches for body in compound if (patches := _patches(pieces, int(body), girth))}
+    if not patches:
+        return pieces
+    piece, first, corner, radius = [0], [0], list[FloatArray](), list[float]()
+    for body in range(len(pieces.piece) - 1):
+        begin, end = int(pieces.piece[body]), int(pieces.piece[body + 1])
+        hulls = [pieces.corner[pieces.first[k] : pieces.first[k + 1]] for k in range(begin, end)]
+        added = patches.get(body, [])
+        corner += [*hulls, *(patch.corners for patch in added)]
+        radius += [*pieces.radius[begin:end].tolist(), *(patch.radius for patch in added)]
+        first += [len(each) for each in corner[len(corner) - len(hulls) - len(added) :]]
+        piece.append(len(hulls) + len(added))
+    return ConvexPieces(
+        np.cumsum(piece).astype(np.int64), np.cumsum(first).astype(np.int64), np.concatenate(corner), np.asarray(radius)
+    )
+
+
+def _patches(pieces: ConvexPieces, body: int, girth: FloatArray) -> list[Hull]:
+    """Return the patches of a body, m."""
+    begin, end = int(pieces.piece[body]), int(pieces.piece[body + 1])
+    corners = {k: pieces.corner[pieces.first[k] : pieces.first[k + 1]] for k in range(begin, end)}
+    sharp = [k for k, each in corners.items() if len(each) > 2 and pieces.radius[k] == 0.0]
+    if len(sharp) < 2:
+        return []
+    polygons = [corners[k] for k in sharp]
+    tolerance = ABUTTING * float(np.ptp(np.concatenate(polygons), axis=0).max())
+    patches, junctions = [], list[FloatArray]()
+    for i, one in enumerate(sharp):
+        for other in sharp[i + 1 :]:
+            for ends in _seams(corners[one], corners[other], tolerance):
+                depth = PATCH_DEPTH * min(girth[one], girth[other])
+                patches.append(Hull(_hexagon(ends, min(depth, 0.4 * math.dist(*ends.tolist()))), 0.0))
+                junctions += [each for each in ends if not _is_among(each, junctions, tolerance)]
+    room = ((point, _room_around(point, polygons, tolerance)) for point in junctions)
+    return patches + [Hull(point[None], radius) for point, radius in room if radius > 0.0]
+
+
+def _is_among(point: FloatArray, points: list[FloatArray], tolerance: float) -> bool:
+    return any(math.dist(point.tolist(), each.tolist()) <= tolerance for each in points)
+
+
+def _room_around(point: FloatArray, polygons: list[FloatArray], tolerance: float) -> float:
+    """Return the radius, m, of a disc around the end of a seam within the pieces there; 0 at a body's edge."""
+    angle, radius = 0.0, math.inf
+    for polygon in polygons:
+        along = np.roll(polygon, -1, axis=0) - polygon
+        length = np.maximum(np.hypot(*along.T), 1e-300)
+        share = np.clip(((point - polygon) * along).sum(axis=1) / length**2, 0.0, 1.0)
+        away = np.hypot(*(polygon + share[:, None] * along - point).T)
+        (sides,) = np.nonzero(away <= tolerance)
+        if not len(sides):
+            continue
+        if len(sides) == 1:
+            angle += math.pi
+        else:
+            one, other = (along[k] / length[k] for k in sides[:2])
+            angle += math.pi - math.acos(min(max(float(one @ other), -1.0), 1.0))
+        radius = min(radius, float(np.min(away[away > tolerance], initial=math.inf)))
+    return radius if angle > 2.0 * math.pi - 1e-3 and math.isfinite(radius) else 0.0
+
+
+def _seams(one: FloatArray, other: FloatArray, tolerance: float) -> list[FloatArray]:
+    """Return the ends of the segments that two anticlockwise polygons abut along, (2, 2) m each."""
+    seams = []
+    following = np.roll(other, -1, axis=0)
+    for a, b in zip(one, np.roll(one, -1, axis=0), strict=True):
+        length = math.dist(a.tolist(), b.tolist())
+        if length <= tolerance:
+            continue
+        along = (b - a) / length
+        across = np.asarray((along[1], -along[0]))
+        near = (np.abs((other - a) @ across) <= tolerance) & (np.abs((following - a) @ across) <= tolerance)
+        for k in np.flatnonzero(near):
+            begin, end = float((following[k] - a) @ along), float((other[k] - a) @ along)  # it runs the other way
+            begin, end = max(begin, 0.0), min(end, length)
+            if end - begin > tolerance:
+                seams.append(np.asarray((a + begin * along, a + end * along)))
+    return seams
+
+
+def _hexagon(ends: FloatArray, depth: float) -> FloatArray:
+    """Return the hexagon around a segment: `depth` wide on both sides, with bevels at its ends, (6, 2) m."""
+    begin, end = ends
+    along = (end - begin) / math.dist(begin.tolist(), end.tolist()) * depth
+    across = np.asarray((along[1], -along[0]))
+    return np.asarray(
+        (begin, begin + along + across, end - along + across, end, end - along - across, begin + along - across)
+    )

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.kernel import bare_kernel, kernel
-from sandbox.window.render.body_geometry import SEAM, ConvexPieces
+from sandbox.window.render.body_geometry import ConvexPieces
 
 FULL = 256
 """A share of all."""
@@ -210,24 +210,22 @@ def _piece_distance(x: float, y: float, room: FloatArray, first: int, last: int,
 
 @bare_kernel
 def _body_distance(
-    x: float, y: float, body: int, pieces: ConvexPieces, room: FloatArray, scale: float, grow: float, deep: float
+    x: float, y: float, body: int, pieces: ConvexPieces, room: FloatArray, scale: float, deep: float
 ) -> float:
-    """Return the least signed distance from the pieces of a body, enlarged by `grow`, px; `deep` where it is less."""
+    """Return the least signed distance from the pieces of a body, px; `deep` where it is less."""
     away = np.inf
     for piece in range(pieces.piece[body], pieces.piece[body + 1]):
         first, last = pieces.first[piece], pieces.first[piece + 1]
         if x < room[first, 7] or x > room[first, 8]:
             continue
-        away = min(away, _piece_distance(x, y, room, first, last, pieces.radius[piece] * scale + grow))
+        away = min(away, _piece_distance(x, y, room, first, last, pieces.radius[piece] * scale))
         if away <= deep:
             return deep
     return away
 
 
 @bare_kernel
-def _place(
-    pieces: ConvexPieces, body: int, pose: PolygonPose, room: FloatArray, grow: float
-) -> tuple[float, float, float, float]:
+def _place(pieces: ConvexPieces, body: int, pose: PolygonPose, room: FloatArray) -> tuple[float, float, float, float]:
     """Put a body's corners into the picture, each with the line of the side behind it: normal, outwards, and offset.
 
     Returns:
@@ -235,7 +233,7 @@ def _place(
     """
     left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
     for piece in range(pieces.piece[body], pieces.piece[body + 1]):
-        wide = pieces.radius[piece] * pose.scale + grow + 1.0
+        wide = pieces.radius[piece] * pose.scale + 1.0
         first, last = pieces.first[piece], pieces.first[piece + 1]
         for k in range(first, last):
             x, y = pieces.corner[k, 0], pieces.corner[k, 1]
@@ -335,9 +333,7 @@ def rasterise_polygons(
         body, here = who[k], PolygonPose(pose[k, 0], pose[k, 1], pose[k, 2], pose[k, 3], pose[k, 4])
         begin, end = pieces.piece[body], pieces.piece[body + 1]
         low, high = pieces.first[begin], pieces.first[end]
-        # The rim of a compound body lies outside: with the pieces enlarged by it, the fill covers them as they are.
-        grow = line[k] + SEAM if end - begin > 1 else 0.0
-        left, top, right, bottom = _place(pieces, body, here, room, grow)
+        left, top, right, bottom = _place(pieces, body, here, room)
         left, top = max(left, float(area[0])), max(top, float(area[1]))
         right, bottom = min(right, float(area[2])), min(bottom, float(area[3]))
         if not (left < right and top < bottom):
@@ -353,7 +349,7 @@ def rasterise_polygons(
                 continue
             for piece in range(begin, end):
                 first, last = pieces.first[piece], pieces.first[piece + 1]
-                wide = pieces.radius[piece] * here.scale + grow
+                wide = pieces.radius[piece] * here.scale
                 room[first, 5], room[first, 6] = inner_span(y, room, first, last, wide + deep, left, right)
                 room[first, 7], room[first, 8] = outer_span(y, room, first, last, wide + 0.5, left, right)
             column, stop = int(left), math.ceil(right)
@@ -376,7 +372,7 @@ def rasterise_polygons(
                 if end - begin == 1:  # a call with all arrays takes longer than the rest
                     away = _piece_distance(x, y, room, low, high, radius)
                 else:
-                    away = _body_distance(x, y, body, pieces, room, here.scale, grow, deep)
+                    away = _body_distance(x, y, body, pieces, room, here.scale, deep)
                 pixel = int(pixels[start + column])
                 pixels[start + column] = _shaded(pixel, away, deep, inner, outer, hollow, antialias)
                 column += 1

@@ -1,7 +1,6 @@
 """Bodies that are no single discs: by a compiled rasteriser where numba is installed, else by pygame's polygons.
 
-The two differ by their antialiasing only. The rim of a body of one piece lies inside its edge, that of a compound body
-outside.
+The two differ by their antialiasing only. The rim of a body lies inside its edge.
 """
 
 import math
@@ -13,7 +12,7 @@ import pygame
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.window.hit_test import Hull, rounded_hull
-from sandbox.window.render.body_geometry import SEAM, BodyGeometry, ScreenPose, clipped_box
+from sandbox.window.render.body_geometry import BodyGeometry, ScreenPose, clipped_box
 from sandbox.window.render.circles import DARK, CircleStyle, darken
 from sandbox.window.render.draw_context import DrawContext
 from sandbox.window.render.lines import SDL_COORDINATE_LIMIT, Pixel, clip_polygon, fill_polygon
@@ -82,8 +81,7 @@ class PolygonRenderer:
         for number, (x, y), turned, colour, width in rows:
             pose = ScreenPose(x, y, turned, scale)
             if style.hollow:
-                outside = width + SEAM if anatomy.is_compound(number) else 0.0
-                self.ring(surface, bodies, number, pose, outside, colour, width, style.antialias)
+                self.ring(surface, bodies, number, pose, 0.0, colour, width, style.antialias)
             else:
                 _draw_plain(surface, anatomy.hulls(number, pose), colour, width, style.antialias, near)
 
@@ -160,23 +158,18 @@ def _draw_plain(
     """Draw a body by polygons: its pieces in the colour of the rim, then its pieces in its own colour."""
     reach = 2 * math.ceil(line) + 8
     area = None if near else surface.get_clip().inflate(reach, reach)
-    if line <= 0.0:
-        _fill_hulls(surface, hulls, colour, antialias, area)
-    elif len(hulls) > 1:
-        _fill_hulls(
-            surface, [Hull(hull.corners, hull.radius + line) for hull in hulls], darken(colour), antialias, area
-        )
-        _fill_hulls(surface, hulls, colour, antialias, area)
-    elif line < THIN_RIM:
+    if len(hulls) == 1 and 0.0 < line < THIN_RIM:
         corners = _corners(hulls[0], area)
         if corners:
             fill_polygon(surface, corners, colour, antialias)
             edge = pygame.draw.aalines if antialias else pygame.draw.lines
             edge(surface, darken(colour), True, [(x - 0.5, y - 0.5) for x, y in corners])
-    else:
-        half = 0.5 if antialias else 0.0  # an antialiased edge adds half a pixel
-        _fill_hulls(surface, [_inset(hulls[0], half)], darken(colour), antialias, area)
-        _fill_hulls(surface, [_inset(hulls[0], half + line)], colour, antialias, area)
+        return
+    half = 0.5 if antialias else 0.25  # pygame also fills pixels that an edge touches
+    passes = ((half, darken(colour)), (half + line, colour)) if line > 0.0 else ((half, colour),)
+    for depth, tone in passes:
+        inset = [_inset(hull, min(depth, 0.9 * _inscribed_radius(hull))) for hull in hulls]
+        _fill_hulls(surface, inset, tone, antialias, area)
 
 
 def _fill_hulls(
@@ -193,6 +186,16 @@ def _corners(hull: Hull, area: pygame.Rect | None) -> list[Pixel]:
     chords = math.ceil(math.pi * math.sqrt(hull.radius / (8.0 * ARC_ERROR)))
     corners = [(x, y) for x, y in rounded_hull(hull, min(max(chords, 2), MAX_ARC_CHORDS)).tolist()]
     return corners if area is None else clip_polygon(corners, area)
+
+
+def _inscribed_radius(hull: Hull) -> float:
+    """Return a lower bound of the radius of the largest disc within a hull, px: area by perimeter, and its radius."""
+    corners, radius = hull
+    if len(corners) < 3:
+        return radius
+    following = np.roll(corners, -1, axis=0)
+    twice = abs(float((corners[:, 0] * following[:, 1] - following[:, 0] * corners[:, 1]).sum()))
+    return radius + 0.5 * twice / max(float(np.hypot(*(following - corners).T).sum()), 1e-300)
 
 
 def _inset(hull: Hull, depth: float) -> Hull:
