@@ -472,7 +472,8 @@ class AppState:
         view = self.view
         if view is None:
             return
-        game, table_waits = self.game, self._table_host.waits and not self.body_tools.is_holding
+        game = self.game
+        table_waits = game is not None and game.waits and not self.body_tools.is_holding
         halted = self.paused or self.waits_for_start or self.covered or self.unfocused or table_waits
         self.compute(lambda: view.update(elapsed, halted))
         if game is not None:

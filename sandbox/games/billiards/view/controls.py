@@ -460,11 +460,6 @@ class TableGameHost:
         self.misses = False
         """whether the foul-and-a-miss rule applies, from the next game of snooker"""
 
-    @property
-    def waits(self) -> bool:
-        """Whether time stops until a player acts."""
-        return self.game is not None and self.game.waits
-
     def take(self, live: LiveView, file: Scene, tell: Callable[[str, str], None]) -> None:
         """Start a game if the scene of a session is a table.
 
