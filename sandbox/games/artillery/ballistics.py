@@ -1,9 +1,10 @@
-"""Flight: where a shell goes through the air, and where it comes down.
+"""External ballistics: the exact trajectory of a shell, and its point of impact.
 
-Without quadratic drag a flight has a closed form. With it, it is the classic Runge–Kutta method's at steps of `FINE`,
-of the engine `reference`; between these a last, shorter step leads to any time, so that nothing is interpolated.
+Without quadratic drag a trajectory has a closed form. With it, the trajectory is integrated by the classic Runge–Kutta
+method in steps of `IMPACT_TOLERANCE`; a last, shorter step reaches times in between, so nothing is interpolated.
 
-Roots: where a function changes sign, by false position with halving (Illinois; Dowell, Jarratt, BIT 11, 1971).
+An impact is searched on the chord of each step first, and then refined on the trajectory by the Illinois variant of
+regula falsi. Source: Dowell, Jarratt, BIT 11 (1971) 168. Terrain and discs are in m, times in s.
 """
 
 import math
@@ -23,13 +24,13 @@ MAX_ITERATIONS = 200
 
 
 def bracketed_root(f: Callable[[float], float], low: float, high: float, width: float) -> float:
-    """Return a place of a change of sign between two that differ in sign, to within `width`.
+    """Return the argument at which a function changes sign, to within `width`.
 
-    A jump is found as well as a root. Where the function is smooth it converges with order 1.44; every third step
-    halves the bracket, so that a jump cannot hold it up.
+    A jump is found as well as a root. The order of convergence is 1.44 for smooth functions; every third iteration
+    bisects the bracket, which bounds the number of iterations at a jump.
 
     Raises:
-        ValueError: the function has one sign at both.
+        ValueError: the function has the same sign at `low` and `high`.
     """
     at_low, at_high = f(low), f(high)
     if at_low == 0.0 or at_high == 0.0:
@@ -54,28 +55,28 @@ def bracketed_root(f: Callable[[float], float], low: float, high: float, width: 
 
 
 IMPACT_TOLERANCE = 1.0 / 128.0
-"""s: halved, it moves no landing of a shell at up to 100 m/s with c up to 0.02 by more than 1e-9 m"""
+"""s, step of the integration: half of it changes the impact of a shell of up to 100 m/s, with a quadratic drag of up to
+0.02, by at most 1e-9 m"""
 
 MAX_FLIGHT = 120.0
-"""s, of a flight that is followed"""
+"""s, limit of the time of flight"""
 
 Knot = tuple[float, float, float, float]
-"""Place, m, and velocity, m/s"""
+"""Position, m, and velocity, m/s: x, y, vx, vy."""
 
 SHORTEST_SEGMENT = 1e-13
-"""s, to which the time of a landing is found: at 100 m/s 1e-11 m"""
+"""s, tolerance of the time of impact: 1e-11 m at 100 m/s"""
 
 
 def inputs_of(world: World, count: int) -> Inputs:
-    """Return what acts on so many shells."""
+    """Return the accelerations and drag coefficients for a number of shells."""
     return Inputs(np.tile(world.gravity, (count, 1)), world.linear_drag, world.quadratic_drag, world.wind)
 
 
 def rk4(world: World, knot: Knot, h: float) -> Knot:
-    """Return place and velocity of one shell a step h later, s.
+    """Advance position and velocity of one shell by a step h, s, by the classic Runge–Kutta method.
 
-    What the engine `reference` does with its method of that name, but in plain floats: for a single shell that is some
-    ten times as fast as arrays of one row.
+    Same method as `rk4` of the engine `reference`, but in plain floats, which is about ten times as fast for one shell.
     """
     (gx, gy), (wind_x, wind_y), linear, quadratic = world.gravity, world.wind, world.linear_drag, world.quadratic_drag
     x, y, vx, vy = knot
@@ -92,7 +93,7 @@ def rk4(world: World, knot: Knot, h: float) -> Knot:
 
 
 class Flight:
-    """The way of one shell through the air of a world, from a place, m, at a velocity, m/s."""
+    """Trajectory of one shell in the air of a world, from an initial position, m, and velocity, m/s."""
 
     def __init__(self, world: World, position: FloatArray, velocity: FloatArray) -> None:
         self._world = world
@@ -101,7 +102,7 @@ class Flight:
         self._knots: list[Knot] = [(x, y, vx, vy)]
 
     def at(self, time: float) -> tuple[FloatArray, FloatArray]:
-        """Return place and velocity, (2,) each, at a time ≥ 0, s."""
+        """Return position, m, and velocity, m/s, (2,) each, at a time ≥ 0, s."""
         if not self._world.quadratic_drag:
             place, velocity = free_flight(np.array([time]), *self._start, self._world)
             return place[0], velocity[0]
@@ -115,20 +116,20 @@ class Flight:
         return np.array(knot[:2]), np.array(knot[2:])
 
     def places(self, first: int, count: int) -> FloatArray:
-        """Return the places (count, 2), m, at the times k·`FINE` from k = first on."""
+        """Return the positions (count, 2), m, at the times k·`IMPACT_TOLERANCE` from k = `first` on."""
         if not self._world.quadratic_drag:
             times = np.arange(first, first + count, dtype=np.float64) * IMPACT_TOLERANCE
             return free_flight(times, *self._start, self._world)[0]
         self.at(IMPACT_TOLERANCE * (first + count - 1))
-        self.at(IMPACT_TOLERANCE * (first + count))  # rounding of the time must not leave the last out
+        self.at(IMPACT_TOLERANCE * (first + count))  # a rounded time may fall short of the last knot
         return np.array([knot[:2] for knot in self._knots[first : first + count]])
 
 
 class Landing(NamedTuple):
-    """Where and when a shell comes down."""
+    """Impact of a shell."""
 
     time: float
-    """s after the shot"""
+    """s, time of flight"""
     place: tuple[float, float]
     """m"""
 
@@ -144,15 +145,15 @@ def landing(
     edges: Edges = "open",
     discs: FloatArray = NO_DISCS,
 ) -> Landing | None:
-    """Return where a shot comes down on ground or strikes a disc; None where it leaves for good.
+    """Return the impact of a shell on the terrain or on a disc; None if it leaves the terrain or flies too long.
 
     Args:
-        world: gives gravity, drag and wind.
+        world: gravity, drag and wind.
         position: (2,) m, of the muzzle.
-        velocity: (2,) m/s.
-        ground: as it lies.
-        edges: what becomes of a shell at the ground's sides.
-        discs: (M, 3) centre and radius of what else it may strike, m.
+        velocity: (2,) m/s, at the muzzle.
+        ground: terrain.
+        edges: behaviour at the left and right end of the terrain.
+        discs: (M, 3) m, centres and radii of other targets.
     """
     began, place, speed = 0.0, position, velocity
     while began < MAX_FLIGHT:
@@ -172,7 +173,7 @@ def landing(
 def times_past(
     place: FloatArray, velocity: FloatArray, side: int, width: float, edges: Edges
 ) -> tuple[FloatArray, FloatArray]:
-    """Return place and velocity of a shell that has come to the left (−1) or right (1) side, or passed it."""
+    """Return position and velocity of a shell after it has reached or passed the left (−1) or right (1) end."""
     wall = width if side > 0 else 0.0
     if edges == "wrap":
         return np.array([place[0] - side * width, place[1]]), velocity
@@ -180,13 +181,13 @@ def times_past(
 
 
 def _first(flight: Flight, ground: Ground, edges: Edges, discs: FloatArray, longest: float) -> tuple[float, int] | None:
-    """Return when a flight first meets ground or disc (0) or a side (−1, 1); None where it never does."""
+    """Return time, s, and kind of the first event: impact (0), left end (−1) or right end (1); None without one."""
     count, top = 64, max(float(ground.heights.max()), float((discs[:, 1] + discs[:, 2]).max(initial=0.0)))
     for first in range(0, int(longest / IMPACT_TOLERANCE), count):
         places = flight.places(first, count + 1)
         low = np.minimum(places[:-1, 1], places[1:, 1]) <= top
         beside = (places[1:, 0] < 0.0) | (places[1:, 0] > ground.width)
-        for k in np.flatnonzero(low | beside).tolist():  # elsewhere is nothing to meet
+        for k in np.flatnonzero(low | beside).tolist():  # other steps are above all obstacles
             a, b = places[k], places[k + 1]
             begin, end = (first + k) * IMPACT_TOLERANCE, (first + k + 1) * IMPACT_TOLERANCE
             side = 0 if edges == "open" else int(b[0] > ground.width) - int(b[0] < 0.0)
@@ -200,20 +201,20 @@ def _first(flight: Flight, ground: Ground, edges: Edges, discs: FloatArray, long
                 if found is not None:
                     return _landed(flight, ground, begin, end, found), 0
                 if b[1] < 0.0 and not 0.0 <= b[0] <= ground.width:
-                    return None  # beside the ground, and below its foot
+                    return None  # beside the terrain and below its base
             if side:
                 return end, side
     return None
 
 
 def _side(flight: Flight, side: int, width: float, begin: float) -> float:
-    """Return when a flight passes a side, s, within the step that begins at a time, s."""
+    """Return the time, s, at which a shell passes an end, within the step that begins at `begin`, s."""
     wall = width if side > 0 else 0.0
 
     def beyond(time: float) -> float:
         return side * (float(flight.at(time)[0][0]) - wall)
 
-    # Who has just come in stands on the line itself; wind that blows it out again within the step takes it all.
+    # A shell that has just returned is on the boundary; if wind blows it out again within the step, use the whole step.
     return (
         begin + IMPACT_TOLERANCE
         if beyond(begin) >= 0.0
@@ -222,7 +223,7 @@ def _side(flight: Flight, side: int, width: float, begin: float) -> float:
 
 
 class Crossing(NamedTuple):
-    """Where a straight way enters the ground, as shares of it: above at `before`, on it at `here`, below at `after`."""
+    """Fractions of a segment that enters the terrain: above it at `before`, on it at `here`, below it at `after`."""
 
     before: float
     here: float
@@ -230,7 +231,7 @@ class Crossing(NamedTuple):
 
 
 def crossing(ground: Ground, a: FloatArray, b: FloatArray) -> Crossing | None:
-    """Return where the straight way from a to b, (2,) m each, enters the ground; None where it does not."""
+    """Return where the segment from a to b, (2,) m each, enters the terrain; None if it does not."""
     low, high = min(a[0], b[0]), max(a[0], b[0])
     kinks = ground.kinks[np.searchsorted(ground.kinks, low, "right") : np.searchsorted(ground.kinks, high, "left")]
     shares = np.array([0.0, 1.0])
@@ -238,20 +239,20 @@ def crossing(ground: Ground, a: FloatArray, b: FloatArray) -> Crossing | None:
         shares = np.sort(np.concatenate((shares, (kinks - a[0]) / (b[0] - a[0]))))
     x, y = a[0] + shares * (b[0] - a[0]), a[1] + shares * (b[1] - a[1])
     gap = y - ground.surface(x)
-    below = np.flatnonzero((gap < 0.0) | ((gap == 0.0) & (shares > 0.0)))  # who leaves the ground stood on it
+    below = np.flatnonzero((gap < 0.0) | ((gap == 0.0) & (shares > 0.0)))  # a shell may start on the surface
     if not len(below):
         return None
     k = int(below[0])
     if k == 0:
         return Crossing(0.0, 0.0, 0.0)
     before, after = float(shares[k - 1]), float(shares[k])
-    if math.isinf(gap[k - 1]):  # through the ground's side
+    if math.isinf(gap[k - 1]):  # through a side of the terrain
         return Crossing(after, after, after)
     return Crossing(before, before + (after - before) * float(gap[k - 1] / (gap[k - 1] - gap[k])), after)
 
 
 def _landed(flight: Flight, ground: Ground, begin: float, end: float, found: Crossing) -> float:
-    """Return when a flight enters the ground, s, by where the straight way through its step does."""
+    """Return the time, s, at which a trajectory enters the terrain, given the crossing of the chord of the step."""
 
     def gap(time: float) -> float:
         place = flight.at(time)[0]
@@ -261,13 +262,13 @@ def _landed(flight: Flight, ground: Ground, begin: float, end: float, found: Cro
         since, until = begin + low * (end - begin), begin + high * (end - begin)
         if since < until and gap(since) > 0.0 >= gap(until):
             return bracketed_root(gap, since, until, SHORTEST_SEGMENT)
-    return begin + found.here * (end - begin)  # it only grazes: the curved way and the straight one differ
+    return begin + found.here * (end - begin)  # grazing: the chord crosses the terrain, the trajectory does not
 
 
 def first_strike(discs: FloatArray, a: FloatArray, b: FloatArray) -> tuple[float, int] | None:
-    """Return where the straight way from a to b enters a disc, as a share of it, and which; None where it does not.
+    """Return where the segment from a to b first enters a disc, as a fraction of it, and the disc's index; else None.
 
-    Who is inside already has entered before.
+    A segment that starts inside a disc does not enter it.
     """
     if not len(discs):
         return None
@@ -284,7 +285,7 @@ def first_strike(discs: FloatArray, a: FloatArray, b: FloatArray) -> tuple[float
 
 
 def _struck(flight: Flight, disc: FloatArray, begin: float, end: float, share: float) -> float:
-    """Return when a flight enters a disc, s, by where the straight way through its step does."""
+    """Return the time, s, at which a trajectory enters a disc, given the fraction at which the chord does."""
 
     def apart(time: float) -> float:
         return math.dist(flight.at(time)[0], disc[:2]) - float(disc[2])

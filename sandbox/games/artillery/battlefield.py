@@ -1,4 +1,8 @@
-"""Battlefield: terrain and tanks, and how explosions and falls change them. WEAPONS lists the weapons and prices."""
+"""Battlefield: terrain, tanks and weapons, and the effects of explosions and falls on them.
+
+The battlefield returns actions for the engine: it reshapes the wall of the terrain, moves buried tanks, and removes
+destroyed ones. Lengths are in m. Health, money and points are plain numbers.
+"""
 
 import math
 from collections.abc import Sequence
@@ -66,15 +70,15 @@ SAFE_FALL, PER_METRE = 1.0, 3.0
 
 
 class Muzzle(NamedTuple):
-    """Start points of shells: a circle about a gun."""
+    """Muzzle of a gun: for each angle of the barrel, a point on a circle around the tank."""
 
     centre: Point
     """m"""
     reach: float
-    """m"""
+    """m, radius of the circle"""
 
     def at(self, angle: FloatArray) -> FloatArray:
-        """Return the start points at angles (K,), rad; (K, 2) m."""
+        """Return the positions (K, 2), m, at angles (K,), rad."""
         return np.asarray(np.array(self.centre) + self.reach * np.column_stack((np.cos(angle), np.sin(angle))))
 
 
@@ -84,7 +88,7 @@ class Tank:
 
     player: Player
     number: int
-    """of its body"""
+    """index of its body"""
     money: int
     angle: float
     """of the barrel, rad, anticlockwise from the right"""
@@ -111,10 +115,10 @@ class Tanks:
     """All tanks of a game, in the order of their turns."""
 
     def __init__(self, artillery: Artillery, names: tuple[str, ...]) -> None:
-        """Create the tanks; `names` are the names of the bodies of the scene."""
+        """Create the tanks; `names` are the names of all bodies, in order."""
         self.size = artillery.tank
         self.radius = 0.5 * max(artillery.tank)
-        """m, radius of the disc that counts as a hit"""
+        """m, radius of the disc around a tank in which a shell hits it"""
         middle = sum(player.position for player in artillery.players) / len(artillery.players)
         self.every = [
             Tank(
@@ -133,11 +137,11 @@ class Tanks:
 
     @property
     def discs(self) -> FloatArray:
-        """(M, 3) centre and radius of the tanks that are alive, m."""
+        """(M, 3) m, centres and radii of the tanks that are alive."""
         return np.array([(*tank.place, self.radius) for tank in self.alive]).reshape(-1, 3)
 
     def see(self, frame: Frame) -> None:
-        """Update the positions."""
+        """Update the positions of the tanks."""
         for tank in self.every:
             if frame.present[tank.number]:
                 x, y = frame.position[tank.number].tolist()
@@ -164,7 +168,7 @@ class Tanks:
         return hurt
 
     def hurt(self, tank: Tank, damage: float, shooter: Tank) -> None:
-        """Take health from a tank, and reward the shooter; damage to its own tank costs the points instead."""
+        """Take health from a tank and reward the shooter; damage to its own tank costs the shooter points."""
         taken = min(damage, tank.health)
         tank.health -= taken
         points = round(taken) + (0 if tank.alive else PER_KILL)
@@ -173,13 +177,13 @@ class Tanks:
 
 
 REST_SPEED = 0.1
-"""m/s: slower, tanks count as at rest"""
+"""m/s: below this speed, a tank counts as at rest"""
 SETTLE_TIMEOUT = 8.0
 """s after which settling ends even if tanks still move"""
 PAUSE = 0.5
 """s, minimum duration of settling"""
 LIFT = 0.01
-"""m above the terrain, where buried tanks are placed"""
+"""m, clearance above the terrain at which buried tanks and new rollers are placed"""
 
 
 class Explosion(NamedTuple):

@@ -1,4 +1,4 @@
-"""ArtilleryBot: a policy that finds a shot as `BotPlanner` does, and sets the gun by holding and tapping keys."""
+"""Bot of artillery as a policy: it plans a shot by `BotPlanner`, and sets the gun by holding and tapping keys."""
 
 import math
 from collections.abc import Sequence
@@ -15,10 +15,10 @@ NEAR = 12.0
 
 
 class ArtilleryBot:
-    """Plays all turns of players without a bot."""
+    """Policy that plays the turns of all players without a bot of their own."""
 
     def __init__(self, seed: int, skill: float = 0.8) -> None:
-        """Create a player.
+        """Create a policy.
 
         Raises:
             ValueError: the skill is not from 0 to 1.
@@ -29,7 +29,7 @@ class ArtilleryBot:
         self._down: set[str] = set()
 
     def decide(self, info: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:
-        """Return the controls that are pressed and released now.
+        """Return the controls to press and to release now.
 
         Raises:
             UnsuitableSceneError: the rules are those of another game.
@@ -72,7 +72,7 @@ class ArtilleryBot:
 
     @staticmethod
     def _lacks(rules: ArtilleryRules, tank: Tank, aim: FiringSolution) -> tuple[tuple[float, float, float], ...]:
-        """Return, for angle and power, the missing amount, the amount of a tap, and the amount per second."""
+        """Return, for angle and power, the remaining change, the change by a tap, and the change per second."""
         power = aim.speed / rules.artillery.speed
         return (
             (min(max(aim.angle, 0.0), math.pi) - tank.angle, TURN, PER_SECOND[0]),

@@ -1,4 +1,8 @@
-"""BotPlanner: target, weapon and aim of a bot. Its random errors depend on its skill and the seed of the scene."""
+"""Shot planner of a bot: target, weapon and aim.
+
+The search for the aim is spread over the steps of the game. Random errors are added to the result: normally
+distributed, proportional to 1 − skill, and determined by the seed of the scene and the turn.
+"""
 
 import math
 
@@ -10,22 +14,23 @@ from sandbox.scene.description.world import World
 from sandbox.scene.random_streams import Stream, draws
 
 ANGLE_ERROR, SPEED_ERROR = math.radians(6.0), 0.08
-"""rad, and relative: standard deviations of angle and speed at skill 0"""
+"""rad, and relative: standard deviations of the errors of angle and speed at skill 0"""
 NEAR = 0.2
 """fraction of the crater radius: shots that land nearer to the target than this are equally good"""
 BIG = 0.5
 """probability of a weapon that costs money, if the tank can pay for it"""
 WORK = 6_000
-"""work of the search per step: 1 to 4 ms, so that a window stays smooth; a search takes about 80 steps"""
+"""work of the search per step, as counted by `AimSolver.go_on`: 1 to 4 ms, so that the window remains responsive; a
+search takes about 80 steps"""
 
 
 def hit_probabilities(seed: int, turn: int) -> np.random.Generator:
-    """Return the random generator of a turn, which is independent of those of other turns."""
+    """Return the random generator of a turn; generators of different turns are independent."""
     return draws(Stream.SHELL, seed, turn)
 
 
 def choose_shot(tanks: Tanks, shooter: Tank, random: np.random.Generator) -> tuple[Tank, int]:
-    """Return the target, which is the weakest tank and of equals the nearest, and the index of the weapon."""
+    """Return the target, the weakest tank or among equals the nearest, and the index of the weapon."""
     others = [tank for tank in tanks.alive if tank is not shooter]
     target = min(others, key=lambda tank: (tank.health, math.dist(tank.place, shooter.place)))
     able = [k for k, weapon in enumerate(WEAPONS) if weapon.kind == "shell" and 0 < weapon.cost <= shooter.money]
@@ -34,12 +39,12 @@ def choose_shot(tanks: Tanks, shooter: Tank, random: np.random.Generator) -> tup
 
 
 class BotPlanner:
-    """Incremental search for the shot of a turn. A copy is independent."""
+    """Incremental search for the shot of a turn. A copy is independent of the original."""
 
     def __init__(
         self, world: World, field: Battlefield, shooter: Tank, random: np.random.Generator, skill: float | None = None
     ) -> None:
-        """Choose target and weapon, and start the search.
+        """Choose target and weapon, and prepare the search.
 
         Args:
             world: world with the wind of the turn.

@@ -1,4 +1,8 @@
-"""Miss: how far from where it should a shot comes down on level ground, by engine, integrator and step."""
+"""Landing error of a shot on level ground, by engine, integrator and time step.
+
+The reference is the closed form or, with quadratic drag, the trajectory of `sandbox.games.artillery.ballistics`. The
+simulated impact is found on the cubic Hermite curve through the last two frames.
+"""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -21,11 +25,11 @@ from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 
 STEPS = 1 / 15, 1 / 60, 1 / 240
-"""s, of the table"""
+"""s, time steps of the table"""
 LATER = 2.0
-"""times as long as the longest true flight, that an engine's is followed"""
+"""limit of the simulated time of flight, as a multiple of `MAX_FLIGHT`"""
 FAR = 1e6
-"""m, beyond which no shot is looked for"""
+"""m, limit of the range"""
 
 
 class LandingError(NamedTuple):
@@ -33,49 +37,49 @@ class LandingError(NamedTuple):
 
     engine: str
     integrator: str | None
-    """none where an engine has but one way to fly"""
+    """None for an engine without a choice of integrators"""
     dt: float
-    """s"""
+    """s, time step"""
     place: float
-    """m, how far off it comes down"""
+    """m, range"""
     time: float
-    """s, after which"""
+    """s, time of flight"""
     off: float
-    """m, by how much that is too far; negative where it falls short"""
+    """m, error of the range; negative if the shot falls short"""
     late: float
-    """s, by how much it is in the air for too long"""
+    """s, error of the time of flight"""
 
 
 class LandingErrorTable(NamedTuple):
-    """Where a shot should come down, and where it does."""
+    """Exact range of a shot, and the errors of the engines."""
 
     range: float
-    """m"""
+    """m, exact"""
     time: float
-    """s"""
+    """s, exact time of flight"""
     rows: tuple[LandingError, ...]
     refused: tuple[tuple[str, str], ...]
-    """engines that do not fly it, and why"""
+    """engines that do not support the shot, and the reasons"""
     interrupted: bool = False
-    """Ctrl-C was pressed before every row was found."""
+    """whether Ctrl-C ended the computation before all rows were complete"""
 
 
 def landing_error_table(
     world: World, speed: float, angle: float, dts: Sequence[float] = STEPS, told: Callable[[str], None] | None = None
 ) -> LandingErrorTable:
-    """Fly a shot over level ground on every engine, with every integrator and step, and return by how much each misses.
+    """Simulate a shot over level ground on every engine, with every integrator and time step, and return the errors.
 
-    The truth is the closed form, or with quadratic drag Runge–Kutta's flight at steps of 1/128 s.
+    The reference is the closed form or, with quadratic drag, a Runge–Kutta integration in steps of 1/128 s.
 
     Args:
-        world: gives gravity, drag and wind.
+        world: gravity, drag and wind.
         speed: m/s.
         angle: rad, anticlockwise from the right.
-        dts: steps, s.
-        told: called with what is flown.
+        dts: time steps, s.
+        told: progress callback; its argument describes the present simulation.
 
     Raises:
-        ValueError: the shot does not come down, or so late or far away that it is not followed.
+        ValueError: the shot does not land within the limits of time and range.
     """
     velocity = speed * np.array([math.cos(angle), math.sin(angle)])
     world = World(**{key: getattr(world, key) for key in ("gravity", "linear_drag", "quadratic_drag", "wind")})
@@ -110,17 +114,21 @@ def _ways() -> Iterator[tuple[str, str | None]]:
 
 
 def _exact(world: World, velocity: FloatArray) -> Landing:
-    """Return where a shot comes down that starts on level ground, from there on.
+    """Return the exact impact of a shot on level ground, relative to its start.
 
     Raises:
-        ValueError: it never does, or too late, or too far away.
+        ValueError: the shot does not land within the limits of time and range.
     """
     near = _from(FAR, world, velocity)
-    return _from(1.0 + 2.0 * abs(near.place[0]), world, velocity)  # nearer to 0, where there is less to round
+    return _from(1.0 + 2.0 * abs(near.place[0]), world, velocity)  # a smaller origin offset rounds less
 
 
 def _from(half: float, world: World, velocity: FloatArray) -> Landing:
-    """Return the same, found on ground that goes so far to either side, m."""
+    """Return the impact relative to the start, on ground that extends by `half`, m, to either side of it.
+
+    Raises:
+        ValueError: the shot does not land within the limits of time and range.
+    """
     down = landing(world, np.array([half, 0.0]), velocity, Ground(np.zeros(2), 2.0 * half))
     if down is None:
         raise ValueError(f"the shot does not come down within {MAX_FLIGHT:g} s and {FAR:g} m")
@@ -129,11 +137,11 @@ def _from(half: float, world: World, velocity: FloatArray) -> Landing:
 
 @heeded()
 def simulated_landing(world: World, velocity: FloatArray, engine: str, settings: Settings) -> Landing:
-    """Return where an engine lets a shot come down on level ground, from the cubic through its last two frames.
+    """Return the impact of a shot on level ground as an engine simulates it, on the cubic through the last two frames.
 
     Raises:
-        Refusal: it does not fly it.
-        ValueError: the shot does not come down.
+        Refusal: the engine does not support the shot.
+        ValueError: the shot does not land within the limit of time.
     """
     vx, vy = velocity.tolist()
     ball = Ball(position=(0.0, 0.0), velocity=(vx, vy), radius=SHELL_RADIUS, mass=SHELL_MASS, collides="none")
@@ -157,5 +165,5 @@ def simulated_landing(world: World, velocity: FloatArray, engine: str, settings:
 
 
 def _state(frame: Frame, aside: float) -> tuple[FloatArray, FloatArray]:
-    """Return place and velocity of the one body, moved aside, m."""
+    """Return position and velocity of the only body, shifted to the right by `aside`, m."""
     return frame.position[0] + np.array([aside, 0.0]), frame.velocity[0]

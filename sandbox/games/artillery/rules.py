@@ -1,6 +1,10 @@
-"""Rules of artillery: turns of aiming, flight and settling, until one tank is left.
+"""Rules of artillery: players take turns to aim and fire, until one tank is left.
 
-GunControls: how keys set a gun. A tap is one small step; a held key moves the gun, faster after a while.
+A turn has the phases of `Phase`: aiming, flight of the shells, and settling of terrain and tanks. A key tap changes the
+gun by one small step; a held key moves it continuously, and faster after `LATER`. A bot plans its shot during the
+aiming phase, moves the gun to it at a fixed rate, and fires.
+
+Angles are in rad, anticlockwise from the right; power is a fraction of full speed.
 """
 
 import math
@@ -39,18 +43,19 @@ CONTROLS = (
 TURN, POWER = math.radians(0.1), 0.001
 """rad, and fraction of full speed, of one tap"""
 SLOW, FAST = 1.0, 8.0
-"""multiples of `PER_SECOND`, before and after `LATER`"""
+"""rates of a held key as multiples of `PER_SECOND`, before and after `LATER`"""
 LATER = 0.6
-"""s"""
+"""s, time after which a held key moves the gun faster"""
 PER_SECOND = math.radians(5.0), 0.05
+"""rad/s, and fraction of full speed per second, by a held key"""
 BRING = math.radians(90.0), 1.0
 """rad/s, and fraction of full speed per second, at which a bot sets its gun"""
 MIN_POWER = 0.02
-"""fraction of full speed"""
+"""fraction of full speed, lower bound of the power"""
 
 
 class GunControls:
-    """Held keys, and the time for which each has been held."""
+    """Setting of the gun by keys: the held keys, and the time for which each has been held."""
 
     def __init__(self) -> None:
         self._held: dict[str, float] = {}
@@ -118,7 +123,7 @@ TRACER_STEP = 0.03
 MAX_TRACER_TIME = 10.0
 """s, length of the tracer of a shot that does not land"""
 TIME_ROUNDING = 1e-9
-"""s"""
+"""s, rounding error of the times of steps"""
 
 Phase = Literal["begin", "aim", "fly", "settle"]
 """Phases of a turn: the next player is chosen; the player aims; shells fly; terrain and tanks come to rest."""
@@ -258,7 +263,7 @@ class ArtilleryRules:
         return [*found, *((f"height {k}", height) for k, height in enumerate(heights.tolist()))]
 
     def view_state(self, time: float) -> ArtilleryViewState:
-        """Return what is drawn at a time, s; of the past, guns alone as they are now: the rules know no more of it."""
+        """Return the values to draw at a time, s; for the past only the guns, as they are now."""
         tanks = self.field.tanks
         if time < self._previous_time - TIME_ROUNDING:
             guns = [GunView(tank.number, tank.name, tank.angle, tank.power, None, aiming=False) for tank in tanks.every]

@@ -1,11 +1,11 @@
-"""Expanding: `[terrain]` to a wall, and the players of `[artillery]` to boxes that stand on it.
+"""Tables `[terrain]` and `[artillery]` of scene files, and their expansion to elements.
 
-`[terrain]` and `[artillery]` of a scene file.
-
-Height fields: random landscapes by midpoint displacement, and height fields as the points of a wall.
+`[terrain]` expands to a wall, named `terrain`, whose points are a height field of columns of equal width: given
+heights, or random hills by midpoint displacement. Each player of `[artillery]` expands to a box on levelled ground.
+Lengths are in m; heights are measured from the base of the terrain, y = 0.
 """
 
-from __future__ import annotations  # numpy is imported for random landscapes alone
+from __future__ import annotations  # numpy is imported only for random landscapes
 
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 MAX_COLUMNS = 5_000
 
 Level = Annotated[float, Field(ge=0, le=1e6)]
-"""A height above the ground's foot, m"""
+"""Height above the base of the terrain, m."""
 
 Edges = Literal["open", "rubber", "wrap"]
-"""What becomes of a shell at the sides of the ground: it leaves, it is thrown back, or it comes in on the far side."""
+"""Behaviour of a shell at the left and right end of the terrain: it leaves, rebounds, or reappears at the other end."""
 
 
 class Terrain(HasMaterial):
@@ -101,27 +101,31 @@ class Artillery(Part):
 
 
 QUANTUM = 2.0**-20
-"""m: 0.95 µm. Heights up to 8 million metres are exact in double precision, and so is the sum of 5,000 of them"""
+"""m, 0.95 µm, unit of heights. Heights up to 8 million metres, and sums of 5,000 of them, are exact in double
+precision."""
 
 
 EVEN = 1e-9
-"""How far off its place a column may stand, as a share of the ground's width: rounding"""
+"""tolerance of the position of a column, as a fraction of the width of the terrain: rounding"""
 
 
 def settled(height: float) -> float:
-    """Return the height nearest to one, m, that a column can have; none is below its foot."""
+    """Return a height, m, rounded to a multiple of `QUANTUM`, at least 0."""
     return max(round(height / QUANTUM), 0) * QUANTUM
 
 
 def course_of(heights: Sequence[float], width: float) -> tuple[Point, ...]:
-    """Return the points of the wall over columns: level to either side, through the middles of their tops."""
+    """Return the points of the wall over columns: through the centres of their tops, and level to both ends."""
     each = width / len(heights)
     tops = [((k + 0.5) * each, height) for k, height in enumerate(heights)]
     return ((0.0, heights[0]), *tops, (width, heights[-1]))
 
 
 def columns_of(points: Sequence[Point]) -> tuple[tuple[float, ...], float] | None:
-    """Return the heights, m, and the width, m, of the columns that a wall goes over; None where it goes over none."""
+    """Return heights and total width, m, of the columns that a wall represents; None if it represents none.
+
+    Inverse of `course_of`.
+    """
     if len(points) < 4 or points[0][0] != 0.0:
         return None
     width, heights = points[-1][0], tuple(y for _, y in points[1:-1])
@@ -134,7 +138,7 @@ def columns_of(points: Sequence[Point]) -> tuple[tuple[float, ...], float] | Non
 
 
 def heights_of(terrain: Terrain, seed: int) -> tuple[float, ...]:
-    """Return the height of each column of a ground, m."""
+    """Return the height of each column of a terrain, m."""
     if terrain.heights is not None:
         return tuple(settled(height) for height in terrain.heights)
     line = displaced(terrain.columns, 2.0 ** -(1.0 - terrain.roughness), seed)
@@ -144,7 +148,10 @@ def heights_of(terrain: Terrain, seed: int) -> tuple[float, ...]:
 
 
 def displaced(count: int, shrink: float, seed: int) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    """Return `count` ≥ 2 points of a random line; each halving displaces by `shrink` times the halving before."""
+    """Return `count` ≥ 2 heights of a random line, by midpoint displacement.
+
+    Each octave has `shrink` times the amplitude of the one before.
+    """
     import numpy as np
 
     from sandbox.scene.random_streams import Stream, draws
@@ -162,29 +169,29 @@ def displaced(count: int, shrink: float, seed: int) -> np.ndarray[tuple[int], np
 
 
 def levelled(heights: tuple[float, ...], width: float, at: float, half: float) -> tuple[float, ...]:
-    """Return heights with the columns whose middles lie within `half` of a place, m, as high as the nearest to it."""
+    """Return heights, m, levelled around `at`: columns within `half`, m, get the height of the column at `at`."""
     each = width / len(heights)
     level = heights[min(max(int(at / each), 0), len(heights) - 1)]
     return tuple(level if abs((k + 0.5) * each - at) <= half else height for k, height in enumerate(heights))
 
 
 GROUND = "terrain"
-"""What the wall is called."""
+"""Name of the wall."""
 
 FRICTION = 0.8
-"""of ground that says nothing of its own"""
+"""default friction of the wall"""
 
 DEEP, HIGH = 0.08, 0.5
-"""of the ground's width, below and above its lowest column, that the window shows"""
+"""extent of the view below and above the lowest column, as fractions of the width of the terrain"""
 
 MARGIN = 1.0
-"""columns beyond a tank to either side that are level with it"""
+"""columns to either side of a tank that are levelled too"""
 
 COLOURS = ("#e05a4f", "#4f9de0", "#63c26b", "#e0b84f", "#b07be0", "#4fd0c8", "#e07bb0", "#a3b34a", "#d98a4a", "#8b97a8")
 
 
 def faults_of(scene: Scene) -> Iterator[tuple[Location, str]]:
-    """Yield why a scene's `[terrain]` or `[artillery]` stands for nothing."""
+    """Yield the location and message of each fault of `[terrain]` and `[artillery]` in a scene."""
     terrain, artillery = table_of(scene, Terrain), table_of(scene, Artillery)
     walls = {wall.name: wall for wall in scene.walls}
     if terrain is not None and GROUND in walls and terrain.laid is None:
@@ -230,7 +237,7 @@ def faults_of(scene: Scene) -> Iterator[tuple[Location, str]]:
 
 
 def expanded(scene: Scene) -> Scene:
-    """Return the scene of walls and boxes that one with a sound `[terrain]` or `[artillery]` stands for."""
+    """Return a scene with `[terrain]` and `[artillery]`, which have no faults, expanded to walls and boxes."""
     terrain, artillery = table_of(scene, Terrain), table_of(scene, Artillery)
     if terrain is None and artillery is None:
         return scene
@@ -256,7 +263,7 @@ def expanded(scene: Scene) -> Scene:
 
 
 def _wall(terrain: Terrain, artillery: Artillery | None, seed: int) -> Wall:
-    """Return the ground that a seed lays out."""
+    """Return the wall of a terrain, generated from a seed, with levelled ground under the tanks."""
     heights = heights_of(terrain, seed)
     for at, half in _pads(artillery, terrain.width / len(heights)):
         heights = levelled(heights, terrain.width, at, half)
@@ -267,9 +274,9 @@ def _wall(terrain: Terrain, artillery: Artillery | None, seed: int) -> Wall:
 
 
 def _laid_anew(scene: Scene, terrain: Terrain, laid: int) -> Scene:
-    """Return a scene, whose ground a seed has laid out, as its own seed does, if that is another.
+    """Return a scene with its terrain, generated from the seed `laid`, generated anew if the scene has another seed.
 
-    Ground that has been given another course since stays as it is, and tanks that have been moved stay where they are.
+    A wall whose points have been changed since is kept, and so are the positions of tanks that have been moved.
     """
     walls = {wall.name: wall for wall in scene.walls}
     artillery = table_of(scene, Artillery)
@@ -298,13 +305,13 @@ def _laid_anew(scene: Scene, terrain: Terrain, laid: int) -> Scene:
 
 
 def _view(ground: Wall) -> tuple[Point, Point]:
-    """Return what the window shows: the ground from somewhat below its lowest column up to where shells fly, m."""
+    """Return the corners of the view, m: the width of the terrain, and space for the flight of shells above it."""
     width, low = ground.points[-1][0], min(y for _, y in ground.points)
     return (0.0, low - DEEP * width), (width, low + HIGH * width)
 
 
 def _pads(artillery: Artillery | None, each: float) -> Iterator[tuple[float, float]]:
-    """Yield where tanks stand, m, and how far to either side the ground is level there, m."""
+    """Yield, for each tank, its x and the half-width of the levelled ground, m."""
     if artillery is not None:
         for player in artillery.players:
             yield player.position, 0.5 * artillery.tank[0] + MARGIN * each
@@ -349,5 +356,5 @@ def needs_player(scene: Scene) -> str | None:
 
 
 def presents(scene: Scene) -> bool:
-    """Return whether a scene is drawn as artillery: it has players."""
+    """Return whether a scene is drawn by the view of artillery: whether it has players."""
     return table_of(scene, Artillery) is not None

@@ -1,12 +1,11 @@
-"""Shells: what flies, as the engine moves it, and where it enters the ground or strikes a tank between two frames.
+"""Projectiles: the shells of a turn from the muzzle to their explosions, and the results of shots.
 
-A shell meets nothing in the engine. Where it strikes is read off its way, which between two frames is the cubic through
-both states: so an engine lets no shell through thin ground, whatever the step, and what a landing misses by is the
-integrator's error and nothing else.
+The engine moves a shell in flight, but detects no collisions of it. Impacts are found between two frames, on the cubic
+Hermite curve through both states. No shell tunnels through thin terrain, whatever the time step, and the error of an
+impact is that of the integrator alone. Each result states the deviation from the exact trajectory, see
+`sandbox.games.artillery.ballistics`.
 
-Shot: what a shot came to, and by how much the flight that was computed missed the exact one.
-
-Barrage: the shells of a turn, from the muzzle to where each goes off.
+Rollers that have landed are discs that collide with the terrain in the engine.
 """
 
 import math
@@ -36,40 +35,40 @@ SHELL_MASS = 10.0
 
 @dataclass
 class Shell:
-    """A shell in the air, or rolling."""
+    """A shell in flight, or a roller on the terrain."""
 
     name: str
     shooter: Tank
     weapon: Weapon
     place: FloatArray
-    """(2,) m, as seen last"""
+    """(2,) m, position in the last frame"""
     velocity: FloatArray
     """(2,) m/s"""
     number: int | None = None
-    """of its body, once that is there"""
+    """index of its body; None until the body has been spawned"""
     fired: float = 0.0
-    """s, when it left the muzzle"""
+    """s, time of the shot"""
     exact: Landing | None = None
-    """where the exact flight comes down"""
+    """impact of the exact trajectory; None without one"""
     disturbed: bool = False
-    """Air or gravity became others on its way."""
+    """whether air or gravity changed during the flight"""
     whole: bool = True
-    """It is what was fired, no fragment of it."""
+    """whether it is the shell that was fired; False for a fragment"""
     rolling: float | None = None
-    """s, since when"""
+    """s, time at which it began to roll; None in flight"""
     slow: float | None = None
-    """s, since when it hardly rolls on"""
+    """s, time since which it has been slower than `HARDLY`; None if it is not"""
 
 
 class FlightSegment:
-    """The way of a shell between two frames: the cubic through both states (Hermite)."""
+    """Path of a shell between two frames: the cubic Hermite curve through both states."""
 
     def __init__(self, start: tuple[FloatArray, FloatArray], end: tuple[FloatArray, FloatArray], time: float) -> None:
-        """Take places, m, and velocities, m/s, and the time between them, s."""
+        """Create a segment from two states, each a position, m, and a velocity, m/s, and the time between them, s."""
         self._start, self._end, self._time = start, end, time
 
     def at(self, share: float) -> FloatArray:
-        """Return the place (2,), m, at a share of the time."""
+        """Return the position (2,), m, at a fraction of the time."""
         s, (a, v), (b, w), h = share, self._start, self._end, self._time
         level = s * s * (3.0 - 2.0 * s)
         return np.asarray(
@@ -77,11 +76,14 @@ class FlightSegment:
         )
 
     def velocity(self, share: float) -> FloatArray:
-        """Return about how fast it goes there, (2,) m/s."""
+        """Return the velocity (2,), m/s, at a fraction of the time, by linear interpolation."""
         return np.asarray(self._start[1] + share * (self._end[1] - self._start[1]))
 
     def meets(self, ground: Ground, discs: FloatArray, until: float) -> tuple[float, int | None] | None:
-        """Return when it enters the ground or strikes a disc, as a share of the time up to `until`, and which disc."""
+        """Return the first impact before the fraction `until`: fraction of the time and the disc's index, or None.
+
+        The index is None for an impact on the terrain.
+        """
         a, b = self._start[0], self.at(until)
         found, struck = crossing(ground, a, b), first_strike(discs, a, b)
         if struck is not None and (found is None or struck[0] < found.here):
@@ -99,7 +101,7 @@ class FlightSegment:
 
     @staticmethod
     def _root(f: Callable[[float], float], low: float, here: float, high: float | None = None) -> float:
-        """Return a root near `here`, where one is bracketed; else `here`, which the straight way says."""
+        """Return a root near `here` if one is bracketed; else `here`, the fraction on the chord."""
         high = here if high is None else high
         for until in (high, min(high + 0.05, 1.0)):
             if low < until and f(low) > 0.0 >= f(until):
@@ -110,41 +112,41 @@ class FlightSegment:
 def returned(
     place: FloatArray, velocity: FloatArray, ground: Ground, edges: Edges
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Return place and velocity of a shell beyond a side as it goes on within; none where it is not, or may leave."""
+    """Return position and velocity of a shell that an end of the terrain returns; None if it is inside or may leave."""
     if edges == "open" or 0.0 <= place[0] <= ground.width:
         return None
     return times_past(place, velocity, 1 if place[0] > 0.0 else -1, ground.width, edges)
 
 
 class ArtilleryShot(NamedTuple):
-    """A shot that has come down, or left."""
+    """Result of a shot."""
 
     shooter: str
     weapon: str
     place: Point | None
-    """where it came down, m; none where it left for good"""
+    """m, impact; None if the shell left the terrain"""
     exact: Point | None
-    """where the exact flight comes down, m"""
+    """m, impact of the exact trajectory; None if it leaves the terrain, or after a change of air or gravity"""
     flown: float
-    """s"""
+    """s, time of flight"""
     time: float = 0.0
-    """s, when it came down, or was seen to have left"""
+    """s, time at which the impact, or the loss of the shell, was detected"""
     disturbed: bool = False
-    """Air or gravity became others on its way: no one flight is the exact one."""
+    """whether air or gravity changed during the flight, so that there is no exact trajectory"""
 
     @property
     def off(self) -> float | None:
-        """How far the two are apart, m; none unless both come down."""
+        """Distance between impact and exact impact, m; None unless both exist."""
         return None if self.place is None or self.exact is None else math.dist(self.place, self.exact)
 
     @property
     def told(self) -> str:
-        """In words: where along x it came down, and how far from the exact solution along x and y."""
+        """Text for the log: x of the impact, and its deviation from the exact solution in x and y."""
         return self.brief if self.place is None else f"landed at {self.brief}"
 
     @property
     def brief(self) -> str:
-        """The same in fewer words."""
+        """Shorter text for the score panel."""
         landed = "out of bounds" if self.place is None else f"{self.place[0]:.2f} m"
         if self.disturbed:
             return f"{landed}; wind or gravity changed during the flight"
@@ -161,32 +163,40 @@ NOTHING = "less than 1 nm"
 
 
 def format_deviation(metres: float) -> str:
-    """Return the size of a deviation from the exact solution, m >= 0, as text; rounding errors are all alike."""
+    """Return a deviation from the exact solution, m, as text; rounding errors below 1 nm have one text."""
     return NOTHING if metres < 1e-9 else format_si(metres, "m")
 
 
 ROLLER = 0.5
-"""m, the radius of what rolls"""
+"""m, radius of a roller"""
 HARDLY = 0.5
-"""m/s: what rolls more slowly for as many seconds goes off"""
+"""m/s and s: a roller that is slower than 0.5 m/s for 0.5 s explodes"""
 ROLLS = 8.0
-"""s, at most"""
+"""s, longest duration of rolling"""
 
 
 class Projectiles:
-    """What flies and rolls."""
+    """Shells in flight and rollers, and the results of all shots of a game."""
 
     def __init__(self, field: Battlefield) -> None:
         self._field, self._edges = field, field.artillery.edges
         self.shells: list[Shell] = []
         self.shots: list[ArtilleryShot] = []
-        """that have come down, or left, in the whole game"""
+        """results of all shots of the game"""
         self.ways: dict[str, list[tuple[float, float]]] = {}
-        """m, where each shell of the last shot has been"""
+        """m, positions at all frames of each shell of the last shot, by name"""
         self._fired = 0
 
     def fire(self, time: float, world: World, tank: Tank, weapon: Weapon, speed: float) -> list[Action]:
-        """Fire from a tank at a time, s, in the air of a world, at a speed, m/s."""
+        """Fire a shell from a tank.
+
+        Args:
+            time: s.
+            world: gravity, drag and wind.
+            tank: shooter.
+            weapon: kind of shell.
+            speed: m/s, at the muzzle.
+        """
         field = self._field
         place = field.tanks.muzzle(tank).at(np.array([tank.angle]))[0]
         velocity = speed * np.array([math.cos(tank.angle), math.sin(tank.angle)])
@@ -199,7 +209,7 @@ class Projectiles:
         return [action]
 
     def know(self, seen: StepInfo) -> None:
-        """Find the numbers of the shells that have been spawned since: the last bodies, in the order of the actions."""
+        """Find the body indices of spawned shells: new bodies are the last ones, in the order of the actions."""
         new = [shell for shell in self.shells if shell.number is None]
         if not new:
             return
@@ -207,22 +217,22 @@ class Projectiles:
         spawned = [action.single.name for action in seen.actions if isinstance(action, Spawn)]
         others = sum(name not in own for name in spawned)
         first = len(seen.frame.position) - len(new) - others
-        for k, shell in enumerate(new):  # what the rules spawn stands before what a hand does
+        for k, shell in enumerate(new):  # the rules spawn before the player does
             shell.number = first + k
 
     def disturb(self) -> None:
-        """Note that what flies now does so in another air than it was fired in."""
+        """Mark all shells as disturbed: air or gravity has changed since they were fired."""
         for shell in self.shells:
             shell.exact, shell.disturbed = None, True
 
     def follow(self, seen: StepInfo, passed: float) -> list[Action]:
-        """Look where all shells have gone since the last frame, a time before, s."""
+        """Update all shells, and return the actions of their impacts; the last step took `passed`, s."""
         actions: list[Action] = []
         for shell in [*self.shells]:
             number = shell.number
             if number is None:
                 continue
-            if not seen.frame.present[number]:  # who leaves the world's bounds is retired
+            if not seen.frame.present[number]:  # bodies beyond the bounds of the world are removed
                 self._gone(shell, seen.time)
                 continue
             before = shell.place, shell.velocity
@@ -236,7 +246,7 @@ class Projectiles:
         return actions
 
     def _fly(self, shell: Shell, before: tuple[FloatArray, FloatArray], time: float, passed: float) -> list[Action]:
-        """Let a shell go on from the last frame to this."""
+        """Update a shell in flight: detect impacts, split clusters, and apply the ends of the terrain."""
         field, place = self._field, shell.place
         step = FlightSegment(before, (place, shell.velocity), passed)
         beyond = returned(place, shell.velocity, field.ground, self._edges)
@@ -260,7 +270,7 @@ class Projectiles:
     def _come_down(
         self, shell: Shell, step: FlightSegment, share: float, struck: int | None, time: float, passed: float
     ) -> list[Action]:
-        """Let a shell go off where it came down at a share of the last step, or begin to roll there."""
+        """Explode a shell at its impact, at a fraction of the last step, or let a roller start there."""
         x, y = step.at(share).tolist()
         shell.place = np.array([x, y])
         self._tell(shell, (x, y), time - (1.0 - share) * passed)
@@ -277,7 +287,7 @@ class Projectiles:
         return [Remove(time=time, body=shell.name), rolling]
 
     def _roll(self, shell: Shell, time: float) -> list[Action]:
-        """Let what rolls go off where it meets a tank, comes to rest, or has rolled for too long."""
+        """Explode a roller that touches a tank, comes to rest, or has rolled for `ROLLS`."""
         assert shell.rolling is not None
         discs = self._field.tanks.discs
         near = np.hypot(*(discs[:, :2] - shell.place).T) <= discs[:, 2] + ROLLER
@@ -294,7 +304,7 @@ class Projectiles:
         return self._left(shell, time) if self._edges == "open" else self._roll_past(shell, time)
 
     def _roll_past(self, shell: Shell, time: float) -> list[Action]:
-        """Let what has rolled past a side roll on within; it goes off where the ground there stands higher."""
+        """Return a roller that has passed an end of the terrain; it explodes if the terrain is higher there."""
         ground = self._field.ground
         beyond = returned(shell.place, shell.velocity, ground, self._edges)
         assert beyond is not None
@@ -307,7 +317,7 @@ class Projectiles:
         return [Move(time=time, body=shell.name, position=place, velocity=(vx, vy))]
 
     def _split(self, shell: Shell, time: float) -> list[Action]:
-        """Let a cluster come apart: its momentum stays, the fragments fly on beside each other."""
+        """Split a cluster into fragments with different horizontal velocities, whose mean is that of the cluster."""
         self.shells.remove(shell)
         actions: list[Action] = [Remove(time=time, body=shell.name)]
         for k in range(FRAGMENTS):
@@ -333,7 +343,7 @@ class Projectiles:
         self._tell(shell, None, time)
 
     def _tell(self, shell: Shell, place: tuple[float, float] | None, time: float) -> None:
-        """Note what a shot came to, if it is one that was fired and came down by itself."""
+        """Record the result of a shot; fragments, and explosions of rollers, are not recorded."""
         if shell.whole and shell.rolling is None:
             exact = None if shell.exact is None else shell.exact.place
             flown = time - shell.fired

@@ -1,11 +1,14 @@
-"""Aim: the angle and speed at which a shot hits, by shooting in thought: a fan of shells, then finer fans.
+"""Firing solution by the shooting method: angle and speed of a shot that hits a target.
 
-Between two neighbours of which one falls short and the other far, the fan is laid anew, closer; the last step is the
-secant's. A search can be made in one go or by and by, between the steps of a game: it comes to the same.
+1. A coarse grid of trial shots over angles and speeds.
+2. Brackets: neighbouring angles at one speed, of which one shot falls short and the other goes too far. Each bracket is
+   subdivided twice; a secant step then gives the angle.
+3. The candidates are ordered: shots within the tolerance first, among these shots that are insensitive to a small error
+   of the angle, then the slowest, then the shortest in flight.
+4. The best candidates are checked on the exact trajectory of `sandbox.games.artillery.ballistics`.
 
-Volley: shells in thought, all flying at once as the bodies of one state, by the engine `reference`'s Runge–Kutta.
-
-It flies by and by: whoever asks for a part of the way, and then for the next, gets the same as who asks for all of it.
+All trial shots of a stage fly at once, as rows of one array, by the Runge–Kutta method of the engine `reference`. The
+search is incremental, so that it can be spread over the steps of a game; the result does not depend on the increments.
 """
 
 import math
@@ -22,38 +25,38 @@ from sandbox.games.artillery.terrain import Ground
 from sandbox.scene.description.world import World
 
 MAX_TRIAL_TIME = 30.0
-"""s, of a flight in thought"""
+"""s, limit of the time of flight of a trial shot"""
 STEP_WORK = 300
-"""A step takes about as long as numpy takes for so many shells, and besides that some time for each shell."""
+"""Overhead of a step in units of work: it takes as long as the computation of this number of shells."""
 
 
 class TrialShots:
-    """K shells in the air.
+    """Simultaneous flight of K shells.
 
-    Between steps their ways are straight: (g h²)/8 off at most, 2 mm at a step of 40 ms. Peaks between steps are not
-    seen.
+    The paths between steps are straight: the error is at most g·h²/8, 2 mm at a step of 40 ms. Peaks of the terrain
+    between steps are missed.
     """
 
     def __init__(
         self, world: World, position: FloatArray, velocity: FloatArray, ground: Ground, edges: Edges, h: float
     ) -> None:
-        """Fire.
+        """Start the flight.
 
         Args:
-            world: gives gravity, drag and wind.
+            world: gravity, drag and wind.
             position: (K, 2) m, of the muzzles.
             velocity: (K, 2) m/s.
-            ground: as it lies.
-            edges: what becomes of shells at the ground's sides.
+            ground: terrain.
+            edges: behaviour at the left and right end of the terrain.
             h: step, s.
         """
         self._world, self._ground, self._edges, self._h = world, ground, edges, h
         self.place = np.full(len(position), np.nan)
-        """(K,) m along the ground, where each came down; beside it or never: nan"""
+        """(K,) m, x of each impact; nan without one"""
         self.when = np.full(len(position), np.nan)
-        """(K,) s, when it did"""
+        """(K,) s, time of each impact; nan without one"""
         self._k, self._steps = 0, int(MAX_TRIAL_TIME / h)
-        self._number = np.arange(len(position))  # of those in the air
+        self._number = np.arange(len(position))  # indices of the shells in flight
         self._state = np.stack((position, velocity))
         self._gap = self._state[0, :, 1] - ground.surface(self._state[0, :, 0])
         below = self._gap < 0.0
@@ -62,11 +65,11 @@ class TrialShots:
 
     @property
     def done(self) -> bool:
-        """Whether nothing flies any more."""
+        """Whether no shell is in flight any more, or the limit of time has been reached."""
         return not len(self._number) or self._k >= self._steps
 
     def fly(self, work: int) -> int:
-        """Go on for so much work, counted in shells × steps, or a step at least; return how much was done."""
+        """Advance by an amount of work, in shells × steps, and at least one step; return the work done."""
         did = 0
         while not self.done and did < work:
             did += STEP_WORK + len(self._number)
@@ -82,7 +85,7 @@ class TrialShots:
         self._gap = now = state[0, :, 1] - ground.surface(x if open_ else np.clip(x, 0.0, ground.width))
         down = (now <= 0.0) & np.isfinite(now)
         share = gap[down] / (gap[down] - now[down])
-        share[~np.isfinite(share)] = 1.0  # through the ground's side
+        share[~np.isfinite(share)] = 1.0  # through a side of the terrain
         self.place[self._number[down]] = was[down] + share * (x[down] - was[down])
         self.when[self._number[down]] = (self._k + share) * self._h
         self._k += 1
@@ -93,12 +96,12 @@ class TrialShots:
             self._return()
 
     def _keep(self, flying: BoolArray) -> None:
-        """Go on with those that fly."""
+        """Restrict the arrays to the shells in flight."""
         if not flying.all():
             self._number, self._state, self._gap = self._number[flying], self._state[:, flying], self._gap[flying]
 
     def _return(self) -> None:
-        """Let those that have passed a side come in again."""
+        """Return the shells that have passed an end of the terrain."""
         state, ground = self._state, self._ground
         for side, wall in ((-1.0, 0.0), (1.0, ground.width)):
             out = side * (state[0, :, 0] - wall) > 0.0
@@ -113,62 +116,63 @@ class TrialShots:
 
 
 COARSE, CLOSE = 0.08, 0.04
-"""s, steps of the first fan and of the finer ones: 2.4 m at 60 m/s, two columns or so"""
+"""s, steps of the coarse grid and of the subdivisions: 4.8 m and 2.4 m at 60 m/s"""
 ANGLES = np.radians(np.arange(3.0, 178.0, 1.5))
-"""of the first fan"""
+"""rad, angles of the coarse grid"""
 SHARES = np.linspace(0.3, 1.0, 8)
-"""of full speed, of the first fan"""
+"""speeds of the coarse grid, as fractions of full speed"""
 TRIED, PARTS = 16, 16
-"""brackets looked at more closely, and into how many parts each"""
+"""number of brackets that are subdivided, and of parts of each"""
 FINER = 2
-"""how often"""
+"""number of subdivisions"""
 SHAKE, STEADY = math.radians(0.1), 2.0
-"""A shot is steady that misses by no more than so many times what is near, when it is aimed so much otherwise."""
+"""rad, and multiple of the tolerance: a shot is insensitive if it lands within STEADY × tolerance of the target with
+its angle changed by ±SHAKE."""
 CHECKED = 6
-"""shots that are followed to the end"""
+"""number of candidates that are checked on the exact trajectory"""
 CHECK_WORK = 10_000
-"""of following one, in what a volley counts"""
+"""work of one check, in the unit of `TrialShots.fly`"""
 
 Stage = Literal["fan", "finer", "shaken", "checked"]
-"""The first fan flies; the brackets found in it; what came of these, and the same aimed a little otherwise; the best of
-them are followed to the end."""
+"""Stages of the search: coarse grid; subdivision of brackets; candidates and their perturbations by ±SHAKE; checks of
+the best candidates."""
 
 
 class FiringSolution(NamedTuple):
-    """A shot in thought."""
+    """Angle and speed of a shot, and its miss distance."""
 
     angle: float
     """rad, anticlockwise from the right"""
     speed: float
     """m/s"""
     miss: float
-    """m along the ground, from the target to where it comes down"""
+    """m, signed, from the target to the impact along x"""
 
 
 class TargetingProblem(NamedTuple):
-    """What a target is shot at on."""
+    """Gun, target and conditions of a shot."""
 
     world: World
-    """gives gravity, drag and wind"""
+    """gravity, drag and wind"""
     muzzle: Muzzle
     ground: Ground
-    """as it lies"""
+    """terrain"""
     edges: Edges
+    """behaviour of a shell at the left and right end of the terrain"""
     full: float
-    """m/s, the greatest speed"""
+    """m/s, full speed"""
     at: float
-    """m, where along the ground the target stands"""
+    """m, x of the target"""
     near: float
-    """m; among shots that come down as near as this, those that hardly miss when aimed a little otherwise come first,
-    of these the slowest, and then those that are in the air for the shortest time"""
+    """m, tolerance: shots that land within this distance of the target are hits"""
 
     def volley(self, angle: FloatArray, speed: FloatArray, h: float) -> TrialShots:
-        """Fire at angles, rad, and speeds, m/s, (K,) each."""
+        """Start trial shots at angles, rad, and speeds, m/s, (K,) each, with a step h, s."""
         velocity = speed[:, None] * np.column_stack((np.cos(angle), np.sin(angle)))
         return TrialShots(self.world, self.muzzle.at(angle), velocity, self.ground, self.edges, h)
 
     def checked(self, aim: FiringSolution) -> FiringSolution:
-        """Return a shot with the miss that it has in truth; inf where it comes down nowhere."""
+        """Return a shot with the miss distance of its exact trajectory; inf without an impact."""
         muzzle = self.muzzle.at(np.array([aim.angle]))[0]
         velocity = aim.speed * np.array([math.cos(aim.angle), math.sin(aim.angle)])
         down = landing(self.world, muzzle, velocity, self.ground, self.edges)
@@ -176,26 +180,26 @@ class TargetingProblem(NamedTuple):
 
 
 class AimSolver:
-    """The search for the shot that comes down next to a target. A copy goes on by itself."""
+    """Incremental search for a shot that hits a target. A copy is independent of the original."""
 
     def __init__(self, range_: TargetingProblem) -> None:
         self.found: FiringSolution | None = None
-        """the shot, once the search is done"""
+        """the shot; None until the search is complete"""
         self._range = range_
         self._stage: Stage = "fan"
         angle, share = (each.reshape(-1) for each in np.meshgrid(ANGLES, SHARES))
-        self._angle, self._speed = angle, range_.full * share  # of the shells that fly
+        self._angle, self._speed = angle, range_.full * share  # of the trial shots
         self._volley = range_.volley(self._angle, self._speed, COARSE)
-        self._brackets = np.empty((0, 3))  # two angles, of a shot that is short and of one that is far, and a speed
+        self._brackets = np.empty((0, 3))  # two angles, between which the miss changes sign, and the speed
         self._closer = 0
-        self._left: list[FiringSolution] = []  # to be followed
-        self._best: FiringSolution | None = None  # of those that were
+        self._left: list[FiringSolution] = []  # candidates to check
+        self._best: FiringSolution | None = None  # best checked candidate
 
     def go_on(self, work: int) -> FiringSolution | None:
-        """Search on for so much work, or a little more; return the shot once it is found.
+        """Continue the search by an amount of work; return the shot once it is found.
 
         Args:
-            work: in what a volley counts; a step of its few shells or a shot that is followed is done to the end.
+            work: in the unit of `TrialShots.fly`; exceeded to complete a step or a check.
         """
         while self.found is None and work > 0:
             if self._stage == "checked":
@@ -212,13 +216,13 @@ class AimSolver:
         return self.found
 
     def all(self) -> FiringSolution:
-        """Search to the end."""
+        """Complete the search, and return the shot."""
         while self.found is None:
             self.go_on(CHECK_WORK)
         return self.found
 
     def _bracket(self) -> None:
-        """Choose pairs of neighbours, one short and one far: first those close to each other, or soon there."""
+        """Choose brackets from the coarse grid: those with the closest impacts and the shortest flights first."""
         volley, angle, speed = self._volley, self._angle, self._speed
         miss = volley.place - self._range.at
         at = np.flatnonzero((miss[1:] * miss[:-1] <= 0.0) & (speed[1:] == speed[:-1]))
@@ -226,12 +230,12 @@ class AimSolver:
         at = at[np.argsort(jump + 0.5 * volley.when[at], kind="stable")][:TRIED]
         k = int(np.argmin(np.where(np.isnan(miss), np.inf, np.abs(miss))))
         self._best = FiringSolution(float(angle[k]), float(speed[k]), math.inf)
-        self._left = [self._best]  # should no pair lead to a hit
+        self._left = [self._best]  # fallback if no bracket leads to a hit
         self._brackets = np.column_stack((angle[at], angle[at + 1], speed[at]))
         self._fan()
 
     def _fan(self) -> None:
-        """Fire between the shots of each bracket; where there is none, the best shot has to do."""
+        """Subdivide each bracket by trial shots; without brackets, check the best shot of the grid."""
         if not len(self._brackets):
             self._stage = "checked"
             return
@@ -241,7 +245,7 @@ class AimSolver:
         self._volley = self._range.volley(self._angle, self._speed, CLOSE)
 
     def _close_in(self) -> None:
-        """Take of each bracket the part in which the change of sign is; at last, the shot by the secant."""
+        """Replace each bracket by its part with the change of sign; after the last subdivision, do the secant step."""
         row = np.arange(len(self._brackets))
         fan = self._angle.reshape(len(row), -1)
         miss = (self._volley.place - self._range.at).reshape(fan.shape)
@@ -263,11 +267,11 @@ class AimSolver:
         self._volley = self._range.volley(self._angle, self._speed, CLOSE)
 
     def _order(self) -> None:
-        """Put the shots in the order in which they are followed."""
+        """Order the candidates for the checks."""
         volley, near, count = self._volley, self._range.near, len(self._brackets)
         shaken = (volley.place - self._range.at).reshape(3, -1)
         miss, when, speed = shaken[0], volley.when[:count], self._speed[:count]
-        unsure = ~(np.abs(shaken).max(axis=0, initial=0.0) <= STEADY * near)  # where nan, too
+        unsure = ~(np.abs(shaken).max(axis=0, initial=0.0) <= STEADY * near)  # also true for nan
         order = np.lexsort((when, speed, unsure, ~(np.abs(miss) <= near)))
         shots = [
             FiringSolution(float(self._angle[k]), float(speed[k]), float(miss[k])) for k in order[:CHECKED].tolist()
@@ -275,7 +279,7 @@ class AimSolver:
         self._left, self._stage = [*shots, *self._left], "checked"
 
     def _check(self) -> None:
-        """Follow the next shot; the first that comes down near is taken, else the nearest."""
+        """Check the next candidate; take the first within the tolerance, else the nearest of all."""
         assert self._best is not None
         aim = self._range.checked(self._left.pop(0))
         if abs(aim.miss) < abs(self._best.miss):

@@ -1,7 +1,7 @@
-"""Ground: columns of dirt, out of which circles are taken and on which dirt falls. Nothing of it gets lost.
+"""Destructible terrain: a height field of columns, from which craters are carved and to which dirt is added.
 
-All heights are whole numbers of `QUANTUM`, so that every sum here is exact: after a crater the columns' sum is the sum
-before less what was taken out, bit for bit.
+All heights are integer multiples of `QUANTUM`, so that sums are exact: the sum of the heights after a crater equals the
+sum before minus the removed heights, bit for bit.
 """
 
 import math
@@ -15,61 +15,64 @@ from sandbox.scene.description.base import Point
 
 
 class LooseDirt(NamedTuple):
-    """Dirt that hangs in the air once a circle below it is gone, and falls."""
+    """Dirt of one column that falls: undermined by a crater, or dropped as a heap."""
 
     column: int
     bottom: float
-    """m, of where it hung"""
+    """m, height of its lower end before the fall"""
     top: float
-    """m"""
+    """m, height of its upper end before the fall"""
     drop: float
-    """m, that it falls"""
+    """m, height of the fall"""
 
 
 class Crater(NamedTuple):
-    """What a blast did to ground."""
+    """Change of the terrain by an explosion."""
 
     ground: "Ground"
-    """after the loose dirt has fallen"""
+    """terrain after the loose dirt has fallen"""
     removed: FloatArray
-    """(N,) m, of each column"""
+    """(N,) m, height removed from each column; negative where dirt was added"""
     loose: tuple[LooseDirt, ...]
 
 
 class Ground:
-    """N columns of one width, from 0 to `width`, each solid from 0 to its height."""
+    """Height field of N columns of equal width, from x = 0 to `width`, each solid from y = 0 to its height.
+
+    The surface is piecewise linear between the centres of the columns' tops. A `Ground` is not changed in place.
+    """
 
     def __init__(self, heights: FloatArray, width: float) -> None:
-        """Take heights (N,), m, that are whole numbers of the quantum, and a width, m."""
+        """Create terrain from heights (N,), m, integer multiples of `QUANTUM`, and a width, m."""
         self.heights, self.width = heights, width
         self.each = width / len(heights)
         self.middles = (np.arange(len(heights)) + 0.5) * self.each
-        """(N,) m"""
+        """(N,) m, x of the centres of the columns"""
         self.kinks = np.concatenate(([0.0], self.middles, [width]))
-        """(N + 2,) m, where the surface may bend, and where it ends"""
+        """(N + 2,) m, x of the vertices of the surface, including both ends"""
 
     @property
     def points(self) -> tuple[Point, ...]:
-        """The course of the wall that is its surface, m."""
+        """Vertices of the wall that represents the surface, m."""
         return course_of(self.heights.tolist(), self.width)
 
     def surface(self, x: FloatArray | float) -> FloatArray:
-        """Return the heights of the surface at places, m; beside the ground there is none, −inf."""
+        """Return the heights of the surface at positions x, m; −inf outside the terrain."""
         return np.interp(x, self.middles, self.heights) + np.where(
             (np.asarray(x) < 0.0) | (np.asarray(x) > self.width), -np.inf, 0.0
         )
 
     def under(self, x: float, half: float) -> float:
-        """Return the highest that the surface is within `half` of a place, m: what stands there stands on it."""
+        """Return the maximum height of the surface within `half` of x, m: the support height of a body there."""
         inner = self.heights[np.abs(self.middles - x) <= half]
         ends = self.surface(np.clip(np.array([x - half, x + half]), 0.0, self.width))
         return float(max(inner.max(initial=-math.inf), ends.max()))
 
     def without(self, centre: Point, radius: float) -> Crater:
-        """Take a circle out: of each column the chord through its middle, as far as it is solid; the rest settles.
+        """Carve a disc out of the terrain: each column loses the chord at its centre, as far as it is solid.
 
-        The area so taken differs from the circle's by what a sum of chords does from their integral, which for a
-        whole circle falls as (column / radius)^1.5.
+        Undermined dirt falls. The removed area is a midpoint sum of chords; for a complete disc its error decreases
+        as (column width / radius)^1.5.
         """
         half = self._chords(centre[0], radius)
         low = np.clip(_whole(centre[1] - half), 0.0, self.heights)
@@ -80,7 +83,7 @@ class Ground:
         return Crater(Ground(self.heights - removed, self.width), removed, loose)
 
     def with_heap(self, centre: Point, radius: float) -> Crater:
-        """Let a disc of dirt fall: onto each column as much as the disc's chord over it. `removed` is negative."""
+        """Drop a disc of dirt: each column gains the chord at its centre. `Crater.removed` is negative."""
         half = self._chords(centre[0], radius)
         added = _whole(2.0 * half)
         bottom = np.maximum(_whole(centre[1] - half), self.heights)
@@ -92,11 +95,11 @@ class Ground:
         return Crater(Ground(self.heights + added, self.width), -added, loose)
 
     def _chords(self, x: float, radius: float) -> FloatArray:
-        """Return half the chord that a circle at x has in each column's middle, (N,) m."""
+        """Return half of the chord of a disc at x at the centre of each column, (N,) m."""
         square = radius * radius - (self.middles - x) ** 2
         return np.asarray(np.sqrt(np.maximum(square, 0.0)))
 
 
 def _whole(height: FloatArray) -> FloatArray:
-    """Return heights rounded to the quantum."""
+    """Return heights rounded to multiples of `QUANTUM`."""
     return np.asarray(np.round(height / QUANTUM) * QUANTUM)

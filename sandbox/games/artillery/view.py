@@ -1,14 +1,8 @@
-"""Guns: tanks with their barrels, names and health, and how the one is set whose turn it is.
+"""View of artillery: sky, terrain, tanks with their guns, shells, explosions, and the wind.
 
-Dots: small discs and rings, and discs that let through what is behind them; only where a picture can have them.
-
-Sky: dusk over far ridges. It stands still behind the ground, whatever the camera does.
-
-Land: the ground of a game under its sky, darker the deeper, with a lit edge; it changes with craters and camera.
-
-Seen: a game of artillery as it is drawn at one moment.
-
-Fire: ways of shells, blasts, dirt in the air, and the wind.
+From back to front: the sky, which does not move with the camera; the terrain, darker with depth and with a bright edge;
+falling dirt and paths of shells; the tanks, and the setting of the gun whose turn it is; shells in flight, explosions,
+and the last impact; the wind. Screen positions are in px, y downwards. Shapes too large for SDL are skipped.
 """
 
 import math
@@ -52,14 +46,14 @@ from sandbox.window.render.text import draw_text
 
 
 def draw_dot(surface: pygame.Surface, at: Pixel, radius: float, colour: Colour, line: float = 0.0) -> None:
-    """Draw a disc, or a ring of so many px."""
+    """Draw a disc or, with a line width in px, a ring."""
     if abs(at[0]) < SDL_COORDINATE_LIMIT and abs(at[1]) < SDL_COORDINATE_LIMIT and radius < SDL_COORDINATE_LIMIT:
         width = max(round(line), 1) if line else 0
         pygame.draw.circle(surface, colour, (round(at[0]), round(at[1])), max(round(radius), 1), width)
 
 
 def draw_glow(surface: pygame.Surface, at: Pixel, radius: float, colour: Colour, opacity: int) -> None:
-    """Lay a disc over a picture of which so much, 0 to 255, hides what is behind."""
+    """Draw a translucent disc; `opacity` is 0 to 255."""
     if not (
         abs(at[0]) < SDL_COORDINATE_LIMIT and abs(at[1]) < SDL_COORDINATE_LIMIT and radius < 0.2 * SDL_COORDINATE_LIMIT
     ):
@@ -71,17 +65,17 @@ def draw_glow(surface: pygame.Surface, at: Pixel, radius: float, colour: Colour,
 
 
 BARREL_WIDTH = 0.75
-"""of a tank's width, from its middle to the muzzle"""
+"""length from the turret to the muzzle, in widths of a tank"""
 MIN_TANK_SIZE = 20.0
-"""px, of a tank's width: farther off it is drawn larger than it is"""
+"""px, smallest drawn width of a tank; smaller tanks are enlarged"""
 HULL = ((-0.50, -0.02), (-0.42, 0.18), (-0.20, 0.24), (0.20, 0.24), (0.42, 0.18), (0.50, -0.02))
-"""Corners, in widths and heights from the middle."""
+"""Corners, in widths and heights of a tank from its centre."""
 AIM_REACH = 26.0
-"""m, of the dots ahead of the muzzle at full power"""
+"""m, length of the row of dots that shows the power, from the muzzle"""
 
 
 def draw_tanks(view: DrawContext, gunnery: ArtilleryViewState, tints: dict[int, Colour]) -> None:
-    """Draw all tanks that are in sight; `tints` are their colours by their bodies' numbers."""
+    """Draw all visible tanks; `tints` are their colours by body index."""
     frame = view.snapshot.frame
     for gun in gunnery.guns:
         if gun.number >= len(frame.position) or not frame.present[gun.number]:
@@ -91,7 +85,7 @@ def draw_tanks(view: DrawContext, gunnery: ArtilleryViewState, tints: dict[int, 
         if not (abs(x) < SDL_COORDINATE_LIMIT and abs(y) < SDL_COORDINATE_LIMIT and width < SDL_COORDINATE_LIMIT):
             continue
         height = width * gunnery.size[1] / gunnery.size[0]
-        lift = 0.5 * (height - gunnery.size[1] * view.camera.scale)  # what is drawn larger stands where it stands
+        lift = 0.5 * (height - gunnery.size[1] * view.camera.scale)  # enlarged tanks keep their bottom edge
         _Tank(view, (x, y - lift), (width, height), -float(frame.angle[gun.number]), tints[gun.number]).draw(gun)
         if gun.aiming:
             _setting(view, gunnery, gun, (x, y - lift), width)
@@ -99,14 +93,14 @@ def draw_tanks(view: DrawContext, gunnery: ArtilleryViewState, tints: dict[int, 
 
 
 class _Tank:
-    """Draws one tank, whose middle lies at a pixel."""
+    """Draws one tank, centred on a pixel."""
 
     def __init__(self, view: DrawContext, at: Pixel, size: Pixel, turn: float, tint: Colour) -> None:
         self._view, self._at, self._size, self._tint = view, at, size, tint
         self._cos, self._sin = math.cos(turn), math.sin(turn)
 
     def _place(self, x: float, y: float) -> Pixel:
-        """Return where a point lies, in widths to the right and heights upwards of a tank that stands upright."""
+        """Return the pixel of a point of the tank, in widths to the right of its centre and heights above it."""
         right, down = x * self._size[0], -y * self._size[1]
         return (
             self._at[0] + self._cos * right - self._sin * down,
@@ -151,7 +145,7 @@ class _Tank:
 
 
 def _setting(view: DrawContext, gunnery: ArtilleryViewState, gun: GunView, at: Pixel, width: float) -> None:
-    """Draw where the gun points, and how far its power goes: dots, and a bar below the tank."""
+    """Draw the setting of a gun: dots along its direction, and a power bar and text below the tank."""
     turret = at[0], at[1] - 0.28 * width * gunnery.size[1] / gunnery.size[0]
     way = math.cos(gun.angle), -math.sin(gun.angle)
     reach = max(AIM_REACH * view.camera.scale, 90.0 * view.ui_scale)
@@ -175,7 +169,7 @@ def _setting(view: DrawContext, gunnery: ArtilleryViewState, gun: GunView, at: P
 
 
 def _label(view: DrawContext, gun: GunView, at: Pixel, tint: Colour) -> None:
-    """Write a name, and draw what health is left under it."""
+    """Draw the name of a player, and a health bar below it."""
     wide, high = 44.0 * view.ui_scale, 4.0 * view.ui_scale
     box = pygame.Rect(round(at[0] - 0.5 * wide), round(at[1] - high), round(wide), round(high))
     if gun.health is not None:
@@ -198,19 +192,19 @@ SKY_TONES: tuple[tuple[float, Colour], ...] = (
     (0.70, (232, 168, 122)),
     (1.0, (240, 186, 140)),
 )
-"""Shares of the way down the picture, and colours there."""
+"""Colours by the fraction of the height of the picture, from the top."""
 RIDGES: tuple[tuple[float, float, Colour], ...] = (
     (0.56, 0.22, (84, 74, 112)),
     (0.72, 0.18, (58, 56, 92)),
 )
-"""How far down the picture ridges stand, how far they reach up and down, and their colours; the nearest last."""
+"""Mean level and vertical extent, in heights of the picture from the top, and colour of each ridge; nearest last."""
 MIST: Colour = (176, 128, 122)
 STARS = 140
 
 
 @lru_cache(maxsize=2)
 def sky_image(size: tuple[int, int]) -> pygame.Surface:
-    """Return the sky of a picture so large, px."""
+    """Return the sky for a picture size, px."""
     width, height = max(size[0], 1), max(size[1], 1)
     strip = pygame.Surface((1, height))
     for y in range(height):
@@ -230,7 +224,7 @@ def sky_image(size: tuple[int, int]) -> pygame.Surface:
 
 
 def sky_tone(share: float) -> Colour:
-    """Return the colour of the sky so far down the picture."""
+    """Return the colour of the sky at a fraction of the height of the picture, from the top."""
     for (above, first), (below, second) in pairwise(SKY_TONES):
         if share <= below:
             return mix_colours(first, second, (share - above) / (below - above))
@@ -238,7 +232,7 @@ def sky_tone(share: float) -> Colour:
 
 
 def _ridge(surface: pygame.Surface, tops: FloatArray, colour: Colour) -> None:
-    """Draw a ridge, whose foot is lost in mist, a column of pixels at a time."""
+    """Draw a ridge that fades into mist downwards, by pixel columns with tops in px."""
     height = surface.get_height()
     strip = pygame.Surface((1, height), 0, surface)
     for y in range(height):
@@ -251,19 +245,19 @@ SOIL: Colour = (122, 92, 62)
 GRASS: Colour = (150, 190, 96)
 DEEP: Colour = (24, 21, 27)
 DARKENS = 16.0
-"""m below the surface, at which ground is half as dark as at all"""
+"""m, depth at which the colour is halfway from `SOIL` to `DEEP`"""
 BAND = 3.2
-"""m, between layers that are a little lighter"""
+"""m, thickness of the alternating layers"""
 
 
 def soil_of(scene: Scene) -> Colour:
-    """Return the colour of ground near its surface."""
+    """Return the colour of the terrain near its surface."""
     wall = next((wall for wall in scene.walls if wall.name == GROUND), None)
     return SOIL if wall is None or wall.colour is None else hex_colour(wall.colour)
 
 
 def draw_land(surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True) -> None:
-    """Draw sky, ground, and what else is fixed, as far as it is in sight."""
+    """Draw sky, terrain, its ends, and other static bodies."""
     surface.blit(sky_image(surface.get_size()), (0, 0))
     others = tuple(wall for wall in scene.walls if wall.name != GROUND)
     for wall in scene.walls:
@@ -274,7 +268,7 @@ def draw_land(surface: pygame.Surface, camera: Camera, scene: Scene, unit: float
 
 
 def _ground(surface: pygame.Surface, camera: Camera, wall: Wall, soil: Colour, unit: float, antialias: bool) -> None:
-    """Fill what lies below a wall, a column of pixels at a time, each cut from one strip."""
+    """Fill the area below a wall by pixel columns, each copied from one strip, and draw its edge."""
     places = camera.to_screen(np.asarray(wall.points))
     width, height = surface.get_size()
     left, right = max(int(np.ceil(places[0, 0])), 0), min(int(np.ceil(places[-1, 0])), width)
@@ -302,7 +296,7 @@ def _ground(surface: pygame.Surface, camera: Camera, wall: Wall, soil: Colour, u
 
 
 def terrain_strip(soil: Colour, scale: float, height: int, like: pygame.Surface) -> pygame.Surface:
-    """Return one column of ground from its surface down, two pictures high, at a scale, px/m."""
+    """Return a pixel column of the terrain, from its surface down, two pictures high; `scale` is in px/m."""
     strip = pygame.Surface((1, max(2 * height, 1)), 0, like)
     for y in range(strip.get_height()):
         depth = y / scale
@@ -313,13 +307,13 @@ def terrain_strip(soil: Colour, scale: float, height: int, like: pygame.Surface)
 
 
 def _sides(surface: pygame.Surface, camera: Camera, scene: Scene, wall: Wall, unit: float, antialias: bool) -> None:
-    """Draw what stands at the sides: walls of rubber, or where one side is the other."""
+    """Draw the ends of the terrain: solid lines if shells rebound, dashed ones if they reappear at the other end."""
     artillery = table_of(scene, Artillery)
     if artillery is None or artillery.edges == "open":
         return
     rubber = artillery.edges == "rubber"
     for x in (wall.points[0][0], wall.points[-1][0]):
-        px, foot = float(camera.to_screen(np.array((x, 0.0)))[0]), surface.get_height() + 1.0  # as far as dirt is seen
+        px, foot = float(camera.to_screen(np.array((x, 0.0)))[0]), surface.get_height() + 1.0  # terrain reaches it
         if rubber:
             draw_line(surface, (px, foot), (px, -1.0), (58, 62, 92), 5.0 * unit, antialias)
             draw_line(surface, (px, foot), (px, -1.0), FAINT, 1.5 * unit, antialias)
@@ -329,15 +323,15 @@ def _sides(surface: pygame.Surface, camera: Camera, scene: Scene, wall: Wall, un
 
 SMOKE: Colour = (214, 206, 200)
 FLAME: tuple[Colour, ...] = ((255, 250, 222), (255, 204, 92), (238, 116, 48), (96, 62, 58))
-"""From the beginning of a blast to its end."""
+"""Colours of an explosion, from its start to its end."""
 OFF_SCREEN_MARGIN = 1e4
-"""px from a picture's corner, beyond which nothing is seen"""
+"""px, bound to which positions are clipped; far beyond every picture"""
 FARTHEST_EMBER = 400
-"""Points of a way that are drawn."""
+"""number of points to which the path of a shell is thinned"""
 
 
 def draw_below(view: DrawContext, gunnery: ArtilleryViewState) -> None:
-    """Draw what lies behind tanks: dirt in the air, the wind, ways."""
+    """Draw the layer behind the tanks: falling dirt, paths of shells, and the tracer."""
     for clod in gunnery.clods:
         _clod(view, clod)
     for way in gunnery.ways:
@@ -348,7 +342,7 @@ def draw_below(view: DrawContext, gunnery: ArtilleryViewState) -> None:
 
 
 def draw_above(view: DrawContext, gunnery: ArtilleryViewState) -> None:
-    """Draw what lies in front of all: shells, blasts, and where the last shot came down."""
+    """Draw the layer in front of the tanks: shells, explosions, and the last impact."""
     frame = view.snapshot.frame
     for number in gunnery.flying:
         if number < len(frame.position) and frame.present[number]:
@@ -362,21 +356,21 @@ def draw_above(view: DrawContext, gunnery: ArtilleryViewState) -> None:
 
 
 def _way(view: DrawContext, way: FloatArray, flying: bool) -> None:
-    """Draw where a shell has been: the older the fainter, or, once it is over, thin all along."""
+    """Draw the path of a shell: fading with age during the flight, thin and dashed afterwards."""
     points = way[:: max(len(way) // FARTHEST_EMBER, 1)]
     places = view.camera.to_screen(np.vstack((points, way[-1:]))).tolist()
     for k in range(len(places) - 1):
         age = 1.0 - k / len(places)
         share = max(0.75 - age, 0.16) if flying else 0.22
         if not flying and k % 3 == 2:
-            continue  # a way that is over is dotted
+            continue  # dashed after the flight
         colour = mix_colours((70, 72, 104), SMOKE, share)
         (ax, ay), (bx, by) = places[k], places[k + 1]
         draw_line(view.surface, (ax, ay), (bx, by), colour, (1.0 + 1.4 * share) * view.ui_scale, view.antialias)
 
 
 def _clod(view: DrawContext, clod: FallingDirt) -> None:
-    """Draw a column of dirt that falls, and the air that it has left where it is to lie."""
+    """Draw a column of falling dirt, and the sky where it will come to rest."""
     surface = view.surface
     ends = np.array([(clod.left, clod.top), (clod.right, clod.bottom), (clod.right, clod.floor)])
     places = np.clip(view.camera.to_screen(ends), -OFF_SCREEN_MARGIN, OFF_SCREEN_MARGIN)
@@ -396,7 +390,7 @@ def _clod(view: DrawContext, clod: FallingDirt) -> None:
 
 
 def _burst(view: DrawContext, burst: ExplosionView) -> None:
-    """Draw a blast: a ball of fire that grows, cools, and thins out."""
+    """Draw an explosion: a disc that grows, changes colour, and fades."""
     share = min(burst.age / EXPLOSION_DURATION, 1.0)
     x, y = view.camera.to_screen(np.asarray(burst.place)).tolist()
     radius = burst.radius * view.camera.scale * (0.35 + 0.75 * share**0.4)
@@ -410,7 +404,7 @@ def _burst(view: DrawContext, burst: ExplosionView) -> None:
 
 
 def _landed(view: DrawContext, landed: tuple[tuple[float, float], tuple[float, float]]) -> None:
-    """Mark where the last shot came down, and, as a ring, where it would have exactly."""
+    """Mark the impact of the last shot by a cross, and that of its exact trajectory by a ring."""
     (x, y), (ex, ey) = view.camera.to_screen(np.asarray(landed)).tolist()
     if all(abs(each) < 1e4 for each in (x, y, ex, ey)):
         size = 4.0 * view.ui_scale
@@ -420,7 +414,7 @@ def _landed(view: DrawContext, landed: tuple[tuple[float, float], tuple[float, f
 
 
 def _back(view: DrawContext, middle: tuple[float, float], size: tuple[float, float]) -> None:
-    """Darken what lies behind words."""
+    """Darken the background of a text."""
     box = pygame.Rect(0, 0, round(size[0]), round(size[1]))
     shade = pygame.Surface(box.size, pygame.SRCALPHA)
     pygame.draw.rect(shade, (*BACKGROUND, 120), box, border_radius=round(6.0 * view.ui_scale))
@@ -429,7 +423,7 @@ def _back(view: DrawContext, middle: tuple[float, float], size: tuple[float, flo
 
 
 def _wind(view: DrawContext, wind: float) -> None:
-    """Draw which way the wind blows, and how hard, at the left, below what is told of the run."""
+    """Draw direction and speed of the wind, at the left below the text of the run."""
     size = 13.0 * view.ui_scale
     middle, top = 96.0 * view.ui_scale, max(view.snapshot.below, 24.0 * view.ui_scale) + 20.0 * view.ui_scale
     half = min(max(7.0 * abs(wind), 8.0), 84.0) * view.ui_scale
@@ -468,7 +462,7 @@ class ArtilleryView:
         return np.asarray(tanks, np.int64)
 
     def above(self, ctx: DrawContext) -> None:
-        """Draw shells, explosions, and where the last shot landed."""
+        """Draw shells, explosions, and the last impact."""
         if isinstance(ctx.snapshot.game, ArtilleryViewState):
             draw_above(ctx, ctx.snapshot.game)
 

@@ -1,4 +1,4 @@
-"""ArtilleryViewState: values that the view of artillery draws besides the bodies."""
+"""View state of artillery: values that the view draws in addition to the bodies."""
 
 from dataclasses import dataclass
 
@@ -14,64 +14,65 @@ class GunView:
     """A tank and its gun."""
 
     number: int
-    """of its body"""
+    """index of its body"""
     name: str
     angle: float
-    """of the barrel, rad, anticlockwise from the right"""
+    """rad, of the barrel, anticlockwise from the right"""
     power: float
-    """share of full speed"""
+    """fraction of full speed"""
     health: float | None
-    """0 to 1, where it is known"""
+    """0 to 1; None if unknown"""
     aiming: bool
-    """It is its turn, and nothing has been fired yet."""
+    """whether it is the tank's turn, and it has not fired yet"""
 
 
 @dataclass(frozen=True)
 class ExplosionView:
-    """A blast a moment ago."""
+    """An explosion."""
 
     age: float
-    """s"""
+    """s since its start"""
     place: Point
-    """m"""
+    """m, centre"""
     radius: float
     """m"""
     dirt: bool
+    """whether it added dirt"""
 
 
 @dataclass(frozen=True)
 class FallingDirt:
-    """Dirt of one column that is falling."""
+    """Falling dirt of one column."""
 
     left: float
     """m"""
     right: float
     """m"""
     bottom: float
-    """m, of where it is now"""
+    """m, present height of its lower end"""
     top: float
-    """m"""
+    """m, present height of its upper end"""
     floor: float
-    """m, that it falls onto"""
+    """m, height of the surface below it"""
 
 
 @dataclass(frozen=True, eq=False)
 class ArtilleryViewState:
-    """A moment of a game."""
+    """State of a game at one time."""
 
     guns: tuple[GunView, ...]
-    """those that still fight, or did then"""
+    """guns of the tanks that are alive; of all tanks for a state of the past"""
     size: tuple[float, float]
-    """of a tank, m"""
+    """m, width and height of a tank"""
     wind: float | None
-    """m/s, to the right, where it is known"""
+    """m/s, positive to the right; None if unknown"""
     ways: tuple[FloatArray, ...] = ()
-    """(P, 2) m, where the shells of the last shot have been"""
+    """(P, 2) m, paths of the shells of the last shot"""
     flying: tuple[int, ...] = ()
-    """numbers of the shells' bodies"""
+    """indices of the bodies of shells in flight and rollers"""
     bursts: tuple[ExplosionView, ...] = ()
     clods: tuple[FallingDirt, ...] = ()
     tracer: FloatArray | None = None
-    """(P, 2) m, where a shot would go"""
+    """(P, 2) m, predicted path of a shot"""
     landed: tuple[Point, Point] | None = None
-    """where the last shot came down, and where it would have exactly, m"""
+    """m, impact of the last shot, and impact of its exact trajectory"""
