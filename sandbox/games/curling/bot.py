@@ -1,7 +1,7 @@
-"""CurlingBot: chooses a shot by the positions of the stones, and delivers it with a random error.
+"""Bot of curling: chooses a shot from the positions of the stones, and adds a random error to the delivery.
 
-It aims by the closed form of a stone without collisions. It takes out the opponent's best stone if a path to it is
-free, and otherwise draws to the tee on the side with more clearance.
+It aims by the closed-form path of a stone without collisions. It takes out the opponent's best stone if a path to it is
+free; otherwise it draws to the tee, with the turn whose path has more clearance.
 """
 
 import math
@@ -15,13 +15,13 @@ from sandbox.scene.description.base import Point
 from sandbox.scene.random_streams import Stream, draws
 
 SPEED_ERROR, HEADING_ERROR = 0.006, 0.0025
-"""relative, and rad: standard deviations of speed and heading at `error = 1`"""
+"""relative, and rad: standard deviations of the errors of speed and heading at `error = 1`"""
 TAKE_OUT_DISTANCE = 7.0
 """m, distance past the target at which the stone of a take-out would stop without the collision"""
 MIN_CLEARANCE = 0.04
 """m between the path of a stone and other stones"""
 PATH_POINTS = 400
-"""number of points of a path that are tested, one each 7 cm"""
+"""number of points at which the clearance of a path is tested, about 7 cm apart"""
 DRAW: Point = (-0.15, 0.0)
 """m, target of a draw: slightly short of the tee, which is harder to hit"""
 GUARD: Point = (-3.2, 0.0)
@@ -34,7 +34,7 @@ Stones = Sequence[tuple[int, Point]]
 
 
 class CurlingBot:
-    """Plays a team."""
+    """Bot that plays one team."""
 
     def __init__(self, team: int, ice: Ice, error: float, seed: int) -> None:
         self._team, self._ice, self._error = team, ice, error
@@ -80,7 +80,7 @@ class CurlingBot:
         return max(ways, key=lambda way: min(self._clearance(way, stones, None), MIN_CLEARANCE))
 
     def _clearance(self, way: Delivery, stones: Stones, target: Point | None) -> float:
-        """Return the clearance between the path of a stone and other stones, up to the target, m."""
+        """Return the clearance, m, between the path of a stone and the other stones; with a target, only up to it."""
         others = np.asarray([complex(*place) for _, place in stones if place != target])
         if not len(others):
             return math.inf

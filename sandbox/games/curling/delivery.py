@@ -1,8 +1,9 @@
-"""Delivery: speed and heading of a stone that reaches a target, by the closed form of a puck that curls.
+"""Delivery of a curling stone: speed and heading that reach a target, by the closed-form path of a curling puck.
 
-In complex numbers, a stone released at v travels v² / (μg) · (1 − s^(2−iκ)) / (2 − iκ), where s is the remaining
-fraction of its speed; `engines.tabletop.motion` derives it. The delivery to a resting place follows directly.
-For a stone that passes a point, s at that point is found by bisection.
+Displacements are complex numbers: real along the heading at release, imaginary to its left. A stone released at speed v
+is displaced by v² / (μg) · (1 − s^(2−iκ)) / (2 − iκ), where s is the remaining fraction of its speed, for a stone that
+turns anticlockwise; `sandbox.engines.tabletop.motion` derives it. The delivery that comes to rest at a point follows
+directly. For a delivery that passes a point, s at the point is found by bisection.
 """
 
 import cmath
@@ -16,7 +17,7 @@ from sandbox.scene.description.surface import Floor
 SPIN = 1.0
 """rad/s at release: about two and a half turns until the stone rests"""
 FRACTION_TOLERANCE = 1e-12
-"""tolerance of the fraction of the speed, a few rounding errors"""
+"""tolerance of the bisection for the fraction of the speed: above the rounding error of 1e-16"""
 
 
 class Delivery(NamedTuple):
@@ -54,28 +55,28 @@ class Ice(NamedTuple):
         return cls(floor.sliding_friction * floor.gravity, floor.curl)
 
     def way(self, delivery: Delivery, share: float) -> complex:
-        """Return the displacement at a remaining fraction of the speed, m: along the sheet, and to its left."""
+        """Return the displacement from the release, m, at a remaining fraction of the speed: x + iy."""
         power = 2.0 - 1j * self.curl * delivery.turn
         gone = 1.0 - (cmath.exp(power * math.log(share)) if share > 0.0 else 0.0)
         return delivery.speed**2 / self.slowing * gone / power * cmath.exp(1j * delivery.heading)
 
     def speed_for(self, distance: float) -> float:
-        """Return the speed, m/s, of a stone that rests at a distance, m, in a straight line from its release."""
+        """Return the speed, m/s, of a stone that comes to rest at a straight-line distance, m, from its release."""
         return math.sqrt(distance * self.slowing * abs(2.0 - 1j * self.curl))
 
     def to_rest(self, target: Point, turn: int) -> Delivery:
-        """Return the delivery of a stone that rests at a position, m."""
+        """Return the delivery of a stone that comes to rest at a position, m."""
         far = complex(target[0] - RELEASE, target[1])
         speed = self.speed_for(abs(far))
         return self._turned(Delivery(speed, 0.0, turn), far, 0.0)
 
     def through(self, target: Point, turn: int, speed: float) -> Delivery:
-        """Return the delivery with a speed, m/s, that passes a position, m; if too slow, the one that rests there."""
+        """Return the delivery with a speed, m/s, that passes a position, m; if it is too slow, as `to_rest`."""
         far = complex(target[0] - RELEASE, target[1])
         straight = Delivery(speed, 0.0, turn)
         if abs(self.way(straight, 0.0)) <= abs(far):
             return self.to_rest(target, turn)
-        low, high = 0.0, 1.0  # the distance grows as the fraction falls
+        low, high = 0.0, 1.0  # the distance increases as the fraction decreases
         while high - low > FRACTION_TOLERANCE:
             middle = 0.5 * (low + high)
             if abs(self.way(straight, middle)) > abs(far):
@@ -85,7 +86,7 @@ class Ice(NamedTuple):
         return self._turned(straight, far, high)
 
     def _turned(self, delivery: Delivery, far: complex, share: float) -> Delivery:
-        """Return a delivery rotated such that its path leads to a displacement, at a fraction of the speed."""
+        """Return a delivery with the heading that leads in the direction of `far`, at a fraction of the speed."""
         way = self.way(delivery, share)
         # not `cmath.phase`, which raises where an angle is too small for a float
         heading = math.atan2(far.imag, far.real) - math.atan2(way.imag, way.real)

@@ -1,12 +1,15 @@
 """Rules of curling: a match on a scene with sixteen stones on ice.
 
 The scene has a [surface] of pucks, the stones `red-1` to `red-8` and `yellow-1` to `yellow-8`, and a body `broom`
-without collisions. The broom is on the tee line and is the aim of the delivery. A stone curls away from the line of
-aim, so the broom is placed beside the target.
+without collisions. A delivery is aimed at the broom, which is on the tee line. A stone curls away from the line of aim,
+so the broom is placed beside the target.
+
+The hammer, the last stone of an end, belongs to the team that did not score in the previous end; a blank end leaves it
+unchanged. Weight is the distance past the tee, m, at which a stone would come to rest.
 
 Not modelled: touched stones, time clocks, and the measurement of nearly equal distances.
 
-CurlingScore: score by ends. The hammer, the last stone of an end, goes to the team that did not score.
+Source: World Curling, The Rules of Curling, as in `sandbox.games.curling.sheet`.
 """
 
 import math
@@ -40,7 +43,7 @@ from sandbox.trajectory import Frame
 
 
 class CurlingScore(NamedTuple):
-    """Score of a match."""
+    """Score of a match, by ends."""
 
     ends: int
     """number of ends of the match; a tie adds ends"""
@@ -89,13 +92,13 @@ class CurlingScore(NamedTuple):
 
 BROOM = "broom"
 SIDEWAYS, HARDER = 0.5, 2.5
-"""m/s, speed of the broom, and rate of change of the weight, while a key is held"""
+"""m/s: speed of the broom, and rate of change of the weight, while a key is held"""
 WEIGHTS = -8.0, 14.0
-"""m, bounds of the distance past the tee for which a delivery is meant; the lower one is short of the hog line"""
+"""m, bounds of the weight; the lower one is short of the hog line"""
 MAX_BROOM_OFFSET = 0.5 * WIDTH - 0.2
-"""m, from the centre line"""
+"""m, bound of the distance of the broom from the centre line"""
 SWEEP_FRICTION, SWEEP_CURL = 0.88, 0.6
-"""Factors of friction and curl on swept ice. They are chosen for this game: a swept stone runs about 3 m farther."""
+"""factors of friction and curl on swept ice, chosen for this game: a swept stone travels about 3 m farther"""
 PAUSE, BOT_PAUSE = 1.5, 1.0
 """s between two stones, and before a bot delivers"""
 
@@ -150,7 +153,7 @@ class Curling:
 
     @property
     def score(self) -> int:
-        """Points of the red team in a match of one person, otherwise the higher points."""
+        """Points of the red team in a match of one person, otherwise of the leading team."""
         red, yellow = self._score.points
         return red if self._people == 1 else max(red, yellow)
 
@@ -241,7 +244,7 @@ class Curling:
         )
 
     def _follow(self, info: StepInfo, elapsed: float) -> Sequence[Action]:
-        """Update the positions, remove stones that leave play, and judge the shot once all stones rest."""
+        """Update the positions, remove stones that leave play, and judge the shot once all stones are at rest."""
         frame, moves = info.frame, list[Action]()
         self._record_hits(info, elapsed)
         for k in tuple(self._places):

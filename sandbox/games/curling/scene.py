@@ -1,4 +1,4 @@
-"""CurlingMatch: length and players of a match of curling, `[play.curling]`."""
+"""Table `[play.curling]` of a scene file: length and players of a match of curling."""
 
 from typing import Annotated
 

@@ -1,11 +1,11 @@
 """Geometry of a curling sheet, positions of stones that are not in play, and the score of an end.
 
-The origin is the tee that is played to; x is the direction of play. Measures are those of World Curling, The Rules of
-Curling, of sheet and stones: length 45.720 m, width at most 5.000 m; from the tee line to the hog line 6.401 m and to
-the back line 1.829 m, tee lines 34.747 m apart, so that hog lines are 21.945 m apart; rings of 12, 8 and 4 feet and a
-button; stones of at most 19.96 kg and a circumference of at most 91.44 cm.
+The origin is the tee of the target house; x is the direction of play, y is to its left, both in m. Dimensions of the
+sheet: length 45.720 m, width at most 5.000 m; from the tee line to the hog line 6.401 m and to the back line 1.829 m;
+34.747 m between the tee lines, so 21.945 m between the hog lines; rings of 12, 8 and 4 feet and a button. A stone has
+at most 19.96 kg and a circumference of at most 91.44 cm.
 
-Source: World Curling, The Rules of Curling, on stones in play, the free guard zone and scoring.
+Source: World Curling, The Rules of Curling, on sheet and stones, stones in play, the free guard zone and scoring.
 """
 
 import math
@@ -14,23 +14,24 @@ from collections.abc import Sequence
 from sandbox.scene.description.base import Point
 
 LENGTH, WIDTH = 45.720, 5.000
+"""m, of the sheet"""
 HOG, BACK, TEES = 6.401, 1.829, 34.747
-"""m: from the tee line to its hog line and its back line; between the two tee lines"""
+"""m, distances: from the tee line to the hog line, and to the back line; between the two tee lines"""
 RINGS = 1.829, 1.219, 0.610, 0.152
-"""m, radii of the house: 12, 8 and 4 feet across, and the button"""
+"""m, radii of the rings of the house, with diameters of 12, 8 and 4 feet, and of the button"""
 STONE, WEIGHT = 0.9144 / math.tau, 19.96
-"""m, radius of a stone, and kg"""
+"""m, radius of a stone, and kg, its mass"""
 RELEASE = HOG - TEES - STONE
-"""m, latest release of a stone: before the nearer hog line"""
+"""m, x of the release of a stone: the last position before the nearer hog line"""
 
 TEAMS = "red", "yellow"
 STONES = 8
-"""stones of each team"""
+"""number of stones of each team"""
 _PITCH = 2.0 * STONE + 0.05
 
 
 def stone_name(team: int, number: int) -> str:
-    """Return the name of a team's stone, counted from 0."""
+    """Return the name of a stone; `team` and `number` count from 0."""
     return f"{TEAMS[team]}-{number + 1}"
 
 
@@ -40,7 +41,7 @@ def parked_position(team: int, number: int) -> Point:
 
 
 def removed_position(team: int, number: int) -> Point:
-    """Return the position of a stone that is out of play, m."""
+    """Return the position of a stone out of play, beside the sheet, m."""
     return BACK + 3.2 - (STONES - number) * _PITCH, _aside(team)
 
 
@@ -49,7 +50,7 @@ def _aside(team: int) -> float:
 
 
 PROTECTED = 5
-"""first deliveries of an end, in which guards of the other team must stay in play"""
+"""number of the first deliveries of an end that must not remove guards of the other team from play"""
 
 
 def is_out_of_play(place: Point) -> bool:
@@ -82,7 +83,7 @@ def end_score(stones: Sequence[tuple[int, Point]]) -> tuple[int | None, int]:
 
     The team with the stone nearest to the tee counts each of its stones that touches the house and is nearer than the
     best stone of the other team. Two best stones at exactly equal distances make a blank end, as stones whose distances
-    cannot be measured apart do.
+    cannot be distinguished by measurement do.
 
     Args:
         stones: team and centre, m, of each stone in play.

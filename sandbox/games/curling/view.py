@@ -1,4 +1,4 @@
-"""View of curling: stones of granite with a coloured top, and a handle that shows their angle."""
+"""View of curling: granite stones with a coloured top and a handle that shows their angle."""
 
 import numpy as np
 
@@ -10,13 +10,13 @@ from sandbox.window.render.palette import Colour
 
 GRANITE: Colour = (120, 124, 130)
 TOP, HANDLE, GRIP = 0.66, 0.50, 0.26
-"""Of the radius: how far the top reaches, and half the length of the handle; and the handle's width."""
+"""radius of the top, and half-length and width of the handle, as fractions of the radius"""
 PALE = 0.45
-"""How far a handle leans to white."""
+"""fraction of white in the colour of a handle"""
 
 
 def draw_stones(view: DrawContext, discs: CircleRenderer) -> None:
-    """Draw the pucks in sight. What meets nothing only marks a place: it is a ring."""
+    """Draw the visible pucks; bodies without collisions, such as the broom, are markers, drawn as rings."""
     bodies = view.snapshot.bodies
     marks = np.asarray([element.collides == "none" for element in bodies.elements], np.bool_)[bodies.element]
     ring = marks[view.shown]
@@ -42,20 +42,20 @@ def _pale(colour: list[int]) -> Colour:
 
 
 class CurlingView:
-    """Draws the stones; the ice is drawn as the ground of other scenes."""
+    """Draws the stones; the renderer draws the ice."""
 
     def __init__(self) -> None:
         self._discs = CircleRenderer()
 
     def background(self, ctx: DrawContext) -> bool:  # noqa: ARG002
-        """Leave the ground to the renderer."""
+        """Leave the background to the renderer."""
         return False
 
     def below(self, ctx: DrawContext) -> None:
         """Draw nothing."""
 
     def bodies(self, ctx: DrawContext) -> IntArray:
-        """Draw the stones, if all bodies are round and larger than points."""
+        """Draw the stones; nothing if bodies are points or not round."""
         if ctx.has_points or not ctx.snapshot.bodies.round.all():
             return np.empty(0, np.int64)
         draw_stones(ctx, self._discs)

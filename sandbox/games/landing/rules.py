@@ -1,9 +1,13 @@
-"""Landing: a ship comes down on a pad, upright and slowly, with as much left in its tank as can be.
+"""Rules of landing: land a ship on a pad, slowly, upright, and with little fuel.
 
-The scene has a body `ship`, a fixed thing `pad`, and thrusts on the ship with keys: those are the controls. Where the
-ship begins, and how fast, is drawn from the scene's seed. A thrust takes from the tank what it gives, its impulse;
-with nothing left, all engines stop. The game ends as the ship stands on the pad, hits it too hard or anything else at
-all, leaves the scene's bounds, or falls over on the pad.
+The scene has a body `ship`, a static body `pad`, and thrusts on the ship that have keys; these thrusts are the
+controls. The initial position and velocity are randomized by the seed of the scene. Fuel is measured as impulse, N·s: a
+thrust consumes its force × time. All engines stop when the tank is empty. The game ends when the ship is at rest on the
+pad, touches the pad too fast or too tilted, touches another static body, tips over on the pad, or leaves the bounds of
+the scene.
+
+A landing scores fixed points, and points for the remaining fuel. A crash scores a few points if the ship is near the
+pad and slow.
 """
 
 import math
@@ -26,31 +30,31 @@ from sandbox.trajectory import Frame
 SHIP, PAD = "ship", "pad"
 LANDED = "landed"
 TANK = 45.0
-"""N·s per kg of ship: the speed, m/s, that a full tank would give it in empty space"""
+"""N·s per kg of the ship, capacity of the tank: the change of velocity, m/s, in free space"""
 DOWN, ASIDE, TILT = 2.0, 1.0, math.radians(15.0)
-"""m/s, m/s and rad: the most at the first touch that is no crash"""
+"""m/s, m/s and rad: limits of vertical speed, horizontal speed and tilt at the first touch"""
 STILL, STANDING = 0.05, 1.0
-"""m/s, below which it stands, and s, for how long it has to"""
+"""m/s and s: the ship has landed when it has been slower than this for this duration"""
 FALLEN = math.radians(45.0)
-"""rad, of tilt on the pad from which nothing stands up again"""
+"""rad, tilt on the pad beyond which the ship has tipped over"""
 FOR_LANDING, FOR_FUEL = 100, 900
-"""points: for landing at all, and for a full tank"""
+"""points for a landing, and for a full tank"""
 FOR_A_CRASH, FAR, FAST = 50, 50.0, 15.0
-"""points for a crash on the pad at no speed; there are none so far from its middle, m, nor so fast, m/s"""
+"""points for a crash; they decrease linearly to 0 at a distance from the pad, m, and at a speed, m/s"""
 ELSEWHERE, FASTER = 18.0, 3.0
-"""m and m/s, to either side: by how much more or less than in the scene a game begins aside, by its seed"""
+"""m and m/s, bounds of the random change of the initial horizontal position and velocity"""
 PADS = {"up": "a rt up", "left": "left -leftx", "right": "right +leftx"}
-"""what of a gamepad goes with a thrust's key"""
+"""gamepad inputs by the key of a thrust"""
 
 
 class Landing:
-    """The rules of one landing."""
+    """Rules and state of a game."""
 
     def __init__(self, scene: Scene, bodies: Bodies) -> None:
-        """Begin.
+        """Start a game.
 
         Raises:
-            UnsuitableSceneError: the scene has no ship, no pad or no engine.
+            UnsuitableSceneError: the scene has no ship, no pad, or no thrust with a key on the ship.
         """
         self._thrusts = {
             thrust.name or default_name("thrust", k): thrust
@@ -78,11 +82,11 @@ class Landing:
         self._touched = False
 
     def on_input(self, control: str, value: float) -> Sequence[Action]:
-        """Open a thrust by so much, as long as there is anything in the tank."""
+        """Set the level of a thrust; without effect if the tank is empty."""
         return (Throttle(time=0.0, thrust=control, level=min(value, 1.0)),) if self._tank > 0.0 else ()
 
     def on_step(self, info: StepInfo) -> Sequence[Action]:
-        """Count what was burnt, and see whether the ship has come down, and how."""
+        """Update fuel and score, and determine whether the game is over."""
         if self._now is None:
             self._now = info.frame
             return (self._start,)
@@ -97,7 +101,7 @@ class Landing:
         return stopped
 
     def _burn(self, info: StepInfo, elapsed: float) -> Sequence[Action]:
-        """Take from the tank what the engines gave; close them as it runs dry."""
+        """Consume the fuel of the last step; return the actions that stop all engines when the tank becomes empty."""
         for action in info.actions:
             if isinstance(action, Throttle) and action.thrust in self._levels:
                 self._levels[action.thrust] = action.level
@@ -111,12 +115,12 @@ class Landing:
         return tuple(Throttle(time=0.0, thrust=name, level=0.0) for name in opened)
 
     def _ended(self, info: StepInfo, elapsed: float) -> str | None:
-        """Return why the game is over now, and set the score; None where it goes on."""
+        """Return the reason why the game is over, and set the score of a landing; None while it runs."""
         frame, ship = info.frame, self._ship
         if not frame.present[ship]:
             return "lost in space"
         touched = {int(pair[1]) if pair[0] == ship else int(pair[0]) for pair in info.contacts.pair if ship in pair}
-        if any(number >= -self._solid for number in touched - {self._pad}):  # the others are no more than zones
+        if any(number >= -self._solid for number in touched - {self._pad}):  # smaller numbers are zones
             return "crashed outside the pad"
         if self._pad not in touched:
             self._still = 0.0
@@ -137,7 +141,7 @@ class Landing:
         return LANDED
 
     def _hard(self) -> str | None:
-        """Return why a first touch is a crash, by the state before it; None where it is none."""
+        """Return the reason why the first touch is a crash, from the state before it; None if it is none."""
         assert self._before is not None
         aside, up = self._before.velocity[self._ship].tolist()
         if -up > DOWN:
@@ -150,7 +154,7 @@ class Landing:
         )
 
     def _consolation(self) -> int:
-        """Return the points of a crash: more where it was near and slow."""
+        """Return the points of a crash."""
         assert self._before is not None
         place, speed = self._before.position[self._ship], float(np.hypot(*self._before.velocity[self._ship]))
         near = max(1.0 - math.dist(place.tolist(), self._place) / FAR, 0.0)
@@ -160,7 +164,7 @@ class Landing:
         return math.remainder(float(frame.angle[self._ship]), math.tau)
 
     def display_lines(self) -> Sequence[tuple[str, str]]:
-        """Return fuel, height and speeds; what would be a crash is marked."""
+        """Return fuel, height, speeds and tilt; values beyond the limits of a landing are marked by `!`."""
         fuel = ("fuel", f"{100.0 * self._tank / self._full:.0f} %")
         if self._now is None or not self._now.present[self._ship]:
             return (fuel,)
@@ -175,11 +179,11 @@ class Landing:
         )
 
     def observation(self) -> Sequence[tuple[str, float]]:
-        """Return how full the tank is, 0 to 1."""
+        """Return the fuel as a fraction of a full tank."""
         return (("fuel", self._tank / self._full),)
 
     def _height(self, frame: Frame) -> float:
-        """Return how far the lowest point of the ship is above the pad, m."""
+        """Return the height of the lowest point of the ship above the pad, m."""
         sine, cosine = math.sin(frame.angle[self._ship]), math.cos(frame.angle[self._ship])
         lowest = min(x * sine + y * cosine - radius for x, y, radius in self._corners)
         return float(frame.position[self._ship, 1]) + lowest - self._place[1]
@@ -196,8 +200,12 @@ def _control(name: str, thrust: Thrust) -> Control:
 
 
 def _place(scene: Scene) -> Point:
-    """Return the middle of the pad's top, m."""
-    pad = dict(zip(scene.fixed_names, scene.fixed, strict=False)).get(PAD)  # pockets and zones come after
+    """Return the centre of the top of the pad, m.
+
+    Raises:
+        UnsuitableSceneError: the pad is not a plane, a wall or a post.
+    """
+    pad = dict(zip(scene.fixed_names, scene.fixed, strict=False)).get(PAD)  # names of pockets and zones follow
     match pad:
         case Wall():
             across, up = zip(*pad.points, strict=True)
@@ -210,7 +218,7 @@ def _place(scene: Scene) -> Point:
 
 
 def _start(scene: Scene, bodies: Bodies, ship: int) -> Move:
-    """Return where the ship begins, as the scene's seed has it."""
+    """Return the action that sets the random initial position and velocity of the ship."""
     chance = draws(Stream.LANDING, scene.world.seed)
     (x, y), (vx, vy) = bodies.position[ship].tolist(), bodies.velocity[ship].tolist()
     x, vx = x + chance.uniform(-ELSEWHERE, ELSEWHERE), vx + chance.uniform(-FASTER, FASTER)
