@@ -6,8 +6,8 @@
     env = gymnasium.make("sandbox/Landing-v0")
 
 `SandboxEnv(scene)` makes an environment of any scene whose `[play] game` has rules. Actions are the controls of the
-game, the reward is the increase of the score. An episode is a session: `recording()` returns it for replay in the
-window. This is the only module that imports gymnasium.
+game, the reward is the increase of the score. `recording()` returns the episode as a recorded session, for replay in
+the window. This is the only module that imports gymnasium.
 """
 
 import operator
@@ -39,9 +39,9 @@ from sandbox.scene.scene import Scene
 GAMES = {each.name: (each.scene, each.frame_skip) for each in environments()}
 """Shipped scene and number of steps per action, by the name in the environment id."""
 LIMIT = 1e6
-"""bound of each observed number, to which it is clipped: unbounded spaces are ill-suited to learning"""
+"""bound to which observed numbers are clipped: learning algorithms expect bounded spaces"""
 STATES = "x", "y", "vx", "vy", "angle", "ω", "present"
-"""Observed state of a body, in m, m/s, rad and rad/s; `present` is 1, or 0 after removal."""
+"""observed state of a body, in m, m/s, rad and rad/s; `present` is 1, or 0 after removal"""
 SIZE = 640, 480
 """px, size of a rendered picture"""
 SEEDS = 2**31
@@ -52,9 +52,9 @@ Observation = np.ndarray[tuple[int], np.dtype[np.float32]]
 class SandboxEnv(gymnasium.Env[Observation, Any]):
     """Gymnasium environment of a game.
 
-    Observation: for each observed body x, y, vx, vy, angle, ω and whether it is present; then the gauges of the game
-    (such as fuel, wind, or the setting of a gun), the time in s and the score. `observed` has the name of each number.
-    Numbers are clipped to ±1e6.
+    Observation: x, y, vx, vy, angle, ω and presence of each observed body; then the observation of the rules (such as
+    fuel, wind, or the setting of a gun), the time in s, and the score. `observed` has the name of each number. Numbers
+    are clipped to ±1e6.
 
     Action: one number for each control. If a control is analogue, the space is a `Box` from 0 to 1; other controls are
     then on above 0.5, and values out of range are clipped. Otherwise the space is a `MultiDiscrete` of 0 and 1.
@@ -176,10 +176,10 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         return self._episode
 
     def _levels_of(self, action: Any) -> list[float]:
-        """Return how far an action presses each control.
+        """Return the value of each control in an action, 0 to 1.
 
         Raises:
-            ValueError: it is none.
+            ValueError: the action does not have one valid number for each control.
         """
         try:
             levels = np.asarray(action, dtype=np.float64)
@@ -223,7 +223,7 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
             return None
         episode = self._going()
         if self._canvas is None:
-            from sandbox.window.render.offscreen import OffscreenRenderer  # pygame is for who wants to see something
+            from sandbox.window.render.offscreen import OffscreenRenderer  # pygame is needed only to render
 
             self._canvas = OffscreenRenderer(SIZE)
         relay = episode.relay
@@ -241,10 +241,10 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
 
 
 def _steps(every: int) -> int:
-    """Return how many steps an action lasts.
+    """Return the number of steps per action as an int.
 
     Raises:
-        ValueError: it is no whole number from 1 on.
+        ValueError: it is not an integer of at least 1.
     """
     try:
         steps = operator.index(every)
@@ -260,10 +260,10 @@ def _gauges(rules: Rules) -> Sequence[tuple[str, float]]:
 
 
 def _numbers(scene: Scene, names: Sequence[str] | None) -> list[int]:
-    """Return the numbers of the bodies that are observed; one name is a list of one.
+    """Return the indices of the observed bodies; `names` is a list of names, one name, or None for the default.
 
     Raises:
-        ValueError: there is no such body.
+        ValueError: there is no body of that name.
     """
     bodies = scene.bodies
     if names is None:

@@ -1,4 +1,4 @@
-"""Games: scene tables, rules, bots and views. `GAMES` lists them; the folder of a game states a `GameSpec`."""
+"""Games: scene tables, rules, bots and views. Each game is a package with a `GameSpec`, listed in `GAMES`."""
 
 GAMES = {
     "billiards": "sandbox.games.billiards:GAME",
@@ -7,4 +7,4 @@ GAMES = {
     "curling": "sandbox.games.curling:GAME",
     "landing": "sandbox.games.landing:GAME",
 }
-"""Import string of each game's `GameSpec`. A new game is a folder, and a line here."""
+"""Import strings of the `GameSpec` objects. A new game is a package and a line here."""

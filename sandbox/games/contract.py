@@ -1,4 +1,4 @@
-"""Rules: the interface between a game and its hosts: headless runs, the window, and Gymnasium environments.
+"""Interface between the rules of a game and its hosts: headless runs, the window, and Gymnasium environments.
 
 A game is a scene and rules. After every step the rules see the state and the contacts, and return actions; they know
 neither engine nor window. A host calls, at the start and after every step:
@@ -8,8 +8,8 @@ neither engine nor window. A host calls, at the start and after every step:
 
 It sets the time of all actions to the present, applies those of `on_step` first, then those of `on_input`, and makes
 the next step. Once `game_over` is not None, the actions of the last `on_step` are applied and the rules are not called
-any more. Rules are plain objects that `copy.deepcopy` copies, as going back in time restores a copy. They are
-deterministic: all random numbers come from the seed of the scene.
+any more. Rules must support `copy.deepcopy`, because undo restores a copy. They are deterministic: all random numbers
+derive from the seed of the scene.
 
 Optional members, each with a protocol: `log`, `observation()`, `lit_lamps()`, `waiting`, `view_state(time)`.
 
@@ -46,7 +46,7 @@ class UnsuitableSceneError(ValueError):
 
 
 class StepInfo(NamedTuple):
-    """Input of the rules, at the start and after every step."""
+    """Input of the rules at the start and after every step."""
 
     time: float
     """s"""
@@ -54,7 +54,7 @@ class StepInfo(NamedTuple):
     contacts: Contacts
     """contacts of the last step; a lasting contact appears at every step, with the time of its first touch"""
     actions: tuple[Action, ...]
-    """actions of the player that were applied before this step, from controls or by hand"""
+    """actions of the player that were applied before this step, from controls, or from direct manipulation of bodies"""
 
 
 class Control(NamedTuple):
@@ -67,12 +67,12 @@ class Control(NamedTuple):
     keys: tuple[str, ...]
     """names of its keys in the window, such as `("left shift", "z")`; never p, o, f1 or escape"""
     pad: str | None = None
-    """on a gamepad: `a b x y lb rb lt rt left right up down`, or a stick's half such as `-leftx`, `+righty`; several
-    are separated by blanks"""
+    """on a gamepad: `a b x y lb rb lt rt left right up down`, or half of a stick axis such as `-leftx`, `+righty`;
+    several are separated by blanks"""
     analogue: bool = False
     """whether its value is any number from 0 to 1; otherwise it is 0 or 1"""
     often: float = 1.0
-    """frequency with which a random player presses it, relative to an ordinary control; greater than 0"""
+    """relative frequency with which a random player presses it; greater than 0"""
 
 
 class Rules(Protocol):
@@ -84,7 +84,7 @@ class Rules(Protocol):
 
     @property
     def score(self) -> int | float:
-        """Score of the present player, or the best score."""
+        """Score of the current player, or the best score."""
 
     @property
     def game_over(self) -> str | None:
@@ -100,7 +100,7 @@ class Rules(Protocol):
         """Return the lines of the score panel, as labels and texts, the most important first."""
 
     def sounds(self) -> Sequence[str]:
-        """Return the names of the sounds since the last call."""
+        """Return the names of the sounds to play since the last call."""
 
 
 @runtime_checkable
@@ -114,7 +114,7 @@ class HasLog(Protocol):
 
 @runtime_checkable
 class HasObservation(Protocol):
-    """Rules that return numbers for learning agents: state that a player reads from the window."""
+    """Rules that return numbers for learning agents: the state of the game that a player reads from the window."""
 
     def observation(self) -> Sequence[tuple[str, float]]:
         """Return names and finite values; names and order are constant during a game, for every seed."""
@@ -142,10 +142,10 @@ class HasViewState(Protocol):
     """Rules that pass values to the `GameView` of their game."""
 
     def view_state(self, time: float) -> object | None:
-        """Return the values to draw at a time, s, at most the present; None for none.
+        """Return the values to draw at a time, s, up to the present; None to draw none.
 
-        Times between the last two steps are interpolated. Before that, the state is of the past, which the rules may
-        not know.
+        Times between the last two steps occur when the window interpolates. Earlier times occur when it shows the
+        past, which the rules may not know.
         """
 
 
@@ -153,7 +153,7 @@ class Policy(Protocol):
     """Player of a game."""
 
     def decide(self, info: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:
-        """Return the controls to set now and their values; called once a step, after `Rules.look`."""
+        """Return the controls to set now and their values; called once a step, after `Rules.on_step`."""
 
 
 def checked_skill(skill: float) -> float:

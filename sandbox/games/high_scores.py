@@ -1,4 +1,7 @@
-"""High scores: the ten best of each game and table, in one small file of the user's."""
+"""High scores: the ten best scores of each game and scene, in a JSON file in the data folder of the user.
+
+The file maps each table, `<game>: <title of the scene>`, to a list of pairs of initials and score, the highest first.
+"""
 
 import json
 import os
@@ -15,21 +18,21 @@ from sandbox.scene.scene import Scene
 from sandbox.whole import read_whole, whole
 
 FOLDER = "SANDBOX_DATA"
-"""An environment variable: the folder to keep the file in, where the platform's is not wanted."""
+"""Environment variable with the data folder; default: that of the platform."""
 
 FILE = "high-scores.json"
 
 BEST = 10
-"""kept of each table"""
+"""number of scores kept in each table"""
 
 MAX_SCORE = 10**15
-"""A score beyond this is damage: no game gives it, and it would not fit on a line."""
+"""Bound of the absolute value of a score; larger values in a file count as damage."""
 
 MAX_BYTES = 2**24
-"""of the file; the ten best of a table take a few hundred"""
+"""bound of the size of the file; a full table takes a few hundred bytes"""
 
 LETTERS = 3
-"""of initials"""
+"""number of letters of the initials"""
 
 _ENTRIES: TypeAdapter[dict[str, list[tuple[str, int | float]]]] = TypeAdapter(
     dict[
@@ -47,7 +50,7 @@ _ENTRIES: TypeAdapter[dict[str, list[tuple[str, int | float]]]] = TypeAdapter(
 
 @dataclass(frozen=True)
 class Entry:
-    """Who scored what."""
+    """Row of a table."""
 
     initials: str
     score: int | float
@@ -55,33 +58,33 @@ class Entry:
 
 @dataclass(frozen=True)
 class HighScores:
-    """The file, and what was wrong with it."""
+    """High-score file."""
 
     path: Path
     told: str | None = None
-    """for the user: the file was damaged, and where it was put aside; None where it was in order"""
+    """message for the user that a damaged file was renamed; None if the file was valid"""
 
     def of(self, table: str) -> tuple[Entry, ...]:
-        """Return the best of a table, the highest first.
+        """Return the best scores of a table, the highest first.
 
         Raises:
             OSError: the file cannot be read.
-            ValueError: it is damaged.
+            ValueError: the file is damaged.
         """
         return tuple(Entry(*row) for row in self._read().get(table, [])[:BEST])
 
     def rank(self, table: str, score: int | float) -> int | None:
-        """Return the place that a score would take, from 1; None where it takes none. Equals stay ahead of it.
+        """Return the rank that a score would have, from 1, after equal scores; None if it does not enter the table.
 
         Raises:
             OSError: the file cannot be read.
-            ValueError: it is damaged.
+            ValueError: the file is damaged.
         """
         ahead = sum(each.score >= score for each in self.of(table))
         return ahead + 1 if score > 0 and ahead < BEST else None
 
     def enter(self, table: str, initials: str, score: int | float) -> int | None:
-        """Enter a score, and return the place that it took; None where it took none, and nothing changed.
+        """Enter a score in a table and return its rank; None if it does not enter, which leaves the file unchanged.
 
         Raises:
             OSError: the file cannot be read or written.
@@ -112,10 +115,13 @@ class HighScores:
 
 
 def opened(path: Path | None = None) -> HighScores:
-    """Return the high scores. A damaged file is put aside, under a name of its own, and told; nothing of it is lost.
+    """Open the high scores. A damaged file is renamed to a new name, and `HighScores.told` states so.
+
+    Args:
+        path: path of the file; default: in the data folder.
 
     Raises:
-        OSError: the file cannot be read, or not put aside.
+        OSError: the file cannot be read, or a damaged file cannot be renamed.
     """
     path = path or data_folder() / FILE
     scores = HighScores(path)
@@ -132,29 +138,29 @@ def opened(path: Path | None = None) -> HighScores:
 
 
 def data_folder() -> Path:
-    """Return where a user's data lies: `SANDBOX_DATA`, or as the platform has it."""
+    """Return the data folder of the user: `SANDBOX_DATA`, or that of the platform."""
     stated = os.environ.get(FOLDER)
     if stated:
         return Path(stated)
     if os.name == "nt":
         return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "sandbox"
-    # Source: XDG Base Directory Specification, 0.8: $XDG_DATA_HOME, else ~/.local/share; a relative path counts not.
+    # Source: XDG Base Directory Specification, 0.8: $XDG_DATA_HOME, else ~/.local/share; a relative path is ignored.
     home = Path(os.environ.get("XDG_DATA_HOME", ""))
     return (home if home.is_absolute() else Path.home() / ".local" / "share") / "sandbox"
 
 
 def table_of(scene: Scene) -> str:
-    """Return what a scene's scores are kept under: its game, and its title."""
+    """Return the name of the table of a scene: its game and its title."""
     return f"{scene.play.game}: {scene.title}"
 
 
 def initials_of(text: str) -> str:
-    """Return up to three capital letters, digits, blanks, dots or dashes of a text; one without any is `---`."""
+    """Return the first three capital letters, digits, blanks, dots or dashes of a text; `---` if it has none."""
     return re.sub(r"[^A-Z0-9 .\-]", "", text.upper())[:LETTERS].strip() or "-" * LETTERS
 
 
 def _as_rows(document: Any) -> Any:
-    """Return a document with its pairs as tuples, as they were before JSON."""
+    """Return a JSON document with its rows converted from lists to tuples."""
     if not isinstance(document, dict):
         return document
     return {

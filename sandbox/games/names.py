@@ -1,4 +1,4 @@
-"""Games by name: the specs of this package's games, and the games that other packages register.
+"""Games by name: the specs of the games of this package, and of games that other packages register.
 
 Another package registers a game by an entry point of the group `sandbox.games`, in its pyproject.toml:
 
@@ -6,7 +6,7 @@ Another package registers a game by an entry point of the group `sandbox.games`,
     keepy-uppy = "keepy_uppy:GAME"
 
 The object is a `GameSpec`, or rules: a class or function that is called with a scene and its bodies. It is imported
-when the game is needed. Entry points are read only if a scene names a game that is not in this package.
+when the game is first used. Entry points are read only if a scene names a game that is not in this package.
 """
 
 import sys
@@ -23,11 +23,11 @@ GROUP = "sandbox.games"
 """Entry-point group of games."""
 
 TableGame = Literal["8-ball", "9-ball", "three-cushion", "straight-rail", "snooker", "free"]
-"""Games of billiards, which need a table."""
+"""Games of billiards; they need a table."""
 
 
 _ADDED: dict[str, GameSpec] = {}
-"""Games that `register_game` added, by name."""
+"""Games added by `register_game`, by name."""
 
 
 @cache
@@ -53,7 +53,7 @@ def environments() -> tuple[Environment, ...]:
 
 
 def games_with_bot() -> tuple[str, ...]:
-    """Return the names of the games of this package that the player `skilled` plays."""
+    """Return the names of the games of this package that have a bot, the player `skilled`."""
     return tuple(name for spec in game_specs() if spec.bot is not None for name in spec.names)
 
 
@@ -63,14 +63,14 @@ def game_names() -> tuple[str, ...]:
 
 
 def is_game(name: str) -> bool:
-    """Return whether there is a game of this name."""
+    """Return whether a game of this name exists."""
     return name in GAMES or name in _ADDED or name in registered_games()
 
 
 def spec_of(game: str | None) -> GameSpec | None:
     """Return the spec of a game; None if there is no such game.
 
-    Rules that another package registers without a spec get one that has only the rules.
+    If another package registers rules without a spec, the spec has only the rules.
 
     Raises:
         ImportError: the game is of another package, whose module cannot be imported.
@@ -92,10 +92,10 @@ def spec_of(game: str | None) -> GameSpec | None:
 
 
 def register_game(spec: GameSpec) -> None:
-    """Add a game to the running program, without an entry point. A later one replaces an earlier one of its name.
+    """Register a game in the running program, without an entry point; it replaces an earlier one of the same name.
 
     Raises:
-        ValueError: the package has a game of that name.
+        ValueError: this package has a game of that name.
     """
     taken = [name for name in spec.names if name in GAMES]
     if taken:
@@ -104,12 +104,12 @@ def register_game(spec: GameSpec) -> None:
 
 
 def registered_games() -> "dict[str, EntryPoint]":
-    """Return the entry points of other packages' games by name. They are imported when one is played."""
+    """Return the entry points of the games of other packages, by name, without importing them."""
     return _entry_points(tuple(sys.path))
 
 
 @lru_cache(maxsize=1)
-def _entry_points(path: tuple[str, ...]) -> "dict[str, EntryPoint]":  # noqa: ARG001, where packages are looked for
-    from importlib.metadata import entry_points  # 20 ms, which scenes with a game of this package do without
+def _entry_points(path: tuple[str, ...]) -> "dict[str, EntryPoint]":  # noqa: ARG001, cache key
+    from importlib.metadata import entry_points  # takes 20 ms, needed only for games of other packages
 
-    return {each.name: each for each in reversed(entry_points(group=GROUP))}  # the first of a name counts
+    return {each.name: each for each in reversed(entry_points(group=GROUP))}  # of equal names, the first

@@ -1,8 +1,8 @@
 """Players of headless games: no input, random input, a script, or the bot of the game.
 
-Script files have one input per line: `time, control, value`, with the time in s; a comment starts with #.
-
-PlayerSpec: a player as a value, which is stored with a run.
+`PlayerSpec` describes a player as a value, which is stored with a run, and starts a game with it. `POLICIES` has the
+players without a script. Script files have one input per line: `time, control, value`, with the time in s; a comment
+starts with #.
 """
 
 import math
@@ -28,14 +28,14 @@ from sandbox.whole import read_whole
 RATE_BOUNDS = 0.2, 2.0
 """1/s, bounds of the rate at which a random player presses an ordinary control; log-uniform, drawn once a control"""
 HOLD_BOUNDS = 0.05, 1.6
-"""s, bounds of the time for which it holds a control; log-uniform, drawn for each press. The longest are long enough to
-pull a plunger"""
+"""s, bounds of the time for which it holds a control; log-uniform, drawn for each press. The longest suffice to pull a
+plunger"""
 FULL_PRESS_PROBABILITY = 0.5
 """probability that an analogue control is pressed fully, as by a key; other presses are uniform from 0 to 1"""
 
 
 class NoInput:
-    """Presses nothing."""
+    """Policy that presses nothing."""
 
     def decide(self, info: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:  # noqa: ARG002
         """Return nothing."""
@@ -43,7 +43,7 @@ class NoInput:
 
 
 class RandomInput:
-    """Presses each control at random: the pauses are exponential, with a rate per control."""
+    """Policy that presses each control at random: pauses are exponentially distributed, with a rate per control."""
 
     def __init__(self, seed: int) -> None:
         self._rng = draws(Stream.KEYS, seed)
@@ -63,7 +63,7 @@ class RandomInput:
             if due > info.time:
                 continue
             down = not down
-            # A control changes at most once a step: the next change is at the next step at the earliest.
+            # A control changes at most once a step.
             lasts = self._draw(HOLD_BOUNDS) if down else float(self._rng.exponential(self._pauses[control.name]))
             self._changes[control.name] = info.time + lasts, down
             found.append((control.name, self._level(control) if down else 0.0))
@@ -86,14 +86,14 @@ class RandomInput:
 
 
 class ScriptedInput:
-    """Presses the inputs of a script, each before the first step that starts at its time or later."""
+    """Policy that plays the inputs of a script, each before the first step that starts at its time or later."""
 
     def __init__(self, presses: Iterable[Press]) -> None:
         self._presses = sorted(presses, key=lambda press: press.time)
         self._done = 0
 
     def decide(self, info: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:  # noqa: ARG002
-        """Return the inputs whose time has come."""
+        """Return the inputs that are due."""
         begin = self._done
         while self._done < len(self._presses) and self._presses[self._done].time <= info.time + 1e-9:  # rounding
             self._done += 1
@@ -117,7 +117,7 @@ def _skilled(scene: Scene) -> Policy:
     """Return the bot of a game.
 
     Raises:
-        UnsuitableSceneError: the game has none.
+        UnsuitableSceneError: the game has no bot.
     """
     spec = find_spec(scene.play.game)
     if spec is None or spec.bot is None:
@@ -191,7 +191,7 @@ def _press(text: str) -> Press:
 
 
 def faults_of(presses: Sequence[Press], controls: Sequence[Control], file: str) -> list[Fault]:
-    """Return the inputs of a script that a game does not have; each fault once, with the first line that has it."""
+    """Return the faults of a script's inputs: unknown controls and invalid values, each once with its first line."""
     known = {control.name: control for control in controls}
     names = ", ".join(map(repr, known))
     found: dict[str, Press] = {}

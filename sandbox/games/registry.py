@@ -81,7 +81,7 @@ def rules_of(scene: Scene, bodies: Bodies | None = None, *, on_request: bool = F
 
 
 def is_real_time(game: str | None) -> bool:
-    """Return whether time matters from the first step of a game: the window waits for a key press to start it.
+    """Return whether a game runs in real time from the first step, so that the window starts it by a key press.
 
     Raises:
         UnsuitableSceneError: the game is of another package and cannot be imported.
@@ -105,7 +105,7 @@ def required_rules(scene: Scene) -> Rules:
     """Start the game that a scene names.
 
     Raises:
-        UnsuitableSceneError: it names no game with rules, or lacks an element that the game needs.
+        UnsuitableSceneError: the scene names no game with rules, or lacks an element that the game needs.
     """
     rules = rules_of(scene, on_request=True)
     if rules is None:

@@ -1,4 +1,4 @@
-"""Scores: how the scores of many games are spread."""
+"""Statistics of the scores of many games: mean, standard deviation, quantiles and histogram."""
 
 import math
 from collections.abc import Sequence
@@ -10,32 +10,32 @@ import numpy as np
 from sandbox.arrays import FloatArray
 
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
-"""of games, whose scores are no more than the quantiles"""
+"""probabilities of the quantiles"""
 MAX_BINS = 10
-"""and up to two more, as bins begin and end at round figures, not at the least and the most score"""
+"""number of bins over the range of the scores; rounding the outer edges to multiples of the width adds up to two"""
 
 
 @dataclass(frozen=True)
 class Scores:
-    """A sample of scores."""
+    """Statistics of a sample of scores."""
 
     count: int
     mean: float
     deviation: float
-    """of one score, from the sample; 0 of a single game"""
+    """sample standard deviation; 0 for a single game"""
     quantiles: tuple[float, ...]
-    """for each of `SHARES`"""
+    """for the probabilities `QUANTILES`"""
     edges: tuple[float, ...]
-    """of the histogram's bins, one more than there are bins; a bin holds its lower edge"""
+    """edges of the bins of the histogram, one more than bins; a bin includes its lower edge"""
     counts: tuple[int, ...]
-    """games in each bin"""
+    """number of games in each bin"""
 
     @classmethod
     def of(cls, scores: Sequence[float]) -> "Scores":
-        """Return how scores are spread.
+        """Return the statistics of scores.
 
         Raises:
-            ValueError: there are none.
+            ValueError: there are no scores.
         """
         if not scores:
             raise ValueError("no games, so no score statistics")
@@ -51,7 +51,7 @@ class Scores:
         )
 
     def document(self) -> dict[str, Any]:
-        """Return it as JSON values."""
+        """Return the statistics as JSON values."""
         return {
             "count": self.count,
             "mean": self.mean,
@@ -62,9 +62,9 @@ class Scores:
 
 
 def _edges(scores: FloatArray) -> list[float]:
-    """Return the edges of bins that are 1, 2 or 5 times a power of ten wide, of few digits, and hold all scores.
+    """Return the edges of bins that contain all scores; their width is 1, 2 or 5 times a power of ten.
 
-    Where all scores are whole numbers, no bin lies between two of these.
+    If all scores are integers, the width is at least 1.
     """
     least, most = float(scores.min()), float(scores.max())
     width = 10.0 ** math.floor(math.log10(max(most - least, 1.0) / MAX_BINS))
@@ -74,5 +74,5 @@ def _edges(scores: FloatArray) -> list[float]:
     first, last = math.floor(least / width), math.floor(most / width) + 1
     if least < width * first:  # a negative score so small that the quotient is -0
         first -= 1
-    parts = round(1.0 / width)  # of 1, where a bin is narrower: 3 / 10 is 0.3, 3 × 0.1 is not
+    parts = round(1.0 / width)  # bins per unit: 3 / 10 is exactly 0.3, 3 × 0.1 is not
     return [k / parts if width < 1.0 else width * k for k in range(first, last + 1)]

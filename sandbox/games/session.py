@@ -1,11 +1,11 @@
-"""GameSession: the rules of one game between the steps of a simulation.
+"""Session of a game: calls the rules between the steps of a simulation, and records and replays inputs.
 
-It sets the times of actions, passes the player's actions to the rules, keeps the inputs, and when a recorded game is
-replayed, repeats its inputs and detects when the rules act differently than in the recording.
+`GameSession` sets the times of actions, passes the player's actions to the rules, and records the inputs. In the replay
+of a recorded game it repeats the recorded inputs, and detects when the rules act differently than in the recording.
+`HeadlessGame` is a session of a run without a window, played by a policy or replayed.
 
-HeadlessGame: a game that a policy plays between the steps of a run without a window, or the replay of a recorded game.
-
-LampRecorder and LampLog: which lamps were lit when. They are stored with a run, because viewing it involves no rules.
+`LampRecorder` and `LampLog` record which lamps were lit at which time. They are stored with a run, because viewing a
+run does not execute the rules.
 """
 
 import copy
@@ -18,8 +18,8 @@ from sandbox.games.contract import HasLamps, HasLog, Policy, Press, Rules, StepI
 from sandbox.trajectory import Contacts, Frame
 
 LAMP_INTERVAL = 0.04
-"""s between two samples of the lamps: the interval between pictures of a film. Flashes last longer, and sampling every
-step would be slow"""
+"""s between two samples of the lamps, the frame interval of a video. Flashes last longer; sampling every step would be
+slow"""
 
 TIME_ROUNDING = 1e-9
 """s, rounding error of the times of steps"""
@@ -83,7 +83,7 @@ class LampLog(NamedTuple):
 
 
 REPLAY_ROUNDING = 1e-9
-"""s by which the time of a recorded input may differ from that of its step: engines add up steps differently"""
+"""s, tolerance of the time of a recorded input: engines accumulate steps with different rounding"""
 
 
 class GameSession:
@@ -99,7 +99,7 @@ class GameSession:
         self.rules = rules
         self._presses = sorted(presses, key=lambda press: press.time)
         self._pressed = 0
-        self._done: list[Action] = []  # actions of the player since the last step
+        self._done: list[Action] = []  # player's actions since the last step
         self.step_info: StepInfo | None = None
         """input of the last `Rules.on_step`"""
         self.diverged_at: float | None = None
@@ -125,7 +125,7 @@ class GameSession:
         return tuple(self._presses)
 
     def set_presses(self, presses: Sequence[Press]) -> None:
-        """Replace all inputs by those of a session that is equal to this one up to now."""
+        """Replace all inputs by those of another session that is equal to this one up to now."""
         self._presses = [*presses]
 
     def discard_future(self) -> None:
@@ -133,7 +133,7 @@ class GameSession:
         del self._presses[self._pressed :]
 
     def on_step(self, time: float, frame: Frame, contacts: Contacts) -> tuple[Action, ...]:
-        """Call the rules after a step, and return their actions, timed; none once the game is over."""
+        """Call the rules after a step, and return their actions with the present time; none once the game is over."""
         self.step_info, self._done = StepInfo(time, frame, contacts, tuple(self._done)), []
         return () if self.rules.game_over is not None else _timed(self.rules.on_step(self.step_info), time)
 
@@ -147,7 +147,7 @@ class GameSession:
         return _timed(self.rules.on_input(control, value), time)
 
     def note_actions(self, actions: Iterable[Action]) -> None:
-        """Add actions of the player to the input of the next step; a switch of engines is not one."""
+        """Add actions of the player to the input of the next step, except switches of the engine."""
         self._done += [action for action in actions if not isinstance(action, Switch)]
 
     def replay(self, time: float, own: Sequence[Action], recorded: Sequence[Action]) -> None:
@@ -167,7 +167,7 @@ class GameSession:
         self.replay_player(time, left)
 
     def replay_player(self, time: float, recorded: Sequence[Action]) -> None:
-        """Repeat the recorded inputs of a time, s, and compare the results with the player's recorded actions."""
+        """Repeat the recorded inputs of a time, s, and compare the resulting actions with the recorded ones."""
         actions: list[Action] = []
         while self._pressed < len(self._presses) and self._presses[self._pressed].time <= time + REPLAY_ROUNDING:
             press = self._presses[self._pressed]
@@ -210,14 +210,14 @@ class HeadlessGame:
     def actions_between_steps(
         self, time: float, frame: Frame, contacts: Contacts, given: Sequence[Action], last: bool
     ) -> Sequence[Action]:
-        """Return the actions to apply between two steps, in order: those of rules, player, and the given ones.
+        """Return the actions to apply between two steps, in order: of the rules, of the player, and the given ones.
 
         Args:
             time: s.
             frame: the present state.
             contacts: contacts of the last step.
-            given: actions that are applied in any case; in a replay these are all.
-            last: whether no step follows; the player is not asked then.
+            given: additional actions; in a replay, all recorded actions.
+            last: whether no step follows; then the policy is not called.
         """
         session, policy = self._session, self._policy
         own = session.on_step(time, frame, contacts)

@@ -1,8 +1,8 @@
-"""GameSpec: the names of a game in scene files, and where its parts are. This module imports nothing of the package.
+"""Specification of a game: its names in scene files, and the import strings of its parts.
 
 Parts are named by import strings, `module:Name`, and imported when they are first used, so that reading a scene
-imports neither rules nor pygame. A package of its own registers a game by an entry point of the group `sandbox.games`
-whose object is a `GameSpec`, see `sandbox.games.names`.
+imports neither rules nor pygame. This module imports nothing of the package. Other packages register a game by an entry
+point of the group `sandbox.games` whose object is a `GameSpec`, see `sandbox.games.names`.
 """
 
 from collections.abc import Mapping
@@ -30,26 +30,27 @@ class GameSpec:
     names: tuple[str, ...]
     """values of `[play] game`"""
     rules: str | None = None
-    """`(scene, bodies) -> Rules`, a class or a function. It may raise `UnsuitableSceneError`"""
+    """`(scene, bodies) -> Rules`, a class or a function; it may raise `UnsuitableSceneError`"""
     tables: Mapping[str, str] = field(default_factory=dict)
     """tables of scene files: heading → `GameTable` or `Preset`; only for games of this package"""
     bot: str | None = None
     """`(seed) -> Policy`: the player `skilled`"""
     view: str | None = None
-    """`() -> GameView`: draws what is special to the game; the only part, besides `controls`, that imports pygame"""
+    """`() -> GameView`: draws the game-specific elements; only this part and `controls` import pygame"""
     controls: str | None = None
-    """input handling of the window, for games whose input is more than the keys of `Rules.controls`"""
+    """input handling of the window, for games with other input than the keys of `Rules.controls`"""
     environments: tuple[Environment, ...] = ()
     """Gymnasium environments; only for games of this package"""
     rules_on_request: bool = False
-    """whether a scene also runs without the rules: commands start them only for a named player, or for a recording with
+    """whether scenes also run without the rules: commands start them only if a player is given, or for a recording with
     inputs"""
     real_time: bool = False
-    """whether time matters from the first step: the window waits for a key press before it starts the game"""
+    """whether the game runs in real time from the first step: the window waits for a key press to start it"""
     presents: str | None = None
     """`(scene) -> bool`: whether `view` draws a scene; default: scenes whose `[play] game` is one of `names`"""
     needs_player: str | None = None
-    """`(scene) -> str | None`: the reason why the player `none` would leave a scene unchanged for ever"""
+    """`(scene) -> str | None`: the reason why the game does not proceed without input, with the player `none`; None if
+    it does"""
 
 
 def import_part(path: str) -> Any:

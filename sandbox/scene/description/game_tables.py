@@ -1,4 +1,4 @@
-"""Tables of games in a scene file: a scene has a field for each, and imports the game whose table occurs.
+"""Tables of games in scene files: a scene has a field for each, and imports a game only if its table occurs.
 
 A game adds tables by `GameSpec.tables`. A table that expands to elements is a `sandbox.scene.files.presets.Preset`,
 other tables are a `GameTable`.
@@ -22,7 +22,7 @@ GAMES = "sandbox.games.names"
 """Module with the games, read through this import string: scenes import no game statically."""
 
 GAME_TABLES: dict[str, str] = import_module(GAMES).game_tables()
-"""Import string, `module:name`, of each table by heading; it names a `GameTable`. Presets expand in this order."""
+"""Import string, `module:name`, of the `GameTable` of each heading. Presets expand in this order."""
 
 PRESETS = tuple(heading for heading in GAME_TABLES if "." not in heading)
 """Tables at the top of a document, which are fields of a scene and expand to its elements."""
@@ -38,12 +38,12 @@ class GameTable:
     about: str
     """description of the key, for the JSON schema"""
     is_kept: bool = True
-    """whether a scene still has the table after it has been read; otherwise its elements replace it"""
+    """whether a scene still has the table after it has been read; otherwise elements replace the table"""
 
 
 @cache
 def game_table(heading: str) -> GameTable:
-    """Return the table of a heading, and import its game.
+    """Import the game of a heading, and return its table.
 
     Raises:
         KeyError: `GAME_TABLES` has no such heading.
@@ -71,7 +71,7 @@ class LazyTable:
         Raises:
             pydantic.ValidationError: it has faults; pydantic adds their locations to those of the scene.
         """
-        if info.mode == "json":  # where arrays stand for tuples; validators in Python get them as lists
+        if info.mode == "json":  # arrays are valid tuples in JSON mode only; here they are lists
             return self.model.model_validate_json(json.dumps(value), by_alias=True, by_name=False)
         return self.model.model_validate(value)
 
@@ -84,10 +84,10 @@ class LazyTable:
 
 
 def with_game_tables(within: str = "") -> Callable[[type[Model]], type[Model]]:
-    """Return a class decorator that adds a field for each table of `GAME_TABLES`, after those that the class has.
+    """Return a class decorator that adds a field for each table of `GAME_TABLES`, after the existing ones.
 
     Args:
-        within: heading of the table that holds them, such as `play`; default: the scene itself.
+        within: heading of the table that contains them, such as `play`; default: the scene itself.
     """
     keys = {heading.rpartition(".")[2]: heading for heading in GAME_TABLES if heading.rpartition(".")[0] == within}
     fields: dict[str, Any] = {key: (Annotated[Any, LazyTable(heading)], None) for key, heading in keys.items()}
@@ -99,17 +99,17 @@ def with_game_tables(within: str = "") -> Callable[[type[Model]], type[Model]]:
 
 
 def is_generated(model: type) -> bool:
-    """Return whether `with_game_tables` made a model: it has no source text."""
+    """Return whether a model was created by `with_game_tables`, so that it has no source text."""
     return model.__module__ == __name__
 
 
 def unexpanded(scene: Part) -> str | None:
-    """Return the heading of the first table whose elements have yet to replace it; None if there is none."""
+    """Return the heading of the first table that has not been replaced by its elements; None without one."""
     return next((key for key in PRESETS if getattr(scene, key) is not None and not game_table(key).is_kept), None)
 
 
 def lazy_table(field: FieldInfo) -> LazyTable | None:
-    """Return the table that a field is for; None for other fields."""
+    """Return the annotation of the field of a table; None for other fields."""
     return next((each for each in field.metadata if isinstance(each, LazyTable)), None)
 
 
@@ -118,6 +118,6 @@ def table_of(part: Part, model: type[Model]) -> Model | None:
 
     Args:
         part: a scene, or its `play`.
-        model: of the table, such as `sandbox.games.artillery.scene.Artillery`.
+        model: model of the table, such as `sandbox.games.artillery.scene.Artillery`.
     """
     return next((value for value in vars(part).values() if isinstance(value, model)), None)
