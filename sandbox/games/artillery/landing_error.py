@@ -120,7 +120,7 @@ def _exact(world: World, velocity: FloatArray) -> Landing:
         ValueError: the shot does not land within the limits of time and range.
     """
     near = _from(FAR, world, velocity)
-    return _from(1.0 + 2.0 * abs(near.place[0]), world, velocity)  # a smaller origin offset rounds less
+    return _from(1.0 + 2.0 * abs(near.place[0]), world, velocity)  # a smaller offset has smaller rounding errors
 
 
 def _from(half: float, world: World, velocity: FloatArray) -> Landing:

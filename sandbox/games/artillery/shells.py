@@ -112,7 +112,7 @@ class FlightSegment:
 def returned(
     place: FloatArray, velocity: FloatArray, ground: Ground, edges: Edges
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Return position and velocity of a shell that an end of the terrain returns; None if it is inside or may leave."""
+    """Return position and velocity of a shell after it has passed an end; None if it is inside, or may leave."""
     if edges == "open" or 0.0 <= place[0] <= ground.width:
         return None
     return times_past(place, velocity, 1 if place[0] > 0.0 else -1, ground.width, edges)
@@ -304,7 +304,7 @@ class Projectiles:
         return self._left(shell, time) if self._edges == "open" else self._roll_past(shell, time)
 
     def _roll_past(self, shell: Shell, time: float) -> list[Action]:
-        """Return a roller that has passed an end of the terrain; it explodes if the terrain is higher there."""
+        """Move a roller that has passed an end of the terrain back inside; it explodes if it is then underground."""
         ground = self._field.ground
         beyond = returned(shell.place, shell.velocity, ground, self._edges)
         assert beyond is not None

@@ -101,7 +101,7 @@ class TrialShots:
             self._number, self._state, self._gap = self._number[flying], self._state[:, flying], self._gap[flying]
 
     def _return(self) -> None:
-        """Return the shells that have passed an end of the terrain."""
+        """Move shells that have passed an end of the terrain back inside."""
         state, ground = self._state, self._ground
         for side, wall in ((-1.0, 0.0), (1.0, ground.width)):
             out = side * (state[0, :, 0] - wall) > 0.0
