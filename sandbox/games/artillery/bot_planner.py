@@ -24,7 +24,7 @@ WORK = 6_000
 search takes about 80 steps"""
 
 
-def hit_probabilities(seed: int, turn: int) -> np.random.Generator:
+def turn_generator(seed: int, turn: int) -> np.random.Generator:
     """Return the random generator of a turn; generators of different turns are independent."""
     return draws(Stream.SHELL, seed, turn)
 

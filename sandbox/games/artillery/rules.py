@@ -17,7 +17,7 @@ from sandbox.action import Action, SetParameter
 from sandbox.arrays import FloatArray
 from sandbox.games.artillery.ballistics import Flight, landing
 from sandbox.games.artillery.battlefield import PAUSE, WEAPONS, WHOLE, Battlefield, Tank
-from sandbox.games.artillery.bot_planner import BotPlanner, hit_probabilities
+from sandbox.games.artillery.bot_planner import BotPlanner, turn_generator
 from sandbox.games.artillery.shells import ArtilleryShot, Projectiles
 from sandbox.games.artillery.targeting import FiringSolution
 from sandbox.games.artillery.view_state import (
@@ -354,7 +354,7 @@ class ArtilleryRules:
         most = self.artillery.wind
         if not most:
             return []
-        wind = (float(hit_probabilities(self.world.seed, 2 * self.turn).uniform(-most, most)), 0.0)
+        wind = (float(turn_generator(self.world.seed, 2 * self.turn).uniform(-most, most)), 0.0)
         self.world = self.world.model_copy(update={"wind": wind})
         return [SetParameter(time=self._time, path="world.wind", value=list(wind))]
 
@@ -370,9 +370,7 @@ class ArtilleryRules:
             self._gunner.hold(tank, passed)
             return []
         if self._thought is None:
-            self._thought = BotPlanner(
-                self.world, self.field, tank, hit_probabilities(self.world.seed, 2 * self.turn + 1)
-            )
+            self._thought = BotPlanner(self.world, self.field, tank, turn_generator(self.world.seed, 2 * self.turn + 1))
             tank.weapon = self._thought.weapon
         if self._aim is None:
             self._aim = self._thought.go_on()

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from sandbox.games.artillery.ballistics import landing
 from sandbox.games.artillery.battlefield import WEAPONS, Battlefield, Muzzle
-from sandbox.games.artillery.bot_planner import ANGLE_ERROR, BotPlanner, choose_shot, hit_probabilities
+from sandbox.games.artillery.bot_planner import ANGLE_ERROR, BotPlanner, choose_shot, turn_generator
 from sandbox.games.artillery.scene import Edges
 from sandbox.games.artillery.targeting import AimSolver, FiringSolution, TargetingProblem
 from sandbox.scene.files.load import loads
@@ -90,7 +90,7 @@ def laid_out(bot: float) -> Battlefield:
 
 def thought_of(turn: int, bot: float) -> FiringSolution:
     field = laid_out(bot)
-    aim = BotPlanner(loads(DUEL).world, field, field.tanks.every[0], hit_probabilities(0, turn)).go_on(10**9)
+    aim = BotPlanner(loads(DUEL).world, field, field.tanks.every[0], turn_generator(0, turn)).go_on(10**9)
     assert aim is not None
     return aim
 
@@ -114,10 +114,10 @@ def test_less_skill_errs_normally_and_by_the_turn() -> None:
     best = thought_of(0, bot=1.0)
     assert best == thought_of(1, bot=1.0)  # no error, whatever the chances
     assert true.angle != best.angle
-    errors = np.array([hit_probabilities(3, turn).standard_normal(2) for turn in range(400)])
+    errors = np.array([turn_generator(3, turn).standard_normal(2) for turn in range(400)])
     assert abs(errors.mean()) < 4.0 / math.sqrt(800)  # 4 σ of a mean
     assert errors.std() == pytest.approx(1.0, abs=4.0 / math.sqrt(1600))
-    random = hit_probabilities(0, 0)
+    random = turn_generator(0, 0)
     choose_shot(laid_out(0.75).tanks, laid_out(0.75).tanks.every[0], random)
     first = random.standard_normal(2)
     assert true.angle - best.angle == pytest.approx(0.25 * ANGLE_ERROR * first[0], abs=1e-12)

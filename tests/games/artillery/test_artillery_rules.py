@@ -12,7 +12,7 @@ from dueling import two_tanks
 from sandbox.action import Action, SetParameter, actions_from_json
 from sandbox.engines.switching import start
 from sandbox.games.artillery.battlefield import PER_KILL, WEAPONS, Battlefield, Weapon
-from sandbox.games.artillery.bot_planner import hit_probabilities
+from sandbox.games.artillery.bot_planner import turn_generator
 from sandbox.games.artillery.rules import ArtilleryRules
 from sandbox.games.artillery.shells import ArtilleryShot
 from sandbox.games.contract import Press, UnsuitableSceneError
@@ -152,7 +152,7 @@ def test_wind_is_of_the_turn_and_of_the_seed() -> None:
         assert all(abs(wind) <= 6.0 for wind in winds[-1])
     assert len(winds[0]) == 2
     assert winds[0] != winds[1]
-    assert winds[0] == [float(hit_probabilities(2, 2 * turn).uniform(-6.0, 6.0)) for turn in (1, 2)]
+    assert winds[0] == [float(turn_generator(2, 2 * turn).uniform(-6.0, 6.0)) for turn in (1, 2)]
 
 
 @pytest.mark.parametrize(("time", "disturbed"), [(0.05, False), (1.0, True)])
