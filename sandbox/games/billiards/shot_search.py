@@ -28,23 +28,24 @@ THINNEST = 0.2
 """cosine of the thinnest candidate cut, 78°"""
 
 GRAZE = 0.98
-"""fraction of two radii; a smaller overlap does not block a path, as jaws and throw are neglected"""
+"""fraction of two radii: a ball that is closer to a path blocks it. Less than 1, because the estimate neglects jaws and
+throw and should not rule out a shot for a grazing contact"""
 
 
 @dataclass(frozen=True, eq=False)
 class PotOptions:
-    """Straight shots from one place at T balls to P pockets."""
+    """Straight shots from one position at T balls to P pockets."""
 
     ghost: FloatArray
-    """(T, P, 2) m, where the cue ball is to touch"""
+    """(T, P, 2) m, ghost ball: centre of the cue ball at contact"""
     chance: FloatArray
-    """(T, P) that the ball falls; 0 where something is in the way"""
+    """(T, P) probability of the pot, 0 to 1; 0 if a ball blocks the path"""
     distance: FloatArray
-    """(T, P) from the cue ball to the ghost ball, m"""
+    """(T, P) m, distance from the cue ball to the ghost ball"""
 
 
 def mouths(layout: TableGeometry, radius: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return what is aimed at: a point in each pocket's mouth, (P, 2) m, its way in, (P, 2), and its width, (P,) m."""
+    """Return aiming points in the mouths of P pockets, (P, 2) m, unit vectors into them, (P, 2), and radii, (P,) m."""
     holes = np.array(list(layout.pockets.values()), dtype=float).reshape(-1, 3)
     (x0, y0), (x1, y1) = layout.area
     inset = 0.7 * radius
@@ -57,15 +58,15 @@ def mouths(layout: TableGeometry, radius: float) -> tuple[FloatArray, FloatArray
 def pot_options(
     layout: TableGeometry, radius: float, cue: FloatArray, targets: FloatArray, others: FloatArray, sigma: float
 ) -> PotOptions:
-    """Return the straight shots.
+    """Return the straight shots at each ball on to each pocket.
 
     Args:
-        layout: of the table.
-        radius: of the balls, m.
-        cue: (2,) m, where the cue ball is.
-        targets: (T, 2) m, the balls on.
-        others: (B, 2) m, all object balls, those on too.
-        sigma: rad, the error of the player's aim.
+        layout: geometry of the table.
+        radius: radius of the balls, m.
+        cue: (2,) m, position of the cue ball.
+        targets: (T, 2) m, positions of the balls on.
+        others: (B, 2) m, positions of all object balls, including the balls on.
+        sigma: standard deviation of the player's aim, rad.
     """
     points, inward, width = mouths(layout, radius)
     to_mouth = points[None] - targets[:, None]
@@ -92,7 +93,7 @@ def pot_options(
 
 
 def _blocked(begin: FloatArray, end: FloatArray, others: FloatArray, radius: float) -> bool:
-    """Return whether a ball blocks the straight path of another."""
+    """Return whether a ball blocks the straight path of another, from `begin` to `end`."""
     way, apart = end - begin, others - begin
     share = np.clip(apart @ way / max(float(way @ way), 1e-18), 0.0, 1.0)
     away = apart - share[:, None] * way
@@ -101,7 +102,7 @@ def _blocked(begin: FloatArray, end: FloatArray, others: FloatArray, radius: flo
 
 
 def _erf(x: FloatArray) -> FloatArray:
-    """Return the error function to 5e-4 (Abramowitz & Stegun 7.1.27), which is more than a guess deserves."""
+    """Return the error function for x ≥ 0, to 5e-4 (Abramowitz & Stegun 7.1.27); the estimate itself is coarser."""
     return np.asarray(1.0 - (1.0 + 0.278393 * x + 0.230389 * x**2 + 0.000972 * x**3 + 0.078108 * x**4) ** -4)
 
 
@@ -115,26 +116,26 @@ class ShotEvaluator:
 
     match: Match
     table: Table
-    """the same on the exact engine"""
+    """the table of the match on the exact engine"""
     sigma: float
-    """rad, the error of the player's aim"""
+    """standard deviation of the player's aim, rad"""
 
     @cached_property
     def radius(self) -> float:
-        """Of the cue ball, m."""
+        """Radius of the cue ball, m."""
         return self.match.layout.radius[self.match.layout.number[self.match.cue]]
 
     @cached_property
     def place(self) -> FloatArray:
-        """(2,) m, where the cue ball lies."""
+        """(2,) m, position of the cue ball."""
         return np.array(self.match.position[self.match.layout.number[self.match.cue]])
 
     def outcome(self, stroke: Stroke, call: ShotCall | None = None) -> tuple[Match, ShotCall] | None:
-        """Return what a stroke leads to, and the call that goes with it; None where it cannot be computed.
+        """Return the match after a stroke and the call for it; None if the engine cannot compute the shot.
 
         Args:
-            stroke: as it is played, without an error.
-            call: what was said; without one, what this very stroke would do is called.
+            stroke: stroke as played; no error is added.
+            call: call before the stroke; default: the call that fits the result, from `called`.
         """
         match = self.match
         try:
@@ -147,7 +148,10 @@ class ShotEvaluator:
         return match.played(contacts, outcome.position, call), call
 
     def worth(self, made: tuple[Match, ShotCall] | None) -> float:
-        """Return how good what a stroke led to is for the player, −1 to 1 and a little more for points."""
+        """Return the value of an outcome for the player: ±1.5 for a won or lost frame, −1 if it could not be computed.
+
+        Other outcomes have a value of −0.7 to 0.8 by the ease of the next shot, plus the value of the points, `UNIT`.
+        """
         if made is None:
             return -1.0
         me, after = self.match.turn, made[0]
@@ -162,11 +166,11 @@ class ShotEvaluator:
 
 
 UNIT = {"snooker": 0.04, "three-cushion": 0.5, "straight-rail": 0.4, "free": 0.1}
-"""value of a point, relative to that of the table"""
+"""value of a point, by game; points of other games are ignored"""
 
 
 def ease(match: Match, sigma: float) -> float:
-    """Return the chance of the best straight shot for whoever is to shoot, 0 to 1; in carom a guess by distances."""
+    """Return the probability of the player's best straight shot, 0 to 1; in carom an estimate by distances."""
     if match.state.in_hand is not None:
         return IN_HAND
     cue, targets, others = standing(match)
@@ -180,14 +184,14 @@ def ease(match: Match, sigma: float) -> float:
 
 
 def straight(match: Match, sigma: float) -> PotOptions:
-    """Return the straight shots of whoever is to shoot, at the balls on in the order of `match.state.table`."""
+    """Return the straight shots of the player to shoot, at the balls on in the order of `match.state.table`."""
     cue, targets, others = standing(match)
     radius = match.layout.radius[match.layout.number[match.cue]]
     return pot_options(match.layout, radius, cue, targets, others, max(sigma, 1e-3))
 
 
 def standing(match: Match) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return where the cue ball, the balls on and all object balls lie, (2,), (T, 2) and (B, 2) m."""
+    """Return the positions of the cue ball, (2,), of the balls on, (T, 2), and of all object balls, (B, 2), m."""
     number, position, on = match.layout.number, match.position, match.targets
     cue = match.cue
     balls = [ball for ball in match.state.table if ball != cue]
@@ -197,7 +201,7 @@ def standing(match: Match) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def called(match: Match, happenings: tuple[ShotEvent, ...]) -> ShotCall:
-    """Return the call that goes with what is meant to happen: the ball touched first, the last ball's pocket."""
+    """Return the call that fits the events of a shot: the ball that was hit first, or a required pocket."""
     choices = match.choices
     if not choices.balls:
         return ShotCall()
@@ -217,22 +221,22 @@ SPEEDS = (1.2, 2.0, 3.2)
 """m/s, cue speeds of candidate pots"""
 
 HEIGHTS = (-0.3, 0.0, 0.3)
-"""draw, stun, follow"""
+"""offset of the tip above the centre, in radii, of candidate pots: draw, stun, follow"""
 
 THROWS = 7
-"""candidate aims to either side of the ghost ball, because throw and spin turn the path of the object ball"""
+"""number of candidate aims on either side of the ghost ball; throw and spin turn the path of the object ball"""
 
 ASIDE = 0.12
-"""rad, range of these aims to either side, as directions of the object ball"""
+"""rad: range of these aims on either side, as a change of the direction of the object ball"""
 
 COMBINATIONS = 5
-"""number of pairs of ball and pocket that are simulated"""
+"""number of pairs of a ball and a pocket that are simulated"""
 
 
 def pot_candidates(trial: ShotEvaluator, most: int = COMBINATIONS) -> list[Stroke]:
-    """Return strokes that pot a ball on: the middle of the aims that do, for each speed and height.
+    """Return strokes that pot a ball on: for each speed and height, the middle of the aims that succeed.
 
-    The likeliest balls and pockets by geometry are tried with a fan of aims each.
+    A fan of aims is simulated for each of the `most` likeliest pairs of a ball and a pocket by geometry.
     """
     match, shots = trial.match, straight(trial.match, trial.sigma)
     order = np.argsort(-shots.chance, axis=None, kind="stable")[:most]
@@ -274,7 +278,7 @@ def _middle(row: Sequence[bool]) -> int | None:
 def directions_all_around(
     trial: ShotEvaluator, count: int, speeds: Sequence[float], sides: Sequence[float] = (0.0,)
 ) -> Iterator[Stroke]:
-    """Yield strokes in every direction, and more of them towards the balls: kicks, banks, caroms, safeties."""
+    """Yield strokes in all directions, most densely towards the nearest balls: kicks, banks, caroms, safeties."""
     cue, targets, others = standing(trial.match)
     aims = list(np.linspace(-math.pi, math.pi, count, endpoint=False))
     balls = targets if trial.match.layout.pockets else others
@@ -288,7 +292,7 @@ def directions_all_around(
 
 
 def break_candidates(trial: ShotEvaluator) -> Iterator[Stroke]:
-    """Yield opening strokes of pool: hard, full or nearly so on what stands nearest."""
+    """Yield opening strokes of pool: hard, at or near the centre of the nearest ball."""
     cue, targets, _ = standing(trial.match)
     x, y = targets[np.argmin(np.hypot(*(targets - cue).T))] - cue
     half = 2.0 * trial.radius / math.hypot(x, y)

@@ -69,28 +69,28 @@ class Billiards(Part):
 INCH = 0.0254  # m
 
 NOSE = 0.64
-"""of a ball's diameter, the height of a cushion's nose: WPA, height of the cushion, asks for 62.5 to 64.5 %"""
+"""height of a cushion nose as a fraction of the ball diameter; WPA, height of the cushion: 62.5 to 64.5 %"""
 
 
 @dataclass(frozen=True)
 class PocketOpening:
-    """How cushions end at a pocket, and the hole behind; m and degrees."""
+    """Dimensions of a pocket: ends of its cushions, and hole; m and degrees."""
 
     mouth: float
-    """between the lips, where the lines of nose and facing would meet if they were not rounded"""
+    """width between the lips, where the lines of nose and facing meet, without rounding"""
     angle: float
-    """of the rubber, between nose and facing"""
+    """angle of the rubber between nose and facing"""
     shelf: float
-    """from the middle of the mouth to the edge of the hole"""
+    """distance from the middle of the mouth to the edge of the hole"""
     radius: float
-    """of the hole"""
+    """radius of the hole"""
     jaw: float
-    """radius of the arc, tangent to nose and facing, that rounds a lip"""
+    """radius of the arc that rounds a lip, tangent to nose and facing"""
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table: playing area between the noses, openings, the balls that are played on it, and spots; m."""
+    """Dimensions of a table: playing area between the noses, pockets, default ball set, and spots; m."""
 
     width: float
     length: float
@@ -101,7 +101,7 @@ class Table:
 
 
 def _pool(length: float, corner: PocketOpening, middle: PocketOpening) -> Table:
-    """Return a table twice as long as wide. WPA: head and foot strings lie a quarter of the length from the ends."""
+    """Return a table twice as long as wide. WPA: head and foot strings are a quarter of the length from the ends."""
     width = 0.5 * length
     return Table(width, length, "pool", _strings(width, length), corner, middle)
 
@@ -112,20 +112,22 @@ def _strings(width: float, length: float) -> dict[str, Point]:
 
 
 # WPA, pocket openings: corner mouth 4.5 to 4.625 in, side mouth 5 to 5.125 in, cut 142° and 104°, shelf 1 to 2.25 in
-# and 0 to 0.375 in. Mouths are in the middle of that; the shelf at the corner lets a ball that is aimed at the hole's
-# middle from the table's pass the jaws. The rules give neither hole nor how round a lip is: holes are as wide as the
-# mouths, and the jaws, 20.95 and 7.95 mm, were measured on a Showood table (Kiefl, pooltool).
+# and 0 to 0.375 in. The mouths are the middle of these ranges. The corner shelf is chosen so that a ball aimed from the
+# centre of the table at the centre of the hole clears the jaws. The rules state neither the size of the holes nor the
+# rounding of the lips: holes are as wide as the mouths, and the jaws, 20.95 and 7.95 mm, were measured on a Showood
+# table (Kiefl, pooltool).
 WPA_CORNER = PocketOpening(4.5625 * INCH, 142.0, 1.125 * INCH, 2.28125 * INCH, 0.02095)
 WPA_SIDE = PocketOpening(5.0625 * INCH, 104.0, 0.1875 * INCH, 2.53125 * INCH, 0.00795)
 
-# BCA, for home tables too, the middle of what it allows: corner mouth 4.875 to 5.125 in, side mouth 5.375 to 5.625 in,
-# cut 142° and 103°, shelf 1.625 to 1.875 in and 0 to 0.375 in.
+# BCA, which covers home tables too; the middle of each range: corner mouth 4.875 to 5.125 in, side mouth 5.375 to
+# 5.625 in, cut 142° and 103°, shelf 1.625 to 1.875 in and 0 to 0.375 in.
 BCA_CORNER = PocketOpening(5.0 * INCH, 142.0, 1.75 * INCH, 2.5 * INCH, 0.02095)
 BCA_SIDE = PocketOpening(5.5 * INCH, 103.0, 0.1875 * INCH, 2.75 * INCH, 0.00795)
 
-# WPBSA: the openings "conform to the templates authorised", which are not published. Taken are facings that are
-# parallel, 85 mm apart at the corners and 87 mm in the middle, about what is told of tables in play; long arcs as jaws,
-# of 3.6 and 2.5 in, and falls 36 mm behind the mouth (Kiefl, pooltool's generic table), in the middle at the nose line.
+# WPBSA: the openings "conform to the templates authorised", which are not published. Facings here are parallel, 85 mm
+# apart at the corners and 87 mm in the middle, close to reported dimensions of tables in play. The jaws are long arcs,
+# 3.6 and 2.5 in, and the corner holes begin 36 mm behind the mouth (Kiefl, pooltool's generic table), the middle holes
+# at the nose line.
 SNOOKER_CORNER = PocketOpening(0.085, 135.0, 0.036, 0.0430, 3.6 * INCH)
 SNOOKER_MIDDLE = PocketOpening(0.087, 90.0, 0.0, 0.0445, 2.5 * INCH)
 
@@ -146,7 +148,7 @@ def _snooker_table() -> Table:
 
 
 def _carom() -> Table:
-    """UMB 11: 2.84 × 1.42 m. UMB 13: spots on the long axis, and two 182.5 mm to the sides of the head spot."""
+    """UMB 11: 2.84 × 1.42 m. UMB 13: spots on the long axis, and two spots 182.5 mm to either side of the head spot."""
     width, length = 1.42, 2.84
     spots = _strings(width, length)
     (x, y), aside = spots["head"], 0.1825
@@ -154,7 +156,7 @@ def _carom() -> Table:
 
 
 TABLES: dict[TableName, Table] = {
-    "pool-7ft": _pool(78.0 * INCH, BCA_CORNER, BCA_SIDE),  # BCA: 78 × 39 in of a 7 ft table of full size
+    "pool-7ft": _pool(78.0 * INCH, BCA_CORNER, BCA_SIDE),  # BCA: 78 × 39 in for a full-size 7 ft table
     "pool-8ft": _pool(92.0 * INCH, WPA_CORNER, WPA_SIDE),  # WPA, playing surface: 92 × 46 in
     "pool-9ft": _pool(100.0 * INCH, WPA_CORNER, WPA_SIDE),  # WPA, playing surface: 100 × 50 in
     "snooker-12ft": _snooker_table(),
@@ -172,20 +174,20 @@ WHITE = "#f4f1e6"
 
 @dataclass(frozen=True)
 class BallSet:
-    """Balls that are played with each other, all alike but for name and colour."""
+    """Set of balls of one game, equal except for name and colour."""
 
     radius: float
     """m"""
     mass: float
     """kg"""
     colours: dict[str, str]
-    """by name; the first is struck"""
+    """colours by name; the first ball is the cue ball"""
     nose: float | None = None
-    """height of the cushions' noses where rules state it in itself, m"""
+    """height of the cushion noses, m, if the rules state it as a length; default: `NOSE` times the diameter"""
     sliding: float = 0.2
     rolling: float = 0.01
     spinning: float = 0.444
-    """of the radius, 1/m: μ_sp = 0.444 R, so that every ball loses 10.9 rad/s of its spin about z each second"""
+    """spinning friction per radius, 1/m: μ_sp = 0.444 R, so that a spin about z decays by 10.9 rad/s each second"""
 
 
 SOLIDS = {
@@ -200,13 +202,13 @@ SOLIDS = {
 
 
 def _striped(colour: str) -> str:
-    """Return a solid's colour lightened halfway to white: a disc of one colour can have no stripe."""
+    """Return a solid's colour lightened halfway to white, because a disc of one colour cannot show a stripe."""
     parts = [(int(colour[k : k + 2], 16) + int(WHITE[k : k + 2], 16)) // 2 for k in (1, 3, 5)]
     return "#" + "".join(f"{part:02x}" for part in parts)
 
 
 POOL = BallSet(
-    # WPA, balls: 2.25 in; 5.5 to 6 oz, here the 6 of which most sets are
+    # WPA, balls: 2.25 in; 5.5 to 6 oz, here 6 oz as in most sets
     radius=0.028575,
     mass=0.170097,
     colours={
@@ -218,7 +220,7 @@ POOL = BallSet(
 )
 
 SNOOKER = BallSet(
-    # WPBSA 2: 52.5 mm, all of equal weight to 3 g, which it does not give; sets weigh about 140 g
+    # WPBSA 2: 52.5 mm, weights equal to within 3 g. It states no weight; balls weigh about 140 g
     radius=0.02625,
     mass=0.140,
     colours={
@@ -250,10 +252,10 @@ RACK_SPOTS: dict[RackName, tuple[str, ...]] = {
     "carom": ("head", "foot"),
     "none": (),
 }
-"""The spots that place the balls of each rack."""
+"""Spots that each rack needs."""
 
 RACK_BALLS: dict[RackName, str] = {"8-ball": "pool", "9-ball": "pool", "snooker": "snooker", "carom": "carom"}
-"""The set of balls of each rack."""
+"""Ball set of each rack."""
 
 
 MATERIAL = "cushion"
@@ -266,14 +268,14 @@ CUSHIONS = (
     "upper left cushion",
     "lower left cushion",
 )
-"""Anti-clockwise, each after the pocket of the same number."""
+"""Names of cushions, anticlockwise; cushion k follows pocket k."""
 
 UP, DOWN, LEFT, RIGHT = (0.0, 1.0), (0.0, -1.0), (-1.0, 0.0), (1.0, 0.0)
 
 
 @dataclass(frozen=True)
 class PocketLip:
-    """One end of a cushion: which way the cushion runs from there, and which way is out of the playing area."""
+    """End of a cushion at a pocket: unit vectors along the cushion from the pocket, and out of the playing area."""
 
     along: Vector
     out: Vector
@@ -281,7 +283,7 @@ class PocketLip:
 
 @dataclass(frozen=True)
 class PocketHole:
-    """A pocket's place: where its two nose lines meet, and its lips, anti-clockwise around the table."""
+    """Position of a pocket on the nose lines of its two cushions, and its lips, anticlockwise around the table."""
 
     name: str
     at: Point
@@ -291,7 +293,7 @@ class PocketHole:
 
 @dataclass(frozen=True)
 class StaticColliders:
-    """What of a table is fixed."""
+    """Static bodies and pockets of a table."""
 
     walls: tuple[Wall, ...]
     posts: tuple[Post, ...]
@@ -299,11 +301,11 @@ class StaticColliders:
 
 
 def static_colliders(table: Table, nose: float) -> StaticColliders:
-    """Lay out the cushions and pockets of a table.
+    """Return the cushions and pockets of a table.
 
     Args:
-        table: its figures.
-        nose: height of the cushions' noses, m.
+        table: dimensions of the table.
+        nose: height of the cushion noses, m.
     """
     holes = _holes(table)
     if not holes:
@@ -327,7 +329,7 @@ def static_colliders(table: Table, nose: float) -> StaticColliders:
 
 
 def _holes(table: Table) -> tuple[PocketHole, ...]:
-    """Return the pockets of a table, anti-clockwise from the lower left."""
+    """Return the pockets of a table, anticlockwise from the lower left."""
     if table.corner is None or table.middle is None:
         return ()
     w, length, corner, middle = table.width, table.length, table.corner, table.middle
@@ -354,14 +356,14 @@ def _wall(name: str, ends: tuple[Point, Point], nose: float) -> Wall:
 
 
 def _lip(hole: PocketHole, lip: PocketLip) -> Point:
-    """Return where the lines of nose and facing meet."""
+    """Return the intersection of the lines of nose and facing, m."""
     (ax, ay), (bx, by) = (each.along for each in hole.lips)
     half_angle = 0.5 * math.acos(ax * bx + ay * by)  # between the pocket's axis and its nose lines
     return _displaced(hole.at, lip.along, 0.5 * hole.opening.mouth / math.sin(half_angle))
 
 
 def _rounded(opening: PocketOpening) -> float:
-    """Return how far from a lip the jaw touches nose and facing, m."""
+    """Return the distance from a lip to the points where the jaw is tangent to nose and facing, m."""
     return opening.jaw * math.tan(0.5 * math.radians(180.0 - opening.angle))
 
 
@@ -370,7 +372,7 @@ def _nose_end(hole: PocketHole, lip: PocketLip) -> Point:
 
 
 def _centre(hole: PocketHole) -> Point:
-    """Return the middle of the hole: straight out from the middle of the mouth."""
+    """Return the centre of the hole, m, straight out from the middle of the mouth."""
     (ax, ay), (bx, by) = (_lip(hole, lip) for lip in hole.lips)
     x, y = (sum(lip.out[k] for lip in hole.lips) for k in (0, 1))
     size = math.hypot(x, y)
@@ -380,7 +382,7 @@ def _centre(hole: PocketHole) -> Point:
 
 
 def _facing(hole: PocketHole, lip: PocketLip) -> tuple[Point, Point] | None:
-    """Return the ends of a facing, from the jaw to the hole; None where the jaw reaches as far itself."""
+    """Return the ends of a facing, from the jaw to the hole, m; None if the jaw itself reaches the hole."""
     turn = math.radians(hole.opening.angle)
     (ax, ay), (ox, oy) = lip.along, lip.out
     cos, sin = math.cos(turn), math.sin(turn)
@@ -398,26 +400,26 @@ def _displaced(point: Point, way: Vector, distance: float) -> Point:
 
 
 HAIR = 1e-10
-"""m, between balls that are frozen: less than touching allows, more than rounding takes away"""
+"""m: gap between racked balls that touch; small enough to count as touching, larger than rounding errors"""
 
 ASIDE = 0.1825
-"""m, from the head spot to the ball with which a game of carom begins: UMB 13"""
+"""m: distance from the head spot to the cue ball at the start of a carom game (UMB 13)"""
 
 BREAK = 0.5
-"""of the way from brown to yellow, where the cue ball lies for a break-off"""
+"""position of the cue ball for the break-off, as a fraction of the line from brown to yellow"""
 
 
 def rack_positions(rack: RackName, spots: dict[str, Point], radius: float, gap: float, seed: int) -> dict[str, Point]:
-    """Return where the balls of a rack lie, by name, m.
+    """Return the positions of the balls of a rack by name, m.
 
     Args:
-        rack: which.
-        spots: of the table, m; those that the rack needs.
-        radius: of the balls, m.
-        gap: the most that neighbours are apart, m.
-        seed: the scene's.
+        rack: name of the rack.
+        spots: spots of the table, m; at least those that the rack needs.
+        radius: radius of the balls, m.
+        gap: largest gap between neighbours, m.
+        seed: seed of the scene.
     """
-    from sandbox.scene.random_streams import Stream, draws  # numpy, which the tables' models do without
+    from sandbox.scene.random_streams import Stream, draws  # imports numpy, which the models must not
 
     random = draws(Stream.RACK, seed)
     match rack:
@@ -436,7 +438,7 @@ def rack_positions(rack: RackName, spots: dict[str, Point], radius: float, gap: 
 
 
 def _eight_ball(random: np.random.Generator) -> list[list[str]]:
-    """WPA, 8-ball rack: the 8 in the middle, a ball of each group in the rear corners, the others at random."""
+    """WPA, 8-ball rack: the 8 in the middle, a ball of each group in the rear corners, the others shuffled."""
     solids, stripes = _shuffled(range(2, 8), random), _shuffled(range(9, 16), random)
     corners = _shuffled((solids.pop(), stripes.pop()), random)
     rest = _shuffled((*solids, *stripes), random)
@@ -445,7 +447,7 @@ def _eight_ball(random: np.random.Generator) -> list[list[str]]:
 
 
 def _nine_ball(random: np.random.Generator) -> list[list[str]]:
-    """WPA, 9-ball rack: a diamond, the 1 at the top on the foot spot, the 9 in the middle, the others at random."""
+    """WPA, 9-ball rack: a diamond, the 1 at the top on the foot spot, the 9 in the middle, the others shuffled."""
     rest = _shuffled(range(2, 9), random)
     return _rows([1, *rest[:3], 9, *rest[3:]], (1, 2, 3, 2, 1))
 
@@ -470,7 +472,7 @@ def _pyramid(
 def _lattice(
     rows: list[list[str]], begin: Point, along: Vector, radius: float, gap: float, random: np.random.Generator
 ) -> dict[str, Point]:
-    """Lay rows of balls, the first at a point, the others behind it."""
+    """Return the positions of rows of balls, the first row at `begin`, the others behind it along `along`, m."""
     pitch, loose = 2.0 * radius + max(0.5 * gap, HAIR), 0.25 * gap
     places: dict[str, Point] = {}
     for k, row in enumerate(rows):
@@ -491,7 +493,7 @@ def _rows(order: list[int] | range, sizes: tuple[int, ...]) -> list[list[str]]:
 
 
 def _shuffled(numbers: range | tuple[int, ...], random: np.random.Generator) -> list[int]:
-    """Return numbers in an order of chance, by uniform doubles alone: their stream is stable in numpy."""
+    """Return numbers in random order. Only uniform doubles are drawn, because numpy keeps their stream stable."""
     return [number for _, number in sorted((float(random.random()), number) for number in numbers)]
 
 

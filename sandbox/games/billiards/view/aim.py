@@ -25,12 +25,13 @@ from sandbox.window.render.palette import (
 from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
 
 FADE = 3.0
-"""m along a way after which it is half as bright"""
+"""m along a path over which its brightness halves"""
 FAINTEST = 0.16
+"""least brightness of a path, as a fraction"""
 LENGTH = 1.47
-"""m, of a cue; for balls of another size, in proportion"""
+"""m: length of a cue for balls of radius `BALL`; it scales with the ball"""
 BALL = 0.028575
-"""m, the radius of the balls that such a cue is for"""
+"""m: ball radius for which the dimensions of the cue are given"""
 PARTS: tuple[tuple[float, float, float, Colour], ...] = (
     (0.000, 0.008, 0.0064, (64, 128, 190)),
     (0.008, 0.030, 0.0066, (238, 234, 222)),
@@ -40,13 +41,13 @@ PARTS: tuple[tuple[float, float, float, Colour], ...] = (
     (1.130, 1.420, 0.0136, (34, 32, 38)),
     (1.420, 1.470, 0.0146, (22, 20, 22)),
 )
-"""From the tip to the butt: from, to, half the width where it begins, colour; m. Widths grow evenly."""
+"""Parts of the cue from tip to butt: start, end, half width at the start, m, and colour. Widths change linearly."""
 BUTT = 0.0148
-"""m, half the width at the end"""
+"""m: half width at the butt"""
 
 
 def draw_paths(view: DrawContext, aim: CueAim, colours: ColourArray) -> None:
-    """Draw where the cue ball and the first ball that it hits would go; below the balls."""
+    """Draw the predicted paths of the cue ball and of the first ball that it hits; drawn below the balls."""
     found = aim.forecast
     if found is None:
         return
@@ -59,13 +60,13 @@ def draw_paths(view: DrawContext, aim: CueAim, colours: ColourArray) -> None:
 
 
 def _faded(view: DrawContext, colour: Colour, share: float) -> Colour:
-    """Return a colour of which so much is seen, on what is below."""
+    """Return a colour blended with the cloth or the background; `share` is the opacity."""
     scene = view.snapshot.scene
     return mix_colours(BACKGROUND if scene.play.area is None else felt_of(scene).bed, colour, share)
 
 
 def _way(view: DrawContext, points: FloatArray, colour: Colour, width: float) -> None:
-    """Draw a way, the fainter the farther along."""
+    """Draw a path that fades along its length."""
     pixels = view.camera.to_screen(points).tolist()
     steps = np.hypot(*np.diff(points, axis=0).T)
     bright = np.maximum(0.5 ** (np.cumsum(steps) / FADE), FAINTEST).tolist()
@@ -74,7 +75,7 @@ def _way(view: DrawContext, points: FloatArray, colour: Colour, width: float) ->
 
 
 def _end(view: DrawContext, points: FloatArray, aim: CueAim, falls: bool, colour: Colour) -> None:
-    """Draw where a ball comes to rest, or that it falls."""
+    """Draw the end of a path: a ring where the ball comes to rest, a smaller, bolder one if it is pocketed."""
     radius = float(view.snapshot.bodies.radius[aim.ball])
     tint = colour if falls else _faded(view, colour, 0.45)
     _ring(view, points[-1], (0.55 if falls else 1.0) * radius, tint, 2.2 if falls else 1.2)
@@ -89,7 +90,7 @@ def _ring(view: DrawContext, at: FloatArray, radius: float, colour: Colour, line
 
 
 def draw_aim(view: DrawContext, aim: CueAim) -> None:
-    """Draw what lies above the balls: the ghost of the cue ball, what was called, the hand or the cue."""
+    """Draw the layer above the balls: called pocket and ball, ghost ball, ball in hand, and cue."""
     radius = float(view.snapshot.bodies.radius[aim.ball])
     if aim.called is not None:
         _ring(view, np.asarray(aim.called[0]), aim.called[1] + 0.25 * radius, YELLOW, 2.5)
@@ -106,7 +107,7 @@ def draw_aim(view: DrawContext, aim: CueAim) -> None:
 
 
 def _straight(view: DrawContext, aim: CueAim) -> None:
-    """Draw a line along the cue, where nobody can tell what it would lead to."""
+    """Draw a straight line along the cue, for shots without a prediction."""
     x, y = aim.place
     ends = np.asarray([(x, y), (x + 10.0 * math.cos(aim.angle), y + 10.0 * math.sin(aim.angle))])
     a, b = view.camera.to_screen(ends).tolist()
@@ -118,7 +119,7 @@ def _cue(view: DrawContext, aim: CueAim, radius: float) -> None:
     size = radius / BALL
     x, y = aim.place
     cos, sin = math.cos(aim.angle), math.sin(aim.angle)
-    # Side to the right is where the player sees it, who looks along the cue.
+    # `side` is positive to the right as seen along the cue.
     start = x + sin * aim.side * radius, y - cos * aim.side * radius
     off = math.sqrt(max(1.0 - aim.side**2, 0.0)) * radius + 0.006 * size + aim.back
 
@@ -144,7 +145,7 @@ def _cue(view: DrawContext, aim: CueAim, radius: float) -> None:
 
 
 def _taper(view: DrawContext, a: Pixel, b: Pixel, halves: tuple[float, float], colour: Colour) -> None:
-    """Draw a piece that grows from one half width to another, px, with flat ends."""
+    """Draw a tapered segment with flat ends; `halves` are the half widths at `a` and `b`, px."""
     length = math.hypot(b[0] - a[0], b[1] - a[1])
     if length < 1e-3:
         return
@@ -155,7 +156,7 @@ def _taper(view: DrawContext, a: Pixel, b: Pixel, halves: tuple[float, float], c
         x, y = px - a[0], py - a[1]
         t = x * along[0] + y * along[1]
         across = np.abs(y * along[0] - x * along[1]) - halves[0] - slope * t
-        return np.asarray(np.maximum(across, np.maximum(-t, t - length) - 0.5))  # half a pixel over the next piece
+        return np.asarray(np.maximum(across, np.maximum(-t, t - length) - 0.5))  # overlaps the next by half a pixel
 
     reach = math.ceil(max(halves)) + 2
     left, top = math.floor(min(a[0], b[0])) - reach, math.floor(min(a[1], b[1])) - reach

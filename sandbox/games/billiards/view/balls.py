@@ -27,18 +27,19 @@ IVORY: Colour = hex_colour(WHITE)
 RED: Colour = (196, 44, 40)
 DARK: Colour = (24, 24, 28)
 STRIPE = 0.58
-"""half the width of a stripe, of the radius"""
+"""half width of a stripe, in ball radii"""
 DISC = 0.46
-"""radius of the disc under a number, likewise"""
+"""radius of the disc under a number, in ball radii"""
 SPOT = 0.17
+"""radius of a spot, in ball radii"""
 BRIGHT = 350
-"""Sum of its colour's parts, from which a ball's spots are red; else they are white."""
+"""sum of red, green and blue, 0 to 765, above which a ball has red spots; darker balls have ivory spots"""
 STRUCK = ("cue", "white", "yellow")
-"""Balls that cues strike, by name; a yellow one only on a table with a white."""
+"""Names of cue balls; `yellow` is one only on a table with a `white`."""
 
 
 class BallTexture(NamedTuple):
-    """How a ball is painted."""
+    """Pattern and colour of a ball."""
 
     kind: TextureKind
     colour: Colour
@@ -46,12 +47,12 @@ class BallTexture(NamedTuple):
 
 
 def texture_of(name: str, colour: Colour, struck: bool) -> BallTexture:
-    """Return the coat of a ball.
+    """Return the texture of a ball.
 
     Args:
-        name: numbers of pool have stripes and figures.
-        colour: as the scene has it.
-        struck: whether it is one that cues strike.
+        name: name of the ball; the numbered balls of pool have labels and stripes.
+        colour: colour of the ball in the scene.
+        struck: whether it is a cue ball, which has spots.
     """
     if struck:
         return BallTexture("spots", colour)
@@ -65,18 +66,18 @@ def texture_of(name: str, colour: Colour, struck: bool) -> BallTexture:
 
 
 def paint_texture(coat: BallTexture, ball: FloatArray, radius: float) -> FloatArray:
-    """Return the colours (P, 3) at points (P, 3) of the unit sphere, in the ball's own frame.
+    """Return the colours at points of the unit sphere, (P, 3), 0 to 255.
 
     Args:
-        coat: of the ball.
-        ball: the points.
-        radius: of the ball in the picture, px, for edges as soft as a pixel.
+        coat: texture of the ball.
+        ball: (P, 3) points in the body frame.
+        radius: radius of the drawn ball, px; edges are antialiased over a pixel.
     """
     own, soft = np.asarray(coat.colour, np.float64), max(radius, 1.0)
     if coat.kind == "plain":
         return np.broadcast_to(own, ball.shape)
     if coat.kind == "spots":
-        off = 1.0 - np.abs(ball).max(axis=1)  # from the nearest of the six ends of the axes, of the height
+        off = 1.0 - np.abs(ball).max(axis=1)  # 1 − cos of the angle to the nearest axis; the chord is √(2·off)
         share = np.clip((SPOT - np.sqrt(2.0 * off)) * soft + 0.5, 0.0, 1.0)
         spot = RED if sum(coat.colour) > BRIGHT else IVORY
         return np.asarray(own + (np.asarray(spot) - own) * share[:, None])
@@ -97,7 +98,7 @@ def paint_texture(coat: BallTexture, ball: FloatArray, radius: float) -> FloatAr
 
 @lru_cache(maxsize=512)
 def _figure(label: str, side: int) -> FloatArray:
-    """Return how much ink a number has at the pixels of its disc, (side, side)."""
+    """Return the coverage of a label at the pixels of its disc, (side, side), 0 to 1."""
     large = pygame.Surface((128, 128), pygame.SRCALPHA)
     draw_text(large, label, (64, 66), 92 if len(label) == 1 else 76, (255, 255, 255), "center", bold=True)
     small = pygame.transform.smoothscale(large, (side, side))
@@ -105,23 +106,23 @@ def _figure(label: str, side: int) -> FloatArray:
 
 
 MAX_STEP = 0.5
-"""s between two pictures over which balls are seen to roll; over more they were put where they are"""
+"""s: longest interval between drawn frames over which balls roll; after a longer one they were placed"""
 
 
 class BallOrientations:
-    """The orientations of balls, from picture to picture. Balls lie at random at first, their faces upwards."""
+    """Orientations of balls, integrated from frame to frame. Initially random, with the labels facing up."""
 
     def __init__(self) -> None:
         self.turned: FloatArray = np.empty((0, 3, 3))
-        """(N, 3, 3) from a ball's own frame to the world's"""
+        """(N, 3, 3) rotation matrices from the body frame to the world frame"""
         self.version: IntArray = np.empty(0, np.int64)
-        """(N,) which grows when a ball turns"""
+        """(N,) counter that increases whenever a ball turns"""
         self._time: float | None = None
         self.goes_on = False
-        """whether the last picture was of a moment before"""
+        """whether the last frame directly follows the one before, within `MAX_STEP`"""
 
     def go_on(self, frame: Frame) -> None:
-        """Let the balls roll on to a frame. Time that runs backwards rolls nothing back."""
+        """Integrate the rotations up to a frame. A step back in time leaves them unchanged."""
         count, known = len(frame.position), len(self.turned)
         if count > known:
             self.turned = np.concatenate((self.turned, [_thrown(k) for k in range(known, count)]))
@@ -141,7 +142,7 @@ class BallOrientations:
 
 
 def _thrown(number: int) -> FloatArray:
-    """Return how a ball lies at first: about its own number, and always the same."""
+    """Return the initial orientation of a ball, (3, 3), with its index as the random seed."""
     random = np.random.default_rng(number)
     tilt = random.uniform(-0.45, 0.45, 3)
     tilt[2] = random.uniform(-0.9, 0.9)
@@ -149,7 +150,7 @@ def _thrown(number: int) -> FloatArray:
 
 
 def _rotations(vectors: FloatArray) -> FloatArray:
-    """Return the rotations (K, 3, 3) about vectors (K, 3) by their lengths, rad (Rodrigues)."""
+    """Return the matrices, (K, 3, 3), of rotations about vectors, (K, 3), by their lengths, rad (Rodrigues)."""
     angle = np.linalg.norm(vectors, axis=1)
     axis = vectors / np.maximum(angle, 1e-300)[:, None]
     x, y, z = axis.T
@@ -160,7 +161,7 @@ def _rotations(vectors: FloatArray) -> FloatArray:
 
 
 def _squared_up(matrices: FloatArray) -> FloatArray:
-    """Return rotations without what rounding has added to them."""
+    """Return rotation matrices re-orthonormalised against rounding errors."""
     x = matrices[:, :, 0] / np.linalg.norm(matrices[:, :, 0], axis=1)[:, None]
     z = np.cross(x, matrices[:, :, 1])
     z /= np.linalg.norm(z, axis=1)[:, None]
@@ -168,34 +169,35 @@ def _squared_up(matrices: FloatArray) -> FloatArray:
 
 
 FINEST, LARGEST = 48.0, 160.0
-"""px: what moves is drawn no finer than the first, what rests than the second, and larger by scaling"""
+"""px: largest radius at which sprites of moving and of resting balls are shaded; larger balls are scaled up"""
 OFFSETS = 4
-"""Balls lie at quarters of a pixel, so that slow ones do not jerk."""
+"""subpixel positions of a sprite along each axis, so that slow balls move smoothly"""
 DROP = 0.18
-"""s in which a ball that has fallen is seen to sink"""
+"""s: duration of the animation of a pocketed ball"""
 LIGHT = (-0.42, 0.50, 0.757)
+"""unit vector towards the light, x to the right and y up as seen"""
 SHADOW = 150
-"""of 255, at its darkest"""
+"""greatest opacity of a shadow, of 255"""
 
 
 class ShadedBall(NamedTuple):
-    """The pixels of a sphere of some size, P of them inside."""
+    """Shading of a sphere at one size and subpixel offset, for its P covered pixels."""
 
     side: int
     inside: npt.NDArray[np.bool_]
-    """(side, side)"""
+    """(side, side) mask of the covered pixels"""
     normal: FloatArray
-    """(P, 3) as seen, x to the right and y up"""
+    """(P, 3) normals in screen axes, x to the right and y up"""
     cover: FloatArray
-    """(P,)"""
+    """(P,) coverage, 0 to 1"""
     shade: FloatArray
-    """(P, 1) of its colour"""
+    """(P, 1) factor of the diffuse colour"""
     shine: FloatArray
-    """(P, 1) added, of 255"""
+    """(P, 1) specular light that is added, of 255"""
 
 
 class BallRenderer:
-    """Draws the balls of a table, and keeps how they lie between pictures."""
+    """Draws the balls of a table, and keeps their orientations between frames."""
 
     def __init__(self) -> None:
         self._rolling = BallOrientations()
@@ -205,7 +207,7 @@ class BallRenderer:
         self._fell: dict[int, float] = {}
 
     def draw(self, view: DrawContext) -> None:
-        """Draw those that are in sight; who lies in a pocket is not seen."""
+        """Draw the visible balls; a pocketed ball sinks and disappears."""
         bodies, frame = view.snapshot.bodies, view.snapshot.frame
         self._know(view)
         self._rolling.go_on(frame)
@@ -234,24 +236,24 @@ class BallRenderer:
         self._known = bodies
         self._sprites.clear()
         struck = {name for name in STRUCK if name != "yellow" or "white" in bodies.names}
-        if view.snapshot.scene.play.game is None:  # a study of spin: all of it is to be seen
+        if view.snapshot.scene.play.game is None:  # no game, a study of spin: spots on all balls
             struck = set(bodies.names)
         colours = dict(zip(view.shown.tolist(), view.colours.tolist(), strict=True))
         self._coats = tuple(
             texture_of(name, _three(colours.get(number, (128, 128, 128))), name in struck)
             for number, name in enumerate(bodies.names)
         )
-        if len(colours) < len(bodies):  # who is out of sight has no colour yet
+        if len(colours) < len(bodies):  # balls outside the view have no colour yet
             self._known = None
 
     def _sunk(self, view: DrawContext) -> dict[int, float]:
-        """Return how far balls have sunk that lie in a pocket, from 0 to 1."""
+        """Return the progress of the sinking animation of pocketed balls by index, 0 to 1."""
         frame, scene = view.snapshot.frame, view.snapshot.scene
         found: dict[int, float] = {}
         for hole in scene.pockets:
             within = (frame.position == np.asarray(hole.position)).all(axis=1) & frame.present
             for number in np.flatnonzero(within).tolist():
-                # Who lay there when it was looked at for the first time was not seen to fall.
+                # A ball that was pocketed before the first drawn frame, or during a jump in time, is not animated.
                 since = self._fell.setdefault(number, frame.time if self._rolling.goes_on else -math.inf)
                 found[number] = min((frame.time - since) / DROP, 1.0)
         for number in [each for each in self._fell if each not in found or self._fell[each] > frame.time]:
@@ -288,7 +290,7 @@ def _sprite(
 ) -> pygame.Surface:
     globe = _globe(size, offset)
     normal = globe.normal
-    if camera.turned:  # to the right is y, up is −x
+    if camera.turned:  # +y is to the right, −x is up
         normal = np.stack((-normal[:, 1], normal[:, 0], normal[:, 2]), 1)
     colours = paint_texture(coat, normal @ turned, size / 8.0)
     lit = np.clip((colours * globe.shade + globe.shine) * bright, 0.0, 255.0)
@@ -301,7 +303,12 @@ def _sprite(
 
 @lru_cache(maxsize=256)
 def _globe(size: int, offset: tuple[int, int]) -> ShadedBall:
-    """Return the pixels of a sphere of a radius in eighths of a pixel, its middle at quarters of one."""
+    """Return the shading of a sphere.
+
+    Args:
+        size: radius, in eighths of a pixel.
+        offset: subpixel offset of the centre, in units of 1/`OFFSETS` px.
+    """
     radius = size / 8.0
     half = math.ceil(radius) + 1
     side = 2 * half + 1

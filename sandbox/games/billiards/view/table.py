@@ -1,4 +1,4 @@
-"""Drawing of a table: wood, cloth, cushions, pockets, spots and strings. It changes only with the camera.
+"""Drawing of a table: wood, cloth, cushions, pockets, spots and strings. The result depends only on scene and camera.
 
 The outlines of cushions are computed from walls, jaws and facings, in metres. A cushion is a wall along an edge of the
 playing area. At each end it may be rounded by a jaw, a post that touches its end, and continue along a facing, a wall
@@ -23,26 +23,26 @@ from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
 from sandbox.window.render.static_geometry import draw_static_bodies
 
 DEPTH = 0.036
-"""of a table's width, from the nose of a cushion to the wood"""
+"""width of a cushion from the nose to the wood, as a fraction of the table width"""
 TOUCH = 1e-6
-"""m: what is nearer touches"""
+"""m: objects whose distance is smaller touch"""
 ARC = math.radians(6.0)
-"""from point to point of a jaw"""
+"""rad between consecutive points of a jaw"""
 
 
 class CushionOutline(NamedTuple):
-    """One piece of rubber."""
+    """Outline of one cushion."""
 
     outline: tuple[Point, ...]
-    """all around, m"""
+    """closed polygon, m"""
     nose: tuple[Point, ...]
-    """the part of it that balls meet, m"""
+    """part of the outline that balls can touch: nose, jaws and facings, m"""
     out: Vector
-    """away from the playing area"""
+    """unit vector out of the playing area"""
 
 
 def cushion_outlines(scene: Scene, area: Box) -> tuple[CushionOutline, ...]:
-    """Return the cushions of a table, as far as its fixed things are such."""
+    """Return the cushions among the walls of a scene."""
     depth = DEPTH * table_width(area)
     noses = {k: out for k, wall in enumerate(scene.walls) if (out := _out(wall, area)) is not None}
     facings = [wall for k, wall in enumerate(scene.walls) if k not in noses and len(wall.points) == 2]
@@ -50,7 +50,7 @@ def cushion_outlines(scene: Scene, area: Box) -> tuple[CushionOutline, ...]:
 
 
 def walls_that_are_no_cushions(scene: Scene, area: Box) -> tuple[tuple[Wall, ...], tuple[Post, ...]]:
-    """Return the walls and posts that are no part of the cushions."""
+    """Return the walls and posts that are not part of a cushion."""
     noses = [(wall, out) for wall in scene.walls if (out := _out(wall, area)) is not None]
     jaws = [jaw for wall, out in noses for end in wall.points if (jaw := _jaw(end, out, scene)) is not None]
     known = [wall for wall, _ in noses] + [
@@ -61,12 +61,12 @@ def walls_that_are_no_cushions(scene: Scene, area: Box) -> tuple[tuple[Wall, ...
 
 
 def _jaw(end: Point, out: Vector, scene: Scene) -> Post | None:
-    """Return the post that a nose touches where it ends."""
+    """Return the post that the end of a nose touches; None if there is none."""
     return next((post for post in scene.posts if math.dist(post.position, _moved(end, out, post.radius)) < TOUCH), None)
 
 
 def _out(wall: Wall, area: Box) -> Vector | None:
-    """Return the way out of the area, of a wall along one of its edges."""
+    """Return the outward unit vector of a wall along an edge of the area; None for other walls."""
     if len(wall.points) != 2 or wall.closed:
         return None
     (left, bottom), (right, top) = area
@@ -91,7 +91,7 @@ def _cushion(wall: Wall, out: Vector, scene: Scene, facings: list[Wall], depth: 
     nose = (*reversed(first), *last)
     height = [(x - a[0]) * out[0] + (y - a[1]) * out[1] for x, y in (nose[0], nose[-1])]
     corners = [_moved(nose[-1], out, max(depth - height[1], 0.0)), _moved(nose[0], out, max(depth - height[0], 0.0))]
-    if len(last) == 1:  # no jaw: it meets the next cushion in a mitre
+    if len(last) == 1:  # no jaw: mitre joint with the next cushion
         corners[0] = _moved(corners[0], along, depth)
     if len(first) == 1:
         corners[1] = _moved(corners[1], back, depth)
@@ -99,7 +99,7 @@ def _cushion(wall: Wall, out: Vector, scene: Scene, facings: list[Wall], depth: 
 
 
 def _end(end: Point, along: Vector, out: Vector, scene: Scene, facings: list[Wall], depth: float) -> tuple[Point, ...]:
-    """Return the points from where a nose ends around its jaw and along its facing."""
+    """Return the points from the end of a nose around its jaw and along its facing."""
     jaw = _jaw(end, out, scene)
     if jaw is None:
         return (end,)
@@ -121,7 +121,7 @@ def _end(end: Point, along: Vector, out: Vector, scene: Scene, facings: list[Wal
 
 
 def _from_jaw(wall: Wall, jaw: Post) -> tuple[Point, Point] | None:
-    """Return the ends of a wall that begins on a jaw and leaves it straight, the one on the jaw first."""
+    """Return the ends of a wall that leaves a jaw tangentially, the end on the jaw first; None for other walls."""
     for near, far in (wall.points, wall.points[::-1]):
         x, y = near[0] - jaw.position[0], near[1] - jaw.position[1]
         leaves = abs(x * (far[0] - near[0]) + y * (far[1] - near[1])) < TOUCH
@@ -142,11 +142,11 @@ HOLE: Colour = (8, 8, 10)
 PEARL: Colour = (206, 200, 184)
 CHALK: Colour = (226, 236, 232)
 LIT, UNLIT = 1.12, 0.80
-"""how bright the cloth is in the middle and at its corners"""
+"""brightness of the cloth in the middle and at the corners, as a factor"""
 
 
 class ClothColours(NamedTuple):
-    """The colours of a cloth."""
+    """Colours of a cloth: bed, cushions, and the line along their noses."""
 
     bed: Colour
     rubber: Colour
@@ -160,14 +160,23 @@ FELTS = {"snooker": SNOOKER, "three-cushion": CAROM, "straight-rail": CAROM}
 
 
 def felt_of(scene: Scene) -> ClothColours:
-    """Return the colours of a table's cloth, by the game that it is for."""
+    """Return the cloth colours of the scene's game."""
     return FELTS.get(scene.play.game or "free", POOL)
 
 
 def draw_table(
     surface: pygame.Surface, camera: Camera, scene: Scene, area: Box, unit: float = 1.0, antialias: bool = True
 ) -> None:
-    """Draw a table, as far as it is in sight."""
+    """Draw the visible part of a table.
+
+    Args:
+        surface: target.
+        camera: transform from m to px.
+        scene: table.
+        area: playing area, m.
+        unit: UI scale, px per nominal pixel.
+        antialias: whether edges are antialiased.
+    """
     felt = felt_of(scene)
     pen = _TablePen(surface, camera, unit, antialias)
     rubber, width = cushion_outlines(scene, area), table_width(area)
@@ -197,7 +206,7 @@ def draw_table(
 
 
 class _TablePen:
-    """Draws in metres."""
+    """Drawing functions that take coordinates in metres."""
 
     def __init__(self, surface: pygame.Surface, camera: Camera, unit: float, antialias: bool) -> None:
         self.surface, self.camera, self.unit, self.antialias = surface, camera, unit, antialias
@@ -209,7 +218,7 @@ class _TablePen:
         fill_polygon(self.surface, self.at(points), colour, self.antialias)
 
     def box(self, box: Box, colour: Colour, rounding: float = 0.0) -> None:
-        """Fill a box; SDL would have its sides at whole pixels, which is what is wanted."""
+        """Fill a box, with its sides rounded to whole pixels so that they are sharp."""
         (left, top), (right, bottom) = _corners(self.camera, box)
         area = self.surface.get_rect().inflate(400, 400)
         left, right = (min(max(x, area.left), area.right) for x in (left, right))
@@ -232,13 +241,13 @@ class _TablePen:
 
 
 def _corners(camera: Camera, box: Box) -> tuple[Pixel, Pixel]:
-    """Return the upper left and the lower right corner of a box in the picture."""
+    """Return the upper left and the lower right corner of a box on the screen, px."""
     (ax, ay), (bx, by) = camera.to_screen(np.asarray(box)).tolist()
     return (min(ax, bx), min(ay, by)), (max(ax, bx), max(ay, by))
 
 
 def _wood(pen: _TablePen, area: Box, width: float) -> None:
-    """Draw the rails: dark without, a bevel of light within."""
+    """Draw the rails as nested boxes: a dark outer edge, a light bevel, the wood, and a dark inner edge."""
     rim, depth = RAIL * width, DEPTH * width
     for out, colour in (
         (rim, WOOD_DARK),
@@ -254,18 +263,18 @@ def _wood(pen: _TablePen, area: Box, width: float) -> None:
 def _throat(
     pen: _TablePen, hole: Point, radius: float, rubber: tuple[CushionOutline, ...], area: Box, colour: Colour
 ) -> None:
-    """Draw the cloth between the two cushions that a pocket cuts."""
+    """Draw the cloth in the mouth of a pocket, between the ends of its two cushions."""
     reach = 3.0 * radius + 0.1 * table_width(area)
     ends = [nose for each in rubber for nose in (each.nose, each.nose[::-1]) if math.dist(nose[0], hole) < reach]
     ends.sort(key=lambda nose: math.dist(nose[0], hole))
     if len(ends) >= 2:
-        # Two fans with the hole's middle: from each lip to where its nose line is straight.
+        # The polygon joins the centre of the hole to the points of each lip, up to the straight part of the nose.
         a, b = (nose[: max(len(nose) // 2, 2)] for nose in ends[:2])
         pen.polygon((hole, *a, *reversed(b)), colour)
 
 
 def _light(surface: pygame.Surface, camera: Camera, area: Box) -> None:
-    """Light the bed from above its middle."""
+    """Brighten the middle of the bed and darken its corners."""
     (left, top), (right, bottom) = _corners(camera, area)
     depth = DEPTH * table_width(area) * camera.scale
     seen = surface.get_rect()
@@ -280,7 +289,7 @@ def _light(surface: pygame.Surface, camera: Camera, area: Box) -> None:
     y = (rect.top + (np.arange(grain[1]) + 0.5) * rect.height / grain[1] - (top + bottom) / 2) / (bottom - top)
     far = np.clip((x[:, None] ** 2 + y[None, :] ** 2) / 0.5, 0.0, 1.0)
     bright = LIT + (UNLIT - LIT) * far
-    # SDL cannot multiply by more than 1: what is above is added.
+    # SDL cannot multiply by more than 1; the excess is added.
     dimmed, added = np.clip(bright, 0.0, 1.0) * 255.0, np.clip(bright - 1.0, 0.0, 1.0) * 110.0
     for tone, flag in ((dimmed, pygame.BLEND_RGB_MULT), (added, pygame.BLEND_RGB_ADD)):
         layer = pygame.surfarray.make_surface(np.repeat(np.rint(tone)[:, :, None], 3, 2).astype(np.uint8))
@@ -288,7 +297,7 @@ def _light(surface: pygame.Surface, camera: Camera, area: Box) -> None:
 
 
 def _marks(pen: _TablePen, scene: Scene, area: Box, felt: ClothColours) -> None:
-    """Draw strings and spots, faintly."""
+    """Draw the head string or baulk line, the D, and the spots."""
     spots = {spot.name: spot.position for spot in scene.play.spots}
     faint, (left, bottom), (right, top) = mix_colours(felt.bed, CHALK, 0.32), *area
     tall, thin = top - bottom > right - left, 1.2 * pen.unit
@@ -309,7 +318,7 @@ def _marks(pen: _TablePen, scene: Scene, area: Box, felt: ClothColours) -> None:
 
 
 def _shadow(pen: _TablePen, cushion: CushionOutline, felt: ClothColours, reach: float) -> None:
-    """Darken the cloth below a nose."""
+    """Draw the shadow of a nose on the cloth, up to `reach` m."""
     for share, dark in ((1.0, 0.10), (0.62, 0.20), (0.3, 0.32)):
         by = reach * share
         moved = tuple((x - cushion.out[0] * by, y - cushion.out[1] * by) for x, y in cushion.nose)
@@ -317,7 +326,7 @@ def _shadow(pen: _TablePen, cushion: CushionOutline, felt: ClothColours, reach: 
 
 
 def _diamonds(pen: _TablePen, scene: Scene, area: Box, width: float) -> None:
-    """Draw the sights on the rails; snooker has none."""
+    """Draw the diamonds on the rails; snooker tables have none."""
     if scene.play.game == "snooker" or not scene.play.spots or any(s.name == "brown" for s in scene.play.spots):
         return
     (left, bottom), (right, top) = area
