@@ -1,14 +1,14 @@
 """Billiards: pool, carom and snooker on any engine that supports a `[surface]`.
 
-- `rules`: the rules of each game as state machines, which know neither engine nor table
-- `match`: `Match`, an immutable frame between two shots: rules, scores, positions
+- `rules`: rules of each game as state machines, independent of engine and table
+- `match`: `Match`, a frame between two shots as an immutable value: rules, scores, positions
 - `game`: `BilliardsRules`, the `Rules` of running games
-- `bot`: `BilliardsBot`, which chooses shots, and `BilliardsPolicy`, which plays both players of a headless game
+- `bot`: `BilliardsBot`, which chooses shots, and `BilliardsPolicy`, which plays for both players of a headless game
 - `headless`: frames between bots, for `sandbox match`
 - `tables`, `scene`: dimensions, and the `[billiards]` table of scene files
-- `view`: the window's part
+- `view`: drawing and input in the window
 
-A match advances by itself, without `BilliardsRules`, as follows:
+A `Match` can be used without `BilliardsRules`, as follows:
 
     match = Match.begin(load("scenes/billiards/9-ball.toml"))
     match = match.decide("play")                                   # if match.choices.decisions is not empty
@@ -19,7 +19,7 @@ A match advances by itself, without `BilliardsRules`, as follows:
     for move in match.moves(simulation.frame().position, simulation.time):
         simulation.apply(move)
 
-A shot is undone by applying the moves of the match before it.
+Applying the moves of the match before a shot undoes the shot.
 """
 
 from sandbox.games.spec import GameSpec

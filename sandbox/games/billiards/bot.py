@@ -1,8 +1,8 @@
 """Bots that play billiards.
 
 A bot lists candidate strokes by geometry, simulates them on the exact engine, lets the rules judge the results, and
-plays the stroke that is best on average with its own aiming error. `shot_search` has the candidates and their values.
-`parse_bots` reads players such as `bot:0.5`; `BilliardsPolicy` plays headless games.
+plays the stroke with the highest mean value under its own aiming error. `shot_search` provides candidates and values,
+`parse_bots` parses players such as `bot:0.5`, and `BilliardsPolicy` plays headless games.
 """
 
 import math
@@ -30,13 +30,13 @@ from sandbox.scene.description.surface import Stroke
 from sandbox.scene.random_streams import Stream, draws
 
 MAX_AIM_ERROR, MIN_AIM_ERROR = 0.03, 0.0003
-"""rad: standard deviation of the aim at skill 0 and at skill 1; geometric interpolation in between"""
+"""rad: standard deviations of the aim at skill 0 and at skill 1; between them, the interpolation is geometric"""
 
 MAX_SPEED_ERROR = 0.1
 """relative standard deviation of the speed at skill 0; a tenth of it at skill 1"""
 
 FINALISTS = 10
-"""number of the best candidates that are simulated with errors"""
+"""number of best candidates that are simulated with errors"""
 
 ERROR_SAMPLES = 8
 """number of simulations with errors per candidate"""
@@ -47,7 +47,7 @@ GOOD_VALUE = 0.45
 
 @dataclass(frozen=True)
 class BilliardsBot:
-    """Player that searches for the stroke that is best on average with its own error.
+    """Player that searches for the stroke with the highest mean value under its own aiming error.
 
     The same match, skill and seed lead to the same shot.
     """
@@ -72,7 +72,7 @@ class BilliardsBot:
         return MAX_SPEED_ERROR * math.pow(0.1, self.skill)
 
     def decide(self, match: Match) -> Decision:
-        """Return the decision with the best result for this player, by the ease of the next shot."""
+        """Return the decision after which the next shot is best for this player, by `ease`."""
         me, best, top = match.turn, match.choices.decisions[0], -math.inf
         for decision in match.choices.decisions:
             if decision == "claim":
@@ -86,7 +86,7 @@ class BilliardsBot:
         return best
 
     def plan(self, match: Match) -> FramePlan:
-        """Return the next shot, with the error of the player."""
+        """Return the next shot, with the aiming error of the player."""
         plan = self.intend(match)
         return replace(plan, stroke=self.with_error(plan.stroke, match.shots))
 
@@ -125,7 +125,7 @@ class BilliardsBot:
         return pot_candidates(trial)
 
     def _ranked(self, trial: ShotEvaluator, strokes: list[Stroke]) -> list[tuple[float, Stroke, ShotCall]]:
-        """Return the value without error, the stroke and its call, best first."""
+        """Return the strokes with their values without error and their calls, best first."""
         found = []
         for stroke in strokes:
             made = trial.outcome(stroke)
@@ -145,7 +145,7 @@ class BilliardsBot:
         return best[1], best[2]
 
     def _best_place(self, match: Match) -> Point:
-        """Return the place of a cue ball in hand, m, from which the best straight shot is easiest."""
+        """Return the place of a cue ball in hand with the highest probability of a straight pot, m."""
         at = match.position[match.layout.number[match.cue]]
         place = match.state.in_hand
         if match.state.opening or place is None or not match.layout.pockets:
@@ -160,7 +160,7 @@ class BilliardsBot:
         return best
 
     def _table(self, match: Match) -> Table:
-        """Return the table on the exact engine; it is compiled once per layout."""
+        """Return the table on the exact engine, compiled once per layout."""
         key = id(match.layout)
         if key not in self._tables or self._tables[key][0].layout is not match.layout:
             self._tables.clear()
@@ -200,20 +200,20 @@ def parse_bots(text: str, seed: int = 0) -> tuple[BilliardsBot, ...]:
 
 
 class BilliardsPolicy:
-    """Policy of headless games: bots of one skill play for every player, by the controls of `BilliardsRules`."""
+    """Policy of headless games: bots of equal skill play for both players through the controls of `BilliardsRules`."""
 
     def __init__(self, seed: int = 0, skill: float = DEFAULT_SKILL) -> None:
         """Create a bot for each of two players.
 
         Args:
-            seed: seed of their errors.
-            skill: 0 to 1.
+            seed: seed of the aiming errors.
+            skill: skill of both bots, 0 to 1.
         """
         self._bots = tuple(BilliardsBot(skill, 2 * seed + number) for number in range(2))
         self._decided: tuple[int, int] | None = None  # shots and player of the last decision
 
     def decide(self, info: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:  # noqa: ARG002
-        """Return the inputs of a decision, or of a call, a placement and a stroke, as soon as every ball is at rest."""
+        """Return the inputs of a decision, or of a call, a placement and a stroke; none while balls move."""
         if not isinstance(rules, BilliardsRules) or not rules.waiting:
             return ()
         match = rules.match

@@ -1,8 +1,8 @@
-"""Billiards as a game: fulfils the `Rules` protocol for every billiards game by way of a `Match`.
+"""Running games of billiards: implements the `Rules` protocol for every billiards game with a `Match`.
 
 A shot begins with a `Strike` and ends with the first step after which every ball is at rest. The rules collect the
 contacts of the shot, let the `Match` judge it, and answer with `Move` actions that respot or rerack balls. Balls that a
-player moves by hand between shots are accepted where they lie.
+player moves by hand between shots stay where they are put.
 
 A player acts by `Strike` and `Move` actions, or by controls. Decisions and calls are controls only. A recording that
 holds actions alone, without presses, is judged as if nothing had been called. A strike of a ball other than the cue
@@ -33,9 +33,9 @@ MIN_CUE_SPEED, MAX_CUE_SPEED = 0.05, 10.0
 MAX_TIP_OFFSET = 0.999 * MISCUE
 """greatest offset of the tip from the centre of the ball, in radii; just below where the tip slips"""
 REST_SPEED = 1e-9
-"""m/s and rad/s; a slower body is at rest. Engines set the velocity to zero at their rest cut, far above"""
+"""m/s and rad/s: a slower body is at rest. Far below the threshold at which engines set the velocity to zero"""
 MAX_JOINED_CONTACTS = 1024
-"""steps whose contacts are kept apart before they are merged; a lasting contact has one row per step"""
+"""number of steps after which the collected contacts are merged; a lasting contact has one row per step"""
 
 CONTROLS = (
     Control("shoot", "strike the cue ball; the value is the speed", ("space",), analogue=True),
@@ -53,8 +53,11 @@ CONTROLS = (
     Control("push out", "announce a push-out", (), often=0.1),
     Control("decide", "take one of the offered decisions, by its index", (), analogue=True),
 )
-"""Controls of every billiards game. Releasing a control, value 0, undoes english and announcements, and does nothing
-else. A control that selects an entry k of n takes a value from k/n to (k + 1)/n; `select_value` returns the middle."""
+"""Controls of every billiards game.
+
+Releasing a control, value 0, resets english and announcements, and has no other effect. A control that selects the
+entry k of n takes a value from k/n to (k + 1)/n; `select_value` returns the middle.
+"""
 
 
 def is_at_rest(frame: Frame) -> bool:
@@ -69,7 +72,7 @@ def select_value(index: int, count: int) -> float:
 
 
 def selected_index(value: float, count: int) -> int | None:
-    """Return the index of the entry that a control's value selects; None for 0, and where there are no entries."""
+    """Return the index of the entry that a control's value selects; None for 0, or if there are no entries."""
     return min(int(value * count), count - 1) if value > 0.0 and count > 0 else None
 
 
@@ -82,18 +85,18 @@ class BilliardsRules:
         """Start a frame.
 
         Args:
-            match: its beginning.
-            shot_in_progress: whether the scene starts with a shot of its own, which is then the first player's.
+            match: match at the start.
+            shot_in_progress: whether the scene starts with a shot of its own, which counts for the first player.
         """
         self.match = match
-        """the match before the next shot; during a shot, before that shot"""
+        """match before the next shot; during a shot, the match before that shot"""
         self.call = ShotCall()
         """call for the next shot"""
         self.log: list[tuple[float, str]] = []
-        """time, s, and text of decisions and of the results of shots"""
+        """time, s, and text of decisions and shot results"""
         self._contacts: list[Contacts] = []
         self._shot_time: float | None = 0.0 if shot_in_progress else None  # s; None between shots
-        self._is_judged = True  # False for a shot of another ball than the cue ball
+        self._is_judged = True  # False if a ball other than the cue ball was struck
         self._is_resting = not shot_in_progress
         self._time = 0.0
         along = match.layout.along
@@ -103,7 +106,7 @@ class BilliardsRules:
         self._sounds: list[str] = []
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
-        """Return a copy; matches and contacts are immutable, and shared."""
+        """Return a copy that shares the immutable matches and contacts."""
         twin = copy.copy(self)
         for name in ("log", "_contacts", "_english", "_place", "_sounds"):
             setattr(twin, name, copy.copy(getattr(self, name)))
@@ -118,7 +121,7 @@ class BilliardsRules:
 
     @property
     def game_over(self) -> str | None:
-        """Who has won the frame; None while it runs."""
+        """Result of the frame, such as `player 1 wins`; None while it is in progress."""
         state = self.match.state
         if not state.over:
             return None
@@ -126,19 +129,19 @@ class BilliardsRules:
 
     @property
     def waiting(self) -> bool:
-        """Whether every ball is at rest and the last shot is judged, so that nothing happens until a player acts."""
+        """Whether every ball is at rest and the last shot is judged, so that a player has to act next."""
         return self._is_resting and self._shot_time is None and not self.match.over
 
     @property
     def stroke(self) -> Stroke:
-        """The stroke that the controls set up, at the lowest speed."""
+        """Stroke set up by the controls, at the lowest speed."""
         side = self._english["right english"] - self._english["left english"]
         height = self._english["follow"] - self._english["draw"]
         scale = MAX_TIP_OFFSET / max(math.hypot(side, height), 1.0)
         return Stroke(aim=self._aim, speed=MIN_CUE_SPEED, side=side * scale, height=height * scale)
 
     def on_step(self, info: StepInfo) -> Sequence[Action]:
-        """Take note of strikes and moves, and judge the shot once every ball is at rest."""
+        """Follow strikes and moves, and judge the shot once every ball is at rest; return the moves of the rules."""
         started, self._time = self._time, info.time
         for action in info.actions:
             if isinstance(action, Strike):
@@ -166,31 +169,31 @@ class BilliardsRules:
         self._sounds.append("shot")
 
     def _accept_position(self, frame: Frame) -> None:
-        """Take over positions that something else than a shot has changed, such as a force."""
+        """Update the match to positions that changed without a shot, for example by a force."""
         now, count = frame.position, len(self.match.position)
-        # An engine of single precision rounds the positions of moves, which does not make them other positions.
+        # Single-precision engines round the positions of moves; such differences are ignored.
         if np.abs(now[:count] - self.match.position).max(initial=0.0) > TOUCH:
             self.match = replace(self.match, position=_points(now[:count]))
 
     def _end_shot(self, frame: Frame) -> Sequence[Action]:
-        """Judge the shot, and return the moves that put the balls where the match has them."""
+        """Judge the shot, and return the moves that take the balls to the positions of the match."""
         assert self._shot_time is not None
         count = len(self.match.position)
         position, began = frame.position[:count], self._shot_time
         after = replace(self.match, position=_points(position))
         if self._is_judged:
             contacts = Contacts.joined(self._contacts).merged() if self._contacts else Contacts.none()
-            # Bodies that were added later take no part in the game.
+            # Bodies that were added during the game are not part of it.
             contacts = contacts.some(np.max(contacts.pair, axis=1, initial=-1) < count)
             try:
                 after = self.match.played(contacts, position, self.call, began)
-            except GameError as error:  # a call that could not be made, or a ball that was brought back by hand
+            except GameError as error:  # an invalid call, or a pocketed ball that was moved back by hand
                 self.log.append((self._time, f"not judged: {error}"))
         self._contacts, self._shot_time, self.call = [], None, ShotCall()
         return self._enter(after, position)
 
     def _enter(self, match: Match, position: Any) -> Sequence[Action]:
-        """Continue with another match; return the moves that it asks for."""
+        """Continue with another match; return the moves to its positions."""
         self.match = match
         if match.verdict is not None:
             self.log += [(self._time, message) for message in match.messages]
@@ -200,7 +203,7 @@ class BilliardsRules:
         return match.moves(np.asarray(position, dtype=float), self._time)
 
     def on_input(self, control: str, value: float) -> Sequence[Action]:
-        """Set up the stroke, call, decide, place, or shoot. What the rules do not allow now is ignored."""
+        """Set up the stroke, call, decide, place, or shoot. Input that the rules do not allow now is ignored."""
         if control in self._english:
             self._english[control] = min(max(value, 0.0), 1.0)
         elif control in ("call safety", "push out"):
@@ -225,7 +228,7 @@ class BilliardsRules:
     def _act(self, name: str, value: float) -> Sequence[Action]:
         match = self.match
         if name == "shoot":
-            self._is_resting = False  # until the next step shows the effect, so that no second stroke follows at once
+            self._is_resting = False  # until the next step has applied the stroke, so that no second one is accepted
             speed = min(max(value * MAX_CUE_SPEED, MIN_CUE_SPEED), MAX_CUE_SPEED)
             return (match.strike(self.stroke.model_copy(update={"speed": speed})),)
         if name == "place":
@@ -247,7 +250,7 @@ class BilliardsRules:
         return x0 + self._place[0] * (x1 - x0), y0 + self._place[1] * (y1 - y0)
 
     def place(self, at: Point) -> Sequence[Action]:
-        """Put the cue ball, if it is in hand, at the allowed place nearest to a point, m."""
+        """Place a cue ball in hand at the allowed place nearest to a point, m; return the moves."""
         match = self.match
         if match.state.in_hand is None:
             return ()
@@ -255,22 +258,22 @@ class BilliardsRules:
         return self._enter(match.place(match.nearest(at)), before)
 
     def decide(self, decision: Decision) -> Sequence[Action]:
-        """Take a decision.
+        """Take a decision; return the moves that follow from it.
 
         Raises:
-            GameError: it is not offered now.
+            GameError: the decision is not offered now.
         """
         before = np.array(self.match.position)
         self.log.append((self._time, f"{player_name(self.match.turn)} decides: {decision}"))
         return self._enter(self.match.decide(decision), before)
 
     def decision_input(self, decision: Decision) -> tuple[str, float]:
-        """Return the control and its value that take an offered decision."""
+        """Return the control and the value that take an offered decision."""
         options = self.match.choices.decisions
         return "decide", select_value(options.index(decision), len(options))
 
     def call_inputs(self, call: ShotCall) -> tuple[tuple[str, float], ...]:
-        """Return the controls and their values that make a call."""
+        """Return the controls and values that make a call."""
         layout = self.match.layout
         pockets = tuple(layout.pockets)
         return (
@@ -289,12 +292,12 @@ class BilliardsRules:
         )
 
     def place_inputs(self, at: Point) -> tuple[tuple[str, float], ...]:
-        """Return the controls and their values that place the cue ball at a point, m."""
+        """Return the controls and values that place the cue ball at a point, m."""
         (x0, y0), (x1, y1) = self.match.layout.area
         return ("place x", (at[0] - x0) / (x1 - x0)), ("place y", (at[1] - y0) / (y1 - y0)), ("place", 1.0)
 
     def stroke_inputs(self, stroke: Stroke) -> tuple[tuple[str, float], ...]:
-        """Return the controls and their values that play a stroke; its numbers are reproduced to rounding errors."""
+        """Return the controls and values that play a stroke, exact to rounding errors."""
         side, height = stroke.side / MAX_TIP_OFFSET, stroke.height / MAX_TIP_OFFSET
         return (
             ("aim", (stroke.aim % math.tau) / math.tau or 1.0),
@@ -338,7 +341,7 @@ def start_game(scene: Scene, bodies: Bodies) -> BilliardsRules:  # noqa: ARG001,
     """Start the game that a scene names: free play with one player, every other game with two.
 
     Raises:
-        UnsuitableSceneError: it cannot be played on this table.
+        UnsuitableSceneError: the game cannot be played on this table.
     """
     try:
         return BilliardsRules(Match.begin(scene, players=1 if scene.play.game == "free" else 2), bool(scene.shots))
@@ -347,7 +350,7 @@ def start_game(scene: Scene, bodies: Bodies) -> BilliardsRules:  # noqa: ARG001,
 
 
 def needs_player(scene: Scene) -> str | None:
-    """Return why a scene stays unchanged without input: it has no shot of its own."""
+    """Return why a scene needs a player, namely that it has no shot of its own; None if it has one."""
     if scene.shots:
         return None
     return "player 'none' plays no shot, so nothing would move; use random, skilled or a script"

@@ -1,7 +1,7 @@
-"""Frames between bots without a window, and their recordings: what `sandbox match` runs.
+"""Headless frames between bots, and their recordings, for `sandbox match`.
 
-`play_frame` runs `BilliardsRules` in a `GameSession`, as every headless game, with two differences: time advances only
-during shots, and each player decides with a `Match` of its own turn.
+`play_frame` runs `BilliardsRules` in a `GameSession`, like every headless game, with two differences: time advances
+only during shots, and each player receives the `Match` at its turn.
 """
 
 from collections.abc import Callable, Sequence
@@ -71,7 +71,7 @@ class FrameTurn:
 
 @dataclass(frozen=True)
 class FrameRecord:
-    """A frame that was played, as an immutable value."""
+    """Played frame, as an immutable value."""
 
     first: Match
     """match at the start"""
@@ -147,16 +147,16 @@ def play_frame(
     """Play a match to its end.
 
     Args:
-        match: its start, with the balls where the scene has them.
+        match: match at the start, with the balls at their positions in the scene.
         players: one for each player of the match.
         engine: name of the engine.
-        most: limit of turns.
+        most: maximum number of turns.
         time_limit: wall time, s, after which no further turn begins; default: no limit.
-        told: called after every turn.
+        told: callback after every turn, with the turn and the match.
 
     Returns:
-        The frame. It is `unfinished` if a limit was reached, or if a shot did not come to rest, left all bounds or
-        exceeded a limit of the engine.
+        The frame. It is `unfinished` if a limit was reached, or if a shot did not come to rest, diverged, or exceeded
+        a limit of the engine.
 
     Raises:
         GameError: a player does something that the rules do not allow.
@@ -200,7 +200,7 @@ def play_frame(
 
 
 class FrameTable:
-    """A simulation of the table, and the game on it. Time advances only while a shot is in progress."""
+    """Simulation of a table with its game. Time advances only while a shot is in progress."""
 
     def __init__(self, match: Match, engine: str) -> None:
         self._scene, self._engine = match.scene, engine
@@ -209,7 +209,7 @@ class FrameTable:
         self._rules = BilliardsRules(match)
         self._game = GameSession(self._rules)
         self._actions: list[Action] = []
-        self._pending = list(self._look(Contacts.none()))  # actions of the rules, for the next step
+        self._pending = list(self._look(Contacts.none()))  # actions of the rules that are applied with the next shot
 
     @property
     def match(self) -> Match:
@@ -220,7 +220,7 @@ class FrameTable:
         """Take a decision.
 
         Raises:
-            GameError: it is not offered now.
+            GameError: the decision is not offered now.
         """
         options = self.match.choices.decisions
         if decision not in options:
@@ -233,7 +233,7 @@ class FrameTable:
         Raises:
             GameError: the place or the call is not allowed.
             NoRestError: the balls do not come to rest.
-            Divergence: a ball left all bounds.
+            Divergence: the simulation diverged.
             Exhaustion: the engine cannot continue.
         """
         time, match = self._simulation.time, self.match
@@ -245,7 +245,7 @@ class FrameTable:
         for control in self._rules.call_inputs(plan.call):
             self._press(control)
         acts.append(match.strike(plan.stroke, time))
-        # Not earlier: an action is recorded with the step that follows it.
+        # Applied only now, because an action is recorded with the step that follows it.
         for action in (*self._pending, *acts):
             self._simulation.apply(action)
         self._actions += [*self._pending, *acts]

@@ -1,4 +1,4 @@
-"""Match: a frame of billiards between two shots, as an immutable value: rules, turn, scores, positions.
+"""Frame of billiards between two shots, as an immutable value: rules, turn, scores, positions.
 
 `require_suitable_table` checks that a table has the balls, spots and pockets that a game needs.
 """
@@ -49,7 +49,7 @@ def require_suitable_table(layout: TableGeometry, rules: Ruleset[Any], state: Ru
     """Check that a game can be played on a table.
 
     Raises:
-        GameError: it cannot; the message names every reason.
+        GameError: the table is not suitable; the message names every reason.
     """
     wanted = {*state.table, *(rules.cue_balls if rules.name != "free" else (rules.cue_ball(state),))}
     missing, idle = sorted(wanted - set(layout.names)), sorted(set(layout.names) - wanted)
@@ -162,7 +162,7 @@ class Match:
         """Return the allowed place of the cue ball that is nearest to a point, m.
 
         Raises:
-            GameError: it is not in hand, or there is no room.
+            GameError: the cue ball is not in hand, or there is no room.
         """
         if self.state.in_hand is None:
             raise GameError("the cue ball is not in hand")
@@ -280,10 +280,10 @@ class Match:
         return [disc for name, disc in self.on_table.items() if name != cue]
 
     def _stayed_behind(self, contacts: Contacts, began: float) -> bool:
-        """Return whether a cue ball in hand behind the head string first touched a ball there without leaving.
+        """Return whether a cue ball in hand behind the head string hit a ball there before it crossed the string.
 
-        A ball on the head string is not behind it. A cue ball rolls straight, or nearly so: it can leave and come back
-        only from a cushion beyond the head string.
+        A ball on the head string is not behind it. A cue ball rolls nearly straight, so it can leave and return only by
+        way of a cushion beyond the head string.
         """
         if self.state.in_hand != "behind the head string":
             return False
@@ -310,7 +310,7 @@ class Match:
         return tuple(position)
 
     def _done(self, verdict: ShotResult[Any]) -> Self:
-        """Return the match after the reracking, restoring and respotting of a result, with its situation settled."""
+        """Return the match after a result: balls reracked, restored or respotted, and the situation settled."""
         position = self.position
         if verdict.rerack:
             position = rerack_moves(self.layout, self.rules, verdict.state)
@@ -327,7 +327,10 @@ class Match:
         return replace(after, state=settled.state, verdict=verdict.followed_by(settled))
 
     def _in_hand(self) -> Self:
-        """Return the match with a cue ball in hand at the allowed place nearest to it, or to its initial position."""
+        """Return the match with a cue ball in hand moved to the nearest allowed place.
+
+        For a pocketed cue ball it is the place nearest to its initial position.
+        """
         if self.state.in_hand is None or self.over:
             return self
         at = self.position[self.layout.number[self.cue]]
@@ -344,7 +347,7 @@ class Match:
         return situation_of(self._cues(), others, self.targets, self.state.in_hand is not None)
 
     def _cues(self) -> Iterator[PlacedDisc]:
-        """Yield the cue ball; if it is in hand, also at places all over the allowed area."""
+        """Yield the cue ball; if it is in hand, also at points spread over the allowed area."""
         radius, place = self._cue_radius, self.state.in_hand
         yield (*self.position[self.layout.number[self.cue]], radius)
         if place is not None:

@@ -1,4 +1,4 @@
-"""Ball in hand: the allowed places, and the nearest of them to a point."""
+"""Placement of a ball in hand: allowed places, and the nearest of them to a point."""
 
 import math
 from collections.abc import Sequence
@@ -11,14 +11,14 @@ from sandbox.games.billiards.table_geometry import HAIR, PlacedDisc, TableGeomet
 from sandbox.scene.description.base import Point
 
 ROUNDING = 1e-9
-"""m by which a place may exceed a bound, for rounding"""
+"""m by which a place may exceed a bound: tolerance for rounding errors"""
 
 AROUND = 72
-"""Number of candidate places around each ball, and along each bound."""
+"""number of candidate places around each ball"""
 
 
 GRID = 16
-"""Columns and rows of candidate places over the allowed area."""
+"""columns and rows of candidate places over the allowed area"""
 
 
 def placement_refusal(
@@ -54,7 +54,7 @@ def allowed(
 def nearest(
     layout: TableGeometry, place: Place, at: Point, radius: float, others: Sequence[PlacedDisc]
 ) -> Point | None:
-    """Return the nearest allowed place, exact to about a millimetre beside curves; None if there is no room.
+    """Return the allowed place nearest to a point, to about 1 mm beside curves; None if there is no room.
 
     Takes the same arguments as `placement_refusal`.
     """
@@ -65,7 +65,7 @@ def nearest(
     near = np.array(others, dtype=float).reshape(-1, 3)
     for x, y, r in near.tolist():
         away, reach = math.atan2(at[1] - y, at[0] - x), radius + r + HAIR
-        turns = away + np.linspace(-math.pi, math.pi, AROUND + 1)  # the nearest of all among them
+        turns = away + np.linspace(-math.pi, math.pi, AROUND + 1)  # includes the nearest point of the circle
         ring = np.array([x, y]) + reach * np.column_stack((np.cos(turns), np.sin(turns)))
         found += [ring, _into(layout, place, ring, radius)]
     found.append(_between(near, radius))
@@ -115,7 +115,7 @@ def _into(layout: TableGeometry, place: Place, points: FloatArray, radius: float
 
 
 def _bounds(layout: TableGeometry, place: Place, radius: float) -> FloatArray:
-    """Return points spread over the area that the rules allow, (M, 2), as a fallback."""
+    """Return a grid of points over the area that the rules allow, (M, 2) m."""
     (x0, y0), (x1, y1) = layout.area
     if place == "in the D" and layout.d_radius:
         (x, y), reach = layout.home, layout.d_radius + radius
@@ -134,7 +134,7 @@ def _apart(points: FloatArray, radius: float, others: Sequence[PlacedDisc]) -> F
 
 
 def _between(others: FloatArray, radius: float) -> FloatArray:
-    """Return the centres of a ball that touches two others, (M, 2) m."""
+    """Return the centres of a ball that touches two others, with a gap of `HAIR`, (M, 2) m."""
     found = []
     for i, (ax, ay, ar) in enumerate(others.tolist()):
         for bx, by, br in others[i + 1 :].tolist():

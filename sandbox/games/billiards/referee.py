@@ -1,8 +1,8 @@
-"""Referee: translates between the engine's view of a table and that of the rules.
+"""Translation between the engine's view of a table, contacts and positions, and that of the rules, events and spots.
 
-- Events: the contacts of a shot as the rules read them, by names (`shot_events`).
-- Situation: balls that touch the cue ball, and whether it is snookered (`situation_of`).
-- Spotting: positions of balls that are respotted or reracked, and the moves that bring balls to their positions.
+`shot_events` converts the contacts of a shot to events by name. `situation_of` returns the balls that touch the cue
+ball, and whether it is snookered. `respot_moves` and `rerack_moves` return the positions of respotted and reracked
+balls, and `collision_free_moves` the moves to these positions.
 """
 
 import math
@@ -32,8 +32,8 @@ def situation_of(
         targets: names of the balls on.
         placed: whether the cue ball is in hand, so that it touches no ball.
 
-    Source: WPBSA 2, Snookered: a ball is on where both its edges can be hit straight; the ball in the way that is
-    nearest to the cue ball snookers it.
+    Source: WPBSA 2, Snookered: the cue ball is snookered if it cannot hit both edges of any ball on in a straight line;
+    of the balls in the way, the nearest to the cue ball snookers it.
     """
     free = {name: disc for name, disc in others.items() if name not in targets}
     against: tuple[str, ...] = ()
@@ -51,7 +51,7 @@ def situation_of(
 
 
 def _hidden(cue: PlacedDisc, target: PlacedDisc, others: dict[str, PlacedDisc]) -> str | None:
-    """Return the nearest ball that blocks the way to either edge of a target; None if both edges can be hit."""
+    """Return the nearest ball that blocks the path to an edge of a target; None if both edges can be hit."""
     in_way = {}
     for edge in _edges(cue, target):
         for name, disc in others.items():
@@ -84,10 +84,10 @@ def _beside(begin: Point, end: Point, point: Point) -> float:
 
 
 def respotted_position(layout: TableGeometry, respot: Respot, radius: float, others: Sequence[PlacedDisc]) -> Point:
-    """Return the position of a respotted ball: the first of its spots that is free, else as near behind the first spot.
+    """Return the position of a respotted ball, m: the first free spot, else the nearest free point behind the first.
 
-    Behind is along the table, towards its foot; if there is no room up to the cushion, in front of the spot (WPA 1.4;
-    WPBSA 3, Spotting Colours). Respotted balls keep a gap of 0.01 mm, so that they do not touch.
+    Behind is towards the foot of the table. If there is no room up to the cushion, the ball is placed in front of the
+    spot (WPA 1.4; WPBSA 3, Spotting Colours). Respotted balls keep a gap of 0.01 mm, so that they do not touch.
 
     Args:
         layout: geometry of the table.
@@ -115,7 +115,7 @@ def respotted_position(layout: TableGeometry, respot: Respot, radius: float, oth
 
 
 def _distance_to_room(spot: Point, way: Point, radius: float, others: Sequence[PlacedDisc]) -> float:
-    """Return the distance from a spot, in a direction, to the first room for a ball, m."""
+    """Return the distance from a spot to the first free point in a direction, m."""
     taken = []
     for x, y, r in others:
         forth = (x - spot[0]) * way[0] + (y - spot[1]) * way[1]
@@ -132,7 +132,7 @@ def _distance_to_room(spot: Point, way: Point, radius: float, others: Sequence[P
 
 
 SIMULTANEOUS = 5e-3
-"""s after a ball was set in motion within which a contact with something that it touched at the start never ended"""
+"""s: a pair that touched before the shot counts as not yet separated up to this time after it was set in motion"""
 
 
 def shot_events(
@@ -148,7 +148,7 @@ def shot_events(
         layout: geometry of the table.
         contacts: contacts on any engine since the stroke. Contacts that began before it are ignored.
         began: time of the stroke, s.
-        against: pairs that touched when the shot began, from `touching_pairs`; they count after a separation (WPA 8.4).
+        against: pairs that touch before the shot, from `touching_pairs`; they count only after a separation (WPA 8.4).
         cue: name of the ball that was struck.
     """
     names, fixed, solid = layout.names, layout.scene.fixed_names, len(layout.scene.fixed)
@@ -171,7 +171,7 @@ def shot_events(
 def _set_in_motion(
     contacts: Contacts, began: float, against: frozenset[tuple[int, int]], cue: int | None
 ) -> dict[int, float]:
-    """Return when each ball was set in motion, s since the stroke, directly or through balls that touch it."""
+    """Return the time at which each ball was set in motion, directly or through touching balls, s since the stroke."""
     group: dict[int, set[int]] = {}
     for a, b in against:
         if b >= 0:
@@ -202,7 +202,7 @@ def touching_pairs(layout: TableGeometry, position: tuple[Point, ...]) -> frozen
 
 
 ASIDE = 1.0
-"""m from the corner of the playing area to the first place where balls wait during a move"""
+"""m from the corner of the playing area to the first place where balls are parked during a move"""
 
 
 def rerack_moves(layout: TableGeometry, rules: Ruleset[Any], state: RulesState) -> tuple[Point, ...]:
@@ -243,14 +243,14 @@ def respot_moves(
 
 
 def collision_free_moves(layout: TableGeometry, now: Sequence[Point], then: Sequence[Point]) -> list[tuple[int, Point]]:
-    """Return the moves, as index and position in m, that bring balls from some positions to others.
+    """Return the moves, as index and position in m, that take balls from the positions `now` to `then`.
 
-    No ball is moved onto another: of balls that block each other in a cycle, one waits beside the table.
+    No ball is moved onto another. If balls block each other in a cycle, one of them is parked beside the table.
     """
     at, left, found = list(now), [k for k in range(len(now)) if now[k] != then[k]], list[tuple[int, Point]]()
     (x0, y0), _ = layout.area
     while left:
-        # Only balls that are still to be moved can block: the final positions are the caller's.
+        # Only balls that are still to be moved can block; the final positions are free by assumption.
         ready = next((k for k in left if _are_places_free(layout, k, then[k], at, left)), None)
         number = left[0] if ready is None else ready
         far = 4.0 * layout.radius[number] * (number + 1) + ASIDE
@@ -266,7 +266,7 @@ def collision_free_moves(layout: TableGeometry, now: Sequence[Point], then: Sequ
 def _are_places_free(
     layout: TableGeometry, number: int, place: Point, at: Sequence[Point], others: Sequence[int]
 ) -> bool:
-    """Return whether a ball can be moved to a place without touching others; in a pocket it touches none."""
+    """Return whether a ball can be moved to a place without overlap; balls in pockets do not overlap."""
     if layout.pocket_at(place) is not None:
         return True
     radius = layout.radius

@@ -42,13 +42,13 @@ RACKS: dict[TableGame, RackName] = {
 """rack of each game"""
 
 DURATION = 20.0
-"""s: a hard break rolls out in 10 to 15"""
+"""s: after a hard break the balls roll for 10 to 15 s"""
 SUBSTEPS = 10
-"""for engines that step: at 1 kHz even a ball at 18 m/s covers less than its radius in one"""
+"""for stepping engines: at 1 kHz, even a ball at 18 m/s moves by less than its radius in a substep"""
 
 
 def faults_of(scene: Scene) -> Iterator[tuple[Location, str]]:
-    """Yield the faults of a scene's `[billiards]`."""
+    """Yield the faults of the `[billiards]` table of a scene."""
     billiards = table_of(scene, Billiards)
     if billiards is None:
         return
@@ -113,7 +113,7 @@ def _balls(
     billiards: Billiards, balls: BallSet, rack: RackName, spots: dict[str, Point], radius: float, seed: int
 ) -> list[Ball]:
     """Return the balls on the table, in the order of their set."""
-    from sandbox.games.billiards.tables import rack_positions  # needs numpy, which the JSON schema does not
+    from sandbox.games.billiards.tables import rack_positions  # imports numpy, which the JSON schema must not
 
     places = {**rack_positions(rack, spots, radius, billiards.gap, seed), **billiards.place}
     mass = balls.mass if billiards.ball_mass is None else billiards.ball_mass
@@ -129,7 +129,7 @@ def _rack(billiards: Billiards) -> RackName:
 
 
 def _set(billiards: Billiards) -> BallSet:
-    """Return the balls: those of the rack, else the table's own, else of pool."""
+    """Return the ball set of the rack, else of the table, else of pool."""
     name = RACK_BALLS.get(_rack(billiards))
     if name is None:
         name = "pool" if billiards.table is None else TABLES[billiards.table].balls
@@ -137,7 +137,7 @@ def _set(billiards: Billiards) -> BallSet:
 
 
 def _spots(scene: Scene, billiards: Billiards) -> dict[str, Point]:
-    """Return the spots of the scene and of its table, by name; the scene's own come first."""
+    """Return the spots of the scene and of its table, by name; those of the scene take precedence."""
     own = {spot.name: spot.position for spot in scene.play.spots}
     more = {} if billiards.table is None else TABLES[billiards.table].spots
     return own | {name: at for name, at in more.items() if name not in own}

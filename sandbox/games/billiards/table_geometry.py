@@ -14,13 +14,13 @@ from sandbox.scene.description.base import Point, Vector
 from sandbox.scene.scene import Scene
 
 TOUCH = 1e-6
-"""m: gap up to which balls touch, for the rules; the rounding of engines is far below"""
+"""m: gap up to which balls touch, for the rules; far above the rounding errors of engines"""
 
 HAIR = 1e-5
 """m: gap between balls that the referee places, above `TOUCH`, so that they do not touch"""
 
 RAIL = 0.115
-"""of a table's width: from the nose of a cushion to the outside of the wood"""
+"""width from the nose of a cushion to the outer edge of the wood, as a fraction of the table width"""
 
 Area = tuple[Point, Point]
 """Lower-left and upper-right corner, m."""
@@ -95,14 +95,14 @@ class TableGeometry:
 
     @cached_property
     def home(self) -> Point:
-        """The head spot, in snooker the brown spot, else the centre of the playing area, m."""
+        """Head spot, in snooker the brown spot, m; default: the centre of the playing area."""
         (x0, y0), (x1, y1) = self.area
         middle = (0.5 * (x0 + x1), 0.5 * (y0 + y1))
         return self.spots.get("head", self.spots.get("brown", middle))
 
     @cached_property
     def d_radius(self) -> float:
-        """Radius of the D, m: from the brown spot to the yellow; 0 without these."""
+        """Radius of the D, m: distance from the brown to the yellow spot; 0 without these spots."""
         if "brown" not in self.spots or "yellow" not in self.spots:
             return 0.0
         return math.dist(self.spots["brown"], self.spots["yellow"])
@@ -113,7 +113,7 @@ class TableGeometry:
         return (point[0] - x) * self.along[0] + (point[1] - y) * self.along[1]
 
     def discs(self, numbers: Iterable[int], position: tuple[Point, ...]) -> list[PlacedDisc]:
-        """Return bodies as discs."""
+        """Return the bodies with some indices as discs."""
         return [(*position[k], self.radius[k]) for k in numbers]
 
     def pocket_at(self, point: Point) -> str | None:
@@ -137,7 +137,7 @@ class TableGeometry:
 
     @cached_property
     def segments(self) -> tuple[FloatArray, FloatArray, list[int]]:
-        """Segments of the walls, (K, 4) m, half their thickness, (K,) m, and the fixed object of each, −1 − k."""
+        """Segments of the walls, (K, 4) m, their half thicknesses, (K,) m, and their fixed objects, −1 − k."""
         rows, whose = [], []
         for k, wall in enumerate(self.scene.walls, len(self.scene.planes)):
             points = (*wall.points, wall.points[0]) if wall.closed else wall.points

@@ -1,4 +1,4 @@
-"""Bot as a player in the window: it searches on a worker thread, then moves the cue visibly and strokes."""
+"""Bot as a player in the window: searches on a worker thread, then animates the cue and plays the stroke."""
 
 import math
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -24,7 +24,7 @@ class BotThought(NamedTuple):
     decision: Decision | None
     """decision before the stroke"""
     plan: FramePlan | None
-    """None if the decision gives the turn to the other player"""
+    """None if the decision ends the turn or the frame"""
 
 
 class BotPlayer:
@@ -47,8 +47,8 @@ class BotPlayer:
         """Return the result of the search for a match; None while it runs. The first call starts it."""
         if self._match is not match or self._future is None:
             if self._future is not None and not self._future.done():
-                return None  # of a table that is no more; it cannot be told to stop
-            self._match, self._since = match, -1.0  # it has not yet moved
+                return None  # a search for an earlier match, which cannot be cancelled
+            self._match, self._since = match, -1.0  # the cue has not moved yet
             self._future = self._pool.submit(self._think, match)
         return self._future.result() if self._future.done() else None
 
@@ -78,7 +78,7 @@ class BotPlayer:
         return self._since > TURNING + 1.15 * DRAWING
 
     def stays(self, match: Match) -> None:
-        """Keep the result for a match in which its decision and placement are done."""
+        """Keep the result for a match in which its decision and placement have been applied."""
         if self._future is None:
             return
         self._match, thought = match, self._future.result()

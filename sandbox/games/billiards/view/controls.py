@@ -28,11 +28,11 @@ from sandbox.window.playback.snapshot import Snapshot
 
 
 class HumanPlayer:
-    """Person who plays at the window."""
+    """Player at the window: checks and applies decisions, calls, placements and strokes."""
 
     def __init__(self, game: BilliardsGame) -> None:
         self.game = game
-        self._carried: tuple[int, Point] | None = None  # after how many strokes, and where
+        self._carried: tuple[int, Point] | None = None  # number of strokes at that time, and position
         self.refused = False
         """whether the cue ball may not be placed under the pointer"""
         self._chosen: tuple[Match, int] | None = None
@@ -75,7 +75,7 @@ class HumanPlayer:
         """Take the selected decision.
 
         Raises:
-            ActionError: there is none.
+            ActionError: there are none.
         """
         self.game.check()
         if self.choice is None:
@@ -117,10 +117,13 @@ class HumanPlayer:
         self.say(replace(self.game.call, safety=not self.game.call.safety))
 
     def shoot(self, speed: float | None = None) -> None:
-        """Play the stroke; a ball that is being placed is put down first.
+        """Play the stroke; a cue ball that is being placed is put down first.
+
+        Args:
+            speed: cue speed, m/s; default: the power that is set.
 
         Raises:
-            ActionError: it cannot be played now.
+            ActionError: the stroke cannot be played now.
         """
         self.put_down()
         self.game.shoot(speed)
@@ -129,7 +132,7 @@ class HumanPlayer:
         """Take the cue ball in hand, or put it down.
 
         Raises:
-            ActionError: the rules do not give it.
+            ActionError: by the rules the cue ball is not in hand.
         """
         if self.carried is not None:
             self.put_down()
@@ -149,14 +152,14 @@ class HumanPlayer:
         self.refused = match.refusal(at) is not None
         try:
             self._carried = self.game.strokes, match.nearest(at)
-        except GameError:  # no room at all: it stays
+        except GameError:  # no room on the table: the ball stays
             self.refused = True
 
     def put_down(self) -> None:
         """Put down a ball that is being placed.
 
         Raises:
-            ActionError: it cannot be put there.
+            ActionError: its place is not allowed.
         """
         at, self._carried = self.carried, None
         if at is None:
@@ -230,7 +233,7 @@ class CueControls:
         self.seen = BilliardsOverlay(person)
         self.mode: CueMode = "aim"
         self._offset: float | None = None
-        """rad from the direction of the pointer to that of the cue; None before the mouse has moved"""
+        """rad from the direction of the pointer to that of the cue; None before the first movement of the mouse"""
         self._strokes = 0
         self._drawn = 0.0
         self._deepest = 0.0
@@ -242,7 +245,7 @@ class CueControls:
         self.mode = mode
 
     def end(self) -> None:
-        """End the mode: its key was released."""
+        """End the mode, when its key is released."""
         self._end()
 
     def _end(self) -> None:
@@ -327,7 +330,7 @@ class CueControls:
         a ball is being placed it puts the ball down.
 
         Raises:
-            ActionError: the ball cannot be put there.
+            ActionError: the place of the ball is not allowed.
         """
         game, person = self.game, self.person
         if person.carried is not None:
@@ -351,7 +354,7 @@ class CueControls:
         """Handle a release of the left button at a point, m; return whether it is used.
 
         Raises:
-            ActionError: a stroke cannot be played, or a ball put down.
+            ActionError: a stroke cannot be played, or the place of a ball is not allowed.
         """
         if self.person.carried is not None and moved:
             self.person.put_down()
@@ -367,14 +370,14 @@ class CueControls:
         return True
 
     def _name(self, at: Point) -> None:
-        """Call the pocket that was clicked."""
+        """Call the clicked pocket, or withdraw the call."""
         match, call = self.game.match, self.game.call
         pocket = match.layout.pocket_at(at)
         if pocket is not None and match.choices.pocket:
             self.person.say(replace(call, pocket=None if pocket == call.pocket else pocket))
 
     def name_ball(self, number: int) -> bool:
-        """Call a clicked ball if the rules offer it; return whether they do.
+        """Call a clicked ball if it may be called, or withdraw the call; return whether it may.
 
         Raises:
             ActionError: it cannot be called now.
@@ -388,7 +391,7 @@ class CueControls:
 
 
 TURN, FINER = 0.002, 0.0001
-"""rad by which an arrow key turns the cue, and with Shift"""
+"""rad by which an arrow key turns the cue, without and with Shift"""
 POWER_STEP = 0.02
 """fraction of the greatest power by which an arrow key changes it"""
 
@@ -443,18 +446,18 @@ def _step() -> float:
 
 
 def prepared_scene(scene: Scene) -> Scene:
-    """Return a scene as it is played: a scene that names a game starts without its own shots."""
+    """Return a scene as the window plays it: without its own shots if it names a game."""
     return TableGeometry.of(scene).scene if scene.play.game in get_args(TableGame) else scene
 
 
 class TableGameHost:
-    """Owner of the game and its controls; both are None if the open scene is no table."""
+    """Owner of the game and its controls; both are None if the open scene is not a billiard table."""
 
     def __init__(self) -> None:
         self.game: BilliardsGame | None = None
-        """the game; None if the scene is no table"""
+        """game of the open scene"""
         self.gestures: CueControls | None = None
-        """its controls"""
+        """controls of the game"""
         self.players: Players | None = None
         """players of the next game; None for the default of the game"""
         self.misses = False
@@ -470,7 +473,7 @@ class TableGameHost:
         """
         if not plays(live.scene):
             return
-        # A scene that starts with its own shot needs no cue prepared for it.
+        # The cue is set to the shot of the file, unless the session plays that shot itself.
         shot = file.shots[0] if file.shots and not live.scene.shots else None
         try:
             self.game = BilliardsGame(live, self.players, shot, self.misses)

@@ -36,37 +36,38 @@ from sandbox.window.ui.icons import draw_disc
 MAX_SCOREBOARD_WIDTH = 470.0
 """px at unit 1"""
 MIN_SCOREBOARD_WIDTH = 300.0
+"""px at unit 1; if the top has less room, the scoreboard is at the bottom"""
 RIGHT = 66.0
-"""px at unit 1 beside it, for how many pictures a second there are"""
+"""px at unit 1: free width to its right, for the frame rate"""
 
 
 class ScoreboardText(NamedTuple):
-    """A scoreboard as it was drawn."""
+    """Drawn scoreboard."""
 
     rect: pygame.Rect
     choices: tuple[tuple[pygame.Rect, Decision], ...]
-    """where the decisions are that can be clicked"""
+    """decisions that can be clicked, with their rectangles, px"""
 
 
 class ScoreboardLayout(NamedTuple):
-    """Where a scoreboard lies, and what it says."""
+    """Position and text of a scoreboard."""
 
     rect: pygame.Rect
     lines: tuple[str, ...]
-    """what happened, and what is to be done"""
+    """status line, wrapped"""
 
 
 def layout_scoreboard(
     person: HumanPlayer, free: pygame.Rect, left: int, unit: float, aside: int = 0
 ) -> ScoreboardLayout:
-    """Lay it at the top of what is free, or where that is too narrow, at the bottom.
+    """Return the layout of the scoreboard: at the top of the free area, or at the bottom if the top is too narrow.
 
     Args:
-        person: who plays.
-        free: px, what it may cover.
-        left: px, what else covers the top.
-        unit: px of a pixel at 1080 lines.
-        aside: px at the right that something else covers at the bottom.
+        person: player at the window.
+        free: free area, px.
+        left: right edge of the status plate at the upper left, px.
+        unit: UI scale, 1 on a display of 1080 lines.
+        aside: occupied width at the bottom right, px.
     """
     size, pad, margin = 13.0 * unit, round(9 * unit), round(10 * unit)
     right = free.right - round(RIGHT * unit)
@@ -85,7 +86,7 @@ def layout_scoreboard(
 def draw_scoreboard(
     surface: pygame.Surface, person: HumanPlayer, free: pygame.Rect, left: int, unit: float, aside: int = 0
 ) -> ScoreboardText:
-    """Draw it where it is laid; as `lay_scoreboard`."""
+    """Draw the scoreboard; the arguments are those of `layout_scoreboard`."""
     rect, lines = layout_scoreboard(person, free, left, unit, aside)
     size, pad, game, match = 13.0 * unit, round(9 * unit), person.game, person.game.match
     line, choices, down = round(1.5 * size), _choices(person), _down(match)
@@ -130,7 +131,7 @@ def _players(surface: pygame.Surface, game: BilliardsGame, rect: pygame.Rect, y:
 
 
 def status_line(person: HumanPlayer) -> str:
-    """Return the line about what happened and what is to be done."""
+    """Return the status line: messages of the last shot, and the next action."""
     game, match = person.game, person.game.match
     if not game.resting:
         return "balls rolling"
@@ -160,7 +161,7 @@ def _asked(game: BilliardsGame) -> str:
 
 
 def _on(match: Match) -> str:
-    """Return what is on, where that is one ball or one kind."""
+    """Return the ball on as the end of the status line; empty if there are several, except in snooker."""
     targets = match.targets
     if match.rules.name == "snooker":
         kinds = {"red" if ball.startswith("red-") else ball for ball in targets}
@@ -169,7 +170,7 @@ def _on(match: Match) -> str:
 
 
 def _down(match: Match) -> tuple[str, ...]:
-    """Return the balls that have been made, in the order of their numbers; reds of snooker are counted."""
+    """Return the pocketed balls, in the order of the bodies."""
     if not match.layout.pockets:
         return ()
     here = {*match.state.table, match.cue}
@@ -190,7 +191,7 @@ def _row_of_balls(
 
 @lru_cache(maxsize=128)
 def _small(coat: BallTexture, side: int) -> pygame.Surface:
-    """Return a little flat picture of a ball."""
+    """Return a small flat icon of a ball, `side` px wide."""
     over = 4
     large = pygame.Surface((side * over, side * over), pygame.SRCALPHA)
     middle, radius = (side * over // 2, side * over // 2), side * over // 2 - over // 2
@@ -217,7 +218,7 @@ def _small(coat: BallTexture, side: int) -> pygame.Surface:
 
 
 def _choices(person: HumanPlayer) -> tuple[Decision, ...]:
-    """Return what is to be decided; in free play nothing needs to be."""
+    """Return the decisions to show; in free play only after another one than `play` was selected."""
     game = person.game
     if not game.mine or game.match.over:
         return ()
@@ -235,7 +236,7 @@ def _draw_choices(
     y: float,
     size: float,
 ) -> tuple[tuple[pygame.Rect, Decision], ...]:
-    """Draw the decisions as plates side by side."""
+    """Draw the decisions as buttons in a row; return those that fit, with their rectangles, px."""
     found, x = [], rect.left + 0.7 * size
     for each in choices:
         wide = text_size(each, 0.92 * size)[0] + round(1.2 * size)
@@ -252,13 +253,13 @@ def _draw_choices(
 
 
 TIP = 0.22
-"""of the ball's radius, the tip's"""
+"""radius of the tip's mark, in ball radii"""
 MARKS = 5
-"""on the power's scale"""
+"""number of intervals on the scale of the power bar"""
 
 
 def draw_tip(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, unit: float) -> None:
-    """Draw the ball, the circle beyond which a tip slips, and the tip's mark."""
+    """Draw the english dial: the ball, the miscue limit, and the contact point of the tip."""
     (x, y), radius = (rect.centerx, rect.centery), rect.width / 2.0
     draw_box(surface, tip_box(rect, unit), 10 * unit, opacity=170)
     _disc(surface, (x, y), radius, ShapeStyle(IVORY, mix_colours(IVORY, PANEL, 0.45), 1.5 * unit))
@@ -278,7 +279,7 @@ def draw_tip(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, unit: fl
 
 
 def tip_box(rect: pygame.Rect, unit: float) -> pygame.Rect:
-    """Return what a dial covers with its plate."""
+    """Return the rectangle of a dial with its background, px."""
     return rect.inflate(round(10 * unit), round(10 * unit))
 
 
@@ -304,35 +305,36 @@ def _disc(surface: pygame.Surface, at: tuple[float, float], radius: float, look:
 
 
 SIDE, GAP = 92.0, 14.0
-"""px at unit 1"""
+"""px at unit 1: side of the english dial, and gap between dials"""
 POWER_BAR = 18.0
+"""px at unit 1: width of the power bar"""
 MIN_HUD = 420, 300
-"""px at unit 1: a smaller picture has no room for them"""
+"""px at unit 1: width and height of the free area below which no HUD is drawn"""
 
 DecisionHandler = Callable[[Callable[[], object]], bool]
 
 
 class BilliardsHud:
-    """Draws them, and lets the mouse set them."""
+    """Scoreboard, english dial and power bar, with their mouse input."""
 
     def __init__(self) -> None:
         self._tip = self._power = pygame.Rect(0, 0, 0, 0)
         self._choices: tuple[tuple[pygame.Rect, Decision], ...] = ()
         self.foot = 0
-        """px that they cover at the bottom left, where messages are told"""
+        """px: height of the scoreboard if it is at the bottom, where the window shows messages; else 0"""
         self.board = pygame.Rect(0, 0, 0, 0)
-        """where the scores stand"""
+        """rectangle of the scoreboard, px"""
         self._held = ""
 
     def draw(self, surface: pygame.Surface, person: HumanPlayer, free: pygame.Rect, left: int, unit: float) -> None:
-        """Draw all.
+        """Draw the HUD.
 
         Args:
-            surface: the picture.
-            person: who plays.
-            free: px, what nothing else covers.
-            left: px, what is told at the upper left.
-            unit: px of a pixel at 1080 lines.
+            surface: target.
+            person: player at the window.
+            free: free area, px.
+            left: right edge of the status plate at the upper left, px.
+            unit: UI scale, 1 on a display of 1080 lines.
         """
         self._tip = self._power = pygame.Rect(0, 0, 0, 0)
         self._choices, self.foot, self.board = (), 0, pygame.Rect(0, 0, 0, 0)
@@ -350,7 +352,7 @@ class BilliardsHud:
         draw_tip(surface, self._tip, person.game.cue, scale)
 
     def taken(self, person: HumanPlayer, free: pygame.Rect, left: int, unit: float) -> list[pygame.Rect]:
-        """Return what they cover, or will as soon as somebody aims; as `draw`."""
+        """Return the rectangles of the HUD, px, with the dials even if they are hidden now; arguments as for `draw`."""
         if free.width < MIN_HUD[0] * unit or free.height < MIN_HUD[1] * unit:
             return []
         scale = _scale(free, unit)
@@ -358,13 +360,13 @@ class BilliardsHud:
         return [board, *(tip_box(dial, scale) for dial in _dials(free, scale))]
 
     def plates(self, free: pygame.Rect, unit: float) -> dict[str, pygame.Rect]:
-        """Return what each of them covers, as they were last drawn."""
+        """Return the rectangles of the elements as last drawn, by name, px."""
         scale = _scale(free, unit)
         dials = {name: tip_box(rect, scale) for name, rect in self._rects() if rect.width}
         return {"score": self.board, **dials}
 
     def handle(self, event: pygame.event.Event, person: HumanPlayer, act: DecisionHandler) -> bool:
-        """Take an event in; return whether it was used up."""
+        """Handle a mouse event; return whether it was used."""
         if event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
             clicked = next((each for rect, each in self._choices if rect.collidepoint(event.pos)), None)
             if clicked is not None:
@@ -398,12 +400,12 @@ def _scale(free: pygame.Rect, unit: float) -> float:
 
 
 def _dials(free: pygame.Rect, scale: float) -> tuple[pygame.Rect, pygame.Rect]:
-    """Return where the tip and the power are set."""
+    """Return the rectangles of the english dial and the power bar, px."""
     side, gap, bar = round(SIDE * scale), round(GAP * scale), round(POWER_BAR * scale)
     power = pygame.Rect(free.right - gap - bar, free.bottom - gap - side, bar, side)
     return pygame.Rect(power.left - gap - side, power.top, side, side), power
 
 
 def _aside(scale: float) -> int:
-    """Return what the dials cover at the right, px."""
+    """Return the width of the dials at the right, px."""
     return round(SIDE * scale) + round(POWER_BAR * scale) + 3 * round(GAP * scale)

@@ -43,7 +43,7 @@ class CueState:
 
     @property
     def power(self) -> float:
-        """The speed as a fraction of the greatest."""
+        """Speed as a fraction of `MAX_CUE_SPEED`."""
         return self.speed / MAX_CUE_SPEED
 
     @power.setter
@@ -52,7 +52,7 @@ class CueState:
 
     @property
     def way(self) -> tuple[float, float]:
-        """Unit vector of the direction."""
+        """Unit vector along the cue, towards the ball."""
         return math.cos(self.aim), math.sin(self.aim)
 
     def tip_at(self, side: float, height: float) -> None:
@@ -86,7 +86,10 @@ class ShotPrediction(NamedTuple):
 
 
 class ShotPredictor:
-    """Predicts strokes on the exact engine, on any playing engine; None if the exact engine refuses the scene."""
+    """Predicts strokes on the exact engine, whichever engine runs the session.
+
+    There are no predictions for scenes that the exact engine refuses.
+    """
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -95,7 +98,7 @@ class ShotPredictor:
         self._known: tuple[object, ShotPrediction | None] | None = None
 
     def of(self, stroke: Stroke, ball: int, position: tuple[Point, ...]) -> ShotPrediction | None:
-        """Return the prediction of a stroke.
+        """Return the prediction of a stroke; None if it cannot be computed.
 
         Args:
             stroke: the stroke.
@@ -128,8 +131,8 @@ class ShotPredictor:
         if hit is not None:
             x, y = event.point
             own, its = (float(self._scene.bodies.radius[each]) for each in (ball, hit))
-            bx, by = position[hit]  # it has not moved before
-            share = own / its  # the point of touch divides the line of centres by the radii
+            bx, by = position[hit]  # it has not moved yet
+            share = own / its  # the contact point divides the line of centres in the ratio of the radii
             ghost = x + (x - bx) * share, y + (y - by) * share
         fallen = outcome.pocketed
         return ShotPrediction(

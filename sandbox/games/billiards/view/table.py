@@ -174,7 +174,7 @@ def draw_table(
         camera: transform from m to px.
         scene: table.
         area: playing area, m.
-        unit: UI scale, px per nominal pixel.
+        unit: UI scale, 1 on a display of 1080 lines.
         antialias: whether edges are antialiased.
     """
     felt = felt_of(scene)

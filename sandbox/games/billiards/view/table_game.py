@@ -69,7 +69,7 @@ class MatchHistory:
         return self._calls[min(strokes, len(self._calls) - 1)]
 
     def go_another_way(self, strokes: int, match: Match) -> None:
-        """Replace the match after a number of strokes; later matches are discarded."""
+        """Replace the match after a number of strokes, and discard later matches."""
         call = self.call(strokes) if match.state is self.match(strokes).state else ShotCall()
         self._matches[strokes:], self._calls[strokes:] = [match], [call]
 
@@ -124,12 +124,12 @@ def plays(scene: Scene) -> bool:
 
 
 class BilliardsGame:
-    """A game that is played in a session. Time stops between strokes."""
+    """Game of billiards in a session. Time stops between strokes."""
 
     def __init__(
         self, live: LiveView, players: Players | None = None, shot: Shot | None = None, misses: bool = False
     ) -> None:
-        """Begin.
+        """Start a game.
 
         Args:
             live: session of a scene without shots.
@@ -153,7 +153,7 @@ class BilliardsGame:
         self.opponent = BotPlayer(seed=live.scene.world.seed) if self.players == "you vs bot" else None
         self._hearing = ShotContacts(live)
         self.notes: list[tuple[str, str]] = []
-        """messages, as level and text; the reader empties the list"""
+        """messages, as level and text; the window empties the list"""
 
     @property
     def strokes(self) -> int:
@@ -199,7 +199,7 @@ class BilliardsGame:
 
     @property
     def mine(self) -> bool:
-        """Whether it is a person's stroke."""
+        """Whether the player at the window can play a stroke now."""
         return self.aiming and not self._bots(self.match)
 
     @property
@@ -230,7 +230,7 @@ class BilliardsGame:
         return tuple((x, y) for x, y in self.live.frame.position.tolist())
 
     def go_on(self, elapsed: float) -> None:
-        """Judge a completed stroke, and let a bot play for some real time, s.
+        """Judge a completed stroke, and advance the turn of a bot by some real time, s.
 
         Raises:
             ActionError: an action of the rules or the bot cannot be applied.
@@ -294,10 +294,10 @@ class BilliardsGame:
         self._turns.say(self.strokes, call)
 
     def check(self) -> None:
-        """Check that a person can play now.
+        """Check that the player at the window can play now.
 
         Raises:
-            ActionError: it is not a person's turn, or no stroke can be played.
+            ActionError: it is the bot's turn, or no stroke can be played.
         """
         if self.resting and self.match.over:
             raise ActionError("the frame is over; press R for a new one")
@@ -330,10 +330,10 @@ class BilliardsGame:
         self.live.apply(match.strike(self.cue.stroke))
 
     def undo(self) -> None:
-        """Undo the last stroke of a person and everything after it.
+        """Undo the last stroke that was not the bot's, and everything after it.
 
         Raises:
-            ActionError: none was played.
+            ActionError: there is none.
         """
         strikes = [k for k, action in enumerate(self.live.session.actions) if isinstance(action, Strike)]
         while strikes and self._bots(self._turns.match(len(strikes) - 1)):
@@ -352,7 +352,7 @@ class BilliardsGame:
         self.notes.append(("info", "shot undone"))
 
     def close(self) -> None:
-        """Stop the bot."""
+        """Stop the bot, and stop collecting contacts."""
         self._hearing.close()
         if self.opponent is not None:
             self.opponent.close()

@@ -1,4 +1,4 @@
-"""View of billiards: the table, balls that roll, and the aim of the next stroke."""
+"""View of billiards: table, rolling balls, and the aim of the next stroke."""
 
 import numpy as np
 
@@ -11,13 +11,13 @@ from sandbox.window.render.draw_context import DrawContext
 
 
 class BilliardsView:
-    """Draws tables, and balls on any surface on which they roll."""
+    """Draws billiard tables, and balls on any surface on which they roll."""
 
     def __init__(self) -> None:
         self._balls = BallRenderer()
 
     def background(self, ctx: DrawContext) -> bool:
-        """Draw the table; a surface without a table is drawn as the ground of other scenes."""
+        """Draw the table; return False for a surface without one, which is drawn as the ground of other scenes."""
         scene = ctx.snapshot.scene
         if scene.play.area is None:
             return False
@@ -30,13 +30,13 @@ class BilliardsView:
             draw_paths(ctx, ctx.snapshot.game, ctx.body_colours)
 
     def bodies(self, ctx: DrawContext) -> IntArray:
-        """Draw the balls, if they are larger than points."""
+        """Draw the balls, unless they are drawn as points; return the indices of the drawn bodies."""
         if ctx.snapshot.scene.surface is None or ctx.has_points:
             return np.empty(0, np.int64)
         self._balls.draw(ctx)
         return ctx.shown
 
     def above(self, ctx: DrawContext) -> None:
-        """Draw the cue."""
+        """Draw the cue and the markers above the balls."""
         if isinstance(ctx.snapshot.game, CueAim):
             draw_aim(ctx, ctx.snapshot.game)
