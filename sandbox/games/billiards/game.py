@@ -4,8 +4,8 @@ A shot begins with a `Strike` and ends with the first step after which every bal
 contacts of the shot, let the `Match` judge it, and answer with `Move` actions that respot or rerack balls. Balls that a
 player moves by hand between shots stay where they are put.
 
-A player acts by `Strike` and `Move` actions, or by controls. Decisions and calls are controls only. A recording that
-holds actions alone, without presses, is judged as if nothing had been called. A strike of a ball other than the cue
+A player acts by `Strike` and `Move` actions, or by controls. Decisions and calls are controls only, so a
+recording that contains actions but no control inputs is judged without calls. A strike of a ball other than the cue
 ball of the player to shoot is not judged: the balls stay where they come to rest, and the turn does not change.
 """
 

@@ -1,4 +1,4 @@
-"""Base of the rules of billiards games: shot events, calls and decisions, states, results, and `Ruleset`."""
+"""Base of the rules of billiards games: `Ruleset`, its states and results, shot events, calls and decisions."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
@@ -10,12 +10,12 @@ from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 
 class GameError(ValueError):
-    """An invalid input of a game; `str()` has the reason. The state is unchanged."""
+    """Invalid input of a game; `str()` has the reason. The state is unchanged."""
 
 
 @dataclass(frozen=True)
 class ShotEvent:
-    """A ball touched a ball or a cushion, or fell into a pocket.
+    """Contact of a ball with a ball or a cushion, or its fall into a pocket.
 
     A cushion is a wall or a jaw. A cushion to which a ball is frozen when the shot begins counts only after the ball
     has left it and returned (WPA 8.4). The same holds for a ball that the cue ball touches at the start.
@@ -31,7 +31,7 @@ class ShotEvent:
 
 @dataclass(frozen=True)
 class ShotSummary:
-    """Summary of a shot as rules need it."""
+    """Summary of a shot for the rules."""
 
     cue: str
     happenings: tuple[ShotEvent, ...]
@@ -43,20 +43,20 @@ class ShotSummary:
     driven: frozenset[str]
     """balls that reached a cushion or a pocket after the first contact of the cue ball"""
     stayed_behind: bool = False
-    """whether a cue ball in hand behind the head string first touched a ball there without having crossed it"""
+    """whether a cue ball in hand behind the head string hit a ball there before it crossed the string"""
 
     @property
     def scratched(self) -> bool:
-        """Whether the cue ball fell."""
+        """Whether the cue ball was pocketed."""
         return any(ball == self.cue for ball, _ in self.fell)
 
     @property
     def down(self) -> tuple[str, ...]:
-        """The object balls that fell, in order of time."""
+        """The pocketed object balls, in order of time."""
         return tuple(ball for ball, _ in self.fell if ball != self.cue)
 
     def pocket_of(self, ball: str) -> str | None:
-        """Return the pocket into which a ball fell."""
+        """Return the pocket into which a ball fell; None if it is not pocketed."""
         return dict(self.fell).get(ball)
 
 
@@ -98,7 +98,7 @@ def balls_touched_by(cue: str, each: ShotEvent) -> str | None:
 
 
 def first_ball_hit(shot: ShotSummary) -> str:
-    """Return the first contact of the cue ball as the start of a sentence."""
+    """Return the start of a message about the first contact, such as `the 8 was`."""
     return f"the {' and the '.join(shot.first)} {'was' if len(shot.first) == 1 else 'were'}"
 
 
@@ -106,8 +106,8 @@ Decision = Literal["play", "pass", "in hand", "rerack", "rerack and pass", "spot
 """Decision before a shot.
 
 play: accept the table · pass: the other player plays · in hand: accept the table, with the cue ball in hand ·
-rerack: rerack and break · rerack and pass: rerack, the other player breaks · spot: touching balls go to their
-spots · restore: restore the positions, the player who missed plays again · claim: the frame is won.
+rerack: rerack and break · rerack and pass: rerack, and the other player breaks · spot: respot touching balls ·
+restore: restore the positions, and the player who missed plays again · claim: claim the frame.
 """
 
 
@@ -129,7 +129,7 @@ class ShotChoices:
     """Decisions and calls that are possible now."""
 
     decisions: tuple[Decision, ...] = ()
-    """decisions before the shot; a shot without a decision counts as `play`"""
+    """decisions before the shot; a shot without a decision implies `play`"""
     balls: tuple[str, ...] = ()
     """balls that may be called or nominated"""
     pocket: bool = False
@@ -143,7 +143,7 @@ class ShotChoices:
         """Check a call.
 
         Raises:
-            GameError: it cannot be made now; the message names every reason.
+            GameError: the call cannot be made now; the message names every reason.
         """
         wrong = [
             *(
@@ -169,7 +169,7 @@ Place = Literal["anywhere", "behind the head string", "in the D"]
 
 @dataclass(frozen=True, kw_only=True)
 class RulesState:
-    """State that every game has.
+    """State common to all games.
 
     Raises:
         GameError: the number of players is not 1 or 2, or does not fit turn and scores.
@@ -180,7 +180,7 @@ class RulesState:
     players: int
     """1 or 2"""
     turn: int = 0
-    """the player to shoot, from 0"""
+    """index of the player to shoot"""
     scores: tuple[int, ...]
     table: tuple[str, ...]
     """object balls that are not pocketed"""
@@ -201,7 +201,7 @@ class RulesState:
 
     @property
     def other(self) -> int:
-        """The next player; with one player, the same."""
+        """The next player; with one player, that player."""
         return (self.turn + 1) % self.players
 
     @property
@@ -210,7 +210,7 @@ class RulesState:
         return None if self.players == 1 else self.other
 
     def scored(self, player: int | None, points: int) -> tuple[int, ...]:
-        """Return the scores with points added for a player; unchanged if `player` is None."""
+        """Return the scores with points added for a player, or unchanged if `player` is None."""
         return tuple(score + points if each == player else score for each, score in enumerate(self.scores))
 
     def without(self, balls: tuple[str, ...]) -> tuple[str, ...]:
@@ -222,7 +222,7 @@ def counted(players: int) -> int:
     """Return a valid number of players unchanged.
 
     Raises:
-        GameError: it is not 1 or 2.
+        GameError: the number is not 1 or 2.
     """
     if players not in (1, 2):
         raise GameError(f"{players} players cannot play; 1 or 2 can")
@@ -234,7 +234,7 @@ S = TypeVar("S", bound=RulesState)
 
 @dataclass(frozen=True)
 class Respot:
-    """A ball to respot: on the first of its spots that is free, else as near as possible to the first."""
+    """Ball to respot: on its first free spot, else as near as possible to the first spot."""
 
     ball: str
     spots: tuple[str, ...]
@@ -243,7 +243,7 @@ class Respot:
 
 @dataclass(frozen=True)
 class ShotResult(Generic[S]):
-    """Result of a shot or a decision: the new state, its reasons, and the changes to make on the table."""
+    """Result of a shot or a decision: the new state, the reasons for it, and the changes of the table."""
 
     state: S
     fouls: tuple[str, ...] = ()
@@ -257,7 +257,7 @@ class ShotResult(Generic[S]):
     restore: bool = False
     """whether all balls return to their positions before the last shot"""
     goes_on: bool = False
-    """whether the player continues the turn"""
+    """whether the turn of the player continues"""
     messages: tuple[str, ...] = ()
     """messages for the players"""
 
@@ -274,14 +274,14 @@ class ShotResult(Generic[S]):
 
 @dataclass(frozen=True)
 class Situation:
-    """Situation once all balls are at rest and respotted; for a ball in hand, that of its best place."""
+    """Situation after all balls are at rest and respotted; for a ball in hand, the situation at its best place."""
 
     touching: tuple[str, ...] = ()
     """object balls that touch the cue ball of the player to shoot"""
     snookered: bool = False
-    """whether no ball on touches the cue ball or can be hit straight at both edges, because others block the way"""
+    """whether no ball on touches the cue ball, and other balls block the straight path to an edge of each ball on"""
     by: tuple[str, ...] = ()
-    """the nearest blocking ball, if it is the same for all balls on"""
+    """nearest blocking ball, if it is the same for all balls on"""
 
 
 def _summed(one: tuple[int, ...], other: tuple[int, ...]) -> tuple[int, ...]:
@@ -291,7 +291,7 @@ def _summed(one: tuple[int, ...], other: tuple[int, ...]) -> tuple[int, ...]:
 
 
 def player_name(number: int) -> str:
-    """Return the name of a player in messages."""
+    """Return the name of a player, as messages use it."""
     return f"player {number + 1}"
 
 
@@ -303,14 +303,14 @@ def renamed(message: str, names: tuple[str, ...]) -> str:
 
 
 class Ruleset(ABC, Generic[S]):
-    """Rules of a game. They are stateless: a frame is a state."""
+    """Rules of a game. Stateless; the state of a frame is a `RulesState`."""
 
     name: str
     rack: str
     """name of the rack: `8-ball`, `9-ball`, `carom`, `snooker`"""
     cue_balls: tuple[str, ...] = ("cue",)
     kind: type[S]
-    """class of its states"""
+    """class of the states"""
 
     @abstractmethod
     def start(self, players: int = 2) -> S:
@@ -322,7 +322,7 @@ class Ruleset(ABC, Generic[S]):
 
     @abstractmethod
     def legal_targets(self, state: S) -> frozenset[str]:
-        """Return the balls that the cue ball may touch first; none once the frame is over."""
+        """Return the balls that the cue ball may touch first; none after the end of the frame."""
 
     def cue_ball(self, state: S) -> str:
         """Return the ball that is struck next."""
@@ -335,14 +335,14 @@ class Ruleset(ABC, Generic[S]):
     def judge(
         self, state: S, call: ShotCall, happenings: Iterable[ShotEvent], stayed_behind: bool = False
     ) -> ShotResult[S]:
-        """Return the result of a shot. A decision that was not taken counts as `play`.
+        """Return the result of a shot. Without a decision, `play` is implied.
 
         Args:
             state: state before the shot.
             call: call before the shot.
             happenings: events, in any order.
-            stayed_behind: whether a cue ball in hand behind the head string first touched a ball there, and had not
-                crossed the head string before.
+            stayed_behind: whether a cue ball in hand behind the head string hit a ball there before it crossed the
+                string.
 
         Raises:
             GameError: the frame is over, the call cannot be made now, or a ball is not on the table.
@@ -358,7 +358,7 @@ class Ruleset(ABC, Generic[S]):
         """Return the result of a decision.
 
         Raises:
-            GameError: it is not offered now.
+            GameError: the decision is not offered now.
         """
         offered = self.choices(state).decisions
         if decision not in offered:
@@ -366,7 +366,7 @@ class Ruleset(ABC, Generic[S]):
         return self._decide(replace(state, decisions=()), decision)
 
     def settle(self, state: S, lie: Situation) -> ShotResult[S]:  # noqa: ARG002
-        """Return the consequences of the situation after a shot, a decision and respotting."""
+        """Return the result of the situation after a shot or decision and respotting."""
         return ShotResult(state)
 
     def document(self, state: S) -> dict[str, Any]:
@@ -378,7 +378,7 @@ class Ruleset(ABC, Generic[S]):
         """Return the state of a JSON object, the inverse of `document`.
 
         Raises:
-            GameError: it is not a state of this game; the message names every fault.
+            GameError: the object is not a state of this game; the message names every fault.
         """
         try:
             return self._adapter.validate_python(plain)

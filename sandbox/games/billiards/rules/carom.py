@@ -1,7 +1,7 @@
 """Carom: three-cushion and straight rail (UMB): touch both other balls, for a point and another shot.
 
-A miss is no foul; it ends the turn. If the player who began reaches the distance first, the other player has one last
-turn from the starting position, so that both have the same number of turns; equal scores are a draw.
+A miss is not a foul; it ends the turn. If the player who began reaches the distance first, the other player has one
+last turn from the starting position, so that both have the same number of turns. Equal scores are a draw.
 """
 
 from dataclasses import dataclass, replace
@@ -28,12 +28,12 @@ CAROM_NAMES = (*WHITES, RED)
 
 @dataclass(frozen=True, kw_only=True)
 class CaromState(RulesState):
-    """A score is the number of caroms. `table` names all three balls."""
+    """State of carom. A score is the number of caroms; `table` has all three balls."""
 
     distance: int
     """points to win"""
     innings: tuple[int, ...]
-    """turns that each player has completed"""
+    """completed turns of each player"""
     run: int = 0
     """points of this turn so far"""
     touching: tuple[str, ...] = ()
@@ -63,7 +63,7 @@ class Carom(Ruleset[CaromState]):
         """Return the state before the opening shot.
 
         Raises:
-            GameError: the number of players is not 1 or 2, or the distance is less than a point.
+            GameError: the number of players is not 1 or 2, or the distance is less than 1.
         """
         points = self.distance if distance is None else distance
         if points < 1:
@@ -78,7 +78,7 @@ class Carom(Ruleset[CaromState]):
         return frozenset((RED,) if state.opening else state.without((self.cue_ball(state),)))
 
     def settle(self, state: CaromState, lie: Situation) -> ShotResult[CaromState]:
-        """Return the state with the balls that touch: the player may have them spotted, or play away (UMB 27)."""
+        """Return the state with the touching balls; the player may have them spotted, or play away (UMB 27)."""
         if state.over:
             return ShotResult(state)
         decisions: tuple[Decision, ...] = ("play", "spot") if lie.touching else ()
@@ -89,10 +89,10 @@ class Carom(Ruleset[CaromState]):
         after = replace(state, touching=())
         if decision != "spot":
             return ShotResult(after)
-        if self.cushions == 0:  # in straight rail all three go back
+        if self.cushions == 0:  # in straight rail all three balls return to the starting position
             return ShotResult(replace(after, opening=True), rerack=True)
-        # UMB 83: the red to the foot spot, the cue ball to the head, the other to the centre; where the third ball is
-        # in the way, to the spot that would be the third ball's.
+        # UMB 83: the red goes to the foot spot, the cue ball to the head spot, the other white to the centre. A ball
+        # whose spot is occupied by the third ball goes to the spot of the third ball.
         cue = self.cue_ball(state)
         spots = {RED: "foot", cue: "head", next(ball for ball in WHITES if ball != cue): "centre"}
         lifted = [ball for ball in CAROM_NAMES if ball == cue or ball in state.touching]
@@ -117,7 +117,7 @@ class Carom(Ruleset[CaromState]):
         return ShotResult(after, points=points, goes_on=True)
 
     def _made(self, shot: ShotSummary) -> bool:
-        """Return whether the cue ball touched both balls, with enough cushion contacts, also of one cushion, before."""
+        """Return whether the cue ball touched both balls, after enough cushion contacts, repeated ones included."""
         touched: set[str] = set()
         cushions = 0
         for each in shot.happenings:

@@ -30,7 +30,7 @@ from sandbox.games.billiards.rules.base import (
 )
 
 DRIVEN = 4
-"""object balls that a break must drive to a cushion, if none falls (WPA 2.3, 3.3)"""
+"""number of object balls that a break must drive to a cushion if none is pocketed (WPA 2.3, 3.3)"""
 
 
 def scratch(shot: ShotSummary) -> list[str]:
@@ -39,7 +39,7 @@ def scratch(shot: ShotSummary) -> list[str]:
 
 
 def wrong_ball(shot: ShotSummary, targets: frozenset[str]) -> list[str]:
-    """Return the foul of a wrong first contact (WPA 6.2); of two simultaneous contacts, one must be right."""
+    """Return the foul of a wrong first contact (WPA 6.2); of simultaneous contacts, one must be legal."""
     if not shot.first:
         return ["the cue ball hit no ball"]
     if targets.isdisjoint(shot.first):
@@ -48,12 +48,12 @@ def wrong_ball(shot: ShotSummary, targets: frozenset[str]) -> list[str]:
 
 
 def no_rail(shot: ShotSummary) -> list[str]:
-    """Return the foul of a contact after which no ball reached a pocket or a cushion (WPA 6.3)."""
+    """Return the foul of a shot in which no ball reached a pocket or a cushion after the contact (WPA 6.3)."""
     return ["no rail after contact"] if shot.first and not shot.driven else []
 
 
 def from_behind(shot: ShotSummary) -> list[str]:
-    """Return the foul of a cue ball in hand that was played at a ball behind the head string (WPA 6.11)."""
+    """Return the foul of playing a cue ball in hand at a ball behind the head string (WPA 6.11)."""
     if not shot.stayed_behind:
         return []
     return [f"{first_ball_hit(shot)} behind the head string, and the cue ball had not crossed it"]
@@ -65,7 +65,7 @@ def standard(shot: ShotSummary, targets: frozenset[str]) -> tuple[str, ...]:
 
 
 def broke(shot: ShotSummary) -> bool:
-    """Return whether a break was strong enough."""
+    """Return whether a break was legal: a ball pocketed, or `DRIVEN` balls driven to a cushion."""
     return bool(shot.down) or len(shot.driven - {shot.cue}) >= DRIVEN
 
 
@@ -111,7 +111,7 @@ class EightBall(Ruleset[EightBallState]):
         )
 
     def legal_targets(self, state: EightBallState) -> frozenset[str]:
-        """Return the balls on: all on the break, all but the eight on an open table, the own group, then the eight."""
+        """Return the balls on: all on the break, all but the eight on an open table, own group, then the eight."""
         if state.over:
             return frozenset()
         if state.opening:
@@ -153,7 +153,7 @@ class EightBall(Ruleset[EightBallState]):
         return ShotResult(after, goes_on=True, messages=(f"{player_name(state.turn)} plays {mine}",))
 
     def _made(self, state: EightBallState, call: ShotCall, shot: ShotSummary) -> str | None:
-        """Return a pocketed ball that counts: the called ball, else the first of the own group."""
+        """Return the pocketed ball that counts, the called one, else the first ball on; None if there is none."""
         able = (call.ball,) if call.ball is not None else tuple(self.legal_targets(state))
         for ball in shot.down:
             if ball in able and call.pocket in (None, shot.pocket_of(ball)):
@@ -161,7 +161,7 @@ class EightBall(Ruleset[EightBallState]):
         return None
 
     def _break(self, state: EightBallState, shot: ShotSummary, fouls: tuple[str, ...]) -> ShotResult[EightBallState]:
-        """Judge a break (WPA 3.3). A weak break is no foul, but the other player may ask for a rerack."""
+        """Judge a break (WPA 3.3). A weak break is not a foul, but the other player may ask for a rerack."""
         respot = (at_foot(EIGHT),) if EIGHT in shot.down else ()
         table = state.without(tuple(ball for ball in shot.down if ball != EIGHT))
         place: Literal["behind the head string"] | None = "behind the head string" if scratch(shot) else None
@@ -201,13 +201,13 @@ class EightBall(Ruleset[EightBallState]):
         if decision in ("rerack", "rerack and pass"):
             turn = state.turn if decision == "rerack" else state.other
             return ShotResult(replace(self.start(state.players), turn=turn), rerack=True)
-        if decision == "in hand":  # of a break alone
+        if decision == "in hand":  # offered only after a break
             return ShotResult(replace(state, in_hand="behind the head string"))
         return super()._decide(state, decision)
 
 
 def _counted(before: EightBallState, verdict: ShotResult[EightBallState]) -> ShotResult[EightBallState]:
-    """Return a result with the scores that follow from the table."""
+    """Return a result with scores and points by the pocketed balls of each group."""
     after = verdict.state
     scores = tuple(
         0 if group is None else sum(ball not in after.table for ball in GROUPS[group]) for group in after.groups
@@ -224,7 +224,7 @@ MAX_CONSECUTIVE_FOULS = 3
 
 @dataclass(frozen=True, kw_only=True)
 class NineBallState(RulesState):
-    """A score is the number of balls that the player has pocketed."""
+    """State of 9-ball; a score is the number of balls that the player has pocketed."""
 
     fouls: tuple[int, ...]
     """consecutive fouls of each player"""
@@ -308,17 +308,17 @@ def _foul(after: NineBallState, fouls: tuple[str, ...]) -> ShotResult[NineBallSt
             lost, fouls, messages=(f"foul: {fouls[0]}", f"{who} fouled {MAX_CONSECUTIVE_FOULS} times in a row", ends)
         )
     told = [f"foul: {fouls[0]}; {player_name(after.other)} has the ball in hand"]
-    if row == MAX_CONSECUTIVE_FOULS - 1:  # WPA 6.14: a player is to be told
+    if row == MAX_CONSECUTIVE_FOULS - 1:  # WPA 6.14: the player must be warned
         told.append(f"{who} is on {row} fouls; one more loses the rack")
     return ShotResult(replace(after, turn=after.other, in_hand="anywhere"), fouls, messages=tuple(told))
 
 
 @dataclass(frozen=True, kw_only=True)
 class FreePlayState(RulesState):
-    """A score is the number of balls that the player has pocketed."""
+    """State of free play; a score is the number of balls that the player has pocketed."""
 
     rack: tuple[str, ...]
-    """the object balls at the start"""
+    """object balls at the start"""
     cue: str
     """the cue ball"""
 
@@ -356,7 +356,7 @@ class FreePlay(Ruleset[FreePlayState]):
         return state.cue
 
     def legal_targets(self, state: FreePlayState) -> frozenset[str]:
-        """Return every ball."""
+        """Return every object ball on the table."""
         return frozenset() if state.over else frozenset(state.table)
 
     def _judge(self, state: FreePlayState, call: ShotCall, shot: ShotSummary) -> ShotResult[FreePlayState]:  # noqa: ARG002

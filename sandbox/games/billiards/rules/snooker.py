@@ -25,11 +25,11 @@ from sandbox.games.billiards.rules.base import (
 
 REDS = tuple(f"red-{number}" for number in range(1, 16))
 VALUES = {"yellow": 2, "green": 3, "brown": 4, "blue": 5, "pink": 6, "black": 7}
-"""values of the colours, in the order in which they are played after the reds"""
+"""values of the colours, in the order of play after the reds"""
 COLOURS = tuple(VALUES)
 SNOOKER_NAMES = (*REDS, *COLOURS)
 MIN_FOUL_POINTS = 4
-"""least points of a foul"""
+"""minimum points of a foul"""
 
 
 def value(ball: str) -> int:
@@ -38,17 +38,17 @@ def value(ball: str) -> int:
 
 
 def reds(table: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the reds of some balls."""
+    """Return the reds among some balls."""
     return tuple(ball for ball in table if ball not in VALUES)
 
 
 def colours(table: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the colours of some balls, the lowest first."""
+    """Return the colours among some balls, the lowest first."""
     return tuple(ball for ball in COLOURS if ball in table)
 
 
 def respots(balls: tuple[str, ...]) -> tuple[Respot, ...]:
-    """Return the respots of colours, the highest first: its own spot, else the highest free spot."""
+    """Return the respots of colours, the highest first: on its own spot, else on the highest free spot."""
     down = COLOURS[::-1]
     return tuple(Respot(ball, (ball, *(spot for spot in down if spot != ball))) for ball in down if ball in balls)
 
@@ -74,10 +74,10 @@ class SnookerShot:
 
     @property
     def hit(self) -> bool:
-        """Whether the first touch was right.
+        """Whether the first contact was legal.
 
-        Away from a ball on that touches the cue ball it counts as played (Touching Ball). A free ball is to be touched
-        first, or at one time with a ball on (Snookered after a Foul).
+        Playing away from a touching ball on counts as hitting it (Touching Ball). A free ball must be hit first, or at
+        the same time as a ball on (Snookered after a Foul).
         """
         if self.free is None and not self.on.isdisjoint(self.touching):
             return True
@@ -112,7 +112,7 @@ class SnookerShot:
 
     @property
     def points(self) -> int:
-        """Points of a fair shot: all reds, but only one of a free ball and the colour on."""
+        """Points of a fair shot: one for each ball if a red is on, else the value of the ball on, once."""
         made = [ball for ball in self.shot.down if ball in self.fair]
         if not made:
             return 0
@@ -152,9 +152,9 @@ class SnookerState(RulesState):
     """State of snooker."""
 
     on: On = "red"
-    """`colour` is any, after a red"""
+    """ball on; `colour` stands for any colour, after a red"""
     run: int = 0
-    """points of this turn so far: the break"""
+    """points of this turn so far, called the break"""
     misses: bool = False
     """whether the foul-and-a-miss rule applies"""
     fouled: bool = False
@@ -162,7 +162,7 @@ class SnookerState(RulesState):
     free: bool = False
     """whether any ball may be nominated as a ball on"""
     freed: str | None = None
-    """the free ball of the last stroke, if nothing fell"""
+    """free ball of the last stroke, if no ball scored"""
     touching: tuple[str, ...] = ()
     """balls that touch the cue ball"""
     before: "SnookerState | None" = None
@@ -170,7 +170,7 @@ class SnookerState(RulesState):
 
 
 def remaining(state: SnookerState) -> int:
-    """Return the points that can still be made, without fouls and free balls: a black goes with each red."""
+    """Return the points that can still be made without fouls and free balls, with a black after each red."""
     black = VALUES["black"]
     left = sum(value(ball) for ball in colours(state.table)) + (1 + black) * len(reds(state.table))
     return left + (black if state.on == "colour" else 0)
@@ -188,19 +188,19 @@ class Snooker(Ruleset[SnookerState]):
 
         Args:
             players: 1 or 2.
-            misses: whether a miss may be played again.
+            misses: whether the foul-and-a-miss rule applies.
         """
         scores = (0,) * counted(players)
         return SnookerState(players=players, scores=scores, table=SNOOKER_NAMES, in_hand="in the D", misses=misses)
 
     def legal_targets(self, state: SnookerState) -> frozenset[str]:
-        """Return the balls on; all, where any may be nominated as a free ball."""
+        """Return the balls on; all balls if any may be nominated as a free ball."""
         if state.over:
             return frozenset()
         return frozenset(state.table) if state.free else balls_on(state)
 
     def choices(self, state: SnookerState) -> ShotChoices:
-        """Return what may be decided, and what may be nominated."""
+        """Return the possible decisions and nominations."""
         base = super().choices(state)
         if state.over or not (state.free or state.on == "colour"):
             return base
@@ -209,10 +209,10 @@ class Snooker(Ruleset[SnookerState]):
         return replace(base, balls=named)
 
     def settle(self, state: SnookerState, lie: Situation) -> ShotResult[SnookerState]:
-        """Return the state with what touches, and a free ball or a foul where the player is snookered.
+        """Return the state with the touching balls, and with a free ball or a foul if the player is snookered.
 
-        After a foul that leaves a snooker any ball is free; to snooker by the free ball itself is foul, unless
-        pink and black alone are left.
+        After a foul that leaves a snooker, any ball is free. A snooker behind the free ball itself is a foul, unless
+        only pink and black are left.
         """
         after = replace(state, touching=lie.touching, freed=None)
         if state.over or not lie.snookered:
@@ -245,7 +245,7 @@ class Snooker(Ruleset[SnookerState]):
         return self._foul(state, clean, played, fouls) if fouls else self._fair(clean, played)
 
     def _fair(self, state: SnookerState, played: SnookerShot) -> ShotResult[SnookerState]:
-        """Return what a fair stroke leads to."""
+        """Return the result of a fair stroke."""
         down, points = played.shot.down, played.points
         last = state.on not in ("red", "colour")
         gone = tuple(ball for ball in down if ball not in VALUES or (last and ball == state.on))
@@ -264,7 +264,7 @@ class Snooker(Ruleset[SnookerState]):
     def _foul(
         self, state: SnookerState, clean: SnookerState, played: SnookerShot, fouls: tuple[tuple[int, str], ...]
     ) -> ShotResult[SnookerState]:
-        """Return what a foul leads to: its dearest part counts, reds stay down, colours come back (Fouls)."""
+        """Return the result of a foul: the highest penalty counts, reds stay down, colours are respotted (Fouls)."""
         penalty, down = max(fouls)[0], played.shot.down
         why = tuple(each for _, each in fouls)
         table = state.without(reds(down))
@@ -285,7 +285,7 @@ class Snooker(Ruleset[SnookerState]):
 
     def _decide(self, state: SnookerState, decision: Decision) -> ShotResult[SnookerState]:
         after = replace(state, before=None)
-        if decision == "pass":  # a free ball is void where the offender plays again
+        if decision == "pass":  # there is no free ball if the offender plays again
             return ShotResult(replace(after, turn=state.other, free=False, fouled=False))
         if decision == "restore" and state.before is not None:
             return ShotResult(replace(state.before, scores=state.scores), restore=True)
@@ -322,7 +322,7 @@ def _needed(state: SnookerState) -> bool:
 
 
 def _claimable(state: SnookerState) -> SnookerState:
-    """Return the state with the choice to claim: the black alone is left, and the player leads by more than it."""
+    """Return the state, with a `claim` offered if only the black is left and the lead exceeds its value."""
     if state.table != ("black",) or state.players == 1:
         return state
     if state.scores[state.turn] - state.scores[state.other] <= VALUES["black"]:
@@ -331,7 +331,7 @@ def _claimable(state: SnookerState) -> SnookerState:
 
 
 def _ended(state: SnookerState) -> ShotResult[SnookerState]:
-    """Return the end of the frame; with level scores the black is respotted, and the other player decides who plays."""
+    """Return the end of the frame. At level scores the black is respotted, and the other player may play or pass."""
     if state.players == 2 and state.scores[0] == state.scores[1]:
         after = replace(
             state, table=("black",), on="black", turn=state.other, in_hand="in the D", run=0, decisions=("play", "pass")
