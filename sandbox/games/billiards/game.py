@@ -31,7 +31,7 @@ from sandbox.trajectory import Contacts, Frame
 MIN_CUE_SPEED, MAX_CUE_SPEED = 0.05, 10.0
 """m/s: the slowest stroke, and a hard break"""
 MAX_TIP_OFFSET = 0.999 * MISCUE
-"""greatest offset of the tip from the centre of the ball, in radii; just below where the tip slips"""
+"""greatest offset of the tip from the centre of the ball, in radii; just below the miscue limit"""
 REST_SPEED = 1e-9
 """m/s and rad/s: a slower body is at rest. Far below the threshold at which engines set the velocity to zero"""
 MAX_JOINED_CONTACTS = 1024

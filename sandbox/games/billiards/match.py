@@ -70,14 +70,14 @@ def require_suitable_table(layout: TableGeometry, rules: Ruleset[Any], state: Ru
 class Match:
     """A frame of a game on a table, between two shots.
 
-    Methods return another match; `moves` returns the actions that bring the table into its state.
+    Methods return a new match; `moves` returns the actions that take the table to its state.
     """
 
     layout: TableGeometry = field(repr=False, compare=False)
     rules: Ruleset[Any] = field(repr=False)
     state: RulesState
     position: tuple[Point, ...] = field(repr=False)
-    """position of every body, m; a pocketed ball lies in its pocket"""
+    """position of every body, m; a pocketed ball is in its pocket"""
     before: tuple[Point, ...] | None = field(default=None, repr=False)
     """positions before the last shot, m, which can be restored after a miss in snooker"""
     shots: int = 0
@@ -96,7 +96,7 @@ class Match:
             terms: further arguments of the game's `start`: `distance` of carom, `misses` of snooker.
 
         Raises:
-            GameError: there is no such game, or it cannot be played on this table.
+            GameError: the game does not exist, or it cannot be played on this table.
         """
         rules, layout = ruleset_named(game or scene.play.game or "free"), TableGeometry.of(scene)
         if rules.name == "free" and "balls" not in terms and layout.names:
@@ -121,7 +121,7 @@ class Match:
 
     @property
     def turn(self) -> int:
-        """The player to shoot, from 0."""
+        """Index of the player to shoot."""
         return self.state.turn
 
     @property
@@ -136,7 +136,7 @@ class Match:
 
     @property
     def choices(self) -> ShotChoices:
-        """What may be decided and called before the next shot."""
+        """Decisions and calls that are possible before the next shot."""
         return self.rules.choices(self.state)
 
     @property

@@ -227,7 +227,7 @@ def respot_moves(
         layout: geometry of the table.
         respots: the balls and their spots, in order.
         position: positions before, m.
-        here: indices of the balls on the table, which block spots unless they lie in a pocket.
+        here: indices of the balls on the table, which block spots unless they are in a pocket.
 
     Raises:
         GameError: there is no room.

@@ -9,8 +9,8 @@ section 1. UMB: Union Mondiale de Billard, World Rules of Carom Billiard, articl
 Cushions: a pocket is a gap between two cushions. Each cushion ends at a lip: its nose line and its facing, the line
 that leads into the pocket, are joined by a jaw, a round post tangent to both. A facing ends where it meets the hole.
 
-Racks: balls lie on a triangular lattice. With a gap g the lattice is g/2 wider than the balls, and each ball lies
-at random within g/4 of its lattice point: the gaps of neighbours are 0 to g, and no balls overlap.
+Racks: balls are on a triangular lattice. With a gap g, the pitch of the lattice is the ball diameter plus g/2, and each
+ball is at random within g/4 of its lattice point. The gaps of neighbours are 0 to g, and no balls overlap.
 """
 
 from __future__ import annotations  # `np.random` in an annotation would import it wherever scenes are read
@@ -137,7 +137,7 @@ def _snooker_table() -> Table:
     width, length, baulk, d = 1.778, 3.569, 0.737, 0.292
     middle = 0.5 * width
     spots = {
-        "yellow": (middle + d, baulk),  # on the right as seen from baulk
+        "yellow": (middle + d, baulk),  # on the right, seen from baulk
         "green": (middle - d, baulk),
         "brown": (middle, baulk),
         "blue": (middle, 0.5 * length),

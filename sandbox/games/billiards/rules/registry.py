@@ -1,4 +1,4 @@
-"""The rules of every game, by name."""
+"""Registry of the rules of all games, by name."""
 
 from typing import Any
 
@@ -22,7 +22,7 @@ def ruleset_named(name: str) -> Ruleset[Any]:
     """Return the rules of a game.
 
     Raises:
-        GameError: there is no such game; the message lists the names.
+        GameError: the game does not exist; the message lists the names.
     """
     try:
         return RULESETS[name]

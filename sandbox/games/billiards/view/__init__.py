@@ -1,1 +1,1 @@
-"""Billiards in the window: table, balls, aim, cue controls, scoreboard, the bot as a player."""
+"""Billiards in the window: table, balls, aim, cue controls, scoreboard, and the bot as a player."""
