@@ -2,8 +2,8 @@
 
 The probability of a straight pot uses the ghost ball, the position of the cue ball at which the object ball leaves
 towards the pocket. An aiming error δ moves the contact by δ·d, where d is the distance to the ghost ball, and turns the
-path of the object ball by δ·d / (2R·cos φ), where φ is the cut angle. The pocket accepts
-directions within an angle of its width, less the diameter of a ball, divided by the distance to it.
+path of the object ball by δ·d / (2R·cos φ), where φ is the cut angle. The pocket accepts directions
+within an angle of its width, less the diameter of a ball, divided by the distance to it.
 
 `ShotEvaluator` simulates strokes on the exact engine and lets the rules judge them.
 """
