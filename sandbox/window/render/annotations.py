@@ -1,4 +1,4 @@
-"""Overlays that mark single bodies: centres, names, boxes, the picked body, mouse spring, missed contacts."""
+"""Overlays that annotate single bodies: bounding boxes, centres, names, selection, mouse spring, missed contacts."""
 
 import math
 from functools import lru_cache
@@ -18,11 +18,11 @@ from sandbox.window.render.text import draw_text, text_size
 
 MOST_NAMES, MOST_BOXES, MOST_CENTRES, MOST_FLASHES = 60, 1000, 4000, 24
 FLASH = 1.5
-"""s, how long a missed contact is shown"""
+"""s, time for which a missed contact is shown"""
 
 
 def draw_boxes(view: DrawContext, polygons: PolygonRenderer) -> None:
-    """Draw the box around each body."""
+    """Draw the bounding box of each body."""
     some = view.first(MOST_BOXES)
     lone = some.snapshot.bodies.round[some.shown]
     if not lone.all():
@@ -38,7 +38,7 @@ def draw_boxes(view: DrawContext, polygons: PolygonRenderer) -> None:
 
 
 def draw_centres(view: DrawContext) -> None:
-    """Draw each centre of mass as a quartered circle, or as a point where a body is small."""
+    """Draw each centre of mass as a quartered circle; on small bodies as a dot."""
     some = view.first(MOST_CENTRES)
     size = 5.0 * view.ui_scale
     mark = _quartered(size)
@@ -58,7 +58,7 @@ def draw_centres(view: DrawContext) -> None:
 
 @lru_cache(maxsize=8)
 def _quartered(size: float) -> pygame.Surface:
-    """Return the mark of a centre of mass."""
+    """Return the sprite that marks a centre of mass."""
     side = 2 * math.ceil(size) + 2
     mark = pygame.Surface((side, side), pygame.SRCALPHA)
     middle = side / 2.0
@@ -71,7 +71,7 @@ def _quartered(size: float) -> pygame.Surface:
 
 
 def draw_names(view: DrawContext, polygons: PolygonRenderer) -> None:
-    """Write the names of bodies above them, as many as fit without covering one another."""
+    """Draw the names of bodies above them; names that would overlap an earlier one are skipped."""
     taken: list[pygame.Rect] = []
     size = 12 * view.ui_scale
     some = view.first(4 * MOST_NAMES)
@@ -98,7 +98,7 @@ def draw_names(view: DrawContext, polygons: PolygonRenderer) -> None:
 
 
 def draw_verdicts(view: DrawContext) -> None:
-    """Say of each body whether it overlaps something, so that it does not rest on colour alone."""
+    """Write on each body whether it overlaps another, so that the state is not shown by colour alone."""
     overlapping = view.snapshot.overlapping
     assert overlapping is not None
     some = view.first(MOST_NAMES)
@@ -109,7 +109,7 @@ def draw_verdicts(view: DrawContext) -> None:
             "overlap" if touching else "clear",
             min(max(0.28 * radius, 11.0 * view.ui_scale), 26.0 * view.ui_scale),
         )
-        place = y - 0.4 * radius  # above the mark of its centre and its name
+        place = y - 0.4 * radius  # above the centre mark and the name
         if text_size(word, size, bold=True)[0] > 1.6 * radius:
             place = y
             word, size = "!", min(max(1.2 * radius, 9.0 * view.ui_scale), 20.0 * view.ui_scale)
@@ -119,7 +119,7 @@ def draw_verdicts(view: DrawContext) -> None:
 
 
 def draw_flashes(view: DrawContext) -> None:
-    """Draw a ring that grows and fades about each contact that was missed a moment ago."""
+    """Draw a ring that expands and fades at each recently missed contact."""
     for flash in view.snapshot.flashes[-MOST_FLASHES:]:
         share = flash.age / FLASH
         with np.errstate(invalid="ignore", over="ignore"):
@@ -134,7 +134,7 @@ def draw_flashes(view: DrawContext) -> None:
 
 
 def draw_picked(view: DrawContext, discs: CircleRenderer, polygons: PolygonRenderer) -> None:
-    """Draw a bright line around the picked body."""
+    """Draw a highlight around the selected body."""
     number, frame = view.snapshot.picked, view.snapshot.frame
     if number is None or not 0 <= number < min(len(frame.position), len(view.snapshot.bodies)):
         return
@@ -155,7 +155,7 @@ def draw_picked(view: DrawContext, discs: CircleRenderer, polygons: PolygonRende
 
 
 def draw_pull(view: DrawContext, discs: CircleRenderer) -> None:
-    """Draw the spring between the held place and the hand."""
+    """Draw the mouse spring between its anchor on the body and the pointer."""
     if view.snapshot.pull is None:
         return
     with np.errstate(invalid="ignore", over="ignore"):

@@ -1,8 +1,8 @@
-"""Geometry of the bodies of a scene for drawing: their convex pieces, on the screen and in kernels.
+"""Geometry of bodies for drawing: their convex pieces in body coordinates, and in pixels for a given pose.
 
-The distance from a body of several pieces is that from its nearest piece. It is 0 along a seam, where two pieces abut,
-although a seam lies inside the body. So seams get patches, further convex pieces that lie within the body: a hexagon
-along each seam, and a disc where several meet. Rims then follow the edge of the whole body.
+The distance from a compound body is the distance from its nearest piece. It is 0 along a seam, where two pieces abut,
+although a seam lies inside the body. Seams therefore get patches, additional convex pieces within the body: a hexagon
+along each seam, and a disc where several seams meet. Rims then follow the outline of the whole body.
 """
 
 import math
@@ -16,38 +16,39 @@ from sandbox.scene.compile.bodies import Bodies
 from sandbox.window.hit_test import Distance, Hull, hull_distance
 
 PATCH_DEPTH = 0.5
-"""Depth of a patch in each piece, as a fraction of half the thickness of the thinner one; a rim takes at most 0.16."""
+"""Depth of a patch in each piece, as a fraction of half the thickness of the thinner piece; a rim takes at most 0.16.
+"""
 ABUTTING = 1e-6
-"""Distance between edges that abut, as a fraction of the size of a body: rounding of corners in scene files."""
+"""Tolerance of abutting edges as a fraction of the size of a body, for rounded corners in scene files."""
 
 
 class ConvexPieces(NamedTuple):
-    """What the bodies of a scene consist of."""
+    """Convex pieces of the N bodies of a scene: S rounded polygons with V corners in total."""
 
     piece: IntArray
-    """(N + 1,) where each body's pieces begin"""
+    """(N + 1,) index of the first piece of each body"""
     first: IntArray
-    """(S + 1,) where each piece's corners begin"""
+    """(S + 1,) index of the first corner of each piece"""
     corner: FloatArray
     """(V, 2) m, in the body's frame"""
     radius: FloatArray
-    """(S,) m"""
+    """(S,) m, rounding radius"""
 
 
 class ScreenPose(NamedTuple):
-    """Where a body is in a picture."""
+    """Pose of a body on the screen."""
 
     x: float
     """px"""
     y: float
     angle: float
-    """rad, counted as in the world, where y is up"""
+    """rad, counter-clockwise, as in the world (y up)"""
     scale: float
     """px/m"""
 
 
 class BodyGeometry:
-    """What the bodies of a scene consist of."""
+    """Convex pieces and patches of the bodies of a scene, with the queries that drawing needs."""
 
     def __init__(self, bodies: Bodies) -> None:
         self._bodies = bodies
@@ -64,12 +65,12 @@ class BodyGeometry:
         self.pieces = _with_patches(pieces, girth)
 
     def rims(self, who: IntArray, scale: float, line: float) -> FloatArray:
-        """Return the widths of the rims of bodies, (K,) px: as of discs of about the same thickness."""
+        """Return the rim widths of bodies, (K,) px: those of discs of about the same thickness."""
         girth = self._girth[who] * scale
         return np.asarray(np.minimum(0.16 * girth, line * np.minimum(1.0 + girth / 80.0, 2.5)))
 
     def hulls(self, number: int, place: ScreenPose) -> list[Hull]:
-        """Return the pieces of a body in the picture, px."""
+        """Return the pieces of a body in screen coordinates, px."""
         pieces, found = self.pieces, []
         cos, sin = math.cos(place.angle) * place.scale, math.sin(place.angle) * place.scale
         turn = np.asarray(((cos, -sin), (-sin, -cos)))
@@ -79,21 +80,24 @@ class BodyGeometry:
         return found
 
     def distance(self, number: int, place: ScreenPose) -> Distance:
-        """Return the signed distance from a body, px; inside a compound body, that from its nearest piece."""
+        """Return the signed distance function of a body, px: the minimum over its pieces."""
         parts = [hull_distance(hull) for hull in self.hulls(number, place)]
         if len(parts) == 1:
             return parts[0]
         return lambda x, y: np.asarray(np.minimum.reduce([part(x, y) for part in parts]))
 
     def within(self, number: int, place: ScreenPose, margin: float = 1.0) -> tuple[float, float, float, float]:
-        """Return left, top, right and bottom of the box around a body and a margin, px."""
+        """Return left, top, right and bottom of the bounding box of a body, enlarged by `margin`, px."""
         hulls = self.hulls(number, place)
         low = np.min([hull.corners.min(axis=0) - hull.radius for hull in hulls], axis=0) - margin
         high = np.max([hull.corners.max(axis=0) + hull.radius for hull in hulls], axis=0) + margin
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
     def boxes(self, who: IntArray, centre: FloatArray, angle: FloatArray, scale: float) -> FloatArray:
-        """Return left, top, right and bottom of the boxes around bodies, (K, 4) px; they are given as to be drawn."""
+        """Return left, top, right and bottom of the bounding boxes of bodies, (K, 4) px.
+
+        `centre` (K, 2) is in px, `angle` (K,) in rad, finite, and `scale` in px/m.
+        """
         pieces = self.pieces
         begin, end = pieces.first[pieces.piece[who]], pieces.first[pieces.piece[who + 1]]
         count = end - begin
@@ -111,7 +115,7 @@ class BodyGeometry:
 
 
 def clipped_box(box: tuple[float, float, float, float], area: pygame.Rect) -> pygame.Rect:
-    """Return the part of an area that a box touches, whatever its size."""
+    """Return the part of `area` that a box of any size overlaps; an empty rectangle if there is none."""
     left, top = max(box[0], area.left), max(box[1], area.top)
     right, bottom = min(box[2], area.right), min(box[3], area.bottom)
     if not (left < right and top < bottom):
@@ -121,7 +125,7 @@ def clipped_box(box: tuple[float, float, float, float], area: pygame.Rect) -> py
 
 
 def _girths(pieces: ConvexPieces) -> FloatArray:
-    """Return half of the thickness of each piece, about, (S,) m: its area by half its perimeter."""
+    """Return the approximate half thickness of each piece, (S,) m: 2 · area / perimeter."""
     start = pieces.first[:-1]
     count = np.diff(pieces.first)
     following = np.arange(len(pieces.corner)) + 1
@@ -133,7 +137,7 @@ def _girths(pieces: ConvexPieces) -> FloatArray:
 
 
 def _with_patches(pieces: ConvexPieces, girth: FloatArray) -> ConvexPieces:
-    """Return the pieces of bodies, followed by the patches of their seams, body by body."""
+    """Return the pieces of each body followed by the patches of its seams."""
     compound = np.flatnonzero(np.diff(pieces.piece) > 1)
     patches = {int(body): patches for body in compound if (patches := _patches(pieces, int(body), girth))}
     if not patches:
@@ -177,7 +181,7 @@ def _is_among(point: FloatArray, points: list[FloatArray], tolerance: float) -> 
 
 
 def _room_around(point: FloatArray, polygons: list[FloatArray], tolerance: float) -> float:
-    """Return the radius, m, of a disc around the end of a seam within the pieces there; 0 at a body's edge."""
+    """Return the radius, m, of a disc around a seam end that fits within the pieces; 0 on the outline of the body."""
     angle, radius = 0.0, math.inf
     for polygon in polygons:
         along = np.roll(polygon, -1, axis=0) - polygon
@@ -197,7 +201,7 @@ def _room_around(point: FloatArray, polygons: list[FloatArray], tolerance: float
 
 
 def _seams(one: FloatArray, other: FloatArray, tolerance: float) -> list[FloatArray]:
-    """Return the ends of the segments that two anticlockwise polygons abut along, (2, 2) m each."""
+    """Return the end points of the segments along which two counter-clockwise polygons abut, (2, 2) m each."""
     seams = []
     following = np.roll(other, -1, axis=0)
     for a, b in zip(one, np.roll(one, -1, axis=0), strict=True):
@@ -208,7 +212,7 @@ def _seams(one: FloatArray, other: FloatArray, tolerance: float) -> list[FloatAr
         across = np.asarray((along[1], -along[0]))
         near = (np.abs((other - a) @ across) <= tolerance) & (np.abs((following - a) @ across) <= tolerance)
         for k in np.flatnonzero(near):
-            begin, end = float((following[k] - a) @ along), float((other[k] - a) @ along)  # it runs the other way
+            begin, end = float((following[k] - a) @ along), float((other[k] - a) @ along)  # opposite direction
             begin, end = max(begin, 0.0), min(end, length)
             if end - begin > tolerance:
                 seams.append(np.asarray((a + begin * along, a + end * along)))
@@ -216,7 +220,7 @@ def _seams(one: FloatArray, other: FloatArray, tolerance: float) -> list[FloatAr
 
 
 def _hexagon(ends: FloatArray, depth: float) -> FloatArray:
-    """Return the hexagon around a segment: `depth` wide on both sides, with bevels at its ends, (6, 2) m."""
+    """Return a hexagon around a segment: `depth` wide on both sides, bevelled at the ends, (6, 2) m."""
     begin, end = ends
     along = (end - begin) / math.dist(begin.tolist(), end.tolist()) * depth
     across = np.asarray((along[1], -along[0]))

@@ -1,4 +1,4 @@
-"""Antialiased discs and rings, blitted from sprites that are cached."""
+"""Antialiased discs and rings, blitted from cached sprites."""
 
 import math
 from typing import NamedTuple
@@ -13,36 +13,36 @@ from sandbox.window.render.particles import packed_pixels
 from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf, sdf_surface, shade_sdf
 
 LARGEST = 96.0
-"""px, the radius up to which discs are sprites; larger ones are painted, only where they are in the picture"""
+"""px, largest radius that is drawn as a sprite; larger discs are painted directly, clipped to the surface"""
 FINEST = 128
-"""Radii of sprites are told apart by 1/128 px."""
+"""Sprites per px of radius: radii are quantised to 1/128 px."""
 OFFSETS = 4
-"""A sprite lies at quarters of a pixel, across and down, so that slow balls do not jerk."""
+"""Sub-pixel positions of a sprite along each axis, so that slow balls move smoothly."""
 SPRITE_BUDGET = 8_000_000
-"""px of sprites that are kept, 32 MB"""
+"""px of cached sprites, 32 MB"""
 SPRITE_CROWD = 48
-"""So many painted discs at once are drawn plainly: they cover each other anyway."""
+"""Number of large discs above which they are drawn without antialiasing; they mostly cover each other."""
 SHORTEST_SPOKE = 4.0
-"""px, the radius from which a spoke is drawn"""
+"""px, smallest radius with a rotation mark"""
 THIN = 14.0
-"""px, the radius up to which a spoke is one pixel wide"""
+"""px, largest radius with a rotation mark one pixel wide"""
 THICK = 300
-"""Of more spokes, all are one pixel wide."""
+"""Number of rotation marks above which all are one pixel wide."""
 DARK = 0.5
-"""How far a rim or spoke leans to the background."""
+"""Fraction by which the colours of rims and rotation marks are mixed with the background."""
 
 
 class CircleStyle(NamedTuple):
-    """How discs are drawn."""
+    """Style of discs."""
 
     line: float = 1.5
-    """width of the rim, px"""
+    """rim width, px"""
     hollow: bool = False
     antialias: bool = True
 
 
 class CircleRenderer:
-    """Draws discs and rings, and keeps their sprites between pictures."""
+    """Draws discs and rings, and caches their sprites between frames."""
 
     def __init__(self) -> None:
         self._sprites: dict[CircleStyle, dict[int, pygame.Surface]] = {}
@@ -51,14 +51,14 @@ class CircleRenderer:
     def draw(
         self, surface: pygame.Surface, centre: FloatArray, radius: FloatArray, colours: ColourArray, style: CircleStyle
     ) -> None:
-        """Draw discs in their order, small ones first.
+        """Draw discs in order, those drawn as sprites first.
 
         Args:
-            surface: where.
+            surface: the target.
             centre: (K, 2) px, finite.
             radius: (K,) px, of any size.
             colours: (K, 3).
-            style: of all of them; a hollow disc is its rim alone, in its own colour.
+            style: of all discs; a hollow disc is only a rim, in the colour of the disc.
         """
         small = radius <= LARGEST
         if small.all():
@@ -98,7 +98,7 @@ class CircleRenderer:
 
 
 def _keys(size: IntArray, colours: ColourArray, offset: IntArray) -> IntArray:
-    """Return a number for each sprite: radius, red, green, blue, and the offsets of its middle."""
+    """Return the cache keys of sprites: radius, red, green, blue and the sub-pixel offsets, packed into an integer."""
     key = size
     for channel in range(3):
         key = key << 8 | colours[:, channel]
@@ -111,7 +111,7 @@ def _sprite(key: int, style: CircleStyle) -> pygame.Surface:
     radius = (key >> 28) / FINEST
     half = math.ceil(radius) + 1
     along = np.arange(2 * half + 1, dtype=np.float64) + 0.5
-    # Coverage that falls off linearly over a pixel adds 1/12 px² to a disc's squared radius; tiny ones would show it.
+    # Coverage that falls off linearly over a pixel adds 1/12 px² to the squared radius, visible on tiny discs.
     true = math.sqrt(max(radius**2 - 1.0 / 12.0, 0.04)) if style.antialias else radius
     distance = disc_distance(half + across / OFFSETS, half + down / OFFSETS, true)
     return sdf_surface(shade_sdf(distance(along[:, None], along[None, :]), _look(radius, (red, green, blue), style)))
@@ -140,7 +140,7 @@ def _paint(
 
 
 def darken(colour: Colour) -> Colour:
-    """Return the colour of the rim and spoke of a ball."""
+    """Return the colour of the rim and the rotation mark of a ball."""
     red, green, blue = (round(c + (b - c) * DARK) for c, b in zip(colour, BACKGROUND, strict=True))
     return red, green, blue
 
@@ -153,24 +153,24 @@ def draw_rotation_marks(
     colours: ColourArray,
     antialias: bool,
 ) -> None:
-    """Draw the line that shows how far a disc has turned; its middle is left free.
+    """Draw the radial line that shows the angle of a disc; it starts at 35 % of the radius.
 
     Args:
-        surface: where.
+        surface: the target.
         centre: (K, 2) px.
-        radius: (K,) px; below `SHORTEST_SPOKE` and beyond 1e6 none is drawn.
-        angle: (K,) rad, counted as in the world, where y is up.
+        radius: (K,) px; discs below `SHORTEST_SPOKE` or above 1e6 get no mark.
+        angle: (K,) rad, counter-clockwise, as in the world (y up).
         colours: (K, 3) of the discs.
         antialias: whether edges are smooth.
     """
     shown = np.flatnonzero((radius >= SHORTEST_SPOKE) & (radius < 1e6) & np.isfinite(angle))
     way = np.stack((np.cos(angle[shown]), -np.sin(angle[shown])), 1)
-    middle, reach = centre[shown] - 0.5, radius[shown, None]  # SDL has a pixel's middle at a whole number
+    middle, reach = centre[shown] - 0.5, radius[shown, None]  # SDL pixel centres are at integers
     ends = np.concatenate((middle + way * reach * 0.35, middle + way * (reach * 0.95 - 1.0)), 1)
     tones = np.rint(colours[shown] * (1.0 - DARK) + np.asarray(BACKGROUND) * DARK).astype(np.uint8)
     thin = (reach[:, 0] <= THIN) | (len(shown) > THICK)
     line = pygame.draw.aaline if antialias else pygame.draw.line
-    # Flat lists of numbers: thousands of small ones would keep the garbage collector busy.
+    # Flat lists of numbers: thousands of small tuples would trigger the garbage collector.
     columns = (column.tolist() for column in (packed_pixels(tones[thin], surface), *ends[thin].T))
     for tone, ax, ay, bx, by in zip(*columns, strict=True):
         line(surface, tone, (ax, ay), (bx, by))

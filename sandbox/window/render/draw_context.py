@@ -1,4 +1,4 @@
-"""DrawContext: the surface, camera and moment of a picture, and the bodies in it."""
+"""Draw context: target surface, camera, snapshot and visible bodies of the frame being drawn."""
 
 from dataclasses import dataclass, replace
 
@@ -14,29 +14,29 @@ from sandbox.window.render.palette import ColourArray
 
 @dataclass(frozen=True, eq=False)
 class DrawContext:
-    """Target, camera, moment and style of a picture, passed to all functions that draw a part of it."""
+    """Target, camera, snapshot and style of a frame, passed to all drawing functions."""
 
     surface: pygame.Surface
     camera: Camera
     snapshot: Snapshot
     ui_scale: float
-    """px, of a line that is one pixel wide on a 1080p display"""
+    """px, width of a line that is one pixel wide on a 1080p display"""
     antialias: bool
     shown: IntArray
-    """(K,) indices of the bodies that are present and in the picture"""
+    """(K,) indices of the bodies that are present and visible"""
     centre: FloatArray
-    """(K, 2) px"""
+    """(K, 2) px, of the visible bodies"""
     radius: FloatArray
     """(K,) px"""
     colours: ColourArray
     """(K, 3)"""
     body_colours: ColourArray
-    """(N, 3) of all bodies, by index"""
+    """(N, 3) colours of all bodies, by index"""
     has_points: bool = False
     """whether the smallest bodies are drawn as points, below everything else"""
 
     def first(self, most: int) -> "DrawContext":
-        """Return this context with at most `most` bodies, spread evenly over all of them."""
+        """Return this context with at most `most` bodies, sampled evenly from all of them."""
         if len(self.shown) <= most:
             return self
         kept = np.linspace(0, len(self.shown) - 1, most).astype(np.intp)
@@ -49,7 +49,7 @@ class DrawContext:
         )
 
     def inside(self, pixels: FloatArray, margin: float = 0.0) -> IntArray:
-        """Return the indices of the places (K, 2) px in the picture or at most a margin outside it; nan is outside."""
+        """Return the indices of the points (K, 2) px on the surface or within a margin of it; nan counts as outside."""
         x, y = pixels[:, 0], pixels[:, 1]
         width, height = self.camera.size
         return np.flatnonzero((x >= -margin) & (x < width + margin) & (y >= -margin) & (y < height + margin))

@@ -1,7 +1,7 @@
-"""GameView: what a game draws itself. The renderer asks the view of a scene's game, and knows no game.
+"""Game views: drawing specific to a game. The renderer looks up the view of a scene and depends on no game.
 
-A view is found through the `GameSpec` of its game, and imported when a scene of the game is drawn. A renderer has one
-view per game, which may keep sprites, and how balls have rolled, from one picture to the next.
+A view is named in the `GameSpec` of its game and imported when a scene of that game is first drawn. A renderer keeps
+one view per game, which may cache sprites and the rolling orientation of balls between frames.
 """
 
 from typing import Protocol, runtime_checkable
@@ -14,41 +14,41 @@ from sandbox.window.render.draw_context import DrawContext
 
 
 class GameView(Protocol):
-    """Draws the parts of a picture that are special to a game. `ctx.snapshot.game` is `Rules.view_state`, or None."""
+    """Draws the parts of a frame that are specific to a game. `ctx.snapshot.game` is `Rules.view_state`, or None."""
 
     def background(self, ctx: DrawContext) -> bool:
-        """Draw ground and static bodies on an empty surface; return False to have them drawn as in other scenes.
+        """Draw ground and static bodies on an empty surface; return False to use the default drawing.
 
-        The picture is cached until scene or camera change. `ctx` has no bodies.
+        The surface is cached until the scene or the camera changes. `ctx` contains no bodies.
         """
 
     def below(self, ctx: DrawContext) -> None:
-        """Draw what lies below the bodies."""
+        """Draw the layer below the bodies."""
 
     def bodies(self, ctx: DrawContext) -> IntArray:
-        """Draw some bodies; return their indices, which are then not drawn as shapes."""
+        """Draw some bodies; return their indices, which the renderer then skips."""
 
     def above(self, ctx: DrawContext) -> None:
-        """Draw what lies above the bodies."""
+        """Draw the layer above the bodies."""
 
 
 @runtime_checkable
 class HasHud(Protocol):
-    """View that also draws text or signs over the picture, in the window only."""
+    """View that also draws text or icons over the frame, in the window only."""
 
     def hud(self, ctx: DrawContext) -> None:
-        """Draw over everything else in the picture."""
+        """Draw over all other content of the frame."""
 
 
 class GameViews:
-    """Views by game; each is created when it is first needed."""
+    """Views by game, created on first use."""
 
     def __init__(self) -> None:
         self._views: dict[str, GameView] = {}
         self._last: tuple[Scene, GameView | None] | None = None
 
     def view_of(self, scene: Scene) -> GameView | None:
-        """Return the view that draws a scene; None if no game does."""
+        """Return the view that draws a scene; None if no game has one for it."""
         if self._last is None or self._last[0] is not scene:
             path = view_path(scene)
             if path is not None and path not in self._views:
@@ -58,9 +58,9 @@ class GameViews:
 
 
 def view_path(scene: Scene) -> str | None:
-    """Return the import string of the view that draws a scene; None if no game does.
+    """Return the import string of the view that draws a scene; None if there is none.
 
-    The game that the scene names comes first, then those that draw such a scene without being named.
+    The game named by the scene takes precedence over games whose `presents` accepts the scene.
     """
     specs = game_specs()
     if scene.play.game is not None:
@@ -74,7 +74,7 @@ def _named_spec(game: str) -> GameSpec | None:
         return spec_of(game)
     except (ImportError, AttributeError):
         assert game not in GAMES
-        return None  # a game of another package that is broken: the start of the game reports it
+        return None  # an installed game that fails to import: starting the game reports the error
 
 
 def _presents(spec: GameSpec, scene: Scene) -> bool:

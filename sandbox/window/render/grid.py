@@ -1,4 +1,4 @@
-"""Grid lines at round distances, and the scale bar that gives the length of one of them."""
+"""Grid lines at round distances, and the scale bar that labels the grid spacing."""
 
 import math
 
@@ -11,20 +11,20 @@ from sandbox.window.render.palette import BACKGROUND, FAINT, GRID, GRID_STRONG
 from sandbox.window.render.text import draw_text
 
 NARROWEST = 56.0
-"""px, the least distance of two lines"""
+"""px, smallest spacing of grid lines"""
 STRONG = 5
-"""Every so many lines one is stronger."""
+"""Every fifth line is emphasised."""
 
 
 def step_of(camera: Camera, unit: float = 1.0) -> float:
-    """Return the distance of two lines, m: 1, 2 or 5 times a power of ten."""
+    """Return the grid spacing, m: 1, 2 or 5 times a power of ten."""
     least = NARROWEST * unit / camera.scale
     power = 10.0 ** math.floor(math.log10(least))
     return next((k * power for k in (1.0, 2.0, 5.0) if k * power >= least), 10.0 * power)
 
 
 def draw_grid(surface: pygame.Surface, camera: Camera, unit: float = 1.0) -> None:
-    """Draw the lines; where places are too large for floats to tell neighbouring lines apart, none."""
+    """Draw the grid; an axis whose coordinates exceed 1e12 spacings gets no lines (float resolution)."""
     step = step_of(camera, unit)
     thickness = max(1, round(unit))
     lines: list[tuple[bool, pygame.Rect]] = []
@@ -41,12 +41,12 @@ def draw_grid(surface: pygame.Surface, camera: Camera, unit: float = 1.0) -> Non
             else:
                 rect = pygame.Rect(0, int(pixel), camera.size[0], thickness)
             lines.append((number % STRONG == 0, rect))
-    for strong, rect in sorted(lines, key=lambda line: line[0]):  # strong ones last: they cross the others
+    for strong, rect in sorted(lines, key=lambda line: line[0]):  # emphasised lines last, as they cross the others
         surface.fill(GRID_STRONG if strong else GRID, rect)
 
 
 def draw_scale(surface: pygame.Surface, camera: Camera, unit: float = 1.0, foot: float = 0.0) -> None:
-    """Draw the bar in the lower left corner, `foot` px above the lower edge."""
+    """Draw the scale bar in the lower left corner, `foot` px above the lower edge."""
     step = step_of(camera, unit)
     length, thick = round(step * camera.scale), max(1, round(1.5 * unit))
     left, base = round(18 * unit), round(camera.size[1] - 18 * unit - foot)
@@ -55,5 +55,5 @@ def draw_scale(surface: pygame.Surface, camera: Camera, unit: float = 1.0, foot:
     for x in (left, left + length - thick):
         surface.fill(FAINT, pygame.Rect(x, base - thick - tick, thick, tick))
     text, middle, above = format_si(step, "m", digits=1), left + length / 2.0, base - tick - 3 * unit
-    draw_text(surface, text, (middle + 1, above + 1), 12 * unit, BACKGROUND, "midbottom")  # it may lie on a bright ball
+    draw_text(surface, text, (middle + 1, above + 1), 12 * unit, BACKGROUND, "midbottom")  # shadow, for contrast
     draw_text(surface, text, (middle, above), 12 * unit, FAINT, "midbottom")

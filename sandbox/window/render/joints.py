@@ -1,7 +1,7 @@
 """Joints and drives: rods, strings and springs below the bodies, and the symbols of the joints overlay above them.
 
-A spring's colour shows its strain: blue is short, grey at rest, orange long. Many springs, as of a cloth, are plain
-lines.
+The colour of a spring shows its strain: blue is compressed, grey at rest, orange stretched. If there are many springs,
+as in a cloth, they are drawn as plain lines.
 """
 
 import math
@@ -37,17 +37,17 @@ from sandbox.window.render.particles import packed_pixels
 from sandbox.window.render.sdf import ShapeStyle, SignedDistance, arc_distance, capsule_distance, draw_sdf
 
 COILED = 500
-"""Springs up to which each is a zigzag."""
+"""Number of springs up to which each is drawn as a zigzag."""
 SOLID_RODS = 500
-"""Rods up to which each is more than a thread wide."""
+"""Number of rods up to which each is drawn wider than one pixel."""
 NAIL = 3.2
-"""px, radius of what the world holds a joint by"""
+"""px, radius of the mark at an anchor on the world"""
 ZIGS = 18
-"""Half turns of a spring."""
+"""Half windings of a spring."""
 SHORTEST = 20.0
-"""px: a shorter spring is a line"""
+"""px, length below which a spring is drawn as a line"""
 STRAINED = 0.1
-"""of its length at rest: a spring so much longer has half of its colour"""
+"""Strain at which a spring shows half of its full colour."""
 _REST = mix_colours(BACKGROUND, SURFACE, 0.75)
 ROD = mix_colours(BACKGROUND, SURFACE, 0.9)
 STRING = mix_colours(BACKGROUND, SURFACE, 0.7)
@@ -58,19 +58,19 @@ SHADES = np.asarray(
     ],
     np.uint8,
 )
-"""From shortest to longest."""
+"""Colours of springs, from compressed to stretched."""
 
 
 @dataclass(frozen=True, eq=False)
 class JointSegments:
-    """The joints in sight, J of them, and where they hold their bodies."""
+    """The J visible joints and their anchors."""
 
     links: JointArrays
     ends: FloatArray
-    """(J, 4) px: of the first body, or the world, and of the second"""
+    """(J, 4) px: anchor on the first body or on the world, then anchor on the second body"""
 
     def of(self, *kinds: LinkKind) -> "JointSegments":
-        """Return those of some kinds."""
+        """Return the joints of the given kinds."""
         which = np.isin(self.links.kind, kinds)
         return JointSegments(self.links.some(which), self.ends[which])
 
@@ -81,7 +81,7 @@ class JointSegments:
 
 
 def joint_segments(view: DrawContext) -> JointSegments:
-    """Return the joints that are whole and whose bodies are present, those about the picture."""
+    """Return the visible joints: unbroken, with both bodies present, and near the surface."""
     links, frame = view.snapshot.links, view.snapshot.frame
     count = min(len(frame.position), len(view.snapshot.bodies))
     if not len(links):
@@ -103,7 +103,7 @@ def joint_segments(view: DrawContext) -> JointSegments:
 
 
 def draw_joints(view: DrawContext, joints: JointSegments, discs: CircleRenderer) -> None:
-    """Draw rods, strings and springs, and where the world holds them."""
+    """Draw rods, strings and springs, and their anchors on the world."""
     fast = joints.of(LinkKind.ROD, LinkKind.SLIDE, LinkKind.SPRING)
     nails = fast.ends[fast.links.a < 0, :2]
     tint = np.broadcast_to(np.asarray(SURFACE, np.uint8), (len(nails), 3))
@@ -125,7 +125,7 @@ def draw_joints(view: DrawContext, joints: JointSegments, discs: CircleRenderer)
 
 
 def strain(springs: JointSegments, scale: float) -> IntArray:
-    """Return which of `SHADES` tells how far each spring is stretched, (J,)."""
+    """Return the index into `SHADES` for the strain of each spring, (J,)."""
     rest = springs.links.figures[:, 0] * scale
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         stretch = np.where(rest > 0.0, springs.length / rest - 1.0, 1.0)
@@ -143,7 +143,7 @@ def _solid_rods(view: DrawContext, rods: JointSegments, colour: tuple[int, int, 
 
 
 def _coil(view: DrawContext, a: Pixel, b: Pixel, rest: float, colour: tuple[int, int, int]) -> None:
-    """Draw a spring: the wire of its zigzag is as long as ever, so its pitch widens and its width shrinks."""
+    """Draw a spring as a zigzag of constant wire length: stretching widens the pitch and narrows the coil."""
     length, unit = float(np.hypot(b[0] - a[0], b[1] - a[1])), view.ui_scale
     reach = 4.0 * max(view.camera.size)
     far = max(map(abs, (*a, *b))) > reach
@@ -170,11 +170,11 @@ def _coil(view: DrawContext, a: Pixel, b: Pixel, rest: float, colour: tuple[int,
 
 
 MAX_SYMBOLS = 600
-"""Joints of one kind that are drawn each in its way; of more, only lines from body to body."""
+"""Number of joints of a kind up to which each gets its symbol; above it, joints are plain lines from body to body."""
 MAX_DIALS = 60
-"""Of what turns, as their arcs take longer."""
+"""The same for dials of rotary joints, which take longer to draw."""
 SMALL_SYMBOL, LARGE_SYMBOL = 12.0, 34.0
-"""px: radii of the arcs of what turns"""
+"""px, smallest and largest radius of the arcs of rotary joints"""
 _TINTS: dict[LinkKind, Colour] = {
     LinkKind.ROD: INK,
     LinkKind.PIVOT: YELLOW,
@@ -189,21 +189,21 @@ _TINTS: dict[LinkKind, Colour] = {
 
 
 class AngleDial(NamedTuple):
-    """Where and how a joint that turns is drawn."""
+    """Where and how the dial of a rotary joint is drawn."""
 
     place: Pixel
     size: float
-    """px, its radius"""
+    """px, radius"""
     base: float
-    """rad, the angle of the first body"""
+    """rad, angle of the first body"""
     turned: float
-    """rad, that of the second from there"""
+    """rad, angle of the second body relative to the first"""
     figures: tuple[float, float, float]
-    """of the link"""
+    """parameters of the joint"""
 
 
 def draw_joint_symbols(view: DrawContext, joints: JointSegments, discs: CircleRenderer) -> None:
-    """Draw all joints about the picture."""
+    """Draw the symbols of all visible joints."""
     ways: dict[LinkKind, Callable[[DrawContext, JointSegments], None]] = {
         LinkKind.ROD: _rod_symbols,
         LinkKind.GEAR: _gears,
@@ -239,7 +239,7 @@ def _dots(view: DrawContext, places: FloatArray, size: float, colour: Colour, di
 
 
 def _rings(view: DrawContext, places: FloatArray, colour: Colour, discs: CircleRenderer) -> None:
-    """Draw what lets turn: a ring on a dark ground."""
+    """Draw the symbol of a revolute joint: a ring on a dark disc."""
     _dots(view, places, 5.0, BACKGROUND, discs)
     kept = view.inside(places, 10.0 * view.ui_scale)
     radius = np.full(len(kept), 5.0 * view.ui_scale)
@@ -262,7 +262,7 @@ def _gears(view: DrawContext, gears: JointSegments) -> None:
 
 
 def _slides(view: DrawContext, slides: JointSegments) -> None:
-    """Draw strings dashed; a tick at each end lies across, both bright where the string is taut."""
+    """Draw strings as dashed lines with a tick at each end, brighter if the string is taut."""
     scale, unit = view.camera.scale, view.ui_scale
     rows = zip(slides.ends.tolist(), slides.links.figures.tolist(), slides.length.tolist(), strict=True)
     for (ax, ay, bx, by), (least, most, _), length in rows:
@@ -276,7 +276,7 @@ def _slides(view: DrawContext, slides: JointSegments) -> None:
 
 
 def _grooves(view: DrawContext, grooves: JointSegments) -> None:
-    """Draw tracks: two lines and their round ends."""
+    """Draw grooves: two parallel lines with round ends."""
     links, frame = grooves.links, view.snapshot.frame
     angle = np.where(links.a < 0, 0.0, frame.angle[links.a])
     place = np.where((links.a < 0)[:, None], 0.0, frame.position[links.a])
@@ -299,7 +299,7 @@ def _grooves(view: DrawContext, grooves: JointSegments) -> None:
 
 
 def _limits(view: DrawContext, limits: JointSegments) -> None:
-    """Draw the arc within which the second body may turn, and a hand that shows where it is."""
+    """Draw the permitted arc of the second body, and a needle at its angle."""
     for (x, y), size, base, turned, (least, most, _) in _dials(view, limits):
         first, span = base + least, min(max(most - least, 0.0), math.tau)
         arc(view, (x, y), size, first, span, INK, 2.0)
@@ -311,7 +311,7 @@ def _limits(view: DrawContext, limits: JointSegments) -> None:
 
 
 def _turning_springs(view: DrawContext, springs: JointSegments) -> None:
-    """Draw a spiral that winds up as the spring does."""
+    """Draw a spiral that winds up with the spring."""
     for (x, y), size, base, turned, (rest, _, _) in _dials(view, springs):
         strained = max(min(turned - rest, 2.0 * math.tau), -2.0 * math.tau)
         wound = 1.5 * math.tau + strained
@@ -325,7 +325,7 @@ def _turning_springs(view: DrawContext, springs: JointSegments) -> None:
 
 
 def _motors(view: DrawContext, motors: JointSegments) -> None:
-    """Draw three quarters of a circle, with an arrow the way it drives."""
+    """Draw three quarters of a circle with an arrowhead in the driving direction."""
     for (x, y), size, base, _, (rate, _, _) in _dials(view, motors):
         way = 1.0 if rate >= 0.0 else -1.0
         first, span = base - way * 0.75 * math.pi, way * 1.35 * math.pi
@@ -336,7 +336,7 @@ def _motors(view: DrawContext, motors: JointSegments) -> None:
 
 
 def _dials(view: DrawContext, joints: JointSegments) -> list[AngleDial]:
-    """Return where joints that turn are drawn: where a pivot holds the same two, else in the second body's middle."""
+    """Return the dials of rotary joints: at a pivot of the same two bodies, else at the centre of the second body."""
     frame, bodies, links = view.snapshot.frame, view.snapshot.bodies, joints.links
     every, pivots = view.snapshot.links, {}
     for k in np.flatnonzero(every.kind == LinkKind.PIVOT).tolist():
@@ -358,7 +358,7 @@ def _dials(view: DrawContext, joints: JointSegments) -> list[AngleDial]:
 
 
 def _from_bodies(view: DrawContext, joints: JointSegments) -> FloatArray:
-    """Return the centres of the bodies that joints hold, (J, 4) px; of the world, the place where it is held."""
+    """Return the centres of the jointed bodies, (J, 4) px; for the world, the anchor."""
     first = np.where((joints.links.a < 0)[:, None], 0.0, view.snapshot.frame.position[joints.links.a])
     ends = np.hstack(
         (view.camera.to_screen(first), view.camera.to_screen(view.snapshot.frame.position[joints.links.b]))
@@ -368,14 +368,14 @@ def _from_bodies(view: DrawContext, joints: JointSegments) -> FloatArray:
 
 
 def spot(centre: Pixel, radius: float, angle: float) -> Pixel:
-    """Return the place on a circle at an angle that counts as in the world, px."""
+    """Return the point on a circle at an angle given in world orientation (y up), px."""
     return centre[0] + radius * math.cos(angle), centre[1] - radius * math.sin(angle)
 
 
 def arc(
     view: DrawContext, centre: Pixel, radius: float, first: float, span: float, colour: Colour, width: float
 ) -> None:
-    """Draw part of a circle, counted as in the world, with a dark edge that sets it off."""
+    """Draw an arc, with angles in world orientation (y up) and a dark outline."""
     low, half = min(first, first + span), min(0.5 * abs(span), math.pi)
     distance = arc_distance(*centre, radius, low + half, half)
     (x, y) = centre
@@ -383,7 +383,7 @@ def arc(
 
 
 def path(view: DrawContext, spots: list[Pixel], colour: Colour, width: float) -> None:
-    """Draw a line through places, with a dark edge."""
+    """Draw a polyline with a dark outline."""
     parts = [capsule_distance(a, b, 0.0) for a, b in pairwise(spots)]
     columns, rows = zip(*spots, strict=True)
     box = min(columns), min(rows), max(columns), max(rows)
@@ -393,7 +393,7 @@ def path(view: DrawContext, spots: list[Pixel], colour: Colour, width: float) ->
 def _trace(
     view: DrawContext, distance: SignedDistance, box: tuple[float, float, float, float], colour: Colour, width: float
 ) -> None:
-    """Draw a line where a distance is 0, which is in a box (left, top, right, bottom), px."""
+    """Draw the zero contour of a signed distance within a box (left, top, right, bottom), px."""
     half, halo = 0.5 * width * view.ui_scale, 1.2 * view.ui_scale
     margin = half + halo + 1.0
     wide = box[0] - margin, box[1] - margin, box[2] + margin, box[3] + margin
@@ -404,17 +404,17 @@ def _trace(
 
 
 PIN = 4.0
-"""px, radius of a hinge"""
+"""px, radius of the mark of a hinge"""
 SHARE = 0.45
-"""of the largest disc in its body that a hinge covers at most"""
+"""Largest radius of a hinge mark, as a fraction of the largest disc inscribed in its body."""
 SMALL_PIN, LARGE_PIN = 14.0, 90.0
-"""px: radii of the arcs of what turns"""
+"""px, smallest and largest radius of the arcs of drives"""
 BEYOND = 1.0
-"""of the largest disc in a body, so far beyond its centre its arc is"""
+"""Distance of the arc beyond the centre of the body, as a fraction of the largest inscribed disc."""
 
 
 def draw_hinges(view: DrawContext, discs: CircleRenderer) -> None:
-    """Draw the hinges on which drives turn bodies, where those are in sight."""
+    """Draw the hinges of driven bodies that are visible."""
     bodies = view.snapshot.bodies
     for mount, number, place in _seen(view):
         if not isinstance(mount.drive, PlungerDrive):
@@ -426,7 +426,7 @@ def draw_hinges(view: DrawContext, discs: CircleRenderer) -> None:
 
 
 def draw_stops(view: DrawContext) -> None:
-    """Draw the stops of drives, the way between them, and on it a hand where the body is."""
+    """Draw the stops of drives, the range between them, and a needle at the position of the body."""
     frame = view.snapshot.frame
     for mount, number, place in _seen(view):
         level = 0.0 if frame.drives is None else float(frame.drives[mount.number, 0])
@@ -436,7 +436,7 @@ def draw_stops(view: DrawContext) -> None:
             _slide(view, drive, place, frame.position[number].tolist(), mount.home, colour)
             continue
         (x, y), (rest, end) = mount.hinge, drive.stops
-        own = math.atan2(-y, -x) if x or y else 0.0  # of the arm from the hinge to the body's centre
+        own = math.atan2(-y, -x) if x or y else 0.0  # direction from the hinge to the centre of the body
         length = (math.hypot(x, y) + BEYOND * float(view.snapshot.bodies.core[number])) * view.camera.scale
         size = min(max(length, SMALL_PIN * view.ui_scale), LARGE_PIN * view.ui_scale)
         arc(view, place, size, own + rest, max(min(end - rest, math.tau), -math.tau), INK, 1.4)
@@ -449,9 +449,9 @@ def draw_stops(view: DrawContext) -> None:
 def _slide(
     view: DrawContext, drive: PlungerDrive, place: Pixel, now: list[float], home: tuple[float, float], colour: Colour
 ) -> None:
-    """Draw the line along which a plunger is drawn, across its ends a tick, and how far it is."""
+    """Draw the travel of a plunger as a line with end ticks, and a tick at its present position."""
     length = math.hypot(*drive.direction)
-    ux, uy = drive.direction[0] / length, -drive.direction[1] / length  # the screen's y is down
+    ux, uy = drive.direction[0] / length, -drive.direction[1] / length  # y points down on the screen
     far = drive.travel * view.camera.scale
     pulled = math.dist(now, home) * view.camera.scale
     tick = 5.0 * view.ui_scale
@@ -462,7 +462,7 @@ def _slide(
 
 
 def _seen(view: DrawContext) -> Iterator[tuple[Mount, int, Pixel]]:
-    """Yield how each driven body in sight is held, its number, and where its hinge or its stop is, px."""
+    """Yield the mount, the index and the hinge or stop position (px) of each visible driven body."""
     names = view.snapshot.bodies.names
     numbers = {names[number]: number for number in view.shown.tolist()}
     for name, mount in mounts(view.snapshot.scene).items():

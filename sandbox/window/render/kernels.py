@@ -1,7 +1,8 @@
-"""Rasterisers of particles, polygons and thin lines, compiled where numba is installed.
+"""Rasterisers of points, polygons and thin lines, compiled if numba is installed.
 
-The workspace `room` of a piece is (V, 9): x and y of each corner, px, then normal and offset of the side behind it;
-in the first row of a piece also the inner and outer span of the current row of pixels.
+The scratch array `room` is (V, 9). Columns 0 to 4 hold, for each corner, its x and y in px, then the unit normal and
+the offset of the side that starts there. Columns 5 to 8 of the first row of a piece hold the inner and outer span of
+the current row of pixels.
 """
 
 import math
@@ -15,12 +16,12 @@ from sandbox.engines.common.kernel import bare_kernel, kernel
 from sandbox.window.render.body_geometry import ConvexPieces
 
 FULL = 256
-"""A share of all."""
+"""Full coverage in fixed-point blending."""
 
 
 @bare_kernel
 def blend_packed(under: int, over: int, share: int) -> int:
-    """Return a pixel with another laid over it by a share of `FULL`, all four bytes alike, two of them at a time."""
+    """Return `under` blended with `over` by share / `FULL`; all four bytes alike, two per multiplication."""
     rest = FULL - share
     even = ((under & 0xFF00FF) * rest + (over & 0xFF00FF) * share + 0x800080) >> 8 & 0xFF00FF
     odd = ((under >> 8 & 0xFF00FF) * rest + (over >> 8 & 0xFF00FF) * share + 0x800080) & 0xFF00FF00
@@ -45,13 +46,13 @@ def rasterise_points(
     Args:
         pixels: of the surface, flat.
         stride: of a row, px.
-        area: left, top, right and bottom of what may be drawn on, px.
+        area: left, top, right and bottom of the clip rectangle, px.
         position: (N, 2) m.
-        colours: (N,) as the surface holds them.
-        present: (N,) who is drawn.
+        colours: (N,) in the pixel format of the surface.
+        present: (N,) whether a particle is drawn.
         centre: of the camera, m.
         scale: of the camera, px/m.
-        middle: of the picture, px.
+        middle: of the surface, px.
         side: of a square, px.
     """
     left, top, right, bottom = area
@@ -59,10 +60,10 @@ def rasterise_points(
     for i in range(len(position)):
         if not present[i]:
             continue
-        # In the order of Camera.to_screen, so that both say the same pixel.
+        # Same order of operations as Camera.to_screen, so that both give the same pixel.
         x = (position[i, 0] - centre[0]) * scale + middle[0]
         y = (position[i, 1] - centre[1]) * -scale + middle[1]
-        # From 0 on, cutting off is rounding down. nan is on no side of anything.
+        # For values from 0, int() rounds down. Comparisons with nan are false.
         if x >= left + back and x < right - side + back + 1 and y >= top + back and y < bottom - side + back + 1:
             corner = (int(y) - back) * stride + int(x) - back
             for row in range(side):
@@ -85,16 +86,16 @@ def rasterise_faded_points(
     first: IntArray,
     steps: int,
 ) -> None:
-    """Give particles the tones of their ages.
+    """Set the colours of particles by their ages.
 
     Args:
-        tones: (F,) as the surface holds them.
-        shades: (S,) all there are.
+        tones: (F,) in the pixel format of the surface, changed in place.
+        shades: (S,) all shades.
         time: s.
         born: (F,) s.
-        rate: (F,) shades a second.
-        first: (F,) the shade that each begins with.
-        steps: how many each has.
+        rate: (F,) shades per second.
+        first: (F,) index of the first shade of each particle.
+        steps: number of shades of each particle.
     """
     for i in range(len(tones)):
         age = (time - born[i]) * rate[i]
@@ -105,7 +106,7 @@ def rasterise_faded_points(
 def span(
     y: float, room: FloatArray, first: int, last: int, offset: float, left: float, right: float
 ) -> tuple[float, float]:
-    """Return from where to where a row lies no farther than an offset outside all sides of a polygon."""
+    """Return the x range of a row of pixels that is at most `offset` outside all sides of a polygon."""
     from_x, to_x = left, right
     for k in range(first, last):
         across, bound = room[k, 2], offset - (room[k, 3] * y + room[k, 4])
@@ -122,7 +123,7 @@ def span(
 def inner_span(
     y: float, room: FloatArray, first: int, last: int, radius: float, left: float, right: float
 ) -> tuple[float, float]:
-    """Return from where to where a row surely lies within a piece whose radius is this, which may be negative."""
+    """Return the x range of a row that lies inside a piece for certain; `radius` may be negative."""
     if last - first > 2:
         return span(y, room, first, last, min(radius, 0.0), left, right)
     if radius <= 0.0:
@@ -132,7 +133,7 @@ def inner_span(
         half = math.sqrt(max(under, 0.0))
         return max(left, room[first, 0] - half), min(right, room[first, 0] + half) if under > 0.0 else left - 1.0
     from_x, to_x = span(y, room, first, last, radius, left, right)
-    for k in range(first, last):  # no farther than the ends
+    for k in range(first, last):  # limited by the ends of the segment
         after = 2 * first + 1 - k
         dx, dy = room[after, 0] - room[k, 0], room[after, 1] - room[k, 1]
         bound = dy * (room[k, 1] - y)
@@ -149,7 +150,7 @@ def inner_span(
 def outer_span(
     y: float, room: FloatArray, first: int, last: int, radius: float, left: float, right: float
 ) -> tuple[float, float]:
-    """Return from where to where a row may lie within a piece whose radius is this: beyond, it surely does not."""
+    """Return the x range of a row outside which no pixel lies inside the piece (conservative bound)."""
     low_x, high_x, low_y, high_y = math.inf, -math.inf, math.inf, -math.inf
     for k in range(first, last):
         low_x, high_x = min(low_x, room[k, 0]), max(high_x, room[k, 0])
@@ -163,13 +164,13 @@ def outer_span(
 
 
 class PolygonPose(NamedTuple):
-    """Where a body is in the picture."""
+    """Pose of a body on the screen."""
 
     x: float
     """px"""
     y: float
     cos: float
-    """of its angle, counted as in the world"""
+    """cosine of the angle, in world orientation (y up)"""
     sin: float
     scale: float
     """px/m"""
@@ -177,7 +178,7 @@ class PolygonPose(NamedTuple):
 
 @bare_kernel
 def _side_distance2(x: float, y: float, ax: float, ay: float, bx: float, by: float) -> float:
-    """Return the square of the distance from a segment."""
+    """Return the squared distance from a segment."""
     dx, dy, px, py = bx - ax, by - ay, x - ax, y - ay
     share = min(max((px * dx + py * dy) / max(dx * dx + dy * dy, 1e-300), 0.0), 1.0)
     px, py = px - share * dx, py - share * dy
@@ -186,7 +187,7 @@ def _side_distance2(x: float, y: float, ax: float, ay: float, bx: float, by: flo
 
 @bare_kernel
 def _piece_distance(x: float, y: float, room: FloatArray, first: int, last: int, radius: float) -> float:
-    """Return the signed distance from a piece that `_place` has put into the picture; some lower bound beyond ½ px."""
+    """Return the signed distance from a piece placed by `_place`; beyond ½ px, a lower bound."""
     if last - first > 2:
         most, side = -np.inf, first
         for k in range(first, last):
@@ -199,7 +200,7 @@ def _piece_distance(x: float, y: float, room: FloatArray, first: int, last: int,
         nx, ny = room[side, 2], room[side, 3]
         behind = (room[side, 1] - y) * nx - (room[side, 0] - x) * ny
         beyond = (room[after, 1] - y) * nx - (room[after, 0] - x) * ny
-        if behind * beyond <= 0.0:  # its foot lies between the ends of the side
+        if behind * beyond <= 0.0:  # the foot of the perpendicular lies on the side
             return most - radius
     best = np.inf
     for k in range(first, last if last - first > 2 else first + 1):
@@ -212,7 +213,7 @@ def _piece_distance(x: float, y: float, room: FloatArray, first: int, last: int,
 def _body_distance(
     x: float, y: float, body: int, pieces: ConvexPieces, room: FloatArray, scale: float, deep: float
 ) -> float:
-    """Return the least signed distance from the pieces of a body, px; `deep` where it is less."""
+    """Return the minimum signed distance from the pieces of a body, px; clamped below at `deep`."""
     away = np.inf
     for piece in range(pieces.piece[body], pieces.piece[body + 1]):
         first, last = pieces.first[piece], pieces.first[piece + 1]
@@ -226,10 +227,10 @@ def _body_distance(
 
 @bare_kernel
 def _place(pieces: ConvexPieces, body: int, pose: PolygonPose, room: FloatArray) -> tuple[float, float, float, float]:
-    """Put a body's corners into the picture, each with the line of the side behind it: normal, outwards, and offset.
+    """Transform the corners of a body to the screen and compute the outward normal and the offset of each side.
 
     Returns:
-        Left, top, right and bottom of what the body covers, with a margin of 1, px.
+        Left, top, right and bottom of the bounding box of the body with a margin of 1, px.
     """
     left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
     for piece in range(pieces.piece[body], pieces.piece[body + 1]):
@@ -253,7 +254,7 @@ def _place(pieces: ConvexPieces, body: int, pose: PolygonPose, room: FloatArray)
 
 @bare_kernel
 def _shaded(pixel: int, away: float, deep: float, fill: int, rim: int, hollow: bool, antialias: bool) -> int:
-    """Return a pixel with what a body covers of it, so far from its edge, laid over it."""
+    """Return a pixel blended with the body, whose edge is at a signed distance of `away` px."""
     cover, shade = min(max(0.5 - away, 0.0), 1.0), min(max(away - deep, 0.0), 1.0)
     if not antialias:
         cover, shade = math.floor(cover + 0.5), math.floor(shade + 0.5)
@@ -278,7 +279,7 @@ def _polygon_row(
     hollow: bool,
     antialias: bool,
 ) -> None:
-    """Draw a row of a lone polygon: most are such, and it need not look for the other pieces of each pixel's body."""
+    """Draw a row of a body that is a single polygon: the common case, with no search over the pieces for each pixel."""
     first, last = corners
     from_x, to_x = span(y, room, first, last, 0.5, ends[0], ends[1])
     from_in, to_in = span(y, room, first, last, deep, ends[0], ends[1])
@@ -313,20 +314,20 @@ def rasterise_polygons(
     hollow: bool,
     antialias: bool,
 ) -> None:
-    """Draw bodies in their order.
+    """Draw bodies in order.
 
     Args:
         pixels: of the surface, flat.
         stride: of a row, px.
-        area: left, top, right and bottom of what may be drawn on, px.
-        pieces: what they consist of.
-        room: (V, 9) to work in.
-        who: (K,) their numbers.
-        pose: (K, 5) as in `Pose`.
-        line: (K,) widths of their rims, px.
-        fill: (K,) their colours, as the surface holds them.
-        rim: (K,) the colours of their rims.
-        hollow: the rims alone.
+        area: left, top, right and bottom of the clip rectangle, px.
+        pieces: of all bodies.
+        room: (V, 9) scratch array.
+        who: (K,) indices of the bodies that are drawn.
+        pose: (K, 5) as in `PolygonPose`.
+        line: (K,) rim widths, px.
+        fill: (K,) colours in the pixel format of the surface.
+        rim: (K,) colours of the rims.
+        hollow: whether only the rims are drawn.
         antialias: whether edges are smooth.
     """
     for k in range(len(who)):
@@ -361,7 +362,7 @@ def rasterise_polygons(
                         beyond = max(beyond, min(int(room[first, 6] - 0.5) + 1, stop))
                     if x <= room[first, 8]:
                         empty = min(empty, int(max(room[first, 7] - 0.5, float(column))))
-                if empty > column:  # none of them is there
+                if empty > column:  # no piece covers this column
                     column = empty
                     continue
                 if beyond > column:
@@ -369,7 +370,7 @@ def rasterise_polygons(
                         pixels[start + column : start + beyond] = inner
                     column = beyond
                     continue
-                if end - begin == 1:  # a call with all arrays takes longer than the rest
+                if end - begin == 1:  # passing all arrays costs more than the rest
                     away = _piece_distance(x, y, room, low, high, radius)
                 else:
                     away = _body_distance(x, y, body, pieces, room, here.scale, deep)
@@ -386,14 +387,14 @@ def rasterise_lines(
     ends: FloatArray,
     tones: npt.NDArray[np.uint32],
 ) -> None:
-    """Draw lines of 1 px in their order, as Wu did, 1991: in each step along a line two pixels share it.
+    """Draw lines of 1 px in order by the method of Wu, 1991: each step along a line is shared by two pixels.
 
     Args:
         pixels: of the surface, flat.
         stride: of a row, px.
-        area: left, top, right and bottom of what may be drawn on, px.
-        ends: (K, 4) px, x and y of both ends, in an area not much larger than the picture.
-        tones: (K,) as the surface holds them.
+        area: left, top, right and bottom of the clip rectangle, px.
+        ends: (K, 4) px, x and y of both ends, clipped to an area not much larger than the surface.
+        tones: (K,) in the pixel format of the surface.
     """
     left, top, right, bottom = area
     for k in range(len(ends)):

@@ -1,6 +1,6 @@
-"""Lamps: dark discs on the ground where a part of a game, `[[play.part]]`, has its light, and the glow of lit ones.
+"""Lamps: dark discs at the lights of game parts (`[[play.part]]`), and the glow of those that are lit.
 
-The dark lamps belong to the background, which is cached; lit lamps are drawn over it as cached sprites.
+Unlit lamps belong to the cached background; lit lamps are drawn over it as cached sprites.
 """
 
 from typing import NamedTuple
@@ -21,26 +21,26 @@ WHITE: Colour = (255, 255, 255)
 RADIUS = 0.0065
 """m"""
 GLOW, STRENGTH = 6.5, 0.75
-"""how far the light reaches, in radii of the lamp, and how much it adds beside it"""
+"""radius of the glow in lamp radii, and its additive intensity next to the lamp"""
 MAX_LAMP_RADIUS = 400.0
-"""px, radius of a lamp so near that its glow would cost more than it shows"""
+"""px, radius above which no glow is drawn, as it would be costly"""
 MAX_SPRITES = 64
-"""sprites that are kept"""
+"""size of the sprite cache"""
 
 
 class LampSprite(NamedTuple):
-    """A lit lamp."""
+    """Sprites of a lit lamp."""
 
     glow: pygame.Surface
-    """added to what is below it"""
+    """blended additively"""
     bulb: pygame.Surface
-    """laid over it"""
+    """blended over the glow"""
 
 
 def draw_lamps(
     surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True
 ) -> None:
-    """Draw all the lamps of a scene as they are while nobody lights them."""
+    """Draw all lamps of a scene unlit."""
     for part in scene.play.parts:
         if part.light is not None:
             colour = _colour(part)
@@ -51,7 +51,7 @@ def draw_lamps(
 
 
 def draw_spot(surface: pygame.Surface, camera: Camera, at: Point, radius: float, look: ShapeStyle) -> None:
-    """Draw a disc on the ground, as far as it is in sight; place and radius in m."""
+    """Draw the visible part of a disc on the ground; position and radius in m."""
     ((x, y),), size = camera.to_screen(np.asarray([at])).tolist(), radius * camera.scale
     if clip_segment((x, y), (x, y), surface.get_clip(), size + 4.0) is None:
         return
@@ -63,13 +63,13 @@ def draw_spot(surface: pygame.Surface, camera: Camera, at: Point, radius: float,
 
 
 class LampRenderer:
-    """Draws what is lit, and keeps the sprites."""
+    """Draws lit lamps, and caches their sprites."""
 
     def __init__(self) -> None:
         self._sprites: dict[tuple[Colour, float], LampSprite] = {}
 
     def draw(self, surface: pygame.Surface, camera: Camera, scene: Scene, lit: frozenset[str]) -> None:
-        """Draw the lamps of the parts of these names."""
+        """Draw the lamps of the parts named in `lit`."""
         radius = max(RADIUS * camera.scale, 1.0)
         if not lit or radius > MAX_LAMP_RADIUS:
             return
@@ -86,7 +86,7 @@ class LampRenderer:
     def _sprite(self, colour: Colour, radius: float) -> LampSprite:
         known = self._sprites.get((colour, radius))
         if known is None:
-            if len(self._sprites) >= MAX_SPRITES:  # of a zoom before
+            if len(self._sprites) >= MAX_SPRITES:  # sprites of earlier zoom levels
                 self._sprites.clear()
             self._sprites[colour, radius] = known = LampSprite(_glow(colour, radius), _bulb(colour, radius))
         return known
@@ -97,14 +97,14 @@ def _colour(part: PlayPart) -> Colour:
 
 
 def _distances(reach: float) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":
-    """Return the distance of each pixel of a sprite from its middle, px."""
+    """Return the distance of each pixel of a sprite from its centre, px."""
     side = 2 * int(np.ceil(reach)) + 1
     along = np.arange(side) - side // 2
     return np.hypot(along[:, None], along[None, :])
 
 
 def _glow(colour: Colour, radius: float) -> pygame.Surface:
-    """Return light that fades with the square of what is left to its reach."""
+    """Return the glow: intensity falls quadratically to 0 at its radius."""
     share = STRENGTH * np.maximum(1.0 - _distances(GLOW * radius) / (GLOW * radius), 0.0) ** 2
     surface = pygame.Surface(share.shape, 0, 32)
     pygame.surfarray.blit_array(surface, np.rint(share[:, :, None] * colour).astype(np.uint8))
@@ -112,8 +112,8 @@ def _glow(colour: Colour, radius: float) -> pygame.Surface:
 
 
 def _bulb(colour: Colour, radius: float) -> pygame.Surface:
-    """Return a disc that is nearly white in its middle."""
-    size = radius + 1.0  # to cover the rim of the dark one, wherever in its pixel that has its middle
+    """Return the bulb: a disc that is nearly white at the centre."""
+    size = radius + 1.0  # covers the rim of the unlit lamp for any sub-pixel offset
     away = _distances(size + 1.0)
     surface = pygame.Surface(away.shape, pygame.SRCALPHA, 32)
     white = (0.8 * (1.0 - np.minimum(away / size, 1.0) ** 2))[:, :, None]

@@ -1,4 +1,4 @@
-"""Lines, dashes, arrows and polygons, clipped to the picture before they reach SDL, and many thin lines in one pass."""
+"""Lines, dashes, arrows and polygons, clipped before they reach SDL, and many thin lines in one compiled pass."""
 
 import math
 from collections.abc import Iterable
@@ -11,16 +11,16 @@ from sandbox.window.render.palette import Colour
 from sandbox.window.render.particles import Packed, flat_pixels, is_flat
 
 SDL_COORDINATE_LIMIT = 16_000.0
-"""px, the largest coordinate or length that is passed to SDL: it counts in 32 bits, and its polygons in 16"""
+"""px, largest coordinate or length passed to SDL, which computes in 32 bits, and in 16 bits for polygons"""
 
 Pixel = tuple[float, float]
-"""A place in a picture, px from its upper left corner; a pixel's middle lies at a half."""
+"""Point in px from the upper left corner of the surface; pixel centres are at half-integers."""
 
 
 def clip_segment(a: Pixel, b: Pixel, area: pygame.Rect, margin: float = 4.0) -> tuple[Pixel, Pixel] | None:
-    """Return the part of a segment that lies in an area with a margin around it, or None.
+    """Return the part of a segment within an area enlarged by a margin, or None.
 
-    Liang and Barsky's way, 1984: each edge narrows the share of the segment that is left.
+    Liang–Barsky algorithm, 1984: each edge narrows the parameter range of the segment.
     """
     left, top, right, bottom = area.left, area.top, area.right, area.bottom
     if left <= a[0] <= right and left <= b[0] <= right and top <= a[1] <= bottom and top <= b[1] <= bottom:
@@ -46,7 +46,7 @@ def clip_segment(a: Pixel, b: Pixel, area: pygame.Rect, margin: float = 4.0) -> 
         return None
     start = a if first == 0.0 else (a[0] + first * dx, a[1] + first * dy)
     end = b if last == 1.0 else (a[0] + last * dx, a[1] + last * dy)
-    widest = 4.0 * margin + area.width + area.height  # what rounding leaves of places far beyond all sense
+    widest = 4.0 * margin + area.width + area.height  # bound on rounding errors of far-away points
     if any(abs(p[0] - area.centerx) > widest or abs(p[1] - area.centery) > widest for p in (start, end)):
         return None
     return start, end
@@ -60,7 +60,7 @@ def draw_line(
     if part is None:
         return
     (ax, ay), (bx, by) = part
-    start, end = (ax - 0.5, ay - 0.5), (bx - 0.5, by - 0.5)  # SDL has a pixel's middle at a whole number
+    start, end = (ax - 0.5, ay - 0.5), (bx - 0.5, by - 0.5)  # SDL pixel centres are at integers
     if not antialias:
         pygame.draw.line(surface, colour, _whole(start), _whole(end), max(1, round(width)))
         return
@@ -69,7 +69,7 @@ def draw_line(
         pygame.draw.aaline(surface, colour, start, end)
         return
     half = width / 2.0 - 0.5  # an antialiased line adds half a pixel
-    if width < 3.0:  # a polygon's corners lie at whole pixels: one so narrow would look wavy
+    if width < 3.0:  # a narrow polygon would look wavy, as its corners are rounded to whole pixels
         shift = -(by - ay) / length * half, (bx - ax) / length * half
         for side in (-1.0, 0.0, 1.0):
             moved = side * shift[0], side * shift[1]
@@ -91,7 +91,7 @@ def draw_line(
 
 
 def fill_polygon(surface: pygame.Surface, corners: list[Pixel], colour: Colour, antialias: bool = True) -> None:
-    """Fill a polygon whose corners lie in or near the picture."""
+    """Fill a polygon whose corners lie on or near the surface."""
     moved = [(x - 0.5, y - 0.5) for x, y in corners]
     pygame.draw.polygon(surface, colour, [_whole(p) for p in moved])
     if antialias:
@@ -99,10 +99,10 @@ def fill_polygon(surface: pygame.Surface, corners: list[Pixel], colour: Colour, 
 
 
 def clip_polygon(corners: list[Pixel], area: pygame.Rect) -> list[Pixel]:
-    """Return the part of a polygon that lies in an area; nothing where it has no part there.
+    """Return the part of a polygon within an area; empty if there is none.
 
-    Sutherland and Hodgman's way, 1974: each edge of the area cuts in turn. Where a concave polygon falls apart, its
-    parts stay joined along the edge.
+    Sutherland–Hodgman algorithm, 1974: the edges of the area clip in turn. Where clipping splits a concave polygon, the
+    parts stay connected along the edge.
     """
     left, top, right, bottom = area.left - 2.0, area.top - 2.0, area.right + 2.0, area.bottom + 2.0
     for axis, sign, limit in ((0, 1.0, left), (0, -1.0, right), (1, 1.0, top), (1, -1.0, bottom)):
@@ -127,7 +127,7 @@ def draw_arrow(
     antialias: bool = True,
     edge: Colour | None = None,
 ) -> None:
-    """Draw an arrow from `a` to `b`, with a head in proportion to its width, and an edge that sets it off."""
+    """Draw an arrow from `a` to `b`, with a head in proportion to its width and an outline of colour `edge`, if any."""
     length = math.hypot(b[0] - a[0], b[1] - a[1])
     if not 0.0 < length < math.inf:
         return
@@ -150,7 +150,7 @@ def draw_arrow(
 def draw_dashes(
     surface: pygame.Surface, corners: Iterable[tuple[Pixel, Pixel]], colour: Colour, dash: float, antialias: bool = True
 ) -> None:
-    """Draw segments dashed; the dashes stay where they are while the picture's edge passes over them."""
+    """Draw dashed segments; the dashes are fixed to the segment, not to the clip rectangle."""
     area = surface.get_clip()
     for a, b in corners:
         part = clip_segment(a, b, area)
@@ -171,22 +171,22 @@ def draw_dashes(
 
 
 def _whole(point: Pixel) -> tuple[int, int]:
-    return math.floor(point[0] + 0.5), math.floor(point[1] + 0.5)  # `round` would send halves to even numbers
+    return math.floor(point[0] + 0.5), math.floor(point[1] + 0.5)  # `round` rounds halves to even
 
 
 MANY_LINES = 300
-"""Lines from which on a compiled pass is worth its import."""
+"""Number of lines from which the import of the compiled pass pays off."""
 BEYOND = 4000.0
-"""px outside the picture to which a line may reach without being cut"""
+"""px outside the surface up to which a line is not clipped"""
 
 
 def draw_thin_lines(surface: pygame.Surface, ends: FloatArray, tones: Packed, antialias: bool = True) -> None:
     """Draw lines of 1 px.
 
     Args:
-        surface: where.
-        ends: (K, 4) px, x and y of both ends; lines at nan or inf are left out.
-        tones: (K,) as `packed` makes them for this surface.
+        surface: the target.
+        ends: (K, 4) px, x and y of both ends; lines with nan or inf are skipped.
+        tones: (K,) from `packed_pixels` for this surface.
         antialias: whether edges are smooth.
     """
     kept, ends = _cut(surface, ends)
@@ -202,14 +202,14 @@ def draw_thin_lines(surface: pygame.Surface, ends: FloatArray, tones: Packed, an
             rasterise_lines(flat_pixels(surface), surface.get_pitch() // 4, edges, ends, tones)
             return
     line = pygame.draw.aaline if antialias else pygame.draw.line
-    # Flat lists of numbers: thousands of small ones would keep the garbage collector busy.
+    # Flat lists of numbers: thousands of small tuples would trigger the garbage collector.
     columns = [column.tolist() for column in (tones, *(ends - 0.5).T)]
     for tone, ax, ay, bx, by in zip(*columns, strict=True):
         line(surface, tone, (ax, ay), (bx, by))
 
 
 def _cut(surface: pygame.Surface, ends: FloatArray) -> tuple[BoolArray, FloatArray]:
-    """Return which lines come near the picture, (K,), and those, cut to some distance around it as by `clipped`."""
+    """Return which lines come near the surface, (K,), and those lines, clipped at `BEYOND` px around it."""
     area = surface.get_clip()
     low = np.asarray((area.left, area.top)) - BEYOND
     high = np.asarray((area.right, area.bottom)) + BEYOND

@@ -1,4 +1,4 @@
-"""Canvas: pictures of states as arrays, without a window."""
+"""Offscreen renderer: frames as arrays, without a window."""
 
 from collections.abc import Mapping
 
@@ -18,10 +18,10 @@ from sandbox.window.view_bounds import view_bounds
 
 
 class OffscreenRenderer:
-    """Draws one picture after the other."""
+    """Draws frames into an array."""
 
     def __init__(self, size: tuple[int, int]) -> None:
-        """Take a size, px."""
+        """Create a renderer for frames of `size`, px."""
         pygame.font.init()
         self._surface = pygame.Surface(size)
         self._picture, self._inset = Renderer(), InsetRenderer()
@@ -29,14 +29,14 @@ class OffscreenRenderer:
     def picture(
         self, scene: Scene, bodies: Bodies, frame: Frame, rules: Rules, throttles: Mapping[str, Throttle]
     ) -> npt.NDArray[np.uint8]:
-        """Return a picture of a game as the window shows it, without the words: (height, width, 3).
+        """Return a frame of a game as the window shows it, without text: (height, width, 3).
 
         Args:
-            scene: as it is now.
-            bodies: with those that were spawned.
-            frame: their state.
-            rules: of the game; guns, blasts and lamps are known to them alone.
-            throttles: that were set, by the names of their thrusts.
+            scene: in its current form.
+            bodies: including spawned ones.
+            frame: state of the bodies.
+            rules: of the game, the source of lit lamps and of the view state (guns, blasts).
+            throttles: current settings, by thruster name.
         """
         camera = Camera.fitting(view_bounds(scene), self._surface.get_size())
         lit = rules.lit_lamps() if isinstance(rules, HasLamps) else frozenset[str]()

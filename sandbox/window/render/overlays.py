@@ -1,4 +1,4 @@
-"""Overlays in their order: what bodies cover (trails, flames, joints) and what covers bodies (annotations, vectors)."""
+"""Overlays in drawing order: below the bodies trails, flames and joints; above them annotations and vectors."""
 
 import math
 from itertools import pairwise
@@ -27,15 +27,15 @@ from sandbox.window.render.polygons import PolygonRenderer
 from sandbox.window.render.vectors import draw_contacts, draw_impulses, draw_velocities
 
 OUTLINE = ((0.0, -0.13), (0.12, -0.19), (0.3, -0.17), (0.6, -0.09), (1.0, 0.0))
-"""One side of a flame: shares of its length along it, and across"""
+"""One side of a flame outline: along and across, as fractions of its length."""
 INNER = 0.55
-"""of the outer flame's size, the one inside"""
+"""Size of the inner flame as a fraction of the outer."""
 MIN_FLAME = 2.0
-"""px, the shortest that is drawn"""
+"""px, length of the shortest flame that is drawn"""
 
 
 def draw_flames(view: DrawContext) -> None:
-    """Draw all flames, which bodies cover where they begin."""
+    """Draw all thruster flames; the bodies are drawn over their roots."""
     frame, camera = view.snapshot.frame, view.camera
     for number, place, way in view.snapshot.flames:
         if number >= len(frame.position) or not frame.present[number]:
@@ -63,16 +63,16 @@ def _tongue(view: DrawContext, begin: list[float], along: tuple[float, float], s
 
 
 LINES = 300
-"""Bodies whose trails are lines."""
+"""Number of bodies up to which trails are drawn as lines."""
 PLACES = 96
-"""The most places of one body that are joined."""
+"""Largest number of points of a trail that is drawn as a line."""
 SHADES = 8
 """Steps in which a trail fades."""
 MAX_DRAWN_POINTS = 200_000
 
 
 def draw_trails(view: DrawContext, points: ParticleRenderer) -> None:
-    """Draw the last places of the bodies in sight, the older the fainter."""
+    """Draw the trails of the visible bodies, fading with age."""
     if not len(view.shown) or sum(len(piece) for piece in view.snapshot.trails) < 2:
         return
     crowd = len(view.shown) > LINES
@@ -90,11 +90,11 @@ def draw_trails(view: DrawContext, points: ParticleRenderer) -> None:
 
 
 def _joined(pieces: tuple[FloatArray, ...], shown: IntArray, most: int) -> FloatArray:
-    """Return the places of some bodies, (T, K, 2) m, thinned out to `most`; nan for a body that a piece knows not."""
+    """Return trail points of bodies, (T, K, 2) m, thinned to about `most`; nan for bodies that a piece lacks."""
     total = sum(len(piece) for piece in pieces)
     every = -(-total // most)
     rows = []
-    skip = (total - 1) % every  # so that the newest place is among them
+    skip = (total - 1) % every  # keeps the newest point
     for piece in pieces:
         kept = piece[skip::every]
         skip = (skip - len(piece)) % every
@@ -106,7 +106,7 @@ def _joined(pieces: tuple[FloatArray, ...], shown: IntArray, most: int) -> Float
 
 
 def _lines(view: DrawContext, places: FloatArray, tints: ColourArray) -> None:
-    """Draw one shade of every trail; a trail is broken where its body was nowhere, or far out of the picture."""
+    """Draw one shade of all trails, with a gap where a body was absent or far outside the surface."""
     if len(places) < 2:
         return
     width, height = view.camera.size
@@ -128,14 +128,14 @@ def _lines(view: DrawContext, places: FloatArray, tints: ColourArray) -> None:
 
 
 BODILY = frozenset({"velocities", "bounds", "centres", "names", "trails"})
-"""Overlays that need to know which bodies are in sight."""
+"""Overlays that need the indices of the visible bodies."""
 APART = 3.0
-"""px between a body and its ghost from which a line joins them"""
+"""px between a body and its ghost above which a line connects them"""
 MAX_GHOSTS = 4000
 
 
 class OverlayRenderer:
-    """Draws the overlays of a picture, what lies below the bodies and what lies above them."""
+    """Draws the overlays of a frame, those below the bodies and those above."""
 
     def __init__(self, discs: CircleRenderer, points: ParticleRenderer, polygons: PolygonRenderer) -> None:
         self._discs = discs
@@ -143,11 +143,11 @@ class OverlayRenderer:
         self._polygons = polygons
 
     def need_bodies(self, sight: Snapshot) -> bool:
-        """Tell whether the bodies in sight must be known, even those that are mere points."""
+        """Return whether an overlay needs all visible bodies, including those drawn as points."""
         return not BODILY.isdisjoint(sight.overlays) or sight.overlapping is not None
 
     def below(self, view: DrawContext) -> None:
-        """Draw what bodies cover."""
+        """Draw the overlays below the bodies."""
         if "trails" in view.snapshot.overlays:
             draw_trails(view, self._points)
         if "shapes" in view.snapshot.overlays and view.snapshot.flames:
@@ -156,7 +156,7 @@ class OverlayRenderer:
             draw_joints(view, joint_segments(view), self._discs)
 
     def above(self, view: DrawContext) -> None:
-        """Draw what covers bodies."""
+        """Draw the overlays above the bodies."""
         overlays, drives = view.snapshot.overlays, view.snapshot.scene.drives
         if drives and "shapes" in overlays:
             draw_hinges(view, self._discs)
@@ -185,19 +185,19 @@ class OverlayRenderer:
             draw_names(view, self._polygons)
 
     def _ghost(self, view: DrawContext) -> None:
-        """Draw the bodies of the other engine hollow, and join each to its own where they are apart."""
+        """Draw the bodies of the ghost engine hollow, each connected to its counterpart where they differ."""
         ghost, frame, camera = view.snapshot.ghost, view.snapshot.frame, view.camera
         assert ghost is not None
         count = min(len(ghost.position), len(frame.position), len(view.snapshot.bodies))
         place, radius = ghost.position[:count], view.snapshot.bodies.radius[:count]
         with np.errstate(invalid="ignore", over="ignore"):
             there = camera.in_sight(place, radius) & ghost.present[:count]
-        seen = np.flatnonzero(there & ~view.snapshot.bodies.fixed[:count])  # what never moves never differs
+        seen = np.flatnonzero(there & ~view.snapshot.bodies.fixed[:count])  # static bodies never differ
         if len(seen) > MAX_GHOSTS:
             seen = seen[np.linspace(0, len(seen) - 1, MAX_GHOSTS).astype(np.intp)]
         if not len(seen):
             return
-        with np.errstate(invalid="ignore", over="ignore"):  # the body itself may be anywhere
+        with np.errstate(invalid="ignore", over="ignore"):  # the body itself may be at nan or inf
             centre, own = camera.to_screen(place[seen]), camera.to_screen(frame.position[seen])
         tint = np.broadcast_to(np.asarray(INK, np.uint8), (len(seen), 3))
         style = view.style(1.5)._replace(hollow=True)

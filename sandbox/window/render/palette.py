@@ -1,6 +1,6 @@
-"""Palette: the colours of the window. Accents are those of Okabe and Ito, told apart by colour-blind people too.
+"""Colour palette of the window. The accents are distinguishable with colour vision deficiency.
 
-Source: M. Okabe, K. Ito, "Color Universal Design", 2008; its black is left out, as the background is dark.
+Source: M. Okabe, K. Ito, "Color Universal Design", 2008; black is omitted, as the background is dark.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from sandbox.scene.description.base import BodySpec, HasMaterial
 from sandbox.scene.description.discs import Emitter
 
 Colour = tuple[int, int, int]
-"""sRGB, 0 to 255 each."""
+"""sRGB, 0 to 255 per channel."""
 ColourArray = npt.NDArray[np.uint8]
 
 BACKGROUND: Colour = (20, 24, 31)
@@ -21,13 +21,13 @@ LINE: Colour = (56, 66, 80)
 GRID: Colour = (29, 34, 43)
 GRID_STRONG: Colour = (37, 44, 55)
 SOLID: Colour = (38, 46, 57)
-"""What planes and walls are filled with."""
+"""Fill of planes and walls."""
 SURFACE: Colour = (138, 151, 168)
-"""The lit edge of what is solid."""
+"""Edge of solid geometry."""
 INK: Colour = (230, 235, 242)
 FAINT: Colour = (146, 158, 174)
 NEUTRAL: Colour = (126, 137, 152)
-"""Fixed bodies and posts."""
+"""Static bodies and posts."""
 
 ORANGE: Colour = (230, 159, 0)
 SKY: Colour = (86, 180, 233)
@@ -37,15 +37,15 @@ BLUE: Colour = (0, 114, 178)
 VERMILION: Colour = (213, 94, 0)
 PURPLE: Colour = (204, 121, 167)
 ACCENTS: tuple[Colour, ...] = (SKY, ORANGE, GREEN, YELLOW, PURPLE, VERMILION, BLUE)
-"""In the order in which elements get them."""
+"""In the order in which they are assigned to elements."""
 
 TOUCHING, CLEAR = VERMILION, GREEN
-"""Bodies that overlap something, and those that do not, where a scene shows contact by colour."""
+"""Bodies with and without overlap, in scenes that show contact by colour."""
 WARNING: Colour = (255, 92, 80)
-"""Only beside words or a shape: red alone says nothing to some."""
+"""Used only together with text or a shape, because of colour vision deficiency."""
 
 FEW_BODIES = 8
-"""A generator of no more balls gives each a colour of its own."""
+"""Number of bodies up to which each body of a generator gets its own accent."""
 COMPANIONS: dict[Colour, Colour] = {
     SKY: BLUE,
     ORANGE: VERMILION,
@@ -56,36 +56,37 @@ COMPANIONS: dict[Colour, Colour] = {
     BLUE: SKY,
 }
 TINTS = (0.0, 0.45, -0.3, 0.2, -0.15, 0.65)
-"""How far the balls of a larger generator lean from its accent to its companion, or if negative to white: lively, but
-of one family."""
+"""Colours of the bodies of a larger generator: fraction of mixing from its accent towards the companion or, if
+negative, towards white.
+"""
 
 
 def hex_colour(text: str) -> Colour:
-    """Return the colour that `#rrggbb` writes."""
+    """Return the colour given as `#rrggbb`."""
     value = int(text[1:], 16)
     return value >> 16, value >> 8 & 255, value & 255
 
 
 def mix_colours(a: Colour, b: Colour, share: float) -> Colour:
-    """Return the colour that is `share` of the way from `a` to `b`."""
+    """Return the linear mix of `a` and `b`: `a` at share 0, `b` at share 1."""
     red, green, blue = (round(x + (y - x) * share) for x, y in zip(a, b, strict=True))
     return red, green, blue
 
 
 def accent(number: int) -> Colour:
-    """Return the accent of the number-th element."""
+    """Return the accent of the element with this index."""
     return ACCENTS[number % len(ACCENTS)]
 
 
 def colour_of_fixed(thing: HasMaterial, otherwise: Colour = NEUTRAL) -> Colour:
-    """Return the colour of a plane, wall or post: its own, or a neutral one."""
+    """Return the colour of a plane, wall or post: its own, or `otherwise`."""
     return otherwise if thing.colour is None else hex_colour(thing.colour)
 
 
 def colour_of(bodies: Bodies) -> ColourArray:
-    """Return the colours of bodies, (N, 3), which stay what they are when another body joins.
+    """Return the colours of bodies, (N, 3); adding a body does not change those of the others.
 
-    An element's own colour, or the first that it fades from, else the accents in turn; fixed ones are neutral.
+    The colour of the element, or the first colour of its fade; else accents in turn; static bodies are neutral.
     """
     colours = np.empty((len(bodies), 3), np.uint8)
     first = np.searchsorted(bodies.element, np.arange(len(bodies.elements) + 1))
@@ -100,11 +101,11 @@ def colour_of(bodies: Bodies) -> ColourArray:
         elif end - start <= FEW_BODIES:
             colours[start:end] = [accent(k + n) for n in range(end - start)]
         else:
-            tints = np.asarray(_family(accent(k + isinstance(element, Emitter))), np.uint8)  # sparks begin with orange
+            tints = np.asarray(_family(accent(k + isinstance(element, Emitter))), np.uint8)  # emitters start at orange
             colours[start:end] = tints[np.arange(end - start) % len(tints)]
     return colours
 
 
 def _family(colour: Colour) -> list[Colour]:
-    """Return the tints of a larger generator."""
+    """Return the tints for the bodies of a larger generator."""
     return [mix_colours(colour, COMPANIONS[colour] if share > 0 else (255, 255, 255), abs(share)) for share in TINTS]

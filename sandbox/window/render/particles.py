@@ -1,6 +1,6 @@
-"""Particles, written straight into the pixels of a surface: by a compiled kernel, or by numpy without numba.
+"""Particles, written directly to the pixels of a surface: by a compiled kernel, or by numpy if numba is missing.
 
-Particles of emitters may fade from colour to colour over their lifetime.
+Particles of emitters may fade through several colours over their lifetime.
 """
 
 from dataclasses import replace
@@ -16,10 +16,10 @@ from sandbox.window.camera import Camera
 from sandbox.window.render.palette import ColourArray, hex_colour
 
 MANY_PARTICLES = 20_000
-"""Particles from which on a compiled pass is worth its import."""
+"""Number of particles from which the import of the compiled pass pays off."""
 
 MAX_POINT_SIZE = 3
-"""px, the side of the largest point"""
+"""px, side of the largest point"""
 
 Packed = npt.NDArray[np.uint32]
 
@@ -36,27 +36,27 @@ class ParticleRenderer:
         present: BoolArray | None = None,
         side: int = 1,
     ) -> None:
-        """Draw particles in their order: a later one covers an earlier one.
+        """Draw particles in order; later ones cover earlier ones.
 
         Args:
-            surface: of any format; one with 32 bits a pixel is the fastest.
+            surface: of any format; 32 bits per pixel is fastest.
             camera: its `to_screen` gives the pixel of each particle.
-            position: (N, 2) m; those at nan or inf are left out.
+            position: (N, 2) m; particles at nan or inf are skipped.
             colours: (N,) from `packed_pixels` for this surface.
             present: (N,) whether a particle is drawn; None for all.
-            side: px, 1, 2 or 3; the particle's pixel is the middle, or the lower right of the middle.
+            side: px, 1, 2 or 3; the pixel of the particle is the centre of the square, for side 2 its lower right.
         """
         area = surface.get_clip()
         if not area.width or not area.height:
             return
-        if camera.turned:  # the same as a camera that is not turned, of a world that is
+        if camera.turned:  # equivalent: an unrotated camera and rotated positions
             right, up = camera.centre[1], -camera.centre[0]
             position, camera = position[:, ::-1] * (1.0, -1.0), replace(camera, centre=(right, up), turned=False)
         if len(position) >= MANY_PARTICLES and _draw_compiled(surface, camera, position, colours, present, area, side):
             return
         if present is not None:
             position, colours = position[present], colours[present]
-        with np.errstate(invalid="ignore", over="ignore"):  # the comparisons leave out nan and overflow
+        with np.errstate(invalid="ignore", over="ignore"):  # the comparisons reject nan and overflow
             corner = np.floor(camera.to_screen(position)) - side // 2
             near = ((corner > (area.left - side, area.top - side)) & (corner < area.bottomright)).all(axis=1)
         x, y = corner[near].astype(np.intp).T
@@ -95,12 +95,12 @@ def _draw_compiled(
 
 
 def is_flat(surface: pygame.Surface) -> bool:
-    """Tell whether a surface's pixels are whole numbers of 32 bits, in one row after the other."""
+    """Return whether the pixels of a surface are contiguous rows of 32-bit integers."""
     return surface.get_bytesize() == 4 and surface.get_pitch() % 4 == 0 and surface.get_parent() is None
 
 
 def flat_pixels(surface: pygame.Surface) -> Packed:
-    """Return a surface's pixels, to be written to."""
+    """Return a writable view of the pixels of a surface, (width · height,)."""
     return np.frombuffer(memoryview(surface.get_buffer()), np.uint32)  # type: ignore[arg-type]  # it is a buffer, which its stub leaves out
 
 
@@ -109,7 +109,7 @@ def _split_channels(tones: Packed) -> ColourArray:
 
 
 def packed_pixels(colours: ColourArray, surface: pygame.Surface) -> Packed:
-    """Return colours (N, 3) as a surface holds them, (N,); for one of 3 bytes a pixel as 0xRRGGBB."""
+    """Return colours (N, 3) in the pixel format of a surface, (N,); for 3 bytes per pixel as 0xRRGGBB."""
     wide = colours.astype(np.uint32)
     if surface.get_bytesize() == 3:
         return np.asarray(wide[:, 0] << 16 | wide[:, 1] << 8 | wide[:, 2], np.uint32)
@@ -123,11 +123,11 @@ def packed_pixels(colours: ColourArray, surface: pygame.Surface) -> Packed:
 
 
 SHADES = 64
-"""Steps of a life that are told apart: one and the next look alike, and a crowd has few colours at once."""
+"""Number of shades over a lifetime: neighbouring shades look alike, and the number of colours stays small."""
 
 
 class LifetimeColours:
-    """Those of some bodies that fade, and how."""
+    """Colours of bodies that fade over their lifetime."""
 
     def __init__(self, bodies: Bodies) -> None:
         colours = [each.colours if isinstance(each, Emitter) else None for each in bodies.elements]
@@ -135,7 +135,7 @@ class LifetimeColours:
         self.shades: ColourArray = np.concatenate(
             [np.empty((0, 3), np.uint8), *(fade_colours(each) for each in colours if each is not None)]
         )
-        """(S, 3), SHADES of each element that fades, one element after the other"""
+        """(S, 3), SHADES rows for each fading element, in the order of elements"""
         order = np.full(len(colours), -1, np.int64)
         order[fading] = np.arange(len(fading))
         row = order[bodies.element]
@@ -143,7 +143,7 @@ class LifetimeColours:
         first = int(numbers[0]) if len(numbers) else 0
         consecutive = len(numbers) == 0 or int(numbers[-1]) == first + len(numbers) - 1
         self.who: slice | IntArray = slice(first, first + len(numbers)) if consecutive else numbers
-        """(F,) numbers of those that fade"""
+        """(F,) indices of the fading bodies"""
         self._place = np.full(len(bodies), -1, np.int64)
         self._place[numbers] = np.arange(len(numbers))
         self._first: IntArray = row[numbers] * SHADES
@@ -153,11 +153,11 @@ class LifetimeColours:
         return len(self._born)
 
     def fade(self, tones: Packed, shades: Packed, time: float) -> None:
-        """Give those of all bodies (N,) who fade the tones of their ages.
+        """Set the colours of the fading bodies by their age.
 
         Args:
-            tones: (N,) as a surface holds them, changed in place.
-            shades: (S,) the shades, as the surface holds them.
+            tones: (N,) of all bodies, in the pixel format of the surface, changed in place.
+            shades: (S,) packed `self.shades`.
             time: s.
         """
         if (
@@ -169,7 +169,7 @@ class LifetimeColours:
         tones[self.who] = shades[self._shade(time, slice(None))]
 
     def _compiled(self, tones: Packed, shades: Packed, time: float) -> bool:
-        """Fade in one compiled pass; return whether that could be done."""
+        """Fade in one compiled pass; return whether that was possible."""
         from sandbox.engines.common.kernel import COMPILED
 
         if COMPILED:
@@ -179,7 +179,7 @@ class LifetimeColours:
         return COMPILED
 
     def over(self, colours: ColourArray, numbers: IntArray, time: float) -> ColourArray:
-        """Return the colours of some bodies (K, 3), by their numbers (K,), those who fade as at a time, s."""
+        """Return a copy of the colours (K, 3) of bodies, by index (K,), with fading ones set for a time in s."""
         place = self._place[numbers]
         fade = place >= 0
         colours = colours.copy()
@@ -187,13 +187,13 @@ class LifetimeColours:
         return colours
 
     def _shade(self, time: float, rows: slice | IntArray) -> IntArray:
-        """Return which of the shades some of those who fade have."""
+        """Return the indices into the shades of fading bodies at a time in s."""
         age = (time - self._born[rows]) * self._rate[rows]
         return self._first[rows] + np.clip(age, 0.0, SHADES - 1.0).astype(np.int64)
 
 
 def fade_colours(colours: tuple[str, ...]) -> ColourArray:
-    """Return colours from the first to the last in equal steps, (SHADES, 3)."""
+    """Return the colours interpolated in equal steps from first to last, (SHADES, 3)."""
     stops = np.asarray([hex_colour(each) for each in colours], np.float64)
     along = np.linspace(0.0, len(stops) - 1.0, SHADES)
     mixed = [np.interp(along, np.arange(len(stops)), stops[:, channel]) for channel in range(3)]

@@ -1,6 +1,6 @@
-"""Bodies that are no single discs: by a compiled rasteriser where numba is installed, else by pygame's polygons.
+"""Polygonal and compound bodies, drawn by a compiled rasteriser if numba is installed, else with pygame's polygons.
 
-The two differ by their antialiasing only. The rim of a body lies inside its edge.
+The two differ only in antialiasing. The rim of a body lies inside its edge.
 """
 
 import math
@@ -21,22 +21,22 @@ from sandbox.window.render.particles import flat_pixels, is_flat, packed_pixels
 from sandbox.window.render.sdf import ShapeStyle, draw_sdf
 
 FEW_POLYGONS = 8
-"""Bodies up to which numba is not imported for them alone: its import takes 0.4 s"""
+"""Number of bodies up to which numba is not imported for their sake; its import takes 0.4 s."""
 ARC_ERROR = 0.1
-"""px, the largest distance between an arc and its chords"""
+"""px, largest distance between an arc and its chords"""
 MAX_ARC_CHORDS = 256
 THIN_RIM = 2.0
-"""px: without the compiled rasteriser a narrower rim is a line of one pixel"""
+"""px, rim width below which the pygame fallback draws the rim as a one-pixel line"""
 
 
 class PolygonRenderer:
-    """Draws bodies of any shape, and keeps what is known of their pieces between pictures."""
+    """Draws bodies of any shape, and caches their geometry between frames."""
 
     def __init__(self) -> None:
         self._known: tuple[Bodies, BodyGeometry] | None = None
 
     def anatomy(self, bodies: Bodies) -> BodyGeometry:
-        """Return what bodies consist of."""
+        """Return the geometry of bodies, cached for the last `Bodies`."""
         if self._known is None or self._known[0] is not bodies:
             self._known = bodies, BodyGeometry(bodies)
         return self._known[1]
@@ -52,17 +52,17 @@ class PolygonRenderer:
         colours: ColourArray,
         style: CircleStyle,
     ) -> None:
-        """Draw bodies in their order.
+        """Draw bodies in order.
 
         Args:
-            surface: where.
-            bodies: N of them.
-            who: (K,) the numbers of those that are drawn.
+            surface: the target.
+            bodies: all N bodies.
+            who: (K,) indices of the bodies that are drawn.
             centre: (K, 2) px, finite.
-            angle: (K,) rad, counted as in the world, where y is up; what is not finite counts as 0.
+            angle: (K,) rad, counter-clockwise, as in the world (y up); non-finite values count as 0.
             scale: px/m.
             colours: (K, 3).
-            style: of all of them; hollow is the rim alone, in its own colour.
+            style: of all bodies; hollow draws only the rim, in the colour of the body.
         """
         if not len(who):
             return
@@ -96,7 +96,7 @@ class PolygonRenderer:
         line: float,
         antialias: bool = True,
     ) -> None:
-        """Draw a line around a body, `line` px wide; its outer edge is `gap` px away from the body."""
+        """Draw an outline of a body, `line` px wide, with its outer edge at `gap` px from the body."""
         anatomy = self.anatomy(bodies)
         distance = anatomy.distance(number, place)
         within = clipped_box(anatomy.within(number, place, gap + 2.0), surface.get_clip())
@@ -105,7 +105,7 @@ class PolygonRenderer:
             draw_sdf(surface, lambda x, y: np.asarray(distance(x, y) - gap), look, within)
 
     def boxes(self, view: DrawContext) -> FloatArray:
-        """Return left, top, right and bottom of the boxes around the bodies of a view, (K, 4) px."""
+        """Return left, top, right and bottom of the bounding boxes of the visible bodies, (K, 4) px."""
         angle = view.snapshot.frame.angle[view.shown]
         angle = np.where(np.isfinite(angle), angle, 0.0)
         return self.anatomy(view.snapshot.bodies).boxes(view.shown, view.centre, angle, view.camera.scale)
@@ -122,7 +122,7 @@ def _in_one_pass(
     line: FloatArray,
     style: CircleStyle,
 ) -> bool:
-    """Draw all in one compiled pass; return whether that could be done."""
+    """Draw all bodies in one compiled pass; return whether that was possible."""
     from sandbox.engines.common.kernel import COMPILED
 
     if not COMPILED or not is_flat(surface):
@@ -155,7 +155,7 @@ def _in_one_pass(
 def _draw_plain(
     surface: pygame.Surface, hulls: list[Hull], colour: Colour, line: float, antialias: bool, near: bool
 ) -> None:
-    """Draw a body by polygons: its pieces in the colour of the rim, then its pieces in its own colour."""
+    """Draw a body as polygons: its pieces in the rim colour, then inset pieces in the fill colour."""
     reach = 2 * math.ceil(line) + 8
     area = None if near else surface.get_clip().inflate(reach, reach)
     if len(hulls) == 1 and 0.0 < line < THIN_RIM:
@@ -182,14 +182,14 @@ def _fill_hulls(
 
 
 def _corners(hull: Hull, area: pygame.Rect | None) -> list[Pixel]:
-    """Return the corners of a hull as a polygon, cut to an area if one is given; none if nothing is left of it."""
+    """Return the corners of a hull as a polygon, clipped to an area if given; empty if nothing remains."""
     chords = math.ceil(math.pi * math.sqrt(hull.radius / (8.0 * ARC_ERROR)))
     corners = [(x, y) for x, y in rounded_hull(hull, min(max(chords, 2), MAX_ARC_CHORDS)).tolist()]
     return corners if area is None else clip_polygon(corners, area)
 
 
 def _inscribed_radius(hull: Hull) -> float:
-    """Return a lower bound of the radius of the largest disc within a hull, px: area by perimeter, and its radius."""
+    """Return a lower bound of the inradius of a hull, px: area / perimeter of its corners, plus its rounding radius."""
     corners, radius = hull
     if len(corners) < 3:
         return radius
@@ -199,7 +199,7 @@ def _inscribed_radius(hull: Hull) -> float:
 
 
 def _inset(hull: Hull, depth: float) -> Hull:
-    """Return a hull made smaller by a depth, px, which is less than its inscribed radius."""
+    """Return a hull shrunk by a depth, px, which must be less than its inscribed radius."""
     corners, radius = hull
     if radius >= depth:
         return Hull(corners, radius - depth)

@@ -1,6 +1,6 @@
-"""Picture: one moment of a scene, drawn. It touches only what is in sight, and keeps what does not change.
+"""Renderer of a scene snapshot, and of the inset that magnifies part of it in a corner of the surface.
 
-Inset: a part of a scene that is drawn larger in a corner of the picture, where the picture shows it small.
+Only visible bodies are drawn. Static content is cached until the scene or the camera changes.
 """
 
 from typing import NamedTuple
@@ -34,15 +34,15 @@ from sandbox.window.render.static_geometry import (
 )
 
 POINT = 1.2
-"""px, the radius below which a ball is a point"""
+"""px, radius below which a ball is drawn as a point"""
 CROWD = 20_000
-"""Bodies, of which many are points."""
+"""Number of bodies above which the size of points is rounded down."""
 ROUNDISH = 0.9
-"""Share of its radius that the disc within a body has at least, if only a spoke shows how it has turned."""
+"""Ratio of inscribed to bounding radius above which a non-circular body gets a rotation mark."""
 
 
 class CachedBackground(NamedTuple):
-    """What a background was drawn for; `scene` is compared by identity."""
+    """Cache key of a background; `scene` is compared by identity."""
 
     scene: Scene
     camera: Camera
@@ -53,22 +53,22 @@ class CachedBackground(NamedTuple):
 
 
 class BodySizes(NamedTuple):
-    """Which bodies are points at a scale; N of them."""
+    """Classification of N bodies as points or discs at a scale."""
 
     bodies: Bodies
     scale: float
     unit: float
     tiny: BoolArray
-    """(N,)"""
+    """(N,) whether a body is drawn as a point"""
     all_tiny: bool
     large: IntArray
-    """numbers of those that are discs"""
+    """indices of the bodies that are not points"""
     side: int
-    """px, of a point: about the diameter of the median of them; 0 where there is none"""
+    """px, side of a point: about the median diameter of the points; 0 if there are none"""
 
 
 class Renderer:
-    """Draws pictures of scenes. One of them serves a window for its whole life; its caches are bounded."""
+    """Draws snapshots of scenes. One renderer serves a window for its whole life; its caches are bounded."""
 
     def __init__(self) -> None:
         self._discs = CircleRenderer()
@@ -98,17 +98,17 @@ class Renderer:
         scale: bool = True,
         hud: bool = True,
     ) -> None:
-        """Draw one moment over the whole of a surface.
+        """Draw a snapshot over the whole surface.
 
         Args:
-            surface: of any format; `camera.size` is its size.
-            camera: what it shows.
-            sight: the moment. Bodies at nan or inf, and those not present, are left out.
-            antialias: whether edges are smooth; without, it takes about half the time.
-            unit: px, of a line that is one pixel wide on a 1080p display; all widths and letters grow with it.
-            foot: px at the lower edge that something else will cover.
-            scale: draw the bar that tells how long things are.
-            hud: whether the view of a game may draw its signs over the picture.
+            surface: of any format and of size `camera.size`.
+            camera: the view.
+            sight: the snapshot. Bodies at nan or inf, and absent bodies, are skipped.
+            antialias: whether edges are smooth; without it, drawing takes about half the time.
+            unit: px, width of a line that is one pixel wide on a 1080p display; line widths and text scale with it.
+            foot: px at the lower edge that will be covered.
+            scale: whether to draw the scale bar.
+            hud: whether the view of a game may draw its HUD.
         """
         self._blit_background(surface, camera, sight, antialias, unit)
         if sight.lit:
@@ -157,7 +157,7 @@ class Renderer:
             game.hud(view)
 
     def _draw_layers(self, view: DrawContext, which: IntArray | None) -> None:
-        """Draw the bodies that are no points, from the ground up, with what is fixed on each layer above it."""
+        """Draw the bodies that are not points, from the lowest layer up; a raised layer is drawn before its bodies."""
         scene = view.snapshot.scene
         if len(scene.layers) == 1:
             self._draw_bodies(view, which)
@@ -170,7 +170,7 @@ class Renderer:
             self._draw_bodies(view, which[layer == k])
 
     def _draw_bodies(self, view: DrawContext, which: IntArray | None) -> None:
-        """Draw the bodies that are no points: all, or those at some places of the view."""
+        """Draw the bodies that are not points: all visible ones, or those at the given rows of the view."""
         centre, radius, colours, shown = view.centre, view.radius, view.colours, view.shown
         if which is not None:
             centre, radius, colours, shown = centre[which], radius[which], colours[which], shown[which]
@@ -200,7 +200,7 @@ class Renderer:
         colours: ColourArray,
         ageing: LifetimeColours | None,
     ) -> None:
-        """Draw the bodies that are too small for discs, those who fade as they do at their ages."""
+        """Draw the bodies that are too small for discs; fading ones in the colour of their age."""
         form = (surface.get_masks(), surface.get_bytesize())
         if self._tones is None or self._tones[0] is not colours or self._tones[1] != form:
             self._tones = colours, form, packed_pixels(colours, surface)
@@ -212,21 +212,21 @@ class Renderer:
         self._points.draw(surface, camera, frame.position[:count], self._tones[2][:count], who, sizes.side)
 
     def _sized(self, bodies: Bodies, scale: float, unit: float) -> "BodySizes":
-        """Return who is drawn how at a scale; it is worked out when that changes."""
+        """Return the classification of bodies at a scale, cached for the last arguments."""
         known = self._sizes
         if known is None or known.bodies is not bodies or known.scale != scale or known.unit != unit:
             tiny = bodies.radius * scale < POINT * max(unit, 1.0)
             side = 0
             if tiny.any():
                 diameter = 2.0 * float(np.median(bodies.radius[tiny])) * scale
-                # Of a crowd one sees the gaps rather than the points: they are drawn no larger than they are.
+                # In a crowd the gaps are more visible than the points: round down.
                 side = int(diameter) if len(tiny) > CROWD else round(diameter)
                 side = min(max(side, round(unit), 1), MAX_POINT_SIZE)
             self._sizes = known = BodySizes(bodies, scale, unit, tiny, bool(tiny.all()), np.flatnonzero(~tiny), side)
         return known
 
     def _know(self, sight: Snapshot) -> None:
-        """Work out what holds for bodies as long as they stay the same: their colours, and who can turn."""
+        """Compute what is constant for given bodies: their colours, and which can rotate."""
         bodies, scene = sight.bodies, sight.scene
         if self._known is not None and self._known[0] is bodies and self._known[1] is scene:
             return
@@ -260,7 +260,7 @@ class Renderer:
 
 
 def _in_sight(camera: Camera, sight: Snapshot, among: IntArray | None) -> IntArray:
-    """Return the numbers of the bodies that are present and at least partly in the picture."""
+    """Return the indices of the bodies that are present and at least partly visible."""
     frame = sight.frame
     count = min(len(frame.position), len(sight.bodies))
     position, radius, present = frame.position[:count], sight.bodies.radius[:count], frame.present[:count]
@@ -269,7 +269,7 @@ def _in_sight(camera: Camera, sight: Snapshot, among: IntArray | None) -> IntArr
         position, radius, present = position[among], radius[among], present[among]
     else:
         among = None
-    with np.errstate(invalid="ignore", over="ignore"):  # what is far out of sight may overflow, or be nan
+    with np.errstate(invalid="ignore", over="ignore"):  # far-away positions may overflow or be nan
         seen = np.flatnonzero(camera.in_sight(position, radius) & present)
     return seen if among is None else among[seen]
 
@@ -277,7 +277,7 @@ def _in_sight(camera: Camera, sight: Snapshot, among: IntArray | None) -> IntArr
 def _background_context(
     surface: pygame.Surface, camera: Camera, sight: Snapshot, antialias: bool, unit: float
 ) -> DrawContext:
-    """Return a context without bodies, for what is cached."""
+    """Return a context without bodies, for the cached background."""
     none = np.empty((0, 3), np.uint8)
     return DrawContext(
         surface=surface,
@@ -294,23 +294,23 @@ def _background_context(
 
 
 def _by_contact(overlapping: BoolArray, count: int) -> ColourArray:
-    """Return the colours of a scene that shows contact by colour."""
+    """Return the body colours of a scene that shows contact by colour, (count, 3)."""
     touching = np.zeros(count, np.bool_)
     touching[: len(overlapping)] = overlapping[:count]
     return np.where(touching[:, None], np.asarray(TOUCHING, np.uint8), np.asarray(CLEAR, np.uint8))
 
 
 WIDE, HIGH = 0.72, 0.38
-"""Of the picture, that an inset takes at most."""
+"""Largest width and height of an inset, as fractions of the free area."""
 MARGIN = 10
-"""px at unit 1 to the edges of the picture"""
+"""px at a UI scale of 1, distance to the edges of the surface"""
 LARGER = 1.5
-"""An inset is of use that shows things so many times as large as the picture."""
+"""Smallest magnification, relative to the main view, at which an inset is shown."""
 EDGE = mix_colours(SKY, INK, 0.25)
 
 
 class InsetRenderer:
-    """Draws the inset of a scene that states one."""
+    """Draws the inset of a scene that defines one."""
 
     def __init__(self) -> None:
         self._picture = Renderer()
@@ -327,16 +327,16 @@ class InsetRenderer:
         unit: float = 1.0,
         aside: int = 0,
     ) -> pygame.Rect | None:
-        """Draw it into the lower right corner, and mark what it is of; return where it is, None where there is none.
+        """Draw the inset in the lower right corner and outline its region; return its rectangle, or None if not drawn.
 
         Args:
-            surface: the picture, drawn already.
-            camera: what that shows.
-            sight: the moment.
-            free: what nothing else covers.
+            surface: with the main view already drawn.
+            camera: of the main view.
+            sight: the snapshot.
+            free: area not covered by other elements.
             antialias: whether edges are smooth.
-            unit: px, of a line that is one pixel wide on a 1080p display.
-            aside: px at the lower right that something else takes.
+            unit: px, width of a line that is one pixel wide on a 1080p display.
+            aside: px at the lower right that are occupied.
         """
         box = sight.scene.play.inset
         if box is None:
@@ -359,7 +359,7 @@ class InsetRenderer:
 
 
 def _place(box: Box, free: pygame.Rect, margin: int, aside: int) -> pygame.Rect:
-    """Return where a box is drawn as large as it may be."""
+    """Return the largest permitted rectangle for the inset of a box."""
     (left, bottom), (right, top) = box
     room = free.width - 2 * margin - (aside + margin if aside else 0)
     scale = min(min(WIDE * free.width, room) / (right - left), HIGH * free.height / (top - bottom))

@@ -1,6 +1,6 @@
-"""Shapes given by their signed distance, painted with antialiased edges, as sprites or straight onto a surface.
+"""Shapes given by a signed distance function, painted with antialiased edges as sprites or directly onto a surface.
 
-A distance is in pixels, negative inside; pixel (i, j) is sampled at its middle (i + ½, j + ½).
+Distances are in pixels, negative inside; pixel (i, j) is sampled at its centre (i + ½, j + ½).
 """
 
 import math
@@ -15,26 +15,26 @@ from sandbox.arrays import FloatArray
 from sandbox.window.render.palette import Colour
 
 SignedDistance = Callable[[FloatArray, FloatArray], FloatArray]
-"""Takes x and y, px, that broadcast, and returns the signed distance there; it changes by no more than 1 a pixel."""
+"""Maps x and y, px, which broadcast, to the signed distance; Lipschitz constant at most 1."""
 
 TILE = 16
-"""px; edges are shaded in squares of this side, the rest is filled"""
+"""px; edges are shaded in square tiles of this side, interior tiles are filled"""
 FAR_OUTSIDE = 1e6
 
 
 class ShapeStyle(NamedTuple):
-    """How a shape is painted: a filling, or none, and a rim that lies inside the edge."""
+    """Style of a shape: optional fill, and a rim inside the edge."""
 
     fill: Colour | None
     rim: Colour
     line: float
-    """width of the rim, px"""
+    """rim width, px"""
     opacity: float = 1.0
     antialias: bool = True
 
 
 def shade_sdf(distance: FloatArray, look: ShapeStyle) -> npt.NDArray[np.uint32]:
-    """Return the pixels (…) of a shape as 0xAARRGGBB; where the distance is nan there is nothing."""
+    """Return the pixels (…) of a shape as 0xAARRGGBB; nan distances are transparent."""
     near = np.nan_to_num(distance, nan=FAR_OUTSIDE, posinf=FAR_OUTSIDE, neginf=-FAR_OUTSIDE).astype(np.float32)
     inside = np.clip(0.5 - near, 0.0, 1.0)
     rim = np.clip(near + np.float32(look.line + 0.5), 0.0, 1.0) if look.line > 0 else np.zeros_like(near)
@@ -50,7 +50,7 @@ def shade_sdf(distance: FloatArray, look: ShapeStyle) -> npt.NDArray[np.uint32]:
 
 
 def sdf_surface(pixels: npt.NDArray[np.uint32], encoded: bool = True) -> pygame.Surface:
-    """Return a surface of pixels (W, H), 0xAARRGGBB; run-length encoded it is blitted several times as fast."""
+    """Return a surface from pixels (W, H), 0xAARRGGBB; with run-length encoding it blits several times faster."""
     surface = pygame.Surface(pixels.shape, pygame.SRCALPHA, 32, (0xFF0000, 0xFF00, 0xFF, 0xFF000000))
     pygame.surfarray.pixels2d(surface)[:] = pixels
     if encoded:
@@ -59,7 +59,7 @@ def sdf_surface(pixels: npt.NDArray[np.uint32], encoded: bool = True) -> pygame.
 
 
 def disc_distance(x: float, y: float, radius: float) -> SignedDistance:
-    """Return the distance from a circle; one too large for its curvature to be seen is a straight line."""
+    """Return the distance from a circle; above a radius of 1e12 px the circle is approximated by a straight line."""
     if radius < 1e12:
         return lambda px, py: np.asarray(np.sqrt((px - x) ** 2 + (py - y) ** 2) - radius)
     far = float(np.hypot(x, y))
@@ -69,7 +69,7 @@ def disc_distance(x: float, y: float, radius: float) -> SignedDistance:
 
 
 def capsule_distance(a: tuple[float, float], b: tuple[float, float], radius: float) -> SignedDistance:
-    """Return the distance from a segment with round ends."""
+    """Return the distance from a capsule: a segment with round ends."""
     along = b[0] - a[0], b[1] - a[1]
     squared = max(along[0] ** 2 + along[1] ** 2, 1e-12)
 
@@ -88,8 +88,8 @@ def arc_distance(x: float, y: float, radius: float, middle: float, half: float) 
         x: of the centre, px.
         y: of the centre, px.
         radius: px.
-        middle: rad, direction of the middle of the arc, counted as in the world, where y is up.
-        half: rad, from its middle to each of its ends, 0 to π.
+        middle: rad, direction of the midpoint of the arc, counter-clockwise, as in the world (y up).
+        half: rad, half of the angle of the arc, 0 to π.
     """
     along, across, cosine = math.cos(middle), -math.sin(middle), math.cos(half)
     ends = [(x + radius * math.cos(angle), y - radius * math.sin(angle)) for angle in (middle - half, middle + half)]
@@ -104,20 +104,20 @@ def arc_distance(x: float, y: float, radius: float, middle: float, half: float) 
 
 
 def line_distance(offset: float, normal: tuple[float, float]) -> SignedDistance:
-    """Return the distance from a half-plane whose normal (a unit vector, y down) points out of it."""
+    """Return the distance from a half-plane with outward unit normal `normal` (y down)."""
     return lambda px, py: offset + px * normal[0] + py * normal[1]
 
 
 def draw_sdf(
     surface: pygame.Surface, distance: SignedDistance, look: ShapeStyle, within: pygame.Rect | None = None
 ) -> None:
-    """Paint a shape onto a picture, of whatever size and however far outside.
+    """Paint a shape of any size and position onto a surface.
 
     Args:
         surface: of any format.
         distance: of the shape.
-        look: how.
-        within: px, where the shape can be at all.
+        look: the style.
+        within: px, bounding box of the shape, if known.
     """
     area = surface.get_clip() if within is None else surface.get_clip().clip(within)
     if not area.width or not area.height:
@@ -147,13 +147,13 @@ def draw_sdf(
 
 
 def _fill(surface: pygame.Surface, full: npt.NDArray[np.bool_], area: pygame.Rect, colour: Colour) -> None:
-    """Fill the tiles that lie wholly inside, a run of them at once."""
+    """Fill the interior tiles, one rectangle for each run in a row."""
     if full.all():
         surface.fill(colour, area)
         return
     padded = np.zeros((full.shape[0] + 2, full.shape[1]), np.int8)
     padded[1:-1] = full
-    change = np.diff(padded, axis=0).T  # (rows, columns + 1): +1 where a run starts, −1 behind its end
+    change = np.diff(padded, axis=0).T  # (rows, columns + 1): +1 at the start of a run, −1 after its end
     starts, ends = np.argwhere(change == 1), np.argwhere(change == -1)
     for (row, first), (_, last) in zip(starts.tolist(), ends.tolist(), strict=True):
         run = pygame.Rect(area.left + first * TILE, area.top + row * TILE, (last - first) * TILE, TILE)

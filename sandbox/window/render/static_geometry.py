@@ -1,4 +1,4 @@
-"""Static geometry: planes, walls, posts, bounds, markings, zones and raised layers; it changes with the camera only."""
+"""Static geometry: planes, walls, posts, bounds, markings, zones and raised layers."""
 
 import math
 from itertools import pairwise
@@ -47,21 +47,21 @@ from sandbox.window.render.sdf import (
 )
 
 HATCH, HATCHES = 9.0, 600
-"""px between two hatches of a plane, and the most of them"""
+"""px between hatch lines of a plane, and their largest number"""
 WAYS = 60.0
-"""px between two arrows through a wall that lets pass from one side"""
+"""px between the arrows of a one-way wall"""
 CAP = 5.0
-"""px, the least radius at which a post that kicks shows its ring"""
+"""Radius above which a post with a kick shows its ring, px at a UI scale of 1."""
 ABSENT = 0.4
-"""How much of its colour is left of what is not solid"""
+"""Fraction of its colour that non-solid geometry keeps."""
 MAX_ROUND_POINTS = 300
-"""Segments of thick walls in sight that get round, shaded ends; where there are more, all are plain lines."""
+"""Number of visible segments of a wall up to which they have round ends and a rim; above it, they are plain lines."""
 
 
 def draw_static_bodies(
     surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True
 ) -> None:
-    """Draw what is fixed in a scene, as far as it is in sight."""
+    """Draw the visible planes, walls and posts of a scene."""
     for plane in scene.planes:
         _plane(surface, camera, plane, unit, antialias)
     for wall in scene.walls:
@@ -89,7 +89,8 @@ def _plane(surface: pygame.Surface, camera: Camera, plane: Plane, unit: float, a
     length = math.hypot(*plane.normal)
     nx, ny = plane.normal[0] / length, plane.normal[1] / length
     middle = camera.size[0] / 2.0, camera.size[1] / 2.0
-    # The height of the picture's middle above the plane is worked out in metres: the plane's own point may be so far
+    # The height of the view centre above the plane is computed in metres: the point of the plane may be so far away
+    # that its pixel position has no precision left.
     # away that its place in pixels says nothing.
     height = ((camera.centre[0] - plane.point[0]) * nx + (camera.centre[1] - plane.point[1]) * ny) * camera.scale
     down = nx, -ny
@@ -121,7 +122,7 @@ def _hatch(
     unit: float,
     antialias: bool,
 ) -> None:
-    """Draw short slanted lines behind a plane's edge; they move with the plane's point."""
+    """Draw short slanted lines behind the edge of a plane; they are fixed to the point of the plane."""
     ends = (
         (foot[0] - along[0] * reach, foot[1] - along[1] * reach),
         (foot[0] + along[0] * reach, foot[1] + along[1] * reach),
@@ -158,7 +159,7 @@ def _wall(surface: pygame.Surface, camera: Camera, wall: Wall, unit: float, anti
             _ways_through(surface, (a[0], a[1]), (b[0], b[1]), half, edge, unit, antialias)
     plain = len(parts) > MAX_ROUND_POINTS
     rim = 0.0 if thin else min(1.5 * unit, half)
-    # The outline of all segments first and then the filling of all, so that no outline shows inside a corner.
+    # All outlines first, then all fills, so that no outline shows inside a corner.
     for inset, colour in ((0.0, edge), (rim, filling)) if rim else ((0.0, edge),):
         for a, b in parts:
             if plain and half < 4000.0:
@@ -171,12 +172,12 @@ def _wall(surface: pygame.Surface, camera: Camera, wall: Wall, unit: float, anti
 def _ways_through(
     surface: pygame.Surface, a: Pixel, b: Pixel, half: float, colour: Colour, unit: float, antialias: bool
 ) -> None:
-    """Draw small arrows out of a wall's left, the way that it lets pass; they stay where they are on it."""
+    """Draw small arrows on the left side of a wall, in its passing direction, at fixed points of the wall."""
     part, length = clip_segment(a, b, surface.get_clip(), half + 12.0 * unit), math.dist(a, b)
     if part is None or length < 2.0:
         return
     ux, uy = (b[0] - a[0]) / length, (b[1] - a[1]) / length
-    out = uy, -ux  # on the screen y points down: so it is to the left
+    out = uy, -ux  # left of the direction a → b, with y down
     step = length / max(1, round(length / (WAYS * unit)))
     first = math.floor(math.dist(a, part[0]) / step)
     for k in range(first, min(math.ceil(math.dist(a, part[1]) / step), first + HATCHES)):
@@ -190,7 +191,7 @@ def _ways_through(
 
 
 def _around(a: Pixel, b: Pixel, reach: float, area: pygame.Rect) -> pygame.Rect:
-    """Return the part of an area that is no farther than `reach` from the box of two points."""
+    """Return the part of an area within `reach` of the bounding box of two points."""
     left, top = max(min(a[0], b[0]) - reach - 2.0, area.left), max(min(a[1], b[1]) - reach - 2.0, area.top)
     right, bottom = min(max(a[0], b[0]) + reach + 2.0, area.right), min(max(a[1], b[1]) + reach + 2.0, area.bottom)
     if right <= left or bottom <= top:
@@ -214,35 +215,35 @@ def _post(surface: pygame.Surface, camera: Camera, post: Post, unit: float, anti
         return
     look = ShapeStyle(mix_colours(BACKGROUND, edge, 0.55), edge, min(1.5 * unit, radius), antialias=antialias)
     draw_sdf(surface, disc_distance(x, y, radius), look, around)
-    if post.kick is not None and radius > CAP * unit:  # the ring of a bumper, inside its cap
+    if post.kick is not None and radius > CAP * unit:  # ring of a bumper
         ring = ShapeStyle(mix_colours(BACKGROUND, edge, 0.3), edge, 1.5 * unit, antialias=antialias)
         draw_sdf(surface, disc_distance(x, y, 0.6 * radius), ring, around)
 
 
 OPACITY = 165
-"""of 255, of what is above the ground"""
+"""of 255, opacity of layers above the ground"""
 MARGIN = 4
-"""px around what is drawn"""
+"""px, margin around a cached layer"""
 
 
 Sprite = tuple[pygame.Surface, tuple[int, int]]
-"""A picture, and where its upper left corner belongs."""
+"""Surface and the position of its upper left corner."""
 
 
 class _DrawnLayer(NamedTuple):
-    """A deck as it was drawn."""
+    """Cached surface of a layer."""
 
     of: tuple[object, ...]
     picture: Sprite | None
 
 
 def lowest_layer(mask: int) -> int:
-    """Return the number of the lowest of some layers, as bits."""
+    """Return the index of the lowest set bit of a layer mask."""
     return (mask & -mask).bit_length() - 1
 
 
 def on_layer(scene: Scene, layer: int) -> Scene:
-    """Return a scene with only those walls and posts that have this one for their lowest layer, and planes below."""
+    """Return a scene with only the walls and posts whose lowest layer is `layer`; planes belong to layer 0."""
 
     def here(layers: tuple[str, ...]) -> bool:
         return lowest_layer(mask_of(layers, scene.layers)) == layer
@@ -253,12 +254,12 @@ def on_layer(scene: Scene, layer: int) -> Scene:
 
 
 def layers_among(frame: Frame, numbers: IntArray) -> IntArray:
-    """Return on which layer each of some bodies is, (K,)."""
+    """Return the layer of each of the given bodies, (K,)."""
     return np.zeros(len(numbers), np.int64) if frame.layer is None else frame.layer[numbers]
 
 
 class LayerRenderer:
-    """What is above the ground, drawn anew only where it, or the camera, has changed."""
+    """Draws layers above the ground; each is cached until its geometry or the camera changes."""
 
     def __init__(self) -> None:
         self._scene: Scene | None = None
@@ -268,8 +269,8 @@ class LayerRenderer:
     def draw(
         self, surface: pygame.Surface, camera: Camera, scene: Scene, layer: int, unit: float, antialias: bool
     ) -> None:
-        """Draw the walls and posts of a layer over a picture so that it shines through."""
-        if self._scene is not scene:  # another scene may have the same decks: on the ground a target fell
+        """Draw the walls and posts of a layer, translucent, over a surface."""
+        if self._scene is not scene:  # a new scene may keep its raised layers
             self._scene = scene
             self._decks = tuple(on_layer(scene, k) for k in range(len(scene.layers)))
         deck = self._decks[layer]
@@ -282,7 +283,7 @@ class LayerRenderer:
 
 
 def _deck(surface: pygame.Surface, camera: Camera, deck: Scene, unit: float, antialias: bool) -> Sprite | None:
-    """Return a see-through picture of a layer and where it belongs; several parts that overlap look like one."""
+    """Return a translucent sprite of a layer; overlapping parts do not add up in opacity. None if not visible."""
     places = [(point, wall.thickness / 2.0) for wall in deck.walls for point in wall.points]
     places += [(post.position, post.radius) for post in deck.posts]
     if not places:
@@ -296,7 +297,7 @@ def _deck(surface: pygame.Surface, camera: Camera, deck: Scene, unit: float, ant
     box = pygame.Rect(*low.astype(int).tolist(), *(high - low + 2.0).astype(int).tolist()).clip(surface.get_rect())
     if not box.width or not box.height:
         return None
-    # Of fixtures on black and of the same on white, the difference tells how much they cover.
+    # Drawn on black and on white: the difference gives the coverage.
     dark, light = (pygame.Surface(surface.get_size(), 0, 32) for _ in range(2))
     for ground, colour in ((dark, (0, 0, 0)), (light, (255, 255, 255))):
         ground.fill(colour)
@@ -314,7 +315,7 @@ def _deck(surface: pygame.Surface, camera: Camera, deck: Scene, unit: float, ant
 def draw_markings(
     surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True
 ) -> None:
-    """Draw the markings of a scene, as far as they are in sight."""
+    """Draw the visible markings of a scene."""
     for marking in scene.play.markings:
         colour = hex_colour(marking.colour)
         if marking.position is not None and marking.radius is not None:
@@ -356,15 +357,15 @@ def _circle(
 
 
 FILLED, LINED = 0.13, 0.55
-"""opacity of the area, and of its outline"""
+"""opacity of the area and of the outline"""
 LINE = 1.5
-"""px, of the outline"""
+"""px, width of the outline"""
 
 
 def draw_zones(
     surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True
 ) -> None:
-    """Draw the zones of a scene, as far as they are in sight."""
+    """Draw the visible zones of a scene."""
     for zone in scene.zones:
         distance, within = _distance(zone, camera)
         box = within.inflate(4, 4).clip(surface.get_clip())
@@ -374,7 +375,7 @@ def draw_zones(
 
 
 def colour_of_zone(zone: Zone) -> Colour:
-    """Return the colour of a zone: its own, or one by what it does."""
+    """Return the colour of a zone: its own, or one by its effect."""
     if zone.colour is not None:
         return hex_colour(zone.colour)
     if zone.holds:
@@ -385,7 +386,7 @@ def colour_of_zone(zone: Zone) -> Colour:
 
 
 def _distance(zone: Zone, camera: Camera) -> tuple[SignedDistance, pygame.Rect]:
-    """Return the distance from a zone, px, and the part of the picture that it may be in."""
+    """Return the signed distance from a zone, px, and its bounding box."""
     if zone.points is None:
         assert zone.position is not None and zone.radius is not None
         corners, reach = _pixels((zone.position,), camera), zone.radius * camera.scale
@@ -405,7 +406,7 @@ def _distance(zone: Zone, camera: Camera) -> tuple[SignedDistance, pygame.Rect]:
 
 
 def _outline(corners: FloatArray) -> SignedDistance:
-    """Return the distance from a simple polygon (K, 2), px; inside, a ray crosses an odd number of sides."""
+    """Return the signed distance from a simple polygon (K, 2), px; inside by the even-odd rule."""
     sides = list(zip(corners.tolist(), np.roll(corners, -1, axis=0).tolist(), strict=True))
 
     def distance(px: FloatArray, py: FloatArray) -> FloatArray:
@@ -425,7 +426,7 @@ def _pixels(points: tuple[Point, ...], camera: Camera) -> FloatArray:
 
 
 def _box(corners: FloatArray, reach: float) -> pygame.Rect:
-    """Return the box of places (K, 2) and so much around them, px, cut to what SDL can count."""
+    """Return the bounding box of points (K, 2) enlarged by `reach`, px, clamped to SDL's coordinate range."""
     low, high = (
         (corners.min(axis=0) - reach).clip(-SDL_COORDINATE_LIMIT, SDL_COORDINATE_LIMIT),
         (corners.max(axis=0) + reach).clip(-SDL_COORDINATE_LIMIT, SDL_COORDINATE_LIMIT),

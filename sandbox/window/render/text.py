@@ -1,4 +1,4 @@
-"""Text in DejaVu Sans if installed, rendered once and cached; translucent boxes behind it; text fitted to a width."""
+"""Cached text in DejaVu Sans if installed, translucent boxes behind it, wrapping and truncation to a width."""
 
 import math
 from collections.abc import Sequence
@@ -13,9 +13,9 @@ from sandbox.window.render.lines import SDL_COORDINATE_LIMIT
 from sandbox.window.render.palette import INK, LINE, PANEL, Colour
 
 MAX_TEXT_LENGTH = 400
-"""Letters of one line that are rendered; no surface grows beyond what SDL takes."""
+"""Number of characters of a line that are rendered; limits the width of the surface."""
 SMALLEST, MAX_TEXT_SIZE = 4, 128
-"""px, the sizes that are rendered"""
+"""px, range of font sizes"""
 
 
 def draw_text(
@@ -28,23 +28,23 @@ def draw_text(
     bold: bool = False,
     mono: bool = False,
 ) -> pygame.Rect:
-    """Write one line of text.
+    """Draw one line of text.
 
     Args:
-        surface: where.
-        text: what; it is cut after `LONGEST` letters, and a control character becomes a space.
-        at: the place of the anchor, px; at one that is not finite nothing is written.
-        size: of the letters, px.
-        colour: of the letters.
-        anchor: which point of the text lies there, as a `pygame.Rect` calls it: `topleft`, `midright`, `center` …
-        bold: in a heavier weight.
-        mono: all letters equally wide, for figures that change.
+        surface: the target.
+        text: truncated after `MAX_TEXT_LENGTH` characters; control characters become spaces.
+        at: position of the anchor, px; if it is not finite, nothing is drawn.
+        size: font size, px.
+        colour: of the text.
+        anchor: point of the text at `at`, named as in `pygame.Rect`: `topleft`, `midright`, `center` …
+        bold: whether the weight is bold.
+        mono: whether the font is monospaced, for changing numbers.
 
     Returns:
-        The place that the text covers, whether in the picture or not.
+        The rectangle of the text, which may lie outside the surface.
     """
     x, y = at
-    if not (abs(x) < SDL_COORDINATE_LIMIT and abs(y) < SDL_COORDINATE_LIMIT):  # nor where it is nan
+    if not (abs(x) < SDL_COORDINATE_LIMIT and abs(y) < SDL_COORDINATE_LIMIT):  # also rejects nan
         return pygame.Rect(0, 0, 0, 0)
     words = _rendered(renderable(text), _whole(size), colour, bold, mono)
     rect = words.get_rect(**{anchor: (round(x), round(y))})
@@ -62,7 +62,7 @@ def _whole(size: float) -> int:
 
 
 def renderable(text: str) -> str:
-    """Return a text that can be rendered, or be a caption: a zero letter or half a surrogate pair would raise."""
+    """Return a text that pygame can render or set as caption: null characters and lone surrogates would raise."""
     text = text[:MAX_TEXT_LENGTH]
     if text.isprintable():
         return text
@@ -80,7 +80,7 @@ def _rendered(text: str, size: int, colour: Colour, bold: bool, mono: bool) -> p
 def _font(size: int, bold: bool, mono: bool) -> pygame.font.Font:
     if not pygame.font.get_init():
         pygame.font.init()
-    pygame.register_quit(_forget)  # fonts do not outlive pygame
+    pygame.register_quit(_forget)  # fonts are invalid after pygame.quit
     path = font_file(bold, mono)
     return pygame.font.Font(None if path is None else str(path), size)
 
@@ -92,7 +92,7 @@ def _forget() -> None:
 
 @lru_cache(maxsize=4)
 def font_file(bold: bool, mono: bool) -> Path | None:
-    """Return where a DejaVu font lies, among matplotlib's files, which are looked up and not imported."""
+    """Return the path of a DejaVu font in matplotlib's data, without importing matplotlib; None if not found."""
     spec = find_spec("matplotlib")
     if spec is None or spec.origin is None:
         return None
@@ -103,7 +103,7 @@ def font_file(bold: bool, mono: bool) -> Path | None:
 
 OPACITY = 214
 MAX_BOX = 16_384
-"""px, of a plate's side"""
+"""px, largest side of a box"""
 
 
 def draw_box(
@@ -114,7 +114,7 @@ def draw_box(
     opacity: int = OPACITY,
     edge: Colour | None = LINE,
 ) -> None:
-    """Lay a rounded translucent plate; one without an area is not drawn."""
+    """Draw a rounded translucent box; nothing if its area is empty."""
     if rect.width <= 0 or rect.height <= 0 or max(rect.size) > MAX_BOX:
         return
     surface.blit(_plate(rect.size, round(radius), colour, opacity, edge), rect)
@@ -130,12 +130,12 @@ def _plate(size: tuple[int, int], radius: int, colour: Colour, opacity: int, edg
 
 
 def largest_area(shape: tuple[float, float], free: pygame.Rect, taken: Sequence[pygame.Rect]) -> pygame.Rect:
-    """Return the part of what is free, beside all that is taken, in which a rectangle of a shape is largest.
+    """Return the part of the free area, outside all taken rectangles, that holds the largest rectangle of a shape.
 
     Args:
         shape: width and height, in any unit.
         free: px.
-        taken: px; where nothing else is left, they are not minded.
+        taken: px; ignored if no area remains.
     """
     taken = [each.clip(free) for each in taken if each.clip(free).size > (0, 0) and free.colliderect(each)]
     lefts, rights = {free.left, *(each.right for each in taken)}, {free.right, *(each.left for each in taken)}
@@ -152,12 +152,12 @@ def largest_area(shape: tuple[float, float], free: pygame.Rect, taken: Sequence[
 
 @lru_cache(maxsize=1024)
 def ellipsis(text: str, size: float, width: float, bold: bool = False, mono: bool = False) -> str:
-    """Return as much of a text as fits a width in px, with `…` where something is missing; "" where nothing fits."""
+    """Return a text truncated with `…` to a width in px; "" if not even one character fits."""
     text = text[:MAX_TEXT_LENGTH]
     if text_size(text, size, bold, mono)[0] <= width:
         return text
     fits, cut = 0, len(text)
-    while cut - fits > 1:  # `fits` letters and … fit, or nothing does; `cut` do not
+    while cut - fits > 1:  # invariant: `fits` characters and … fit (or none do); `cut` characters do not
         middle = (fits + cut) // 2
         if text_size(f"{text[:middle].rstrip()}…", size, bold, mono)[0] <= width:
             fits = middle
@@ -170,7 +170,7 @@ def ellipsis(text: str, size: float, width: float, bold: bool = False, mono: boo
 def wrap_text(
     text: str, size: float, width: float, most: int = 3, bold: bool = False, mono: bool = False
 ) -> tuple[str, ...]:
-    """Return a text as lines that fit a width in px, broken at spaces; the last of `most` is shortened."""
+    """Return a text wrapped at spaces to a width in px, at most `most` lines; the last one is truncated with `…`."""
     words = text[: MAX_TEXT_LENGTH * most].split()
     lines: list[str] = []
     while words and len(lines) < most:
@@ -184,7 +184,7 @@ def wrap_text(
 
 
 def draw_hint(surface: pygame.Surface, text: str, pointer: tuple[int, int], unit: float) -> None:
-    """Draw what is told about the thing under the pointer, below it and inside the picture."""
+    """Draw a tooltip below the pointer, kept inside the surface."""
     size = 12 * unit
     lines = wrap_text(text, size, min(280 * unit, 0.9 * surface.get_width()), 4)
     wide = max((text_size(line, size)[0] for line in lines), default=0)

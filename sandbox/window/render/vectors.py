@@ -1,4 +1,4 @@
-"""Contacts, and velocities and forces as arrows."""
+"""Contact points and normals, and arrows for velocities and forces."""
 
 import math
 from itertools import pairwise
@@ -15,17 +15,17 @@ from sandbox.window.render.palette import BACKGROUND, INK, ORANGE, SKY, YELLOW, 
 from sandbox.window.render.text import draw_text
 
 MOST_CURVED = 400
-"""Contacts with walls and posts whose normals are worked out anew."""
+"""Number of contacts with walls and posts whose normals are recomputed."""
 SLACK = 0.02
-"""Radii by which places that touch may be farther apart than the nearest."""
+"""Tolerance of a touching feature beyond the closest distance, in radii."""
 MAX_CURVE = 256
-"""Points of a wall for which that is done."""
+"""Number of wall points up to which normals are recomputed."""
 
 
 def contact_points(view: DrawContext) -> tuple[FloatArray, FloatArray]:
-    """Return place (C, 2) m and normal (C, 2) of all contacts, from where their bodies are in the frame.
+    """Return position (C, 2) m and normal (C, 2) of all contacts, recomputed from the poses in the frame.
 
-    Where a contact's bodies are unknown, or nowhere, its row is taken at its word.
+    Where the bodies of a contact are unknown or not finite, the recorded values are returned.
     """
     contacts, position, bodies = view.snapshot.contacts, view.snapshot.frame.position, view.snapshot.bodies
     count = min(len(position), len(bodies))
@@ -52,7 +52,7 @@ def contact_points(view: DrawContext) -> tuple[FloatArray, FloatArray]:
 
 
 def _round(view: DrawContext, normal: FloatArray, rows: "np.ndarray[tuple[int], np.dtype[np.intp]]") -> None:
-    """Turn the normals of contacts with walls and posts, which change as a ball rolls around them."""
+    """Recompute the normals of contacts with walls and posts, which change as a ball rolls around them."""
     fixed, position = view.snapshot.scene.fixed, view.snapshot.frame.position
     for row, (number, thing) in zip(rows.tolist(), view.snapshot.contacts.pair[rows].tolist(), strict=True):
         if -1 - thing >= len(fixed):
@@ -70,7 +70,7 @@ def _round(view: DrawContext, normal: FloatArray, rows: "np.ndarray[tuple[int], 
 def _solid(
     view: DrawContext, place: FloatArray, normal: FloatArray, rows: "np.ndarray[tuple[int], np.dtype[np.intp]]"
 ) -> None:
-    """Find anew where bodies touch of which one is no lone disc: in the middle of where they are nearest."""
+    """Recompute contacts that involve a non-circular body: the midpoint between the closest features."""
     bodies, frame, fixed = view.snapshot.bodies, view.snapshot.frame, view.snapshot.scene.fixed
     for row, (number, other) in zip(rows.tolist(), view.snapshot.contacts.pair[rows].tolist(), strict=True):
         if not np.isfinite(frame.position[number]).all() or not math.isfinite(float(frame.angle[number])):
@@ -85,13 +85,13 @@ def _solid(
         if found:
             place[row] = min(found, key=lambda each: each[0])[1]
         for disc, way in ((number, 1.0), (other, -1.0)):
-            if disc >= 0 and bodies.round[disc]:  # the normal goes through its centre
+            if disc >= 0 and bodies.round[disc]:  # the normal passes through the centre of the disc
                 out = (place[row] - frame.position[disc]) * way
                 normal[row] = out / np.hypot(*out)
 
 
 def _hulls_of_fixed(thing: Plane | Wall | Post, near: FloatArray) -> list[Hull]:
-    """Return a fixed thing as hulls; of a plane, what lies about a place."""
+    """Return static geometry as hulls; of a plane, the part near a point."""
     if isinstance(thing, Post):
         return [Hull(np.asarray([thing.position]), thing.radius)]
     if isinstance(thing, Wall):
@@ -104,7 +104,7 @@ def _hulls_of_fixed(thing: Plane | Wall | Post, near: FloatArray) -> list[Hull]:
 
 
 def _nearest(wall: Wall, centre: FloatArray) -> FloatArray:
-    """Return the point of a wall's middle line that is nearest to a place, m."""
+    """Return the point of a wall's centre line that is closest to a point, m."""
     ends = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points)
     start, along = ends[:-1], np.diff(ends, axis=0)
     share = np.clip(((centre - start) * along).sum(1) / (along**2).sum(1), 0.0, 1.0)
@@ -113,29 +113,29 @@ def _nearest(wall: Wall, centre: FloatArray) -> FloatArray:
 
 
 MAX_ARROWS = 1000
-"""Arrows of one kind; of more bodies or contacts, so many of them spread over all, or of forces the strongest"""
+"""Largest number of arrows of one kind: velocities and contacts are sampled evenly, forces by strength."""
 ARROW_CROWD = 300
-"""Contacts from which their marks become smaller, and arrows are drawn without a dark edge."""
+"""Number above which contact marks are smaller and arrows have no dark outline."""
 SPAN = 0.1
-"""s: an arrow reaches to where its body would be after so long"""
+"""s: the arrow of a velocity v has length v · SPAN"""
 NORMAL = 16.0
-"""px, of a contact's normal"""
+"""px, length of a contact normal"""
 WEIGHT = 26.0
-"""px, of a force of one weight m·g"""
+"""px, length of a force of one weight m·g"""
 LONGEST_ARROW = 80.0
-"""px, of the largest force where weights would make it longer"""
+"""px, length of the largest force if weights would make it longer"""
 _COOL = mix_colours(BACKGROUND, SKY, 0.8)
 HEAT: tuple[Colour, ...] = tuple(
     mix_colours(_COOL, YELLOW, k / 16) if k < 16 else mix_colours(YELLOW, (255, 255, 255), k / 16 - 1.0)
     for k in range(33)
 )
-"""For a line's length, in 32nds of the largest: from blue through yellow to white."""
+"""Colours of forces by line length, from blue through yellow to white."""
 LABELS = 12
-"""Up to so many forces are told in newtons."""
+"""Number of forces up to which each is labelled in newtons."""
 
 
 def draw_velocities(view: DrawContext) -> None:
-    """Draw v · 0.1 s as arrows; one longer than a third of the picture is cut to that."""
+    """Draw v · 0.1 s as arrows, clipped to a third of the smaller side of the surface."""
     some = view.first(MAX_ARROWS)
     longest = max(min(view.camera.size) / 3.0, 1.0)
     with np.errstate(invalid="ignore", over="ignore"):
@@ -149,7 +149,7 @@ def draw_velocities(view: DrawContext) -> None:
 
 
 def _in_sight(view: DrawContext, most: int) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return which contacts are in sight, (K,), where, (K, 2) px, and their normals there, (K, 2)."""
+    """Return the visible contacts: indices (K,), positions (K, 2) px and normals (K, 2), y down."""
     place, normal = contact_points(view)
     with np.errstate(invalid="ignore", over="ignore"):
         pixels = view.camera.to_screen(place)
@@ -161,7 +161,7 @@ def _in_sight(view: DrawContext, most: int) -> tuple[IntArray, FloatArray, Float
 
 
 def draw_contacts(view: DrawContext, discs: CircleRenderer) -> None:
-    """Draw where bodies touch, and the normal from the first to the second."""
+    """Draw contact points, and the normals from the first body to the second."""
     seen, place, normal = _in_sight(view, MAX_ARROWS)
     if not len(seen):
         return
@@ -175,10 +175,10 @@ def draw_contacts(view: DrawContext, discs: CircleRenderer) -> None:
 
 
 def draw_impulses(view: DrawContext) -> None:
-    """Draw mean forces, |impulse| / seconds, as lines along the normal, half to each side of the contact.
+    """Draw mean forces, |impulse| / seconds, as lines along the normal, centred at the contact.
 
-    A force of one weight of the lighter body has a fixed length; where the largest in sight would become too long by
-    that, or there is no gravity, it is that one which has.
+    A force equal to the weight of the lighter body has a fixed length. If that would make the largest visible force too
+    long, or if there is no gravity, the scale is set by the largest force instead.
     """
     seen, place, normal = _in_sight(view, 4 * MAX_ARROWS)
     if not len(seen) or not view.snapshot.seconds > 0.0:
@@ -193,7 +193,7 @@ def draw_impulses(view: DrawContext) -> None:
         )
         length = np.minimum(WEIGHT * float(np.max(weights)), LONGEST_ARROW) * share * view.ui_scale
     drawn = np.flatnonzero(length > 1.0)
-    drawn = drawn[np.argsort(force[drawn], kind="stable")][-MAX_ARROWS:]  # the strongest last: they are looked for
+    drawn = drawn[np.argsort(force[drawn], kind="stable")][-MAX_ARROWS:]  # the strongest last, on top
     for k in drawn.tolist():
         (x, y), (nx, ny), half = place[k].tolist(), normal[k].tolist(), float(length[k]) / 2.0
         ends = (x - nx * half, y - ny * half), (x + nx * half, y + ny * half)
@@ -209,9 +209,9 @@ def draw_impulses(view: DrawContext) -> None:
 
 
 def _lighter(view: DrawContext, pair: IntArray) -> FloatArray:
-    """Return the mass of the lighter of two that can move, kg, (K,)."""
+    """Return the mass of the lighter movable body of each pair, (K,) kg; 1 if neither can move."""
     bodies = view.snapshot.bodies
-    mass = np.append(np.where(bodies.fixed, np.inf, bodies.mass), np.inf)  # the last stands for all fixed things
+    mass = np.append(np.where(bodies.fixed, np.inf, bodies.mass), np.inf)  # the last entry stands for static geometry
     sides = np.where((pair >= 0) & (pair < len(bodies)), pair, len(bodies))
     lighter = np.min(mass[sides], axis=1, initial=np.inf)
     return np.asarray(np.where(np.isfinite(lighter), lighter, 1.0))
