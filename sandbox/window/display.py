@@ -1,4 +1,4 @@
-"""Opens the display, and derives the UI scale from its height."""
+"""Creation of the window, and the UI scale derived from the height of the display."""
 
 import os
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ MIN_SIZE = (160, 120)
 SHARE = 0.9
 """largest fraction of the desktop that a new window covers"""
 LINES = 1080
-"""height of a display, px, with UI scale 1"""
+"""height of a display with UI scale 1, px"""
 
 
 class NoDisplayError(Exception):
@@ -30,7 +30,7 @@ def open_screen(size: tuple[int, int] | None, title: str) -> pygame.Surface:
     Raises:
         NoDisplayError: there is no display.
     """
-    os.environ["SDL_VIDEO_X11_WMCLASS"] = "sandbox"  # pygame sets it to the name of the script on import
+    os.environ["SDL_VIDEO_X11_WMCLASS"] = "sandbox"  # on import, pygame sets it to the name of the script
     asked = "SDL_VIDEODRIVER" in os.environ
     try:
         with _silenced():
@@ -50,10 +50,10 @@ def open_screen(size: tuple[int, int] | None, title: str) -> pygame.Surface:
 
 @contextmanager
 def _silenced() -> Iterator[None]:
-    """Redirect standard error, as libraries used by SDL print to it while SDL looks for a display."""
+    """Redirect standard error while SDL probes for a display, as libraries used by SDL print to it."""
     try:
         kept = os.dup(2)
-    except OSError:  # it is closed
+    except OSError:  # standard error is closed
         yield
         return
     hole = os.open(os.devnull, os.O_WRONLY)
@@ -72,7 +72,7 @@ def close_screen() -> None:
 
 
 def ui_scale() -> float:
-    """Return the UI scale: display height over 1080 px, in quarters; at least 1."""
+    """Return the UI scale: display height / 1080 px, rounded to quarters, at least 1."""
     try:
         heights = [height for _, height in pygame.display.get_desktop_sizes()]
     except pygame.error:
@@ -88,7 +88,7 @@ def _fitting() -> tuple[int, int]:
 
 
 def _icon() -> pygame.Surface:
-    """Return the icon: a ball on a plane, with the ring of its ghost."""
+    """Return the window icon: a ball on a plane, with the ring of its ghost."""
     icon = pygame.Surface((64, 64), pygame.SRCALPHA)
     pygame.draw.rect(icon, BACKGROUND, icon.get_rect(), border_radius=12)
     pygame.draw.line(icon, INK, (8, 52), (56, 52), 4)

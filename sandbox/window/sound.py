@@ -1,7 +1,6 @@
-"""Sound of impacts and of game events. It is off by default, and unavailable without an audio device.
+"""Sounds of impacts and of game events. Off by default; unavailable without an audio device.
 
-The sound of an impact is synthesised from a few decaying partials and a click; the sound of a game event is a short
-sequence of such notes.
+An impact is synthesised from a few decaying partials and a click; a game event is a short sequence of such notes.
 """
 
 import math
@@ -21,43 +20,45 @@ Samples = npt.NDArray[np.int16]
 RATE = 44_100
 """samples/s"""
 LOWEST, HIGHEST = 80.0, 2000.0
-"""Hz, of the fundamental: small loudspeakers are weak below, and higher tones are shrill"""
+"""Hz, range of the fundamental: small loudspeakers are weak below it, and higher tones are shrill"""
 STEPS = 28
-"""Pitches between the two, a whole tone apart: a few dozen sounds serve every body."""
+"""Number of pitches in the range, a whole tone apart, so that a few dozen sounds serve all bodies."""
 PARTIALS = ((1.0, 1.0), (2.756, 0.35), (5.404, 0.12))
-"""Frequency over the fundamental's, and amplitude: those of a free bar, which sound like wood or stone.
-Source: L. D. Landau, E. M. Lifshitz, Theory of Elasticity, § 25: the roots of cos κl · cosh κl = 1."""
+"""Frequency ratio to the fundamental, and amplitude: those of a free bar, which sound like wood or stone.
+
+Source: L. D. Landau, E. M. Lifshitz, Theory of Elasticity, § 25: the roots of cos κl · cosh κl = 1.
+"""
 CYCLES = 22.0
-"""cycles of the fundamental in which it decays to 1/e; a high sound decays faster"""
+"""Decay time to 1/e in cycles of the fundamental; higher pitches decay faster."""
 SLOWEST = 0.09
 """s, largest decay time to 1/e"""
 CLICK, CLICK_SECONDS = 0.25, 0.0015
-"""Amplitude of the noise at the start, and the time in which it falls to 1/e, s"""
+"""amplitude of the noise at the start, and its decay time to 1/e, s"""
 SECONDS = 0.5
-"""of a sound: by then it is 50 dB down"""
+"""s, duration of a sound, at the end of which it has fallen by 50 dB"""
 PEAK = 0.6
-"""fraction of full scale, so that a few sounds can be mixed"""
+"""fraction of full scale, with headroom for mixing"""
 
 
 def impact_pitch(radius: float) -> float:
-    """Return the pitch of a body, Hz: proportional to the inverse square root of the radius, m, in whole tones.
+    """Return the pitch of a body, Hz: proportional to radius^(−1/2), radius in m, rounded to whole tones.
 
-    That of a real body is inversely proportional to the radius, which would exceed the range of hearing.
+    The pitch of a real body is inversely proportional to its radius, which would exceed the audible range.
     """
     octaves = math.log2(HIGHEST / LOWEST)
-    wanted = math.log2(220.0 / LOWEST) - 0.5 * math.log2(radius / 0.5)  # half a metre sounds an A
+    wanted = math.log2(220.0 / LOWEST) - 0.5 * math.log2(radius / 0.5)  # a radius of 0.5 m sounds at 220 Hz (A3)
     step = round(min(max(wanted / octaves, 0.0), 1.0) * (STEPS - 1))
     return float(LOWEST * 2.0 ** (octaves * step / (STEPS - 1)))
 
 
 def impact_sound(pitch: float) -> Samples:
-    """Return a sound of a pitch, Hz, mono at `RATE`."""
+    """Return the sound of an impact at a pitch in Hz, mono at `RATE`."""
     time = np.arange(int(SECONDS * RATE)) / RATE
     decay = min(CYCLES / pitch, SLOWEST)
     sound = np.zeros(len(time))
     for ratio, amplitude in PARTIALS:
         if ratio * pitch < RATE / 2:
-            # Higher partials lose their energy sooner, as in any material that damps.
+            # Higher partials decay faster, as in any damped material.
             sound += amplitude * np.exp(-time * ratio / decay) * np.sin(2.0 * math.pi * ratio * pitch * time)
     noise = np.random.default_rng(round(pitch)).uniform(-1.0, 1.0, len(time))
     sound += CLICK * noise * np.exp(-time / CLICK_SECONDS)
@@ -66,7 +67,7 @@ def impact_sound(pitch: float) -> Samples:
 
 
 def _faded(count: int) -> FloatArray:
-    """Return an envelope that begins and ends at 0, so that no edge is heard but the click."""
+    """Return an envelope that starts and ends at 0, which avoids audible edges."""
     attack, release = 16, 512
     envelope = np.ones(count)
     envelope[:attack] = np.arange(attack) / attack
@@ -77,20 +78,20 @@ def _faded(count: int) -> FloatArray:
 NOTE = 0.09
 """s between notes"""
 HOME = 440.0
-"""Hz, of the scale's first note"""
+"""Hz, first note of the scale"""
 SCALE = (0, 2, 4, 7, 9)
-"""semitones over it: a scale of five tones, of which any two go together"""
+"""semitones above `HOME`: a pentatonic scale, in which any two notes are consonant"""
 CUE_NOTES: dict[str, tuple[int, ...]] = {
     "win": (0, 4, 7, 12),
     "lose": (0, -3, -7, -12),
     "empty": (-5, -5),
     "touch": (-12,),
 }
-"""Semitones over `HOME`, of cues that many games have; any other name has a figure of its own."""
+"""Semitones relative to `HOME` for cues shared by many games; other cues get notes derived from their name."""
 
 
 def cue_notes(cue: str) -> tuple[int, ...]:
-    """Return the notes of a game event, in semitones: fixed for a name, and usually different for different names."""
+    """Return the notes of a cue in semitones: fixed for a name, and usually different for different names."""
     if cue in CUE_NOTES:
         return CUE_NOTES[cue]
     number = zlib.crc32(cue.encode())
@@ -115,37 +116,40 @@ def cue_sound(cue: str) -> Samples:
 
 
 VOICES = 16
-"""sounds at a time"""
+"""number of simultaneous sounds"""
 A_CALL = 5
-"""loudest sounds that one call starts; more at once are noise"""
+"""largest number of sounds started by one call; more would be noise"""
 CANDIDATES = 64
-"""Contacts, the loudest, that are looked up among those of the last call."""
+"""Number of the loudest contacts that are compared with those of the previous call."""
 GRAVITY = 9.81
-"""m/s², reference of impact strength, also for scenes without gravity"""
+"""m/s², reference acceleration of impact strength, also in scenes without gravity"""
 SILENT, LOUDEST = 0.1, 4.0
-"""Impulse over m·√(2·g·r), that of a body which falls its own radius: below the first nothing is heard, from the
-second on it is not louder. A body at rest passes on m·g·dt a step, 0.05 of it for half a metre at 1/60 s."""
+"""Impact strength below which no sound is played, and from which on the volume is constant.
+
+Impact strength is impulse / (m·√(2·g·r)): 1 for a body that falls by its own radius. A body at rest transmits m·g·dt
+per step, a strength of 0.05 for r = 0.5 m at dt = 1/60 s.
+"""
 CUE = 0.7
-"""volume of game sounds, at which impacts stay audible"""
+"""volume of cues, at which impacts stay audible"""
 BUFFER = 512
-"""samples of latency: 12 ms"""
+"""samples of latency, 12 ms"""
 
 
 class Sounds:
-    """Plays a chime for each new contact, lower for a larger body, louder for a harder hit."""
+    """Plays a sound for each new contact: lower for larger bodies, louder for harder impacts; and cues of games."""
 
     def __init__(self) -> None:
         self.available = True
-        """False once enabling has failed"""
+        """False after enabling has failed"""
         self.why = ""
-        """it failed"""
+        """reason why enabling has failed"""
         self.enabled = False
         self._heard = Contacts.none()
         self._sounds: dict[float | str, pygame.mixer.Sound] = {}
         self._opened = False
 
     def enable(self) -> bool:
-        """Open the audio device. Return whether sounds can be heard; where not, `why` says the reason."""
+        """Open the audio device; return whether that succeeded. If not, `why` holds the reason."""
         if self.enabled:
             return True
         try:
@@ -153,7 +157,7 @@ class Sounds:
                 pygame.mixer.init(RATE, -16, 2, BUFFER, allowedchanges=0)
                 self._opened = True
             pygame.mixer.set_num_channels(max(VOICES, pygame.mixer.get_num_channels()))
-        # A pygame built without its mixer has a stand-in, which raises NotImplementedError.
+        # pygame without its mixer module provides a stub that raises NotImplementedError.
         except (pygame.error, NotImplementedError, OSError) as error:
             self.available, self.why = False, f"no sound: {error}"
             return False
@@ -172,10 +176,10 @@ class Sounds:
         self._opened = False
 
     def hits(self, contacts: Contacts, bodies: Bodies) -> int:
-        """Play the contacts that are new since the last call, the loudest few, and return how many sounds began.
+        """Play the loudest contacts that are new since the last call; return the number of sounds started.
 
         Args:
-            contacts: those open now, with the impulses since the last call.
+            contacts: present contacts, with the impulses since the last call.
             bodies: the bodies of the contacts.
         """
         if not self.enabled or pygame.mixer.get_init() is None:
@@ -206,7 +210,7 @@ class Sounds:
         return len(played)
 
     def cue(self, name: str) -> bool:
-        """Play the figure of a cue of a game; tell whether it began."""
+        """Play the sound of a game's cue; return whether it was started."""
         if not self.enabled or pygame.mixer.get_init() is None:
             return False
         channel = pygame.mixer.find_channel()
@@ -217,11 +221,11 @@ class Sounds:
         return True
 
     def _sound(self, what: float | str) -> pygame.mixer.Sound:
-        """Return the chime of a pitch, Hz, or the figure of a cue by its name."""
+        """Return the sound of a pitch, Hz, or of a cue by name, cached."""
         if what not in self._sounds:
             rate, _, channels = pygame.mixer.get_init() or (RATE, -16, 2)
             samples = cue_sound(what) if isinstance(what, str) else impact_sound(what)
-            if rate != RATE:  # the mixer was opened with another rate
+            if rate != RATE:  # another part of the program opened the mixer
                 places = np.arange(0, len(samples), RATE / rate)
                 samples = np.interp(places, np.arange(len(samples)), samples).astype(np.int16)
             self._sounds[what] = pygame.mixer.Sound(buffer=np.repeat(samples, channels).tobytes())
@@ -229,32 +233,32 @@ class Sounds:
 
 
 def loudness(contacts: Contacts, bodies: Bodies) -> tuple[FloatArray, FloatArray]:
-    """Return how hard each contact is, (C,), and the radius of the body that is heard, (C,) m.
+    """Return the strength of each contact, (C,), and the radius of the body that sounds, (C,) m.
 
-    Heard is the lighter body of the two that can move; how hard, in units of m·√(2·g·r) of that body.
+    The lighter of the movable bodies sounds. Strength is in units of m·√(2·g·r) of that body.
     """
     first, second = _numbers(contacts.pair[:, 0]), _numbers(contacts.pair[:, 1])
-    mass = np.append(np.where(bodies.fixed, np.inf, bodies.mass), np.inf)  # the last one is any fixed thing
+    mass = np.append(np.where(bodies.fixed, np.inf, bodies.mass), np.inf)  # the last entry stands for static geometry
     heard = np.where(mass[first] <= mass[second], first, second)
     radius = np.append(bodies.radius, 1.0)[heard]
     unit = mass[heard] * np.sqrt(2.0 * GRAVITY * radius)
-    with np.errstate(over="ignore", invalid="ignore"):  # in a diverging state
+    with np.errstate(over="ignore", invalid="ignore"):  # a diverging simulation
         impulse = np.hypot(contacts.impulse[:, 0], contacts.impulse[:, 1])
         return np.nan_to_num(impulse / unit, nan=0.0, posinf=0.0), radius
 
 
 def volume(strength: float) -> float:
-    """Return the volume, 0 to 1, of a contact so hard; ears hear ratios, so it rises as the root."""
+    """Return the volume, 0 to 1, of an impact strength: a square root, as loudness is perceived on a ratio scale."""
     return math.sqrt(min(strength / LOUDEST, 1.0))
 
 
 def _numbers(side: IntArray) -> IntArray:
-    """Return body numbers, those of fixed things being −1: the last."""
+    """Return body indices with all static geometry mapped to −1, the last entry."""
     return np.maximum(side, -1)
 
 
 def _is_among(contacts: Contacts, row: int, others: Contacts) -> bool:
-    """Tell whether a contact was there before; it keeps its first time, so the same is known by that."""
+    """Return whether a contact existed before, identified by its pair and its start time."""
     first, second = contacts.pair[row]
     same = np.flatnonzero(others.pair[:, 0] == first)
     same = same[others.pair[same, 1] == second]

@@ -1,7 +1,7 @@
 """Worker thread for jobs that may compile kernels, so that the window stays responsive.
 
-There is no concurrent access: the main thread waits for each job. While a job compiles or takes long, it draws a
-progress note and handles events, but does not touch the session.
+Access is never concurrent: the main thread waits for each job. During a job that compiles or takes long, the main
+thread draws a progress notice and handles events, but does not touch the session.
 """
 
 import threading
@@ -16,23 +16,23 @@ from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 T = TypeVar("T")
 
 MAX_SILENT_WAIT = 0.5
-"""s after which a job counts as long, and the main thread shows progress"""
+"""s after which a job counts as long and progress is shown"""
 
 
 class Compute(Protocol):
-    """Runs a job that may compile or take long, and returns its result."""
+    """Callable that runs a job that may compile or take long."""
 
     def __call__(self, job: Callable[[], T]) -> T:
-        """Run the job; its exceptions are raised here."""
+        """Run the job and return its result; its exceptions are raised here."""
 
 
 def compute_here(job: Callable[[], T]) -> T:
-    """Run a job on the present thread."""
+    """Run a job on the calling thread."""
     return job()
 
 
 class Worker:
-    """A thread that runs jobs while its owner waits."""
+    """Thread that runs jobs while its owner waits."""
 
     def __init__(self, on_wait: Callable[[Callable[[float], bool]], None]) -> None:
         """Start the thread.
@@ -46,8 +46,8 @@ class Worker:
         self._woken, self._done = threading.Event(), threading.Event()
         self._done.set()
         self.kernels = 0
-        """kernels whose compilation the present job has started"""
-        # A daemon: a second Ctrl+C ends the process without waiting for it.
+        """number of kernels whose compilation the present job has started"""
+        # A daemon, so that a second Ctrl+C ends the process without waiting for it.
         self._thread = threading.Thread(target=self._work, name="sandbox worker", daemon=True)
         self._thread.start()
 
@@ -78,7 +78,7 @@ class Worker:
         return not self._done.is_set()
 
     def note_compiling(self, _: str) -> None:
-        """Count a kernel that is about to be compiled; `COMPILE_CLOCK.on_begin`."""
+        """Count a kernel that is about to be compiled; set as `COMPILE_CLOCK.on_begin`."""
         if threading.current_thread() is self._thread:
             self.kernels += 1
             self._woken.set()
@@ -106,7 +106,7 @@ class Wait:
         return self._worker.kernels > 0 or COMPILE_CLOCK.seconds > self._compiled
 
     def text(self) -> str:
-        """Return the progress note."""
+        """Return the text of the progress notice."""
         seconds = f"{perf_counter() - self._began:.0f} s"
         if not self._worker.kernels:
             return f"computing … {seconds}"

@@ -1,6 +1,6 @@
-"""Key bindings of a scene: arrow keys and Space of `[play]`, keys of thrusts and drives, and the controls of a game.
+"""Key bindings of a scene: arrow keys and Space of `[play]`, keys of thrusters and drives, and the controls of a game.
 
-They are computed once for each session; a key that a scene binds no longer gives its command of the window.
+They are computed once per session. A key bound by the scene loses its window command.
 """
 
 from collections.abc import Callable, Iterator
@@ -35,10 +35,10 @@ NAMED: dict[str, tuple[int, ...]] = {
     "left ctrl": (pygame.K_LCTRL,),
     "right ctrl": (pygame.K_RCTRL,),
 }
-"""Names of keys that write no character; any other key is named by its character."""
+"""Names of keys without a character; any other key is named by its character."""
 
 PAD_DIRECTIONS = ("left", "right", "up", "down")
-"""directions of a gamepad's D-pad"""
+"""names of the D-pad directions of a gamepad"""
 
 KeyHandler = Callable[[], object]
 """Called when a key is pressed or released; it may raise `ActionError`, and its result is ignored."""
@@ -114,7 +114,7 @@ KEYS = {
     "slash": pygame.K_SLASH,
     "return": pygame.K_RETURN,
 }
-"""Keys of thrusts and drives by their names in scene files."""
+"""Keys of thrusters and drives by their names in scene files."""
 
 
 class KeyBindings(NamedTuple):
@@ -128,7 +128,7 @@ class KeyBindings(NamedTuple):
     """by key code"""
 
     def handler_for(self, key: int, repeated: bool) -> KeyHandler | None:
-        """Return the handler of a pressed key. Only arrows that move a body by steps repeat while they are held."""
+        """Return the handler of a pressed key. On key repeat, only arrow keys that move a body by steps have one."""
         return None if repeated and (key not in ARROWS or key in self.released) else self.pressed.get(key)
 
 
@@ -138,7 +138,7 @@ NO_BINDINGS = KeyBindings({}, (), {})
 def key_bindings(
     live: LiveView, tools: BodyTools, gestures: CueControls | None = None, host: GameHost | None = None
 ) -> KeyBindings:
-    """Return the keys that a session's scene binds, with those of a billiard table and of a game's controls."""
+    """Return the key bindings of a session: those of its scene, its billiard table and the controls of its game."""
     scene = live.scene
     pressed: dict[int, KeyHandler] = {}
     released: dict[int, KeyHandler] = {}
@@ -154,7 +154,7 @@ def key_bindings(
     control_pressed, control_released = ({}, {}) if host is None else control_handlers(host)
     for name, verb, on_press, on_release in thrust_and_drive_keys(scene):
         key = KEYS[name]
-        if key in control_pressed:  # the rules of the game apply these actions
+        if key in control_pressed:  # handled by the rules of the game
             continue
         pressed[key] = partial(_apply, live, on_press, pressed.get(key))
         released[key] = partial(_apply, live, on_release, released.get(key))
@@ -172,7 +172,7 @@ def key_bindings(
 
 
 def thrust_and_drive_keys(scene: Scene) -> Iterator[tuple[str, str, Action, Action]]:
-    """Yield (key name, help text, action of a press, action of a release) of a scene's thrusts and drives."""
+    """Yield (key name, help text, action of a press, action of a release) for thrusters and drives."""
     for k, thrust in enumerate(scene.thrusts):
         if thrust.key is not None:
             name = thrust.name or default_name("thrust", k)
@@ -185,7 +185,7 @@ def thrust_and_drive_keys(scene: Scene) -> Iterator[tuple[str, str, Action, Acti
 
 
 def _apply(live: LiveView, action: Action, first: KeyHandler | None) -> None:
-    """Apply an action, after that of another thrust or drive with the same key."""
+    """Apply an action, after `first`, the action of another thruster or drive with the same key."""
     if first is not None:
         first()
     live.apply(action)

@@ -22,17 +22,17 @@ NUDGE_SPEED = 1.0
 
 
 class BodyTools:
-    """The picked body, and the body that is being dragged."""
+    """Selection and dragging of a body."""
 
     def __init__(self) -> None:
         self.picked: int | None = None
-        """index of the body that is selected"""
+        """index of the selected body"""
         self._held: str | None = None  # name
         self._pick_position: Position = (0.0, 0.0)
-        self._offset: Position = (0.0, 0.0)  # from the body's centre to the picked point, when it was picked
-        self._angle = 0.0  # rad, of the body when it was picked
-        self._grip: Position = (0.0, 0.0)  # picked point: in the body's frame, or while paused relative to its centre
-        self._moving = False  # dragged while paused: placed, not pulled by a spring
+        self._offset: Position = (0.0, 0.0)  # from the body's centre to the picked point, at the time of picking
+        self._angle = 0.0  # rad, angle of the body at the time of picking
+        self._grip: Position = (0.0, 0.0)  # picked point: in the body frame; while paused, relative to the centre
+        self._moving = False  # dragged while paused: moved directly, not pulled by a spring
         self._target: Position = (0.0, 0.0)
 
     @property
@@ -41,11 +41,11 @@ class BodyTools:
         return self._held is not None
 
     def picked_index(self, live: LiveView) -> int | None:
-        """Return the index of the picked body; None if it does not exist at the present time, as after a step back."""
+        """Return the index of the selected body; None if it does not exist at the present time."""
         return self.picked if self.picked is not None and self.picked < len(live.bodies) else None
 
     def pick(self, view: LiveView | RecordedView, position: Position, tolerance: float) -> bool:
-        """Select the body at a position, or within a tolerance, m, of it; return whether there is one."""
+        """Select the body at a position, within a tolerance in m; return whether there is one."""
         frame = view.frame
         self.picked = index = pick_body(view.bodies, frame, position, tolerance)
         if index is None:
@@ -56,9 +56,9 @@ class BodyTools:
         return True
 
     def grab(self, live: LiveView, paused: bool) -> None:
-        """Start to drag the picked body at its picked point, which may have moved since.
+        """Start to drag the selected body at its picked point, which may have moved since.
 
-        While paused a drag moves the body; otherwise a spring pulls it. A fixed body cannot be pulled.
+        While paused, dragging moves the body; otherwise a spring pulls it. A static body cannot be pulled.
 
         Raises:
             ActionError: the body cannot be dragged.
@@ -105,15 +105,15 @@ class BodyTools:
             live.apply(Pull(time=0.0, body=held))
 
     def drop(self) -> None:
-        """Discard the drag without an action on the session; the selection stays."""
+        """End the drag without an action on the session; the selection stays."""
         self._held = None
 
     def reset(self) -> None:
-        """Discard the drag and the selection."""
+        """Clear the drag and the selection."""
         self._held = self.picked = None
 
     def spring_line(self, live: LiveView) -> tuple[Position, Position] | None:
-        """Return both ends of the spring that pulls a body; None if no body is pulled."""
+        """Return both ends of the mouse spring, m; None if no body is pulled."""
         if self._held is None or self._moving or self._held not in live.bodies.names:
             return None
         index = live.bodies.names.index(self._held)
@@ -125,10 +125,10 @@ class BodyTools:
         return (x + right, y + up), self._target
 
     def remove(self, live: LiveView) -> None:
-        """Remove the picked body.
+        """Remove the selected body.
 
         Raises:
-            ActionError: no body is picked, or the engine refuses.
+            ActionError: no body is selected, or the engine refuses.
         """
         live.apply(Remove(time=0.0, body=live.bodies.names[self._require_picked(live)]))
         self.reset()
@@ -140,10 +140,10 @@ class BodyTools:
         return index
 
     def nudge(self, live: LiveView) -> None:
-        """Apply an impulse up and to the right to the picked body.
+        """Apply an impulse up and to the right to the selected body.
 
         Raises:
-            ActionError: no body is picked, or the engine refuses.
+            ActionError: no body is selected, or the engine refuses.
         """
         index = self._require_picked(live)
         mass, radius = float(live.bodies.mass[index]), float(live.bodies.radius[index])
@@ -151,7 +151,7 @@ class BodyTools:
         live.apply(Impulse(time=0.0, body=live.bodies.names[index], impulse=(0.6 * kick, 0.8 * kick)))
 
     def add(self, live: LiveView, position: Position, view_size: float, *, box: bool = False) -> None:
-        """Add a ball or box like the picked body or the first one; without bodies, of a size that suits the view.
+        """Add a ball or box modelled on the selected body, else on the first one; without bodies, sized to the view.
 
         If the model has another shape, the new body has its area and density.
 
@@ -159,7 +159,7 @@ class BodyTools:
             live: session to add to.
             position: of the new body, m.
             view_size: shorter side of the visible area, m.
-            box: add a box in place of a ball.
+            box: add a box instead of a ball.
 
         Raises:
             ActionError: there is no free space, or the engine refuses.
@@ -175,7 +175,7 @@ class BodyTools:
         live.apply(Spawn(time=0.0, box=made) if isinstance(made, Box) else Spawn(time=0.0, ball=made))
 
     def shift(self, live: LiveView, body: str, by: Position) -> None:
-        """Move a body by an offset, m, and stop it, as the arrow keys do.
+        """Displace a body by an offset, m, and set its velocity to zero, as the arrow keys do.
 
         Raises:
             ActionError: the engine refuses.
@@ -186,14 +186,14 @@ class BodyTools:
 
 
 MAX_RINGS, RING_POSITIONS = 24, 16
-"""Positions tried around the cursor: rings half a body radius apart, and positions on each ring."""
+"""Candidate positions around the cursor: number of rings, half a body radius apart, and positions per ring."""
 
 
 def _find_free_position(live: LiveView, made: Ball | Box) -> Ball | Box:
-    """Return a new body at the nearest position where it overlaps nothing.
+    """Return a new body moved to the nearest free position.
 
     Raises:
-        ActionError: there is no such position nearby.
+        ActionError: there is no free position nearby.
     """
     if made.collides == "none":
         return made
@@ -212,7 +212,7 @@ def _find_free_position(live: LiveView, made: Ball | Box) -> Ball | Box:
 
 
 def count_changes(actions: Iterable[Action], moved_by_keys: str | None = None) -> int:
-    """Return the number of hand-made changes: bodies added, removed and moved, values set.
+    """Return the number of manual changes: bodies added, removed and moved, parameters set.
 
     Args:
         actions: of a session.
@@ -231,19 +231,19 @@ def count_changes(actions: Iterable[Action], moved_by_keys: str | None = None) -
                 last = ""
                 continue
         moved_so = isinstance(action, Move) and not now
-        count += not moved_so and (not now or now != last)  # a drag is many moves
+        count += not moved_so and (not now or now != last)  # a drag consists of many moves
         last = now
     return count
 
 
 def describe_loss(count: int, how: str) -> str:
-    """Return the question that is shown before `count` hand-made changes are lost."""
+    """Return the confirmation question for the loss of `count` manual changes."""
     changes = "1 hand-made change" if count == 1 else f"{count:,} hand-made changes"
     return f"{changes} will be lost: {how}, Ctrl+S saves the session"
 
 
 def _new_body_like(bodies: Bodies, index: int, position: Position, box: bool) -> Ball | Box:
-    """Return a ball or box with the surface, area and density of a body."""
+    """Return a ball or box with the surface properties, area and density of a body."""
     element = bodies.elements[int(bodies.element[index])]
     surface = {
         key: getattr(element, key) for key in ("material", "restitution", "restitution_falloff", "friction", "collides")

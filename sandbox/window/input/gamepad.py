@@ -1,6 +1,6 @@
-"""Gamepads: layouts by name, and the controls of a game that their buttons and axes hold.
+"""Gamepads: button and axis layouts by device name, and the routing of their input to the controls of a game.
 
-Layouts: the tables of "Common Controller Axis Mappings" in the documentation of pygame.joystick, for pygame 2.
+The layouts are those of "Common Controller Axis Mappings" in the documentation of pygame.joystick, for pygame 2.
 """
 
 from collections.abc import Callable
@@ -13,9 +13,10 @@ from sandbox.games.contract import Control
 from sandbox.window.game_host import GameHost
 
 DEAD_ZONE = 0.2
-"""Fraction of a stick's deflection that counts as zero: few sticks rest exactly at their centre."""
+"""Fraction of a stick's deflection that counts as zero, as few sticks rest exactly at the centre."""
 ANALOGUE_LEVELS = 16
-"""Analogue values are rounded to 1/16: a stick sends hundreds of events per second, and each change is an action."""
+"""Analogue values are quantised to 1/16, as a stick sends hundreds of events per second and each change is an action.
+"""
 BUTTON_THRESHOLD = 0.5
 """deflection of a stick or trigger above which it counts as a pressed button"""
 
@@ -46,21 +47,21 @@ PLAYSTATION = GamepadLayout(
 )
 LAYOUTS = {"ps4": PLAYSTATION, "ps5": PLAYSTATION, "dualshock": PLAYSTATION, "dualsense": PLAYSTATION}
 LAYOUTS |= {"sony": PLAYSTATION, "playstation": PLAYSTATION, "nintendo switch pro": PLAYSTATION}
-"""Layouts by a part of the gamepad's name. The Switch controller differs only in its button labels."""
+"""Layouts by a substring of the device name. The Switch controller differs only in its button labels."""
 
 
 class GamepadDevice(Protocol):
-    """The part of `pygame.joystick.Joystick` that is used."""
+    """Subset of `pygame.joystick.Joystick` that is used."""
 
     def get_name(self) -> str:
-        """Name of the model."""
+        """Return the name of the model."""
 
     def get_instance_id(self) -> int:
-        """Id of the device in events."""
+        """Return the id of the device in events."""
 
 
 def layout_of(name: str) -> GamepadLayout:
-    """Return the layout of a gamepad by its name."""
+    """Return the layout of a gamepad by its device name."""
     return next((layout for part, layout in LAYOUTS.items() if part in name.lower()), XBOX)
 
 
@@ -80,7 +81,7 @@ class Gamepads:
         self._devices: dict[int, tuple[GamepadDevice, GamepadLayout]] = {}
 
     def start(self) -> None:
-        """Start to receive events, also of connected devices; without joystick support, add a message."""
+        """Start to receive events, including those of connected devices; without joystick support, show a message."""
         try:
             pygame.joystick.init()
         except (pygame.error, NotImplementedError) as error:
@@ -130,7 +131,7 @@ class Gamepads:
 
 
 def _words(event: pygame.event.Event, layout: GamepadLayout) -> dict[str, float]:
-    """Return the values, 0 to 1, of the button and axis names that an event changes."""
+    """Return the values, 0 to 1, of the buttons and axes that an event changes, by name."""
     if event.type in (pygame.JOYBUTTONDOWN, pygame.JOYBUTTONUP):
         word = layout.buttons.get(event.button)
         return {} if word is None else {word: float(event.type == pygame.JOYBUTTONDOWN)}

@@ -1,6 +1,6 @@
-"""Keymap: the table of all key bindings of the window, and the keyboard state.
+"""Keymap: all key bindings of the window, and the state of the keyboard.
 
-A key is matched by its code or by its character, so that `[` also works on layouts that need AltGr for it, and by its
+A key is matched by its key code or its character, so that `[` also works on layouts that need AltGr for it, and by its
 scan code on layouts without Latin letters.
 """
 
@@ -14,7 +14,7 @@ from sandbox.window.playback.snapshot import OVERLAYS
 
 
 class Command(StrEnum):
-    """A command of the window. Commands that toggle an overlay have its name in `OVERLAYS`."""
+    """Commands of the window. A command that toggles an overlay has its name in `OVERLAYS`."""
 
     PAUSE = "pause"
     STEP = "step"
@@ -62,19 +62,19 @@ class Command(StrEnum):
 
 
 class Binding(NamedTuple):
-    """Keys of one command."""
+    """Keys of a command."""
 
     keys: tuple[int, ...]
-    """codes, `pygame.K_…`"""
+    """key codes, `pygame.K_…`"""
     modifiers: int
-    """`pygame.KMOD_CTRL`, `KMOD_SHIFT`, or 0: neither Ctrl nor Alt; Shift matters only where a binding has it"""
+    """`pygame.KMOD_CTRL`, `KMOD_SHIFT`, or 0 for neither Ctrl nor Alt; Shift is ignored unless a binding requires it"""
     command: Command
     about: str
     label: str
-    """the keys as the help page names them"""
+    """keys as shown on the help page"""
     group: str
     characters: str = ""
-    """characters that also give the command, on any key"""
+    """characters that trigger the command on any key"""
     repeats: bool = False
     """whether the command repeats while the key is held"""
 
@@ -141,7 +141,7 @@ _BY_KEY = {(key, binding.modifiers): binding.command for binding in BINDINGS for
 _BY_CHARACTER = {character: binding.command for binding in BINDINGS for character in binding.characters}
 
 _NAMED = 1 << 30
-"""SDL's bit of key codes without a character, such as F1"""
+"""bit that SDL sets in key codes without a character, such as F1"""
 _BOARD = {
     **{pygame.KSCAN_A + k: pygame.K_a + k for k in range(26)},
     pygame.KSCAN_LEFTBRACKET: pygame.K_LEFTBRACKET,
@@ -149,15 +149,15 @@ _BOARD = {
     pygame.KSCAN_PERIOD: pygame.K_PERIOD,
     pygame.KSCAN_COMMA: pygame.K_COMMA,
 }
-"""Key codes by scan code, of the US layout."""
+"""Key codes of the US layout by scan code."""
 
 
 def command_for(event: pygame.event.Event, claimed: AbstractSet[int] = frozenset()) -> Command | None:
     """Return the command of a pressed key, or None.
 
     Args:
-        event: any event; only KEYDOWN gives a command.
-        claimed: codes of the keys that the scene binds. Ctrl with a key is never bound by a scene.
+        event: any event; only KEYDOWN triggers a command.
+        claimed: codes of the keys that the scene binds. Scenes never bind keys with Ctrl.
     """
     if event.type != pygame.KEYDOWN:
         return None
@@ -173,31 +173,31 @@ def command_for(event: pygame.event.Event, claimed: AbstractSet[int] = frozenset
         return None
     plain = not (control or alt)
     if character in _BY_CHARACTER and (plain or ord(character) != key):
-        return _BY_CHARACTER[character]  # first, as `[` may be AltGr and 8, and AltGr may look like Ctrl and Alt
+        return _BY_CHARACTER[character]  # first, as `[` may be AltGr+8, and AltGr may be reported as Ctrl+Alt
     shifted = _BY_KEY.get((key, _SHIFT)) if modifiers & _SHIFT else None
     return (shifted or _BY_KEY.get((key, 0))) if plain else None
 
 
 def _latin(event: pygame.event.Event) -> int:
-    """Return the key code, or on a layout without Latin letters, the US key code of the scan code."""
+    """Return the key code; on a layout without Latin letters, the US key code of the scan code."""
     key = int(event.key)
-    foreign = key > 0x24F and not key & _NAMED  # past the Latin blocks of Unicode
+    foreign = key > 0x24F and not key & _NAMED  # beyond the Latin blocks of Unicode
     return _BOARD.get(int(getattr(event, "scancode", 0)), key) if foreign else key
 
 
 class Keyboard:
-    """Keys that are down, so that a held key gives its command once unless the command repeats."""
+    """Set of pressed keys, which suppresses key repeat for commands that do not repeat."""
 
     def __init__(self) -> None:
         self._held: set[int] = set()
         self.is_repeat = False
-        """the last KEYDOWN was of a key that was down already"""
+        """whether the last KEYDOWN was a key repeat"""
 
     def command(self, event: pygame.event.Event, claimed: AbstractSet[int] = frozenset()) -> Command | None:
-        """Return the command of an event, or None. Every event must be passed, to keep track of releases."""
+        """Return the command of an event, or None. Every event must be passed, so that releases are tracked."""
         if event.type == pygame.KEYUP:
             self._held.discard(event.key)
-        elif event.type == pygame.WINDOWFOCUSLOST:  # another window receives the releases
+        elif event.type == pygame.WINDOWFOCUSLOST:  # another window receives the key releases
             self._held.clear()
         if event.type != pygame.KEYDOWN:
             return None

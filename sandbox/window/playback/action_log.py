@@ -1,4 +1,4 @@
-"""The actions of a session, with the position up to which they are applied, and the scene as they change it."""
+"""Log of the actions of a session, with the number already applied, and the history of scene changes they cause."""
 
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
@@ -8,30 +8,30 @@ from sandbox.engines.switching import SwitchableSimulation
 from sandbox.scene.scene import Scene
 
 TIME_ROUNDING = 1e-9
-"""fraction of a step by which the time of an action may exceed the present one: sums of dt are rounded"""
+"""Tolerance of due times as a fraction of a step: sums of dt have rounding errors."""
 
 
 class ActionLog:
-    """The actions of a session in order of time. After a seek backwards those later than now are repeated."""
+    """Actions of a session in order of time. After a seek backwards, those in the future are replayed."""
 
     def __init__(self, actions: tuple[Action, ...] = ()) -> None:
         self._actions = list(actions)
         self.done = 0
-        """how many have been applied"""
+        """number of applied actions"""
 
     @property
     def past(self) -> tuple[Action, ...]:
-        """The actions up to now."""
+        """The actions up to the present."""
         return tuple(self._actions[: self.done])
 
     @property
     def all(self) -> tuple[Action, ...]:
-        """All actions, also those later than now."""
+        """All actions, including those in the future."""
         return tuple(self._actions)
 
     @property
     def has_future(self) -> bool:
-        """Whether there are actions later than now."""
+        """Whether there are actions in the future."""
         return self.done < len(self._actions)
 
     def truncate(self, index: int) -> None:
@@ -40,7 +40,7 @@ class ActionLog:
         self.done = min(self.done, index)
 
     def due(self, simulation: SwitchableSimulation) -> list[Action]:
-        """Return the actions up to the present time that are not yet applied."""
+        """Return the actions up to the present time that are not applied yet."""
         latest = simulation.time + TIME_ROUNDING * simulation.settings.dt
         end = self.done
         while end < len(self._actions) and self._actions[end].time <= latest:
@@ -48,10 +48,10 @@ class ActionLog:
         return self._actions[self.done : end]
 
     def replay_due(self, simulation: SwitchableSimulation) -> list[Action]:
-        """Apply the due actions, and return them.
+        """Apply the due actions and return them.
 
         Raises:
-            ActionError: the engine refuses one, which can happen to a recording of another engine.
+            ActionError: the engine refuses an action, which can happen with a recording of another engine.
         """
         due = self.due(simulation)
         for action in due:
@@ -60,14 +60,14 @@ class ActionLog:
         return due
 
     def append(self, action: Action) -> None:
-        """Log an action that was just applied, where no later one is known."""
+        """Log an action that was just applied; there must be no future actions."""
         self._actions.append(action)
         self.done = len(self._actions)
 
     def branch(self, actions: Sequence[Action], simulation: SwitchableSimulation) -> None:
-        """Discard the actions later than now, and log those that were just applied.
+        """Discard the future actions, and log actions that were just applied.
 
-        Pulls whose release was in the discarded part are released now, unless one of the actions pulls the same body.
+        Pulls whose release was in the discarded future are released now, unless one of the actions pulls the same body.
         """
         future, self._actions[self.done :] = self._actions[self.done :], []
         pulled = {action.body for action in actions if isinstance(action, Pull)}
@@ -80,10 +80,10 @@ class ActionLog:
         self.done = len(self._actions)
 
     def insert_switch(self, index: int, time: float) -> bool:
-        """Log that a checkpoint was restored; return False if that is in the log already.
+        """Log the restoring of a checkpoint; return False if it is already logged.
 
         Args:
-            index: how many actions had been applied there.
+            index: number of actions applied before the checkpoint.
             time: of the checkpoint, s.
         """
         before = len(self._actions)
@@ -93,19 +93,19 @@ class ActionLog:
 
 
 def insert_switch(actions: tuple[Action, ...], index: int, time: float) -> tuple[Action, ...]:
-    """Return actions with the restoring of a checkpoint at an index and a time, s, unless it is there already."""
+    """Return actions with the restoring of a checkpoint inserted at an index, unless it is already there; time in s."""
     switch = Switch(time=time, resumes=True)
     return actions if actions[:index][-1:] == (switch,) else (*actions[:index], switch, *actions[index:])
 
 
 class SceneHistory:
-    """The scene of a run at any time, as actions change it. The same time always gives the same object."""
+    """Scene of a run at any time, as changed by actions. Equal times return the same object."""
 
     def __init__(self, scene: Scene, actions: Iterable[Action]) -> None:
-        """Start.
+        """Compute the scene after each action that changes it.
 
         Args:
-            scene: at the start.
+            scene: initial scene.
             actions: in order of time.
         """
         self._times: list[float] = []
@@ -116,14 +116,14 @@ class SceneHistory:
                 self._scenes.append(_changed(self._scenes[-1], action))
 
     def at(self, time: float) -> Scene:
-        """Return the scene of a time, s."""
+        """Return the scene at a time, s."""
         return self._scenes[bisect_right(self._times, time)]
 
 
 def _changed(scene: Scene, action: Reshape | Toggle) -> Scene:
-    """Return a scene with the change of an action to its walls and posts."""
+    """Return a scene with the change that an action makes to its walls and posts."""
     change = {"points": action.points} if isinstance(action, Reshape) else {"solid": action.solid}
-    names = dict(zip((id(each) for each in scene.fixed), scene.fixed_names, strict=False))  # pockets come last
+    names = dict(zip((id(each) for each in scene.fixed), scene.fixed_names, strict=False))  # pockets last
     walls, posts = (
         tuple(each.model_copy(update=change) if names[id(each)] == action.thing else each for each in fixed)
         for fixed in (scene.walls, scene.posts)

@@ -1,7 +1,7 @@
-"""Fixed-step clock: steps that are due per picture, simulation speed, and interpolation between two states.
+"""Fixed-step clock: number of due steps per frame, playback speed, and interpolation between two states.
 
-The accumulator of G. Fiedler, "Fix Your Timestep!" (2004): real time is accumulated and spent in whole steps; the
-remainder is the position of the picture between two states.
+Accumulator of G. Fiedler, "Fix Your Timestep!" (2004): real time is accumulated and spent in whole steps; the remainder
+is the interpolation parameter between two states.
 """
 
 from collections import deque
@@ -13,15 +13,15 @@ from sandbox.arrays import FloatArray
 from sandbox.trajectory import Frame
 
 TELEPORT_FACTOR = 4.0
-"""A body that moved more than this times speed × dt was placed, not simulated; it is not interpolated."""
+"""Teleport threshold: a body that moved more than this times speed × dt was placed, not simulated; not interpolated."""
 TELEPORT_MIN_SQUARED = 1e-18
-"""m², displacement² below which a body never counts as placed"""
+"""m², squared displacement below which a body never counts as teleported"""
 
 
 def interpolate(before: Frame, after: Frame, alpha: float) -> Frame:
     """Return the state at a fraction `alpha` (0 to 1) between two states, by linear interpolation.
 
-    A body that is not in both states, or that was placed elsewhere, has its later state.
+    A body that is not present in both states, or was teleported between them, keeps its later state.
     """
     if alpha >= 1.0 or before is after:
         return after
@@ -36,7 +36,7 @@ def interpolate(before: Frame, after: Frame, alpha: float) -> Frame:
         position = after.position.copy()
         position[:known] -= moved * (continuous * (1.0 - alpha))[:, None]
         angle = after.angle
-        if before.angle is not after.angle:  # states of bodies that cannot turn share one array
+        if before.angle is not after.angle:  # states of non-rotating bodies share one array
             angle = after.angle.copy()
             angle[:known] -= (after.angle[:known] - before.angle[:known]) * (continuous * (1.0 - alpha))
     return replace(after, time=time, position=position, angle=angle)
@@ -51,18 +51,18 @@ SPEEDS_PER_DECADE = 10
 MIN_SPEED_LEVEL, MAX_SPEED_LEVEL = -30, 10
 """0.1 % to 1000 %"""
 MAX_FRAME_TIME = 0.1
-"""s of real time that one picture may ask for, so that the scene does not jump after the computer was suspended"""
+"""s, largest real time credited per frame, so that the scene does not jump after the computer was suspended"""
 SPEED_WINDOW = 0.5
 """s over which the real speed is measured"""
 
 
 class FixedStepClock:
-    """Converts real time into steps."""
+    """Converts real time to a number of steps."""
 
     def __init__(self) -> None:
         self._level = 0
         self._accumulated = 0.0  # s
-        self._samples: deque[tuple[float, float]] = deque()  # real and simulated time of each picture, s
+        self._samples: deque[tuple[float, float]] = deque()  # real and simulated time of each frame, s
 
     @property
     def speed(self) -> float:
@@ -71,7 +71,7 @@ class FixedStepClock:
 
     @property
     def real_speed(self) -> float:
-        """Speed reached lately, as a multiple of real time; the requested one until it is measured."""
+        """Recently measured speed, as a multiple of real time; the requested speed until enough samples exist."""
         real = sum(each for each, _ in self._samples)
         return sum(each for _, each in self._samples) / real if real > SPEED_WINDOW / 2.0 else self.speed
 
@@ -88,15 +88,15 @@ class FixedStepClock:
     def steps_due(self, elapsed: float, dt: float) -> int:
         """Accumulate real time, s, and return how many whole steps of dt, s, are due."""
         self._accumulated += min(elapsed, MAX_FRAME_TIME) * self.speed
-        return int(self._accumulated / dt * (1.0 + 1e-12))  # a sum of dt may lack some rounding errors
+        return int(self._accumulated / dt * (1.0 + 1e-12))  # tolerance for rounding errors of summed dt
 
     def record_steps(self, elapsed: float, steps: int, asked: int, dt: float) -> None:
-        """Subtract the steps that were made. Steps that were not are dropped: the scene is slower than requested."""
+        """Subtract the executed steps. Due steps beyond them are dropped, so the scene runs slower than requested."""
         self._accumulated = max(self._accumulated - max(steps, asked) * dt, 0.0)
         self._add_sample(elapsed, steps * dt)
 
     def scale_time(self, elapsed: float) -> float:
-        """Return the simulated time, s, of real time, s, for a playback without steps."""
+        """Return the simulated time, s, for a real time, s, for playback without steps."""
         time = min(elapsed, MAX_FRAME_TIME) * self.speed
         self._add_sample(elapsed, time)
         return time
@@ -107,10 +107,10 @@ class FixedStepClock:
             self._samples.popleft()
 
     def alpha(self, dt: float) -> float:
-        """Return the position of the picture between the last two states, 0 to 1."""
+        """Return the interpolation parameter between the last two states, 0 to 1."""
         return min(max(self._accumulated / dt, 0.0), 1.0)
 
     def reset(self) -> None:
-        """Discard the accumulated time, as in a pause: the picture shows the last state."""
+        """Discard the accumulated time, as on pause: the last state is shown."""
         self._accumulated = 0.0
         self._samples.clear()

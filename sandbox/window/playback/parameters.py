@@ -1,7 +1,4 @@
-"""Knobs: what of a session can be turned while it runs, and by which actions.
-
-Knob: one figure or choice that can be turned while a scene runs, and how positions of a slider become values.
-"""
+"""Parameters of a session that the panel can change, their slider scales, and the actions that set them."""
 
 import math
 from collections.abc import Sequence
@@ -21,35 +18,35 @@ ParameterValue = float | str
 
 @dataclass(frozen=True)
 class Parameter:
-    """What the panel shows of one setting. A value: turning it is reported, never done here."""
+    """Value, range and scale of one parameter. Immutable: a widget reports a change and does not apply it."""
 
     key: str
-    """what `on_change` calls it"""
+    """key that is passed to `on_change`"""
     label: str
     low: float = 0.0
     high: float = 1.0
     value: ParameterValue = 0.0
-    """now; one of `choices` where there are some"""
+    """present value; one of `choices` if there are any"""
     log: bool = False
-    """equal ways are equal factors; `low` is then above 0"""
+    """whether the scale is logarithmic; requires `low` > 0"""
     step: float = 0.01
-    """what a notch of the wheel adds, and what values are whole multiples of; of a logarithmic knob, in decades"""
+    """increment per notch of the wheel, and grid of the values; on a logarithmic scale, in decades"""
     unit: str = ""
-    """with `%`, shares are shown in percent"""
+    """unit; with `%`, fractions are shown as percentages"""
     choices: tuple[str, ...] = ()
     enabled: bool = True
     why: str = ""
-    """why it cannot be turned"""
+    """reason why the parameter is disabled"""
     default: ParameterValue | None = None
-    """the file's, which a double click goes back to"""
+    """value in the scene file, restored by a double click"""
 
     @property
     def whole(self) -> bool:
-        """Only whole numbers are meant."""
+        """Whether the parameter takes integers only."""
         return not self.log and self.step >= 1 and self.step == int(self.step)
 
     def at(self, share: float) -> float:
-        """Return the value at a share of the way from `low` to `high`, snapped; the ends are exact."""
+        """Return the value at a fraction of the range from `low` to `high`, snapped to the grid; the ends are exact."""
         if share <= 0 or self.high <= self.low:
             return self.low
         if share >= 1:
@@ -59,7 +56,7 @@ class Parameter:
         return self._snapped(self.low + share * (self.high - self.low))
 
     def share(self, value: ParameterValue) -> float:
-        """Return where a value lies, 0 at `low` to 1 at `high`; one beyond lies at the end."""
+        """Return the position of a value on the scale, 0 at `low` to 1 at `high`, clamped."""
         if isinstance(value, str) or not math.isfinite(value) or self.high <= self.low:
             return 0.0
         inside = min(max(value, self.low), self.high)
@@ -68,7 +65,7 @@ class Parameter:
         return (inside - self.low) / (self.high - self.low)
 
     def stepped(self, value: ParameterValue, notches: int) -> ParameterValue:
-        """Return the value some notches of the wheel further; choices go round."""
+        """Return the value after a number of notches of the wheel; choices are cyclic."""
         if self.choices:
             present = self.choices.index(str(value)) if value in self.choices else -1 if notches > 0 else 0
             return self.choices[(present + notches) % len(self.choices)]
@@ -80,15 +77,15 @@ class Parameter:
 
     def _snapped(self, value: float) -> float:
         if self.log:
-            digits = 1 if self.step >= 0.05 else 2 if self.step >= 0.005 else 12  # a notch is then never lost
+            digits = 1 if self.step >= 0.05 else 2 if self.step >= 0.005 else 12  # keeps each notch
             value = float(f"{value:.{digits}e}")
         elif self.step > 0:
-            places = max(0, 2 - math.floor(math.log10(self.step)))  # multiples of 0.1 are not 0.30000000000000004
+            places = max(0, 2 - math.floor(math.log10(self.step)))  # avoids 0.30000000000000004 for multiples of 0.1
             value = round(round(value / self.step) * self.step, places)
         return min(max(value, self.low), self.high)
 
     def text(self, value: ParameterValue) -> str:
-        """Return a value as it is shown."""
+        """Return a value formatted for display."""
         if isinstance(value, str):
             return value.replace("_", " ")
         if self.unit == "%":
@@ -103,22 +100,22 @@ SETTING_KINDS = ("ball", "grid", "scatter", "emitter")
 
 
 class SessionParameters:
-    """The knobs of a session. What an engine can do is asked once for a scene and settings."""
+    """Parameters of a session. The capabilities of the engine are cached by scene and settings."""
 
     def __init__(self) -> None:
         self._asked: tuple[Scene, str, Settings] | None = None
         self._able: dict[str, tuple[str, ...]] = {}
 
     def of(self, live: LiveView, file: Scene, picked: int | None) -> tuple[Parameter, ...]:
-        """Return the knobs as they now stand.
+        """Return the parameters with their present values.
 
         Args:
             live: the session.
-            file: its scene as the file has it, for what a double click goes back to.
-            picked: number of the body that restitution and friction are of; else they are of all balls.
+            file: its scene as read from the file, the source of default values.
+            picked: index of the body whose restitution and friction are shown; None for all bodies.
         """
         scene, settings = live.scene, live.settings
-        if picked is not None and picked >= len(live.bodies):  # the session has gone back to before it came
+        if picked is not None and picked >= len(live.bodies):  # in the future, as after a step back
             picked = None
         return (
             Parameter(
@@ -141,7 +138,7 @@ class SessionParameters:
         )
 
     def _choice(self, live: LiveView, key: str, words: tuple[str, ...]) -> Parameter:
-        """Return the knob of a choice, with those that the engine has."""
+        """Return a choice parameter with the options that the engine supports."""
         now = live.scene, live.engine, live.session.simulation.wanted
         if self._asked is None or any(a is not b for a, b in zip(self._asked, now, strict=True)):
             self._asked, self._able = now, {}
@@ -180,9 +177,9 @@ def _counts(live: LiveView, file: Scene) -> tuple[Parameter, ...]:
 
 
 def _surface(live: LiveView, file: Scene, picked: int | None, key: str, high: float) -> Parameter:
-    """Return the knob of restitution or friction.
+    """Return the parameter for restitution or friction.
 
-    Where pairs of materials state it, they are turned: they outrank what a ball states.
+    Material pairs that define the property take precedence over bodies, so their value is shown and set.
     """
     scene = live.scene
     place = _place(live, picked)
@@ -210,17 +207,17 @@ def _surface(live: LiveView, file: Scene, picked: int | None, key: str, high: fl
 
 
 def _place(live: LiveView, picked: int | None) -> int:
-    """Return the place among the scene's movers of a picked body's, or else of the first."""
+    """Return the index of the picked body's element among the scene's body sources; without a body, 0."""
     return 0 if picked is None else live.scene.source_index(int(live.bodies.element[picked]))
 
 
 def _pairs(scene: Scene, disc: BodySource | None) -> list[int]:
-    """Return the numbers of the pairs that a ball's material is in; without a ball, of all."""
+    """Return the indices of the material pairs with a body's material; without a body, of all pairs."""
     return [n for n, pair in enumerate(scene.pairs) if disc is None or disc.material in pair.between]
 
 
 def stated(scene: Scene, disc: BodySource, key: str) -> float:
-    """Return the restitution or friction that a ball states itself, or its material; 0 for none."""
+    """Return the restitution or friction of a body or else of its material; 0 if neither defines it."""
     own: float | None = getattr(disc, key)
     if own is None and disc.material is not None:
         own = next((getattr(each, key) for each in scene.materials if each.name == disc.material), None)
@@ -228,7 +225,7 @@ def stated(scene: Scene, disc: BodySource, key: str) -> float:
 
 
 def turned(live: LiveView, key: str, value: ParameterValue, picked: int | None) -> list[Action]:
-    """Return the actions that a knob's new value asks for; those that are the engine's are `Live.switch`'s."""
+    """Return the actions that set a parameter; switching the engine is handled by `AppState.switch_engine`."""
     if key == "gravity":
         return [SetParameter(time=0.0, path="world.gravity", value=[live.scene.world.gravity[0], float(value)])]
     if key in ("restitution", "friction"):
@@ -239,7 +236,7 @@ def turned(live: LiveView, key: str, value: ParameterValue, picked: int | None) 
 
 
 def _paths(live: LiveView, key: str, picked: int | None) -> list[str]:
-    """Return where a figure stands: of the picked body or its material, or of all pairs, balls and generators."""
+    """Return the scene paths of a property: of the picked body or its pairs, or of all pairs, bodies and generators."""
     scene = live.scene
     place = _place(live, picked)
     if picked is not None and place >= len(scene.body_sources):
@@ -263,12 +260,12 @@ def _paths(live: LiveView, key: str, picked: int | None) -> list[str]:
 
 
 def _every(discs: Sequence[BodySource]) -> list[str]:
-    """Return what addresses all elements of a list: `*`, unless one is called so."""
+    """Return the path parts of all elements of a list: `*`, unless an element has that name."""
     return [_part(discs, k) for k in range(len(discs))] if any(disc.name == "*" for disc in discs) else ["*"]
 
 
 def _part(discs: Sequence[BodySource], index: int) -> str:
-    """Return what addresses an element of a list: its number, unless another is called so, as names go first."""
+    """Return the path part of an element of a list: its index, or its name if an element is named like the index."""
     name = discs[index].name
     if name is None or all(disc.name != str(index) for disc in discs):
         return str(index)
@@ -276,7 +273,7 @@ def _part(discs: Sequence[BodySource], index: int) -> str:
 
 
 def _quoted(name: str) -> str:
-    """Return a name as a part of a path."""
+    """Return a name as a path part, quoted if necessary."""
     if "." not in name and name[0] not in "\"'":
         return name
     quote = "'" if '"' in name else '"'

@@ -1,4 +1,4 @@
-"""Snapshot: the values that are drawn of one frame, with joint breaks and thruster flames; no engine, no pygame."""
+"""Snapshot of a frame: all values that drawing needs, without engine or pygame. Joint breaks and thruster flames."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -31,27 +31,27 @@ def broken_joints(breaks: FloatArray, time: float) -> list[int]:
 
 
 class BreakTimes:
-    """When each joint broke."""
+    """Break times of the joints."""
 
     def __init__(self, joints: int) -> None:
-        """Start with all joints whole."""
+        """Start with all joints unbroken."""
         self.times: FloatArray = np.full(joints, np.inf)
-        """(J,) s, inf if it never did; replaced by an update, never changed in place"""
+        """(J,) s, inf if unbroken; replaced by an update, never changed in place"""
 
     def update(self, broken: Mapping[int, float]) -> None:
-        """Add the times at which joints broke, s. Times later than now stay: a replay leads there again."""
+        """Add break times, s. Times later than the present remain, as a replay reaches them again."""
         numbers = list(broken)
         if numbers and not np.isfinite(self.times[numbers]).all():
             self.times = self.times.copy()
             self.times[numbers] = list(broken.values())
 
     def reset(self) -> None:
-        """Count all joints as whole."""
+        """Mark all joints as unbroken."""
         self.times = np.full(len(self.times), np.inf)
 
 
 class BreakNotifier:
-    """Notifies of broken joints: of the first at once, then once a second, as a cloth tears in many steps."""
+    """Notifications of broken joints: immediate for the first, then at most one per second, as a cloth tears slowly."""
 
     def __init__(self) -> None:
         self._notified, self._last_time = 0, 0.0
@@ -79,12 +79,12 @@ OVERLAYS = (
     "trails",
     "energy",
 )
-"""What can be drawn besides static geometry, in the order of the keys 1 … 9, 0."""
+"""Layers of drawing besides static geometry, in the order of the keys 1 … 9, 0."""
 
 
 @dataclass(frozen=True, eq=False)
 class MissedContactMarker:
-    """A missed contact that was detected a moment ago."""
+    """Marker of a recently missed contact."""
 
     position: tuple[float, float]
     """m"""
@@ -93,126 +93,126 @@ class MissedContactMarker:
 
 
 class ThrusterFlame(NamedTuple):
-    """Flame of a thruster that fires."""
+    """Flame of an active thruster."""
 
     body: int
     """index"""
     place: tuple[float, float]
-    """its origin, from the centre of mass, in the body frame, m"""
+    """origin relative to the centre of mass, in the body frame, m"""
     way: tuple[float, float]
-    """from its origin to its tip, in the body frame, m"""
+    """vector from the origin to the tip, in the body frame, m"""
 
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """State of a scene as it is drawn; it may lie between two steps."""
+    """State of a scene to be drawn; it may be interpolated between two steps."""
 
     scene: Scene
     bodies: Bodies
-    """N, with those that were spawned"""
+    """N bodies, including spawned ones"""
     frame: Frame
     overlays: frozenset[str] = frozenset({"shapes"})
     """of `OVERLAYS`"""
     contacts: Contacts = field(default_factory=Contacts.none)
-    """of the last steps, with their impulses"""
+    """of the last steps, with impulses"""
     seconds: float = 0.0
     """simulated time of those steps, s"""
     ghost: Frame | None = None
-    """state of the same bodies on another engine, drawn hollow; it may have fewer"""
+    """state of the bodies on another engine, drawn hollow; it may have fewer bodies"""
     trails: tuple[FloatArray, ...] = ()
-    """(T, N, 2) m each, last positions of the bodies, oldest first, nan if not present; any number of pieces"""
+    """(T, N, 2) m each, past positions, oldest first, nan if not present; any number of pieces"""
     overlapping: BoolArray | None = None
-    """(N,) which bodies overlap something, in scenes that show it by colour"""
+    """(N,) whether each body overlaps another, in scenes that show it by colour"""
     flashes: tuple[MissedContactMarker, ...] = ()
     picked: int | None = None
-    """index of the body that is inspected"""
+    """index of the selected body"""
     pull: tuple[tuple[float, float], tuple[float, float]] | None = None
     """ends of the mouse joint: the grip on a body, and the pointer, m"""
     broken: Collection[int] = ()
-    """indices of the joints of the scene that have broken"""
+    """indices of the broken joints"""
     game: object | None = None
     """values that the `GameView` of the game draws, see `Rules.view_state`"""
     lit: frozenset[str] = frozenset()
     """names of the parts, `[[play.part]]`, whose lamps are lit"""
     below: float = 0.0
-    """px at the top left that are covered by text"""
+    """px at the top left covered by text"""
     flames: tuple[ThrusterFlame, ...] = ()
-    """of the thrusters that fire"""
+    """of the active thrusters"""
     setup: Setup | None = None
-    """of the running session; None where `bodies` are those of the scene or of a recorded run"""
+    """of the running session; None if `bodies` are those of the scene or of a stored run"""
 
     @cached_property
     def links(self) -> JointArrays:
-        """The joints that are not broken."""
+        """The unbroken joints."""
         return (self.setup or self.scene).links.without(self.broken)
 
 
 @dataclass(frozen=True)
 class HudStatus:
-    """What the window tells in words."""
+    """Values of the head-up display."""
 
     title: str
     engine: str
     settings: str
-    """such as "dt 10 ms · 1 × 10" """
+    """summary such as "dt 10 ms · 1 × 10" """
     step: int
     time: float
     """s, simulated"""
     paused: bool = False
     waits_for_start: bool = False
-    """a real-time game that no key has started yet"""
+    """whether a real-time game waits for the first key"""
     question: str | None = None
-    """what is asked before something is lost"""
+    """confirmation that is asked for before data is lost"""
     out_of_sight: str | None = None
-    """what can be done where nothing that moves is in the picture"""
+    """notice while no moving body is in view"""
     unfocused: bool = False
-    """another window has the keyboard, and time stands still"""
+    """whether the window has lost the keyboard focus, which pauses the scene"""
     ended: str | None = None
-    """why nothing comes after this moment"""
+    """reason why the run ends at this time"""
     replay: bool = False
-    """a stored run: nothing can be changed"""
+    """whether a stored run is shown, which cannot be changed"""
     speed: float = 1.0
-    """asked, as a share of real time"""
+    """requested speed, as a multiple of real time"""
     real_speed: float = 1.0
-    """reached"""
+    """measured speed"""
     frames_per_second: float = 0.0
     trust: str = "unknown"
-    """`unknown`, `trusted`, or `lost`: past the horizon of predictability"""
+    """`unknown`, `trusted`, or `lost` (past the predictability horizon)"""
     horizon: float | None = None
-    """s, when trust was lost"""
+    """s, time at which trust was lost"""
     ghost: str | None = None
-    """the ghost's engine"""
+    """name of the ghost's engine"""
     distance: float | None = None
-    """m, the largest between a body and its ghost"""
+    """m, largest distance between a body and its ghost"""
     missed: int | None = None
-    """contacts that the engine missed so far; None where none are looked for"""
+    """number of contacts that the engine has missed; None if they are not detected"""
     recording: str | None = None
-    """what is being recorded, such as "gif 3.2 s" """
+    """format and length of the recording in progress, such as "gif 3.2 s" """
     busy: str | None = None
-    """what the window is waiting for, such as "replaying 40 %" """
+    """progress of a background task, such as "replaying 40 %" """
     picked: tuple[str, ...] = ()
-    """lines about the picked body"""
+    """lines about the selected body"""
     messages: tuple[tuple[str, str], ...] = ()
     """(level, text), newest last; levels `info`, `warning`, `error`"""
     faults: tuple[str, ...] = ()
-    """of the scene file, while the old scene goes on"""
+    """of a scene file that could not be loaded, while the previous scene keeps running"""
     claimed: tuple[tuple[str, str], ...] = ()
-    """keys that the scene claims, and what each does"""
+    """(keys, action) bound by the scene"""
 
 
 LONG = 1.1
-"""of a body's reach, the flame of its strongest thrust, fully open"""
+"""Length of the flame of a body's strongest thruster at full throttle, in body radii."""
 
 
 def active_thrusters(
     scene: Scene, bodies: Bodies, throttles: Mapping[str, Throttle], time: float
 ) -> tuple[ThrusterFlame, ...]:
-    """Return the flames of the thrusts that act.
+    """Return the flames of the active thrusters.
 
     Args:
-        scene: what runs.
-        bodies: by number.
-        throttles: that were set, by the names of their thrusts.
+        scene: the scene.
+        bodies: including spawned ones.
+        throttles: current settings, by thruster name.
         time: s.
     """
     found = []
@@ -225,7 +225,7 @@ def active_thrusters(
         strongest = max(math.hypot(*each.force) for each in scene.thrusts if each.body == thrust.body)
         x, y = _centre(bodies.elements[int(bodies.element[number])])
         place = thrust.point[0] - x, thrust.point[1] - y
-        # By the root: a thrust of a tenth is seen too.
+        # Square root, so that a tenth of the thrust is still visible.
         long = LONG * float(bodies.radius[number]) * math.sqrt(level * force / strongest)
         found.append(ThrusterFlame(number, place, (-thrust.force[0] / force * long, -thrust.force[1] / force * long)))
     return tuple(found)
@@ -241,5 +241,5 @@ def _level(thrust: Thrust, throttle: Throttle | None, time: float) -> float:
 
 @lru_cache(maxsize=64)
 def _centre(element: BodySource) -> Point:
-    """Return the centre of mass in the frame that an element was drawn in, m."""
+    """Return the centre of mass in the frame in which an element is defined, m."""
     return form_of(element).centre
