@@ -1,6 +1,6 @@
-"""Application state: the open scene or stored run, its game, pause, engine and preferences. It draws nothing.
+"""Application state: the open scene or stored run, its game, pause, engine and preferences. No drawing.
 
-An operation that fails adds a message and leaves the open scene as it was.
+A failed operation adds a message and leaves the open scene unchanged.
 """
 
 from collections.abc import Callable, Iterable
@@ -38,11 +38,11 @@ from sandbox.window.worker import Compute, compute_here
 P = ParamSpec("P")
 
 MAX_TWIN_BODIES = 64
-"""Scenes of at most this many bodies start with the divergence monitor on."""
+"""Number of bodies up to which a scene starts with the divergence monitor on."""
 
 
 def scenes_beside(path: Path | None) -> tuple[Path, ...]:
-    """Return the scene files of a file's folder; without a file, the shipped scenes."""
+    """Return the scene files in the folder of a file; without a file, the shipped scenes."""
     if path is None:
         return tuple(scene.path for scene in shipped())
     try:
@@ -54,7 +54,7 @@ def scenes_beside(path: Path | None) -> tuple[Path, ...]:
 
 
 def neighbouring_scene(path: Path | None, by: int) -> Path | None:
-    """Return the scene file `by` positions further, cyclically; None if there is none."""
+    """Return the scene file `by` positions further, cyclically; None if there are no scene files."""
     files = scenes_beside(path)
     if not files:
         return None
@@ -65,7 +65,7 @@ def neighbouring_scene(path: Path | None, by: int) -> Path | None:
 
 
 def scenes_to_pick(path: Path | None) -> list[tuple[str, Path]]:
-    """Return (name, file) of the scenes beside the open one, and of the shipped scenes."""
+    """Return (name, file) of the scenes in the folder of the open one, then of the shipped scenes."""
     own = [(scene.name, scene.path) for scene in shipped()]
     known = {file.resolve() for _, file in own}
     others = [file for file in (scenes_beside(path) if path is not None else ()) if file.resolve() not in known]
@@ -74,17 +74,17 @@ def scenes_to_pick(path: Path | None) -> list[tuple[str, Path]]:
 
 @dataclass
 class Preferences:
-    """Choices that are kept when another scene is opened, and parameters of the open scene that a restart keeps."""
+    """Preferences that persist across scenes, and parameters of the open scene that persist across restarts."""
 
     engine: str | None
-    """preferred engine; a session may run on another one that supports its scene"""
+    """preferred engine; a session uses another one if it does not support the scene"""
     overrides: tuple[Override, ...]
     """values set in every scene that is opened"""
     ghosted: bool = False
     trusting: bool | None = None
-    """None: not chosen"""
+    """None if the user has not chosen"""
     parameters: dict[str, Any] = field(default_factory=dict)
-    """values of the open scene by path"""
+    """parameter values of the open scene by path"""
 
     def apply(self, company: Diagnostics, trusting: bool) -> None:
         """Apply the ghost and twin preferences to a new session; `trusting` is the default of the twin."""
@@ -93,18 +93,18 @@ class Preferences:
             company.show_ghost(True)
 
     def toggle_ghost(self, company: Diagnostics) -> None:
-        """Start or stop the ghost, and keep that for later scenes."""
+        """Start or stop the ghost, also for later scenes."""
         self.ghosted = not company.has_ghost
         company.show_ghost(self.ghosted)
 
     def toggle_trust(self, company: Diagnostics) -> None:
-        """Start or stop the perturbed twin, and keep that for later scenes."""
+        """Start or stop the perturbed twin, also for later scenes."""
         self.trusting = company.divergence is None
         company.watch_divergence(self.trusting)
 
     def store_parameter(self, action: SetParameter) -> None:
-        """Keep a value for a restart."""
-        self.parameters.pop(action.path, None)  # the value set last is applied last
+        """Store a parameter value for restarts."""
+        self.parameters.pop(action.path, None)  # re-inserted, as the latest value is applied last
         self.parameters[action.path] = action.value
 
     def with_parameters(self, file: Scene) -> Scene:
@@ -117,7 +117,7 @@ class Preferences:
 
 
 def session_of_recording(recording: Recording) -> LiveView:
-    """Return a session that has repeated a recording and continues from its end."""
+    """Return a session that has replayed a recording and continues from its end."""
     rules = rules_of(recording.scene)
     game = None if rules is None else GameSession(rules, recording.presses)
     session = Session(
@@ -130,12 +130,12 @@ def session_of_recording(recording: Recording) -> LiveView:
 
 
 def create_session(scene: Scene, engine: str, settings: Settings | None, messages: Messages) -> LiveView | None:
-    """Return a new session of a scene, with its game if it has one; None if no engine supports the scene.
+    """Return a new session of a scene, including its game if any; None if no engine supports the scene.
 
     Args:
         scene: as read from its file.
-        engine: preferred engine; if it does not support the scene, another one is used and a warning added.
-        settings: by default those of the scene.
+        engine: preferred engine; if it does not support the scene, another one is used, with a warning.
+        settings: solver settings; None for those of the scene.
         messages: receives warnings and errors.
     """
     scene = prepared_scene(scene)
@@ -152,75 +152,74 @@ def create_session(scene: Scene, engine: str, settings: Settings | None, message
 
 
 class AppState:
-    """The open scene or run, and the operations on it."""
+    """The open scene or stored run, and the operations on it."""
 
     def __init__(self, engine: str | None = None, overrides: Iterable[Override] = ()) -> None:
         """Start without a scene.
 
         Args:
-            engine: preferred engine of every scene, until another is chosen; by default `exact` for tables and
-                `pymunk` for all other scenes.
+            engine: preferred engine of all scenes; by default `exact` for tables and `pymunk` for all other scenes.
             overrides: values set in every scene that is opened.
         """
         self.view: LiveView | RecordedView | None = None
         self.path: Path | None = None
         self.reach: Box | None = None
-        """bounds of the bodies' predicted motion without user input, m; None if unknown"""
+        """bounds of the predicted motion without user input, m; None if unknown"""
         self.file: Scene | None = None
         """the scene as read from its file"""
         self._table_host = TableGameHost()
         self.host: GameHost | None = None
-        """host of the scene's game, if it has one"""
+        """host of the scene's game, if any"""
         self.key_bindings: KeyBindings = NO_BINDINGS
-        """keys that the scene and its game bind"""
+        """keys bound by the scene and its game"""
         self._paused = False
         self.waits_for_start = False
-        """a real-time game is open and has not been started yet"""
+        """whether a real-time game waits for its start"""
         self.covered = False
-        """help, the scene browser or a question covers the scene, which pauses it"""
+        """whether help, the scene browser or a question covers the scene, which pauses it"""
         self.unfocused = False
-        """another window has the keyboard focus, which pauses the scene"""
+        """whether another window has the keyboard focus, which pauses the scene"""
         self.compute: Compute = compute_here
-        """runs jobs that may compile kernels; the window runs them on a worker thread"""
+        """runner of jobs that may compile kernels; the window uses a worker thread"""
         self.question: str | None = None
-        """the question that is shown before hand-made changes are lost"""
+        """question asked before manual changes are lost"""
         self.saves_at_end = False
-        """the session is saved when the window closes"""
+        """whether the session is saved when the window closes"""
         self._lost: Recording | None = None  # restored by Ctrl+Z
         self.opening: Scene | None = None
-        """the scene whose session is being started"""
+        """scene whose session is being started"""
         self.body_tools = BodyTools()
         self.messages = Messages()
         self.faults: tuple[str, ...] = ()
         self.on_scene_changed: Callable[[bool], None] | None = None
-        """Called after another view is shown; its argument tells whether it is of the same scene."""
+        """callback after another view is shown; its argument is whether the view is of the same scene"""
         self._preferences = Preferences(engine, tuple(overrides))
         self._again: Callable[[], LiveView | RecordedView] | None = None
-        self._tried: Path | None = None  # the faulty file that was tried after the open one
+        self._tried: Path | None = None  # faulty file that was tried after the open one
 
     @property
     def live(self) -> LiveView | None:
-        """The interactive session; None if nothing or a stored run is shown."""
+        """The interactive session; None if a stored run or nothing is shown."""
         return self.view if isinstance(self.view, LiveView) else None
 
     @property
     def game(self) -> BilliardsGame | None:
-        """The billiards game, if there is one."""
+        """The billiards game, if any."""
         return self._table_host.game
 
     @property
     def gestures(self) -> CueControls | None:
-        """The cue controls of the billiards game."""
+        """The cue controls of the billiards game, if any."""
         return self._table_host.gestures
 
     @property
     def engine(self) -> str:
-        """The present engine's name."""
+        """Name of the present engine."""
         return self.view.engine if self.view is not None else self._preferences.engine or USUAL
 
     @property
     def paused(self) -> bool:
-        """Whether the user has paused; a stored run that is resumed at its end starts over."""
+        """Whether the user has paused; resuming a stored run at its end restarts it."""
         return self._paused
 
     @paused.setter
@@ -237,14 +236,14 @@ class AppState:
         same: bool = False,
         again: Callable[[], LiveView | RecordedView] | None = None,
     ) -> None:
-        """Show a session or a stored run in place of the present one.
+        """Replace the present view by a session or a stored run.
 
         Args:
             view: the session or run.
             path: its scene file.
             file: the scene as read from its file.
-            same: it is of the scene that is open.
-            again: creates the view anew for a restart, if scene and settings do not suffice, as for a recording.
+            same: whether the view is of the open scene.
+            again: creates the view anew for a restart, where scene and settings do not suffice, as for a recording.
         """
         self._table_host.leave()
         self.host = host_of(view) if isinstance(view, LiveView) else None
@@ -277,11 +276,11 @@ class AppState:
         self.restart()
 
     def open(self, path: Path, same: bool = False, engine: str | None = None) -> bool:
-        """Open a scene file and return whether that succeeded; faults are stored in `faults`."""
+        """Open a scene file; return whether that succeeded. Faults of the file are stored in `faults`."""
         try:
             scene = load(path, self._preferences.overrides)
         except SceneError as error:
-            # The file name without its folders leaves room for the fault.
+            # Without its folders, the file name leaves space for the fault.
             self.faults = tuple(str(Fault(path.name, f.line, f.path, f.message)) for f in error.faults)
             return False
         return self._start(scene, path, scene, engine or self._preferences.engine or usual(scene), None, same)
@@ -302,7 +301,7 @@ class AppState:
         return live is not None
 
     def restart(self) -> None:
-        """Start the scene again at time 0, with the same engine and the parameters that were set."""
+        """Restart the scene at time 0 with the same engine and the parameters set by the user."""
         if isinstance(self.view, RecordedView):
             self.view.scrub(self.view.start_time)
         elif self._again is not None and self.file is not None:
@@ -318,10 +317,10 @@ class AppState:
             self._lost = lost
 
     def count_unsaved(self, restart: bool = False) -> int:
-        """Return the number of hand-made changes that would be lost; 0 for games.
+        """Return the number of manual changes that would be lost; 0 for games.
 
         Args:
-            restart: count those that a restart loses; it keeps parameters.
+            restart: count only those that a restart loses; it keeps parameters.
         """
         live = self.live
         if live is None or self.host is not None or self.game is not None:
@@ -331,7 +330,7 @@ class AppState:
         return count_changes(actions, live.scene.play.arrows)
 
     def restore_session(self) -> None:
-        """Restore the session as it was before a restart, or before an action in its past replaced its future."""
+        """Restore the session as it was before a restart, or before an action in its past discarded its future."""
         live = self.live
         lost = self._lost
         if live is not None and live.session.replaced is not None:
@@ -346,7 +345,7 @@ class AppState:
         self.messages.add(f"previous session restored{again}")
 
     def _current_recording(self) -> Recording | None:
-        """Return the recording of the session, after a seek that is under way is finished."""
+        """Return the recording of the session, after finishing a pending seek."""
         live = self.live
         if live is None:
             return None
@@ -355,7 +354,7 @@ class AppState:
         return live.session.recording()
 
     def reload(self) -> None:
-        """Read the scene's file again and start it at time 0."""
+        """Read the scene file again and start the scene at time 0."""
         if self.path is None or not isinstance(self.view, LiveView):
             self.messages.add("there is no scene file to reload", "warning")
             return
@@ -364,17 +363,17 @@ class AppState:
             self.messages.add(f"{self.path.name} reloaded")
 
     def open_neighbour(self, by: int) -> None:
-        """Open the scene file `by` positions after the open one, or after the faulty one that was tried last."""
+        """Open the scene file `by` positions after the open one, or after the faulty one tried last."""
         path = neighbouring_scene(self._tried or self.path, by)
         if path is None:
             self.messages.add("there is no other scene", "warning")
         elif self._tried is not None and self.path is not None and path.resolve() == self.path.resolve():
-            self.faults, self._tried = (), None  # back to the open scene
+            self.faults, self._tried = (), None  # back at the open scene
         else:
             self.open_other(path)
 
     def open_other(self, path: Path) -> None:
-        """Open another scene file and drop the parameters that were set."""
+        """Open another scene file and discard the parameters set by the user."""
         if self.open(path):
             self._preferences.parameters.clear()
         else:
@@ -397,7 +396,7 @@ class AppState:
         self.compute(lambda: self._preferences.toggle_trust(company))
 
     def switch_to_next_engine(self) -> None:
-        """Continue on the next engine that supports the scene; the others add the reason as a warning."""
+        """Switch to the next engine that supports the scene; each skipped engine adds its reason as a warning."""
         if not isinstance(self.view, LiveView):
             self._warn_no_session("cannot change its engine; replay it with --engine NAME")
             return
@@ -408,7 +407,7 @@ class AppState:
                 return
 
     def switch_engine(self, engine: str) -> bool:
-        """Continue on an engine from the present state; return whether that succeeded."""
+        """Continue on another engine from the present state; return whether that succeeded."""
         live = self.live
         if live is None or engine == live.engine:
             return False
@@ -447,7 +446,7 @@ class AppState:
         self.run_handler(apply)
 
     def _warn_no_session(self, what: str) -> None:
-        """Add the warning that a stored run, or nothing, is shown."""
+        """Add a warning that a stored run, or no scene, is open."""
         self.messages.add(f"a stored run {what}" if self.view is not None else "no scene is open", "warning")
 
     def run_handler(self, handler: KeyHandler) -> bool:
@@ -463,7 +462,7 @@ class AppState:
         return True
 
     def use_tool(self, tool: Callable[Concatenate[LiveView, P], object], *args: P.args, **kwargs: P.kwargs) -> bool:
-        """Run a tool of `body_tools` on the session, as `run_handler` does."""
+        """Run a tool of `body_tools` on the session, like `run_handler`."""
         live = self.live
         return self.run_handler(lambda: tool(live, *args, **kwargs) if live is not None else None)
 
@@ -492,7 +491,7 @@ class AppState:
         self.waits_for_start = self.paused = False
 
     def toggle_pause(self) -> None:
-        """Pause or resume; a game that waits for its start is started."""
+        """Pause or resume; start a game that waits for its start."""
         if self.waits_for_start:
             self.start_game()
         else:

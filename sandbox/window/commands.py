@@ -1,4 +1,4 @@
-"""Command dispatch: the handler of each command of keys and panel buttons."""
+"""Command dispatch: handlers of the commands of keys and panel buttons."""
 
 from collections.abc import Callable
 
@@ -21,7 +21,7 @@ BUTTONS = {
     "picker": Command.PICKER,
     "help": Command.HELP,
 }
-"""Commands of the panel's buttons."""
+"""Commands by the name of the panel button."""
 
 CONFIRMATIONS = {
     Command.RESTART: "press R again to restart",
@@ -30,17 +30,17 @@ CONFIRMATIONS = {
     Command.RELOAD: "press Ctrl+L again to reload",
     Command.QUIT: "press Esc again to quit",
 }
-"""How to confirm the commands that end a session, if hand-made changes would be lost."""
+"""Confirmation hints of the commands that end a session with unsaved manual changes."""
 
 
 class Commands:
-    """Handlers of commands, and of the panel's widgets."""
+    """Handlers of commands and of the panel's widgets."""
 
     def __init__(self, context: WindowContext, mouse: MouseController) -> None:
         self._context, self._mouse = context, mouse
-        self._changed: dict[str, ParameterValue] = {}  # parameters changed since the last `flush`, the latest last
+        self._changed: dict[str, ParameterValue] = {}  # parameter changes since the last `flush`, latest last
         self.pending: Command | None = None
-        """command that waits for confirmation"""
+        """command waiting for confirmation"""
         app_state, gui = context.app_state, context.gui
         self._handlers: dict[Command, Callable[[], object]] = {
             Command.PAUSE: app_state.toggle_pause,
@@ -77,7 +77,7 @@ class Commands:
         gui.panel.on_change = self._store_parameter
 
     def run(self, command: Command) -> None:
-        """Run a command, after the pending changes of parameters and of the mouse."""
+        """Run a command after applying the pending changes of parameters and of the mouse."""
         self.flush()
         if self._needs_confirmation(command):
             return
@@ -87,7 +87,7 @@ class Commands:
             self._handlers[command]()
 
     def _needs_confirmation(self, command: Command) -> bool:
-        """Show the question before hand-made changes are lost; return False if a repeated command confirms it."""
+        """Ask for confirmation if manual changes would be lost; return False if none is needed or it was just given."""
         app_state, confirmed = self._context.app_state, command == self.pending
         self.cancel_confirmation()
         if command not in CONFIRMATIONS or confirmed or (command is Command.QUIT and app_state.saves_at_end):
@@ -99,7 +99,7 @@ class Commands:
         return True
 
     def cancel_confirmation(self) -> None:
-        """Withdraw the question."""
+        """Cancel the pending confirmation."""
         self.pending = self._context.app_state.question = None
 
     def toggle(self, name: str) -> None:
@@ -110,7 +110,7 @@ class Commands:
             self.run(Command(name))
 
     def flush(self) -> None:
-        """Apply the latest values of sliders and of a drag: once a frame, however many motion events there were."""
+        """Apply the latest values of sliders and of a drag: once per frame, whatever the number of motion events."""
         changed, self._changed = self._changed, {}
         for key, value in changed.items():
             self._context.app_state.set_parameter(key, value)
@@ -121,7 +121,7 @@ class Commands:
         self._changed[key] = value
 
     def _release_all(self) -> None:
-        """End all drags, before something covers the scene and consumes their releases."""
+        """End all drags, before an overlay covers the scene and consumes the button releases."""
         self._mouse.release_all()
         self._context.gui.panel.release()
         self.flush()
@@ -135,7 +135,7 @@ class Commands:
         self._context.gui.toggle_help()
 
     def _fit_view(self) -> None:
-        """Fit the scene; if it is fitted already, the present positions of the bodies."""
+        """Fit the camera to the scene; if it is fitted already, to the present positions of the bodies."""
         self._context.following = None
         if self._context.is_fitted:
             self._context.fit_bodies()

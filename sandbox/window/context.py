@@ -1,4 +1,4 @@
-"""Window context: the application state, the GUI, the camera, and the state kept between scenes."""
+"""Window context: application state, GUI, camera, and state that outlives a scene."""
 
 import math
 from collections.abc import Callable
@@ -25,13 +25,13 @@ TITLE = "sandbox"
 MAX_FOLLOW_ZOOM = 1.5
 """largest zoom of a camera that follows all moving bodies, relative to the fitted scene"""
 FIELD_MARGIN = 0.02
-"""margin on each side of a table or playing field, as a fraction of the area that plates leave free"""
+"""margin on each side of a table or playing field, as a fraction of the free area"""
 MIN_VIEW_RADII = 12.0
-"""median body radii that the camera shows at least when it fits bodies"""
+"""smallest extent of a view fitted to bodies, in median body radii"""
 
 
 class WindowContext:
-    """Surface, camera and title of the window, and the parts that commands and the mouse use. It opens no window."""
+    """Surface, camera and title of the window, shared by commands and the mouse. It does not open the window."""
 
     def __init__(
         self,
@@ -46,9 +46,9 @@ class WindowContext:
 
         Args:
             surface: surface of the window.
-            unit: UI scale, relative to a display of 1080 lines.
+            unit: UI scale, 1 on a display of 1080 lines.
             app_state: the open scene and its operations.
-            folder: where screenshots, films and sessions are saved.
+            folder: folder for screenshots, films and sessions.
             film: format of films, `.gif` or `.mp4`.
             say: prints a line on the terminal.
         """
@@ -57,14 +57,14 @@ class WindowContext:
         self.gui = Gui(surface.get_size(), unit)
         self.camera = Camera((0.0, 0.0), 100.0, surface.get_size())
         self.is_fitted = True
-        """the camera shows the whole scene, and is fitted again to a new scene or size"""
+        """whether the camera shows the whole scene; if so, it is fitted again to a new scene or window size"""
         self.following: int | Literal["all"] | None = None
-        """index of the body that the camera follows, or all moving bodies"""
+        """index of the body that the camera follows, "all" for all moving bodies, or None"""
         self._window_size: tuple[int, int] | None = None  # before full screen
-        self._plates: list[pygame.Rect] = []  # areas of plates when the camera was fitted
-        self._covered = (0, 0)  # px at the top and bottom covered by the score panel when the camera was fitted
+        self._plates: list[pygame.Rect] = []  # rectangles of plates when the camera was fitted
+        self._covered = (0, 0)  # px covered by the score panel at the top and bottom when the camera was fitted
         self.exit_status: int | None = None
-        """set when the window is to close"""
+        """set when the window is to be closed"""
 
     def notify(self, text: str, level: str = "info") -> None:
         """Show a message in the window and print it on the terminal."""
@@ -72,7 +72,7 @@ class WindowContext:
         self._print_line(text)
 
     def on_scene_changed(self, same: bool) -> None:
-        """Fit the camera, GUI and title to another view; of the same scene the camera stays."""
+        """Update camera, GUI and title for another view; with `same`, a view of the same scene, the camera stays."""
         show = self.app_state.view
         if not same:
             self.following = None if show is None else _thrust_body(show.scene)
@@ -84,14 +84,14 @@ class WindowContext:
 
     @property
     def name(self) -> str:
-        """Base name of saved files: that of the scene file, or without one, the title."""
+        """Base name of saved files: that of the scene file, else the title of the scene."""
         if self.app_state.path is not None:
             return self.app_state.path.stem
         show = self.app_state.view
         return (show.scene.title if show is not None else "") or "scene"
 
     def render_preview(self) -> pygame.Surface | None:
-        """Return a picture of the initial state of the scene that is being opened; None if none is."""
+        """Return an image of the initial state of the scene being opened; None if no scene is being opened."""
         scene = self.app_state.opening
         if scene is None or (self.app_state.view is not None and self.app_state.view.scene is scene):
             return None
@@ -126,7 +126,7 @@ class WindowContext:
         return bool((~bodies.fixed).any()) and not seen.any()
 
     def toggle_follow(self) -> None:
-        """Follow the picked body or all moving bodies with the camera, or stop following."""
+        """Follow the selected body, or all moving bodies, with the camera; or stop following."""
         show, messages = self.app_state.view, self.app_state.messages
         if show is None:
             return
@@ -140,7 +140,7 @@ class WindowContext:
         messages.add(f"the camera follows {name} (F: stop)")
 
     def update_camera(self, elapsed: float) -> None:
-        """Move the camera towards what it follows; `elapsed` is real time, s."""
+        """Move the camera towards the followed bodies; `elapsed` is real time, s."""
         show = self.app_state.view
         if show is None or self.following is None:
             return
@@ -161,13 +161,13 @@ class WindowContext:
 
     @property
     def _free_area(self) -> tuple[float, float, float, float]:
-        """Left, top, right and bottom of the area that nothing covers, px."""
+        """Left, top, right and bottom of the area not covered by the GUI, px."""
         width, height = self.surface.get_size()
         head, foot = self.gui.score_margins(self.app_state)
         return 0.0, float(head), float(width - self.gui.panel.width), float(height - foot - self.gui.bottom_margin)
 
     def toggle_full_screen(self) -> None:
-        """Switch between full screen and the former window size."""
+        """Toggle full screen; leaving it restores the previous window size."""
         if self._window_size is None:
             self._window_size = self.surface.get_size()
             surface = pygame.display.set_mode((0, 0), pygame.FULLSCREEN)
@@ -195,11 +195,11 @@ class WindowContext:
         self.camera = self._fitted_camera(box)
 
     def _fitted_camera(self, box: Box) -> Camera:
-        """Return a camera that shows a box, m, in the area that panels and timeline leave free."""
+        """Return a camera that shows a box, m, in the area not covered by panels and timeline."""
         size, room, show = self.surface.get_size(), self.gui.area, self.app_state.view
         self._covered = head, foot = self.gui.score_margins(self.app_state)
         lies = show is not None and should_rotate(show.scene, room.size)
-        if self._has_field:  # plates must not cover any part of it
+        if self._has_field:  # plates must not cover any part of the field
             (left, bottom), (right, top) = box
             shape = max(right - left, 1e-9), max(top - bottom, 1e-9)
             room = largest_area(shape[::-1] if lies else shape, room, self.gui.permanent_plates(self.app_state))
@@ -210,7 +210,7 @@ class WindowContext:
 
     @property
     def _has_field(self) -> bool:
-        """Whether all of what is seen counts: a table, the field of a game, or a view that the scene states."""
+        """Whether the scene has a field that must stay uncovered: a table, a game, or an explicit view."""
         show = self.app_state.view
         if show is None:
             return False
@@ -218,7 +218,7 @@ class WindowContext:
         return play.area is not None or play.view is not None or play.game is not None
 
     def refit_if_covered(self) -> None:
-        """Fit the scene again if a plate has grown over it, as with a new row or the result of a game."""
+        """Fit the scene again if a plate has grown over it, for example by a new row or the result of a game."""
         if not self.is_fitted or self.following is not None:
             return
         covered, show = self.gui.score_margins(self.app_state), self.app_state.view
@@ -234,7 +234,7 @@ class WindowContext:
             self.fit_scene()
 
     def resize(self, surface: pygame.Surface) -> None:
-        """Use a surface of another size."""
+        """Switch to a surface of another size."""
         self.surface = surface
         self.gui.resize(surface.get_size())
         self.camera = self.camera.resized(surface.get_size())
@@ -243,13 +243,13 @@ class WindowContext:
 
 
 def _thrust_body(scene: Scene) -> int | None:
-    """Return the index of the body that thrust keys move; None if the scene has no such body or sets its own view."""
+    """Return the index of the body moved by thrust keys; None without such a body or if the scene sets its view."""
     names = [thrust.body for thrust in scene.thrusts if thrust.key is not None]
     return scene.bodies.names.index(names[0]) if names and scene.play.view is None else None
 
 
 def _enlarge_box(box: Corners, radius: FloatArray) -> Box:
-    """Return a box, m, that is at least `MIN_VIEW_RADII` median radii wide and high."""
+    """Return a box, m, enlarged to at least `MIN_VIEW_RADII` median radii in width and height."""
     low, high = box
     least = MIN_VIEW_RADII * float(np.median(radius)) if len(radius) else 1.0
     grown = np.maximum(least - (high - low), 0.0) / 2.0

@@ -1,6 +1,6 @@
-"""Hosts the game of a session in the window: its controls, its display, and the display at earlier times.
+"""Game host: connects the game of a session with the window: controls, display, and the history of the display.
 
-Several keys and a gamepad may hold a control at once; its value is the largest of theirs.
+Several keys and a gamepad may hold a control at the same time; its value is the largest of theirs.
 """
 
 from bisect import bisect_right
@@ -14,36 +14,36 @@ from sandbox.window.messages import Messages
 from sandbox.window.playback.live import LiveView
 
 MAX_ENTRIES = 10_000
-"""of a display history; when it is full, every second entry of the older half is dropped"""
+"""entries of a display history; when it is full, every second entry of the older half is dropped"""
 
 
 class ScoreDisplay(NamedTuple):
-    """Score, rows and result of a game."""
+    """Score, labelled values and result of a game."""
 
     score: str
     lines: tuple[tuple[str, str], ...]
     """(label, text) rows"""
     over: str | None
-    """how the game ended; None while it is being played"""
+    """result; None during the game"""
 
 
 class GameDisplay(NamedTuple):
-    """Display of a game at one time."""
+    """Display of a game at a point in time."""
 
     board: ScoreDisplay
     lit: frozenset[str]
-    """names of the parts with lit lamps"""
+    """names of the parts whose lamps are lit"""
 
 
 class DisplayHistory:
-    """Displays of a game by time, as its rules know the present only. Equal successive displays are stored once."""
+    """Displays of a game by time, since rules know only the present. Equal successive displays are stored once."""
 
     def __init__(self) -> None:
         self._times: list[float] = []
         self._shown: list[GameDisplay] = []
 
     def add(self, time: float, end: float, shown: GameDisplay) -> None:
-        """Store the display at a time, s; entries after `end`, s, the end of the session, are dropped."""
+        """Store the display at a time, s; entries after `end`, the end of the session, s, are dropped."""
         known = bisect_right(self._times, end)
         del self._times[known:], self._shown[known:]
         index = bisect_right(self._times, time)
@@ -59,12 +59,12 @@ class DisplayHistory:
             self._times[:half], self._shown[:half] = self._times[:half:2], self._shown[:half:2]
 
     def at(self, time: float) -> GameDisplay | None:
-        """Return the display at a time, s; before the first entry, the first one; None if there is none."""
+        """Return the display at a time, s; before the first entry, the first one; None if empty."""
         return self._shown[max(bisect_right(self._times, time) - 1, 0)] if self._shown else None
 
 
 def game_session_of(scene: Scene, messages: Messages) -> GameSession | None:
-    """Return the new game of a scene; None with a warning if the scene does not suit its rules."""
+    """Return a new game for a scene; None if it has none or, with a warning, if it does not suit the rules."""
     try:
         rules = rules_of(scene)
     except UnsuitableSceneError as error:
@@ -74,7 +74,7 @@ def game_session_of(scene: Scene, messages: Messages) -> GameSession | None:
 
 
 def host_of(live: LiveView) -> "GameHost | None":
-    """Return the host of a session's game; None if it has no game."""
+    """Return a host for the game of a session; None if it has no game."""
     return None if live.session.game is None else GameHost(live, live.session.game)
 
 
@@ -85,21 +85,21 @@ class GameHost:
         self.live = live
         self.controls: tuple[Control, ...] = game.rules.controls
         self.touched = False
-        """whether the player has given input, in addition to a recording"""
+        """whether the player has given input beyond that of a recording"""
         self._held: dict[str, dict[object, float]] = {control.name: {} for control in self.controls}
-        self._game: GameSession | None = None  # game of the last call of `cues`
+        self._game: GameSession | None = None  # game at the last call of `cues`
         self._warned = False
-        self._read = 0  # log entries
+        self._read = 0  # number of log entries already returned
         self._history = DisplayHistory()
 
     @property
     def rules(self) -> Rules:
-        """The rules at the present time; a step back replaces them by a copy."""
+        """The present rules; a step back replaces them by a copy."""
         assert self.live.session.game is not None
         return self.live.session.game.rules
 
     def hold(self, source: object, control: str, value: float) -> None:
-        """Set how far a key or button holds a control, and apply the largest value of all its sources.
+        """Set the value at which one source holds a control, and apply the largest value of all sources.
 
         Args:
             source: key code, or gamepad and button.
@@ -107,7 +107,7 @@ class GameHost:
             value: 0 (released) to 1.
 
         Raises:
-            ActionError: an action that follows is refused.
+            ActionError: a resulting action is refused.
         """
         sources = self._held[control]
         before = max(sources.values(), default=0.0)
@@ -123,26 +123,26 @@ class GameHost:
         game = self.live.session.game
         past = game is not None and bool(game.future_presses)
         self.live.press(control, value)
-        if past:  # releases in the discarded future happen now, except of controls that are held
+        if past:  # releases in the discarded future are applied now, except for controls that are held
             for name in self._pressed():
                 if not self._held[name] and name != control:
                     self.live.press(name, 0.0)
 
     def _pressed(self) -> list[str]:
-        """Return the controls that are held according to the input log."""
+        """Return the names of the controls that are held according to the input log."""
         game = self.live.session.game
         last = {press.control: press.value for press in game.presses} if game is not None else {}
         return [name for name, value in last.items() if value > 0.0]
 
     def notes(self) -> list[tuple[str, str]]:
-        """Return (level, text) of the messages since the last call."""
+        """Return (level, text) messages since the last call."""
         return [
             *(("warning", text) for text in self._divergence_notes()),
             *(("info", text) for text in self._log_notes()),
         ]
 
     def _divergence_notes(self) -> list[str]:
-        """Return the warning, given once, that the rules do not reproduce a recorded game."""
+        """Return a warning, once, if the rules do not reproduce a recorded game."""
         game = self.live.session.game
         if self._warned or game is None or game.diverged_at is None:
             return []
@@ -171,7 +171,7 @@ class GameHost:
         return now
 
     def cues(self) -> tuple[str, ...]:
-        """Return the names of sounds since the last call; none during a seek or after a step back."""
+        """Return the names of cues since the last call; none during a seek or after a step back."""
         cues, game = tuple(self.rules.sounds()), self.live.session.game
         known, self._game = self._game is game, game
         return cues if known and self.live.busy is None else ()

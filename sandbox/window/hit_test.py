@@ -1,6 +1,6 @@
-"""Hit tests: the body at a point, and overlaps of bodies with static geometry and each other.
+"""Hit tests: the body at a point, and overlaps of bodies with static geometry and with each other.
 
-A body is a set of rounded convex hulls: the convex hull of some corners, widened by a radius.
+A body is a set of rounded convex hulls: the convex hull of its corners, expanded by a radius.
 """
 
 import math
@@ -23,10 +23,10 @@ Distance = Callable[[FloatArray, FloatArray], FloatArray]
 
 
 class Hull(NamedTuple):
-    """Convex hull of corners, widened by a radius; in m or px, clockwise or counter-clockwise."""
+    """Convex hull of corners, expanded by a radius; in m or px, clockwise or counter-clockwise."""
 
     corners: FloatArray
-    """(n, 2); one corner makes a disc, two make a capsule"""
+    """(n, 2); one corner is a disc, two are a capsule"""
     radius: float
 
 
@@ -65,7 +65,7 @@ def hull_distance(hull: Hull) -> Distance:
     def distance(px: FloatArray, py: FloatArray) -> FloatArray:
         signed = np.asarray(np.maximum.reduce([px * x + (py * y + offset) for x, y, offset in lines]))
         outside = signed > 0.0
-        if outside.any():  # near a corner the lines through the edges are nearer than the hull
+        if outside.any():  # near a corner, the distance to the edge lines is too small
             x, y = (np.broadcast_to(each, signed.shape)[outside] for each in (px, py))
             signed[outside] = np.minimum.reduce([edge(x, y) for edge in edges])
         return np.asarray(signed - radius)
@@ -88,7 +88,7 @@ def segment_distance(ends: Sequence[Sequence[float]]) -> Distance:
 
 
 def rounded_hull(hull: Hull, steps: int = 6) -> FloatArray:
-    """Return a polygon that approximates a rounded hull, (K, 2), with `steps` + 1 points around each corner."""
+    """Return a polygon that approximates a rounded hull, (K, 2), with `steps` + 1 points per corner."""
     corners, radius = hull
     if radius == 0.0:
         return corners
@@ -97,7 +97,7 @@ def rounded_hull(hull: Hull, steps: int = 6) -> FloatArray:
         return np.asarray(corners + radius * np.column_stack((np.cos(spots), np.sin(spots))))
     edge = np.roll(corners, -1, axis=0) - corners
     sign = 1.0 if _area(corners) >= 0.0 else -1.0
-    out = np.arctan2(-edge[:, 0] * sign, edge[:, 1] * sign)  # of each side's outward normal
+    out = np.arctan2(-edge[:, 0] * sign, edge[:, 1] * sign)  # direction of the outward normal of each side
     before = np.roll(out, 1)
     turn = np.mod((out - before) * sign, 2.0 * math.pi) * sign
     spots = before[:, None] + turn[:, None] * np.linspace(0.0, 1.0, steps + 1)
@@ -107,7 +107,7 @@ def rounded_hull(hull: Hull, steps: int = 6) -> FloatArray:
 def hull_area(hull: Hull) -> float:
     """Return the area of a hull."""
     corners, radius = hull
-    perimeter = float(np.hypot(*(np.roll(corners, -1, axis=0) - corners).T).sum())  # of a segment twice its length
+    perimeter = float(np.hypot(*(np.roll(corners, -1, axis=0) - corners).T).sum())  # of a segment, twice its length
     return abs(_area(corners)) / 2.0 + perimeter * radius + math.pi * radius**2
 
 
@@ -117,25 +117,25 @@ def _area(corners: FloatArray) -> float:
 
 
 def signed_distance(hulls: list[Hull], x: float, y: float) -> float:
-    """Return the signed distance of a point from the nearest of some hulls; inf without hulls."""
+    """Return the signed distance of a point from the nearest hull; inf without hulls."""
     point = np.asarray(x), np.asarray(y)
     return min((float(hull_distance(hull)(*point)) for hull in hulls), default=math.inf)
 
 
 def hulls_overlap(a: Hull, b: Hull, tolerance: float = 0.0) -> tuple[float, FloatArray]:
-    """Return the gap of two hulls, negative if they overlap, and the point of contact or closest approach, (2,).
+    """Return the gap between two hulls, negative if they overlap, and the point of contact or closest approach, (2,).
 
     Args:
         a: a hull.
         b: another.
-        tolerance: points whose gap exceeds the least by at most this count as closest too; their mean is returned.
+        tolerance: the mean is returned of all points whose gap exceeds the smallest one by at most this.
     """
     gaps, places = [], []
     for one, other in ((a, b), (b, a)):
         foot = _closest(one.corners, other.corners)
         away = one.corners - foot
         length = np.hypot(away[:, 0], away[:, 1])[:, None]
-        # The middle of the gap, or of the overlap, of the two surfaces.
+        # Midpoint of the gap, or of the overlap, between the two surfaces.
         offset = 0.5 * (length + other.radius - one.radius)
         places.append(foot + away / np.maximum(length, 1e-300) * offset)
         gaps.append(length[:, 0])
@@ -147,14 +147,14 @@ def hulls_overlap(a: Hull, b: Hull, tolerance: float = 0.0) -> tuple[float, Floa
 
 
 def _edges(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return starts and vectors of the edges, (n, 2) each; of one corner, an edge of length 0."""
+    """Return the start points and vectors of the edges, (n, 2) each; a single corner has an edge of length 0."""
     if len(corners) < 3:
         return corners[:1], corners[-1:] - corners[:1]
     return corners, np.roll(corners, -1, axis=0) - corners
 
 
 def _closest(points: FloatArray, corners: FloatArray) -> FloatArray:
-    """Return the point on the edges of a hull that is closest to each of some points, (K, 2)."""
+    """Return the point on the edges of a hull that is closest to each of the given points, (K, 2)."""
     start, along = _edges(corners)
     offset = points[:, None] - start[None]
     t = np.clip((offset * along).sum(-1) / np.maximum((along**2).sum(-1), 1e-300), 0.0, 1.0)
@@ -184,15 +184,15 @@ def _separation(a: FloatArray, b: FloatArray) -> float:
 
 
 def pick_body(bodies: Bodies, frame: Frame, point: tuple[float, float], reach: float = 0.0) -> int | None:
-    """Return the index of the body at a point, or of the nearest one within reach, or None.
+    """Return the index of the body at a point, else of the nearest one within reach; None if there is none.
 
-    Of several bodies at the point, the one with the least distance of its centre relative to its radius.
+    If several bodies contain the point, the one with the smallest ratio of centre distance to radius is chosen.
 
     Args:
         bodies: N of them.
         frame: their state.
         point: m.
-        reach: distance from the outline up to which a body is picked, m.
+        reach: distance from the outline up to which a body is selected, m.
     """
     count = min(len(bodies), len(frame.position))
     with np.errstate(all="ignore"):
@@ -210,7 +210,7 @@ def pick_body(bodies: Bodies, frame: Frame, point: tuple[float, float], reach: f
 
 
 def overlapping_bodies(scene: Scene, bodies: Bodies, frame: Frame) -> BoolArray:
-    """Return which bodies overlap a plane, wall, post or another body, (N,); bodies that only touch do not."""
+    """Return which bodies overlap a plane, wall, post or another body, (N,); touching does not count."""
     position, there = frame.position, frame.present
     count = min(len(position), len(bodies))
     radius, lone = bodies.radius[: len(position)], bodies.round[:count]
@@ -250,7 +250,7 @@ def overlapping_bodies(scene: Scene, bodies: Bodies, frame: Frame) -> BoolArray:
 
 
 def is_free(scene: Scene, bodies: Bodies, frame: Frame, hulls: list[Hull], layer: str) -> bool:
-    """Return whether nothing solid of a layer overlaps some hulls, m; touching is no overlap."""
+    """Return whether hulls, m, overlap nothing solid on a layer; touching does not count."""
     bit, layers = 1 << scene.layers.index(layer), scene.layers
     for plane in scene.planes:
         normal = np.asarray(plane.normal) / np.hypot(*plane.normal)
@@ -282,7 +282,7 @@ def is_free(scene: Scene, bodies: Bodies, frame: Frame, hulls: list[Hull], layer
 
 
 def _mark_overlaps(found: BoolArray, near: BoolArray, solids: dict[int, list[Hull]], fixed: Hull) -> None:
-    """Set the entries of the bodies near a static shape that overlap it."""
+    """Mark the bodies near a static shape that overlap it."""
     for number, hulls in solids.items():
         if near[number] and not found[number]:
             found[number] = any(hulls_overlap(hull, fixed)[0] < 0.0 for hull in hulls)

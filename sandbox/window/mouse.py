@@ -1,6 +1,7 @@
-"""Mouse controller: zoom, pan, pick and drag bodies, and cue gestures at a billiard table.
+"""Mouse controller: zoom, pan, selecting and dragging bodies, and cue gestures at a billiard table.
 
-A press only picks a body, so that it can be inspected; a drag starts when the mouse moves further than a click allows.
+A press only selects a body, so that it can be inspected; a drag starts once the mouse has moved farther than a click
+allows.
 """
 
 import math
@@ -14,24 +15,24 @@ from sandbox.window.context import WindowContext
 ZOOM_PER_NOTCH = 1.15
 """zoom factor of one notch of the wheel"""
 MAX_NOTCHES = 100.0
-"""notches of one wheel event that are used; fewer zoom from one limit to the other"""
+"""limit of the notches used per wheel event; fewer already zoom from one limit to the other"""
 PICK_TOLERANCE = 6.0
-"""px at unit 1 beside a body within which a press still picks it"""
+"""px at UI scale 1, distance beside a body within which a press still selects it"""
 CLICK_TOLERANCE = 4.0
-"""px at unit 1 that the mouse may move between press and release of a click"""
+"""px at UI scale 1 that the mouse may move between press and release of a click"""
 
 
 class MouseController:
-    """Handles the mouse events that no part of the GUI consumed."""
+    """Handles the mouse events that the GUI did not consume."""
 
     def __init__(self, context: WindowContext) -> None:
         self._context = context
         self._panning = False
-        self._pressed: tuple[int, int] | None = None  # px, of a press on a body that is not dragged yet
-        self._began: tuple[int, int] | None = None  # px, of the left button's press
+        self._pressed: tuple[int, int] | None = None  # px, press on a body that is not dragged yet
+        self._began: tuple[int, int] | None = None  # px, press of the left button
         self._drag: tuple[int, int] | None = None  # px, latest target of the dragged body
         self.position: tuple[int, int] | None = None
-        """px; None before the first event"""
+        """px; None before the first mouse event"""
 
     def handle_event(self, event: pygame.event.Event) -> None:
         """Handle an event."""
@@ -71,11 +72,11 @@ class MouseController:
         self._pressed = pixel if found else None
 
     def _use_cue(self, gesture: Callable[[CueControls], bool]) -> bool:
-        """Pass a gesture to the cue controls, if there are any; return whether they used or refused it."""
+        """Pass a gesture to the cue controls, if any; return whether they used or refused it."""
         cue = self._context.app_state.gestures
         if cue is None:
             return False
-        used = True  # also of a refused gesture, which adds a message
+        used = True  # stays True for a refused gesture, which adds a message
 
         def run() -> None:
             nonlocal used
@@ -113,7 +114,7 @@ class MouseController:
             self._drag = event.pos
 
     def _aim(self, before: tuple[int, int], now: tuple[int, int]) -> None:
-        """Pass a motion, from one pixel to another, to the cue controls."""
+        """Pass a mouse motion between two pixels to the cue controls."""
         camera, unit = self._context.camera, self._context.gui.ui_scale
         pixels = (now[0] - before[0]) / unit, (now[1] - before[1]) / unit
         fine = bool(pygame.key.get_mods() & pygame.KMOD_SHIFT)
@@ -126,7 +127,7 @@ class MouseController:
         self._use_cue(aim)
 
     def flush(self) -> None:
-        """Drag the held body to the latest position: one action, however many motion events there were."""
+        """Drag the held body to the latest mouse position: one action per frame, despite many motion events."""
         pixel, self._drag = self._drag, None
         app_state = self._context.app_state
         tools = app_state.body_tools
@@ -148,6 +149,6 @@ class MouseController:
             tools.drop()
 
     def world_position(self) -> tuple[float, float]:
-        """Return the position of the cursor, m; before its first event, the centre of the view."""
+        """Return the position of the pointer, m; before its first event, the centre of the view."""
         camera = self._context.camera
         return camera.centre if self.position is None else camera.to_world(self.position)

@@ -1,4 +1,4 @@
-"""View bounds: the box that the camera initially shows, of a scene before it runs or of a recorded run."""
+"""View bounds: the initial view box of a scene before it runs, or of a stored run."""
 
 import numpy as np
 
@@ -13,34 +13,34 @@ from sandbox.scene.scene import Scene
 from sandbox.window.camera import Box
 
 MAX_STEPS, MAX_BODY_STEPS = 12_000, 30_000
-"""Steps, and steps times moving bodies, of `predict_bounds`: about half a second on pymunk"""
+"""Limits of `predict_bounds`: steps, and steps times moving bodies; about half a second on pymunk."""
 FLIGHT_SAMPLES = 17
-"""Times at which positions in free flight are computed"""
+"""Number of times at which positions in free flight are evaluated."""
 MAX_ROLLING_TIME = 1.2
-"""s of free flight that is considered on a surface, where friction and collisions end it"""
+"""s of free flight considered on a surface, where friction and collisions end it"""
 SURFACE_MARGIN = 0.12
-"""Margin beside bodies on a surface, relative to the size of their box"""
+"""Margin around bodies on a surface, relative to the size of their box."""
 OUTLIER_PERCENT = 0.5
-"""of the positions at each side that are left out if there are more than `MANY`"""
+"""Percentage of positions ignored at each side if there are more than `MANY`."""
 MANY = 1000
 ANCHORED = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.GROOVE, LinkKind.SPRING)
-"""Joints that are anchored in a point"""
+"""Joints with anchor points."""
 MAX_VIEW = 1e15
-"""m: coordinates beyond it are ignored"""
+"""m; larger coordinates are ignored"""
 NEAR = 0.1
-"""Distance of static geometry from the bodies' box up to which it is shown, relative to the size of the box"""
+"""Largest distance of visible static geometry from the bodies' box, relative to the size of the box."""
 FAR = 20.0
-"""Static geometry and flights are considered up to this multiple of the size of the initial box"""
+"""Limit of static geometry and flights, as a multiple of the size of the initial box."""
 
 
 def view_bounds(scene: Scene, reach: Box | None = None) -> Box:
-    """Return the box with a scene's bodies, their free flights, and the static geometry near them, m.
+    """Return the box around the bodies of a scene, their free flights, and nearby static geometry, m.
 
-    For a table it is the box of the table. A view that the scene states takes precedence.
+    For a table it is the box of the table. An explicit view of the scene takes precedence.
 
     Args:
-        scene: to show.
-        reach: box of the positions that the bodies reach, m, by `predict_bounds` or from a recorded run.
+        scene: the scene.
+        reach: box of the positions that the bodies reach, m, from `predict_bounds` or a stored run.
     """
     if scene.play.view is not None:
         return scene.play.view
@@ -63,13 +63,13 @@ def view_bounds(scene: Scene, reach: Box | None = None) -> Box:
     near = NEAR * float((flown[1] - flown[0]).max())
     met = [each for each in met if (each[0] <= flown[1] + near).all() and (each[1] >= flown[0] - near).all()]
     low, high = _union([start, *met]) if met else flown
-    if scene.surface is not None:  # room to roll on
+    if scene.surface is not None:  # space for rolling
         low, high = low - SURFACE_MARGIN * (high - low).max(), high + SURFACE_MARGIN * (high - low).max()
-    if scene.play.arrows is not None:  # room to move it
+    if scene.play.arrows is not None:  # space for moving the body
         low, high = low - 2.0 * scene.play.arrow_step, high + 2.0 * scene.play.arrow_step
     if not (high - low).max() > 0.0:
         low, high = low - UNIT_BOX, high + UNIT_BOX
-    for plane in scene.planes:  # the closest point of its surface, if it is not far
+    for plane in scene.planes:  # the closest point of the plane, if it is not far
         normal = np.asarray(plane.normal) / np.hypot(*plane.normal)
         middle = (low + high) / 2.0
         foot = middle - ((middle - np.asarray(plane.point)) @ normal) * normal
@@ -79,11 +79,11 @@ def view_bounds(scene: Scene, reach: Box | None = None) -> Box:
 
 
 def predict_bounds(scene: Scene, engine: str, settings: Settings | None = None) -> Box | None:
-    """Return the box in which the moving bodies stay during a run without actions, by running the scene.
+    """Return the box that the moving bodies stay in during a run without actions, by simulating it.
 
-    Work is limited by counts, so that the result is the same on every machine: `MAX_STEPS` steps, and `MAX_BODY_STEPS`
-    steps times bodies. The run ends early at the scene's duration, or if the box exceeds `FAR` times the initial view.
-    None if nothing moves, the scene states its view, or the engine cannot run the scene.
+    Work is limited by counts, so that the result is machine-independent: `MAX_STEPS` steps and `MAX_BODY_STEPS` steps
+    times bodies. The run ends early at the duration of the scene, or if the box exceeds `FAR` times the initial view.
+    Returns None if nothing moves, the scene sets its view, or the engine cannot run the scene.
     """
     bodies, world, solver = scene.bodies, scene.world, scene.solver if settings is None else settings
     moving = np.flatnonzero(~bodies.fixed)
@@ -120,7 +120,7 @@ def predict_bounds(scene: Scene, engine: str, settings: Settings | None = None) 
 
 
 def should_rotate(scene: Scene, size: tuple[int, int]) -> bool:
-    """Return whether a scene is a table that a rotated camera shows larger in a picture of a size, px."""
+    """Return whether a scene is a table that appears larger, in a view of a size in px, with the camera rotated."""
     if scene.play.area is None or scene.planes:
         return False
     (left, bottom), (right, top) = scene.play.area
@@ -129,7 +129,7 @@ def should_rotate(scene: Scene, size: tuple[int, int]) -> bool:
 
 UNIT_BOX = np.ones(2)
 Corners = tuple[FloatArray, FloatArray]
-"""Lower left and upper right, (2,) m each."""
+"""Lower left and upper right corner, (2,) m each."""
 
 
 def _union(boxes: list[Corners]) -> Corners:
@@ -137,7 +137,7 @@ def _union(boxes: list[Corners]) -> Corners:
 
 
 def bounding_box(position: FloatArray, radius: FloatArray) -> Corners | None:
-    """Return the box around circles at (M, 2) m; of more than `MANY`, without outliers; None without circles."""
+    """Return the box around circles at (M, 2) m, of more than `MANY` without outliers; None without circles."""
     counts = (np.abs(position) < MAX_VIEW).all(axis=1)
     position, radius = position[counts], radius[counts]
     if not len(position):
@@ -187,9 +187,9 @@ def _orbits(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
         with np.errstate(all="ignore"):
             away = np.hypot(*offset.T)
             size = max(size, float(away.max(initial=0.0)))
-            bound = each.strength / away - 0.5 * (motion * motion).sum(axis=1)  # J/kg short of escaping
+            bound = each.strength / away - 0.5 * (motion * motion).sum(axis=1)  # binding energy, J/kg
             spin = offset[:, 0] * motion[:, 1] - offset[:, 1] * motion[:, 0]
-            oval = np.maximum(1.0 - 2.0 * bound * (spin / each.strength) ** 2, 0.0)  # eccentricity squared
+            oval = np.maximum(1.0 - 2.0 * bound * (spin / each.strength) ** 2, 0.0)  # squared eccentricity
             farthest = np.where(bound > 0.0, 0.5 * each.strength / bound * (1.0 + np.sqrt(oval)), np.nan)
         farthest = farthest[~bodies.fixed & (farthest <= FAR * size)]
         if len(farthest):
@@ -199,7 +199,7 @@ def _orbits(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
 
 
 def _falls(scene: Scene, bodies: Bodies, position: FloatArray) -> BoolArray:
-    """Return which positions (T, M, 2) are below all static geometry, on which the body would have landed, (T, M)."""
+    """Return which positions (T, M, 2) are below all static geometry, where the body would have landed, (T, M)."""
     gravity = np.asarray(scene.world.gravity)
     fixed = [*_things(scene), *_solids(bodies)]
     if not fixed or not gravity.any():
@@ -212,7 +212,7 @@ def _falls(scene: Scene, bodies: Bodies, position: FloatArray) -> BoolArray:
 
 
 def _solids(bodies: Bodies) -> list[FloatArray]:
-    """Return the corners (P, 2), m, of each piece of the static bodies other than balls."""
+    """Return corners (P, 2), m, of each piece of the static bodies other than discs."""
     shapes, found = bodies.shapes, []
     for piece in np.flatnonzero((bodies.fixed & ~bodies.round)[shapes.body]).tolist():
         body, radius = int(shapes.body[piece]), float(shapes.radius[piece])
@@ -225,7 +225,7 @@ def _solids(bodies: Bodies) -> list[FloatArray]:
 
 
 def _tethered(scene: Scene, bodies: Bodies) -> BoolArray:
-    """Return which bodies are static or connected by joints to the world or a static body, (N,)."""
+    """Return which bodies are static or connected by joints to the world or to a static body, (N,)."""
     links, found = scene.links.of(*ANCHORED), bodies.fixed.copy()
     found[links.b[links.a < 0]] = True
     a, b = links.a[links.a >= 0], links.b[links.a >= 0]
@@ -237,7 +237,7 @@ def _tethered(scene: Scene, bodies: Bodies) -> BoolArray:
 
 
 def _swings(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
-    """Return the box of world anchors, and of the swings of bodies that hang from them by rods and strings."""
+    """Return the box of world anchors, and of the swings of bodies suspended from them by rods and strings."""
     links = scene.links
     if not len(links):
         return []
@@ -258,7 +258,7 @@ def _swings(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
 
 
 def _things(scene: Scene) -> list[FloatArray]:
-    """Return two or more corners (P, 2), m, of each wall and post."""
+    """Return the bounding corners (P, 2), m, of each wall and post."""
     found = []
     for wall in scene.walls:
         points, half = np.asarray(wall.points), wall.thickness / 2.0
@@ -269,14 +269,14 @@ def _things(scene: Scene) -> list[FloatArray]:
 
 
 STRAY_FRACTION = 3.0
-"""Distance from the central 80 % of positions, relative to their size, up to which a body is shown"""
+"""Distance from the central 80 % of positions up to which a body is shown, relative to their extent."""
 
 
 def crowd_bounds(position: FloatArray, radius: FloatArray, anchors: FloatArray) -> Box:
-    """Return the box of the positions in a run without bodies far from the others, m.
+    """Return the box of the positions in a run, m, without bodies far from the others.
 
     Args:
-        position: (T, N, 2) m; positions that are not finite are ignored.
+        position: (T, N, 2) m; non-finite positions are ignored.
         radius: (N,) m
         anchors: (K, 2) m, points of static geometry, included if they are not far.
     """
@@ -287,7 +287,7 @@ def crowd_bounds(position: FloatArray, radius: FloatArray, anchors: FloatArray) 
         return (-1.0, -1.0), (1.0, 1.0)
     corners = np.concatenate((lower, upper)) if len(lower) else anchors
     middle = np.percentile(corners, (10.0, 90.0), axis=0)
-    with np.errstate(over="ignore"):  # of a run that diverged
+    with np.errstate(over="ignore"):  # in a diverged run
         reach = STRAY_FRACTION * max(float((middle[1] - middle[0]).max()), 1e-9)
     both = np.concatenate((corners, anchors))
     kept = both[((both >= middle[0] - reach) & (both <= middle[1] + reach)).all(axis=1)]
@@ -298,7 +298,7 @@ def crowd_bounds(position: FloatArray, radius: FloatArray, anchors: FloatArray) 
 
 
 def anchor_points(scene: Scene) -> FloatArray:
-    """Return points of static geometry, (K, 2) m: ends of walls, boxes of posts, world anchors of joints; no planes."""
+    """Return points of static geometry, (K, 2) m: wall ends, boxes of posts, world anchors of joints; no planes."""
     places = [point for wall in scene.walls for point in wall.points]
     for post in scene.posts:
         (x, y), r = post.position, post.radius

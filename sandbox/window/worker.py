@@ -74,7 +74,7 @@ class Worker:
 
     @property
     def is_busy(self) -> bool:
-        """Whether a job is running, as after its owner was interrupted while waiting."""
+        """Whether a job is still running, for example after the waiting owner was interrupted."""
         return not self._done.is_set()
 
     def note_compiling(self, _: str) -> None:

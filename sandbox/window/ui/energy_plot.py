@@ -1,4 +1,4 @@
-"""Energy graph: kinetic, potential and total energy over the last seconds, of a session or of a stored run."""
+"""Energy graph: kinetic, potential and total energy over the last seconds of a session or of a stored run."""
 
 import math
 from collections.abc import Sequence
@@ -16,11 +16,11 @@ from sandbox.window.render.palette import FAINT, INK, LINE, PURPLE, SKY, Colour
 from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size
 
 TIME_SPAN = 10.0
-"""s of simulated time that are shown"""
+"""s of simulated time that are plotted"""
 MAX_SAMPLES = 4096
-"""with more, every other sample is dropped"""
+"""number of samples above which every other one is dropped"""
 MIN_SCALE_USE = 0.4
-"""the scale shrinks when the curves need less than this fraction of it"""
+"""fraction of the axis range that the curves must use; below it the range shrinks"""
 
 CURVES: tuple[tuple[str, Colour], ...] = (("kinetic", SKY), ("potential", PURPLE), ("total", INK))
 
@@ -29,14 +29,14 @@ Limits = tuple[float, float]
 
 
 class EnergyGraph:
-    """A small chart of the last samples. A sample at an earlier time removes those after it."""
+    """Chart of the latest samples. Adding a sample at an earlier time removes those after it."""
 
     def __init__(self, span: float = TIME_SPAN) -> None:
         self.span = span
         self.samples: list[Sample] = []
         """(time s, kinetic, potential, total J), oldest first"""
         self.limits: Limits = (0.0, 1.0)
-        """lower and upper end of the scale, J"""
+        """axis limits, J"""
 
     def clear(self) -> None:
         """Remove all samples."""
@@ -44,10 +44,10 @@ class EnergyGraph:
         self.limits = (0.0, 1.0)
 
     def add(self, time: float, kinetic: float, potential: float, total: float) -> None:
-        """Add a sample; an energy that is not finite leaves a gap.
+        """Add a sample; a non-finite energy leaves a gap in its curve.
 
         Args:
-            time: s; a sample at the same time is replaced; a time that is not finite is ignored.
+            time: s; a sample at the same time is replaced, a non-finite time is ignored.
             kinetic: J.
             potential: J.
             total: J.
@@ -68,11 +68,11 @@ class EnergyGraph:
         return [sample for sample in self.samples if sample[0] >= oldest]
 
     def fit_limits(self, samples: Sequence[Sample]) -> Limits:
-        """Return limits that include all curves and zero; the present limits if they fit closely enough."""
+        """Return axis limits that include all curves and zero; the present limits if they fit closely enough."""
         values = np.asarray(samples, np.float64).reshape(-1, 4)[:, 1:]
         values = values[np.isfinite(values)]
         low, high = float(values.min(initial=0.0)), float(values.max(initial=0.0))
-        need = high / 2 - low / 2  # halves, as the difference of two floats may overflow
+        need = high / 2 - low / 2  # halved, as the difference of two floats may overflow
         if not 0 < need < 1e307:
             return self.limits if need == 0 else (-1e308, 1e308)
         bottom, top = self.limits
@@ -82,7 +82,7 @@ class EnergyGraph:
         return (math.floor(low / grain - 0.05) * grain if low < 0 else 0.0), math.ceil(high / grain + 0.05) * grain
 
     def draw(self, surface: pygame.Surface, rect: pygame.Rect, ui_scale: float = 1.0) -> None:
-        """Draw the chart in a rectangle; without labels in a small one."""
+        """Draw the chart in a rectangle; a small chart has no labels."""
         size = 11.5 * ui_scale
         pad = round(0.8 * size)
         draw_box(surface, rect, 6 * ui_scale)
@@ -108,7 +108,7 @@ class EnergyGraph:
             self._draw_labels(surface, chart, rect.right - pad - label_width, samples, size)
 
     def _draw_frame(self, surface: pygame.Surface, chart: pygame.Rect, ui_scale: float) -> None:
-        """Draw grid lines at the limits and the middle, and a stronger one at zero."""
+        """Draw grid lines at the limits and the quarters, and an emphasised one at zero."""
         bottom, top = self.limits
         thin = max(round(ui_scale), 1)
         for fraction in (0.0, 0.25, 0.5, 0.75, 1.0):
@@ -133,7 +133,7 @@ class EnergyGraph:
         first, last = samples[0][0], samples[-1][0]
         across = (chart.left + (kept[:, 0] - first) / (last - first) * chart.width).tolist()
         bottom, top = self.limits
-        with np.errstate(all="ignore"):  # values that are not finite are left out below
+        with np.errstate(all="ignore"):  # non-finite values are skipped below
             fractions = np.clip((kept[:, 1:] / 2 - bottom / 2) / (top / 2 - bottom / 2), 0.0, 1.0)
         finite = np.isfinite(kept[:, 1:])
         heights = (chart.bottom - fractions * chart.height).tolist()
@@ -148,7 +148,7 @@ class EnergyGraph:
     def _draw_labels(
         self, surface: pygame.Surface, chart: pygame.Rect, left: int, samples: Sequence[Sample], size: float
     ) -> None:
-        """Draw the name and value of each curve beside its end, and the spans of the axes."""
+        """Draw the name and value of each curve next to its end, and the axis ranges."""
         small = 0.9 * size
         bottom, top = self.limits
         draw_text(surface, format_si(top, "J"), (chart.right, chart.top - 0.1 * size), small, FAINT, "bottomright")
@@ -179,15 +179,15 @@ def _draw_curve_piece(
 
 
 def _round_up(value: float) -> float:
-    """Return the smallest of 1, 2, 2.5, 5 times a power of ten that is at least a positive value."""
+    """Return the smallest of 1, 2, 2.5, 5 times a power of ten that is at least `value`, which must be positive."""
     power = 10.0 ** math.floor(math.log10(value))
-    if not power > 0:  # a subnormal value's power of ten may be 0
+    if not power > 0:  # underflow for subnormal values
         return value
     return next((part * power for part in (1.0, 2.0, 2.5, 5.0) if part * power >= value), 10.0 * power)
 
 
 def spread_labels(wanted: Sequence[float], gap: float, low: float, high: float) -> tuple[float, ...]:
-    """Return positions near those wanted, in the same order, a gap apart and within bounds if there is room."""
+    """Return positions close to those wanted, in the same order, at least `gap` apart and within bounds if possible."""
     order = sorted(range(len(wanted)), key=lambda k: wanted[k])
     placed: list[float] = []
     for k in order:
@@ -203,7 +203,7 @@ def spread_labels(wanted: Sequence[float], gap: float, low: float, high: float) 
 
 
 MAX_DRAWN_SAMPLES = 500
-"""for the time span that is shown"""
+"""number of samples in the plotted time span"""
 WIDTH, HEIGHT, MARGIN = 330.0, 130.0, 12.0
 """px at UI scale 1"""
 
@@ -223,7 +223,7 @@ class RunGraph:
         """Draw the energies of the last seconds before a time, s, in the lower right corner."""
         first, last = np.searchsorted(self._run.time, (time - TIME_SPAN, time), side="right")
         stride = max(1, round(TIME_SPAN / MAX_DRAWN_SAMPLES / _step(self._run)))
-        first = -(-first // stride) * stride  # always the same frames, so that the curves do not jitter
+        first = -(-first // stride) * stride  # a fixed grid of frames, so that the curves do not jitter
         self._graph.samples.clear()
         for row in [*range(first, last - 1, stride), last - 1]:
             self._graph.add(float(self._run.time[row]), *(float(each[row]) for each in self._energies))

@@ -38,17 +38,17 @@ GRAPH_SIZE = (300, 130)
 
 
 class Gui:
-    """The scene's picture, the widgets around it, and the overlays that are switched on."""
+    """Scene view, surrounding widgets, and the set of enabled overlays."""
 
     def __init__(self, size: tuple[int, int], ui_scale: float) -> None:
         self.ui_scale = ui_scale
         self.overlays: set[str] = {"shapes"}
-        """of `OVERLAYS`"""
+        """enabled ones of `OVERLAYS`"""
         self.antialias = True
         self.panel = SidePanel(size, ui_scale)
         self.help = HelpOverlay()
         self.scene_browser: SceneBrowser | None = None
-        """None while it is closed"""
+        """None while closed"""
         self.billiards_hud = BilliardsHud()
         self._high_scores = HighScoreDialog()
         self._timeline = Timeline()
@@ -57,13 +57,13 @@ class Gui:
         self._sounds = Sounds()
         self._parameters = SessionParameters()
         self._size = size
-        self._announces_keys = False  # the keys of a new scene have still to be announced
-        self._score: tuple[object, ScoreLayout] | None = None  # the arguments of the last layout, and the layout
-        self._panel_inputs: tuple[object, ...] = ()  # everything that the panel shows, as it was last shown
-        self._heard: object = None  # the contacts that were last turned into sound
+        self._announces_keys = False  # whether the keys of a new scene are still to be announced
+        self._score: tuple[object, ScoreLayout] | None = None  # arguments of the last layout, and the layout
+        self._panel_inputs: tuple[object, ...] = ()  # values shown by the panel at its last update
+        self._heard: object = None  # contacts that were last passed to the sounds
         self.bodies_out_of_view = False
-        """whether all moving bodies are outside the picture"""
-        self._faults = pygame.Rect(0, 0, 0, 0)  # the box that lists the faults of the scene file
+        """whether all moving bodies are outside the view"""
+        self._faults = pygame.Rect(0, 0, 0, 0)  # box with the faults of the scene file
         self._plates: dict[str, pygame.Rect] = {}
 
     def on_scene_changed(self, same: bool) -> None:
@@ -77,7 +77,7 @@ class Gui:
             self._announces_keys = True
 
     def announce_keys(self, stage: AppState) -> None:
-        """Post messages that name the keys of the scene."""
+        """Add messages that list the keys of the scene."""
         help_lines = stage.key_bindings.help_rows
         if stage.game is not None:
             stage.messages.add("aim with the mouse, shoot with Space; H lists all keys")
@@ -88,7 +88,7 @@ class Gui:
                 stage.messages.add(f"{keys}: {about}")
 
     def resize(self, size: tuple[int, int]) -> None:
-        """Fit all widgets to a window of another size, px."""
+        """Lay out all widgets for a window of another size, px."""
         self._size = size
         self._panel_inputs = ()
         self.panel.resize(size, self.ui_scale)
@@ -100,7 +100,7 @@ class Gui:
 
     @property
     def area(self) -> pygame.Rect:
-        """The part of the window that neither the panel nor the timeline covers, px."""
+        """Area of the window not covered by the panel or the timeline, px."""
         return pygame.Rect(0, 0, self._size[0] - self.panel.width, self._size[1] - self.bottom_margin)
 
     @property
@@ -110,13 +110,13 @@ class Gui:
 
     @property
     def plates(self) -> dict[str, pygame.Rect]:
-        """The rectangles of the plates as they were last drawn, px."""
+        """Rectangles of the plates as last drawn, px, by name."""
         return {name: rect for name, rect in self._plates.items() if rect.width and rect.height}
 
     def permanent_plates(self, stage: AppState) -> list[pygame.Rect]:
-        """Return the rectangles of the plates that stay while the scene is open, px; messages are left out.
+        """Return the rectangles of the plates that are always shown for the open scene, px; messages are excluded.
 
-        The status plate is measured with its line for the pause, so that pausing moves nothing.
+        The status plate is measured with its pause line, so that pausing does not move anything.
         """
         show, area = stage.view, self.area
         if show is None:
@@ -131,13 +131,13 @@ class Gui:
         return found
 
     def score_margins(self, stage: AppState) -> tuple[int, int]:
-        """Return the heights that the score panel takes at the top and at the bottom of the area, px."""
+        """Return the heights of the score panel at the top and at the bottom of the area, px."""
         if stage.host is None or stage.gestures is not None or stage.view is None:
             return 0, 0
         return self._layout_score(stage.host.shown().board, stage.view).margins(self.area)
 
     def _layout_score(self, display: ScoreDisplay, show: LiveView | RecordedView) -> ScoreLayout:
-        """Return the layout of the score panel; it is computed again only if something in it changes."""
+        """Return the layout of the score panel, cached for the last arguments."""
         arguments = display, self.area, self._hud_width(show), self.ui_scale
         if self._score is None or self._score[0] != arguments:
             self._score = arguments, layout_score(*arguments)
@@ -162,14 +162,14 @@ class Gui:
         self.help.open = not self.help.open
 
     def toggle_sound(self) -> tuple[str, str]:
-        """Turn sound on or off; return the text and the level of the message about it."""
+        """Switch sound on or off; return the text and the level of a message about it."""
         if self._sounds.enabled:
             self._sounds.disable()
             return "sound off", "info"
         return ("sound on", "info") if self._sounds.enable() else (self._sounds.why, "warning")
 
     def handle_event(self, event: pygame.event.Event, stage: AppState) -> bool:
-        """Let the topmost widget process an event; return whether it was consumed.
+        """Pass an event to the topmost widget; return whether it was consumed.
 
         Events that end a drag are never consumed, as they also end drags elsewhere.
         """
@@ -203,7 +203,7 @@ class Gui:
         return False
 
     def _browse(self, browser: SceneBrowser, event: pygame.event.Event, stage: AppState) -> None:
-        """Pass an event to the scene browser, and open the scene that was chosen."""
+        """Pass an event to the scene browser, and open a chosen scene."""
         path = browser.handle_event(event)
         unsaved = stage.count_unsaved()
         if path is not None and unsaved and browser.confirmed != path:
@@ -232,7 +232,7 @@ class Gui:
             camera: its camera.
             stage: the application state.
             frame_rate: frames per second.
-            recording: length and format of the film that is being recorded.
+            recording: length and format of the film being recorded, if any.
         """
         show = stage.view
         if self.scene_browser is not None:
@@ -290,7 +290,7 @@ class Gui:
         display: GameDisplay | None,
         plates: dict[str, pygame.Rect],
     ) -> None:
-        """Draw the scene, and the inset of a game that has one."""
+        """Draw the scene and its inset, if any."""
         pull = stage.body_tools.spring_line(show) if isinstance(show, LiveView) else None
         snapshot = show.snapshot(frozenset(self.overlays), stage.body_tools.picked, pull)
         if stage.gestures is not None:
@@ -315,7 +315,7 @@ class Gui:
             plates["inset"] = inset
 
     def _play_sounds(self, stage: AppState, show: LiveView | RecordedView) -> None:
-        """Play the sounds of new contacts and of the game's events."""
+        """Play the sounds of new contacts and of game events."""
         if show.contacts is not self._heard:
             self._heard = show.contacts
             if self._sounds.enabled:
@@ -324,7 +324,7 @@ class Gui:
             self._sounds.cue(cue)
 
     def describe_out_of_view(self, stage: AppState) -> str | None:
-        """Return the notice to show while all moving bodies are outside the picture; None otherwise."""
+        """Return the notice for a view without moving bodies; None if any is visible."""
         show = stage.view
         if show is None or not self.bodies_out_of_view:
             return None
@@ -343,7 +343,7 @@ class Gui:
         display: GameDisplay | None,
         plates: dict[str, pygame.Rect],
     ) -> None:
-        """Draw the score panel, or the controls of a billiards table."""
+        """Draw the score panel, or the controls of a billiard table."""
         if stage.gestures is not None:
             left = self._hud_width(show)
             self.billiards_hud.draw(surface, stage.gestures.person, self.area, left, self.ui_scale)
@@ -356,7 +356,7 @@ class Gui:
                 stage.messages.add(note, "warning")
 
     def draw_wait(self, surface: pygame.Surface, text: str) -> None:
-        """Draw a notice over the picture while the window waits; the surface may be locked by what was being drawn."""
+        """Draw a progress notice in the centre of the surface, which may be locked by an interrupted drawing call."""
         size = 15 * self.ui_scale
         width, height = text_size(text, size)
         note = pygame.Surface((round(width + 3 * size), round(height + 2 * size)), 0, surface)
@@ -368,14 +368,14 @@ class Gui:
         if not surface.get_locked():
             surface.blit(note, place)
             return
-        # A locked surface cannot be blitted to, but its pixels can be written.
+        # A locked surface does not accept blits, but its pixels can be written.
         seen = place.clip(surface.get_rect())
         area = seen.move(-place.x, -place.y)
         pixels = pygame.surfarray.array3d(note)[area.left : area.right, area.top : area.bottom]
         pygame.surfarray.pixels3d(surface)[seen.left : seen.right, seen.top : seen.bottom] = pixels
 
     def _draw_graph(self, surface: pygame.Surface, stage: AppState, plates: dict[str, pygame.Rect]) -> None:
-        """Draw the energy graph at the lower right, above other plates; smaller if there is no room."""
+        """Draw the energy graph at the lower right, above other plates; smaller if there is little space."""
         show = stage.view
         if show is None or "energy" not in self.overlays:
             return
@@ -395,7 +395,7 @@ class Gui:
                     return
 
     def _update_panel(self, stage: AppState, recording: bool) -> None:
-        """Show the present values in the panel, if any of them has changed or a widget has been used."""
+        """Update the panel if any value that it shows has changed or a widget has been used."""
         live, game = stage.live, stage.game
         toggles = {name: name in self.overlays for name in OVERLAYS}
         if live is not None:

@@ -1,4 +1,4 @@
-"""Help overlay: lists the keys of the scene, all other keys, and the mouse."""
+"""Help overlay: lists the keys of the scene, all other keys, and mouse actions."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from sandbox.window.render.palette import BACKGROUND, FAINT, INK, LINE, ORANGE, 
 from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size
 
 TEXT_SIZES = (14.0, 13.0, 12.0, 11.0, 10.0, 9.0)
-"""px at UI scale 1: the largest at which everything fits; the smallest can be scrolled"""
+"""px at UI scale 1: the largest size at which everything fits is used; at the smallest, the page can be scrolled"""
 
 TITLE_HEIGHT = 3.7
 """in text heights"""
@@ -32,15 +32,15 @@ RESERVED_KEYS = ("P", "O", "F1", "Esc")
 
 
 class HelpGroup(NamedTuple):
-    """Keys under one heading."""
+    """Keys under a common heading."""
 
     title: str
     lines: tuple[tuple[str, str], ...]
-    """keys and their function"""
+    """(keys, action)"""
 
 
 def help_groups(scene_keys: Sequence[tuple[str, str]] = ()) -> tuple[HelpGroup, ...]:
-    """Return all groups: the keys of the scene, all other bindings, the mouse."""
+    """Return all groups: keys of the scene, other bindings, mouse."""
     titles = dict.fromkeys(binding.group for binding in BINDINGS)
     taken = {name for label, _ in scene_keys for name in _key_names(label)}
     own = tuple(
@@ -52,31 +52,31 @@ def help_groups(scene_keys: Sequence[tuple[str, str]] = ()) -> tuple[HelpGroup, 
 
 
 def _key_names(label: str) -> list[str]:
-    """Return the keys that a label names; `S (hold)` names S."""
+    """Return the keys in a label; `S (hold)` gives S."""
     return [name.split(" (")[0].strip() for name in label.split(" or ")]
 
 
 def _binding_line(binding: Binding, taken: set[str]) -> tuple[str, str]:
-    """Return the line of a binding without the keys that the scene uses; in parentheses if none is left."""
+    """Return the line of a binding without keys that the scene binds; in parentheses if none remains."""
     keys = [name for name in _key_names(binding.label) if name in RESERVED_KEYS or name not in taken]
     return (" or ".join(keys), binding.about) if keys else (binding.label, f"({binding.about})")
 
 
 class HelpOverlay:
-    """The help overlay."""
+    """Overlay with the list of keys."""
 
     def __init__(self) -> None:
         self.open = False
         self._scroll = 0.0
 
     def handle_event(self, event: pygame.event.Event) -> bool:
-        """Close at any key or click, scroll by the wheel; return whether the event was consumed."""
+        """Close on any key or click, scroll with the wheel; return whether the event was consumed."""
         if not self.open:
             return False
         if event.type == pygame.MOUSEWHEEL:
             self._scroll -= 3 * event.y
             return True
-        if event.type == pygame.MOUSEBUTTONDOWN and event.button > 3:  # the wheel again
+        if event.type == pygame.MOUSEBUTTONDOWN and event.button > 3:  # wheel events as buttons
             return True
         if event.type in (pygame.KEYDOWN, pygame.MOUSEBUTTONDOWN):
             self.open, self._scroll = False, 0.0
@@ -84,7 +84,7 @@ class HelpOverlay:
         return False
 
     def draw(self, surface: pygame.Surface, ui_scale: float, scene_keys: Sequence[tuple[str, str]] = ()) -> None:
-        """Draw the overlay over the whole window, whether it is open or not."""
+        """Draw the overlay over the whole window, regardless of `open`."""
         draw_box(surface, surface.get_rect(), 0, BACKGROUND, 236, None)
         groups = help_groups(scene_keys)
         margin = round(min(28 * ui_scale, 0.04 * min(surface.get_size())))
@@ -100,7 +100,7 @@ Column = list[HelpGroup]
 
 
 def _group_widths(group: HelpGroup, size: float) -> tuple[int, int]:
-    """Return the widths of the keys of a group and of the text beside them, px."""
+    """Return the widths of the keys and of the descriptions of a group, px."""
     keys = max(text_size(keys, 0.92 * size, mono=True)[0] for keys, _ in group.lines)
     words = max(text_size(words, size)[0] for _, words in group.lines)
     return keys + round(1.0 * size), words
@@ -116,7 +116,7 @@ def _column_widths(column: Column, size: float) -> tuple[int, int]:
 
 
 def _fit_columns(groups: Sequence[HelpGroup], area: pygame.Rect, ui_scale: float) -> tuple[float, list[Column]]:
-    """Return the largest text size at which all groups fit, px, and the columns; at the smallest they may be longer."""
+    """Return the largest text size at which all groups fit, px, and the columns; at the smallest they may overflow."""
     for size in TEXT_SIZES:
         columns = _fill_columns(groups, area, size * ui_scale)
         if columns is not None:
@@ -150,7 +150,7 @@ def _fill_columns(groups: Sequence[HelpGroup], area: pygame.Rect, size: float) -
 def _balance_columns(
     groups: Sequence[HelpGroup], area: pygame.Rect, size: float, columns: list[Column]
 ) -> list[Column]:
-    """Return the same number of columns with their heights as equal as possible."""
+    """Return the same number of columns with heights as equal as possible."""
     for percent in range(40, 100, 4):
         lower = pygame.Rect(area.left, area.top, area.width, area.height * percent // 100)
         found = _fill_columns(groups, lower, size)
@@ -191,6 +191,6 @@ def _draw_group(
         cap.midleft = round(left), round(y)
         draw_box(surface, cap, 0.3 * size, PANEL_RAISED, 255, LINE)
         draw_text(surface, label, cap.center, 0.92 * size, INK, "center", mono=True)
-        shade = FAINT if about.startswith("(") else INK  # the scene uses the key
+        shade = FAINT if about.startswith("(") else INK  # bound by the scene
         draw_text(surface, about, (left + keys + 1.2 * size, y), size, shade, "midleft")
         y += LINE_STEP * size

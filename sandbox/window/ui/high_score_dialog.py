@@ -1,4 +1,4 @@
-"""High-score dialog: at the end of a game with a score among the ten best it asks for initials and lists the scores."""
+"""High-score dialog: asks for initials after a game with a score among the ten best, and lists the scores."""
 
 from dataclasses import dataclass
 
@@ -12,13 +12,13 @@ from sandbox.window.render.text import draw_box, draw_text, text_size
 TEXT_SIZE = 15.0
 """px at UI scale 1"""
 MIN_DELAY_S = 0.8
-"""s after the end of the game in which keys are ignored: the player may still be pressing keys of the game"""
+"""s after the end of the game during which keys are ignored, as the player may still be pressing keys of the game"""
 ENTER_KEYS = (pygame.K_RETURN, pygame.K_KP_ENTER)
 
 
 @dataclass
 class HighScoreEntry:
-    """A score among the ten best, and the initials that are being typed for it."""
+    """A score among the ten best, and the initials typed for it."""
 
     scores: HighScores
     table: str
@@ -26,10 +26,10 @@ class HighScoreEntry:
     rank: int
     """1 is the best"""
     others: tuple[Entry, ...] = ()
-    """the scores in the file before this one is entered"""
+    """scores in the file before this one is saved"""
     letters: str = ""
     saved: tuple[Entry, ...] | None = None
-    """the scores in the file after this one was entered; None before"""
+    """scores in the file after this one was saved; None before"""
 
     def type(self, text: str) -> None:
         """Append a letter; any other text is ignored."""
@@ -42,17 +42,17 @@ class HighScoreEntry:
         self.letters = self.letters[:-1]
 
     def save(self) -> None:
-        """Enter the score into the file.
+        """Save the score to the file.
 
         Raises:
             OSError: the file cannot be read or written.
-            ValueError: the file has been damaged since the dialog opened.
+            ValueError: the file has become invalid since the dialog opened.
         """
         self.scores.enter(self.table, self.letters, self.score)
         self.saved = self.scores.of(self.table)
 
     def rows(self) -> tuple[Entry, ...]:
-        """Return the ten best, including this one. The file is not read."""
+        """Return the ten best scores including this one, without reading the file."""
         if self.saved is not None:
             return self.saved
         own = Entry(self.letters.ljust(LETTERS, "_"), self.score)
@@ -60,17 +60,17 @@ class HighScoreEntry:
 
 
 class HighScoreDialog:
-    """Opens once at the end of a game that was played by hand, and takes the keys that type text while it is open."""
+    """Dialog that opens once after a game with player input, and consumes text input while it is open."""
 
     def __init__(self) -> None:
         self.entry: HighScoreEntry | None = None
-        """None while the dialog is closed"""
-        self._ended: GameHost | None = None  # the game whose end has been handled
+        """None while closed"""
+        self._ended: GameHost | None = None  # game whose end has been handled
         self._opened_at = 0  # ms
         self._notes: list[str] = []
 
     def update(self, host: GameHost | None) -> list[str]:
-        """Open the dialog if the game has just ended with a score among the best; return the messages to show."""
+        """Open the dialog if the game has just ended with a score among the best; return messages to show."""
         if host is None or host.rules.game_over is None:
             self._ended, self.entry = None, None
         elif host is not self._ended:
@@ -105,7 +105,7 @@ class HighScoreDialog:
         if pygame.time.get_ticks() - self._opened_at < 1000 * MIN_DELAY_S:
             return True
         if event.key in ENTER_KEYS:
-            if entry.letters:  # Enter may be a key of the game that is still being pressed
+            if entry.letters:  # Enter may be a game key that is still being pressed
                 self._save(entry)
         elif event.key == pygame.K_ESCAPE:
             self.entry = None
@@ -118,7 +118,7 @@ class HighScoreDialog:
         return True
 
     def _save(self, entry: HighScoreEntry) -> None:
-        """Save the entry; close the dialog with a message if that fails."""
+        """Save the entry; on failure close the dialog and add a message."""
         try:
             entry.save()
         except (OSError, ValueError) as error:
@@ -126,7 +126,7 @@ class HighScoreDialog:
             self.entry = None
 
     def draw(self, surface: pygame.Surface, area: pygame.Rect, ui_scale: float) -> None:
-        """Draw the dialog in the middle of an area, px."""
+        """Draw the dialog in the centre of an area, px."""
         entry = self.entry
         if entry is None:
             return

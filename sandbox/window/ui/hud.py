@@ -1,4 +1,4 @@
-"""Head-up display: status lines, messages, figures of the selected body, and faults of the scene file."""
+"""Head-up display: status lines, messages, values of the selected body, and faults of the scene file."""
 
 import math
 from collections.abc import Sequence
@@ -13,43 +13,43 @@ from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size,
 from sandbox.window.ui.icons import draw_disc
 
 MAX_SPEED_ERROR = 0.10
-"""largest relative difference of real and requested speed that is not shown"""
+"""relative difference between real and requested speed above which both are shown"""
 MAX_SHOWN_MESSAGES = 4
-"""the newest ones"""
+"""number of the newest messages that are shown"""
 FULL_SIZE_AREA = 460, 320
-"""px at UI scale 1; text is smaller in a smaller area"""
+"""px at UI scale 1, area below which text is scaled down"""
 MIN_TEXT_SIZE = 9.0
-"""px, smallest legible text"""
+"""px, smallest legible text size"""
 
 MAX_STATUS_HEIGHT_FRACTION = 0.4
-"""largest fraction of the area's height that the status plate takes"""
+"""largest height of the status plate as a fraction of the area"""
 MIN_MESSAGE_WIDTH = 14.0
-"""in text heights; a message that would be narrower beside another plate goes above it"""
+"""in text heights, width below which a message is placed above another plate rather than beside it"""
 
 MAX_RANK_BESIDE_FAULTS = 2
-"""highest rank of the rows that are shown beside faults of a scene file"""
+"""highest rank of rows that are shown together with faults of a scene file"""
 
 PAUSE_LINE = "PAUSED  (P or Space)"
-"""the longest of the lines about a pause"""
+"""the longest pause line"""
 
 Mark = Literal["", "disc", "triangle", "ring", "bars"]
 
 
 class HudRow(NamedTuple):
-    """One line of the status plate."""
+    """One row of the status plate."""
 
     text: str
     colour: Colour = INK
     mark: Mark = ""
-    """a shape before the text, so that no state depends on colour alone"""
+    """shape before the text, so that no state is shown by colour alone"""
     bold: bool = False
     mono: bool = False
     rank: int = 5
-    """if there is no room for all rows, those of the lowest rank stay"""
+    """priority: rows of the highest ranks are dropped first if space is short"""
 
 
 def hud_rows(status: HudStatus) -> tuple[HudRow, ...]:
-    """Return the rows of the status plate, from top to bottom."""
+    """Return the rows of the status plate from top to bottom."""
     title = f"{status.title}  ·  replay" if status.replay else status.title
     step = status.time / status.step if status.step else 0.01
     found = [
@@ -82,7 +82,7 @@ def _speed_rows(status: HudStatus) -> list[HudRow]:
 
 
 def _prediction_rows(status: HudStatus) -> list[HudRow]:
-    """Return the rows about predictability, the ghost and missed contacts."""
+    """Return the rows about predictability, ghost and missed contacts."""
     found = []
     if status.trust == "trusted":
         found.append(HudRow("predictable", GREEN, "disc", rank=6))
@@ -108,11 +108,11 @@ class HudText(NamedTuple):
     rect: pygame.Rect
     """of the plate; empty if no row fits"""
     lines: tuple[tuple[HudRow, str], ...]
-    """rows with their text, shortened to fit"""
+    """rows and their text, truncated to fit"""
 
 
 def _scale_area(area: pygame.Rect, ui_scale: float) -> tuple[pygame.Rect, float]:
-    """Return the area inside the margin and the text size, px; both shrink in a small area."""
+    """Return the area without its margin, and the text size, px; both are scaled down in a small area."""
     scale = ui_scale * min(
         max(min(area.width / (FULL_SIZE_AREA[0] * ui_scale), area.height / (FULL_SIZE_AREA[1] * ui_scale)), 0.4), 1.0
     )
@@ -121,9 +121,9 @@ def _scale_area(area: pygame.Rect, ui_scale: float) -> tuple[pygame.Rect, float]
 
 
 def layout_rows(status: HudStatus, area: pygame.Rect, ui_scale: float, taken: Sequence[pygame.Rect] = ()) -> HudText:
-    """Lay out the status plate at the upper left of an area, beside the rectangles in `taken`.
+    """Lay out the status plate at the upper left of an area, next to the rectangles in `taken`.
 
-    Rows of the highest ranks are left out where the plate would exceed `MAX_STATUS_HEIGHT_FRACTION` of the area.
+    Rows of the highest ranks are dropped if the plate would exceed `MAX_STATUS_HEIGHT_FRACTION` of the area.
     """
     area, size = _scale_area(area, ui_scale)
     shown = hud_rows(status)
@@ -148,7 +148,7 @@ def layout_rows(status: HudStatus, area: pygame.Rect, ui_scale: float, taken: Se
         text_size(text, size, row.bold, row.mono)[0] + (indent if row.mark else 0)
         for row, text in zip(kept, texts, strict=True)
     )
-    grain = round(2 * size)  # the plate keeps its width while digits change
+    grain = round(2 * size)  # keeps the width constant while digits change
     rect = pygame.Rect(
         area.topleft, (min(-(-widest // grain) * grain, width) + 2 * pad, len(kept) * line_height + 2 * pad)
     )
@@ -165,19 +165,19 @@ def draw_hud(
     taken: Sequence[pygame.Rect] = (),
     plates: dict[str, pygame.Rect] | None = None,
 ) -> pygame.Rect:
-    """Draw all plates of the head-up display; those that do not fit are left out, the least important first.
+    """Draw all plates of the head-up display; plates without space are dropped, the least important first.
 
     Args:
         surface: the window.
-        status: what to show.
+        status: the values to show.
         ui_scale: 1 on a display of 1080 lines.
         right: px covered at the right.
         bottom: px covered at the bottom.
         taken: rectangles of other plates, which are kept free.
-        plates: filled with the rectangle of each plate.
+        plates: receives the rectangle of each plate.
 
     Returns:
-        the rectangle of the box with the faults of the scene file; empty without faults.
+        The rectangle of the box with the faults of the scene file; empty without faults.
     """
     plates, nothing = {} if plates is None else plates, pygame.Rect(0, 0, 0, 0)
     whole = pygame.Rect(0, 0, max(surface.get_width() - right, 0), max(surface.get_height() - bottom, 0))
@@ -208,7 +208,7 @@ def draw_hud(
 def hud_width(longest: str, ui_scale: float) -> int:
     """Return the right edge of the status plate at full size, px, given its longest line.
 
-    The plate is never narrower than the line about a pause.
+    The plate is at least as wide as the pause line.
     """
     size = 13.5 * ui_scale
     paused = text_size(PAUSE_LINE, size, bold=True)[0] + round(1.3 * size)
@@ -237,7 +237,7 @@ def _draw_rows(surface: pygame.Surface, rows: HudText, size: float) -> None:
 def draw_mark(
     surface: pygame.Surface, mark: Mark, position: tuple[float, float], radius: float, colour: Colour
 ) -> None:
-    """Draw the shape before a line."""
+    """Draw the shape before a row."""
     x, y = position
     width = max(round(0.4 * radius), 1)
     if mark == "disc":
@@ -255,7 +255,7 @@ def draw_mark(
 
 
 def _draw_notice(surface: pygame.Surface, text: str, area: pygame.Rect, size: float, edge: Colour) -> None:
-    """Draw a notice in the middle of the area."""
+    """Draw a notice in the centre of the area."""
     lines = wrap_text(text, size, area.width - 2 * size, 3, bold=True)
     line_height = round(1.4 * size)
     width = max(text_size(each, size, bold=True)[0] for each in lines)
@@ -287,7 +287,7 @@ def _draw_rate(
 def _draw_picked(
     surface: pygame.Surface, lines: tuple[str, ...], area: pygame.Rect, taken: Sequence[pygame.Rect], size: float
 ) -> pygame.Rect:
-    """Draw the figures of the selected body at the upper right, or below other plates; return their rectangle."""
+    """Draw the values of the selected body at the upper right or below other plates; return their rectangle."""
     nothing = pygame.Rect(0, 0, 0, 0)
     if not lines:
         return nothing
@@ -358,7 +358,7 @@ def _draw_messages(
 
 
 def _draw_faults(surface: pygame.Surface, faults: tuple[str, ...], area: pygame.Rect, size: float) -> pygame.Rect:
-    """Draw the faults of the scene file in a box in the middle; return its rectangle."""
+    """Draw the faults of the scene file in a centred box; return its rectangle."""
     pad, line_height = round(min(1.1 * size, 0.04 * area.width)), round(1.45 * size)
     room = min(area.width, round(62 * size)) - 2 * pad
     title = "1 fault in the scene file" if len(faults) == 1 else f"{len(faults)} faults in the scene file"
@@ -390,14 +390,14 @@ def _draw_faults(surface: pygame.Surface, faults: tuple[str, ...], area: pygame.
 
 
 def _fault_lines(faults: tuple[str, ...], size: float, room: int, max_lines: int) -> list[tuple[int, str]]:
-    """Return lines with their indents, px: a fault starts at the left; the last line counts those left out."""
+    """Return (indent in px, text) lines of the faults; if space is short, the last line counts the faults left out."""
     indent = round(1.4 * size)
     lines: list[tuple[int, str]] = []
     for number, fault in enumerate(faults):
         first, *rest = wrap_text(fault, size, room - indent, 4, mono=True) or ("",)
         last = number == len(faults) - 1
         if len(lines) + 1 + len(rest) + (not last) > max_lines:
-            if number == 0:  # shortened to fit
+            if number == 0:  # truncated to fit
                 first, *rest = wrap_text(fault, size, room - indent, max(max_lines, 1), mono=True) or ("",)
                 return [(0, first), *((indent, text) for text in rest)][: max(max_lines, 0)]
             lines.append((0, f"… and {len(faults) - number} more"))

@@ -1,4 +1,4 @@
-"""Icons of the buttons and small discs, drawn oversampled and scaled down for smooth edges."""
+"""Icons of buttons, and small discs, drawn oversampled and scaled down for smooth edges."""
 
 import math
 from functools import lru_cache
@@ -10,17 +10,17 @@ from sandbox.window.render.palette import Colour
 ICON_NAMES = ("play", "pause", "step", "back", "restart", "camera", "record", "stop", "save", "help", "picker")
 _OVERSAMPLING = 4
 _GRID = 24
-"""icons are drawn on a grid of 24 by 24"""
+"""side of the grid on which icons are drawn"""
 
 
 @lru_cache(maxsize=128)
 def icon(name: str, side: int, colour: Colour) -> pygame.Surface | None:
-    """Return an icon of `ICON_NAMES`, `side` px wide and high; None for another name."""
+    """Return an icon of `ICON_NAMES` with a side of `side` px; None for other names."""
     if name not in ICON_NAMES:
         return None
     side = max(side, 1)
     large = pygame.Surface((side * _OVERSAMPLING, side * _OVERSAMPLING), pygame.SRCALPHA)
-    large.fill((*colour, 0))  # so that edges do not darken
+    large.fill((*colour, 0))  # transparent pixels in the same colour, so that smoothing does not darken edges
     _Pen(large, side * _OVERSAMPLING / _GRID, colour).draw(name)
     return pygame.transform.smoothscale(large, (side, side))
 
@@ -28,14 +28,14 @@ def icon(name: str, side: int, colour: Colour) -> pygame.Surface | None:
 def draw_disc(
     surface: pygame.Surface, position: tuple[float, float], radius: float, colour: Colour, hole: float = 0.0
 ) -> None:
-    """Draw a small antialiased disc, or a ring if `hole`, the inner radius, is positive; px."""
+    """Draw a small antialiased disc, or a ring with inner radius `hole` if that is positive; px."""
     image = _disc(round(_OVERSAMPLING * max(radius, 0.5)), colour, round(_OVERSAMPLING * hole))
     surface.blit(image, image.get_rect(center=(round(position[0]), round(position[1]))))
 
 
 @lru_cache(maxsize=256)
 def _disc(radius: int, colour: Colour, hole: int) -> pygame.Surface:
-    side = 2 * (radius // _OVERSAMPLING) + 3  # odd, for a centre pixel
+    side = 2 * (radius // _OVERSAMPLING) + 3  # odd, so that there is a centre pixel
     large = pygame.Surface((side * _OVERSAMPLING, side * _OVERSAMPLING), pygame.SRCALPHA)
     large.fill((*colour, 0))
     middle = large.get_rect().center
@@ -46,13 +46,13 @@ def _disc(radius: int, colour: Colour, hole: int) -> pygame.Surface:
 
 
 class _Pen:
-    """Draws icons on a grid of 24 by 24."""
+    """Draws icons on a grid of 24 by 24 units."""
 
     def __init__(self, surface: pygame.Surface, scale: float, colour: Colour) -> None:
         self.surface, self.scale, self.colour = surface, scale, colour
 
     def draw(self, name: str) -> None:
-        """Draw an icon by its name."""
+        """Draw an icon by name."""
         if name == "play":
             self._polygon((7, 4), (20, 12), (7, 20))
         elif name == "pause":
@@ -96,7 +96,7 @@ class _Pen:
         self._disc(12, 19.4, 1.8)
 
     def _arc(self, x: float, y: float, radius: float, start: float, end: float) -> None:
-        """Draw part of a circle, between two angles in degrees, with round ends."""
+        """Draw an arc between two angles in degrees, with round ends."""
         for degrees in range(round(start), round(end) + 1, 3):
             angle = math.radians(degrees)
             self._disc(x + radius * math.cos(angle), y - radius * math.sin(angle), 1.4)

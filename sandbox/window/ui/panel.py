@@ -1,6 +1,6 @@
 """Side panel: a column of buttons, parameters and check boxes at the right of the window, and its layout.
 
-The panel does not know what its widgets do: it reports their use through three callbacks.
+User actions are reported through three callbacks; the panel does not know their effect.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -24,15 +24,15 @@ from sandbox.window.ui.widgets import (
 
 
 class PanelHeading(NamedTuple):
-    """Heading of a section."""
+    """Heading of a panel section."""
 
     text: str
     top: int
-    """px from the top of the content"""
+    """px below the top of the content"""
 
 
 class PanelLayout(NamedTuple):
-    """Positions of all widgets in the content, whose upper left corner is (0, 0); px."""
+    """Positions of all widgets relative to the upper left corner of the content, px."""
 
     rects: tuple[tuple[Widget, pygame.Rect], ...]
     """from top to bottom"""
@@ -47,7 +47,7 @@ def arrange_widgets(
     width: int,
     ui_scale: float,
 ) -> PanelLayout:
-    """Lay widgets out in a column: buttons, parameters, then check boxes, in two columns if they fit."""
+    """Lay out widgets in a column: buttons, parameters, then check boxes, which form two columns if they fit."""
     pad = round(14 * ui_scale)
     column = pygame.Rect(pad, pad, max(width - 2 * pad - round(4 * ui_scale), 1), 0)
     rects: list[tuple[Widget, pygame.Rect]] = []
@@ -110,11 +110,11 @@ def _layout_checkboxes(
 PANEL_WIDTH = 264
 """px at UI scale 1"""
 MAX_WIDTH_FRACTION = 0.6
-"""largest fraction of the width of a small window"""
+"""largest fraction of the window's width that the panel covers"""
 FOLD_WIDTH_FRACTION = 0.45
-"""fraction of the window's width above which the panel is hidden at first"""
+"""fraction of the window's width above which the panel is initially hidden"""
 SCROLL_STEP = 48
-"""px at UI scale 1, for a notch of the wheel"""
+"""px at UI scale 1 per notch of the wheel"""
 
 _BUTTONS = {
     "play": ("Resume", Command.PAUSE),
@@ -135,7 +135,7 @@ _MOUSE_EVENTS = (pygame.MOUSEMOTION, pygame.MOUSEBUTTONDOWN, pygame.MOUSEBUTTONU
 
 
 class SidePanel:
-    """A column of widgets. `show` sets its content; the callbacks report what the user does."""
+    """Column of widgets. `show` sets its content; callbacks report user actions."""
 
     def __init__(self, size: tuple[int, int], ui_scale: float = 1.0) -> None:
         """Create an empty panel for a window of a size in px."""
@@ -152,18 +152,18 @@ class SidePanel:
         self._scroll = 0
         self._sheet = pygame.Surface((1, 1))
         self._drawn_state: tuple[object, ...] = ()
-        """all values that the sheet was drawn from"""
+        """all values that the cached drawing depends on"""
         self._pointer: tuple[int, int] | None = None
         self._pressed: set[int] = set()
         self._bar_held = False
         self.used = True
-        """an event or a resize may have changed a widget since this was last reset: `show` is needed"""
-        self._dirty = True  # the sheet has to be checked for changes
+        """whether an event or a resize may have changed a widget, so that `show` is required; reset by the owner"""
+        self._dirty = True  # whether the cached drawing may be outdated
         self.resize(size, ui_scale)
 
     @property
     def width(self) -> int:
-        """Width that the panel covers at the right of the window, px; 0 while it is hidden."""
+        """Width that the panel covers at the right of the window, px; 0 while hidden."""
         return self._full_width if self.visible else 0
 
     @property
@@ -172,7 +172,7 @@ class SidePanel:
 
     @property
     def visible(self) -> bool:
-        """Whether the panel is shown. In a small window it is hidden until the user shows it.
+        """Whether the panel is shown; in a small window it is hidden until the user shows it.
 
         Hiding the panel ends a drag.
         """
@@ -192,7 +192,7 @@ class SidePanel:
         return tuple(widget for widget, _ in self._layout.rects)
 
     def resize(self, size: tuple[int, int], ui_scale: float) -> None:
-        """Fit the panel to a window of another size, px."""
+        """Lay out the panel for a window of another size, px."""
         self.size, self.ui_scale = size, ui_scale
         self._sheet = pygame.Surface((self._full_width, max(size[1], 1)))
         self._drawn_state = ()
@@ -200,7 +200,7 @@ class SidePanel:
         self._layout_widgets()
 
     def show(self, parameters: Sequence[Parameter], toggles: Mapping[str, bool], buttons: Sequence[str] = ()) -> None:
-        """Show these parameters, check boxes and buttons, without callbacks. A widget that stays keeps its drag."""
+        """Show parameters, check boxes and buttons, without callbacks. Widgets that remain keep their drags."""
         self._dirty = True
         before = [*self._parameter_widgets, *self._checkboxes, len(self._buttons)]
         parameter_widgets: dict[str, ParameterWidget] = {}
@@ -230,7 +230,7 @@ class SidePanel:
         return checkbox
 
     def _layout_widgets(self) -> None:
-        """Lay out all widgets in the content, whose top is at 0."""
+        """Lay out all widgets in content coordinates."""
         self._layout = arrange_widgets(
             self._buttons,
             list(self._parameter_widgets.values()),
@@ -241,7 +241,7 @@ class SidePanel:
         self._move()
 
     def _move(self) -> None:
-        """Move the widgets to where the content is scrolled."""
+        """Move the widgets to the present scroll position."""
         self._dirty = True
         self._scroll = min(max(self._scroll, 0), max(self._layout.height - self.size[1], 0))
         for widget, rect in self._layout.rects:
@@ -259,9 +259,9 @@ class SidePanel:
         self._report_events()
 
     def handle_event(self, event: pygame.event.Event) -> bool:
-        """Process an event; return whether it was consumed. Pass motion too: wheel events carry no position.
+        """Process an event; return whether it was consumed. Motion events are required: wheel events have no position.
 
-        A press outside the panel belongs to the picture, and so do the motion and the release that follow it.
+        A press outside the panel belongs to the scene view, as do the motion and the release that follow it.
         """
         if event.type in (pygame.WINDOWFOCUSLOST, pygame.WINDOWLEAVE):
             if event.type == pygame.WINDOWFOCUSLOST or not self._pressed:
@@ -281,7 +281,7 @@ class SidePanel:
             self._pressed.discard(event.button)
         elif event.type == pygame.MOUSEBUTTONDOWN:
             ours = inside
-            if ours and event.button <= 3:  # 4 and up are the wheel again
+            if ours and event.button <= 3:  # buttons from 4 up are wheel events
                 self._pressed.add(event.button)
         else:
             foreign = any(getattr(event, "buttons", ())) and not self._pressed
@@ -300,7 +300,7 @@ class SidePanel:
         self._report_events()
 
     def _drag_bar(self, event: pygame.event.Event, at: tuple[int, int]) -> bool:
-        """Scroll by the bar at the right edge; return whether it is held."""
+        """Scroll by the scroll bar at the right edge; return whether it is being dragged."""
         if event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
             self._bar_held = self._layout.height > self.size[1] and at[0] >= self._full_width - 9 * self.ui_scale
         if not self._bar_held:
@@ -323,7 +323,7 @@ class SidePanel:
         return True
 
     def _report_events(self) -> None:
-        """Report the events since the last call; a callback may change what is shown."""
+        """Report the events since the last call; a callback may change the content of the panel."""
         events: list[WidgetEvent] = []
         for widget in self.widgets:
             events += widget.events
@@ -337,7 +337,7 @@ class SidePanel:
                 self.on_change(used.name, used.value, used.final)
 
     def draw(self, surface: pygame.Surface) -> None:
-        """Draw the panel at the right of the window, if it is visible."""
+        """Draw the panel at the right of the window, if visible."""
         if not self.visible:
             return
         if self._dirty:
@@ -355,7 +355,7 @@ class SidePanel:
         self._draw_hint(surface)
 
     def _draw_sheet(self) -> None:
-        """Draw the column on its own surface, which most frames blit unchanged."""
+        """Draw the column on the cached surface, which most frames only blit."""
         sheet, ui_scale = self._sheet, self.ui_scale
         sheet.fill(PANEL)
         for text, top in self._layout.headings:
@@ -382,7 +382,7 @@ class SidePanel:
 
 
 def _ignore(*_: object) -> None:
-    """Default of the callbacks."""
+    """No-op, the default of the callbacks."""
 
 
 def _button_hint(name: str) -> str:

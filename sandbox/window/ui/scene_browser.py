@@ -1,6 +1,6 @@
-"""Scene browser: a grid of cards, each with a thumbnail of a scene.
+"""Scene browser: a grid of cards with thumbnails of scenes.
 
-A thumbnail shows a scene at its start, with a ghost of its bodies a moment later.
+A thumbnail shows the initial state of a scene, with a ghost of its bodies a moment later.
 """
 
 from collections.abc import Sequence
@@ -25,13 +25,13 @@ from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size,
 from sandbox.window.view_bounds import should_rotate, view_bounds
 
 MAX_PREVIEW_BODIES = 40
-"""bodies; a thumbnail of more shows no ghost, which would be illegible"""
+"""number of bodies above which a thumbnail has no ghost, as it would be illegible"""
 MAX_PREVIEW_BODY_STEPS = 4000
-"""bodies times solver steps to simulate for a ghost"""
+"""limit of bodies times solver steps simulated for a ghost"""
 PREVIEW_FRACTION = 0.12
 """time of the ghost as a fraction of the scene's duration, at most 0.5 s"""
 BURST_EXTENT_FRACTION = 0.02
-"""bodies that start within this fraction of the view are shown in flight instead"""
+"""extent of the initial positions, as a fraction of the view, below which bodies are shown in flight"""
 BURST_TIME_FRACTION = 0.5
 """time of that flight as a fraction of the scene's duration"""
 
@@ -58,11 +58,11 @@ def read_scene(path: Path) -> SceneThumbnail:
 
 
 def draw_thumbnail(scene: Scene, size: tuple[int, int], renderer: Renderer, ui_scale: float) -> pygame.Surface:
-    """Return a picture of a scene; `size` is its width and height, px."""
+    """Return a thumbnail of a scene; `size` is its width and height, px."""
     surface = pygame.Surface(size)
     box = view_bounds(scene)
     is_burst = _is_burst(scene, box)
-    has_motion = not is_burst and scene.play.area is None  # at a table nothing moves before a shot
+    has_motion = not is_burst and scene.play.area is None  # at a table nothing moves before the first shot
     ghost = _preview_frame(scene) if has_motion and 0 < len(scene.bodies) <= MAX_PREVIEW_BODIES else None
     frame = frame_in_flight(scene, BURST_TIME_FRACTION * scene.world.duration if is_burst else 0.0)
     camera = Camera.fitting(box, size, margin=0.08, turned=should_rotate(scene, size))
@@ -71,7 +71,7 @@ def draw_thumbnail(scene: Scene, size: tuple[int, int], renderer: Renderer, ui_s
 
 
 def _is_burst(scene: Scene, box: Box) -> bool:
-    """Return whether all bodies start at about one point and collide with nothing."""
+    """Return whether all bodies start close to one point and collide with nothing."""
     bodies = scene.bodies
     if len(bodies) < 2 or any(element.collides != "none" for element in bodies.elements):
         return False
@@ -81,7 +81,7 @@ def _is_burst(scene: Scene, box: Box) -> bool:
 
 
 def frame_in_flight(scene: Scene, time: float = 0.0) -> Frame:
-    """Return the bodies after a time, s, of free flight without drag or collisions."""
+    """Return the state of the bodies after a time, s, of free flight without drag or collisions."""
     bodies = scene.bodies
     gravity = np.where(bodies.fixed[:, None], 0.0, np.asarray(scene.world.gravity))
     return Frame(
@@ -95,7 +95,7 @@ def frame_in_flight(scene: Scene, time: float = 0.0) -> Frame:
 
 
 def _preview_frame(scene: Scene) -> Frame | None:
-    """Return the bodies a moment later; None if simulating that would be slow or is impossible."""
+    """Return the state of the bodies a moment later; None if the simulation would be slow or is impossible."""
     settings = scene.solver
     max_steps = MAX_PREVIEW_BODY_STEPS // (len(scene.bodies) * settings.substeps)
     steps = min(round(min(PREVIEW_FRACTION * scene.world.duration, 0.5) / settings.dt), max_steps)
@@ -116,7 +116,7 @@ MIN_CARD_WIDTH = 236
 """px at UI scale 1"""
 MAX_COLUMNS = 5
 SCROLL_STEP = 80
-"""px at UI scale 1, for a notch of the wheel"""
+"""px at UI scale 1 per notch of the wheel"""
 MAX_FILTER_LENGTH = 60
 
 _MOVES = {pygame.K_LEFT: -1, pygame.K_RIGHT: 1}
@@ -124,7 +124,7 @@ _ROW_MOVES = {pygame.K_UP: -1, pygame.K_DOWN: 1, pygame.K_PAGEUP: -3, pygame.K_P
 
 
 class SceneCard:
-    """A scene file and its thumbnail, once it has been read."""
+    """A scene file, and its thumbnail once loaded."""
 
     def __init__(self, name: str, path: Path) -> None:
         self.name, self.path = name, path
@@ -133,7 +133,7 @@ class SceneCard:
 
     @property
     def title(self) -> str:
-        """The scene's title, or the file's name until the file has been read."""
+        """Title of the scene; until the file is read, its name."""
         scene = self.thumbnail.scene if self.thumbnail else None
         return scene.title if scene is not None and scene.title else self.name.rpartition("/")[2]
 
@@ -144,12 +144,12 @@ class SceneCard:
 
     @property
     def about(self) -> str:
-        """The scene's description."""
+        """Description of the scene; empty until the file is read."""
         scene = self.thumbnail.scene if self.thumbnail else None
         return scene.about if scene is not None else ""
 
     def is_called(self, text: str) -> bool:
-        """Return whether a text equals the name, with or without its folder, or the title."""
+        """Return whether a text equals the title or the name, with or without its folder."""
         return text.casefold() in (self.name.casefold(), self.name.rpartition("/")[2].casefold(), self.title.casefold())
 
     def matches(self, words: Sequence[str]) -> bool:
@@ -159,17 +159,17 @@ class SceneCard:
 
 
 class SceneBrowser:
-    """A grid of cards over the whole window. At each frame one file is read or one thumbnail drawn."""
+    """Grid of cards over the whole window. Each frame reads one file or draws one thumbnail."""
 
     def __init__(self, scenes: Sequence[tuple[str, Path]]) -> None:
-        """Offer scenes, given by name, for example `tutorial/bounce`, and file."""
+        """Create a browser of scenes, given as (name, file); a name is, for example, `tutorial/bounce`."""
         self.cards = [SceneCard(name, Path(path)) for name, path in scenes]
         self.typed = ""
-        """the filter"""
+        """filter text"""
         self.chosen = 0
-        """index among the cards that are shown"""
+        """index among the matching cards"""
         self.confirmed: Path | None = None
-        """chosen once; opening it would lose changes, so it has to be chosen again"""
+        """file that was chosen once and must be chosen again, as opening it would lose changes"""
         self._note = ""
         self.closed = False
         """whether the user has closed the browser"""
@@ -190,7 +190,7 @@ class SceneBrowser:
         return sorted(fitting, key=lambda card: not card.is_called(self.typed))
 
     def ask(self, path: Path, note: str) -> None:
-        """Show what opening a scene would lose; it opens when it is chosen again."""
+        """Show a note on what opening a scene would lose; choosing it again opens it."""
         self.confirmed, self._note = path, note
 
     def handle_event(self, event: pygame.event.Event) -> Path | None:
@@ -212,7 +212,7 @@ class SceneBrowser:
         return None
 
     def _card_at(self, position: tuple[int, int]) -> SceneCard | None:
-        """Return the card at a position, among those that match the filter."""
+        """Return the matching card at a position, if any."""
         shown = self.shown
         return next(
             (card for card, card_rect in self._rects if card_rect.collidepoint(position) and card in shown), None
@@ -286,7 +286,7 @@ class SceneBrowser:
         return round(rect.bottom + 1.2 * size)
 
     def _layout_cards(self, shown: Sequence[SceneCard], area: pygame.Rect, size: float) -> None:
-        """Lay out the cards in a grid, scrolled so that the chosen card is visible."""
+        """Lay out the cards in a grid, scrolled to make the chosen card visible."""
         gap = round(1.1 * size)
         min_width = max(MIN_CARD_WIDTH * size / 14, area.width / MAX_COLUMNS - gap)
         self._columns = max(int((area.width + gap) // (min_width + gap)), 1)
@@ -313,7 +313,7 @@ class SceneBrowser:
         draw_box(surface, card_rect, 0.6 * size, PANEL_RAISED if chosen else PANEL, 255, LINE)
         if card.image is not None:
             picture = card.image
-            if picture.get_size() != image_rect.size:  # until it is drawn at this size
+            if picture.get_size() != image_rect.size:  # scaled until it is redrawn at this size
                 picture = pygame.transform.smoothscale(picture, image_rect.size)
             surface.blit(picture, image_rect)
         else:
@@ -353,7 +353,7 @@ class SceneBrowser:
         )
 
     def _load_one(self, in_sight: Sequence[tuple[SceneCard, pygame.Rect]]) -> None:
-        """Read one file or draw one thumbnail, of a visible card; if all are done, read the file of another card."""
+        """Read the file or draw the thumbnail of one visible card; if all are done, read the file of another card."""
         for card, card_rect in in_sight:
             if card.thumbnail is None:
                 card.thumbnail = read_scene(card.path)

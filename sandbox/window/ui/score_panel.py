@@ -1,4 +1,4 @@
-"""Score panel: score and status of a game as rows of labelled values, and how the game ended."""
+"""Score panel: score and status of a game as rows of labelled values, and the result of the game."""
 
 from typing import NamedTuple
 
@@ -10,19 +10,19 @@ from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size,
 from sandbox.window.ui.icons import draw_disc
 
 FRAME_RATE_WIDTH = 66.0
-"""px at UI scale 1, kept free at the right for the frame rate"""
+"""px at UI scale 1, reserved at the right for the frame rate"""
 MIN_TOP_WIDTH = 300.0
-"""px at UI scale 1; in a narrower space the panel lies at the bottom"""
+"""px at UI scale 1, width below which the panel is placed at the bottom"""
 TEXT_SIZES = (14.0, 12.5, 11.0)
 """px at UI scale 1: the largest that gives a single row, else the smallest"""
 MAX_LINES = 8
-"""values shown besides the score"""
+"""largest number of values besides the score"""
 MAX_TOP_ROWS = 3
-"""beside the status plate; with more rows the panel lies at the bottom, where it is wider"""
+"""number of rows next to the status plate above which the panel is placed at the bottom, where it is wider"""
 
 
 ScoreCell = tuple[str, str]
-"""Label and text."""
+"""(label, text)"""
 
 
 class ScoreLayout(NamedTuple):
@@ -30,27 +30,27 @@ class ScoreLayout(NamedTuple):
 
     rect: pygame.Rect
     above: bool
-    """whether the panel lies at the top"""
+    """whether the panel is at the top"""
     rows: list[tuple[list[ScoreCell], list[int]]]
-    """of each row, cells and their widths, px"""
+    """cells and their widths, px, for each row"""
     end: tuple[str, ...]
-    """how the game ended"""
+    """lines about the result"""
     size: float
     """text size, px"""
     gap: int
     """px between cells"""
 
     def margins(self, area: pygame.Rect) -> tuple[int, int]:
-        """Return the heights that the panel takes at the top and at the bottom of an area, px."""
+        """Return the heights that the panel covers at the top and at the bottom of an area, px."""
         return (self.rect.bottom - area.top, 0) if self.above else (0, area.bottom - self.rect.top)
 
 
 def layout_score(display: ScoreDisplay, area: pygame.Rect, left: int, ui_scale: float) -> ScoreLayout:
-    """Lay the panel out at the top of an area, or at the bottom if the top is too narrow.
+    """Lay out the panel at the top of an area, or at the bottom if the top is too narrow.
 
     Args:
         display: score and values.
-        area: px, the part of the window that the panel may cover.
+        area: px, part of the window that the panel may cover.
         left: px, right edge of the status plate at the top.
         ui_scale: 1 on a display of 1080 lines.
     """
@@ -77,7 +77,7 @@ def layout_score(display: ScoreDisplay, area: pygame.Rect, left: int, ui_scale: 
 def _fit_rows(
     display: ScoreDisplay, width: int, scale: float
 ) -> tuple[list[tuple[list[ScoreCell], list[int]]], float, int, int]:
-    """Return the rows, their text size, the gap between cells and the width available in a row, px."""
+    """Return the rows, their text size, the gap between cells and the width available for a row, px."""
     for letter_size in TEXT_SIZES:
         size = letter_size * scale
         gap, max_width = round(1.1 * size), width - 2 * _pad(size)
@@ -111,7 +111,7 @@ def _row_height(size: float) -> int:
 
 
 def _rows(display: ScoreDisplay, max_width: float, size: float, gap: int) -> list[tuple[list[ScoreCell], list[int]]]:
-    """Return the cells in rows that fit, each with their widths, px; the score comes first."""
+    """Return the cells arranged in rows that fit, with their widths, px; the score comes first."""
     cells = [("score", display.score), *display.lines[:MAX_LINES]]
     rows: list[tuple[list[ScoreCell], list[int]]] = [([], [])]
     for name, text in cells:

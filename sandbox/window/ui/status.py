@@ -1,4 +1,4 @@
-"""Status of the window as text: the HUD's values, the figures of a body, and the settings of an engine."""
+"""Status text of the window: values of the HUD, quantities of a body, and a summary of solver settings."""
 
 import math
 
@@ -38,7 +38,7 @@ def body_facts(bodies: Bodies, frame: Frame, contacts: Contacts, body_index: int
         ]
     lines.insert(1, f"x {format_si(x, 'm')}, {format_si(y, 'm')}")
     lines.append(f"m {format_si(mass, 'kg')}, {_size(bodies, body_index)}")
-    if not (bodies.fixed[body_index] or bodies.round[body_index]):  # a disc has ½ m r²
+    if not (bodies.fixed[body_index] or bodies.round[body_index]):  # a disc has I = ½ m r²
         lines.append(f"I {format_si(moment, 'kg·m²')}")
     if angle:
         lines.append(f"angle {format_si(angle, 'rad')}")
@@ -49,7 +49,7 @@ def body_facts(bodies: Bodies, frame: Frame, contacts: Contacts, body_index: int
 
 
 def _size(bodies: Bodies, body_index: int) -> str:
-    """Return the size of a body as text, in the terms of its shape."""
+    """Return the dimensions of a body as text, in terms of its shape."""
     element = bodies.elements[int(bodies.element[body_index])]
     if isinstance(element, Box | Stack):
         return f"{format_si(element.size[0], 'm')} × {format_si(element.size[1], 'm')}"
@@ -75,13 +75,13 @@ def settings_text(settings: Settings) -> str:
 def hud_status(
     stage: AppState, scene_keys: tuple[tuple[str, str], ...], frame_rate: float, recording: str | None
 ) -> HudStatus:
-    """Return the values that the head-up display shows.
+    """Return the values of the head-up display.
 
     Args:
         stage: the application state.
-        scene_keys: keys that the scene binds, and their functions.
+        scene_keys: (keys, action) bound by the scene.
         frame_rate: frames per second.
-        recording: format and length of the film that is being recorded.
+        recording: format and length of the film being recorded, if any.
     """
     show, messages = stage.view, stage.messages.visible()
     if show is None:
@@ -121,7 +121,7 @@ def hud_status(
 
 
 def _ended(show: LiveView | RecordedView) -> str | None:
-    """Return the reason why the run ends at the moment that is shown; None if it continues."""
+    """Return the reason why the run ends at the displayed time; None if it continues."""
     if isinstance(show, LiveView):
         session = show.session
         return session.ended if show.step_number == session.step_number else None

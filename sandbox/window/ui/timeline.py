@@ -1,4 +1,4 @@
-"""Timeline: the seek bar at the bottom of the window."""
+"""Timeline: seek bar at the bottom of the window."""
 
 import math
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ TIMELINE_HEIGHT = 34
 
 
 class Timeline:
-    """A seek bar from the first to the last moment of a session, with a knob at the present."""
+    """Seek bar over the simulated time of a session or run, with a knob at the present."""
 
     def __init__(self) -> None:
         self.held = False
@@ -25,10 +25,10 @@ class Timeline:
         self._ui_scale = 1.0
 
     def handle_event(self, event: pygame.event.Event, area: pygame.Rect) -> float | None:
-        """Return the time that a press or a drag selects, s, or None.
+        """Return the time selected by a press or a drag, s, or None.
 
         Args:
-            event: any event; it was consumed if `held` was true before it or is true after it.
+            event: any event; it is consumed if `held` is true before or after it.
             area: rectangle of the bar.
         """
         if event.type in (pygame.WINDOWFOCUSLOST, pygame.WINDOWLEAVE):
@@ -55,14 +55,14 @@ class Timeline:
         keyframes: Sequence[float] = (),
         ui_scale: float = 1.0,
     ) -> None:
-        """Draw the bar; nothing is drawn in an area that is too small.
+        """Draw the bar, unless the area is too small.
 
         Args:
             surface: the window.
             area: rectangle of the bar.
-            start: the first moment, s.
-            now: the present, s.
-            end: the last simulated moment, s.
+            start: first time, s.
+            now: present time, s.
+            end: last simulated time, s.
             keyframes: times of the keyframes, s.
             ui_scale: 1 on a display of 1080 lines.
         """
@@ -73,7 +73,7 @@ class Timeline:
             return
         draw_box(surface, area, 6 * ui_scale)
         size = self._size(area)
-        if track.left - area.left > 2 * size:  # there is room for labels
+        if track.left - area.left > 2 * size:  # space for labels
             draw_text(surface, format_time(now), (track.left - size, area.centery), size, INK, "midright", mono=True)
             draw_text(surface, format_time(end), (track.right + size, area.centery), size, FAINT, "midleft", mono=True)
         thickness = max(round(4 * ui_scale), 2)
@@ -108,7 +108,7 @@ class Timeline:
         return min(12.5 * self._ui_scale, 0.6 * area.height)
 
     def _track(self, area: pygame.Rect) -> pygame.Rect:
-        """Return the rectangle of the track: between the labels, if these leave it half of the bar."""
+        """Return the rectangle of the track: between the labels if that leaves half of the bar, else the whole bar."""
         size = self._size(area)
         label_width = text_size(format_time(self._span[1]), size, mono=True)[0] + round(2 * size)
         edge = label_width if 4 * label_width <= area.width else round(0.8 * size)

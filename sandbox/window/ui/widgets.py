@@ -1,7 +1,7 @@
 """Widgets of the side panel: check box, button, slider, and a button that cycles through options.
 
-Widgets react to events, not to the state of the mouse once a frame, so that a press and its release within one frame
-count as a click. A widget queues what was done to it in `events`; it holds no reference to its panel.
+Widgets handle events instead of polling the mouse once per frame, so that a press and its release within one frame
+count as a click. User actions are queued in `events`; a widget holds no reference to its panel.
 """
 
 from typing import Literal, NamedTuple
@@ -16,13 +16,13 @@ from sandbox.window.ui.icons import draw_disc, icon
 WIDGET_TEXT_SIZE = 12.5
 """px at UI scale 1"""
 DOUBLE_CLICK_MS = 400
-"""longest time between the two presses of a double click"""
+"""longest time between the presses of a double click"""
 DOUBLE_CLICK_DISTANCE = 6
-"""px at UI scale 1, greatest distance between the two presses"""
+"""px at UI scale 1, largest distance between the presses"""
 
 
 class WidgetEvent(NamedTuple):
-    """A user action on a widget."""
+    """User action on a widget."""
 
     kind: Literal["change", "toggle", "button"]
     name: str
@@ -32,7 +32,7 @@ class WidgetEvent(NamedTuple):
 
 
 class Widget:
-    """Base of all widgets: geometry, pointer state and the queue of events. Positions are those on `surface`."""
+    """Base of all widgets: geometry, pointer state and event queue. Positions are relative to `surface`."""
 
     def __init__(self, surface: pygame.Surface) -> None:
         self.surface = surface
@@ -50,11 +50,11 @@ class Widget:
         self.rect, self.ui_scale = rect.copy(), ui_scale
 
     def contains(self, x: int, y: int) -> bool:
-        """Return whether a position is inside the widget; its edge is outside."""
+        """Return whether a position is inside the widget, excluding its edge."""
         return self.rect.left < x < self.rect.right and self.rect.top < y < self.rect.bottom
 
     def handle_event(self, event: pygame.event.Event) -> None:
-        """Process a mouse event: a press and a release inside the widget make a click."""
+        """Process a mouse event; a press and a release inside the widget are a click."""
         if event.type == pygame.MOUSEMOTION:
             self.hovered = self.rect.collidepoint(event.pos)
         elif event.type == pygame.MOUSEBUTTONDOWN and event.button in (1, 3):
@@ -66,10 +66,10 @@ class Widget:
                 self.click(event)
 
     def click(self, event: pygame.event.Event) -> None:
-        """React to a click; `event` is the release of the button."""
+        """Handle a click; `event` is the release of the button."""
 
     def release(self) -> None:
-        """End a press or drag without its mouse event, for example when the window loses focus."""
+        """End a press or drag without a mouse event, for example when the window loses focus."""
         self.held = self.hovered = False
 
     def draw(self) -> None:
@@ -82,12 +82,12 @@ class Widget:
 
     @property
     def text_colour(self) -> Colour:
-        """The colour of label and value; dimmed while disabled."""
+        """Colour of label and value; dimmed while disabled."""
         return INK if self.enabled else mix_colours(FAINT, BACKGROUND, 0.35)
 
 
 class Checkbox(Widget):
-    """A check box with its label and the key that toggles it."""
+    """Check box with its label and the key that toggles it."""
 
     def __init__(self, surface: pygame.Surface, name: str, on: bool, label: str = "", key: str = "") -> None:
         super().__init__(surface)
@@ -124,7 +124,7 @@ class Checkbox(Widget):
 
 
 class PushButton(Widget):
-    """A button with an icon, or with its name if no icon has that name."""
+    """Button with an icon, or with its name if there is no such icon."""
 
     def __init__(self, surface: pygame.Surface, name: str, hint: str = "") -> None:
         super().__init__(surface)
@@ -161,11 +161,11 @@ class ParameterWidget(Widget):
         super().__init__(surface)
         self.parameter = parameter
         self.value: ParameterValue = parameter.value
-        """the value that is shown; while dragged, ahead of `parameter.value`"""
+        """displayed value; during a drag, newer than `parameter.value`"""
         self.show_parameter(parameter)
 
     def show_parameter(self, parameter: Parameter) -> None:
-        """Show a parameter as it is now, without an event; a widget that is being dragged keeps its value."""
+        """Update the parameter without an event; during a drag the displayed value is kept."""
         self.parameter = parameter
         self.enabled = parameter.enabled
         self.hint = "" if parameter.enabled else parameter.why
@@ -185,7 +185,7 @@ class ParameterWidget(Widget):
         self.events.append(WidgetEvent("change", self.parameter.key, value, final))
 
     def scroll(self, notches: int, position: tuple[int, int]) -> bool:
-        """Change the value by notches of the mouse wheel if the pointer is over the track; return whether it is."""
+        """Change the value by notches of the wheel if the pointer is over the track; return whether it is."""
         if not self.contains(*position) or not self.enabled:
             return False
         value = self.parameter.stepped(self.value, notches)
@@ -195,22 +195,22 @@ class ParameterWidget(Widget):
 
 
 class ParameterSlider(ParameterWidget):
-    """A slider: label and value above the track. `rect` is the track, `row` the whole widget."""
+    """Slider with label and value above the track. `rect` is the track, `row` the whole widget."""
 
     def __init__(self, surface: pygame.Surface, parameter: Parameter) -> None:
         self.fraction = 0.0
-        """position of the handle, 0 at the left end of the track to 1 at its right end"""
+        """position of the handle, 0 at the left to 1 at the right end of the track"""
         self.row = pygame.Rect(0, 0, 0, 0)
-        """label, value and track together"""
+        """rectangle of label, value and track"""
         self.handle_radius = 0
         """px"""
-        self._dragged = False  # the value has changed since the press
-        self._on_handle, self._grip = False, 0.0  # the press hit the handle; its offset from the handle's centre, px
+        self._dragged = False  # whether the value has changed since the press
+        self._on_handle, self._grip = False, 0.0  # whether the press hit the handle; offset from its centre, px
         self._last_press = -DOUBLE_CLICK_MS - 1, (0, 0)
         super().__init__(surface, parameter)
 
     def set_rect(self, rect: pygame.Rect, ui_scale: float) -> None:
-        """Move and resize the widget; the track lies in the lower part of the rectangle."""
+        """Move and resize the widget; the track is in the lower part of the rectangle."""
         height = round(14 * ui_scale)
         radius = round(7 * ui_scale)
         track = pygame.Rect(rect.left + radius, rect.bottom - height, rect.width - 2 * radius, height)
@@ -218,7 +218,7 @@ class ParameterSlider(ParameterWidget):
         self.row, self.handle_radius = rect.copy(), radius
 
     def show_parameter(self, parameter: Parameter) -> None:
-        """Show a parameter as it is now, without an event; a widget that is being dragged keeps its value."""
+        """Update the parameter without an event; during a drag the displayed value is kept."""
         super().show_parameter(parameter)
         self.fraction = parameter.share(self.value)
 
@@ -228,7 +228,7 @@ class ParameterSlider(ParameterWidget):
         self.fraction = self.parameter.share(value)
 
     def handle_event(self, event: pygame.event.Event) -> None:
-        """Process a mouse event; a drag continues wherever the pointer is, and ends with a final event."""
+        """Process a mouse event; a drag continues outside the widget and ends with a final event."""
         if event.type == pygame.MOUSEMOTION:
             self.hovered = self.row.collidepoint(event.pos)
             if self.held:
@@ -254,7 +254,7 @@ class ParameterSlider(ParameterWidget):
         self.held, self._dragged = True, False
         handle = self.rect.left + self.fraction * self.rect.width
         self._on_handle = abs(position[0] - handle) <= self.handle_radius
-        self._grip = position[0] - handle if self._on_handle else 0.0  # a pressed handle does not jump
+        self._grip = position[0] - handle if self._on_handle else 0.0  # avoids a jump of the handle
         if not self._on_handle:
             self._drag_to(position[0])
 
@@ -296,10 +296,10 @@ class ParameterSlider(ParameterWidget):
 
 
 class OptionButton(ParameterWidget):
-    """One of several options: a click selects the next; a click on its left end or a right click, the previous."""
+    """Button for one of several options: a click selects the next, a right or left-end click the previous."""
 
     def contains(self, x: int, y: int) -> bool:
-        """Return whether a position is on the button, not on its label."""
+        """Return whether a position is on the button, excluding its label."""
         return bool(self._box.collidepoint(x, y))
 
     @property
@@ -308,7 +308,7 @@ class OptionButton(ParameterWidget):
         return pygame.Rect(self.rect.right - width, self.rect.top, width, self.rect.height)
 
     def click(self, event: pygame.event.Event) -> None:
-        """Select the next option, or the previous one."""
+        """Select the next or the previous option."""
         if self.contains(*event.pos) and self.parameter.choices:
             back = event.button == 3 or event.pos[0] < self._box.left + 0.25 * self._box.width
             self.change(self.parameter.stepped(self.value, -1 if back else 1), final=True)
