@@ -225,7 +225,7 @@ class Sounds:
         if what not in self._sounds:
             rate, _, channels = pygame.mixer.get_init() or (RATE, -16, 2)
             samples = cue_sound(what) if isinstance(what, str) else impact_sound(what)
-            if rate != RATE:  # another part of the program opened the mixer
+            if rate != RATE:  # the mixer was opened at another rate
                 places = np.arange(0, len(samples), RATE / rate)
                 samples = np.interp(places, np.arange(len(samples)), samples).astype(np.int16)
             self._sounds[what] = pygame.mixer.Sound(buffer=np.repeat(samples, channels).tobytes())

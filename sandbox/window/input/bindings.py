@@ -41,7 +41,7 @@ PAD_DIRECTIONS = ("left", "right", "up", "down")
 """names of the D-pad directions of a gamepad"""
 
 KeyHandler = Callable[[], object]
-"""Called when a key is pressed or released; it may raise `ActionError`, and its result is ignored."""
+"""Callback for the press or release of a key; it may raise `ActionError`, and its result is ignored."""
 
 
 class KeyNameError(ValueError):
@@ -61,7 +61,7 @@ def codes_of(name: str) -> tuple[int, ...]:
 
 
 def control_handlers(host: GameHost) -> tuple[dict[int, KeyHandler], dict[int, KeyHandler]]:
-    """Return the handlers of a game's keys by key code: of presses, and of releases."""
+    """Return the handlers of presses and of releases of a game's keys, by key code."""
     pressed: dict[int, KeyHandler] = {}
     released: dict[int, KeyHandler] = {}
     for control in host.controls:

@@ -1,4 +1,4 @@
-"""Mouse tools on the bodies of a session: pick, drag, nudge, add, remove. Positions are in world coordinates, m."""
+"""Mouse tools on the bodies of a session: select, drag, nudge, add, remove. Positions are in world coordinates, m."""
 
 import math
 from collections.abc import Iterable

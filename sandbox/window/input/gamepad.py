@@ -90,11 +90,11 @@ class Gamepads:
     def handle_event(
         self, event: pygame.event.Event, host: GameHost | None, pause: Callable[[], object]
     ) -> list[ActionError]:
-        """Handle an event, and return the errors of refused actions.
+        """Process an event; return the errors of refused actions.
 
         Args:
             event: any event.
-            host: host of the present game.
+            host: host of the running game.
             pause: called for the Start button.
         """
         if event.type == pygame.JOYDEVICEADDED:

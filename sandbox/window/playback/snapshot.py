@@ -22,7 +22,7 @@ from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
 
 NOTIFICATION_INTERVAL = 1.0
-"""s of the scene between two notifications of broken joints"""
+"""s of simulated time between notifications of broken joints"""
 
 
 def broken_joints(breaks: FloatArray, time: float) -> list[int]:

@@ -172,7 +172,7 @@ def _coil(view: DrawContext, a: Pixel, b: Pixel, rest: float, colour: tuple[int,
 MAX_SYMBOLS = 600
 """Number of joints of a kind up to which each gets its symbol; above it, joints are plain lines from body to body."""
 MAX_DIALS = 60
-"""The same for dials of rotary joints, which take longer to draw."""
+"""Largest number of dials, the symbols of rotary joints, which take longer to draw."""
 SMALL_SYMBOL, LARGE_SYMBOL = 12.0, 34.0
 """px, smallest and largest radius of the arcs of rotary joints"""
 _TINTS: dict[LinkKind, Colour] = {

@@ -91,7 +91,6 @@ def _plane(surface: pygame.Surface, camera: Camera, plane: Plane, unit: float, a
     middle = camera.size[0] / 2.0, camera.size[1] / 2.0
     # The height of the view centre above the plane is computed in metres: the point of the plane may be so far away
     # that its pixel position has no precision left.
-    # away that its place in pixels says nothing.
     height = ((camera.centre[0] - plane.point[0]) * nx + (camera.centre[1] - plane.point[1]) * ny) * camera.scale
     down = nx, -ny
     offset = height - middle[0] * down[0] - middle[1] * down[1]

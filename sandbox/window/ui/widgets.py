@@ -296,7 +296,7 @@ class ParameterSlider(ParameterWidget):
 
 
 class OptionButton(ParameterWidget):
-    """Button for one of several options: a click selects the next, a right or left-end click the previous."""
+    """Button that cycles through options: forwards on a click, backwards on a right click or on its left end."""
 
     def contains(self, x: int, y: int) -> bool:
         """Return whether a position is on the button, excluding its label."""
