@@ -135,7 +135,7 @@ LABELS = 12
 
 
 def draw_velocities(view: DrawContext) -> None:
-    """Draw v · 0.1 s as arrows, clipped to a third of the smaller side of the surface."""
+    """Draw v · 0.1 s as arrows, shortened to a third of the smaller side of the surface."""
     some = view.first(MAX_ARROWS)
     longest = max(min(view.camera.size) / 3.0, 1.0)
     with np.errstate(invalid="ignore", over="ignore"):
