@@ -122,7 +122,7 @@ def signed_distance(hulls: list[Hull], x: float, y: float) -> float:
     return min((float(hull_distance(hull)(*point)) for hull in hulls), default=math.inf)
 
 
-def hulls_overlap(a: Hull, b: Hull, tolerance: float = 0.0) -> tuple[float, FloatArray]:
+def hull_gap(a: Hull, b: Hull, tolerance: float = 0.0) -> tuple[float, FloatArray]:
     """Return the gap between two hulls, negative if they overlap, and the point of contact or closest approach, (2,).
 
     Args:
@@ -244,7 +244,7 @@ def overlapping_bodies(scene: Scene, bodies: Bodies, frame: Frame) -> BoolArray:
         over = (np.hypot(*(position[a] - position[b]).T) < radius[a] + radius[b]) & (lies[a] == lies[b])
         for k in np.flatnonzero(over & ~(lone[a] & lone[b])).tolist():
             one, other = (solids.get(n) or hulls_of(bodies, frame, n) for n in (int(a[k]), int(b[k])))
-            over[k] = any(hulls_overlap(p, q)[0] < 0.0 for p in one for q in other)
+            over[k] = any(hull_gap(p, q)[0] < 0.0 for p in one for q in other)
         found[a[over]] = found[b[over]] = True
     return found & there
 
@@ -278,11 +278,11 @@ def is_free(scene: Scene, bodies: Bodies, frame: Frame, hulls: list[Hull], layer
         near = np.hypot(*(frame.position[:count] - middle).T) < reach + bodies.radius[:count]
     near &= frame.present[:count] & solid & (bits_of(frame.layer, count) & bit != 0)
     others = [hull for number in np.flatnonzero(near).tolist() for hull in hulls_of(bodies, frame, number)]
-    return all(hulls_overlap(hull, other)[0] >= 0.0 for hull in hulls for other in (*fixed, *others))
+    return all(hull_gap(hull, other)[0] >= 0.0 for hull in hulls for other in (*fixed, *others))
 
 
 def _mark_overlaps(found: BoolArray, near: BoolArray, solids: dict[int, list[Hull]], fixed: Hull) -> None:
     """Mark the bodies near a static shape that overlap it."""
     for number, hulls in solids.items():
         if near[number] and not found[number]:
-            found[number] = any(hulls_overlap(hull, fixed)[0] < 0.0 for hull in hulls)
+            found[number] = any(hull_gap(hull, fixed)[0] < 0.0 for hull in hulls)

@@ -268,7 +268,7 @@ def _things(scene: Scene) -> list[FloatArray]:
     return found
 
 
-STRAY_FRACTION = 3.0
+STRAY_DISTANCE = 3.0
 """Distance from the central 80 % of positions up to which a body is shown, relative to their extent."""
 
 
@@ -288,7 +288,7 @@ def crowd_bounds(position: FloatArray, radius: FloatArray, anchors: FloatArray) 
     corners = np.concatenate((lower, upper)) if len(lower) else anchors
     middle = np.percentile(corners, (10.0, 90.0), axis=0)
     with np.errstate(over="ignore"):  # in a diverged run
-        reach = STRAY_FRACTION * max(float((middle[1] - middle[0]).max()), 1e-9)
+        reach = STRAY_DISTANCE * max(float((middle[1] - middle[0]).max()), 1e-9)
     both = np.concatenate((corners, anchors))
     kept = both[((both >= middle[0] - reach) & (both <= middle[1] + reach)).all(axis=1)]
     if not len(kept):

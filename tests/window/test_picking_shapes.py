@@ -16,7 +16,7 @@ from sandbox.window.hit_test import (
     Hull,
     hull_area,
     hull_distance,
-    hulls_overlap,
+    hull_gap,
     overlapping_bodies,
     pick_body,
     rounded_hull,
@@ -124,10 +124,10 @@ def test_area_of_hulls() -> None:
 
 def test_boxes_meet_in_the_middle_of_what_touches() -> None:
     unit = np.asarray([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
-    gap, place = hulls_overlap(Hull(unit, 0.0), Hull(unit + np.asarray((1.0, 2.5)), 0.0), 1e-6)
+    gap, place = hull_gap(Hull(unit, 0.0), Hull(unit + np.asarray((1.0, 2.5)), 0.0), 1e-6)
     assert gap == pytest.approx(0.5, abs=1e-12)  # rounding
     assert place.tolist() == pytest.approx([0.5, 1.25], abs=1e-12)  # rounding
-    gap, _ = hulls_overlap(Hull(unit, 0.0), Hull(np.asarray([(0.0, 3.0)]), 1.5))
+    gap, _ = hull_gap(Hull(unit, 0.0), Hull(np.asarray([(0.0, 3.0)]), 1.5))
     assert gap == pytest.approx(0.5, abs=1e-12)  # rounding
 
 

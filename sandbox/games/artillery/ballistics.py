@@ -1,7 +1,7 @@
 """External ballistics: the exact trajectory of a shell, and its point of impact.
 
 Without quadratic drag a trajectory has a closed form. With it, the trajectory is integrated by the classic Runge–Kutta
-method in steps of `IMPACT_TOLERANCE`; a last, shorter step reaches times in between, so nothing is interpolated.
+method in steps of `INTEGRATION_STEP`; a last, shorter step reaches times in between, so nothing is interpolated.
 
 An impact is searched on the chord of each step first, and then refined on the trajectory by the Illinois variant of
 regula falsi. Source: Dowell, Jarratt, BIT 11 (1971) 168. Terrain and discs are in m, times in s.
@@ -54,7 +54,7 @@ def bracketed_root(f: Callable[[float], float], low: float, high: float, width: 
     return 0.5 * (low + high)
 
 
-IMPACT_TOLERANCE = 1.0 / 128.0
+INTEGRATION_STEP = 1.0 / 128.0
 """s, step of the integration: half of it changes the impact of a shell of up to 100 m/s, with a quadratic drag of up to
 0.02, by at most 1e-9 m"""
 
@@ -64,7 +64,7 @@ MAX_FLIGHT = 120.0
 Knot = tuple[float, float, float, float]
 """Position, m, and velocity, m/s: x, y, vx, vy."""
 
-SHORTEST_SEGMENT = 1e-13
+IMPACT_TIME_TOLERANCE = 1e-13
 """s, tolerance of the time of impact: 1e-11 m at 100 m/s"""
 
 
@@ -106,22 +106,22 @@ class Flight:
         if not self._world.quadratic_drag:
             place, velocity = free_flight(np.array([time]), *self._start, self._world)
             return place[0], velocity[0]
-        count = int(time / IMPACT_TOLERANCE)
+        count = int(time / INTEGRATION_STEP)
         while len(self._knots) <= count:
-            self._knots.append(rk4(self._world, self._knots[-1], IMPACT_TOLERANCE))
+            self._knots.append(rk4(self._world, self._knots[-1], INTEGRATION_STEP))
         knot = self._knots[count]
-        rest = time - count * IMPACT_TOLERANCE
+        rest = time - count * INTEGRATION_STEP
         if rest > 0.0:
             knot = rk4(self._world, knot, rest)
         return np.array(knot[:2]), np.array(knot[2:])
 
     def places(self, first: int, count: int) -> FloatArray:
-        """Return the positions (count, 2), m, at the times k·`IMPACT_TOLERANCE` from k = `first` on."""
+        """Return the positions (count, 2), m, at the times k·`INTEGRATION_STEP` from k = `first` on."""
         if not self._world.quadratic_drag:
-            times = np.arange(first, first + count, dtype=np.float64) * IMPACT_TOLERANCE
+            times = np.arange(first, first + count, dtype=np.float64) * INTEGRATION_STEP
             return free_flight(times, *self._start, self._world)[0]
-        self.at(IMPACT_TOLERANCE * (first + count - 1))
-        self.at(IMPACT_TOLERANCE * (first + count))  # a rounded time may fall short of the last knot
+        self.at(INTEGRATION_STEP * (first + count - 1))
+        self.at(INTEGRATION_STEP * (first + count))  # a rounded time may fall short of the last knot
         return np.array([knot[:2] for knot in self._knots[first : first + count]])
 
 
@@ -166,11 +166,11 @@ def landing(
         began += time
         if side == 0:
             return Landing(began, (float(place[0]), float(place[1])))
-        place, speed = times_past(place, speed, side, ground.width, edges)
+        place, speed = state_past_edge(place, speed, side, ground.width, edges)
     return None
 
 
-def times_past(
+def state_past_edge(
     place: FloatArray, velocity: FloatArray, side: int, width: float, edges: Edges
 ) -> tuple[FloatArray, FloatArray]:
     """Return position and velocity of a shell after it has reached or passed the left (−1) or right (1) end."""
@@ -183,13 +183,13 @@ def times_past(
 def _first(flight: Flight, ground: Ground, edges: Edges, discs: FloatArray, longest: float) -> tuple[float, int] | None:
     """Return time, s, and kind of the first event: impact (0), left end (−1) or right end (1); None without one."""
     count, top = 64, max(float(ground.heights.max()), float((discs[:, 1] + discs[:, 2]).max(initial=0.0)))
-    for first in range(0, int(longest / IMPACT_TOLERANCE), count):
+    for first in range(0, int(longest / INTEGRATION_STEP), count):
         places = flight.places(first, count + 1)
         low = np.minimum(places[:-1, 1], places[1:, 1]) <= top
         beside = (places[1:, 0] < 0.0) | (places[1:, 0] > ground.width)
         for k in np.flatnonzero(low | beside).tolist():  # other steps are above all obstacles
             a, b = places[k], places[k + 1]
-            begin, end = (first + k) * IMPACT_TOLERANCE, (first + k + 1) * IMPACT_TOLERANCE
+            begin, end = (first + k) * INTEGRATION_STEP, (first + k + 1) * INTEGRATION_STEP
             side = 0 if edges == "open" else int(b[0] > ground.width) - int(b[0] < 0.0)
             if side:
                 end = _side(flight, side, ground.width, begin)
@@ -216,9 +216,9 @@ def _side(flight: Flight, side: int, width: float, begin: float) -> float:
 
     # A shell that has just returned is on the boundary; if wind blows it out again within the step, use the whole step.
     return (
-        begin + IMPACT_TOLERANCE
+        begin + INTEGRATION_STEP
         if beyond(begin) >= 0.0
-        else bracketed_root(beyond, begin, begin + IMPACT_TOLERANCE, SHORTEST_SEGMENT)
+        else bracketed_root(beyond, begin, begin + INTEGRATION_STEP, IMPACT_TIME_TOLERANCE)
     )
 
 
@@ -261,7 +261,7 @@ def _landed(flight: Flight, ground: Ground, begin: float, end: float, found: Cro
     for low, high in ((found.before, found.after), (0.0, 1.0)):
         since, until = begin + low * (end - begin), begin + high * (end - begin)
         if since < until and gap(since) > 0.0 >= gap(until):
-            return bracketed_root(gap, since, until, SHORTEST_SEGMENT)
+            return bracketed_root(gap, since, until, IMPACT_TIME_TOLERANCE)
     return begin + found.here * (end - begin)  # grazing: the chord crosses the terrain, the trajectory does not
 
 
@@ -293,5 +293,5 @@ def _struck(flight: Flight, disc: FloatArray, begin: float, end: float, share: f
     here = begin + share * (end - begin)
     inside = min(here + 0.1 * float(disc[2]) / max(float(np.hypot(*flight.at(here)[1])), 1e-9), end)
     if apart(begin) > 0.0 >= apart(inside):
-        return bracketed_root(apart, begin, inside, SHORTEST_SEGMENT)
+        return bracketed_root(apart, begin, inside, IMPACT_TIME_TOLERANCE)
     return here

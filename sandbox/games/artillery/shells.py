@@ -18,7 +18,7 @@ import numpy as np
 from sandbox.action import Action, Move, Remove, Spawn
 from sandbox.arrays import FloatArray
 from sandbox.formatting import format_si
-from sandbox.games.artillery.ballistics import Landing, bracketed_root, crossing, first_strike, landing, times_past
+from sandbox.games.artillery.ballistics import Landing, bracketed_root, crossing, first_strike, landing, state_past_edge
 from sandbox.games.artillery.battlefield import FRAGMENTS, LIFT, SPREAD, Battlefield, Tank, Weapon
 from sandbox.games.artillery.scene import Edges
 from sandbox.games.artillery.terrain import Ground
@@ -115,7 +115,7 @@ def returned(
     """Return position and velocity of a shell after it has passed an end; None if it is inside, or may leave."""
     if edges == "open" or 0.0 <= place[0] <= ground.width:
         return None
-    return times_past(place, velocity, 1 if place[0] > 0.0 else -1, ground.width, edges)
+    return state_past_edge(place, velocity, 1 if place[0] > 0.0 else -1, ground.width, edges)
 
 
 class ArtilleryShot(NamedTuple):

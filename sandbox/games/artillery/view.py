@@ -64,7 +64,7 @@ def draw_glow(surface: pygame.Surface, at: Pixel, radius: float, colour: Colour,
     surface.blit(layer, (round(at[0]) - side, round(at[1]) - side))
 
 
-BARREL_WIDTH = 0.75
+BARREL_LENGTH = 0.75
 """length from the turret to the muzzle, in widths of a tank"""
 MIN_TANK_SIZE = 20.0
 """px, smallest drawn width of a tank; smaller tanks are enlarged"""
@@ -113,7 +113,7 @@ class _Tank:
         dark, light = mix_colours(tint, BACKGROUND, 0.55), mix_colours(tint, INK, 0.35)
         turret = self._place(0.0, 0.28)
         way = math.cos(gun.angle), -math.sin(gun.angle)
-        muzzle = turret[0] + BARREL_WIDTH * width * way[0], turret[1] + BARREL_WIDTH * width * way[1]
+        muzzle = turret[0] + BARREL_LENGTH * width * way[0], turret[1] + BARREL_LENGTH * width * way[1]
         thick = max(0.10 * width, 2.0)
         draw_line(
             view.surface,
@@ -124,7 +124,7 @@ class _Tank:
             view.antialias,
         )
         draw_line(view.surface, turret, muzzle, mix_colours(tint, (90, 94, 104), 0.5), thick, view.antialias)
-        brake = turret[0] + 0.86 * BARREL_WIDTH * width * way[0], turret[1] + 0.86 * BARREL_WIDTH * width * way[1]
+        brake = turret[0] + 0.86 * BARREL_LENGTH * width * way[0], turret[1] + 0.86 * BARREL_LENGTH * width * way[1]
         draw_line(view.surface, brake, muzzle, light, thick + 1.0, view.antialias)
         dome = [
             self._place(0.21 * math.cos(a), 0.22 + 0.40 * math.sin(a)) for a in np.linspace(0.0, math.pi, 14).tolist()
@@ -149,7 +149,7 @@ def _setting(view: DrawContext, gunnery: ArtilleryViewState, gun: GunView, at: P
     turret = at[0], at[1] - 0.28 * width * gunnery.size[1] / gunnery.size[0]
     way = math.cos(gun.angle), -math.sin(gun.angle)
     reach = max(AIM_REACH * view.camera.scale, 90.0 * view.ui_scale)
-    first, count = BARREL_WIDTH * width + 6.0 * view.ui_scale, 14
+    first, count = BARREL_LENGTH * width + 6.0 * view.ui_scale, 14
     for k in range(count):
         share = (k + 1) / count
         lit = share <= gun.power + 0.5 / count
@@ -326,7 +326,7 @@ FLAME: tuple[Colour, ...] = ((255, 250, 222), (255, 204, 92), (238, 116, 48), (9
 """Colours of an explosion, from its start to its end."""
 OFF_SCREEN_MARGIN = 1e4
 """px, bound to which positions are clipped; far beyond every picture"""
-FARTHEST_EMBER = 400
+MAX_TRAIL_POINTS = 400
 """number of points to which the path of a shell is thinned"""
 
 
@@ -357,7 +357,7 @@ def draw_above(view: DrawContext, gunnery: ArtilleryViewState) -> None:
 
 def _way(view: DrawContext, way: FloatArray, flying: bool) -> None:
     """Draw the path of a shell: fading with age during the flight, thin and dashed afterwards."""
-    points = way[:: max(len(way) // FARTHEST_EMBER, 1)]
+    points = way[:: max(len(way) // MAX_TRAIL_POINTS, 1)]
     places = view.camera.to_screen(np.vstack((points, way[-1:]))).tolist()
     for k in range(len(places) - 1):
         age = 1.0 - k / len(places)

@@ -15,7 +15,7 @@ from sandbox.scene.description.base import Point
 from sandbox.trajectory import Contacts
 
 
-def touches_ball(cue: PlacedDisc, others: dict[str, PlacedDisc]) -> tuple[str, ...]:
+def touching_balls(cue: PlacedDisc, others: dict[str, PlacedDisc]) -> tuple[str, ...]:
     """Return the balls that touch the cue ball."""
     x, y, radius = cue
     return tuple(name for name, (bx, by, r) in others.items() if math.hypot(bx - x, by - y) - radius - r <= TOUCH)
@@ -41,7 +41,7 @@ def situation_of(
     looks = 0
     for cue in cues:
         looks += 1
-        against = () if placed else touches_ball(cue, others)
+        against = () if placed else touching_balls(cue, others)
         found = [_hidden(cue, others[name], free) for name in others if name in targets]
         if not found or any(way is None for way in found) or not targets.isdisjoint(against):
             return Situation(against)

@@ -137,7 +137,7 @@ class Trough:
 SEARCH_AFTER = 10.0
 """s without a switch, the balls slow"""
 
-MAX_SEARCH_INTERVAL = 30.0
+SEARCH_AFTER_AT_ANY_SPEED = 30.0
 """s without a switch, however fast they are"""
 
 PULSE, BETWEEN = 0.12, 0.25
@@ -188,7 +188,7 @@ class BallSearch(Device):
             return
         silent = now.time - self.heard_of
         slow = all(math.hypot(*now.frame.velocity[ball].tolist()) < SLOW for ball in now.loose)
-        if silent >= MAX_SEARCH_INTERVAL or (slow and silent >= SEARCH_AFTER):
+        if silent >= SEARCH_AFTER_AT_ANY_SPEED or (slow and silent >= SEARCH_AFTER):
             self.next = (0, now.time)
             self.round += 1
             yield ShowMessage("ball search")

@@ -97,12 +97,12 @@ class Kickers(Device):
 BANK_AWARD: dict[Role, int] = {"rollover": 10_000, "standup": 20_000}
 """points of a set"""
 
-BANK_NEWS: dict[Role, str] = {"rollover": "lanes", "standup": "standups"}
+BANK_LABELS: dict[Role, str] = {"rollover": "lanes", "standup": "standups"}
 """what a full set is called"""
 
 BANK_BONUS = 2_000
 
-RELIGHT_DELAY = 4
+EXTRA_BALL_MULTIPLIER = 4
 """times that the bonus counts, with which an extra ball comes"""
 
 MIN_BANK_SIZE: dict[Role, int] = {"rollover": 3, "standup": 2}
@@ -137,10 +137,10 @@ class LaneLights(Device):
         if self.role == "rollover" and now.sheet.times < MAX_BONUS_MULTIPLIER:
             now.sheet.times += 1
             yield ShowMessage(f"bonus × {now.sheet.times}")
-            if now.sheet.times == RELIGHT_DELAY:
+            if now.sheet.times == EXTRA_BALL_MULTIPLIER:
                 yield ExtraBall("lanes")
         yield PlaySound("set")
-        yield Award(BANK_NEWS[self.role], BANK_AWARD[self.role], self.group, BANK_BONUS, hit.ball)
+        yield Award(BANK_LABELS[self.role], BANK_AWARD[self.role], self.group, BANK_BONUS, hit.ball)
 
     def rotate(self, side: str) -> None:
         """Move the lights of lanes by one, to the side of the flipper that was raised."""

@@ -54,7 +54,7 @@ CAP = 5.0
 """Radius above which a post with a kick shows its ring, px at a UI scale of 1."""
 ABSENT = 0.4
 """Fraction of its colour that non-solid geometry keeps."""
-MAX_ROUND_POINTS = 300
+MAX_ROUND_WALLS = 300
 """Number of visible segments of a wall up to which they have round ends and a rim; above it, they are plain lines."""
 
 
@@ -156,7 +156,7 @@ def _wall(surface: pygame.Surface, camera: Camera, wall: Wall, unit: float, anti
     if wall.one_way:
         for a, b in pairwise(pixels):
             _ways_through(surface, (a[0], a[1]), (b[0], b[1]), half, edge, unit, antialias)
-    plain = len(parts) > MAX_ROUND_POINTS
+    plain = len(parts) > MAX_ROUND_WALLS
     rim = 0.0 if thin else min(1.5 * unit, half)
     # All outlines first, then all fills, so that no outline shows inside a corner.
     for inset, colour in ((0.0, edge), (rim, filling)) if rim else ((0.0, edge),):

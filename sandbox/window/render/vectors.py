@@ -7,7 +7,7 @@ import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.scene.description.fixed import Plane, Post, Wall
-from sandbox.window.hit_test import Hull, hulls_of, hulls_overlap
+from sandbox.window.hit_test import Hull, hull_gap, hulls_of
 from sandbox.window.render.circles import CircleRenderer, CircleStyle
 from sandbox.window.render.draw_context import DrawContext
 from sandbox.window.render.lines import draw_arrow, draw_line
@@ -81,7 +81,7 @@ def _solid(
         else:
             others = _hulls_of_fixed(fixed[-1 - other], frame.position[number]) if -1 - other < len(fixed) else []
         tolerance = SLACK * float(bodies.radius[number])
-        found = [hulls_overlap(one, two, tolerance) for one in own for two in others]
+        found = [hull_gap(one, two, tolerance) for one in own for two in others]
         if found:
             place[row] = min(found, key=lambda each: each[0])[1]
         for disc, way in ((number, 1.0), (other, -1.0)):

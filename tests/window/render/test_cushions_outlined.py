@@ -9,7 +9,7 @@ from sandbox.games.billiards.tables import TABLES
 from sandbox.games.billiards.view.table import (
     DEPTH,
     cushion_outlines,
-    walls_that_are_no_cushions,
+    other_walls,
 )
 from sandbox.scene.files.load import loads
 from sandbox.scene.scene import Scene
@@ -73,11 +73,11 @@ height = 0.037
     )
     assert scene.play.area is not None
     assert len(cushion_outlines(scene, scene.play.area)) == 4
-    assert walls_that_are_no_cushions(scene, scene.play.area) == ((scene.walls[0],), ())
+    assert other_walls(scene, scene.play.area) == ((scene.walls[0],), ())
 
 
 @pytest.mark.parametrize("name", TABLES)
 def test_tables_have_nothing_else(name: str) -> None:
     scene = table(name)
     assert scene.play.area is not None
-    assert walls_that_are_no_cushions(scene, scene.play.area) == ((), ())
+    assert other_walls(scene, scene.play.area) == ((), ())

@@ -119,7 +119,7 @@ class SnookerShot:
         return len(made) if self.worth == 1 else self.worth
 
 
-def judge_snooker_shot(
+def snooker_shot(
     shot: ShotSummary, on: str, table: tuple[str, ...], named: str | None, free: bool, touching: tuple[str, ...]
 ) -> SnookerShot:
     """Return a shot with the balls on.
@@ -230,7 +230,7 @@ class Snooker(Ruleset[SnookerState]):
         return ShotResult(replace(after, free=True), messages=("free ball",))
 
     def _judge(self, state: SnookerState, call: ShotCall, shot: ShotSummary) -> ShotResult[SnookerState]:
-        played = judge_snooker_shot(shot, state.on, state.table, call.ball, state.free, state.touching)
+        played = snooker_shot(shot, state.on, state.table, call.ball, state.free, state.touching)
         clean = replace(
             state,
             opening=False,

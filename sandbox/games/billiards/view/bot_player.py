@@ -14,7 +14,7 @@ from sandbox.scene.description.surface import Stroke
 
 TURNING, DRAWING = 0.9, 0.45
 """s, duration of the aiming and of the draw-back animation"""
-STROKE_ANIMATION = 0.02
+DRAW_BACK = 0.02
 """m of draw-back per m/s of cue speed"""
 
 
@@ -74,7 +74,7 @@ class BotPlayer:
         cue.tip_at(side + (stroke.side - side) * share, height + (stroke.height - height) * share)
         cue.speed = stroke.speed
         drawn = min(max(self._since - TURNING, 0.0) / DRAWING, 1.0)
-        cue.back = STROKE_ANIMATION * stroke.speed * drawn
+        cue.back = DRAW_BACK * stroke.speed * drawn
         return self._since > TURNING + 1.15 * DRAWING
 
     def stays(self, match: Match) -> None:

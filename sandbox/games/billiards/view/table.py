@@ -49,7 +49,7 @@ def cushion_outlines(scene: Scene, area: Box) -> tuple[CushionOutline, ...]:
     return tuple(_cushion(scene.walls[k], out, scene, facings, depth) for k, out in noses.items())
 
 
-def walls_that_are_no_cushions(scene: Scene, area: Box) -> tuple[tuple[Wall, ...], tuple[Post, ...]]:
+def other_walls(scene: Scene, area: Box) -> tuple[tuple[Wall, ...], tuple[Post, ...]]:
     """Return the walls and posts that are not part of a cushion."""
     noses = [(wall, out) for wall in scene.walls if (out := _out(wall, area)) is not None]
     jaws = [jaw for wall, out in noses for end in wall.points if (jaw := _jaw(end, out, scene)) is not None]
@@ -200,7 +200,7 @@ def draw_table(
     for hole in scene.pockets:
         pen.disc(hole.position, hole.radius, HOLE, rim=mix_colours(IRON, HOLE, 0.5), line=3.0)
     _diamonds(pen, scene, area, width)
-    walls, posts = walls_that_are_no_cushions(scene, area)
+    walls, posts = other_walls(scene, area)
     if walls or posts or scene.planes:
         draw_static_bodies(surface, camera, scene.model_copy(update={"walls": walls, "posts": posts}), unit, antialias)
 
