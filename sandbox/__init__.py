@@ -40,14 +40,15 @@ if TYPE_CHECKING:
     from sandbox.engines.reference.integrators import INTEGRATORS
     from sandbox.engines.registry import ENGINES, UnknownEngineError
     from sandbox.engines.switching import start
+    from sandbox.games.billiards.shots import horizon, odds, sensitivity, windows
+    from sandbox.games.billiards.shots.shot import Spread
     from sandbox.measure.compare import compare
-    from sandbox.measure.play_out import play_out
-    from sandbox.measure.run import run
-    from sandbox.measure.shots import horizon, odds, sensitivity, windows
-    from sandbox.measure.shots.spread import Spread
+    from sandbox.measure.run.runner import run
+    from sandbox.measure.run.sessions import play_out
     from sandbox.measure.tradeoff import tradeoff
     from sandbox.recording import Recording
     from sandbox.scene.compile.demands import demands
+    from sandbox.scene.compile.scene import Scene
     from sandbox.scene.compile.setup import Setup
     from sandbox.scene.description.bodies import Box, Capsule, Compound, Polygon
     from sandbox.scene.description.discs import Ball
@@ -55,7 +56,6 @@ if TYPE_CHECKING:
     from sandbox.scene.description.world import Settings, World
     from sandbox.scene.errors import Fault, SceneError
     from sandbox.scene.files.load import dumps, load, loads
-    from sandbox.scene.scene import Scene
     from sandbox.trajectory import Contacts, Frame, Trajectory
 
 __all__ = [
@@ -140,13 +140,13 @@ _HOMES = {
     "Refusal": "sandbox.engines.contract",
     "Remove": "sandbox.action",
     "Reshape": "sandbox.action",
-    "Scene": "sandbox.scene.scene",
+    "Scene": "sandbox.scene.compile.scene",
     "SceneError": "sandbox.scene.errors",
     "SetParameter": "sandbox.action",
     "Settings": "sandbox.scene.description.world",
     "Setup": "sandbox.scene.compile.setup",
     "Spawn": "sandbox.action",
-    "Spread": "sandbox.measure.shots.spread",
+    "Spread": "sandbox.games.billiards.shots.shot",
     "Strike": "sandbox.action",
     "Store": "sandbox.batch.store",
     "Stroke": "sandbox.scene.description.surface",
@@ -160,18 +160,18 @@ _HOMES = {
     "compare": "sandbox.measure.compare",
     "demands": "sandbox.scene.compile.demands",
     "dumps": "sandbox.scene.files.load",
-    "horizon": "sandbox.measure.shots",
+    "horizon": "sandbox.games.billiards.shots",
     "integrate": "sandbox.engines.reference.integrate",
     "load": "sandbox.scene.files.load",
     "loads": "sandbox.scene.files.load",
-    "odds": "sandbox.measure.shots",
-    "play_out": "sandbox.measure.play_out",
-    "run": "sandbox.measure.run",
+    "odds": "sandbox.games.billiards.shots",
+    "play_out": "sandbox.measure.run.sessions",
+    "run": "sandbox.measure.run.runner",
     "run_table": "sandbox.batch.run_table",
-    "sensitivity": "sandbox.measure.shots",
+    "sensitivity": "sandbox.games.billiards.shots",
     "start": "sandbox.engines.switching",
     "tradeoff": "sandbox.measure.tradeoff",
-    "windows": "sandbox.measure.shots",
+    "windows": "sandbox.games.billiards.shots",
 }
 
 

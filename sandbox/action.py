@@ -308,7 +308,7 @@ def in_order(actions: tuple[Action, ...]) -> tuple[Action, ...]:
     return tuple(sorted(actions, key=lambda action: action.time))
 
 
-def number_among(names: Sequence[str], name: str, kind: str) -> int:
+def index_of_name(names: Sequence[str], name: str, kind: str) -> int:
     """Return the index of a name among those of a kind.
 
     Raises:
@@ -319,11 +319,11 @@ def number_among(names: Sequence[str], name: str, kind: str) -> int:
     return names.index(name)
 
 
-def speed_limit(speed: float, what: str) -> None:
+def check_speed(speed: float, subject: str) -> None:
     """Check a speed against `MAX_SPEED`.
 
     Raises:
         ActionError: the speed is above `MAX_SPEED` or not a number.
     """
     if not speed <= MAX_SPEED:
-        raise ActionError(f"{what}: a speed of {speed:g} m/s is out of range; the limit is {MAX_SPEED:g}")
+        raise ActionError(f"{subject}: a speed of {speed:g} m/s is out of range; the limit is {MAX_SPEED:g}")

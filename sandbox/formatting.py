@@ -52,5 +52,79 @@ def format_time(time: float, step: float = 0.01) -> str:
     return _signed(f"{time:.{decimals}f} s")
 
 
+UNKNOWN = "–"
+"""Stands for an unknown value in a table."""
+ROUNDING = 1e-12
+"""Relative changes below it are rounding errors of double precision and are written as about 0."""
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def format_number(value: float | None, digits: int = 3) -> str:
+    """Return a number for a table, with a power of ten where it is far from 1, such as `98,800` or `1.23×10⁻⁷`.
+
+    Args:
+        value: None and nan are written `–`.
+        digits: significant ones, at least 1; trailing zeros after the decimal point are left out.
+    """
+    if value is None or math.isnan(value):
+        return UNKNOWN
+    if math.isinf(value):
+        return "∞" if value > 0 else "−∞"
+    if value == 0.0:
+        return "0"
+    mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
+    power = int(exponent)
+    if -3 <= power < 3:
+        return _signed(_without_zeros(f"{value:.{max(digits - 1 - power, 0)}f}"))
+    if 3 <= power < 6:
+        return _signed(f"{float(f'{mantissa}e{exponent}'):,.0f}")
+    factor = _without_zeros(mantissa)
+    raised = f"10{str(power).translate(_SUPERSCRIPTS)}"
+    return _signed(f"{factor[:-1]}{raised}" if factor in {"1", "-1"} else f"{factor}×{raised}")
+
+
+def format_change(fraction: float | None) -> str:
+    """Return a relative change in percent with its sign, such as `+5.1 %`; rounding errors as `≈ 0`, None as `–`."""
+    if fraction is None:
+        return UNKNOWN
+    if 0.0 < abs(fraction) < ROUNDING:
+        return "≈ 0"
+    return f"{'+' if fraction > 0 else ''}{format_number(100.0 * fraction, 2)} %" if fraction else "0"
+
+
+def format_count(count: int | None) -> str:
+    """Return a count with separators of thousands, such as `12,000`; None as `–`."""
+    return UNKNOWN if count is None else f"{count:,}"
+
+
+def format_plural(count: int, noun: str, plural: str | None = None) -> str:
+    """Return a count with its noun, such as `1 body` or `3 bodies`.
+
+    Args:
+        count: of things.
+        noun: in the singular.
+        plural: of the noun; by default with an s.
+    """
+    return f"{count:,} {noun if count == 1 else plural or f'{noun}s'}"
+
+
+def _without_zeros(text: str) -> str:
+    """Return a decimal number without trailing zeros after the point."""
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
 def _signed(text: str) -> str:
     return f"−{text[1:]}" if text.startswith("-") else text
+
+
+LENGTH_UNITS = (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6), ("nm", 1e-9))
+
+
+def format_quantity(value: float, unit: str) -> str:
+    """Return a value with three significant digits and its unit; short lengths in mm, µm or nm, such as `310 µm`."""
+    rounded = float(f"{value:.3g}")  # first, otherwise 0.9999 m would be 1e+03 mm
+    if unit == "m" and rounded > 0.0:
+        for name, size in LENGTH_UNITS:
+            if rounded >= size:
+                return f"{rounded / size:.3g} {name}"
+    return f"{value:.3g} {unit}".strip()

@@ -27,14 +27,14 @@ from sandbox.action import ActionError
 from sandbox.arrays import FloatArray
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import able, engine_named
+from sandbox.game_names import environments
 from sandbox.games.contract import HasObservation, Rules
-from sandbox.games.names import environments
 from sandbox.games.registry import required_rules
-from sandbox.measure.episode import Episode
-from sandbox.measure.seeds import seeded
+from sandbox.measure.run.sessions import Episode
+from sandbox.measure.seeds import with_seed
 from sandbox.recording import Recording
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import load
-from sandbox.scene.scene import Scene
 
 GAMES = {each.name: (each.scene, each.frame_skip) for each in environments()}
 """Shipped scene and number of steps per action, by the name in the environment id."""
@@ -90,7 +90,7 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
     ) -> None:
         """Create an environment; `reset` begins an episode."""
         self.scene = scene if isinstance(scene, Scene) else load(scene)
-        self.engine, self.every, self.render_mode = engine, _steps(every), render_mode
+        self.engine, self.every, self.render_mode = engine, _steps_per_action(every), render_mode
         rules = required_rules(self.scene)
         self.controls = rules.controls
         missing = engine_named(engine).missing(self.scene, self.scene.solver)
@@ -98,9 +98,9 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
             raise Refusal(engine, missing, able(self.scene))
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"unknown render mode {render_mode!r}; use 'rgb_array'")
-        self._numbers = _numbers(self.scene, bodies)
-        states = [f"{self.scene.bodies.names[number]} {state}" for number in self._numbers for state in STATES]
-        self.observed: tuple[str, ...] = (*states, *(name for name, _ in _gauges(rules)), "time", "score")
+        self._observed_bodies = _body_indices(self.scene, bodies)
+        states = [f"{self.scene.bodies.names[index]} {state}" for index in self._observed_bodies for state in STATES]
+        self.observed: tuple[str, ...] = (*states, *(name for name, _ in _rules_observation(rules)), "time", "score")
         """name of each number of an observation"""
         count = len(self.controls)
         self.analogue = any(control.analogue for control in self.controls)
@@ -135,7 +135,7 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         super().reset(seed=self.scene.world.seed if seed is None and first else seed)
         number = seed if seed is not None else self.scene.world.seed if first else int(self.np_random.integers(SEEDS))
         self._release()
-        self._episode, self._ended = Episode(seeded(self.scene, number), self.engine), False
+        self._episode, self._ended = Episode(with_seed(self.scene, number), self.engine), False
         return self._observation(), self._info()
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -151,7 +151,7 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
             ValueError: the action does not have one valid number for each control. The environment is left unchanged.
             ResetNeeded: no episode has begun, or the episode has ended.
         """
-        episode = self._going()
+        episode = self._current_episode()
         if self._ended:
             raise gymnasium.error.ResetNeeded("the episode has ended; call reset before the next step")
         levels = self._levels_of(action)
@@ -170,7 +170,12 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         self._ended = over or late
         return self._observation(), float(episode.rules.score - before), over, late, info
 
-    def _going(self) -> Episode:
+    def _current_episode(self) -> Episode:
+        """Return the episode.
+
+        Raises:
+            ResetNeeded: no episode has begun.
+        """
         if self._episode is None:
             raise gymnasium.error.ResetNeeded("call reset before step, render or recording")
         return self._episode
@@ -193,17 +198,17 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         return found
 
     def _observation(self) -> Observation:
-        episode = self._going()
-        frame, some = episode.frame(), self._numbers
+        episode = self._current_episode()
+        frame, some = episode.frame(), self._observed_bodies
         columns: list[FloatArray] = [frame.position[some], frame.velocity[some]]
         columns += [each[some, None] for each in (frame.angle, frame.angular_velocity, frame.present.astype(float))]
-        others = [*(value for _, value in _gauges(episode.rules)), episode.time, float(episode.rules.score)]
+        others = [*(value for _, value in _rules_observation(episode.rules)), episode.time, float(episode.rules.score)]
         state = np.concatenate((np.hstack(columns).ravel(), others))
         bounded = np.clip(np.nan_to_num(state, posinf=LIMIT, neginf=-LIMIT), -LIMIT, LIMIT)
         return np.asarray(bounded, np.float32)
 
     def _info(self) -> dict[str, Any]:
-        episode = self._going()
+        episode = self._current_episode()
         rules = episode.rules
         return {
             "time": episode.time,
@@ -215,13 +220,13 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
 
     def recording(self) -> Recording:
         """Return the episode so far as a recording, for `sandbox replay`."""
-        return self._going().recording()
+        return self._current_episode().recording()
 
     def render(self) -> Any:
         """Return a picture, (height, width, 3) from 0 to 255; None without a render mode."""
         if self.render_mode is None:
             return None
-        episode = self._going()
+        episode = self._current_episode()
         if self._canvas is None:
             from sandbox.window.render.offscreen import OffscreenRenderer  # pygame is needed only to render
 
@@ -240,7 +245,7 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         self._episode = None
 
 
-def _steps(every: int) -> int:
+def _steps_per_action(every: int) -> int:
     """Return the number of steps per action as an int.
 
     Raises:
@@ -255,11 +260,12 @@ def _steps(every: int) -> int:
     return steps
 
 
-def _gauges(rules: Rules) -> Sequence[tuple[str, float]]:
+def _rules_observation(rules: Rules) -> Sequence[tuple[str, float]]:
+    """Return the names and values that the rules of the game observe; empty if they observe nothing."""
     return rules.observation() if isinstance(rules, HasObservation) else ()
 
 
-def _numbers(scene: Scene, names: Sequence[str] | None) -> list[int]:
+def _body_indices(scene: Scene, names: Sequence[str] | None) -> list[int]:
     """Return the indices of the observed bodies; `names` is a list of names, one name, or None for the default.
 
     Raises:
@@ -267,7 +273,7 @@ def _numbers(scene: Scene, names: Sequence[str] | None) -> list[int]:
     """
     bodies = scene.bodies
     if names is None:
-        return [int(number) for number in np.flatnonzero(~bodies.fixed)]
+        return [int(index) for index in np.flatnonzero(~bodies.fixed)]
     names = (names,) if isinstance(names, str) else names
     unknown = [name for name in names if name not in bodies.names]
     if unknown:
@@ -275,7 +281,9 @@ def _numbers(scene: Scene, names: Sequence[str] | None) -> list[int]:
     return [bodies.names.index(name) for name in names]
 
 
-for _name, (_scene, _every) in GAMES.items():
+for _each in environments():
     gymnasium.register(
-        f"sandbox/{_name}-v0", entry_point="sandbox.gym:SandboxEnv", kwargs={"scene": _scene, "every": _every}
+        f"sandbox/{_each.name}-v0",
+        entry_point="sandbox.gym:SandboxEnv",
+        kwargs={"scene": _each.scene, "every": _each.frame_skip, "engine": _each.engine},
     )

@@ -12,14 +12,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from sandbox.report.page.document import Page
+    from sandbox.report.html.page import Page
 
-MAX_LETTERS = 1_500_000
-"""Of one display; a page that is longer is shown without its replay."""
+MAX_CHARACTERS = 1_500_000
+"""Length of one display; a longer page is shown without its replay, so that notebook files stay small."""
 TALL, LOW = 560, 380
 """Heights of frames, px, until the page has reported its own."""
 
-FITTING = """
+FIT_HEIGHT = """
 if (!window.sandboxFrames) {
   window.sandboxFrames = true;
   window.addEventListener("message", (event) => {
@@ -37,12 +37,12 @@ if (!window.sandboxFrames) {
 PageOf = Callable[..., "Page"]
 
 _PAGES = {
-    "Scene": ("sandbox.report.page.scene_page", "scene_page", LOW),
-    "Trajectory": ("sandbox.report.page.run_page", "run_page", TALL),
-    "Comparison": ("sandbox.report.page.comparison_page", "comparison_page", TALL),
-    "Tradeoff": ("sandbox.report.page.tradeoff_page", "page_of_tradeoff", TALL),
-    "ShotResult": ("sandbox.report.page.shot_page", "shot_page", TALL),
-    "Odds": ("sandbox.report.page.odds_page", "odds_page", TALL),
+    "Scene": ("sandbox.report.html.scene_page", "scene_page", LOW),
+    "Trajectory": ("sandbox.report.html.scene_page", "run_page", TALL),
+    "Comparison": ("sandbox.report.html.comparison", "comparison_page", TALL),
+    "Tradeoff": ("sandbox.report.html.tradeoff", "page_of_tradeoff", TALL),
+    "ShotResult": ("sandbox.report.html.shot_pages", "shot_page", TALL),
+    "Odds": ("sandbox.report.html.shot_pages", "odds_page", TALL),
 }
 """By the name of the class: module and function of its page, and the height of its frame, px."""
 
@@ -51,15 +51,15 @@ def html_of(value: object) -> str:
     """Return a value as HTML.
 
     Raises:
-        TypeError: nothing renders values of its class.
+        TypeError: there is no display for its class.
     """
     name = next((each.__name__ for each in type(value).__mro__ if each.__name__ in _PAGES), None)
     if name is None:
-        raise TypeError(f"nothing displays a {type(value).__name__}")
+        raise TypeError(f"no display for {type(value).__name__}")
     module, function, height = _PAGES[name]
     page_of: PageOf = getattr(import_module(module), function)
     text = _frame(page_of(value), height)
-    if len(text) > MAX_LETTERS:
+    if len(text) > MAX_CHARACTERS:
         text = _frame(page_of(value, **_without_replay(name)), height)
     return text
 
@@ -73,9 +73,9 @@ def _frame(page: "Page", height: int) -> str:
     """Return a page as a frame: scripts run, but have no access to the notebook around it."""
     document, title = html.escape(page.html(compact=True)), html.escape(page.title)
     style = f"box-sizing: border-box; width: 100%; height: {height}px; border: 1px solid #8886; border-radius: 6px"
-    # the listener comes first: a page that is shown at once reports its height at once
+    # the listener comes first, because the page may report its height at once
     return (
-        f"<script>{FITTING}</script>"
+        f"<script>{FIT_HEIGHT}</script>"
         f'<iframe srcdoc="{document}" sandbox="allow-scripts" class="sandbox-page" title="{title}" loading="lazy"'
         f' style="{style}"></iframe>'
     )

@@ -9,15 +9,14 @@ from typing import Any, NamedTuple, Self
 from pydantic import ValidationError
 
 from sandbox.action import Action, ActionError, Switch, actions_from_json, actions_to_json
+from sandbox.atomic_write import atomic_write
 from sandbox.echo import short_repr
-from sandbox.resource_limits import SESSION_SIZE
+from sandbox.resource_limits import SESSION_SIZE, read_limited
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.scene.errors import Fault, SceneError
-from sandbox.scene.files.document import to_document
+from sandbox.scene.files.document import check_text, to_document
 from sandbox.scene.files.load import from_session
-from sandbox.scene.files.nesting import check_text
-from sandbox.scene.scene import Scene
-from sandbox.whole import read_whole, whole
 
 FORMAT = 1
 MAX_DURATION = 1e9  # s, as of a scene
@@ -61,6 +60,11 @@ class Recording:
     """s, time to which the session had been rewound when it was saved; None if it was saved at its end"""
 
     @property
+    def has_game(self) -> bool:
+        """Whether the rules of a game ran in the session."""
+        return bool(self.presses) or self.score is not None
+
+    @property
     def whole_scene(self) -> Scene:
         """The scene with the duration of the session."""
         world = self.scene.world.model_copy(update={"duration": self.duration})
@@ -92,7 +96,7 @@ class Recording:
             The path of the file.
         """
         path = Path(path)
-        with whole(path) as temporary:
+        with atomic_write(path) as temporary:
             temporary.write_text(self.to_json(), encoding="utf-8")
         return path
 
@@ -128,7 +132,7 @@ class Recording:
             check_text(text)
             document = json.loads(text)
             if not isinstance(document, Mapping) or document.get("format") != FORMAT:
-                raise ValueError(_no_session(document))
+                raise ValueError(_not_a_session(document))
             duration = _part(document, "duration", (int, float))
             if not 0 <= duration <= MAX_DURATION:
                 raise ValueError(f"`duration` must be 0 to {MAX_DURATION:g} s")
@@ -164,20 +168,20 @@ class Recording:
         Raises:
             SceneError: the file cannot be read or is too large, or the document, its scene or its actions have faults.
         """
-        file, most = Path(path), SESSION_SIZE.value
+        file = Path(path)
         try:
-            refusal = SESSION_SIZE.refusal("its size is", file.stat().st_size)  # a pipe states none
+            refusal = SESSION_SIZE.refusal("its size is", file.stat().st_size)  # 0 for a pipe
             if refusal is not None:
                 raise SceneError([Fault(str(path), None, "", refusal)])
-            text = read_whole(file, most).decode("utf-8")
+            text = read_limited(file, SESSION_SIZE.value).decode("utf-8")
         except (OSError, ValueError) as error:
             reason = (error.strerror if isinstance(error, OSError) else None) or error
             raise SceneError([Fault(str(path), None, "", f"cannot be read: {reason}")]) from None
         return cls.from_json(text, str(path))
 
 
-def _no_session(document: Any) -> str:
-    """Say what a JSON document is that is no session."""
+def _not_a_session(document: Any) -> str:
+    """Return the reason why a JSON document is not a session."""
     made = {"runs": "run", "engines": "compare", "points": "tradeoff", "cells": "extremes", "$schema": "schema"}
     if isinstance(document, Mapping) and "format" not in document:
         for key, command in made.items():
@@ -189,9 +193,13 @@ def _no_session(document: Any) -> str:
     return "it is not a JSON object; the window saves sessions with Ctrl+S"
 
 
-def _part(document: Mapping[str, Any], key: str, kind: type | tuple[type, ...], without: Any = ...) -> Any:
-    """Return a part of a document; one that may be missing has a value for where it is."""
-    value = document.get(key) if without is ... else document.get(key, without)
+def _part(document: Mapping[str, Any], key: str, kind: type | tuple[type, ...], default: Any = ...) -> Any:
+    """Return a value of a document, or a default for a missing key that is not required.
+
+    Raises:
+        ValueError: the key is required and missing, or the value has another type.
+    """
+    value = document.get(key) if default is ... else document.get(key, default)
     if not isinstance(value, kind) or isinstance(value, bool):
         raise ValueError(f"`{key}` is missing or of the wrong type")
     return value

@@ -237,3 +237,21 @@ def _free_in_address_space() -> float:
     except OSError:  # no Linux
         pages = 0
     return limit - pages * os.sysconf("SC_PAGE_SIZE")
+
+
+def read_limited(path: Path, max_bytes: int) -> bytes:
+    """Return the bytes of a file, which may be a pipe or a device without an end.
+
+    Args:
+        path: path of the file.
+        max_bytes: largest size.
+
+    Raises:
+        OSError: the file cannot be read.
+        ValueError: the file is larger.
+    """
+    with path.open("rb") as stream:
+        content = stream.read(max_bytes + 1)
+    if len(content) > max_bytes:
+        raise ValueError(f"larger than {max_bytes >> 20} MiB")
+    return content

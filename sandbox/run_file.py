@@ -1,8 +1,8 @@
-"""Run files: the `.npz` of a stored run is validated as a whole when it is read, before anything uses it.
+"""Run files: the `.npz` file of a stored run, which is validated completely when it is read.
 
-Sizes come first, so that a damaged header or an archive made to expand allocates nothing: the members of the archive,
-then the header of each array against its size in the archive, the other arrays, and memory. Then `info` is validated as
-a typed model, and at last the contents of the arrays against the scene that `info` states.
+Sizes are checked first, so that a damaged header or a decompression bomb allocates nothing: the members of the archive,
+then the header of each array against its size in the archive, against the other arrays, and against the free memory.
+Then `info` is validated as a typed model, and the contents of the arrays against the scene in `info`.
 
 The format: a zip archive with one `.npy` member for each array of `Trajectory`, of native byte order and without
 pickled objects, and `info`, a JSON object as an array of one text.
@@ -26,13 +26,14 @@ import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from sandbox.action import Action, Spawn
+from sandbox.arrays import state_hash
 from sandbox.echo import MAX_NAMED, printable, shorten
 from sandbox.resource_limits import CONTACTS, FREE_FRACTION, SESSION_SIZE, TooLargeError, free_memory
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Name
 from sandbox.scene.description.world import Settings
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import from_session
-from sandbox.scene.scene import Scene
 
 Array = npt.NDArray[Any]
 
@@ -58,22 +59,22 @@ SHAPES: dict[str, tuple[str | int, ...]] = {
     "layer": ("T", "N"),
     "info": (),
 }
-"""The arrays by name; a letter is a length, which the first array that has it decides."""
+"""Shapes of the arrays; a letter is a length, which the first array with that letter determines."""
 
 KINDS = {"names": "U", "info": "U", "contact_pair": "i8", "missed_pair": "i8", "layer": "i"}
 """Types of the arrays that are not float64: text, int64, and integers of any width."""
 
 OPTIONAL = frozenset({"broken_time", "energy", "account", "spin", "layer"})
-"""Arrays that runs stored by earlier versions lack, or runs without such a thing."""
+"""Arrays that are missing in runs of earlier versions, or of scenes without joints, energy accounting and so on."""
 
 EMPTY = {"spin": (0, 0, 3), "layer": (0, 0)}
-"""Shapes of arrays that may be stored though the run has nothing to put in."""
+"""Shapes of arrays that may be stored without values."""
 
 DAMAGE = (ValueError, EOFError, RuntimeError, OverflowError, struct.error, zipfile.BadZipFile, zlib.error)
-"""What reading a damaged archive raises, besides OSError and MemoryError."""
+"""Exceptions raised by reading a damaged archive, besides OSError and MemoryError."""
 
 MAX_DIRECTORY = 64 * 2**10
-"""Bytes of the archive's directory, which zipfile reads whole: a run's 20 members take 1 KiB."""
+"""Largest size of the archive's directory, bytes, which zipfile reads at once; the 20 members of a run take 1 KiB."""
 
 _END = struct.Struct("<4s4H2LH")
 """End of central directory: signature, disks and counts, size and offset of the directory, length of a comment."""
@@ -82,33 +83,33 @@ _END_64 = struct.Struct("<4sQ2H2L4Q")
 """Zip64 end of central directory, of archives beyond 4 GiB: its size is the last but one value."""
 
 BYTES_PER_CHARACTER = 4
-"""of text in an array of numpy's"""
+"""of text in a numpy array"""
 
 _HEADER = re.compile(
     rb"\{'descr': '([<>|=]?)([a-zA-Z]\d{0,9})', 'fortran_order': (?:True|False), "
     rb"'shape': \((|\d{1,18},|\d{1,18}(?:, \d{1,18})+)\), \} *\n"
 )
-"""As numpy writes it: other descriptions are of records or objects, which no run has."""
+"""Header as numpy writes it; other headers are of records or objects, which no run has."""
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Time = Annotated[float, Field(ge=0, le=1e9, allow_inf_nan=False)]
 """s"""
-Count = Annotated[int, Field(ge=0, lt=2**63)]
-Number = Annotated[int, Field(gt=-(2**63), lt=2**63)] | Finite
+StoredCount = Annotated[int, Field(ge=0, lt=2**63)]
+StoredNumber = Annotated[int, Field(gt=-(2**63), lt=2**63)] | Finite
 
 
-class Stored(BaseModel):
+class StoredPart(BaseModel):
     """A strict part of `info`. Keys of later versions are ignored."""
 
     model_config = ConfigDict(strict=True, extra="ignore", frozen=True)
 
 
-class GameInfo(Stored):
-    """The game that was played, as `Bout.told` returns it."""
+class GameInfo(StoredPart):
+    """Game that was played, as `HeadlessGame.to_dict` returns it."""
 
     name: str = ""
     player: str | None = None
-    score: Number
+    score: StoredNumber
     over: str | None = None
     lines: tuple[tuple[str, str], ...] = ()
     presses: tuple[tuple[Time, str, Finite], ...] = ()
@@ -117,28 +118,28 @@ class GameInfo(Stored):
     lamps: tuple[tuple[Time, tuple[str, ...]], ...] = ()
 
 
-class Info(Stored):
-    """What was run and how it went, as `measure.run` writes it. Keys with a default are missing in earlier versions."""
+class Info(StoredPart):
+    """Description and results of a run, as `measure.run` writes them. Earlier versions lack the keys with defaults."""
 
     scene: dict[str, Any]
-    """a document, which is validated as a scene after this"""
+    """a scene document, which is validated separately"""
     engine: Name
     settings: Settings
     actions: tuple[Action, ...] = ()
-    seed: Count
+    seed: StoredCount
     versions: dict[str, str]
     status: Literal["ok", "diverged", "refused", "failed"]
     reason: str | None
-    steps: Count
+    steps: StoredCount
     seconds: Annotated[Finite, Field(ge=0)]
-    work: dict[str, Annotated[Number, Field(ge=0)]] = Field(default_factory=dict)
+    work: dict[str, Annotated[StoredNumber, Field(ge=0)]] = Field(default_factory=dict)
     audited: bool
     state_hash: str | None = None
     energy_start: float | None
-    """J; not finite where a run diverged"""
+    """J; may be infinite or nan after a divergence"""
     energy_end: float | None
     joint_error: float | None = None
-    broken: Count = 0
+    broken: StoredCount = 0
     causes: tuple[str, ...] = ()
     game: GameInfo | None = None
 
@@ -147,25 +148,25 @@ _NAMES: TypeAdapter[list[Name]] = TypeAdapter(list[Name])
 
 
 class _Header(NamedTuple):
-    """How an array is stored."""
+    """Header of a stored array."""
 
     member: zipfile.ZipInfo
     kind: str
-    """numpy's code of the type, without the byte order"""
+    """numpy's type code without the byte order"""
     shape: tuple[int, ...]
 
     def __str__(self) -> str:
-        """Say shape and type, such as `51 x 1 x 2 of float64`."""
+        """Return shape and type, such as `51 x 1 x 2 of float64`."""
         return f"{_shape_name(self.shape)} of {_type_name(self.kind)}"
 
 
 def read_run_file(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
-    """Read a stored run: the arrays by their names in `Trajectory`, without those that it lacks, and `info`.
+    """Read a stored run: the arrays that it has, by their names in `Trajectory`, and `info`.
 
     Raises:
         OSError: the file cannot be opened or read.
         TooLargeError: the arrays would not fit into memory.
-        ValueError: it is no stored run, or is damaged. `str()` names the file and the array or key, and what is wrong.
+        ValueError: the file is not a stored run, or is damaged. `str()` has the file, the array or key, and the fault.
     """
     with path.open("rb") as stream:
         try:
@@ -178,12 +179,13 @@ def read_run_file(path: Path) -> tuple[dict[str, Array], dict[str, Any]]:
                 _check_lengths(lengths, stated)
                 arrays = {name: _read(archive, header) for name, header in headers.items()}
             _check_contents(arrays, stated.scene)
+            _check_completed(arrays, stated)
         except TooLargeError as error:
             raise TooLargeError(f"{path}: {error}") from None
         except MemoryError:
             raise TooLargeError(f"{path}: does not fit into memory") from None
         except OSError as error:
-            if error.errno != errno.EINVAL:  # as of a position before the start of the file, which a damaged one states
+            if error.errno != errno.EINVAL:  # a damaged file may state a position before its start
                 raise
             raise _fault(path, error) from None
         except DAMAGE as error:
@@ -197,12 +199,12 @@ def _fault(path: Path, error: Exception) -> ValueError:
 
 
 def _check_directory(stream: IO[bytes]) -> None:
-    """Bound the size that an archive states for its directory, as zipfile makes an object of each entry in it.
+    """Check the size of an archive's directory, because zipfile creates an object for each entry.
 
-    Source: .ZIP file format specification (APPNOTE), 4.3.14 to 4.3.16. An archive of numpy's has no comment.
+    Source: .ZIP file format specification (APPNOTE), 4.3.14 to 4.3.16. Archives that numpy writes have no comment.
 
     Raises:
-        ValueError: it states another end than numpy writes, or a directory larger than any run's.
+        ValueError: the end of the archive is not as numpy writes it, or its directory is larger than that of any run.
     """
     longest = _END_64.size + _LOCATOR.size + _END.size
     stream.seek(-min(stream.seek(0, os.SEEK_END), longest), os.SEEK_END)
@@ -219,10 +221,10 @@ def _check_directory(stream: IO[bytes]) -> None:
 
 
 def _headers(archive: zipfile.ZipFile) -> dict[str, _Header]:
-    """Read the header of every array; arrays of other names are left alone.
+    """Read the header of every array; arrays of other names are ignored.
 
     Raises:
-        ValueError: one is missing or there twice, or is stored in another way than numpy stores arrays.
+        ValueError: an array is missing, occurs twice, or is not stored as numpy stores arrays.
     """
     headers: dict[str, _Header] = {}
     for member in archive.infolist():
@@ -256,16 +258,16 @@ def _header(name: str, member: zipfile.ZipInfo, stream: IO[bytes]) -> _Header:
     if kind[0] not in "biufcSU" or (order and width > 1 and np.dtype(f"{order}i4") != np.dtype("i4")):
         raise ValueError(f"{name} is of {_type_name(order + kind)}, not {_type_name(KINDS.get(name, 'f8'))}")
     size = prod(shape) * width * (BYTES_PER_CHARACTER if kind[0] == "U" else 1)
-    there = member.file_size - len(start) - length
-    if size != there:
+    stored = member.file_size - len(start) - length
+    if size != stored:
         raise ValueError(
-            f"{name} is {_shape_name(shape)} of {_type_name(kind)}, {size:,} bytes, but there are {there:,}"
+            f"{name} is {_shape_name(shape)} of {_type_name(kind)}, {size:,} bytes, but there are {stored:,}"
         )
     return _Header(member, kind, shape)
 
 
 def _check_shapes(headers: Mapping[str, _Header]) -> dict[str, int]:
-    """Check types and shapes of the arrays against each other; return the lengths by their letters.
+    """Check types and shapes of the arrays against each other; return the length for each letter.
 
     Raises:
         ValueError: an array has another type or shape.
@@ -284,10 +286,10 @@ def _check_shapes(headers: Mapping[str, _Header]) -> dict[str, int]:
 
 
 def _check_memory(headers: Mapping[str, _Header]) -> None:
-    """Refuse arrays that would not fit into memory.
+    """Check that the arrays fit into memory.
 
     Raises:
-        TooLargeError: they would not.
+        TooLargeError: they do not.
     """
     free, size = int(free_memory() * FREE_FRACTION), sum(header.member.file_size for header in headers.values())
     if size > free:
@@ -298,7 +300,7 @@ def _check_memory(headers: Mapping[str, _Header]) -> None:
 
 
 class _Stated(NamedTuple):
-    """`info` as it is stored, as the model that validated it, and the scene that it states."""
+    """`info` as stored and as a model, and its scene."""
 
     document: dict[str, Any]
     info: Info
@@ -306,10 +308,10 @@ class _Stated(NamedTuple):
 
 
 def _read_info(archive: zipfile.ZipFile, header: _Header) -> _Stated:
-    """Read and validate `info`, and the scene that it states.
+    """Read and validate `info` and its scene.
 
     Raises:
-        ValueError: it does not say what it should.
+        ValueError: `info` or its scene is invalid.
     """
     text = str(_read(archive, header))
     try:
@@ -326,10 +328,10 @@ def _read_info(archive: zipfile.ZipFile, header: _Header) -> _Stated:
 
 
 def _integer(text: str) -> int:
-    """Read an integer; the model takes one of any length as a float.
+    """Read an integer. The model reads integers of any length as floats.
 
     Raises:
-        ValueError: it is of more than 64 bits, which no run writes.
+        ValueError: the integer has more than 64 bits, which no run writes.
     """
     value = int(text)
     if not -(2**63) <= value < 2**63:
@@ -341,13 +343,15 @@ def _check_lengths(lengths: Mapping[str, int], stated: _Stated) -> None:
     """Check the lengths of the arrays against `info`.
 
     Raises:
-        TooLargeError: there are more contacts than a run may record.
-        ValueError: they belong to another run.
+        TooLargeError: there are more contacts than the limit of a run.
+        ValueError: the lengths differ from those of the run in `info`.
     """
     info, scene = stated.info, stated.scene
     frames, bodies, known = lengths["T"], lengths["N"], len(scene.bodies)
     spawned = sum(isinstance(action, Spawn) for action in info.actions)
-    without = info.status == "refused" or (info.status == "failed" and info.steps == 0)  # as of a run that was given up
+    without = info.status == "refused" or (
+        info.status == "failed" and info.steps == 0
+    )  # such as a run that exceeded its time limit
     if (frames == 0 and not without) or (frames > 0 and info.status == "refused") or frames > info.steps + 2:
         raise ValueError(f"time has {frames:,} frames of a run of {info.steps:,} steps that is {info.status}")
     if not known <= bodies <= known + spawned:
@@ -365,10 +369,10 @@ def _check_lengths(lengths: Mapping[str, int], stated: _Stated) -> None:
 
 
 def _check_contents(arrays: Mapping[str, Array], scene: Scene) -> None:
-    """Check the contents of the arrays; states of bodies may be any numbers, as those of a run that diverged are.
+    """Check the contents of the arrays. States of bodies may be any numbers here, because a run may have diverged.
 
     Raises:
-        ValueError: a time, a name or a number is none of this run.
+        ValueError: a time, a name or an index is not one of this run.
     """
     time, fixed, bodies = arrays["time"], len(scene.fixed_names), len(arrays["names"])
     for name in ("time", "contact_time"):
@@ -396,9 +400,39 @@ def _check_contents(arrays: Mapping[str, Array], scene: Scene) -> None:
     try:
         _NAMES.validate_python(names)
     except ValidationError as error:
-        raise ValueError(f"names: a name is none: {error.errors()[0]['msg']}") from None
+        raise ValueError(f"names: a name is invalid: {error.errors()[0]['msg']}") from None
     if len(set(names)) < len(names) or tuple(names[: len(scene.bodies)]) != tuple(scene.bodies.names):
         raise ValueError("names: the bodies are not those of info.scene")
+
+
+def _check_completed(arrays: Mapping[str, Array], stated: _Stated) -> None:
+    """Check the states of a run that ended without a failure, and its last one against the hash in `info`.
+
+    The hash covers more than the arrays if the scene has layers, zones, drives or one-way walls, and the removal of
+    bodies is not stored exactly: there it is not compared.
+
+    Raises:
+        ValueError: a state is not finite, two frames have the same time, or the last state is not that of the run.
+    """
+    info, scene, time = stated.info, stated.scene, arrays["time"]
+    if info.status != "ok" or not len(time):
+        return
+    if (time[1:] <= time[:-1]).any():
+        raise ValueError("time: two frames of a complete run have the same time")
+    known = len(scene.bodies)  # a body has no state before it is spawned
+    for name in ("position", "velocity", "angle", "angular_velocity"):
+        if not np.isfinite(arrays[name][:, :known]).all():
+            raise ValueError(f"{name}: has values that are not finite, although the run is complete")
+    hidden = len(scene.layers) > 1 or scene.zones or scene.drives or any(wall.one_way for wall in scene.walls)
+    if info.state_hash is None or hidden or not np.isnan(arrays["retired_time"]).all():
+        return
+    last = [arrays[name][-1] for name in ("position", "velocity", "angle", "angular_velocity")]
+    last.append(np.ones(len(arrays["names"]), np.bool_))
+    spin = arrays.get("spin", np.empty(0))
+    if spin.size:
+        last.append(spin[-1, :, :2])
+    if state_hash(float(time[-1]), last) != info.state_hash:
+        raise ValueError("the last state is not the one whose hash is in info")
 
 
 def _read(archive: zipfile.ZipFile, header: _Header) -> Array:
@@ -414,6 +448,6 @@ def _shape_name(shape: tuple[str | int, ...]) -> str:
 
 
 def _type_name(code: str) -> str:
-    """Return the name of a type by numpy's code, which is of any width or none."""
+    """Return the name of a type by its numpy code, with or without a width."""
     names = {"U": "text", "i": "integers", "f8": "float64", "i8": "int64", "f4": "float32", "i4": "int32"}
     return names.get(code) or names.get(code[:1], f"type {code}")

@@ -1,6 +1,5 @@
 """Results of a simulation: frames, contacts, and whole trajectories as arrays."""
 
-import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -10,10 +9,13 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
-from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.arrays import BoolArray, FloatArray, IntArray, state_hash
+from sandbox.atomic_write import atomic_write
 from sandbox.echo import MAX_MESSAGE, short_repr, shorten
 from sandbox.html_repr import HtmlRepr
-from sandbox.whole import whole
+
+REST_SPEED = 1e-9
+"""m/s and rad/s: rounding errors of a body at rest are below it, and engines stop bodies at far higher speeds"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -53,12 +55,18 @@ class Frame:
 
     def __repr__(self) -> str:
         """Return the time, the number of bodies and the largest speed."""
-        there = int(np.count_nonzero(self.present))
-        gone = len(self.present) - there
+        count = int(np.count_nonzero(self.present))
+        removed = len(self.present) - count
         with np.errstate(invalid="ignore", over="ignore"):
-            fastest = float(np.hypot(*self.velocity[self.present].T).max()) if there else 0.0
-        bodies = _bodies(len(self.present)) + (f", {gone:,} removed" if gone else "")
+            fastest = float(np.hypot(*self.velocity[self.present].T).max()) if count else 0.0
+        bodies = _bodies(len(self.present)) + (f", {removed:,} removed" if removed else "")
         return f"<Frame at {self.time:g} s: {bodies}, largest speed {fastest:.4g} m/s>"
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether no body moves or turns, up to `REST_SPEED`."""
+        rates = (self.velocity, self.angular_velocity, *(() if self.roll is None else (self.roll,)))
+        return all(float(np.abs(rate).max(initial=0.0)) <= REST_SPEED for rate in rates)
 
     @property
     def spin(self) -> FloatArray | None:
@@ -67,10 +75,7 @@ class Frame:
 
     def state_hash(self) -> str:
         """Return a SHA-256 hash of the time and of the exact state of all bodies and drives."""
-        digest = hashlib.sha256(np.float64(self.time).tobytes())
-        for array in self._arrays():
-            digest.update(array.tobytes())
-        return digest.hexdigest()
+        return state_hash(self.time, self._arrays())
 
     def _arrays(self) -> list[npt.NDArray[Any]]:
         arrays = [self.position, self.velocity, self.angle, self.angular_velocity, self.present]
@@ -130,7 +135,7 @@ class Contacts:
         """
         if len(self) < 2:
             return self
-        order = np.lexsort((self.pair[:, 1], self.pair[:, 0], self.time))  # stable: the first row told stays first
+        order = np.lexsort((self.pair[:, 1], self.pair[:, 0], self.time))  # stable: the first recorded row stays first
         time, pair = self.time[order], self.pair[order]
         new = np.append(True, (time[1:] != time[:-1]) | (pair[1:] != pair[:-1]).any(axis=1))
         first = np.flatnonzero(new)
@@ -155,7 +160,7 @@ class Contacts:
         return len(self.time)
 
     def __iter__(self) -> Iterator[ContactEvent]:
-        if not len(self):  # of most steps; five empty lists take longer than all else that asks
+        if not len(self):  # most steps have none; making five empty lists takes longer than everything else here
             return
         columns = (self.time, self.pair, self.point, self.normal, self.impulse)
         for time, *vectors in zip(*(column.tolist() for column in columns), strict=True):
@@ -212,6 +217,56 @@ class Trajectory(HtmlRepr):
     joint_error (the largest constraint violation, relative to a length; None without joints), broken (number of broken
     joints), audited, state_hash (of the last state), versions; causes (names of the columns of `account`)"""
 
+    @classmethod
+    def from_frames(
+        cls,
+        frames: Mapping[str, npt.NDArray[Any]],
+        names: Sequence[str],
+        contacts: Contacts,
+        retired_time: FloatArray,
+        info: Mapping[str, Any],
+        *,
+        missed_time: FloatArray | None = None,
+        missed_pair: IntArray | None = None,
+        broken_time: FloatArray | None = None,
+    ) -> Self:
+        """Assemble a run from the arrays of its frames and its contacts.
+
+        Args:
+            frames: `time`, `position`, `velocity`, `angle` and `angular_velocity`; optionally `energy`, `account`,
+                `spin` and `layer`.
+            names: names of the N bodies.
+            contacts: the contacts.
+            retired_time: (N,) s.
+            info: facts about the run.
+            missed_time: (M,) s; default: no missed contacts.
+            missed_pair: (M, 2); default: no missed contacts.
+            broken_time: (J,) s; default: no joints.
+        """
+        return cls(
+            names=np.asarray(names, dtype=np.str_),
+            contact_time=contacts.time,
+            contact_pair=contacts.pair,
+            contact_point=contacts.point,
+            contact_normal=contacts.normal,
+            contact_impulse=contacts.impulse,
+            retired_time=retired_time,
+            missed_time=np.empty(0) if missed_time is None else missed_time,
+            missed_pair=np.empty((0, 2), np.int64) if missed_pair is None else missed_pair,
+            broken_time=np.empty(0) if broken_time is None else broken_time,
+            info=info,
+            **frames,
+        )
+
+    def present(self, frames: IntArray | slice = slice(None)) -> BoolArray:
+        """Return which bodies have not been retired at some frames, (K, N).
+
+        Args:
+            frames: indices of K frames, or a slice; default: all.
+        """
+        gone = np.where(np.isnan(self.retired_time), np.inf, self.retired_time)
+        return np.asarray(self.time[frames, None] < gone)
+
     def __repr__(self) -> str:
         """Return scene, engine and status, the sizes of the arrays, and the key figures."""
         title, engine = self.info.get("scene", {}).get("title", ""), self.info.get("engine")
@@ -263,7 +318,7 @@ class Trajectory(HtmlRepr):
         if not len(self.broken_time):
             return np.full(joints, np.inf)
         if len(self.broken_time) != joints:
-            raise ValueError(f"the run had {len(self.broken_time):,} joints, described are {joints:,}")
+            raise ValueError(f"the run had {len(self.broken_time):,} joints, the scene has {joints:,}")
         return np.where(np.isnan(self.broken_time), np.inf, self.broken_time)
 
     def number(self, name: str) -> int:
@@ -310,7 +365,7 @@ class Trajectory(HtmlRepr):
         without = {"info", *(key for key in ("spin", "layer") if not len(getattr(self, key)))}
         arrays = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in without}
         arrays["info"] = np.asarray(json.dumps(dict(self.info), ensure_ascii=False))
-        with whole(path) as temporary, temporary.open("xb") as stream:
+        with atomic_write(path) as temporary, temporary.open("xb") as stream:
             np.savez_compressed(stream, **arrays)
         return path
 

@@ -1,6 +1,7 @@
 """Accounts of energy that have to close, whoever keeps them."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,7 +10,9 @@ from sandbox.action import Action
 from sandbox.engines.common.energy_balance import total_energy
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.registry import start
-from sandbox.scene.scene import Scene
+from sandbox.measure.metrics.energy import Ledger, ledger_of
+from sandbox.measure.run.runner import run
+from sandbox.scene.compile.scene import Scene
 
 Timed = Sequence[tuple[int, Action]]
 """What is done, and before which step."""
@@ -49,3 +52,10 @@ def kept(
     scale = max(np.abs(seen).max(), max(map(abs, account.values())))
     assert total_energy(simulation) - began == pytest.approx(sum(account.values()), abs=closes * scale)
     return account
+
+
+def ledger(scene: Scene, engine: str = "pymunk", **settings: Any) -> Ledger:
+    """Run a scene with an energy account and return its ledger; a refusal fails the test."""
+    trajectory = run(scene, engine, **{"audit": False, **settings, "account": True})
+    assert len(trajectory.time), trajectory.reason
+    return ledger_of(trajectory, scene)

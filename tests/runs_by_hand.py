@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from sandbox.arrays import FloatArray
-from sandbox.measure.compare.runs import frames_as_run
+from sandbox.measure.analytic.trajectory import run_without_engine
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Trajectory
 
 BALLS = """
@@ -118,6 +118,6 @@ def run_of(
     )
     state = (at, np.zeros_like(at) if velocity is None else velocity, np.zeros(at.shape[:2]), np.zeros(at.shape[1]))
     gone = np.full(len(scene.bodies), np.nan) if retired is None else np.asarray(retired)
-    run = frames_as_run(scene, scene.solver, when, state, rows, gone)
+    run = run_without_engine(scene, scene.solver, when, state, rows, gone)
     run.info.update(info)  # type: ignore[attr-defined] # it is a dict
     return run

@@ -8,9 +8,9 @@ from typing import Any
 
 from hypothesis import strategies as st
 
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import Location
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
 
 Document = dict[str, Any]
 

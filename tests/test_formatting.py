@@ -6,7 +6,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.formatting import format_percent, format_si, format_time
+from sandbox.formatting import (
+    format_change,
+    format_count,
+    format_number,
+    format_percent,
+    format_plural,
+    format_si,
+    format_time,
+)
 
 
 @pytest.mark.parametrize(
@@ -82,3 +90,36 @@ def test_percent_keeps_small_shares_apart_from_nothing(share: float, text: str) 
 )
 def test_clock_shows_each_step(time: float, step: float, text: str) -> None:
     assert format_time(time, step) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (None, "–"),
+        (math.nan, "–"),
+        (math.inf, "∞"),
+        (-math.inf, "−∞"),
+        (0.0, "0"),
+        (0.00123456, "0.00123"),
+        (0.000999, "9.99×10⁻⁴"),
+        (1e-4, "10⁻⁴"),
+        (-1e-7, "−10⁻⁷"),
+        (999.6, "1,000"),
+        (98765.0, "98,800"),
+        (1.5e7, "1.5×10⁷"),
+        (-2.5, "−2.5"),
+        (100.0, "100"),
+    ],
+)
+def test_numbers_of_tables_have_powers_of_ten_far_from_one(value: float | None, text: str) -> None:
+    assert format_number(value) == text
+
+
+def test_changes_are_in_percent_with_a_sign() -> None:
+    assert [format_change(x) for x in (None, 0.0, 0.0512, -0.5, 1e-14)] == ["–", "0", "+5.1 %", "−50 %", "≈ 0"]
+
+
+def test_counts_have_separators_and_plurals() -> None:
+    assert [format_count(n) for n in (None, 0, 12345)] == ["–", "0", "12,345"]
+    assert [format_plural(n, "point") for n in (0, 1, 2)] == ["0 points", "1 point", "2 points"]
+    assert format_plural(1200, "body", "bodies") == "1,200 bodies"

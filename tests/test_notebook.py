@@ -8,7 +8,9 @@ import sys
 import pytest
 
 import sandbox
-from sandbox.notebook import FITTING, MAX_LETTERS, html_of
+from sandbox.notebook import FIT_HEIGHT, MAX_CHARACTERS, html_of
+
+pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 HOSTILE = '</iframe><script>alert("1")</script>'
 TEXT = f"""
@@ -37,7 +39,7 @@ def document_in(text: str) -> str:
     pattern = r'<script>(.*?)</script><iframe srcdoc="([^"]*)" sandbox="allow-scripts"[^<>]*></iframe>'
     found = re.fullmatch(pattern, text, re.DOTALL)
     assert found is not None
-    assert found[1] == FITTING
+    assert found[1] == FIT_HEIGHT
     return html.unescape(found[2])
 
 
@@ -68,14 +70,14 @@ def test_displays_are_frames_that_hold_hostile_texts_as_texts(scene: sandbox.Sce
         assert "default-src 'none'" in document, name
         links = set(re.findall(r"https?://[^\s\"'<>&)]+", document))
         assert links <= {"http://www.w3.org/2000/svg"}, name
-        assert len(text) < MAX_LETTERS, name
+        assert len(text) < MAX_CHARACTERS, name
 
 
 def test_run_has_a_replay_and_figures_and_a_scene_a_picture(scene: sandbox.Scene) -> None:
     found = displayed(scene)
     run = document_in(found["run"])
     assert "<canvas" in run
-    assert "total energy, J" in run
+    assert "energy of the scene, J" in run
     assert "first contact" in run
     picture = document_in(found["scene"])
     assert 'class="scene"' in picture
@@ -101,7 +103,7 @@ def test_run_with_added_bodies_is_displayed(scene: sandbox.Scene) -> None:
 
 def test_display_that_would_be_too_long_has_no_replay(scene: sandbox.Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     run = sandbox.run(scene)
-    monkeypatch.setattr("sandbox.notebook.MAX_LETTERS", 1000)
+    monkeypatch.setattr("sandbox.notebook.MAX_CHARACTERS", 1000)
     document = document_in(run._repr_html_())
     assert "<canvas" not in document
     assert "first contact" in document
@@ -146,7 +148,7 @@ def test_shot_has_a_replay_paths_and_figures(table: sandbox.Table) -> None:
     assert "&lt;b&gt;bold&lt;/b&gt; in &lt;i&gt;hole&lt;/i&gt;" in document
     assert "<b>bold" not in document
     assert "3, of which 2 moved" in document
-    assert len(text) < MAX_LETTERS
+    assert len(text) < MAX_CHARACTERS
 
 
 def test_shot_without_paths_shows_its_end_and_how_to_record_them(table: sandbox.Table) -> None:
@@ -165,7 +167,7 @@ def test_shot_that_moves_nothing_is_displayed(table: sandbox.Table) -> None:
 
 def test_page_of_a_shot_is_shorter_without_its_replay(table: sandbox.Table, monkeypatch: pytest.MonkeyPatch) -> None:
     shot = table.shoot(sandbox.Stroke(aim=0.0, speed=2.0), ways=True)
-    monkeypatch.setattr("sandbox.notebook.MAX_LETTERS", 1000)
+    monkeypatch.setattr("sandbox.notebook.MAX_CHARACTERS", 1000)
     document = document_in(shot._repr_html_())
     assert "<canvas" not in document
     assert 'class="paths"' in document
@@ -190,7 +192,7 @@ def test_tradeoff_is_displayed_and_represented(scene: sandbox.Scene) -> None:
 
 
 def test_nothing_else_is_displayed() -> None:
-    with pytest.raises(TypeError, match="nothing displays a int"):
+    with pytest.raises(TypeError, match="no display for int"):
         html_of(1)
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import loads
 

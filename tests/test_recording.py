@@ -7,17 +7,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import strategies
 from hypothesis import example, given
 from hypothesis import strategies as st
-from test_action import actions
 
 from sandbox.action import Action, Impulse
 from sandbox.recording import Recording
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import loads
-from sandbox.scene.scene import Scene
+from tests import strategies
+from tests.test_action import actions
 
 RECORDING = Recording(
     scene=loads('[[ball]]\nname = "a"\nposition = [0, 0]\nradius = 1\n'),

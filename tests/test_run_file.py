@@ -15,7 +15,7 @@ import pytest
 
 from sandbox import run_file
 from sandbox.action import Remove, Spawn
-from sandbox.measure.run import run, run_without_frames
+from sandbox.measure.run.runner import run, run_without_frames
 from sandbox.resource_limits import TooLargeError
 from sandbox.run_file import SHAPES, Info
 from sandbox.scene.description.discs import Ball
@@ -142,9 +142,9 @@ def test_sound_run_is_read(path: Path, sound: Trajectory) -> None:
         ("names", array([1.0, 2.0, 3.0]), "names is 3 of float64, not 3 of text"),
         ("names", array(["a", "b", "a"]), "names: the bodies are not those"),
         ("names", array(["b", "a", "c"]), "names: the bodies are not those"),
-        ("names", array(["a", "b", ""]), "names: a name is none"),
-        ("names", array(["a", "b", "\ud800"]), "names: a name is none"),
-        ("names", array(["a", "b", "c\n"]), "names: a name is none"),
+        ("names", array(["a", "b", ""]), "names: a name is invalid"),
+        ("names", array(["a", "b", "\ud800"]), "names: a name is invalid"),
+        ("names", array(["a", "b", "c\n"]), "names: a name is invalid"),
         (
             "names",
             array(np.array([97, 98, 2**31 - 1], "<u4").view("<U1")),
@@ -373,3 +373,42 @@ def test_run_that_was_given_up_has_no_frames(tmp_path: Path) -> None:
 def test_folder_is_no_damage(tmp_path: Path) -> None:
     with pytest.raises(IsADirectoryError):
         Trajectory.load(tmp_path)
+
+
+def _first_frames(arrays: dict[str, Any]) -> None:
+    per_frame = [name for name, shape in SHAPES.items() if shape[:1] in (("T",), ("E",)) and name in arrays]
+    for name in per_frame:
+        arrays[name] = arrays[name][:5]
+
+
+def _with_nan(arrays: dict[str, Any]) -> None:
+    arrays["velocity"][7, 1, 0] = np.nan
+
+
+def _with_other_position(arrays: dict[str, Any]) -> None:
+    arrays["position"][-1, 0, 0] += 1e-9
+
+
+def _all_at_time_0(arrays: dict[str, Any]) -> None:
+    arrays["time"][:] = 0.0
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (_first_frames, "the last state is not the one whose hash is in info"),
+        (_with_nan, "velocity: has values that are not finite"),
+        (_with_other_position, "the last state is not the one whose hash is in info"),
+        (_all_at_time_0, "time: two frames of a complete run have the same time"),
+    ],
+)
+def test_complete_run_with_other_values_is_refused(
+    damage: Callable[[dict[str, Any]], None], message: str, tmp_path: Path
+) -> None:
+    path = run(SCENE).save(tmp_path / "run.npz")
+    assert Trajectory.load(path).status == "ok"
+    with np.load(path) as stored:
+        arrays = {name: stored[name] for name in stored.files}
+    damage(arrays)
+    np.savez_compressed(path, **arrays)
+    assert message in refusal(path)

@@ -8,9 +8,9 @@ from sandbox.action import Action, Impulse, Spawn
 from sandbox.games.contract import Control, StepInfo
 from sandbox.games.session import GameSession
 from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import loads
-from sandbox.scene.scene import Scene
 
 TOY = """
 title = "Toy"

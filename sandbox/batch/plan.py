@@ -1,61 +1,54 @@
-"""Plans: which runs a command asks for. Scenes, sweeps, seeds and engines multiply."""
+"""Plans: the list of runs that a command makes. Scenes, sweeps, seeds and engines multiply."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
-from sandbox.echo import short_count, short_repr, shorten
+from sandbox.batch.sweep import parse_sweep, relabelled
+from sandbox.engines.registry import USUAL
 from sandbox.games.players import PlayerSpec
 from sandbox.games.registry import has_rules
-from sandbox.measure.replay import read_session
-from sandbox.measure.seeds import same_chances
-from sandbox.measure.told import Told
+from sandbox.measure.run.sessions import read_session
+from sandbox.measure.seeds import same_random_state
+from sandbox.progress import Progress, ProgressCallback
 from sandbox.recording import Recording
-from sandbox.resource_limits import PLAN_MEMORY, RUNS
+from sandbox.resource_limits import PLAN_MEMORY
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import Override, from_session, load
-from sandbox.scene.files.overrides import (
-    AddressError,
-    combinations,
-    parse_assignment,
-    parse_path,
-    parse_value,
-    split_assignment,
-)
-from sandbox.scene.scene import Scene
+from sandbox.scene.files.overrides import AddressError, combinations, parse_assignment
 
 MAX_FAILED = 100
-"""Runs that cannot be made, after which the check ends with their faults."""
+"""Runs with faults after which planning stops and reports them: further ones would repeat the same faults."""
 _BYTES_A_SCENE, _BYTES_AN_ELEMENT, _BYTES_A_BODY = 16_000, 4_000, 500
-"""What a scene takes at most, as measured: an element is a table of the file, a body one that may be generated."""
+"""Upper bounds of the memory of a scene, measured: an element is a table of the file, a body may be generated."""
 
-USUAL = "pymunk"
-"""The engine that runs what nobody has chosen one for."""
+Values = tuple[tuple[str, Any], ...]
+"""Keys of a scene and the values that they are set to."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """One run to be made: a scene as it is to be run, and on what."""
+    """One run to be made: a scene with all values set, and an engine. Picklable."""
 
     label: str
     """the scene as the user named it"""
     scene: Scene
     engine: str
     actions: tuple[Any, ...] = ()
-    point: tuple[tuple[str, Any], ...] = ()
-    """the keys that were set or swept, and this run's values"""
+    point: Values = ()
+    """the keys that are set or swept, with their values in this run"""
     recorded: bool = False
-    """It is a session that was played before."""
+    """the job replays a recorded session"""
     state_hash: str | None = None
-    """of the end of that session, where this run is to end alike: on its engine, with nothing set"""
+    """of the end of that session, if the run must reproduce it: same engine, nothing set"""
     player: PlayerSpec | None = None
-    """who plays the game of the scene, where it has one with rules"""
+    """player of the game; None if no game is played"""
     score: float | None = None
-    """of that session, where this run is to end alike"""
+    """of that session, if the run must reproduce it"""
     seeds: int = 1
-    """for how many seeds, from its own on, it stands: nothing in its scene is random where there are several"""
+    """number of seeds that the job stands for: more than 1 if nothing in its scene is random"""
 
 
 def plan(
@@ -65,147 +58,159 @@ def plan(
     sweeps: Sequence[str] = (),
     seeds: int | None = None,
     player: PlayerSpec | None = None,
-    told: Told | None = None,
+    progress: ProgressCallback | None = None,
 ) -> list[Job]:
-    """Lay out every run, in order: scene by scene, the last sweep changing fastest, then seeds, then engines.
+    """Return all runs, in order: scene by scene, the last sweep changing fastest, then seeds, then engines.
 
-    Where nothing in a scene is random, all seeds are one run, of the first.
+    If nothing in a scene is random, all seeds are one run, with the first seed.
 
     Args:
         scenes: label and path of each; a `.json` is a recorded session.
-        engines: names; none for the usual, which is a session's own.
+        engines: names; None for the default: pymunk, or the engine of the session.
         overrides: `KEY=VALUE`, set in every run.
         sweeps: `KEY=A,B,C` or `KEY=LOW:HIGH:N[:log]`.
-        seeds: how many, from 1 on; without, each scene's own.
-        player: who plays where a scene has a game with rules; by default chance, and of a session who played it.
-        told: called with how far it is.
+        seeds: run the seeds 1 to this; None for the seed of each scene.
+        player: player of scenes whose game has rules; default: random, or the player of the session.
+        progress: called with the progress.
 
     Raises:
-        SceneError: scenes have faults, as they stand or with a value set; all of them are told, each once. Or a game
-            cannot be played so.
-        AddressError: a sweep cannot be understood, or there would be too many runs.
+        SceneError: scenes have faults, with or without the values set (each fault once), or a game cannot be played.
+        AddressError: a sweep is malformed, or there would be too many runs.
     """
     axes: list[tuple[str, Sequence[Any]]] = [parse_sweep(sweep) for sweep in sweeps]
-    keys = [key for key, _ in axes]
     seeding: Sequence[int | None] = [None] if seeds is None else range(1, seeds + 1)
     points = combinations(axes, len(seeding))
-    count = len(points) * len(seeding)
-    jobs: list[Job] = []
+    planner = _Planner(overrides, [key for key, _ in axes], seeding, len(points) * len(seeding), player)
     set_values = [_assignment(override) for override in overrides]
-    faults: dict[Fault, None] = {}
-    planned = failed = 0
+    jobs: list[Job] = []
     for label, path in scenes:
-        recorded = _is_recording(path)
-        known: Recording | None = None
         for point in points:
-            found: list[tuple[Recording, PlayerSpec | None, tuple[tuple[str, Any], ...]]] = []
-            alike = 1
-            for seed in seeding:
-                where = (*point, *(() if seed is None else (("world.seed", seed),)))
-                try:
-                    known = read_session(path) if recorded and known is None else known
-                    session = _read(path, known, (*overrides, *where))
-                    plays = _player(session, path, player)
-                except SceneError as error:
-                    faults |= dict.fromkeys(relabelled(fault, keys) for fault in error.faults)
-                    failed += 1
-                    if failed == MAX_FAILED:
-                        raise SceneError(tuple(faults)) from None
-                    continue
-                if len(found) == 1 and plays is None and same_chances(found[0][0].scene, session.scene):
-                    alike = len(seeding)
-                    break
-                if len(found) < 2:  # by the second it is known that seeds differ
-                    before, each = planned, _bytes_of(session.scene)
-                    planned += each * (len(seeding) - 1 if found else 1)
-                    if planned > PLAN_MEMORY.value:
-                        subject = f"{count:,} runs of {len(session.scene.bodies):,} bodies take"
-                        reason = PLAN_MEMORY.refusal(subject, max(planned, before + each * count))
-                        raise SceneError([Fault(label, None, "", str(reason))])
-                found.append((session, plays, where))
-            for session, plays, where in found:
+            variants, alike = planner.variants(label, path, point)
+            for session, plays, where in variants:
                 for engine in engines or (session.engine,):
                     played = session if engine == session.engine else session.on(engine)
                     state, score = (None, None) if overrides or where else (played.state_hash, played.score)
                     values = (*set_values, *where)
+                    recorded = _is_recording(path)
                     job = Job(label, played.scene, engine, played.actions, values, recorded, state, plays, score, alike)
                     jobs.append(job)
-            if told is not None:
-                told(f"checking {label}: runs so far: {len(jobs):,}")
-    if faults:
-        raise SceneError(tuple(faults))
+            if progress is not None:
+                progress(Progress(f"checking {label}: runs so far: {len(jobs):,}"))
+    if planner.faults:
+        raise SceneError(tuple(planner.faults))
     return jobs
 
 
+class _Variant(NamedTuple):
+    """A scene or session with the values of one point of the sweep and one seed."""
+
+    session: Recording
+    player: PlayerSpec | None
+    where: Values
+    """the swept values and the seed"""
+
+
+class _Planner:
+    """Loads each variant of the scenes, collects the faults, and bounds the memory of the plan."""
+
+    def __init__(
+        self,
+        overrides: Sequence[Override],
+        swept: Sequence[str],
+        seeding: Sequence[int | None],
+        count: int,
+        player: PlayerSpec | None,
+    ) -> None:
+        self.faults: dict[Fault, None] = {}
+        self._overrides, self._swept, self._seeding, self._player = overrides, swept, seeding, player
+        self._count = count
+        """number of variants of each scene"""
+        self._failed = 0
+        self._bytes = 0
+        """memory of all scenes planned so far"""
+        self._recordings: dict[str, Recording] = {}
+        """recorded sessions by their path"""
+
+    def variants(self, label: str, path: str, point: Values) -> tuple[list[_Variant], int]:
+        """Return a scene with the values of a point, once per seed, and the number of seeds that each stands for.
+
+        Raises:
+            SceneError: `MAX_FAILED` variants have faults, or the plan takes too much memory.
+        """
+        found: list[_Variant] = []
+        for seed in self._seeding:
+            where = (*point, *(() if seed is None else (("world.seed", seed),)))
+            try:
+                session = self._load(path, where)
+                plays = _player(session, path, self._player)
+            except SceneError as error:
+                self._add_faults(error)
+                continue
+            if len(found) == 1 and plays is None and same_random_state(found[0].session.scene, session.scene):
+                return found, len(self._seeding)
+            if len(found) < 2:  # the second shows that the seeds differ, so all others are planned with it
+                self._reserve(label, session.scene, len(self._seeding) - 1 if found else 1)
+            found.append(_Variant(session, plays, where))
+        return found, 1
+
+    def _load(self, path: str, where: Values) -> Recording:
+        """Return a scene as a session without actions, or a recorded session, with values set.
+
+        Raises:
+            SceneError: it has faults.
+        """
+        overrides = (*self._overrides, *where)
+        if not _is_recording(path):
+            scene = load(path, overrides)
+            return Recording(scene, USUAL, scene.solver, (), scene.world.duration)
+        if path not in self._recordings:
+            self._recordings[path] = read_session(path)
+        recording = self._recordings[path]
+        document = to_document(recording.whole_scene)
+        document["solver"] = recording.settings.model_dump(mode="json", exclude_defaults=True)
+        return replace(recording, scene=from_session(document, path, overrides))
+
+    def _add_faults(self, error: SceneError) -> None:
+        self.faults |= dict.fromkeys(relabelled(fault, self._swept) for fault in error.faults)
+        self._failed += 1
+        if self._failed == MAX_FAILED:
+            raise SceneError(tuple(self.faults)) from None
+
+    def _reserve(self, label: str, scene: Scene, copies: int) -> None:
+        """Count the memory of a scene and its copies.
+
+        Raises:
+            SceneError: the plan takes too much.
+        """
+        before, each = self._bytes, _bytes_of(scene)
+        self._bytes += each * copies
+        if self._bytes > PLAN_MEMORY.value:
+            subject = f"{self._count:,} runs of {len(scene.bodies):,} bodies take"
+            reason = PLAN_MEMORY.refusal(subject, max(self._bytes, before + each * self._count))
+            raise SceneError([Fault(label, None, "", str(reason))])
+
+
 def _bytes_of(scene: Scene) -> int:
-    """Return about how many bytes a scene takes."""
+    """Return an upper bound of the memory of a scene, bytes."""
     elements = sum(len(part) for _, part in scene if isinstance(part, tuple))
     return _BYTES_A_SCENE + _BYTES_AN_ELEMENT * elements + _BYTES_A_BODY * len(scene.bodies)
 
 
-def repeated_keys(overrides: Sequence[str], sweeps: Sequence[str], seeds: int | None = None) -> list[Fault]:
-    """Return a fault for each key that `--set`, `--sweep` and `--seeds` give more than one value of a single run.
-
-    Values that cannot be read are left to `parse_sweep` and `load`.
-    """
-    set_keys, swept = ([key for key in map(_path, texts) if key] for texts in (overrides, sweeps))
-    faults: dict[Fault, None] = {}
-    for k, (path, key) in enumerate(swept):
-        if any(path == other for other, _ in swept[:k]):
-            faults[Fault("--sweep", None, key, "is swept twice; give all its values in one --sweep")] = None
-        if any(path == other for other, _ in set_keys):
-            faults[Fault("--sweep", None, key, "is given by --set too; leave out one of them")] = None
-    for option, keys in (("--sweep", swept), ("--set", set_keys)) if seeds is not None else ():
-        for path, key in keys:
-            if path == ("world", "seed"):
-                faults[Fault(option, None, key, "is given by --seeds too; leave out one of them")] = None
-    return list(faults)
-
-
-def _path(assignment: str) -> tuple[tuple[str, ...], str] | None:
-    """Return the path of an assignment's key, one for all its spellings, and the key; None if it cannot be read."""
-    try:
-        key, _ = parse_assignment(assignment)
-        return parse_path(key), key
-    except AddressError:
-        return None
-
-
 def _assignment(override: Override) -> tuple[str, Any]:
-    """Return the key and value of what is set; one that cannot be read is left to `load`, which says why."""
+    """Return the key and value of an override; `load` reports a malformed one."""
     try:
         return parse_assignment(override) if isinstance(override, str) else override
     except AddressError:
         return str(override), None
 
 
-def relabelled(fault: Fault, keys: Sequence[str]) -> Fault:
-    """Return a fault of an override, named by `--sweep` where the path that leads nowhere is one that is swept."""
-    is_swept = fault.path == "--set" and any(fault.message.startswith((f"{key}:", f"{key!r}")) for key in keys)
-    return replace(fault, path="--sweep") if is_swept else fault
-
-
-def _read(path: str, known: Recording | None, overrides: Sequence[Override]) -> Recording:
-    """Return a scene as a session without actions, or the session that was read from the file, with values set.
-
-    Raises:
-        SceneError: it has faults.
-    """
-    if known is None:
-        scene = load(path, overrides)
-        return Recording(scene, USUAL, scene.solver, (), scene.world.duration)
-    document = to_document(known.whole_scene)
-    document["solver"] = known.settings.model_dump(mode="json", exclude_defaults=True)
-    return replace(known, scene=from_session(document, path, overrides))
-
-
 def _player(session: Recording, path: str, player: PlayerSpec | None) -> PlayerSpec | None:
-    """Return who plays; none where there is no game with rules.
+    """Return the player; None if the scene has no game with rules.
 
     Raises:
-        SceneError: the game cannot be played so.
+        SceneError: the game cannot be played by that player.
     """
-    is_requested = bool(session.presses) if _is_recording(path) else player is not None
+    is_requested = session.has_game if _is_recording(path) else player is not None
     if not has_rules(session.scene, on_request=is_requested):
         return None
     plays = PlayerSpec.from_recording(session) if _is_recording(path) else player or PlayerSpec()
@@ -215,103 +220,3 @@ def _player(session: Recording, path: str, player: PlayerSpec | None) -> PlayerS
 
 def _is_recording(path: str) -> bool:
     return path.lower().endswith(".json")
-
-
-def parse_sweep(text: str) -> tuple[str, Sequence[Any]]:
-    """Read `KEY=A,B,C` or `KEY=LOW:HIGH:N[:log]` into the key and its values, each once.
-
-    Between whole ends, what is whole stays an integer: `solver.substeps=1:8:4:log` is 1, 2, 4, 8.
-
-    Raises:
-        AddressError: it is neither.
-    """
-    key, _ = parse_assignment(text)
-    values = split_assignment(text)[2].strip()
-    parts = values.split(":", 5)
-    if len(parts) in (3, 4) and not values.startswith(('"', "'", "[")):
-        return key, _range(text, parts)
-    if len(parts) > 4 and all(_is_number(part) for part in parts[:-1]):
-        raise AddressError(f"{short_repr(text)}: a range is LOW:HIGH:N or LOW:HIGH:N:log")
-    if len(parts) == 2 and all(_is_number(part) for part in parts):
-        asked = f"{shorten(key)}={shorten(values)}"
-        raise AddressError(f"{short_repr(text)}: a range needs a count: {asked}:N, such as {asked}:10")
-    found = [parse_value(value) for value in dict.fromkeys(_split(values))]
-    if not values or "" in found:
-        raise AddressError(
-            f"{short_repr(text)}: a value is missing; use KEY=A,B,C or KEY=LOW:HIGH:N or KEY=LOW:HIGH:N:log"
-        )
-    return key, list({f"{type(value).__name__} {value!r}": value for value in found}.values())  # 1, 1.0 and true differ
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-@dataclass(frozen=True)
-class _Range(Sequence[float]):
-    """Evenly spaced values, made one by one: how many there are is known, and may be refused, before there is any."""
-
-    low: float
-    high: float
-    size: int
-    is_log: bool
-    is_whole: bool
-    """The ends are integers, and what is whole in between is one too."""
-
-    def __len__(self) -> int:
-        return self.size
-
-    def __getitem__(self, index: Any) -> Any:
-        """Return a value by its index from 0, or from the end."""
-        k = range(self.size)[index]
-        low, high = self.low, self.high
-        fraction = k / (self.size - 1) if self.size > 1 else 0.0
-        value = low * (high / low) ** fraction if self.is_log else low + (high - low) * fraction
-        if k and k == self.size - 1:
-            value = high  # not a rounding beside it
-        near = round(value) if self.is_whole else 0
-        return near if self.is_whole and abs(value - near) <= 1e-12 * abs(value) else value  # powers and sums round
-
-
-def _range(text: str, parts: list[str]) -> _Range:
-    is_whole = all(part.strip().removeprefix("-").isdecimal() for part in parts[:2])
-    try:
-        low, high, count = float(parts[0]), float(parts[1]), int(parts[2])
-    except ValueError:
-        raise AddressError(f"{short_repr(text)}: a range is LOW:HIGH:N, two numbers and a count") from None
-    is_log = len(parts) == 4
-    if is_log and parts[3] != "log":
-        unknown = short_repr(parts[3])
-        raise AddressError(f"{short_repr(text)}: {unknown} is unknown; KEY=LOW:HIGH:N:log gives logarithmic spacing")
-    if not (count >= 1 and math.isfinite(high - low)):
-        raise AddressError(f"{short_repr(text)}: a range needs finite ends and at least 1 value")
-    if count > RUNS.value:
-        raise AddressError(f"{short_repr(text)}: a range of {short_count(count)} values; {RUNS.remedy(count)}")
-    if is_log and not (0.0 < low <= high and math.isfinite(high / low)):
-        raise AddressError(f"{short_repr(text)}: logarithmic spacing needs 0 < LOW <= HIGH")
-    return _Range(low, high, count if low != high else 1, is_log, is_whole)
-
-
-def _split(values: str) -> list[str]:
-    """Split at the commas that separate TOML values, not at those within arrays, tables or texts."""
-    parts, start, depth, quote, escaped = [], 0, 0, "", False
-    for k, letter in enumerate(values):
-        if escaped:
-            escaped = False
-        elif quote:
-            escaped = letter == "\\" and quote == '"'
-            quote = "" if letter == quote else quote
-        elif letter in "\"'":
-            quote = letter
-        elif letter in "[{":
-            depth += 1
-        elif letter in "]}":
-            depth -= 1
-        elif letter == "," and depth <= 0:
-            parts.append(values[start:k].strip())
-            start = k + 1
-    return [*parts, values[start:].strip()]

@@ -13,20 +13,19 @@ from typing import Any
 import numpy as np
 
 from sandbox.batch.store import Store, StoredRun
-
-Row = dict[str, Any]
+from sandbox.jsonable import JsonObject
 
 FIRST = ("id", "title", "engine", "seed", "status", "reason")
-"""Columns before those by which the runs differ."""
+"""First columns, before those by which the runs differ."""
 LAST = (
     "steps", "seconds", "energy_start", "energy_end", "contacts", "missed_contacts", "score", "state_hash",
 )  # fmt: skip
-"""Columns after them: see the columns of a run store."""
+"""Last columns: see the columns of a run store."""
 ELSEWHERE = ("title", "about", "solver", "play")
-"""Tables of a scene that are no columns, or have columns already."""
+"""Tables of a scene without columns: they do not distinguish runs, or have columns of their own."""
 
 
-def run_table(store: Store) -> list[Row]:
+def run_table(store: Store) -> list[JsonObject]:
     """Return one row per stored run, in the order of adding. All rows have the same keys.
 
     Between `FIRST` and `LAST` there is a column for each value by which runs of one title differ, named by its path as
@@ -44,7 +43,7 @@ def run_table(store: Store) -> list[Row]:
     for run in runs:
         info = _info(store, run)
         scene = {key: value for key, value in info.get("scene", {}).items() if key not in ELSEWHERE}
-        scene.get("world", {}).pop("seed", None)  # a column of its own
+        scene.get("world", {}).pop("seed", None)  # has its own column
         values.append(dict(_flat({**scene, "solver": json.loads(run.settings)})))
         hashes.append(info.get("state_hash"))
     differing = _differing([run.scene_title for run in runs], values)
@@ -59,7 +58,7 @@ def run_table(store: Store) -> list[Row]:
 
 
 def _info(store: Store, run: StoredRun) -> dict[str, Any]:
-    """Return what the file of a run says about it, without reading its arrays."""
+    """Return the info of a run from its file, without reading the arrays."""
     try:
         with np.load(store.file(run), allow_pickle=False) as file:
             info = json.loads(file["info"].item())

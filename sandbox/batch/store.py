@@ -21,23 +21,23 @@ from types import TracebackType
 from typing import Any, Self, get_type_hints
 
 from sandbox.action import Action, actions_to_json
-from sandbox.interrupt import pass_on_held
-from sandbox.measure.collisions import collisions
+from sandbox.atomic_write import remove_stale, temporary_in
+from sandbox.measure.metrics.contacts import collisions
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.document import to_document
-from sandbox.scene.scene import Scene
+from sandbox.signals import deliver_deferred_interrupt
 from sandbox.trajectory import Trajectory
-from sandbox.whole import remove_stale, temporary_in
 
 DATABASE = "runs.sqlite"
 VERSION = 2
-"""Of the table below. A store of an earlier one is brought up to date, a later one is refused."""
+"""Version of the table below. A store of an earlier version is migrated, one of a later version is refused."""
 WAIT = 60.0
-"""s, for another process to finish its write; each takes milliseconds, for files are written before."""
+"""s, for another process to finish its write, which takes milliseconds, because files are written before the lock."""
 NOTICE = 1.0
-"""s of waiting, after which it is reported; a multiple of any write."""
+"""s of waiting, after which it is reported: many times as long as any write."""
 ECHO = 40
-"""characters of a damaged value that a message repeats"""
+"""characters of a damaged value that a message quotes"""
 STATUSES = ("ok", "diverged", "refused", "failed")
 NO_ROOM = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)
 ID = re.compile(r"[0-9a-f]{20}")
@@ -65,8 +65,8 @@ CREATE TABLE runs (
 )
 """
 
-LATER = {2: "ALTER TABLE runs ADD COLUMN score REAL"}
-"""By version, what makes its table of that of the version before."""
+MIGRATIONS = {2: "ALTER TABLE runs ADD COLUMN score REAL"}
+"""Migrations: the statement that makes the table of a version from that of the version before."""
 
 
 class StoreError(Exception):
@@ -159,7 +159,7 @@ def _hash(document: object) -> str:
 
 
 def _json(document: object) -> str:
-    """Write JSON in one way only, so that equal values give equal texts."""
+    """Return canonical JSON: equal values give equal texts."""
     return json.dumps(document, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
@@ -258,7 +258,7 @@ class Store:
             self._notice(message)
 
     def _select(self, which: str, parameters: Sequence[Any] = ()) -> tuple[StoredRun, ...]:
-        """Return the sound rows of some, and give notice of the others."""
+        """Return the valid rows of a selection, and report the damaged ones."""
         with self._faults():
             rows = self._execute(f"SELECT {COLUMNS} FROM runs {which}", parameters)
         sound = []
@@ -282,7 +282,7 @@ class Store:
         if version == 0:
             self._execute(TABLE)
         for later in range(version + 1, VERSION + 1) if version > 0 else ():
-            self._execute(LATER[later])
+            self._execute(MIGRATIONS[later])
         if version < 0 or _layout(self._connection) != _layout_of_table():
             raise StoreError(
                 f"{self._database}: damaged, or not a database of runs: its table does not have "
@@ -293,7 +293,7 @@ class Store:
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
-        """Hold the database's write lock; what was done inside counts as a whole or not at all."""
+        """Hold the write lock of the database; the statements inside are one transaction."""
         with self._faults():
             self._execute("BEGIN IMMEDIATE")
             try:
@@ -304,7 +304,7 @@ class Store:
                 raise
 
     def _execute(self, statement: str, parameters: Sequence[Any] = ()) -> list[Any]:
-        """Execute a statement and return its rows. While another process holds the lock, wait, heeding Ctrl-C.
+        """Execute a statement and return its rows. While another process holds the lock, wait; Ctrl-C ends the wait.
 
         Raises:
             sqlite3.Error: it cannot be executed.
@@ -317,7 +317,7 @@ class Store:
             except sqlite3.OperationalError as error:
                 if error.sqlite_errorcode & 0xFF != sqlite3.SQLITE_BUSY:  # the low byte is the kind of an error
                     raise
-            pass_on_held()
+            deliver_deferred_interrupt()
             if monotonic() >= until:
                 raise StoreError(
                     f"{self._database}: another process has locked it for {WAIT:g} s; stop that process, or wait "
@@ -327,7 +327,7 @@ class Store:
 
     @contextmanager
     def _faults(self) -> Iterator[None]:
-        """Turn what can go wrong with a folder and its database into a `StoreError`."""
+        """Raise errors of the folder and its database as `StoreError`."""
         try:
             yield
         except (FileExistsError, NotADirectoryError):
@@ -370,7 +370,7 @@ def _row(trajectory: Trajectory, run: str) -> StoredRun:
 
 
 def _fault_of(values: Sequence[Any]) -> str | None:
-    """Return what is wrong with a row as the database holds it, whose columns may have values of any type."""
+    """Return the fault of a row of the database, whose columns may have values of any type; None if it is valid."""
     for (column, allowed), value in zip(get_type_hints(StoredRun).items(), values, strict=True):
         if not isinstance(value, allowed) or (isinstance(value, str) and not _is_text(value)):
             return f"{column} is {repr(value)[:ECHO]}"
@@ -388,7 +388,7 @@ def _fault_of(values: Sequence[Any]) -> str | None:
 
 
 def _is_text(value: str) -> bool:
-    """Tell whether all of a text was UTF-8: what was not has become surrogates."""
+    """Tell whether a text was UTF-8: other bytes have become surrogates."""
     try:
         value.encode("utf-8")
     except UnicodeEncodeError:
@@ -404,7 +404,7 @@ def _is_json_object(text: str) -> bool:
 
 
 def _layout(connection: sqlite3.Connection) -> tuple[list[Any], list[Any]]:
-    """Return the columns of the table of runs, and what else in a database could change what a statement does."""
+    """Return the columns of the table of runs, and the triggers and views, which may change what statements do."""
     columns = connection.execute("PRAGMA table_xinfo(runs)").fetchall()
     others = connection.execute("SELECT type, name FROM sqlite_master WHERE type = 'trigger' OR type = 'view'")
     return columns, others.fetchall()
@@ -417,5 +417,5 @@ def _layout_of_table() -> tuple[list[Any], list[Any]]:
 
 
 def _known(value: float | None) -> float | None:
-    """Return a number, infinite or not, or None for what SQL has no number for."""
+    """Return a number, which may be infinite; None for nan, for which SQL has no number."""
     return None if value is None or math.isnan(value) else float(value)

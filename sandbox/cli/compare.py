@@ -1,43 +1,241 @@
-"""`sandbox compare`: one scene on several engines, scored against the best known truth."""
+"""Command `compare` and its table."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
 
-from sandbox.batch.plan import MAX_FAILED, parse_sweep, relabelled, repeated_keys
-from sandbox.cli.comparison_table import print_comparison
-from sandbox.cli.engine_choice import only_engine
-from sandbox.cli.minimising import faults_of, minimised
-from sandbox.cli.naming import engines_in, plural
-from sandbox.cli.output import make_folder, require_folder, write_json
-from sandbox.cli.reading import gathering, path_of, print_json, refused
-from sandbox.cli.telling import telling
-from sandbox.measure.compare import Comparison, Variant, compare_variants
-from sandbox.measure.recorder import TooLargeError
+from sandbox.batch.plan import MAX_FAILED
+from sandbox.batch.sweep import parse_sweep, relabelled, repeated_keys
+from sandbox.cli.common import (
+    collect_errors,
+    exit_with_errors,
+    make_folder,
+    only_engine,
+    parse_engines,
+    plural,
+    require_folder,
+    scene_path,
+    write_json,
+)
+from sandbox.cli.minimise import faults_of, minimised
+from sandbox.cli.options import (
+    OutputOptions,
+    engines_option,
+    json_option,
+    out_option,
+    quiet_option,
+    set_option,
+    sweep_option,
+    verbose_option,
+)
+from sandbox.cli.progress import status_line
+from sandbox.cli.streams import print_json
+from sandbox.cli.tables import add_columns, format_optional, heads_of, new_table, print_legend, print_line, print_table
+from sandbox.measure.compare import Comparison, Row, Variant, compare_variants
+from sandbox.measure.compare.contact_matching import ContactMatch
+from sandbox.measure.compare.result import short_key, value_text
+from sandbox.measure.metrics.invariants import CONSTRAINT_KINDS
+from sandbox.measure.run.recorder import TooLargeError
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.load import load
 from sandbox.scene.files.overrides import AddressError, combinations
 
+MAX_LISTED = 5
+"""Unmatched contacts that are listed for each engine; `--json` has more."""
+ONE_SIDED = {"missed": "truth only", "phantom": "run only"}
+"""Heads of unmatched contacts by their JSON names. `run` has another meaning of missed: tunnelling."""
+
+NO_EFFECT = 1e-6
+"""Relative change of the error below which a setting has no effect: far below any that is worth a change."""
+HEADS = (
+    "max error, m", "rms error, m", "max error, m/s", "diverges, s", "energy", "momentum", "contacts",
+    *ONE_SIDED.values(), "after", "seconds",
+)  # fmt: skip
+LEGEND = (
+    "error: the largest, and the root mean square, of all bodies' distances from the truth while that is trusted",
+    "diverges: when a distance first exceeds the tolerance; energy, momentum: change without a cause, as a fraction",
+    "contacts: also in the truth; truth only, run only: in one of the two alone; "
+    "after: either, once a body has diverged",
+)
+"""Meaning of the columns, in short."""
+COLUMNS = {
+    "engine": "the physics engine",
+    "dt": "time step of a frame, s",
+    "status": "ok; diverged: a state is not finite; refused: the engine cannot model the scene; failed: it stopped",
+    "max error, m": "largest distance of any body from the truth, while the truth is trusted, m",
+    "rms error, m": "root mean square of these distances, m",
+    "max error, m/s": "largest difference of any body's velocity from the truth, m/s",
+    "diverges, s": "time at which a distance first exceeds the tolerance, s",
+    "energy": "change of the energy without a cause, as a fraction; + is a gain",
+    "momentum": "change of the momentum without a cause, as a fraction",
+    "contacts": "contacts that the truth has too",
+    "truth only": "contacts of the truth that the run does not have",
+    "run only": "contacts of the run that the truth does not have",
+    "after": "contacts of either after one of their bodies has diverged; these are not matched",
+    "seconds": "computing time of the run, without compilation, s",
+}
+"""Columns of the table and their meaning, for `--verbose`."""
+
+
+def print_comparison(scene: str, comparison: Comparison, why: bool, refusals: bool, verbose: bool = False) -> None:
+    """Print the truth, a table with a line for each engine and swept value, and notes below it.
+
+    Args:
+        scene: the scene as the user named it.
+        comparison: what to print.
+        why: print the settings that matter most.
+        refusals: print why engines refuse the scene.
+        verbose: explain every column, not only some in short.
+    """
+    from rich.text import Text
+
+    table = new_table()
+    add_columns(table, ["engine"])
+    swept = [key for key in comparison.rows[0].set if key != "solver.dt"]
+    add_columns(table, (*map(short_key, swept), "dt"), "right")
+    add_columns(table, ["status"])
+    add_columns(table, HEADS, "right")
+    for row in comparison.rows:
+        table.add_row(
+            row.engine,
+            *(Text(value_text(row.set[key])) for key in swept),
+            f"{row.settings['dt']:.4g}",
+            Text(row.status, style="green" if row.status == "ok" else "bold red"),
+            format_optional(row.score.max_position),
+            format_optional(row.score.rms_position),
+            format_optional(row.score.max_velocity),
+            _divergence(row),
+            _drift(row.energy_drift),
+            _drift(row.momentum_drift),
+            *(format_optional(row.count(kind), ",") for kind in ("matched", *ONE_SIDED, "after_divergence")),
+            format_optional(row.seconds),
+        )
+    print_line(f"{scene}: {comparison.scene.title}" if comparison.scene.title else scene)
+    print_line(comparison.sentence())
+    print_table(table)
+    if verbose:
+        print_legend(heads_of(table), COLUMNS | {short_key(key): f"value of {key!r}" for key in swept})
+    for line in _below(comparison, why, refusals, not verbose):
+        click.echo(line)
+
+
+def _below(comparison: Comparison, why: bool, refusals: bool, legend: bool) -> list[str]:
+    """Return the lines below the table."""
+    lines = [*LEGEND] if legend and any(row.status != "refused" for row in comparison.rows) else []
+    if any(row.energy_against == "start" and row.energy_drift for row in comparison.rows):
+        lines.append(
+            "energy: change since the start, which includes correct losses, because the truth ends before the run does"
+        )
+    lines += [*_below_accuracy(comparison), *_joint_order(comparison)]
+    for row in comparison.rows:
+        if refusals and row.status == "refused":
+            lines.append(str(row.reason))
+        for kind, head in ONE_SIDED.items():
+            events = [event for event in row.events or () if event.kind == kind]
+            if events:
+                lines.append(f"{row.name}: {head}: {_named(events)}")
+        if why and row.status != "refused":
+            lines += _explained(row)
+    return lines
+
+
+def _below_accuracy(comparison: Comparison) -> Iterator[str]:
+    """Yield a line for each error that is smaller than the accuracy of the truth."""
+    for row in comparison.rows:
+        best, error = comparison.truth_of(row.name), row.score.max_position
+        if best is not None and error is not None and best.difference > 0.0 and error <= best.difference:
+            accuracy = f"the accuracy of the truth, {best.difference:.1g} m"
+            yield f"{row.name}: its max error is below {accuracy}; it may be smaller"
+
+
+def _joint_order(comparison: Comparison) -> Iterator[str]:
+    """Yield the order to which the solver of rigid joints limits integrators, if integrators are compared."""
+    rows = [row for row in comparison.rows if "solver.integrator" in row.set and row.status != "refused"]
+    if not rows or not len(comparison.scene.links.of(*CONSTRAINT_KINDS)):
+        return
+    for method in sorted({str(row.settings["joints"]) for row in rows}):
+        order = 2 if method == "rattle" else 1
+        other = "" if order == 2 else "; `--set solver.joints=rattle` gives order 2"
+        yield f"rigid joints by {method} limit every integrator to order {order}{other}"
+
+
+def _named(events: Sequence[ContactMatch]) -> str:
+    named = [f"{' and '.join(event.between)} at {event.when:.4g} s" for event in events[:MAX_LISTED]]
+    more = len(events) - len(named)
+    return "; ".join(named) + (f"; and {more:,} more" if more else "")
+
+
+def _explained(row: Row) -> list[str]:
+    """Return the verdict, a table of the changes with an effect, and the changes without one or that failed."""
+    if row.verdict is None:
+        return [f"{row.name}: no error to explain"]
+    found = sorted((knob for knob in row.why if knob.ratio is not None), key=lambda knob: knob.ratio or 0.0)
+    idle = [knob for knob in found if abs((knob.ratio or 0.0) - 1.0) < NO_EFFECT]
+    heads = ("change", "max error, m", "of the original")
+    cells = [
+        heads,
+        *((k.label, format_optional(k.max_position_error), f"×{k.ratio:.3g}") for k in found if k not in idle),
+    ]
+    wide = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    lines = [row.verdict]
+    lines += [f"  {a:<{wide[0]}}  {b:>{wide[1]}}  {c:>{wide[2]}}" for a, b, c in cells] if len(cells) > 1 else []
+    for what, some in (
+        ("no effect", idle),
+        ("failed", [knob for knob in row.why if knob.ratio is None and knob.status != "refused"]),
+        ("refused", [knob for knob in row.why if knob.status == "refused"]),
+    ):
+        if some:
+            named = (f"{knob.label} ({knob.status})" if what == "failed" else knob.label for knob in some)
+            lines.append(f"  {what}: {', '.join(named)}")
+    return lines
+
+
+def _divergence(row: Row) -> str:
+    if row.first_divergence is not None:
+        return f"{row.first_divergence:.4g}"
+    return "–" if row.score.max_position is None else "never"
+
+
+def _drift(value: float | None) -> str:
+    return "–" if value is None else f"{value:+.2g}" if value else "0"
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Options(OutputOptions):
+    """The command line as typed; None for an option that was left out."""
+
+    scene: str
+    engines: str | None
+    overrides: tuple[str, ...]
+    sweeps: tuple[str, ...]
+    tolerance: float | None
+    why: bool
+    out: Path | None
+    minimise: str | None
+    force: bool
+    verbose: bool
+
+
+class _Request(NamedTuple):
+    """What to compare: the checked command line."""
+
+    engines: list[str] | None
+    axes: list[tuple[str, Sequence[Any]]]
+    """keys and values of the sweeps"""
+    variants: list[Variant]
+    smallest: Path | None
+    """file of `--minimise`"""
+
 
 @click.command(name="compare")
 @click.argument("scene")
-@click.option(
-    "--engine",
-    "--engines",
-    "engines",
-    metavar="NAME[,NAME]",
-    help="engine or engines to run; default: all, or with --sweep those that can run every value",
-)
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene")
-@click.option(
-    "--sweep",
-    "sweeps",
-    multiple=True,
-    metavar="KEY=A,B,C",
-    help="run once per value; a range is KEY=LOW:HIGH:N[:log]; several sweeps multiply",
-)
+@engines_option("all, or with --sweep those that can run every value")
+@set_option()
+@sweep_option
 @click.option(
     "--tolerance",
     type=click.FloatRange(min=0.0, min_open=True),
@@ -58,113 +256,124 @@ from sandbox.scene.files.overrides import AddressError, combinations
     "default: SCENE.min.toml in the current folder",
 )
 @click.option("--force", is_flag=True, help="allow --minimise to replace an existing file")
-@click.option(
-    "--out", type=click.Path(path_type=Path), metavar="DIR", help="write report.html, plots and comparison.json"
-)
-@click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
-@click.option("-v", "--verbose", is_flag=True, help="explain every column of the table")
-@click.option("--quiet", is_flag=True, help="print no table and no progress")
-def command(
-    scene: str,
-    engines: str | None,
-    overrides: tuple[str, ...],
-    sweeps: tuple[str, ...],
-    tolerance: float | None,
-    why: bool,
-    out: Path | None,
-    minimise: str | None,
-    force: bool,
-    as_json: bool,
-    verbose: bool,
-    quiet: bool,
-) -> int:
+@out_option("write report.html, plots and comparison.json")
+@json_option
+@verbose_option
+@quiet_option()
+def compare_command(**given: Any) -> int:
     """Run a scene on several engines, or with several values, and measure each error against the best known truth.
 
     SCENE is a file or the name of a shipped scene. The truth is a closed form, the event-driven engine, or a run with
     ever smaller steps. Exit status 1: an engine failed, diverged, or refused the scene although it was named.
     """
+    options = _Options(**given)
     faults: list[Fault] = []
-    names = engines_in(engines, faults)
-    axes: list[tuple[str, Sequence[Any]]] = []
-    for sweep in sweeps:
-        with gathering(faults, "--sweep", (AddressError,)):
-            axes.append(parse_sweep(sweep))
-    faults += repeated_keys(overrides, sweeps)
-    variants: list[Variant] = []
-    path = ""
-    with gathering(faults), gathering(faults, "--sweep", (AddressError,)):
-        path = path_of(scene)
-        variants = _variants(path, overrides, axes)
-    with gathering(faults, "--tolerance", (ValueError,)):
-        if tolerance == float("inf") or tolerance != tolerance:
-            raise ValueError(f"is {tolerance} m; it must be finite")
-    with gathering(faults):
-        require_folder(out)
-
-    smallest = None if minimise is None else Path(minimise or f"{Path(path or scene).stem}.min.toml")
-    if smallest is not None:
-        faults += faults_of(smallest, path, force)
-        if sweeps:
-            faults.append(Fault("--minimise", None, "", "works on a single scene; leave out --sweep"))
-    elif force:
-        faults.append(Fault("--force", None, "", "works only together with --minimise"))
-
-    if out is not None and any(not key.startswith("solver.") for key, _ in axes):
-        faults.append(Fault("--out", None, "", "draws a single scene; sweep only keys of solver, or leave out --out"))
-    if out is not None and not faults:
-        with gathering(faults):
-            make_folder(out)
+    request = _checked(options, faults)
     comparison: Comparison | None = None
     if not faults:
-        chosen = None if names is not None else only_engine([each.scene for each in variants], overrides, axes)
-        if chosen is not None:
-            names = [chosen.engine]
-            if not quiet:
-                click.echo(chosen.sentence, err=True)
-        with gathering(faults, scene, (TooLargeError,)), telling(quiet or as_json) as told:
-            comparison = compare_variants(variants, names, tolerance=tolerance, why=why, told=told)
+        request = _choose_engine(request, options)
+        with (
+            collect_errors(faults, options.scene, (TooLargeError,)),
+            status_line(options.is_silent) as progress,
+        ):
+            comparison = compare_variants(
+                request.variants, request.engines, tolerance=options.tolerance, why=options.why, on_progress=progress
+            )
     if comparison is None:
-        return refused(faults, as_json, scene=scene, truth=None, engines=[])
+        return exit_with_errors(faults, options.as_json, scene=options.scene, truth=None, engines=[])
 
-    status = 0
-    for row in comparison.rows:
-        if row.status != "ok" and (row.status != "refused" or names is not None or axes):
-            status = 1
-            what = row.reason if row.status == "refused" else f"{row.name} {row.status}: {row.reason}"
-            click.echo(f"{scene}: {what}", err=True)
-    document = comparison.document(scene)
-    if not as_json and not quiet:
-        print_comparison(scene, comparison, why, refusals=names is None and not axes, verbose=verbose)
+    is_engine_chosen = request.engines is not None or bool(request.axes)
+    status = _report_problems(options.scene, comparison, is_engine_chosen)
+    document = comparison.document(options.scene)
+    if not options.is_silent:
+        print_comparison(options.scene, comparison, options.why, not is_engine_chosen, options.verbose)
     if comparison.interrupted:
         click.echo(f"interrupted: {plural(len(comparison.rows), 'run')} complete; the results are kept", err=True)
         status = 130
-    elif smallest is not None:
-        with telling(quiet or as_json) as told:
-            answer = minimised(scene, comparison, names, smallest, told)
-        document["minimised"] = answer.document
-        status = answer.status or status
-        if answer.status:
-            click.echo(answer.sentence, err=True)
-        elif not as_json and not quiet:
-            click.echo(answer.sentence)
-    if as_json:
+    elif request.smallest is not None:
+        status = _minimise(comparison, request, options, document) or status
+    if options.as_json:
         print_json(document)
-    if out is not None:
-        try:
-            _write(comparison, document, out)
-        except OSError as error:
-            click.echo(f"--out: {out}: {error.strerror or error}", err=True)
-            return 2
-        if not quiet and not as_json:
-            click.echo(f"written: {out}")
+    return _write(comparison, document, options, status)
+
+
+def _checked(options: _Options, faults: list[Fault]) -> _Request:
+    """Return what to compare; add what is wrong with the command line to the faults."""
+    names = parse_engines(options.engines, faults)
+    axes: list[tuple[str, Sequence[Any]]] = []
+    for sweep in options.sweeps:
+        with collect_errors(faults, "--sweep", (AddressError,)):
+            axes.append(parse_sweep(sweep))
+    faults += repeated_keys(options.overrides, options.sweeps)
+    variants: list[Variant] = []
+    path = ""
+    with collect_errors(faults), collect_errors(faults, "--sweep", (AddressError,)):
+        path = scene_path(options.scene)
+        variants = _variants(path, options.overrides, axes)
+    if options.tolerance is not None and not math.isfinite(options.tolerance):
+        faults.append(Fault("--tolerance", None, "", f"is {options.tolerance} m; it must be finite"))
+    with collect_errors(faults):
+        require_folder(options.out)
+    smallest = None
+    if options.minimise is not None:
+        smallest = Path(options.minimise or f"{Path(path or options.scene).stem}.min.toml")
+        faults += faults_of(smallest, path, options.force)
+        if options.sweeps:
+            faults.append(Fault("--minimise", None, "", "works on a single scene; leave out --sweep"))
+    elif options.force:
+        faults.append(Fault("--force", None, "", "works only together with --minimise"))
+    if options.out is not None and any(not key.startswith("solver.") for key, _ in axes):
+        faults.append(Fault("--out", None, "", "draws a single scene; sweep only keys of solver, or leave out --out"))
+    if options.out is not None and not faults:
+        with collect_errors(faults):
+            make_folder(options.out)
+    return _Request(names, axes, variants, smallest)
+
+
+def _choose_engine(request: _Request, options: _Options) -> _Request:
+    """Return the request; if only one engine has a setting that is given, on that engine."""
+    if request.engines is not None:
+        return request
+    chosen = only_engine([each.scene for each in request.variants], options.overrides, request.axes)
+    if chosen is None:
+        return request
+    if not options.quiet:
+        click.echo(chosen.sentence, err=True)
+    return request._replace(engines=[chosen.engine])
+
+
+def _report_problems(scene: str, comparison: Comparison, is_engine_chosen: bool) -> int:
+    """Print a line for each run that failed, and return the exit status.
+
+    A refusal is a failure only if the engine was chosen.
+    """
+    status = 0
+    for row in comparison.rows:
+        if row.status != "ok" and (row.status != "refused" or is_engine_chosen):
+            status = 1
+            what = row.reason if row.status == "refused" else f"{row.name} {row.status}: {row.reason}"
+            click.echo(f"{scene}: {what}", err=True)
     return status
+
+
+def _minimise(comparison: Comparison, request: _Request, options: _Options, document: dict[str, Any]) -> int:
+    """Reduce the scene, enter the result into the document, and return the exit status."""
+    assert request.smallest is not None
+    with status_line(options.is_silent) as progress:
+        answer = minimised(options.scene, comparison, request.engines, request.smallest, progress)
+    document["minimised"] = answer.document
+    if answer.status:
+        click.echo(answer.sentence, err=True)
+    elif not options.is_silent:
+        click.echo(answer.sentence)
+    return answer.status
 
 
 def _variants(path: str, overrides: Sequence[str], axes: Sequence[tuple[str, Sequence[Any]]]) -> list[Variant]:
     """Return the scene with each combination of swept values, the last sweep changing fastest.
 
     Raises:
-        SceneError: the scene has faults, as it stands or with a value set.
+        SceneError: the scene has faults, with or without the values set.
         AddressError: there are too many combinations.
     """
     keys = [key for key, _ in axes]
@@ -184,11 +393,21 @@ def _variants(path: str, overrides: Sequence[str], axes: Sequence[tuple[str, Seq
     return found
 
 
-def _write(comparison: Comparison, document: dict[str, object], out: Path) -> None:
-    """Write the plots and the document into a folder, each to a temporary name first."""
-    from sandbox.report.comparison import plot_comparison
-    from sandbox.report.page.comparison_page import write_comparison
+def _write(comparison: Comparison, document: dict[str, object], options: _Options, status: int) -> int:
+    """Write the page, the plots and the document into the folder of `--out`, and return the exit status."""
+    out = options.out
+    if out is None:
+        return status
+    from sandbox.report.comparison_plot import plot_comparison
+    from sandbox.report.html.comparison import write_comparison
 
-    plot_comparison(comparison, out)
-    write_comparison(comparison, out / "report.html")
-    write_json(document, out / "comparison.json")
+    try:
+        plot_comparison(comparison, out)
+        write_comparison(comparison, out / "report.html")
+        write_json(document, out / "comparison.json")
+    except OSError as error:
+        click.echo(f"--out: {out}: {error.strerror or error}", err=True)
+        return 2
+    if not options.is_silent:
+        click.echo(f"written: {out}")
+    return status

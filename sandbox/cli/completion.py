@@ -1,7 +1,7 @@
 """Shell completion: commands, options, engines, scenes, runs and the keys of `--set`, for bash, zsh and fish.
 
-It is click's: `_SANDBOX_COMPLETE=bash_source sandbox` prints the script of a shell, which asks
-`_SANDBOX_COMPLETE=bash_complete sandbox` for the words that fit. Nothing here is imported otherwise.
+It uses the completion of click: `_SANDBOX_COMPLETE=bash_source sandbox` prints the script for a shell, which calls
+`_SANDBOX_COMPLETE=bash_complete sandbox` for the matching words. Otherwise this module is not imported.
 """
 
 import tomllib
@@ -22,7 +22,7 @@ Words = Callable[[click.Context, str], Iterable[str]]
 
 
 class CompletedText(click.types.StringParamType):
-    """Text of which the shell knows likely values."""
+    """Text argument that the shell completes."""
 
     name = "text"
 
@@ -30,16 +30,16 @@ class CompletedText(click.types.StringParamType):
         self._words = words
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002
-        """Return the words that begin with what is typed; none where they cannot be found."""
+        """Return the words that begin with the incomplete one; none if looking for them fails."""
         try:
             found = [word for word in self._words(ctx, incomplete) if word.startswith(incomplete)]
-        except Exception:  # noqa: BLE001, a shell has no use for a message while a line is typed
+        except Exception:  # noqa: BLE001, a message would disturb the line that is being typed
             return []
         return [CompletionItem(word) for word in found if word == printable(word)]
 
 
 def add_completions(command: click.Command) -> None:
-    """Give the parameters of a command the words that complete them, by their names."""
+    """Set the completion of the parameters of a command, by their names."""
     for parameter in command.params:
         words = _WORDS.get(parameter.name or "")
         if parameter.name == "scenes" and command.name == "run":
@@ -49,7 +49,7 @@ def add_completions(command: click.Command) -> None:
 
 
 def register_shells() -> None:
-    """Have the scripts of bash and zsh put no space after a word that ends in `/`, `.` or `=`; fish does not anyway."""
+    """Register scripts of bash and zsh that add no space after `/`, `.` or `=`, as the one of fish does already."""
     add_completion_class(_Bash)
     add_completion_class(_Zsh)
 
@@ -62,7 +62,7 @@ class _Bash(BashComplete):
 
     @staticmethod
     def _check_version() -> None:
-        """Skip click's start of a bash to ask for its version: 4.4, of 2016, suffices."""
+        """Do nothing: the check of click starts a bash to ask for its version, and 4.4, of 2016, suffices."""
 
 
 class _Zsh(ZshComplete):
@@ -87,7 +87,7 @@ def _several_engines(ctx: click.Context, incomplete: str) -> Iterable[str]:
 
 
 def _list_of(names: Iterable[str], incomplete: str) -> list[str]:
-    """Return `NAME,NAME` with each name that the list does not have yet as its last one."""
+    """Return the lists `NAME,NAME` that end in each name which the list does not contain yet."""
     before, comma, _ = incomplete.rpartition(",")
     return [before + comma + name for name in names if name not in before.split(",")]
 
@@ -101,7 +101,7 @@ def _scenes_and_sessions(_ctx: click.Context, incomplete: str) -> Iterable[str]:
 
 
 def _shipped(incomplete: str) -> list[str]:
-    """Return the names of shipped scenes: short ones, or those of a folder once it is typed."""
+    """Return names of shipped scenes: short names, or full names once a folder is typed."""
     from sandbox.scene.files.shipped_scenes import shipped
 
     names = [scene.name for scene in shipped()]
@@ -113,7 +113,7 @@ def _shipped(incomplete: str) -> list[str]:
 
 
 def _files(incomplete: str, endings: Sequence[str]) -> list[str]:
-    """Return the files and folders that a path may become; hidden ones only once their dot is typed."""
+    """Return the files and folders that complete a path; hidden ones only once the dot is typed."""
     folder, slash, beginning = incomplete.rpartition("/")
     found: list[str] = []
     within = Path(folder + slash or ".")
@@ -133,8 +133,8 @@ def _runs(_ctx: click.Context, incomplete: str) -> Iterable[str]:
 
 
 def _keys(ctx: click.Context, incomplete: str) -> Iterable[str]:
-    """Return the keys that `--set` may change, a part at a time: `ball.`, `ball.cue.`, `ball.cue.velocity=`."""
-    from sandbox.scene.files.tables import keys_of, list_tables, model_at
+    """Return the keys of `--set`, completed part by part: `ball.`, `ball.cue.`, `ball.cue.velocity=`."""
+    from sandbox.scene.files.document import keys_of, list_tables, model_at
 
     if "=" in incomplete:
         return []
@@ -161,7 +161,7 @@ def _names(elements: Sequence[dict[str, Any]], kind: str) -> list[str]:
 
 
 def _document(ctx: click.Context) -> dict[str, Any]:
-    """Return the first scene of the line as it is written; nothing where none is typed yet."""
+    """Return the document of the first scene of the line; empty if none is typed yet."""
     from sandbox.scene.files.shipped_scenes import find
 
     # An option without its value ends click's parsing; the arguments before it are then left in `ctx.args`.
@@ -178,7 +178,7 @@ def _metrics(_ctx: click.Context, _incomplete: str) -> Iterable[str]:
 
 
 def _axes(_ctx: click.Context, incomplete: str) -> Iterable[str]:
-    from sandbox.measure.extremes.axes import AXES
+    from sandbox.measure.extremes.scenarios import AXES
 
     return _list_of(AXES, incomplete)
 
@@ -206,4 +206,4 @@ _WORDS: dict[str, Words] = {
     "player": _players,
     "table": _tables,
 }
-"""By the name of a parameter."""
+"""Completions by the name of a parameter."""

@@ -1,9 +1,6 @@
-"""`sandbox export`: a stored run as csv, parquet, gif, mp4 or png."""
+"""Command `export`: write a stored run as csv, parquet, gif, mp4 or png."""
 
 import os
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,10 +8,13 @@ from typing import TYPE_CHECKING, Any
 import click
 import numpy as np
 
-from sandbox.cli.exporting import TABLES, Options, check_options, check_times
-from sandbox.cli.reading import fault_rows, gathering, print_json, refused
-from sandbox.cli.stored import find_run, read_run
-from sandbox.measure.run import Progress
+from sandbox.batch.find_run import find_run, read_run
+from sandbox.cli.common import collect_errors, exit_with_errors, fault_rows
+from sandbox.cli.export_options import TABLES, Options, check_options, check_times
+from sandbox.cli.options import json_option, quiet_option
+from sandbox.cli.progress import ProgressBars, progress_bars
+from sandbox.cli.streams import print_json
+from sandbox.progress import ProgressCallback
 from sandbox.recording import Recording
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.trajectory import Trajectory
@@ -46,9 +46,9 @@ if TYPE_CHECKING:
 @click.option(
     "--overlay", "overlays", multiple=True, metavar="NAME", help="overlay to draw, such as velocities; may be repeated"
 )
-@click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
-@click.option("--quiet", is_flag=True, help="print no file names and no progress")
-def command(run: str, as_json: bool, quiet: bool, **given: Any) -> int:
+@json_option
+@quiet_option("print no file names and no progress")
+def export_command(run: str, as_json: bool, quiet: bool, **given: Any) -> int:
     """Export a stored run or a recorded session as csv, parquet, gif, mp4 or png.
 
     RUN is DIR/ID, a folder that holds one run, a .npz file, or a session (.json). With --runs it is a folder with any
@@ -56,27 +56,27 @@ def command(run: str, as_json: bool, quiet: bool, **given: Any) -> int:
     """
     options = Options(**given)
     faults: list[Fault] = []
-    with gathering(faults):
+    with collect_errors(faults):
         check_options(options)
     if options.runs:
         return _export_runs(run, options, faults, as_json, quiet)
     source: Trajectory | Recording | None = None
-    with gathering(faults):
+    with collect_errors(faults):
         source = read_run(find_run(run), run)
     if source is not None:
         end = source.duration if isinstance(source, Recording) else float(source.time[-1]) if len(source.time) else None
-        with gathering(faults):
+        with collect_errors(faults):
             check_times(options, end)
     if source is None or faults:
-        return refused(faults, as_json, run=run, files=[])
+        return exit_with_errors(faults, as_json, run=run, files=[])
 
     files: list[dict[str, Any]] = []
     status = 0
     try:
-        with gathering(faults), _progress(quiet or as_json) as told:
-            status, trajectory = _trajectory(run, source, told)
+        with collect_errors(faults), progress_bars(quiet or as_json) as bars:
+            status, trajectory = _trajectory(run, source, bars)
             if len(trajectory.time):
-                _export(run, options, trajectory, files, told)
+                _export(run, options, trajectory, files, bars)
             else:
                 click.echo(
                     f"{run}: {trajectory.status}: {trajectory.reason}; the run has no frames to export", err=True
@@ -104,13 +104,13 @@ def _export_runs(folder: str, options: Options, faults: list[Fault], as_json: bo
     """Write a table of all runs of a folder, and return the exit status."""
     from sandbox.batch.run_table import run_table
     from sandbox.batch.store import DATABASE, Store, StoreError
-    from sandbox.report.tables import write_rows
+    from sandbox.report.table_export import write_rows
 
     if not (Path(folder) / DATABASE).is_file():
         message = "is no folder of stored runs; `sandbox run SCENE --out DIR` makes one"
         faults.append(Fault(folder, None, "", message))
     if faults:
-        return refused(faults, as_json, run=folder, files=[])
+        return exit_with_errors(faults, as_json, run=folder, files=[])
     files: list[dict[str, Any]] = []
     try:
         with Store(folder, notice=lambda message: click.echo(message, err=True)) as store:
@@ -133,8 +133,8 @@ def _export_runs(folder: str, options: Options, faults: list[Fault], as_json: bo
     return 2 if faults else 0
 
 
-def _trajectory(run: str, source: Trajectory | Recording, told: "Told") -> tuple[int, Trajectory]:
-    """Return a stored run, or run a session; and status 1 where that did not go well.
+def _trajectory(run: str, source: Trajectory | Recording, bars: ProgressBars) -> tuple[int, Trajectory]:
+    """Return the exit status, 1 if the run failed, and the stored run, or a new run of the session.
 
     Raises:
         SceneError: the session cannot be run here.
@@ -143,11 +143,11 @@ def _trajectory(run: str, source: Trajectory | Recording, told: "Told") -> tuple
         return 0, source
     from sandbox.engines.registry import UnknownEngineError
     from sandbox.games.contract import UnsuitableSceneError
-    from sandbox.measure.recorder import TooLargeError
-    from sandbox.measure.replay import rerun
+    from sandbox.measure.run.recorder import TooLargeError
+    from sandbox.measure.run.sessions import rerun
 
     try:
-        trajectory = rerun(source, audit=False, progress=told(f"running {run}"))
+        trajectory = rerun(source, audit=False, on_progress=bars.callback(f"running {run}"))
     except (UnknownEngineError, TooLargeError, UnsuitableSceneError) as error:
         raise SceneError([Fault(run, None, "", str(error))]) from None
     if trajectory.status == "ok" or not len(trajectory.time):
@@ -156,11 +156,13 @@ def _trajectory(run: str, source: Trajectory | Recording, told: "Told") -> tuple
     return 1, trajectory
 
 
-def _export(run: str, options: Options, trajectory: Trajectory, files: list[dict[str, Any]], told: "Told") -> None:
-    """Write every file, and enter each in the list once it is complete.
+def _export(
+    run: str, options: Options, trajectory: Trajectory, files: list[dict[str, Any]], bars: ProgressBars
+) -> None:
+    """Write all files, and enter each into the list when it is complete.
 
     Raises:
-        SceneError: one cannot be written, or the run is damaged.
+        SceneError: a file cannot be written, or the run is damaged.
     """
     film: RecordedRun | None = None
     for target in options.targets:
@@ -171,12 +173,12 @@ def _export(run: str, options: Options, trajectory: Trajectory, files: list[dict
             files.append({"path": target, "format": kind[1:], "rows": rows})
             continue
         film = film or _film(run, trajectory)
-        frames = _shoot(options, film, path, told(f"drawing {target}"))
+        frames = _shoot(options, film, path, bars.callback(f"drawing {target}"))
         files.append({"path": target, "format": kind[1:], "frames": frames})
 
 
 def _write_table(run: str, options: Options, trajectory: Trajectory, path: Path) -> int:
-    from sandbox.report.tables import write_contacts, write_states
+    from sandbox.report.table_export import write_contacts, write_states
 
     part = _between(trajectory, options)
     try:
@@ -188,14 +190,14 @@ def _write_table(run: str, options: Options, trajectory: Trajectory, path: Path)
 
 
 def _fixed_names(run: str, trajectory: Trajectory) -> tuple[str, ...]:
-    """Return the names of a run's fixed things."""
+    """Return the names of the static bodies of a run."""
     from sandbox.scene.files.load import from_session
 
     return from_session(trajectory.info["scene"], run).fixed_names
 
 
 def _between(run: Trajectory, options: Options) -> Trajectory:
-    """Return the frames and contacts of the time asked for, without copying them."""
+    """Return the frames and contacts within the requested interval of time, as views."""
     if options.start is None and options.until is None:
         return run
     limits = options.start or 0.0, np.inf if options.until is None else options.until
@@ -212,13 +214,13 @@ def _between(run: Trajectory, options: Options) -> Trajectory:
 
 
 def _film(run: str, trajectory: Trajectory) -> "RecordedRun":
-    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # standard output is for what was asked
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # nothing but results on standard output
     from sandbox.window.playback.recorded import RecordedRun
 
     return RecordedRun(trajectory, run)
 
 
-def _shoot(options: Options, film: "RecordedRun", path: Path, progress: Progress | None) -> int:
+def _shoot(options: Options, film: "RecordedRun", path: Path, on_progress: ProgressCallback | None) -> int:
     from sandbox.window.capture.export import ExportOptions, export_images
     from sandbox.window.capture.image_files import CaptureError
 
@@ -235,35 +237,6 @@ def _shoot(options: Options, film: "RecordedRun", path: Path, progress: Progress
         overlays=frozenset({"shapes", *options.overlays}),
     )
     try:
-        return export_images(film, shot, path, progress)
+        return export_images(film, shot, path, on_progress)
     except CaptureError as error:
         raise SceneError([Fault("--to", None, "", f"{path}: {error}")]) from None
-
-
-class Told:
-    """Who is told how far each part of the work is."""
-
-    def __init__(self, bars: Any = None) -> None:
-        self._bars = bars
-
-    def __call__(self, what: str) -> Progress | None:
-        """Begin a part of the work; return whom to tell its progress."""
-        if self._bars is None:
-            return None
-        bar = self._bars.add_task(what, total=1.0)
-        return lambda share: self._bars.update(bar, completed=share)
-
-
-@contextmanager
-def _progress(silent: bool) -> Iterator[Told]:
-    """Yield who is told: bars on a terminal, nobody elsewhere."""
-    if silent or not sys.stderr.isatty():
-        yield Told()
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
-    from rich.progress import Progress as Bars
-
-    columns = TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn()
-    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
-        yield Told(bars)

@@ -1,186 +1,290 @@
-"""`sandbox extremes`: how far each engine and setting goes before it breaks, and whether the forecast saw it coming."""
+"""Command `extremes` and its tables."""
 
 import math
-import sys
+from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import click
 
-from sandbox.cli.extremes_table import print_extremes
-from sandbox.cli.naming import MAX_UNKNOWN, engines_in, further_unknown, names_in
-from sandbox.cli.output import make_folder, require_folder, write_json
-from sandbox.cli.reading import gathering, print_json, refused
+from sandbox.cli.common import (
+    MAX_UNKNOWN,
+    collect_errors,
+    exit_with_errors,
+    make_folder,
+    more_unknown,
+    parse_engines,
+    parse_names,
+    plural,
+    require_folder,
+    write_json,
+)
+from sandbox.cli.options import (
+    OutputOptions,
+    engines_option,
+    json_option,
+    out_option,
+    quiet_option,
+    set_option,
+    workers_option,
+)
+from sandbox.cli.progress import ProgressBar, progress_bars
+from sandbox.cli.streams import print_json
+from sandbox.cli.tables import add_columns, format_optional, new_console, new_table, print_line, print_table
 from sandbox.echo import short_repr
-from sandbox.measure.extremes import Extremes, Plan, extremes
-from sandbox.measure.extremes.axes import AXES, PAIRS
-from sandbox.measure.extremes.axis import Axis
-from sandbox.measure.extremes.checking import check_overrides
-from sandbox.measure.extremes.matrix import MEMORY, SECONDS, Progress, Watch
-from sandbox.measure.extremes.stored import Change, StoredError, changes, read
-from sandbox.measure.extremes.warden import WorkerError
+from sandbox.jsonable import to_json
+from sandbox.measure.extremes import Extremes, ExtremesPlan, Sample, extremes
+from sandbox.measure.extremes.baseline import BoundaryChange, StoredError, changes, read
+from sandbox.measure.extremes.boundary import Boundary
+from sandbox.measure.extremes.experiment import Axis, check_overrides
+from sandbox.measure.extremes.isolation import WorkerError
+from sandbox.measure.extremes.outcome import VERDICTS
+from sandbox.measure.extremes.runner import SAMPLE_SECONDS, WORKER_MEMORY
+from sandbox.measure.extremes.scenarios import AXES, PAIRS
+from sandbox.progress import Progress, ProgressCallback
 from sandbox.scene.errors import Fault
 
-LEAST_MEMORY = 1024
-"""MiB: what the libraries of a worker take, and some more."""
+MIN_WIDTH = 60
+"""Columns to which a line of results is cut at least, on however narrow a terminal."""
+LETTERS = {"exact": "E", "degraded": "d", "refused": "–", "failed": "✗"}
+STYLES = {"exact": "bold green", "degraded": "yellow", "refused": "dim", "failed": "bold red"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Options(OutputOptions):
+    """The command line as typed; None for an option that was left out."""
+
+    axes: str | None
+    engines: str | None
+    overrides: tuple[str, ...]
+    quick: bool
+    pairs: bool
+    timeout: float
+    memory: int
+    workers: int | None
+    out: Path | None
+    against: Path | None
+
+
+def print_extremes(result: Extremes) -> None:
+    """Print a line for each axis and setup, the quality of the predictions, and the number of cells by verdict."""
+    _print_limits(result)
+    scores = [score for score in result.predictions if score.precision is not None or score.recall is not None]
+    if scores:
+        table = new_table()
+        add_columns(table, ["forecast"])
+        add_columns(table, ("true alarms", "false alarms", "missed", "true negatives", "precision", "recall"), "right")
+        for score in scores:
+            counts = (score.true_positives, score.false_positives, score.false_negatives, score.true_negatives)
+            table.add_row(
+                score.kind,
+                *map(str, counts),
+                format_optional(score.precision, ".0%"),
+                format_optional(score.recall, ".0%"),
+            )
+        print_table(table)
+    for line in _summary(result):
+        print_line(line)
+
+
+def _print_limits(result: Extremes) -> None:
+    """Print a line for each axis and setup: a letter per level, and how far it passes."""
+    from rich.text import Text
+
+    console = new_console()
+    first = max((len(limit.axis) for limit in result.limits), default=0)
+    second = max((len(limit.setup) for limit in result.limits), default=0)
+    across = max((len(list(_row(result, limit))) for limit in result.limits), default=0)
+    last = ""
+    for limit in result.limits:
+        line = Text(f"{limit.axis if limit.axis != last else '':<{first}}  {limit.setup:<{second}}  ")
+        cells = list(_row(result, limit))
+        for cell in cells:
+            line.append(LETTERS[cell.verdict], STYLES[cell.verdict])
+        line.append(f"{'':<{across - len(cells)}}  {_reached(limit)}")
+        line.truncate(max(console.width, MIN_WIDTH), overflow="ellipsis")
+        console.print(line, soft_wrap=True)
+        last = limit.axis
+    if result.limits:
+        legend = ", ".join(f"{letter} {word}" for word, letter in LETTERS.items())
+        print_line(f"one letter per level, from the easiest to the hardest: {legend}", "dim")
+
+
+def _row(result: Extremes, limit: Boundary) -> Iterator[Sample]:
+    return (cell for cell in result.cells if (cell.axis, cell.setup) == (limit.axis, limit.setup))
+
+
+def _summary(result: Extremes) -> Iterator[str]:
+    """Yield the number of cells by verdict, and the computing time."""
+    for what, cells in (("single axes", result.cells), ("boundaries", result.probes), ("pairs", result.pairs)):
+        if cells:
+            count = Counter(cell.verdict for cell in cells)
+            verdicts = ", ".join(f"{count[word]:,} {word}" for word in VERDICTS if count[word])
+            yield f"{what}: {len(cells):,} cells: {verdicts}"
+    yield f"{result.seconds:.0f} s on {plural(result.plan.workers, 'worker')}"
+
+
+def _reached(limit: Boundary) -> str:
+    """Return the level up to which a setup passes, and why it fails beyond."""
+    if limit.refused:
+        return f"refused: {limit.reason}"
+    reached, failed = format_optional(limit.limit, ".4g"), format_optional(limit.first_failure, ".4g")
+    if limit.first_failure is None:
+        return f"all levels pass, up to {reached}"
+    if limit.limit is None:
+        return f"no level passes: {limit.rule}: {limit.reason}"
+    beyond = "" if limit.monotone else " (levels beyond pass and fail in turn)"
+    return f"up to {reached}, fails at {failed}{beyond}: {limit.rule}: {limit.reason}"
+
+
+MIN_MEMORY = 1024
+"""MiB, more than the libraries of a worker take."""
 
 
 @click.command(name="extremes")
 @click.option("--axes", metavar="NAME[,NAME]", help=f"axes to vary; default: all, which are {', '.join(AXES)}")
-@click.option("--engine", "--engines", "engines", metavar="NAME[,NAME]", help="engine or engines to test; default: all")
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of every scene")
+@engines_option("all", "test")
+@set_option("set a value of every scene")
 @click.option("--quick", is_flag=True, help="few levels, no pairs, boundaries only as fine as the levels")
 @click.option("--pairs/--no-pairs", default=True, help="also vary two axes at once")
 @click.option(
-    "--timeout", type=click.FloatRange(0.1, 86_400.0), default=SECONDS, metavar="S", help="time limit of each cell, s"
+    "--timeout",
+    type=click.FloatRange(0.1, 86_400.0),
+    default=SAMPLE_SECONDS,
+    metavar="S",
+    help="time limit of each cell, s",
 )
 @click.option(
-    "--memory", type=click.IntRange(LEAST_MEMORY), default=MEMORY, metavar="MB", help="memory limit of each worker, MiB"
+    "--memory",
+    type=click.IntRange(MIN_MEMORY),
+    default=WORKER_MEMORY,
+    metavar="MB",
+    help="memory limit of each worker, MiB",
 )
-@click.option(
-    "--workers", type=click.IntRange(1, 256), metavar="N", help="number of worker processes; default: one per core"
-)
-@click.option(
-    "--out", type=click.Path(path_type=Path), metavar="DIR", help="write report.html, heat maps, extremes.json"
-)
+@workers_option(None, "one per core")
+@out_option("write report.html, heat maps, extremes.json")
 @click.option(
     "--against",
     type=click.Path(path_type=Path),
     metavar="FILE",
     help="compare the boundaries with those stored in FILE (an extremes.json)",
 )
-@click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
-@click.option("--quiet", is_flag=True, help="print no tables and no progress")
-def command(
-    axes: str | None,
-    engines: str | None,
-    overrides: tuple[str, ...],
-    quick: bool,
-    pairs: bool,
-    timeout: float,
-    memory: int,
-    workers: int | None,
-    out: Path | None,
-    against: Path | None,
-    as_json: bool,
-    quiet: bool,
-) -> int:
+@json_option
+@quiet_option("print no tables and no progress")
+def extremes_command(**given: Any) -> int:
     """Increase one parameter at a time, and pairs of them, until each engine fails, and report the boundaries.
 
     Each cell runs in a worker process with a time and a memory limit, so a crash does not stop the command.
     """
+    options = _Options(**given)
     faults: list[Fault] = []
-    chosen = _axes(axes, faults)
-    names = engines_in(engines, faults)
+    plan = _plan(options, faults)
     stored = None
-    if against is not None:
-        with gathering(faults, "--against", (StoredError,)):
-            stored = read(against)
-    if not math.isfinite(timeout):
-        faults.append(Fault("--timeout", None, "", f"is {timeout} s; it must be finite"))
-    with gathering(faults):
-        check_overrides(overrides, chosen)
-    with gathering(faults):
-        require_folder(out)
-    if out is not None and not faults:
-        with gathering(faults):
-            make_folder(out)
+    if options.against is not None:
+        with collect_errors(faults, "--against", (StoredError,)):
+            stored = read(options.against)
+    with collect_errors(faults):
+        require_folder(options.out)
+    if options.out is not None and not faults:
+        with collect_errors(faults):
+            make_folder(options.out)
     if faults:
-        return refused(faults, as_json, cells=[], limits=[])
-
-    cases = {axis.case.name for axis in chosen}
-    both = tuple(pair for pair in PAIRS if pair.case.name in cases) if pairs and not quick else ()
-    plan = Plan(chosen, both, None if names is None else tuple(names), overrides, quick, timeout, memory)
-    if workers is not None:
-        plan = replace(plan, workers=workers)
+        return exit_with_errors(faults, options.as_json, cells=[], limits=[])
     try:
-        with _telling(quiet or as_json) as told:
-            result = extremes(plan, told)
+        with progress_bars(options.is_silent, has_estimate=False) as bars:
+            result = extremes(plan, None if not bars.is_shown else _progress_callback(bars.add("starting")))
     except WorkerError as error:
-        click.echo(f"--memory: {error}", err=True)
-        return 2
-    return _tell(result, out, stored, as_json, quiet)
+        click.echo(str(error) if error.was_killed else f"--memory: {error}", err=True)
+        return 1 if error.was_killed else 2
+    return _report(result, stored, options)
+
+
+def _plan(options: _Options, faults: list[Fault]) -> ExtremesPlan:
+    """Return what to run; add what is wrong with the command line to the faults."""
+    chosen = _axes(options.axes, faults)
+    names = parse_engines(options.engines, faults)
+    if not math.isfinite(options.timeout):
+        faults.append(Fault("--timeout", None, "", f"is {options.timeout} s; it must be finite"))
+    with collect_errors(faults):
+        check_overrides(options.overrides, chosen)
+    cases = {axis.case.name for axis in chosen}
+    has_pairs = options.pairs and not options.quick
+    pairs = tuple(pair for pair in PAIRS if pair.case.name in cases) if has_pairs else ()
+    engines = None if names is None else tuple(names)
+    plan = ExtremesPlan(chosen, pairs, engines, options.overrides, options.quick, options.timeout, options.memory)
+    return plan if options.workers is None else replace(plan, workers=options.workers)
+
+
+def _progress_callback(bar: ProgressBar) -> ProgressCallback:
+    def show(progress: Progress) -> None:
+        bar.update(progress.fraction or 0.0, progress.message, 1.0)
+
+    return show
 
 
 def _axes(text: str | None, faults: list[Fault]) -> tuple[Axis, ...]:
+    """Return the axes that `--axes` names, all without it; add unknown names to the faults."""
     if text is None:
         return tuple(AXES.values())
-    names = names_in(text)
+    names = parse_names(text)
     unknown = [name for name in names if name not in AXES]
     axes = ", ".join(AXES)
     faults += [Fault("--axes", None, "", f"no axis {short_repr(name)}; axes: {axes}") for name in unknown[:MAX_UNKNOWN]]
-    faults += further_unknown("--axes", len(unknown))
+    faults += more_unknown("--axes", len(unknown))
     return tuple(AXES[name] for name in names if name in AXES)
 
 
-def _tell(
-    result: Extremes, out: Path | None, stored: Sequence[dict[str, object]] | None, as_json: bool, quiet: bool
-) -> int:
-    """Print what came of it, write it down, and return the exit status."""
+def _report(result: Extremes, stored: Sequence[dict[str, object]] | None, options: _Options) -> int:
+    """Print and write the result, and return the exit status.
+
+    Args:
+        result: the result.
+        stored: boundaries of an earlier result, to be compared with; None for no comparison.
+        options: the command line.
+    """
     status = 0
     document = result.document()
     found = [] if stored is None else changes(stored, result.limits)
-    worse = [change for change in found if change.worse]
     if stored is not None:
-        document["changes"] = [change.document() for change in found]
-    for change in worse:
-        click.echo(str(change), err=True)
-        status = 1
+        document["changes"] = to_json(found)
+    for change in found:
+        if change.worse:
+            click.echo(str(change), err=True)
+            status = 1
     if result.interrupted:
         click.echo(f"interrupted: {len(result.cells) + len(result.pairs)} cells are complete and kept", err=True)
         status = 130
-    if as_json:
+    if options.as_json:
         print_json(document)
-    elif not quiet:
+    elif not options.quiet:
         print_extremes(result)
-        _tell_changes(found, stored is not None)
-    if out is not None:
+        _print_improvements(found, stored is not None)
+    if options.out is not None:
         try:
-            _write(result, document, out)
+            _write(result, document, options.out)
         except OSError as error:
-            click.echo(f"--out: {out}: {error.strerror or error}", err=True)
+            click.echo(f"--out: {options.out}: {error.strerror or error}", err=True)
             return status or 2
-        if not quiet and not as_json:
-            click.echo(f"written: {out}")
+        if not options.is_silent:
+            click.echo(f"written: {options.out}")
     return status
 
 
-def _tell_changes(found: Sequence[Change], held: bool) -> None:
+def _print_improvements(found: Sequence[BoundaryChange], is_compared: bool) -> None:
     for change in found:
         if not change.worse:
             click.echo(str(change))
-    if held and not found:
+    if is_compared and not found:
         click.echo("no boundary has moved")
 
 
 def _write(result: Extremes, document: dict[str, object], out: Path) -> None:
-    """Write heat maps, a page and the document into a folder, each to a temporary name first."""
-    from sandbox.report.heatmap import plot_extremes
-    from sandbox.report.page.extremes_page import write_extremes
+    """Write heat maps, a page and the document into a folder, each atomically."""
+    from sandbox.report.extremes_plot import plot_extremes
+    from sandbox.report.html.extremes import write_extremes
 
     plot_extremes(result, out)
     write_extremes(document, out / "report.html")
     write_json(document, out / "extremes.json")
-
-
-@contextmanager
-def _telling(silent: bool) -> Iterator[Watch | None]:
-    """Yield who is told how far it is: a bar on a terminal, nobody elsewhere."""
-    if silent or not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
-    from rich.progress import Progress as Bars
-
-    columns = TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn()
-    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
-        bar = bars.add_task("starting")
-
-        def told(progress: Progress) -> None:
-            text = f"{progress.cells} cells, {progress.failed} failed; {progress.what}"
-            bars.update(bar, description=text, completed=progress.done, total=progress.lines)
-
-        yield told

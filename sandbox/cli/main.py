@@ -1,4 +1,4 @@
-"""`sandbox …`: the commands, each loaded only when it is called."""
+"""Entry point of the command line: the group of commands, each imported only when it is called."""
 
 import difflib
 import gc
@@ -19,26 +19,29 @@ if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-# Else pydantic searches every installed package for plugins, 20 ms of each command.
+# Without this, pydantic searches every installed package for plugins, which takes 20 ms of each command.
 
 COMMANDS = {
-    "run": "run scenes without a window and print the results",
-    "play": "open the window: play a scene, or pick one",
-    "compare": "run a scene on several engines and measure the error of each",
-    "tradeoff": "find the cheapest setting within an error, or the most accurate within a budget",
-    "shots": "success odds, sensitivity and predictability horizon of a billiard shot",
-    "extremes": "find the limits of each engine: mass ratio, speed, stack height, …",
-    "report": "compare many scenes and write one HTML page: errors, costs, replays",
-    "check": "validate scenes and predict numerical problems before a run",
-    "scenes": "list the shipped scenes",
-    "engines": "list the engines and the physics that each models",
-    "schema": "print the keys of a table of the scene file, or the whole JSON Schema",
-    "export": "export a stored run as csv, parquet, gif, mp4 or png",
-    "replay": "show a stored run or a recorded session in the window",
-    "miss": "measure how far a projectile lands off target, by engine, integrator and step",
-    "match": "play frames of billiards between bots and print the score",
+    "run": ("run:run_command", "run scenes without a window and print the results"),
+    "play": ("window:play_command", "open the window: play a scene, or pick one"),
+    "compare": ("compare:compare_command", "run a scene on several engines and measure the error of each"),
+    "tradeoff": (
+        "tradeoff:tradeoff_command",
+        "find the cheapest setting within an error, or the most accurate within a budget",
+    ),
+    "shots": ("shots:shots_command", "success odds, sensitivity and predictability horizon of a billiard shot"),
+    "extremes": ("extremes:extremes_command", "find the limits of each engine: mass ratio, speed, stack height, …"),
+    "report": ("report:report_command", "compare many scenes and write one HTML page: errors, costs, replays"),
+    "check": ("check:check_command", "validate scenes and predict numerical problems before a run"),
+    "scenes": ("info:scenes_command", "list the shipped scenes"),
+    "engines": ("info:engines_command", "list the engines and the physics that each models"),
+    "schema": ("info:schema_command", "print the keys of a table of the scene file, or the whole JSON Schema"),
+    "export": ("export:export_command", "export a stored run as csv, parquet, gif, mp4 or png"),
+    "replay": ("window:replay_command", "show a stored run or a recorded session in the window"),
+    "miss": ("games:miss_command", "measure how far a projectile lands off target, by engine, integrator and step"),
+    "match": ("games:match_command", "play frames of billiards between bots and print the score"),
 }
-"""Each command's line of help stands here, so that help needs to import none of them."""
+"""Each command: module of this package and function, and one line of help. Help needs to import none of them."""
 
 COMPLETION = "_SANDBOX_COMPLETE"
 """Environment variable of shell completion, as click names it."""
@@ -51,14 +54,14 @@ sandbox runs one physics scene on several engines and measures the error and the
   sandbox compare bounce      measure the error of every engine
 
 All commands: sandbox --help. Shipped scenes: sandbox scenes."""
-"""What `sandbox` alone prints."""
+"""Output of `sandbox` without a command."""
 
 
 class Commands(click.Group):
-    """A group whose commands live in modules of their names."""
+    """Group that imports a command when it is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002, click's signature
-        """Return the commands in the order of use."""
+        """Return the names of all commands, in the order of their typical use."""
         return list(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002
@@ -66,9 +69,10 @@ class Commands(click.Group):
         if cmd_name not in COMMANDS:
             return None
         collecting = gc.isenabled()
-        gc.disable()  # imports make many objects and no garbage: looking for some takes a fifth of the time
+        gc.disable()  # imports create many objects and no garbage: collections take a fifth of the time
         try:
-            command: click.Command = importlib.import_module(f"sandbox.cli.{cmd_name}").command
+            module, _, function = COMMANDS[cmd_name][0].partition(":")
+            command: click.Command = getattr(importlib.import_module(f"sandbox.cli.{module}"), function)
             if COMPLETION in os.environ:
                 importlib.import_module("sandbox.cli.completion").add_completions(command)
         finally:
@@ -79,10 +83,10 @@ class Commands(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command of the first argument; of one that is none, say which was likely meant.
+        """Return the command named by the first argument.
 
         Raises:
-            click.UsageError: there is no such command.
+            click.UsageError: there is no such command; the message suggests the closest one.
         """
         name = args[0]
         if name in COMMANDS or name.startswith("-") or ctx.resilient_parsing:
@@ -99,21 +103,21 @@ class Commands(click.Group):
         raise click.UsageError(f"unknown command {short_repr(name)}; commands: {', '.join(COMMANDS)}", ctx)
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list["CompletionItem"]:
-        """Return the commands that begin with what is typed, without importing them."""
+        """Return the commands that begin with the incomplete word, without importing them."""
         from click.shell_completion import CompletionItem
 
         found = click.Command.shell_complete(self, ctx, incomplete)
         names = (name for name in COMMANDS if name.startswith(incomplete))
-        return [CompletionItem(name, help=COMMANDS[name]) for name in names] + found
+        return [CompletionItem(name, help=COMMANDS[name][1]) for name in names] + found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
         """List the commands without importing them."""
         with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
+            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
 
 
 def _is_scene(text: str) -> bool:
-    # Needed only where a word is no command
+    # Needed only for an unknown command
     from sandbox.scene.files.shipped_scenes import UnknownSceneError, find
 
     try:
@@ -132,29 +136,29 @@ def cli() -> None:
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line, and exit.
 
-    Status: 0 done; 1 done, and something failed the question asked; 2 wrong input; 130 interrupted.
+    Exit status: 0 done; 1 done, with a negative answer or a failed run; 2 wrong input; 130 interrupted.
     """
     prepare_streams()
     status = call(arguments)
-    gc.freeze()  # nor is there garbage worth finding at exit
+    gc.freeze()  # the interpreter would look for garbage at exit, to no use
     sys.exit(status)
 
 
 def call(arguments: list[str] | None = None) -> int:
-    """Run the command line and return its exit status. A fault of the user's is one line, never a traceback.
+    """Run the command line and return its exit status. Errors in the input are one line each, never a traceback.
 
-    Resource limits are to refuse what does not fit into memory; where memory runs out all the same, the status is 1.
+    Resource limits refuse work that does not fit into memory; if memory runs out nevertheless, the status is 1.
     """
-    faults = _unreadable(sys.argv[1:] if arguments is None else arguments)
-    if faults:
-        click.echo(f"sandbox: {faults}", err=True)
+    fault = _undecodable(sys.argv[1:] if arguments is None else arguments)
+    if fault:
+        click.echo(f"sandbox: {fault}", err=True)
         return 2
     try:
         resource_limits.check_environment()
         if COMPLETION in os.environ:
             importlib.import_module("sandbox.cli.completion").register_shells()
         status: Any = cli.main(arguments, prog_name="sandbox", standalone_mode=False)
-        sys.stdout.flush()  # what cannot be written shows here, not at the exit of the interpreter
+        sys.stdout.flush()  # write errors are raised here, not at the exit of the interpreter
     except click.exceptions.NoArgsIsHelpError as error:
         click.echo(GREETING if error.ctx.command is cli else error.format_message(), err=True)
         return 2
@@ -178,14 +182,14 @@ def call(arguments: list[str] | None = None) -> int:
         )
         return 1
     except (BrokenPipeError, SystemExit):
-        # The reader has gone, as `| head` does, and click and rich answer by an exit; leave nothing to flush.
+        # The reader has closed the pipe, as `| head` does; click and rich then exit. Nothing may be left to flush.
         sys.stdout = None
         return 0
     return status if isinstance(status, int) else 0
 
 
-def _unreadable(arguments: Sequence[str]) -> str:
-    """Return which argument is no text, and why; "" where all are."""
+def _undecodable(arguments: Sequence[str]) -> str:
+    """Return the fault of the first argument that is not text; "" if all are."""
     for number, argument in enumerate(arguments, 1):
         try:
             argument.encode()
@@ -197,5 +201,5 @@ def _unreadable(arguments: Sequence[str]) -> str:
 
 
 def _bounded(message: str) -> str:
-    """Return a message of click's, which quotes what was typed as it is, in one line of bounded length."""
+    """Return a message of click, which may quote the command line, as one line of bounded length."""
     return shorten(printable(re.sub(r"\S{81,}", lambda word: shorten(word[0]), message)), MAX_MESSAGE)

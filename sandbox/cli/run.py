@@ -1,57 +1,111 @@
-"""`sandbox run`: headless runs, a table on the terminal, a folder of stored runs."""
+"""Command `run`: headless runs, their table, and a folder of stored runs."""
 
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import click
 
 from sandbox.action import Spawn
-from sandbox.batch.crew import CrewError, Making, MakingError, make
-from sandbox.batch.outcome import Outcome, execute
-from sandbox.batch.plan import Job, parse_sweep, plan, repeated_keys
+from sandbox.batch.executors import Executor, ExecutorError, InProcessExecutor, JobError, ProcessExecutor, Result
+from sandbox.batch.job import RunOptions, RunRecord
+from sandbox.batch.plan import Job, plan
 from sandbox.batch.store import Store, StoreError
-from sandbox.cli.engine_choice import EngineChoice, only_engine
-from sandbox.cli.ledger_table import print_ledgers
-from sandbox.cli.naming import engines_in, meant_or_known, plural, with_other_engine
-from sandbox.cli.output import require_picture
-from sandbox.cli.reading import gathering, paths_of, print_json, refused, scenes_of
-from sandbox.cli.scores_table import print_scores, score_rows
-from sandbox.cli.table import Row, print_runs
-from sandbox.cli.telling import telling
+from sandbox.batch.sweep import parse_sweep, repeated_keys
+from sandbox.cli.common import (
+    EngineChoice,
+    collect_errors,
+    engine_advice,
+    exit_with_errors,
+    expand_folders,
+    only_engine,
+    parse_engines,
+    plural,
+    require_plot_file,
+    scene_paths,
+    suggest_names,
+)
+from sandbox.cli.options import (
+    OutputOptions,
+    engines_option,
+    json_option,
+    out_option,
+    plot_option,
+    quiet_option,
+    set_option,
+    sweep_option,
+    verbose_option,
+    workers_option,
+)
+from sandbox.cli.progress import progress_bars, status_line
+from sandbox.cli.run_tables import print_ledgers, print_runs, print_scores, score_rows
+from sandbox.cli.streams import print_json
 from sandbox.echo import short_repr
 from sandbox.engines.registry import able
 from sandbox.games.players import PlayerSpec
-from sandbox.measure.recorder import TooLargeError, require_memory
-from sandbox.measure.seeds import same_chances
+from sandbox.jsonable import JsonObject
+from sandbox.measure.run.recorder import TooLargeError, require_memory
+from sandbox.measure.seeds import same_random_state
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.overrides import AddressError
 
 MAX_MISSED = 3
-"""Missed contacts that are named below the table of a single run."""
+"""Missed contacts that are listed below the table of a single run."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Options(OutputOptions):
+    """The command line as typed; None for an option that was left out."""
+
+    scenes: tuple[str, ...]
+    engines: str | None
+    overrides: tuple[str, ...]
+    sweeps: tuple[str, ...]
+    seeds: int | None
+    player: str | None
+    workers: int
+    out: Path | None
+    plot: Path | None
+    bodies: tuple[str, ...]
+    audit: bool
+    ledger: bool
+    verbose: bool
+
+
+@dataclass
+class _Batch:
+    """The runs of the command: jobs, and what has been completed."""
+
+    jobs: list[Job]
+    rows: dict[int, JsonObject] = field(default_factory=dict)
+    """rows of completed runs by the index of their job"""
+    single: RunRecord | None = None
+    """the run, if there is only one and it was made in this process"""
+    status: int = 0
+    """exit status: 130 interrupted, 2 a job could not be run, 1 no worker could be started"""
+
+    def add(self, result: Result) -> None:
+        """Enter a completed run."""
+        self.rows[result.index] = result.row
+        if len(self.jobs) == 1:
+            self.single = result.record
+
+    @property
+    def ordered_rows(self) -> list[JsonObject]:
+        """Rows of completed runs in the order of the jobs."""
+        return [self.rows[index] for index in sorted(self.rows)]
 
 
 @click.command(name="run")
 @click.argument("scenes", nargs=-1, required=True)
-@click.option(
-    "--engine",
-    "--engines",
-    "engines",
-    metavar="NAME[,NAME]",
-    help="engine or engines to run; default: pymunk, the engine of the session, or the only engine that has a setting "
-    "of --set or --sweep",
+@engines_option(
+    "pymunk, the engine of the session, or the only engine that has a setting of --set or --sweep",
 )
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene")
-@click.option(
-    "--sweep",
-    "sweeps",
-    multiple=True,
-    metavar="KEY=A,B,C",
-    help="run once per value; a range is KEY=LOW:HIGH:N[:log]; several sweeps multiply",
-)
+@set_option()
+@sweep_option
 @click.option(
     "--seeds",
     type=click.IntRange(1, 1_000_000),
@@ -63,18 +117,9 @@ MAX_MISSED = 3
     metavar="WHO",
     help="player of a game: random, skilled, none, or a script file",
 )
-@click.option(
-    "--workers", type=click.IntRange(1, 256), default=1, metavar="N", help="number of worker processes; default: 1"
-)
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    metavar="DIR",
-    help="store the runs in a folder; runs that are already there are not repeated",
-)
-@click.option(
-    "--plot", type=click.Path(path_type=Path), metavar="FILE", help="draw the run to FILE: .png, .svg or .pdf"
-)
+@workers_option(1, "1")
+@out_option("store the runs in a folder; runs that are already there are not repeated")
+@plot_option("draw the run to FILE: .png, .svg or .pdf")
 @click.option(
     "--body", "bodies", multiple=True, metavar="NAME", help="body to draw with --plot; may be repeated; default: all"
 )
@@ -82,92 +127,111 @@ MAX_MISSED = 3
 @click.option(
     "--ledger", "ledger", is_flag=True, help="account for energy by cause; a pymunk run takes 3 to 12 times as long"
 )
-@click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
-@click.option("-v", "--verbose", is_flag=True, help="explain every column of the table")
-@click.option("--quiet", is_flag=True, help="print no table and no progress")
-def command(
-    scenes: tuple[str, ...],
-    engines: str | None,
-    overrides: tuple[str, ...],
-    sweeps: tuple[str, ...],
-    seeds: int | None,
-    player: str | None,
-    workers: int,
-    out: Path | None,
-    plot: Path | None,
-    bodies: tuple[str, ...],
-    audit: bool,
-    ledger: bool,
-    as_json: bool,
-    verbose: bool,
-    quiet: bool,
-) -> int:
+@json_option
+@verbose_option
+@quiet_option()
+def run_command(**given: Any) -> int:
     """Run scenes without a window and print the results.
 
     SCENES are files, folders of files, names of shipped scenes, or recorded sessions (.json). Exit status 1: a run
     diverged or failed, or the engine refused the scene.
     """
+    options = _Options(**given)
     faults: list[Fault] = []
-    names = engines_in(engines, faults)
-    found: list[tuple[str, str]] = []
-    for scene in scenes_of(scenes):
-        with gathering(faults):
-            found += _runnable(paths_of([scene]))
-    sound: list[str] = []
-    for sweep in sweeps:
-        with gathering(faults, "--sweep", (AddressError,)):
-            parse_sweep(sweep)
-            sound.append(sweep)
-    faults += repeated_keys(overrides, sound, seeds)
-    plays: PlayerSpec | None = None
-    with gathering(faults):
-        plays = None if player is None else PlayerSpec.parse(player)
-    jobs: list[Job] = []
-    with gathering(faults, "--sweep", (AddressError,)), telling(quiet or as_json) as told:
-        jobs = plan(found, names, overrides, sound, seeds, plays, told)
-    if names is None and not faults:
-        jobs = _on_engines_found(jobs, overrides, sound, quiet)
-    if plays is not None and jobs and not any(job.player == plays for job in jobs):
-        faults.append(Fault("--player", None, "", "has no use: none of the scenes has a game with rules"))
-    if not faults:
-        with gathering(faults):
-            _check_drawing(plot, bodies, jobs)
-            _check_memory(jobs)
+    jobs = _planned_jobs(options, faults)
     store = None
-    if out is not None and not faults:
-        with gathering(faults, "--out", (StoreError,)):
-            store = Store(out, _give_notice)
+    if options.out is not None and not faults:
+        with collect_errors(faults, "--out", (StoreError,)):
+            store = Store(options.out, _print_notice)
     if faults:
-        return refused(faults, as_json, runs=[])
-
-    if not quiet:
-        _tell_if_nothing_is_random(jobs)
-    status, was_interrupted = 0, False
-    is_single = all(len(job.scene.bodies) == 1 for job in jobs)  # then the table can show the final position
-    making = Making(out, audit, ledger, as_json or is_single)
-    made: dict[int, Row] = {}
-    drawn: Outcome | None = None
+        return exit_with_errors(faults, options.as_json, runs=[])
+    if not options.quiet:
+        _report_equal_seeds(jobs)
+    batch = _Batch(jobs)
     try:
-        with _progress(jobs, quiet or as_json) as heard:
-            drawn = _make(jobs, workers, making, store, made, heard)
-    except KeyboardInterrupt:
-        status, was_interrupted = 130, True
-        click.echo(f"interrupted: {len(made)} of {len(jobs)} runs are complete and kept", err=True)
-    except MakingError as error:
-        status = 2
-        click.echo(str(error), err=True)
-    except CrewError as error:
-        status = 1
-        click.echo(f"--workers: {error}; {len(made)} of {len(jobs)} runs are complete and kept", err=True)
+        _run_all(batch, options, store)
     finally:
         if store is not None:
             store.close()
-    rows = [made[k] for k in sorted(made)]
+    status = _report_problems(batch, is_engine_chosen=options.engines is not None)
+    _print_results(batch, options, status)
+    return _draw(batch, options, status)
 
-    for k, row in sorted(made.items()):
+
+def _planned_jobs(options: _Options, faults: list[Fault]) -> list[Job]:
+    """Return all jobs of the command; add what is wrong with it to the faults."""
+    names = parse_engines(options.engines, faults)
+    found: list[tuple[str, str]] = []
+    for scene in expand_folders(options.scenes):
+        with collect_errors(faults):
+            found += _runnable(scene_paths([scene]))
+    sweeps: list[str] = []
+    for sweep in options.sweeps:
+        with collect_errors(faults, "--sweep", (AddressError,)):
+            parse_sweep(sweep)
+            sweeps.append(sweep)
+    faults += repeated_keys(options.overrides, sweeps, options.seeds)
+    player: PlayerSpec | None = None
+    with collect_errors(faults):
+        player = None if options.player is None else PlayerSpec.parse(options.player)
+    jobs: list[Job] = []
+    with collect_errors(faults, "--sweep", (AddressError,)), status_line(options.is_silent) as progress:
+        jobs = plan(found, names, options.overrides, sweeps, options.seeds, player, progress)
+    if names is None and not faults:
+        jobs = _choose_engines(jobs, options.overrides, sweeps, options.quiet)
+    if player is not None and jobs and not any(job.player == player for job in jobs):
+        faults.append(Fault("--player", None, "", "has no use: none of the scenes has a game with rules"))
+    if not faults:
+        with collect_errors(faults):
+            _check_drawing(options.plot, options.bodies, jobs)
+            _check_memory(jobs)
+    return jobs
+
+
+def _run_all(batch: _Batch, options: _Options, store: Store | None) -> None:
+    """Run all jobs, and enter each run into the batch as it completes; an interrupt or error ends the batch."""
+    jobs = batch.jobs
+    is_single = all(len(job.scene.bodies) == 1 for job in jobs)  # then the table can show the final position
+    run_options = RunOptions(options.out, options.audit, options.ledger, options.as_json or is_single)
+    kept = "of {} runs are complete and kept"
+    try:
+        with progress_bars(options.is_silent) as bars:
+            bar = bars.add(plural(len(jobs), "run"), float(len(jobs)))
+
+            def show(index: int, fraction: float = 0.0) -> None:
+                done = len(batch.rows)
+                bar.update(done + fraction, f"{min(done + 1, len(jobs))}/{len(jobs)} {jobs[index].label}")
+
+            def done(result: Result) -> None:
+                batch.add(result)
+                show(result.index)
+
+            executor: Executor
+            if min(options.workers, len(jobs)) > 1:
+                executor = ProcessExecutor(run_options, options.workers, _print_notice)
+            else:
+                executor = InProcessExecutor(run_options, store, show)
+            for job in jobs:
+                executor.submit(job)
+            executor.wait(done)
+    except KeyboardInterrupt:
+        batch.status = 130
+        click.echo(f"interrupted: {len(batch.rows)} {kept.format(len(jobs))}", err=True)
+    except JobError as error:
+        batch.status = 2
+        click.echo(str(error), err=True)
+    except ExecutorError as error:
+        batch.status = 1
+        click.echo(f"--workers: {error}; {len(batch.rows)} {kept.format(len(jobs))}", err=True)
+
+
+def _report_problems(batch: _Batch, is_engine_chosen: bool) -> int:
+    """Print a line for each run that did not end as it should, and return the exit status."""
+    status = batch.status
+    for index, row in sorted(batch.rows.items()):
         if row["status"] != "ok":
             status = status or 1
-            advice = with_other_engine(jobs[k].scene, names is not None) if row["status"] == "refused" else ""
+            advice = engine_advice(batch.jobs[index].scene, is_engine_chosen) if row["status"] == "refused" else ""
             click.echo(f"{row['scene']}: {row['status']}: {row['reason']}{advice}", err=True)
         if "damaged" in row:
             click.echo(f"{row['damaged']}; the run was repeated", err=True)
@@ -176,36 +240,49 @@ def command(
             what = "state" if row.get("otherwise") is None else f"game, from {row['otherwise']:g} s on,"
             message = f"ended in a different {what} than the session; a possible cause is another version of an engine"
             click.echo(f"{row['scene']}: {message}", err=True)
-    if as_json:
-        spread = score_rows(rows) if seeds is not None else []
-        print_json({"runs": rows, **({"scores": spread} if spread else {}), "interrupted": was_interrupted})
-    elif not quiet and rows:
-        print_runs(rows, verbose)
-        if drawn is not None:
-            _print_missed(drawn)
-        if seeds is not None:
-            print_scores(score_rows(rows))
-        if ledger:
-            print_ledgers(rows)
-        if out is not None:
-            click.echo(f"stored: {out}")
-        if len(rows) == 1 and not (overrides or sweeps or plot or out or verbose or status):
-            _suggest_next(rows[0]["scene"])
-    if plot is not None and drawn is not None and len(drawn.trajectory.time):
-        from sandbox.report.plots import plot_run
+    return status
 
-        try:
-            plot_run(drawn.trajectory, jobs[0].scene, plot, list(bodies) or None)
-        except OSError as error:
-            click.echo(f"--plot: {plot}: {error.strerror or error}", err=True)
-            return status or 2
-        if not quiet and not as_json:
-            click.echo(f"drawn: {plot}")
+
+def _print_results(batch: _Batch, options: _Options, status: int) -> None:
+    """Print the JSON document, or the tables."""
+    rows = batch.ordered_rows
+    if options.as_json:
+        spread = score_rows(rows) if options.seeds is not None else []
+        scores = {"scores": spread} if spread else {}
+        print_json({"runs": rows, **scores, "interrupted": batch.status == 130})
+    elif not options.quiet and rows:
+        print_runs(rows, options.verbose)
+        if batch.single is not None:
+            _print_missed(batch.single)
+        if options.seeds is not None:
+            print_scores(score_rows(rows))
+        if options.ledger:
+            print_ledgers(rows)
+        if options.out is not None:
+            click.echo(f"stored: {options.out}")
+        is_plain = not (options.overrides or options.sweeps or options.plot or options.out or options.verbose)
+        if len(rows) == 1 and is_plain and not status:
+            _suggest_next(rows[0]["scene"])
+
+
+def _draw(batch: _Batch, options: _Options, status: int) -> int:
+    """Draw the single run to the file of `--plot`, and return the exit status."""
+    if options.plot is None or batch.status or batch.single is None or not len(batch.single.trajectory.time):
+        return status
+    from sandbox.report.run_plot import plot_run
+
+    try:
+        plot_run(batch.single.trajectory, batch.jobs[0].scene, options.plot, list(options.bodies) or None)
+    except OSError as error:
+        click.echo(f"--plot: {options.plot}: {error.strerror or error}", err=True)
+        return status or 2
+    if not options.is_silent:
+        click.echo(f"drawn: {options.plot}")
     return status
 
 
 def _runnable(paths: list[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Return names and files of scenes.
+    """Return the names and files of scenes and sessions as they are.
 
     Raises:
         SceneError: one is a stored run.
@@ -217,8 +294,8 @@ def _runnable(paths: list[tuple[str, str]]) -> list[tuple[str, str]]:
     return paths
 
 
-def _on_engines_found(jobs: list[Job], overrides: Sequence[str], sweeps: Sequence[str], quiet: bool) -> list[Job]:
-    """Return the runs, each on the one engine that can make it where the usual one lacks a setting that was given.
+def _choose_engines(jobs: list[Job], overrides: Sequence[str], sweeps: Sequence[str], quiet: bool) -> list[Job]:
+    """Return the jobs; where the default engine lacks a setting that is given, on the only engine that has it.
 
     All runs of a scene stay on one engine. A recorded session stays on its own.
     """
@@ -237,9 +314,9 @@ def _on_engines_found(jobs: list[Job], overrides: Sequence[str], sweeps: Sequenc
     return [replace(job, engine=found[job.label].engine) if job.label in found else job for job in jobs]
 
 
-def _print_missed(outcome: Outcome) -> None:
+def _print_missed(record: RunRecord) -> None:
     """Print the first contacts that the engine missed, and the number of the others."""
-    run, fixed = outcome.trajectory, outcome.job.scene.fixed_names
+    run, fixed = record.trajectory, record.job.scene.fixed_names
     missed = list(zip(run.missed_time.tolist(), run.missed_pair.tolist(), strict=True))
     for time, pair in missed[:MAX_MISSED]:
         one, other = (short_repr(str(run.names[k]) if k >= 0 else fixed[-1 - k]) for k in pair)
@@ -249,14 +326,18 @@ def _print_missed(outcome: Outcome) -> None:
 
 
 def _suggest_next(scene: str) -> None:
-    """Print what may follow a plain run of one scene, on a terminal only."""
+    """Suggest further commands after a plain run of one scene, on a terminal only."""
     if sys.stdout.isatty() and not scene.endswith(".json"):
         name = shlex.quote(scene)
         click.secho(f"next: sandbox compare {name} (error of each engine), sandbox play {name} (window)", dim=True)
 
 
 def _check_drawing(plot: Path | None, bodies: tuple[str, ...], jobs: list[Job]) -> None:
-    """Refuse before the run what could not be drawn after it."""
+    """Check, before the run, that `--plot` can draw it.
+
+    Raises:
+        SceneError: it cannot.
+    """
     faults: list[Fault] = []
 
     def fault(option: str, message: str) -> None:
@@ -269,22 +350,21 @@ def _check_drawing(plot: Path | None, bodies: tuple[str, ...], jobs: list[Job]) 
             remedy = "run one scene on one --engine, without --sweep and --seeds"
             several = "sandbox compare SCENE --out DIR plots several engines"
             fault("--plot", f"draws a single run, but this command makes {len(jobs):,}; {remedy}; {several}")
-        with gathering(faults):
-            require_picture(plot)
+        with collect_errors(faults):
+            require_plot_file(plot)
         names = jobs[0].scene.bodies.names
         for name in bodies:
             if name not in names:
-                fault("--body", f"no body is named {short_repr(name)}; {meant_or_known(name, names)}")
+                fault("--body", f"no body is named {short_repr(name)}; {suggest_names(name, names)}")
     if faults:
         raise SceneError(faults)
 
 
-def _tell_if_nothing_is_random(jobs: list[Job]) -> None:
-    """Say so where runs of several seeds will all be the same."""
+def _report_equal_seeds(jobs: list[Job]) -> None:
+    """Report scenes in which nothing is random, so that several seeds give the same run."""
     for label in dict.fromkeys(job.label for job in jobs):
-        # Seeds change fastest: the first two that differ in it have every other value in common.
         if any(job.label == label and job.player is not None for job in jobs):
-            continue  # the game and who plays it have chances of their own
+            continue  # the game and its player are random
         alike = max(job.seeds for job in jobs if job.label == label)
         if alike > 1:
             where = "" if all(job.seeds > 1 for job in jobs if job.label == label) else "for some of the swept values, "
@@ -294,16 +374,21 @@ def _tell_if_nothing_is_random(jobs: list[Job]) -> None:
                 err=True,
             )
             continue
+        # Seeds change fastest: the first two jobs with different seeds are equal in every other value.
         first, *others = (job.scene for job in jobs if job.label == label)
         other = next((scene for scene in others if scene.world.seed != first.world.seed), first)
         if other is first:
             continue
-        if same_chances(first, other):
+        if same_random_state(first, other):
             click.echo(f"{label}: nothing is random, so all seeds give the same run", err=True)
 
 
 def _check_memory(jobs: list[Job]) -> None:
-    """Refuse all runs where one would not fit, rather than find out after the others."""
+    """Check that every run fits into memory, before the first one.
+
+    Raises:
+        SceneError: some do not.
+    """
     faults = []
     for job in jobs:
         try:
@@ -315,64 +400,5 @@ def _check_memory(jobs: list[Job]) -> None:
         raise SceneError(tuple(dict.fromkeys(faults)))
 
 
-def _give_notice(message: str) -> None:
+def _print_notice(message: str) -> None:
     click.echo(message, err=True)
-
-
-Told = Callable[[int, Job, float], None]
-"""Called with how many runs are done, the job that is under way, and the share of it that is done."""
-
-
-def _make(
-    jobs: list[Job], workers: int, making: Making, store: Store | None, made: dict[int, Row], told: Told
-) -> Outcome | None:
-    """Make all runs, and enter each into `made` by its place as it is done; return the outcome of a single one.
-
-    Raises:
-        MakingError: a run could not be made.
-        CrewError: no worker can be started.
-    """
-    if min(workers, len(jobs)) > 1:
-
-        def done(place: int, row: Row) -> None:
-            made[place] = row
-            told(len(made), jobs[place], 0.0)
-
-        make(jobs, workers, making, done, _give_notice)
-        return None
-    outcome: Outcome | None = None
-    for k, job in enumerate(jobs):
-
-        def keep(finished: Outcome, k: int = k) -> None:
-            made[k] = finished.row(making.final, making.ledger)
-
-        def under_way(share: float, k: int = k, job: Job = job) -> None:
-            told(k, job, share)
-
-        under_way(0.0)
-        try:
-            outcome = execute(job, store, under_way, making.audit, making.ledger, keep)
-        except (TooLargeError, StoreError) as error:
-            raise MakingError(job, error) from error
-    return outcome if len(jobs) == 1 else None
-
-
-@contextmanager
-def _progress(jobs: list[Job], silent: bool) -> Iterator[Told]:
-    """Yield who is told how far the runs are: a bar on a terminal, nothing elsewhere."""
-    if silent or not sys.stderr.isatty():
-        yield lambda *_: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
-    from rich.progress import Progress as Bars
-
-    columns = TextColumn("{task.description}", markup=False), BarColumn(), TimeRemainingColumn()
-    with Bars(*columns, console=Console(stderr=True), transient=True) as bars:
-        whole = bars.add_task(plural(len(jobs), "run"), total=float(len(jobs)))
-
-        def told(done: int, job: Job, share: float) -> None:
-            at = min(done + 1, len(jobs))
-            bars.update(whole, description=f"{at}/{len(jobs)} {job.label}", completed=done + share)
-
-        yield told

@@ -1,64 +1,113 @@
-"""`sandbox shots`: how likely a shot is, what it hangs on, and until when anybody could tell."""
+"""Command `shots`: success odds, sensitivity and predictability horizon of a billiard shot."""
 
 import math
 import os
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import click
 
-from sandbox.cli.output import make_folder, require_folder, write_json
-from sandbox.cli.reading import gathering, path_of, print_json, refused
+from sandbox.cli.common import (
+    collect_errors,
+    exit_with_errors,
+    make_folder,
+    require_folder,
+    scene_path,
+    write_json,
+)
+from sandbox.cli.options import OutputOptions, json_option, out_option, quiet_option, set_option
+from sandbox.cli.progress import status_line
 from sandbox.cli.shots_table import print_study
-from sandbox.cli.telling import telling
+from sandbox.cli.streams import print_json
 from sandbox.engines.contract import Exhaustion, Refusal
-from sandbox.measure.shots.attempt import Attempt, NoSuchShotError, attempt_of
-from sandbox.measure.shots.horizon import NUDGE, TOLERANCE, By
-from sandbox.measure.shots.odds import COUNT
-from sandbox.measure.shots.spread import Spread
-from sandbox.measure.shots.study import Study, pot_of, study
+from sandbox.games.billiards.shots.monte_carlo import DEFAULT_COUNT
+from sandbox.games.billiards.shots.predictability import PERTURBATION, TOLERANCE, By
+from sandbox.games.billiards.shots.shot import NoSuchShotError, ShotSetup, Spread, shot_setup
+from sandbox.games.billiards.shots.study import ShotStudy, pot_of, study_shot
+from sandbox.progress import Progress
 from sandbox.scene.errors import Fault
 from sandbox.scene.files.load import load
 
-USUAL = Spread()
-SHARE = click.FloatRange(min=0.0, max=1.0)
+DEFAULT = Spread()
+FRACTION = click.FloatRange(min=0.0, max=1.0)
 POSITIVE = click.FloatRange(min=0.0, min_open=True, max=1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Options(OutputOptions):
+    """The command line as typed; None for an option that was left out."""
+
+    scene: str
+    name: str | None
+    overrides: tuple[str, ...]
+    aim_error: float
+    speed_error: float
+    side_error: float
+    height_error: float
+    count: int
+    seed: int | None
+    threads: int | None
+    slopes: bool
+    pots: tuple[str, ...]
+    foretold: bool
+    nudge: float
+    by: By
+    tolerance: float
+    out: Path | None
+
+
+@dataclass
+class _Request:
+    """What to analyse: the checked command line."""
+
+    spread: Spread
+    shot: ShotSetup | None
+    """None if the scene has faults or is refused"""
+    pots: list[tuple[str, str]]
+    """ball and pocket of each `--window`"""
+    refusal: str = ""
+    """why the exact engine cannot run the scene"""
 
 
 @click.command(name="shots")
 @click.argument("scene")
 @click.option("--shot", "name", metavar="NAME", help="name of the [[shot]]; default: the first")
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene")
+@set_option()
 @click.option(
     "--aim-error",
-    type=SHARE,
-    default=USUAL.aim,
+    type=FRACTION,
+    default=DEFAULT.aim,
     metavar="RAD",
     help="standard deviation of the aim, rad; default: 0.002",
 )
 @click.option(
     "--speed-error",
-    type=SHARE,
-    default=USUAL.speed,
+    type=FRACTION,
+    default=DEFAULT.speed,
     metavar="FRACTION",
     help="standard deviation of the speed, as a fraction; default: 0.03",
 )
 @click.option(
     "--side-error",
-    type=SHARE,
-    default=USUAL.side,
+    type=FRACTION,
+    default=DEFAULT.side,
     metavar="R",
     help="standard deviation of the tip to the side, ball radii; default: 0",
 )
 @click.option(
     "--height-error",
-    type=SHARE,
-    default=USUAL.height,
+    type=FRACTION,
+    default=DEFAULT.height,
     metavar="R",
     help="standard deviation of the tip's height, ball radii; default: 0",
 )
 @click.option(
-    "--count", type=click.IntRange(1, 1_000_000), default=COUNT, metavar="N", help="number of shots; default: 10,000"
+    "--count",
+    type=click.IntRange(1, 1_000_000),
+    default=DEFAULT_COUNT,
+    metavar="N",
+    help="number of shots; default: 10,000",
 )
 @click.option(
     "--seed",
@@ -84,7 +133,11 @@ POSITIVE = click.FloatRange(min=0.0, min_open=True, max=1.0)
 )
 @click.option("--horizon", "foretold", is_flag=True, help="time after which the shot cannot be predicted")
 @click.option(
-    "--nudge", type=POSITIVE, default=NUDGE, metavar="X", help="perturbation for --horizon, rad or m; default: 1e-9"
+    "--nudge",
+    type=POSITIVE,
+    default=PERTURBATION,
+    metavar="X",
+    help="perturbation for --horizon, rad or m; default: 1e-9",
 )
 @click.option(
     "--by",
@@ -99,107 +152,114 @@ POSITIVE = click.FloatRange(min=0.0, min_open=True, max=1.0)
     metavar="M",
     help="position difference that ends the horizon, m; default: 0.001",
 )
-@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="write shots.json, rests.png and aims.png")
-@click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
-@click.option("--quiet", is_flag=True, help="no table, no progress")
-def command(
-    scene: str,
-    name: str | None,
-    overrides: tuple[str, ...],
-    aim_error: float,
-    speed_error: float,
-    side_error: float,
-    height_error: float,
-    count: int,
-    seed: int | None,
-    threads: int | None,
-    slopes: bool,
-    pots: tuple[str, ...],
-    foretold: bool,
-    nudge: float,
-    by: By,
-    tolerance: float,
-    out: Path | None,
-    as_json: bool,
-    quiet: bool,
-) -> int:
+@out_option("write shots.json, rests.png and aims.png")
+@json_option
+@quiet_option()
+def shots_command(**given: Any) -> int:
     """Play a shot many times with random errors of the player, and print the odds of each outcome.
 
     SCENE is a file or the name of a shipped scene, with a [surface] and a [[shot]]. Errors are normally distributed.
     """
+    options = _Options(**given)
     faults: list[Fault] = []
-    spread = USUAL
-    with gathering(faults, "--aim-error, --speed-error, --side-error, --height-error", (ValueError,)):
-        spread = Spread(aim_error, speed_error, side_error, height_error)
-    for flag, figure in (("--nudge", nudge), ("--tolerance", tolerance)):
-        if math.isnan(figure):
-            faults.append(Fault(flag, None, "", "is not a number; it must be positive and finite"))
-    attempt: Attempt | None = None
-    wanted: list[tuple[str, str]] = []
-    reason = ""
-    with gathering(faults), gathering(faults, scene, (NoSuchShotError,)):
-        try:
-            attempt = attempt_of(load(path_of(scene), overrides), name)
-        except Refusal as refusal:
-            reason = str(refusal)
-    if attempt is not None:
-        for pot in pots:
-            with gathering(faults, "--window", (NoSuchShotError,)):
-                wanted.append(pot_of(attempt, pot))
-    with gathering(faults):
-        require_folder(out)
+    request = _checked(options, faults)
+    if options.out is not None and request.shot is not None and not faults:
+        with collect_errors(faults):
+            make_folder(options.out)
     if faults:
-        return refused(faults, as_json, scene=scene, status="refused", odds=None)
-    if attempt is None:
-        return _failed(scene, "refused", reason, as_json)
-    if out is not None:
-        with gathering(faults):
-            make_folder(out)
-        if faults:
-            return refused(faults, as_json, scene=scene, status="refused", odds=None)
+        return exit_with_errors(faults, options.as_json, scene=options.scene, status="refused", odds=None)
+    if request.shot is None:
+        return _failed(options, "refused", request.refusal)
     try:
-        with telling(quiet or as_json) as told:
-            say = None if told is None else lambda share: told(f"playing {count:,} shots: {100.0 * share:.0f} %")
-            found = study(
-                attempt, spread, count=count, seed=seed, threads=threads or os.cpu_count() or 1, slopes=slopes,
-                pots=wanted, foretold=foretold, nudge=nudge, by=by, tolerance=tolerance,
-                progress=say,
-            )  # fmt: skip
+        found = _study(request.shot, request, options)
     except Exhaustion as error:
-        return _failed(scene, "failed", str(error), as_json)
-    document = {"scene": scene, "status": "ok", "reason": None, **found.document()}
-    if as_json:
+        return _failed(options, "failed", str(error))
+    document = {"scene": options.scene, "status": "ok", "reason": None, **found.document()}
+    if options.as_json:
         print_json(document)
-    elif not quiet:
-        print_study(scene, found)
+    elif not options.quiet:
+        print_study(options.scene, found)
     status = 0 if found.answered else 1
     if found.odds.interrupted:
-        click.echo(f"interrupted: {found.odds.count:,} of {count:,} shots were played and are counted", err=True)
+        played = f"{found.odds.count:,} of {options.count:,} shots were played and are counted"
+        click.echo(f"interrupted: {played}", err=True)
         status = 130
     elif found.interrupted:
         click.echo("interrupted: the odds and all other completed results are kept", err=True)
         status = 130
-    return max(status, _kept(found, document, out, quiet or as_json))
+    return max(status, _write(found, document, options))
 
 
-def _failed(scene: str, status: str, reason: str, as_json: bool) -> int:
-    click.echo(f"{scene}: {status}: {reason}", err=True)
-    if as_json:
-        print_json({"scene": scene, "status": status, "reason": reason, "odds": None})
+def _checked(options: _Options, faults: list[Fault]) -> _Request:
+    """Return what to analyse; add what is wrong with the command line to the faults."""
+    request = _Request(DEFAULT, None, [])
+    with collect_errors(faults, "--aim-error, --speed-error, --side-error, --height-error", (ValueError,)):
+        request.spread = Spread(options.aim_error, options.speed_error, options.side_error, options.height_error)
+    for flag, value in (("--nudge", options.nudge), ("--tolerance", options.tolerance)):
+        if math.isnan(value):
+            faults.append(Fault(flag, None, "", "is not a number; it must be positive and finite"))
+    with collect_errors(faults), collect_errors(faults, options.scene, (NoSuchShotError,)):
+        try:
+            request.shot = shot_setup(load(scene_path(options.scene), options.overrides), options.name)
+        except Refusal as refusal:
+            request.refusal = str(refusal)
+    if request.shot is not None:
+        for pot in options.pots:
+            with collect_errors(faults, "--window", (NoSuchShotError,)):
+                request.pots.append(pot_of(request.shot, pot))
+    with collect_errors(faults):
+        require_folder(options.out)
+    return request
+
+
+def _study(attempt: ShotSetup, request: _Request, options: _Options) -> ShotStudy:
+    """Play the shots.
+
+    Raises:
+        Exhaustion: the shot without error does not come to rest.
+    """
+    with status_line(options.is_silent) as show:
+
+        def report(progress: Progress) -> None:
+            assert show is not None
+            percent = 100.0 * (progress.fraction or 0.0)
+            show(Progress(f"playing {options.count:,} shots: {percent:.0f} %", progress.fraction))
+
+        return study_shot(
+            attempt,
+            request.spread,
+            count=options.count,
+            seed=options.seed,
+            threads=options.threads or os.cpu_count() or 1,
+            slopes=options.slopes,
+            pots=request.pots,
+            foretold=options.foretold,
+            nudge=options.nudge,
+            by=options.by,
+            tolerance=options.tolerance,
+            on_progress=None if show is None else report,
+        )
+
+
+def _failed(options: _Options, status: str, reason: str) -> int:
+    """Print why there are no odds, and return the exit status."""
+    click.echo(f"{options.scene}: {status}: {reason}", err=True)
+    if options.as_json:
+        print_json({"scene": options.scene, "status": status, "reason": reason, "odds": None})
     return 1
 
 
-def _kept(found: Study, document: dict[str, Any], out: Path | None, silent: bool) -> int:
-    """Write what was asked for, and say so; return 2 where something cannot be written."""
-    if out is None:
+def _write(found: ShotStudy, document: dict[str, Any], options: _Options) -> int:
+    """Write the document and the plots into the folder of `--out`; return 2 if they cannot be written."""
+    if options.out is None:
         return 0
-    from sandbox.report.shots import plot_shots
+    from sandbox.report.shots_plot import plot_shots
 
     try:
-        write_json(document, out / "shots.json")
-        plot_shots(found, out)
+        write_json(document, options.out / "shots.json")
+        plot_shots(found, options.out)
     except OSError as error:
-        return refused([Fault("--out", None, "", f"{error.filename}: {error.strerror}")])
-    if not silent:
-        click.echo(f"written: {out}")
+        return exit_with_errors([Fault("--out", None, "", f"{error.filename}: {error.strerror}")])
+    if not options.is_silent:
+        click.echo(f"written: {options.out}")
     return 0

@@ -1,61 +1,54 @@
-"""What `sandbox shots` prints: a row a ball, and below what else was asked."""
+"""Tables of `shots`: odds and sensitivity by ball, aim windows, predictability horizon."""
 
 import math
-import sys
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
-from sandbox.cli.table import WIDE
-from sandbox.measure.shots.attempt import UNITS, VARIABLES
-from sandbox.measure.shots.horizon import Horizon, Parted
-from sandbox.measure.shots.odds import Chance, Odds
-from sandbox.measure.shots.sensitivity import Slope
-from sandbox.measure.shots.study import Study
-from sandbox.measure.shots.windows import Windows
+from sandbox.cli.tables import add_columns, new_table, print_line, print_table
+from sandbox.games.billiards.shots.aim_windows import Windows
+from sandbox.games.billiards.shots.monte_carlo import Odds, Proportion
+from sandbox.games.billiards.shots.predictability import Horizon, Separation
+from sandbox.games.billiards.shots.sensitivity import Slope
+from sandbox.games.billiards.shots.shot import UNITS, VARIABLES
+from sandbox.games.billiards.shots.study import ShotStudy
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 ODDS_HEADS = ("ball", "pocketed", "95 % interval", "into", "mean rest, m", "std, m", "without error")
 OF_POCKETS = slice(1, 4)
-"""Those that a table without pockets does without."""
+"""Columns about pockets, left out if the table has none."""
 
-MOST_POCKETS = 3
-"""Named of each ball; `--json` has all."""
+MAX_POCKETS = 3
+"""Pockets listed for each ball; `--json` has all."""
 
-MOST_WINDOWS = 3
-"""Told of each pot, the nearest ones, likewise."""
+MAX_WINDOWS = 3
+"""Intervals listed for each pot, the nearest ones; `--json` has all."""
 
 
-def print_study(scene: str, found: Study) -> None:
-    """Print what is asked about, each ball's odds, and the answers.
+def print_study(scene: str, found: ShotStudy) -> None:
+    """Print the shot, the odds of each ball, and the other results that were requested.
 
     Args:
-        scene: what it is called.
+        scene: the scene as the user named it.
         found: what to print.
     """
-    from rich.console import Console
-    from rich.text import Text
-
-    title = found.attempt.table.scene.title
-    console = Console(width=None if sys.stdout.isatty() else WIDE)
-    rows = [list(ODDS_HEADS), *_odds_rows(found.odds)]
-    if not found.attempt.pockets:
-        for row in rows:
-            del row[OF_POCKETS]
-    tables = [_table(rows[0], rows[1:])]
-    if found.slopes is not None:
-        heads = [f"d/d({variable}), m/{UNITS[variable]}" for variable in VARIABLES]
-        tables.append(_table(["ball", *heads, "same contacts within"], _slope_rows(found.slopes)))
-    for table in tables:
-        console.width = max(console.width, Console(width=10_000).measure(table).maximum)
-    console.print(Text(f"{scene}: {title}" if title else scene), soft_wrap=True)
+    title = found.shot.table.scene.title
+    print_line(f"{scene}: {title}" if title else scene)
     for line in _about(found):
         click.echo(line)
-    console.print(tables[0])
+    rows = [list(ODDS_HEADS), *_odds_rows(found.odds)]
+    if not found.shot.pockets:
+        for row in rows:
+            del row[OF_POCKETS]
+    print_table(_table(rows[0], rows[1:]))
     for line in _in_all(found.odds):
         click.echo(line)
-    for table in tables[1:]:
-        console.print(table)
+    if found.slopes is not None:
+        heads = [f"d/d({variable}), m/{UNITS[variable]}" for variable in VARIABLES]
+        print_table(_table(["ball", *heads, "same contacts within"], _slope_rows(found.slopes)))
     for each in found.windows:
         for line in _window(each):
             click.echo(line)
@@ -64,20 +57,20 @@ def print_study(scene: str, found: Study) -> None:
             click.echo(line)
 
 
-def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> Any:
-    from rich.table import Table
+def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> "Table":
+    """Return a table; the first column and columns of words are justified to the left."""
     from rich.text import Text
 
-    table = Table(box=None, pad_edge=False, header_style="bold")
+    table = new_table()
     for k, head in enumerate(heads):
-        table.add_column(head, justify="left" if k == 0 or head in ("into", "without error") else "right", no_wrap=True)
+        add_columns(table, [head], "left" if k == 0 or head in ("into", "without error") else "right")
     for row in rows:
-        table.add_row(*(Text(cell) for cell in row))
+        table.add_row(*map(Text, row))
     return table
 
 
-def _about(found: Study) -> Iterator[str]:
-    attempt, odds = found.attempt, found.odds
+def _about(found: ShotStudy) -> Iterator[str]:
+    attempt, odds = found.shot, found.odds
     stroke = attempt.stroke
     off = f", tip at ({stroke.side:+g}, {stroke.height:+g}) R" if stroke.side or stroke.height else ""
     yield f"{attempt.name}: {attempt.ball!r} struck at {stroke.speed:g} m/s at an aim of {stroke.aim:.6g} rad{off}"
@@ -94,13 +87,13 @@ def _odds_rows(odds: Odds) -> list[list[str]]:
     rows = []
     for number, ball in enumerate(nominal.names):
         fell, rest = odds.chance(ball), odds.rest(ball)
-        into = {pocket: odds.chance(ball, pocket) for pocket in odds.attempt.pockets}
+        into = {pocket: odds.chance(ball, pocket) for pocket in odds.shot.pockets}
         often = sorted((each for each in into.items() if each[1].hits), key=lambda each: -each[1].hits)
         meant = nominal.pocketed.get(ball) or _place(nominal.position[number].tolist())
         rows.append(
             [
                 ball,
-                _percent(fell.share),
+                _percent(fell.probability),
                 _bounds(fell),
                 _into(often),
                 "–" if rest is None else _place(rest.mean),
@@ -111,17 +104,17 @@ def _odds_rows(odds: Odds) -> list[list[str]]:
     return rows
 
 
-def _into(often: Sequence[tuple[str, Chance]]) -> str:
-    named = [f"{pocket} {_percent(chance.share)}" for pocket, chance in often[:MOST_POCKETS]]
-    return ", ".join([*named, *(["…"] if len(often) > MOST_POCKETS else [])]) or "–"
+def _into(often: Sequence[tuple[str, Proportion]]) -> str:
+    named = [f"{pocket} {_percent(chance.probability)}" for pocket, chance in often[:MAX_POCKETS]]
+    return ", ".join([*named, *(["…"] if len(often) > MAX_POCKETS else [])]) or "–"
 
 
 def _in_all(odds: Odds) -> Iterator[str]:
-    if not odds.attempt.pockets:
+    if not odds.shot.pockets:
         return
     pot, scratch = odds.any_pot, odds.scratch
-    yield f"another ball is pocketed and {odds.attempt.ball!r} is not: {_percent(pot.share)}, {_bounds(pot)}"
-    yield f"{odds.attempt.ball!r} is pocketed: {_percent(scratch.share)}, {_bounds(scratch)}"
+    yield f"another ball is pocketed and {odds.shot.ball!r} is not: {_percent(pot.probability)}, {_bounds(pot)}"
+    yield f"{odds.shot.ball!r} is pocketed: {_percent(scratch.probability)}, {_bounds(scratch)}"
 
 
 def _slope_rows(slopes: Sequence[Slope]) -> list[list[str]]:
@@ -142,28 +135,28 @@ def _slope(slope: Slope) -> str:
 
 
 def _window(found: Windows) -> Iterator[str]:
-    who = f"{found.ball!r} into {found.pocket!r}"
+    pot = f"{found.ball!r} into {found.pocket!r}"
     nearest = found.nearest
     if nearest is None:
-        yield f"{who}: for no aim within {found.reach:g} rad of {found.aim:.6g}"
+        yield f"{pot}: for no aim within {found.reach:g} rad of {found.aim:.6g}"
         return
-    near = sorted(found.found, key=lambda each: each.off(found.aim))[:MOST_WINDOWS]
+    near = sorted(found.found, key=lambda each: each.off(found.aim))[:MAX_WINDOWS]
     for each in sorted(near, key=lambda each: each.low):
         ends = f"[{each.low:.9f}, {each.high:.9f}] rad, ± {1e3 * each.half:.4g} mrad about {each.centre:.9f}"
-        yield f"{who}: for an aim in {ends}"
+        yield f"{pot}: for an aim in {ends}"
     if len(found.found) > len(near):
-        yield f"{who}: {len(found.found) - len(near)} more intervals within {found.reach:g} rad, farther from the aim"
+        yield f"{pot}: {len(found.found) - len(near)} more intervals within {found.reach:g} rad, farther from the aim"
     off = 1e3 * (found.aim - nearest.centre)
     side = "left" if off > 0.0 else "right"
     inside = "within" if found.aim in nearest else "outside"
-    yield f"{who}: the aim of the shot is {inside} it, {abs(off):.4g} mrad to the {side} of its centre"
+    yield f"{pot}: the aim of the shot is {inside} it, {abs(off):.4g} mrad to the {side} of its centre"
 
 
 def _horizon(found: Horizon) -> Iterator[str]:
     unit = "rad in aim" if found.by == "aim" else "m in position"
     within = f"{1e3 * found.tolerance:g} mm"
-    yield f"perturbed by {found.parted.nudge:g} {unit}: {_parted(found.parted, within)}"
-    yield f"perturbed by {found.parted.nudge:g} {unit}: {_parted(found.by_a_radius, 'a radius')}"
+    yield f"perturbed by {found.separation.nudge:g} {unit}: {_parted(found.separation, within)}"
+    yield f"perturbed by {found.separation.nudge:g} {unit}: {_parted(found.by_a_radius, 'a radius')}"
     if found.player is not None:
         yield f"perturbed by the player's error: {_parted(found.player, 'a radius')}"
     rungs = [f"{each.nudge:.0e}: {each.time:.3g} s" for each in found.ladder if each.time is not None]
@@ -175,7 +168,7 @@ def _horizon(found: Horizon) -> Iterator[str]:
         yield f"each further second needs {digits:.2g} more digits of the aim"
 
 
-def _parted(each: Parted, within: str) -> str:
+def _parted(each: Separation, within: str) -> str:
     if each.time is None:
         return f"no ball ever differs by {within}; the largest difference is {1e3 * each.farthest:.2g} mm"
     grown = ""
@@ -190,7 +183,7 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.1f} %"
 
 
-def _bounds(chance: Chance) -> str:
+def _bounds(chance: Proportion) -> str:
     low, high = chance.interval
     return f"{100.0 * low:.1f}–{100.0 * high:.1f} %"
 

@@ -1,4 +1,4 @@
-"""Standard streams: closed ones are replaced, and what cannot be written is one error, or for standard error none."""
+"""Standard streams: closed ones are replaced; a failed write to standard output is one error."""
 
 import codecs
 import errno
@@ -7,7 +7,9 @@ import os
 import sys
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
+
+import click
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
@@ -18,23 +20,23 @@ class OutputError(Exception):
 
 
 def prepare_streams() -> None:
-    """Replace the standard streams, so that the process neither fails by them nor writes into another file.
+    """Replace the standard streams by ones that handle closed descriptors, full disks and missing characters.
 
-    A descriptor of 0 to 2 that is closed would be that of the next file opened, a database say, and text meant for a
-    terminal would be written there. Closed ones are opened on the null device: standard output for reading alone, so
-    that writing to it is the error that it is. Characters that an encoding lacks are written as escapes.
+    The next file that is opened, such as a database, would get a closed descriptor of 0 to 2, and text for the terminal
+    would be written into it. Therefore closed descriptors are opened on the null device; standard output for reading
+    only, so that a write to it fails. Characters that an encoding lacks are written as escapes.
 
-    A write to standard output that fails raises `OutputError`, once: what follows is dropped, also at the exit of the
-    interpreter. Standard error drops what cannot be written, as there is nowhere left to say so.
+    The first failed write to standard output raises `OutputError`; further output is dropped, also at the exit of the
+    interpreter. Standard error drops what cannot be written, because there is no other stream to report it on.
     """
     for descriptor, flags in enumerate((os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)):
         try:
             os.fstat(descriptor)
         except OSError:
-            null = os.open(os.devnull, flags)  # the lowest that is free: this one
+            null = os.open(os.devnull, flags)  # gets the lowest free descriptor: this one
             os.set_inheritable(null, True)
     if sys.stdin is None:
-        sys.stdin = Path(os.devnull).open(encoding="utf-8")  # noqa: SIM115, open as long as the process
+        sys.stdin = Path(os.devnull).open(encoding="utf-8")  # noqa: SIM115, open until the process ends
     sys.stdout = _guarded(sys.stdout, _Output, os.O_RDONLY)
     sys.stderr = _guarded(sys.stderr, _Errors, os.O_WRONLY)
 
@@ -43,6 +45,13 @@ def can_write_unicode() -> bool:
     """Tell whether standard output can encode every character."""
     encoding = getattr(sys.stdout, "encoding", None)
     return encoding is None or codecs.lookup(encoding).name.startswith("utf")
+
+
+def print_json(document: Any) -> None:
+    """Print the JSON document of `--json` on standard output."""
+    import json  # help does not need it
+
+    click.echo(json.dumps(document, ensure_ascii=not can_write_unicode(), allow_nan=False))
 
 
 class _Output(io.FileIO):
@@ -54,7 +63,7 @@ class _Output(io.FileIO):
         """Write bytes; after a failure, drop them.
 
         Raises:
-            BrokenPipeError: the reader has gone, as `| head` does.
+            BrokenPipeError: the reader has closed the pipe, as `| head` does.
             OutputError: they cannot be written.
         """
         if self._has_failed:
@@ -81,12 +90,12 @@ class _Errors(io.FileIO):
 
 
 def _guarded(stream: TextIO | None, kind: type[io.FileIO], flags: int) -> TextIO:
-    """Return a stream like another, on the same descriptor, that writes by a kind of file."""
-    if stream is None:  # closed; on a descriptor of its own, as its own may be another file's by now
+    """Return a stream with the properties of another, on the same descriptor, that writes through `kind`."""
+    if stream is None:  # closed; a new descriptor, because another file may have taken the old one
         return io.TextIOWrapper(io.BufferedWriter(_null(kind, flags)), "utf-8", "backslashreplace")
     assert isinstance(stream, io.TextIOWrapper)
     raw = getattr(stream.buffer, "raw", stream.buffer)  # unbuffered streams have no buffer in between
-    if type(raw) is not io.FileIO:  # a console of Windows, which takes Unicode and is never full
+    if type(raw) is not io.FileIO:  # a console of Windows: takes Unicode, and is never full
         stream.reconfigure(errors="backslashreplace")
         return stream
     return io.TextIOWrapper(

@@ -1,36 +1,277 @@
-"""`sandbox tradeoff`: error against cost over engines and settings, and the setting to take."""
+"""Command `tradeoff` and its tables."""
 
 import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import click
 
-from sandbox.batch.plan import USUAL
-from sandbox.cli.naming import engines_in
-from sandbox.cli.output import make_folder, require_folder, require_picture, write_json
-from sandbox.cli.reading import gathering, path_of, print_json, refused
-from sandbox.cli.telling import telling
-from sandbox.cli.tradeoff_table import print_tradeoff
-from sandbox.engines.registry import ENGINES
+from sandbox.cli.common import (
+    collect_errors,
+    exit_with_errors,
+    make_folder,
+    parse_engines,
+    require_folder,
+    require_plot_file,
+    scene_path,
+    write_json,
+)
+from sandbox.cli.options import (
+    OutputOptions,
+    engines_option,
+    json_option,
+    out_option,
+    plot_option,
+    quiet_option,
+    set_option,
+    time_limit_option,
+    verbose_option,
+)
+from sandbox.cli.progress import status_line
+from sandbox.cli.streams import print_json
+from sandbox.cli.tables import add_columns, format_optional, heads_of, new_table, print_legend, print_line, print_table
+from sandbox.engines.registry import ENGINES, USUAL
+from sandbox.formatting import format_quantity
 from sandbox.measure.compare import compare
-from sandbox.measure.recorder import TooLargeError
-from sandbox.measure.tradeoff.aim import UnknownMetricError, require_aim
+from sandbox.measure.run.recorder import TooLargeError
+from sandbox.measure.tradeoff.configuration import Evaluation
+from sandbox.measure.tradeoff.error_budget import ErrorBudget
 from sandbox.measure.tradeoff.metrics import METRICS
-from sandbox.measure.tradeoff.weighed import Tradeoff
-from sandbox.measure.tradeoff.weighing import EFFORT, POINTS, REPEATS, tradeoff
-from sandbox.scene.errors import Fault
+from sandbox.measure.tradeoff.objective import UnknownMetricError, check_objective
+from sandbox.measure.tradeoff.recommendation import FRAME_TOLERANCE, format_value, label, pymunk_lines
+from sandbox.measure.tradeoff.result import Tradeoff
+from sandbox.measure.tradeoff.study import DEFAULT_EFFORT, DEFAULT_REPEATS, MAX_POINTS, tradeoff
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.load import load
-from sandbox.scene.files.toml_edit import write_solver
-from sandbox.scene.scene import Scene
+from sandbox.scene.files.toml_edit import write_solver, written
 
-USUAL_FPS = 60.0
+ROUNDING = 1e-12
+"""m; a part of an error below this is a rounding error, as coordinates of up to 1 km are exact to 1e-13 m."""
+MAX_REASONS = 3
+"""Failures listed with their reason."""
+MAX_ROWS = 8
+"""Rows of the front of one engine; of a longer front, evenly spaced points and the recommended ones are shown."""
+LEGEND = {
+    "scene": "the setting in the scene file",
+    "front": "no other setting is both cheaper and more accurate",
+    "cheapest": "the cheapest setting within the tolerance",
+    "best": "the most accurate setting within the budget",
+}
+LONG = ">frame"
+"""Mark of settings that are not recommended, because their dt is longer than a frame."""
+
+
+COLUMNS = {
+    "engine": "the physics engine",
+    "dt": "time step of a frame, s",
+    "substeps": "solver steps per frame",
+    "iterations": "iterations of the contact solver per substep",
+    "other settings": "further changes of [solver]",
+    "ms/s minimum": "computing time per simulated second on this machine, ms: the smallest of the timings",
+    "ms/s median": "the same: the median of the timings",
+}
+"""Columns of the table and their meaning, for `--verbose`; the column of the error is added."""
+
+
+def print_tradeoff(scene: str, found: Tradeoff, verbose: bool = False) -> None:
+    """Print the metric, the front of each engine, how its error splits up, and the recommended settings.
+
+    Args:
+        scene: the scene as the user named it.
+        found: what to print.
+        verbose: explain every column and mark below the table.
+    """
+    from rich.text import Text
+
+    unit = f", {found.metric.unit}" if found.metric.unit else ""
+    error_head = f"{found.metric.name}{unit}"
+    table = new_table()
+    add_columns(table, ["engine"])
+    add_columns(table, ("dt", "substeps", "iterations"), "right")
+    add_columns(table, ["other settings"])
+    add_columns(table, (error_head, "ms/s minimum", "ms/s median"), "right")
+    add_columns(table, [""])
+    rows = _rows(found)
+    for point in rows:
+        marks = [*_marks(point, found), *([LONG] if point.settings.dt > found.max_dt else [])]
+        table.add_row(*_cells(point), Text(" ".join(marks), style="green"))
+    name = f"{scene} ({found.scene.title})" if found.scene.title else scene
+    print_line(f"{name}: {found.error_about}")
+    print_line(_about(found))
+    if rows:
+        print_table(table)
+        if verbose:
+            print_legend([*heads_of(table), *LEGEND], COLUMNS | {error_head: f"{found.metric.about}{unit}"} | LEGEND)
+        else:
+            click.echo(_legend(rows, found))
+        if any(point.settings.dt > found.max_dt for point in rows):
+            click.echo(_long_legend(found))
+    splits = [_split(each, found) for each in found.splits if each.total >= ROUNDING]
+    proposed = [each.sentence for each in found.proposals]
+    for line in [*_failures(found), *splits, *found.answers(), *_notes(found), *proposed, *_solver(found)]:
+        click.echo(line)
+
+
+def _rows(found: Tradeoff) -> list[Evaluation]:
+    """Return the settings of the table: the front of each engine, and all marked settings, by engine and cost."""
+    rows = [point for front in found.fronts().values() for point in _thinned(front, found)]
+    marked = (point for point in found.points if point.status == "ok" and _marks(point, found))
+    rows += [point for point in marked if not any(point is row for row in rows)]
+    order = list(found.fronts())
+    return sorted(rows, key=lambda each: (order.index(each.engine), each.cost or 0.0))
+
+
+def _about(found: Tradeoff) -> str:
+    seeds = f"; each error is the largest over {len(found.seeds)} seeds" if len(found.seeds) > 1 else ""
+    ended = "; the time limit ended the search, so another run may try other settings" if found.out_of_time else ""
+    count = len(found.points)
+    return f"{count} setting{'s' if count != 1 else ''} tried{seeds}{ended}"
+
+
+def _thinned(front: Sequence[Evaluation], found: Tradeoff) -> list[Evaluation]:
+    """Return at most `MAX_ROWS` settings of the front of an engine, and all recommended ones."""
+    asked = [point for point in front if set(_marks(point, found)) - {"front"}]
+    if len(front) <= MAX_ROWS:
+        return list(front)
+    evenly = [front[round(k * (len(front) - 1) / (MAX_ROWS - 1))] for k in range(MAX_ROWS)]
+    return [point for point in front if point in evenly or point in asked]
+
+
+def _marks(point: Evaluation, found: Tradeoff) -> list[str]:
+    picks = {"cheapest": found.within_tolerance, "best": found.within_budget}
+    marks = ["scene"] if point.is_own else []
+    marks += ["front"] if any(point is each for each in found.pareto) else []
+    return marks + [name for name, pick in picks.items() if pick is not None and pick.point is point]
+
+
+def _legend(rows: Sequence[Evaluation], found: Tradeoff) -> str:
+    used = {mark for point in rows for mark in _marks(point, found)}
+    repeats = max(point.repeats for point in rows)
+    times = f"minimum and median of {repeats} timings" if repeats else "from the run that was scored"
+    marks = "".join(f"; {mark}: {meaning}" for mark, meaning in LEGEND.items() if mark in used)
+    return f"ms/s: milliseconds of computing per simulated second on this machine, {times}{marks}"
+
+
+def _long_legend(found: Tradeoff) -> str:
+    own = " and than the dt of the scene" if found.max_dt > FRAME_TOLERANCE / found.fps else ""
+    return f"{LONG}: dt is longer than a frame at {found.fps:g} fps{own}, so the setting is not recommended"
+
+
+def _cells(point: Evaluation) -> list[str]:
+    steps = {"dt", "substeps", "iterations"}
+    words = ", ".join(
+        f"no {key}" if value is None else f"{key} {format_value(value)}"
+        for key, value in point.changes.items()
+        if key not in steps
+    )
+    own = point.settings
+    return [
+        point.engine,
+        f"{own.dt:.4g}",
+        str(own.substeps),
+        str(own.iterations),
+        words,
+        format_optional(point.error),
+        format_optional(point.cost, ".4g"),
+        format_optional(point.cost_median, ".4g"),
+    ]
+
+
+def _failures(found: Tradeoff) -> list[str]:
+    failed = [point for point in found.points if point.status != "ok"]
+    counted = Counter(point.status for point in failed)
+    lines = [f"{count} {status}" for status, count in counted.items()]
+    reasons = [f"{label(p)} {p.status}: {p.reason}" for p in failed[:MAX_REASONS]]
+    left = [f"{found.untried} skipped because they would have taken too long"] if found.untried else []
+    summary = ", ".join([*lines, *left])
+    return ([summary] if summary else []) + reasons
+
+
+def _split(each: ErrorBudget, found: Tradeoff) -> str:
+    left = (
+        f"at most {_part(each.residual)} from the model (the error left with {each.substep_factor} times the substeps)"
+    )
+    model = left if each.model is None else f"{_part(each.model)} from the model"
+    parts = f"{_part(each.time_step)} from the time step, {_part(each.solver)} from the iterations, {model}"
+    trusted = found.scene.world.duration if found.best is None else found.best.trusted_until
+    until = f", while the truth is trusted ({trusted:.3g} s)" if trusted < found.scene.world.duration else ""
+    return (
+        f"position error of {each.engine} with the settings of the scene{until}: {_part(each.total)}, of which {parts}"
+    )
+
+
+def _part(metres: float) -> str:
+    """Return a part of an error as text; rounding errors are 0."""
+    return "0" if metres < ROUNDING else format_quantity(metres, "m")
+
+
+def _notes(found: Tradeoff) -> list[str]:
+    """Return the warnings for the recommended settings, each once, with the settings that it concerns."""
+    picks = [found.within_tolerance or found.nearest_to_tolerance, found.within_budget or found.nearest_to_budget]
+    picks += found.cheapest_by_engine.values()
+    concerned: dict[str, dict[str, None]] = {}
+    for pick in filter(None, picks):
+        for warning in pick.warnings:
+            concerned.setdefault(warning.message, {})[label(pick.point)] = None
+    return [f"note: {' and '.join(names)}: {message}" for message, names in concerned.items()]
+
+
+def _solver(found: Tradeoff) -> list[str]:
+    """Return the recommended `[solver]`, and the lines of Python for the cheapest setting of pymunk."""
+    lines = []
+    if found.within_tolerance is not None:
+        point = found.within_tolerance.point
+        values = [f"{key} = {written(value)}" for key, value in point.changes.items() if value is not None]
+        dropped = [f"# without {key}" for key, value in point.changes.items() if value is None]
+        if values or dropped:
+            block = _indented(["[solver]", *values, *dropped])
+            lines += ["", f"recommended changes to the scene file, for --engine {point.engine}:", *block]
+    pymunk = found.cheapest_by_engine.get("pymunk")
+    if pymunk is not None:
+        head = "the cheapest pymunk setting within the tolerance, as code for a program that uses pymunk:"
+        lines += ["", head, *_indented(pymunk_lines(pymunk.point.settings))]
+    return lines
+
+
+def _indented(lines: Sequence[str]) -> list[str]:
+    return [f"    {line}" for line in lines]
+
+
+DEFAULT_FPS = 60.0
 POSITIVE = click.FloatRange(min=0.0, min_open=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Options(OutputOptions):
+    """The command line as typed; None for an option that was left out."""
+
+    scene: str
+    engines: str | None
+    overrides: tuple[str, ...]
+    metric: str | None
+    tolerance: float | None
+    budget: float | None
+    fps: float
+    seeds: int
+    zoom: float | None
+    effort: float
+    time_limit: float | None
+    points: int
+    repeats: int
+    write: bool
+    out: Path | None
+    plot: Path | None
+    verbose: bool
 
 
 @click.command(name="tradeoff")
 @click.argument("scene")
-@click.option("--engine", "--engines", "engines", metavar="NAME[,NAME]", help="engine or engines to try; default: all")
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="set a value of the scene")
+@engines_option("all", "try")
+@set_option()
 @click.option(
     "--metric",
     metavar="NAME",
@@ -43,7 +284,7 @@ POSITIVE = click.FloatRange(min=0.0, min_open=True)
 @click.option(
     "--fps",
     type=POSITIVE,
-    default=USUAL_FPS,
+    default=DEFAULT_FPS,
     metavar="N",
     help="frames per second that --budget refers to; default: 60",
 )
@@ -58,65 +299,33 @@ POSITIVE = click.FloatRange(min=0.0, min_open=True)
 @click.option(
     "--effort",
     type=POSITIVE,
-    default=EFFORT,
+    default=DEFAULT_EFFORT,
     metavar="N",
     help="effort of the search, in seconds of counted work, so that every machine tries the same settings; the truth, "
-    f"timing and other seeds come on top; default: {EFFORT:g}",
+    f"timing and other seeds come on top; default: {DEFAULT_EFFORT:g}",
 )
-@click.option(
-    "--time-limit",
-    "--patience",
-    "time_limit",
-    type=POSITIVE,
-    metavar="S",
-    help="time limit of the search, s; the settings tried then depend on the machine; default: no limit",
-)
+@time_limit_option("time limit of the search, s; the settings tried then depend on the machine; default: no limit")
 @click.option(
     "--points",
     type=click.IntRange(1, 100_000),
-    default=POINTS,
+    default=MAX_POINTS,
     metavar="N",
-    help=f"largest number of settings to try; default: {POINTS}",
+    help=f"largest number of settings to try; default: {MAX_POINTS}",
 )
 @click.option(
     "--repeats",
     type=click.IntRange(1, 1000),
-    default=REPEATS,
+    default=DEFAULT_REPEATS,
     metavar="N",
-    help=f"timings of each setting near the front; default: {REPEATS}",
+    help=f"timings of each setting near the front; default: {DEFAULT_REPEATS}",
 )
 @click.option("--write", is_flag=True, help="write the recommended [solver] into the scene file")
-@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="write tradeoff.json and report.html")
-@click.option(
-    "--plot",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="draw error against cost to FILE: .png, .svg or .pdf",
-)
-@click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
-@click.option("-v", "--verbose", is_flag=True, help="explain every column of the table")
-@click.option("--quiet", is_flag=True, help="print no table and no progress")
-def command(
-    scene: str,
-    engines: str | None,
-    overrides: tuple[str, ...],
-    metric: str | None,
-    tolerance: float | None,
-    budget: float | None,
-    fps: float,
-    seeds: int,
-    zoom: float | None,
-    effort: float,
-    time_limit: float | None,
-    points: int,
-    repeats: int,
-    write: bool,
-    out: Path | None,
-    plot: Path | None,
-    as_json: bool,
-    verbose: bool,
-    quiet: bool,
-) -> int:
+@out_option("write tradeoff.json and report.html")
+@plot_option("draw error against cost to FILE: .png, .svg or .pdf")
+@json_option
+@verbose_option
+@quiet_option()
+def tradeoff_command(**given: Any) -> int:
     """Measure error against cost over engines and settings, and recommend a setting.
 
     SCENE is a file or the name of a shipped scene. The settings that are tried and their errors are the same on every
@@ -124,119 +333,167 @@ def command(
     work decides which is cheaper. Exit status 1: no setting is within the tolerance or the
     budget; the nearest is shown.
     """
+    options = _Options(**given)
     faults: list[Fault] = []
-    names = engines_in(engines, faults)
-    with gathering(faults, "--metric", (UnknownMetricError,)):
-        require_aim(metric, None, None, USUAL_FPS)
-    for flag, figures in (
-        ("--tolerance", (metric if metric in METRICS else None, tolerance, None, USUAL_FPS)),
-        ("--budget", (None, None, budget, USUAL_FPS)),
-        ("--fps", (None, None, None, fps)),
-    ):
-        with gathering(faults, flag, (ValueError,)):
-            require_aim(*figures)
-    for flag, figure in (("--zoom", zoom), ("--effort", effort), ("--time-limit", time_limit)):
-        if figure is not None and not math.isfinite(figure):
-            faults.append(Fault(flag, None, "", f"is {figure:g}; it must be positive and finite"))
-    read: Scene | None = None
-    path = scene
-    with gathering(faults):
-        path = path_of(scene)
-        read = load(path, overrides)
-    if write and overrides:
-        faults.append(
-            Fault("--write", None, "", "cannot be combined with --set, because the file does not contain those changes")
-        )
-    elif write and read is not None:
-        with gathering(faults):
-            write_solver(path, {})  # changes nothing, but tells whether it could
-    with gathering(faults):
-        require_folder(out)
-    with gathering(faults):
-        require_picture(plot)
-    if out is not None and not faults:
-        with gathering(faults):
-            make_folder(out)
+    names = parse_engines(options.engines, faults)
+    _check_numbers(options, faults)
+    path, read = _read(options, faults)
     found: Tradeoff | None = None
     if read is not None and not faults:
-        with gathering(faults, scene, (TooLargeError, ValueError)), telling(quiet or as_json) as told:
+        with (
+            collect_errors(faults, options.scene, (TooLargeError, ValueError)),
+            status_line(options.is_silent) as progress,
+        ):
             found = tradeoff(
                 read,
                 names,
-                metric=metric,
-                tolerance=tolerance,
-                budget=budget,
-                fps=fps,
-                seeds=seeds,
-                zoom=zoom,
-                effort=effort,
-                time_limit=time_limit,
-                repeats=repeats,
-                most=points,
-                told=told,
+                metric=options.metric,
+                tolerance=options.tolerance,
+                budget=options.budget,
+                fps=options.fps,
+                seeds=options.seeds,
+                zoom=options.zoom,
+                effort=options.effort,
+                time_limit=options.time_limit,
+                repeats=options.repeats,
+                most=options.points,
+                on_progress=progress,
             )
     if found is None:
-        picks = {"within_tolerance": None, "within_budget": None}
-        return refused(faults, as_json, scene=scene, truth=None, metric=metric, points=[], pareto=[], **picks)
-    document = found.document(scene)
-    if as_json:
+        lists: dict[str, list[object]] = {"points": [], "pareto": []}
+        nulls = {"truth": None, "within_tolerance": None, "within_budget": None}
+        named = {"scene": options.scene, "metric": options.metric}
+        return exit_with_errors(faults, options.as_json, **named, **nulls, **lists)
+    document = found.document(options.scene)
+    if options.as_json:
         print_json(document)
-    elif not quiet:
-        print_tradeoff(scene, found, verbose)
-    status = 1 if found.within_tolerance is None or (budget is not None and found.within_budget is None) else 0
+    elif not options.quiet:
+        print_tradeoff(options.scene, found, options.verbose)
+    is_met = found.within_tolerance is not None and (options.budget is None or found.within_budget is not None)
+    status = 0 if is_met else 1
     if found.interrupted:
         click.echo(f"interrupted: the {len(found.points)} settings tried so far are kept", err=True)
-        status, write = 130, False
-    return max(status, _kept(found, document, path, write, out, plot, quiet or as_json))
+        status = 130
+    return max(status, _write_results(found, document, path, options))
 
 
-def _kept(
-    found: Tradeoff,
-    document: dict[str, object],
-    path: str,
-    write: bool,
-    out: Path | None,
-    plot: Path | None,
-    silent: bool,
-) -> int:
-    """Write what was asked for, and say so; return 2 where something cannot be written."""
+def _check_numbers(options: _Options, faults: list[Fault]) -> None:
+    """Add numbers out of range, and an unknown metric, to the faults."""
+    with collect_errors(faults, "--metric", (UnknownMetricError,)):
+        check_objective(options.metric, None, None, DEFAULT_FPS)
+    known = options.metric if options.metric in METRICS else None
+    for flag, figures in (
+        ("--tolerance", (known, options.tolerance, None, DEFAULT_FPS)),
+        ("--budget", (None, None, options.budget, DEFAULT_FPS)),
+        ("--fps", (None, None, None, options.fps)),
+    ):
+        with collect_errors(faults, flag, (ValueError,)):
+            check_objective(*figures)
+    for flag, value in (
+        ("--zoom", options.zoom),
+        ("--effort", options.effort),
+        ("--time-limit", options.time_limit),
+    ):
+        if value is not None and not math.isfinite(value):
+            faults.append(Fault(flag, None, "", f"is {value:g}; it must be positive and finite"))
+
+
+def _read(options: _Options, faults: list[Fault]) -> tuple[str, Scene | None]:
+    """Return the file of the scene and the scene; add to the faults what is wrong with it or with a file to write."""
+    read: Scene | None = None
+    path = options.scene
+    with collect_errors(faults):
+        path = scene_path(options.scene)
+        read = load(path, options.overrides)
+    if options.write and options.overrides:
+        faults.append(
+            Fault("--write", None, "", "cannot be combined with --set, because the file does not contain those changes")
+        )
+    elif options.write and read is not None:
+        with collect_errors(faults):
+            write_solver(path, {})  # without changes: raises if the file cannot be written
+    with collect_errors(faults):
+        require_folder(options.out)
+    with collect_errors(faults):
+        require_plot_file(options.plot)
+    if options.out is not None and not faults:
+        with collect_errors(faults):
+            make_folder(options.out)
+    return path, read
+
+
+def _write_results(found: Tradeoff, document: dict[str, object], path: str, options: _Options) -> int:
+    """Write the scene, the plot and the folder that are asked for; return 2 if one of them cannot be written."""
     faults: list[Fault] = []
-    if write and found.within_tolerance is None:
-        _say(f"not written: no setting is within the tolerance, so {path} is unchanged", silent)
-    elif write and found.within_tolerance is not None:
-        with gathering(faults):
-            changed = write_solver(path, found.within_tolerance.point.changes)
-            _say(f"written: {path}" if changed else f"{path}: already has the recommended [solver]", silent)
-            engine = found.within_tolerance.point.engine
-            if engine != USUAL:
-                _say(f"run it with --engine {engine}", silent)
-    asked, written = "--plot", list[Path]()
-    try:
-        if plot is not None:
-            from sandbox.report.work_precision import plot_tradeoff
-
-            plot_tradeoff(document, plot)
-            written.append(plot)
-        asked = "--out"
-        if out is not None:
-            from sandbox.report.page.tradeoff_page import write_tradeoff
-
-            write_json(document, out / "tradeoff.json")
-            engines = [name for name in ENGINES if any(point.engine == name for point in found.points)]
-            replayed = None if found.interrupted else compare(found.scene, engines, truth=found.best)
-            if replayed is not None and replayed.interrupted:
-                raise KeyboardInterrupt
-            write_tradeoff(document, out / "report.html", replayed)
-            written.append(out)
-    except OSError as error:
-        faults.append(Fault(asked, None, "", f"{error.filename}: {error.strerror}"))
+    if options.write and not found.interrupted:
+        with collect_errors(faults):
+            _write_scene(found, path, options.is_silent)
+    written: list[Path] = []
+    with collect_errors(faults):
+        _draw(document, options.plot, written)
+        _write_folder(found, document, options.out, written)
     for file in written:
-        _say(f"written: {file}", silent)
+        _print(f"written: {file}", options.is_silent)
     for fault in faults:
         click.echo(str(fault), err=True)
     return 2 if faults else 0
 
 
-def _say(text: str, silent: bool) -> None:
+def _write_scene(found: Tradeoff, path: str, silent: bool) -> None:
+    """Write the recommended `[solver]` into the scene file.
+
+    Raises:
+        SceneError: the file cannot be written.
+    """
+    if found.within_tolerance is None:
+        _print(f"not written: no setting is within the tolerance, so {path} is unchanged", silent)
+        return
+    point = found.within_tolerance.point
+    is_changed = write_solver(path, point.changes)
+    _print(f"written: {path}" if is_changed else f"{path}: already has the recommended [solver]", silent)
+    if point.engine != USUAL:
+        _print(f"run it with --engine {point.engine}", silent)
+
+
+def _draw(document: dict[str, object], plot: Path | None, written: list[Path]) -> None:
+    """Draw error against cost to the file of `--plot`, and add it to the written files.
+
+    Raises:
+        SceneError: it cannot be written.
+    """
+    if plot is None:
+        return
+    from sandbox.report.tradeoff_plot import plot_tradeoff
+
+    try:
+        plot_tradeoff(document, plot)
+    except OSError as error:
+        raise SceneError([Fault("--plot", None, "", f"{error.filename}: {error.strerror}")]) from None
+    written.append(plot)
+
+
+def _write_folder(found: Tradeoff, document: dict[str, object], out: Path | None, written: list[Path]) -> None:
+    """Write the document and the page into the folder of `--out`, and add it to the written files.
+
+    Raises:
+        SceneError: they cannot be written.
+    """
+    if out is None:
+        return
+    from sandbox.report.html.tradeoff import write_tradeoff
+
+    try:
+        write_json(document, out / "tradeoff.json")
+        engines = [name for name in ENGINES if any(point.engine == name for point in found.points)]
+        replayed = None if found.interrupted else compare(found.scene, engines, truth=found.best)
+        if replayed is not None and replayed.interrupted:
+            raise KeyboardInterrupt
+        write_tradeoff(document, out / "report.html", replayed)
+    except OSError as error:
+        raise SceneError([Fault("--out", None, "", f"{error.filename}: {error.strerror}")]) from None
+    written.append(out)
+
+
+def _print(text: str, silent: bool) -> None:
     if not silent:
         click.echo(text)

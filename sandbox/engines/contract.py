@@ -17,10 +17,10 @@ if TYPE_CHECKING:  # importing an engine must stay cheap
     from sandbox.engines.energy_ledger import Cause
     from sandbox.scene.compile.bodies import Bodies
     from sandbox.scene.compile.demands import Demand
+    from sandbox.scene.compile.scene import Scene
     from sandbox.scene.compile.setup import Setup
     from sandbox.scene.description.fixed import PlaneReach
     from sandbox.scene.description.world import Settings
-    from sandbox.scene.scene import Scene
     from sandbox.trajectory import Contacts, Frame
 
 

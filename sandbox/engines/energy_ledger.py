@@ -59,27 +59,27 @@ class EnergyLedger:
     def __init__(self) -> None:
         self._entries = dict.fromkeys(Cause, 0.0)
 
-    def enter(self, cause: Cause, energy: float) -> None:
+    def add(self, cause: Cause, energy: float) -> None:
         """Add the energy change by a cause as one sum for a substep or impact; an impossible gain is phantom energy."""
         self._entries[Cause.PHANTOM if energy > 0.0 and cause in DISSIPATIVE else cause] += energy
 
-    def touch(self, along: float, across: float) -> None:
-        """Add the energy change by contacts, as one sum, along their normals (without kicks) and along their surfaces.
+    def add_contacts(self, normal: float, tangential: float) -> None:
+        """Add the normal (without kicks) and tangential energy change by contacts, each as one sum.
 
         Only the sum of the two is known to be a loss: an impulse along the normal of a corner changes how fast it
         slides. A gain of one is set off against the loss of the other; a gain of the sum is phantom energy.
         """
-        both = along + across
+        both = normal + tangential
         if both > 0.0:
-            self.enter(Cause.PHANTOM, both)
-        elif along > 0.0 or across > 0.0:
-            self.enter(Cause.FRICTION if along > 0.0 else Cause.RESTITUTION, both)
+            self.add(Cause.PHANTOM, both)
+        elif normal > 0.0 or tangential > 0.0:
+            self.add(Cause.FRICTION if normal > 0.0 else Cause.RESTITUTION, both)
         else:
-            self.enter(Cause.RESTITUTION, along)
-            self.enter(Cause.FRICTION, across)
+            self.add(Cause.RESTITUTION, normal)
+            self.add(Cause.FRICTION, tangential)
 
-    def add(self, cause: Cause, energy: float) -> None:
-        """Add an energy change as it is, also a gain: the sum of another ledger, or a loan and its return."""
+    def add_unchecked(self, cause: Cause, energy: float) -> None:
+        """Add an energy change without the check for phantom energy: of another ledger, or of stored energy."""
         self._entries[cause] += energy
 
     def entries(self) -> Mapping[Cause, float]:

@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from pydantic import ValidationError
 
 from sandbox.action import ActionError, Impulse, Pull
-from sandbox.engines.common.geometry import rotate
 from sandbox.engines.contract import Simulation
+from sandbox.scene.geometry.segments import rotate
 
 FREQUENCY = 7.5  # Hz
 DAMPING_RATIO = 1.0

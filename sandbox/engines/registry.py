@@ -5,9 +5,9 @@ from sandbox.engines.contract import Engine, Refusal, Simulation
 from sandbox.engines.exact.engine import ExactEngine
 from sandbox.engines.pymunk_adapter.engine import PymunkEngine
 from sandbox.engines.reference.engine import ReferenceEngine
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
-from sandbox.scene.scene import Scene
 
 ENGINES: dict[str, Engine] = {
     "pymunk": PymunkEngine(),
@@ -59,7 +59,8 @@ def start(start: Scene | Setup, engine: str = "pymunk", settings: Settings | Non
     setup = Setup.of(start)
     settings = setup.scene.solver if settings is None else settings
     chosen = engine_named(engine)
-    missing = chosen.missing(setup, settings)
-    if missing:
-        raise Refusal(engine, missing, able(setup, settings))
-    return chosen.start(setup, settings)
+    try:
+        return chosen.start(setup, settings)
+    except Refusal as refusal:
+        others = tuple(name for name in able(setup, settings) if name != engine)
+        raise Refusal(engine, refusal.reasons, others) from None

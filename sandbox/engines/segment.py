@@ -10,10 +10,10 @@ from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.contract import Observer, Simulation
 from sandbox.engines.registry import start as start_engine
 from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.fixed import Passing, PlaneReach
 from sandbox.scene.description.world import Settings
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
 
 
@@ -51,17 +51,17 @@ class Checkpoint:
 
 def present_bodies(bodies: Bodies, frame: Frame) -> Bodies:
     """Return the present bodies, in the state of a frame."""
-    there = np.flatnonzero(frame.present)
-    some = bodies.some(there)
+    present = np.flatnonzero(frame.present)
+    some = bodies.some(present)
     return replace(
         some,
-        position=frame.position[there],
-        velocity=frame.velocity[there],
-        angle=frame.angle[there],
-        angular_velocity=frame.angular_velocity[there],
-        roll=some.roll if frame.roll is None else frame.roll[there],
-        layer=some.layer if frame.layer is None else frame.layer[there],
-        visits=some.visits if frame.visits is None else frame.visits[there],
+        position=frame.position[present],
+        velocity=frame.velocity[present],
+        angle=frame.angle[present],
+        angular_velocity=frame.angular_velocity[present],
+        roll=some.roll if frame.roll is None else frame.roll[present],
+        layer=some.layer if frame.layer is None else frame.layer[present],
+        visits=some.visits if frame.visits is None else frame.visits[present],
     )
 
 
@@ -69,8 +69,8 @@ def passing_in(frame: Frame) -> Passing:
     """Return the pairs of a body and the one-way wall that it is passing through, by indices of `present_bodies`."""
     if frame.passing is None:
         return ()
-    there = np.flatnonzero(frame.present)
-    body_indices = np.searchsorted(there, frame.passing[:, 0])
+    present = np.flatnonzero(frame.present)
+    body_indices = np.searchsorted(present, frame.passing[:, 0])
     return tuple(zip(body_indices.tolist(), frame.passing[:, 1].tolist(), strict=True))
 
 

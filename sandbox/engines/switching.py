@@ -1,7 +1,7 @@
 """A simulation whose engine, settings and bodies can be changed while it runs.
 
 Each segment is a simulation of its own that starts from the last state of the segment before; body indices and time
-continue. Other engine state, such as the impulses of lasting contacts, starts anew.
+continue. Other engine state, such as the impulses of lasting contacts, starts again.
 """
 
 from collections import Counter
@@ -26,13 +26,13 @@ from sandbox.engines.registry import start as start_engine
 from sandbox.engines.segment import Checkpoint, Segment, start_segment
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.generators import GeneratorError, count_of, layout_of
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource
 from sandbox.scene.description.fixed import AWAY, PlaneReach
 from sandbox.scene.description.world import Settings
 from sandbox.scene.errors import path_of
 from sandbox.scene.files.load import as_scene
-from sandbox.scene.scene import Scene
 from sandbox.scene.validate.references import generators
 from sandbox.trajectory import Contacts, Frame
 
@@ -322,7 +322,7 @@ class SwitchableSimulation:
         """Apply the mouse joints, and advance the engine, for a fraction of a step."""
         simulation = self._segment.simulation
         if self._pulls.any:
-            with self._ledger.hands(simulation):
+            with self._ledger.attributing_pulls(simulation):
                 self._pulls.apply_impulses(simulation, self.settings.dt * part)
         self._segment.steps += part
         try:
@@ -402,7 +402,7 @@ class SwitchableSimulation:
             segment = start_segment(self.setup, engine, wanted, bodies, frame, persistent, broken, plane_reach)
         except (Refusal, UnknownEngineError) as refusal:
             raise ActionError(str(refusal)) from None
-        with self._ledger.passing(self, segment.simulation):
+        with self._ledger.replacing(self, segment.simulation):
             self._replace_segment(segment, retired, broken)
             self.engine, self.wanted = engine, wanted
 
@@ -426,7 +426,7 @@ class SwitchableSimulation:
         """Return the persistent actions, without forces on bodies that have left the scene."""
         if self._persistent.forces:
             present = zip(self.bodies.names, self.frame().present.tolist(), strict=True)
-            self._persistent.remove_forces(name for name, there in present if not there)
+            self._persistent.remove_forces(name for name, is_present in present if not is_present)
         return self._persistent
 
     def frame(self) -> Frame:

@@ -13,9 +13,10 @@ from typing import Annotated, Any
 
 from pydantic import Field, StringConstraints, TypeAdapter, ValidationError
 
-from sandbox.scene.files.nesting import NestingError, check_text
-from sandbox.scene.scene import Scene
-from sandbox.whole import read_whole, whole
+from sandbox.atomic_write import atomic_write
+from sandbox.resource_limits import read_limited
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.files.document import NestingError, check_text
 
 FOLDER = "SANDBOX_DATA"
 """Environment variable with the data folder; default: that of the platform."""
@@ -98,13 +99,13 @@ class HighScores:
         rows.insert(place - 1, (initials_of(initials), score))
         del rows[BEST:]
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        with whole(self.path) as temporary:
+        with atomic_write(self.path) as temporary:
             temporary.write_text(json.dumps(tables, indent=1, ensure_ascii=False, sort_keys=True), encoding="utf-8")
         return place
 
     def _read(self) -> dict[str, list[tuple[str, int | float]]]:
         try:
-            text = read_whole(self.path, MAX_BYTES).decode("utf-8")
+            text = read_limited(self.path, MAX_BYTES).decode("utf-8")
         except FileNotFoundError:
             return {}
         try:

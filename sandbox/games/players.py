@@ -14,16 +14,16 @@ from typing import Any, Self
 import numpy as np
 
 from sandbox.echo import short_repr, shorten
+from sandbox.game_names import games_with_bot
+from sandbox.game_spec import import_part
 from sandbox.games.contract import Control, Policy, Press, Rules, StepInfo, UnsuitableSceneError
-from sandbox.games.names import games_with_bot
 from sandbox.games.registry import find_spec, fitting_rules
 from sandbox.games.session import HeadlessGame
-from sandbox.games.spec import import_part
 from sandbox.recording import Recording
+from sandbox.resource_limits import read_limited
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.random_streams import Stream, draws
-from sandbox.scene.scene import Scene
-from sandbox.whole import read_whole
 
 RATE_BOUNDS = 0.2, 2.0
 """1/s, bounds of the rate at which a random player presses an ordinary control; log-uniform, drawn once a control"""
@@ -152,7 +152,7 @@ def read_script(path: str | Path) -> tuple[Press, ...]:
         SceneError: the file cannot be read, or has faults; the error lists them.
     """
     try:
-        lines = read_whole(Path(path), MAX_SCRIPT_SIZE).decode("utf-8").splitlines()
+        lines = read_limited(Path(path), MAX_SCRIPT_SIZE).decode("utf-8").splitlines()
     except (OSError, ValueError) as error:
         reason = (error.strerror if isinstance(error, OSError) else None) or error
         raise SceneError([Fault(str(path), None, "", f"cannot be read: {reason}")]) from None
@@ -216,7 +216,7 @@ def _limit_faults(faults: list[Fault], file: str) -> list[Fault]:
 def _lines(file: str) -> dict[Press, int]:
     """Return the line of each input; empty if the file can no longer be read."""
     try:
-        statements = [*_statements(read_whole(Path(file), MAX_SCRIPT_SIZE).decode("utf-8").splitlines())]
+        statements = [*_statements(read_limited(Path(file), MAX_SCRIPT_SIZE).decode("utf-8").splitlines())]
         return {_press(text): number for number, text in reversed(statements)}  # of equal inputs, the first
     except (OSError, ValueError):
         return {}

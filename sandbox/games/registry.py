@@ -4,12 +4,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from sandbox.game_names import GAMES, game_specs, registered_games, spec_of
+from sandbox.game_spec import GameSpec, import_part
 from sandbox.games.contract import Rules, UnsuitableSceneError
-from sandbox.games.names import GAMES, game_specs, registered_games, spec_of
-from sandbox.games.spec import GameSpec, import_part
 from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import Fault, Lines, SceneError
-from sandbox.scene.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ def find_spec(game: str | None) -> GameSpec | None:
     """
     try:
         return spec_of(game)
-    except (ImportError, AttributeError) as error:
+    except (ImportError, AttributeError, ValueError) as error:
         source = registered_games()[game or ""].value
         raise UnsuitableSceneError(f"the game {game!r} cannot be imported from {source}: {error}") from error
 
@@ -78,6 +78,42 @@ def rules_of(scene: Scene, bodies: Bodies | None = None, *, on_request: bool = F
     """
     start = _find_rules(scene.play.game, on_request)
     return None if start is None else start(scene, scene.bodies if bodies is None else bodies)
+
+
+def spec_in_window(scene: Scene) -> GameSpec | None:
+    """Return the spec of the game that the window plays on a scene; None if it plays none.
+
+    Raises:
+        UnsuitableSceneError: a game of another package cannot be imported.
+    """
+    if scene.play.game is not None:
+        return find_spec(scene.play.game)
+    return next((spec for spec in game_specs() if spec.plays is not None and import_part(spec.plays)(scene)), None)
+
+
+def rules_in_window(scene: Scene) -> Rules | None:
+    """Start the game that the window plays on a scene; None if it plays none, or one without rules.
+
+    Raises:
+        UnsuitableSceneError: the scene lacks an element that the game needs.
+    """
+    if scene.play.game is not None:
+        return rules_of(scene, on_request=True)
+    spec = spec_in_window(scene)
+    return None if spec is None or spec.rules is None else RulesFactory(spec.rules)(scene, scene.bodies)
+
+
+def scene_in_window(scene: Scene) -> Scene:
+    """Return a scene as the window plays it.
+
+    Raises:
+        UnsuitableSceneError: a game of another package cannot be imported.
+    """
+    spec = find_spec(scene.play.game)
+    if spec is None or spec.prepare is None:
+        return scene
+    prepared: Scene = import_part(spec.prepare)(scene)
+    return prepared
 
 
 def is_real_time(game: str | None) -> bool:

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, Self
 
 from sandbox.action import Action, Switch
-from sandbox.games.contract import HasLamps, HasLog, Policy, Press, Rules, StepInfo
+from sandbox.games.contract import HasLamps, HasLog, HasWaiting, Policy, Press, Rules, StepInfo
 from sandbox.trajectory import Contacts, Frame
 
 LAMP_INTERVAL = 0.04
@@ -131,6 +131,21 @@ class GameSession:
     def discard_future(self) -> None:
         """Discard the inputs after now."""
         del self._presses[self._pressed :]
+
+    def truncate(self, count: int) -> None:
+        """Discard all inputs but the first `count`."""
+        del self._presses[count:]
+        self._pressed = min(self._pressed, count)
+
+    @property
+    def pending_actions(self) -> tuple[Action, ...]:
+        """The player's actions since the last step, which the rules have not seen yet."""
+        return tuple(self._done)
+
+    @property
+    def waiting(self) -> bool:
+        """Whether the rules hold time until the player acts, and the player has not acted since the last step."""
+        return isinstance(self.rules, HasWaiting) and self.rules.waiting and not self._done
 
     def on_step(self, time: float, frame: Frame, contacts: Contacts) -> tuple[Action, ...]:
         """Call the rules after a step, and return their actions with the present time; none once the game is over."""

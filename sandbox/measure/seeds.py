@@ -1,27 +1,27 @@
-"""Seeds: the same scene with other chances."""
+"""Seeds: the same scene with another seed of its random numbers."""
 
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
 
-CHANCES = ("position", "velocity", "lifetime")
-"""What of a body may come from the seed."""
+RANDOM_ARRAYS = ("position", "velocity", "lifetime")
+"""Arrays of the bodies that can depend on the seed."""
 
 
-def seeded(scene: Scene, seed: int) -> Scene:
+def with_seed(scene: Scene, seed: int) -> Scene:
     """Return a scene with another seed.
 
     Raises:
-        SceneError: the seed is out of range, or what it lays out is no sound scene.
+        SceneError: the seed is out of range, or the scene is invalid with it.
     """
     return from_document(to_document(scene), "<scene>", [("world.seed", seed)])
 
 
-def same_chances(a: Scene, b: Scene) -> bool:
-    """Tell whether two scenes that differ in their seed start alike, bit for bit."""
-    return all(getattr(a.bodies, key).tobytes() == getattr(b.bodies, key).tobytes() for key in CHANCES)
+def same_random_state(a: Scene, b: Scene) -> bool:
+    """Return whether two scenes that differ in their seed start with the same bodies, bit for bit."""
+    return all(getattr(a.bodies, key).tobytes() == getattr(b.bodies, key).tobytes() for key in RANDOM_ARRAYS)
 
 
 def is_random(scene: Scene) -> bool:
-    """Tell whether anything in a scene depends on its seed."""
-    return not same_chances(scene, seeded(scene, scene.world.seed ^ 1))
+    """Return whether anything in a scene depends on its seed."""
+    return not same_random_state(scene, with_seed(scene, scene.world.seed ^ 1))

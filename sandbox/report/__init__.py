@@ -1,1 +1,1 @@
-"""Reports: plots and pages."""
+"""Reports: plots, tables and HTML pages."""

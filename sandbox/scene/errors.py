@@ -10,8 +10,8 @@ from typing import Any, Self
 
 from sandbox.echo import MAX_MESSAGE, MAX_NAMED, printable, shorten
 
-Key = str | int
-Location = tuple[Key, ...]
+PathKey = str | int
+Location = tuple[PathKey, ...]
 """Position in a document: keys of tables and indices of arrays, as in `("ball", 0, "velocity", 1)`."""
 
 LocatedMessage = tuple[Location, str]
@@ -76,7 +76,7 @@ def quoted(name: str) -> str:
     return f'"{name}"' if '"' not in name else f"'{name}'"
 
 
-def _child(value: Any, key: Key) -> Any:
+def _child(value: Any, key: PathKey) -> Any:
     try:
         return value[key]
     except (KeyError, IndexError, TypeError):

@@ -56,6 +56,13 @@ NUMBER_FIRST = {Stream.COIL, Stream.CURLER, Stream.FLIPPERS, Stream.LANDING, Str
 """Streams keyed by number, index and seed, in this order, because published scores depend on it; `AIM` is keyed by
 number, seed and index; all others by seed, number and index."""
 
+_RESERVED = {stream.value for stream in (*NUMBER_FIRST, Stream.AIM)}
+"""First words of the keys that begin with the number of a stream."""
+
+_SUFFIX = (1, 1, 1)
+"""Ends the key of a stream that begins with a seed if that seed is in `_RESERVED`: the key then has five words or more,
+and no key that begins with a number has more than four."""
+
 
 def key_of(stream: Stream, seed: int, *index: int) -> list[int]:
     """Return the key of a stream.
@@ -68,7 +75,9 @@ def key_of(stream: Stream, seed: int, *index: int) -> list[int]:
     """
     if stream is Stream.AIM:
         return [stream.value, seed, *index]
-    return [stream.value, *index, seed] if stream in NUMBER_FIRST else [seed, stream.value, *index]
+    if stream in NUMBER_FIRST:
+        return [stream.value, *index, seed]
+    return [seed, stream.value, *index, *(_SUFFIX if seed & 0xFFFFFFFF in _RESERVED else ())]
 
 
 def bits(stream: Stream, seed: int, *index: int) -> np.random.PCG64:

@@ -14,7 +14,7 @@ import pygame
 
 from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 from sandbox.window.app_state import AppState
-from sandbox.window.commands import Commands
+from sandbox.window.commands import CommandDispatcher
 from sandbox.window.context import TITLE, WindowContext
 from sandbox.window.display import close_screen, open_screen, ui_scale
 from sandbox.window.input.bindings import KeyHandler
@@ -98,7 +98,7 @@ class App:
         self._gamepads = Gamepads(self.context.notify)
         self._gamepads.start()
         self.mouse = MouseController(self.context)
-        self.commands = Commands(self.context, self.mouse)
+        self.commands = CommandDispatcher(self.context, self.mouse)
         self._clock = pygame.time.Clock()
         app_state.on_scene_changed = self._on_scene_changed
         self._worker = Worker(self._wait)
@@ -137,9 +137,11 @@ class App:
     def draw(self) -> None:
         """Draw the scene and the GUI."""
         context = self.context
+        context.gui.update(self.app_state, self._clock.get_fps(), context.capture.status)
         context.refit_if_covered()
         context.gui.bodies_out_of_view = context.is_out_of_view
-        context.gui.draw(context.surface, context.camera, self.app_state, self._clock.get_fps(), context.capture.status)
+        context.gui.draw(context.surface, context.camera, self.app_state)
+        context.gui.announce_keys(self.app_state)
 
     def _wait(self, done: Callable[[float], bool]) -> None:
         """Show progress until a job of the worker is done; Esc and the close button still close the window.
@@ -211,8 +213,8 @@ class App:
         if self.app_state.waits_for_start or event.mod & (pygame.KMOD_CTRL | pygame.KMOD_ALT):
             return
         bindings = self.app_state.key_bindings
-        handler = bindings.handler_for(event.key, self._keyboard.is_repeat)
-        if handler is not None:
+        handler = bindings.pressed.get(event.key)
+        if handler is not None and (event.key in bindings.repeated or not self._keyboard.is_repeat):
             self.app_state.run_handler(handler)
             if event.key in bindings.released:
                 self._release_handlers[event.key] = bindings.released[event.key]

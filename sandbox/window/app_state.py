@@ -6,27 +6,26 @@ A failed operation adds a message and leaves the open scene unchanged.
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
+from time import perf_counter
 from typing import Any, Concatenate, ParamSpec
 
 from sandbox.action import ActionError, SetParameter
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import ENGINES, USUAL, able, engine_named, usual
-from sandbox.games.billiards.view.controls import CueControls, TableGameHost, prepared_scene
-from sandbox.games.billiards.view.table_game import PLAYERS, BilliardsGame, Players
-from sandbox.games.registry import is_real_time, rules_of
+from sandbox.games.contract import GameControls, UnsuitableSceneError
+from sandbox.games.registry import is_real_time, rules_in_window, scene_in_window
 from sandbox.games.session import GameSession
 from sandbox.recording import Recording
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import Override, from_document, load
 from sandbox.scene.files.shipped_scenes import shipped
-from sandbox.scene.scene import Scene
-from sandbox.window.camera import Box
-from sandbox.window.game_host import GameHost, game_session_of, host_of
+from sandbox.window.camera import ViewBox
+from sandbox.window.game_host import GameHost, controls_of, host_of
 from sandbox.window.input.bindings import NO_BINDINGS, KeyBindings, KeyHandler, key_bindings
 from sandbox.window.input.body_tools import BodyTools, count_changes
-from sandbox.window.messages import Messages
 from sandbox.window.playback.diagnostics import Diagnostics
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.parameters import ParameterValue, turned
@@ -70,6 +69,36 @@ def scenes_to_pick(path: Path | None) -> list[tuple[str, Path]]:
     known = {file.resolve() for _, file in own}
     others = [file for file in (scenes_beside(path) if path is not None else ()) if file.resolve() not in known]
     return [*((f"{file.parent.resolve().name}/{file.stem}", file) for file in others), *own]
+
+
+MESSAGE_DURATION = {"info": 3.0, "warning": 6.0, "error": 10.0}
+"""s that a message is shown, by its level"""
+MAX_MESSAGES = 5
+
+
+class Messages:
+    """The messages of the last seconds, newest last."""
+
+    def __init__(self) -> None:
+        self._messages: list[tuple[float, str, str]] = []
+
+    def add(self, text: str, level: str = "info") -> None:
+        """Add a message; a repeated one is shown for longer instead."""
+        until = perf_counter() + MESSAGE_DURATION[level]
+        self._messages = [each for each in self._messages if each[1:] != (level, text)]
+        self._messages = [*self._messages, (until, level, text)][-MAX_MESSAGES:]
+
+    def extend(self, notes: list[tuple[str, str]]) -> None:
+        """Add notes, (level, text), and clear the list."""
+        for level, text in notes:
+            self.add(text, level)
+        notes.clear()
+
+    def visible(self) -> tuple[tuple[str, str], ...]:
+        """Return (level, text) of the messages that have not expired."""
+        now = perf_counter()
+        self._messages = [each for each in self._messages if each[0] > now]
+        return tuple((level, text) for _, level, text in self._messages)
 
 
 @dataclass
@@ -118,7 +147,10 @@ class Preferences:
 
 def session_of_recording(recording: Recording) -> LiveView:
     """Return a session that has replayed a recording and continues from its end."""
-    rules = rules_of(recording.scene)
+    try:
+        rules = rules_in_window(recording.scene)
+    except UnsuitableSceneError:  # the session was played without the rules, too
+        rules = None
     game = None if rules is None else GameSession(rules, recording.presses)
     session = Session(
         recording.scene, recording.engine, recording.settings, recording.actions, game, recording.duration
@@ -130,7 +162,7 @@ def session_of_recording(recording: Recording) -> LiveView:
 
 
 def create_session(scene: Scene, engine: str, settings: Settings | None, messages: Messages) -> LiveView | None:
-    """Return a new session of a scene, including its game if any; None if no engine supports the scene.
+    """Return a new session of a scene, including its game if it suits the rules; None if no engine supports the scene.
 
     Args:
         scene: as read from its file.
@@ -138,8 +170,13 @@ def create_session(scene: Scene, engine: str, settings: Settings | None, message
         settings: solver settings; None for those of the scene.
         messages: receives warnings and errors.
     """
-    scene = prepared_scene(scene)
-    game = game_session_of(scene, messages)
+    game: GameSession | None = None
+    try:
+        scene = scene_in_window(scene)
+        rules = rules_in_window(scene)
+        game = None if rules is None else GameSession(rules)
+    except UnsuitableSceneError as error:
+        messages.add(str(error), "warning")
     try:
         return LiveView(Session(scene, engine, settings, game=game))
     except Refusal as refusal:
@@ -163,13 +200,16 @@ class AppState:
         """
         self.view: LiveView | RecordedView | None = None
         self.path: Path | None = None
-        self.reach: Box | None = None
+        self.reach: ViewBox | None = None
         """bounds of the predicted motion without user input, m; None if unknown"""
         self.file: Scene | None = None
         """the scene as read from its file"""
-        self._table_host = TableGameHost()
         self.host: GameHost | None = None
         """host of the scene's game, if any"""
+        self.controls: GameControls | None = None
+        """controls of a game that has more than keys, if any"""
+        self._game_options: dict[str, str] = {}
+        """chosen values of the parameters of game controls, by key; they persist across scenes"""
         self.key_bindings: KeyBindings = NO_BINDINGS
         """keys bound by the scene and its game"""
         self._paused = False
@@ -201,16 +241,6 @@ class AppState:
     def live(self) -> LiveView | None:
         """The interactive session; None if a stored run or nothing is shown."""
         return self.view if isinstance(self.view, LiveView) else None
-
-    @property
-    def game(self) -> BilliardsGame | None:
-        """The billiards game, if any."""
-        return self._table_host.game
-
-    @property
-    def gestures(self) -> CueControls | None:
-        """The cue controls of the billiards game, if any."""
-        return self._table_host.gestures
 
     @property
     def engine(self) -> str:
@@ -245,8 +275,8 @@ class AppState:
             same: whether the view is of the open scene.
             again: creates the view anew for a restart, where scene and settings do not suffice, as for a recording.
         """
-        self._table_host.leave()
-        self.host = host_of(view) if isinstance(view, LiveView) else None
+        self._close_controls()
+        self.host = host = host_of(view) if isinstance(view, LiveView) else None
         if self.view is not None:
             self.view.close()
         self.view, self.path, self.file = view, path, file
@@ -261,19 +291,19 @@ class AppState:
             self.waits_for_start = again is None and self.host is not None and is_real_time(file.play.game)
         self.key_bindings = NO_BINDINGS
         if isinstance(view, LiveView):
-            # A twin cannot predict the next input of rules and players.
-            self._preferences.apply(
-                view.diagnostics, trusting=len(view.bodies) <= MAX_TWIN_BODIES and self.host is None
-            )
-            self.compute(lambda: self._table_host.take(view, file, self.messages.add))
-            self.key_bindings = key_bindings(view, self.body_tools, self.gestures, self.host)
+            # A twin cannot predict the next input of rules and players, unless time waits for it.
+            is_free = host is None or host.can_wait
+            self._preferences.apply(view.diagnostics, trusting=len(view.bodies) <= MAX_TWIN_BODIES and is_free)
+            if host is not None:
+                self.controls = self.compute(lambda: controls_of(host, file, self._game_options))
+            self.key_bindings = key_bindings(view, self.body_tools, host, self.controls)
         if self.on_scene_changed is not None:
             self.on_scene_changed(same)
 
-    def set_players(self, players: Players) -> None:
-        """Restart the game with other players."""
-        self._table_host.players = players
-        self.restart()
+    def _close_controls(self) -> None:
+        if self.controls is not None:
+            self.controls.close()
+            self.controls = None
 
     def open(self, path: Path, same: bool = False, engine: str | None = None) -> bool:
         """Open a scene file; return whether that succeeded. Faults of the file are stored in `faults`."""
@@ -323,7 +353,7 @@ class AppState:
             restart: count only those that a restart loses; it keeps parameters.
         """
         live = self.live
-        if live is None or self.host is not None or self.game is not None:
+        if live is None or self.host is not None:
             return 0
         kept = SetParameter if restart else ()
         actions = [action for action in live.session.unsaved_actions if not isinstance(action, kept)]
@@ -428,12 +458,8 @@ class AppState:
         if key == "engine":
             self.switch_engine(str(value))
             return
-        players = next((each for each in PLAYERS if each == value), None)
-        if key == "players" and players is not None:
-            self.set_players(players)
-            return
-        if key == "misses":
-            self._table_host.misses = value == "on"
+        if self.controls is not None and any(each.key == key for each in self.controls.parameters()):
+            self._game_options[key] = str(value)
             self.restart()
             return
 
@@ -471,15 +497,15 @@ class AppState:
         view = self.view
         if view is None:
             return
-        game = self.game
-        table_waits = game is not None and game.waits and not self.body_tools.is_holding
-        halted = self.paused or self.waits_for_start or self.covered or self.unfocused or table_waits
+        held = self.host is not None and self.host.waiting  # time stops until the player acts
+        halted = self.paused or self.waits_for_start or self.covered or self.unfocused or held
         self.compute(lambda: view.update(elapsed, halted))
-        if game is not None:
-            self.run_handler(lambda: game.go_on(elapsed))
-            self.messages.extend(game.notes)
-        if self.host is not None:
-            self.messages.extend(self.host.notes())
+        controls = self.controls
+        if controls is not None:
+            self.run_handler(lambda: controls.update(elapsed))
+            self.messages.extend(controls.messages())
+        if self.host is not None:  # the log of a game with a display of its own is shown there
+            self.messages.extend(self.host.messages(with_log=controls is None))
         if isinstance(view, LiveView) and view.wants_pause:
             self.paused, view.wants_pause = True, False
         elif isinstance(view, RecordedView) and view.at_end:
@@ -521,7 +547,7 @@ class AppState:
 
     def close(self) -> None:
         """Close the session or run."""
-        self._table_host.leave()
+        self._close_controls()
         if self.view is not None:
             self.view.close()
             self.view = None

@@ -16,7 +16,7 @@ PAN_TIME, ZOOM_OUT_TIME, ZOOM_IN_TIME = 0.15, 0.1, 0.8
 INNER_FRACTION, OUTER_FRACTION = 0.4, 0.8
 """of the free area: in the inner part the followed body does not move the camera; it never leaves the outer part"""
 
-Box = tuple[tuple[float, float], tuple[float, float]]
+ViewBox = tuple[tuple[float, float], tuple[float, float]]
 """Lower-left and upper-right corner, m."""
 
 
@@ -39,7 +39,7 @@ class Camera:
     @classmethod
     def fitting(
         cls,
-        box: Box,
+        box: ViewBox,
         size: tuple[int, int],
         margin: float = 0.06,
         inset: int = 0,
@@ -91,7 +91,7 @@ class Camera:
         return (down, right) if self.turned else (right, -down)
 
     @property
-    def box(self) -> Box:
+    def box(self) -> ViewBox:
         """The visible part of the world, m."""
         half = self.size[0] / 2.0 / self.scale, self.size[1] / 2.0 / self.scale
         if self.turned:

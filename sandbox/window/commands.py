@@ -33,7 +33,7 @@ CONFIRMATIONS = {
 """Confirmation hints of the commands that end a session with unsaved manual changes."""
 
 
-class Commands:
+class CommandDispatcher:
     """Handlers of commands and of the panel's widgets."""
 
     def __init__(self, context: WindowContext, mouse: MouseController) -> None:

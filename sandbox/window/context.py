@@ -10,9 +10,9 @@ import numpy as np
 import pygame
 
 from sandbox.arrays import FloatArray
-from sandbox.scene.scene import Scene
+from sandbox.scene.compile.scene import Scene
 from sandbox.window.app_state import AppState
-from sandbox.window.camera import Box, Camera
+from sandbox.window.camera import Camera, ViewBox
 from sandbox.window.capture.controller import CaptureController
 from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.renderer import Renderer
@@ -190,11 +190,11 @@ class WindowContext:
             self._fit(_enlarge_box(box, show.bodies.radius[: len(there)][there]))
             self.is_fitted = False
 
-    def _fit(self, box: Box) -> None:
+    def _fit(self, box: ViewBox) -> None:
         """Fit the camera to a box, m."""
         self.camera = self._fitted_camera(box)
 
-    def _fitted_camera(self, box: Box) -> Camera:
+    def _fitted_camera(self, box: ViewBox) -> Camera:
         """Return a camera that shows a box, m, in the area not covered by panels and timeline."""
         size, room, show = self.surface.get_size(), self.gui.area, self.app_state.view
         self._covered = head, foot = self.gui.score_margins(self.app_state)
@@ -248,7 +248,7 @@ def _thrust_body(scene: Scene) -> int | None:
     return scene.bodies.names.index(names[0]) if names and scene.play.view is None else None
 
 
-def _enlarge_box(box: Corners, radius: FloatArray) -> Box:
+def _enlarge_box(box: Corners, radius: FloatArray) -> ViewBox:
     """Return a box, m, enlarged to at least `MIN_VIEW_RADII` median radii in width and height."""
     low, high = box
     least = MIN_VIEW_RADII * float(np.median(radius)) if len(radius) else 1.0

@@ -4,13 +4,15 @@ Several keys and a gamepad may hold a control at the same time; its value is the
 """
 
 from bisect import bisect_right
+from collections.abc import Mapping
 from typing import NamedTuple
 
-from sandbox.games.contract import Control, HasLamps, HasLog, Rules, UnsuitableSceneError
-from sandbox.games.registry import rules_of
+from sandbox.action import Action
+from sandbox.game_spec import import_part
+from sandbox.games.contract import Control, GameControls, HasLamps, HasLog, HasWaiting, Rules
+from sandbox.games.registry import spec_in_window
 from sandbox.games.session import GameSession
-from sandbox.scene.scene import Scene
-from sandbox.window.messages import Messages
+from sandbox.scene.compile.scene import Scene
 from sandbox.window.playback.live import LiveView
 
 MAX_ENTRIES = 10_000
@@ -63,19 +65,24 @@ class DisplayHistory:
         return self._shown[max(bisect_right(self._times, time) - 1, 0)] if self._shown else None
 
 
-def game_session_of(scene: Scene, messages: Messages) -> GameSession | None:
-    """Return a new game for a scene; None if it has none or, with a warning, if it does not suit the rules."""
-    try:
-        rules = rules_of(scene)
-    except UnsuitableSceneError as error:
-        messages.add(str(error), "warning")
-        return None
-    return None if rules is None else GameSession(rules)
-
-
 def host_of(live: LiveView) -> "GameHost | None":
     """Return a host for the game of a session; None if it has no game."""
     return None if live.session.game is None else GameHost(live, live.session.game)
+
+
+def controls_of(host: "GameHost", file: Scene, options: Mapping[str, str]) -> GameControls | None:
+    """Return the controls of a game that has more than the keys of its rules; None for other games.
+
+    Args:
+        host: of the game.
+        file: the scene as in its file.
+        options: values of `GameControls.parameters` that were chosen.
+    """
+    spec = spec_in_window(host.live.scene)
+    if spec is None or spec.controls is None:
+        return None
+    controls: GameControls = import_part(spec.controls)(host, file, options)
+    return controls
 
 
 class GameHost:
@@ -116,10 +123,24 @@ class GameHost:
             sources[source] = value
         now = max(sources.values(), default=0.0)
         if now != before:
-            self.touched = True
-            self._press(control, now)
+            self.press(control, now)
 
-    def _press(self, control: str, value: float) -> None:
+    def apply(self, action: Action) -> None:
+        """Apply an action of the player.
+
+        Raises:
+            ActionError: it is refused.
+        """
+        self.touched = True
+        self.live.apply(action)
+
+    def press(self, control: str, value: float) -> None:
+        """Set a control to a value, 0 to 1.
+
+        Raises:
+            ActionError: a resulting action is refused.
+        """
+        self.touched = True
         game = self.live.session.game
         past = game is not None and bool(game.future_presses)
         self.live.press(control, value)
@@ -134,11 +155,21 @@ class GameHost:
         last = {press.control: press.value for press in game.presses} if game is not None else {}
         return [name for name, value in last.items() if value > 0.0]
 
-    def notes(self) -> list[tuple[str, str]]:
-        """Return (level, text) messages since the last call."""
+    @property
+    def waiting(self) -> bool:
+        """Whether time is held until the player acts."""
+        return self.live.session.waiting
+
+    @property
+    def can_wait(self) -> bool:
+        """Whether the rules hold time at all."""
+        return isinstance(self.rules, HasWaiting)
+
+    def messages(self, *, with_log: bool) -> list[tuple[str, str]]:
+        """Return (level, text) of the messages since the last call; `with_log` includes the log of the game."""
         return [
             *(("warning", text) for text in self._divergence_notes()),
-            *(("info", text) for text in self._log_notes()),
+            *(("info", text) for text in self._log_notes() if with_log),
         ]
 
     def _divergence_notes(self) -> list[str]:

@@ -1,4 +1,4 @@
-"""Mouse controller: zoom, pan, selecting and dragging bodies, and cue gestures at a billiard table.
+"""Mouse controller: zoom, pan, selecting and dragging bodies, and the mouse input of games.
 
 A press only selects a body, so that it can be inspected; a drag starts once the mouse has moved farther than a click
 allows.
@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import pygame
 
-from sandbox.games.billiards.view.controls import CueControls
+from sandbox.games.contract import GameControls
 from sandbox.window.context import WindowContext
 
 ZOOM_PER_NOTCH = 1.15
@@ -65,66 +65,63 @@ class MouseController:
         position = context.camera.to_world(pixel)
         tolerance = PICK_TOLERANCE * context.gui.ui_scale / context.camera.scale
         self._began = pixel
-        if self._use_cue(lambda cue: cue.press(position, tolerance)):
+        if self._use_controls(lambda controls: controls.press(position, tolerance)):
             return
         view = app_state.view
         found = view is not None and app_state.body_tools.pick(view, position, tolerance)
         self._pressed = pixel if found else None
 
-    def _use_cue(self, gesture: Callable[[CueControls], bool]) -> bool:
-        """Pass a gesture to the cue controls, if any; return whether they used or refused it."""
-        cue = self._context.app_state.gestures
-        if cue is None:
+    def _use_controls(self, handle: Callable[[GameControls], bool | None]) -> bool:
+        """Pass mouse input to the controls of the game, if any; return whether they used or refused it."""
+        controls = self._context.app_state.controls
+        if controls is None:
             return False
-        used = True  # stays True for a refused gesture, which adds a message
+        used: bool | None = True  # remains so for a refused input, which adds a message
 
         def run() -> None:
             nonlocal used
-            used = gesture(cue)
+            used = handle(controls)
 
         self._context.app_state.run_handler(run)
-        return used
+        return used is not False
 
     def _release(self, pixel: tuple[int, int]) -> None:
         context, began = self._context, self._began
         moved = began is not None and math.dist(began, pixel) > CLICK_TOLERANCE * context.gui.ui_scale
         self._began = None
         picked = context.app_state.body_tools.picked if self._pressed is not None and not moved else None
-        used = began is not None and self._use_cue(lambda cue: cue.release(context.camera.to_world(pixel), moved))
-        if picked is not None and not used:
-            self._use_cue(lambda cue: cue.name_ball(picked))
+        if began is not None:
+            self._use_controls(lambda controls: controls.release(context.camera.to_world(pixel), moved, picked))
         self._end_drag()
 
     def _move(self, event: pygame.event.Event) -> None:
         context, app_state, tools = self._context, self._context.app_state, self._context.app_state.body_tools
         before, self.position = self.position, event.pos
         if not self._panning and not tools.is_holding and self._pressed is None:
-            self._aim(event.pos if before is None else before, event.pos)
+            self._move_controls(event.pos if before is None else before, event.pos)
         if self._panning:
             context.camera = context.camera.panned(event.rel)
             context.is_fitted, context.following = False, None
             return
         if self._pressed is not None and math.dist(self._pressed, event.pos) > CLICK_TOLERANCE * context.gui.ui_scale:
             self._pressed = None
-            if app_state.game is not None and app_state.game.match.rules.name != "free":
-                app_state.messages.add("in a game, only the cue moves balls", "warning")
+            refusal = None if app_state.controls is None else app_state.controls.drag_refusal
+            if refusal is not None:
+                app_state.messages.add(refusal, "warning")
             else:
                 app_state.use_tool(tools.grab, app_state.paused)
         if tools.is_holding:
             self._drag = event.pos
 
-    def _aim(self, before: tuple[int, int], now: tuple[int, int]) -> None:
-        """Pass a mouse motion between two pixels to the cue controls."""
+    def _move_controls(self, before: tuple[int, int], now: tuple[int, int]) -> None:
+        """Pass a mouse motion between two pixels to the controls of the game."""
         camera, unit = self._context.camera, self._context.gui.ui_scale
         pixels = (now[0] - before[0]) / unit, (now[1] - before[1]) / unit
         fine = bool(pygame.key.get_mods() & pygame.KMOD_SHIFT)
         time = pygame.time.get_ticks() / 1000.0
 
-        def aim(cue: CueControls) -> bool:
-            cue.motion(camera.to_world(before), camera.to_world(now), pixels, fine, time)
-            return True
-
-        self._use_cue(aim)
+        points = camera.to_world(before), camera.to_world(now)
+        self._use_controls(lambda controls: controls.move(*points, pixels, fine, time))
 
     def flush(self) -> None:
         """Drag the held body to the latest mouse position: one action per frame, despite many motion events."""

@@ -5,13 +5,14 @@ import numpy as np
 from sandbox.arrays import BoolArray, FloatArray
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import UnknownEngineError, start
-from sandbox.games.billiards.table_geometry import table_bounds
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
-from sandbox.scene.scene import Scene
-from sandbox.window.camera import Box
+from sandbox.window.camera import ViewBox
 
+RAIL = 0.115
+"""width of the rails around a playing area, from the inner edge of the cushion, as a fraction of its shorter side"""
 MAX_STEPS, MAX_BODY_STEPS = 12_000, 30_000
 """Limits of `predict_bounds`: steps, and steps times moving bodies; about half a second on pymunk."""
 FLIGHT_SAMPLES = 17
@@ -33,7 +34,20 @@ FAR = 20.0
 """Limit of static geometry and flights, as a multiple of the size of the initial box."""
 
 
-def view_bounds(scene: Scene, reach: Box | None = None) -> Box:
+def shorter_side(area: ViewBox) -> float:
+    """Return the shorter side of an area, m."""
+    (left, bottom), (right, top) = area
+    return min(right - left, top - bottom)
+
+
+def area_bounds(area: ViewBox) -> ViewBox:
+    """Return the box of a playing area with the rails around it, m."""
+    rail = RAIL * shorter_side(area)
+    (left, bottom), (right, top) = area
+    return (left - rail, bottom - rail), (right + rail, top + rail)
+
+
+def view_bounds(scene: Scene, reach: ViewBox | None = None) -> ViewBox:
     """Return the box around the bodies of a scene, their free flights, and nearby static geometry, m.
 
     For a table it is the box of the table. An explicit view of the scene takes precedence.
@@ -45,7 +59,7 @@ def view_bounds(scene: Scene, reach: Box | None = None) -> Box:
     if scene.play.view is not None:
         return scene.play.view
     if scene.play.area is not None:
-        return table_bounds(scene.play.area)
+        return area_bounds(scene.play.area)
     bodies = scene.bodies
     things = [corners for corners in _things(scene) if (np.abs(corners) < MAX_VIEW).all()]
     discs = bodies.round | ~bodies.fixed  # a moving body may rotate within its circle; a static one does not
@@ -78,7 +92,7 @@ def view_bounds(scene: Scene, reach: Box | None = None) -> Box:
     return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
 
 
-def predict_bounds(scene: Scene, engine: str, settings: Settings | None = None) -> Box | None:
+def predict_bounds(scene: Scene, engine: str, settings: Settings | None = None) -> ViewBox | None:
     """Return the box that the moving bodies stay in during a run without actions, by simulating it.
 
     Work is limited by counts, so that the result is machine-independent: `MAX_STEPS` steps and `MAX_BODY_STEPS` steps
@@ -272,7 +286,7 @@ STRAY_DISTANCE = 3.0
 """Distance from the central 80 % of positions up to which a body is shown, relative to their extent."""
 
 
-def crowd_bounds(position: FloatArray, radius: FloatArray, anchors: FloatArray) -> Box:
+def crowd_bounds(position: FloatArray, radius: FloatArray, anchors: FloatArray) -> ViewBox:
     """Return the box of the positions in a run, m, without bodies far from the others.
 
     Args:

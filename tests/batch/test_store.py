@@ -18,6 +18,7 @@ from sandbox.scene.description.world import Settings
 from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import dumps, loads
 from sandbox.trajectory import Trajectory
+from tests.environment import with_root_on_path
 
 GROUND = "[[plane]]\npoint = [0, 0]\nnormal = [0, 1]\n"
 SCENE = loads(f'title = "Ünïted ✂ ../etc"\n[[ball]]\nname = "a/b"\nposition = [0, 1]\nradius = 0.5\n{GROUND}')
@@ -178,10 +179,9 @@ def test_text_that_is_no_id_never_becomes_a_file(tmp_path: Path, run: str) -> No
     assert files(tmp_path) == {"runs.sqlite"}
 
 
-ADDER = f"""
+ADDER = """
 import sys
-sys.path.insert(0, {str(Path(__file__).parent)!r})
-from test_store import Store, a_run
+from tests.batch.test_store import Store, a_run
 sys.stdin.read(1)
 with Store(sys.argv[1]) as store:
     for run in sys.argv[2:]:
@@ -196,6 +196,7 @@ def test_several_processes_add_to_one_folder(tmp_path: Path) -> None:
     adders = [
         subprocess.Popen(
             [sys.executable, "-c", ADDER, str(directory), *runs],
+            env=with_root_on_path(),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -221,7 +222,7 @@ def test_several_processes_add_to_one_folder(tmp_path: Path) -> None:
 def test_folder_that_is_a_file_is_refused(tmp_path: Path, below: str) -> None:
     file = tmp_path / "runs"
     file.write_text("precious")
-    with pytest.raises(StoreError, match=r"runs\S*: is a file or inside a file; runs need a folder"):
+    with pytest.raises(StoreError, match=r"runs\S*: is a file"):
         Store(file / below)
     assert file.read_text() == "precious"
 
@@ -245,7 +246,7 @@ def locked() -> Iterator[Path]:
 def test_folder_that_cannot_be_written_to_is_refused(locked: Path, below: str) -> None:
     with pytest.raises(StoreError) as caught:
         Store(locked / below)
-    assert str(caught.value) == f"{locked / below}: Permission denied; name a folder with write permission"
+    assert str(caught.value).startswith(f"{locked / below}: Permission denied")
 
 
 def test_name_that_no_folder_can_have_is_refused(tmp_path: Path) -> None:
@@ -286,7 +287,11 @@ def test_store_of_a_newer_version_is_refused(tmp_path: Path) -> None:
 
 def test_closing_twice_does_nothing(tmp_path: Path) -> None:
     with Store(tmp_path) as store:
+        store.add(a_run(), ID)
         store.close()
+        store.close()
+    with Store(tmp_path) as again:
+        assert again.find(ID) is not None
 
 
 def test_columns_are_the_fields_of_a_row(tmp_path: Path) -> None:

@@ -11,16 +11,18 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 import pytest
-from test_store import ID, OTHER, a_run, files
 
 from sandbox.batch import store as module
 from sandbox.batch.store import DATABASE, TABLE, Store, StoreError
-from sandbox.interrupt import uninterrupted
+from sandbox.signals import defer_interrupt
+from tests.batch.test_store import ID, OTHER, a_run, files
+from tests.environment import with_root_on_path
+
+pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 SAVING = f"""
 import sys
-sys.path.insert(0, {str(Path(__file__).parent)!r})
-from test_store import Store, Trajectory, a_run
+from tests.batch.test_store import Store, Trajectory, a_run
 class Slow(Trajectory):
     def save(self, path):
         path.write_bytes(b"half")
@@ -49,7 +51,8 @@ def change(folder: Path, *statements: str) -> None:
 def saving(folder: Path) -> Iterator[subprocess.Popen[str]]:
     """A process in the middle of saving a run."""
     pipe = subprocess.PIPE
-    with subprocess.Popen([sys.executable, "-c", SAVING, str(folder)], stdin=pipe, stdout=pipe, text=True) as process:
+    script = [sys.executable, "-c", SAVING, str(folder)]
+    with subprocess.Popen(script, env=with_root_on_path(), stdin=pipe, stdout=pipe, text=True) as process:
         try:
             assert process.stdout is not None and process.stdout.readline() == "ready\n"
             yield process
@@ -198,7 +201,7 @@ def test_interrupt_ends_the_wait_for_a_lock_also_where_it_is_held_back(
     locked: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "WAIT", 600.0)
-    with pytest.raises(KeyboardInterrupt), uninterrupted():
+    with pytest.raises(KeyboardInterrupt), defer_interrupt():
         Store(locked, lambda _: os.kill(os.getpid(), signal.SIGINT))
 
 
@@ -223,8 +226,7 @@ def test_folder_that_is_removed_meanwhile_is_told(filled: Path) -> None:
 def test_full_disk_leaves_the_runs_that_are_stored_and_nothing_half_written(filled: Path) -> None:
     script = f"""
 import resource, sys
-sys.path.insert(0, {str(Path(__file__).parent)!r})
-from test_store import Store, StoreError, a_run
+from tests.batch.test_store import Store, StoreError, a_run
 import numpy as np
 from dataclasses import replace
 store = Store(sys.argv[1])
@@ -237,7 +239,12 @@ for limit in (0, 100, 4096, 100_000):
         print(error)
 """
     done = subprocess.run(
-        [sys.executable, "-c", script, str(filled)], capture_output=True, text=True, check=True, timeout=60
+        [sys.executable, "-c", script, str(filled)],
+        env=with_root_on_path(),
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
     )
     assert done.stderr == ""
     told = done.stdout.splitlines()

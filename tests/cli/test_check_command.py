@@ -3,16 +3,18 @@
 from pathlib import Path
 
 import pytest
-from calling import DROP, FAULTY, json_of, lines_of, written
 
 from sandbox.cli import check
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.forecast import FAILED, Warning
-from sandbox.measure.forecast.forecasts import FORECASTS, Forecast
-from sandbox.measure.run import run
+from sandbox.measure.preflight import FAILED, Diagnostic
+from sandbox.measure.preflight.checks import CHECKS, Check
+from sandbox.measure.run.runner import run
 from sandbox.scene.compile.demands import JOINTS, Demand
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import load, loads
-from sandbox.scene.scene import Scene
+from tests.cli.calling import DROP, FAULTY, json_of, lines_of, written
+
+pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 
 def test_json_of_a_sound_scene_has_every_key(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -191,10 +193,10 @@ def test_failure_in_one_scene_costs_no_other_its_answer(
 def test_failure_of_one_forecast_costs_no_other_its_answer(
     capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def broken(situation: object) -> list[Warning]:
+    def broken(situation: object) -> list[Diagnostic]:
         raise ZeroDivisionError("float division by zero")
 
-    monkeypatch.setitem(FORECASTS, "springs", Forecast(broken))
+    monkeypatch.setitem(CHECKS, "springs", Check(broken))
     status, document, _ = json_of(capfd, "check", "bullet")
     assert (status, [w["kind"] for w in document["warnings"]]) == (1, ["tunnelling", FAILED])
     assert document["warnings"][1]["forecast"] == "springs"

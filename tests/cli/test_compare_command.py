@@ -4,10 +4,12 @@ import json
 from pathlib import Path
 
 import pytest
-from calling import DIVERGING, FAULTY, document_of, json_of, lines_of, process, written
 
 from sandbox.cli import compare as module
 from sandbox.cli.main import call
+from tests.cli.calling import DIVERGING, FAULTY, document_of, json_of, lines_of, process, written
+
+pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 PROMISED = {
     "engine",

@@ -3,7 +3,10 @@
 from pathlib import Path
 
 import pytest
-from calling import json_of, lines_of, written
+
+from tests.cli.calling import json_of, lines_of, written
+
+pytestmark = pytest.mark.full  # child processes and pages
 
 SWEEP = ("--sweep", "solver.integrator=explicit_euler,velocity_verlet,rk4")
 

@@ -7,8 +7,11 @@ import time
 from pathlib import Path
 
 import pytest
-from calling import json_of, lines_of, process
-from interruptible import interruptible
+
+from tests.cli.calling import json_of, lines_of, process
+from tests.interruptible import interruptible
+
+pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 SMALL = ("extremes", "--axes", "stiffness,restitution", "--engines", "pymunk,exact", "--quick", "--workers", "1")
 

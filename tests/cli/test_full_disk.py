@@ -6,7 +6,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from calling import DROP, json_of, written
+
+from tests.cli.calling import DROP, json_of, written
+
+pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 SCRIPT = """
 import json, resource, sys

@@ -4,12 +4,14 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from calling import json_of, lines_of, written
 
 import sandbox.cli.check as checking
 import sandbox.games.artillery.landing_error as missing
-import sandbox.measure.compare.comparing as comparing
-import sandbox.measure.shots.study as studying
+import sandbox.games.billiards.shots.study as studying
+import sandbox.measure.compare.comparison as comparing
+from tests.cli.calling import json_of, lines_of, written
+
+pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 
 def interrupt_at(monkeypatch: pytest.MonkeyPatch, module: Any, name: str, call: int) -> None:
@@ -29,7 +31,7 @@ def interrupt_at(monkeypatch: pytest.MonkeyPatch, module: Any, name: str, call: 
 def test_compare_keeps_the_engines_that_are_finished(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    interrupt_at(monkeypatch, comparing, "timed", 2)
+    interrupt_at(monkeypatch, comparing, "timed_run", 2)
     status, document, err = json_of(capfd, "compare", "bounce")
     assert (status, document["interrupted"], len(document["engines"])) == (130, True, 1)
     assert err == ["interrupted: 1 run complete; the results are kept"]
@@ -38,7 +40,7 @@ def test_compare_keeps_the_engines_that_are_finished(
 def test_compare_that_has_nothing_yet_is_interrupted(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    interrupt_at(monkeypatch, comparing, "timed", 1)
+    interrupt_at(monkeypatch, comparing, "timed_run", 1)
     status, out, err = lines_of(capfd, "compare", "bounce")
     assert (status, out, err[-1]) == (130, [], "interrupted")
 

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 import pytest
-from calling import json_of, lines_of, written
 
 from sandbox.engines.energy_ledger import Cause
 from sandbox.trajectory import Trajectory
+from tests.cli.calling import json_of, lines_of, written
 
 RUN = ("--engine", "reference", "--ledger")
 

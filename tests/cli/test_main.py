@@ -7,11 +7,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from calling import json_of, lines_of, process, written
 
 from sandbox.cli.main import COMMANDS
 from sandbox.engines.registry import ENGINES
 from sandbox.scene.files.shipped_scenes import shipped
+from tests.cli.calling import json_of, lines_of, process, written
 
 
 def test_commands_are_those_promised() -> None:

@@ -7,12 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from calling import json_of, lines_of
 
 from sandbox.cli.main import call
 from sandbox.engines.contract import Divergence, Exhaustion
 from sandbox.games.billiards.headless import FrameRecord, FrameTable, NoRestError, play_frame
 from sandbox.games.billiards.match import Match
+from tests.cli.calling import json_of, lines_of
+
+pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 QUICK = ("match", "straight-rail", "--distance", "2", "--players", "bot:0.9,bot:0.8")
 
@@ -62,7 +64,7 @@ def test_snooker_is_played_with_the_miss(monkeypatch: pytest.MonkeyPatch, capfd:
         states.append(match.state)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sandbox.cli.match.play_frame", ended)
+    monkeypatch.setattr("sandbox.cli.games.play_frame", ended)
     for more in ((), ("--misses",)):
         assert lines_of(capfd, "match", "snooker", *more)[0] == 130
     assert [state.misses for state in states] == [False, True]
@@ -108,7 +110,7 @@ def test_reader_that_leaves_is_no_fault_of_out(
         raise BrokenPipeError
 
     monkeypatch.setattr("sys.stdout", sys.stdout)  # `call` replaces it
-    monkeypatch.setattr("sandbox.cli.match._told", write)
+    monkeypatch.setattr("sandbox.cli.games._frame_line", write)
     assert call(list(QUICK)) == 0
     assert capfd.readouterr().err == ""
 
@@ -125,7 +127,7 @@ def test_interrupt_keeps_the_frames_that_are_finished(
         frames.append(play_frame(*given, **named))
         return frames[0]
 
-    monkeypatch.setattr("sandbox.cli.match.play_frame", interrupted)
+    monkeypatch.setattr("sandbox.cli.games.play_frame", interrupted)
     called = json_of if as_json else lines_of
     status, told, err = called(capfd, *QUICK, "--frames", "3")
     assert (status, err) == (130, ["interrupted: 1 of 3 frames are complete"])
@@ -140,9 +142,9 @@ def test_progress_is_said_on_a_terminal(monkeypatch: pytest.MonkeyPatch, capfd: 
 
     @contextmanager
     def telling(silent: bool) -> Iterator[Any]:
-        yield None if silent else said.append
+        yield None if silent else lambda progress: said.append(progress.message)
 
-    monkeypatch.setattr("sandbox.cli.match.telling", telling)
+    monkeypatch.setattr("sandbox.cli.games.status_line", telling)
     lines_of(capfd, *QUICK, "--frames", "2")
     assert said[0].startswith("frame 1 of 2: 1 turn, ")
     assert said[-1].startswith("frame 2 of 2: ")

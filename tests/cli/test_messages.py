@@ -5,7 +5,8 @@ import shlex
 from pathlib import Path
 
 import pytest
-from calling import DROP, json_of, lines_of, written
+
+from tests.cli.calling import DROP, json_of, lines_of, written
 
 SLINGSHOT = "[pinball]\n[[pinball.slingshot]]\npoints = [[0.0, 0.0], [0.1, 0.0]]\n"
 BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
@@ -43,7 +44,7 @@ BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
             "engines that can: reference; use --engine reference",
         ),
         ("play bounce --set solver.integrator=rk4", 1, "engines that can: reference; add --engine reference"),
-        ("match 8-ball --engine reference", 1, "; use --engine "),
+        ("match 8-ball --engine reference --set solver.response=penalty", 1, "response 'penalty'"),
         ("run bounce --set solver.engine=box2d", 2, "the engine is not part of a scene"),
         # values
         ("run bounce --set ball.ball.radius=-1", 2, "ball.ball.radius (set): must be greater than 0, is -1"),

@@ -3,12 +3,15 @@
 from pathlib import Path
 
 import pytest
-from calling import document_of, json_of, lines_of, written
 
-from sandbox.cli import minimising
+from sandbox.cli import minimise as minimising
 from sandbox.cli.main import call
-from sandbox.measure.compare.minimise import Minimised, minimise
+from sandbox.measure.compare.reduce import ReducedScene, minimise
+from sandbox.progress import Progress
 from sandbox.scene.files.load import load
+from tests.cli.calling import document_of, json_of, lines_of, written
+
+pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 TUNNEL = """
 title = "Tunnel"
@@ -106,7 +109,7 @@ def test_what_cannot_be_written_is_refused_before_the_runs(tmp_path: Path, capfd
     scene = written(tmp_path, TUNNEL, "tunnel.toml")
     Path("old.toml").write_text("kept", encoding="utf-8")
     for file, reason in (
-        ("old.toml", "exists already; add --force"),
+        ("old.toml", "exists already"),
         ("tunnel.toml", "is the scene itself"),
         (".", "is a folder"),
         ("nowhere/small.toml", "no such folder"),
@@ -123,16 +126,16 @@ def test_what_cannot_be_written_is_refused_before_the_runs(tmp_path: Path, capfd
 def test_interrupted_it_writes_what_it_has(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def interrupted(*arguments: object, **options: object) -> Minimised:
+    def interrupted(*arguments: object, **options: object) -> ReducedScene:
         count = 0
 
-        def told(_: str) -> None:
+        def told(_: Progress) -> None:
             nonlocal count
             count += 1
             if count == 6:
                 raise KeyboardInterrupt
 
-        return minimise(*arguments, **{**options, "told": told})
+        return minimise(*arguments, **{**options, "on_progress": told})
 
     monkeypatch.setattr(minimising, "minimise", interrupted)
     scene = written(tmp_path, TUNNEL, "tunnel.toml")

@@ -4,7 +4,10 @@ import math
 from pathlib import Path
 
 import pytest
-from calling import json_of, lines_of
+
+from tests.cli.calling import json_of, lines_of
+
+pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 AIR = """
 [world]

@@ -7,11 +7,13 @@ import sys
 from pathlib import Path
 
 import pytest
-from calling import DROP, document_of, written
 
 from sandbox.batch.store import Store
 from sandbox.cli.main import COMMANDS
 from sandbox.engines.common.compile_clock import ANNOUNCEMENT
+from tests.cli.calling import DROP, document_of, written
+
+pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 DRAWN = DROP.replace('title = "Drop"', 'title = "μ − 🎱 é"').replace("duration = 0.5", "duration = 0.05")
 

@@ -3,19 +3,21 @@
 from pathlib import Path
 
 import pytest
-from calling import DROP, lines_of, written
 
 from sandbox.action import Impulse
-from sandbox.cli.replay import _shown
+from sandbox.cli.window import _shown
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.replay import rerun
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
+from sandbox.measure.run.sessions import rerun
 from sandbox.recording import Recording
 from sandbox.scene.files.load import loads
 from sandbox.window.app_state import AppState
 from sandbox.window.playback import live as live_module
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.session import Session
+from tests.cli.calling import DROP, lines_of, written
+
+pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 SCENE = loads(DROP)
 KICK = Impulse(time=0.1, body="a", impulse=(1.0, 0.0))

@@ -9,11 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from calling import DROP, SPARKS, document_of, json_of, lines_of, written
-from interruptible import interrupted
 
 from sandbox.batch.store import Store
 from sandbox.trajectory import Trajectory
+from tests.cli.calling import DROP, SPARKS, document_of, json_of, lines_of, written
+from tests.interruptible import interrupted
+
+pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 COLUMNS = (
     "id scene_hash scene_title engine settings seed versions status reason created steps seconds energy_start "

@@ -12,16 +12,18 @@ from time import monotonic, sleep
 from typing import Any, NoReturn
 
 import pytest
-from calling import DROP, SPARKS, document_of, json_of, lines_of, written
-from interruptible import interrupted, interruptible
 
-from sandbox.batch import crew
-from sandbox.batch.crew import ATTEMPTS, Making
-from sandbox.batch.outcome import Outcome, execute
+from sandbox.batch import executors, worker
+from sandbox.batch.executors import ATTEMPTS
+from sandbox.batch.job import RunOptions, RunRecord, run_or_fetch
 from sandbox.batch.plan import Job
 from sandbox.batch.store import Store, StoreError
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.trajectory import Trajectory
+from tests.cli.calling import DROP, SPARKS, document_of, json_of, lines_of, written
+from tests.interruptible import interrupted, interruptible
+
+pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 TIMES = ("seconds", "steps_per_second", "realtime_factor")
 """of a row, which are of the machine"""
@@ -72,56 +74,53 @@ def pid_file(folder: Path) -> Path:
 
 
 def die(job: Job, store: Store | None, *_: object) -> NoReturn:
-    """In place of `execute`, die of a signal, and write down that this was tried."""
+    """In place of `run_or_fetch`, die of a signal, and write down that this was tried."""
     with pid_file(Path(job.label).parent).open("a") as stream:
         stream.write(f"{os.getpid()}\n")
     os.kill(os.getpid(), signal.SIGSEGV if job.scene.world.seed == 2 else signal.SIGKILL)
     raise AssertionError("still alive")
 
 
-def die_of_one(job: Job, *more: Any) -> Outcome:
-    """In place of `execute`, die of seed 2 alone."""
-    return die(job, *more) if job.scene.world.seed == 2 else execute(job, *more)
+def die_of_one(job: Job, *more: Any) -> RunRecord:
+    """In place of `run_or_fetch`, die of seed 2 alone."""
+    return die(job, *more) if job.scene.world.seed == 2 else run_or_fetch(job, *more)
 
 
-def die_once(job: Job, *more: Any) -> Outcome:
-    """In place of `execute`, die at the first attempt alone."""
-    return execute(job, *more) if pid_file(Path(job.label).parent).exists() else die(job, *more)
+def die_once(job: Job, *more: Any) -> RunRecord:
+    """In place of `run_or_fetch`, die at the first attempt alone."""
+    return run_or_fetch(job, *more) if pid_file(Path(job.label).parent).exists() else die(job, *more)
 
 
-def fail_of_one(job: Job, *more: Any) -> Outcome:
-    """In place of `execute`, meet a fault of the program with seed 2."""
+def fail_of_one(job: Job, *more: Any) -> RunRecord:
+    """In place of `run_or_fetch`, meet a fault of the program with seed 2."""
     if job.scene.world.seed == 2:
         raise ZeroDivisionError("here")
-    return execute(job, *more)
+    return run_or_fetch(job, *more)
 
 
-def run_out_of_memory(job: Job, *more: Any) -> Outcome:
-    """In place of `execute`."""
+def run_out_of_memory(job: Job, *more: Any) -> RunRecord:
+    """In place of `run_or_fetch`."""
     raise MemoryError
 
 
 @pytest.fixture
-def replaced(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[..., Outcome]], None]:
-    """Have workers run a function in place of `execute`."""
+def replaced(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[..., RunRecord]], None]:
+    """Have workers run a function in place of `run_or_fetch`."""
 
-    def replace(function: Callable[..., Outcome]) -> None:
+    def replace(function: Callable[..., RunRecord]) -> None:
         # A worker imports what it serves by, from wherever that is: this folder is on its path.
-        monkeypatch.setattr(crew, "_serve", partial(serve_with, function))
+        monkeypatch.setattr(executors, "serve", partial(serve_with, function))
 
     return replace
 
 
-def serve_with(function: Callable[..., Outcome], pipe: Any, making: Making) -> None:
-    crew.execute = function  # type: ignore[assignment]
-    ORIGINAL_SERVE(pipe, making)
-
-
-ORIGINAL_SERVE = crew._serve
+def serve_with(function: Callable[..., RunRecord], pipe: Any, options: RunOptions) -> None:
+    worker.run_or_fetch = function  # type: ignore[assignment]
+    worker.serve(pipe, options)
 
 
 def test_run_whose_worker_is_killed_is_made_again(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], replaced: Callable[[Callable[..., Outcome]], None]
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], replaced: Callable[[Callable[..., RunRecord]], None]
 ) -> None:
     replaced(die_once)
     words = ("run", written(tmp_path, DROP + SPARKS), "--seeds", "4", "--workers", "2")
@@ -132,8 +131,8 @@ def test_run_whose_worker_is_killed_is_made_again(
 
 
 @pytest.mark.slow
-def test_run_that_kills_every_worker_fails_and_the_others_go_on(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], replaced: Callable[[Callable[..., Outcome]], None]
+def test_run_that_kills_every_worker_fails_and_the_others_complete(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], replaced: Callable[[Callable[..., RunRecord]], None]
 ) -> None:
     replaced(die_of_one)
     scene, folder = written(tmp_path, DROP + SPARKS), tmp_path / "runs"
@@ -147,7 +146,7 @@ def test_run_that_kills_every_worker_fails_and_the_others_go_on(
     with Store(folder) as store:
         assert sorted(row.status for row in store.rows()) == ["failed", "ok", "ok", "ok"]
     # It is not finished, and is made by the next call.
-    replaced(execute)
+    replaced(run_or_fetch)
     status, document, _ = json_of(capfd, *words)
     assert status == 0
     assert [run["repeated"] for run in document["runs"]] == [True, False, True, True]
@@ -158,11 +157,11 @@ def test_run_that_kills_every_worker_fails_and_the_others_go_on(
 @pytest.mark.parametrize(
     ("function", "phrase"), [(fail_of_one, "ZeroDivisionError"), (run_out_of_memory, "out of memory")]
 )
-def test_fault_of_the_program_in_a_worker_names_its_run_and_the_others_go_on(
+def test_internal_error_in_a_worker_names_its_run_and_the_others_complete(
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
-    replaced: Callable[[Callable[..., Outcome]], None],
-    function: Callable[..., Outcome],
+    replaced: Callable[[Callable[..., RunRecord]], None],
+    function: Callable[..., RunRecord],
     phrase: str,
 ) -> None:
     replaced(function)
@@ -176,17 +175,17 @@ def test_fault_of_the_program_in_a_worker_names_its_run_and_the_others_go_on(
 
 
 @pytest.mark.slow
-def test_workers_that_cannot_start_are_told_and_not_started_for_ever(
+def test_workers_that_cannot_start_end_the_command(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(crew, "_serve", end_at_once)
+    monkeypatch.setattr(executors, "serve", end_at_once)
     status, document, err = json_of(capfd, "run", written(tmp_path, DROP + SPARKS), "--seeds", "3", "--workers", "2")
     assert (status, document["runs"]) == (1, [])
     assert "no worker process could be started" in err[-1]
     assert "status 3" in err[-1]
 
 
-def end_at_once(pipe: object, making: object) -> NoReturn:
+def end_at_once(pipe: object, options: object) -> NoReturn:
     os._exit(3)
 
 
@@ -253,7 +252,7 @@ def test_interrupt_ends_workers_that_are_stopped(tmp_path: Path) -> None:
 
 
 def test_handler_of_a_worker_raises_for_the_first_signal_only() -> None:
-    before = signal.signal(signal.SIGINT, crew._raise_once())
+    before = signal.signal(signal.SIGINT, worker.raise_once())
     try:
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)

@@ -3,10 +3,12 @@
 import json
 
 import pytest
-from calling import json_of, lines_of
 
 from sandbox.cli.main import call
 from sandbox.scene.files.json_schema import dumps, schema
+from tests.cli.calling import json_of, lines_of
+
+pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 
 def test_without_a_table_it_is_the_schema(capfd: pytest.CaptureFixture[str]) -> None:

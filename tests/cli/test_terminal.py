@@ -9,7 +9,11 @@ import sys
 import termios
 from pathlib import Path
 
-from calling import written
+import pytest
+
+from tests.cli.calling import written
+
+pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 
 def shown(*arguments: str, cwd: Path) -> list[str]:

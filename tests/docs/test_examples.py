@@ -3,7 +3,10 @@
 from pathlib import Path
 
 import pytest
-from examples import PAGES, ROOT, examples, processes, run_page
+
+from tests.docs.examples import PAGES, ROOT, examples, processes, run_page
+
+pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 MAX_PROCESSES = 1
 """Commands of a page that the fast tests run; each takes a second or more."""

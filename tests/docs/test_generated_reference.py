@@ -1,7 +1,6 @@
 """Blocks of the reference that are generated from the code: all can be made, and together they are complete."""
 
 import re
-import sys
 from pathlib import Path
 
 import pytest
@@ -11,10 +10,11 @@ from sandbox.run_file import SHAPES
 from sandbox.scene.files.json_schema import schema
 from sandbox.trajectory import Trajectory
 
+pytestmark = pytest.mark.full  # child processes and pages
+
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = sorted(page for page in DOCS.rglob("*.md") if "```{generated}" in page.read_text(encoding="utf-8"))
 
-sys.path.insert(0, str(DOCS / "_ext"))
 generated = pytest.importorskip("generated", exc_type=ImportError)
 
 

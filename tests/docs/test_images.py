@@ -6,10 +6,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from examples import ROOT
 from PIL import Image
 
 from sandbox.scene.files.shipped_scenes import shipped
+from tests.docs.examples import ROOT
 
 FOLDER = ROOT / "docs" / "images"
 FILES = sorted(path for path in FOLDER.rglob("*") if path.is_file())
@@ -38,8 +38,8 @@ def test_every_picture_is_referenced() -> None:
 
 
 def test_every_picture_is_made_by_the_tool() -> None:
-    tool = [sys.executable, str(ROOT / "tools" / "readme_images.py"), "--list"]
-    done = subprocess.run(tool, capture_output=True, text=True, check=True, timeout=120)
+    tool = [sys.executable, "-m", "tools.images", "--list"]
+    done = subprocess.run(tool, cwd=ROOT, capture_output=True, text=True, check=True, timeout=120)
     known = {line.split()[0] for line in done.stdout.splitlines()}
     assert {path.relative_to(FOLDER).as_posix() for path in FILES} == known
 

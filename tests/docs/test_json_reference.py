@@ -14,6 +14,8 @@ import sandbox
 from sandbox.cli.main import COMMANDS, call
 from sandbox.recording import Recording
 
+pytestmark = pytest.mark.full  # child processes and command lines that run long
+
 PAGE = (Path(__file__).parents[2] / "docs/reference/json.md").read_text(encoding="utf-8")
 NO_DOCUMENT = {"play", "replay", "schema"}
 """commands without a document of their own"""

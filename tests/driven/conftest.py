@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from driving import Driven, Play, start_server
-from xclient import LIBRARY
+
+from tests.driven.driving import Driven, Play, start_server
+from tests.driven.xclient import LIBRARY
 
 # For what tests draw in this process to compare with; the windows that they drive say x11 themselves.
 os.environ["SDL_VIDEODRIVER"] = "dummy"

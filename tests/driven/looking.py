@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 import pygame
-from driving import SIZE, Shot
 
 from sandbox.window.app import App
 from sandbox.window.app_state import AppState
 from sandbox.window.camera import Camera
-from sandbox.window.render.palette import WARNING, Colour
+from sandbox.window.render.palette import WARNING, RgbColour
+from tests.driven.driving import SIZE, Shot
 
 NEAR = 6
 """How far a channel may be from its colour: shading and antialiasing change what is beside an edge by more."""
@@ -49,7 +49,7 @@ def laid_out(path: Path) -> Laid:
         window.close()
 
 
-def mask(shot: Shot, colour: Colour, box: pygame.Rect = ARENA) -> "np.ndarray[tuple[int, int], np.dtype[np.bool_]]":
+def mask(shot: Shot, colour: RgbColour, box: pygame.Rect = ARENA) -> "np.ndarray[tuple[int, int], np.dtype[np.bool_]]":
     """Tell which pixels of a region have a colour, (height, width)."""
     part = shot[box.top : box.bottom, box.left : box.right].astype(np.int16)
     return np.asarray((np.abs(part - np.asarray(colour)) <= NEAR).all(axis=2))
@@ -60,18 +60,18 @@ def paused(shot: Shot) -> bool:
     return count(shot, WARNING, HUD) > 60
 
 
-def at(shot: Shot, place: tuple[float, float]) -> Colour:
+def at(shot: Shot, place: tuple[float, float]) -> RgbColour:
     """Return the colour of a pixel."""
     red, green, blue = map(int, shot[round(place[1]), round(place[0])])
     return red, green, blue
 
 
-def count(shot: Shot, colour: Colour, box: pygame.Rect = ARENA) -> int:
+def count(shot: Shot, colour: RgbColour, box: pygame.Rect = ARENA) -> int:
     """Return how many pixels of a region have a colour."""
     return int(mask(shot, colour, box).sum())
 
 
-def middle(shot: Shot, colour: Colour, box: pygame.Rect = ARENA) -> tuple[float, float]:
+def middle(shot: Shot, colour: RgbColour, box: pygame.Rect = ARENA) -> tuple[float, float]:
     """Return the middle of all pixels of a colour in a region, px in the window; nan where there are none."""
     rows, columns = np.nonzero(mask(shot, colour, box))
     if not len(rows):

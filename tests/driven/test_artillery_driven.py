@@ -3,13 +3,13 @@
 from pathlib import Path
 
 import pytest
-from driving import Play, Shot
-from looking import at, laid_out, on_screen
-from rooms import written
 
 from sandbox.action import Reshape
-from sandbox.measure.replay import rerun
+from sandbox.measure.run.sessions import rerun
 from sandbox.recording import Recording
+from tests.driven.driving import Play, Shot
+from tests.driven.looking import at, laid_out, on_screen
+from tests.driven.rooms import written
 
 pytestmark = pytest.mark.slow  # a real window in real time
 

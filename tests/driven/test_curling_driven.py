@@ -1,11 +1,11 @@
 """Curling in a real window: the broom is held and a stone thrown by real keys, and the session keeps the match."""
 
 import pytest
-from driving import Play
-from looking import differ
 
 from sandbox.action import Action, Move
-from sandbox.measure.replay import rerun
+from sandbox.measure.run.sessions import rerun
+from tests.driven.driving import Play
+from tests.driven.looking import differ
 
 pytestmark = pytest.mark.slow  # a real window in real time
 

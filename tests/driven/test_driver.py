@@ -6,7 +6,10 @@ from collections.abc import Iterator
 from time import sleep
 
 import pytest
-from driving import LIMIT, SIZE, environment
+
+from tests.driven.driving import LIMIT, SIZE, environment
+
+pytestmark = pytest.mark.full  # a window or a film
 
 LISTENER = f"""
 import pygame

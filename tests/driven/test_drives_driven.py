@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import pytest
-from driving import Play
 
 from sandbox.action import Drive
-from sandbox.measure.replay import rerun
+from sandbox.measure.run.sessions import rerun
 from sandbox.scene.files.load import load
+from tests.driven.driving import Play
 
 pytestmark = pytest.mark.slow  # a real window in real time
 

@@ -1,9 +1,9 @@
 """A game with rules in a real window: played by real keys, saved, started again."""
 
 import pytest
-from driving import Play
 
-from sandbox.measure.replay import rerun
+from sandbox.measure.run.sessions import rerun
+from tests.driven.driving import Play
 
 pytestmark = pytest.mark.slow  # a real window in real time
 

@@ -3,16 +3,16 @@
 from pathlib import Path
 
 import pytest
-from driving import Driven, Play
-from looking import count, differ, laid_out, middle, near, on_screen, paused
-from rooms import AT_REST, written
-from xclient import XClient
 
 from sandbox.action import Launch, Move, Pull, SetParameter, Spawn
-from sandbox.measure.replay import rerun
+from sandbox.measure.run.sessions import rerun
 from sandbox.recording import Recording
 from sandbox.window.camera import Camera
 from sandbox.window.render.palette import GREEN, SKY, VERMILION
+from tests.driven.driving import Driven, Play
+from tests.driven.looking import count, differ, laid_out, middle, near, on_screen, paused
+from tests.driven.rooms import AT_REST, written
+from tests.driven.xclient import XClient
 
 pytestmark = pytest.mark.slow  # a real window in real time
 

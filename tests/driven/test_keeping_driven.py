@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from driving import SIZE, Play
-from looking import HUD, count, paused
 from PIL import Image
-from rooms import MOVING, written
 
-from sandbox.measure.replay import rerun
+from sandbox.measure.run.sessions import rerun
 from sandbox.recording import Recording
 from sandbox.window.render.palette import WARNING
+from tests.driven.driving import SIZE, Play
+from tests.driven.looking import HUD, count, paused
+from tests.driven.rooms import MOVING, written
 
 pytestmark = pytest.mark.slow  # a real window in real time
 

@@ -5,13 +5,15 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from driving import LIMIT, Play, command, environment
-from looking import MESSAGES, count, differ, laid_out, on_screen
-from rooms import AT_REST, LEAVING, MOVING, written
-from xclient import XClient
 
 from sandbox.cli.main import call
 from sandbox.window.render.palette import ORANGE, WARNING
+from tests.driven.driving import LIMIT, Play, command, environment
+from tests.driven.looking import MESSAGES, count, differ, laid_out, on_screen
+from tests.driven.rooms import AT_REST, LEAVING, MOVING, written
+from tests.driven.xclient import XClient
+
+pytestmark = pytest.mark.full  # a window or a film
 
 
 @pytest.mark.parametrize(

@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pygame
 import pytest
-from driving import Driven, Play
-from looking import count, laid_out, middle, on_screen
 
-from sandbox.measure.replay import rerun
+from sandbox.measure.run.sessions import rerun
 from sandbox.recording import Recording
-from sandbox.scene.description.forces import Drive
+from sandbox.scene.description.forces import AnyDrive
 from sandbox.scene.files.load import load
 from sandbox.window.render.palette import hex_colour
+from tests.driven.driving import Driven, Play
+from tests.driven.looking import count, laid_out, middle, on_screen
 
 pytestmark = pytest.mark.slow  # a real window in real time
 
@@ -24,7 +24,7 @@ SEEN = 6.0
 """px, by which the middle of a bat goes up at least: its way is about twice that"""
 
 
-def bat(side: str) -> tuple[Drive, int, pygame.Rect]:
+def bat(side: str) -> tuple[AnyDrive, int, pygame.Rect]:
     """Return the drive of a bat, its number, and the part of the picture in which it moves."""
     scene, camera = load(CLASSIC), laid_out(CLASSIC).camera
     drive = next(each for each in scene.drives if each.name == f"{side} flipper")

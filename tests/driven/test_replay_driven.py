@@ -4,9 +4,6 @@ from pathlib import Path
 
 import pygame
 import pytest
-from driving import SIZE, Driven, Play
-from looking import count, middle, near, on_screen, paused
-from rooms import FALLING, MOVING, written
 
 import sandbox
 from sandbox.window.camera import Camera
@@ -15,6 +12,11 @@ from sandbox.window.render.palette import INK, SKY
 from sandbox.window.ui.panel import PANEL_WIDTH
 from sandbox.window.ui.timeline import TIMELINE_HEIGHT, Timeline
 from sandbox.window.view_bounds import view_bounds
+from tests.driven.driving import SIZE, Driven, Play
+from tests.driven.looking import count, middle, near, on_screen, paused
+from tests.driven.rooms import FALLING, MOVING, written
+
+pytestmark = pytest.mark.full  # a window or a film
 
 AREA = pygame.Rect(0, SIZE[1] - TIMELINE_HEIGHT, SIZE[0] - PANEL_WIDTH, TIMELINE_HEIGHT)
 WITHIN = 2.0  # px: the mean over the pixels of a disc whose rim is antialiased

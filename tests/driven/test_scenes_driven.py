@@ -3,11 +3,14 @@
 from pathlib import Path
 
 import pygame
-from driving import Play
-from looking import ARENA, ENGINE_ROW, PICTURE, at, count, differ, laid_out, on_screen, paused
-from rooms import AT_REST, FALLING, MOVING, RESTING, written
+import pytest
 
 from sandbox.window.render.palette import BACKGROUND, INK, SKY, WARNING
+from tests.driven.driving import Play
+from tests.driven.looking import ARENA, ENGINE_ROW, PICTURE, at, count, differ, laid_out, on_screen, paused
+from tests.driven.rooms import AT_REST, FALLING, MOVING, RESTING, written
+
+pytestmark = pytest.mark.full  # a window or a film
 
 
 def test_brackets_walk_the_scenes_beside_and_keep_the_pause(drive: Play, tmp_path: Path) -> None:

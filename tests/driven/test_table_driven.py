@@ -4,13 +4,13 @@ import math
 from pathlib import Path
 
 import pytest
-from driving import Driven, Play
-from looking import differ, laid_out, on_screen
-from rooms import written
 
 from sandbox.action import Move, Strike
-from sandbox.measure.replay import rerun
+from sandbox.measure.run.sessions import rerun
 from sandbox.window.camera import Camera
+from tests.driven.driving import Driven, Play
+from tests.driven.looking import differ, laid_out, on_screen
+from tests.driven.rooms import written
 
 pytestmark = pytest.mark.slow  # a real window in real time
 

@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import pytest
-from driving import Play
-from looking import ARENA, HUD, STEP_ROW, differ, laid_out, middle, near, on_screen, paused
-from rooms import AT_REST, MOVING, written
 
 from sandbox.window.render.palette import SKY
+from tests.driven.driving import Play
+from tests.driven.looking import ARENA, HUD, STEP_ROW, differ, laid_out, middle, near, on_screen, paused
+from tests.driven.rooms import AT_REST, MOVING, written
 
 pytestmark = pytest.mark.slow  # a real window in real time
 

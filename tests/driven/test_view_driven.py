@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pygame
 import pytest
-from driving import SIZE, Driven, Play, Shot
-from looking import count, differ, laid_out, middle, near, on_screen, paused
-from rooms import AT_REST, RESTING, written
 
 from sandbox.window.camera import Camera
 from sandbox.window.mouse import ZOOM_PER_NOTCH
 from sandbox.window.playback.snapshot import OVERLAYS
 from sandbox.window.render.palette import PANEL, SKY
+from tests.driven.driving import SIZE, Driven, Play, Shot
+from tests.driven.looking import count, differ, laid_out, middle, near, on_screen, paused
+from tests.driven.rooms import AT_REST, RESTING, written
 
 pytestmark = pytest.mark.slow  # a real window in real time
 

@@ -5,8 +5,8 @@ from typing import Any
 
 from sandbox.action import Drive
 from sandbox.engines.switching import SwitchableSimulation
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
 
 LENGTH = 0.0702  # m
 MASS = 0.080  # kg

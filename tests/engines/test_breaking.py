@@ -7,8 +7,8 @@ import pytest
 
 from sandbox.action import Action, Force, Impulse, Launch, Remove, SetParameter, Switch
 from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
 
 ENGINES = ("pymunk", "reference")
 OTHER = {"pymunk": "reference", "reference": "pymunk"}

@@ -9,12 +9,14 @@ import pytest
 
 from sandbox.action import Action, Move, Remove, Reshape, Spawn, Toggle
 from sandbox.engines.switching import start
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.bodies import Box
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import load, loads
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 GRAVITY = np.array([0.0, -9.81])
 

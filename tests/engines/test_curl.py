@@ -12,6 +12,8 @@ from scipy.integrate import solve_ivp
 from sandbox.engines.tabletop.motion import SHORT, curled, figures_of, rolled
 from sandbox.scene.description.surface import Floor
 
+pytestmark = pytest.mark.full  # long runs and sweeps
+
 G, MU = 9.81, 0.01
 SLOWING = MU * G
 

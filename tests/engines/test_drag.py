@@ -4,15 +4,17 @@ import math
 from functools import partial
 from typing import Any
 
-import accounts
 import numpy as np
 import pytest
 
 from sandbox.action import Action, Force, Impulse
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
+from tests import accounts
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 # Rounding of a few hundred sums
 kept = partial(accounts.kept, engine="pymunk", closes=1e-11)

@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from flippers import BALL, BAR_MOMENT, END, LENGTH, MASS, MOMENT, REST, ball, bar, bat, press, scene
-from flippers import TORQUE as COIL
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+from tests.engines.flippers import BALL, BAR_MOMENT, END, LENGTH, MASS, MOMENT, REST, ball, bar, bat, press, scene
+from tests.engines.flippers import TORQUE as COIL
 
 TORQUE, RAMP, HOLD = 0.513, 0.030, 0.75
 STROKE = END - REST

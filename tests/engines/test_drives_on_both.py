@@ -4,12 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from flippers import BALL, BAR_MOMENT, MASS, MOMENT, REST, ball, bar, bat, press, scene
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sandbox.engines import switching as relay
 from sandbox.engines.common.energy_balance import total_energy
+from tests.engines.flippers import BALL, BAR_MOMENT, MASS, MOMENT, REST, ball, bar, bat, press, scene
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 ROD = {
     "box": [{"name": "rod", "size": [0.02, 0.1], "position": [0.0, -0.05]}],

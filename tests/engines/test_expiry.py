@@ -11,11 +11,11 @@ from sandbox.action import Launch, Remove, Spawn, Switch
 from sandbox.engines.common.lifetimes import SLACK, Lifetimes
 from sandbox.engines.registry import ENGINES, able, start
 from sandbox.engines.switching import SwitchableSimulation
-from sandbox.measure.compare.closed import solved
+from sandbox.measure.analytic.trajectory import solved_run
 from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
 
 SPARK = {"position": [0.0, 1.0], "velocity_min": [-2.0, 1.0], "velocity_max": [2.0, 5.0], "radius": 0.05}
 FLOOR = {"point": [0.0, -0.5], "normal": [0.0, 1.0], "restitution": 0.5}
@@ -84,7 +84,7 @@ def test_engines_and_formulas_retire_the_same_at_the_same_frames() -> None:
         {"count": 200, "lifetime": 0.4, "lifetime_jitter": 0.2},
         world={"gravity": [0.0, -9.81], "duration": 0.55, "bounds": [[-0.5, -9.0], [9.0, 9.0]]},
     )
-    truth = solved(scene, scene.solver)
+    truth = solved_run(scene, scene.solver)
     assert truth is not None
     expected = {n: t for n, t in enumerate(truth.retired_time.tolist()) if t == t}
     aside = [n for n, time in expected.items() if time < scene.bodies.lifetime[n]]

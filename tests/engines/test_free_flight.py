@@ -223,9 +223,9 @@ def test_compiled_and_numpy_flight_are_the_same_bit_for_bit(air, substeps, count
     which = crowd(count, substeps, **AIRS[air])
     compiled, plain = start(which), start(which)
     for _ in range(4):
-        monkeypatch.setattr(free, "MANY", 200)
+        monkeypatch.setattr(free, "MIN_COMPILED", 200)
         compiled.step()
-        monkeypatch.setattr(free, "MANY", 10**9)
+        monkeypatch.setattr(free, "MIN_COMPILED", 10**9)
         plain.step()
     assert same(compiled.frame(), plain.frame())
 
@@ -234,7 +234,7 @@ def test_compiled_and_numpy_flight_are_the_same_bit_for_bit(air, substeps, count
 @pytest.mark.parametrize("many", [0, 10**9])
 def test_holes_in_a_crowd_change_no_one_else(air, many, monkeypatch):
     """Those who are left fly as before, in a few runs or scattered; those who are gone stay where they were."""
-    monkeypatch.setattr(free, "MANY", many)
+    monkeypatch.setattr(free, "MIN_COMPILED", many)
     which = crowd(150, 3, **AIRS[air])
     whole, holed = start(which), start(which)
     gone: list[int] = []
@@ -258,7 +258,7 @@ def test_holes_in_a_crowd_change_no_one_else(air, many, monkeypatch):
 
 @pytest.mark.parametrize("many", [0, 10**9])
 def test_a_force_on_one_of_a_crowd_moves_that_one_alone(many, monkeypatch):
-    monkeypatch.setattr(free, "MANY", many)
+    monkeypatch.setattr(free, "MIN_COMPILED", many)
     which = crowd(150, 4)
     calm, pushed = start(which), start(which)
     pushed.apply(Force(time=0, body=which.bodies.names[7], force=(3.7, 0.0), torque=0.01))
@@ -276,7 +276,7 @@ def test_a_force_on_one_of_a_crowd_moves_that_one_alone(many, monkeypatch):
 
 @pytest.mark.parametrize("many", [0, 10**9])
 def test_what_leaves_all_bounds_in_a_crowd_is_named(many, monkeypatch):
-    monkeypatch.setattr(free, "MANY", many)
+    monkeypatch.setattr(free, "MIN_COMPILED", many)
     which = crowd(150, 1, linear_drag=1e-9)
     simulation = start(which)
     name = which.bodies.names[123]

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from sandbox.action import Remove, Spawn, Switch
 from sandbox.engines.contract import Refusal
 from sandbox.engines.switching import SwitchableSimulation, start
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
 
 both = pytest.mark.parametrize("engine", ["pymunk", "reference"])
 

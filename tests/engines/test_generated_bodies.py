@@ -8,9 +8,9 @@ import pytest
 from sandbox.action import Launch, Remove, SetParameter, Spawn
 from sandbox.engines.registry import start as start_engine
 from sandbox.engines.switching import start
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
 
 ENGINES = ("pymunk", "reference")
 every_engine = pytest.mark.parametrize("engine", ENGINES)

@@ -8,10 +8,10 @@ import pytest
 from sandbox.action import ActionError, Launch, Pull, Remove, SetParameter, Spawn, Switch
 from sandbox.engines.registry import ENGINES
 from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 
 BOUNDS = [[-3.0, -3.0], [3.0, 30.0]]

@@ -4,7 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from flippers import BALL, ball, press, scene
+
+from tests.engines.flippers import BALL, ball, press, scene
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 TRAVEL, SPEED = 0.043, 1.03  # m, m/s: a pinball machine's
 RATE, BACK = 20.0, 5.0  # rad/s

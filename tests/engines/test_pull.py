@@ -228,3 +228,6 @@ def test_spawned_body_too_small_for_its_grip_is_pulled() -> None:
     relay.apply(Spawn(time=0.0, ball=Ball(name="b", position=(5.0, 5.0), radius=1e-9)))
     relay.apply(Pull(time=0.0, body="b", grip=(1.0, 1.0), target=(5.0, 5.0)))
     stepped(relay, 3)
+    frame, b = relay.frame(), relay.bodies.names.index("b")
+    assert np.isfinite(frame.position[b]).all()
+    assert np.isfinite([frame.angle[b], frame.angular_velocity[b]]).all()

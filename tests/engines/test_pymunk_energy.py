@@ -4,15 +4,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import accounts
 import numpy as np
 import pytest
 
 import sandbox
 from sandbox.action import Force, Impulse, Move, Remove, SetParameter, Spawn
 from sandbox.engines.energy_ledger import Cause
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
+from tests import accounts
 
 SCENES = Path(__file__).parents[2] / "scenes"
 # Rounding of a few hundred sums, of energies that are up to 1e4 times those in motion

@@ -14,11 +14,13 @@ from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.registry import start
 from sandbox.engines.switching import SwitchableSimulation
 from sandbox.engines.tabletop.collisions import CUSHION, ELASTIC, FRICTIONAL, collide_balls, collide_cushion
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.bodies import Box
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.surface import struck
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 MASS, RADIUS, G = 0.170097, 0.028575, 9.81
 SLIDE, ROLL, SPIN = 0.2, 0.01, 0.0127

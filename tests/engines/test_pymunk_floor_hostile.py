@@ -3,16 +3,19 @@
 from typing import Any
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import numbers
 
 from sandbox.action import Action, ActionError, Force, Impulse, Move, Remove, Spawn, Strike
 from sandbox.engines.contract import Divergence, Simulation
 from sandbox.engines.registry import start
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
+from tests.strategies import numbers
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 RADIUS = 0.03
 NAMES = ("a", "b", "c", "d")

@@ -7,14 +7,16 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from strategies import Document, documents, numbers
 
 from sandbox.action import Action, ActionError, Force, Impulse, Move, Remove, SetParameter, Spawn
 from sandbox.engines.contract import Divergence, Simulation
 from sandbox.engines.registry import able, start
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
+from tests.strategies import Document, documents, numbers
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 
 @st.composite

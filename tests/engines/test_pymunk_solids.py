@@ -11,12 +11,12 @@ from sandbox.action import Impulse, Move, Remove, Spawn, Switch, Throttle
 from sandbox.engines.contract import Divergence, Simulation
 from sandbox.engines.registry import start
 from sandbox.engines.switching import start as start_relay
-from sandbox.measure.energy import energies
-from sandbox.measure.run import run
+from sandbox.measure.metrics.energy import energies
+from sandbox.measure.run.runner import run
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.bodies import BallPart, Compound
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 G = 9.81

@@ -14,12 +14,12 @@ from sandbox.engines.common.restitution import fraction_at, kicked, rebound, seg
 from sandbox.engines.contract import Refusal
 from sandbox.engines.energy_ledger import Cause, EnergyLedger
 from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import Post
 from sandbox.scene.description.surface import Floor
 from sandbox.scene.description.world import Kick
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
 
 ENGINES = ("pymunk", "exact", "reference")
 SURFACES = {
@@ -317,7 +317,7 @@ def test_pairs_that_need_nothing_are_told_nothing(monkeypatch: pytest.MonkeyPatc
 
 def test_account_books_kicks_as_a_cause_of_their_own() -> None:
     account = EnergyLedger()
-    account.enter(Cause.KICKS, 2.0)
+    account.add(Cause.KICKS, 2.0)
     assert account.entries()[Cause.KICKS] == 2.0
     assert account.entries()[Cause.PHANTOM] == 0.0
 

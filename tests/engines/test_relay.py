@@ -26,12 +26,14 @@ from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import ENGINES, able
 from sandbox.engines.registry import start as start_alone
 from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find, shipped
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 SCENES = {each.name: load(each.path) for each in shipped()}
 SHORT = ("tutorial/bounce", "tutorial/fireworks", "benchmark/newtons_cradle", "benchmark/gas", "benchmark/incline")

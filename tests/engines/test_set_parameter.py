@@ -10,13 +10,15 @@ from sandbox.engines.contract import Exhaustion, Refusal
 from sandbox.engines.registry import ENGINES
 from sandbox.engines.switching import start
 from sandbox.recording import Recording
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.world import Settings
-from sandbox.scene.files.document import change_value, to_document
+from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import from_document, load
-from sandbox.scene.files.overrides import assign
+from sandbox.scene.files.overrides import assign, change_value
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.scene.scene import Scene
+
+pytestmark = pytest.mark.full  # hundreds of combinations
 
 SCENES = (
     "benchmark/incline",

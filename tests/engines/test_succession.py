@@ -8,8 +8,10 @@ from sandbox.action import Launch, Pull, Switch
 from sandbox.engines.common.energy_balance import total_energy
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 
 def scene_of(**more: Any) -> Scene:

@@ -10,9 +10,11 @@ from hypothesis import strategies as st
 
 import sandbox
 from sandbox.engines.common.colliders import straightened, wall_segments
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Wall
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 ENGINES = "pymunk", "reference"
 

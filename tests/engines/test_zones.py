@@ -12,10 +12,10 @@ import sandbox
 from sandbox.action import Action, Force, Impulse, Move, Pull, Remove, SetParameter, Spawn, Switch
 from sandbox.engines.contract import Refusal
 from sandbox.engines.switching import SwitchableSimulation
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
-from sandbox.scene.description.fixed import AWAY, HELD, INSIDE, LET_GO
+from sandbox.scene.description.fixed import AWAY, HELD, INSIDE, RELEASED
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 both = pytest.mark.parametrize("engine", ["pymunk", "reference"])
@@ -222,7 +222,7 @@ def test_held_body_is_freed_by_who_drives_it_and_not_caught_before_it_has_left(e
     assert relay.frame().visits.tolist() == [[HELD]]
     relay.apply(release)
     relay.step()
-    assert relay.frame().visits.tolist() in ([[LET_GO]], [[AWAY]])
+    assert relay.frame().visits.tolist() in ([[RELEASED]], [[AWAY]])
     for _ in range(100):
         relay.step()
     frame = relay.frame()

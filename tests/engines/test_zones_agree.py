@@ -9,9 +9,11 @@ from hypothesis import strategies as st
 
 import sandbox
 from sandbox.action import Impulse, Switch
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import HELD
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 H = 0.002
 """s, the substep"""

@@ -19,10 +19,10 @@ from sandbox.games.landing.rules import (
     Landing,
 )
 from sandbox.games.players import ScriptedInput
-from sandbox.measure.play_out import Played, play_out
+from sandbox.measure.run.sessions import PlayedGame, play_out
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import load, loads
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.scene.scene import Scene
 
 SCENE = load(find("landing"))
 G, ENGINE = 1.62, 5.0  # m/s², the Moon's and the engine's on 1 kg
@@ -81,7 +81,7 @@ def flat(height: float = 5.0, angle: float = 0.0) -> Scene:
     return loads(FLAT.format(height=height, angle=angle))
 
 
-def assert_freely_fallen(game: Played, height: float) -> None:
+def assert_freely_fallen(game: PlayedGame, height: float) -> None:
     speed = math.sqrt(2.0 * G * height)
     assert game.over is not None
     told = float(game.over.split()[1])

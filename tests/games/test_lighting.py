@@ -3,9 +3,9 @@
 import json
 
 import pytest
-from toy_game import Toy, toy_scene
 
 from sandbox.games.session import LAMP_INTERVAL, LampLog, LampRecorder
+from tests.toy_game import Toy, toy_scene
 
 STEP = 0.01
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from sandbox.cli.main import call
+from sandbox.game_names import GAMES, GROUP, game_names
 from sandbox.games.landing.rules import Landing
-from sandbox.games.names import GAMES, GROUP, game_names
 from sandbox.games.registry import RULES, has_rules, is_real_time, rules_of
-from sandbox.measure.play_out import play_out
+from sandbox.measure.run.sessions import play_out
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.json_schema import schema
 from sandbox.scene.files.load import dumps, load, loads
@@ -29,6 +29,7 @@ restitution = 0.8
 """
 
 RULES_OF_COUNT = """
+from sandbox.game_spec import GameSpec
 from sandbox.games.contract import Control
 
 class Count:
@@ -51,6 +52,8 @@ class Count:
 
     def sounds(self):
         return ()
+
+TABLED = GameSpec(names=("tabled",), rules="bounce_counter:Count", tables={"tabled": "bounce_counter:Count"})
 """
 
 
@@ -61,8 +64,9 @@ def scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     info = tmp_path / "bounce_counter-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: bounce-counter\nVersion: 1.0\n")
-    entries = "count-bounces = bounce_counter:Count\nbroken = bounce_counter:Missing\nlanding = bounce_counter:Count\n"
-    (info / "entry_points.txt").write_text(f"[{GROUP}]\n{entries}")
+    entries = {"count-bounces": "Count", "broken": "Missing", "tabled": "TABLED", "landing": "Count"}
+    lines = [f"[{GROUP}]", *(f"{name} = bounce_counter:{part}" for name, part in entries.items())]
+    (info / "entry_points.txt").write_text("\n".join(lines))
     monkeypatch.syspath_prepend(tmp_path)
     file = tmp_path / "count.toml"
     file.write_text(SCENE)
@@ -75,7 +79,7 @@ def test_scene_may_name_a_game_of_another_package(scene: Path) -> None:
     assert loads(dumps(loaded)) == loaded
     assert has_rules(loaded)
     assert is_real_time("count-bounces")
-    assert game_names() == (*GAMES, "broken", "count-bounces")
+    assert game_names() == (*GAMES, "broken", "count-bounces", "tabled")
     assert "count-bounces" in schema()["$defs"]["Play"]["properties"]["game"]["enum"]
 
 
@@ -95,6 +99,14 @@ def test_game_that_cannot_be_imported_is_reported_with_its_line(scene: Path, cap
     assert err.startswith(f"{scene}:4: play.game: the game 'broken' cannot be imported from bounce_counter:Missing: ")
 
 
+def test_game_with_a_scene_table_is_refused_with_its_line(scene: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene.write_text(SCENE.replace("count-bounces", "tabled"))
+    assert call(["check", str(scene)]) == 2
+    err = capfd.readouterr().err
+    assert err.startswith(f"{scene}:4: play.game: the game 'tabled' cannot be imported from bounce_counter:TABLED: ")
+    assert "[tabled]" in err
+
+
 def test_game_of_this_package_outranks_one_of_the_same_name(scene: Path) -> None:
     assert type(rules_of(load("landing"))) is Landing
 
@@ -104,7 +116,7 @@ def test_unknown_game_is_refused_with_all_names(scene: Path) -> None:
         loads(SCENE.replace("count-bounces", "count"))
     (fault,) = caught.value.faults
     assert (fault.line, fault.path) == (4, "play.game")
-    assert fault.message.endswith("'curling', 'landing', 'broken' or 'count-bounces', is \"count\"")
+    assert fault.message.endswith("'curling', 'landing', 'broken', 'count-bounces' or 'tabled', is \"count\"")
 
 
 def test_unknown_game_is_refused_without_other_packages() -> None:

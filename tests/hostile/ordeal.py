@@ -16,8 +16,8 @@ from pydantic import ValidationError
 from sandbox.action import ActionError, Force, Impulse, Move, Remove, SetParameter, Spawn
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import UnknownEngineError, start
-from sandbox.measure.recorder import TooLargeError
-from sandbox.measure.run import run
+from sandbox.measure.run.recorder import TooLargeError
+from sandbox.measure.run.runner import run
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import from_document, loads
 from sandbox.scene.description.discs import Ball

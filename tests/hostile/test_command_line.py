@@ -5,7 +5,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from ordeal import WAYS
+
+from tests.hostile.ordeal import WAYS
+
+pytestmark = pytest.mark.full  # fuzzing and inputs at the ends of their ranges
 
 SCENE = """
 [world]

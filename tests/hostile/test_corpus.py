@@ -1,12 +1,12 @@
 """The corpus: every case that once broke, run in an isolated process. `tools/fuzzing` says what a case file holds."""
 
-import sys
 from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
-from fuzzing.isolated import Case, Limits, run_cases
+from tools.fuzzing.isolated import Case, Limits, run_cases
+
+pytestmark = pytest.mark.full  # fuzzing and inputs at the ends of their ranges
 
 CORPUS = sorted((Path(__file__).parent / "corpus").glob("*.json"))
 SHARDS = 4

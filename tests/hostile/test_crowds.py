@@ -1,7 +1,8 @@
 """Crowds: what takes pymunk minutes, or for ever, if it is let. Each ends in a reason, or in a few seconds."""
 
 import pytest
-from ordeal import WAYS, endure
+
+from tests.hostile.ordeal import WAYS, endure
 
 pytestmark = pytest.mark.slow  # crowds take their time
 

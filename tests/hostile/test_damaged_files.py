@@ -1,13 +1,11 @@
 """Damaged files, bounded: files of every kind through the commands that read them, in isolated processes."""
 
-import sys
-from pathlib import Path
-
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
-from fuzzing.damaged_files import KINDS, argument, file_cases
-from fuzzing.isolated import Case, Limits, run_cases
+from tools.fuzzing.damaged_files import KINDS, argument, file_cases
+from tools.fuzzing.isolated import Case, Limits, run_cases
+
+pytestmark = pytest.mark.full  # fuzzing and inputs at the ends of their ranges
 
 
 def failures(cases: list[Case], workers: int = 1) -> list[str]:
@@ -24,7 +22,7 @@ def test_sound_files_are_read_by_every_command() -> None:
     quick = {"plot", "other", "again", "png", "gif"}  # the others take seconds of compiling and drawing
     cases = [
         Case(
-            "fuzzing.damaged_files:read_damaged",
+            "tools.fuzzing.damaged_files:read_damaged",
             {"file": name, "damage": [], "commands": [each for each in kind.commands if each not in quick]},
             name,
         )

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import strategies
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -12,6 +11,7 @@ from sandbox.engines.contract import Divergence, Exhaustion
 from sandbox.engines.switching import SwitchableSimulation, start
 from sandbox.scene.description.forces import PlungerDrive
 from sandbox.scene.files.load import from_document
+from tests import strategies
 
 pytestmark = pytest.mark.slow  # some 30 s together
 

@@ -1,7 +1,10 @@
 """Extremes: scenes at the edge of what may be written. They run, diverge with a reason, or are refused."""
 
 import pytest
-from ordeal import WAYS, endure
+
+from tests.hostile.ordeal import WAYS, endure
+
+pytestmark = pytest.mark.full  # fuzzing and inputs at the ends of their ranges
 
 CASES: dict[str, tuple[str, str]] = {
     "radius 1e-9 beside 1e9": (

@@ -3,7 +3,10 @@
 from typing import Any
 
 import pytest
-from ordeal import WAYS, endure
+
+from tests.hostile.ordeal import WAYS, endure
+
+pytestmark = pytest.mark.full  # fuzzing and inputs at the ends of their ranges
 
 SCENE = """
 PAIR = [{"between": ["m", "m"], "restitution": 0.5, "friction": 0.5}]

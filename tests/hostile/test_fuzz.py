@@ -1,17 +1,16 @@
 """Fuzzing, bounded: mutants of the shipped scenes on every engine, in isolated processes."""
 
-import sys
 from collections.abc import Iterable
-from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tools"))
-from fuzzing.isolated import Case, Limits, Outcome, run_cases
-from fuzzing.scene_mutants import argument, scene_cases
+from tools.fuzzing.isolated import Case, Limits, Outcome, run_cases
+from tools.fuzzing.scene_mutants import argument, scene_cases
+
+pytestmark = pytest.mark.full  # fuzzing and inputs at the ends of their ranges
 
 SEED = 1
-"""The same mutants every time; `tools/fuzz.py` draws others by hand."""
+"""The same mutants every time; `python -m tools.fuzzing` draws others by hand."""
 
 
 def outcomes(cases: Iterable[Case], limits: Limits | None = None) -> list[Outcome]:
@@ -56,19 +55,19 @@ def test_a_mutant_is_determined_by_seed_and_number() -> None:
     ],
 )
 def test_outcome_of_a_case_says_how_it_ended(name: str, kind: str, what: str) -> None:
-    outcome = outcomes([Case(f"fuzzing.samples:{name}", 1)], Limits(cpu=1.0, memory=2**30))[0]
+    outcome = outcomes([Case(f"tools.fuzzing.samples:{name}", 1)], Limits(cpu=1.0, memory=2**30))[0]
     assert (outcome.kind, outcome.what) == (kind, what)
 
 
 def test_cases_after_one_that_died_are_run() -> None:
     names = ("passes", "aborts", "passes", "raises", "refuses")
-    found = outcomes(Case(f"fuzzing.samples:{name}", 1) for name in names)
+    found = outcomes(Case(f"tools.fuzzing.samples:{name}", 1) for name in names)
     assert [outcome.kind for outcome in found] == ["ok", "abort", "ok", "traceback", "refused"]
 
 
 def test_closing_the_iterator_ends_the_workers() -> None:
     found = run_cases(
-        (Case(f"fuzzing.samples:{name}", 1) for name in ("passes", "waits", "waits")), Limits(), workers=2
+        (Case(f"tools.fuzzing.samples:{name}", 1) for name in ("passes", "waits", "waits")), Limits(), workers=2
     )
     assert next(found)[1].kind == "ok"
     found.close()  # type: ignore[attr-defined]

@@ -1,6 +1,10 @@
 """A simulation's life: started, shared, copied, ended, and used after its end."""
 
-from ordeal import WAYS, endure
+import pytest
+
+from tests.hostile.ordeal import WAYS, endure
+
+pytestmark = pytest.mark.full  # fuzzing and inputs at the ends of their ranges
 
 SETTING = """
 def pile(**world):

@@ -1,6 +1,5 @@
 """Hostile values of every option and argument of every command: one bounded line and status 2, never a traceback."""
 
-import importlib
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,7 +8,9 @@ from typing import Any
 import click
 import pytest
 
-from sandbox.cli.main import COMMANDS, call
+from sandbox.cli.main import COMMANDS, call, cli
+
+pytestmark = pytest.mark.full  # fuzzing and inputs at the ends of their ranges
 
 LONG = 10**6
 """Characters of a long value."""
@@ -42,7 +43,7 @@ PATHS = (
 
 def commands() -> dict[str, click.Command]:
     """Return every command by name."""
-    return {name: importlib.import_module(f"sandbox.cli.{name}").command for name in COMMANDS}
+    return {name: cli.get_command(click.Context(cli), name) for name in COMMANDS}
 
 
 def values_for(parameter: click.Parameter) -> tuple[str, ...]:

@@ -8,11 +8,13 @@ from typing import Any
 import pytest
 
 from sandbox.cli.main import call
-from sandbox.measure.replay import rerun
+from sandbox.measure.run.sessions import rerun
 from sandbox.recording import Recording
 from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.playback.session import Session
+
+pytestmark = pytest.mark.full  # fuzzing and inputs at the ends of their ranges
 
 Document = dict[str, Any]
 

@@ -1,7 +1,10 @@
 """Hostile solids, joints and forces: they run, diverge with a reason, or are refused; the process lives."""
 
 import pytest
-from ordeal import WAYS, endure
+
+from tests.hostile.ordeal import WAYS, endure
+
+pytestmark = pytest.mark.full  # fuzzing and inputs at the ends of their ranges
 
 CASES: dict[str, tuple[str, str]] = {
     "a pin of a body to itself": ('dict(ball=two, joint=[dict(kind="pin", between=["a", "a"])])', "SceneError"),

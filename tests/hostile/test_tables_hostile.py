@@ -13,10 +13,12 @@ from sandbox.action import Action, ActionError, Drive, Impulse, Remove, Reshape,
 from sandbox.engines.common.energy_balance import total_energy
 from sandbox.engines.contract import Divergence
 from sandbox.engines.switching import SwitchableSimulation, start
-from sandbox.measure.replay import rerun
+from sandbox.measure.run.sessions import rerun
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document
 from sandbox.window.playback.session import Session
+
+pytestmark = pytest.mark.full  # fuzzing and inputs at the ends of their ranges
 
 STEPS = 40
 LAYERS = (["ground"], ["ramp"], ["ground", "ramp"])

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from ways import HARD, INTEGRATORS, SOFT, Way, drop, named
 
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.energy import energies
+from sandbox.measure.metrics.energy import energies
 from sandbox.scene.files.load import from_document
+from tests.laws.ways import HARD, INTEGRATORS, SOFT, Way, drop, named
 
 G = 9.81
 FIRST_ORDER = {"explicit_euler": 0.5, "semi_implicit_euler": -0.5}
@@ -58,6 +58,7 @@ def test_bounce_from_5_m(way):
     assert first == pytest.approx(1.0096376, abs=5e-8 if way.engine == "exact" else 2 * h)  # eight digits are given
 
 
+@pytest.mark.full
 @named(HARD)
 def test_elastic_ball_for_100_s(way):
     """Case 8. What a scheme does to energy, each in its own band."""

@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 
 from sandbox.engines.tabletop.collisions import HAN2005, MATHAVAN2010, SIMPLE, Five, collide_cushion
 
+pytestmark = pytest.mark.full  # property tests with many examples
+
 R = 0.03
 
 shares = st.floats(0.0, 1.0)

@@ -1,4 +1,4 @@
-"""Two engines, one law: pymunk's balls on a floor go as the exact ones do, until chaos, whatever the models."""
+"""One law on every engine: balls on a surface move as on `exact`, until chaos, with every collision model."""
 
 import math
 from typing import Any
@@ -8,9 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 R = 0.0285
 CORNERS = [[0.0, 0.0], [1.0, 0.0], [1.0, 2.0], [0.0, 2.0]]
@@ -34,13 +36,14 @@ def shot(ball_ball: str, cushion: str, aim: float, **more: Any) -> Scene:
     return from_document(document)
 
 
+@pytest.mark.parametrize("engine", ["pymunk", "reference"])
 @pytest.mark.parametrize("cushion", ["simple", "han2005", "mathavan2010"])
 @pytest.mark.parametrize("ball_ball", ["elastic", "frictional"])
 @settings(max_examples=6, deadline=None)
 @given(aim=st.floats(0.0, 6.28), speed=st.floats(0.5, 1.5), side=offsets, height=offsets)
-def test_engines_agree_over_the_first_hits(ball_ball: str, cushion: str, aim: float, **how: float) -> None:
+def test_engines_agree_over_the_first_hits(engine: str, ball_ball: str, cushion: str, aim: float, **how: float) -> None:
     scene = shot(ball_ball, cushion, aim, **how)
-    exact, native = run(scene, "exact", account=True), run(scene, "pymunk", account=True)
+    exact, native = run(scene, "exact", account=True), run(scene, engine, account=True)
     # m: both take each hit at its own time, so that only rounding is left, which a hit of balls grows tenfold
     assert np.abs(exact.position - native.position).max() < 1e-8
     for trajectory in (exact, native):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from ways import HARD, SOFT, Way, named, pair
+
+from tests.laws.ways import HARD, SOFT, Way, named, pair
 
 ROUNDING = 1e-11  # 60 roundings of 1e-16, amplified by mass ratios up to 1e3
 speeds = st.floats(0.2, 3.0)

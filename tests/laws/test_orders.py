@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from ways import INTEGRATORS, Way, drop
 
 from sandbox.engines.reference.integrators import INTEGRATORS as TABLE
-from sandbox.measure.closed_form import bounces
-from sandbox.measure.compare.closed import solved
+from sandbox.measure.analytic import bounces
+from sandbox.measure.analytic.trajectory import solved_run
 from sandbox.scene.files.load import from_document
+from tests.laws.ways import INTEGRATORS, Way, drop
 
 STEPS = np.array([0.04, 0.02, 0.01, 0.005])
 
@@ -115,7 +115,7 @@ def test_springs_orbits_and_pendulums_converge_to_their_closed_forms(document, w
     """The largest error of any frame: at a single one, errors of different sign may cancel."""
     scene, errors = from_document(document), []
     for dt in STEPS / 2.0:
-        truth = solved(scene, scene.solver.replace(dt=float(dt)))
+        truth = solved_run(scene, scene.solver.replace(dt=float(dt)))
         done = way.run(scene, dt=float(dt))
         errors.append(np.hypot(*(done.position - truth.position)[:, 0].T).max())
     assert fitted(errors) == pytest.approx(order, abs=0.2)  # a fit over three halvings

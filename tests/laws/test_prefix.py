@@ -8,14 +8,16 @@ from sandbox.action import Impulse, Spawn
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import ENGINES
 from sandbox.engines.switching import SwitchableSimulation, start
-from sandbox.measure.replay import rerun
+from sandbox.measure.run.sessions import rerun
 from sandbox.recording import Recording
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.bodies import Box
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import load, loads
 from sandbox.scene.files.shipped_scenes import find, shipped
-from sandbox.scene.scene import Scene
 from sandbox.window.playback.session import Session
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 LONG = 1000.0
 """s; far longer than any scene runs by itself"""

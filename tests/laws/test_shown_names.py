@@ -4,12 +4,12 @@ import re
 
 import pytest
 
-from sandbox.measure.forecast import notes, warnings
+from sandbox.measure.preflight import notes, warnings
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import path_of
 from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import loads
 from sandbox.scene.files.overrides import AddressError, assign, parse_assignment
-from sandbox.scene.scene import Scene
 
 UNNAMED = """
 [world]

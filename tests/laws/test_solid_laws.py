@@ -4,9 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from ways import Way, named
 
 from sandbox.scene.files.load import from_document
+from tests.laws.ways import Way, named
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 G = 9.81
 SOLID = [

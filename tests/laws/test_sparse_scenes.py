@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from features import BODIES, FEATURES, JOINTS, document
 
 from sandbox.action import (
     ActionError,
@@ -22,9 +21,10 @@ from sandbox.action import (
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal, Simulation
 from sandbox.engines.registry import ENGINES, start
 from sandbox.engines.switching import SwitchableSimulation
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import dumps, from_document, loads
-from sandbox.scene.scene import Scene
+from tests.laws.features import BODIES, FEATURES, JOINTS, document
 
 pytestmark = pytest.mark.slow  # some 45 s together
 

@@ -5,10 +5,12 @@ import math
 import numpy as np
 import pytest
 from scipy.special import ellipk
-from ways import Way, named
 
-from sandbox.measure.energy import energies
+from sandbox.measure.metrics.energy import energies
 from sandbox.scene.files.load import from_document
+from tests.laws.ways import Way, named
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 G = 9.81
 PYMUNK, PLAIN = Way("pymunk", {}), Way("reference", {})

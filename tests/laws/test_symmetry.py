@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from ways import HARD, SOFT, named
 
 from sandbox.scene.files.load import from_document
+from tests.laws.ways import HARD, SOFT, named
 
 SHIFT = 1e-12  # m and m/s: roundings of 1e-16 that one impact in four balls amplifies by less than 1e3
 

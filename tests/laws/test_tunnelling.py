@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from sandbox.measure.forecast.passages import passages
-from sandbox.measure.run import run
+from sandbox.measure.preflight.tunnelling import tunnelling_risks
+from sandbox.measure.run.runner import run
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
-from sandbox.scene.scene import Scene
 
 BULLETS = 2500
 RADIUS, THICK, SPEED = 0.01, 0.02, 100.0
@@ -28,7 +28,7 @@ def salvo(ratio: float) -> Scene:
 @pytest.mark.parametrize("ratio", [0.9, 1.1, 1.5, 3.0, 10.0])
 def test_share_that_passes_is_what_is_forecast(ratio: float, engine: str) -> None:
     scene = salvo(ratio)
-    (forecast,) = passages(scene)
+    (forecast,) = tunnelling_risks(scene)
     done = run(scene, engine, audit=False)
     assert done.status == "ok"
     passed = float(np.mean(done.position[-1, :, 0] > WALL))

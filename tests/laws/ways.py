@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from sandbox.engines.registry import ENGINES, start
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 

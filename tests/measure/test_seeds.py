@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sandbox.measure.seeds import is_random, same_chances, seeded
+from sandbox.measure.seeds import is_random, same_random_state, with_seed
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import loads
@@ -26,17 +26,17 @@ def test_scene_without_chances_is_none() -> None:
 @pytest.mark.parametrize("kind", HEADS)
 def test_scene_with_chances_is_random_and_its_seeds_differ(kind: str) -> None:
     scene = loads(HEADS[kind])
-    other = seeded(scene, 7)
+    other = with_seed(scene, 7)
     assert is_random(scene)
     assert other.world.seed == 7
-    assert not same_chances(scene, other)
-    assert same_chances(scene, seeded(other, scene.world.seed))
+    assert not same_random_state(scene, other)
+    assert same_random_state(scene, with_seed(other, scene.world.seed))
     assert np.array_equal(scene.bodies.mass, other.bodies.mass)
 
 
 def test_only_the_seed_is_another() -> None:
     scene = loads("[world]\nduration = 2.0\n" + HEADS["place"])
-    mine, its = to_document(scene), to_document(seeded(scene, 5))
+    mine, its = to_document(scene), to_document(with_seed(scene, 5))
     assert its.pop("world") == {**mine.pop("world"), "seed": 5}
     assert mine == its
 
@@ -47,4 +47,4 @@ def test_seed_at_the_end_of_its_range_is_no_trap() -> None:
 
 def test_seed_out_of_range_is_a_fault() -> None:
     with pytest.raises(SceneError, match="seed"):
-        seeded(loads(PLAIN), -1)
+        with_seed(loads(PLAIN), -1)

@@ -7,12 +7,14 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sandbox.report.colours import COLOURS
-from sandbox.report.plots import draw_run, format_of, plot_run
+from sandbox.report.run_plot import draw_run, format_of, plot_run
+from sandbox.report.style import COLOURS
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import loads
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 HEAD = 'title = "Trial"\n[world]\ngravity = [0.0, -10.0]\n[solver]\ndt = 0.1\n'
 GROUND = "[[plane]]\npoint = [0.0, 0.0]\nnormal = [0.0, 1.0]\n"

@@ -7,10 +7,9 @@ import pytest
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
-from sandbox.measure.shots.attempt import attempt_of
-from sandbox.measure.shots.spread import Spread
-from sandbox.measure.shots.study import Study, study
-from sandbox.report.shots import draw_aims, draw_rests, plot_shots
+from sandbox.games.billiards.shots.shot import Spread, shot_setup
+from sandbox.games.billiards.shots.study import ShotStudy, study_shot
+from sandbox.report.shots_plot import draw_aims, draw_rests, plot_shots
 from sandbox.scene.files.load import loads
 
 FLOOR = "[surface]\nsliding_friction = 0.2\nrolling_friction = 0.01\nspinning_friction = 0.01\n"
@@ -21,9 +20,9 @@ HOLE = '[[pocket]]\nname = "hole"\nposition = [1.2, 0]\nradius = 0.06\n'
 SHOT = "[[shot]]\naim = 0\nspeed = 2\n"
 
 
-def asked(*parts: str, pots: tuple[tuple[str, str], ...] = ()) -> Study:
-    attempt = attempt_of(loads(FLOOR + "".join(parts) + SHOT))
-    return study(attempt, Spread(0.005, 0.05), count=300, pots=pots)
+def asked(*parts: str, pots: tuple[tuple[str, str], ...] = ()) -> ShotStudy:
+    attempt = shot_setup(loads(FLOOR + "".join(parts) + SHOT))
+    return study_shot(attempt, Spread(0.005, 0.05), count=300, pots=pots)
 
 
 def meshes(figure: Figure) -> list[QuadMesh]:
@@ -33,7 +32,7 @@ def meshes(figure: Figure) -> list[QuadMesh]:
 def test_every_ball_that_stays_has_its_field() -> None:
     found = asked(WALLS, CUE, OBJECT, HOLE)
     maps = meshes(draw_rests(found.odds))[:2]
-    stayed = found.odds.fan.pocket < 0
+    stayed = found.odds.batch.pocket < 0
     counts = [int(np.ma.filled(np.ma.asarray(each.get_array()), 0.0).sum()) for each in maps]
     assert counts == [int(stayed[:, k].sum()) for k in (0, 1)]
     assert 0 < counts[1] < 300

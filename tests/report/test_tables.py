@@ -9,9 +9,9 @@ import pyarrow.parquet as parquet
 import pytest
 
 from sandbox.action import Remove, Spawn
-from sandbox.measure.run import run
-from sandbox.report import tables
-from sandbox.report.tables import CONTACTS, STATES, MissingExtraError, write_contacts, write_states
+from sandbox.measure.run.runner import run
+from sandbox.report import table_export as tables
+from sandbox.report.table_export import CONTACTS, STATES, MissingExtraError, write_contacts, write_states
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory

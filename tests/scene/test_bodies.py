@@ -4,15 +4,15 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import strategies
 from hypothesis import given, settings
 
 from sandbox.scene.compile.generators import size
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.discs import Ball, Emitter, Grid, Scatter
 from sandbox.scene.files.load import loads
-from sandbox.scene.geometry.shapes import form_of
-from sandbox.scene.scene import Scene
+from sandbox.scene.geometry.shapes import geometry_of
+from tests import strategies
 
 SCENE = """
 [[emitter]]
@@ -66,9 +66,9 @@ def test_bodies_are_numbered_balls_grids_scatters_emitters() -> None:
 
 def test_mass_is_stated_or_from_the_density_or_one() -> None:
     at = {"position": (0.0, 0.0), "radius": 3.0}
-    assert form_of(Ball(**at, mass=2.5)).mass == 2.5
-    assert form_of(Ball(**at, density=2.0)).mass == 2.0 * math.pi * 9.0
-    assert form_of(Ball(**at)).mass == 1.0
+    assert geometry_of(Ball(**at, mass=2.5)).mass == 2.5
+    assert geometry_of(Ball(**at, density=2.0)).mass == 2.0 * math.pi * 9.0
+    assert geometry_of(Ball(**at)).mass == 1.0
 
 
 def test_moment_is_that_of_a_disc() -> None:

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from sandbox.engines.registry import start
 from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import dumps, from_document, load, loads
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.scene.scene import Scene
 
 CLOTH = {"corner": [1.0, 2.0], "columns": 4, "rows": 3, "spacing": [0.5, 0.25], "stiffness": 100.0, "damping": 0.1}
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from touching import balls_meet, coefficient, elements, is_fixed, meets_fixed_things, touching_scenes
 
 from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import Plane, Post, Wall
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
+from tests.scene.touching import balls_meet, coefficient, elements, is_fixed, meets_fixed_things, touching_scenes
 
 
 @settings(max_examples=200)

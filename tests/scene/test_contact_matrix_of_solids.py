@@ -2,13 +2,13 @@
 
 from typing import Any
 
-import strategies
 from hypothesis import given, settings
 
 from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Plane
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
+from tests import strategies
 
 BOX: dict[str, Any] = {"position": [0, 0], "size": [1, 1]}
 BALL: dict[str, Any] = {"position": [9, 0], "radius": 1}

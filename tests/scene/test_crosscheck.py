@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sandbox.scene.compile.start_state import start_bodies
+from sandbox.scene.compile.scene import start_bodies
 from sandbox.scene.description.fixed import Plane
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import from_document, loads
@@ -71,7 +71,9 @@ def test_material_is_declared_once() -> None:
 
 
 def test_material_and_body_may_share_a_name() -> None:
-    from_document({"material": [{"name": "a"}], "ball": [{**BALL, "name": "a", "material": "a"}]})
+    scene = from_document({"material": [{"name": "a"}], "ball": [{**BALL, "name": "a", "material": "a"}]})
+    assert scene.bodies.names == ("a",)
+    assert [material.name for material in scene.materials] == ["a"]
 
 
 def test_names_are_unique_over_bodies_and_fixed_things() -> None:
@@ -119,7 +121,8 @@ def test_normal_without_direction_is_refused(normal: list[float]) -> None:
 
 @pytest.mark.parametrize("normal", [[0, 1e-100], [1e100, 0], [-3, 4], [1e-90, -1e-90]])
 def test_normal_of_any_other_length_is_taken(normal: list[float]) -> None:
-    from_document({"plane": [{"point": [0, 0], "normal": normal}], "ball": [BALL]})
+    scene = from_document({"plane": [{"point": [0, 0], "normal": normal}], "ball": [BALL]})
+    assert scene.planes[0].normal == tuple(normal)
 
 
 def test_wall_of_zero_length_segments_is_refused_where_it_doubles_back() -> None:
@@ -141,7 +144,9 @@ def test_closed_wall_of_two_points_is_refused() -> None:
 @pytest.mark.parametrize("normal", [[0, 1], [0, 1e-50], [0, 3e50]])
 @pytest.mark.parametrize("depth", [999.9, 1000.0])
 def test_centre_less_than_a_kilometre_behind_a_plane_is_taken(depth: float, normal: list[float]) -> None:
-    from_document({"plane": [{"point": [5, 2], "normal": normal}], "ball": [{**BALL, "position": [0, 2 - depth]}]})
+    ball = {**BALL, "position": [0, 2 - depth]}
+    scene = from_document({"plane": [{"point": [5, 2], "normal": normal}], "ball": [ball]})
+    assert scene.bodies.position.tolist() == [[0.0, 2 - depth]]
 
 
 @pytest.mark.parametrize("normal", [[0, 1], [0, 1e-50], [0, 3e50]])
@@ -200,7 +205,8 @@ def test_million_balls_in_one_spot_are_refused() -> None:
 
 @pytest.mark.parametrize("collides", ["none", "fixed"])
 def test_any_number_of_balls_in_one_spot_may_pass_through_each_other(collides: str) -> None:
-    from_document({"grid": [{**GRID, "columns": 1000, "spacing": [0, 0], "collides": collides}]})
+    scene = from_document({"grid": [{**GRID, "columns": 1000, "spacing": [0, 0], "collides": collides}]})
+    assert len(scene.bodies) == 1000
 
 
 def test_overlaps_are_taken_up_to_their_number_and_refused_beyond() -> None:

@@ -3,12 +3,12 @@
 from typing import Any
 
 import pytest
-import strategies
 from hypothesis import given, settings
 
 from sandbox.scene.compile.demands import Demand, Item, bill, demands, unmodelled
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
+from tests import strategies
 
 BALL: dict[str, Any] = {"position": [0.0, 0.0], "radius": 1.0}
 ROCK: dict[str, Any] = {**BALL, "fixed": True}

@@ -27,7 +27,7 @@ def faults(document: dict[str, Any]) -> list[str]:
         ({}, {**TORQUE, "body": "car"}, "drive[0].body: no body is named 'car'"),
         ({"fixed": True}, TORQUE, "drive[0].body: 'bar' is fixed"),
         ({"velocity": [1, 0]}, PLUNGER, "drive[0].body: 'bar' has an initial velocity"),
-        ({"angle": 2}, STROKE, "drive[0].stops: 'bar' starts at 2 rad; the angle must be between 0 and 1 rad"),
+        ({"angle": 2}, STROKE, "drive[0].stops: 'bar' starts at 2 rad"),
         ({}, {**STROKE, "stops": [1, 1]}, "drive[0].stops: must be two different angles"),
         ({}, {**PLUNGER, "direction": [0, 0]}, "drive[0].direction: [0.0, 0.0] has no direction"),
         # 1 kg at 1 m
@@ -42,7 +42,7 @@ def test_fault_of_a_drive_is_told(box: dict[str, Any], drive: dict[str, Any], to
 def test_body_has_one_drive_and_no_thrust() -> None:
     thrust = {"body": "bar", "force": [1, 0]}
     found = faults({"box": [BOX], "drive": [{**TORQUE, "name": "a"}, {**STROKE, "name": "a"}], "thrust": [thrust]})
-    assert "drive.a.name: another drive is also named 'a'; names must be unique" in found
+    assert any(each.startswith("drive.a.name: another drive is also named 'a'") for each in found)
     assert sum("already has a drive" in each for each in found) == 1
     assert sum("has a thrust" in each for each in found) == 2
 
@@ -50,7 +50,7 @@ def test_body_has_one_drive_and_no_thrust() -> None:
 def test_one_of_many_bodies_has_no_drive() -> None:
     grid = {"name": "g", "origin": [0, 0], "spacing": [3, 3], "columns": 2, "rows": 1, "radius": 1}
     (found,) = faults({"grid": [grid], "drive": [{**PLUNGER, "body": "g-1"}]})
-    assert found == "drive[0].body: 'g-1' is made by a generator; a drive needs a body with a table of its own"
+    assert found.startswith("drive[0].body: 'g-1' is made by a generator")
 
 
 def test_fault_in_a_figure_names_line_and_range() -> None:

@@ -4,12 +4,12 @@ import random
 from typing import Any
 
 import pytest
-import strategies
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sandbox.scene.errors import Fault, Lines, SceneError, path_of
 from sandbox.scene.files.load import loads
+from tests import strategies
 
 
 @given(strategies.rendered())

@@ -1,19 +1,24 @@
 """Reading and writing scene files: whatever comes in, a Scene or a SceneError comes out."""
 
 import random
+import sys
 import tomllib
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import pytest
-import strategies
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+import sandbox
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import dumps, from_document, load, loads
-from sandbox.scene.scene import Scene
+from tests import strategies
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
 KEYS = sorted(
@@ -290,3 +295,22 @@ def test_any_override_gives_a_scene_or_a_scene_error(key: str, value: str) -> No
         assert isinstance(loads(BALL, overrides=[f"{key}={value}"]), Scene)
     except SceneError as error:
         assert error.faults
+
+
+def test_loading_a_small_scene_calls_few_modules() -> None:
+    package = str(Path(sandbox.__file__).parent)
+    called: set[str] = set()
+
+    def note(frame: FrameType, event: str, _: object) -> None:
+        if event == "call" and frame.f_code.co_filename.startswith(package):
+            called.add(frame.f_code.co_filename)
+
+    load("bounce")  # imports modules, and builds the validator
+    before = sys.getprofile()
+    sys.setprofile(note)
+    try:
+        load("bounce")
+    finally:
+        sys.setprofile(before)
+    assert any(path.endswith("load.py") for path in called)
+    assert len(called) <= 12, sorted(called)

@@ -11,13 +11,13 @@ from pydantic import ValidationError
 from sandbox.games.artillery.scene import Artillery, Terrain
 from sandbox.games.billiards.tables import Billiards
 from sandbox.games.curling.scene import CurlingMatch
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.game_tables import GAME_TABLES, PRESETS, game_table, lazy_table, table_of
 from sandbox.scene.description.play import Play
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import dumps, from_document, load, loads
 from sandbox.scene.files.presets import Preset
-from sandbox.scene.scene import Scene
 
 LOADED = """
 import sys
@@ -43,7 +43,7 @@ def test_scene_imports_only_the_games_of_its_tables(scene: str, folders: set[str
     done = subprocess.run(
         [sys.executable, "-c", LOADED, scene], capture_output=True, text=True, check=True, timeout=120
     )
-    modules = set(done.stdout.split()) - {"sandbox.games.names", "sandbox.games.spec"}
+    modules = set(done.stdout.split()) - {"sandbox.game_names"}
     assert {module.split(".")[2] for module in modules if module.count(".") > 2} == folders  # of the others, the spec
     assert not [module for module in modules if module.endswith(("rules", "bot", "hand", "registry"))]
 

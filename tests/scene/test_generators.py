@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.scene.compile.generators import GeneratorError, expand, lifetimes, size
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Emitter, Grid, Scatter
 from sandbox.scene.description.world import World
-from sandbox.scene.scene import Scene
 from sandbox.scene.validate.scene import crosscheck
 
 GRID = Grid(origin=(1.0, 2.0), columns=3, rows=2, spacing=(0.5, -4.0), radius=0.1)

@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
-import strategies
 from hypothesis import given, settings
 
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
+from tests import strategies
 
 L = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]
 

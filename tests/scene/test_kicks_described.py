@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from sandbox.measure.forecast import warnings
+from sandbox.measure.preflight import warnings
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import from_document, loads
@@ -103,7 +103,7 @@ def test_warning_where_gravity_alone_makes_a_hit() -> None:
 
 
 def test_forecast_of_speed_counts_kicks_in() -> None:
-    from sandbox.measure.forecast import top_speeds
+    from sandbox.measure.preflight import top_speeds
 
     def fastest(**wall: Any) -> float:
         scene = from_document({"ball": [BALL], "wall": [{**WALL, **wall}], "world": {"duration": 1}})
@@ -117,7 +117,7 @@ def test_forecast_of_speed_counts_kicks_in() -> None:
 
 
 def test_no_closed_form_is_claimed_where_restitution_falls_off() -> None:
-    from sandbox.measure.closed_form import solution
+    from sandbox.measure.analytic import solution
 
     plane = {"point": [0, 0], "normal": [0, 1], "restitution": 0.5}
     drop = {"world": {"gravity": [0, -9.81], "duration": 3}, "ball": [{**BALL, "position": [0, 5]}], "plane": [plane]}
@@ -129,9 +129,9 @@ def test_no_closed_form_is_claimed_where_restitution_falls_off() -> None:
 
 
 def test_energy_is_not_kept_where_restitution_falls_off_or_something_kicks() -> None:
-    from sandbox.measure.tradeoff.aim import keeps_energy
+    from sandbox.measure.tradeoff.objective import conserves_energy
 
     elastic = {**BALL, "restitution": 1}
-    assert keeps_energy(from_document({"ball": [elastic], "post": [POST]}))
-    assert not keeps_energy(from_document({"ball": [{**elastic, "restitution_falloff": 0.1}], "post": [POST]}))
-    assert not keeps_energy(from_document({"ball": [elastic], "post": [{**POST, "kick": {"speed": 1}}]}))
+    assert conserves_energy(from_document({"ball": [elastic], "post": [POST]}))
+    assert not conserves_energy(from_document({"ball": [{**elastic, "restitution_falloff": 0.1}], "post": [POST]}))
+    assert not conserves_energy(from_document({"ball": [elastic], "post": [{**POST, "kick": {"speed": 1}}]}))

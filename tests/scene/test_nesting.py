@@ -8,14 +8,16 @@ from typing import Any
 import pytest
 
 from sandbox.action import ActionError, actions_from_json
-from sandbox.batch.plan import parse_sweep
+from sandbox.batch.sweep import parse_sweep
 from sandbox.games.high_scores import HighScores
 from sandbox.recording import FORMAT, Recording
 from sandbox.scene.errors import SceneError
+from sandbox.scene.files.document import MAX_DEPTH, NestingError, check_text, check_value
 from sandbox.scene.files.load import from_document, loads
-from sandbox.scene.files.nesting import MAX_DEPTH, NestingError, check_text, check_value
 from sandbox.scene.files.overrides import AddressError, parse_assignment, parse_path
 from sandbox.scene.files.shipped_scenes import scenes_in
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 BALL: dict[str, Any] = {"ball": [{"position": [0, 1], "radius": 0.5}]}
 

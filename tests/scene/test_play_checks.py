@@ -37,9 +37,9 @@ def test_what_is_there_can_be_claimed(play: dict[str, Any]) -> None:
 @pytest.mark.parametrize(
     ("play", "path", "words"),
     [
-        ({"arrows": "zzz"}, "play.arrows", "no body is named 'zzz'; known names: 'a.b', 'ball-2', 'grid-1-1'"),
+        ({"arrows": "zzz"}, "play.arrows", "no body is named 'zzz'"),
         ({"arrows": "s"}, "play.arrows", "no body"),
-        ({"relaunch": "a.b"}, "play.relaunch", "no generator is named 'a.b'; known names: 'grid-1'"),
+        ({"relaunch": "a.b"}, "play.relaunch", "no generator is named 'a.b'"),
         ({"relaunch": "emitter-2"}, "play.relaunch", "no generator"),
         ({"arrow_step": 0}, "play.arrow_step", "greater than 0"),
         ({"show": "all"}, "play.show", "overlap"),

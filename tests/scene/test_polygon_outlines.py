@@ -83,17 +83,16 @@ def test_sound_outline_has_no_fault(points: tuple[Point, ...]) -> None:
 
 def test_corner_on_its_neighbour_is_a_fault() -> None:
     fault = outline_fault(((0.0, 0.0), (1.0, 0.0), (1.0, 1e-10), (0.0, 1.0)))
-    assert fault == (
-        2,
-        "points[1] and points[2] are 1e-10 m apart; remove one of them, or place them at least 1e-09 m apart",
-    )
+    assert fault is not None
+    assert fault[0] == 2
+    assert all(part in fault[1] for part in ("points[1]", "points[2]", "1e-10 m", "at least 1e-09 m"))
 
 
 def test_outline_that_repeats_its_first_corner_at_the_end_is_a_fault() -> None:
     fault = outline_fault((*SQUARE, SQUARE[0]))
     assert fault is not None
     assert fault[0] == 0
-    assert fault[1].startswith("points[4] and points[0] are 0 m apart; remove one of them")
+    assert fault[1].startswith("points[4] and points[0] are 0 m apart")
 
 
 def test_neighbours_of_a_large_outline_must_be_farther_apart() -> None:
@@ -123,7 +122,9 @@ def test_corner_that_just_misses_an_edge_is_none() -> None:
 
 def test_spike_without_width_is_a_fault_at_its_tip() -> None:
     fault = outline_fault(((0.0, 0.0), (1.0, 0.0), (3.0, 0.0), (1.5, 0.0), (1.0, 1.0)))
-    assert fault == (2, "the outline turns straight back at points[2]; remove that point, or give the spike a width")
+    assert fault is not None
+    assert fault[0] == 2
+    assert "straight back at points[2]" in fault[1]
 
 
 def test_corners_on_one_line_are_a_fault() -> None:
@@ -134,10 +135,9 @@ def test_corners_on_one_line_are_a_fault() -> None:
 
 def test_outline_without_width_is_a_fault_of_no_corner() -> None:
     fault = outline_fault(((0.0, 0.0), (1.0, 0.0), (0.5, 1e-13)))
-    assert fault == (
-        None,
-        "the outline encloses 5e-14 m², too little for its extent of 1 m; give it a width",
-    )
+    assert fault is not None
+    assert fault[0] is None
+    assert "5e-14 m²" in fault[1]
 
 
 @given(grid_points)

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from sandbox.arrays import FloatArray
 from sandbox.engines.registry import start
 from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.generators import segments
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import dumps, from_document, load, loads
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.scene.scene import Scene
 
 MASSES = {
     "head": 6.9, "pelvis": 21.75, "chest": 21.75, "upper-arm": 2.7, "forearm": 1.6, "hand": 0.6, "thigh": 14.2,

@@ -1,4 +1,4 @@
-"""Streams: no two purposes draw the same numbers, whatever the seed and however many elements there are."""
+"""Streams: no two purposes draw the same numbers, for any seed and any number of elements."""
 
 from collections.abc import Iterator
 
@@ -50,6 +50,17 @@ def keys(seed: int, many: int) -> Iterator[list[int]]:
 def test_every_stream_of_a_seed_has_a_key_of_its_own(seed):
     every = [words(key) for key in keys(seed, MANY)]
     assert len(set(every)) == len(every)
+
+
+@pytest.mark.parametrize(
+    "stream", [Stream.COIL, Stream.CURLER, Stream.FLIPPERS, Stream.LANDING, Stream.KEYS, Stream.AIM]
+)
+def test_seed_that_is_the_number_of_a_stream_has_keys_of_its_own(stream):
+    index = () if stream in WITHOUT_INDEX else (0,)
+    others = {words(key_of(stream, seed, *index)) for seed in range(1000)}
+    for generator in (Stream.GRID, Stream.SCATTER, Stream.EMITTER, Stream.STACK):
+        for k in range(1000):
+            assert words(key_of(generator, stream.value, k)) not in others
 
 
 def test_words_are_what_numpy_makes_of_a_key():

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from sandbox.arrays import FloatArray
 from sandbox.engines.registry import start
 from sandbox.scene.compile.joint_arrays import WORLD, LinkKind
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import dumps, from_document, load, loads
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.scene.scene import Scene
 
 ROPE = {"start": [0.0, 0.0], "end": [3.0, 4.0], "links": 5}
 SPRINGS = {"kind": "springs", "stiffness": 200.0}

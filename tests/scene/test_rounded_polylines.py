@@ -30,10 +30,10 @@ def test_arc_touches_both_edges_and_goes_over_into_them_without_a_kink(turn: flo
     assert arc.turn == pytest.approx(turn, abs=SMALL)
     (bx, by), (ex, ey), (cx, cy) = arc.at(0.0), arc.at(1.0), arc.centre
     assert by == pytest.approx(0.0, abs=SMALL)  # it begins on the first edge
-    assert bx == pytest.approx(-arc.reach, abs=SMALL)
+    assert bx == pytest.approx(-arc.tangent_length, abs=SMALL)
     way = math.cos(turn), math.sin(turn)
     assert ex * way[1] - ey * way[0] == pytest.approx(0.0, abs=SMALL)  # and ends on the second
-    assert ex * way[0] + ey * way[1] == pytest.approx(arc.reach, abs=SMALL)
+    assert ex * way[0] + ey * way[1] == pytest.approx(arc.tangent_length, abs=SMALL)
     # there its radius stands square to the edge
     assert bx - cx == pytest.approx(0.0, abs=SMALL)
     assert (ex - cx) * way[0] + (ey - cy) * way[1] == pytest.approx(0.0, abs=SMALL)

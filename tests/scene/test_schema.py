@@ -5,11 +5,11 @@ from typing import Any, get_args
 
 import pytest
 
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Part
 from sandbox.scene.description.game_tables import lazy_table
 from sandbox.scene.files.json_schema import dumps, schema
 from sandbox.scene.files.shipped_scenes import SCHEMA, folder
-from sandbox.scene.scene import Scene
 
 
 @cache

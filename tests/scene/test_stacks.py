@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from sandbox.engines.registry import start
 from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import dumps, from_document, load, loads
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.scene.scene import Scene
 
 PYRAMID = {"base": [1.0, 2.0], "size": [0.4, 0.2], "columns": 4, "rows": 4, "fewer": 1}
 

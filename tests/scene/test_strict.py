@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import from_document, loads
-from sandbox.scene.scene import Scene
 
 BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
 

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import given
-from touching import coefficient, elements, touching_scenes
 
 from sandbox.scene.compile.contacts import mix, pair_table
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
+from tests.scene.touching import coefficient, elements, touching_scenes
 
 
 def of_two(a: dict[str, Any], b: dict[str, Any], **more: Any) -> tuple[float, float]:

@@ -8,13 +8,15 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import Rendered, documents, rendered
 
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files import toml_edit as rewrite
 from sandbox.scene.files.load import load, loads
 from sandbox.scene.files.shipped_scenes import shipped
 from sandbox.scene.files.toml_edit import statements, with_solver, write_solver, written
+from tests.strategies import Rendered, documents, rendered
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 BALL = '[[ball]]\nname = "a"  # it falls\nposition = [0.0, 1.0]\nradius = 0.5\n'
 CHANGES = {"dt": 0.002, "substeps": 4, "iterations": None, "integrator": "rk4"}

@@ -7,10 +7,10 @@ from typing import Any
 
 from hypothesis import strategies as st
 
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import HasMaterial
 from sandbox.scene.description.discs import Ball, Disc
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
 
 FIGURES = [0.0, 0.25, 0.5, 1.0]
 

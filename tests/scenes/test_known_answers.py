@@ -8,11 +8,13 @@ from scipy.special import ellipk
 
 import sandbox
 from sandbox.arrays import FloatArray
-from sandbox.measure.energy import energies
+from sandbox.measure.metrics.energy import energies
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 G = 9.81
 both = pytest.mark.parametrize("engine", ["pymunk", "reference"])

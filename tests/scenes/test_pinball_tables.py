@@ -13,12 +13,14 @@ from shapely import LineString, Point, Polygon, unary_union
 from sandbox.action import Drive, Toggle
 from sandbox.engines.common.restitution import rebound
 from sandbox.engines.registry import start
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import GROUND
 from sandbox.scene.description.forces import PlungerDrive
 from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.scene.scene import Scene
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 TABLES = ("pinball/classic", "pinball/full")
 RADIUS = 0.01349

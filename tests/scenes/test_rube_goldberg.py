@@ -8,6 +8,8 @@ import sandbox
 from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find
 
+pytestmark = pytest.mark.full  # long runs and sweeps
+
 STAGES = [
     ("marble", "domino-1"), ("domino-1", "domino-2"), ("domino-8", "domino-9"), ("domino-9", "pusher"),
     ("pusher", "first beam"), ("runner", "cradle-1"), ("cradle-4", "cradle-5"), ("cradle-5", "third"),

@@ -10,10 +10,12 @@ import pytest
 
 from sandbox.engines.registry import start
 from sandbox.scene.compile.demands import Demand, demands
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import dumps, load, loads
 from sandbox.scene.files.shipped_scenes import SCHEMA, ShippedScene, find, shipped
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 SCENES = shipped()
 G = 9.81

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from sandbox.arrays import FloatArray
-from sandbox.measure.compare.errors import usual_tolerance
-from sandbox.measure.compare.truth import Truth, TruthKind, truth_of
-from sandbox.measure.energy import energies
+from sandbox.measure.compare.ground_truth import Truth, TruthKind, truth_of
+from sandbox.measure.metrics.energy import energies
+from sandbox.measure.metrics.trajectory_error import default_tolerance
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 
 G = 9.81
@@ -234,7 +234,7 @@ CASES = (
 
 def truth_for(case: Case) -> tuple[Scene, Truth]:
     scene = load(find(case.scene), case.overrides)
-    truth = truth_of(scene, scene.solver, usual_tolerance(scene))
+    truth = truth_of(scene, scene.solver, default_tolerance(scene))
     assert truth is not None
     return scene, truth
 

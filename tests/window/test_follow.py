@@ -6,13 +6,15 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
-from pressing import key, key_up, press, release
-from windowed import turned, window_on
 
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.app import App
 from sandbox.window.app_state import AppState
 from sandbox.window.camera import Camera
+from tests.window.pressing import key, key_up, press, release
+from tests.window.windowed import turned, window_on
+
+pytestmark = pytest.mark.full  # every shipped scene
 
 LEAVING = """
 title = "Leaving"

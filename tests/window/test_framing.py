@@ -6,18 +6,20 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import given
-from strategies import scenes
 
 from sandbox.engines.registry import start, usual
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find, shipped
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 from sandbox.window.camera import Camera
 from sandbox.window.hit_test import overlapping_bodies, pick_body
 from sandbox.window.playback.history import MAX_TRAIL_BODIES, TRAIL_LENGTH, Trails
 from sandbox.window.view_bounds import predict_bounds, view_bounds
+from tests.strategies import scenes
+
+pytestmark = pytest.mark.full  # every shipped scene
 
 SHIPPED = [each.name for each in shipped()]
 VIEWED = {each.name for each in shipped() if (play := load(each.path).play).view is not None or play.area is not None}

@@ -8,8 +8,8 @@ import pygame
 import pytest
 
 from sandbox.action import Spawn
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
 from sandbox.window.camera import Camera
 from sandbox.window.hit_test import (

@@ -18,6 +18,8 @@ from sandbox.window.render.text import largest_area
 from sandbox.window.ui import score_panel
 from sandbox.window.view_bounds import view_bounds
 
+pytestmark = pytest.mark.full  # every shipped scene
+
 SIZES = [(400, 300, 1.0), (800, 600, 1.0), (1024, 700, 1.0), (1280, 720, 1.0), (1920, 1080, 1.0), (1280, 720, 2.0)]
 """Width and height, px, and by how much letters and widgets are larger."""
 SHIPPED = [each.name for each in shipped()]

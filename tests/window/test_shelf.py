@@ -9,9 +9,8 @@ from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import from_document
 from sandbox.scene.files.shipped_scenes import shipped
 from sandbox.trajectory import Contacts, Frame
-from sandbox.window import messages as module
-from sandbox.window.app_state import neighbouring_scene, scenes_beside, scenes_to_pick
-from sandbox.window.messages import MAX_MESSAGES, Messages
+from sandbox.window import app_state as module
+from sandbox.window.app_state import MAX_MESSAGES, Messages, neighbouring_scene, scenes_beside, scenes_to_pick
 from sandbox.window.ui.status import body_facts, settings_text
 
 

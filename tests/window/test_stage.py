@@ -7,7 +7,7 @@ import pytest
 
 from sandbox.action import SetParameter, Switch
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.app_state import AppState
@@ -16,6 +16,8 @@ from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.parameters import SessionParameters, turned
 from sandbox.window.playback.recorded import RecordedRun, RecordedView
 from sandbox.window.playback.session import Session
+
+pytestmark = pytest.mark.full  # a window or a film
 
 GOOD = """
 title = "{name}"

@@ -9,18 +9,19 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
-from pressing import FOCUS_LOST, key, key_up, move, press, release
 
 from sandbox.action import SetParameter, Spawn
 from sandbox.window.app import App
-from sandbox.window.app_state import AppState
+from sandbox.window.app_state import AppState, Messages
 from sandbox.window.display import NoDisplayError, open_screen
 from sandbox.window.input.keymap import Command
-from sandbox.window.messages import Messages
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.recorded import RecordedView
-from sandbox.window.render.palette import SKY, WARNING, Colour
+from sandbox.window.render.palette import SKY, WARNING, RgbColour
 from sandbox.window.ui.status import hud_status
+from tests.window.pressing import FOCUS_LOST, key, key_up, move, press, release
+
+pytestmark = pytest.mark.full  # a window or a film
 
 SIZE = (900, 600)
 PICTURE = pygame.Rect(0, 165, 630, 235)
@@ -105,7 +106,7 @@ def live(window: App) -> LiveView:
 
 
 def places(
-    surface: pygame.Surface, colour: Colour, box: pygame.Rect
+    surface: pygame.Surface, colour: RgbColour, box: pygame.Rect
 ) -> "np.ndarray[tuple[int, int], np.dtype[np.intp]]":
     """Return the pixels of a colour in a region, (P, 2)."""
     part = pygame.surfarray.array3d(surface.subsurface(box)).astype(np.int16)

@@ -6,12 +6,14 @@ from pathlib import Path
 
 import pygame
 import pytest
-from pressing import key
 
 from sandbox.games.high_scores import HighScores, opened
 from sandbox.window.app import App
 from sandbox.window.app_state import AppState
 from sandbox.window.ui.high_score_dialog import HighScoreEntry
+from tests.window.pressing import key
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 ROOM = """
 title = {title}

@@ -7,16 +7,19 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
-from pressing import key, key_up, move, press, release
 
 from sandbox.action import Move, Strike
 from sandbox.games.billiards.rules.snooker import SnookerState
 from sandbox.games.billiards.tables import INCH
-from sandbox.games.billiards.view.table_game import BilliardsGame
+from sandbox.games.billiards.view.controls import BilliardsControls
+from sandbox.games.billiards.view.player import BilliardsPlayer
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.app import App
 from sandbox.window.app_state import AppState
 from sandbox.window.ui.help import help_groups
+from tests.window.pressing import key, key_up, move, press, release
+
+pytestmark = pytest.mark.full  # a window or a film
 
 SIZE = (1000, 620)
 TURN = 1.0 / 60.0
@@ -44,9 +47,13 @@ def window(tmp_path: Path) -> Iterator[App]:
     opened.close()
 
 
-def game_in(window: App) -> BilliardsGame:
-    assert window.app_state.game is not None
-    return window.app_state.game
+def controls_in(window: App) -> BilliardsControls:
+    assert isinstance(window.app_state.controls, BilliardsControls)
+    return window.app_state.controls
+
+
+def game_in(window: App) -> BilliardsPlayer:
+    return controls_in(window).player
 
 
 def do(window: App, *events: pygame.event.Event) -> None:
@@ -64,7 +71,7 @@ def roll_out(window: App) -> None:
     game = game_in(window)
     window.run_frame(TURN)
     for _ in range(5000):
-        if game.waits:
+        if game.host.waiting:
             return
         game.live.step()
         window.run_frame(TURN)
@@ -128,7 +135,8 @@ def test_x_and_arrows_set_the_power(window: App) -> None:
 def test_dial_and_power_can_be_clicked(window: App) -> None:
     game = game_in(window)
     window.draw()
-    (_, tip), (_, power) = window.context.gui.billiards_hud._rects()
+    dials = controls_in(window).hud.dials
+    tip, power = dials["tip"], dials["power"]
     do(window, press(tip.centerx - 0.25 * tip.width / 2, tip.centery), release(tip.centerx, tip.centery))
     assert game.cue.side == pytest.approx(-0.25, abs=2.0 / tip.width)  # a pixel
     do(window, press(power.centerx, power.top + 1), release(power.centerx, power.top + 1))
@@ -196,6 +204,8 @@ def test_window_without_room_draws_the_table_all_the_same(window: App) -> None:
         window.context.resize(pygame.Surface(size))
         window.draw()
         do(window, move(5, 5), press(5, 5), release(5, 5))
+        picture = pygame.surfarray.array3d(window.context.surface)
+        assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 10, size  # cloth, cushions, balls and texts
 
 
 def test_restart_begins_the_game_anew(window: App) -> None:

@@ -6,14 +6,16 @@ from pathlib import Path
 
 import pygame
 import pytest
-from pressing import FOCUS_LOST, key, key_up, press
-from windowed import turned, window_on
 
 from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.app import App
 from sandbox.window.app_state import AppState
 from sandbox.window.worker import Worker
+from tests.window.pressing import FOCUS_LOST, key, key_up, press
+from tests.window.windowed import turned, window_on
+
+pytestmark = pytest.mark.full  # a window or a film
 
 MOVING = """
 title = "Moving"

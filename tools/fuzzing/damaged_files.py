@@ -21,7 +21,18 @@ from unittest import mock
 
 import numpy as np
 
-from fuzzing.file_damage import (
+from sandbox.action import Impulse, Spawn
+from sandbox.cli.main import call
+from sandbox.games.high_scores import opened
+from sandbox.jsonable import to_json
+from sandbox.measure.extremes.baseline import StoredError, changes, read
+from sandbox.measure.extremes.boundary import Boundary
+from sandbox.measure.run.sessions import play_out, rerun
+from sandbox.recording import Recording
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import loads
+from sandbox.trajectory import Trajectory
+from tools.fuzzing.file_damage import (
     Damage,
     apply_damage,
     draw_archive,
@@ -30,18 +41,7 @@ from fuzzing.file_damage import (
     draw_json,
     draw_text,
 )
-from fuzzing.isolated import Case, Violation
-from sandbox.action import Impulse, Spawn
-from sandbox.cli.main import call
-from sandbox.games.high_scores import opened
-from sandbox.measure.extremes.boundary import Limit
-from sandbox.measure.extremes.stored import StoredError, changes, read
-from sandbox.measure.play_out import play_out
-from sandbox.measure.replay import rerun
-from sandbox.recording import Recording
-from sandbox.scene.description.discs import Ball
-from sandbox.scene.files.load import loads
-from sandbox.trajectory import Trajectory
+from tools.fuzzing.isolated import Case, Violation
 
 MAX_ERROR = 20_000  # characters on standard error
 MAX_LINE = 2_000  # characters of one line of it
@@ -164,7 +164,7 @@ def file_cases(seed: int, count: int, first: int = 0) -> Iterator[Case]:
     """Yield the cases of the damaged files `first` to `first + count − 1` of a seed."""
     for index in range(first, first + count):
         made = argument(seed, index)
-        yield Case("fuzzing.damaged_files:read_damaged", made, f"damaged {made['file']} {index} of seed {seed}")
+        yield Case("tools.fuzzing.damaged_files:read_damaged", made, f"damaged {made['file']} {index} of seed {seed}")
 
 
 def argument(seed: int, index: int) -> dict[str, Any]:
@@ -298,9 +298,12 @@ def _changes(_: str, path: str) -> int:
         if len(str(error)) > MAX_LINE:
             raise Violation("length", str(error)[:1000]) from None
         return 2
-    now = [Limit("dt", "pymunk", "pymunk", {}, 0.01, 0.02, "why"), Limit("x", "pymunk", "pymunk", {}, None, 5.0, "")]
+    now = [
+        Boundary("dt", "pymunk", {}, "pymunk", 0.01, 0.02, "why"),
+        Boundary("x", "pymunk", {}, "pymunk", None, 5.0, ""),
+    ]
     for change in changes(before, now):
-        json.dumps(change.document(), allow_nan=False)
+        json.dumps(to_json(change), allow_nan=False)
         str(change).encode()
     return 0
 

@@ -30,7 +30,7 @@ try:
 except ImportError:  # not on Windows
     resource = None  # type: ignore[assignment]
 
-TOOLS = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 MAX_DETAIL = 8000  # characters of a traceback that are kept
 
 Kind = Literal["ok", "refused", "traceback", "violation", "abort", "hang", "memory"]
@@ -246,9 +246,10 @@ class Worker:
         self._complaints.seek(0)
         self._complaints.truncate()
         code = (
-            f"import sys; sys.path.insert(0, {str(TOOLS)!r}); from fuzzing.isolated import Limits, serve; "
+            "from tools.fuzzing.isolated import Limits, serve; "
             f"serve(Limits({self._limits.cpu!r}, {self._limits.memory!r}))"
         )
+        path = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
         self._process = subprocess.Popen(
             [sys.executable, "-W", "error", "-c", code],
             stdin=subprocess.PIPE,
@@ -256,7 +257,7 @@ class Worker:
             stderr=self._complaints,
             text=True,
             encoding="utf-8",
-            env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"},
+            env={**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"},
             start_new_session=True,  # Ctrl-C is the parent's
         )
         return self._process

@@ -4,8 +4,10 @@ import copy
 import random
 from typing import Any
 
-from fuzzing.scene_changes import NUMBERS, OTHERS, TEXTS, shift
-from fuzzing.schema_values import (
+from sandbox.action import SPAWNED
+from sandbox.engines.registry import ENGINES
+from tools.fuzzing.scene_changes import NUMBERS, OTHERS, TEXTS, shift
+from tools.fuzzing.schema_values import (
     SINGLES,
     Document,
     action_schema,
@@ -18,8 +20,6 @@ from fuzzing.schema_values import (
     tables,
     value_of,
 )
-from sandbox.action import SPAWNED
-from sandbox.engines.registry import ENGINES
 
 FREQUENT = ("remove", "remove", "switch", "switch", "launch", "spawn", "strike", "strike", "throttle", "drive", "drive")
 """Actions that are drawn more often: those that start an engine anew, and those that few scenes have a subject for."""

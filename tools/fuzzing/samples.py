@@ -5,7 +5,7 @@ import time
 import warnings
 from typing import Any
 
-from fuzzing.isolated import Violation
+from tools.fuzzing.isolated import Violation
 
 
 def passes(_: Any) -> None:

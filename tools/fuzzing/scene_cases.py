@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from fuzzing.isolated import Violation, begin_stage, extend_cpu_limit
 from sandbox.action import Action, ActionError, actions_from_json, in_order
 from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
@@ -26,20 +25,20 @@ from sandbox.games.contract import UnsuitableSceneError
 from sandbox.games.registry import rules_of
 from sandbox.games.session import GameSession
 from sandbox.measure.compare import compare
-from sandbox.measure.forecast import FAILED, forecast, largest_safe_dt, notes
-from sandbox.measure.ledger import ledger_of
-from sandbox.measure.play_out import play_out
-from sandbox.measure.recorder import TooLargeError
-from sandbox.measure.replay import rerun
-from sandbox.measure.run import run
+from sandbox.measure.metrics.energy import ledger_of
+from sandbox.measure.preflight import FAILED, largest_safe_dt, notes, run_preflight
+from sandbox.measure.run.recorder import TooLargeError
+from sandbox.measure.run.runner import run
+from sandbox.measure.run.sessions import play_out, rerun
 from sandbox.recording import Recording
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.demands import bill
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import dumps, loads
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame, Trajectory
 from sandbox.window.playback.session import Session
+from tools.fuzzing.isolated import Violation, begin_stage, extend_cpu_limit
 
 MAX_MESSAGE = 4000  # characters of one fault or error
 BUDGET = 0.5  # s of CPU time after which the steps of one run are ended
@@ -150,7 +149,7 @@ def run_publicly(scene: Scene, acts: tuple[Action, ...], how: Mapping[str, Any])
             raise _BudgetSpent
 
     flags = {key: how[key] for key in ("audit", "account") if key in how}
-    found = _attempt(lambda: run(scene, how["engine"], actions=acts, watch=watch, **flags))
+    found = _attempt(lambda: run(scene, how["engine"], actions=acts, on_work=watch, **flags))
     if found is not None:
         check_run(found, scene)
         if flags.get("account") and found.info["status"] != "refused":
@@ -257,10 +256,10 @@ def _check(scene: Scene, _: tuple[Action, ...]) -> None:
     bill(scene)
     largest_safe_dt(scene)
     notes(scene)
-    answer = forecast(scene, cover=1.0 if _is_small(scene) else 0.0)
+    answer = run_preflight(scene, cover=1.0 if _is_small(scene) else 0.0)
     for warning in answer.warnings:
         if warning.kind == FAILED:
-            raise Violation("failed forecast", f"{warning.figures['forecast']}: {warning.message[:2000]}")
+            raise Violation("failed forecast", f"{warning.details['forecast']}: {warning.message[:2000]}")
         if not 0 < len(warning.message) <= MAX_MESSAGE:
             raise Violation("long message", warning.message[:300])
     _attempt(lambda: rules_of(scene))

@@ -8,7 +8,8 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-from fuzzing.schema_values import (
+from sandbox.scene.files.shipped_scenes import shipped
+from tools.fuzzing.schema_values import (
     GENERATORS,
     SINGLES,
     Document,
@@ -22,7 +23,6 @@ from fuzzing.schema_values import (
     tables,
     value_of,
 )
-from sandbox.scene.files.shipped_scenes import shipped
 
 HEAVY = frozenset({"fireworks_100k", "pile"})
 """Shipped scenes of so many bodies that one run takes seconds; few mutants are made of them."""

@@ -11,11 +11,11 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from fuzzing.isolated import Case
-from fuzzing.mutant_actions import actions
-from fuzzing.scene_changes import INVALID_CHANGES, VALID_CHANGES, base_scene
-from fuzzing.schema_values import Document
 from sandbox.engines.registry import ENGINES
+from tools.fuzzing.isolated import Case
+from tools.fuzzing.mutant_actions import actions
+from tools.fuzzing.scene_changes import INVALID_CHANGES, VALID_CHANGES, base_scene
+from tools.fuzzing.schema_values import Document
 
 VALID = 0.94
 """Fraction of the changes that keep to the schema."""
@@ -31,7 +31,7 @@ ALSO = {
 def scene_cases(seed: int, count: int, first: int = 0) -> Iterator[Case]:
     """Yield the cases of the mutants `first` to `first + count − 1` of a seed."""
     for k in range(first, first + count):
-        yield Case("fuzzing.scene_cases:run_scene", argument(seed, k), f"mutant {k} of seed {seed}")
+        yield Case("tools.fuzzing.scene_cases:run_scene", argument(seed, k), f"mutant {k} of seed {seed}")
 
 
 def argument(seed: int, index: int) -> Document:

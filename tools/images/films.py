@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import sandbox
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.camera import Camera
 from sandbox.window.capture.export import MIN_CAPTION_WIDTH, RunRenderer

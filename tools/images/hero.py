@@ -12,7 +12,7 @@ import sandbox
 from sandbox.window.camera import Camera
 from sandbox.window.capture.image_files import offscreen
 from sandbox.window.playback.recorded import RecordedRun
-from sandbox.window.render.palette import BACKGROUND, FAINT, GREEN, LINE, ORANGE, PANEL, SKY, Colour, mix_colours
+from sandbox.window.render.palette import BACKGROUND, FAINT, GREEN, LINE, ORANGE, PANEL, SKY, RgbColour, mix_colours
 from sandbox.window.render.renderer import Renderer
 from sandbox.window.render.text import draw_text
 
@@ -44,7 +44,7 @@ class Run(NamedTuple):
 
     engine: str
     about: str
-    colour: Colour
+    colour: RgbColour
     film: RecordedRun
     error: np.ndarray[tuple[int], np.dtype[np.float64]]
     """largest distance of a ball from the exact one in each frame, m; empty for the exact engine itself"""
@@ -181,7 +181,7 @@ def _draw_chart(surface: pygame.Surface, area: pygame.Rect, runs: list[Run], tim
         )
 
 
-def _draw_line(surface: pygame.Surface, points: list[tuple[float, float]], colour: Colour) -> None:
+def _draw_line(surface: pygame.Surface, points: list[tuple[float, float]], colour: RgbColour) -> None:
     pygame.draw.lines(surface, colour, False, points, 2 * SHARP)
 
 

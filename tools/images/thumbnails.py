@@ -8,10 +8,10 @@ from PIL import Image, ImageChops
 import sandbox
 from sandbox.engines.registry import usual
 from sandbox.games.pinball.bot import PinballBot
-from sandbox.measure.play_out import play_out
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
+from sandbox.measure.run.sessions import play_out
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.window.camera import Box, Camera
+from sandbox.window.camera import Camera, ViewBox
 from sandbox.window.capture.image_files import offscreen
 from sandbox.window.playback.recorded import RecordedRun
 from sandbox.window.render.palette import BACKGROUND
@@ -38,7 +38,7 @@ class Moment(NamedTuple):
     """how many earlier moments are seen faintly, equally spaced from the start"""
     trail: float = 0.0
     """s, for how long back trails go"""
-    box: Box | None = None
+    box: ViewBox | None = None
     """part of the world, m; None: where the run goes"""
     player: str | None = None
     """of a game with rules; None: it is left to itself"""

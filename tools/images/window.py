@@ -9,12 +9,12 @@ from PIL import Image
 
 import sandbox
 from sandbox.games.billiards.bot import BilliardsBot
+from sandbox.games.billiards.view.controls import BilliardsControls
 from sandbox.games.contract import StepInfo
 from sandbox.games.pinball.bot import PinballBot
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.window.app import App
-from sandbox.window.app_state import AppState
-from sandbox.window.messages import Messages
+from sandbox.window.app_state import AppState, Messages
 from sandbox.window.playback import diagnostics as companions
 from sandbox.window.view_bounds import view_bounds
 
@@ -159,11 +159,12 @@ def _plays(frame: sandbox.Frame, height: float) -> bool:
 def table(path: Path) -> None:
     """Break, and aim the next shot as a good player would; the numbers of the bot are those of its seed."""
     opened = _open("8-ball", SIZE)
-    game = opened.app_state.game
-    assert game is not None
+    controls = opened.app_state.controls
+    assert isinstance(controls, BilliardsControls)
+    game = controls.player
     game.shoot()
     opened.run_frame(FRAME)
-    while not game.waits:
+    while not game.host.waiting:
         opened.run_frame(FRAME)
     plan = BilliardsBot(1.0, 1).intend(game.match).stroke
     game.cue.aim, game.cue.speed = plan.aim, plan.speed

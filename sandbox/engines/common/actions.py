@@ -28,16 +28,17 @@ from sandbox.action import (
     Switch,
     Throttle,
     Toggle,
+    check_speed,
     heading_of,
+    index_of_name,
     is_settable,
-    number_among,
-    speed_limit,
 )
 from sandbox.arrays import BoolArray, FloatArray
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
 from sandbox.scene.compile.demands import on_floor
 from sandbox.scene.compile.drives import names_of
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BACKING, MAX_BODIES, BodySource, BodySpec, Collides
 from sandbox.scene.description.bodies import Box, Capsule, Compound, Polygon
@@ -47,10 +48,9 @@ from sandbox.scene.description.game_tables import PRESETS
 from sandbox.scene.description.scene import default_name
 from sandbox.scene.description.surface import MISCUE, miscues, struck
 from sandbox.scene.errors import SceneError, quoted
-from sandbox.scene.files.document import change_value, to_document
+from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import from_session
-from sandbox.scene.files.overrides import AddressError, assign, elements_hint, parse_path
-from sandbox.scene.scene import Scene
+from sandbox.scene.files.overrides import AddressError, assign, change_value, elements_hint, parse_path
 from sandbox.scene.validate.references import check_surface
 from sandbox.scene.validate.scene import MAX_SURFACES, check_wall_points, crosscheck
 
@@ -247,7 +247,7 @@ def toggle(action: Toggle, target: ActionTarget) -> None:
     scene = target.scene
     begin = len(scene.planes)
     names = scene.fixed_names[begin : len(scene.fixed)]
-    index = number_among(names, action.thing, "wall or post")
+    index = index_of_name(names, action.thing, "wall or post")
     if scene.surface is not None or scene.pockets:
         raise ActionError("the cushions of a billiard table cannot be switched off")
     colliders: list[Wall | Post] = [*scene.walls, *scene.posts]
@@ -304,11 +304,11 @@ def apply_action(action: Action, target: ActionTarget) -> int | None:
             set_parameter(action, target)
         case Throttle():
             thrusts = [thrust.name or default_name("thrust", k) for k, thrust in enumerate(target.scene.thrusts)]
-            target.throttle(number_among(thrusts, action.thrust, "thrust"), action.level)
+            target.throttle(index_of_name(thrusts, action.thrust, "thrust"), action.level)
         case Reshape():
             reshape(action, target)
         case Drive():
-            target.drive(number_among(names_of(target.scene), action.drive, "drive"), action.level)
+            target.drive(index_of_name(names_of(target.scene), action.drive, "drive"), action.level)
         case Toggle():
             toggle(action, target)
         case Strike():
@@ -387,8 +387,8 @@ def _apply_impulse(action: Impulse, target: ActionTarget) -> None:
     velocity, spin = target.motion(index)
     velocity = velocity + np.asarray(action.impulse) / target.bodies.mass[index]
     spin += float(action.angular / target.bodies.moment[index])
-    speed_limit(float(np.hypot(*velocity)), f"the impulse on {action.body!r}")
-    speed_limit(abs(spin), f"the angular impulse on {action.body!r}")
+    check_speed(float(np.hypot(*velocity)), f"the impulse on {action.body!r}")
+    check_speed(abs(spin), f"the angular impulse on {action.body!r}")
     target.set_velocity(index, velocity)
     if action.angular:
         target.set_spin(index, spin)
@@ -397,8 +397,8 @@ def _apply_impulse(action: Impulse, target: ActionTarget) -> None:
 def _apply_force(action: Force, target: ActionTarget) -> None:
     index = _movable_body_index(action.body, target)
     mass, moment = float(target.bodies.mass[index]), float(target.bodies.moment[index])
-    speed_limit(math.hypot(*action.force) / mass * target.h, f"one step under the force on {action.body!r}")
-    speed_limit(abs(action.torque) / moment * target.h, f"one step under the torque on {action.body!r}")
+    check_speed(math.hypot(*action.force) / mass * target.h, f"one step under the force on {action.body!r}")
+    check_speed(abs(action.torque) / moment * target.h, f"one step under the torque on {action.body!r}")
     target.set_constant_force(index, np.asarray(action.force), action.torque)
 
 

@@ -9,10 +9,10 @@ from typing import NoReturn
 import numpy as np
 
 from sandbox.engines.energy_ledger import Cause
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.fixed import PlaneReach
 from sandbox.scene.description.world import MAX_SLOP, Settings
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 
 
@@ -44,7 +44,7 @@ class BaseSimulation(ABC):
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        self._turn = StepLock()
+        self._lock = StepLock()
         self._steps, self._part = 0, 0.0
         self._ended = False
         self.patience: float | None = None

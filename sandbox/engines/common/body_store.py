@@ -18,10 +18,10 @@ from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
 from sandbox.scene.compile.drives import Mount, about_hinge, mounts
 from sandbox.scene.compile.joint_arrays import JointArrays
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource, BodySpec, Collides
 from sandbox.scene.description.forces import PlungerDrive, TorqueDrive
-from sandbox.scene.scene import Scene
 
 NOTHING, FIXED, ALL = 0, 1, 2
 """Collision masks, as in `BodyStore.collision_mask`: a body collides with nothing, with static and fixed bodies, or
@@ -58,7 +58,7 @@ class BodyStore:
         """(N,) whether a zone holds the body in place"""
         self.drives: FloatArray = setup.drives.copy()
         """(D, 3) state of each drive, as in `Frame.drives`"""
-        self._mounts: dict[str, Mount] = mounts(scene)
+        self._all_mounts: dict[str, Mount] = mounts(scene)
         self._retired: dict[int, float] = {}
         self._broken: dict[int, float] = {}
         self._lifetimes = Lifetimes(bodies, setup.time, h)
@@ -88,24 +88,24 @@ class BodyStore:
         # A body that nothing can turn gets no inverse moment: its spin stays the same, bit for bit.
         turns = moves & (matrix.turnable | self._has_torque)
         self.inverse_moment: FloatArray = np.where(turns, 1.0 / bodies.moment, 0.0)
-        self.held: dict[int, Mount] = {}
+        self.mounts: dict[int, Mount] = {}
         """how drives hold the present bodies, by body index"""
-        if self._mounts:
+        if self._all_mounts:
             self._rebuild_driven()
 
     def _rebuild_driven(self) -> None:
         """Set up driven bodies: their hinges, and their inverse masses as the solver sees them."""
         names, bodies = self.bodies.names, self.bodies
-        indices = {names.index(name): mount for name, mount in self._mounts.items() if name in names}
-        self.held = {n: mount for n, mount in sorted(indices.items()) if self.present[n]}
+        indices = {names.index(name): mount for name, mount in self._all_mounts.items() if name in names}
+        self.mounts = {n: mount for n, mount in sorted(indices.items()) if self.present[n]}
         self.hinge: FloatArray = np.zeros((len(bodies), 2))
         """(N, 2) m, in the body's frame, the point about which it turns: its centre unless it is on a hinge"""
-        self.led: BoolArray = np.zeros(len(bodies), np.bool_)
+        self.kinematic: BoolArray = np.zeros(len(bodies), np.bool_)
         """(N,) moves along its path whatever it collides with (kinematic)"""
-        for n, mount in self.held.items():
-            self.hinge[n], self.led[n] = mount.hinge, not isinstance(mount.drive, TorqueDrive)
+        for n, mount in self.mounts.items():
+            self.hinge[n], self.kinematic[n] = mount.hinge, not isinstance(mount.drive, TorqueDrive)
             about = about_hinge(mount, float(bodies.mass[n]), float(bodies.moment[n]))
-            self.inverse_mass[n], self.inverse_moment[n] = 0.0, 0.0 if self.led[n] else 1.0 / about
+            self.inverse_mass[n], self.inverse_moment[n] = 0.0, 0.0 if self.kinematic[n] else 1.0 / about
 
     @property
     def links(self) -> JointArrays:
@@ -114,10 +114,10 @@ class BodyStore:
 
     def linked(self) -> IntArray:
         """Return the indices of the scene's joints that are intact and whose bodies are present."""
-        links, there = self.setup.links, np.append(self.present, True)  # index −1, the world, is the last entry
-        holds = there[links.a] & there[links.b]
-        holds[list(self._broken)] = False
-        return np.flatnonzero(holds)
+        links, is_present = self.setup.links, np.append(self.present, True)  # index −1, the world, is the last entry
+        intact = is_present[links.a] & is_present[links.b]
+        intact[list(self._broken)] = False
+        return np.flatnonzero(intact)
 
     def throttle(self, index: int, level: float) -> None:
         """Set the level of a thrust, by its index in the scene: the fraction of its force that acts."""
@@ -155,7 +155,7 @@ class BodyStore:
         """Time in s, by index in `setup.links`, at which joints broke."""
         return MappingProxyType(self._broken)
 
-    def part(self, links: IntArray, time: float) -> None:
+    def mark_broken(self, links: IntArray, time: float) -> None:
         """Mark joints, by their indices, as broken since a time, s."""
         self._broken |= dict.fromkeys(links.tolist(), time)
 

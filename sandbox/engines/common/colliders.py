@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.fixed import Plane, Wall
-from sandbox.scene.scene import Scene
 
 IN_LINE = 4 * 2.0**-52
 """Distance of a point from the line through its neighbours, as a fraction of its coordinates, up to which it is in

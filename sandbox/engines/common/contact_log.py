@@ -1,6 +1,6 @@
 """Contact log: contacts of each substep, merged into one row per contact.
 
-A fixed-step engine finds its contacts anew after every substep; `ContactLog` merges those that last. Vectors are
+A fixed-step engine finds its contacts again after every substep; `ContactLog` merges those that last. Vectors are
 complex numbers, x + iy, until they are returned.
 """
 

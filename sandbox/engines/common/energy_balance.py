@@ -13,8 +13,8 @@ from sandbox.engines.contract import Simulation
 from sandbox.engines.energy_ledger import Cause, EnergyLedger
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.potential import Potential
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 
 if TYPE_CHECKING:
@@ -67,12 +67,12 @@ def total_energy(simulation: Simulation) -> float:
 def record_energy_change(account: EnergyLedger | None, cause: Cause, simulation: Simulation) -> Iterator[None]:
     """Attribute the energy change of a simulation within the context to a cause. Without an account do nothing.
 
-    If the body of the context raises, nothing is entered: the simulation is unchanged then.
+    If the context raises, nothing is added: the simulation is unchanged then.
     """
     before = 0.0 if account is None else total_energy(simulation)
     yield
     if account is not None:
-        account.enter(cause, total_energy(simulation) - before)
+        account.add(cause, total_energy(simulation) - before)
 
 
 class LedgerHandover:
@@ -92,21 +92,21 @@ class LedgerHandover:
         return {cause: energy + own[cause] for cause, energy in self._past.entries().items()}
 
     @contextmanager
-    def passing(self, whole: Simulation, heir: Simulation) -> Iterator[None]:
-        """Attribute the energy change while `heir` replaces the simulation of `whole` to `ACTIONS`."""
+    def replacing(self, session: Simulation, successor: Simulation) -> Iterator[None]:
+        """Attribute the energy change while `successor` replaces the present simulation to `ACTIONS`."""
         if self._past is None:
             yield
             return
-        energy, entries = total_energy(whole), whole.account()
+        energy, entries = total_energy(session), session.account()
         yield
         self._past = EnergyLedger()
-        for cause, brought in entries.items():
-            self._past.add(cause, brought)
-        heir.account()
-        self._past.enter(Cause.ACTIONS, total_energy(whole) - energy)
+        for cause, energy_so_far in entries.items():
+            self._past.add_unchecked(cause, energy_so_far)
+        successor.account()
+        self._past.add(Cause.ACTIONS, total_energy(session) - energy)
 
     @contextmanager
-    def hands(self, present: Simulation) -> Iterator[None]:
+    def attributing_pulls(self, present: Simulation) -> Iterator[None]:
         """Attribute the work of mouse joints in the context to `DRIVES`. To an engine their impulses are actions."""
         if self._past is None:
             yield
@@ -114,5 +114,5 @@ class LedgerHandover:
         before = present.account()[Cause.ACTIONS]
         yield
         work = present.account()[Cause.ACTIONS] - before
-        self._past.enter(Cause.DRIVES, work)
-        self._past.enter(Cause.ACTIONS, -work)
+        self._past.add(Cause.DRIVES, work)
+        self._past.add(Cause.ACTIONS, -work)

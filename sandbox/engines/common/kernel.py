@@ -82,7 +82,8 @@ def cache_folder() -> Path | None:
     # Installations may share the user's folder, and Python versions the sources: each has its own folders.
     installation = blake2b(f"{here} {sys.version} {numba.__version__}".encode(), digest_size=4).hexdigest()
     stamp = blake2b(digest_size=8)
-    for file in sorted(_sources(here)):
+    shared = here.parent / "scene" / "geometry"  # kernels compile functions of it
+    for file in sorted((*_sources(here), *_sources(shared))):
         status = file.stat()
         stamp.update(f"{file.name} {status.st_mtime_ns} {status.st_size}".encode())
     user = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")

@@ -9,8 +9,8 @@ In a substep the torque ramps, and the body moves between its stops under the me
 reaches a stop are exact. Where the wanted torque depends on the angle, the substep is divided into pieces that each
 cross a part of that range.
 
-`glide` moves a body of one degree of freedom between two stops under a constant acceleration. Its path consists of
-parabolas, one to each bounce at a stop, so that the effect of a stop does not depend on the step.
+`advance_between_stops` moves a body of one degree of freedom between two stops under a constant acceleration. Its path
+consists of parabolas, one to each bounce at a stop, so that the effect of a stop does not depend on the step.
 """
 
 import math
@@ -23,7 +23,9 @@ MAX_BOUNCES = 16
 """Largest number of parabolas in a substep. Bounces need few: each leaves only a fraction of the speed."""
 
 
-def glide(position: float, speed: float, h: float, rate: float, end: float, bounce: float) -> tuple[float, float, int]:
+def advance_between_stops(
+    position: float, speed: float, h: float, rate: float, end: float, bounce: float
+) -> tuple[float, float, int]:
     """Return the position and speed after h, s, and the stop that the body is pressed against: −1, 1, or 0 for none.
 
     Args:
@@ -133,16 +135,18 @@ class HingeDrive:
             wanted = self._wanted(level, min(max(ahead, 0.0), end))
             steady = steady and torque == wanted
             torque, mean = self._ramp(torque, wanted, piece)
-            position, speed, stop = glide(position, speed, piece, (mean + own) / self.moment, end, self.drive.bounce)
+            position, speed, stop = advance_between_stops(
+                position, speed, piece, (mean + own) / self.moment, end, self.drive.bounce
+            )
         new = self.drive.stops[1] if stop > 0 else self.rest + sense * position  # the stop's exact angle
         return HingeState(new, sense * speed, stop, sense * (mean + own) if stop else 0.0, torque, steady)
 
     def _pieces(self, position: float, speed: float, own: float, h: float) -> int:
         """Return the number of pieces that a substep is divided into."""
-        reach = h * (abs(speed) + 0.5 * h * (self.drive.torque + abs(own)) / self.moment)
-        if self._edge == self._end or position + reach <= self._edge:
+        max_displacement = h * (abs(speed) + 0.5 * h * (self.drive.torque + abs(own)) / self.moment)
+        if self._edge == self._end or position + max_displacement <= self._edge:
             return 1
-        pieces = PIECES_OF_RANGE * reach / self.drive.hold_within
+        pieces = PIECES_OF_RANGE * max_displacement / self.drive.hold_within
         return max(math.ceil(pieces), 1) if pieces < MAX_PIECES else MAX_PIECES  # also for nan, after divergence
 
     def _wanted(self, level: float, position: float) -> float:
@@ -237,10 +241,10 @@ def _spring_forward(drive: PlungerDrive, pull: float, rate: float, h: float) -> 
     """Move forward by the spring for a substep, or up to the stop, with the speed at that moment."""
     omega = drive.speed / drive.travel
     cos, sin = math.cos(omega * h), math.sin(omega * h)
-    there, pace = pull * cos + rate / omega * sin, rate * cos - pull * omega * sin
-    if there <= 0.0:
+    new_pull, pace = pull * cos + rate / omega * sin, rate * cos - pull * omega * sin
+    if new_pull <= 0.0:
         return PlungerState(0.0, -math.hypot(pull * omega, rate), True)
-    return PlungerState(there, pace, False)
+    return PlungerState(new_pull, pace, False)
 
 
 def stroke_direction(drive: PlungerDrive) -> Point:

@@ -14,9 +14,9 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-from sandbox.engines.common.geometry import nearest_fraction
 from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.scene.description.base import Point
+from sandbox.scene.geometry.segments import nearest_fraction
 
 
 def rebound(restitution: float, falloff: float, closing: float) -> float:

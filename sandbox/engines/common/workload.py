@@ -3,9 +3,9 @@
 import numpy as np
 
 from sandbox.resource_limits import PAIRS, STEP_WORK
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
-from sandbox.scene.scene import Scene
 from sandbox.scene.validate.bodies import MAX_OVERLAPS, MAX_OVERLAPS_EACH, count_overlaps
 
 CONTACTS_PER_BODY = 2

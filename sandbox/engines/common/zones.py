@@ -9,10 +9,10 @@ import numpy as np
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.contact_log import ContactBatch
 from sandbox.scene.compile.contacts import ContactMatrix
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
-from sandbox.scene.description.fixed import AWAY, HELD, INSIDE, LET_GO, mask_of
+from sandbox.scene.description.fixed import AWAY, HELD, INSIDE, RELEASED, mask_of
 from sandbox.scene.geometry.shapes import middle_of
-from sandbox.scene.scene import Scene
 
 
 class ZoneHost(Protocol):
@@ -60,7 +60,7 @@ class ZoneTracker:
         self._first = len(scene.fixed) + len(scene.pockets)
         self._rows: list[tuple[int, int, complex, complex]] = []
 
-    def set_arrays(
+    def rebuild_arrays(
         self, position: FloatArray, velocity: FloatArray, spin: FloatArray, layer: IntArray, visits: IntArray
     ) -> None:
         """Use these arrays of all N bodies from now on."""
@@ -78,11 +78,11 @@ class ZoneTracker:
         """(N,) whether each body is held."""
         return np.asarray((self.visits == HELD).any(axis=1))
 
-    def begin(self, indices: Iterable[int], anew: bool) -> None:
-        """Determine the zones of sensed bodies; with `anew`, as if they had entered them at this moment."""
+    def begin(self, indices: Iterable[int], entering: bool) -> None:
+        """Determine the zones of sensed bodies; with `entering`, bodies inside a zone enter it at this moment."""
         for index in indices:
             inside = self._host.at(self._position[index])
-            if anew:
+            if entering:
                 self._enter(index, inside, np.zeros(2))
             if (self.visits[index] == HELD).any():
                 self._host.hold(index)
@@ -102,7 +102,7 @@ class ZoneTracker:
         """Release a body if it is held."""
         where = self.visits[index] == HELD
         if where.any():
-            self.visits[index, where] = LET_GO
+            self.visits[index, where] = RELEASED
             self._host.release(index)
 
     def forget(self, indices: IntArray) -> None:

@@ -7,10 +7,11 @@ it comes up (lazy invalidation, as in event-driven molecular dynamics: Lubachevs
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.kernel import bare_kernel as kernel
-from sandbox.engines.exact import state as c
+from sandbox.engines.exact.common import state as c
+from sandbox.engines.exact.common.record import ROWS_PER_EVENT, account_hit, account_slip
+from sandbox.engines.exact.common.state import EventState, is_supported
 from sandbox.engines.exact.impact import angle_at, hit_ball, hit_vertex, log_hit, move_to, position_at
 from sandbox.engines.exact.prediction import predict_next_event
-from sandbox.engines.exact.record import ROWS_PER_EVENT, account_hit, account_slip
 from sandbox.engines.exact.rest import (
     end_slip,
     hit_line,
@@ -19,7 +20,6 @@ from sandbox.engines.exact.rest import (
     set_free_fall,
     update_supported_motion,
 )
-from sandbox.engines.exact.state import EventState, is_supported
 
 TOO_DENSE, TOO_FAST = 4, 5
 """Further return codes of `advance`, after those of `state`: more events in one instant than the limit; two successive
@@ -43,11 +43,11 @@ balls, the 116 that finished reached at most 4.9, for a fifth of `MAX_EVENTS`.""
 
 
 @kernel
-def restart(data: EventState) -> None:
+def rebuild_all(data: EventState) -> None:
     """Update the motion of all balls and predict all events from `NOW` on."""
     for i in range(len(data.state)):
         if data.state[i, c.INVERSE_MASS] > 0.0:
-            update_motion(data, i)
+            rebuild_ball(data, i)
     predict_all(data)
 
 
@@ -67,18 +67,18 @@ def predict_all(data: EventState) -> None:
 
 
 @kernel
-def rebuild_motion(data: EventState, t: float) -> None:
+def rebuild_from(data: EventState, t: float) -> None:
     """Continue all balls from a time, s, at which an action has changed gravity, surfaces or colliders."""
     data.world[c.NOW], data.world[c.NOW_RESIDUAL] = t, 0.0
     for i in range(len(data.state)):
         if data.state[i, c.INVERSE_MASS] > 0.0:
             advance_to(data, i, t, 0.0)
             recheck_supports(data, i)
-    restart(data)
+    rebuild_all(data)
 
 
 @kernel
-def update_motion(data: EventState, i: int) -> None:
+def rebuild_ball(data: EventState, i: int) -> None:
     """Recompute the accelerations of a ball after a change, and increment its `VERSION`."""
     if is_supported(data.tags, i):
         update_supported_motion(data, i)
@@ -152,9 +152,9 @@ def process_event(data: EventState, i: int, kind: int, partner: int, t: float, r
         recheck_supports(data, i)
     if both and is_supported(tags, partner):
         recheck_supports(data, partner)
-    update_motion(data, i)
+    rebuild_ball(data, i)
     if both:
-        update_motion(data, partner)
+        rebuild_ball(data, partner)
         predict_next_event(data, partner, t, residual)
     predict_next_event(data, i, t, residual)
 

@@ -9,10 +9,10 @@ import math
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.common.restitution import compiled_kick_gain, compiled_kicked, compiled_rebound
-from sandbox.engines.exact import state as c
-from sandbox.engines.exact.record import account_fixed_hit, add_impulse, add_row, log_support
-from sandbox.engines.exact.roots import NOISE
-from sandbox.engines.exact.state import EventState
+from sandbox.engines.exact.common import state as c
+from sandbox.engines.exact.common.record import account_fixed_hit, add_impulse, add_row, log_support
+from sandbox.engines.exact.common.roots import NOISE
+from sandbox.engines.exact.common.state import EventState
 
 
 @kernel

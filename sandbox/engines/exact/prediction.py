@@ -9,10 +9,10 @@ import math
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.body_store import ALL
 from sandbox.engines.common.kernel import bare_kernel as kernel
-from sandbox.engines.exact import state as c
+from sandbox.engines.exact.common import state as c
+from sandbox.engines.exact.common.roots import NOISE, curved_entry, line_entry, pair_entry
+from sandbox.engines.exact.common.state import EventState
 from sandbox.engines.exact.impact import position_at
-from sandbox.engines.exact.roots import NOISE, curved_entry, line_entry, pair_entry
-from sandbox.engines.exact.state import EventState
 
 
 @kernel

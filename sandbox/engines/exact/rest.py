@@ -11,12 +11,12 @@ import math
 from sandbox.arrays import FloatArray
 from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.common.restitution import compiled_kick_gain, compiled_kicked, compiled_rebound
-from sandbox.engines.exact import state as c
+from sandbox.engines.exact.common import state as c
+from sandbox.engines.exact.common.record import account_spin, account_velocity, add_impulse, add_row, open_support_row
+from sandbox.engines.exact.common.roots import NOISE
+from sandbox.engines.exact.common.state import EventState, is_in_corner, is_solid, is_supported
 from sandbox.engines.exact.impact import collide_fixed, record_partner
 from sandbox.engines.exact.prediction import PARALLEL_ANGLE, are_parallel
-from sandbox.engines.exact.record import account_spin, account_velocity, add_impulse, add_row, open_support_row
-from sandbox.engines.exact.roots import NOISE
-from sandbox.engines.exact.state import EventState, is_in_corner, is_solid, is_supported
 
 REST_TIME = 1e-13
 """s: when the remaining bounces of a decaying series take less than this in total, the ball is put to rest, as if all

@@ -8,9 +8,11 @@ import numpy as np
 from sandbox.arrays import IntArray
 from sandbox.engines.common.energy_balance import record_energy_change
 from sandbox.engines.energy_ledger import Cause
-from sandbox.engines.exact import state as c
-from sandbox.engines.exact.bodies import EventDrivenBodies
-from sandbox.engines.exact.event_driven import FIRST_LOG_ROWS, EventDrivenSimulation, last_event_bodies
+from sandbox.engines.exact.common import state as c
+from sandbox.engines.exact.common.bodies import EventDrivenBodies
+from sandbox.engines.exact.common.event_driven import FIRST_LOG_ROWS, EventDrivenSimulation, last_event_bodies
+from sandbox.engines.exact.common.record import account_slips, drain_log, log_supports, open_support_row, with_log_rows
+from sandbox.engines.exact.common.state import EventState, make_state, rebuild, with_new_walls
 from sandbox.engines.exact.events import (
     BATCHES_PER_BUDGET,
     MAX_BATCH_RATE,
@@ -20,14 +22,12 @@ from sandbox.engines.exact.events import (
     advance_to,
     evaluate,
     predict_all,
-    rebuild_motion,
-    restart,
-    update_motion,
+    rebuild_all,
+    rebuild_ball,
+    rebuild_from,
 )
 from sandbox.engines.exact.prediction import predict_next_event
-from sandbox.engines.exact.record import account_slips, drain_log, log_supports, open_support_row, with_log_rows
 from sandbox.engines.exact.rest import recheck_supports, release_supports
-from sandbox.engines.exact.state import EventState, make_state, rebuilt, with_new_walls
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Contacts
@@ -54,7 +54,7 @@ class ExactSimulation(EventDrivenSimulation[EventState]):
         super().__init__(settings, make_state(store), store)
         self._set_event_limit()
         with np.errstate(all="ignore"):
-            restart(self._data)
+            rebuild_all(self._data)
 
     @property
     def events(self) -> int:
@@ -109,7 +109,7 @@ class ExactSimulation(EventDrivenSimulation[EventState]):
             state = (store.position, store.velocity, store.angle, store.angular_velocity)
             evaluate(self._data, self.time, *state)
 
-    def _load_bodies(self) -> None:
+    def _rebuild(self) -> None:
         """Copy the changes of an action from the body store into the state arrays, and predict again."""
         store, now = self._store, self.time
         touched = sorted(store.velocity_set | store.position_set)
@@ -130,35 +130,35 @@ class ExactSimulation(EventDrivenSimulation[EventState]):
             self._data = data = with_new_walls(data, store)
         if store.scene_changed:
             known = len(data.state)
-            self._data = data = rebuilt(data, store)
+            self._data = data = rebuild(data, store)
             data.state[known:, c.T] = now  # the rows of spawned bodies begin now
             self._set_event_limit()
-            rebuild_motion(data, now)
+            rebuild_from(data, now)
             return
         data.world[c.NOW], data.world[c.NOW_RESIDUAL] = now, 0.0
         for i in touched:
             if data.state[i, c.INVERSE_MASS] > 0.0:
                 recheck_supports(data, i)
-                update_motion(data, i)
+                rebuild_ball(data, i)
         if any(self.bodies.fixed[i] for i in touched):
             predict_all(data)  # a fixed body that has moved may now be in the path of any ball
         for i in touched:
             if data.state[i, c.INVERSE_MASS] > 0.0:
                 predict_next_event(data, i, now, 0.0)
 
-    def _remove(self, numbers: IntArray) -> None:
+    def _remove(self, indices: IntArray) -> None:
         """Remove bodies by index; they keep their positions and have no velocity."""
         now = self.time
         with np.errstate(all="ignore"):
-            for i in numbers.tolist():
+            for i in indices.tolist():
                 advance_to(self._data, i, now, 0.0)
                 release_supports(self._data, i)
                 self._data.state[i, c.VX : c.SPIN + 2] = 0.0
                 self._data.next_time[i] = np.inf
                 self._data.tags[i, c.VERSION] += 1
         with record_energy_change(self._ledger, Cause.RETIRED, self):
-            self._store.remove_bodies(numbers, now)
-        self._data = rebuilt(self._data, self._store)
+            self._store.remove_bodies(indices, now)
+        self._data = rebuild(self._data, self._store)
 
     def _set_event_limit(self) -> None:
         """Set the largest number of events in one second."""

@@ -20,10 +20,10 @@ from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_stepp
 from sandbox.engines.tabletop.stepper import BallArrays, TabletopStepper
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource, BodySpec, Collides, Point
 from sandbox.scene.description.world import Settings
-from sandbox.scene.scene import Scene
 
 
 class PymunkZoneHost:
@@ -45,9 +45,9 @@ class PymunkZoneHost:
     def pending(self, pending: set[int]) -> None:
         self._space_bodies.zone_sensors.pending = pending
 
-    def at(self, place: FloatArray) -> list[int]:
+    def at(self, position: FloatArray) -> list[int]:
         """Return the zones that contain a position, m, in ascending order."""
-        return self._space_bodies.zone_sensors.at(place)
+        return self._space_bodies.zone_sensors.at(position)
 
     def inside(self, index: int) -> list[int]:
         """Return the zones that contained a body's centre at the end of the last substep, in ascending order."""
@@ -90,20 +90,20 @@ UNCORRECTED = 1e9
 NO_BODIES: IntArray = np.empty(0, np.int64)
 
 
-CROWD = 100
+MAX_OVERLAPS = 100
 """Bodies that a new body may overlap: pymunk takes minutes to separate a thousand at one point."""
 
-SWARM = 1000
+MAX_CANDIDATES = 1000
 """The same for bodies that pass through each other: pymunk still tests every pair."""
 
 
-def check_crowd(
-    place: FloatArray, radius: float, collides: Collides, position: FloatArray, bodies: Bodies, present: BoolArray
+def check_overlaps(
+    centre: FloatArray, radius: float, collides: Collides, position: FloatArray, bodies: Bodies, present: BoolArray
 ) -> None:
     """Check that a body at a position would not overlap too many bodies.
 
     Args:
-        place: position, (2,) m.
+        centre: position of the body, (2,) m.
         radius: of the body, m.
         collides: what the body collides with.
         position: (N, 2) m, of all bodies.
@@ -113,13 +113,13 @@ def check_crowd(
     Raises:
         ActionError: it would overlap too many.
     """
-    near = np.hypot(*(position - place).T) < bodies.radius + radius
-    into = bodies.element[near & present]
-    how = [bodies.elements[element].collides for element in into.tolist()]
-    if collides == "all" and how.count("all") >= CROWD:
-        raise ActionError(f"it would overlap {how.count('all')} bodies; pymunk can separate at most {CROWD}")
-    if len(how) - how.count("none") >= SWARM:
-        raise ActionError(f"it would overlap {len(how) - how.count('none')} bodies; the limit is {SWARM}")
+    near = np.hypot(*(position - centre).T) < bodies.radius + radius
+    overlapping = bodies.element[near & present]
+    kinds = [bodies.elements[element].collides for element in overlapping.tolist()]
+    if collides == "all" and kinds.count("all") >= MAX_OVERLAPS:
+        raise ActionError(f"it would overlap {kinds.count('all')} bodies; pymunk can separate at most {MAX_OVERLAPS}")
+    if len(kinds) - kinds.count("none") >= MAX_CANDIDATES:
+        raise ActionError(f"it would overlap {len(kinds) - kinds.count('none')} bodies; the limit is {MAX_CANDIDATES}")
 
 
 class PymunkBodies:
@@ -151,10 +151,10 @@ class PymunkBodies:
         self.distribute(np.arange(len(self.bodies)))
         self.capture()
         if self.zone_tracker is not None:
-            here = filter(
+            sensed = filter(
                 self.space_bodies.is_sensed, np.flatnonzero(self._contact_matrix.can_enter_zone).tolist()
             )  # others may lie in pockets
-            self.zone_tracker.begin(here, anew=setup.time == 0.0)
+            self.zone_tracker.begin(sensed, entering=setup.time == 0.0)
 
     @property
     def scene(self) -> Scene:
@@ -180,10 +180,12 @@ class PymunkBodies:
         """Pass the present arrays to the space, the zones and the tabletop stepper."""
         self.space_bodies.layer = self.layer
         if self.zone_tracker is not None:
-            self.zone_tracker.set_arrays(self.position, self.velocity, self.angular_velocity, self.layer, self.visits)
+            self.zone_tracker.rebuild_arrays(
+                self.position, self.velocity, self.angular_velocity, self.layer, self.visits
+            )
         if self.tabletop is not None:
             state = BallArrays(self.position, self.velocity, self.roll, self.angular_velocity, self.angle)
-            self.tabletop.set_arrays(state, self.bodies, self.present)
+            self.tabletop.rebuild_arrays(state, self.bodies, self.present)
 
     def capture(self) -> bool:
         """Let balls fall into pockets. Return whether some did."""
@@ -251,7 +253,7 @@ class PymunkBodies:
         matrix, bodies = self._contact_matrix, self.bodies
         flying = matrix.free[indices] & ~self._driven[indices]
         state = self.position, self.velocity, self.angle, self.angular_velocity
-        self.particles.set_arrays(*state, bodies)
+        self.particles.rebuild_arrays(*state, bodies)
         self.particles.join(indices[flying & ~bodies.fixed[indices]])
         # In the space, a body that nothing can turn gets no moment. A particle keeps it, for torques of actions.
         turned = np.where(matrix.turnable, bodies.moment, math.inf)
@@ -283,8 +285,8 @@ class PymunkBodies:
         bodies, matrix = self.bodies, self._contact_matrix
         same = spawned is None and has_same_bodies(scene, self.scene)
         checked = same and scene.world is self.scene.world
-        if self.tabletop is not None and not checked and (lacks := next(unsupported_by_steppers(setup), None)):
-            raise ActionError(lacks)
+        if self.tabletop is not None and not checked and (reason := next(unsupported_by_steppers(setup), None)):
+            raise ActionError(reason)
         if not same:
             spawned = bodies.elements[len(self.scene.elements) :] if spawned is None else spawned
             bodies = replace(bodies, elements=(*scene.elements, *spawned))
@@ -313,8 +315,8 @@ class PymunkBodies:
         """
         scene = self.scene
         bodies = self.bodies.joined_by(single, name)
-        if self.tabletop is not None and (lacks := next(unsupported_by_steppers(self.setup, bodies), None)):
-            raise ActionError(lacks)
+        if self.tabletop is not None and (reason := next(unsupported_by_steppers(self.setup, bodies), None)):
+            raise ActionError(reason)
         matrix = derive_contacts(self.setup, bodies)
         self.refresh()
         index = len(self.bodies)
@@ -472,8 +474,8 @@ class PymunkBodies:
         Raises:
             ActionError: the position is out of range, or would overlap too many bodies.
         """
-        place = np.asarray(position)
+        centre = np.asarray(position)
         self.refresh()
-        if not self.space_bodies.reaches(place):
+        if not self.space_bodies.reaches(centre):
             raise ActionError(f"{position} m is out of range of pymunk's half-planes")
-        check_crowd(place, radius, collides, self.position, self.bodies, self.present)
+        check_overlaps(centre, radius, collides, self.position, self.bodies, self.present)

@@ -12,19 +12,25 @@ contact at a speed of rounding, so that it could not be distinguished from one t
 Munk2D keeps the decision of `begin` on a contact until the contact ends; `pre_solve` is called nevertheless.
 `separate`, which would report the end, cannot be used: it is called for present contacts when a space is freed, and
 pymunk has released its objects by then.
+
+Internal edges: `correct_normal` corrects contacts of polygons at the joints of a wall, whose segments have no edges
+there. `Segment.set_neighbors` makes Munk2D reject contacts with an end of a segment if the normal points over it
+towards the neighbour. For discs that is exact. For other shapes Munk2D compares the nearest point with the end bit by
+bit, which fails by rounding once the two overlap: then the end of the next segment stops a sliding box. A normal that
+leans over an end, towards the continuation of the wall, is turned to the nearest normal of the whole wall.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import pymunk
+from pymunk._chipmunk_cffi import ffi, lib
 
 from sandbox.arrays import BoolArray, FloatArray
-from sandbox.engines.common.colliders import WallSegment
+from sandbox.engines.common.colliders import LEAN, SIDEWAYS, WallSegment
 from sandbox.engines.common.restitution import fraction_at, kick_gain, kicked, rebound
-from sandbox.engines.pymunk_adapter.internal_edges import smooth
 from sandbox.engines.pymunk_adapter.reader import address_of
 from sandbox.scene.compile.contacts import PairTable
 from sandbox.scene.description.world import Kick
@@ -59,6 +65,45 @@ def _turning(body: pymunk.Body, point: pymunk.Vec2d, normal: pymunk.Vec2d) -> fl
     """Return the velocity along a normal of a point of a body due to its spin, m/s."""
     arm = point - body.local_to_world(body.center_of_gravity)  # the hinge, for a body on a hinge
     return float(body.angular_velocity * (arm.x * normal.y - arm.y * normal.x))
+
+
+def correct_normal(arbiter: pymunk.Arbiter, joints: Mapping[pymunk.Shape, WallSegment]) -> None:
+    """Correct the normal of a contact if it leans over a joint of a wall."""
+    first, second = arbiter.shapes
+    part = joints.get(second) or joints.get(first)
+    other = first if second in joints else second
+    if part is None or isinstance(other, pymunk.Circle):
+        return
+    normal = arbiter.normal if part is joints.get(first) else -arbiter.normal  # from the wall to the body
+    turned = _corrected_normal(normal, part, other)
+    if turned is None:
+        return
+    points = lib.cpArbiterGetContactPointSet(arbiter._arbiter)
+    sign = 1.0 if part is joints.get(first) else -1.0
+    points.normal = (sign * turned.x, sign * turned.y)  # pymunk's setter would merge its two points
+    lib.cpArbiterSetContactPointSet(arbiter._arbiter, ffi.addressof(points))
+
+
+def _corrected_normal(normal: pymunk.Vec2d, part: WallSegment, other: pymunk.Shape) -> pymunk.Vec2d | None:
+    """Return the normal of the wall nearest to one that leans over a joint; None if it does not lean."""
+    a, b = pymunk.Vec2d(*part.a), pymunk.Vec2d(*part.b)
+    along = (b - a).normalized()
+    lean = normal.dot(along)
+    if abs(lean) <= LEAN:
+        return None
+    end, sign = (part.after, 1.0) if lean > 0.0 else (part.before, -1.0)
+    if end is None:
+        return None
+    onward = (pymunk.Vec2d(*end) - (b if lean > 0.0 else a)).normalized()
+    if normal.dot(onward) <= LEAN:
+        return None
+    left = along.perpendicular()
+    side = normal.dot(left)
+    if abs(side) < SIDEWAYS:
+        side = (other.bb.center() - a).dot(left)
+    side = 1.0 if side >= 0.0 else -1.0
+    own, its = side * left, side * sign * onward.perpendicular()
+    return own if normal.dot(own) >= normal.dot(its) else its
 
 
 BodyWallPair: TypeAlias = tuple[int, int]
@@ -103,7 +148,7 @@ class SpaceOneWayWalls:
 
     def _begin(self, arbiter: pymunk.Arbiter, _: pymunk.Space, __: Any) -> None:
         if self.joints:
-            smooth(arbiter, self.joints)
+            correct_normal(arbiter, self.joints)
         wall, shape = self._wall_and_other(arbiter)
         if wall is None:  # indices of surfaces change when bodies join
             return
@@ -213,10 +258,10 @@ class PairCallbacks:
             known.append(PairCoefficients(restitution, friction, float(surfaces.falloff[a, b]), kick))
             self.space.on_collision(a + 1, b + 1, pre_solve=self._set_coefficients, data=known)
             if (a, b) in jointed and not (surfaces.one_way[a] or surfaces.one_way[b]):  # these have a `begin`
-                self.space.on_collision(a + 1, b + 1, begin=self._smooth)
+                self.space.on_collision(a + 1, b + 1, begin=self._correct_normal)
 
-    def _smooth(self, arbiter: pymunk.Arbiter, _: pymunk.Space, __: Any) -> None:
-        smooth(arbiter, self.one_way_walls.joints)  # before the warm-start impulse is read, along its normal
+    def _correct_normal(self, arbiter: pymunk.Arbiter, _: pymunk.Space, __: Any) -> None:
+        correct_normal(arbiter, self.one_way_walls.joints)  # before the warm-start impulse is read, along its normal
 
     def _set_coefficients(self, arbiter: pymunk.Arbiter, _: pymunk.Space, known: list[PairCoefficients]) -> None:
         if not known:
@@ -226,7 +271,7 @@ class PairCallbacks:
             if not arbiter.process_collision:
                 return
         if self.one_way_walls.joints:
-            smooth(arbiter, self.one_way_walls.joints)
+            correct_normal(arbiter, self.one_way_walls.joints)
         coefficients = known[0]
         arbiter.restitution, arbiter.friction = coefficients.restitution, coefficients.friction
         if coefficients.is_constant:

@@ -23,10 +23,10 @@ from sandbox.engines.pymunk_adapter.callbacks import PairCallbacks, SpaceOneWayW
 from sandbox.engines.pymunk_adapter.forces import has_drag
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BACKING, Collides, Point
 from sandbox.scene.description.fixed import Plane, PlaneReach, Post, Wall, mask_of
 from sandbox.scene.description.world import Settings
-from sandbox.scene.scene import Scene
 
 TOLERANCE = 2.0**-51
 """Relative; two roundings, of a square root or quotient and of the product."""
@@ -227,8 +227,8 @@ class SurfaceSetter:
             *_pairs(touching & ~(surfaces.fixed_coefficients & ~(surfaces.one_way | surfaces.one_way[:, None]))),
         }
         solid = matrix.solid
-        mended = {(a, b) for a, b in _pairs(touching) if (a in jointed and solid[b]) or (b in jointed and solid[a])}
-        self.pair_callbacks.rebuild(surfaces, wrong, mended)
+        corrected = {(a, b) for a, b in _pairs(touching) if (a in jointed and solid[b]) or (b in jointed and solid[a])}
+        self.pair_callbacks.rebuild(surfaces, wrong, corrected)
         if surfaces.one_way.any():
             self.one_way_walls.rebuild(surfaces, touching)
 
@@ -298,14 +298,14 @@ class StaticShapes:
         where = min(self.reach, FARTHEST)
         self._limit = np.array([where, where, math.inf, FASTEST, FASTEST, math.inf])
 
-    def extend(self, place: FloatArray) -> None:
+    def extend(self, position: FloatArray) -> None:
         """Extend the half-planes to positions (M, 2), m, at most to `LONGEST_REACH`.
 
         The reach is doubled as often as necessary, by the positions of bodies, so that it does not depend on when a run
         ends. A body that moves farther than the reach within one step can be beyond the ends, at twice the reach,
         before that.
         """
-        far = np.abs(place - self._middle[0:2])
+        far = np.abs(position - self._middle[0:2])
         far = far[far <= LONGEST_REACH]  # no half-plane can reach positions beyond, or nan
         if not len(far) or far.max() <= self.reach:
             return
@@ -378,9 +378,9 @@ class StaticShapes:
         """Return which values of states (R, 6), x, y, angle, vx, vy, ω, are within bounds; nan is not."""
         return np.asarray(np.abs(state - self._middle) <= self._limit)
 
-    def reaches(self, place: FloatArray) -> bool:
+    def reaches(self, position: FloatArray) -> bool:
         """Return whether half-planes can be extended to a position; always true without planes."""
-        return math.isinf(self.reach) or bool((np.abs(place - self._middle[0:2]) <= LONGEST_REACH).all())
+        return math.isinf(self.reach) or bool((np.abs(position - self._middle[0:2]) <= LONGEST_REACH).all())
 
 
 def jointed_surfaces(scene: Scene, surface: IntArray) -> set[int]:

@@ -9,10 +9,10 @@ second time. Without it, the impulses of a run add up to its change of momentum,
 polygons, of whose two points one may be recognised and the other new, and for bodies of several shapes, of which one
 separates while another stays.
 
-`RevivedContacts` computes the same correction from the lists of contacts, without callbacks. It needs pairs with at
-most one contact point. The impulse with which such a pair begins again is its last one, in the frame of the normal:
-with complex numbers c = J/n, and then c·n' about the new normal. A callback at each beginning takes as long as a sixth
-of the step of a pile.
+`CachedContactCorrection` computes the same correction from the lists of contacts, without callbacks. It needs pairs
+with at most one contact point. The impulse with which such a pair begins again is its last one, in the frame of the
+normal: with complex numbers c = J/n, and then c·n' about the new normal. A callback at each beginning takes as long as
+a sixth of the step of a pile.
 """
 
 from typing import Any, NamedTuple, Self
@@ -151,7 +151,7 @@ class ContactPointReader:
         second: list[int] = []
         normal: list[tuple[float, float]] = []
         records: list[FloatArray] = []
-        places: list[int] = []
+        addresses: list[int] = []
         kicks = self._pair_callbacks.recorded_kicks
         for arbiter in self._space._get_arbiters():
             if arbiter.state >= NOT_TOUCHING:
@@ -163,7 +163,7 @@ class ContactPointReader:
                     record[:, IMPULSES] -= old  # applied before they separated
             records.append(record)
             if kicks:
-                places.append(address_of(arbiter))
+                addresses.append(address_of(arbiter))
             a, b = index.get(arbiter.body_a, -1), index.get(arbiter.body_b, -1)
             n = arbiter.n.x, arbiter.n.y
             for _ in range(len(record)):
@@ -174,7 +174,7 @@ class ContactPointReader:
             begun.clear()
         kick = np.zeros(len(first))
         if kicks:
-            kick = kick_works(kicks, places, [len(record) for record in records])
+            kick = kick_works(kicks, addresses, [len(record) for record in records])
             kicks.clear()
         table = np.concatenate(records) if records else np.empty((0, WIDTH))
         arms, impulses = table[:, ARMS], table[:, IMPULSES]
@@ -183,66 +183,66 @@ class ContactPointReader:
         return ContactPoints(*indices, arms[:, :2], arms[:, 2:], normals, impulses[:, 0], impulses[:, 1], kick)
 
 
-Pair = tuple[int, int]
+ColliderPair = tuple[int, int]
 """Indices of two bodies or static colliders, the lower first."""
 
 
-class RevivedContacts:
+class CachedContactCorrection:
     """Pairs that have separated and that pymunk still caches."""
 
     def __init__(self, reader: SpaceReader, collider_count: int) -> None:
-        """Start after a first look at which no pair is cached.
+        """Start after a first reading in which no pair is cached.
 
         Args:
-            reader: of the space; from now on it keeps each listing for one more look.
+            reader: of the space; from now on it keeps each listing for one more reading.
             collider_count: number of static colliders.
         """
         self._reader, self._collider_count = reader, collider_count
         self._rows = PairIndex()
         self._last = NO_CONTACTS
-        self._parted: dict[Pair, complex] = {}
+        self._separated: dict[ColliderPair, complex] = {}
         """pair → last impulse, N·s, in the frame of its normal"""
         reader.keep_last = True
 
     def correct(self, found: ContactBatch) -> ContactBatch:
-        """Return the contacts of a look, which differ from the last, without impulses that are counted twice."""
+        """Return contacts that differ from the last ones, without impulses that are counted twice."""
         last = self._last
         lower, higher = np.minimum(found.a, found.b), np.maximum(found.a, found.b)  # pymunk lists either first
         row, new = self._rows.find(lower + self._collider_count, higher + self._collider_count)
         self._rows.keep(np.arange(len(found.a)))
         self._last = found
         ended = np.ones(len(last.a), np.bool_)
-        goes_on = np.ones(len(found.a), np.bool_)
-        goes_on[new] = False
-        ended[row[goes_on]] = False
+        lasting = np.ones(len(found.a), np.bool_)
+        lasting[new] = False
+        ended[row[lasting]] = False
         gone = np.flatnonzero(ended)
         if len(gone):
             impulse, normal = self._reader.last_vectors(gone)
-            for pair, had in zip(_pairs(last, gone), (impulse / normal).tolist(), strict=True):
-                self._parted[pair] = had
-        if not self._parted:
+            for pair, last_impulse in zip(_pairs(last, gone), (impulse / normal).tolist(), strict=True):
+                self._separated[pair] = last_impulse
+        if not self._separated:
             return found
         again = [
-            (k, self._parted.pop(pair))
+            (k, self._separated.pop(pair))
             for k, pair in zip(new.tolist(), _pairs(found, new), strict=True)
-            if pair in self._parted
+            if pair in self._separated
         ]
-        if self._parted:  # a pair that pymunk no longer caches begins at 0
+        if self._separated:  # a pair that pymunk no longer caches begins at 0
             cached = set(map(_pair, *self._reader.cached().T.tolist()))
-            self._parted = {pair: had for pair, had in self._parted.items() if pair in cached}
+            self._separated = {pair: last_impulse for pair, last_impulse in self._separated.items() if pair in cached}
         if not again:
             return found
         impulse = found.impulse.copy()
-        for k, had in again:
-            impulse[k] -= had * found.normal[k]
+        for k, last_impulse in again:
+            impulse[k] -= last_impulse * found.normal[k]
         return found._replace(impulse=impulse)
 
 
-def _pairs(touching: ContactBatch, rows: IntArray) -> list[Pair]:
+def _pairs(touching: ContactBatch, rows: IntArray) -> list[ColliderPair]:
     return list(map(_pair, touching.a[rows].tolist(), touching.b[rows].tolist()))
 
 
-def _pair(a: int, b: int) -> Pair:
+def _pair(a: int, b: int) -> ColliderPair:
     return (a, b) if a < b else (b, a)
 
 
@@ -259,7 +259,7 @@ class ContactReader:
             collider_count,
         )
         self._warm_start: WarmStartCorrection | None = None
-        self._revived: RevivedContacts | None = None
+        self._cached_correction: CachedContactCorrection | None = None
         self._points: ContactPointReader | None = None
 
     def touching(self, polygons: bool, single: bool, steady: bool) -> ContactBatch | ComplexArray:
@@ -270,16 +270,16 @@ class ContactReader:
             single: whether two bodies have at most one contact.
             steady: whether impulses alone suffice if the contacts are the same as at the last call, in the same order.
         """
-        same = self._reader.look(polygons)
+        same = self._reader.read_contacts(polygons)
         if single and self._are_listings_enough():
-            if same and steady and self._revived is not None:
+            if same and steady and self._cached_correction is not None:
                 return self._reader.impulses()
             found = self._reader.touching()
-            if self._revived is None:
-                self._revived = RevivedContacts(self._reader, self._collider_count)
+            if self._cached_correction is None:
+                self._cached_correction = CachedContactCorrection(self._reader, self._collider_count)
             elif same:
                 return found
-            return self._revived.correct(found)
+            return self._cached_correction.correct(found)
         warm_start = self._warm_start or self._start_warm_start_correction()
         if same and steady and warm_start.pairs and not warm_start.found:
             return self._reader.impulses()
@@ -292,7 +292,7 @@ class ContactReader:
         """Return whether listings suffice: no pair was cached before the first, and no callback is in use."""
         if self._warm_start is not None and self._warm_start.pairs:
             return False
-        return self._revived is not None or not len(self._reader.cached())
+        return self._cached_correction is not None or not len(self._reader.cached())
 
     def _start_warm_start_correction(self) -> WarmStartCorrection:
         if self._warm_start is None:

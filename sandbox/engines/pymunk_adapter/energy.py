@@ -18,7 +18,7 @@ from sandbox.engines.pymunk_adapter.joint_impulses import ImpulseSums, JointImpu
 from sandbox.engines.pymunk_adapter.joints import spring_forces
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.potential import Potential
-from sandbox.scene.scene import Scene
+from sandbox.scene.compile.scene import Scene
 
 
 class AppliedImpulses(NamedTuple):
@@ -30,7 +30,7 @@ class AppliedImpulses(NamedTuple):
     """(N, 2) by constant forces and thrusts"""
     twisted: FloatArray
     """(N,) by constant torques and thrusts, N·m·s"""
-    dragged: FloatArray
+    drag: FloatArray
     """(N, 2) by drag, including its reduction of other forces"""
 
 
@@ -50,14 +50,14 @@ def applied_impulses(
     mass = np.where(counts, bodies.mass, 0.0)[:, None]
     constant, torque = _constant_forces(population)
     pull, thrust, thrust_torque = _field(population)
-    dragged = np.zeros_like(before)
+    drag = np.zeros_like(before)
     if has_drag(world):
         applied = (constant + thrust + (0.0 if springs is None else springs)) / bodies.mass[:, None] + pull
         given = acceleration(world, before, applied, population.h) - np.asarray(world.gravity) - applied
-        dragged = mass * given * h
+        drag = mass * given * h
     driven = np.where(counts[:, None], constant + thrust, 0.0)
     twisted = np.where(counts, torque + thrust_torque, 0.0)
-    return AppliedImpulses(mass * (np.asarray(world.gravity) + pull) * h, driven * h, twisted * h, dragged)
+    return AppliedImpulses(mass * (np.asarray(world.gravity) + pull) * h, driven * h, twisted * h, drag)
 
 
 def _constant_forces(population: PymunkBodies) -> tuple[FloatArray, FloatArray]:
@@ -110,7 +110,7 @@ class DriveWorkSums(NamedTuple):
     """by their drives, including stops and the weight of kinematic bodies"""
     weight: float
     """by the weight of bodies driven by torque, as computed in the steps"""
-    lifted: float
+    potential_change: float
     """gain of potential energy of bodies driven by torque"""
 
 
@@ -152,14 +152,14 @@ def drive_work(
     velocity, spin = means
     met = ImpulseSums(np.zeros_like(velocity), np.zeros_like(spin), np.empty(0, np.int64))
     met.subtract(points.joint_impulses)  # the negative of the impulses by contacts
-    driven = weight = lifted = 0.0
+    driven = weight = potential_change = 0.0
     for driven_body in driven_bodies:
         n = driven_body.index
         mass = float(bodies.mass[n])
         shift = now.position[n] - before.position[n]
         rise = -mass * float(shift @ np.asarray(gravity))
         if isinstance(driven_body, SpaceHingeMotor):
-            lifted += rise
+            potential_change += rise
         else:
             driven += rise  # a kinematic body's drive carries its weight
         if isinstance(driven_body, SpacePlunger):
@@ -176,7 +176,7 @@ def drive_work(
             given = moment * float(now.spin[n] - before.spin[n]) + float(met.angular[n])
             given -= driven_body.weight_torque * h * fraction if isinstance(driven_body, SpaceHingeMotor) else 0.0
         driven += given * float(spin[n])
-    return DriveWorkSums(driven, weight, lifted)
+    return DriveWorkSums(driven, weight, potential_change)
 
 
 class PymunkEnergyLedger:
@@ -223,7 +223,7 @@ class PymunkEnergyLedger:
         """Enter the last substep or, if it is cut off, its first fraction."""
         p, account = self._population, self.account
         if p.particles.has_only_gravity:
-            account.enter(Cause.INTEGRATOR, self._free_fall_error(fraction))
+            account.add(Cause.INTEGRATOR, self._free_fall_error(fraction))
         if before is None:
             return
         counts = p.free_to_move
@@ -247,18 +247,18 @@ class PymunkEnergyLedger:
 
         self._move(before, now, counts, fraction, kicks, (velocity, spin))
         for each in stiff:
-            account.add(Cause.INTEGRATOR, each.work(velocity, spin))
-        account.enter(Cause.DRAG, float(np.sum(kicks.dragged * velocity[:-1])))
-        account.enter(Cause.DRIVES, float(np.sum(kicks.driven * velocity[:-1]) + kicks.twisted @ spin[:-1]))
-        account.enter(Cause.DAMPING, sum(each.work(velocity, spin) for each in damped))
+            account.add_unchecked(Cause.INTEGRATOR, each.work(velocity, spin))
+        account.add(Cause.DRAG, float(np.sum(kicks.drag * velocity[:-1])))
+        account.add(Cause.DRIVES, float(np.sum(kicks.driven * velocity[:-1]) + kicks.twisted @ spin[:-1]))
+        account.add(Cause.DAMPING, sum(each.work(velocity, spin) for each in damped))
         along, across, by_kicks = points.work(velocity, spin)
-        account.touch(along, across)
-        account.enter(Cause.KICKS, by_kicks)
+        account.add_contacts(along, across)
+        account.add(Cause.KICKS, by_kicks)
         if driven_bodies:
             gravity = p.scene.world.gravity
             work = drive_work(driven_bodies, (before, now), (velocity, spin), points, p.bodies, gravity, p.h, fraction)
-            account.enter(Cause.DRIVES, work.driven)
-            account.enter(Cause.INTEGRATOR, work.weight + work.lifted)
+            account.add(Cause.DRIVES, work.driven)
+            account.add(Cause.INTEGRATOR, work.weight + work.potential_change)
 
         if len(held.rigid):
             given = self._unexplained_impulses(before, now, counts, kicks)
@@ -271,7 +271,7 @@ class PymunkEnergyLedger:
         now = self._state()
         before = self._stored_energy(now)
         self._breaks[indices], self._potential = -np.inf, None
-        self.account.enter(Cause.PARTED, float(self._stored_energy(now)[0] - before[0]))
+        self.account.add(Cause.PARTED, float(self._stored_energy(now)[0] - before[0]))
 
     def _free_fall_error(self, fraction: float) -> float:
         """Return the energy error of explicit Euler on bodies under gravity alone: ½ m (g h)² in each substep."""
@@ -310,8 +310,8 @@ class PymunkEnergyLedger:
         shifted = float(np.sum(heavy * (now.position - drift)))
         start, middle, end = self._stored_energy(before, EnergyState(drift, turned, *now[2:]), now).tolist()
         worked = float(np.sum(kicks.weight * mean[0][:-1]))
-        self.account.enter(Cause.INTEGRATOR, worked - fallen + (middle - start))
-        self.account.enter(Cause.CORRECTION, (end - middle) - shifted)
+        self.account.add(Cause.INTEGRATOR, worked - fallen + (middle - start))
+        self.account.add(Cause.CORRECTION, (end - middle) - shifted)
 
     def _stored_energy(self, *states: EnergyState) -> FloatArray:
         """Return the energy stored in springs and attraction in some states, (S,) J."""
@@ -340,7 +340,7 @@ class PymunkEnergyLedger:
         """Return the impulses on bodies, without those of `kicks`."""
         p = self._population
         mass, moment = np.where(counts, p.bodies.mass, 0.0), np.where(counts, p.bodies.moment, 0.0)
-        gained = mass[:, None] * (now.velocity - before.velocity) - kicks.weight - kicks.driven - kicks.dragged
+        gained = mass[:, None] * (now.velocity - before.velocity) - kicks.weight - kicks.driven - kicks.drag
         twisted = moment * (now.spin - before.spin) - kicks.twisted
         rigid = p.space_bodies.joints.by_kind.rigid
         return ImpulseSums(np.vstack((gained, np.zeros((1, 2)))), np.append(twisted, 0.0), np.union1d(rigid.a, rigid.b))
@@ -353,5 +353,5 @@ class PymunkEnergyLedger:
             fraction
         )
         given.subtract(driven)
-        self.account.enter(Cause.DRIVES, driven.work(velocity, spin))
-        self.account.enter(Cause.JOINTS, given.work(velocity, spin))
+        self.account.add(Cause.DRIVES, driven.work(velocity, spin))
+        self.account.add(Cause.JOINTS, given.work(velocity, spin))

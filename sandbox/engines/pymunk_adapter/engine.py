@@ -8,21 +8,21 @@ from sandbox.engines.common.workload import overload
 from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_steppers
 from sandbox.resource_limits import SPACE_SIZE
 from sandbox.scene.compile.demands import BALLS, FLOOR, JOINTS, SURFACES, Demand, unmodelled
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
-from sandbox.scene.scene import Scene
 
 if TYPE_CHECKING:
     from sandbox.engines.pymunk_adapter.simulation import PymunkSimulation
 
 
-PYMUNK_WORDS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse", "impact": "newton"}
-"""The one value of each of these settings that describes pymunk."""
+FIXED_METHODS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse", "impact": "newton"}
+"""Settings that describe pymunk's methods, each with its only supported value"""
 
 OWN = frozenset({Demand.POLYGONS, Demand.ATTRACTION, Demand.THRUST, Demand.LAYERS, Demand.ZONES, Demand.DRIVES})
 
 PERSISTENCE = 3
-"""pymunk's default."""
+"""pymunk's default, substeps"""
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,7 @@ class PymunkEngine:
     A substep of length h, in pymunk's order: positions move by the *old* velocity, overlaps are found, forces and
     gravity change velocities, contacts are solved. For free motion that is explicit Euler, drift–kick.
 
-    A substep of length h, in pymunk's order: positions move by the *old* velocity, overlaps are found,
-    velocities get their kick, contacts are solved. For free motion that is explicit Euler, drift–kick.
-    Discrete: a body tunnels through a thin wall when v·h > r + half its thickness.
+    Detection is discrete: a body tunnels through a thin wall when v·h > r + half its thickness.
     """
 
     name: str = "pymunk"
@@ -45,38 +43,38 @@ class PymunkEngine:
         """Return each demand and setting that pymunk does not support."""
         setup = Setup.of(start)
         scene = setup.scene
-        lacks = unmodelled(setup, self.capabilities)
-        for key, word in PYMUNK_WORDS.items():
+        missing = unmodelled(setup, self.capabilities)
+        for key, method in FIXED_METHODS.items():
             stated = getattr(settings, key)
-            if stated not in (None, word):
-                lacks.append(f"{key} {stated!r} is not supported (only {word!r})")
-        lacks += [
+            if stated not in (None, method):
+                missing.append(f"{key} {stated!r} is not supported (only {method!r})")
+        missing += [
             f"{key} applies to penalty springs, which it does not have"
             for key in ("stiffness", "damping")
             if getattr(settings, key) is not None
         ]
         if settings.broad_phase is not None:
-            lacks.append(f"broad_phase {settings.broad_phase!r} is not supported (it always uses its own tree)")
+            missing.append(f"broad_phase {settings.broad_phase!r} is not supported (it always uses its own tree)")
         if settings.joints not in (None, "impulses"):
-            lacks.append(f"joints {settings.joints!r} is not supported (only 'impulses')")
+            missing.append(f"joints {settings.joints!r} is not supported (only 'impulses')")
         if settings.stretch is not None:
-            lacks.append("stretch applies to joints = 'relaxation', which it does not have")
+            missing.append("stretch applies to joints = 'relaxation', which it does not have")
         if settings.half_kick and (scene.world.linear_drag or scene.world.quadratic_drag):
-            lacks.append("half_kick does not support drag")
+            missing.append("half_kick does not support drag")
         if settings.half_kick and (scene.joints or scene.attractions or scene.thrusts or scene.drives):
-            lacks.append("half_kick supports gravity only, and the scene has other forces")
+            missing.append("half_kick supports gravity only, and the scene has other forces")
         if settings.half_kick and any(zone.holds or zone.gravity is not None for zone in scene.zones):
-            lacks.append("half_kick does not support zones with their own gravity")
+            missing.append("half_kick does not support zones with their own gravity")
         if scene.drives and scene.attractions:
-            lacks.append("it does not model attraction and drives together")
+            missing.append("it does not model attraction and drives together")
         if on_floor(setup):
-            lacks += unsupported_by_steppers(setup)
-        return (*lacks, *overload(setup, settings), *_too_large(setup))
+            missing += unsupported_by_steppers(setup)
+        return (*missing, *overload(setup, settings), *_too_large(setup))
 
     def resolve(self, start: Scene | Setup, settings: Settings) -> Settings:
         """Return the settings with defaults for slop, bias, persistence and the values that describe pymunk."""
         setup = Setup.of(start)
-        own: dict[str, object] = {"slop": slop_of(setup), "bias": BIAS, "persistence": PERSISTENCE, **PYMUNK_WORDS}
+        own: dict[str, object] = {"slop": slop_of(setup), "bias": BIAS, "persistence": PERSISTENCE, **FIXED_METHODS}
         if len(setup.links):
             own["joints"] = "impulses"
         return settings.replace(**{k: v for k, v in own.items() if getattr(settings, k) is None})

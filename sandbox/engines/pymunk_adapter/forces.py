@@ -20,7 +20,8 @@ from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.forces import Attraction, Thrust
 from sandbox.scene.description.world import World
-from sandbox.scene.geometry.shapes import form_of
+from sandbox.scene.geometry.segments import rotate
+from sandbox.scene.geometry.shapes import geometry_of
 
 
 class SpaceForceField:
@@ -44,7 +45,7 @@ class SpaceForceField:
         for k, thrust in enumerate(scene.thrusts):
             if thrust.body not in bodies.number_of:  # it left the scene on an earlier engine
                 continue
-            x, y = form_of(bodies.elements[bodies.element[bodies.number_of[thrust.body]]]).centre
+            x, y = geometry_of(bodies.elements[bodies.element[bodies.number_of[thrust.body]]]).centre
             arm = thrust.point[0] - x, thrust.point[1] - y
             self._thrusts.setdefault(thrust.body, []).append((k, thrust, arm))
         self._attracting_points = [a for a in scene.attractions if not isinstance(a.toward, str)]
@@ -92,7 +93,7 @@ class SpaceForceField:
             if thrusts:
                 cos, sin = body.rotation_vector  # math.cos would raise if the angle is not finite
                 fx, fy, torque = self._thrust(thrusts)
-                thrust = cos * fx - sin * fy, sin * fx + cos * fy
+                thrust = rotate(cos, sin, fx, fy)
                 ax += thrust[0] / body.mass
                 ay += thrust[1] / body.mass
                 body.torque += torque

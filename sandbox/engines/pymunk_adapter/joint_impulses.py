@@ -5,8 +5,8 @@ from typing import NamedTuple, Self, TypeAlias
 import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
-from sandbox.engines.common.geometry import rotate
-from sandbox.engines.pymunk_adapter.joints import SpaceJoints, elastic, relative
+from sandbox.engines.common.springs import anchors_in_world
+from sandbox.engines.pymunk_adapter.joints import SpaceJoints, elastic_force, relative
 from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
 
 
@@ -47,7 +47,7 @@ class JointImpulses(NamedTuple):
         return float(np.sum(self.impulse * self.separating_velocity(velocity, spin)) + turning)
 
 
-Pair: TypeAlias = tuple[JointImpulses, JointImpulses]
+JointPair: TypeAlias = tuple[JointImpulses, JointImpulses]
 
 
 class ImpulseSums(NamedTuple):
@@ -77,7 +77,7 @@ class ImpulseSums(NamedTuple):
         return float(np.sum(self.linear[n] * velocity[n]) + self.angular[n] @ spin[n])
 
 
-def springs(joints: SpaceJoints, position: FloatArray, angle: FloatArray, h: float) -> tuple[Pair, Pair]:
+def springs(joints: SpaceJoints, position: FloatArray, angle: FloatArray, h: float) -> tuple[JointPair, JointPair]:
     """Return the impulses of springs and rotary springs by their stiffness, and by their dampers.
 
     Args:
@@ -87,18 +87,18 @@ def springs(joints: SpaceJoints, position: FloatArray, angle: FloatArray, h: flo
         h: substep, s.
     """
     links = joints.by_kind.springs
-    arm_a, place_a = _anchors(links.a, links.anchor_a, position, angle)
-    arm_b, place_b = _anchors(links.b, links.anchor_b, position, angle)
-    displacement = place_b - place_a
+    arm_a, point_a = anchors_in_world(links.a, links.anchor_a, position, angle)
+    arm_b, point_b = anchors_in_world(links.b, links.anchor_b, position, angle)
+    displacement = point_b - point_a
     length = np.hypot(displacement[:, 0], displacement[:, 1])
     along = displacement / np.where(length > 0.0, length, 1.0)[:, None]
-    stiff = elastic(links, length) * h
+    stiff = elastic_force(links, length) * h
     damped = joints.impulses(links) - stiff
     nothing = np.zeros(len(links))
     ends = links.a, links.b, arm_a, arm_b
 
     rotary = joints.by_kind.rotary
-    wound = elastic(rotary, relative(rotary, angle)) * h
+    wound = elastic_force(rotary, relative(rotary, angle)) * h
     slowed = joints.impulses(rotary) - wound
     still = np.zeros((len(rotary), 2))
     rotary_ends = rotary.a, rotary.b, still, still, still
@@ -142,8 +142,8 @@ def _unit_responses(links: JointArrays, position: FloatArray, angle: FloatArray)
     count = _component_counts(links)
     column = np.cumsum(count) - count
     table = np.zeros((len(position) + 1, 3, int(count.sum())))
-    arm_a, place_a = _anchors(links.a, links.anchor_a, position, angle)
-    arm_b, place_b = _anchors(links.b, links.anchor_b, position, angle)
+    arm_a, point_a = anchors_in_world(links.a, links.anchor_a, position, angle)
+    arm_b, point_b = anchors_in_world(links.b, links.anchor_b, position, angle)
     for k, kind in enumerate(links.kind.tolist()):
         a, b, at = int(links.a[k]), int(links.b[k]), int(column[k])
         if kind in (LinkKind.MOTOR, LinkKind.ROTARY_LIMIT, LinkKind.GEAR):
@@ -151,8 +151,8 @@ def _unit_responses(links: JointArrays, position: FloatArray, angle: FloatArray)
             table[a, 2, at] -= 1.0 / links.figures[k, 1] if kind == LinkKind.GEAR else 1.0
             continue
         middle = position[a] if a >= 0 else np.zeros(2)
-        own = place_b[k] - middle if kind == LinkKind.GROOVE else arm_a[k]
-        directions = np.eye(2) if count[k] == 2 else (place_b - place_a)[k : k + 1]
+        own = point_b[k] - middle if kind == LinkKind.GROOVE else arm_a[k]
+        directions = np.eye(2) if count[k] == 2 else (point_b - point_a)[k : k + 1]
         for extra, direction in enumerate(directions):
             for body, arm, sign in ((a, own, -1.0), (b, arm_b[k], 1.0)):
                 table[body, :2, at + extra] += sign * direction
@@ -167,14 +167,3 @@ def cross(arm: FloatArray, impulse: FloatArray) -> FloatArray:
 
 def _left(arm: FloatArray) -> FloatArray:
     return np.column_stack((-arm[:, 1], arm[:, 0]))
-
-
-def _anchors(
-    index: IntArray, anchor: FloatArray, position: FloatArray, angle: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the anchors of joints, (K, 2) m, relative to the bodies' centres and in the world."""
-    cos, sin = np.cos(angle[index]), np.sin(angle[index])
-    x, y = anchor.T
-    arm = np.column_stack(rotate(cos, sin, x, y))
-    world = (index < 0)[:, None]
-    return np.where(world, 0.0, arm), np.where(world, anchor, position[index] + arm)

@@ -8,7 +8,7 @@ import numpy as np
 import pymunk
 
 from sandbox.arrays import FloatArray, IntArray
-from sandbox.engines.common.geometry import rotate
+from sandbox.engines.common.springs import anchors_in_world, spring_law
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
 
 
@@ -56,7 +56,7 @@ def _new_constraint(links: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body) 
             return pymunk.DampedRotarySpring(a, b, -x, y, z)  # pymunk: angle of the first body relative to the second
 
 
-def tension(
+def spring_force_magnitude(
     links: JointArrays, position: FloatArray, velocity: FloatArray, angle: FloatArray, spin: FloatArray
 ) -> FloatArray:
     """Return the magnitude of the force of springs, (K,) N.
@@ -68,13 +68,16 @@ def tension(
         angle: (N,) rad.
         spin: (N,) rad/s.
     """
-    bodies = position, velocity, angle, spin
-    place_a, speed_a = _anchors(links.a, links.anchor_a, *bodies)
-    place_b, speed_b = _anchors(links.b, links.anchor_b, *bodies)
-    displacement, parting = place_b - place_a, speed_b - speed_a
+    arm_a, point_a = anchors_in_world(links.a, links.anchor_a, position, angle)
+    arm_b, point_b = anchors_in_world(links.b, links.anchor_b, position, angle)
+    displacement = point_b - point_a
+    relative_velocity = _anchor_velocity(links.b, arm_b, velocity, spin) - _anchor_velocity(
+        links.a, arm_a, velocity, spin
+    )
     length = np.hypot(displacement[:, 0], displacement[:, 1])
-    rate = np.einsum("kd,kd->k", displacement, parting) / np.where(length > 0.0, length, 1.0)
-    return np.asarray(np.abs(links.figures[:, 2] * rate - elastic(links, length)))
+    rate = np.einsum("kd,kd->k", displacement, relative_velocity) / np.where(length > 0.0, length, 1.0)
+    rest, stiffness, damping = links.figures.T
+    return np.asarray(np.abs(spring_law(rest, stiffness, damping, length, rate)))
 
 
 def spring_forces(links: JointArrays, position: FloatArray, angle: FloatArray) -> FloatArray:
@@ -85,12 +88,11 @@ def spring_forces(links: JointArrays, position: FloatArray, angle: FloatArray) -
         position: (N, 2) m.
         angle: (N,) rad.
     """
-    still = np.zeros_like(position), angle, np.zeros_like(angle)
-    place_a, _ = _anchors(links.a, links.anchor_a, position, *still)
-    place_b, _ = _anchors(links.b, links.anchor_b, position, *still)
-    displacement = place_b - place_a
+    _, point_a = anchors_in_world(links.a, links.anchor_a, position, angle)
+    _, point_b = anchors_in_world(links.b, links.anchor_b, position, angle)
+    displacement = point_b - point_a
     length = np.hypot(displacement[:, 0], displacement[:, 1])
-    per_length = np.divide(elastic(links, length), length, out=np.zeros_like(length), where=length > 0.0)
+    per_length = np.divide(elastic_force(links, length), length, out=np.zeros_like(length), where=length > 0.0)
     force = displacement * per_length[:, None]
     total = np.zeros((len(position) + 1, 2))  # the last row is the world, −1
     np.add.at(total, links.b, force)
@@ -98,19 +100,16 @@ def spring_forces(links: JointArrays, position: FloatArray, angle: FloatArray) -
     return total[:-1]
 
 
-def torsion(links: JointArrays, angle: FloatArray, spin: FloatArray) -> FloatArray:
+def spring_torque_magnitude(links: JointArrays, angle: FloatArray, spin: FloatArray) -> FloatArray:
     """Return the magnitude of the torque of rotary springs, (K,) N·m."""
-    turned, rate = relative(links, angle), relative(links, spin)
-    return np.asarray(np.abs(links.figures[:, 2] * rate - elastic(links, turned)))
+    rest, stiffness, damping = links.figures.T
+    return np.asarray(np.abs(spring_law(rest, stiffness, damping, relative(links, angle), relative(links, spin))))
 
 
-def elastic(links: JointArrays, extent: FloatArray) -> FloatArray:
-    """Return the force, N, of springs at lengths (K,), m, or the torque, N·m, of rotary springs at angles (K,), rad.
-
-    It is stiffness · (rest − extent), without the damper, and positive where it increases the extent.
-    """
-    rest, stiffness, _ = links.figures.T
-    return np.asarray(stiffness * (rest - extent))
+def elastic_force(links: JointArrays, extent: FloatArray) -> FloatArray:
+    """Return `spring_law` without dampers, at lengths (K,), m, or angles of rotary springs (K,), rad."""
+    rest, stiffness, damping = links.figures.T
+    return np.asarray(spring_law(rest, stiffness, damping, extent, np.zeros_like(extent)))
 
 
 def relative(links: JointArrays, values: FloatArray) -> FloatArray:
@@ -118,26 +117,10 @@ def relative(links: JointArrays, values: FloatArray) -> FloatArray:
     return np.asarray(values[links.b] - np.where(links.a >= 0, values[links.a], 0.0))
 
 
-def _anchors(
-    index: IntArray,
-    anchor: FloatArray,
-    position: FloatArray,
-    velocity: FloatArray,
-    angle: FloatArray,
-    spin: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Return the anchors of joints on their first or second bodies, (K, 2) m, and their velocities, (K, 2) m/s."""
-    place, speed, own = position[index], velocity[index], anchor.any(axis=1)
-    if own.any():  # most anchors are at the centre
-        at, (x, y) = index[own], anchor[own].T
-        cos, sin, rate = np.cos(angle[at]), np.sin(angle[at]), spin[at]
-        arm_x, arm_y = rotate(cos, sin, x, y)
-        place[own] += np.column_stack((arm_x, arm_y))
-        speed[own] += np.column_stack((-rate * arm_y, rate * arm_x))
-    world = index < 0
-    if world.any():
-        place[world], speed[world] = anchor[world], 0.0
-    return place, speed
+def _anchor_velocity(index: IntArray, arm: FloatArray, velocity: FloatArray, spin: FloatArray) -> FloatArray:
+    """Return the velocities of anchors, (K, 2) m/s, of joints on bodies with an index (K,); 0 for the world."""
+    turning = np.column_stack((-spin[index] * arm[:, 1], spin[index] * arm[:, 0]))
+    return np.where((index >= 0)[:, None], velocity[index] + turning, 0.0)
 
 
 class JointsByKind(NamedTuple):
@@ -209,14 +192,16 @@ class SpaceJoints:
             spin: (N,) rad/s.
             h: substep, s.
         """
-        held, springs, rotary = self._breakable_joints, self._breakable_springs, self._breakable_rotary
-        given = np.asarray([self._constraints[k].impulse for k in held.number.tolist()]) / h
-        gone = [held.number[given > held.strength]]
+        rigid, springs, rotary = self._breakable_joints, self._breakable_springs, self._breakable_rotary
+        force = np.asarray([self._constraints[k].impulse for k in rigid.number.tolist()]) / h
+        broken = [rigid.number[force > rigid.strength]]
         if len(springs):
-            gone.append(springs.number[tension(springs, position, velocity, angle, spin) > springs.strength])
+            broken.append(
+                springs.number[spring_force_magnitude(springs, position, velocity, angle, spin) > springs.strength]
+            )
         if len(rotary):
-            gone.append(rotary.number[torsion(rotary, angle, spin) > rotary.strength])
-        indices = np.sort(np.concatenate(gone))
+            broken.append(rotary.number[spring_torque_magnitude(rotary, angle, spin) > rotary.strength])
+        indices = np.sort(np.concatenate(broken))
         if len(indices):
             self._remove(indices.tolist())
         return indices

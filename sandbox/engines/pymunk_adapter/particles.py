@@ -138,7 +138,7 @@ def runs_of(indices: IntArray) -> IntArray:
 BLOCK = 16_384
 """Rows that numpy processes at once, so that they stay in the cache: half the time at 100,000 bodies."""
 
-MANY = 200
+MIN_COMPILED = 200
 """Number of bodies from which on the compiled loop is used; below it numpy does the same."""
 
 SCATTERED = 16
@@ -159,7 +159,7 @@ class Particles:
     def __len__(self) -> int:
         return len(self.indices)
 
-    def set_arrays(
+    def rebuild_arrays(
         self,
         position: FloatArray,
         velocity: FloatArray,
@@ -259,7 +259,7 @@ class Particles:
 
     @property
     def _compiled(self) -> bool:
-        return COMPILED and len(self.indices) >= MANY
+        return COMPILED and len(self.indices) >= MIN_COMPILED
 
     def step(self, substeps: int = 1) -> None:
         """Advance by some substeps: in each, positions by the old velocity, then velocities."""

@@ -87,11 +87,11 @@ class SpaceReader:
         self._bodies, self._arbiters, self._forces = Buffer(), Buffer(), Buffer()
         self._listing = _listing(self._arbiters)
         self.keep_last = False
-        """whether the vectors of the previous `look` are kept; set once, after a `look`"""
+        """whether the vectors of the previous `read_contacts` are kept; set once, after a `read_contacts`"""
         self._last: tuple[Buffer, Any, IntArray] | None = None  # previous listing: buffer, listing, rows
         self._index_of = IdTable({})
         self._moving: IntArray = np.empty(0, np.int64)
-        self._words, self._width = b"", 4  # ids at the last look, and number of vectors of a contact
+        self._words, self._width = b"", 4  # ids of the last reading, and number of vectors of a contact
         self._live: IntArray = np.empty(0, np.int64)
         self._firsts = self._live  # first vector of each
         self._moved, self._first, self._all = True, True, 0
@@ -149,7 +149,7 @@ class SpaceReader:
         self._forces.set_float_buf(self._outgoing.reshape(-1))
         set_space_bodies(self._space, BodyFields.FORCE, self._forces)
 
-    def drive(self, velocity: FloatArray) -> None:
+    def set_velocities(self, velocity: FloatArray) -> None:
         """Set the velocities of all moving bodies to those of (N, 2), m/s, in scene order."""
         if self._moved:
             self._read_order()
@@ -168,14 +168,14 @@ class SpaceReader:
         live = words[words[:, 2] > 0]
         return np.column_stack([self._index_of.indices(live[:, k]) for k in (0, 1)])
 
-    def look(self, polygons: bool = False) -> bool:
+    def read_contacts(self, polygons: bool = False) -> bool:
         """Read the present contacts, with `polygons` up to two points each. Return whether they are the previous ones.
 
         If the same ids are listed in the same order as at the last call, the contacts are the same, and only their
         impulses are new.
         """
         if self.keep_last:
-            self._turn_over()
+            self._swap_buffers()
         self._arbiters.clear()
         self._listing.fields = SECOND_FLAGS if polygons else TOUCH_FLAGS
         lib.cpSpaceEachCachedArbiter(self._space._space, LIST, self._listing)
@@ -190,7 +190,7 @@ class SpaceReader:
             self._firsts = self._live * self._width
         return same
 
-    def _turn_over(self) -> None:
+    def _swap_buffers(self) -> None:
         """Keep the present listing as the previous one, and reuse the buffers of the one before it."""
         spare = Buffer() if self._last is None else self._last[0]
         listing = _listing(spare) if self._last is None else self._last[1]
@@ -198,7 +198,7 @@ class SpaceReader:
         self._arbiters, self._listing = spare, listing
 
     def last_vectors(self, rows: IntArray) -> tuple[ComplexArray, ComplexArray]:
-        """Return the impulses, N·s, and normals (K,) of some rows of the previous look."""
+        """Return the impulses, N·s, and normals (K,) of some rows of the previous reading."""
         assert self._last is not None
         arbiters, _, firsts = self._last
         vectors = np.frombuffer(arbiters.float_buf(), np.complex128)

@@ -141,7 +141,7 @@ class PymunkSimulation(BaseSimulation):
             Divergence: a body is not finite, or out of bounds. The state can still be read.
             Exhaustion: so many balls on a surface touch at once that resolving their collisions would take too long.
         """
-        with self._turn:
+        with self._lock:
             self._check_running()
             self._advance(self._settings.substeps)
             self._steps += 1
@@ -163,7 +163,7 @@ class PymunkSimulation(BaseSimulation):
             ValueError: `part` is out of range.
         """
         self._check_part(part)
-        with self._turn:
+        with self._lock:
             self._check_running()
             whole, rest = divmod(part * self._settings.substeps, 1.0)
             self._advance(int(whole))
@@ -193,7 +193,7 @@ class PymunkSimulation(BaseSimulation):
         Raises:
             ActionError: the action cannot be applied. The simulation is left unchanged.
         """
-        with self._turn:
+        with self._lock:
             self._check_running()
             self._shared_angles = None
             with record_energy_change(self._action_ledger, Cause.ACTIONS, self):
@@ -311,7 +311,7 @@ class PymunkSimulation(BaseSimulation):
             if self._recorder is None:
                 tabletop.drain_contacts()  # captures before recording started are dropped
             try:
-                tabletop.step(space_bodies, space_bodies.constant_forces.items(), start, fraction)
+                tabletop.step(space_bodies, space_bodies.constant_forces.items(), fraction)
             except Exhaustion:
                 population.end()
                 raise

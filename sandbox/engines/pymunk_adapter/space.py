@@ -30,10 +30,10 @@ from sandbox.engines.pymunk_adapter.zones import ZoneSensors
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.fixed import PlaneReach
 from sandbox.scene.description.world import Settings, World
-from sandbox.scene.scene import Scene
 
 
 class SpaceBody(NamedTuple):
@@ -481,15 +481,15 @@ class SpaceBodies(SpaceBodyTable):
             position[index], angle[index] = body.position, body.angle
         return spring_forces(links, position, angle)[indices]
 
-    def find_pairs(self, velocity: FloatArray, time: float) -> IntArray:
-        """Move all bodies by a substep with velocities (N, 2), m/s, from a time, s; return pairs in contact, (K, 2).
+    def find_pairs(self, velocity: FloatArray) -> IntArray:
+        """Move all bodies by a substep with velocities (N, 2), m/s; return pairs in contact, (K, 2).
 
         Static body k has the index −1 − k. A pair may be listed twice.
         """
         if not self._moving:
             return np.empty((0, 2), np.int64)
-        self._reader.drive(velocity)
-        self.step(time)
+        self._reader.set_velocities(velocity)
+        self.step(0.0)  # on a surface no force depends on time
         return self._reader.pairs()
 
     def _read(self) -> tuple[IntArray, FloatArray]:
@@ -543,9 +543,9 @@ class SpaceBodies(SpaceBodyTable):
         """Present extent of half-planes; None while there are none."""
         return self._static_shapes.plane_reach
 
-    def reaches(self, place: FloatArray) -> bool:
+    def reaches(self, position: FloatArray) -> bool:
         """Return whether half-planes can be extended to a position."""
-        return self._static_shapes.reaches(place)
+        return self._static_shapes.reaches(position)
 
     def extend_planes(self) -> None:
         """Extend half-planes to the bodies in the space."""

@@ -63,9 +63,9 @@ class ZoneSensors:
         """Return the zones that contained a body's centre at the end of the last substep, in ascending order."""
         return sorted(zone for zone, pieces in self._within[index].items() if pieces > 0)
 
-    def at(self, place: FloatArray) -> list[int]:
+    def at(self, position: FloatArray) -> list[int]:
         """Return the zones that contain a position, m, now, in ascending order."""
-        found = self._space.point_query((float(place[0]), float(place[1])), 0.0, SEARCH)
+        found = self._space.point_query((float(position[0]), float(position[1])), 0.0, SEARCH)
         return sorted({self._zone_of[each.shape] for each in found if each.shape in self._zone_of})
 
     def _on_begin(self, arbiter: pymunk.Arbiter, _: pymunk.Space, __: Any) -> None:

@@ -5,21 +5,15 @@ A pair is one integer key. Candidates come in ascending order of their keys, so 
 BROAD_PHASES is the table of broad phases. Each is a kernel (order, position, radius, collision_mask, moves, margin,
 most, keys) -> (found, tests). It writes the keys of candidate pairs into `keys` (C,), each once, in any order, up to
 its capacity. It returns the number of candidates found and the number of cheap tests, or `EXCEEDED` if it stopped after
-`most` tests. Every pair nearer than the margin is found, so all broad phases agree after the narrow phase. `order` is
-the broad phase's own order of the balls that can collide with anything; it is kept from step to step.
+`max_tests` tests. Every pair nearer than the margin is found, so all broad phases agree after the narrow phase. `order`
+is the broad phase's own order of the balls that can collide with anything; it is kept from step to step.
 
-Grid: balls are sorted into square cells as wide as the widest of them; only neighbouring cells are looked at.
-
-O(N) for balls of one size. One huge ball among small ones makes all cells huge: then the sweep is the better choice.
-
-Sweep: boxes sorted along x; only those whose x ranges overlap are tested in y (Baraff 1992, sort and sweep).
-
-O(N log N + pairs that overlap in x). Suits scenes that are wide, and balls of very different sizes.
-
-Segments: a broad phase of its own for walls and posts, which never move.
-
-Their boxes are sorted from left to right once. A ball looks only at those that begin no farther left than the widest
-of them reaches.
+- `grid` sorts balls into square cells as wide as the largest ball and tests neighbouring cells only. It is O(N) for
+  balls of equal size. One huge ball among small ones makes all cells huge; then `sweep` is faster.
+- `sweep` sorts boxes along x and tests those whose x ranges overlap in y (Baraff 1992, sort and sweep). It is O(N log N
+  + pairs that overlap in x) and suits wide scenes and balls of very different sizes.
+- `near_segments` is the broad phase of walls and posts, which do not move. Their boxes are sorted from left to right
+  once; a binary search finds the first box that can overlap a ball.
 """
 
 import math
@@ -34,16 +28,16 @@ from sandbox.engines.common.colliders import StaticColliders
 from sandbox.engines.common.kernel import bare_kernel, kernel
 
 FIRST = 30
-"""Bits below the first number in the key of a pair: a scene holds fewer bodies, and fewer segments, than 2³⁰."""
+"""Number of bits below the first index in the key of a pair: a scene has fewer than 2³⁰ bodies and segments"""
 SECOND = (1 << FIRST) - 1
-"""The bits of the second."""
+"""Mask of the bits of the second index"""
 
 ROUNDING = 1e-15
-"""Rounding error of two edges, x ± r, relative to their terms: four roundings, and a margin.
-Boxes are widened by it, or far from the origin they would lose pairs whose centres are near enough."""
+"""Rounding error of two edges, x ± r, relative to their terms: four roundings, and a margin. Boxes are widened by it,
+because far from the origin they would otherwise miss pairs that touch."""
 
 EXCEEDED, UNSORTED = -1, -2
-"""Returned in place of the number of tests: the limit of pairs was exceeded; the order must be sorted anew."""
+"""Returned in place of the number of tests: the limit of pairs was exceeded; the order must be sorted again."""
 
 
 @bare_kernel
@@ -86,10 +80,10 @@ def all_pairs(
     collision_mask: IntArray,
     moves: BoolArray,
     margin: float,  # noqa: ARG001
-    most: int,  # noqa: ARG001, the finder counts these pairs beforehand
+    max_tests: int,  # noqa: ARG001, the pipeline checks the number of pairs beforehand
     keys: IntArray,
 ) -> tuple[int, int]:
-    """Emit every pair that can touch."""
+    """Write every pair that can collide."""
     found = 0
     for i in range(len(position)):
         if collision_mask[i] == NOTHING:  # particles may be many
@@ -110,10 +104,10 @@ def circles(
     collision_mask: IntArray,
     moves: BoolArray,
     margin: float,
-    most: int,  # noqa: ARG001, the finder counts these pairs beforehand
+    max_tests: int,  # noqa: ARG001, as above
     keys: IntArray,
 ) -> tuple[int, int]:
-    """Emit the pairs whose bounding circles, widened by the margin, overlap."""
+    """Write the pairs whose bounding circles, widened by the margin, overlap."""
     found, tests = 0, 0
     for i in range(len(position)):
         if collision_mask[i] == NOTHING:  # particles may be many
@@ -122,19 +116,19 @@ def circles(
             if can_collide(collision_mask[i], moves[i], collision_mask[j], moves[j]):
                 tests += 1
                 x, y = position[j, 0] - position[i, 0], position[j, 1] - position[i, 1]
-                reach = radius[i] + radius[j] + margin
-                if x * x + y * y <= reach * reach:
+                limit = radius[i] + radius[j] + margin
+                if x * x + y * y <= limit * limit:
                     if found < len(keys):
                         keys[found] = pair_key(i, j)
                     found += 1
     return found, tests
 
 
-FARTHEST_CELL = 4e18
-"""Cells beyond are merged: cell numbers are 64-bit."""
+MAX_CELL = 4e18
+"""Largest cell number: cell numbers are 64-bit integers. Farther cells are merged."""
 
 LOW = 2**31 - 1
-"""The low bits of a cell's number: more than any table has slots."""
+"""Mask of the low bits of a cell number: more than any table has slots"""
 
 
 @kernel
@@ -142,13 +136,13 @@ def cell_of(coordinate: float, width: float) -> int:
     """Return the number of the cell that a coordinate lies in."""
     if math.isnan(coordinate):  # a body that has diverged touches nothing; the step ends with a Divergence
         return 0
-    return math.floor(min(max(coordinate / width, -FARTHEST_CELL), FARTHEST_CELL))
+    return math.floor(min(max(coordinate / width, -MAX_CELL), MAX_CELL))
 
 
 @kernel
 def slot_of(column: int, row: int, mask: int) -> int:
     """Return the slot of a cell in a table of mask + 1 slots (Teschner et al. 2003, their two primes)."""
-    # By their low bits alone, so that no product overflows; of a product, they depend on nothing else.
+    # From the low bits only, so that no product overflows. The low bits of a product depend on nothing else.
     return int((((column & LOW) * 73856093) ^ ((row & LOW) * 19349663)) & mask)
 
 
@@ -160,15 +154,15 @@ def grid(
     collision_mask: IntArray,
     moves: BoolArray,
     margin: float,
-    most: int,
+    max_tests: int,
     keys: IntArray,
 ) -> tuple[int, int]:
-    """Emit the pairs whose bounding circles, widened by the margin, overlap; `order` (N,) is used for scratch."""
-    count, widest = len(position), 0.0
+    """Write the pairs whose bounding circles, widened by the margin, overlap; `order` (N,) is scratch memory."""
+    count, max_radius = len(position), 0.0
     for i in range(count):
         if collision_mask[i] > 0:
-            widest = max(widest, radius[i])
-    width = 2.0 * widest + margin
+            max_radius = max(max_radius, radius[i])
+    width = 2.0 * max_radius + margin
     if width <= 0.0:
         return 0, 0
     mask = 1
@@ -176,7 +170,7 @@ def grid(
         mask *= 2
     mask -= 1
 
-    # Counting sort: `begin[s]` … `begin[s + 1]` are the places in `order` of the balls of slot s.
+    # Counting sort: `begin[s]` … `begin[s + 1]` are the rows in `order` of the balls of slot s.
     column, row, slot = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count, np.int64)
     begin = np.zeros(mask + 3, np.int64)
     for i in range(count):
@@ -191,36 +185,36 @@ def grid(
             order[begin[slot[i] + 1]] = i
             begin[slot[i] + 1] += 1
 
-    found, tests, looked = 0, 0, 0
+    found, tests, visited = 0, 0, 0
     for i in range(count):
         if collision_mask[i] == 0:
             continue
-        if looked > most:
+        if visited > max_tests:
             return found, EXCEEDED
         x, y = position[i, 0], position[i, 1]
-        # Three by three cells at most; distinguished by positions: far out, neighbouring cell numbers round to one.
+        # At most 3 × 3 cells. Far from the origin the numbers of neighbouring cells can round to the same value.
         for across in range(cell_of(x - width, width), cell_of(x + width, width) + 1):
             for up in range(cell_of(y - width, width), cell_of(y + width, width) + 1):
                 s = slot_of(across, up, mask)
-                looked += begin[s + 1] - begin[s]
-                for place in range(begin[s], begin[s + 1]):
-                    j = order[place]
+                visited += begin[s + 1] - begin[s]
+                for slot_index in range(begin[s], begin[s + 1]):
+                    j = order[slot_index]
                     # Another cell may share the slot.
                     if j <= i or column[j] != across or row[j] != up:
                         continue
                     if can_collide(collision_mask[i], moves[i], collision_mask[j], moves[j]):
                         tests += 1
                         dx, dy = position[j, 0] - x, position[j, 1] - y
-                        reach = radius[i] + radius[j] + margin
-                        if dx * dx + dy * dy <= reach * reach:
+                        limit = radius[i] + radius[j] + margin
+                        if dx * dx + dy * dy <= limit * limit:
                             if found < len(keys):
                                 keys[found] = pair_key(i, j)
                             found += 1
     return found, tests
 
 
-FEW_SHIFTS = 100
-"""Places that a box is moved by in the order, on average, up to which insertion beats sorting anew."""
+MEAN_SHIFTS = 100
+"""Mean number of positions that a box may move in the order before sorting is faster than insertion"""
 
 
 @kernel
@@ -231,38 +225,38 @@ def sweep(
     collision_mask: IntArray,
     moves: BoolArray,
     margin: float,
-    most: int,
+    max_tests: int,
     keys: IntArray,
 ) -> tuple[int, int]:
-    """Emit the pairs whose axis-aligned boxes, widened by the margin, overlap.
+    """Write the pairs whose axis-aligned boxes, widened by the margin, overlap.
 
-    `order` was the order from left to right a step ago; it is brought up to date. Little changes in a step, so that
-    insertion is nearly linear; `UNSORTED` is returned where it is not.
+    `order` is the order from left to right of the last step. It is updated by insertion sort, which is nearly linear
+    because little changes in a step. If too much has changed, `UNSORTED` is returned.
     """
-    shifts, most_shifts = 0, FEW_SHIFTS * (len(order) + FEW_SHIFTS)
+    shifts, max_shifts = 0, MEAN_SHIFTS * (len(order) + MEAN_SHIFTS)
     for k in range(1, len(order)):
-        if shifts > most_shifts:
+        if shifts > max_shifts:
             return 0, UNSORTED
-        moving, place = order[k], k
+        moving, target = order[k], k
         left = position[moving, 0] - radius[moving]
-        while place > 0 and position[order[place - 1], 0] - radius[order[place - 1]] > left:
-            order[place] = order[place - 1]
-            place -= 1
-        order[place] = moving
-        shifts += k - place
+        while target > 0 and position[order[target - 1], 0] - radius[order[target - 1]] > left:
+            order[target] = order[target - 1]
+            target -= 1
+        order[target] = moving
+        shifts += k - target
 
-    found, tests, looked = 0, 0, 0
+    found, tests, visited = 0, 0, 0
     for k in range(len(order)):
-        if looked > most:
+        if visited > max_tests:
             return found, EXCEEDED
         i = order[k]
-        reach = radius[i] + margin
-        right = position[i, 0] + reach + ROUNDING * (abs(position[i, 0]) + reach)
+        limit = radius[i] + margin
+        right = position[i, 0] + limit + ROUNDING * (abs(position[i, 0]) + limit)
         for next_k in range(k + 1, len(order)):
             j = order[next_k]
             if position[j, 0] - radius[j] > right:
                 break
-            looked += 1
+            visited += 1
             if can_collide(collision_mask[i], moves[i], collision_mask[j], moves[j]):
                 tests += 1
                 if abs(position[j, 1] - position[i, 1]) <= radius[i] + radius[j] + margin:
@@ -292,7 +286,7 @@ class CandidatePairs(NamedTuple):
 
 
 class SegmentBoxes:
-    """The boxes around G segments, sorted."""
+    """Axis-aligned boxes of G segments, sorted from left to right."""
 
     def __init__(self, fixtures: StaticColliders) -> None:
         ends = fixtures.segments[:, :4].reshape(-1, 2, 2)
@@ -300,54 +294,54 @@ class SegmentBoxes:
         low, high = ends.min(axis=1) - half, ends.max(axis=1) + half
         self.index: IntArray = np.argsort(low[:, 0], kind="stable")
         self.box: FloatArray = np.hstack((low, high))[self.index]
-        self.widest = float((high - low)[:, 0].max(initial=0.0))
+        self.max_width = float((high - low)[:, 0].max(initial=0.0))
 
     def __len__(self) -> int:
         return len(self.index)
 
     @property
     def sorted(self) -> tuple[FloatArray, IntArray, float]:
-        """The boxes (G, 4), m, from left to right, the number of each one's segment, and the largest width, m."""
-        return self.box, self.index, self.widest
+        """The boxes (G, 4), m, from left to right, the index of each segment, and the largest width, m."""
+        return self.box, self.index, self.max_width
 
 
 @bare_kernel
 def near_segments(
     position: FloatArray,
     radius: FloatArray,
-    able: BoolArray,
+    can_touch: BoolArray,
     box: FloatArray,
     index: IntArray,
-    widest: float,
+    max_width: float,
     margin: float,
-    most: int,
+    max_tests: int,
     keys: IntArray,
 ) -> tuple[int, int]:
-    """Write the keys of balls and segments whose boxes, widened by the margin, overlap; return how many, and tests.
+    """Write the keys of balls and segments whose boxes, widened by the margin, overlap; return their number, and tests.
 
-    In place of the tests it returns `EXCEEDED` where there are more than `most`.
+    The number of tests is replaced by `EXCEEDED` if there were more than `max_tests`.
     """
     found, tests = 0, 0
     for i in range(len(position)):
-        if not able[i]:
+        if not can_touch[i]:
             continue
-        if tests > most:
+        if tests > max_tests:
             return found, EXCEEDED
-        x, y, reach = position[i, 0], position[i, 1], radius[i] + margin
-        reach += ROUNDING * (abs(x) + abs(y) + reach + widest)
+        x, y, limit = position[i, 0], position[i, 1], radius[i] + margin
+        limit += ROUNDING * (abs(x) + abs(y) + limit + max_width)
         low, high = 0, len(box)
         while low < high:  # the first that begins at x − reach − widest or farther right
             middle = (low + high) // 2
-            if box[middle, 0] < x - reach - widest:
+            if box[middle, 0] < x - limit - max_width:
                 low = middle + 1
             else:
                 high = middle
-        for place in range(low, len(box)):
-            if box[place, 0] > x + reach:
+        for row in range(low, len(box)):
+            if box[row, 0] > x + limit:
                 break
             tests += 1
-            if box[place, 2] >= x - reach and box[place, 1] <= y + reach and box[place, 3] >= y - reach:
+            if box[row, 2] >= x - limit and box[row, 1] <= y + limit and box[row, 3] >= y - limit:
                 if found < len(keys):
-                    keys[found] = pair_key(i, index[place])
+                    keys[found] = pair_key(i, index[row])
                 found += 1
     return found, tests

@@ -1,22 +1,23 @@
 """Continuous collision detection: steps that end at the time of impact. DETECTIONS is the table of all detections.
 
-Each advances a world by h, in steps of its own, from the verbs of `step`.
+Each detection advances a world by h in one or more steps, by the verbs of `step`.
 
-`bisect` rewinds and halves the step until the time of impact is found (the tutorial's example 5). A step that ends with
-a new overlap is taken back. The last time at which nothing overlaps yet is found by bisection, the impact is resolved
-there, and the rest of the step begins anew. It finds when something was hit, not whether: a body that is through before
-the end of the step is not seen, as with `discrete`.
+`bisect` finds the time of impact by bisection (the tutorial's example 5). If a step ends with a new overlap, the latest
+time without overlap is found, the impact is resolved there, and the rest of the step follows. It finds the time of an
+impact and not whether there is one: as with `discrete`, a body tunnels that has passed an obstacle at the end of the
+step.
 
-Impacts in time need accurate flights: explicit Euler gains g·h of speed in each, which discrete detection happens to
-remove again. With `bisect` and `swept` it stays, and a bouncing ball never falls below e·g·h/(1 − e).
+`bisect` and `swept` need an accurate integrator: explicit Euler gains a speed of g·h in each free flight, which
+discrete detection happens to remove. With these two it remains, and a bouncing ball keeps a speed of at least e·g·h/(1
+− e).
 
-`swept` computes the time of impact of circles in closed form, along the straight line that each centre moves in a step.
-Nothing is passed unseen, however fast. Paths under gravity are curved; the line differs by g·h²/8 at most, so that
-impacts are second order in time.
+`swept` computes the time of impact of circles in closed form, on the straight line of each centre in a step. Nothing
+tunnels at any speed. Paths under gravity are curved; they differ from the line by at most g·h²/8, so that the error of
+impact times is of second order.
 
-`shrink` cuts the step until no displacement is large, the tutorial's remedy against tunnelling. No body moves more than
-half the smallest radius in a piece, so that none passes through another, or a wall, unseen: the centre is never across
-before the overlap shows. All bodies pay the price for the fastest.
+`shrink` divides the step until all displacements are small, the tutorial's remedy against tunnelling. No body moves
+more than half the smallest radius in a piece, so that an overlap is found before a centre has crossed an obstacle. The
+fastest body determines the number of pieces for all.
 """
 
 from collections.abc import Iterator
@@ -29,91 +30,97 @@ from sandbox.engines.reference.collision import CirclePipeline
 from sandbox.engines.reference.integrators import State
 from sandbox.engines.reference.manifold import Manifolds
 from sandbox.engines.reference.step import Detection, StepRecord, WorldState, discrete, step
+from sandbox.engines.reference.velocity_solver import Motion
 from sandbox.resource_limits import STEP_PIECES
 
-NEAR = 1e-6
-"""A pair nearer than this part of its contact distance touches: far above what bisection leaves (1e-9 of a step)."""
+TOUCHING = 1e-6
+"""Separation, as a fraction of the contact distance, below which a pair touches: far above the error of bisection, 1e-9
+of a step"""
 
-SLOW = 0.5
-"""What closes by less than this part of its contact distance in a step cannot pass unseen."""
+MAX_RESTING_APPROACH = 0.5
+"""Approach in a step, as a fraction of the contact distance, below which a pair cannot tunnel"""
 
 MAX_IMPACTS = 200
-"""Impacts that one substep resolves one by one; the rest of the substep is then one discrete step. It bounds the work
-for balls that rattle between others in ever shorter time."""
+"""Number of impacts in a substep that are resolved one by one; the rest of the substep is then one discrete step. It
+bounds the work for balls that bounce between others at ever shorter intervals."""
 
 
-def resting(world: WorldState, h: float) -> IntArray:
-    """Return the keys of pairs that touch already and close slowly, ascending: they are left to the discrete step."""
+def resting_pairs(world: WorldState, h: float) -> IntArray:
+    """Return the keys of pairs that touch and close slowly, ascending. The discrete step handles them."""
     x = world.x
-    reach = NEAR * 2.0 * world.pipeline.widest
-    contacts = world.pipeline.manifolds(x[0], world.pipeline.candidates(x[0], reach), reach)
-    distance = contacts.arm.sum(axis=1)
-    still = (contacts.separation <= NEAR * distance) & (world.closing_speed(contacts, x) * h < SLOW * distance)
+    max_separation = TOUCHING * 2.0 * world.pipeline.max_radius
+    contacts = world.pipeline.manifolds(x[0], world.pipeline.candidates(x[0], max_separation), max_separation)
+    distance = contacts.anchor.sum(axis=1)
+    still = (contacts.separation <= TOUCHING * distance) & (
+        world.closing_speed(contacts, x) * h < MAX_RESTING_APPROACH * distance
+    )
     return np.asarray(contacts.key[still])
 
 
-def new_contacts(world: WorldState, x: State, rest: IntArray, slow: float) -> Manifolds:
-    """Return the contacts of a state that are new: overlapping, not resting before, closing faster than `slow`, m/s.
+def new_contacts(world: WorldState, motion: Motion, resting: IntArray, resting_speed: float) -> Manifolds:
+    """Return the new contacts at the end of a motion: not resting before, and closing faster than `resting_speed`, m/s.
 
-    Slower ones have come to rest: bounces smaller than a step can show would never end.
+    Slower ones have come to rest. Otherwise a series of ever smaller bounces would not end (Zeno behaviour).
     """
-    contacts = world.solver.detect(x)
+    contacts = world.solver.detect(motion)
     if not contacts.size:
         return contacts
-    return contacts.of(_is_new(contacts, rest) & (world.closing_speed(contacts, x) > slow))
+    return contacts.of(_is_new(contacts, resting) & (world.closing_speed(contacts, motion.placed) > resting_speed))
 
 
-def lasting_contacts(world: WorldState, x: State, rest: IntArray, clash: Manifolds) -> Manifolds:
-    """Return the contacts of a state that rested before, without those of the clash."""
-    if not len(rest):
-        return clash.of(slice(0))
-    contacts = world.solver.detect(x)
-    return contacts.of(~_is_new(contacts, rest) & _is_new(contacts, clash.key))
+def persistent_contacts(world: WorldState, motion: Motion, resting: IntArray, colliding: Manifolds) -> Manifolds:
+    """Return the resting contacts at the end of a motion, without those of the impact."""
+    if not len(resting):
+        return colliding.of(slice(0))
+    contacts = world.solver.detect(motion)
+    return contacts.of(~_is_new(contacts, resting) & _is_new(contacts, colliding.key))
 
 
-def simultaneous_contacts(world: WorldState, x: State, clash: Manifolds) -> Manifolds:
-    """Return the points of an impact, and those at which the same bodies touch in a state but for rounding.
+def simultaneous_contacts(world: WorldState, x: State, colliding: Manifolds) -> Manifolds:
+    """Return the contacts of an impact, and those at which the same pairs touch up to rounding.
 
-    The corners of a box that falls flat meet the ground at one time, of which rounding makes several. Solved one after
-    the other, the first would turn the box.
+    The corners of a box that lands flat touch the ground at the same time, up to rounding. If they were solved one
+    after the other, the first impact would turn the box.
     """
     if isinstance(world.pipeline, CirclePipeline):
-        return clash
-    reach = NEAR * 2.0 * world.pipeline.widest
-    contacts = world.pipeline.manifolds(x[0], world.pipeline.candidates(x[0], reach), reach)
-    pairs = set(zip(clash.first.tolist(), clash.second.tolist(), strict=True))
+        return colliding
+    max_separation = TOUCHING * 2.0 * world.pipeline.max_radius
+    contacts = world.pipeline.manifolds(x[0], world.pipeline.candidates(x[0], max_separation), max_separation)
+    pairs = set(zip(colliding.first.tolist(), colliding.second.tolist(), strict=True))
     same = [pair in pairs for pair in zip(contacts.first.tolist(), contacts.second.tolist(), strict=True)]
     found = contacts.of(np.asarray(same, np.bool_))
-    return found if np.isin(clash.key, found.key).all() else clash  # so fast that a halved step still is beyond reach
+    return (
+        found if np.isin(colliding.key, found.key).all() else colliding
+    )  # too fast: the remaining separation exceeds the tolerance
 
 
-def _is_new(contacts: Manifolds, rest: IntArray) -> BoolArray:
-    return np.asarray(~np.isin(contacts.key, rest, assume_unique=True))
+def _is_new(contacts: Manifolds, resting: IntArray) -> BoolArray:
+    return np.asarray(~np.isin(contacts.key, resting, assume_unique=True))
 
 
-EPSILON = 1e-9
-"""How near to the impact bisection comes, as a part of the step: 30 halvings."""
+BISECTION_TOLERANCE = 1e-9
+"""Error of the time of impact as a fraction of the step: 30 halvings"""
 
 
 def bisect(world: WorldState, h: float) -> Iterator[StepRecord]:
-    """Advance from impact to impact, each to the last time at which nothing overlaps anew within EPSILON·h."""
-    left, slow = h, world.resting_speed(h)
+    """Advance from impact to impact; each is resolved at the latest time without new overlap."""
+    left, resting_speed = h, world.resting_speed(h)
     for _ in range(MAX_IMPACTS):
-        rest = resting(world, left)
-        clash = new_contacts(world, world.advance(left).placed, rest, slow)
-        if not clash.size:
+        resting = resting_pairs(world, left)
+        colliding = new_contacts(world, world.advance(left), resting, resting_speed)
+        if not colliding.size:
             break
         low, high = 0.0, left
-        while high - low > EPSILON * h:
+        while high - low > BISECTION_TOLERANCE * h:
             middle = 0.5 * (low + high)
-            found = new_contacts(world, world.advance(middle).placed, rest, slow)
+            found = new_contacts(world, world.advance(middle), resting, resting_speed)
             if found.size:
-                clash, high = found, middle
+                colliding, high = found, middle
             else:
                 low = middle
         motion = world.advance(low)
-        clash = simultaneous_contacts(world, motion.placed, clash)
-        yield world.impact(motion, lasting_contacts(world, motion.placed, rest, clash), clash, low)
+        colliding = simultaneous_contacts(world, motion.placed, colliding)
+        yield world.impact(motion, persistent_contacts(world, motion, resting, colliding), colliding, low)
         left -= low
     yield step(world, left)
 
@@ -122,16 +129,16 @@ def shrink(world: WorldState, h: float) -> Iterator[StepRecord]:
     """Advance in pieces, each as long as the largest possible displacement allows.
 
     Raises:
-        Exhaustion: the substep would take more than its part of the pieces that one step may have.
+        Exhaustion: the substep would have more pieces than its share of the limit of one step.
     """
     left, pieces, limit = h, 0, STEP_PIECES.value // world.substeps
     while left > 0.0:
-        needed = _max_displacement(world, left) / (0.5 * world.pipeline.thinnest)
-        if not needed < limit - pieces:
-            reason = f"a substep would be divided into {needed:.3g} parts; the limit is {limit:,}"
-            remedy = STEP_PIECES.remedy((needed + pieces) * world.substeps)
+        pieces_needed = _max_displacement(world, left) / (0.5 * world.pipeline.min_radius)
+        if not pieces_needed < limit - pieces:
+            reason = f"a substep would be divided into {pieces_needed:.3g} parts; the limit is {limit:,}"
+            remedy = STEP_PIECES.remedy((pieces_needed + pieces) * world.substeps)
             raise Exhaustion(f"{reason}; other detections need fewer; {remedy}")
-        piece = left / needed if needed > 1.0 else left
+        piece = left / pieces_needed if pieces_needed > 1.0 else left
         yield step(world, piece)
         left = left - piece if piece < left else 0.0
         pieces += 1
@@ -140,7 +147,7 @@ def shrink(world: WorldState, h: float) -> Iterator[StepRecord]:
 def _max_displacement(world: WorldState, h: float) -> float:
     """Return a bound, m, for the displacement of any body in h, s.
 
-    The speeds at both ends count too: a body that is thrown up and falls back has moved, and is where it was.
+    The speeds at both ends count too, because a body that rises and falls back in h has moved without a displacement.
     """
     pipeline, x, moved = world.pipeline, world.x, world.advance(h).placed
     still = np.zeros_like(x[1])
@@ -149,26 +156,28 @@ def _max_displacement(world: WorldState, h: float) -> float:
 
 
 def swept(world: WorldState, h: float) -> Iterator[StepRecord]:
-    """Advance from one first touch to the next; slow contacts come to rest, and are left to the discrete step."""
+    """Advance from one time of impact to the next. Slow contacts come to rest and are solved by the discrete step."""
     pipeline = world.pipeline
-    assert isinstance(pipeline, CirclePipeline)  # for polygons the engine refuses this detection
-    left, slow = h, world.resting_speed(h)
-    rest = resting(world, left)
+    assert isinstance(pipeline, CirclePipeline)  # the engine refuses this detection for polygons
+    left, resting_speed = h, world.resting_speed(h)
+    resting = resting_pairs(world, left)
     for _ in range(MAX_IMPACTS):
-        fraction, key = pipeline.first_touch(world.x[0], world.advance(left).placed[0], rest)
+        fraction, key = pipeline.first_touch(world.x[0], world.advance(left).placed[0], resting)
         if key < 0:
             break
         motion = world.advance(fraction * left)
-        contact = pipeline.only(motion.placed[0], key)
-        if world.closing_speed(contact, motion.placed)[0] <= min(slow, SLOW * contact.arm.sum() / left):
-            rest = np.union1d(rest, [key])
+        contact = pipeline.pair_manifold(motion.placed[0], key)
+        if world.closing_speed(contact, motion.placed)[0] <= min(
+            resting_speed, MAX_RESTING_APPROACH * contact.anchor.sum() / left
+        ):
+            resting = np.union1d(resting, [key])
             continue
-        lasting = lasting_contacts(world, motion.placed, rest, contact)
-        yield world.impact(motion, lasting, contact, fraction * left)
+        persistent = persistent_contacts(world, motion, resting, contact)
+        yield world.impact(motion, persistent, contact, fraction * left)
         left -= fraction * left
         if left <= 0.0:  # the impact is at the end of the step
             return
-        rest = resting(world, left)
+        resting = resting_pairs(world, left)
     yield step(world, left)
 
 

@@ -1,13 +1,11 @@
-"""Driven bodies: motors, flippers and plungers, and how they take part in the solver.
+"""Driven bodies: motors, flippers and plungers in the solver.
 
-DrivenBody: a body that a drive holds. In states of the solver, the position of a body on a hinge is that of its hinge.
-Lever arms of its contacts start there: the hinge cannot move, and the body has its moment of inertia about the hinge.
+In states of the solver, the position of a body on a hinge is that of the hinge, which cannot move. The anchors of its
+contacts start there, and its moment of inertia is that about the hinge.
 
-Drives: all driven bodies of a simulation, for the solver.
-
-The stops of a hinge act as one-sided joints. If all contacts of a body press it onto its stop as well, it is immovable
-for that substep: contacts and stop, solved alternately, would not converge in 10 iterations. A body led by a stroke or
-a plunger is kinematic, and has its planned velocity during the whole substep.
+The stops of a hinge are one-sided constraints. If all contacts of a body press it onto its stop as well, it is
+immovable in that substep, because contacts and stop, solved alternately, would not converge in 10 iterations. A body
+moved by a stroke or a plunger is kinematic, and has its planned velocity during the whole substep.
 """
 
 from abc import ABC, abstractmethod
@@ -31,46 +29,46 @@ from sandbox.engines.common.motors import (
 )
 from sandbox.engines.reference.collision import CollisionPipeline
 from sandbox.engines.reference.integrators import Inputs, State, transition
-from sandbox.engines.reference.joint_data import ties_of
-from sandbox.engines.reference.joint_rows import VelocityConstraints, rows_of
+from sandbox.engines.reference.joint_data import select_joints
+from sandbox.engines.reference.joint_rows import VelocityConstraints, make_velocity_constraints
 from sandbox.engines.reference.joints import JointSolver
 from sandbox.engines.reference.manifold import Manifolds
 from sandbox.engines.reference.sequential_impulses import AngularStops, solve_together
-from sandbox.engines.reference.velocity_solver import ContactMemory, ImpulseSolver, Motion
+from sandbox.engines.reference.velocity_solver import ContactMemory, ImpulseSolver, Motion, SpringContacts
 from sandbox.scene.compile.drives import Mount, about_hinge
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.forces import PlungerDrive, StrokeDrive, TorqueDrive
 from sandbox.scene.description.world import Settings
 
 STILL = 1e-9
-"""rad/s, angular velocity that rounding leaves to a body pressed onto its stop"""
+"""rad/s, rounding error of the angular velocity of a body pressed onto its stop"""
 
 
 class DrivenBody(ABC):
-    """Base of driven bodies. A substep calls `plan`, `begin`, `place`, and after the contacts `commit`."""
+    """Base class of driven bodies. A substep calls `plan`, `begin`, `place`, and after the contacts `commit`."""
 
-    def __init__(self, store: BodyStore, number: int, mount: Mount) -> None:
-        self.number, self.mount = number, mount
-        self.mass = float(store.bodies.mass[number])
-        self.moment = about_hinge(mount, self.mass, float(store.bodies.moment[number]))
+    def __init__(self, store: BodyStore, index: int, mount: Mount) -> None:
+        self.index, self.mount = index, mount
+        self.mass = float(store.bodies.mass[index])
+        self.moment = about_hinge(mount, self.mass, float(store.bodies.moment[index]))
         """moment of inertia about the hinge, kg·m²"""
         self.gravity: Point = store.scene.world.gravity
         self.state: FloatArray = store.drives[mount.number]
         """(3,) of its drive, as in a frame; written to"""
         drive = mount.drive
-        self._seat = mount.home if isinstance(drive, PlungerDrive) else drive.pivot
+        self._origin = mount.home if isinstance(drive, PlungerDrive) else drive.pivot
 
     @abstractmethod
     def plan(self, x: State, h: float) -> None:
-        """Plan the motion of the body from a state (2, N, 3) over h, s, as if nothing were hit."""
+        """Plan the motion of the body from a state (2, N, 3) over h, s, without contacts."""
 
     @abstractmethod
     def begin(self, x: State) -> None:
         """Write into a state the velocity that the body has during the planned substep."""
 
-    def glide(self, x: State, h: float) -> None:
+    def use_mean_velocity(self, x: State, h: float) -> None:
         """Write into a state the constant velocity that leads to the end of the planned substep of h, s."""
-        n = self.number
+        n = self.index
         end = np.zeros_like(x)
         self.place(end)
         x[1, n] = (end[0, n] - x[0, n]) / h
@@ -85,224 +83,226 @@ class DrivenBody(ABC):
 
     def use_hinges(self, x: State) -> None:
         """Replace the centre of mass by the hinge in a state."""
-        n = self.number
-        x[0, n, 0], x[0, n, 1] = self._seat
+        n = self.index
+        x[0, n, 0], x[0, n, 1] = self._origin
         x[1, n, 0] = x[1, n, 1] = 0.0
 
     def centre(self, pose: FloatArray, rate: FloatArray) -> tuple[Point, Point]:
         """Return position, m, and velocity, m/s, of the centre of mass for poses and rates (N, 3)."""
         return centre_about_pivot(
-            self.mount.hinge, self._seat, float(pose[self.number, 2]), float(rate[self.number, 2])
+            self.mount.hinge, self._origin, float(pose[self.index, 2]), float(rate[self.index, 2])
         )
 
     def kinetic(self, rate: FloatArray) -> float:
         """Return the kinetic energy of the body, J, for rates (N, 3)."""
-        return 0.5 * self.moment * float(rate[self.number, 2]) ** 2
+        return 0.5 * self.moment * float(rate[self.index, 2]) ** 2
 
     def height(self, pose: FloatArray) -> float:
         """Return the potential energy in gravity, J, up to a constant."""
-        x, y = hinge_to_centre(self.mount.hinge, float(pose[self.number, 2]))
+        x, y = hinge_to_centre(self.mount.hinge, float(pose[self.index, 2]))
         return -self.mass * (self.gravity[0] * x + self.gravity[1] * y)
 
 
 class HingeMotor(DrivenBody):
     """A body on a hinge, driven by a torque."""
 
-    turned: HingeState
-    fall: float
+    planned: HingeState
+    weight_torque: float
     """torque of the weight in the planned substep, N·m"""
 
-    def __init__(self, store: BodyStore, number: int, mount: Mount) -> None:
-        super().__init__(store, number, mount)
+    def __init__(self, store: BodyStore, index: int, mount: Mount) -> None:
+        super().__init__(store, index, mount)
         assert isinstance(mount.drive, TorqueDrive)
         self._law = HingeDrive(mount.drive, self.moment)
         self._h = 0.0
         self._planned = 0.0, 0.0, 0.0, 0.0  # angle, spin, torque of the drive, its level
-        self._held = 0, 0.0, 0.0  # by a stop: at which, N·m·s, in which time
+        self._last_stop = 0, 0.0, 0.0  # of the last substep: stop, impulse in N·m·s, duration in s
         self._low, self._high = sorted(mount.drive.stops)
 
     @property
     def direction(self) -> float:
         """Direction in which the planned substep presses it onto a stop: 1, −1, or 0 for none."""
-        return self.turned.stop * self._law.sense
+        return self.planned.stop * self._law.sense
 
     @property
     def stop_impulse(self) -> float:
-        """Impulse of the stop to begin with, N·m·s: that of the last substep, scaled to a shorter one."""
-        at, impulse, h = self._held
-        return impulse * min(self._h / h, 1.0) if at and at == self.turned.stop else 0.0
+        """Initial impulse of the stop, N·m·s: that of the last substep, scaled down if this one is shorter."""
+        at, impulse, h = self._last_stop
+        return impulse * min(self._h / h, 1.0) if at and at == self.planned.stop else 0.0
 
     def store_stop_impulse(self, given: float) -> None:
-        """Remember the impulse of the stop, N·m·s."""
-        self._held = self.turned.stop, given, self._h
+        """Store the impulse of the stop, N·m·s, for warm starting."""
+        self._last_stop = self.planned.stop, given, self._h
 
     def copy_stop_impulse(self, old: "HingeMotor") -> None:
         """Take over the impulse of the stop from another body object."""
-        self._held = old._held
+        self._last_stop = old._last_stop
 
     def plan(self, x: State, h: float) -> None:
         """Plan the motion under the ramped torque, between the stops."""
         level, torque, _ = self.state.tolist()
-        angle, spin = float(x[0, self.number, 2]), float(x[1, self.number, 2])
-        self.fall = gravity_torque(self.mount.hinge, angle, self.mass, self.gravity)
+        angle, spin = float(x[0, self.index, 2]), float(x[1, self.index, 2])
+        self.weight_torque = gravity_torque(self.mount.hinge, angle, self.mass, self.gravity)
         self._planned = angle, spin, torque, level
-        self.turned, self._h = self._law.turn(*self._planned, self.fall, h), h
+        self.planned, self._h = self._law.turn(*self._planned, self.weight_torque, h), h
 
     def begin(self, x: State) -> None:
-        """Keep the present velocity: the torque acts like any other force."""
+        """Do nothing: the torque is a force, and the velocity at the start of the substep is the present one."""
 
     def place(self, moved: State) -> None:
         """Write the end of the planned substep; the stop later removes the angular velocity that presses onto it."""
-        n, turned = self.number, self.turned
+        n, planned = self.index, self.planned
         self.use_hinges(moved)
-        moved[0, n, 2] = turned.angle
-        moved[1, n, 2] = turned.spin + turned.press * self._h / self.moment
+        moved[0, n, 2] = planned.angle
+        moved[1, n, 2] = planned.spin + planned.press * self._h / self.moment
 
     @property
     def is_at_stop(self) -> bool:
         """Whether the body is pressed onto a stop during the whole planned substep."""
-        return self.turned.stop != 0 and not self._planned[1] and self._planned[0] == self.turned.angle
+        return self.planned.stop != 0 and not self._planned[1] and self._planned[0] == self.planned.angle
 
-    def apply_spring_torque(self, spun: float) -> bool:
-        """Count the change of angular velocity by springs in the planned substep, rad/s, as a torque.
+    def apply_spring_torque(self, spin_change: float) -> bool:
+        """Add a change of angular velocity by springs, rad/s, to the planned substep as a torque.
 
-        Return whether that leaves it pressed onto a stop on which it stands.
+        Return whether a body at rest on a stop remains pressed onto it.
         """
         stood = self.is_at_stop
-        turned = self._law.turn(*self._planned, self.fall + self.moment * spun / self._h, self._h)
-        self.turned = turned._replace(press=0.0)
+        planned = self._law.turn(*self._planned, self.weight_torque + self.moment * spin_change / self._h, self._h)
+        self.planned = planned._replace(press=0.0)
         return stood and self.is_at_stop
 
     def commit(self, after: State) -> None:
-        """Keep the body between the stops, also if a contact changed its motion, and at rest on a stop."""
-        n = self.number
+        """Limit the angle to the stops, also after contacts, and set a velocity of rounding error at a stop to 0."""
+        n = self.index
         after[0, n, 2] = min(max(after[0, n, 2], self._low), self._high)
-        if self.turned.stop and abs(after[1, n, 2]) <= STILL:
+        if self.planned.stop and abs(after[1, n, 2]) <= STILL:
             after[1, n, 2] = 0.0
-        self.state[1] = self.turned.torque
+        self.state[1] = self.planned.torque
 
 
 class KinematicHinge(DrivenBody):
-    """A body that turns about a hinge at a given rate."""
+    """A body that turns about a hinge at a prescribed rate."""
 
     def plan(self, x: State, h: float) -> None:
         """Plan a rotation at the rate."""
         assert isinstance(self.mount.drive, StrokeDrive)
-        self._planned = turn_at_rate(self.mount.drive, float(self.state[0]), float(x[0, self.number, 2]), h)
+        self._planned = turn_at_rate(self.mount.drive, float(self.state[0]), float(x[0, self.index, 2]), h)
 
     def begin(self, x: State) -> None:
         """Write the rate, from the beginning of the substep."""
-        x[1, self.number, 2] = self._planned.spin
+        x[1, self.index, 2] = self._planned.spin
 
     def place(self, moved: State) -> None:
         """Write the end of the planned substep."""
         self.use_hinges(moved)
-        moved[0, self.number, 2], moved[1, self.number, 2] = self._planned.angle, self._planned.spin
+        moved[0, self.index, 2], moved[1, self.index, 2] = self._planned.angle, self._planned.spin
 
     def commit(self, after: State) -> None:
         """Set the rate to 0 at a stop."""
         if self._planned.arrives:
-            after[1, self.number, 2] = 0.0
+            after[1, self.index, 2] = 0.0
 
 
 class DrivenPlunger(DrivenBody):
-    """A body that is pulled back along a line, and released by a spring."""
+    """A body that is drawn back along a line and driven forward by a spring."""
 
-    def __init__(self, store: BodyStore, number: int, mount: Mount) -> None:
-        super().__init__(store, number, mount)
+    def __init__(self, store: BodyStore, index: int, mount: Mount) -> None:
+        super().__init__(store, index, mount)
         assert isinstance(mount.drive, PlungerDrive)
-        self._drive, self._along = mount.drive, stroke_direction(mount.drive)
+        self._drive, self._direction = mount.drive, stroke_direction(mount.drive)
 
     def plan(self, x: State, h: float) -> None:
-        """Plan the pull, or the release by the spring, depending on the level."""
+        """Plan the motion by the hand or by the spring, depending on the level."""
         del x
         level, pull, rate = self.state.tolist()
         self._planned = advance_plunger(self._drive, level, pull, rate, h)
 
     def use_hinges(self, x: State) -> None:
-        """Do nothing: the pose is that of the centre already."""
+        """Do nothing: its position is that of the centre."""
 
     def begin(self, x: State) -> None:
-        """Write the final velocity of the substep from its beginning."""
-        x[1, self.number, :2] = self._where()[1]
+        """Write the velocity at the end of the substep, which it has throughout."""
+        x[1, self.index, :2] = self._centre_state()[1]
 
-    def _where(self) -> tuple[Point, Point]:
-        return plunger_state(self._seat, self._along, self._planned.pull, self._planned.rate)
+    def _centre_state(self) -> tuple[Point, Point]:
+        return plunger_state(self._origin, self._direction, self._planned.pull, self._planned.rate)
 
     def place(self, moved: State) -> None:
         """Write the end of the planned substep."""
-        n = self.number
-        moved[0, n, :2], moved[1, n, :2] = self._where()
+        n = self.index
+        moved[0, n, :2], moved[1, n, :2] = self._centre_state()
         moved[1, n, 2] = 0.0
 
     def commit(self, after: State) -> None:
         """Set the velocity to 0 at the target."""
         rate = 0.0 if self._planned.arrives else self._planned.rate
         if not rate:
-            after[1, self.number, :2] = 0.0
+            after[1, self.index, :2] = 0.0
         self.state[1:] = self._planned.pull, rate
 
     def centre(self, pose: FloatArray, rate: FloatArray) -> tuple[Point, Point]:
         """Return position, m, and velocity, m/s."""
-        x, y = pose[self.number, :2].tolist()
-        vx, vy = rate[self.number, :2].tolist()
+        x, y = pose[self.index, :2].tolist()
+        vx, vy = rate[self.index, :2].tolist()
         return (x, y), (vx, vy)
 
     def kinetic(self, rate: FloatArray) -> float:
         """Return the kinetic energy of the body, J, for rates (N, 3)."""
-        return 0.5 * self.mass * float(rate[self.number, 0] ** 2 + rate[self.number, 1] ** 2)
+        return 0.5 * self.mass * float(rate[self.index, 0] ** 2 + rate[self.index, 1] ** 2)
 
     def height(self, pose: FloatArray) -> float:
         """Return the potential energy in gravity, J, up to a constant."""
-        return -self.mass * float(np.dot(self.gravity, pose[self.number, :2]))
+        return -self.mass * float(np.dot(self.gravity, pose[self.index, :2]))
 
 
-def make_driven_body(store: BodyStore, number: int, mount: Mount) -> DrivenBody:
+def make_driven_body(store: BodyStore, index: int, mount: Mount) -> DrivenBody:
     """Return the driven body with an index."""
     kinds: dict[str, type[HingeMotor] | type[KinematicHinge] | type[DrivenPlunger]]
     kinds = {"torque": HingeMotor, "stroke": KinematicHinge, "plunger": DrivenPlunger}
-    return kinds[mount.drive.kind](store, number, mount)
+    return kinds[mount.drive.kind](store, index, mount)
 
 
 class DriveWork(NamedTuple):
     """Energy that a substep gave to driven bodies, J."""
 
     gained: float
-    """kinetic energy, and potential energy of bodies that nothing stops"""
+    """increase of kinetic energy, and of the potential energy of kinematic bodies"""
     weight: float
-    """work of the weight of bodies on hinges, as the step computes it"""
-    lifted: float
-    """increase of their potential energy"""
+    """work of the weight of bodies on motor hinges, as the step computes it"""
+    potential_change: float
+    """increase of the potential energy of bodies on motor hinges"""
 
 
 class Drives:
-    """The driven bodies that are present."""
+    """All present driven bodies of a simulation."""
 
     def __init__(self, store: BodyStore) -> None:
         self._store = store
         self.driven_bodies: list[DrivenBody] = [
-            make_driven_body(store, number, mount) for number, mount in store.held.items()
+            make_driven_body(store, index, mount) for index, mount in store.mounts.items()
         ]
         self._hinges = [driven for driven in self.driven_bodies if isinstance(driven, HingeMotor)]
-        self._numbers: IntArray = np.asarray([driven.number for driven in self.driven_bodies], np.int64)
-        self._turning = not store.led[self._numbers].all()
+        self._indices: IntArray = np.asarray([driven.index for driven in self.driven_bodies], np.int64)
+        self._turning = not store.kinematic[self._indices].all()
         self.inverse_moment_overlap: FloatArray = store.inverse_moment.copy()
-        """(N,) 1/(kg·m²), inverse moments for the correction of overlaps: 0 for driven bodies, which keep their pose"""
-        self.inverse_moment_overlap[self._numbers] = 0.0
+        """(N,) 1/(kg·m²), inverse moments for the correction of overlap: 0 for driven bodies"""
+        self.inverse_moment_overlap[self._indices] = 0.0
         self.inverse_moment_forces: FloatArray = store.inverse_moment
         """(N,) 1/(kg·m²), inverse moments for forces in the planned substep: 0 for a body pressed onto a stop"""
-        self._no_rows: VelocityConstraints = rows_of(ties_of(store.setup.links, among=np.empty(0, np.int64)))
+        self._no_rows: VelocityConstraints = make_velocity_constraints(
+            select_joints(store.setup.links, among=np.empty(0, np.int64))
+        )
 
     @classmethod
     def of(cls, store: BodyStore, old: Self | None) -> Self | None:
-        """Return the drives of the bodies in a body store, continuing old ones; None if no body is driven."""
-        if not store.held:
+        """Return the drives of the bodies in a body store, with the stop impulses of old ones, or None."""
+        if not store.mounts:
             return None
         new = cls(store)
-        stopped = {} if old is None else {hinge.number: hinge for hinge in old._hinges}
+        stopped = {} if old is None else {hinge.index: hinge for hinge in old._hinges}
         for hinge in new._hinges:
-            if hinge.number in stopped:
-                hinge.copy_stop_impulse(stopped[hinge.number])
+            if hinge.index in stopped:
+                hinge.copy_stop_impulse(stopped[hinge.index])
         return new
 
     def use_hinges(self, x: State) -> None:
@@ -314,13 +314,13 @@ class Drives:
         """Write the centres of mass of a state into the body store."""
         store = self._store
         for driven in self.driven_bodies:
-            store.position[driven.number], store.velocity[driven.number] = driven.centre(*x)
+            store.position[driven.index], store.velocity[driven.index] = driven.centre(*x)
 
     def centres(self, x: State) -> FloatArray:
         """Return the centres of mass of all bodies in a state, (N, 2) m."""
         position = x[0, :, :2].copy()
         for driven in self.driven_bodies:
-            position[driven.number] = driven.centre(*x)[0]
+            position[driven.index] = driven.centre(*x)[0]
         return position
 
     def begin(self, x: State, h: float) -> State:
@@ -333,47 +333,48 @@ class Drives:
         return self.start
 
     def advance_with_springs(
-        self, x: State, h: float, advance: Callable[[State], tuple[State, Manifolds, FloatArray]]
-    ) -> State:
-        """Return the state h, s, ahead, under contacts that act as forces during the whole substep.
+        self, x: State, h: float, advance: Callable[[State], tuple[State, SpringContacts]]
+    ) -> tuple[State, SpringContacts]:
+        """Return the state after h, s, under contacts that act as forces during the whole substep, and these contacts.
 
-        A body on a stop stays at rest while the contacts press it onto the stop, or off it less than its drive presses.
-        Other bodies on hinges move at a constant rate, changed by the contacts; their drives apply the stops.
+        A body on a stop remains at rest if the contacts press it onto the stop, or away from it with a smaller torque
+        than its drive. Other bodies on hinges move at a constant rate, changed by the contacts; their drives apply the
+        stops.
 
         Args:
             x: (2, N, 3) the state.
             h: s.
-            advance: returns the end state from a start state, the contacts, and their impulses (K, 2), N·s.
+            advance: returns the end state for a start state, and the contacts.
         """
         self.begin(x, h)
         for driven in self.driven_bodies:
-            driven.glide(self.start, h)
+            driven.use_mean_velocity(self.start, h)
         self.inverse_moment_forces = self._store.inverse_moment.copy()
         standing = [hinge for hinge in self._hinges if hinge.is_at_stop]
-        self.inverse_moment_forces[[hinge.number for hinge in standing]] = 0.0
-        while True:  # at most once for each of them
-            moved, contacts, impulse = advance(self.start)
-            loose = [each for each in standing if not each.apply_spring_torque(self._turn(each, contacts, impulse))]
-            if not loose:
+        self.inverse_moment_forces[[hinge.index for hinge in standing]] = 0.0
+        while True:  # each pass releases at least one of them
+            moved, springs = advance(self.start)
+            released = [each for each in standing if not each.apply_spring_torque(self._spin_change(each, *springs))]
+            if not released:
                 break
-            for hinge in loose:
+            for hinge in released:
                 hinge.plan(x, h)
-                self.inverse_moment_forces[hinge.number] = 1.0 / hinge.moment
-            standing = [hinge for hinge in standing if hinge not in loose]
+                self.inverse_moment_forces[hinge.index] = 1.0 / hinge.moment
+            standing = [hinge for hinge in standing if hinge not in released]
             for hinge in standing:
                 hinge.plan(x, h)
         for hinge in self._hinges:
             if hinge not in standing:
-                n = hinge.number
+                n = hinge.index
                 hinge.apply_spring_torque(float(moved[1, n, 2] - self.start[1, n, 2]))
-        return moved
+        return moved, springs
 
-    def _turn(self, hinge: HingeMotor, contacts: Manifolds, impulse: FloatArray) -> float:
+    def _spin_change(self, hinge: HingeMotor, contacts: Manifolds, impulse: FloatArray) -> float:
         """Return the change of angular velocity, rad/s, of a body on a hinge by impulses (K, 2), N·s."""
         turn = 0.0
         for body, side, sign in ((contacts.first, 0, -1.0), (contacts.second, 1, 1.0)):
-            which = body == hinge.number
-            turn -= float(contacts.arm[which, side] @ impulse[which, 1])
+            which = body == hinge.index
+            turn -= float(contacts.anchor[which, side] @ impulse[which, 1])
             turn -= sign * float(contacts.offset[which, side] @ impulse[which, 0])
         return turn / hinge.moment
 
@@ -382,11 +383,11 @@ class Drives:
         for driven in self.driven_bodies:
             driven.place(moved)
 
-    def with_stops(self, rates: FloatArray) -> FloatArray:
-        """Return rates (N, 3) after the planned substep, without the part that presses onto stops."""
+    def remove_stop_rates(self, rates: FloatArray) -> FloatArray:
+        """Return rates (N, 3) after the planned substep, without the parts that press onto stops."""
         rates = rates.copy()
         for hinge in self._hinges:
-            rates[hinge.number, 2] = hinge.turned.spin
+            rates[hinge.index, 2] = hinge.planned.spin
         return rates
 
     def solve(
@@ -401,12 +402,12 @@ class Drives:
         """Solve contacts, joints and stops together; the arguments are those of `solve_together`."""
         inverse_moment, stopped = self._store.inverse_moment.copy(), list[HingeMotor]()
         for hinge in self._hinges:
-            if hinge.direction and _presses(contacts, hinge.number, hinge.direction):
-                inverse_moment[hinge.number] = velocity[hinge.number, 2] = 0.0
+            if hinge.direction and _press_onto_stop(contacts, hinge.index, hinge.direction):
+                inverse_moment[hinge.index] = velocity[hinge.index, 2] = 0.0
             elif hinge.direction:
                 stopped.append(hinge)
         stops = AngularStops(
-            np.asarray([hinge.number for hinge in stopped], np.int64),
+            np.asarray([hinge.index for hinge in stopped], np.int64),
             np.asarray([hinge.direction for hinge in stopped]),
             np.asarray([hinge.stop_impulse for hinge in stopped]),
         )
@@ -415,7 +416,7 @@ class Drives:
         solve_together(contacts, bounce, rows, stops, velocity, *inverse, impulse, iterations)
         given = dict(zip(stops.body.tolist(), stops.impulse.tolist(), strict=True))
         for hinge in self._hinges:
-            hinge.store_stop_impulse(given.get(hinge.number, 0.0))
+            hinge.store_stop_impulse(given.get(hinge.index, 0.0))
 
     def commit(self, after: State) -> None:
         """Commit the planned substep."""
@@ -430,33 +431,33 @@ class Drives:
         impulse_xy = contacts.normal * along[:, None] + _left(contacts.normal) * across[:, None]
         work = 0.0
         for body, side, sign in ((contacts.first, 0, -1.0), (contacts.second, 1, 1.0)):
-            which = np.isin(body, self._numbers)
+            which = np.isin(body, self._indices)
             rate = mean[body[which]]
-            lever = contacts.arm[which, side] * across[which] + sign * contacts.offset[which, side] * along[which]
+            lever = contacts.anchor[which, side] * across[which] + sign * contacts.offset[which, side] * along[which]
             work += sign * float((impulse_xy[which] * rate[:, :2]).sum()) - float(lever @ rate[:, 2])
         return work
 
     def work(self, before: State, after: State, h: float) -> DriveWork:
         """Return the energy that a substep of h, s, between two states gave to driven bodies."""
-        gained = weight = lifted = 0.0
+        gained = weight = potential_change = 0.0
         for driven in self.driven_bodies:
             gained += driven.kinetic(after[1]) - driven.kinetic(before[1])
             rise = driven.height(after[0]) - driven.height(before[0])
             if isinstance(driven, HingeMotor):
-                n = driven.number
-                weight += driven.fall * h * 0.5 * float(before[1, n, 2] + after[1, n, 2])
-                lifted += rise
+                n = driven.index
+                weight += driven.weight_torque * h * 0.5 * float(before[1, n, 2] + after[1, n, 2])
+                potential_change += rise
             else:
                 gained += rise
-        return DriveWork(gained, weight, lifted)
+        return DriveWork(gained, weight, potential_change)
 
 
 class DrivenSolver(ImpulseSolver):
-    """Sequential impulses with driven bodies: their drives plan the motion, and their stops take turns with contacts.
+    """Sequential impulses with driven bodies: drives plan the motion, and stops are solved together with contacts.
 
     Args:
         drives: of the driven bodies.
-        store: the other arguments are those of `ImpulseSolver`.
+        store: as in `ImpulseSolver`, as the following arguments.
         settings: likewise.
         pipeline: likewise.
         joints: likewise.
@@ -472,27 +473,27 @@ class DrivenSolver(ImpulseSolver):
         joints: JointSolver | None,
         memory: ContactMemory,
     ) -> None:
-        super().__init__(store, settings, pipeline, joints, memory)
-        self._drives, self._always = drives, True
-        self._inverse_overlap = store.inverse_mass, drives.inverse_moment_overlap
+        super().__init__(store, settings, pipeline, joints, memory, drives.inverse_moment_overlap, has_constraints=True)
+        self._drives = drives
 
     def integrate(self, x: State, forces: Inputs, time: float, h: float) -> Motion:
-        """Return the motion from a state at a time, s, over h, s, as if nothing were hit."""
+        """Return the motion from a state at a time, s, over h, s, without contacts."""
         start = self._drives.begin(x, h)
         free = self._integrator.step(transition, time, start, forces, h)
         self._drives.place(free)
-        return self.place(start, free, h)
+        return self.complete_motion(start, free, h)
 
     def finish(self, after: State) -> State:
-        """Return the start state of the next step: driven bodies are between their stops, and at rest on a stop."""
+        """Return the state with which the next step begins, with driven bodies between their stops."""
         after = after.copy()
         self._drives.commit(after)
         return after
 
-    def _with_stops(self, rates: FloatArray) -> FloatArray:
-        return self._drives.with_stops(rates)
+    def remove_stop_rates(self, rates: FloatArray) -> FloatArray:
+        """Return rates (N, 3) at the end of a motion without the parts that stops will remove."""
+        return self._drives.remove_stop_rates(rates)
 
-    def _iterate(
+    def iterate(
         self,
         contacts: Manifolds,
         bounce: FloatArray,
@@ -500,6 +501,7 @@ class DrivenSolver(ImpulseSolver):
         velocity: FloatArray,
         impulse: FloatArray,
     ) -> None:
+        """Iterate over contacts, joints and stops; the arguments are those of `ImpulseSolver.iterate`."""
         self._drives.solve(contacts, bounce, rows, velocity, impulse, self._iterations)
 
 
@@ -508,9 +510,9 @@ def _left(normal: FloatArray) -> FloatArray:
     return np.column_stack((-normal[:, 1], normal[:, 0]))
 
 
-def _presses(contacts: Manifolds, number: int, direction: float) -> bool:
-    """Return whether a body has contacts and all of them turn it in the same direction, or not at all."""
-    first, second = contacts.first == number, contacts.second == number
+def _press_onto_stop(contacts: Manifolds, index: int, direction: float) -> bool:
+    """Return whether a body has contacts, all of which turn it in a direction, or not at all."""
+    first, second = contacts.first == index, contacts.second == index
     if not (first.any() or second.any()):
         return False
     return bool(

@@ -1,7 +1,7 @@
 """Energy ledger of a reference run: the energy change in each stage of a step, by cause.
 
 A contact or a joint acts during the whole step. The kick by the step's forces, which precedes its impulse, is not
-attributed to it. So the work of its impulse J is that at the mean of the velocities u at both ends of the step,
+attributed to it. So the work of its impulse J is computed at the mean of the velocities u at both ends of the step,
 
     work = J·(u_start + u_end)/2,
 
@@ -21,19 +21,19 @@ import numpy as np
 from sandbox.arrays import FloatArray
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.energy_ledger import Cause, EnergyLedger
-from sandbox.engines.reference.drives import Drives
+from sandbox.engines.reference.drives import Drives, DriveWork
 from sandbox.engines.reference.integrators import State
 from sandbox.engines.reference.manifold import Manifolds
 from sandbox.engines.reference.sequential_impulses import contact_work
 from sandbox.engines.reference.step import StepRecord, WorldState
 from sandbox.scene.compile.potential import Potential
 
-GAUSS = tuple((0.5 + 0.5 * node * math.sqrt(0.6), weight / 18.0) for node, weight in ((-1, 5), (0, 8), (1, 5)))
-"""Places in a step, as fractions of it, and their weights: exact for polynomials up to degree 5."""
+GAUSS_NODES = tuple((0.5 + 0.5 * node * math.sqrt(0.6), weight / 18.0) for node, weight in ((-1, 5), (0, 8), (1, 5)))
+"""Gauss–Legendre nodes, as fractions of a step, and their weights: exact for polynomials up to degree 5"""
 
 
 class StepEnergyLedger:
-    """Energy ledger of a running world: it reads the record of each step after that is done.
+    """Energy ledger of a running world, updated from the record of each step.
 
     Args:
         store: the bodies.
@@ -44,141 +44,155 @@ class StepEnergyLedger:
         self.account = EnergyLedger()
         self._store, self._world, self._field = store, world, world.field
         self._fraction = world.position_fraction
+        world.records_work = True
         self.rebuild()
 
     def rebuild(self) -> None:
-        """Derive masses, weights and potential anew from the bodies, forces, joints and drives of the world.
+        """Update after a change of the bodies, forces, joints or drives of the world.
 
         The penalty contacts of the ledger use a collision pipeline of their own, so that they are not counted as work.
         """
         store, world = self._store, self._world
-        self._u, self._joints, self._drives = world.forces, world.joints, world.drives
+        self._forces, self._joints, self._drives = world.forces, world.joints, world.drives
         self._penalty = world.ledger_penalty()
-        moving = store.mobile  # a body that a zone holds has no motion, but height
-        self._everyone: FloatArray = np.where(moving, (store.bodies.mass,) * 2 + (store.bodies.moment,), 0.0).T
-        self._inertia = self._everyone
-        if self._drives is not None:  # the motion of driven bodies is booked separately
-            self._inertia = self._everyone.copy()
-            self._inertia[list(store.held)] = 0.0
+        moving = store.mobile  # includes bodies held by zones, which have potential energy
+        self._all_inertia: FloatArray = np.where(moving, (store.bodies.mass,) * 2 + (store.bodies.moment,), 0.0).T
+        self._inertia = self._all_inertia
+        if self._drives is not None:  # the motion of driven bodies is entered separately
+            self._inertia = self._all_inertia.copy()
+            self._inertia[list(store.mounts)] = 0.0
         self._weight: FloatArray = self._inertia[:, :1] * store.scene.world.gravity
-        self._lifted: FloatArray = self._inertia[:, :1] * (store.gravity - np.asarray(store.scene.world.gravity))
+        self._zone_weight: FloatArray = self._inertia[:, :1] * (store.gravity - np.asarray(store.scene.world.gravity))
         breaks = np.full(len(store.setup.links), np.inf)
         breaks[list(store.broken)] = -np.inf
         self._potential = Potential(store.setup, store.bodies, breaks=breaks)
         self._no_spin: FloatArray = np.zeros(len(moving))
-        steady = bool(store.force.any() or store.torque.any() or self._lifted.any())
-        u = self._u
-        self._worked = u.dragged or u.rubbing or steady or self._field.thrusting or self._penalty is not None
+        steady = bool(store.force.any() or store.torque.any() or self._zone_weight.any())
+        u = self._forces
+        self._has_work = u.has_drag or u.damped_forces or steady or self._field.thrusting or self._penalty is not None
         self._compliant = self._joints is not None and self._joints.method == "xpbd"
 
     @contextmanager
-    def booking(self, cause: Cause) -> Iterator[None]:
-        """Book the change of energy by all that is done to the body store meanwhile to one cause."""
+    def attributing(self, cause: Cause) -> Iterator[None]:
+        """Attribute the change of energy by changes of the body store within the context to one cause."""
         before = self._total()
         yield
-        self.account.enter(cause, self._total() - before)
+        self.account.add(cause, self._total() - before)
 
-    def book(self, record: StepRecord) -> None:
-        """Book a step: contacts and joints through it, the impact at its end, drives, and the rest."""
+    def enter_step(self, record: StepRecord) -> None:
+        """Enter a step: its contacts and joints, the impact at its end, drives, forces and the integrator."""
         start, impact = record.motion.start[1], record.impact
         mean = 0.5 * (start + record.end)
         if self._penalty is None:
-            self._book_contacts(record.contacts, record.impulse, mean, record.kick_energy)
+            self._enter_contacts(record.contacts, record.impulse, mean, record.kick_energy)
+        assert record.work is not None  # this ledger has switched it on
         if self._joints is not None and self._joints.method == "impulses":
-            self.account.enter(Cause.JOINTS, self._joints.work(mean))
+            self.account.add(Cause.JOINTS, record.work.joints)
         if impact is not None:
             at_impact = 0.5 * (record.end + record.after[1])
-            self._book_contacts(impact.contacts, impact.impulse, at_impact, impact.kick_energy)
-        if self._drives is not None:
-            self._book_drives(self._drives, record, mean)
-        self._book_motion(record)
+            self._enter_contacts(impact.contacts, impact.impulse, at_impact, impact.kick_energy)
+        if self._drives is not None and record.work.drives is not None:
+            self._enter_drives(self._drives, record.work.drives, record, mean)
+        self._enter_motion(record)
 
-    def _book_drives(self, drives: Drives, record: StepRecord, mean: FloatArray) -> None:
+    def _enter_drives(self, drives: Drives, work: DriveWork, record: StepRecord, mean: FloatArray) -> None:
         """Enter the work of drives: the energy gain of driven bodies less the work of contacts and weight."""
-        work = drives.work(record.before, record.after, record.h)
         impulse_work = drives.impulse_work(record.contacts, record.impulse, mean)
-        if self._penalty is not None:  # its forces are booked whole, and against freely moving bodies alone
-            self.account.enter(Cause.INTEGRATOR, impulse_work)
-        self.account.enter(Cause.DRIVES, work.gained - impulse_work - work.weight)
-        self.account.enter(Cause.INTEGRATOR, work.weight + work.lifted)
+        if self._penalty is not None:  # the work of its forces is entered for freely moving bodies only
+            self.account.add(Cause.INTEGRATOR, impulse_work)
+        self.account.add(Cause.DRIVES, work.gained - impulse_work - work.weight)
+        self.account.add(Cause.INTEGRATOR, work.weight + work.potential_change)
 
-    def _book_contacts(
+    def _enter_contacts(
         self, contacts: Manifolds, impulse: FloatArray, mean: FloatArray, kick_energy: FloatArray | None
     ) -> None:
         if contacts.size:
             spin = mean[:, 2] if mean.shape[1] == 3 else self._no_spin
             along, across = contact_work(contacts, impulse, mean, spin)
             kicks = 0.0 if kick_energy is None else float(impulse[:, 0] @ kick_energy)
-            self.account.touch(along - kicks, across)
-            self.account.enter(Cause.KICKS, kicks)
+            self.account.add_contacts(along - kicks, across)
+            self.account.add(Cause.KICKS, kicks)
 
-    def _book_motion(self, record: StepRecord) -> None:
-        """Book forces, joints solved by positions, position correction, and the integrator."""
+    def _enter_motion(self, record: StepRecord) -> None:
+        """Enter forces, joints solved by positions, position correction, and the integrator."""
         h, after, end, motion = record.h, record.after, record.end, record.motion
         start, free, placed = motion.start, motion.free, motion.placed
         shift = 0.0 if motion.shift is None else motion.shift
         work = self._work(record.time, start, np.stack((after[0] - shift, end)), h)
         for cause in (Cause.DRAG, Cause.DAMPING, Cause.DRIVES):
-            self.account.enter(cause, work[cause])
+            self.account.add(cause, work[cause])
         forces = work[Cause.DRAG] + work[Cause.DRIVES] + self._spring_contacts(work, start[0], after[0])
 
         joint_change = placed[1] - free[1]  # by joints that are solved by positions
         displaced = bool(joint_change.any())
         corrected = free[0] if motion.shift is None else free[0] + shift
         followed = corrected + (self._fraction * h) * (end - free[1]) if displaced else after[0]
-        drift = self._kinetic(start[1], free[1]) + self._lift(start[0], free[0]) + self._lift(corrected, followed)
-        # The part of the kick that contacts and joints reversed.
+        drift = (
+            self._kinetic(start[1], free[1])
+            + self._potential_change(start[0], free[0])
+            + self._potential_change(corrected, followed)
+        )
+        # The part of the kick that contacts and joints have reversed
         drift += 0.5 * self._product(joint_change, free[1] - start[1] + placed[1] - end)
         drift += 0.5 * self._product(end - placed[1], placed[1] - start[1])
-        correction = self._lift(free[0], corrected) + self._strain(free[0], corrected) + self._lift(followed, after[0])
-        strain, strain_after = self._strain(start[0], free[0]) + self._strain(corrected, followed), 0.0
+        correction = (
+            self._potential_change(free[0], corrected)
+            + self._spring_energy_change(free[0], corrected)
+            + self._potential_change(followed, after[0])
+        )
+        strain, strain_after = (
+            self._spring_energy_change(start[0], free[0]) + self._spring_energy_change(corrected, followed),
+            0.0,
+        )
         if displaced:
-            strain_after = self._strain(followed, after[0])
+            strain_after = self._spring_energy_change(followed, after[0])
         joints = 0.5 * self._product(joint_change, start[1] + end)
         if self._compliant:  # springs are solved as joints are: their stored energy counts, except for damping
             joints += strain + strain_after - work[Cause.DAMPING]
         else:
             drift, correction, forces = drift + strain, correction + strain_after, forces + work[Cause.DAMPING]
-        self.account.enter(Cause.JOINTS, joints)
-        self.account.enter(Cause.CORRECTION, correction)
-        self.account.enter(Cause.INTEGRATOR, drift - forces)
+        self.account.add(Cause.JOINTS, joints)
+        self.account.add(Cause.CORRECTION, correction)
+        self.account.add(Cause.INTEGRATOR, drift - forces)
 
     def _spring_contacts(self, work: dict[Cause, float], start: FloatArray, end: FloatArray) -> float:
-        """Book contacts that are springs; return their work, J. What they store is restitution's until given back."""
+        """Enter penalty contacts; return their work, J. Stored energy counts as restitution until it is released."""
         if self._penalty is None:
             return 0.0
-        given_back = self._penalty.stored(start) - self._penalty.stored(end)
-        self.account.add(Cause.RESTITUTION, given_back)
-        self.account.touch(work[Cause.RESTITUTION], work[Cause.FRICTION])
+        given_back = self._penalty.stored_energy(start) - self._penalty.stored_energy(end)
+        self.account.add_unchecked(Cause.RESTITUTION, given_back)
+        self.account.add_contacts(work[Cause.RESTITUTION], work[Cause.FRICTION])
         return given_back + work[Cause.RESTITUTION] + work[Cause.FRICTION]
 
     def _work(self, time: float, start: State, end: State, h: float) -> dict[Cause, float]:
         """Return the work, J, of drag, damping and drives along the path of a step, a parabola between its ends."""
         work = dict.fromkeys(Cause, 0.0)
-        if h <= 0.0 or not self._worked:
+        if h <= 0.0 or not self._has_work:
             return work
-        off = end[0] - start[0] - (0.5 * h) * (start[1] + end[1])  # where the scheme leaves the parabola of its kick
-        for fraction, weight in GAUSS:
-            rate = start[1] + fraction * (end[1] - start[1]) + off / h
-            pose = start[0] + (fraction * h) * (start[1] + (0.5 * fraction) * (end[1] - start[1])) + fraction * off
+        deviation = end[0] - start[0] - (0.5 * h) * (start[1] + end[1])  # deviation of the scheme from a parabola
+        for fraction, weight in GAUSS_NODES:
+            rate = start[1] + fraction * (end[1] - start[1]) + deviation / h
+            pose = (
+                start[0] + (fraction * h) * (start[1] + (0.5 * fraction) * (end[1] - start[1])) + fraction * deviation
+            )
             for cause, power in self._powers(time + fraction * h, np.stack((pose, rate))):
                 work[cause] += weight * h * power
         return work
 
     def _powers(self, time: float, x: State) -> Iterator[tuple[Cause, float]]:
         """Yield the power, W, of each cause in a state."""
-        u, store, rate = self._u, self._store, x[1]
-        if u.dragged:
+        u, store, rate = self._forces, self._store, x[1]
+        if u.has_drag:
             wind = rate[:, :2] - u.wind
             fraction = u.linear_drag + u.quadratic_drag * np.hypot(wind[:, :1], wind[:, 1:])
             yield Cause.DRAG, -float((self._inertia[:, :1] * fraction * wind * rate[:, :2]).sum())
-        if u.rubbing and self._joints is not None:
+        if u.damped_forces and self._joints is not None:
             yield Cause.DAMPING, self._joints.damper_power(x)
         if store.force.any() or store.torque.any():
             yield Cause.DRIVES, float((store.force * rate[:, :2]).sum())
             yield Cause.DRIVES, float(store.torque @ rate[:, 2]) if rate.shape[1] == 3 else 0.0
-        if self._lifted.any():  # gravity of zones in excess of the world's
-            yield Cause.DRIVES, float((self._lifted * rate[:, :2]).sum())
+        if self._zone_weight.any():  # gravity of zones in excess of the world's
+            yield Cause.DRIVES, float((self._zone_weight * rate[:, :2]).sum())
         if self._field.thrusting:
             yield Cause.DRIVES, self._product(self._field.thrusts(time, x), rate)
         if self._penalty is not None:
@@ -194,25 +208,25 @@ class StepEnergyLedger:
         """Return the change of kinetic energy, J, between two sets of rates."""
         return 0.5 * self._product(after - before, after + before)
 
-    def _lift(self, before: FloatArray, after: FloatArray) -> float:
+    def _potential_change(self, before: FloatArray, after: FloatArray) -> float:
         """Return the change of the potential energy of gravity and attraction, J, between two sets of poses."""
         if before is after:
             return 0.0
         change = -float((self._weight * (after[:, :2] - before[:, :2])).sum())
         if self._potential.attracts:
-            change += self._attracted(after) - self._attracted(before)
+            change += self._attraction_energy(after) - self._attraction_energy(before)
         return change
 
-    def _strain(self, before: FloatArray, after: FloatArray) -> float:
+    def _spring_energy_change(self, before: FloatArray, after: FloatArray) -> float:
         """Return the change of the energy stored in springs, J, between two sets of poses."""
         if before is after or not self._potential.springs:
             return 0.0
-        return self._strained(after) - self._strained(before)
+        return self._spring_energy(after) - self._spring_energy(before)
 
-    def _attracted(self, pose: FloatArray) -> float:
+    def _attraction_energy(self, pose: FloatArray) -> float:
         return float(self._potential.of_attraction(pose[None, :, :2], self._store.present[None])[0])
 
-    def _strained(self, pose: FloatArray) -> float:
+    def _spring_energy(self, pose: FloatArray) -> float:
         angle = pose[:, 2] if pose.shape[1] == 3 else self._store.angle
         here = pose[None, :, :2], angle[None], self._store.present[None]
         return float(self._potential.of_springs(np.zeros(1), *here)[0])
@@ -222,8 +236,8 @@ class StepEnergyLedger:
         store = self._store
         pose = np.column_stack((store.position, store.angle))
         rate = np.column_stack((store.velocity, store.angular_velocity))
-        weight = self._everyone[:, :1] * store.scene.world.gravity
-        total = 0.5 * float((self._everyone * rate * rate).sum()) - float((weight * store.position).sum())
+        weight = self._all_inertia[:, :1] * store.scene.world.gravity
+        total = 0.5 * float((self._all_inertia * rate * rate).sum()) - float((weight * store.position).sum())
         if self._potential.attracts:
-            total += self._attracted(pose)
-        return total + self._strained(pose) if self._potential.springs else total
+            total += self._attraction_energy(pose)
+        return total + self._spring_energy(pose) if self._potential.springs else total

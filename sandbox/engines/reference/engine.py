@@ -5,33 +5,35 @@ from typing import TYPE_CHECKING
 
 from sandbox.engines.common.base import BIAS, slop_of
 from sandbox.engines.common.workload import overload
+from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_steppers
 from sandbox.scene.compile.contacts import contact_matrix
-from sandbox.scene.compile.demands import BALLS, Demand, demands, unmodelled
+from sandbox.scene.compile.demands import BALLS, FLOOR, SURFACES, Demand, demands, unmodelled
 from sandbox.scene.compile.drives import names_of
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
-from sandbox.scene.scene import Scene
 
 if TYPE_CHECKING:
     from sandbox.engines.reference.simulation import ReferenceSimulation
+    from sandbox.engines.reference.tabletop import ReferenceTabletopSimulation
 
 
-def drives_lack(setup: Setup, wanted: frozenset[Demand], settings: Settings) -> list[str]:
+def _drive_faults(setup: Setup, wanted: frozenset[Demand], settings: Settings) -> list[str]:
     """Return the demands and settings of a scene with drives that are not supported."""
-    lacks = []
+    missing = []
     if settings.detection in ("bisect", "swept"):
-        lacks.append(f"detection {settings.detection!r} does not support drives; 'discrete' and 'shrink' do")
+        missing.append(f"detection {settings.detection!r} does not support drives; 'discrete' and 'shrink' do")
     if Demand.ATTRACTION in wanted:
-        lacks.append("it does not model attraction and drives together")
-    held = _fixed_joint_with_drive(setup)
-    if held is not None:
-        body, drive = held
-        lacks.append(f"it does not model a joint to {body!r}, whose motion the drive {drive!r} prescribes")
-    return lacks
+        missing.append("it does not model attraction and drives together")
+    jointed = _fixed_joint_with_drive(setup)
+    if jointed is not None:
+        body, drive = jointed
+        missing.append(f"it does not model a joint to {body!r}, whose motion the drive {drive!r} prescribes")
+    return missing
 
 
 def _fixed_joint_with_drive(setup: Setup) -> tuple[str, str] | None:
-    """Return a driven body that a joint holds as well, and its drive."""
+    """Return a driven body that has a joint as well, and its drive; None if there is none."""
     scene, numbers = setup.scene, setup.bodies.number_of
     joined = setup.links.held(len(setup.bodies))
     for drive, name in zip(scene.drives, names_of(scene), strict=True):
@@ -40,33 +42,39 @@ def _fixed_joint_with_drive(setup: Setup) -> tuple[str, str] | None:
     return None
 
 
-WORDS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse"}
-"""Default methods: those of pymunk and of the tutorial."""
+DEFAULT_METHODS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse"}
+"""Default methods: those of pymunk and of the tutorial"""
 
-SUITED = {"relaxation": "semi_implicit_euler", "xpbd": "semi_implicit_euler", "rattle": "velocity_verlet"}
-"""Integrators that suit position-based joint methods: kicks come before position correction."""
+TABLETOP = BALLS | FLOOR | SURFACES | {Demand.CURL}
+"""Demands that the engine models in scenes with a surface, as far as `unsupported_by_steppers` allows"""
 
-HELD = {Demand.RODS, Demand.PIVOTS, Demand.SLIDES, Demand.ROTARY_LIMITS}
-"""Joints that hold, other than springs, which are forces."""
+TABLETOP_METHODS = {**DEFAULT_METHODS, "impact": "newton", "persistence": 1}
+"""Settings of scenes with a surface, each with its only supported value"""
 
-FEW = 24
-"""Bodies up to which testing all pairs is quicker than sorting them."""
+JOINT_INTEGRATORS = {"relaxation": "semi_implicit_euler", "xpbd": "semi_implicit_euler", "rattle": "velocity_verlet"}
+"""Default integrators of position-based joint methods: they change velocities before positions are corrected."""
 
-ONE_SIZE = 8.0
-"""Ratio of radii up to which a uniform grid suits."""
+CONSTRAINTS = {Demand.RODS, Demand.PIVOTS, Demand.SLIDES, Demand.ROTARY_LIMITS}
+"""Joints that are constraints; springs are forces"""
+
+MAX_ALL_PAIRS = 24
+"""Number of bodies up to which testing all pairs is faster than sorting them"""
+
+MAX_GRID_RATIO = 8.0
+"""Largest ratio of radii for which a uniform grid is used"""
 
 
 @dataclass(frozen=True)
 class ReferenceEngine:
-    """Written by hand to be read: fixed step, every axis a table of interchangeable functions.
+    """Hand-written engine with a fixed step. Integrator, broad phase, detection and response are chosen by settings.
 
-    Integrator, broad phase, detection and response are chosen by settings. As explicit_euler, discrete and impulse it
-    is pymunk's scheme over again, but for drag: that is an exponential step there, here a force like any other.
+    With explicit_euler, discrete and impulse the scheme is that of pymunk, except for drag: pymunk applies it as an
+    exponential step, this engine as a force.
     """
 
     name: str = "reference"
     about: str = "hand-written, fixed step: choice of integrator, broad phase, detection and response"
-    capabilities: frozenset[Demand] = BALLS | {
+    capabilities: frozenset[Demand] = TABLETOP | {
         Demand.FALLOFF,
         Demand.KICKS,
         Demand.ONE_WAY,
@@ -89,78 +97,85 @@ class ReferenceEngine:
         """Return the demands and settings that the engine does not support."""
         setup = Setup.of(start)
         wanted = demands(setup)
-        lacks = unmodelled(setup, self.capabilities)
-        lacks += self._detection_lacks(wanted, settings)
+        if on_floor(setup):
+            return (*_tabletop_faults(setup, settings), *overload(setup, settings))
+        missing = unmodelled(setup, self.capabilities)
+        missing += self._detection_faults(wanted, settings)
         if Demand.DRIVES in wanted:
-            lacks += drives_lack(setup, wanted, settings)
+            missing += _drive_faults(setup, wanted, settings)
         if settings.broad_phase == "oriented" and Demand.POLYGONS not in wanted:
-            lacks.append("broad_phase 'oriented' needs polygons, and the scene has none; use 'grid' or 'sweep'")
+            missing.append("broad_phase 'oriented' needs polygons, and the scene has none; use 'grid' or 'sweep'")
         if settings.stretch is not None and settings.joints != "relaxation":
-            lacks.append("stretch applies to joints = 'relaxation' only")
+            missing.append("stretch applies to joints = 'relaxation' only")
         if settings.half_kick:
-            lacks.append("half_kick applies to pymunk only; use integrator 'velocity_verlet'")
-        if settings.impact == "dissipative" and (wanted & HELD or Demand.DRIVES in wanted):
-            lacks.append("impact 'dissipative' does not support joints and drives; use 'newton'")
+            missing.append("half_kick applies to pymunk only; use integrator 'velocity_verlet'")
+        if settings.impact == "dissipative" and (wanted & CONSTRAINTS or Demand.DRIVES in wanted):
+            missing.append("impact 'dissipative' does not support joints and drives; use 'newton'")
         if settings.persistence not in (None, 1):
-            lacks.append(f"persistence {settings.persistence} is not supported; it keeps contacts for 1 substep")
+            missing.append(f"persistence {settings.persistence} is not supported; it keeps contacts for 1 substep")
         if settings.response == "penalty":
-            lacks += self._penalty_lacks(setup, settings)
+            missing += self._penalty_faults(setup, settings)
             if settings.impact is not None:
-                lacks.append("impact applies to response 'impulse' only")
+                missing.append("impact applies to response 'impulse' only")
             for demand in (Demand.FALLOFF, Demand.KICKS):
                 if demand in wanted:
-                    lacks.append(f"response 'penalty' does not model {demand}; 'impulse' does")
+                    missing.append(f"response 'penalty' does not model {demand}; 'impulse' does")
         else:
-            lacks += [
+            missing += [
                 f"{key} applies to response 'penalty' only"
                 for key in ("stiffness", "damping")
                 if getattr(settings, key) is not None
             ]
-        return (*lacks, *overload(setup, settings))
+        return (*missing, *overload(setup, settings))
 
-    def _detection_lacks(self, wanted: frozenset[Demand], settings: Settings) -> list[str]:
-        """Yield the demands that detection of impacts within a step does not support."""
-        lacks = []
+    def _detection_faults(self, wanted: frozenset[Demand], settings: Settings) -> list[str]:
+        """Return the demands that the detection of impacts within a step does not support."""
+        missing = []
         if settings.detection == "swept" and Demand.POLYGONS in wanted:
-            lacks.append("detection 'swept' supports balls only; 'bisect' supports polygons too")
-        if settings.detection in ("bisect", "swept") and wanted & HELD:
-            lacks.append(f"detection {settings.detection!r} does not support joints; 'shrink' does")
-        return lacks
+            missing.append("detection 'swept' supports balls only; 'bisect' supports polygons too")
+        if settings.detection in ("bisect", "swept") and wanted & CONSTRAINTS:
+            missing.append(f"detection {settings.detection!r} does not support joints; 'shrink' does")
+        return missing
 
-    def _penalty_lacks(self, setup: Setup, settings: Settings) -> list[str]:
-        from sandbox.engines.reference.penalty import unstable
+    def _penalty_faults(self, setup: Setup, settings: Settings) -> list[str]:
+        from sandbox.engines.reference.penalty import instability
 
-        lacks = [
+        missing = [
             f"{key} applies to response 'impulse' only"
             for key in ("slop", "bias", "persistence")
             if getattr(settings, key) is not None
         ]
         if settings.detection in ("bisect", "swept"):
-            lacks.append(f"detection {settings.detection!r} leaves no overlap, but penalty springs need one")
-        reason = unstable(setup, self.resolve(setup, settings), settings.stiffness is not None)
-        return lacks if reason is None else [*lacks, reason]
+            missing.append(f"detection {settings.detection!r} leaves no overlap, but penalty springs need one")
+        reason = instability(setup, self.resolve(setup, settings), settings.stiffness is not None)
+        return missing if reason is None else [*missing, reason]
 
     def resolve(self, start: Scene | Setup, settings: Settings) -> Settings:
-        """Return the settings with every choice filled in."""
+        """Return the settings with the engine's choice for every setting that is None."""
         setup = Setup.of(start)
-        own: dict[str, object] = {**WORDS, "slop": slop_of(setup), "bias": BIAS, "persistence": 1}
+        if on_floor(setup):
+            own = {**TABLETOP_METHODS, "slop": slop_of(setup), "bias": BIAS, "broad_phase": _default_broad_phase(setup)}
+            return settings.replace(**{k: v for k, v in own.items() if getattr(settings, k) is None})
+        choices: dict[str, object] = {**DEFAULT_METHODS, "slop": slop_of(setup), "bias": BIAS, "persistence": 1}
         if len(setup.links):
-            own["joints"] = "impulses"
+            choices["joints"] = "impulses"
         if demands(setup) & {Demand.SPRINGS, Demand.ROTARY_SPRINGS, Demand.ATTRACTION}:
-            own["integrator"] = "semi_implicit_euler"  # with explicit Euler, oscillations gain energy
-        own["integrator"] = SUITED.get(settings.joints or "impulses", own["integrator"])
+            choices["integrator"] = "semi_implicit_euler"  # with explicit Euler, oscillations gain energy
+        choices["integrator"] = JOINT_INTEGRATORS.get(settings.joints or "impulses", choices["integrator"])
         if settings.response == "penalty":
-            from sandbox.engines.reference.penalty import suited
+            from sandbox.engines.reference.penalty import default_stiffness
 
-            own["integrator"] = "semi_implicit_euler"  # explicit Euler makes springs gain energy
-            own["stiffness"] = suited(setup, settings)
+            choices["integrator"] = "semi_implicit_euler"  # explicit Euler makes springs gain energy
+            choices["stiffness"] = default_stiffness(setup, settings)
         else:
-            own["impact"] = "newton"
-        own["broad_phase"] = _suitable(setup)
-        return settings.replace(**{k: v for k, v in own.items() if getattr(settings, k) is None})
+            choices["impact"] = "newton"
+        choices["broad_phase"] = _default_broad_phase(setup)
+        return settings.replace(**{k: v for k, v in choices.items() if getattr(settings, k) is None})
 
-    def start(self, start: Scene | Setup, settings: Settings | None = None) -> "ReferenceSimulation":
-        """Set a scene up.
+    def start(
+        self, start: Scene | Setup, settings: Settings | None = None
+    ) -> "ReferenceSimulation | ReferenceTabletopSimulation":
+        """Start a scene, or continue from a setup.
 
         Raises:
             Refusal: a demand is not supported, or the first collision detection exceeds a resource limit.
@@ -173,16 +188,38 @@ class ReferenceEngine:
         missing = self.missing(setup, settings)
         if missing:
             raise Refusal(self.name, missing, ())
+        resolved = self.resolve(setup, settings)
         try:
-            return ReferenceSimulation(setup, self.resolve(setup, settings))
+            if on_floor(setup):
+                from sandbox.engines.reference.tabletop import ReferenceTabletopSimulation
+
+                return ReferenceTabletopSimulation(setup, resolved)
+            return ReferenceSimulation(setup, resolved)
         except Exhaustion as exhaustion:
             raise Refusal(self.name, (str(exhaustion),), ()) from None
 
 
-def _suitable(setup: Setup) -> str:
-    """Return the broad phase that suits a scene's balls."""
+def _tabletop_faults(setup: Setup, settings: Settings) -> list[str]:
+    """Return the demands and settings of a scene with a surface that are not supported."""
+    missing = unmodelled(setup, TABLETOP)
+    missing += unsupported_by_steppers(setup)
+    for key, method in TABLETOP_METHODS.items():
+        if getattr(settings, key) not in (None, method):
+            missing.append(f"{key} {getattr(settings, key)!r} is not supported on a [surface] (only {method!r})")
+    for key in ("joints", "stretch", "stiffness", "damping"):
+        if getattr(settings, key) is not None:
+            missing.append(f"{key} does not apply to a [surface]; remove it")
+    if settings.half_kick:
+        missing.append("half_kick applies to pymunk only; remove it")
+    if settings.broad_phase == "oriented":
+        missing.append("broad_phase 'oriented' needs polygons, and the scene has none; use 'grid' or 'sweep'")
+    return missing
+
+
+def _default_broad_phase(setup: Setup) -> str:
+    """Return the default broad phase, by the number and sizes of the bodies."""
     bodies = setup.bodies
     radius = bodies.radius[contact_matrix(setup).touches | bodies.fixed]
-    if len(radius) <= FEW:
+    if len(radius) <= MAX_ALL_PAIRS:
         return "all_pairs"
-    return "grid" if radius.max() <= ONE_SIZE * radius.min() else "sweep"
+    return "grid" if radius.max() <= MAX_GRID_RATIO * radius.min() else "sweep"

@@ -1,15 +1,13 @@
-"""Collision filtering: layers, bodies that a zone holds, and one-way walls.
+"""Collision filtering: layers, bodies held by zones, and one-way walls.
 
-OneWayWalls: a one-way wall is solid on its left. A body that first overlaps it from the right passes until they
-separate.
+A one-way wall is solid on its left. A body that first overlaps it from the right passes until they separate. The side
+is that of the body's centre at the beginning of the piece of a substep in which the overlap begins. The decision holds
+until they separate: a body that turns round inside the wall returns freely, and a stopped body never passes, at any
+depth. For a polyline the nearest segment decides; at a vertex, where two segments are equally near, the sum of their
+normals does (Bærentzen & Aanæs 2005, pseudonormals).
 
-The side is that of the centre of the body at the beginning of the piece of a substep in which the two begin to touch.
-The decision holds until they separate: a body that turns round inside the wall returns unhindered, and a body that was
-stopped does not pass, however deep it is. For a polyline the nearest segment decides; at a vertex, where two segments
-are equally near, the sum of their normals does (Bærentzen & Aanæs 2005, pseudonormals).
-
-CollisionFilter: removes candidate pairs by layer, one-way walls, and pairs in which neither body can move (held,
-driven by a stroke or plunger, or fixed). A scene with none of these has no filter.
+`CollisionFilter` removes candidate pairs by layer, by one-way walls, and pairs in which neither body can move (held,
+kinematic, or fixed). Scenes without these have no filter.
 """
 
 import numpy as np
@@ -18,13 +16,13 @@ from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.reference.broad_phase import FIRST, SECOND, CandidatePairs
 from sandbox.engines.reference.manifold import KIND, Manifolds
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Wall, mask_of
-from sandbox.scene.scene import Scene
 
 EQUAL = 1e-9
 """Relative difference of two distances below which both segments meet at one vertex of a wall."""
 
-Pair = tuple[int, int]
+BodyColliderPair = tuple[int, int]
 """Indices of a body and of a static collider."""
 
 
@@ -37,12 +35,12 @@ class OneWayWalls:
             [isinstance(t, Wall) and t.one_way for t in store.scene.fixed], np.bool_
         )
         """(F,) which static colliders are one-way walls"""
-        self._passing: set[Pair] = {(body, -1 - wall) for body, wall in store.setup.passing}
-        self._stopped: set[Pair] = set()
-        self._goes_on = store.setup.time > 0.0  # the state says which bodies pass: others on the left are stopped
+        self._passing: set[BodyColliderPair] = {(body, -1 - wall) for body, wall in store.setup.passing}
+        self._stopped: set[BodyColliderPair] = set()
+        self._continues = store.setup.time > 0.0  # the state contains the bodies that pass; others are stopped
 
     def rebuild(self, start: FloatArray) -> None:
-        """Take centres (N, ≥ 2), m, and walls that may have another course, or have become solid."""
+        """Update after a change of the walls; `start` are the centres (N, ≥ 2), m."""
         fixtures, self._start = self._store.fixtures, start
         order = np.argsort(fixtures.segment_collider, kind="stable")
         colliders = np.flatnonzero(self.is_one_way)
@@ -60,18 +58,18 @@ class OneWayWalls:
         return found
 
     def settle(self, overlaps: Manifolds, end: FloatArray) -> None:
-        """Take the overlaps at the end of a piece of a substep, and the centres there, (N, ≥ 2) m."""
+        """Update after a piece of a substep: the overlaps at its end, and the centres then, (N, ≥ 2) m."""
         touching = _pairs(overlaps)
         self._passing = {pair for pair in touching if not self._stops(pair)}
         self._stopped, self._start = touching - self._passing, end
 
     def begin(self, overlaps: Manifolds, closing: FloatArray) -> None:
-        """Take the overlaps at the beginning, and how fast they close, (K,) m/s.
+        """Set the initial overlaps, and their closing speeds, (K,) m/s.
 
-        A new body on the left is stopped unless it leaves.
+        A new body on the left is stopped unless it moves away.
         """
-        coming = _pairs(overlaps if self._goes_on else overlaps.of(closing >= 0.0))
-        self._goes_on = False
+        coming = _pairs(overlaps if self._continues else overlaps.of(closing >= 0.0))
+        self._continues = False
         touching, known = _pairs(overlaps), self._passing | self._stopped
         passing = {pair for pair in touching - known if pair not in coming or not self._on_left(pair)}
         self._passing = passing | (self._passing & touching)
@@ -83,28 +81,28 @@ class OneWayWalls:
         pairs = sorted((body, -1 - collider) for body, collider in self._passing)
         return np.asarray(pairs, np.int64) if pairs else None
 
-    def _stops(self, pair: Pair) -> bool:
+    def _stops(self, pair: BodyColliderPair) -> bool:
         if pair in self._passing:
             return False
         return pair in self._stopped or self._on_left(pair)
 
-    def _on_left(self, pair: Pair) -> bool:
-        """Return whether a body is on the left of a wall, or on its line."""
+    def _on_left(self, pair: BodyColliderPair) -> bool:
+        """Return whether a body is to the left of a wall, or on its line."""
         body, collider = pair
         segments = self._segments[collider]
-        a, b, place = segments[:, :2], segments[:, 2:], self._start[body, :2]
+        a, b, position = segments[:, :2], segments[:, 2:], self._start[body, :2]
         along = b - a
         length = np.sqrt((along * along).sum(axis=1))
         unit = along / length[:, None]
-        off = place - a
+        off = position - a
         along_segment = np.clip((off * unit).sum(axis=1), 0.0, length)
-        away = np.hypot(*(off - along_segment[:, None] * unit).T)
-        nearest = away <= away.min() * (1.0 + EQUAL)
+        distance = np.hypot(*(off - along_segment[:, None] * unit).T)
+        nearest = distance <= distance.min() * (1.0 + EQUAL)
         across = unit[:, 0] * off[:, 1] - unit[:, 1] * off[:, 0]
         return bool(across[nearest].sum() >= 0.0)
 
 
-def _pairs(contacts: Manifolds) -> set[Pair]:
+def _pairs(contacts: Manifolds) -> set[BodyColliderPair]:
     return set(zip(contacts.first.tolist(), (-1 - contacts.second).tolist(), strict=True))
 
 
@@ -113,9 +111,9 @@ class CollisionFilter:
 
     def __init__(self, store: BodyStore) -> None:
         self._store, scene = store, store.scene
-        self._of_fixed: IntArray = np.asarray([mask_of(t.layers, scene.layers) for t in scene.fixed], np.int64)
+        self._collider_bits: IntArray = np.asarray([mask_of(t.layers, scene.layers) for t in scene.fixed], np.int64)
         every = (1 << len(scene.layers)) - 1
-        self._planes_apart = bool((self._of_fixed[: len(scene.planes)] != every).any())
+        self._filters_planes = bool((self._collider_bits[: len(scene.planes)] != every).any())
         self.walls = OneWayWalls(store) if any(wall.one_way for wall in scene.walls) else None
         """the one-way walls, if there are any"""
         self.rebuild(store.position)
@@ -126,9 +124,9 @@ class CollisionFilter:
         return len(scene.layers) > 1 or any(wall.one_way for wall in scene.walls) or any(z.holds for z in scene.zones)
 
     def rebuild(self, position: FloatArray) -> None:
-        """Derive layers, movable bodies and walls anew from the body store; positions are (N, ≥ 2) m."""
+        """Update after a change of the body store; positions are (N, ≥ 2) m."""
         self._bits: IntArray = 1 << self._store.layer
-        self._yields: BoolArray = (self._store.inverse_mass > 0.0) | (self._store.inverse_moment > 0.0)
+        self._is_movable: BoolArray = (self._store.inverse_mass > 0.0) | (self._store.inverse_moment > 0.0)
         self._segment_collider = self._store.fixtures.segment_collider
         if self.walls is not None:
             self.walls.rebuild(position)
@@ -138,38 +136,40 @@ class CollisionFilter:
         balls, segments = near
         if len(balls):
             a, b = owner[balls >> FIRST], owner[balls & SECOND]
-            balls = balls[(self._yields[a] | self._yields[b]) & (self._bits[a] & self._bits[b] != 0)]
+            balls = balls[(self._is_movable[a] | self._is_movable[b]) & (self._bits[a] & self._bits[b] != 0)]
         if len(segments):
             body, collider = owner[segments >> FIRST], self._segment_collider[segments & SECOND]
-            collides = self._bits[body] & self._of_fixed[collider] != 0
+            collides = self._bits[body] & self._collider_bits[collider] != 0
             if self.walls is not None:
                 collides[collides] = self.walls.stop(body[collides], collider[collides])
             segments = segments[collides]
         return CandidatePairs(balls, segments)
 
     def at_one_way_walls(self, near: CandidatePairs, owner: IntArray) -> CandidatePairs:
-        """Return the candidates of one-way walls that share a layer with them, and no others."""
+        """Return only the candidate pairs with one-way walls on a common layer."""
         assert self.walls is not None
         body, collider = owner[near.segments >> FIRST], self._segment_collider[near.segments & SECOND]
-        collides = self.walls.is_one_way[collider] & (self._bits[body] & self._of_fixed[collider] != 0)
+        collides = self.walls.is_one_way[collider] & (self._bits[body] & self._collider_bits[collider] != 0)
         return CandidatePairs(near.balls[:0], near.segments[collides])
 
     def is_one_way(self, second: IntArray) -> BoolArray:
-        """Return which second partners of contacts (K,) are one-way walls."""
+        """Return which second bodies of contacts (K,) are one-way walls."""
         assert self.walls is not None
         return np.asarray(self.walls.is_one_way[np.maximum(-1 - second, 0)] & (second < 0))
 
-    def on_planes(self, contacts: Manifolds) -> Manifolds:
-        """Return contacts without those of planes on other layers, of which every body is a candidate."""
-        if not self._planes_apart:
+    def drop_filtered_planes(self, contacts: Manifolds) -> Manifolds:
+        """Return contacts without those of planes on other layers; every body is a candidate for every plane."""
+        if not self._filters_planes:
             return contacts
         collider = np.maximum(-1 - contacts.second, 0)
-        return contacts.of((contacts.second >= 0) | (self._bits[contacts.first] & self._of_fixed[collider] != 0))
+        return contacts.of((contacts.second >= 0) | (self._bits[contacts.first] & self._collider_bits[collider] != 0))
 
-    def with_planes_apart(self, keys: IntArray, can_touch: BoolArray) -> IntArray:
-        """Return keys, ascending, with those of all can_touch balls and planes on other layers."""
-        if not self._planes_apart:
+    def with_filtered_planes(self, keys: IntArray, can_touch: BoolArray) -> IntArray:
+        """Return keys, ascending, together with those of all pairs of balls and planes on different layers."""
+        if not self._filters_planes:
             return keys
-        apart = can_touch[:, None] & (self._bits[:, None] & self._of_fixed[self._store.fixtures.plane_collider] == 0)
-        ball, plane = np.nonzero(apart)
+        filtered = can_touch[:, None] & (
+            self._bits[:, None] & self._collider_bits[self._store.fixtures.plane_collider] == 0
+        )
+        ball, plane = np.nonzero(filtered)
         return np.union1d(keys, (1 << KIND) + (ball << FIRST) + plane)

@@ -7,45 +7,46 @@ import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.body_store import BodyStore
+from sandbox.engines.common.geometry import rotate
 from sandbox.engines.common.kernel import bare_kernel
 from sandbox.engines.reference.integrators import Inputs, State
-from sandbox.engines.reference.joint_data import line
+from sandbox.engines.reference.joint_data import length_and_direction
 from sandbox.engines.reference.joints import JointSolver
 from sandbox.scene.compile.joint_arrays import WORLD, LinkKind
-from sandbox.scene.geometry.shapes import form_of
+from sandbox.scene.geometry.shapes import geometry_of
 
 
 @bare_kernel
-def attract(
+def add_attraction(
     pose: FloatArray,
     target: IntArray,
-    place: FloatArray,
+    position: FloatArray,
     strength: FloatArray,
     softening: FloatArray,
     inverse_mass: FloatArray,
     out: FloatArray,
 ) -> None:
-    """Add the accelerations of N bodies by A attractions, and the reactions on the attracting bodies.
+    """Add the accelerations of N bodies by A attractions, and of the attracting bodies by the reactions. Costs A·N.
 
-    A strength is G·M. The attracting body's own mass counts only in its answer: it is pulled with the force that it
-    gives. What coincides with its target is not pulled. Costs A·N.
+    A strength is G·M. The mass of the attracting body affects only its own acceleration, by the reaction. A body at the
+    position of its target gets no acceleration.
 
     Args:
         pose: (N, 2 or 3) m.
-        target: (A,) body number, or −1 for a place.
-        place: (A, 2) m, of those with none.
+        target: (A,) index of the attracting body, or −1 for a fixed position.
+        position: (A, 2) m, fixed positions; not read where there is a target body.
         strength: (A,) m³/s².
         softening: (A,) m.
-        inverse_mass: (N,) 1/kg; where 0, no pull is felt.
+        inverse_mass: (N,) 1/kg; bodies with 0 are not accelerated.
         out: (N, 2 or 3) m/s², added to.
     """
     for k in range(len(target)):
         own = target[k]
-        x, y = (pose[own, 0], pose[own, 1]) if own >= 0 else (place[k, 0], place[k, 1])
+        x, y = (pose[own, 0], pose[own, 1]) if own >= 0 else (position[k, 0], position[k, 1])
         for i in range(len(pose)):
             if i == own or inverse_mass[i] == 0.0:
                 continue
-            distance, nx, ny = line(x - pose[i, 0], y - pose[i, 1])
+            distance, nx, ny = length_and_direction(x - pose[i, 0], y - pose[i, 1])
             if distance == 0.0:
                 continue
             pull = strength[k] / (distance * distance + softening[k] * softening[k])
@@ -58,7 +59,7 @@ def attract(
 
 
 @bare_kernel
-def thrust(
+def add_thrust(
     pose: FloatArray,
     body: IntArray,
     point: FloatArray,
@@ -72,8 +73,8 @@ def thrust(
 
     Args:
         pose: (N, 3) m and rad.
-        body: (T,) index of the body that each drives.
-        point: (T, 2) m, where it acts, in the body's own frame about its centre of mass.
+        body: (T,) index of the body that each thrust acts on.
+        point: (T, 2) m, point of application, in the body's frame about its centre of mass.
         force: (T, 2) N, in that frame, at full throttle.
         throttle: (T,) fraction of the force that acts.
         inverse_mass: (N,) 1/kg.
@@ -84,31 +85,32 @@ def thrust(
         i = body[k]
         x, y = throttle[k] * force[k, 0], throttle[k] * force[k, 1]
         cos, sin = math.cos(pose[i, 2]), math.sin(pose[i, 2])
-        out[i, 0] += inverse_mass[i] * (cos * x - sin * y)
-        out[i, 1] += inverse_mass[i] * (sin * x + cos * y)
+        world_x, world_y = rotate(cos, sin, x, y)
+        out[i, 0] += inverse_mass[i] * world_x
+        out[i, 1] += inverse_mass[i] * world_y
         out[i, 2] += inverse_moment[i] * (point[k, 0] * y - point[k, 1] * x)
 
 
 class ForceField:
-    """What acts on the bodies of a running scene from afar and from within."""
+    """Attractions and thrusts of a running scene."""
 
     def __init__(self, store: BodyStore) -> None:
         self._store, self._began = store, store.setup.time
         scene, bodies = store.scene, store.bodies
         number = {name: k for k, name in enumerate(bodies.names)}
-        # Bodies that left before an earlier engine handed over attract no more, and carry nothing.
+        # Bodies that left the scene before an engine switch neither attract nor have thrusts.
         attractions = [a for a in scene.attractions if not isinstance(a.toward, str) or a.toward in number]
         which = [k for k, thrust in enumerate(scene.thrusts) if thrust.body in number]
         thrusts = [scene.thrusts[k] for k in which]
         toward = [a.toward for a in attractions]
         self._target: IntArray = np.asarray([number[t] if isinstance(t, str) else WORLD for t in toward], np.int64)
-        places = [(0.0, 0.0) if isinstance(t, str) else t for t in toward]
-        self._place: FloatArray = np.asarray(places, np.float64).reshape(-1, 2)
+        positions = [(0.0, 0.0) if isinstance(t, str) else t for t in toward]
+        self._position: FloatArray = np.asarray(positions, np.float64).reshape(-1, 2)
         self._strength: FloatArray = np.asarray([a.strength for a in attractions], np.float64)
         self._softening: FloatArray = np.asarray([a.softening for a in attractions], np.float64)
         self._thrust: IntArray = np.asarray(which, np.int64)
         self._body: IntArray = np.asarray([number[t.body] for t in thrusts], np.int64)
-        centres = [form_of(bodies.elements[bodies.element[n]]).centre for n in self._body.tolist()]
+        centres = [geometry_of(bodies.elements[bodies.element[n]]).centre for n in self._body.tolist()]
         points = [(t.point[0] - c[0], t.point[1] - c[1]) for t, c in zip(thrusts, centres, strict=True)]
         self._point: FloatArray = np.asarray(points, np.float64).reshape(-1, 2)
         self._force: FloatArray = np.asarray([t.force for t in thrusts], np.float64).reshape(-1, 2)
@@ -117,7 +119,7 @@ class ForceField:
 
     @property
     def empty(self) -> bool:
-        """Nothing acts."""
+        """Whether there are no attractions and no thrusts."""
         return not (len(self._target) or len(self._body))
 
     def __call__(self, time: float, x: State) -> FloatArray:
@@ -125,30 +127,35 @@ class ForceField:
         store = self._store
         out: FloatArray = np.zeros_like(x[1])
         if len(self._target):
-            there = np.append(store.present, True)[self._target]  # the world, −1, finds the last
-            some = self._target[there], self._place[there], self._strength[there], self._softening[there]
-            attract(x[0], *some, store.inverse_mass, out[: len(store.inverse_mass)])
-        self._drive(time, x, out)
+            is_present = np.append(store.present, True)[self._target]  # the world, −1, finds the last
+            some = (
+                self._target[is_present],
+                self._position[is_present],
+                self._strength[is_present],
+                self._softening[is_present],
+            )
+            add_attraction(x[0], *some, store.inverse_mass, out[: len(store.inverse_mass)])
+        self._add_thrusts(time, x, out)
         return out
 
     @property
     def thrusting(self) -> bool:
-        """There are thrusts."""
+        """Whether there are thrusts."""
         return len(self._body) > 0
 
     def thrusts(self, time: float, x: State) -> FloatArray:
-        """Return the accelerations (N, D) by thrusts alone, as all of them are returned when called."""
+        """Return the accelerations (N, D) by thrusts alone, m/s² and rad/s²."""
         out: FloatArray = np.zeros_like(x[1])
-        self._drive(time, x, out)
+        self._add_thrusts(time, x, out)
         return out
 
-    def _drive(self, time: float, x: State, out: FloatArray) -> None:
+    def _add_thrusts(self, time: float, x: State, out: FloatArray) -> None:
         """Add the accelerations by thrusts."""
         if self.thrusting:
             store, now = self._store, self._began + time
             level = store.throttles[self._thrust] * ((self._begin <= now) & (now < self._end))
             inverse = store.inverse_mass, store.inverse_moment
-            thrust(x[0], self._body, self._point, self._force, level, *inverse, out)
+            add_thrust(x[0], self._body, self._point, self._force, level, *inverse, out)
 
 
 def forces_on(store: BodyStore, field: ForceField, joints: JointSolver | None, coordinates: int) -> Inputs:
@@ -158,13 +165,13 @@ def forces_on(store: BodyStore, field: ForceField, joints: JointSolver | None, c
         store: the bodies, and the steady forces on them.
         field: attractions and thrusts.
         joints: solver of the joints, if there are any.
-        coordinates: of a state: 2, or 3 where something turns.
+        coordinates: D of a state: 2, or 3 if a body turns.
     """
     world = store.scene.world
     moving = store.moving[:, None]
-    if store.held:  # their drives apply the forces on them
+    if store.mounts:  # their drives apply the forces on them
         moving = moving.copy()
-        moving[list(store.held)] = False
+        moving[list(store.mounts)] = False
     steady: FloatArray = np.zeros((len(moving), coordinates))
     steady[:, :2] = np.where(moving, store.gravity, 0.0) + store.force * store.inverse_mass[:, None]
     if coordinates == 3:
@@ -180,5 +187,5 @@ def forces_on(store: BodyStore, field: ForceField, joints: JointSolver | None, c
         world.wind,
         moving.astype(np.float64),
         forces=tuple(forces),
-        rubbing=bool(springs.figures[:, 2].any()),
+        damped_forces=bool(springs.figures[:, 2].any()),
     )

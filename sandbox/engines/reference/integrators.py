@@ -1,9 +1,8 @@
-"""Fixed-step integrators, the state vector that they advance, and its derivative ẋ = f(t, x, u).
+"""Fixed-step integrators, the state vector x, and its derivative ẋ = f(t, x, u).
 
-Integrators: one function each, from the state at t to the state at t + h. INTEGRATORS is the table of them.
-
-Each takes the state transition function as an argument: step(f, t, x, u, h) -> x'. Errors for a projectile after a
-time T, and for an oscillator of angular frequency ω:
+INTEGRATORS is the table of integrators. Each is a function step(f, t, x, u, h) -> x' from the state at t to that at
+t + h; f is the state transition function. Errors for a projectile after a time T, and for an oscillator of angular
+frequency ω:
 
 | name | projectile, position | oscillator |
 |---|---|---|
@@ -12,10 +11,8 @@ time T, and for an oscillator of angular frequency ω:
 | velocity_verlet, leapfrog | exact | in a band, frequency (2/h)·asin(ωh/2), ωh < 2 |
 | rk4 | exact | loses (ωh)⁶/72 of its energy a step, ωh < 2√2 |
 
-Motion: the state vector x of a scene, and the state transition function ẋ = f(t, x, u).
-
-x is one array (2, N, D): x[0] the poses, x[1] their rates. D is 2 (x, y) where nothing turns, else 3 (x, y, angle).
-u holds the external forces: gravity, drag, constant forces, and penalty contacts if they are chosen.
+x is an array (2, N, D): x[0] the poses, x[1] their rates. D is 2 (x, y) if nothing turns, else 3 (x, y, angle). u
+contains the external forces: gravity, drag, constant forces, and penalty contacts with `response = "penalty"`.
 """
 
 from collections.abc import Callable
@@ -33,7 +30,7 @@ _ALL = np.ones((1, 1))
 
 
 class Inputs(NamedTuple):
-    """u: all that acts on N bodies during one substep."""
+    """u: the forces on N bodies during one substep."""
 
     steady: FloatArray
     """(N, D) acceleration by gravity, steady forces and torques, m/s² and rad/s²; 0 for fixed bodies"""
@@ -46,21 +43,21 @@ class Inputs(NamedTuple):
     mobile: FloatArray = _ALL
     """(N, 1) or (1, 1): 1 for bodies with drag, 0 for fixed or removed ones"""
     contacts: Callable[[State], FloatArray] | None = None
-    """Penalty contacts: the acceleration (N, D) that they add in a state."""
+    """penalty contacts: acceleration (N, D) in a state"""
     forces: tuple[Callable[[float, State], FloatArray], ...] = ()
-    """What else acts, by time and state: springs, attraction, thrusts; the acceleration (N, D) that each adds."""
-    rubbing: bool = False
-    """Some of these forces depend on velocity."""
+    """springs, attraction and thrusts: acceleration (N, D) of each as a function of time and state"""
+    damped_forces: bool = False
+    """whether one of these forces depends on velocity"""
 
     @property
-    def dragged(self) -> bool:
-        """There is drag."""
+    def has_drag(self) -> bool:
+        """Whether there is drag."""
         return self.linear_drag > 0.0 or self.quadratic_drag > 0.0
 
     @property
     def damped(self) -> bool:
-        """Acceleration depends on velocity, so that a scheme needs to know the velocity where it asks."""
-        return self.dragged or self.rubbing or self.contacts is not None
+        """Whether acceleration depends on velocity, so that a scheme has to evaluate it at the right velocity."""
+        return self.has_drag or self.damped_forces or self.contacts is not None
 
 
 Transition: TypeAlias = Callable[[float, State, Inputs], State]
@@ -81,7 +78,7 @@ def transition(t: float, x: State, u: Inputs) -> State:
     derivative = np.empty_like(x)
     derivative[0] = x[1]
     derivative[1] = u.steady
-    if u.dragged:
+    if u.has_drag:
         wind = x[1, :, :2] - u.wind
         rate = u.linear_drag + u.quadratic_drag * np.sqrt(wind[:, :1] ** 2 + wind[:, 1:] ** 2)
         derivative[1, :, :2] -= u.mobile * rate * wind
@@ -96,11 +93,11 @@ class Tableau(NamedTuple):
     """An explicit Runge–Kutta method of s stages."""
 
     a: tuple[tuple[float, ...], ...]
-    """Row i holds the weights of the slopes before stage i."""
+    """row i contains the weights of the slopes before stage i"""
     b: tuple[float, ...]
     """(s,) weights of the slopes in the step; they sum to 1"""
     c: tuple[float, ...]
-    """(s,) where in the step each stage stands; the sum of its row of `a`"""
+    """(s,) time of each stage as a fraction of the step; the sum of its row of `a`"""
 
 
 EULER = Tableau(a=((),), b=(1.0,), c=(0.0,))

@@ -1,9 +1,9 @@
-"""Internal edges: contacts of polygons near the joints of a wall, which are no edges of it.
+"""Internal edges: corrects contacts of polygons at the joints of a wall, which are not edges of the wall.
 
-Each segment stores how its wall runs on from its ends. A normal that leans over an end, towards where the wall runs on,
-cannot occur on the whole wall: the neighbour is nearer. The contact of a polygon whose normal is nearer to the
-neighbour's, and that lies deeper in the segment's own face, is left to the neighbour. Otherwise the contact is found
-anew on that face, as if the segment were longer. For discs see `manifold.is_covered`.
+Each segment stores the directions in which its wall continues at its ends. A normal that leans over an end, towards the
+continuation, cannot occur on the whole wall, because the neighbour is nearer. Such a contact is computed again on the
+segment's own face, as if the segment were longer. If the normal is nearer to the neighbour's and the contact is deeper
+in the segment's own face, it is dropped: the neighbouring segment has it. For discs see `manifold.is_covered`.
 
 Compare Bullet's `btInternalEdgeUtility` and the ghost vertices of Box2D's chain shapes.
 """
@@ -13,14 +13,14 @@ import math
 from sandbox.arrays import FloatArray
 from sandbox.engines.common.colliders import LEAN, SIDEWAYS
 from sandbox.engines.common.kernel import bare_kernel as kernel
-from sandbox.engines.reference.polygon import ROUGH, clip, face_at, write
+from sandbox.engines.reference.polygon import DEGENERATE, clip, face_at, write_point
 
-FAVOUR = 5e-4
-"""Part of a segment's length by which a piece may lie deeper in its face: as much as `polygon.FAVOUR` ignores."""
+DEPTH_TOLERANCE = 5e-4
+"""Depth difference, as a fraction of the segment's length, that is ignored; equal to `polygon.REFERENCE_FACE_BIAS`"""
 
 
 @kernel
-def smooth(
+def correct_internal_edge(
     corner: FloatArray,
     start: int,
     end: int,
@@ -29,21 +29,21 @@ def smooth(
     wall_radius: float,
     joints: FloatArray,
     count: int,
-    reach: float,
+    max_separation: float,
     out: FloatArray,
 ) -> int:
-    """Mend the contact of a piece of two corners or more with a segment of a wall; return how many points it has then.
+    """Correct the contact of a piece of two corners or more with a segment of a wall; return its number of points.
 
     Args:
         corner: (V, 2) of all pieces, m.
         start: row of the piece's first corner.
-        end: row after its last.
+        end: row after its last corner.
         radius: of the piece, m.
-        a: row of the segment's first end; the other follows.
+        a: row of the segment's first end; its second end follows.
         wall_radius: half the wall's thickness, m.
         joints: (4,) m, as in `StaticColliders.joints`.
-        count: how many points were found.
-        reach: separation from which on nothing is a contact, m.
+        count: number of points found.
+        max_separation: contacts have a smaller separation, m.
         out: (2, 6) the points; written to.
     """
     ux, uy = -out[0, 0], -out[0, 1]  # from the wall to the piece
@@ -58,9 +58,9 @@ def smooth(
     else:
         return count
     beyond = math.sqrt(jx * jx + jy * jy)
-    if ux * jx + uy * jy <= LEAN * beyond:  # so it is where the wall ends
+    if ux * jx + uy * jy <= LEAN * beyond:  # also at the end of a wall, where it is 0
         return count
-    # Of which side's faces it is
+    # The side of the wall on which the piece is
     side = uy * tx - ux * ty
     if abs(side) < SIDEWAYS:
         low, high = math.inf, -math.inf
@@ -73,10 +73,10 @@ def smooth(
     its = side * sign * (uy * jx - ux * jy) / beyond
     deepest = out[0, 2] if count == 1 else min(out[0, 2], out[1, 2])
     one, two = (a + 1, a) if side > 0.0 else (a, a + 1)
-    count = _collide_face(corner, start, end, radius, one, two, wall_radius, reach, out)
+    count = _collide_face(corner, start, end, radius, one, two, wall_radius, max_separation, out)
     if its > own + LEAN:
         for row in range(count):
-            if out[row, 2] < deepest - FAVOUR * length:
+            if out[row, 2] < deepest - DEPTH_TOLERANCE * length:
                 return 0
     return count
 
@@ -90,10 +90,10 @@ def _collide_face(
     one: int,
     two: int,
     wall_radius: float,
-    reach: float,
+    max_separation: float,
     out: FloatArray,
 ) -> int:
-    """Write where a piece touches a face that runs from `one` to `two`, solid to the left; return how many points."""
+    """Write the contact of a piece with a face from `one` to `two`, solid to its left; return the number of points."""
     nx, ny = corner[two, 1] - corner[one, 1], corner[one, 0] - corner[two, 0]
     length = math.sqrt(nx * nx + ny * ny)
     nx, ny = nx / length, ny / length
@@ -103,15 +103,15 @@ def _collide_face(
         if height < low:
             low, lowest = height, k
     incident, other = face_at(corner, start, end, lowest, -nx, -ny)
-    slack = ROUGH * (abs(corner[one, 0]) + abs(corner[one, 1]))
+    slack = DEGENERATE * (abs(corner[one, 0]) + abs(corner[one, 1]))
     over, begin_x, begin_y, begin, end_x, end_y, finish = clip(corner, one, two, incident, other, slack)
     if not over:
         return 0
-    wide, count = radius + wall_radius, 0
+    radii, count = radius + wall_radius, 0
     for row in range(1 if incident == other else 2):
         x, y, height = (end_x, end_y, finish) if row == 0 else (begin_x, begin_y, begin)
-        if height - wide < reach:
+        if height - radii < max_separation:
             middle = 0.5 * (height + radius - wall_radius)
-            write(out, count, -nx, -ny, height - wide, x - nx * middle, y - ny * middle, float(row))
+            write_point(out, count, -nx, -ny, height - radii, x - nx * middle, y - ny * middle, float(row))
             count += 1
     return count

@@ -1,14 +1,11 @@
-"""Joints as arrays: geometry, lengths, spring laws and the limit of stretch.
+"""Joints as arrays: anchors, effective masses, spring forces and stretch limits.
 
-JointData: joints in the form of kernel arguments, their anchors, and the effect of an impulse at an anchor.
+The axis of a joint points from its anchor on the first body to its anchor on the second. An impulse acts on the second
+body, and its opposite on the first.
 
-A tie's line goes from its end on the first body to its end on the second. An impulse acts on the second body, and its
-opposite on the first.
-
-Springs as forces: F = −k (l − l₀) − c l̇ along the line of a spring, τ = −k (φ − φ₀) − c φ̇ of a rotary one.
-
-They are part of the state transition, so that an integrator finds them wherever it asks for forces. A force worked out
-once and held for the step would make any scheme an explicit Euler.
+Springs are forces: F = −k (l − l₀) − c l̇ along the axis of a spring, τ = −k (φ − φ₀) − c φ̇ of a rotary spring. They
+are part of the state transition, so that the integrator evaluates them at every stage. A force computed once per step
+would reduce every integrator to first order.
 """
 
 import math
@@ -17,24 +14,28 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.common.geometry import rotate
 from sandbox.engines.common.kernel import bare_kernel
+from sandbox.engines.common.springs import spring_law
 from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
 
-# Plain numbers: compiled code compares them without an enumeration's detour.
+# Plain integers: numba compares them faster than members of an enumeration.
 ROD, PIVOT, SLIDE = int(LinkKind.ROD), int(LinkKind.PIVOT), int(LinkKind.SLIDE)
 ROTARY_LIMIT = int(LinkKind.ROTARY_LIMIT)
 SPRING, ROTARY_SPRING = int(LinkKind.SPRING), int(LinkKind.ROTARY_SPRING)
 
 SPRINGS = (LinkKind.SPRING, LinkKind.ROTARY_SPRING)
-HOLDS = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.ROTARY_LIMIT)
+CONSTRAINTS = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.ROTARY_LIMIT)
+
+_spring_law = bare_kernel(spring_law)
 
 
-Arms: TypeAlias = tuple[float, float, float, float]
-"""ax, ay, bx, by, m: from the centres of two bodies to the anchors of a joint"""
+Anchors: TypeAlias = tuple[float, float, float, float]
+"""ax, ay, bx, by, m: from the centres of two bodies to the anchors of a joint; Box2D's rA, rB"""
 
 
 class JointData(NamedTuple):
-    """K joints, by body indices; the first may be `WORLD`, −1."""
+    """K joints by the indices of their bodies; the first may be `WORLD`, −1."""
 
     link: IntArray
     """(K,) index among all joints of the setup"""
@@ -48,46 +49,46 @@ class JointData(NamedTuple):
     """(K, 4) m, anchors ax, ay, bx, by in the frames of the bodies; for the world, a point in space"""
     figures: FloatArray
     """(K, 3) as `LinkKind` says"""
-    most_force: FloatArray
+    max_force: FloatArray
     """(K,) N or N·m"""
 
-    def some(self, which: IntArray) -> "JointData":
-        """Return the joints in some rows."""
+    def take(self, which: IntArray) -> "JointData":
+        """Return the joints of some rows."""
         return JointData._make(column[which] for column in self)
 
     def joined(self, more: "JointData") -> "JointData":
-        """Return these joints and more."""
+        """Return these joints, followed by others."""
         return JointData._make(np.concatenate(pair) for pair in zip(self, more, strict=True))
 
 
-def ties_of(links: JointArrays, *kinds: LinkKind, among: IntArray | None = None) -> JointData:
+def select_joints(links: JointArrays, *kinds: LinkKind, among: IntArray | None = None) -> JointData:
     """Return the joints of some kinds, in their order; with `among`, only those with these indices."""
     which = np.isin(links.kind, kinds)
     if among is not None:
         which &= np.isin(np.arange(len(links)), among)
     anchor = np.column_stack((links.anchor_a, links.anchor_b))
     every = JointData(np.arange(len(links)), links.kind, links.a, links.b, anchor, links.figures, links.most_force)
-    return every.some(np.flatnonzero(which))
+    return every.take(np.flatnonzero(which))
 
 
 @bare_kernel
-def reach(ties: JointData, k: int, pose: FloatArray) -> tuple[Arms, float, float]:
-    """Return the arms of joint k, and the vector from its first anchor to its second, x and y, m."""
-    i, j = ties.first[k], ties.second[k]
-    ax, ay, bx, by = ties.anchor[k, 0], ties.anchor[k, 1], ties.anchor[k, 2], ties.anchor[k, 3]
+def anchor_separation(joints: JointData, k: int, pose: FloatArray) -> tuple[Anchors, float, float]:
+    """Return the anchors of joint k, and the vector from the first to the second, x and y, m."""
+    i, j = joints.first[k], joints.second[k]
+    ax, ay, bx, by = joints.anchor[k, 0], joints.anchor[k, 1], joints.anchor[k, 2], joints.anchor[k, 3]
     if bx != 0.0 or by != 0.0:
         cos, sin = math.cos(pose[j, 2]), math.sin(pose[j, 2])
-        bx, by = cos * bx - sin * by, sin * bx + cos * by
+        bx, by = rotate(cos, sin, bx, by)
     if i < 0:
         return (0.0, 0.0, bx, by), pose[j, 0] + bx - ax, pose[j, 1] + by - ay
     if ax != 0.0 or ay != 0.0:
         cos, sin = math.cos(pose[i, 2]), math.sin(pose[i, 2])
-        ax, ay = cos * ax - sin * ay, sin * ax + cos * ay
+        ax, ay = rotate(cos, sin, ax, ay)
     return (ax, ay, bx, by), pose[j, 0] + bx - (pose[i, 0] + ax), pose[j, 1] + by - (pose[i, 1] + ay)
 
 
 @bare_kernel
-def line(x: float, y: float) -> tuple[float, float, float]:
+def length_and_direction(x: float, y: float) -> tuple[float, float, float]:
     """Return the length of a vector and its direction; both are 0 for a zero vector."""
     length = math.sqrt(x * x + y * y)
     if length == 0.0:
@@ -96,9 +97,9 @@ def line(x: float, y: float) -> tuple[float, float, float]:
 
 
 @bare_kernel
-def parting(i: int, j: int, arms: Arms, velocity: FloatArray) -> tuple[float, float]:
+def relative_velocity(i: int, j: int, anchors: Anchors, velocity: FloatArray) -> tuple[float, float]:
     """Return the velocity of the anchor on body j relative to that on body i, m/s; velocities are (N, 3)."""
-    ax, ay, bx, by = arms
+    ax, ay, bx, by = anchors
     vx = velocity[j, 0] - velocity[j, 2] * by
     vy = velocity[j, 1] + velocity[j, 2] * bx
     if i >= 0:
@@ -108,7 +109,7 @@ def parting(i: int, j: int, arms: Arms, velocity: FloatArray) -> tuple[float, fl
 
 
 @bare_kernel
-def turning(i: int, j: int, rate: FloatArray) -> float:
+def relative_rotation(i: int, j: int, rate: FloatArray) -> float:
     """Return the angle, or angular velocity, of body j relative to body i."""
     turned: float = rate[j, 2]
     return turned - rate[i, 2] if i >= 0 else turned
@@ -118,7 +119,7 @@ def turning(i: int, j: int, rate: FloatArray) -> float:
 def apply_impulse(
     i: int,
     j: int,
-    arms: Arms,
+    anchors: Anchors,
     x: float,
     y: float,
     inverse_mass: FloatArray,
@@ -126,7 +127,7 @@ def apply_impulse(
     out: FloatArray,
 ) -> None:
     """Apply a force (x, y) to accelerations, or an impulse to velocities, both (N, 3)."""
-    ax, ay, bx, by = arms
+    ax, ay, bx, by = anchors
     out[j, 0] += inverse_mass[j] * x
     out[j, 1] += inverse_mass[j] * y
     out[j, 2] += inverse_moment[j] * (bx * y - by * x)
@@ -145,17 +146,17 @@ def apply_angular_impulse(i: int, j: int, torque: float, inverse_moment: FloatAr
 
 
 @bare_kernel
-def yielding(
+def inverse_effective_mass(
     i: int,
     j: int,
-    arms: Arms,
+    anchors: Anchors,
     nx: float,
     ny: float,
     inverse_mass: FloatArray,
     inverse_moment: FloatArray,
 ) -> float:
     """Return the relative velocity of the anchors along (nx, ny) per unit impulse: an inverse mass, 1/kg."""
-    ax, ay, bx, by = arms
+    ax, ay, bx, by = anchors
     lever = bx * ny - by * nx
     inverse: float = inverse_mass[j] + inverse_moment[j] * lever * lever
     if i >= 0:
@@ -165,18 +166,18 @@ def yielding(
 
 
 @bare_kernel
-def slackness(i: int, j: int, inverse_moment: FloatArray) -> float:
+def inverse_effective_moment(i: int, j: int, inverse_moment: FloatArray) -> float:
     """Return the relative angular velocity per unit angular impulse, 1/(kg·m²)."""
     inverse: float = inverse_moment[j]
     return inverse + inverse_moment[i] if i >= 0 else inverse
 
 
 @bare_kernel
-def block(
-    i: int, j: int, arms: Arms, inverse_mass: FloatArray, inverse_moment: FloatArray
+def effective_mass_matrix(
+    i: int, j: int, anchors: Anchors, inverse_mass: FloatArray, inverse_moment: FloatArray
 ) -> tuple[float, float, float]:
     """Return the effective mass matrix xx, xy, yy, kg: impulse per relative velocity; 0 if nothing can move."""
-    ax, ay, bx, by = arms
+    ax, ay, bx, by = anchors
     xx = yy = inverse_mass[j]
     xx += inverse_moment[j] * by * by
     xy = -inverse_moment[j] * bx * by
@@ -192,8 +193,8 @@ def block(
 
 
 @bare_kernel
-def spring_forces(
-    ties: JointData,
+def add_spring_forces(
+    joints: JointData,
     pose: FloatArray,
     rates: FloatArray,
     inverse_mass: FloatArray,
@@ -203,104 +204,108 @@ def spring_forces(
     """Add the accelerations caused by springs.
 
     Args:
-        ties: of them, the springs and rotary springs.
+        joints: joints other than springs have no effect.
         pose: (N, 3) m and rad.
         rates: (N, 3) m/s and rad/s.
         inverse_mass: (N,) 1/kg, 0 for fixed bodies.
         inverse_moment: (N,) 1/(kg·m²).
         out: (N, 3) m/s² and rad/s², added to.
     """
-    for k in range(len(ties.kind)):
-        i, j = ties.first[k], ties.second[k]
-        if ties.kind[k] == SPRING:
-            arms, dx, dy = reach(ties, k, pose)
-            x, y = tension(ties, k, arms, dx, dy, rates)
-            apply_impulse(i, j, arms, x, y, inverse_mass, inverse_moment, out)
-        elif ties.kind[k] == ROTARY_SPRING:
-            apply_angular_impulse(i, j, torsion(ties, k, pose, rates), inverse_moment, out)
+    for k in range(len(joints.kind)):
+        i, j = joints.first[k], joints.second[k]
+        if joints.kind[k] == SPRING:
+            anchors, dx, dy = anchor_separation(joints, k, pose)
+            x, y = spring_force(joints, k, anchors, dx, dy, rates)
+            apply_impulse(i, j, anchors, x, y, inverse_mass, inverse_moment, out)
+        elif joints.kind[k] == ROTARY_SPRING:
+            apply_angular_impulse(i, j, spring_torque(joints, k, pose, rates), inverse_moment, out)
 
 
 @bare_kernel
-def tension(ties: JointData, k: int, arms: Arms, dx: float, dy: float, rates: FloatArray) -> tuple[float, float]:
-    """Return the force of spring k, which reaches over (dx, dy), on its second body, x and y, N.
+def spring_force(
+    joints: JointData, k: int, anchors: Anchors, dx: float, dy: float, rates: FloatArray
+) -> tuple[float, float]:
+    """Return the force of spring k on its second body, x and y, N; (dx, dy) is the vector between its anchors, m.
 
-    Where its ends coincide, its line is that of their motion, as it will be at once. Without motion there is none,
-    and no force: a spring of no rest length is at rest there, any other in unstable balance.
+    If the anchors coincide, the axis is the direction of their relative velocity. If that is 0 too, the force is 0: a
+    spring of rest length 0 is in equilibrium there, any other in unstable equilibrium.
     """
-    vx, vy = parting(ties.first[k], ties.second[k], arms, rates)
-    length, nx, ny = line(dx, dy)
+    vx, vy = relative_velocity(joints.first[k], joints.second[k], anchors, rates)
+    length, nx, ny = length_and_direction(dx, dy)
     if length == 0.0:
-        _, nx, ny = line(vx, vy)
-    force = -ties.figures[k, 1] * (length - ties.figures[k, 0]) - ties.figures[k, 2] * (vx * nx + vy * ny)
+        _, nx, ny = length_and_direction(vx, vy)
+    rest, stiffness, damping = joints.figures[k, 0], joints.figures[k, 1], joints.figures[k, 2]
+    force = _spring_law(rest, stiffness, damping, length, vx * nx + vy * ny)
     return force * nx, force * ny
 
 
 @bare_kernel
-def torsion(ties: JointData, k: int, pose: FloatArray, rates: FloatArray) -> float:
+def spring_torque(joints: JointData, k: int, pose: FloatArray, rates: FloatArray) -> float:
     """Return the torque of rotary spring k on its second body, N·m."""
-    i, j = ties.first[k], ties.second[k]
-    turned = turning(i, j, pose) - ties.figures[k, 0]
-    torque: float = -ties.figures[k, 1] * turned - ties.figures[k, 2] * turning(i, j, rates)
+    i, j = joints.first[k], joints.second[k]
+    rest, stiffness, damping = joints.figures[k, 0], joints.figures[k, 1], joints.figures[k, 2]
+    angle, rate = relative_rotation(i, j, pose), relative_rotation(i, j, rates)
+    torque: float = _spring_law(rest, stiffness, damping, angle, rate)
     return torque
 
 
 @bare_kernel
-def damper_power(ties: JointData, pose: FloatArray, rates: FloatArray) -> float:
-    """Return the power, W, of the dampers of springs: −c l̇² and −c φ̇²; never more than 0.
+def damper_power(joints: JointData, pose: FloatArray, rates: FloatArray) -> float:
+    """Return the power, W, of the dampers of springs: −c l̇² and −c φ̇²; at most 0.
 
     Args:
-        ties: of them, the springs and rotary springs.
+        joints: joints other than springs have no effect.
         pose: (N, 3) m and rad.
         rates: (N, 3) m/s and rad/s.
     """
     power = 0.0
-    for k in range(len(ties.kind)):
-        i, j = ties.first[k], ties.second[k]
-        if ties.kind[k] == SPRING:
-            arms, dx, dy = reach(ties, k, pose)
-            vx, vy = parting(i, j, arms, rates)
-            length, nx, ny = line(dx, dy)
+    for k in range(len(joints.kind)):
+        i, j = joints.first[k], joints.second[k]
+        if joints.kind[k] == SPRING:
+            anchors, dx, dy = anchor_separation(joints, k, pose)
+            vx, vy = relative_velocity(i, j, anchors, rates)
+            length, nx, ny = length_and_direction(dx, dy)
             if length == 0.0:
-                _, nx, ny = line(vx, vy)
-            power -= ties.figures[k, 2] * (vx * nx + vy * ny) ** 2
-        elif ties.kind[k] == ROTARY_SPRING:
-            power -= ties.figures[k, 2] * turning(i, j, rates) ** 2
+                _, nx, ny = length_and_direction(vx, vy)
+            power -= joints.figures[k, 2] * (vx * nx + vy * ny) ** 2
+        elif joints.kind[k] == ROTARY_SPRING:
+            power -= joints.figures[k, 2] * relative_rotation(i, j, rates) ** 2
     return power
 
 
 @bare_kernel
-def spring_loads(ties: JointData, pose: FloatArray, rates: FloatArray, load: FloatArray) -> None:
+def write_spring_loads(joints: JointData, pose: FloatArray, rates: FloatArray, load: FloatArray) -> None:
     """Write the load of each spring on its second body into its row: force, N, or torque, N·m, and 0.
 
     Args:
-        ties: of them, the springs and rotary springs.
+        joints: joints other than springs have no effect.
         pose: (N, 3) m and rad.
         rates: (N, 3) m/s and rad/s.
-        load: (J, 2), by number of link.
+        load: (J, 2), by index of the joint in the setup.
     """
-    for k in range(len(ties.kind)):
-        if ties.kind[k] == SPRING:
-            arms, dx, dy = reach(ties, k, pose)
-            load[ties.link[k], 0], load[ties.link[k], 1] = tension(ties, k, arms, dx, dy, rates)
-        elif ties.kind[k] == ROTARY_SPRING:
-            load[ties.link[k], 0], load[ties.link[k], 1] = torsion(ties, k, pose, rates), 0.0
+    for k in range(len(joints.kind)):
+        if joints.kind[k] == SPRING:
+            anchors, dx, dy = anchor_separation(joints, k, pose)
+            load[joints.link[k], 0], load[joints.link[k], 1] = spring_force(joints, k, anchors, dx, dy, rates)
+        elif joints.kind[k] == ROTARY_SPRING:
+            load[joints.link[k], 0], load[joints.link[k], 1] = spring_torque(joints, k, pose, rates), 0.0
 
 
-CAP = 0.1
+MAX_STRETCH = 0.1
 """Largest stretch of cloth, as a fraction of the rest length of a spring."""
 
 
-def cap_stretch(ties: JointData, cap: float) -> JointData:
-    """Return the strings that keep springs from stretching farther, to be held with whatever else is.
+def stretch_limits(joints: JointData, max_stretch: float) -> JointData:
+    """Return slide joints that limit the stretch of springs.
 
-    Springs of no rest length get none, for that would be a pivot; rotary springs neither.
+    Springs of rest length 0 get none, because that would be a pivot. Rotary springs get none.
 
     Args:
-        ties: any.
-        cap: the most stretch as a part of the rest length; inf for none.
+        joints: joints other than springs are ignored.
+        max_stretch: largest stretch as a fraction of the rest length; inf for no limit.
     """
-    some = np.flatnonzero((ties.kind == SPRING) & (ties.figures[:, 0] > 0.0) & np.isfinite(cap))
-    own = ties.some(some)
-    figures = np.zeros((len(some), 3))
-    figures[:, 1] = (1.0 + cap) * own.figures[:, 0]
-    return own._replace(kind=np.full(len(some), SLIDE), figures=figures, most_force=np.full(len(some), np.inf))
+    rows = np.flatnonzero((joints.kind == SPRING) & (joints.figures[:, 0] > 0.0) & np.isfinite(max_stretch))
+    own = joints.take(rows)
+    figures = np.zeros((len(rows), 3))
+    figures[:, 1] = (1.0 + max_stretch) * own.figures[:, 0]
+    return own._replace(kind=np.full(len(rows), SLIDE), figures=figures, max_force=np.full(len(rows), np.inf))

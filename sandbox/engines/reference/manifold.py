@@ -1,10 +1,8 @@
 """Contact manifolds as arrays, and those of circles with circles, half-planes and segments.
 
-Narrow phase: whether and how a circle touches a half-plane, a segment or another circle.
-
-Each function takes two shapes with their poses and returns a manifold: the separation (m; negative in overlap, and
-only then is there contact) and the unit normal from the first shape to the second. For circles one point is enough:
-it lies on the normal through the centre.
+Each narrow-phase function takes two shapes with their poses and returns the separation, m, which is negative in
+overlap, and the unit normal from the first shape to the second. A contact of a circle has one point, on the normal
+through the centre.
 """
 
 import math
@@ -13,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.engines.common.geometry import nearest_fraction
 from sandbox.engines.common.kernel import bare_kernel, kernel
 from sandbox.engines.reference.broad_phase import FIRST, SECOND, pair_key
 
@@ -22,19 +21,19 @@ Manifold = tuple[float, float, float]
 
 @kernel
 def circle_circle(ax: float, ay: float, a_radius: float, bx: float, by: float, b_radius: float) -> Manifold:
-    """Return how two circles lie; coincident centres have the normal (1, 0), as in Munk2D."""
+    """Return separation and normal of two circles; coincident centres have the normal (1, 0), as in Munk2D."""
     x, y = bx - ax, by - ay
     distance = math.sqrt(x * x + y * y)
     if distance == 0.0:
         return -(a_radius + b_radius), 1.0, 0.0
-    # By the reciprocal, as Munk2D divides: the same roundings.
+    # By the reciprocal, with the same roundings as Munk2D.
     inverse = 1.0 / distance
     return distance - (a_radius + b_radius), x * inverse, y * inverse
 
 
 @kernel
 def circle_half_plane(x: float, y: float, radius: float, px: float, py: float, nx: float, ny: float) -> Manifold:
-    """Return how a circle lies to a half-plane that is solid behind its normal: the tutorial's example 4.
+    """Return separation and normal of a circle and a half-plane, solid behind its normal: the tutorial's example 4.
 
     They intersect when the centre's height over the surface is less than the radius. With radius 1 over y = 0:
 
@@ -50,15 +49,13 @@ def circle_half_plane(x: float, y: float, radius: float, px: float, py: float, n
 def circle_segment(
     x: float, y: float, radius: float, ax: float, ay: float, bx: float, by: float, half_thickness: float
 ) -> Manifold:
-    """Return how a circle lies to a segment with round ends; one of no length is a circle.
+    """Return separation and normal of a circle and a segment with round ends. A segment of length 0 is a circle.
 
-    A centre on the segment itself leaves to its left; on one of no length, along x.
+    If the centre lies on the segment, the normal points to the right of it; if its length is 0, along x.
     """
     along_x, along_y = bx - ax, by - ay
     length2 = along_x * along_x + along_y * along_y
-    fraction = 0.0
-    if length2 > 0.0:
-        fraction = min(max((along_x * (x - ax) + along_y * (y - ay)) / length2, 0.0), 1.0)
+    fraction = nearest_fraction(ax, ay, bx, by, x, y)
     dx, dy = ax + along_x * fraction - x, ay + along_y * fraction - y
     distance = math.sqrt(dx * dx + dy * dy)
     separation = distance - (radius + half_thickness)
@@ -72,7 +69,7 @@ def circle_segment(
 
 
 KIND = 60
-"""Bits below the kind of a pair in its key: 0 ball-ball, 1 ball-plane, 2 ball-segment. Keys ascend."""
+"""Number of bits below the kind of a pair in its key: 0 ball-ball, 1 ball-plane, 2 ball-segment"""
 
 
 @bare_kernel
@@ -90,21 +87,21 @@ def is_covered(
     after_x: float,
     after_y: float,
 ) -> bool:
-    """Tell whether a circle touches an end of a segment beyond which the wall comes nearer to it.
+    """Return whether a circle touches an end of a segment at which the continuation of the wall is nearer to it.
 
-    The contact is then left to the neighbouring segment. The rule is that of Munk2D's `cpSegmentShapeSetNeighbors`, in
+    The neighbouring segment then has the contact. The rule is that of Munk2D's `cpSegmentShapeSetNeighbors`, in
     the same arithmetic.
 
     Args:
-        x: of its centre, m.
-        y: of its centre, m.
-        ax: of the end at which the segment begins, m.
+        x: centre of the circle, m.
+        y: likewise.
+        ax: first end of the segment, m.
         ay: likewise.
-        bx: of the end at which it ends, m.
+        bx: second end, m.
         by: likewise.
-        nx: of the normal, from the circle to the segment.
+        nx: normal, from the circle to the segment.
         ny: likewise.
-        before_x: m, from the first end along the wall, away from the segment; 0 where the wall ends.
+        before_x: continuation of the wall at the first end, away from the segment, m; 0 if the wall ends there.
         before_y: likewise.
         after_x: likewise, from the second end.
         after_y: likewise.
@@ -120,41 +117,42 @@ def is_covered(
 
 
 class Manifolds(NamedTuple):
-    """K contacts, by ascending key. The second of a pair may be a static collider."""
+    """K contacts, by ascending key. The second body of a pair may be a static collider."""
 
     key: IntArray
-    """(K,) says which pair of shapes, from step to step"""
+    """(K,) identifies the pair of shapes from step to step"""
     first: IntArray
-    """(K,) body number"""
+    """(K,) body index"""
     second: IntArray
-    """(K,) body number, or −1 − k"""
+    """(K,) body index, or −1 − k of static collider k"""
     normal: FloatArray
     """(K, 2) from the first to the second"""
     separation: FloatArray
     """(K,) m; negative in overlap"""
     point: FloatArray
-    """(K, 2) m, midway in the overlap"""
-    arm: FloatArray
-    """(K, 2) m, from each centre to the contact along the normal, towards the other"""
+    """(K, 2) m, in the middle of the overlap"""
+    anchor: FloatArray
+    """(K, 2) m, component along the normal of each anchor, the vector from a centre to the contact; positive towards
+    the other body"""
     offset: FloatArray
-    """(K, 2) m, how far to the left of the normal the contact lies from each centre; 0 for discs"""
+    """(K, 2) m, component of each anchor to the left of the normal; 0 for discs"""
     friction: FloatArray
     """(K,) coefficient of friction of the pair"""
     surface_pair: IntArray
-    """(K,) index of the pair of surfaces, row·S + column, in a table (S, S): of restitution, damping or falloff"""
+    """(K,) index of the pair of surfaces, row·S + column, in tables (S, S) of restitution, damping and falloff"""
 
     @property
     def size(self) -> int:
-        """K."""
+        """Number of contacts K."""
         return len(self.key)
 
     def of(self, which: IntArray | BoolArray | slice) -> "Manifolds":
-        """Return some of them."""
+        """Return some of the contacts."""
         columns: Any = (column[which] for column in self)
         return Manifolds(*columns)
 
     def joined(self, more: "Manifolds") -> "Manifolds":
-        """Return these and more, one after the other: their keys need not ascend."""
+        """Return these contacts followed by others; the keys need not ascend then."""
         columns: Any = (np.concatenate(pair) for pair in zip(self, more, strict=True))
         return Manifolds(*columns)
 
@@ -166,25 +164,27 @@ def find_ball_contacts(
     radius: FloatArray,
     surface: IntArray,
     friction: FloatArray,
-    reach: float,
+    max_separation: float,
     out: Manifolds,
-    at: int,
+    row: int,
 ) -> int:
-    """Write the pairs of balls nearer than `reach` from row `at` on; return the next free row."""
+    """Write the contacts of pairs of balls from row `row` on; return the next free row."""
     for k in range(len(keys)):
         i, j = keys[k] >> FIRST, keys[k] & SECOND
         separation, nx, ny = circle_circle(
             position[i, 0], position[i, 1], radius[i], position[j, 0], position[j, 1], radius[j]
         )
-        if separation < reach:
-            if at < len(out.key):
-                out.key[at] = keys[k]
-                out.first[at], out.second[at] = i, j
-                _place(out, at, position[i, 0], position[i, 1], radius[i], radius[j], separation, nx, ny)
-                out.friction[at] = friction[surface[i], surface[j]]
-                out.surface_pair[at] = surface[i] * len(friction) + surface[j]
-            at += 1
-    return at
+        if separation < max_separation:
+            if row < len(out.key):
+                out.key[row] = keys[k]
+                out.first[row], out.second[row] = i, j
+                _write_circle_contact(
+                    out, row, position[i, 0], position[i, 1], radius[i], radius[j], separation, nx, ny
+                )
+                out.friction[row] = friction[surface[i], surface[j]]
+                out.surface_pair[row] = surface[i] * len(friction) + surface[j]
+            row += 1
+    return row
 
 
 @bare_kernel
@@ -197,11 +197,11 @@ def find_plane_contacts(
     collider: IntArray,
     collider_surface: IntArray,
     friction: FloatArray,
-    reach: float,
+    max_separation: float,
     out: Manifolds,
-    at: int,
+    row: int,
 ) -> int:
-    """Write the balls nearer than `reach` to half-planes from row `at` on; return the next free row."""
+    """Write the contacts of balls with half-planes from row `row` on; return the next free row."""
     for i in range(len(position)):
         if not can_touch[i]:
             continue
@@ -209,16 +209,16 @@ def find_plane_contacts(
             separation, nx, ny = circle_half_plane(
                 position[i, 0], position[i, 1], radius[i], planes[p, 0], planes[p, 1], planes[p, 2], planes[p, 3]
             )
-            if separation < reach:
-                if at < len(out.key):
+            if separation < max_separation:
+                if row < len(out.key):
                     other = collider_surface[collider[p]]
-                    out.key[at] = (1 << KIND) + pair_key(i, p)
-                    out.first[at], out.second[at] = i, -1 - collider[p]
-                    _place(out, at, position[i, 0], position[i, 1], radius[i], 0.0, separation, nx, ny)
-                    out.friction[at] = friction[surface[i], other]
-                    out.surface_pair[at] = surface[i] * len(friction) + other
-                at += 1
-    return at
+                    out.key[row] = (1 << KIND) + pair_key(i, p)
+                    out.first[row], out.second[row] = i, -1 - collider[p]
+                    _write_circle_contact(out, row, position[i, 0], position[i, 1], radius[i], 0.0, separation, nx, ny)
+                    out.friction[row] = friction[surface[i], other]
+                    out.surface_pair[row] = surface[i] * len(friction) + other
+                row += 1
+    return row
 
 
 @bare_kernel
@@ -232,11 +232,11 @@ def find_segment_contacts(
     collider: IntArray,
     collider_surface: IntArray,
     friction: FloatArray,
-    reach: float,
+    max_separation: float,
     out: Manifolds,
-    at: int,
+    row: int,
 ) -> int:
-    """Write the balls nearer than `reach` to segments from row `at` on; return the next free row."""
+    """Write the contacts of balls with segments from row `row` on; return the next free row."""
     for k in range(len(keys)):
         i, s = keys[k] >> FIRST, keys[k] & SECOND
         separation, nx, ny = circle_segment(
@@ -249,7 +249,7 @@ def find_segment_contacts(
             segments[s, 3],
             segments[s, 4],
         )
-        if separation < reach and not is_covered(
+        if separation < max_separation and not is_covered(
             position[i, 0],
             position[i, 1],
             segments[s, 0],
@@ -263,23 +263,33 @@ def find_segment_contacts(
             joints[s, 2],
             joints[s, 3],
         ):
-            if at < len(out.key):
+            if row < len(out.key):
                 other = collider_surface[collider[s]]
-                out.key[at] = (2 << KIND) + keys[k]
-                out.first[at], out.second[at] = i, -1 - collider[s]
-                _place(out, at, position[i, 0], position[i, 1], radius[i], segments[s, 4], separation, nx, ny)
-                out.friction[at] = friction[surface[i], other]
-                out.surface_pair[at] = surface[i] * len(friction) + other
-            at += 1
-    return at
+                out.key[row] = (2 << KIND) + keys[k]
+                out.first[row], out.second[row] = i, -1 - collider[s]
+                _write_circle_contact(
+                    out, row, position[i, 0], position[i, 1], radius[i], segments[s, 4], separation, nx, ny
+                )
+                out.friction[row] = friction[surface[i], other]
+                out.surface_pair[row] = surface[i] * len(friction) + other
+            row += 1
+    return row
 
 
 @bare_kernel
-def _place(
-    out: Manifolds, at: int, x: float, y: float, a_arm: float, b_arm: float, separation: float, nx: float, ny: float
+def _write_circle_contact(
+    out: Manifolds,
+    row: int,
+    x: float,
+    y: float,
+    a_anchor: float,
+    b_anchor: float,
+    separation: float,
+    nx: float,
+    ny: float,
 ) -> None:
-    out.normal[at, 0], out.normal[at, 1] = nx, ny
-    out.separation[at] = separation
-    out.arm[at, 0], out.arm[at, 1] = a_arm, b_arm
-    middle = a_arm + 0.5 * separation
-    out.point[at, 0], out.point[at, 1] = x + nx * middle, y + ny * middle
+    out.normal[row, 0], out.normal[row, 1] = nx, ny
+    out.separation[row] = separation
+    out.anchor[row, 0], out.anchor[row, 1] = a_anchor, b_anchor
+    middle = a_anchor + 0.5 * separation
+    out.point[row, 0], out.point[row, 1] = x + nx * middle, y + ny * middle

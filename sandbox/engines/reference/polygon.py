@@ -1,23 +1,17 @@
 """Convex polygons: separating axes, clipping, and the contact points of a pair.
 
-Convex pieces: where two of them touch, or one touches a half-plane, by the cheapest test that fits.
+A piece is the convex hull of its corners, widened by a radius: a disc has one corner, a capsule or a wall segment two,
+a polygon three or more. Its corners are the rows start…end of `corner`, counter-clockwise, in world coordinates. Face k
+runs from corner k to the next; its normal points to the right of that direction. Two corners have two opposite faces
+and no area.
 
-A piece is the hull of its corners, widened by a radius: a disc has one corner, a capsule or a wall two, a polygon three
-or more, counter-clockwise, in the world's coordinates. By the corners of the two: 1 and 1 a distance; 1 and 2 a
-distance from a segment; 1 and more the faces of one and the region its centre lies in; else separating axes, then
-clipping (Gottschalk, Lin & Manocha 1996; the contact points as in Box2D, whose distance of corners is here exact).
+The test depends on the numbers of corners: 1 and 1, distance of points; 1 and 2, distance from a segment; 1 and more,
+the Voronoi region of the polygon in which the centre lies; else separating axes, then clipping (Gottschalk, Lin &
+Manocha 1996). The contact points are those of Box2D, except that the distance between corners is exact here.
 
-Every test returns how many points lie nearer than `reach` and writes them as rows of `out`: see clipping.
-
-Faces: the separating axis test of one convex outline against another, and the face that a contact lies on.
-
-A piece is the rows start…end of `corner`, counter-clockwise: face k runs from corner k to the one after it, and its
-normal looks to the right of that. Two corners are an outline of no area with two faces, back to back.
-
-Clipping: the contact points of two faces, and how rows of contact are written.
-
-A row of `out` (2, 6) is: normal x, y, from the first piece to the second; separation, m, negative in overlap; point
-x, y, midway in the overlap; feature, 0 or 1: which of the two points, counted along the normal turned left.
+Every test writes the points with a separation below `max_separation` as rows of `out` and returns their number. A row
+of `out` (2, 6) is: normal x, y, from the first piece to the second; separation, m, negative in overlap; point x, y, in
+the middle of the overlap; feature, 0 or 1, the order of the two points along the normal turned left.
 """
 
 import math
@@ -28,10 +22,10 @@ from sandbox.engines.reference.manifold import circle_circle, circle_segment
 
 
 @kernel
-def write(
+def write_point(
     out: FloatArray, row: int, nx: float, ny: float, separation: float, x: float, y: float, feature: float
 ) -> None:
-    """Write one point of contact."""
+    """Write one contact point."""
     out[row, 0], out[row, 1], out[row, 2] = nx, ny, separation
     out[row, 3], out[row, 4], out[row, 5] = x, y, feature
 
@@ -48,11 +42,11 @@ def clip(
         two: corner at which it ends.
         first: corner at one end of the incident face.
         second: corner at its other end.
-        slack: how far beside the reference face the incident one may lie, and no end is cut, m.
+        slack: distance beside the reference face, m, up to which an end is not clipped.
 
     Returns:
         Whether a part remains; then x, y and height over the reference face, m, of the two ends of that part, in
-        the order in which the reference face runs.
+        the direction of the reference face.
     """
     x, y = corner[one, 0], corner[one, 1]
     tx, ty = corner[two, 0] - x, corner[two, 1] - y
@@ -82,10 +76,10 @@ def clip(
 def closest_points(
     corner: FloatArray, one: int, two: int, first: int, second: int
 ) -> tuple[float, float, float, float, float]:
-    """Return the distance of two faces that do not cross, m, and x, y of the nearest points of each."""
+    """Return the distance of two faces that do not intersect, m, and x, y of the closest point of each."""
     best, ax, ay, bx, by = math.inf, 0.0, 0.0, 0.0, 0.0
     for k in range(4):
-        # Of two segments that do not cross, one of the nearest points is an end.
+        # One of the closest points of two segments that do not intersect is an end.
         if k < 2:
             end, begin, far = (one if k == 0 else two), first, second
         else:
@@ -109,16 +103,17 @@ def closest_points(
     return math.sqrt(best), ax, ay, bx, by
 
 
-ROUGH = 1e-13
-"""A face shorter than this part of its coordinates has no direction but what rounding gave it: it is passed over."""
+DEGENERATE = 1e-13
+"""Length of a face, as a fraction of its coordinates, below which its direction is rounding error; it is ignored"""
 
-STRAIGHT = 1e-9
-"""Angle up to which two neighbouring faces are one, rad: corners set in the middle of a face make it no shorter."""
+COLLINEAR = 1e-9
+"""rad, angle between neighbouring faces up to which they are one face: corners in the middle of a face do not divide
+it"""
 
 
 @kernel
 def next_corner(start: int, end: int, k: int) -> int:
-    """Return the corner after k, going round."""
+    """Return the corner after k, cyclically."""
     return k + 1 if k + 1 < end else start
 
 
@@ -126,15 +121,15 @@ def next_corner(start: int, end: int, k: int) -> int:
 def widest_gap(
     corner: FloatArray, start: int, end: int, other: int, other_end: int, enough: float
 ) -> tuple[float, int, int]:
-    """Return how far the faces of one piece keep the other away, which face does, and the other's corner nearest to it.
+    """Return the largest gap over the faces of one piece, its face, and the other piece's corner nearest to that face.
 
-    The gap is the least height of the other's corners over a face, m; the best face is the one of the largest gap: the
-    axis of least penetration where all are negative. The search ends at a gap of `enough`. Where no face has a
-    direction the gap is −inf.
+    The gap of a face is the smallest height of the other piece's corners over it, m. The face of the largest gap is the
+    axis of least penetration if all gaps are negative. The search stops at a gap of `enough`. If all faces are
+    degenerate, the gap is −inf.
 
-    It is a lower bound of the distance of the pieces, and it is the distance wherever the nearest points lie in that
-    face and at that corner. Where they lie at two corners, those are that corner and an end of that face: the face is
-    then next to the corner of the Minkowski difference that is nearest to the origin.
+    The gap is a lower bound of the distance of the pieces. It equals the distance if the closest points are that corner
+    and a point of that face. If they are two corners, they are that corner and an end of that face, because the face is
+    then adjacent to the corner of the Minkowski difference closest to the origin.
     """
     best, face, nearest = -math.inf, start, other
     for k in range(start, end):
@@ -142,7 +137,7 @@ def widest_gap(
         x, y = corner[k, 0], corner[k, 1]
         along_x, along_y = corner[after, 0] - x, corner[after, 1] - y
         length = math.sqrt(along_x * along_x + along_y * along_y)
-        if length <= ROUGH * (abs(x) + abs(y)):
+        if length <= DEGENERATE * (abs(x) + abs(y)):
             continue
         nx, ny = along_y / length, -along_x / length
         low, lowest = math.inf, other
@@ -150,7 +145,7 @@ def widest_gap(
             gap = nx * (corner[j, 0] - x) + ny * (corner[j, 1] - y)
             if gap < low:
                 low, lowest = gap, j
-                if low <= best:  # this face is not the best, whatever the other corners do
+                if low <= best:  # the gap of this face is not the largest
                     break
         if low > best:
             best, face, nearest = low, k, lowest
@@ -161,9 +156,9 @@ def widest_gap(
 
 @kernel
 def whole_face(corner: FloatArray, start: int, end: int, one: int, two: int) -> tuple[int, int]:
-    """Return the ends of the face that two neighbouring corners lie on, past those in line with them."""
+    """Return the ends of the face of two neighbouring corners, across corners that are collinear with them."""
     dx, dy = corner[two, 0] - corner[one, 0], corner[two, 1] - corner[one, 1]
-    limit = STRAIGHT * STRAIGHT * (dx * dx + dy * dy)
+    limit = COLLINEAR * COLLINEAR * (dx * dx + dy * dy)
     while True:
         far = next_corner(start, end, two)
         ex, ey = corner[far, 0] - corner[two, 0], corner[far, 1] - corner[two, 1]
@@ -183,10 +178,10 @@ def whole_face(corner: FloatArray, start: int, end: int, one: int, two: int) -> 
 
 @kernel
 def face_at(corner: FloatArray, start: int, end: int, k: int, nx: float, ny: float) -> tuple[int, int]:
-    """Return the ends of that face next to corner k whose normal looks the more along (nx, ny)."""
+    """Return the ends of the face adjacent to corner k whose normal is closer to (nx, ny)."""
     x, y = corner[k, 0], corner[k, 1]
-    shortest = ROUGH * (abs(x) + abs(y))
-    # Corners that coincide with k, but for rounding, are passed over.
+    shortest = DEGENERATE * (abs(x) + abs(y))
+    # Skip corners that coincide with k up to rounding.
     after, out_x, out_y, out_length = k, 0.0, 0.0, 0.0
     before, in_x, in_y, in_length = k, 0.0, 0.0, 0.0
     for _ in range(start, end):
@@ -208,38 +203,38 @@ def face_at(corner: FloatArray, start: int, end: int, k: int, nx: float, ny: flo
     return whole_face(corner, start, end, before, k)
 
 
-FAVOUR = 5e-4
-"""By which part of a face's length the other piece's face must part them better to be the one that is clipped to: Box2D
-takes 0.5 mm. Without it two boxes at rest would change roles, and so their normal, from step to step."""
+REFERENCE_FACE_BIAS = 5e-4
+"""Gap difference, as a fraction of a face's length, above which the second piece gets the reference face; Box2D uses
+0.5 mm. Without it two boxes at rest would swap roles, and with them the normal, from step to step."""
 
-LEVEL = 0.01
-"""Angle up to which two faces are level, rad."""
+PARALLEL = 0.01
+"""rad, angle up to which two faces are parallel"""
 
 SLACK = 1e-9
-"""Part of a face's length by which corners may lie beside each other and still count as face to face."""
+"""Distance along a face, as a fraction of its length, within which two corners are opposite each other"""
 
 
 @kernel
 def collide_pieces(
-    corner: FloatArray, first: IntArray, radius: FloatArray, p: int, q: int, reach: float, out: FloatArray
+    corner: FloatArray, first: IntArray, radius: FloatArray, p: int, q: int, max_separation: float, out: FloatArray
 ) -> int:
-    """Write where pieces p and q are nearer than `reach`, m; return at how many points: 0, 1 or 2.
+    """Write the contact of pieces p and q; return its number of points: 0, 1 or 2.
 
     Args:
         corner: (V, 2) of all pieces, m.
-        first: row in `corner` of each one's first; piece p ends where p + 1 begins.
-        radius: of each, m.
-        p: the first, from which normals point.
-        q: the second.
-        reach: separation from which on nothing is written, m.
+        first: row of the first corner of each piece; piece p ends where p + 1 begins.
+        radius: of each piece, m.
+        p: first piece, from which normals point.
+        q: second piece.
+        max_separation: points of a contact have a smaller separation, m.
         out: (2, 6).
     """
     a, a_end, b, b_end = first[p], first[p + 1], first[q], first[q + 1]
     if a_end - a == 1:
-        return collide_disc(corner, a, radius[p], b, b_end, radius[q], 1.0, reach, out)
+        return collide_disc(corner, a, radius[p], b, b_end, radius[q], 1.0, max_separation, out)
     if b_end - b == 1:
-        return collide_disc(corner, b, radius[q], a, a_end, radius[p], -1.0, reach, out)
-    return collide_faces(corner, a, a_end, radius[p], b, b_end, radius[q], reach, out)
+        return collide_disc(corner, b, radius[q], a, a_end, radius[p], -1.0, max_separation, out)
+    return collide_faces(corner, a, a_end, radius[p], b, b_end, radius[q], max_separation, out)
 
 
 @kernel
@@ -251,10 +246,10 @@ def collide_disc(
     end: int,
     piece_radius: float,
     sign: float,
-    reach: float,
+    max_separation: float,
     out: FloatArray,
 ) -> int:
-    """Write where a disc about corner c touches a piece; the sign is −1 where normals point to the disc."""
+    """Write the contact of a disc about corner c with a piece; `sign` is −1 if normals point to the disc."""
     x, y = corner[c, 0], corner[c, 1]
     px, py = corner[start, 0], corner[start, 1]
     if end - start == 1:
@@ -263,40 +258,41 @@ def collide_disc(
         qx, qy = corner[start + 1, 0], corner[start + 1, 1]
         separation, nx, ny = circle_segment(x, y, disc_radius, px, py, qx, qy, piece_radius)
     else:
-        separation, nx, ny = disc_polygon(corner, c, disc_radius, start, end, piece_radius, reach)
-    if separation >= reach:
+        separation, nx, ny = disc_polygon(corner, c, disc_radius, start, end, piece_radius, max_separation)
+    if separation >= max_separation:
         return 0
     middle = disc_radius + 0.5 * separation
-    write(out, 0, sign * nx, sign * ny, separation, x + nx * middle, y + ny * middle, 0.0)
+    write_point(out, 0, sign * nx, sign * ny, separation, x + nx * middle, y + ny * middle, 0.0)
     return 1
 
 
 @kernel
 def disc_polygon(
-    corner: FloatArray, c: int, disc_radius: float, start: int, end: int, piece_radius: float, reach: float
+    corner: FloatArray, c: int, disc_radius: float, start: int, end: int, piece_radius: float, max_separation: float
 ) -> tuple[float, float, float]:
-    """Return separation and normal from a disc to a polygon: by the Voronoi region, of a face or a corner, it lies in.
+    """Return separation and normal from a disc to a polygon, by the Voronoi region that contains the centre.
 
-    A centre inside leaves through the nearest face. Apart by `reach` or more, the separation is a lower bound.
+    For a centre inside the polygon, the nearest face determines them. A separation of `max_separation` or more is a
+    lower bound.
     """
-    x, y, wide = corner[c, 0], corner[c, 1], disc_radius + piece_radius
-    gap, k, _ = widest_gap(corner, start, end, c, c + 1, reach + wide)
-    if gap == -math.inf:  # no larger than rounding: a disc
+    x, y, radii = corner[c, 0], corner[c, 1], disc_radius + piece_radius
+    gap, k, _ = widest_gap(corner, start, end, c, c + 1, max_separation + radii)
+    if gap == -math.inf:  # degenerate: the polygon is a disc
         return circle_circle(x, y, disc_radius, corner[start, 0], corner[start, 1], piece_radius)
     one, two = whole_face(corner, start, end, k, next_corner(start, end, k))
     tx, ty = corner[two, 0] - corner[one, 0], corner[two, 1] - corner[one, 1]
     length = math.sqrt(tx * tx + ty * ty)
     tx, ty = tx / length, ty / length
-    if 0.0 < gap < reach + wide:
+    if 0.0 < gap < max_separation + radii:
         near = one
-        place = (x - corner[one, 0]) * tx + (y - corner[one, 1]) * ty
-        if place > 0.0:
+        position = (x - corner[one, 0]) * tx + (y - corner[one, 1]) * ty
+        if position > 0.0:
             near = two
-            place = length - place
-        if place < 0.0:
+            position = length - position
+        if position < 0.0:
             separation, nx, ny = circle_circle(x, y, disc_radius, corner[near, 0], corner[near, 1], piece_radius)
             return separation, nx, ny
-    return gap - wide, -ty, tx
+    return gap - radii, -ty, tx
 
 
 @kernel
@@ -308,65 +304,66 @@ def collide_faces(
     b: int,
     b_end: int,
     b_radius: float,
-    reach: float,
+    max_separation: float,
     out: FloatArray,
 ) -> int:
-    """Write where two pieces of two corners or more touch: separating axes, then one face clipped to the other."""
-    wide = a_radius + b_radius
-    a_gap, a_face, b_corner = widest_gap(corner, a, a_end, b, b_end, reach + wide)
-    if a_gap >= reach + wide:
+    """Write the contact of two pieces of two corners or more: separating axes, then clipping of faces."""
+    radii = a_radius + b_radius
+    a_gap, a_face, b_corner = widest_gap(corner, a, a_end, b, b_end, max_separation + radii)
+    if a_gap >= max_separation + radii:
         return 0
-    b_gap, b_face, a_corner = widest_gap(corner, b, b_end, a, a_end, reach + wide)
-    if b_gap >= reach + wide:
+    b_gap, b_face, a_corner = widest_gap(corner, b, b_end, a, a_end, max_separation + radii)
+    if b_gap >= max_separation + radii:
         return 0
     gap = max(a_gap, b_gap)
-    if gap == -math.inf:  # neither is larger than rounding: two discs
-        return collide_disc(corner, a, a_radius, b, b + 1, b_radius, 1.0, reach, out)
+    if gap == -math.inf:  # both are degenerate: two discs
+        return collide_disc(corner, a, a_radius, b, b + 1, b_radius, 1.0, max_separation, out)
 
-    # The reference face, whose normal counts, and the incident one across from it
-    turned, one, two, incident, other = facing(
+    # The reference face, which defines the normal, and the incident face opposite to it
+    swapped, one, two, incident, other = select_faces(
         corner, a, a_end, a_gap, a_face, a_corner, b, b_end, b_gap, b_face, b_corner
     )
-    sign = -1.0 if turned else 1.0
-    own, its = (b_radius, a_radius) if turned else (a_radius, b_radius)
+    sign = -1.0 if swapped else 1.0
+    own_radius, other_radius = (b_radius, a_radius) if swapped else (a_radius, b_radius)
     nx, ny = corner[two, 1] - corner[one, 1], corner[one, 0] - corner[two, 0]
     length = math.sqrt(nx * nx + ny * ny)
     nx, ny = nx / length, ny / length
     across = math.sqrt((corner[other, 0] - corner[incident, 0]) ** 2 + (corner[other, 1] - corner[incident, 1]) ** 2)
-    slack = SLACK * min(length, across) + ROUGH * (abs(corner[one, 0]) + abs(corner[one, 1]))
+    slack = SLACK * min(length, across) + DEGENERATE * (abs(corner[one, 0]) + abs(corner[one, 1]))
     over, begin_x, begin_y, begin, end_x, end_y, end = clip(corner, one, two, incident, other, slack)
 
-    # Apart, the nearest points may be corners. So may those of two segments in line, which no face keeps apart.
+    # Without overlap the closest points may be corners; so may those of two collinear segments, which no face
+    # separates.
     if gap > 0.0 or (not over and a_end - a == 2 and b_end - b == 2):
         distance, x, y, its_x, its_y = closest_points(corner, one, two, incident, other)
-        # Seen from the face of the wider gap, which need not be the reference, nearest points lie straight across.
+        # The closest points lie along the normal of the face of the larger gap, which need not be the reference face.
         dx, dy = nx, ny
-        if turned != (b_gap > a_gap):
+        if swapped != (b_gap > a_gap):
             dx = (corner[incident, 1] - corner[other, 1]) / across
             dy = (corner[other, 0] - corner[incident, 0]) / across
         if not over or abs((its_x - x) * dy - (its_y - y) * dx) > slack:
-            if distance - wide >= reach:
+            if distance - radii >= max_separation:
                 return 0
             nx, ny = sign * (its_x - x) / distance, sign * (its_y - y) / distance
-            middle = 0.5 * sign * (distance + own - its)
-            write(out, 0, nx, ny, distance - wide, x + nx * middle, y + ny * middle, 0.0)
+            middle = 0.5 * sign * (distance + own_radius - other_radius)
+            write_point(out, 0, nx, ny, distance - radii, x + nx * middle, y + ny * middle, 0.0)
             return 1
-    if not over:  # by rounding: slivers
-        deepest = a_corner if turned else b_corner
+    if not over:  # slivers, by rounding
+        deepest = a_corner if swapped else b_corner
         incident, other, begin_x, begin_y, begin = deepest, deepest, corner[deepest, 0], corner[deepest, 1], gap
 
     count = 0
     for row in range(1 if incident == other else 2):
-        x, y, height = (begin_x, begin_y, begin) if (row == 0) != turned else (end_x, end_y, end)
-        if height - wide < reach:
-            middle = 0.5 * (height + its - own)
-            write(out, count, sign * nx, sign * ny, height - wide, x - nx * middle, y - ny * middle, float(row))
+        x, y, height = (begin_x, begin_y, begin) if (row == 0) != swapped else (end_x, end_y, end)
+        if height - radii < max_separation:
+            middle = 0.5 * (height + other_radius - own_radius)
+            write_point(out, count, sign * nx, sign * ny, height - radii, x - nx * middle, y - ny * middle, float(row))
             count += 1
     return count
 
 
 @kernel
-def facing(
+def select_faces(
     corner: FloatArray,
     a: int,
     a_end: int,
@@ -379,20 +376,20 @@ def facing(
     b_face: int,
     b_corner: int,
 ) -> tuple[bool, int, int, int, int]:
-    """Return whether the second piece has the reference face, the ends of that, and those of the incident face."""
+    """Return whether the second piece has the reference face, the ends of that face, and those of the incident face."""
     a_one, a_two = whole_face(corner, a, a_end, a_face, next_corner(a, a_end, a_face))
     if b_gap > a_gap:
         b_one, b_two = whole_face(corner, b, b_end, b_face, next_corner(b, b_end, b_face))
         dx, dy = corner[b_two, 0] - corner[b_one, 0], corner[b_two, 1] - corner[b_one, 1]
         incident, other = face_at(corner, a, a_end, a_corner, -dy, dx)
         ex, ey = corner[a_two, 0] - corner[a_one, 0], corner[a_two, 1] - corner[a_one, 1]
-        own, its = math.sqrt(dx * dx + dy * dy), math.sqrt(ex * ex + ey * ey)
-        if b_gap > a_gap + FAVOUR * min(own, its):
+        own_radius, other_radius = math.sqrt(dx * dx + dy * dy), math.sqrt(ex * ex + ey * ey)
+        if b_gap > a_gap + REFERENCE_FACE_BIAS * min(own_radius, other_radius):
             return True, b_one, b_two, incident, other
-        # Apart, the normal must remain the direction between the nearest points: only faces across from each other, and
-        # level, change roles.
+        # Without overlap the normal must remain the direction between the closest points: only parallel faces opposite
+        # each other swap roles.
         if b_gap > 0.0:
-            if incident != a_one or other != a_two or abs(dx * ey - dy * ex) > LEVEL * own * its:
+            if incident != a_one or other != a_two or abs(dx * ey - dy * ex) > PARALLEL * own_radius * other_radius:
                 return True, b_one, b_two, incident, other
             return False, a_one, a_two, b_one, b_two
     dx, dy = corner[a_two, 0] - corner[a_one, 0], corner[a_two, 1] - corner[a_one, 1]
@@ -410,32 +407,32 @@ def collide_half_plane(
     py: float,
     nx: float,
     ny: float,
-    reach: float,
+    max_separation: float,
     out: FloatArray,
 ) -> int:
-    """Write where piece p is nearer than `reach`, m, to a half-plane, at its lowest face; return at how many points.
+    """Write the contact of piece p with a half-plane, at the piece's lowest face; return its number of points.
 
-    The half-plane is solid behind its unit normal at (px, py); normals of contact point into it.
+    The half-plane is solid behind its unit normal at (px, py). Contact normals point into it.
     """
-    start, end, wide = first[p], first[p + 1], radius[p]
+    start, end, radii = first[p], first[p + 1], radius[p]
     low, lowest = math.inf, start
     for k in range(start, end):
         height = (corner[k, 0] - px) * nx + (corner[k, 1] - py) * ny
         if height < low:
             low, lowest = height, k
-    if low - wide >= reach:
+    if low - radii >= max_separation:
         return 0
     one, two = face_at(corner, start, end, lowest, -nx, -ny)
-    # Counted along the normal of contact turned left
+    # In the order along the contact normal turned left
     if (corner[one, 0] - corner[two, 0]) * ny > (corner[one, 1] - corner[two, 1]) * nx:
         one, two = two, one
     count = 0
     for row in range(1 if one == two else 2):
         k = one if row == 0 else two
-        separation = (corner[k, 0] - px) * nx + (corner[k, 1] - py) * ny - wide
-        if separation < reach:
-            middle = wide + 0.5 * separation
+        separation = (corner[k, 0] - px) * nx + (corner[k, 1] - py) * ny - radii
+        if separation < max_separation:
+            middle = radii + 0.5 * separation
             x, y = corner[k, 0] - nx * middle, corner[k, 1] - ny * middle
-            write(out, count, -nx, -ny, separation, x, y, float(row))
+            write_point(out, count, -nx, -ny, separation, x, y, float(row))
             count += 1
     return count

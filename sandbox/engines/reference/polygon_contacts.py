@@ -1,12 +1,10 @@
 """Convex pieces in world coordinates, and their contacts with each other and with static colliders.
 
-Contacts of convex pieces, from the candidates of the broad phases: up to two points each, written as manifolds.
+A contact has up to two points, each of which is a row of manifolds. The lowest bit of a key is the index of the point,
+so that the points of a pair are adjacent.
 
-Keys hold the pair and, in the lowest bit, which of its two points: the points of a pair stand one after the other.
-
-Oriented boxes: a rectangle around each convex piece, turned with it, and whether two of them are apart.
-
-Tighter than a disc or an axis-aligned box around a long piece, and four axes are tested whatever the number of corners.
+An oriented box encloses a piece more tightly than a disc or an axis-aligned box if the piece is long. A test of two
+boxes needs four axes, independently of the number of corners.
 """
 
 import math
@@ -19,33 +17,33 @@ from sandbox.engines.common.body_store import NOTHING, BodyStore
 from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.contract import Exhaustion
 from sandbox.engines.reference.broad_phase import FIRST, ROUNDING, SECOND, contains_key, pair_key
-from sandbox.engines.reference.internal_edges import smooth
+from sandbox.engines.reference.internal_edges import correct_internal_edge
 from sandbox.engines.reference.manifold import KIND, Manifolds, is_covered
 from sandbox.engines.reference.polygon import collide_half_plane, collide_pieces, next_corner
 from sandbox.resource_limits import MEMORY
 from sandbox.scene.compile.joint_arrays import JointArrays
 
 BYTES_PER_PAIR = 6 * 8
-"""Both numbers, the key, and sorting it."""
+"""B: two indices, a key, and the sorted key"""
 
 
 class ConvexHulls(NamedTuple):
-    """P pieces in the world, of which the first S belong to bodies."""
+    """P pieces in world coordinates; the first S belong to bodies, the others are wall segments."""
 
     corner: FloatArray
     """(V, 2) m"""
     first: IntArray
-    """(P + 1,) row of each one's first corner"""
+    """(P + 1,) row of the first corner of each piece"""
     radius: FloatArray
     """(P,) m"""
     body: IntArray
-    """(S,) number of each one's body"""
+    """(S,) index of the body of each piece"""
     surface: IntArray
     """(S,)"""
 
 
 class WorldPieces:
-    """S pieces of bodies and G segments, which a piece of two corners or one is just as well."""
+    """S pieces of bodies and G segments of static colliders, which are pieces of two corners."""
 
     def __init__(self, store: BodyStore) -> None:
         shapes, segments = store.bodies.shapes, store.fixtures.segments
@@ -54,62 +52,64 @@ class WorldPieces:
         self.surface: IntArray = store.contact_matrix.surfaces.of_shape
         self.local: FloatArray = shapes.corner
         self.local_middle: FloatArray = shapes.middle
-        if store.held:  # poses are those of hinges
+        if store.mounts:  # poses are those of hinges
             self.local = shapes.corner - np.repeat(store.hinge[shapes.body], np.diff(shapes.first), axis=0)
             self.local_middle = shapes.middle - store.hinge[shapes.body]
-        self.reach: FloatArray = shapes.reach
+        self.bounding_radius: FloatArray = shapes.bounding_radius
         self.radius: FloatArray = np.concatenate((shapes.radius, segments[:, 4]))
         ends = segments[:, :4].reshape(-1, 2)
         self.first: IntArray = np.concatenate((shapes.first, shapes.first[-1] + 2 * np.arange(1, len(segments) + 1)))
         self.corner: FloatArray = np.concatenate((self.local, ends))
-        """(V + 2G, 2) m, in the world, at the poses of the last call of `lay_out`"""
+        """(V + 2G, 2) m, in the world, at the poses of the last `update`"""
         self.middle: FloatArray = np.empty((self.count, 2))
-        """(S, 2) m, likewise"""
+        """(S, 2) m, centres of the bounding circles, likewise"""
         self.collision_mask: IntArray = store.collision_mask[self.body]
         self.moves: BoolArray = store.mobile[self.body]
         self.can_touch: BoolArray = store.moving[self.body] & (self.collision_mask > NOTHING)
-        self.apart: IntArray = apart_keys(store.links)
-        if store.held:
-            self.can_touch = self.can_touch & ~store.led[self.body]
-            self.apart = np.union1d(self.apart, led_keys(store))
+        self.excluded: IntArray = excluded_pair_keys(store.links)
+        if store.mounts:
+            self.can_touch = self.can_touch & ~store.kinematic[self.body]
+            self.excluded = np.union1d(self.excluded, kinematic_pair_keys(store))
         self.group: IntArray = store.bodies.group
-        """(N,) of each body"""
+        """(N,) collision group of each body"""
 
     @property
     def hulls(self) -> ConvexHulls:
         """Present positions and shapes."""
         return ConvexHulls(self.corner, self.first, self.radius, self.body, self.surface)
 
-    def lay_out(self, position: FloatArray, angle: FloatArray) -> None:
-        """Put corners and middles where bodies now lie, at (N, ≥ 2) m and (N,) rad."""
-        lay_out(self.body, self.first, self.local, self.local_middle, position, angle, self.corner, self.middle)
+    def update(self, position: FloatArray, angle: FloatArray) -> None:
+        """Transform corners and middles to the poses of the bodies, (N, ≥ 2) m and (N,) rad."""
+        transform_pieces(
+            self.body, self.first, self.local, self.local_middle, position, angle, self.corner, self.middle
+        )
 
 
-def apart_keys(links: JointArrays) -> IntArray:
+def excluded_pair_keys(links: JointArrays) -> IntArray:
     """Return the keys of the pairs of bodies that joints exclude from collision, (K,), ascending."""
     return np.sort([pair_key(a, b) for a, b in links.apart().tolist()]).astype(np.int64)
 
 
-def led_keys(store: BodyStore) -> IntArray:
-    """Return keys of the pairs of bodies of which nothing moves either, (K,), ascending: led ones, and fixed ones.
+def kinematic_pair_keys(store: BodyStore) -> IntArray:
+    """Return the keys of all pairs of kinematic bodies with kinematic or fixed bodies, (K,), ascending.
 
     Raises:
         Exhaustion: there are too many.
     """
-    firm = np.flatnonzero(store.led | store.bodies.fixed)
-    led = np.flatnonzero(store.led)
+    immovable = np.flatnonzero(store.kinematic | store.bodies.fixed)
+    kinematic = np.flatnonzero(store.kinematic)
     refusal = MEMORY.refusal(
-        "the table of pairs of driven and fixed bodies takes", len(firm) * len(led) * BYTES_PER_PAIR
+        "the table of pairs of driven and fixed bodies takes", len(immovable) * len(kinematic) * BYTES_PER_PAIR
     )
     if refusal is not None:
         raise Exhaustion(refusal)
-    a, b = np.repeat(led, len(firm)), np.tile(firm, len(led))
+    a, b = np.repeat(kinematic, len(immovable)), np.tile(immovable, len(kinematic))
     keys = (np.minimum(a, b) << FIRST) + np.maximum(a, b)
     return np.unique(keys[a != b])
 
 
 @kernel
-def lay_out(
+def transform_pieces(
     body: IntArray,
     first: IntArray,
     local: FloatArray,
@@ -119,7 +119,7 @@ def lay_out(
     corner: FloatArray,
     middle: FloatArray,
 ) -> None:
-    """Turn and move the corners and middles of pieces into the world."""
+    """Transform the corners and middles of pieces to world coordinates."""
     for p in range(len(body)):
         b = body[p]
         x, y, cos, sin = position[b, 0], position[b, 1], np.cos(angle[b]), np.sin(angle[b])
@@ -131,16 +131,16 @@ def lay_out(
 
 
 OrientedBox = tuple[float, float, float, float, float, float]
-"""centre x, y, m; unit axis x, y; half the extent along that axis and along its normal, m"""
+"""centre x, y, m; unit axis x, y; half extents along that axis and along its normal, m"""
 
 
 @kernel
-def box_of(corner: FloatArray, first: IntArray, radius: FloatArray, p: int) -> OrientedBox:
-    """Return the box around piece p that lies along its longest face: the piece itself where that is a rectangle.
+def oriented_box(corner: FloatArray, first: IntArray, radius: FloatArray, p: int) -> OrientedBox:
+    """Return the box around piece p along its longest face, which for a rectangle is the piece itself.
 
-    It is not always the smallest: an outline has one of least area along some face, not always the longest.
+    It is not always the smallest box: the box of least area lies along some face, not always the longest.
     """
-    start, end, wide = first[p], first[p + 1], radius[p]
+    start, end, half = first[p], first[p + 1], radius[p]
     longest, ax, ay = 0.0, 1.0, 0.0
     for k in range(start, end):
         after = next_corner(start, end, k)
@@ -161,20 +161,20 @@ def box_of(corner: FloatArray, first: IntArray, radius: FloatArray, p: int) -> O
         y + along * ay + across * ax,
         ax,
         ay,
-        0.5 * (right - left) + wide,
-        0.5 * (high - low) + wide,
+        0.5 * (right - left) + half,
+        0.5 * (high - low) + half,
     )
 
 
 @kernel
-def boxes_apart(a: OrientedBox | FloatArray, b: OrientedBox | FloatArray, margin: float) -> bool:
-    """Tell whether two boxes, or rows that hold them, are farther apart than the margin, m, along one of their axes.
+def are_separated(a: OrientedBox | FloatArray, b: OrientedBox | FloatArray, margin: float) -> bool:
+    """Return whether two boxes, or their rows, are separated by more than the margin, m, along one of their axes.
 
-    Two whose nearest points are corners may be farther apart than that and still be reported.
+    Two boxes whose closest points are corners may have a larger distance and still not be separated along an axis.
     """
     x, y = b[0] - a[0], b[1] - a[1]
     cos, sin = abs(a[2] * b[2] + a[3] * b[3]), abs(a[2] * b[3] - a[3] * b[2])
-    # What centres and extents are rounded by must not part two that touch.
+    # Rounding errors of centres and extents must not separate boxes that touch.
     margin += 8.0 * ROUNDING * (abs(a[0]) + abs(a[1]) + abs(b[0]) + abs(b[1]) + a[4] + a[5] + b[4] + b[5])
     return bool(
         abs(x * a[2] + y * a[3]) > a[4] + b[4] * cos + b[5] * sin + margin
@@ -185,47 +185,47 @@ def boxes_apart(a: OrientedBox | FloatArray, b: OrientedBox | FloatArray, margin
 
 
 class NarrowPhaseInput(NamedTuple):
-    """How to look."""
+    """Parameters of the narrow phase, and its scratch memory."""
 
     friction: FloatArray
     """(S, S) of pairs of surfaces"""
-    reach: float
-    """m, separation of two pieces below which there is a contact"""
+    max_separation: float
+    """m, separation below which there is a contact"""
     scratch: FloatArray
     """(2, 6)"""
 
 
 @kernel
-def drop(keys: IntArray, body: IntArray, apart: IntArray, group: IntArray) -> int:
-    """Keep, at the front, the pairs of pieces that can collide, and return their number.
+def drop_excluded(keys: IntArray, body: IntArray, excluded: IntArray, group: IntArray) -> int:
+    """Move the pairs of pieces that can collide to the front, and return their number.
 
-    They are of two bodies, which are neither joined nor of one group.
+    They belong to two bodies that are neither joined nor of the same group.
     """
     kept = 0
     for k in range(len(keys)):
         a, b = body[keys[k] >> FIRST], body[keys[k] & SECOND]
         if a == b or (group[a] != 0 and group[a] == group[b]):
             continue
-        if not contains_key(apart, pair_key(min(a, b), max(a, b))):
+        if not contains_key(excluded, pair_key(min(a, b), max(a, b))):
             keys[kept] = keys[k]
             kept += 1
     return kept
 
 
 @kernel
-def lay_boxes(corner: FloatArray, first: IntArray, radius: FloatArray, box: FloatArray) -> None:
-    """Write the oriented box around each piece, a row of (P, 6) each."""
+def write_boxes(corner: FloatArray, first: IntArray, radius: FloatArray, box: FloatArray) -> None:
+    """Write the oriented box of each piece into its row of (P, 6)."""
     for p in range(len(box)):
-        x, y, ax, ay, along, across = box_of(corner, first, radius, p)
+        x, y, ax, ay, along, across = oriented_box(corner, first, radius, p)
         box[p, 0], box[p, 1], box[p, 2], box[p, 3], box[p, 4], box[p, 5] = x, y, ax, ay, along, across
 
 
 @kernel
-def drop_apart(keys: IntArray, offset: int, box: FloatArray, margin: float) -> int:
-    """Keep, at the front, the pairs whose oriented boxes, widened by the margin, overlap; return how many."""
+def drop_separated(keys: IntArray, offset: int, box: FloatArray, margin: float) -> int:
+    """Move the pairs whose oriented boxes, widened by the margin, overlap to the front; return their number."""
     kept = 0
     for k in range(len(keys)):
-        if not boxes_apart(box[keys[k] >> FIRST], box[offset + (keys[k] & SECOND)], margin):
+        if not are_separated(box[keys[k] >> FIRST], box[offset + (keys[k] & SECOND)], margin):
             keys[kept] = keys[k]
             kept += 1
     return kept
@@ -233,15 +233,15 @@ def drop_apart(keys: IntArray, offset: int, box: FloatArray, margin: float) -> i
 
 @kernel
 def find_body_contacts(
-    keys: IntArray, hulls: ConvexHulls, position: FloatArray, look: NarrowPhaseInput, out: Manifolds, at: int
+    keys: IntArray, hulls: ConvexHulls, position: FloatArray, query: NarrowPhaseInput, out: Manifolds, row: int
 ) -> int:
-    """Write the pairs of pieces that are near from row `at` on; return the next free row."""
+    """Write the contacts of pairs of pieces from row `row` on; return the next free row."""
     for k in range(len(keys)):
         p, q = keys[k] >> FIRST, keys[k] & SECOND
         j = hulls.body[q]
-        count = collide_pieces(hulls.corner, hulls.first, hulls.radius, p, q, look.reach, look.scratch)
-        at = _write(hulls, look, count, 2 * keys[k], p, j, hulls.surface[q], position, out, at)
-    return at
+        count = collide_pieces(hulls.corner, hulls.first, hulls.radius, p, q, query.max_separation, query.scratch)
+        row = _write(hulls, query, count, 2 * keys[k], p, j, hulls.surface[q], position, out, row)
+    return row
 
 
 @kernel
@@ -252,22 +252,22 @@ def find_half_plane_contacts(
     planes: FloatArray,
     collider: IntArray,
     collider_surface: IntArray,
-    look: NarrowPhaseInput,
+    query: NarrowPhaseInput,
     out: Manifolds,
-    at: int,
+    row: int,
 ) -> int:
-    """Write the pieces near half-planes from row `at` on; return the next free row."""
+    """Write the contacts of pieces with half-planes from row `row` on; return the next free row."""
     for p in range(len(hulls.body)):
         if not can_touch[p]:
             continue
         for s in range(len(planes)):
             px, py, nx, ny = planes[s, 0], planes[s, 1], planes[s, 2], planes[s, 3]
             count = collide_half_plane(
-                hulls.corner, hulls.first, hulls.radius, p, px, py, nx, ny, look.reach, look.scratch
+                hulls.corner, hulls.first, hulls.radius, p, px, py, nx, ny, query.max_separation, query.scratch
             )
             key, other = (1 << KIND) + 2 * pair_key(p, s), collider_surface[collider[s]]
-            at = _write(hulls, look, count, key, p, -1 - collider[s], other, position, out, at)
-    return at
+            row = _write(hulls, query, count, key, p, -1 - collider[s], other, position, out, row)
+    return row
 
 
 @kernel
@@ -278,33 +278,35 @@ def find_fixed_segment_contacts(
     joints: FloatArray,
     collider: IntArray,
     collider_surface: IntArray,
-    look: NarrowPhaseInput,
+    query: NarrowPhaseInput,
     out: Manifolds,
-    at: int,
+    row: int,
 ) -> int:
-    """Write the pieces near segments from row `at` on; return the next free row."""
+    """Write the contacts of pieces with segments from row `row` on; return the next free row."""
     for k in range(len(keys)):
         p, s = keys[k] >> FIRST, keys[k] & SECOND
         q = len(hulls.body) + s
-        count = collide_pieces(hulls.corner, hulls.first, hulls.radius, p, q, look.reach, look.scratch)
+        count = collide_pieces(hulls.corner, hulls.first, hulls.radius, p, q, query.max_separation, query.scratch)
         if count > 0 and joints[s].any():
-            count = _smoothed(hulls, p, q, joints[s], count, look)
+            count = _correct_internal_edge(hulls, p, q, joints[s], count, query)
         key, other = (2 << KIND) + 2 * keys[k], collider_surface[collider[s]]
-        at = _write(hulls, look, count, key, p, -1 - collider[s], other, position, out, at)
-    return at
+        row = _write(hulls, query, count, key, p, -1 - collider[s], other, position, out, row)
+    return row
 
 
 @kernel
-def _smoothed(hulls: ConvexHulls, p: int, q: int, joints: FloatArray, count: int, look: NarrowPhaseInput) -> int:
-    """Mend the contact of a piece with a segment where the wall runs on from that; return how many points it has."""
+def _correct_internal_edge(
+    hulls: ConvexHulls, p: int, q: int, joints: FloatArray, count: int, query: NarrowPhaseInput
+) -> int:
+    """Correct the contact of a piece with a segment at a joint of its wall; return its number of points."""
     corner, a, b = hulls.corner, hulls.first[p], hulls.first[q]
     if hulls.first[p + 1] - a > 1:
         radii = hulls.radius[p], hulls.radius[q]
-        return smooth(
-            corner, a, hulls.first[p + 1], radii[0], b, radii[1], joints, count, look.reach, look.scratch
+        return correct_internal_edge(
+            corner, a, hulls.first[p + 1], radii[0], b, radii[1], joints, count, query.max_separation, query.scratch
         )  # fmt: skip
     ax, ay, bx, by = corner[b, 0], corner[b, 1], corner[b + 1, 0], corner[b + 1, 1]
-    nx, ny = look.scratch[0, 0], look.scratch[0, 1]
+    nx, ny = query.scratch[0, 0], query.scratch[0, 1]
     x, y = corner[a, 0], corner[a, 1]
     covered = is_covered(x, y, ax, ay, bx, by, nx, ny, joints[0], joints[1], joints[2], joints[3])
     return 0 if covered else count
@@ -313,7 +315,7 @@ def _smoothed(hulls: ConvexHulls, p: int, q: int, joints: FloatArray, count: int
 @kernel
 def _write(
     hulls: ConvexHulls,
-    look: NarrowPhaseInput,
+    query: NarrowPhaseInput,
     count: int,
     key: int,
     p: int,
@@ -321,42 +323,42 @@ def _write(
     other: int,
     position: FloatArray,
     out: Manifolds,
-    at: int,
+    row: int,
 ) -> int:
-    """Write the points found in `look.scratch` from row `at` on, as far as there is room; return the next free row.
+    """Write the points in `query.scratch` from row `row` on, up to the capacity; return the next free row.
 
     Args:
         hulls: the pieces.
-        look: with the points of two of them.
-        count: how many points.
-        key: of the pair, its lowest bit left for the point.
-        p: the first piece.
-        second: number of the second body, or −1 − k.
-        other: surface of the second.
+        query: contains the points of the pair.
+        count: number of points.
+        key: of the pair; its lowest bit is 0.
+        p: first piece.
+        second: index of the second body, or −1 − k of a static collider.
+        other: surface of the second piece.
         position: (N, ≥ 2) m, of bodies.
-        out: where to.
-        at: from where on.
+        out: buffer of manifolds.
+        row: first row.
     """
     i, surface = hulls.body[p], hulls.surface[p]
     ax, ay = position[i, 0], position[i, 1]
     for n in range(count):
-        if at < len(out.key):
-            nx, ny, separation = look.scratch[n, 0], look.scratch[n, 1], look.scratch[n, 2]
-            x, y, half = look.scratch[n, 3], look.scratch[n, 4], 0.5 * separation
+        if row < len(out.key):
+            nx, ny, separation = query.scratch[n, 0], query.scratch[n, 1], query.scratch[n, 2]
+            x, y, half = query.scratch[n, 3], query.scratch[n, 4], 0.5 * separation
             bx, by = x, y  # static bodies do not turn
             if second >= 0:
                 bx, by = position[second, 0], position[second, 1]
-            out.key[at] = key + int(look.scratch[n, 5])
-            out.first[at], out.second[at] = i, second
-            out.normal[at, 0], out.normal[at, 1] = nx, ny
-            out.separation[at] = separation
-            out.point[at, 0], out.point[at, 1] = x, y
-            # The lever of each ends on its own surface.
-            out.arm[at, 0] = (x - ax) * nx + (y - ay) * ny - half
-            out.arm[at, 1] = (bx - x) * nx + (by - y) * ny - half
-            out.offset[at, 0] = (y - ay) * nx - (x - ax) * ny
-            out.offset[at, 1] = (y - by) * nx - (x - bx) * ny
-            out.friction[at] = look.friction[surface, other]
-            out.surface_pair[at] = surface * len(look.friction) + other
-        at += 1
-    return at
+            out.key[row] = key + int(query.scratch[n, 5])
+            out.first[row], out.second[row] = i, second
+            out.normal[row, 0], out.normal[row, 1] = nx, ny
+            out.separation[row] = separation
+            out.point[row, 0], out.point[row, 1] = x, y
+            # Each anchor ends on the surface of its own body.
+            out.anchor[row, 0] = (x - ax) * nx + (y - ay) * ny - half
+            out.anchor[row, 1] = (bx - x) * nx + (by - y) * ny - half
+            out.offset[row, 0] = (y - ay) * nx - (x - ax) * ny
+            out.offset[row, 1] = (y - by) * nx - (x - bx) * ny
+            out.friction[row] = query.friction[surface, other]
+            out.surface_pair[row] = surface * len(query.friction) + other
+        row += 1
+    return row

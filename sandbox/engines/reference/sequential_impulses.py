@@ -1,60 +1,66 @@
-"""Sequential impulses: kernels that solve contacts, and contacts together with joints.
+"""Sequential impulses: kernels that solve contacts, and contacts together with joints (Catto 2005).
 
-Sequential impulses: contacts solved one after the other, again and again, until they agree (Catto 2005).
+As in Munk2D (`cpArbiter.c`), accumulated impulses are clamped to the friction cone and warm-started by those of the
+last substep. Overlap is corrected by pseudo-velocities, which move bodies but are not part of their motion.
 
-As in Munk2D (`cpArbiter.c`): accumulated impulses clamped to the friction cone, warm-started by those of the
-last substep; overlap corrected by velocities of their own, which move bodies but are no part of their motion.
+Energy-limited restitution: with friction, Newton's law of restitution can add energy where normal and tangential
+impulses are coupled, as at the corner of a box (Kane & Levinson 1985; Stronge, Impact Mechanics, ch. 3). With the
+dissipative law of impact, the impulses of each group of connected bodies are then
+
+    p(s) = p₀ + s (p₁ − p₀),   0 ≤ s < 1,
+
+between those without restitution, p₀, which only remove energy, and Newton's, p₁, with the largest s at which contacts
+add none. All p(s) lie within the friction cones, which are convex, and leave no approach.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from sandbox.arrays import FloatArray, IntArray
-from sandbox.engines.common.kernel import bare_kernel
-from sandbox.engines.common.kernel import bare_kernel as kernel
-from sandbox.engines.reference.joint_rows import VelocityConstraints, one_pass, warm_start
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.engines.common.kernel import bare_kernel, kernel
+from sandbox.engines.reference.joint_rows import VelocityConstraints, solve_joints_once, warm_start_joints
 from sandbox.engines.reference.manifold import Manifolds
 
 
-@kernel
-def approach(now: Manifolds, velocity: FloatArray, spin: FloatArray, out: FloatArray) -> None:
-    """Write the normal velocity (K,) of each contact, m/s: negative where the two approach."""
-    for k in range(len(now.key)):
-        i, j = now.first[k], now.second[k]
+@bare_kernel
+def approach(contacts: Manifolds, velocity: FloatArray, spin: FloatArray, out: FloatArray) -> None:
+    """Write the normal velocity (K,) of each contact, m/s: negative if the bodies approach."""
+    for k in range(len(contacts.key)):
+        i, j = contacts.first[k], contacts.second[k]
         vx, vy = -velocity[i, 0], -velocity[i, 1]
         if j >= 0:
             vx += velocity[j, 0]
             vy += velocity[j, 1]
-        out[k] = vx * now.normal[k, 0] + vy * now.normal[k, 1] + spin[i] * now.offset[k, 0]
+        out[k] = vx * contacts.normal[k, 0] + vy * contacts.normal[k, 1] + spin[i] * contacts.offset[k, 0]
         if j >= 0:
-            out[k] -= spin[j] * now.offset[k, 1]
+            out[k] -= spin[j] * contacts.offset[k, 1]
 
 
-@kernel
+@bare_kernel
 def rebound_speeds(
-    now: Manifolds, velocity: FloatArray, spin: FloatArray, restitution: FloatArray, out: FloatArray
+    contacts: Manifolds, velocity: FloatArray, spin: FloatArray, restitution: FloatArray, out: FloatArray
 ) -> None:
-    """Write the approach of each contact (K,), m/s, times its restitution; that is a table (S·S,) of surface pairs."""
-    approach(now, velocity, spin, out)
+    """Write the normal velocity of each contact (K,), m/s, times the restitution, a table (S·S,) of surface pairs."""
+    approach(contacts, velocity, spin, out)
     for k in range(len(out)):
-        out[k] *= restitution[now.surface_pair[k]]
+        out[k] *= restitution[contacts.surface_pair[k]]
 
 
-@kernel
-def remembered(key: IntArray, old_key: IntArray, old: FloatArray, impulse: FloatArray) -> None:
-    """Write the impulses of the same contacts in the last substep into impulse (K, 2); both keys ascend."""
-    place = 0
+@bare_kernel
+def match_impulses(key: IntArray, old_key: IntArray, old: FloatArray, impulse: FloatArray) -> None:
+    """Write the impulses of the same contacts in the last substep into `impulse` (K, 2); both keys ascend."""
+    index = 0
     for k in range(len(key)):
-        while place < len(old_key) and old_key[place] < key[k]:
-            place += 1
-        if place < len(old_key) and old_key[place] == key[k]:
-            impulse[k, 0], impulse[k, 1] = old[place, 0], old[place, 1]
+        while index < len(old_key) and old_key[index] < key[k]:
+            index += 1
+        if index < len(old_key) and old_key[index] == key[k]:
+            impulse[k, 0], impulse[k, 1] = old[index, 0], old[index, 1]
 
 
-@kernel
+@bare_kernel
 def solve_velocities(
-    now: Manifolds,
+    contacts: Manifolds,
     bounce: FloatArray,
     velocity: FloatArray,
     spin: FloatArray,
@@ -63,40 +69,40 @@ def solve_velocities(
     impulse: FloatArray,
     iterations: int,
 ) -> None:
-    """Give contacts the impulses that part them with `bounce`, within the friction cone.
+    """Solve contacts by impulses for a restitution target `bounce`, within the friction cone.
 
     Args:
-        now: K contacts.
-        bounce: (K,) m/s, the wanted normal velocity is its negative.
+        contacts: K contacts.
+        bounce: (K,) m/s, the negative of the target normal velocity.
         velocity: (N, ≥ 2) m/s, changed.
         spin: (N,) rad/s, changed.
         inverse_mass: (N,) 1/kg.
         inverse_moment: (N,) 1/(kg·m²).
-        impulse: (K, 2) N·s along the normal and along the normal turned left; those to start with, and then the sums.
+        impulse: (K, 2) N·s along the normal and along the normal turned left: initial, then accumulated.
         iterations: passes over all contacts.
     """
-    start_with(now, velocity, spin, inverse_mass, inverse_moment, impulse)
+    warm_start_contacts(contacts, velocity, spin, inverse_mass, inverse_moment, impulse)
     for _ in range(iterations):
-        solve_once(now, bounce, velocity, spin, inverse_mass, inverse_moment, impulse)
+        solve_contacts_once(contacts, bounce, velocity, spin, inverse_mass, inverse_moment, impulse)
 
 
-@kernel
-def start_with(
-    now: Manifolds,
+@bare_kernel
+def warm_start_contacts(
+    contacts: Manifolds,
     velocity: FloatArray,
     spin: FloatArray,
     inverse_mass: FloatArray,
     inverse_moment: FloatArray,
     impulse: FloatArray,
 ) -> None:
-    """Apply the impulses (K, 2) that contacts start with; the arguments are those of `solve_velocities`."""
-    for k in range(len(now.key)):
-        _apply_impulse(now, k, impulse[k, 0], impulse[k, 1], velocity, spin, inverse_mass, inverse_moment)
+    """Apply the initial impulses (K, 2); the arguments are those of `solve_velocities`."""
+    for k in range(len(contacts.key)):
+        _apply_impulse(contacts, k, impulse[k, 0], impulse[k, 1], velocity, spin, inverse_mass, inverse_moment)
 
 
-@kernel
-def solve_once(
-    now: Manifolds,
+@bare_kernel
+def solve_contacts_once(
+    contacts: Manifolds,
     bounce: FloatArray,
     velocity: FloatArray,
     spin: FloatArray,
@@ -105,17 +111,17 @@ def solve_once(
     impulse: FloatArray,
 ) -> None:
     """Pass over all contacts once; the arguments are those of `solve_velocities`."""
-    for k in range(len(now.key)):
-        i, j = now.first[k], now.second[k]
-        nx, ny = now.normal[k, 0], now.normal[k, 1]
-        a, a_off = now.arm[k, 0], now.offset[k, 0]
+    for k in range(len(contacts.key)):
+        i, j = contacts.first[k], contacts.second[k]
+        nx, ny = contacts.normal[k, 0], contacts.normal[k, 1]
+        a, a_off = contacts.anchor[k, 0], contacts.offset[k, 0]
         mass = inverse_mass[i]
         along_mass = mass + inverse_moment[i] * a_off * a_off
         across_mass = mass + inverse_moment[i] * a * a
         vx, vy = -velocity[i, 0], -velocity[i, 1]
         slip_of_spin, turn = -spin[i] * a, spin[i] * a_off
         if j >= 0:
-            b, b_off = now.arm[k, 1], now.offset[k, 1]
+            b, b_off = contacts.anchor[k, 1], contacts.offset[k, 1]
             mass += inverse_mass[j]
             along_mass += inverse_mass[j] + inverse_moment[j] * b_off * b_off
             across_mass += inverse_mass[j] + inverse_moment[j] * b * b
@@ -128,16 +134,16 @@ def solve_once(
         along = (-(bounce[k] + (vx * nx + vy * ny) + turn)) / along_mass
         old_normal, old_tangent = impulse[k, 0], impulse[k, 1]
         impulse[k, 0] = max(old_normal + along, 0.0)
-        most = now.friction[k] * impulse[k, 0]
+        max_friction = contacts.friction[k] * impulse[k, 0]
         across = -(vy * nx - vx * ny + slip_of_spin) / across_mass
-        impulse[k, 1] = min(max(old_tangent + across, -most), most)
+        impulse[k, 1] = min(max(old_tangent + across, -max_friction), max_friction)
         normal, tangent = impulse[k, 0] - old_normal, impulse[k, 1] - old_tangent
-        _apply_impulse(now, k, normal, tangent, velocity, spin, inverse_mass, inverse_moment)
+        _apply_impulse(contacts, k, normal, tangent, velocity, spin, inverse_mass, inverse_moment)
 
 
-@kernel
+@bare_kernel
 def _apply_impulse(
-    now: Manifolds,
+    contacts: Manifolds,
     k: int,
     normal: float,
     tangent: float,
@@ -146,58 +152,62 @@ def _apply_impulse(
     inverse_mass: FloatArray,
     inverse_moment: FloatArray,
 ) -> None:
-    """Apply an impulse to the second of a contact, and its opposite to the first."""
-    i, j = now.first[k], now.second[k]
-    nx, ny = now.normal[k, 0], now.normal[k, 1]
+    """Apply an impulse to the second body of a contact, and its opposite to the first."""
+    i, j = contacts.first[k], contacts.second[k]
+    nx, ny = contacts.normal[k, 0], contacts.normal[k, 1]
     x, y = nx * normal - ny * tangent, nx * tangent + ny * normal
     velocity[i, 0] -= inverse_mass[i] * x
     velocity[i, 1] -= inverse_mass[i] * y
-    # The lever has two parts, along the normal and beside it: for discs only the first, which turns by rubbing.
-    spin[i] -= inverse_moment[i] * (now.arm[k, 0] * tangent - now.offset[k, 0] * normal)
+    # The anchor has two components, along the normal and across it; of discs only the first is not 0.
+    spin[i] -= inverse_moment[i] * (contacts.anchor[k, 0] * tangent - contacts.offset[k, 0] * normal)
     if j >= 0:
         velocity[j, 0] += inverse_mass[j] * x
         velocity[j, 1] += inverse_mass[j] * y
-        spin[j] -= inverse_moment[j] * (now.arm[k, 1] * tangent + now.offset[k, 1] * normal)
+        spin[j] -= inverse_moment[j] * (contacts.anchor[k, 1] * tangent + contacts.offset[k, 1] * normal)
 
 
-@kernel
-def work_at(now: Manifolds, k: int, impulse: FloatArray, velocity: FloatArray, spin: FloatArray) -> tuple[float, float]:
-    """Return the work of the impulses of one contact, J, along its normal and across it; see `contact_work`."""
-    i, j = now.first[k], now.second[k]
-    nx, ny = now.normal[k, 0], now.normal[k, 1]
+@bare_kernel
+def work_at(
+    contacts: Manifolds, k: int, impulse: FloatArray, velocity: FloatArray, spin: FloatArray
+) -> tuple[float, float]:
+    """Return the normal and tangential work of the impulses of one contact, J; see `contact_work`."""
+    i, j = contacts.first[k], contacts.second[k]
+    nx, ny = contacts.normal[k, 0], contacts.normal[k, 1]
     vx, vy = -velocity[i, 0], -velocity[i, 1]
-    slip_of_spin, turn = -spin[i] * now.arm[k, 0], spin[i] * now.offset[k, 0]
+    slip_of_spin, turn = -spin[i] * contacts.anchor[k, 0], spin[i] * contacts.offset[k, 0]
     if j >= 0:
         vx += velocity[j, 0]
         vy += velocity[j, 1]
-        slip_of_spin -= spin[j] * now.arm[k, 1]
-        turn -= spin[j] * now.offset[k, 1]
+        slip_of_spin -= spin[j] * contacts.anchor[k, 1]
+        turn -= spin[j] * contacts.offset[k, 1]
     along = impulse[k, 0] * (vx * nx + vy * ny + turn)
     across = impulse[k, 1] * (vy * nx - vx * ny + slip_of_spin)
     return along, across
 
 
-@kernel
-def contact_work(now: Manifolds, impulse: FloatArray, velocity: FloatArray, spin: FloatArray) -> tuple[float, float]:
-    """Return the work of impulses (K, 2), J, along the normals and across them.
+@bare_kernel
+def contact_work(
+    contacts: Manifolds, impulse: FloatArray, velocity: FloatArray, spin: FloatArray
+) -> tuple[float, float]:
+    """Return the normal and tangential work of impulses (K, 2), J.
 
     Args:
-        now: K contacts.
+        contacts: K contacts.
         impulse: (K, 2) N·s along the normal and along the normal turned left.
         velocity: (N, ≥ 2) m/s, the mean of those before and after the impulses.
         spin: (N,) rad/s, likewise.
     """
     along, across = 0.0, 0.0
-    for k in range(len(now.key)):
-        work = work_at(now, k, impulse, velocity, spin)
+    for k in range(len(contacts.key)):
+        work = work_at(contacts, k, impulse, velocity, spin)
         along += work[0]
         across += work[1]
     return along, across
 
 
-@kernel
+@bare_kernel
 def solve_overlaps(
-    now: Manifolds,
+    contacts: Manifolds,
     target: FloatArray,
     pseudo_velocity: FloatArray,
     inverse_mass: FloatArray,
@@ -205,22 +215,22 @@ def solve_overlaps(
     total: FloatArray,
     iterations: int,
 ) -> None:
-    """Find the velocities that undo overlap, apart from those of the motion.
+    """Find the pseudo-velocities that correct overlap.
 
     Args:
-        now: K contacts.
-        target: (K,) m/s, how fast each is to part.
+        contacts: K contacts.
+        target: (K,) m/s, target separation rate.
         pseudo_velocity: (N, 3) m/s and rad/s, changed.
         inverse_mass: (N,) 1/kg.
         inverse_moment: (N,) 1/(kg·m²).
-        total: (K,) accumulated impulse of each, kg·m/s; 0 at first.
+        total: (K,) accumulated impulse of each contact, kg·m/s; initially 0.
         iterations: passes over all contacts.
     """
     for _ in range(iterations):
-        for k in range(len(now.key)):
-            i, j = now.first[k], now.second[k]
-            nx, ny = now.normal[k, 0], now.normal[k, 1]
-            a_off, b_off = now.offset[k, 0], now.offset[k, 1]
+        for k in range(len(contacts.key)):
+            i, j = contacts.first[k], contacts.second[k]
+            nx, ny = contacts.normal[k, 0], contacts.normal[k, 1]
+            a_off, b_off = contacts.offset[k, 0], contacts.offset[k, 1]
             mass = inverse_mass[i] + inverse_moment[i] * a_off * a_off
             vx, vy, turn = -pseudo_velocity[i, 0], -pseudo_velocity[i, 1], pseudo_velocity[i, 2] * a_off
             if j >= 0:
@@ -242,15 +252,84 @@ def solve_overlaps(
                 pseudo_velocity[j, 2] -= inverse_moment[j] * change * b_off
 
 
+TURNOVER_ROUNDING = 1e-13
+"""Energy gain, as a fraction of the sum of absolute works, that is rounding error"""
+
+
+class GroupWork:
+    """Work of the impulses of K contacts, J, summed over each group of connected bodies."""
+
+    def __init__(self, contacts: Manifolds, inverse_mass: FloatArray, inverse_moment: FloatArray) -> None:
+        bodies = len(inverse_mass)
+        moves = (inverse_mass > 0.0) | (inverse_moment > 0.0)
+        self.group: IntArray = np.arange(bodies)
+        join_groups(contacts.first, contacts.second, moves, self.group)
+        self._contacts = contacts
+        self.of_contact: IntArray = self.group[
+            np.where(moves[contacts.first], contacts.first, np.maximum(contacts.second, 0))
+        ]
+
+    def work(self, impulse: FloatArray, velocity: FloatArray, spin: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the work of impulses (K, 2) at velocities (N, D) and spins (N,) by group, (N,), and its modulus."""
+        out, turnover = np.zeros(len(self.group)), np.zeros(len(self.group))
+        sum_work(self._contacts, impulse, velocity, spin, self.of_contact, out, turnover)
+        return out, turnover
+
+
+def largest_fractions(work: FloatArray, slope: FloatArray, curve: FloatArray) -> FloatArray:
+    """Return the largest s ≤ 1, (N,), with work + slope·s + curve·s² ≤ 0, curve ≥ 0; 0 if there is none."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = np.sqrt(np.maximum(slope * slope - 4.0 * curve * work, 0.0))
+        # The larger root, in the form without cancellation
+        fraction = np.where(slope > 0.0, -2.0 * work / (slope + root), (root - slope) / (2.0 * curve))
+    fraction = np.where(work + slope + curve <= 0.0, 1.0, fraction)
+    return np.where(np.isfinite(fraction), np.clip(fraction, 0.0, 1.0), 0.0)
+
+
+@kernel
+def join_groups(first: IntArray, second: IntArray, moves: BoolArray, group: IntArray) -> None:
+    """Write into group (N,) the lowest index among the bodies connected to each by contacts, ignoring fixed bodies."""
+    for k in range(len(first)):
+        i, j = first[k], second[k]
+        if j < 0 or not (moves[i] and moves[j]):
+            continue
+        while group[i] != i:  # path halving: without it a chain of bodies takes quadratic time
+            group[i] = group[group[i]]
+            i = group[i]
+        while group[j] != j:
+            group[j] = group[group[j]]
+            j = group[j]
+        group[max(i, j)] = min(i, j)
+    for i in range(len(group)):  # the root of a group has a lower index
+        group[i] = group[group[i]]
+
+
+@kernel
+def sum_work(
+    contacts: Manifolds,
+    impulse: FloatArray,
+    velocity: FloatArray,
+    spin: FloatArray,
+    group: IntArray,
+    out: FloatArray,
+    turnover: FloatArray,
+) -> None:
+    """Add the work of each contact's impulse to that of its group; `contact_work` returns the sum over all."""
+    for k in range(len(contacts.key)):
+        along, across = work_at(contacts, k, impulse, velocity, spin)
+        out[group[k]] += along + across
+        turnover[group[k]] += abs(along) + abs(across)
+
+
 class AngularStops(NamedTuple):
-    """S bodies that are pressed onto a stop."""
+    """S bodies that are pressed against a stop."""
 
     body: IntArray
     """(S,)"""
     direction: FloatArray
-    """(S,) 1 or −1: the sense in which the stop lets it turn no further"""
+    """(S,) 1 or −1: direction of rotation that the stop blocks"""
     impulse: FloatArray
-    """(S,) N·m·s, against that sense; that to start with, and then the sum"""
+    """(S,) N·m·s, against that direction: initial, then accumulated"""
 
 
 NO_STOPS = AngularStops(np.empty(0, np.int64), np.empty(0), np.empty(0))
@@ -258,7 +337,7 @@ NO_STOPS = AngularStops(np.empty(0, np.int64), np.empty(0), np.empty(0))
 
 @bare_kernel
 def solve_together(
-    now: Manifolds,
+    contacts: Manifolds,
     bounce: FloatArray,
     rows: VelocityConstraints,
     stops: AngularStops,
@@ -268,27 +347,27 @@ def solve_together(
     impulse: FloatArray,
     iterations: int,
 ) -> None:
-    """Give contacts, joints and stops the impulses that they ask for, in this order in each pass, as Munk2D does.
+    """Solve contacts, joints and stops by impulses, in this order in each pass, as Munk2D does.
 
     Args:
-        now: K contacts.
-        bounce: (K,) m/s, as `solve_velocities` takes it.
+        contacts: K contacts.
+        bounce: (K,) m/s, as in `solve_velocities`.
         rows: of the joints, prepared.
         stops: one-sided constraints.
         velocity: (N, 3) m/s and rad/s, changed.
         inverse_mass: (N,) 1/kg.
         inverse_moment: (N,) 1/(kg·m²).
-        impulse: (K, 2) N·s of the contacts; those to start with, and then the sums.
-        iterations: passes over all.
+        impulse: (K, 2) N·s of the contacts: initial, then accumulated.
+        iterations: number of passes.
     """
     spin = velocity[:, 2]
-    start_with(now, velocity, spin, inverse_mass, inverse_moment, impulse)
-    warm_start(rows, velocity, inverse_mass, inverse_moment)
+    warm_start_contacts(contacts, velocity, spin, inverse_mass, inverse_moment, impulse)
+    warm_start_joints(rows, velocity, inverse_mass, inverse_moment)
     for k in range(len(stops.body)):
         spin[stops.body[k]] -= stops.direction[k] * stops.impulse[k] * inverse_moment[stops.body[k]]
     for _ in range(iterations):
-        solve_once(now, bounce, velocity, spin, inverse_mass, inverse_moment, impulse)
-        one_pass(rows, velocity, inverse_mass, inverse_moment)
+        solve_contacts_once(contacts, bounce, velocity, spin, inverse_mass, inverse_moment, impulse)
+        solve_joints_once(rows, velocity, inverse_mass, inverse_moment)
         for k in range(len(stops.body)):
             n, direction, old = stops.body[k], stops.direction[k], stops.impulse[k]
             stops.impulse[k] = max(old + direction * spin[n] / inverse_moment[n], 0.0)

@@ -21,22 +21,22 @@ from sandbox.engines.reference.manifold import Manifolds
 from sandbox.engines.reference.step import StepRecord, WorldState
 from sandbox.engines.reference.zones import ZonedBodyStore
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.contacts import bearers_of
+from sandbox.scene.compile.contacts import surface_parts
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySpec
 from sandbox.scene.description.discs import Disc
 from sandbox.scene.description.world import Settings
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
 
 ROUNDING = 1e-12
-"""Less than this fraction of the contact distance is no overlap, less than this fraction of the speed no impulse."""
+"""Overlap as a fraction of the contact distance, and change of velocity as a fraction of the speed, that is rounding"""
 
 
 class ReferenceSimulation(BaseSimulation):
-    """A running scene. A substep is the tutorial's: apply forces, advance, detect and resolve; see `step.step`.
+    """A running scene. A substep applies forces, advances bodies, detects and resolves contacts; see `step.step`.
 
-    Zones detect centres at the end of a substep, so the delay until a zone acts depends on the substep alone.
+    Zones detect centres at the end of a substep, so that the delay of their effects depends only on the substep.
     """
 
     def __init__(self, setup: Setup, settings: Settings) -> None:
@@ -54,13 +54,14 @@ class ReferenceSimulation(BaseSimulation):
         self._energy: StepEnergyLedger | None = None
         self._breaker = JointBreaker(setup.links) if np.isfinite(setup.links.strength).any() else None
         """finds the joints that break; None if no joint can break any more"""
+        self._world.records_joint_load = self._breaker is not None
         self._removes = setup.scene.world.bounds is not None or bool(np.isfinite(setup.bodies.lifetime).any())
-        """whether bodies are removed outside of bounds, or at the end of a lifetime; bodies added later have none"""
+        """whether bodies can leave the bounds or have a lifetime; bodies added later have no lifetime"""
         self._h = settings.h
-        self._ledger: ContactLog | None = None
+        self._log: ContactLog | None = None
         self._observer: Observer | None = None
-        self._now = NO_CONTACTS  # contacts at the last record
-        self._came: ContactBatch | None = None  # bodies in zones when the recording began
+        self._last_contacts = NO_CONTACTS  # contacts of the last record
+        self._initial_entries: ContactBatch | None = None  # zone entries before the recording began
         self._world.pipeline.check_limits(self._world.x[0])  # exceeding a limit raises before the run begins
         warn_if_uncompiled(len(setup.bodies))
 
@@ -94,13 +95,13 @@ class ReferenceSimulation(BaseSimulation):
 
         Raises:
             Divergence: the state of a body is not finite, or exceeds the bounds. It can still be read.
-            Exhaustion: a substep would be divided into too many pieces, or contacts exceed memory.
+            Exhaustion: a substep would be divided into too many pieces, or contacts exceed a resource limit.
         """
-        with self._turn, np.errstate(all="ignore"):
+        with self._lock, np.errstate(all="ignore"):
             self._check_running()
             self._advance(self._settings.substeps)
             self._steps += 1
-            self._settle()
+            self._finish_step()
 
     def finish(self, part: float) -> None:
         """Advance by a last fraction of dt, 0 < part < 1: whole substeps, then a shorter one.
@@ -110,12 +111,12 @@ class ReferenceSimulation(BaseSimulation):
             ValueError: `part` is out of range.
         """
         self._check_part(part)
-        with self._turn, np.errstate(all="ignore"):
+        with self._lock, np.errstate(all="ignore"):
             self._check_running()
             whole, rest = divmod(part * self._settings.substeps, 1.0)
             self._advance(int(whole), rest, (self._steps + part) * self._settings.dt)
             self._part = part
-            self._settle()
+            self._finish_step()
             self._ended = True
 
     def _advance(self, whole: int, rest: float = 0.0, end: float = 0.0) -> None:
@@ -130,7 +131,7 @@ class ReferenceSimulation(BaseSimulation):
             self._end_substep(rest * h, end, end)
 
     def _substep(self, time: float, h: float) -> None:
-        """Advance by h, s, from a time, s, and read the record of each step."""
+        """Advance by h, s, from a time, s, and process the record of each step."""
         self._world.time = time
         try:
             for record in self._detection(self._world, h):
@@ -140,71 +141,71 @@ class ReferenceSimulation(BaseSimulation):
             raise
 
     def _observe(self, record: StepRecord) -> None:
-        """Pass the record of a step to the energy ledger, the joint breaker, the contact log and the one-way walls."""
+        """Update the energy ledger, joint breaker, contact log and one-way walls from the record of a step."""
         world = self._world
         if self._energy is not None:
-            self._energy.book(record)
-        if self._breaker is not None and world.joints is not None:
-            self._breaker.add(record.h * world.joints.load(record.after))
-        if self._ledger is not None:
-            self._log_contacts(self._ledger, record)
-        if world.walls is not None:  # last: it detects collisions anew, which ends the life of the record's contacts
+            self._energy.enter_step(record)
+        if self._breaker is not None and record.joint_load is not None:
+            self._breaker.add(record.h * record.joint_load)
+        if self._log is not None:
+            self._log_contacts(self._log, record)
+        if world.walls is not None:
             world.walls.settle(world.pipeline.at_one_way_walls(record.after[0]), world.centres(record.after))
 
     def _end_substep(self, h: float, broken_at: float, noted_at: float) -> None:
-        """Break joints that were overloaded in a substep of h, s, and let zones act; at the times, s, of both."""
+        """Break joints that were overloaded in a substep of h, s, and apply zones; the times are those of both, s."""
         if self._breaker is not None:
             self._break_joints(self._breaker.find_broken(h), broken_at)
             if not self._breaker.any_breakable:
-                self._breaker = None
+                self._breaker, self._world.records_joint_load = None, False
         if self._zoned is not None:
             self._visit_zones(noted_at, self._zoned)
 
     def _break_joints(self, broken: IntArray, time: float) -> None:
         if len(broken):
             self._world.write_state()
-            with self._booked(Cause.PARTED):
-                self._store.part(broken, time)
+            with self._attributed(Cause.PARTED):
+                self._store.mark_broken(broken, time)
                 self._rebuild()
 
     def _visit_zones(self, time: float, store: ZonedBodyStore) -> None:
-        """Let zones act on the bodies that entered or left one, and log the visits at a time, s."""
-        if store.look(self._world.centres(self._world.x)):
+        """Apply zones to the bodies that entered or left one, and log the entries at a time, s."""
+        if store.detect(self._world.centres(self._world.x)):
             self._world.write_state()
-            with self._booked(Cause.DRIVES):
-                if store.settle():
+            with self._attributed(Cause.DRIVES):
+                if store.apply_zones():
                     self._rebuild()
-        visits = store.visiting.drain_entries()
-        if self._ledger is not None and visits is not None:
-            # Contacts were logged with their impulses: they last, beside the visits.
-            lasting = self._now._replace(impulse=np.zeros_like(self._now.impulse))
-            self._ledger.record(time, join_batches(lasting, visits))
+        visits = store.tracker.drain_entries()
+        if self._log is not None and visits is not None:
+            # The contacts of the substep are already logged with their impulses; here they only continue.
+            lasting = self._last_contacts._replace(impulse=np.zeros_like(self._last_contacts.impulse))
+            self._log.record(time, join_batches(lasting, visits))
 
     def _rebuild(self) -> None:
-        """Derive the world and the energy ledger anew from the body store."""
+        """Update the world and the energy ledger after a change of the body store."""
         self._world.rebuild()
         if self._energy is not None:
             self._energy.rebuild()
 
-    def _booked(self, cause: Cause) -> AbstractContextManager[None]:
-        """Book the change of energy by all that is done to the body store meanwhile to one cause."""
-        return nullcontext() if self._energy is None else self._energy.booking(cause)
+    def _attributed(self, cause: Cause) -> AbstractContextManager[None]:
+        """Attribute the change of energy by changes of the body store within the context to one cause."""
+        return nullcontext() if self._energy is None else self._energy.attributing(cause)
 
-    def _settle(self) -> None:
-        """Write the state to the body store, check that it is finite and bounded, remove bodies whose time is up."""
+    def _finish_step(self) -> None:
+        """Write the state to the body store, check that it is finite and bounded, and remove expired bodies."""
         self._world.write_state()
         beyond = self._store.beyond()
         if beyond is not None:
             self._ended = True
             raise Divergence(self.time, self.bodies.names[beyond], BEYOND)
         if self._removes:
-            going = self._store.expired(self.time)
-            if len(going):
-                self._remove_bodies(going)
+            expired = self._store.expired(self.time)
+            if len(expired):
+                self._remove_bodies(expired)
 
-    def _remove_bodies(self, numbers: IntArray) -> None:
-        with self._booked(Cause.RETIRED):
-            self._store.remove_bodies(numbers, self.time)
+    def _remove_bodies(self, indices: IntArray) -> None:
+        with self._attributed(Cause.RETIRED):
+            self._store.remove_bodies(indices, self.time)
             self._rebuild()
 
     def apply(self, action: Action) -> None:
@@ -213,26 +214,26 @@ class ReferenceSimulation(BaseSimulation):
         Raises:
             ActionError: the action cannot be applied. The simulation is left unchanged.
         """
-        with self._turn:
+        with self._lock:
             self._check_running()
             if isinstance(action, Spawn):
                 self._check_shape(action.single)
-            with self._booked(Cause.ACTIONS):
+            with self._attributed(Cause.ACTIONS):
                 leaving = apply_action(action, self._store)
                 if not (isinstance(action, Impulse) and self._world.read_velocities()):
                     self._rebuild()
             if leaving is not None:
                 self._remove_bodies(np.asarray([leaving]))
 
-    def _check_shape(self, single: BodySpec) -> None:
+    def _check_shape(self, spec: BodySpec) -> None:
         """Refuse a body that the chosen detection or response does not support.
 
         Raises:
             ActionError: it is not supported.
         """
-        if self._settings.detection == "swept" and single.collides != "none" and not isinstance(single, Disc):
+        if self._settings.detection == "swept" and spec.collides != "none" and not isinstance(spec, Disc):
             raise ActionError("detection 'swept' supports balls only; 'bisect' supports polygons too")
-        if self._settings.response == "penalty" and _falls_off(single, self.scene):
+        if self._settings.response == "penalty" and _has_falloff(spec, self.scene):
             raise ActionError("response 'penalty' does not support restitution_falloff; response 'impulse' does")
 
     def frame(self) -> Frame:
@@ -247,14 +248,16 @@ class ReferenceSimulation(BaseSimulation):
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""
-        if self._ledger is None:
-            self._ledger = ContactLog(len(self._store.scene.fixed_names), can_repeat_pairs=True)
-            overlaps = self._world.solver.detect(self._world.x)
-            now = _touching(overlaps, np.zeros((overlaps.size, 2)))
-            if self._zoned is not None:  # bodies in zones are logged now, and with the first substep
-                self._came = self._zoned.visiting.drain_entries()
-            self._ledger.record(self.time, now if self._came is None else join_batches(now, self._came))
-        return self._ledger.take()
+        if self._log is None:
+            self._log = ContactLog(len(self._store.scene.fixed_names), can_repeat_pairs=True)
+            overlaps = self._world.present_contacts()
+            now = _contact_batch(overlaps, np.zeros((overlaps.size, 2)))
+            if self._zoned is not None:  # entries are logged now and again with the first substep
+                self._initial_entries = self._zoned.tracker.drain_entries()
+            self._log.record(
+                self.time, now if self._initial_entries is None else join_batches(now, self._initial_entries)
+            )
+        return self._log.take()
 
     def account(self) -> Mapping[Cause, float]:
         """Return the energy change, J, by each cause since the first call."""
@@ -264,48 +267,50 @@ class ReferenceSimulation(BaseSimulation):
 
     def watch(self, observer: Observer) -> None:
         """Register an observer, called after every substep and every impact within one; records contacts too."""
-        if self._ledger is None:
+        if self._log is None:
             self.contacts()
         self._observer = observer
 
     def _log_contacts(self, log: ContactLog, record: StepRecord) -> None:
         """Log the contacts of a step, and call the observer."""
         end = self._world.time
-        self._now = now = _touching(*_real(*record.all_contacts(), record.after[1], self._store.inverse_mass))
-        visits, self._came = self._came, None
+        self._last_contacts = now = _contact_batch(
+            *_drop_rounding(*record.all_contacts(), record.after[1], self._store.inverse_mass)
+        )
+        visits, self._initial_entries = self._initial_entries, None
         log.record(end, now if visits is None else join_batches(now, visits))
         if self._observer is not None:
-            # The observer may keep what it is given: these arrays are never written to again.
+            # The observer may keep these arrays: they are never written to again.
             centres = self._world.centres
             self._observer(record.time, centres(record.before), centres(record.after), log.pairs())
 
 
-def _falls_off(single: BodySpec, scene: Scene) -> bool:
-    """Return whether restitution falls with speed at a contact of a body that is to be added."""
-    own = {bearer.material for bearer in bearers_of((single,))}
-    figures = [bearer.restitution_falloff for bearer in bearers_of((single,))]
-    figures += [material.restitution_falloff for material in scene.materials if material.name in own]
-    figures += [pair.restitution_falloff for pair in scene.pairs if own.intersection(pair.between)]
-    return any(figures)
+def _has_falloff(spec: BodySpec, scene: Scene) -> bool:
+    """Return whether a body to be added has contacts with velocity-dependent restitution."""
+    own = {element.material for element in surface_parts((spec,))}
+    falloffs = [element.restitution_falloff for element in surface_parts((spec,))]
+    falloffs += [material.restitution_falloff for material in scene.materials if material.name in own]
+    falloffs += [pair.restitution_falloff for pair in scene.pairs if own.intersection(pair.between)]
+    return any(falloffs)
 
 
-def _real(
+def _drop_rounding(
     contacts: Manifolds, impulse: FloatArray, rates: FloatArray, inverse_mass: FloatArray
 ) -> tuple[Manifolds, FloatArray]:
-    """Drop contacts whose overlap and impulse are rounding: bodies that move side by side after an impact."""
+    """Drop contacts whose overlap and impulse are rounding errors, as of bodies that move together after an impact."""
     if not contacts.size:
         return contacts, impulse
     first, second = contacts.first, contacts.second
     speed = np.hypot(rates[:, 0], rates[:, 1])
-    # What is fixed has no speed and no inverse mass of its own: the first of the pair stands in, and changes nothing.
+    # A static collider has no row; that of the first body is used for it.
     other = np.where(second >= 0, second, first)
     kick = np.hypot(impulse[:, 0], impulse[:, 1]) * np.maximum(inverse_mass[first], inverse_mass[other])
-    real = contacts.separation < -ROUNDING * contacts.arm.sum(axis=1)
+    real = contacts.separation < -ROUNDING * contacts.anchor.sum(axis=1)
     real |= kick > ROUNDING * (speed[first] + speed[other])
     return (contacts, impulse) if real.all() else (contacts.of(real), impulse[real])
 
 
-def _touching(contacts: Manifolds, impulse: FloatArray) -> ContactBatch:
+def _contact_batch(contacts: Manifolds, impulse: FloatArray) -> ContactBatch:
     """Return contacts as the contact log stores them: complex numbers, with the impulse on the first body."""
     if not contacts.size:
         return NO_CONTACTS

@@ -1,7 +1,7 @@
 """The world of a running simulation, and one step of it with discrete collision detection.
 
     motion = world.advance(h)                          forces and free motion
-    contacts = world.solver.detect(motion.placed)      broad phase, filter, narrow phase
+    contacts = world.solver.detect(motion)             broad phase, filter, narrow phase
     solution = world.solver.solve(motion, contacts, h) contacts, joints and stops
     world.solver.correct(solution, h)                  overlap, for the next step
     record = world.commit(motion, solution, h)         the result becomes the present state
@@ -19,21 +19,30 @@ import numpy as np
 from sandbox.arrays import FloatArray
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.reference.collision import WORK, CollisionPipeline, is_suitable, make_pipeline
-from sandbox.engines.reference.drives import DrivenSolver, Drives
+from sandbox.engines.reference.drives import DrivenSolver, Drives, DriveWork
 from sandbox.engines.reference.filtering import CollisionFilter, OneWayWalls
 from sandbox.engines.reference.forces import ForceField, forces_on
 from sandbox.engines.reference.integrators import INTEGRATORS, State
 from sandbox.engines.reference.joints import JointSolver
 from sandbox.engines.reference.manifold import Manifolds
 from sandbox.engines.reference.penalty import DrivenPenaltySolver, PenaltyContacts, PenaltySolver
-from sandbox.engines.reference.velocity_solver import ContactMemory, Impact, ImpulseSolver, Motion, Solution
+from sandbox.engines.reference.velocity_solver import ContactMemory, Impact, ImpulseSolution, ImpulseSolver, Motion
 from sandbox.scene.description.world import Settings
 
 
-class StepRecord(NamedTuple):
-    """One step, or one piece of it up to an impact, as the energy ledger, contact log, joints and walls read it.
+class SolverWork(NamedTuple):
+    """Work in a step that depends on the state of the solver, for the energy ledger."""
 
-    The states are never written to again. Contacts are valid until the next collision detection.
+    joints: float
+    """J, of joint impulses; 0 for joints that are solved by positions"""
+    drives: DriveWork | None
+    """energy given to driven bodies; None if there are none"""
+
+
+class StepRecord(NamedTuple):
+    """One step, or one piece of it up to an impact, for the energy ledger, contact log, joint breaker and walls.
+
+    The states are never written to again. Contacts are valid until the next step.
     """
 
     time: float
@@ -55,7 +64,11 @@ class StepRecord(NamedTuple):
     kick_energy: FloatArray | None
     """(K,) J that kicks add for each N·s along the normal; None if nothing was kicked"""
     impact: Impact | None
-    """contacts that act at the end of the step alone; None with discrete detection"""
+    """contacts that act only at the end of the step; None with discrete detection"""
+    joint_load: FloatArray | None
+    """(L, 2) N or N·m, force of each joint on its second body; None if no joint can break"""
+    work: "SolverWork | None"
+    """work of joints and drives; None while energy accounting is off"""
 
     def all_contacts(self) -> tuple[Manifolds, FloatArray]:
         """Return all contacts, those of the impact last, and their impulses (K, 2), N·s."""
@@ -77,10 +90,10 @@ def step(world: "WorldState", h: float) -> StepRecord:
     Raises:
         Exhaustion: there are too many contacts for the limits of work or memory.
     """
-    # 1. Forces and free motion: where bodies go if they hit nothing; joints solved by positions hold them
+    # 1. Forces and free motion without contacts, with joints that are solved by positions
     motion = world.advance(h)
     # 2. Detect: broad phase, filter, narrow phase
-    contacts = world.solver.detect(motion.placed)
+    contacts = world.solver.detect(motion)
     # 3. Solve: impulses of contacts, joints and stops, warm-started by those of the last step
     solution = world.solver.solve(motion, contacts, h)
     # 4. Correct: velocities that undo overlap beyond the slop during the next step
@@ -110,7 +123,7 @@ class WorldState:
         assert settings.broad_phase and settings.slop is not None and settings.bias is not None
         self._store, self._settings = store, settings
         self.work: Counter[str] = Counter(dict.fromkeys(WORK, 0))
-        """how often each kind of work was done so far"""
+        """work counters"""
         self.memory = ContactMemory(settings.h)
         self.field = ForceField(store)
         self.joints = self._new_joints()
@@ -121,6 +134,8 @@ class WorldState:
         self._penalty = self._new_penalty(self.pipeline)
         self._fixtures = store.fixtures
         self.drives: Drives | None = None
+        self.records_joint_load = self.records_work = False
+        """whether step records contain `joint_load`, and `work`"""
         self.time = 0.0
         self.rebuild()
 
@@ -144,20 +159,20 @@ class WorldState:
         return JointSolver(links, *inverse, settings.bias, settings.iterations, settings.joints, cap)
 
     def rebuild(self) -> None:
-        """Derive state, forces, collision data and solver anew from the body store."""
+        """Update state, forces, collision data and solver after a change of the body store."""
         store = self._store
         self.x = self._stored_state()
         if self.filter is not None:
-            self.filter.rebuild(self.x[0])  # centres: hinges take their places only below
+            self.filter.rebuild(self.x[0])  # centres; `use_hinges` below replaces them by hinges
         self.drives = Drives.of(store, self.drives)
         if self.drives is not None:
             self.drives.use_hinges(self.x)
         self.memory.rebuild(store.moving)
-        if not is_suitable(self.pipeline, store):  # keys mean other pairs from now on
+        if not is_suitable(self.pipeline, store):  # keys mean other pairs in the new pipeline
             self.pipeline = self._new_pipeline(self.work)
             self._penalty = self._new_penalty(self.pipeline)
             self.memory.forget(self._settings.h)
-        if store.fixtures is not self._fixtures:  # keys may mean other segments from now on
+        if store.fixtures is not self._fixtures:  # keys may mean other segments now
             self._fixtures = store.fixtures
             self.memory.forget(self._settings.h)
         self.pipeline.rebuild()
@@ -170,7 +185,7 @@ class WorldState:
         self.forces = forces_on(store, self.field, self.joints, self.x.shape[2])
 
     def _choose_solver(self) -> None:
-        """Choose among the four solvers by the contact response and by whether a body is driven."""
+        """Choose one of the four solvers by the contact response and by whether a body is driven."""
         store, drives, penalty = self._store, self.drives, self._penalty
         given = store, self._settings, self.pipeline, self.joints, self.memory
         self.impulses = ImpulseSolver(*given) if drives is None else DrivenSolver(drives, *given)
@@ -182,7 +197,7 @@ class WorldState:
                 self.solver = DrivenPenaltySolver(drives, penalty, self.impulses)
 
     def _stored_state(self) -> State:
-        """Return the state in the body store, (2, N, D), with angles only if something can turn."""
+        """Return the state in the body store, (2, N, D), with angles only if a body can turn."""
         store = self._store
         if not self._turns():
             return np.stack((store.position, store.velocity))
@@ -192,10 +207,10 @@ class WorldState:
     def _turns(self) -> bool:
         """Return whether states need angles: a body turns, or a joint, drive, attraction or thrust may turn it."""
         store = self._store
-        return bool(self._posed or store.held or store.inverse_moment.any() or store.angular_velocity.any())
+        return bool(self._posed or store.mounts or store.inverse_moment.any() or store.angular_velocity.any())
 
     def read_velocities(self) -> bool:
-        """Take velocities from the body store after an impulse; return False if `rebuild` has to do it.
+        """Read velocities from the body store after an impulse; return False if `rebuild` is needed instead.
 
         One-way walls depend on velocities, zones release a body that gets a velocity, and angular velocities can change
         the shape of states. Nothing else that `rebuild` derives depends on velocities.
@@ -226,7 +241,7 @@ class WorldState:
         return x[0, :, :2] if self.drives is None else self.drives.centres(x)
 
     def ledger_penalty(self) -> PenaltyContacts | None:
-        """Return penalty contacts for the energy ledger, which are not counted as work; None for other responses."""
+        """Return penalty contacts for the energy ledger, whose work is not counted; None for other responses."""
         if self._penalty is None:
             return None
         own = PenaltyContacts(self._store, self._settings, self._new_pipeline(Counter()))
@@ -240,30 +255,43 @@ class WorldState:
         return INTEGRATORS[self._settings.integrator].fraction
 
     def advance(self, h: float) -> Motion:
-        """Return the motion of all bodies over h, s, as if they hit nothing. The present state is not changed."""
+        """Return the motion of all bodies over h, s, without contact impulses. The present state is not changed."""
         return self.solver.integrate(self.x, self.forces, self.time, h)
 
-    def commit(self, motion: Motion, solution: Solution, h: float) -> StepRecord:
+    def commit(self, motion: Motion, solution: ImpulseSolution, h: float) -> StepRecord:
         """Take a solution at the end of h, s, as the present state."""
         before, start = self.x, self.time
         self.x, self.time = self.solver.finish(solution.after), start + h
-        return StepRecord(start, h, before, motion, self.x, *solution[1:])
+        load = self.joints.load(self.x) if self.joints is not None and self.records_joint_load else None
+        work = self._solver_work(before, motion, solution.end, h) if self.records_work else None
+        return StepRecord(start, h, before, motion, self.x, *solution[1:], load, work)
 
-    def impact(self, motion: Motion, lasting: Manifolds, clash: Manifolds, h: float) -> StepRecord:
+    def _solver_work(self, before: State, motion: Motion, end: FloatArray, h: float) -> SolverWork:
+        """Return the work of joints and drives in a step of h, s, that ended with rates `end` before its impact."""
+        joints, drives = self.joints, self.drives
+        by_impulses = joints is not None and joints.method == "impulses"
+        joint_work = joints.work(0.5 * (motion.start[1] + end)) if joints is not None and by_impulses else 0.0
+        return SolverWork(joint_work, None if drives is None else drives.work(before, self.x, h))
+
+    def present_contacts(self) -> Manifolds:
+        """Return the contacts in the present state; penalty contacts are those of the last motion."""
+        return self.pipeline.overlaps(self.x[0]) if self._penalty is None else self._penalty.last.contacts
+
+    def impact(self, motion: Motion, persistent: Manifolds, colliding: Manifolds, h: float) -> StepRecord:
         """Take the end of a motion of h, s, as the present state, with an impact at that time.
 
         Args:
             motion: over h.
-            lasting: contacts that act through h; as in `step`, else gravity's kick would make them bounce.
-            clash: contacts that begin at the end of h.
+            persistent: contacts that act through h, as in `step`; otherwise gravity's kick would make them bounce.
+            colliding: contacts that begin at the end of h.
             h: s.
         """
-        return self.commit(motion, self.impulses.impact(motion, lasting, clash, h), h)
+        return self.commit(motion, self.impulses.impact(motion, persistent, colliding, h), h)
 
     def resting_speed(self, h: float) -> float:
-        """Return the closing speed, m/s, that the forces of two substeps cause: slower contacts rest on each other."""
+        """Return the closing speed, m/s, caused by the forces of two substeps; slower contacts are resting."""
         return 2.0 * h * float(np.abs(self.forces.steady[:, :2]).max(initial=0.0))
 
     def closing_speed(self, contacts: Manifolds, x: State) -> FloatArray:
-        """Return how fast each contact closes in a state, (K,) m/s."""
+        """Return the closing speed of each contact in a state, (K,) m/s."""
         return -self.impulses.approach(contacts, x[1])

@@ -12,14 +12,14 @@ from sandbox.engines.reference.broad_phase import FIRST, SECOND, contains_key, p
 from sandbox.engines.reference.manifold import KIND, circle_segment, is_covered
 
 NEVER = 2.0
-"""More than any fraction of the path."""
+"""Larger than any fraction of the path"""
 
 
 @kernel
 def touch_circle(x: float, y: float, mx: float, my: float, distance: float) -> float:
     """Return when a point at (x, y) that moves by (mx, my) comes within a distance of the origin, m.
 
-    The discriminant is taken from the cross product, which keeps its digits in a graze: D = A·R² − (x × m)².
+    The discriminant is computed from the cross product, without cancellation in a graze: D = A·R² − (x × m)².
     """
     length2, along = mx * mx + my * my, x * mx + y * my
     if along >= 0.0:
@@ -51,11 +51,11 @@ def touch_segment(
     """Return when a point at (x, y) that moves by (mx, my) comes within a distance of a segment, m."""
     along_x, along_y = bx - ax, by - ay
     length = math.sqrt(along_x * along_x + along_y * along_y)
-    place = 0.0
+    along = 0.0
     if length > 0.0:
         along_x, along_y = along_x / length, along_y / length
-        place = min(max((x - ax) * along_x + (y - ay) * along_y, 0.0), length)
-    dx, dy = x - ax - place * along_x, y - ay - place * along_y
+        along = min(max((x - ax) * along_x + (y - ay) * along_y, 0.0), length)
+    dx, dy = x - ax - along * along_x, y - ay - along * along_y
     if dx * dx + dy * dy <= distance * distance:
         # The shape is convex: a circle that moves away from its nearest point does not come nearer later.
         return 0.0 if dx * mx + dy * my < 0.0 else NEVER
@@ -71,8 +71,8 @@ def touch_segment(
         side, rate = -side, -rate
     fraction = touch_line(side - distance, -rate)
     if fraction < first:
-        place = (x + fraction * mx - ax) * along_x + (y + fraction * my - ay) * along_y
-        if 0.0 <= place <= length:
+        along = (x + fraction * mx - ax) * along_x + (y + fraction * my - ay) * along_y
+        if 0.0 <= along <= length:
             first = fraction
     return first
 
@@ -88,7 +88,7 @@ def first_touch(
     segment_keys: IntArray,
     segments: FloatArray,
     joints: FloatArray,
-    rest: IntArray,
+    resting: IntArray,
 ) -> tuple[float, int]:
     """Return the fraction of the displacement, and the key, of the first touch among candidates; key −1 for none.
 
@@ -101,8 +101,8 @@ def first_touch(
         planes: (P, 4).
         segment_keys: keys of a ball and a segment.
         segments: (G, 5).
-        joints: (G, 4) how walls run on from their ends.
-        rest: keys, ascending, of pairs that are not looked at.
+        joints: (G, 4) m, as in `StaticColliders.joints`.
+        resting: keys, ascending, of pairs that are ignored.
     """
     first, found = NEVER, -1
     for k in range(len(balls)):
@@ -110,7 +110,7 @@ def first_touch(
         x, y = start[j, 0] - start[i, 0], start[j, 1] - start[i, 1]
         mx, my = end[j, 0] - end[i, 0] - x, end[j, 1] - end[i, 1] - y
         fraction = touch_circle(x, y, mx, my, radius[i] + radius[j])
-        if fraction < first and not contains_key(rest, balls[k]):
+        if fraction < first and not contains_key(resting, balls[k]):
             first, found = fraction, balls[k]
     for i in range(len(start)):
         if can_touch[i]:
@@ -120,7 +120,7 @@ def first_touch(
                 gap = (start[i, 0] - planes[p, 0]) * nx + (start[i, 1] - planes[p, 1]) * ny - radius[i]
                 fraction = touch_line(gap, -(mx * nx + my * ny))
                 key = (1 << KIND) + pair_key(i, p)
-                if fraction < first and not contains_key(rest, key):
+                if fraction < first and not contains_key(resting, key):
                     first, found = fraction, key
     for k in range(len(segment_keys)):
         i, s = segment_keys[k] >> FIRST, segment_keys[k] & SECOND
@@ -128,7 +128,7 @@ def first_touch(
         ax, ay, bx, by = segments[s, 0], segments[s, 1], segments[s, 2], segments[s, 3]
         fraction = touch_segment(x, y, end[i, 0] - x, end[i, 1] - y, ax, ay, bx, by, radius[i] + segments[s, 4])
         key = (2 << KIND) + segment_keys[k]
-        if fraction < first and not contains_key(rest, key):
+        if fraction < first and not contains_key(resting, key):
             x, y = x + fraction * (end[i, 0] - x), y + fraction * (end[i, 1] - y)
             _, nx, ny = circle_segment(x, y, radius[i], ax, ay, bx, by, segments[s, 4])
             before_x, before_y, after_x, after_y = joints[s, 0], joints[s, 1], joints[s, 2], joints[s, 3]

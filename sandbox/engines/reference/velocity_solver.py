@@ -1,10 +1,10 @@
 """The impulse solver: contacts and joints by sequential impulses, restitution targets, and kicks.
 
-ImpulseSolver has the verbs that all solvers share, in the order of a step: `integrate`, `detect`, `solve`, `correct`,
-`finish`. `drives.DrivenSolver`, `penalty.PenaltySolver` and `penalty.DrivenPenaltySolver` are its siblings.
+`ImpulseSolver` has the verbs that all solvers share, in the order of a step: `integrate`, `detect`, `solve`, `correct`,
+`finish`. The other solvers are `drives.DrivenSolver`, `penalty.PenaltySolver` and `penalty.DrivenPenaltySolver`.
 
-ReboundModel gives the restitution targets where restitution depends on speed, or something kicks. Elsewhere the target
-is restitution times approach.
+`ReboundModel` returns the restitution targets of pairs with kicks or velocity-dependent restitution. For other pairs
+the target is restitution times approach.
 """
 
 from typing import NamedTuple
@@ -17,33 +17,36 @@ from sandbox.engines.common.kernel import kernel
 from sandbox.engines.common.restitution import compiled_rebound, fraction_at, kick_gain, kicked, segment_fractions
 from sandbox.engines.contract import Exhaustion
 from sandbox.engines.reference.collision import CollisionPipeline
-from sandbox.engines.reference.dissipation import ROUNDING, Bilinear, largest_fractions
 from sandbox.engines.reference.integrators import INTEGRATORS, Inputs, State, Step, transition
 from sandbox.engines.reference.joint_rows import VelocityConstraints
 from sandbox.engines.reference.joints import JointSolver, kick_pose
 from sandbox.engines.reference.manifold import Manifolds
 from sandbox.engines.reference.sequential_impulses import (
     NO_STOPS,
+    TURNOVER_ROUNDING,
+    GroupWork,
     approach,
+    largest_fractions,
+    match_impulses,
     rebound_speeds,
-    remembered,
-    solve_once,
+    solve_contacts_once,
     solve_overlaps,
     solve_together,
     solve_velocities,
-    start_with,
+    warm_start_contacts,
 )
 from sandbox.resource_limits import STEP_WORK
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.fixed import Post, Wall
 from sandbox.scene.description.world import Kick, Settings
+from sandbox.scene.geometry.segments import nearest_fraction
 
 
 class Rebound(NamedTuple):
     """Restitution targets of K contacts."""
 
     speed: FloatArray
-    """(K,) m/s, negative: the wanted normal velocity is its opposite"""
+    """(K,) m/s, at most 0: the target normal velocity is its opposite"""
     kick_energy: FloatArray | None
     """(K,) J that kicks add for each N·s along the normal; None if nothing was kicked"""
 
@@ -71,17 +74,18 @@ class ReboundModel:
             number = -1 - int(contacts.second[k])
             if number in self._kicks:
                 x, y = contacts.point[k].tolist()
-                kick[k] = self._gain(number, (x, y), restitution[k], falloff[k], -float(approach[k]))
+                kick[k] = self._kick_gain(number, (x, y), restitution[k], falloff[k], -float(approach[k]))
         if not kick.any():
             return Rebound(speed, None)
         whole = kick - speed
-        met = kick > 0.0
+        is_kicked = kick > 0.0
         energy = np.zeros(contacts.size)
-        # From `-speed` on an impulse is the kick's: half of it finds the speed before it, half that after.
-        energy[met] = (kick / (whole - approach) * 0.5 * (whole - speed))[met]
+        # The part of the impulse beyond `-speed` is the kick's. Its work is taken at the mean of the speeds at its
+        # ends.
+        energy[is_kicked] = (kick / (whole - approach) * 0.5 * (whole - speed))[is_kicked]
         return Rebound(speed - kick, energy)
 
-    def _gain(self, number: int, point: Point, restitution: float, falloff: float, closing: float) -> float:
+    def _kick_gain(self, number: int, point: Point, restitution: float, falloff: float, closing: float) -> float:
         """Return the separation speed, m/s, that the kick of a static collider adds at a contact point."""
         collider = self._kicks[number]
         kick = _kick_of(collider)
@@ -90,7 +94,7 @@ class ReboundModel:
         if middle and isinstance(collider, Wall):
             ends = (*collider.points, collider.points[0]) if collider.closed else collider.points
             each = zip(ends[:-1], ends[1:], segment_fractions(ends), strict=True)
-            fraction = min((_away(a, b, point), fraction_at(a, b, part, point)) for a, b, part in each)[1]
+            fraction = min((_squared_distance(a, b, point), fraction_at(a, b, part, point)) for a, b, part in each)[1]
         speed = kicked(kick.speed, kick.threshold, middle, fraction, closing)
         return kick_gain(restitution, falloff, speed, kick.adds_to == "approach", closing)
 
@@ -99,11 +103,11 @@ def _kick_of(collider: object) -> Kick | None:
     return collider.kick if isinstance(collider, Wall | Post) else None
 
 
-def _away(a: Point, b: Point, point: Point) -> float:
-    """Return the square of how far a point is from a segment, m²."""
-    dx, dy, x, y = b[0] - a[0], b[1] - a[1], point[0] - a[0], point[1] - a[1]
-    along = min(max((x * dx + y * dy) / (dx * dx + dy * dy), 0.0), 1.0)
-    return (x - along * dx) ** 2 + (y - along * dy) ** 2
+def _squared_distance(a: Point, b: Point, point: Point) -> float:
+    """Return the squared distance of a point from a segment, m²."""
+    fraction = nearest_fraction(*a, *b, *point)
+    x, y = point[0] - a[0], point[1] - a[1]
+    return (x - fraction * (b[0] - a[0])) ** 2 + (y - fraction * (b[1] - a[1])) ** 2
 
 
 @kernel
@@ -112,31 +116,41 @@ def _rebounds(restitution: FloatArray, falloff: FloatArray, approach: FloatArray
         out[k] = -compiled_rebound(restitution[k], falloff[k], -approach[k])
 
 
-MAX_PASSES = 1000
-"""Passes over the contacts of one impact."""
+MAX_IMPACT_PASSES = 1000
+"""Largest number of passes over the contacts of one impact"""
 
 CONVERGED = 1e-15
-"""Part of the largest impulse by which a pass changes others by rounding alone."""
+"""Change of an impulse in a pass, as a fraction of the largest impulse, that is rounding error"""
 
 
 NO_IMPULSE: FloatArray = np.zeros((0, 2))
 
 
+class SpringContacts(NamedTuple):
+    """K penalty contacts that acted as forces in a motion."""
+
+    contacts: Manifolds
+    impulse: FloatArray
+    """(K, 2) N·s, normal and tangential"""
+
+
 class Motion(NamedTuple):
-    """Motion of all bodies over a step, as if they hit nothing. The arrays are never written to again."""
+    """Motion of all bodies over a step without contact impulses. The arrays are never written to again."""
 
     start: State
     """(2, N, D) at the start, with the velocities that driven bodies have through the step"""
     free: State
     """(2, N, D) at the end, by forces alone"""
     shift: FloatArray | None
-    """(N, D) m and rad, by which overlap of the last step is undone; None if nothing overlapped"""
+    """(N, D) m and rad, correction of the overlap of the last step; None if nothing overlapped"""
     placed: State
-    """(2, N, D) at the end: `free`, shifted, and moved by the joints that are solved by positions"""
+    """(2, N, D) at the end: `free`, shifted, and corrected by joints that are solved by positions"""
+    springs: SpringContacts | None = None
+    """penalty contacts that acted in the motion; None if contacts are solved by impulses"""
 
 
 class Impact(NamedTuple):
-    """Contacts that act at the end of a step alone."""
+    """Contacts that act only at the end of a step."""
 
     contacts: Manifolds
     impulse: FloatArray
@@ -145,8 +159,8 @@ class Impact(NamedTuple):
     """(K,) J that kicks add for each N·s along the normal; None if nothing was kicked"""
 
 
-class Solution(NamedTuple):
-    """State at the end of a step, and the contacts that led to it."""
+class ImpulseSolution(NamedTuple):
+    """State at the end of a step, with its contacts and impulses."""
 
     after: State
     """(2, N, D)"""
@@ -161,23 +175,23 @@ class Solution(NamedTuple):
 
 
 class ContactMemory:
-    """What the contacts of a step leave to the next: impulses to start with, and velocities that undo overlap."""
+    """Data that a step passes to the next: impulses for warm starting, and velocities that correct overlap."""
 
     def __init__(self, h: float) -> None:
         self.forget(h)
         self.pseudo_velocity: FloatArray = np.zeros((0, 3))
-        """(N, 3) m/s and rad/s, by which overlap is undone in the next step; no part of the motion"""
+        """(N, 3) m/s and rad/s, velocities that correct overlap in the next step; not part of the motion"""
         self.has_pseudo_velocity = False
         """whether any of these is not 0"""
 
     def forget(self, h: float) -> None:
-        """Forget impulses, as those of a step of h, s: their keys mean other pairs now."""
+        """Forget the impulses, because keys now mean other pairs; h is the substep, s."""
         self.key: IntArray = np.empty(0, np.int64)
         self.impulse: FloatArray = np.empty((0, 2))
         self.h = h
 
     def rebuild(self, moving: BoolArray) -> None:
-        """Adapt to more bodies, or to bodies that no longer move: (N,) which do."""
+        """Update after a change of the bodies; (N,) whether each moves."""
         kept = np.zeros((len(moving), 3))
         kept[: len(self.pseudo_velocity)] = self.pseudo_velocity
         self.pseudo_velocity = np.where(moving[:, None], kept, 0.0)
@@ -187,12 +201,16 @@ class ContactMemory:
 class ImpulseSolver:
     """Solver by sequential impulses (Catto 2005). Its verbs, in the order of a step: integrate, detect, solve, correct.
 
+    `DrivenSolver` overrides `integrate`, `finish`, and the two verbs within `solve`: `iterate` and `remove_stop_rates`.
+
     Args:
         store: the bodies.
         settings: with every choice filled in.
-        pipeline: detects collisions; its work counters count the iterations, too.
+        pipeline: detects collisions; its work counters also count the iterations.
         joints: solver of the scene's joints, if it has any.
         memory: of the last step, changed by `correct`.
+        inverse_moment_overlap: inverse moments for the correction of overlap, if they differ, (N,) 1/(kg·m²).
+        has_constraints: whether there is something to solve without any contact, apart from joints.
     """
 
     def __init__(
@@ -202,6 +220,8 @@ class ImpulseSolver:
         pipeline: CollisionPipeline,
         joints: JointSolver | None,
         memory: ContactMemory,
+        inverse_moment_overlap: FloatArray | None = None,
+        has_constraints: bool = False,
     ) -> None:
         assert settings.integrator and settings.slop is not None and settings.bias is not None
         self._integrator = INTEGRATORS[settings.integrator]
@@ -209,11 +229,12 @@ class ImpulseSolver:
         by_impulses = joints is not None and joints.method == "impulses"
         self._velocity_joints = joints if by_impulses else None
         self._position_joints = None if by_impulses else joints
-        self._always = by_impulses
+        self._has_constraints = has_constraints or by_impulses
         """whether there is something to solve without any contact"""
         self._inverse = store.inverse_mass, store.inverse_moment
-        self._inverse_overlap = self._inverse
-        """inverse masses and moments with which overlap is undone"""
+        overlap_moment = store.inverse_moment if inverse_moment_overlap is None else inverse_moment_overlap
+        self._inverse_overlap = store.inverse_mass, overlap_moment
+        """inverse masses and moments for the correction of overlap"""
         self._iterations, self._slop, self._bias = settings.iterations, settings.slop, settings.bias
         self._dissipative = settings.impact == "dissipative"
         self._substeps, self._max_work = settings.substeps, STEP_WORK.value // settings.substeps
@@ -228,11 +249,14 @@ class ImpulseSolver:
         return self._integrator.step
 
     def integrate(self, x: State, forces: Inputs, time: float, h: float) -> Motion:
-        """Return the motion from a state at a time, s, over h, s, as if nothing were hit."""
-        return self.place(x, self._integrator.step(transition, time, x, forces, h), h)
+        """Return the motion from a state at a time, s, over h, s, without contacts."""
+        return self.complete_motion(x, self._integrator.step(transition, time, x, forces, h), h)
 
-    def place(self, start: State, free: State, h: float) -> Motion:
-        """Return a motion that ends at `free`, with overlap undone and joints held that are solved by positions."""
+    def complete_motion(self, start: State, free: State, h: float, springs: SpringContacts | None = None) -> Motion:
+        """Return a motion from `start` to `free`, with overlap corrected, and joints that are solved by positions.
+
+        `springs` are the penalty contacts that acted in it.
+        """
         shift, placed = None, free
         if self._memory.has_pseudo_velocity:
             shift = h * self._memory.pseudo_velocity[:, : free.shape[2]]
@@ -242,56 +266,56 @@ class ImpulseSolver:
         if self._position_joints is not None:
             placed = free.copy() if placed is free else placed
             self._position_joints.project(start, placed, h)
-            self._work["joint_iterations"] += self._position_joints.visits
-        return Motion(start, free, shift, placed)
+            self._work["joint_iterations"] += self._position_joints.visits_per_step
+        return Motion(start, free, shift, placed, springs)
 
-    def detect(self, x: State) -> Manifolds:
-        """Return the contacts in a state (2, N, D). They are valid until the next detection.
+    def detect(self, motion: Motion) -> Manifolds:
+        """Return the contacts at the end of a motion. They are valid until the next detection.
 
         Raises:
             Exhaustion: there are too many.
         """
-        return self._pipeline.overlaps(x[0])
+        return self._pipeline.overlaps(motion.placed[0])
 
-    def solve(self, motion: Motion, contacts: Manifolds, h: float) -> Solution:
+    def solve(self, motion: Motion, contacts: Manifolds, h: float) -> ImpulseSolution:
         """Return the state at the end of a motion over h, s, with contacts and joints that act through it.
 
-        The separations of contacts are brought up to date.
+        The separations of contacts are updated.
 
         Raises:
-            Exhaustion: that takes too many passes over contacts.
+            Exhaustion: it would take too many passes over contacts.
         """
         placed = motion.placed
-        if not (len(contacts.key) or self._always):
-            return Solution(placed, placed[1], contacts, NO_IMPULSE, None)
+        if not (len(contacts.key) or self._has_constraints):
+            return ImpulseSolution(placed, placed[1], contacts, NO_IMPULSE, None)
         after, impulse = placed.copy(), np.zeros((contacts.size, 2))
         memory, fraction = self._memory, self._integrator.fraction
         if self._velocity_joints is not None:
             self._velocity_joints.prepare(kick_pose(placed, fraction, h), h)
         bounce = self.bounce(contacts, motion.start[1])
-        remembered(contacts.key, memory.key, memory.impulse, impulse)
-        # The impulse of a resting contact is proportional to the time. It never grows: that of an impact is not.
+        match_impulses(contacts.key, memory.key, memory.impulse, impulse)
+        # The impulse of a resting contact is proportional to the step. It is not scaled up: that of an impact is not.
         impulse *= min(h / memory.h, 1.0)
-        self._resolve(contacts, bounce, motion.start[1], after[1], impulse, joined=True)
+        self._resolve(contacts, bounce, motion.start[1], after[1], impulse, with_joints=True)
         if fraction:
-            change = after[1] - self._with_stops(placed[1])
+            change = after[1] - self.remove_stop_rates(placed[1])
             after[0] += (fraction * h) * change
             contacts.separation[:] += (fraction * h) * self.approach(contacts, change)
-        return Solution(after, after[1], contacts, impulse, bounce.kick_energy)
+        return ImpulseSolution(after, after[1], contacts, impulse, bounce.kick_energy)
 
-    def impact(self, motion: Motion, lasting: Manifolds, clash: Manifolds, h: float) -> Solution:
-        """Return the state at the end of a motion over h, s, with lasting contacts and an impact at its end.
+    def impact(self, motion: Motion, persistent: Manifolds, colliding: Manifolds, h: float) -> ImpulseSolution:
+        """Return the state at the end of a motion over h, s, with persistent contacts and an impact at its end.
 
-        Engines refuse drives and joints with the detections that solve impacts one by one.
+        The engine refuses drives and joints with the detections that solve impacts one by one.
         """
-        held = self.solve(motion, lasting, h)
-        after, impulse = held.after.copy(), np.zeros((clash.size, 2))
-        bounce = self.bounce(clash, after[1])
-        self._resolve(clash, bounce, held.after[1], after[1], impulse, settled=True)
-        return held._replace(after=after, impact=Impact(clash, impulse, bounce.kick_energy))
+        through = self.solve(motion, persistent, h)
+        after, impulse = through.after.copy(), np.zeros((colliding.size, 2))
+        bounce = self.bounce(colliding, after[1])
+        self._resolve(colliding, bounce, through.after[1], after[1], impulse, until_converged=True)
+        return through._replace(after=after, impact=Impact(colliding, impulse, bounce.kick_energy))
 
-    def correct(self, solution: Solution, h: float) -> None:
-        """Find the velocities that undo overlap in the next step; keep the impulses of this one, of h, s, for it."""
+    def correct(self, solution: ImpulseSolution, h: float) -> None:
+        """Find the velocities that correct overlap in the next step; store the impulses of this step, h in s."""
         contacts, memory = solution.contacts, self._memory
         if memory.has_pseudo_velocity:
             memory.has_pseudo_velocity = False
@@ -299,7 +323,7 @@ class ImpulseSolver:
         memory.key, memory.impulse, memory.h = contacts.key, solution.impulse, h
         if len(contacts.key):
             memory.key = contacts.key.copy()
-            # One substep undoes a fraction of the overlap beyond the slop, by the motion of the next.
+            # A substep corrects a fraction of the overlap beyond the slop.
             target = -(1.0 - self._bias**h) / h * np.minimum(contacts.separation + self._slop, 0.0)
             memory.has_pseudo_velocity = bool(target.any())
             if memory.has_pseudo_velocity:
@@ -310,15 +334,15 @@ class ImpulseSolver:
                 )
 
     def finish(self, after: State) -> State:
-        """Return the state to begin the next step with."""
+        """Return the state with which the next step begins."""
         return after
 
-    def _with_stops(self, rates: FloatArray) -> FloatArray:
-        """Return rates (N, D) at the end of a motion without those that a stop is to take away."""
+    def remove_stop_rates(self, rates: FloatArray) -> FloatArray:
+        """Return rates (N, D) at the end of a motion without the parts that stops will remove; here there are none."""
         return rates
 
     def approach(self, contacts: Manifolds, velocity: FloatArray) -> FloatArray:
-        """Return how fast each contact opens under velocities (N, D), (K,) m/s."""
+        """Return the normal velocity of each contact at velocities (N, D), (K,) m/s: negative if it closes."""
         out = np.empty(contacts.size)
         approach(contacts, velocity, self._spin(velocity), out)
         return out
@@ -332,31 +356,36 @@ class ImpulseSolver:
         return Rebound(speed, None)
 
     def _solve(
-        self, contacts: Manifolds, bounce: FloatArray, velocity: FloatArray, impulse: FloatArray, joined: bool = False
+        self,
+        contacts: Manifolds,
+        bounce: FloatArray,
+        velocity: FloatArray,
+        impulse: FloatArray,
+        with_joints: bool = False,
     ) -> None:
-        """Change velocities (N, D) and impulses (K, 2), N·s, by passes over contacts, and over joints if `joined`.
+        """Change velocities (N, D) and impulses (K, 2), N·s, by passes over contacts and, if `with_joints`, joints.
 
         Args:
-            contacts: K of them.
-            bounce: (K,) m/s, how fast each is to part.
+            contacts: K contacts.
+            bounce: (K,) m/s, restitution targets as in `Rebound.speed`.
             velocity: (N, D).
-            impulse: (K, 2) N·s to begin with.
-            joined: whether joints take turns with contacts.
+            impulse: (K, 2) N·s, initial impulses.
+            with_joints: whether each pass also solves the joints.
 
         Raises:
-            Exhaustion: that takes too many passes over contacts.
+            Exhaustion: it would take too many passes over contacts.
         """
         passes, rows = self._iterations, None
         if contacts.size * passes > self._max_work:
             work = contacts.size * passes * self._substeps
             raise Exhaustion(f"a step of {contacts.size:,} contacts takes too long; {STEP_WORK.remedy(work)}")
         self._work["contact_iterations"] += contacts.size * passes
-        if self._velocity_joints is not None and joined:
-            self._work["joint_iterations"] += self._velocity_joints.visits
+        if self._velocity_joints is not None and with_joints:
+            self._work["joint_iterations"] += self._velocity_joints.visits_per_step
             rows = self._velocity_joints.rows
-        self._iterate(contacts, bounce, rows, velocity, impulse)
+        self.iterate(contacts, bounce, rows, velocity, impulse)
 
-    def _iterate(
+    def iterate(
         self,
         contacts: Manifolds,
         bounce: FloatArray,
@@ -364,7 +393,7 @@ class ImpulseSolver:
         velocity: FloatArray,
         impulse: FloatArray,
     ) -> None:
-        """Pass over contacts and the rows of joints, if there are any; the other arguments are those of `_solve`."""
+        """Iterate over contacts and the rows of joints, if any; the other arguments are those of `_solve`."""
         if rows is None:
             solve_velocities(
                 contacts, bounce, velocity, self._spin(velocity), *self._inverse, impulse, self._iterations
@@ -372,19 +401,21 @@ class ImpulseSolver:
         else:
             solve_together(contacts, bounce, rows, NO_STOPS, velocity, *self._inverse, impulse, self._iterations)
 
-    def _settle(self, contacts: Manifolds, bounce: FloatArray, velocity: FloatArray, impulse: FloatArray) -> None:
-        """Change velocities and impulses as `_solve` does, until a pass changes nothing; contacts alone.
+    def _solve_until_converged(
+        self, contacts: Manifolds, bounce: FloatArray, velocity: FloatArray, impulse: FloatArray
+    ) -> None:
+        """Change velocities and impulses as `_solve` does, until a pass changes nothing; contacts only.
 
-        A single contact takes one pass. The two corners of a box that falls flat take more, the taller it is.
+        A single contact takes one pass. The two corners of a box that lands flat take more passes, the taller it is.
         """
         if contacts.size == 1:
             self._solve(contacts, bounce, velocity, impulse)
             return
         spin = self._spin(velocity)
-        start_with(contacts, velocity, spin, *self._inverse, impulse)
-        for _ in range(min(MAX_PASSES, max(self._max_work // max(contacts.size, 1), 1))):
+        warm_start_contacts(contacts, velocity, spin, *self._inverse, impulse)
+        for _ in range(min(MAX_IMPACT_PASSES, max(self._max_work // max(contacts.size, 1), 1))):
             before = impulse.copy()
-            solve_once(contacts, bounce, velocity, spin, *self._inverse, impulse)
+            solve_contacts_once(contacts, bounce, velocity, spin, *self._inverse, impulse)
             self._work["contact_iterations"] += contacts.size
             if np.abs(impulse - before).max(initial=0.0) <= CONVERGED * np.abs(impulse).max(initial=0.0):
                 break
@@ -396,30 +427,30 @@ class ImpulseSolver:
         start: FloatArray,
         velocity: FloatArray,
         impulse: FloatArray,
-        joined: bool = False,
-        settled: bool = False,
+        with_joints: bool = False,
+        until_converged: bool = False,
     ) -> None:
-        """Change velocities and impulses as `_solve` or, if settled, `_settle` does, by the chosen law of impact.
+        """Change velocities and impulses as `_solve` or `_solve_until_converged` does, by the chosen law of impact.
 
         Args:
             contacts: the contacts.
-            bounce: how fast each is to part.
-            start: (N, D) velocities at the beginning of the substep, to which energy is compared.
+            bounce: restitution targets.
+            start: (N, D) velocities at the beginning of the substep, the reference of the energy.
             velocity: (N, D), changed.
-            impulse: (K, 2) N·s to begin with, changed.
-            joined: whether joints take turns with contacts.
-            settled: whether to iterate until nothing changes.
+            impulse: (K, 2) N·s, initial impulses, changed.
+            with_joints: whether each pass also solves the joints.
+            until_converged: whether to iterate until nothing changes.
         """
-        limited = self._dissipative and contacts.size > 0
-        kicked, warm = (velocity.copy(), impulse.copy()) if limited else (velocity, impulse)
-        if settled:
-            self._settle(contacts, bounce.speed, velocity, impulse)
+        limits_energy = self._dissipative and contacts.size > 0
+        kicked, warm = (velocity.copy(), impulse.copy()) if limits_energy else (velocity, impulse)
+        if until_converged:
+            self._solve_until_converged(contacts, bounce.speed, velocity, impulse)
         else:
-            self._solve(contacts, bounce.speed, velocity, impulse, joined)
-        if limited:
-            self._limit(contacts, bounce, start, kicked, warm, velocity, impulse)
+            self._solve(contacts, bounce.speed, velocity, impulse, with_joints)
+        if limits_energy:
+            self._limit_energy(contacts, bounce, start, kicked, warm, velocity, impulse)
 
-    def _limit(
+    def _limit_energy(
         self,
         contacts: Manifolds,
         bounce: Rebound,
@@ -429,18 +460,18 @@ class ImpulseSolver:
         velocity: FloatArray,
         impulse: FloatArray,
     ) -> None:
-        """Cut the restitution of groups of bodies whose contacts would give energy.
+        """Reduce the restitution of groups of bodies whose contacts would add energy.
 
         Args:
             contacts: the contacts.
-            bounce: how fast each is to part.
+            bounce: restitution targets.
             start: (N, D) velocities at the beginning of the substep.
             kicked: (N, D) velocities before the solution by Newton's law; overwritten.
-            warm: (K, 2) N·s, the impulses that this started with; overwritten.
-            velocity: (N, D) after it, changed.
-            impulse: (K, 2) N·s after it, changed.
+            warm: (K, 2) N·s, initial impulses of that solution; overwritten.
+            velocity: (N, D) of the solution, changed.
+            impulse: (K, 2) N·s of the solution, changed.
         """
-        spin, works = self._spin, Bilinear(contacts, *self._inverse)
+        spin, works = self._spin, GroupWork(contacts, *self._inverse)
         kicks = np.zeros(contacts.size) if bounce.kick_energy is None else bounce.kick_energy
 
         def work(impulses: FloatArray, rates: FloatArray) -> FloatArray:
@@ -450,16 +481,16 @@ class ImpulseSolver:
             return np.asarray(np.bincount(works.of_contact, impulses[:, 0] * kicks, len(works.group)), np.float64)
 
         given, turnover = works.work(impulse, mean := 0.5 * (start + velocity), spin(mean))
-        gains = given - kicked_by(impulse) > ROUNDING * turnover
+        gains = given - kicked_by(impulse) > TURNOVER_ROUNDING * turnover
         if not gains.any():
             return
         free = kicked.copy()
-        self._settle(contacts, np.zeros(contacts.size), kicked, warm)
-        # The passes may end unconverged, and gravity kicks within the substep: both can give energy at s = 0 too.
-        least = largest_fractions(0.0 * given, work(warm, 0.5 * (start + free)), work(warm, 0.5 * (kicked - free)))
-        least = np.where(gains, least, 1.0)
-        warm *= least[works.of_contact][:, None]
-        kicked[:] = free + least[works.group][:, None] * (kicked - free)
+        self._solve_until_converged(contacts, np.zeros(contacts.size), kicked, warm)
+        # Unconverged passes, and gravity's kick within the substep, can add energy at s = 0 too.
+        minimum = largest_fractions(0.0 * given, work(warm, 0.5 * (start + free)), work(warm, 0.5 * (kicked - free)))
+        minimum = np.where(gains, minimum, 1.0)
+        warm *= minimum[works.of_contact][:, None]
+        kicked[:] = free + minimum[works.group][:, None] * (kicked - free)
         impulses, change = impulse - warm, velocity - kicked
         fraction = largest_fractions(
             work(warm, 0.5 * (start + kicked)) - kicked_by(warm),
@@ -474,5 +505,5 @@ class ImpulseSolver:
         velocity[cut] = (kicked + of_body * change)[cut]
 
     def _spin(self, velocity: FloatArray) -> FloatArray:
-        """Return the spins (N,) among rates (N, D): zeros where nothing turns."""
+        """Return the spins (N,) of rates (N, D); zeros if nothing turns."""
         return (velocity if velocity.shape[1] == 3 else self._no_spin)[:, 2]

@@ -18,8 +18,8 @@ from sandbox.engines.common.geometry import nearest_fraction
 from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.tabletop.collisions import ELASTIC, STILL, Five, collide_balls, collide_cushion, collide_pucks
 from sandbox.engines.tabletop.motion import TabletopBalls, advance_ball, motion_of, set_motion, state_at
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Post, Wall
-from sandbox.scene.scene import Scene
 
 
 class Cushions(NamedTuple):
@@ -45,9 +45,6 @@ def cushions_of(scene: Scene, surface: IntArray) -> Cushions:
     return Cushions(fixtures.planes, fixtures.segments, first, np.asarray(height, dtype=np.float64), surface)
 
 
-_nearest_fraction = kernel(nearest_fraction)
-
-
 @kernel
 def distance_to_collider(
     cushions: Cushions, k: int, x: float, y: float, vx: float, vy: float
@@ -69,7 +66,7 @@ def distance_to_collider(
     for j in range(cushions.first[k], cushions.first[k + 1]):
         segment = cushions.segments[j]
         ax, ay, bx, by, half = segment[0], segment[1], segment[2], segment[3], segment[4]
-        fraction = _nearest_fraction(ax, ay, bx, by, x, y)
+        fraction = nearest_fraction(ax, ay, bx, by, x, y)
         dx, dy = ax + fraction * (bx - ax) - x, ay + fraction * (by - ay) - y
         distance = math.sqrt(dx * dx + dy * dy)
         if distance - half < best:

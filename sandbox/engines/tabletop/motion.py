@@ -31,6 +31,7 @@ import math
 from typing import NamedTuple
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.engines.common.geometry import rotate
 from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.tabletop.collisions import Five
 from sandbox.scene.description.surface import Floor
@@ -161,7 +162,8 @@ def curled(vx: float, vy: float, slowing: float, curl: float, time: float) -> tu
         x, y = far * (along * vx - left * vy), far * (along * vy + left * vx)
     turn = -curl * math.log1p(-lost)
     cos, sin, fraction = math.cos(turn), math.sin(turn), 1.0 - lost
-    return x, y, fraction * (cos * vx - sin * vy), fraction * (cos * vy + sin * vx)
+    vx, vy = rotate(cos, sin, vx, vy)
+    return x, y, fraction * vx, fraction * vy
 
 
 @kernel

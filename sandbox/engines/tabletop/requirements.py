@@ -8,8 +8,8 @@ from sandbox.arrays import FloatArray, IntArray
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.demands import SURFACES, demands
 from sandbox.scene.compile.demands import on_floor as has_floor
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
-from sandbox.scene.scene import Scene
 
 
 def unsupported_on_surface(start: Scene | Setup, bodies: Bodies | None = None) -> Iterator[str]:

@@ -36,8 +36,8 @@ from sandbox.engines.tabletop.motion import TabletopBalls, advance_all, figures_
 from sandbox.resource_limits import PAIRS
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
-from sandbox.scene.scene import Scene
 
 EXTRA_PAIRS = 100
 """Number of pairs beyond twice the initial ones that collisions may bring into contact within a substep; further pairs
@@ -66,10 +66,11 @@ class BallArrays(NamedTuple):
 class PairFinder(Protocol):
     """Collision detection between balls, and of balls with cushions."""
 
-    def find_pairs(self, velocity: FloatArray, time: float) -> IntArray:
-        """Move all balls by a substep with mean velocities (N, 2), m/s, from a time, s; return pairs (K, 2) in contact.
+    def find_pairs(self, velocity: FloatArray) -> IntArray:
+        """Return the pairs (K, 2) in contact after a substep with mean velocities (N, 2), m/s.
 
-        A cushion has a negative index. Pairs may repeat, and come in any order.
+        The arrays of the stepper have the positions after the substep already. Static collider k has the index −1 − k.
+        Pairs may repeat, come in any order, and include pairs that do not touch.
         """
 
     def set_position(self, index: int, position: FloatArray) -> None:
@@ -110,7 +111,7 @@ class TabletopStepper:
         self._cushions: Cushions = cushions_of(scene, surfaces.of_fixed)
         self._surface: IntArray = surfaces.of_body
 
-    def set_arrays(self, state: BallArrays, bodies: Bodies, present: BoolArray) -> None:
+    def rebuild_arrays(self, state: BallArrays, bodies: Bodies, present: BoolArray) -> None:
         """Use these arrays from now on. Pockets of bodies that were there before are kept."""
         index = len(bodies)
         pocket = np.full(index, -1, np.int64)
@@ -155,7 +156,6 @@ class TabletopStepper:
         self,
         finder: PairFinder,
         forces: Iterable[tuple[int, tuple[FloatArray, float]]],
-        time: float,
         fraction: float = 1.0,
     ) -> None:
         """Advance by a substep or, for the last, by a fraction of one.
@@ -163,7 +163,6 @@ class TabletopStepper:
         Args:
             finder: collision detector.
             forces: constant force (2,), N, and torque, N·m, by ball index.
-            time: start of the substep, s.
             fraction: fraction of a substep.
 
         Raises:
@@ -174,7 +173,7 @@ class TabletopStepper:
         before = self._energy()
         advance_all(balls, h, self._displacement)
         self._attribute(Cause.FRICTION, before)
-        pairs, count = _distinct_pairs(finder.find_pairs(self._displacement / self._h, time), balls.in_play)
+        pairs, count = _distinct_pairs(finder.find_pairs(self._displacement / self._h), balls.in_play)
         rows, work = np.zeros((len(pairs), WIDTH)), np.zeros(3)
         if count:
             found = count
@@ -187,8 +186,8 @@ class TabletopStepper:
             for index in np.flatnonzero(balls.moved).tolist():
                 finder.set_position(index, balls.position[index])
             if self.account is not None:
-                self.account.touch(*work[:2].tolist())
-                self.account.add(Cause.FRICTION, float(work[2]))  # may be positive: undone friction
+                self.account.add_contacts(*work[:2].tolist())
+                self.account.add_unchecked(Cause.FRICTION, float(work[2]))  # may be positive: undone friction
         self.touching = _touching(pairs[:count], rows[:count])
 
     def _apply_forces(self, forces: Iterable[tuple[int, tuple[FloatArray, float]]], h: float) -> None:
@@ -248,7 +247,7 @@ class TabletopStepper:
 
     def _attribute(self, cause: Cause, before: float) -> None:
         if self.account is not None:
-            self.account.enter(cause, self._energy() - before)
+            self.account.add(cause, self._energy() - before)
 
 
 def _distinct_pairs(pairs: IntArray, in_play: BoolArray) -> tuple[IntArray, int]:

@@ -1,6 +1,6 @@
 """Artillery: tanks take turns to fire shells over terrain that explosions deform."""
 
-from sandbox.games.spec import Environment, GameSpec
+from sandbox.game_spec import Environment, GameSpec
 
 GAME = GameSpec(
     names=("artillery",),

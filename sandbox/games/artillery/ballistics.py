@@ -125,7 +125,7 @@ class Flight:
         return np.array([knot[:2] for knot in self._knots[first : first + count]])
 
 
-class Landing(NamedTuple):
+class ShellImpact(NamedTuple):
     """Impact of a shell."""
 
     time: float
@@ -144,7 +144,7 @@ def landing(
     ground: Ground,
     edges: Edges = "open",
     discs: FloatArray = NO_DISCS,
-) -> Landing | None:
+) -> ShellImpact | None:
     """Return the impact of a shell on the terrain or on a disc; None if it leaves the terrain or flies too long.
 
     Args:
@@ -165,7 +165,7 @@ def landing(
         place, speed = flight.at(time)
         began += time
         if side == 0:
-            return Landing(began, (float(place[0]), float(place[1])))
+            return ShellImpact(began, (float(place[0]), float(place[1])))
         place, speed = state_past_edge(place, speed, side, ground.width, edges)
     return None
 

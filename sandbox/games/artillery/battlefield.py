@@ -17,12 +17,12 @@ from sandbox.games.artillery.scene import GROUND, Artillery, Player, columns_of
 from sandbox.games.artillery.terrain import Crater, Ground, LooseDirt
 from sandbox.games.contract import StepInfo, UnsuitableSceneError
 from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.game_tables import table_of
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 
-Kind = Literal["shell", "dirt", "cluster", "roller"]
+Ammunition = Literal["shell", "dirt", "cluster", "roller"]
 """A shell digs a crater; dirt adds a heap; a cluster splits at its highest point; a roller rolls until it rests or
 hits a tank."""
 
@@ -31,7 +31,7 @@ class Weapon(NamedTuple):
     """A kind of shell."""
 
     name: str
-    kind: Kind
+    kind: Ammunition
     radius: float
     """m, of the crater or the disc of dirt"""
     damage: float

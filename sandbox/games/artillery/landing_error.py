@@ -5,7 +5,7 @@ simulated impact is found on the cubic Hermite curve through the last two frames
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import product
 from typing import NamedTuple
 
@@ -15,13 +15,14 @@ from sandbox.arrays import FloatArray
 from sandbox.engines.contract import Refusal
 from sandbox.engines.reference.integrators import INTEGRATORS
 from sandbox.engines.registry import ENGINES, start
-from sandbox.games.artillery.ballistics import MAX_FLIGHT, NO_DISCS, Landing, landing
+from sandbox.games.artillery.ballistics import MAX_FLIGHT, NO_DISCS, ShellImpact, landing
 from sandbox.games.artillery.shells import SHELL_MASS, SHELL_RADIUS, FlightSegment
 from sandbox.games.artillery.terrain import Ground
-from sandbox.interrupt import heeded
+from sandbox.progress import Progress, ProgressCallback
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.world import Settings, World
-from sandbox.scene.scene import Scene
+from sandbox.signals import reraise_interrupt
 from sandbox.trajectory import Frame
 
 STEPS = 1 / 15, 1 / 60, 1 / 240
@@ -65,7 +66,7 @@ class LandingErrorTable(NamedTuple):
 
 
 def landing_error_table(
-    world: World, speed: float, angle: float, dts: Sequence[float] = STEPS, told: Callable[[str], None] | None = None
+    world: World, speed: float, angle: float, dts: Sequence[float] = STEPS, on_progress: ProgressCallback | None = None
 ) -> LandingErrorTable:
     """Simulate a shot over level ground on every engine, with every integrator and time step, and return the errors.
 
@@ -76,22 +77,22 @@ def landing_error_table(
         speed: m/s.
         angle: rad, anticlockwise from the right.
         dts: time steps, s.
-        told: progress callback; its argument describes the present simulation.
+        on_progress: progress callback; its message describes the present simulation.
 
     Raises:
         ValueError: the shot does not land within the limits of time and range.
     """
     velocity = speed * np.array([math.cos(angle), math.sin(angle)])
     world = World(**{key: getattr(world, key) for key in ("gravity", "linear_drag", "quadratic_drag", "wind")})
-    true = _exact(world, velocity)
+    true = exact_landing(world, velocity)
     rows: list[LandingError] = []
     refused: dict[tuple[str, str | None], str] = {}
     interrupted = False
     for (engine, integrator), dt in product(_ways(), dict.fromkeys(dts)):
         if (engine, integrator) in refused:
             continue
-        if told is not None:
-            told(f"{engine}{f', {integrator}' if integrator else ''}, dt {dt:g} s")
+        if on_progress is not None:
+            on_progress(Progress(f"{engine}{f', {integrator}' if integrator else ''}, dt {dt:g} s"))
         settings = Settings().replace(dt=dt, integrator=integrator)
         try:
             down = simulated_landing(world, velocity, engine, settings)
@@ -113,7 +114,7 @@ def _ways() -> Iterator[tuple[str, str | None]]:
             yield engine, integrator
 
 
-def _exact(world: World, velocity: FloatArray) -> Landing:
+def exact_landing(world: World, velocity: FloatArray) -> ShellImpact:
     """Return the exact impact of a shot on level ground, relative to its start.
 
     Raises:
@@ -123,7 +124,7 @@ def _exact(world: World, velocity: FloatArray) -> Landing:
     return _from(1.0 + 2.0 * abs(near.place[0]), world, velocity)  # a smaller offset has smaller rounding errors
 
 
-def _from(half: float, world: World, velocity: FloatArray) -> Landing:
+def _from(half: float, world: World, velocity: FloatArray) -> ShellImpact:
     """Return the impact relative to the start, on ground that extends by `half`, m, to either side of it.
 
     Raises:
@@ -135,8 +136,8 @@ def _from(half: float, world: World, velocity: FloatArray) -> Landing:
     return down._replace(place=(down.place[0] - half, down.place[1]))
 
 
-@heeded()
-def simulated_landing(world: World, velocity: FloatArray, engine: str, settings: Settings) -> Landing:
+@reraise_interrupt()
+def simulated_landing(world: World, velocity: FloatArray, engine: str, settings: Settings) -> ShellImpact:
     """Return the impact of a shot on level ground as an engine simulates it, on the cubic through the last two frames.
 
     Raises:
@@ -161,7 +162,7 @@ def simulated_landing(world: World, velocity: FloatArray, engine: str, settings:
     step = FlightSegment(_state(before, half), _state(now, half), now.time - before.time)
     found = step.meets(Ground(np.zeros(2), 2.0 * half), NO_DISCS, 1.0)
     share = 1.0 if found is None else found[0]
-    return Landing(before.time + share * (now.time - before.time), (float(step.at(share)[0]) - half, 0.0))
+    return ShellImpact(before.time + share * (now.time - before.time), (float(step.at(share)[0]) - half, 0.0))
 
 
 def _state(frame: Frame, aside: float) -> tuple[FloatArray, FloatArray]:

@@ -1,8 +1,8 @@
 """Rules of artillery: players take turns to aim and fire, until one tank is left.
 
-A turn has the phases of `Phase`: aiming, flight of the shells, and settling of terrain and tanks. A key tap changes the
-gun by one small step; a held key moves it continuously, and faster after `LATER`. A bot plans its shot during the
-aiming phase, moves the gun to it at a fixed rate, and fires.
+A turn has the phases of `TurnPhase`: aiming, flight of the shells, and settling of terrain and tanks. A key tap
+changes the gun by one small step; a held key moves it continuously, and faster after `LATER`. A bot plans its shot
+during the aiming phase, moves the gun to it at a fixed rate, and fires.
 
 Angles are in rad, anticlockwise from the right; power is a fraction of full speed.
 """
@@ -29,7 +29,7 @@ from sandbox.games.artillery.view_state import (
 )
 from sandbox.games.contract import Control, StepInfo
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.scene import Scene
+from sandbox.scene.compile.scene import Scene
 
 CONTROLS = (
     Control("left", "turn the barrel left", ("left",), pad="left -leftx"),
@@ -125,7 +125,7 @@ MAX_TRACER_TIME = 10.0
 TIME_ROUNDING = 1e-9
 """s, rounding error of the times of steps"""
 
-Phase = Literal["begin", "aim", "fly", "settle"]
+TurnPhase = Literal["begin", "aim", "fly", "settle"]
 """Phases of a turn: the next player is chosen; the player aims; shells fly; terrain and tanks come to rest."""
 
 
@@ -145,7 +145,7 @@ class ArtilleryRules:
         """world with the wind of the present turn"""
         self.turn = 0
         """number of the turn, from 1, counted over all players"""
-        self.phase: Phase = "begin"
+        self.phase: TurnPhase = "begin"
         self._gunner = GunControls()
         self._time, self._previous_time, self._since, self._number = 0.0, 0.0, 0.0, 0
         self._thought: BotPlanner | None = None  # of a bot whose turn it is

@@ -12,21 +12,20 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Colour, Friction, HasMaterial, Mass, Name, Part, Point
 from sandbox.scene.description.bodies import Box
 from sandbox.scene.description.fixed import Wall
 from sandbox.scene.description.game_tables import table_of
 from sandbox.scene.errors import Location
-from sandbox.scene.files.merge import stated
-from sandbox.scene.files.presets import Preset
-from sandbox.scene.scene import Scene
+from sandbox.scene.files.presets import Preset, stated
 
 if TYPE_CHECKING:
     import numpy as np
 
 MAX_COLUMNS = 5_000
 
-Level = Annotated[float, Field(ge=0, le=1e6)]
+TerrainHeight = Annotated[float, Field(ge=0, le=1e6)]
 """Height above the base of the terrain, m."""
 
 Edges = Literal["open", "rubber", "wrap"]
@@ -43,14 +42,14 @@ class Terrain(HasMaterial):
     """m"""
     columns: Annotated[int, Field(ge=2, le=MAX_COLUMNS)] = 300
     """number of columns of the ground"""
-    base: Level = 10.0
+    base: TerrainHeight = 10.0
     """height of the lowest column, m"""
-    height: Level = 40.0
+    height: TerrainHeight = 40.0
     """height of the highest column above the lowest, m"""
     roughness: Annotated[float, Field(ge=0, le=1)] = 0.3
     """0 for smooth hills to 1 for jagged ones: each octave has 2^(roughness − 1) times the amplitude of the one
     before"""
-    heights: Annotated[tuple[Level, ...], Field(min_length=2, max_length=MAX_COLUMNS)] | None = None
+    heights: Annotated[tuple[TerrainHeight, ...], Field(min_length=2, max_length=MAX_COLUMNS)] | None = None
     """height of each column, m; replaces columns, base, height and roughness"""
     laid: Annotated[int, Field(ge=0, lt=2**63)] | None = None
     """seed from which the wall `terrain` was generated, in expanded scenes only; setting another seed generates new

@@ -18,7 +18,14 @@ import numpy as np
 from sandbox.action import Action, Move, Remove, Spawn
 from sandbox.arrays import FloatArray
 from sandbox.formatting import format_si
-from sandbox.games.artillery.ballistics import Landing, bracketed_root, crossing, first_strike, landing, state_past_edge
+from sandbox.games.artillery.ballistics import (
+    ShellImpact,
+    bracketed_root,
+    crossing,
+    first_strike,
+    landing,
+    state_past_edge,
+)
 from sandbox.games.artillery.battlefield import FRAGMENTS, LIFT, SPREAD, Battlefield, Tank, Weapon
 from sandbox.games.artillery.scene import Edges
 from sandbox.games.artillery.terrain import Ground
@@ -48,7 +55,7 @@ class Shell:
     """index of its body; None until the body has been spawned"""
     fired: float = 0.0
     """s, time of the shot"""
-    exact: Landing | None = None
+    exact: ShellImpact | None = None
     """impact of the exact trajectory; None without one"""
     disturbed: bool = False
     """whether air or gravity changed during the flight"""

@@ -21,9 +21,9 @@ from sandbox.games.artillery.view_state import (
     FallingDirt,
     GunView,
 )
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Wall
 from sandbox.scene.description.game_tables import table_of
-from sandbox.scene.scene import Scene
 from sandbox.window.camera import Camera
 from sandbox.window.render.draw_context import DrawContext
 from sandbox.window.render.lines import SDL_COORDINATE_LIMIT, Pixel, draw_arrow, draw_dashes, draw_line, fill_polygon
@@ -36,8 +36,8 @@ from sandbox.window.render.palette import (
     SKY,
     WARNING,
     YELLOW,
-    Colour,
     ColourArray,
+    RgbColour,
     hex_colour,
     mix_colours,
 )
@@ -45,14 +45,14 @@ from sandbox.window.render.static_geometry import draw_static_bodies
 from sandbox.window.render.text import draw_text
 
 
-def draw_dot(surface: pygame.Surface, at: Pixel, radius: float, colour: Colour, line: float = 0.0) -> None:
+def draw_dot(surface: pygame.Surface, at: Pixel, radius: float, colour: RgbColour, line: float = 0.0) -> None:
     """Draw a disc or, with a line width in px, a ring."""
     if abs(at[0]) < SDL_COORDINATE_LIMIT and abs(at[1]) < SDL_COORDINATE_LIMIT and radius < SDL_COORDINATE_LIMIT:
         width = max(round(line), 1) if line else 0
         pygame.draw.circle(surface, colour, (round(at[0]), round(at[1])), max(round(radius), 1), width)
 
 
-def draw_glow(surface: pygame.Surface, at: Pixel, radius: float, colour: Colour, opacity: int) -> None:
+def draw_glow(surface: pygame.Surface, at: Pixel, radius: float, colour: RgbColour, opacity: int) -> None:
     """Draw a translucent disc; `opacity` is 0 to 255."""
     if not (
         abs(at[0]) < SDL_COORDINATE_LIMIT and abs(at[1]) < SDL_COORDINATE_LIMIT and radius < 0.2 * SDL_COORDINATE_LIMIT
@@ -74,7 +74,7 @@ AIM_REACH = 26.0
 """m, length of the row of dots that shows the power, from the muzzle"""
 
 
-def draw_tanks(view: DrawContext, gunnery: ArtilleryViewState, tints: dict[int, Colour]) -> None:
+def draw_tanks(view: DrawContext, gunnery: ArtilleryViewState, tints: dict[int, RgbColour]) -> None:
     """Draw all visible tanks; `tints` are their colours by body index."""
     frame = view.snapshot.frame
     for gun in gunnery.guns:
@@ -95,7 +95,7 @@ def draw_tanks(view: DrawContext, gunnery: ArtilleryViewState, tints: dict[int, 
 class _Tank:
     """Draws one tank, centred on a pixel."""
 
-    def __init__(self, view: DrawContext, at: Pixel, size: Pixel, turn: float, tint: Colour) -> None:
+    def __init__(self, view: DrawContext, at: Pixel, size: Pixel, turn: float, tint: RgbColour) -> None:
         self._view, self._at, self._size, self._tint = view, at, size, tint
         self._cos, self._sin = math.cos(turn), math.sin(turn)
 
@@ -168,7 +168,7 @@ def _setting(view: DrawContext, gunnery: ArtilleryViewState, gun: GunView, at: P
     )
 
 
-def _label(view: DrawContext, gun: GunView, at: Pixel, tint: Colour) -> None:
+def _label(view: DrawContext, gun: GunView, at: Pixel, tint: RgbColour) -> None:
     """Draw the name of a player, and a health bar below it."""
     wide, high = 44.0 * view.ui_scale, 4.0 * view.ui_scale
     box = pygame.Rect(round(at[0] - 0.5 * wide), round(at[1] - high), round(wide), round(high))
@@ -184,7 +184,7 @@ def _label(view: DrawContext, gun: GunView, at: Pixel, tint: Colour) -> None:
     draw_text(view.surface, gun.name, (at[0], box.top - 2 * view.ui_scale), size, name, "midbottom", bold=True)
 
 
-SKY_TONES: tuple[tuple[float, Colour], ...] = (
+SKY_TONES: tuple[tuple[float, RgbColour], ...] = (
     (0.0, (13, 17, 34)),
     (0.30, (34, 42, 80)),
     (0.48, (92, 80, 120)),
@@ -193,12 +193,12 @@ SKY_TONES: tuple[tuple[float, Colour], ...] = (
     (1.0, (240, 186, 140)),
 )
 """Colours by the fraction of the height of the picture, from the top."""
-RIDGES: tuple[tuple[float, float, Colour], ...] = (
+RIDGES: tuple[tuple[float, float, RgbColour], ...] = (
     (0.56, 0.22, (84, 74, 112)),
     (0.72, 0.18, (58, 56, 92)),
 )
 """Mean level and vertical extent, in heights of the picture from the top, and colour of each ridge; nearest last."""
-MIST: Colour = (176, 128, 122)
+MIST: RgbColour = (176, 128, 122)
 STARS = 140
 
 
@@ -223,7 +223,7 @@ def sky_image(size: tuple[int, int]) -> pygame.Surface:
     return whole
 
 
-def sky_tone(share: float) -> Colour:
+def sky_tone(share: float) -> RgbColour:
     """Return the colour of the sky at a fraction of the height of the picture, from the top."""
     for (above, first), (below, second) in pairwise(SKY_TONES):
         if share <= below:
@@ -231,7 +231,7 @@ def sky_tone(share: float) -> Colour:
     return SKY_TONES[-1][1]
 
 
-def _ridge(surface: pygame.Surface, tops: FloatArray, colour: Colour) -> None:
+def _ridge(surface: pygame.Surface, tops: FloatArray, colour: RgbColour) -> None:
     """Draw a ridge that fades into mist downwards, by pixel columns with tops in px."""
     height = surface.get_height()
     strip = pygame.Surface((1, height), 0, surface)
@@ -241,16 +241,16 @@ def _ridge(surface: pygame.Surface, tops: FloatArray, colour: Colour) -> None:
     pygame.draw.aalines(surface, mix_colours(colour, MIST, 0.3), False, list(enumerate(tops.tolist())))
 
 
-SOIL: Colour = (122, 92, 62)
-GRASS: Colour = (150, 190, 96)
-DEEP: Colour = (24, 21, 27)
+SOIL: RgbColour = (122, 92, 62)
+GRASS: RgbColour = (150, 190, 96)
+DEEP: RgbColour = (24, 21, 27)
 DARKENS = 16.0
 """m, depth at which the colour is halfway from `SOIL` to `DEEP`"""
 BAND = 3.2
 """m, thickness of the alternating layers"""
 
 
-def soil_of(scene: Scene) -> Colour:
+def soil_of(scene: Scene) -> RgbColour:
     """Return the colour of the terrain near its surface."""
     wall = next((wall for wall in scene.walls if wall.name == GROUND), None)
     return SOIL if wall is None or wall.colour is None else hex_colour(wall.colour)
@@ -267,7 +267,7 @@ def draw_land(surface: pygame.Surface, camera: Camera, scene: Scene, unit: float
     draw_static_bodies(surface, camera, scene.model_copy(update={"walls": others}), unit, antialias)
 
 
-def _ground(surface: pygame.Surface, camera: Camera, wall: Wall, soil: Colour, unit: float, antialias: bool) -> None:
+def _ground(surface: pygame.Surface, camera: Camera, wall: Wall, soil: RgbColour, unit: float, antialias: bool) -> None:
     """Fill the area below a wall by pixel columns, each copied from one strip, and draw its edge."""
     places = camera.to_screen(np.asarray(wall.points))
     width, height = surface.get_size()
@@ -295,7 +295,7 @@ def _ground(surface: pygame.Surface, camera: Camera, wall: Wall, soil: Colour, u
             )
 
 
-def terrain_strip(soil: Colour, scale: float, height: int, like: pygame.Surface) -> pygame.Surface:
+def terrain_strip(soil: RgbColour, scale: float, height: int, like: pygame.Surface) -> pygame.Surface:
     """Return a pixel column of the terrain, from its surface down, two pictures high; `scale` is in px/m."""
     strip = pygame.Surface((1, max(2 * height, 1)), 0, like)
     for y in range(strip.get_height()):
@@ -321,8 +321,8 @@ def _sides(surface: pygame.Surface, camera: Camera, scene: Scene, wall: Wall, un
             draw_dashes(surface, [((px, foot), (px, -1.0))], FAINT, 9.0 * unit, antialias)
 
 
-SMOKE: Colour = (214, 206, 200)
-FLAME: tuple[Colour, ...] = ((255, 250, 222), (255, 204, 92), (238, 116, 48), (96, 62, 58))
+SMOKE: RgbColour = (214, 206, 200)
+FLAME: tuple[RgbColour, ...] = ((255, 250, 222), (255, 204, 92), (238, 116, 48), (96, 62, 58))
 """Colours of an explosion, from its start to its end."""
 OFF_SCREEN_MARGIN = 1e4
 """px, bound to which positions are clipped; far beyond every picture"""
@@ -472,6 +472,6 @@ class ArtilleryView:
             _wind(ctx, ctx.snapshot.game.wind)
 
 
-def _rgb(colour: ColourArray) -> Colour:
+def _rgb(colour: ColourArray) -> RgbColour:
     red, green, blue = colour.tolist()
     return red, green, blue

@@ -129,7 +129,7 @@ class BilliardsBot:
         found = []
         for stroke in strokes:
             made = trial.outcome(stroke)
-            found.append((trial.worth(made), stroke, ShotCall() if made is None else made[1]))
+            found.append((trial.value_of(made), stroke, ShotCall() if made is None else made[1]))
         return sorted(found, key=lambda each: -each[0])
 
     def _steadiest(self, trial: ShotEvaluator, ranked: list[tuple[float, Stroke, ShotCall]]) -> tuple[Stroke, ShotCall]:
@@ -138,7 +138,7 @@ class BilliardsBot:
         errors = random.standard_normal((ERROR_SAMPLES, 2)) * (self.sigma, self.speed_error)
         best, top = ranked[0], -math.inf
         for good, stroke, call in ranked:
-            tried = [trial.worth(trial.outcome(_with_error(stroke, *error), call)) for error in errors.tolist()]
+            tried = [trial.value_of(trial.outcome(_with_error(stroke, *error), call)) for error in errors.tolist()]
             mean = (good + sum(tried)) / (1 + ERROR_SAMPLES)
             if mean > top:
                 best, top = (good, stroke, call), mean

@@ -23,17 +23,17 @@ from sandbox.games.billiards.rules.base import Decision, GameError, ShotCall, pl
 from sandbox.games.billiards.table_geometry import TOUCH
 from sandbox.games.contract import Control, StepInfo, UnsuitableSceneError
 from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.surface import MISCUE, Stroke
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
 
 MIN_CUE_SPEED, MAX_CUE_SPEED = 0.05, 10.0
 """m/s: the slowest stroke, and a hard break"""
 MAX_TIP_OFFSET = 0.999 * MISCUE
 """greatest offset of the tip from the centre of the ball, in radii; just below the miscue limit"""
-REST_SPEED = 1e-9
-"""m/s and rad/s: a slower body is at rest. Far below the threshold at which engines set the velocity to zero"""
+NOT_JUDGED = "not judged: "
+"""start of the log entry of a shot that the rules could not judge"""
 MAX_JOINED_CONTACTS = 1024
 """number of steps after which the collected contacts are merged; a lasting contact has one row per step"""
 
@@ -60,10 +60,12 @@ entry k of n takes a value from k/n to (k + 1)/n; `select_value` returns the mid
 """
 
 
-def is_at_rest(frame: Frame) -> bool:
-    """Return whether no body of a frame moves or turns."""
-    rates = (frame.velocity, frame.angular_velocity, *(() if frame.roll is None else (frame.roll,)))
-    return all(float(np.abs(rate).max(initial=0.0)) <= REST_SPEED for rate in rates)
+SETTINGS = ("players", "misses", "withdraw calls")
+"""Inputs of a player at the window besides `CONTROLS`, which no policy sets.
+
+`players` (entry 0 or 1: one or two) and `misses` (1: the foul-and-a-miss rule of snooker applies) begin the frame anew,
+before its first shot. `withdraw calls` withdraws all calls for the next shot.
+"""
 
 
 def select_value(index: int, count: int) -> float:
@@ -128,6 +130,11 @@ class BilliardsRules:
         return "no winner" if state.winner is None else f"{player_name(state.winner)} wins"
 
     @property
+    def misses(self) -> bool:
+        """Whether the foul-and-a-miss rule applies, in snooker."""
+        return bool(getattr(self.match.state, "misses", False))
+
+    @property
     def waiting(self) -> bool:
         """Whether every ball is at rest and the last shot is judged, so that a player has to act next."""
         return self._is_resting and self._shot_time is None and not self.match.over
@@ -150,7 +157,7 @@ class BilliardsRules:
                 position = list(self.match.position)
                 position[self.match.layout.number[action.body]] = action.position
                 self.match = replace(self.match, position=tuple(position))
-        self._is_resting = is_at_rest(info.frame)
+        self._is_resting = info.frame.is_at_rest
         if self._shot_time is None:
             if self._is_resting:
                 self._accept_position(info.frame)
@@ -188,7 +195,7 @@ class BilliardsRules:
             try:
                 after = self.match.played(contacts, position, self.call, began)
             except GameError as error:  # an invalid call, or a pocketed ball that was moved back by hand
-                self.log.append((self._time, f"not judged: {error}"))
+                self.log.append((self._time, f"{NOT_JUDGED}{error}"))
         self._contacts, self._shot_time, self.call = [], None, ShotCall()
         return self._enter(after, position)
 
@@ -206,6 +213,8 @@ class BilliardsRules:
         """Set up the stroke, call, decide, place, or shoot. Input that the rules do not allow now is ignored."""
         if control in self._english:
             self._english[control] = min(max(value, 0.0), 1.0)
+        elif control in SETTINGS:
+            self._set(control, value)
         elif control in ("call safety", "push out"):
             self._announce(control, value > 0.0)
         elif value <= 0.0:
@@ -217,6 +226,16 @@ class BilliardsRules:
         elif self.waiting:
             return self._act(control, value)
         return ()
+
+    def _set(self, name: str, value: float) -> None:
+        match = self.match
+        if name == "withdraw calls":
+            self.call = ShotCall()
+        elif self.waiting and match.shots == 0:
+            players = 1 + (selected_index(value, 2) or 0) if name == "players" else match.state.players
+            misses = value > 0.0 if name == "misses" else self.misses
+            terms = {"misses": True} if misses and match.rules.name == "snooker" else {}
+            self.match = Match.begin(match.scene, match.rules.name, players, **terms)
 
     def _announce(self, name: str, is_on: bool) -> None:
         choices = self.match.choices
@@ -344,9 +363,22 @@ def start_game(scene: Scene, bodies: Bodies) -> BilliardsRules:  # noqa: ARG001,
         UnsuitableSceneError: the game cannot be played on this table.
     """
     try:
-        return BilliardsRules(Match.begin(scene, players=1 if scene.play.game == "free" else 2), bool(scene.shots))
+        is_free = scene.play.game in (None, "free")
+        # A shot of a scene that names no game belongs to the scene, not to the player.
+        has_shot = bool(scene.shots) and scene.play.game is not None
+        return BilliardsRules(Match.begin(scene, players=1 if is_free else 2), has_shot)
     except GameError as error:
         raise UnsuitableSceneError(str(error)) from None
+
+
+def plays(scene: Scene) -> bool:
+    """Return whether the window plays free billiards on a scene without a game: it has a surface and a ball `cue`."""
+    return scene.surface is not None and any(ball.name == "cue" for ball in scene.balls)
+
+
+def without_shots(scene: Scene) -> Scene:
+    """Return a scene without its shots, which the players of its game make instead."""
+    return scene.model_copy(update={"shots": ()}) if scene.shots else scene
 
 
 def needs_player(scene: Scene) -> str | None:

@@ -142,7 +142,7 @@ def play_frame(
     *,
     most: int = MAX_TURNS,
     time_limit: float | None = None,
-    told: Callable[[FrameTurn, Match], None] | None = None,
+    on_turn: Callable[[FrameTurn, Match], None] | None = None,
 ) -> FrameRecord:
     """Play a match to its end.
 
@@ -152,7 +152,7 @@ def play_frame(
         engine: name of the engine.
         most: maximum number of turns.
         time_limit: wall time, s, after which no further turn begins; default: no limit.
-        told: callback after every turn, with the turn and the match.
+        on_turn: callback after every turn, with the turn and the match.
 
     Returns:
         The frame. It is `unfinished` if a limit was reached, or if a shot did not come to rest, diverged, or exceeded
@@ -192,8 +192,8 @@ def play_frame(
         verdict = table.match.verdict
         outcome = ((), (), ()) if verdict is None else (verdict.fouls, verdict.points, verdict.messages)
         turns.append(FrameTurn(number, decision, plan, *outcome))
-        if told is not None:
-            told(turns[-1], table.match)
+        if on_turn is not None:
+            on_turn(turns[-1], table.match)
     recording = table.recording()
     table.close()
     return FrameRecord(first, table.match, tuple(turns), recording, unfinished)
@@ -246,10 +246,8 @@ class FrameTable:
             self._press(control)
         acts.append(match.strike(plan.stroke, time))
         # Applied only now, because an action is recorded with the step that follows it.
-        for action in (*self._pending, *acts):
-            self._simulation.apply(action)
-        self._actions += [*self._pending, *acts]
-        self._pending = []
+        self._pending += acts
+        self._apply_pending()
         self._game.note_actions(acts)
         limit = time + MAX_SHOT_TIME
         while True:
@@ -261,15 +259,29 @@ class FrameTable:
                 raise NoRestError(f"a shot does not come to rest within {MAX_SHOT_TIME:g} s")
 
     def recording(self) -> Recording:
-        """Return the scene and the actions up to now."""
+        """Apply the actions of the rules that are due, and return the scene, and the actions and inputs up to now."""
         scene, simulation = self._scene, self._simulation
+        self._apply_pending()
         return Recording(
-            scene, self._engine, scene.solver, tuple(self._actions), simulation.time, simulation.state_hash()
+            scene=scene,
+            engine=self._engine,
+            settings=scene.solver,
+            actions=tuple(self._actions),
+            duration=simulation.time,
+            state_hash=simulation.state_hash(),
+            presses=self._game.presses,
+            score=self._rules.score,
         )
 
     def close(self) -> None:
         """Release the engine."""
         self._simulation.close()
+
+    def _apply_pending(self) -> None:
+        for action in self._pending:
+            self._simulation.apply(action)
+        self._actions += self._pending
+        self._pending = []
 
     def _press(self, control: tuple[str, float]) -> None:
         self._pending += self._game.press(self._simulation.time, *control)

@@ -22,21 +22,21 @@ from sandbox.games.billiards.referee import (
     touching_pairs,
 )
 from sandbox.games.billiards.rules.base import (
+    BallEvent,
     Decision,
     GameError,
     Ruleset,
     RulesState,
+    Ruling,
     ShotCall,
     ShotChoices,
-    ShotEvent,
-    ShotResult,
     Situation,
 )
 from sandbox.games.billiards.rules.registry import ruleset_named
 from sandbox.games.billiards.table_geometry import TOUCH, PlacedDisc, TableGeometry
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.surface import Stroke
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts
 
 SPOTS = {"8-ball": ("head", "foot"), "9-ball": ("head", "foot"), "carom": ("head", "centre", "foot")}
@@ -82,7 +82,7 @@ class Match:
     """positions before the last shot, m, which can be restored after a miss in snooker"""
     shots: int = 0
     """number of shots played"""
-    verdict: ShotResult[Any] | None = field(default=None, repr=False, compare=False)
+    verdict: Ruling[Any] | None = field(default=None, repr=False, compare=False)
     """result of the last shot or decision: fouls, points, messages"""
 
     @classmethod
@@ -188,7 +188,7 @@ class Match:
         Raises:
             GameError: the decision is not offered now.
         """
-        return self._done(self.rules.decide(self.state, decision))
+        return self._after_result(self.rules.decide(self.state, decision))
 
     def strike(self, stroke: Stroke, time: float = 0.0) -> Strike:
         """Return the action that plays a stroke at a time, s.
@@ -200,7 +200,7 @@ class Match:
             raise GameError("the frame is over")
         return Strike(time=time, ball=self.cue, **stroke.model_dump(exclude_defaults=True))
 
-    def happenings(self, contacts: Contacts, began: float = 0.0) -> tuple[ShotEvent, ...]:
+    def events(self, contacts: Contacts, began: float = 0.0) -> tuple[BallEvent, ...]:
         """Return the events of a shot from this match, by its contacts on any engine and its start time, s."""
         return shot_events(self.layout, contacts, began, self.against, self.cue)
 
@@ -218,11 +218,11 @@ class Match:
         Raises:
             GameError: the frame is over, or the call could not be made.
         """
-        happenings, stayed = self.happenings(contacts, began), self._stayed_behind(contacts, began)
-        verdict = self.rules.judge(self.state, call or ShotCall(), happenings, stayed)
+        events, remained_behind = self.events(contacts, began), self._remained_behind(contacts, began)
+        verdict = self.rules.judge(self.state, call or ShotCall(), events, remained_behind)
         rest = tuple((x, y) for x, y in position.tolist())
         after = replace(self, position=rest, before=self.position, shots=self.shots + 1)
-        return after._done(verdict)
+        return after._after_result(verdict)
 
     def moves(self, position: FloatArray, time: float = 0.0) -> tuple[Move, ...]:
         """Return the actions that move the balls to the positions of this match.
@@ -279,7 +279,7 @@ class Match:
         cue = self.cue
         return [disc for name, disc in self.on_table.items() if name != cue]
 
-    def _stayed_behind(self, contacts: Contacts, began: float) -> bool:
+    def _remained_behind(self, contacts: Contacts, began: float) -> bool:
         """Return whether a cue ball in hand behind the head string hit a ball there before it crossed the string.
 
         A ball on the head string is not behind it. A cue ball rolls nearly straight, so it can leave and return only by
@@ -309,7 +309,7 @@ class Match:
             position[self.layout.number[name]] = at
         return tuple(position)
 
-    def _done(self, verdict: ShotResult[Any]) -> Self:
+    def _after_result(self, verdict: Ruling[Any]) -> Self:
         """Return the match after a result: balls reracked, restored or respotted, and the situation settled."""
         position = self.position
         if verdict.rerack:
@@ -323,7 +323,7 @@ class Match:
         after = after._in_hand()
         if after.over:
             return replace(after, verdict=verdict)
-        settled = after.rules.settle(after.state, after._lie())
+        settled = after.rules.settle(after.state, after._situation())
         return replace(after, state=settled.state, verdict=verdict.followed_by(settled))
 
     def _in_hand(self) -> Self:
@@ -340,13 +340,13 @@ class Match:
             at = self.layout.start[self.layout.number[self.cue]]
         return replace(self, position=self._with({self.cue: self.nearest(at)}))
 
-    def _lie(self) -> Situation:
+    def _situation(self) -> Situation:
         """Return the situation of the player to shoot."""
         cue = self.cue
         others = {name: disc for name, disc in self.on_table.items() if name != cue}
-        return situation_of(self._cues(), others, self.targets, self.state.in_hand is not None)
+        return situation_of(self._cue_placements(), others, self.targets, self.state.in_hand is not None)
 
-    def _cues(self) -> Iterator[PlacedDisc]:
+    def _cue_placements(self) -> Iterator[PlacedDisc]:
         """Yield the cue ball; if it is in hand, also at points spread over the allowed area."""
         radius, place = self._cue_radius, self.state.in_hand
         yield (*self.position[self.layout.number[self.cue]], radius)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray
-from sandbox.games.billiards.rules.base import Place
+from sandbox.games.billiards.rules.base import PlacementRegion
 from sandbox.games.billiards.table_geometry import HAIR, PlacedDisc, TableGeometry
 from sandbox.scene.description.base import Point
 
@@ -22,7 +22,7 @@ GRID = 16
 
 
 def placement_refusal(
-    layout: TableGeometry, place: Place, at: Point, radius: float, others: Sequence[PlacedDisc]
+    layout: TableGeometry, place: PlacementRegion, at: Point, radius: float, others: Sequence[PlacedDisc]
 ) -> str | None:
     """Return why a ball in hand may not be placed at a point; None if it may.
 
@@ -44,7 +44,7 @@ def placement_refusal(
 
 
 def allowed(
-    layout: TableGeometry, place: Place, points: FloatArray, radius: float, others: Sequence[PlacedDisc]
+    layout: TableGeometry, place: PlacementRegion, points: FloatArray, radius: float, others: Sequence[PlacedDisc]
 ) -> BoolArray:
     """Return whether a ball may be placed at (M, 2) points, m, as (M,) booleans."""
     free = (layout.room(points) >= radius - ROUNDING) & (_apart(points, radius, others) >= -ROUNDING)
@@ -52,7 +52,7 @@ def allowed(
 
 
 def nearest(
-    layout: TableGeometry, place: Place, at: Point, radius: float, others: Sequence[PlacedDisc]
+    layout: TableGeometry, place: PlacementRegion, at: Point, radius: float, others: Sequence[PlacedDisc]
 ) -> Point | None:
     """Return the allowed place nearest to a point, to about 1 mm beside curves; None if there is no room.
 
@@ -77,7 +77,7 @@ def nearest(
     return float(best[0]), float(best[1])
 
 
-def spread(layout: TableGeometry, place: Place, radius: float, others: Sequence[PlacedDisc]) -> list[Point]:
+def spread(layout: TableGeometry, place: PlacementRegion, radius: float, others: Sequence[PlacedDisc]) -> list[Point]:
     """Return allowed places of a ball in hand, m, spread over the allowed area."""
     points = layout.places.get((place, radius))
     if points is None:
@@ -88,7 +88,7 @@ def spread(layout: TableGeometry, place: Place, radius: float, others: Sequence[
     return [(x, y) for x, y in free.tolist()]
 
 
-def _within(layout: TableGeometry, place: Place, points: FloatArray) -> BoolArray:
+def _within(layout: TableGeometry, place: PlacementRegion, points: FloatArray) -> BoolArray:
     """Return whether (M, 2) points are in the area that the rules allow, as (M,) booleans."""
     if place == "anywhere":
         return np.ones(len(points), dtype=bool)
@@ -99,7 +99,7 @@ def _within(layout: TableGeometry, place: Place, points: FloatArray) -> BoolArra
     return np.asarray(behind)
 
 
-def _into(layout: TableGeometry, place: Place, points: FloatArray, radius: float) -> FloatArray:
+def _into(layout: TableGeometry, place: PlacementRegion, points: FloatArray, radius: float) -> FloatArray:
     """Return (M, 2) points clamped to the playing area and to the area that the rules allow."""
     (x0, y0), (x1, y1) = layout.area
     inside = np.clip(points, (x0 + radius, y0 + radius), (x1 - radius, y1 - radius))
@@ -114,7 +114,7 @@ def _into(layout: TableGeometry, place: Place, points: FloatArray, radius: float
     return np.asarray(inside)
 
 
-def _bounds(layout: TableGeometry, place: Place, radius: float) -> FloatArray:
+def _bounds(layout: TableGeometry, place: PlacementRegion, radius: float) -> FloatArray:
     """Return a grid of points over the area that the rules allow, (M, 2) m."""
     (x0, y0), (x1, y1) = layout.area
     if place == "in the D" and layout.d_radius:
@@ -141,8 +141,8 @@ def _between(others: FloatArray, radius: float) -> FloatArray:
             a, b, d = ar + radius + HAIR, br + radius + HAIR, math.hypot(bx - ax, by - ay)
             if not 0.0 < d < a + b:
                 continue
-            forth = 0.5 * (a * a - b * b + d * d) / d
-            aside = math.sqrt(max(a * a - forth * forth, 0.0))
+            forward = 0.5 * (a * a - b * b + d * d) / d
+            aside = math.sqrt(max(a * a - forward * forward, 0.0))
             ux, uy = (bx - ax) / d, (by - ay) / d
-            found += [(ax + ux * forth - s * uy * aside, ay + uy * forth + s * ux * aside) for s in (1.0, -1.0)]
+            found += [(ax + ux * forward - s * uy * aside, ay + uy * forward + s * ux * aside) for s in (1.0, -1.0)]
     return np.array(found).reshape(-1, 2)

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from sandbox.games.billiards.rules.base import GameError, Respot, Ruleset, RulesState, ShotEvent, Situation
+from sandbox.games.billiards.rules.base import BallEvent, GameError, Respot, Ruleset, RulesState, Situation
 from sandbox.games.billiards.table_geometry import HAIR, TOUCH, PlacedDisc, TableGeometry
 from sandbox.scene.description.base import Point
 from sandbox.trajectory import Contacts
@@ -65,12 +65,12 @@ def _edges(cue: PlacedDisc, target: PlacedDisc) -> tuple[Point, Point]:
     dx, dy, reach = target[0] - cue[0], target[1] - cue[1], cue[2] + target[2]
     far = math.hypot(dx, dy)
     reach = min(reach, far)
-    forth = math.sqrt(far * far - reach * reach)
+    forward = math.sqrt(far * far - reach * reach)
     turn, heading = math.asin(reach / far) if far else 0.0, math.atan2(dy, dx)
     left, right = heading + turn, heading - turn
     return (
-        (cue[0] + forth * math.cos(left), cue[1] + forth * math.sin(left)),
-        (cue[0] + forth * math.cos(right), cue[1] + forth * math.sin(right)),
+        (cue[0] + forward * math.cos(left), cue[1] + forward * math.sin(left)),
+        (cue[0] + forward * math.cos(right), cue[1] + forward * math.sin(right)),
     )
 
 
@@ -79,8 +79,8 @@ def _beside(begin: Point, end: Point, point: Point) -> float:
     dx, dy = end[0] - begin[0], end[1] - begin[1]
     px, py = point[0] - begin[0], point[1] - begin[1]
     size = dx * dx + dy * dy
-    share = min(1.0, max(0.0, (px * dx + py * dy) / size)) if size else 0.0
-    return math.hypot(px - share * dx, py - share * dy)
+    fraction = min(1.0, max(0.0, (px * dx + py * dy) / size)) if size else 0.0
+    return math.hypot(px - fraction * dx, py - fraction * dy)
 
 
 def respotted_position(layout: TableGeometry, respot: Respot, radius: float, others: Sequence[PlacedDisc]) -> Point:
@@ -118,12 +118,12 @@ def _distance_to_room(spot: Point, way: Point, radius: float, others: Sequence[P
     """Return the distance from a spot to the first free point in a direction, m."""
     taken = []
     for x, y, r in others:
-        forth = (x - spot[0]) * way[0] + (y - spot[1]) * way[1]
+        forward = (x - spot[0]) * way[0] + (y - spot[1]) * way[1]
         aside = (x - spot[0]) * way[1] - (y - spot[1]) * way[0]
         reach = radius + r + HAIR
         if abs(aside) < reach:
             half = math.sqrt(reach * reach - aside * aside)
-            taken.append((forth - half, forth + half))
+            taken.append((forward - half, forward + half))
     far = 0.0
     for low, high in sorted(taken):
         if low < far < high:
@@ -141,7 +141,7 @@ def shot_events(
     began: float = 0.0,
     against: frozenset[tuple[int, int]] = frozenset(),
     cue: str | None = None,
-) -> tuple[ShotEvent, ...]:
+) -> tuple[BallEvent, ...]:
     """Return the events of a shot.
 
     Args:
@@ -162,9 +162,9 @@ def shot_events(
         if (a, b) in against and since <= SIMULTANEOUS + (0.0 if b >= 0 else moved.get(a, math.inf)):
             continue
         if b >= 0:
-            found.append(ShotEvent(since, names[a], "ball", names[b]))
+            found.append(BallEvent(since, names[a], "ball", names[b]))
         else:
-            found.append(ShotEvent(since, names[a], "cushion" if -1 - b < solid else "pocket", fixed[-1 - b]))
+            found.append(BallEvent(since, names[a], "cushion" if -1 - b < solid else "pocket", fixed[-1 - b]))
     return tuple(found)
 
 

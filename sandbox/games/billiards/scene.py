@@ -14,9 +14,10 @@ from sandbox.games.billiards.tables import (
     BallSet,
     Billiards,
     RackName,
+    TableGame,
     static_colliders,
 )
-from sandbox.games.names import TableGame
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.game_tables import table_of
@@ -24,9 +25,7 @@ from sandbox.scene.description.play import Spot
 from sandbox.scene.description.surface import Floor
 from sandbox.scene.description.world import Material, Pair
 from sandbox.scene.errors import Location
-from sandbox.scene.files.merge import added, paired, stated
-from sandbox.scene.files.presets import Preset
-from sandbox.scene.scene import Scene
+from sandbox.scene.files.presets import Preset, added, paired, stated
 
 BALL = "phenolic"
 """material of the balls"""

@@ -20,7 +20,7 @@ from sandbox.arrays import BoolArray, FloatArray
 from sandbox.engines.contract import Exhaustion
 from sandbox.engines.exact.tabletop.shots import Table
 from sandbox.games.billiards.match import Match
-from sandbox.games.billiards.rules.base import ShotCall, ShotEvent, balls_touched_by
+from sandbox.games.billiards.rules.base import BallEvent, ShotCall, balls_touched_by
 from sandbox.games.billiards.table_geometry import TableGeometry
 from sandbox.scene.description.surface import Stroke
 
@@ -94,9 +94,9 @@ def pot_options(
 
 def _blocked(begin: FloatArray, end: FloatArray, others: FloatArray, radius: float) -> bool:
     """Return whether a ball blocks the straight path of another, from `begin` to `end`."""
-    way, apart = end - begin, others - begin
-    share = np.clip(apart @ way / max(float(way @ way), 1e-18), 0.0, 1.0)
-    away = apart - share[:, None] * way
+    path, apart = end - begin, others - begin
+    fraction = np.clip(apart @ path / max(float(path @ path), 1e-18), 0.0, 1.0)
+    away = apart - fraction[:, None] * path
     near: BoolArray = np.einsum("kc,kc->k", away, away) < (2.0 * GRAZE * radius) ** 2
     return bool(near.any())
 
@@ -135,7 +135,7 @@ class ShotEvaluator:
 
         Args:
             stroke: stroke as played; no error is added.
-            call: call before the stroke; default: the call that fits the result, from `called`.
+            call: call before the stroke; default: the call that fits the result, from `fitting_call`.
         """
         match = self.match
         try:
@@ -144,10 +144,10 @@ class ShotEvaluator:
             return None
         contacts = outcome.contacts
         if call is None:
-            call = called(match, match.happenings(contacts))
+            call = fitting_call(match, match.events(contacts))
         return match.played(contacts, outcome.position, call), call
 
-    def worth(self, made: tuple[Match, ShotCall] | None) -> float:
+    def value_of(self, made: tuple[Match, ShotCall] | None) -> float:
         """Return the value of an outcome for the player: ±1.5 for a won or lost frame, −1 if it could not be computed.
 
         Other outcomes have a value of −0.7 to 0.8 by the ease of the next shot, plus the value of the points, `UNIT`.
@@ -177,9 +177,9 @@ def ease(match: Match, sigma: float) -> float:
     if not len(targets):
         return 0.0
     if not match.layout.pockets:
-        ways = np.hypot(*(others - cue).T)
+        distances = np.hypot(*(others - cue).T)
         between = float(np.hypot(*(others[0] - others[-1])))
-        return math.exp(-float(ways.min()) - between)
+        return math.exp(-float(distances.min()) - between)
     return float(straight(match, sigma).chance.max(initial=0.0))
 
 
@@ -200,7 +200,7 @@ def standing(match: Match) -> tuple[FloatArray, FloatArray, FloatArray]:
     return np.array(position[number[cue]]), np.array(targets).reshape(-1, 2), np.array(others).reshape(-1, 2)
 
 
-def called(match: Match, happenings: tuple[ShotEvent, ...]) -> ShotCall:
+def fitting_call(match: Match, events: tuple[BallEvent, ...]) -> ShotCall:
     """Return the call that fits the events of a shot: the ball that was hit first, or a required pocket."""
     choices = match.choices
     if not choices.balls:
@@ -208,10 +208,10 @@ def called(match: Match, happenings: tuple[ShotEvent, ...]) -> ShotCall:
     if choices.pocket:
         if not choices.needed:
             return ShotCall()
-        fell = {each.ball: each.other for each in happenings if each.kind == "pocket"}
+        fell = {each.ball: each.other for each in events if each.kind == "pocket"}
         last = choices.balls[0]
         return ShotCall(ball=last, pocket=fell.get(last, next(iter(match.layout.pockets))))
-    first = next((ball for each in happenings if (ball := balls_touched_by(match.cue, each)) is not None), None)
+    first = next((ball for each in events if (ball := balls_touched_by(match.cue, each)) is not None), None)
     if first in choices.balls:
         return ShotCall(ball=first)
     return ShotCall() if match.state.table and first in match.targets else ShotCall(ball=choices.balls[0])
@@ -242,7 +242,7 @@ def pot_candidates(trial: ShotEvaluator, most: int = COMBINATIONS) -> list[Strok
     order = np.argsort(-shots.chance, axis=None, kind="stable")[:most]
     on = [ball for ball in match.state.table if ball in match.targets and ball != match.cue]
     holes, found = list(match.layout.pockets), []
-    ways = list(product(SPEEDS, HEIGHTS))
+    speeds_and_heights = list(product(SPEEDS, HEIGHTS))
     for t, p in zip(*np.unravel_index(order, shots.chance.shape), strict=True):
         if shots.chance[t, p] <= 0.0:
             continue
@@ -250,12 +250,12 @@ def pot_candidates(trial: ShotEvaluator, most: int = COMBINATIONS) -> list[Strok
         ahead = math.atan2(to_ghost[1], to_ghost[0])
         reach = ASIDE * 2.0 * trial.radius / float(shots.distance[t, p])
         turns = (ahead + np.linspace(-reach, reach, 2 * THROWS + 1)).tolist()
-        strokes = [Stroke(aim=aim, speed=speed, height=height) for speed, height in ways for aim in turns]
+        strokes = [Stroke(aim=aim, speed=speed, height=height) for speed, height in speeds_and_heights for aim in turns]
         fan = trial.table.fan(strokes, match.cue)
         ball, cue = match.layout.number[on[t]], match.layout.number[match.cue]
         hole = list(match.layout.pockets).index(holes[p])
         made = (fan.pocket[:, ball] == hole) & (fan.pocket[:, cue] < 0)
-        for k in range(len(ways)):
+        for k in range(len(speeds_and_heights)):
             row = made[k * len(turns) : (k + 1) * len(turns)].tolist()
             middle = _middle(row)
             if middle is not None:

@@ -10,8 +10,8 @@ from typing import Self
 import numpy as np
 
 from sandbox.arrays import FloatArray
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point, Vector
-from sandbox.scene.scene import Scene
 
 TOUCH = 1e-6
 """m: gap up to which balls touch, for the rules; far above the rounding errors of engines"""
@@ -19,11 +19,6 @@ TOUCH = 1e-6
 HAIR = 1e-5
 """m: gap between balls that the referee places, above `TOUCH`, so that they do not touch"""
 
-RAIL = 0.115
-"""width from the nose of a cushion to the outer edge of the wood, as a fraction of the table width"""
-
-Area = tuple[Point, Point]
-"""Lower-left and upper-right corner, m."""
 PlacedDisc = tuple[float, float, float]
 """x, y and radius, m"""
 
@@ -138,21 +133,23 @@ class TableGeometry:
     @cached_property
     def segments(self) -> tuple[FloatArray, FloatArray, list[int]]:
         """Segments of the walls, (K, 4) m, their half thicknesses, (K,) m, and their fixed objects, −1 − k."""
-        rows, whose = [], []
+        rows, owner = [], []
         for k, wall in enumerate(self.scene.walls, len(self.scene.planes)):
             points = (*wall.points, wall.points[0]) if wall.closed else wall.points
             rows += [(*a, *b, 0.5 * wall.thickness) for a, b in pairwise(points)]
-            whose += [-1 - k] * (len(points) - 1)
+            owner += [-1 - k] * (len(points) - 1)
         table = np.array(rows, dtype=float).reshape(-1, 5)
-        return table[:, :4], table[:, 4], whose
+        return table[:, :4], table[:, 4], owner
 
     def from_segments(self, points: FloatArray) -> FloatArray:
         """Return the distance of (M, 2) points from the faces of the wall segments, (M, K) m."""
         ends, half, _ = self.segments
-        a, way = ends[:, :2], ends[:, 2:] - ends[:, :2]
+        a, segment = ends[:, :2], ends[:, 2:] - ends[:, :2]
         from_a = points[:, None] - a
-        share = np.einsum("mkc,kc->mk", from_a, way) / np.maximum(np.einsum("kc,kc->k", way, way), 1e-300)
-        apart = from_a - np.clip(share, 0.0, 1.0)[..., None] * way
+        fraction = np.einsum("mkc,kc->mk", from_a, segment) / np.maximum(
+            np.einsum("kc,kc->k", segment, segment), 1e-300
+        )
+        apart = from_a - np.clip(fraction, 0.0, 1.0)[..., None] * segment
         return np.asarray(np.hypot(apart[..., 0], apart[..., 1]) - half)
 
     def from_planes(self, points: FloatArray) -> FloatArray:
@@ -166,28 +163,15 @@ class TableGeometry:
         """Return the pairs of bodies and planes, walls or posts that touch; fixed objects are −1 − k."""
         points, radius = np.array(position).reshape(-1, 2), np.array(self.radius)[:, None]
         planes = [-1 - k for k in range(len(self.scene.planes))]
-        found = _those(self.from_planes(points) - radius, planes)
-        found += _those(self.from_segments(points) - radius, self.segments[2])
+        found = _touching(self.from_planes(points) - radius, planes)
+        found += _touching(self.from_segments(points) - radius, self.segments[2])
         begin = len(self.scene.planes) + len(self.scene.walls)
         for k, post in enumerate(self.scene.posts, begin):
             apart = np.hypot(*(points - post.position).T) - post.radius
-            found += _those(apart[:, None] - radius, [-1 - k])
+            found += _touching(apart[:, None] - radius, [-1 - k])
         return found
 
 
-def _those(apart: FloatArray, whose: list[int]) -> list[tuple[int, int]]:
+def _touching(apart: FloatArray, owner: list[int]) -> list[tuple[int, int]]:
     """Return the pairs that touch, from (M, K) distances between bodies and fixed objects."""
-    return [(i, whose[k]) for i, k in np.argwhere(apart <= TOUCH).tolist()]
-
-
-def table_width(area: Area) -> float:
-    """Return the shorter side of a playing area, m."""
-    (left, bottom), (right, top) = area
-    return min(right - left, top - bottom)
-
-
-def table_bounds(area: Area) -> Area:
-    """Return the bounding box of a table with its wooden rails, m."""
-    rail = RAIL * table_width(area)
-    (left, bottom), (right, top) = area
-    return (left - rail, bottom - rail), (right + rail, top + rail)
+    return [(i, owner[k]) for i, k in np.argwhere(apart <= TOUCH).tolist()]

@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
-from sandbox.games.names import TableGame
 from sandbox.scene.description.base import Friction, Mass, Name, Part, Point, Radius, Restitution, Vector
 from sandbox.scene.description.fixed import Post, Wall
 from sandbox.scene.description.surface import Pocket
@@ -29,6 +28,8 @@ from sandbox.scene.description.surface import Pocket
 if TYPE_CHECKING:
     import numpy as np
 
+TableGame = Literal["8-ball", "9-ball", "three-cushion", "straight-rail", "snooker", "free"]
+"""games that are played on a table"""
 TableName = Literal["pool-7ft", "pool-8ft", "pool-9ft", "snooker-12ft", "carom-10ft"]
 RackName = Literal["8-ball", "9-ball", "snooker", "carom", "none"]
 
@@ -89,7 +90,7 @@ class PocketOpening:
 
 
 @dataclass(frozen=True)
-class Table:
+class TableSpec:
     """Dimensions of a table: playing area between the noses, pockets, default ball set, and spots; m."""
 
     width: float
@@ -100,10 +101,10 @@ class Table:
     middle: PocketOpening | None = None
 
 
-def _pool(length: float, corner: PocketOpening, middle: PocketOpening) -> Table:
+def _pool(length: float, corner: PocketOpening, middle: PocketOpening) -> TableSpec:
     """Return a table twice as long as wide. WPA: head and foot strings are a quarter of the length from the ends."""
     width = 0.5 * length
-    return Table(width, length, "pool", _strings(width, length), corner, middle)
+    return TableSpec(width, length, "pool", _strings(width, length), corner, middle)
 
 
 def _strings(width: float, length: float) -> dict[str, Point]:
@@ -132,7 +133,7 @@ SNOOKER_CORNER = PocketOpening(0.085, 135.0, 0.036, 0.0430, 3.6 * INCH)
 SNOOKER_MIDDLE = PocketOpening(0.087, 90.0, 0.0, 0.0445, 2.5 * INCH)
 
 
-def _snooker_table() -> Table:
+def _snooker_table() -> TableSpec:
     """WPBSA 1: 3,569 × 1,778 mm; baulk line at 737 mm, D of 292 mm; black 324 mm from the top cushion."""
     width, length, baulk, d = 1.778, 3.569, 0.737, 0.292
     middle = 0.5 * width
@@ -144,18 +145,18 @@ def _snooker_table() -> Table:
         "pink": (middle, 0.75 * length),  # midway between the centre spot and the face of the top cushion
         "black": (middle, length - 0.324),
     }
-    return Table(width, length, "snooker", spots, SNOOKER_CORNER, SNOOKER_MIDDLE)
+    return TableSpec(width, length, "snooker", spots, SNOOKER_CORNER, SNOOKER_MIDDLE)
 
 
-def _carom() -> Table:
+def _carom() -> TableSpec:
     """UMB 11: 2.84 × 1.42 m. UMB 13: spots on the long axis, and two spots 182.5 mm to either side of the head spot."""
     width, length = 1.42, 2.84
     spots = _strings(width, length)
     (x, y), aside = spots["head"], 0.1825
-    return Table(width, length, "carom", {**spots, "head-left": (x - aside, y), "head-right": (x + aside, y)})
+    return TableSpec(width, length, "carom", {**spots, "head-left": (x - aside, y), "head-right": (x + aside, y)})
 
 
-TABLES: dict[TableName, Table] = {
+TABLES: dict[TableName, TableSpec] = {
     "pool-7ft": _pool(78.0 * INCH, BCA_CORNER, BCA_SIDE),  # BCA: 78 × 39 in for a full-size 7 ft table
     "pool-8ft": _pool(92.0 * INCH, WPA_CORNER, WPA_SIDE),  # WPA, playing surface: 92 × 46 in
     "pool-9ft": _pool(100.0 * INCH, WPA_CORNER, WPA_SIDE),  # WPA, playing surface: 100 × 50 in
@@ -292,7 +293,7 @@ class PocketHole:
 
 
 @dataclass(frozen=True)
-class StaticColliders:
+class TableColliders:
     """Static bodies and pockets of a table."""
 
     walls: tuple[Wall, ...]
@@ -300,7 +301,7 @@ class StaticColliders:
     pockets: tuple[Pocket, ...]
 
 
-def static_colliders(table: Table, nose: float) -> StaticColliders:
+def static_colliders(table: TableSpec, nose: float) -> TableColliders:
     """Return the cushions and pockets of a table.
 
     Args:
@@ -309,7 +310,7 @@ def static_colliders(table: Table, nose: float) -> StaticColliders:
     """
     holes = _holes(table)
     if not holes:
-        return StaticColliders(_rectangle(table, nose), (), ())
+        return TableColliders(_rectangle(table, nose), (), ())
     walls: list[Wall] = []
     for k, name in enumerate(CUSHIONS):
         here, there = holes[k], holes[(k + 1) % len(holes)]
@@ -325,10 +326,10 @@ def static_colliders(table: Table, nose: float) -> StaticColliders:
             if ends is not None:
                 walls.append(_wall(f"{hole.name} facing {number}", ends, nose))
     pockets = tuple(Pocket(name=h.name, position=_centre(h), radius=h.opening.radius) for h in holes)
-    return StaticColliders(tuple(walls), tuple(posts), pockets)
+    return TableColliders(tuple(walls), tuple(posts), pockets)
 
 
-def _holes(table: Table) -> tuple[PocketHole, ...]:
+def _holes(table: TableSpec) -> tuple[PocketHole, ...]:
     """Return the pockets of a table, anticlockwise from the lower left."""
     if table.corner is None or table.middle is None:
         return ()
@@ -344,7 +345,7 @@ def _holes(table: Table) -> tuple[PocketHole, ...]:
     )
 
 
-def _rectangle(table: Table, nose: float) -> tuple[Wall, ...]:
+def _rectangle(table: TableSpec, nose: float) -> tuple[Wall, ...]:
     w, length = table.width, table.length
     corners = ((0.0, 0.0), (w, 0.0), (w, length), (0.0, length))
     names = ("lower cushion", "right cushion", "upper cushion", "left cushion")
@@ -386,17 +387,17 @@ def _facing(hole: PocketHole, lip: PocketLip) -> tuple[Point, Point] | None:
     turn = math.radians(hole.opening.angle)
     (ax, ay), (ox, oy) = lip.along, lip.out
     cos, sin = math.cos(turn), math.sin(turn)
-    way = (ax * cos + ox * sin, ay * cos + oy * sin)
+    direction = (ax * cos + ox * sin, ay * cos + oy * sin)
     (x, y), (px, py) = _lip(hole, lip), _centre(hole)
-    toward = (px - x) * way[0] + (py - y) * way[1]
-    aside = (px - x) * way[1] - (py - y) * way[0]
+    toward = (px - x) * direction[0] + (py - y) * direction[1]
+    aside = (px - x) * direction[1] - (py - y) * direction[0]
     length = toward - math.sqrt(hole.opening.radius**2 - aside**2)
     begins = _rounded(hole.opening)
-    return (_displaced((x, y), way, begins), _displaced((x, y), way, length)) if length > begins else None
+    return (_displaced((x, y), direction, begins), _displaced((x, y), direction, length)) if length > begins else None
 
 
-def _displaced(point: Point, way: Vector, distance: float) -> Point:
-    return point[0] + way[0] * distance, point[1] + way[1] * distance
+def _displaced(point: Point, direction: Vector, distance: float) -> Point:
+    return point[0] + direction[0] * distance, point[1] + direction[1] * distance
 
 
 HAIR = 1e-10
@@ -477,12 +478,12 @@ def _lattice(
     places: dict[str, Point] = {}
     for k, row in enumerate(rows):
         for n, name in enumerate(row):
-            forth, aside = k * pitch * math.sqrt(0.75), (n - 0.5 * (len(row) - 1)) * pitch
+            forward, aside = k * pitch * math.sqrt(0.75), (n - 0.5 * (len(row) - 1)) * pitch
             far, turn = loose * math.sqrt(random.random()), 2.0 * math.pi * random.random()
-            forth, aside = forth + far * math.cos(turn), aside + far * math.sin(turn)
+            forward, aside = forward + far * math.cos(turn), aside + far * math.sin(turn)
             places[name] = (
-                begin[0] + along[0] * forth - along[1] * aside,
-                begin[1] + along[1] * forth + along[0] * aside,
+                begin[0] + along[0] * forward - along[1] * aside,
+                begin[1] + along[1] * forward + along[0] * aside,
             )
     return places
 
@@ -502,5 +503,5 @@ def _way(begin: Point, end: Point) -> Vector:
     return (end[0] - begin[0]) / size, (end[1] - begin[1]) / size
 
 
-def _shifted(point: Point, way: Vector, distance: float) -> Point:
-    return point[0] + way[0] * distance, point[1] + way[1] * distance
+def _shifted(point: Point, direction: Vector, distance: float) -> Point:
+    return point[0] + direction[0] * distance, point[1] + direction[1] * distance

@@ -1,6 +1,6 @@
 """Curling: two teams slide sixteen stones an end towards a house; bots aim by a closed-form solution."""
 
-from sandbox.games.spec import Environment, GameSpec
+from sandbox.game_spec import Environment, GameSpec
 
 GAME = GameSpec(
     names=("curling",),

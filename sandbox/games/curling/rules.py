@@ -36,9 +36,9 @@ from sandbox.games.curling.sheet import (
     stone_name,
 )
 from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.game_tables import table_of
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 
 

@@ -4,9 +4,9 @@ from typing import Annotated
 
 from pydantic import Field
 
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Part
 from sandbox.scene.description.game_tables import GameTable, table_of
-from sandbox.scene.scene import Scene
 
 
 class CurlingMatch(Part):

@@ -6,9 +6,9 @@ from sandbox.arrays import IntArray
 from sandbox.window.render.circles import SHORTEST_SPOKE, CircleRenderer, darken
 from sandbox.window.render.draw_context import DrawContext
 from sandbox.window.render.lines import draw_line
-from sandbox.window.render.palette import Colour
+from sandbox.window.render.palette import RgbColour
 
-GRANITE: Colour = (120, 124, 130)
+GRANITE: RgbColour = (120, 124, 130)
 TOP, HANDLE, GRIP = 0.66, 0.50, 0.26
 """radius of the top, and half-length and width of the handle, as fractions of the radius"""
 PALE = 0.45
@@ -36,7 +36,7 @@ def draw_stones(view: DrawContext, discs: CircleRenderer) -> None:
         discs.ring(view.surface, (x, y), float(view.radius[k]), (red, green, blue), view.style(2.5))
 
 
-def _pale(colour: list[int]) -> Colour:
+def _pale(colour: list[int]) -> RgbColour:
     red, green, blue = (round(part + (255 - part) * PALE) for part in colour)
     return red, green, blue
 

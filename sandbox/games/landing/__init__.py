@@ -1,6 +1,6 @@
 """Landing: a lunar lander with a main engine and side thrusters, gusts of wind and a limited amount of fuel."""
 
-from sandbox.games.spec import Environment, GameSpec
+from sandbox.game_spec import Environment, GameSpec
 
 GAME = GameSpec(
     names=("landing",),

@@ -18,13 +18,13 @@ import numpy as np
 from sandbox.action import Action, Move, Throttle
 from sandbox.games.contract import Control, StepInfo, UnsuitableSceneError
 from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.fixed import Plane, Post, Wall
 from sandbox.scene.description.forces import Thrust
 from sandbox.scene.description.scene import default_name
-from sandbox.scene.geometry.shapes import form_of
+from sandbox.scene.geometry.shapes import geometry_of
 from sandbox.scene.random_streams import Stream, draws
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 
 SHIP, PAD = "ship", "pad"
@@ -70,7 +70,7 @@ class Landing:
         self.game_over: str | None = None
         self._ship, self._pad = bodies.names.index(SHIP), -1 - scene.fixed_names.index(PAD)
         self._place, self._solid = _place(scene), len(scene.fixed)
-        form = form_of(bodies.elements[int(bodies.element[self._ship])])
+        form = geometry_of(bodies.elements[int(bodies.element[self._ship])])
         self._corners = [(x, y, piece.radius) for piece in form.pieces for x, y in piece.corners]
         self._tank = self._full = TANK * float(bodies.mass[self._ship])
         self._levels = dict.fromkeys(self._thrusts, 0.0)

@@ -1,10 +1,10 @@
 """Pinball: tables of devices that read switches and answer with points, sounds and actions."""
 
-from sandbox.games.spec import Environment, GameSpec
+from sandbox.game_spec import Environment, GameSpec
 
 GAME = GameSpec(
     names=("pinball",),
-    rules="sandbox.games.pinball.rules:Pinball",
+    rules="sandbox.games.pinball.rules:PinballRules",
     tables={"pinball": "sandbox.games.pinball.scene:PINBALL"},
     bot="sandbox.games.pinball.bot:PinballBot",
     view="sandbox.games.pinball.view:PinballView",

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from sandbox.games.contract import Rules, StepInfo, UnsuitableSceneError, checked_skill
 from sandbox.games.pinball.ball_control import SLOW
 from sandbox.games.pinball.playfield import PlayfieldElement
-from sandbox.games.pinball.rules import FLIPPERS, PLUNGER, Pinball
+from sandbox.games.pinball.rules import FLIPPERS, PLUNGER, PinballRules
 from sandbox.scene.random_streams import Stream, draws
 
 LEAD = 0.03
@@ -57,7 +57,7 @@ class PinballBot:
         Raises:
             UnsuitableSceneError: these are no rules of pinball.
         """
-        if not isinstance(rules, Pinball):
+        if not isinstance(rules, PinballRules):
             raise UnsuitableSceneError("this player only plays pinball")
         found = [(control, 0.0) for control, until in sorted(self._until.items()) if until <= info.time]
         for control, _ in found:
@@ -74,7 +74,7 @@ class PinballBot:
                 found.append((control, float(self._chance.uniform(*STRENGTH)) if plunges else 1.0))
         return found
 
-    def _flip(self, control: str, flippers: tuple[PlayfieldElement, ...], info: StepInfo, rules: Pinball) -> None:
+    def _flip(self, control: str, flippers: tuple[PlayfieldElement, ...], info: StepInfo, rules: PinballRules) -> None:
         """Decide whether to flip, once for each ball that comes within reach."""
         near = any(_reached(each, ball, info, rules) for each in flippers for ball in rules.trough.live)
         if near and not self._judged.get(control) and self._chance.random() < self.skill:
@@ -84,7 +84,7 @@ class PinballBot:
         if self._chance.random() < IDLE * (1.0 - self.skill) * rules.board.dt:
             self._due.setdefault(control, info.time)
 
-    def _plunge(self, info: StepInfo, rules: Pinball) -> None:
+    def _plunge(self, info: StepInfo, rules: PinballRules) -> None:
         position, velocity = info.frame.position, info.frame.velocity
         waits = any(
             rules.board.in_lane(*position[ball].tolist()) and math.hypot(*velocity[ball].tolist()) < SLOW
@@ -94,7 +94,7 @@ class PinballBot:
             self._due.setdefault(PLUNGER, info.time)
 
 
-def _reached(flipper: PlayfieldElement, ball: int, info: StepInfo, rules: Pinball) -> bool:
+def _reached(flipper: PlayfieldElement, ball: int, info: StepInfo, rules: PinballRules) -> bool:
     """Tell whether a ball will be where a flipper can strike it, by the time that it is up."""
     (x, y), (vx, vy) = info.frame.position[ball].tolist(), info.frame.velocity[ball].tolist()
     up = rules.board.up

@@ -10,9 +10,9 @@ from sandbox.games.pinball.elements import (
     LEAST_DEPTH,
     Art,
     Bumper,
-    Corner,
     Drain,
     DropTargets,
+    FilletCorner,
     Flipper,
     Gate,
     Kicker,
@@ -32,7 +32,7 @@ from sandbox.scene.description.base import GROUND, Point, Vector
 from sandbox.scene.description.bodies import Polygon
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import Post, Wall, Zone
-from sandbox.scene.description.forces import Drive, PlungerDrive, StrokeDrive, TorqueDrive
+from sandbox.scene.description.forces import AnyDrive, PlungerDrive, StrokeDrive, TorqueDrive
 from sandbox.scene.description.play import Marking, PlayPart, Role
 from sandbox.scene.description.world import Kick, Material, Pair
 from sandbox.scene.errors import Location
@@ -61,12 +61,12 @@ class Building:
     zones: list[Zone] = field(default_factory=list)
     balls: list[Ball] = field(default_factory=list)
     polygons: list[Polygon] = field(default_factory=list)
-    drives: list[Drive] = field(default_factory=list)
+    drives: list[AnyDrive] = field(default_factory=list)
     parts: list[PlayPart] = field(default_factory=list)
     markings: list[Marking] = field(default_factory=list)
     origins: dict[str, Location] = field(default_factory=dict)
 
-    def line(self, corners: Sequence[Corner], closed: bool = False) -> tuple[Point, ...]:
+    def line(self, corners: Sequence[FilletCorner], closed: bool = False) -> tuple[Point, ...]:
         """Return a line with its round corners flattened."""
         return rounded(corners, closed, self.tolerance)
 

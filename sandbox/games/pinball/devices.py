@@ -220,7 +220,7 @@ MIN_SPIN_SPEED = 4.0
 """rad/s: a slower plate does not get over the top again"""
 
 
-class Spinner(Device):
+class SpinnerDevice(Device):
     """A plate with its angle and speed.
 
     A ball that passes with v carries the edge along: Ω = v/r, unless it turns faster already. Then Ω falls as exp(−kt)

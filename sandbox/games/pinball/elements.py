@@ -21,17 +21,17 @@ from sandbox.scene.description.base import (
     Wording,
 )
 from sandbox.scene.description.fixed import Layers
-from sandbox.scene.description.world import LEAST_THRESHOLD
+from sandbox.scene.description.world import MIN_THRESHOLD
 
-Length = Annotated[float, Field(gt=0, le=1e3)]
+ElementLength = Annotated[float, Field(gt=0, le=1e3)]
 """m"""
-Size = Annotated[float, Field(ge=0, le=1e3)]
+ElementSize = Annotated[float, Field(ge=0, le=1e3)]
 """m"""
 Points = Annotated[int, Field(ge=0, le=10**12)]
 """of a score"""
-Corner = Annotated[tuple[Coordinate, ...], Field(min_length=2, max_length=3)]
+FilletCorner = Annotated[tuple[Coordinate, ...], Field(min_length=2, max_length=3)]
 """x and y, m; and, of a corner that is round, the radius of the arc that rounds it, m"""
-Corners = Annotated[tuple[Corner, ...], Field(min_length=2, max_length=1000)]
+FilletCorners = Annotated[tuple[FilletCorner, ...], Field(min_length=2, max_length=1000)]
 
 
 class Element(Part):
@@ -61,9 +61,9 @@ class Scoring(Element):
 class Line(Element):
     """A line of straight pieces and arcs, such as `[[0.0, 0.1], [0.0, 1.0, 0.2], [0.5, 1.0]]`, one corner rounded."""
 
-    points: Corners
+    points: FilletCorners
     """corners, m; a third number rounds a corner with an arc of that radius, m"""
-    thickness: Size
+    thickness: ElementSize
     """full thickness, m"""
     closed: bool = False
     """Connect the last point to the first."""
@@ -76,14 +76,14 @@ class Line(Element):
 MaterialName = Literal["wall", "rubber", "post", "target"]
 Speed = Annotated[float, Field(ge=0, le=1e3)]
 """m/s"""
-Threshold = Annotated[float, Field(ge=LEAST_THRESHOLD, le=1e3)]
+Threshold = Annotated[float, Field(ge=MIN_THRESHOLD, le=1e3)]
 """m/s"""
 
 
 class PinballWall(Line):
     """Wood, plastic or wire."""
 
-    thickness: Size = 0.006
+    thickness: ElementSize = 0.006
     """full thickness, m"""
     material: MaterialName = "wall"
     """name of the material"""
@@ -92,7 +92,7 @@ class PinballWall(Line):
 class Rubber(Line):
     """A rubber band around posts at its corners."""
 
-    thickness: Size = 0.008
+    thickness: ElementSize = 0.008
     """thickness of the band, which is also the diameter of its posts, m"""
 
 
@@ -114,7 +114,7 @@ class Gate(Scoring):
 
     points: tuple[Point, Point]
     """ends of the wire, m"""
-    thickness: Size = 0.003
+    thickness: ElementSize = 0.003
     """thickness of the wire, m"""
 
 
@@ -139,7 +139,7 @@ class Slingshot(Scoring):
         tuple[Point, Point, Point], Wording("corners, the two ends of the kicking side and one behind it")
     ]
     """its three posts, m: the ends of the kicking side, and the one behind"""
-    thickness: Size = 0.008
+    thickness: ElementSize = 0.008
     """thickness of the rubber, m"""
     speed: Speed = 2.16
     """speed that is added to the approach in the middle, m/s"""
@@ -155,9 +155,9 @@ class Standup(Scoring):
     """centre of its face, m"""
     facing: Vector
     """direction out of its face; any length"""
-    width: Length = 0.025
+    width: ElementLength = 0.025
     """width of its face, m"""
-    thickness: Size = 0.005
+    thickness: ElementSize = 0.005
     """thickness of the target, m"""
     score: Points = 500
 
@@ -171,16 +171,16 @@ class DropTargets(Scoring):
     """direction out of the front; any length"""
     count: Annotated[int, Field(ge=1, le=20)] = 3
     """number of targets"""
-    width: Length = 0.025
+    width: ElementLength = 0.025
     """width of each target, m"""
-    gap: Size = 0.003
+    gap: ElementSize = 0.003
     """gap between two targets, m"""
-    thickness: Size = 0.005
+    thickness: ElementSize = 0.005
     """width of each target, m"""
     score: Points = 500
 
 
-Angle = Annotated[float, Field(ge=-10, le=10)]
+ElementAngle = Annotated[float, Field(ge=-10, le=10)]
 """rad"""
 
 
@@ -199,14 +199,14 @@ class Flipper(Element):
     """A bat that turns about a pivot between two stops.
 
     It is driven by a coil (default: that of Visual Pinball, 0.513 N·m after 30 ms, on a moment of inertia of m L²/3),
-    or by a stroke at given rates whatever the load: up at `rate`, down at `return_rate`.
+    or by a stroke at given rates, independent of the load: up at `rate`, down at `return_rate`.
     """
 
     pivot: Point
     """position of the pivot, m"""
-    stops: tuple[Angle, Angle] = (-0.541, 0.349)
+    stops: tuple[ElementAngle, ElementAngle] = (-0.541, 0.349)
     """directions of the bat at rest and raised, rad; default −31° and 20°, for the left one of a pair"""
-    length: Length = 0.0702
+    length: ElementLength = 0.0702
     """length from the pivot to the centre of the tip, m: 130 units of Visual Pinball"""
     base: Radius = 0.0116
     """radius at the pivot, m"""
@@ -217,7 +217,7 @@ class Flipper(Element):
     side: Literal["left", "right"] | None = None
     """button that moves it; default: the side of the table that its pivot is on"""
     drive: Literal["torque", "stroke"] = "torque"
-    """`torque`: turned by the torque of its coil; `stroke`: turned at given rates, whatever the load"""
+    """`torque`: turned by the torque of its coil; `stroke`: turned at given rates, independent of the load"""
     torque: Annotated[float, Field(gt=0, le=1e6)] = 0.513
     """N·m"""
     rate: Annotated[float, Field(gt=0, le=1e4)] = 40.0
@@ -233,9 +233,9 @@ class Plunger(Scoring):
     """centre of the tip, where the ball rests, m"""
     direction: Vector = (0.0, 1.0)
     """direction of the shot; any length"""
-    width: Length = 0.02
+    width: ElementLength = 0.02
     """width of the tip, m"""
-    travel: Length = 0.043
+    travel: ElementLength = 0.043
     """travel of a full pull, m: 80 units of Visual Pinball"""
     speed: Annotated[float, Field(gt=0, le=1e3)] = 1.03
     """speed of the ball after a full pull, m/s"""
@@ -260,7 +260,7 @@ class Spinner(Scoring):
 
     points: tuple[Point, Point]
     """ends of the axle, m"""
-    thickness: Length = LEAST_DEPTH
+    thickness: ElementLength = LEAST_DEPTH
     """thickness of the area in which a ball is detected, m"""
     score: Points = 100
 
@@ -282,7 +282,7 @@ class Drain(Scoring):
 
     points: tuple[Point, Point]
     """ends of the line, m"""
-    thickness: Length = 0.02
+    thickness: ElementLength = 0.02
     """m"""
 
 
@@ -292,17 +292,17 @@ class Ramp(Scoring):
     A ball that enters the mouth is moved to that layer; one too slow for the climb rolls back out of the mouth.
     """
 
-    points: Corners
+    points: FilletCorners
     """centre line from the mouth to the end, m; corners may be rounded as those of walls"""
-    width: Length = 0.040
+    width: ElementLength = 0.040
     """width between the rails, m"""
-    thickness: Size = 0.003
+    thickness: ElementSize = 0.003
     """thickness of the rails, m"""
     layer: Name | None = None
     """name of its layer; default: the name of the ramp"""
-    climb: Length = 0.12
+    climb: ElementLength = 0.12
     """length of the climb from the mouth, m"""
-    rise: Size = 0.04
+    rise: ElementSize = 0.04
     """height above the playfield after the climb, m"""
     floor: Colour | None = None
     """colour of the ground between the rails"""
@@ -318,7 +318,7 @@ class Art(Element):
     """centre of a disc, m"""
     radius: Radius | None = None
     """radius of a disc, m"""
-    points: Corners | None = None
+    points: FilletCorners | None = None
     """corners of an outline, m"""
 
     @model_validator(mode="after")
@@ -401,7 +401,7 @@ class Pinball(Part):
     """restitution of two balls"""
     colour: Colour | None = None
     """colour of the playfield"""
-    outline: Corners | None = None
+    outline: FilletCorners | None = None
     """outline of the painted playfield, m; corners may be rounded"""
     arts: tuple[Art, ...] = Field((), alias="art")
     walls: tuple[PinballWall, ...] = Field((), alias="wall")

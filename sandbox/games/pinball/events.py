@@ -75,7 +75,7 @@ class Hit(NamedTuple):
     """of the ball, after the step, m/s"""
 
 
-class Touch(NamedTuple):
+class OpenContact(NamedTuple):
     """An open contact."""
 
     steps: int
@@ -96,11 +96,11 @@ class Switches:
 
     def __init__(self, board: Playfield) -> None:
         self._board = board
-        self._open: dict[tuple[float, int, int], Touch] = {}
+        self._open: dict[tuple[float, int, int], OpenContact] = {}
 
     def read(self, info: StepInfo) -> list[Hit]:
         """Return the switches that closed in the last step, in the order of their first touch."""
-        now: dict[tuple[float, int, int], Touch] = {}
+        now: dict[tuple[float, int, int], OpenContact] = {}
         hits = []
         for time, (first, second), _, normal, impulse in info.contacts:
             element = self._board.switches.get(second)
@@ -108,12 +108,12 @@ class Switches:
             if element is None or mass is None:
                 continue
             key = (time, first, second)
-            touch = now.get(key) or self._open.get(key) or Touch(0, 0.0, False)
+            touch = now.get(key) or self._open.get(key) or OpenContact(0, 0.0, False)
             given = touch.impulse + (impulse[0] * normal[0] + impulse[1] * normal[1]) / mass
             closes = (
                 not touch.is_reported and touch.steps < IMPACT_STEPS and (not element.least or given > element.least)
             )
-            now[key] = Touch(touch.steps + 1, given, touch.is_reported or closes)
+            now[key] = OpenContact(touch.steps + 1, given, touch.is_reported or closes)
             if closes:
                 hits.append(Hit(time, first, element, math.hypot(*info.frame.velocity[first].tolist())))
         self._open = now

@@ -21,7 +21,7 @@ TILT_PAUSE = 3.0
 EXTRA_BALL_SCORE = 250_000
 """points that award an extra ball"""
 
-Phase = Literal["start", "play", "count", "over"]
+GamePhase = Literal["start", "play", "count", "over"]
 
 
 class GameFlow:
@@ -33,7 +33,7 @@ class GameFlow:
         """devices that are reset for each ball"""
         self.sheets = [PlayerState() for _ in range(board.players)]
         self.turn = 0
-        self.phase: Phase = "start"
+        self.phase: GamePhase = "start"
         self.until = 0.0
         """s, time at which the bonus count ends and the next ball starts"""
         self.saved = 0.0

@@ -101,7 +101,7 @@ class Multiball(Device):
         yield ServeBalls(self.size - 1)
 
 
-class Mode(NamedTuple):
+class TimedMode(NamedTuple):
     """A timed objective."""
 
     name: str
@@ -116,10 +116,10 @@ class Mode(NamedTuple):
 
 
 MODES = (
-    Mode("bumper fever", ("bumper",), 12, 30.0, 1_000, 50_000),
-    Mode("target hunt", ("standup", "drop"), 5, 30.0, 5_000, 75_000),
-    Mode("ramp rush", ("ramp",), 2, 40.0, 20_000, 100_000),
-    Mode("spinner storm", ("spinner",), 20, 30.0, 500, 60_000),
+    TimedMode("bumper fever", ("bumper",), 12, 30.0, 1_000, 50_000),
+    TimedMode("target hunt", ("standup", "drop"), 5, 30.0, 5_000, 75_000),
+    TimedMode("ramp rush", ("ramp",), 2, 40.0, 20_000, 100_000),
+    TimedMode("spinner storm", ("spinner",), 20, 30.0, 500, 60_000),
 )
 
 READYING_AWARDS = ("bank", "lanes", "standups")
@@ -137,7 +137,7 @@ class Modes(Device):
         self.modes = tuple(mode for mode in MODES if board.of_role(*mode.roles))
         self.holes = bool(board.of_role("kicker"))
         self.ready = False
-        self.mode: Mode | None = None
+        self.mode: TimedMode | None = None
         self.left = 0.0
         """s"""
         self.to_go = 0
@@ -181,7 +181,7 @@ class Modes(Device):
         yield PlaySound("mode")
         yield ShowMessage(self.mode.name)
 
-    def _count_hit(self, mode: Mode, now: StepContext) -> Iterator[Effect]:
+    def _count_hit(self, mode: TimedMode, now: StepContext) -> Iterator[Effect]:
         self.to_go -= 1
         yield Award("mode", mode.each)
         if not self.to_go:

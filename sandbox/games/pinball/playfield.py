@@ -8,11 +8,11 @@ from typing import Any, Self
 from sandbox.games.contract import UnsuitableSceneError
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import pair_table
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point, Vector
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import Plane, Post, Wall
 from sandbox.scene.description.play import PlayPart, Role
-from sandbox.scene.scene import Scene
 
 Fixed = Plane | Wall | Post
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from sandbox.action import Action, Drive
 from sandbox.games.contract import Control, StepInfo
 from sandbox.games.pinball.ball_control import BallSearch, Trough
-from sandbox.games.pinball.devices import Kickers, LaneLights, Ramps, ScoringSwitches, Spinner, lane_lights_of
+from sandbox.games.pinball.devices import Kickers, LaneLights, Ramps, ScoringSwitches, SpinnerDevice, lane_lights_of
 from sandbox.games.pinball.drop_targets import DropTargetBanks, banks_of
 from sandbox.games.pinball.events import (
     BALLS,
@@ -28,7 +28,7 @@ from sandbox.games.pinball.modes import Modes, Multiball
 from sandbox.games.pinball.playfield import Playfield
 from sandbox.games.pinball.tilt import NudgeAndTilt
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.scene import Scene
+from sandbox.scene.compile.scene import Scene
 
 LEFT, RIGHT, PLUNGER = "left flipper", "right flipper", "plunger"
 
@@ -96,10 +96,12 @@ def observation(
         yield from ((f"{target.name} down", place in gone) for place, target in enumerate(bank.members))
 
 
-Line = tuple[str, str]
+DisplayLine = tuple[str, str]
 
 
-def display_lines(sheets: Sequence[PlayerState], turn: int, modes: Modes, saved: float, message: str) -> list[Line]:
+def display_lines(
+    sheets: Sequence[PlayerState], turn: int, modes: Modes, saved: float, message: str
+) -> list[DisplayLine]:
     """Return labels and texts, the most important first, without the score, which the host shows.
 
     Args:
@@ -137,7 +139,7 @@ BLINK_PERIOD = 0.4
 """s"""
 
 
-class Pinball:
+class PinballRules:
     """A game of three balls for one to four players."""
 
     controls: tuple[Control, ...] = CONTROLS
@@ -153,7 +155,7 @@ class Pinball:
         self.banks, self.lamps = banks_of(board), lane_lights_of(board)
         self.modes, self.multiball = Modes(board), Multiball(board)
         self.devices: tuple[Device, ...] = (
-            ScoringSwitches(), *self.lamps, *self.banks, *(Spinner(each) for each in board.of_role("spinner")),
+            ScoringSwitches(), *self.lamps, *self.banks, *(SpinnerDevice(each) for each in board.of_role("spinner")),
             self.holes, Ramps(board), self.modes, self.multiball, self.nudge,
             BallSearch(board, self.holes, self.banks),
         )  # fmt: skip
@@ -268,6 +270,7 @@ class Pinball:
             self.flow.save(0.0)
             for side in sorted(self.up):
                 yield from self._set_flippers(side, False, now)
+            self._update_context(now)
         yield from self.trough.tick(now)
         yield from self.flow.update(now)
 
@@ -288,7 +291,7 @@ class Pinball:
             for lamps in self.lamps:
                 lamps.rotate(side)
         (self.up.add if up else self.up.discard)(side)
-        self._update_context(now)
+        now.up = frozenset(self.up)
         return [Drive(time=now.time, drive=each.name, level=float(up)) for each in self.board.flippers(side)]
 
     def _set_plunger(self, value: float, now: StepContext) -> Iterator[Effect]:

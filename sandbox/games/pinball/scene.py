@@ -9,10 +9,10 @@ from sandbox.games.pinball.build import MATERIALS, Building, pairs, rolling_grav
 from sandbox.games.pinball.elements import (
     LEAST_DEPTH,
     Art,
-    Corner,
     Drain,
     DropTargets,
     Element,
+    FilletCorner,
     Flipper,
     Gate,
     Line,
@@ -24,14 +24,11 @@ from sandbox.games.pinball.elements import (
     Standup,
     both,
 )
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.game_tables import table_of
-from sandbox.scene.errors import Location, path_of
-from sandbox.scene.files.merge import added, paired, stated
-from sandbox.scene.files.presets import Preset
+from sandbox.scene.errors import LocatedMessage, Location, path_of
+from sandbox.scene.files.presets import Preset, added, paired, stated
 from sandbox.scene.geometry.polyline import RoundingError, length_of, rounded
-from sandbox.scene.scene import Scene
-
-Found = tuple[Location, str]
 
 CLOSEST = 1e-6
 """m: the least distance of an element's points"""
@@ -40,7 +37,7 @@ MAX_COORDINATE = 1e6
 _TOO_FAR = f"is too far away; the coordinates of a pinball table are at most {MAX_COORDINATE:g} m"
 
 
-def faults_of(scene: Scene) -> Iterator[Found]:
+def faults_of(scene: Scene) -> Iterator[LocatedMessage]:
     """Yield why a scene's `[pinball]` stands for nothing."""
     pinball = table_of(scene, Pinball)
     if pinball is None:
@@ -60,7 +57,7 @@ def faults_of(scene: Scene) -> Iterator[Found]:
     yield from _called_alike(pinball)
 
 
-def _far_away(element: Element) -> Iterator[Found]:
+def _far_away(element: Element) -> Iterator[LocatedMessage]:
     """Yield which points of an element are too far from the origin."""
     for key in ("position", "pivot"):
         point = getattr(element, key, None)
@@ -83,7 +80,7 @@ def elements_of(pinball: Pinball) -> Iterator[tuple[str, tuple[Element, ...]]]:
             yield field.alias, getattr(pinball, name)
 
 
-def _called_alike(pinball: Pinball) -> Iterator[Found]:
+def _called_alike(pinball: Pinball) -> Iterator[LocatedMessage]:
     """Yield the elements that are called as another one is."""
     first: dict[str, Location] = {}
     for kind, those in elements_of(pinball):
@@ -102,7 +99,7 @@ def _called_alike(pinball: Pinball) -> Iterator[Found]:
                     yield (*here, "name"), f"{path_of(there, {})} is also named {name!r}; names must be unique"
 
 
-def _wrong(element: Element, pinball: Pinball) -> Iterator[Found]:
+def _wrong(element: Element, pinball: Pinball) -> Iterator[LocatedMessage]:
     """Yield what is wrong with one element, located within it."""
     tolerance = pinball.tolerance
     match element:
@@ -140,7 +137,9 @@ def _wrong(element: Element, pinball: Pinball) -> Iterator[Found]:
                 yield ("stops",), "must be two different angles: at rest and raised, rad"
 
 
-def _corners(at: Location, corners: tuple[Corner, ...], closed: bool, tolerance: float) -> Iterator[Found]:
+def _corners(
+    at: Location, corners: tuple[FilletCorner, ...], closed: bool, tolerance: float
+) -> Iterator[LocatedMessage]:
     sharp = next((k for k, corner in enumerate(corners) if len(corner) > 2 and corner[2] < 0.0), None)
     if sharp is not None:
         yield (*at, sharp, 2), "must not be negative: it is the radius of the corner"
@@ -154,7 +153,7 @@ def _corners(at: Location, corners: tuple[Corner, ...], closed: bool, tolerance:
         yield (*at, error.corner), str(error)
 
 
-def _ramp(ramp: Ramp, tolerance: float, ball: float) -> Iterator[Found]:
+def _ramp(ramp: Ramp, tolerance: float, ball: float) -> Iterator[LocatedMessage]:
     wrong = list(_corners(("points",), ramp.points, False, tolerance))
     yield from wrong
     if ramp.width <= max(ball, LEAST_DEPTH):

@@ -6,18 +6,18 @@ import numpy as np
 import pygame
 
 from sandbox.arrays import IntArray
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import GROUND
 from sandbox.scene.description.fixed import Post
-from sandbox.scene.scene import Scene
 from sandbox.window.camera import Camera
 from sandbox.window.render.draw_context import DrawContext
 from sandbox.window.render.lamps import draw_lamps, draw_spot
 from sandbox.window.render.lines import Pixel, clip_segment, draw_line
-from sandbox.window.render.palette import INK, Colour, colour_of_fixed, mix_colours
+from sandbox.window.render.palette import INK, RgbColour, colour_of_fixed, mix_colours
 from sandbox.window.render.sdf import ShapeStyle
 from sandbox.window.render.static_geometry import draw_markings, draw_static_bodies, draw_zones, on_layer
 
-DARK: Colour = (5, 8, 14)
+DARK: RgbColour = (5, 8, 14)
 SHADOW = (0.003, -0.005)
 """m, from what is fixed to its shadow"""
 SHADE, NOTHING = 90, (255, 0, 255)

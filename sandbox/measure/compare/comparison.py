@@ -1,219 +1,292 @@
-"""Comparison: scores of engines against the truth, as frozen values and as a JSON document."""
+"""Comparison: one scene on several engines, or with several values of a setting, each run timed and scored."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, get_args
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
 
-from sandbox.echo import short_repr
-from sandbox.html_repr import HtmlRepr
-from sandbox.measure.compare.alignment import Event, Kind
-from sandbox.measure.compare.errors import Score
-from sandbox.measure.compare.sweep import set_text
-from sandbox.measure.compare.truth import Truth
-from sandbox.measure.compare.why import Knob
-from sandbox.measure.finite import finite
-from sandbox.scene.scene import Scene
+import numpy as np
+
+from sandbox.engines.registry import ENGINES, USUAL, able, engine_named
+from sandbox.measure.compare.attribution import one_at_a_time, verdict
+from sandbox.measure.compare.contact_matching import match_contacts
+from sandbox.measure.compare.ground_truth import Truth, find_truth
+from sandbox.measure.compare.result import (
+    Comparison,
+    Row,
+    Sweep,
+    Variant,
+    physics_of,
+    set_text,
+    short_key,
+    truth_settings,
+    variants_of,
+)
+from sandbox.measure.metrics.invariants import energy_drift, momentum_drift
+from sandbox.measure.metrics.trajectory_error import default_tolerance, errors
+from sandbox.measure.run.recorder import require_memory
+from sandbox.measure.run.runner import run
+from sandbox.progress import Progress, ProgressCallback, ignore_progress
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.load import as_scene
+from sandbox.signals import defer_interrupt
 from sandbox.trajectory import Trajectory
 
-MAX_SHOWN = 4
-"""Rows in the representation of a comparison."""
-MOST_EVENTS = 100
-"""Told of each engine in a document."""
+MAX_REPEATED_SECONDS = 5.0
+"""s: a run no longer than this is timed a second time, because the first may have loaded compiled code from disk."""
+NEGLIGIBLE = 1e-6
+"""Fraction of the tolerance below which an error needs no explanation."""
 
 
-@dataclass(frozen=True)
-class Row:
-    """Score of one engine. Unknown values are None."""
+def compare(
+    scene: Scene | str | Path,
+    engines: Sequence[str] | None = None,
+    *,
+    sweep: Sweep | None = None,
+    tolerance: float | None = None,
+    why: bool = False,
+    truth: Truth | None = None,
+    on_progress: ProgressCallback | None = None,
+    **settings: Any,
+) -> Comparison:
+    """Run a scene on several engines, or with several values of a setting, and score each run against the truth.
 
-    engine: str
-    """name of the engine"""
-    status: str
-    """`ok`, `diverged`, `failed` or `refused`"""
-    reason: str | None
-    """reason for a status other than `ok`"""
-    settings: Mapping[str, Any]
-    """settings as the engine resolved them"""
-    score: Score
-    """errors up to `trusted_until`"""
-    energy_drift: float | None
-    """energy change as a fraction of the largest kinetic energy; see `drift.energy_drift`"""
-    energy_against: str | None
-    """reference of the energy drift: `truth` or `start`"""
-    momentum_drift: float | None
-    """unexplained momentum change as a fraction of the largest Σ|m v|; see `drift.momentum_drift`"""
-    first_divergence: float | None
-    """s, time of the first frame whose position error exceeds the tolerance; None if there is none"""
-    events: tuple[Event, ...] | None
-    """contacts of the run matched with those of the truth, up to `trusted_until`"""
-    seconds: float | None
-    """s, computing time of the steps"""
-    why: tuple[Knob, ...] = ()
-    """effect of other settings on the error"""
-    verdict: str | None = None
-    """conclusion from `why`, as one sentence"""
-    set: Mapping[str, Any] = field(default_factory=dict)
-    """swept keys and their values; empty without a sweep"""
+    The truth is the closed form of the scene, if it has one. Otherwise it is `exact`, or a fixed step refined until it
+    converges, up to the time to which a second method confirms it. Errors, contacts and divergence are measured up to
+    `trusted_until`, drifts of energy and momentum over the whole run.
 
-    @property
-    def name(self) -> str:
-        """Engine and swept values, such as `reference, integrator rk4`."""
-        return f"{self.engine}, {set_text(self.set)}" if self.set else self.engine
+        sandbox.compare(scene, sweep={"solver.integrator": ["explicit_euler", "velocity_verlet", "rk4"]})
 
-    def __repr__(self) -> str:
-        """Return engine and status, the largest error and the number of contacts of each kind."""
-        error = "unknown" if self.score.max_position is None else f"{self.score.max_position:.3g} m"
-        counts = ", ".join(f"{kind} {sum(e.kind == kind for e in self.events or ())}" for kind in get_args(Kind))
-        return f"<Row {self.name}: {self.status}, max error {error}, contacts: {counts}>"
+    Args:
+        scene: the scene, or its name or path, as `load` takes it.
+        engines: names of the engines, or one name; default: all. An engine that cannot run the scene gets a
+            row with the reason. With a sweep, the default is the engines that can run every value.
+        sweep: values by key, such as `{"solver.dt": [0.01, 0.001]}`. Each value is a row; several keys give each
+            combination of their values.
+        tolerance: position error beyond which a run has diverged from the truth, m; default: 1 % of the smallest radius
+            or half width of the moving bodies.
+        why: rerun each engine whose error is not negligible with other settings, and report the changes that lower the
+            error.
+        truth: truth of this scene, with its frames and the tolerance, if already known; not with a sweep.
+        on_progress: progress callback; its message describes each stage.
+        settings: changes to the scene's `[solver]`, such as `dt=0.001`.
 
-    def count(self, kind: str) -> int | None:
-        """Return the number of contacts of a kind; None if there is no truth.
+    Returns:
+        One row for each engine and combination of values; after Ctrl-C the finished rows, if there are any.
 
-        Args:
-            kind: `matched`, `missed`, `phantom` or `after_divergence`.
-        """
-        return None if self.events is None else sum(event.kind == kind for event in self.events)
-
-    def document(self, trusted_until: float | None) -> dict[str, Any]:
-        """Return the row as a JSON object; values that are not finite are null.
-
-        Args:
-            trusted_until: time up to which the truth is trusted, s.
-        """
-        events = self.events or ()
-        pairs = [e for e in events if e.kind == "matched"]
-        figures = {
-            "max_position_error": self.score.max_position,
-            "rms_position_error": self.score.rms_position,
-            "max_velocity_error": self.score.max_velocity,
-            "rms_velocity_error": self.score.rms_velocity,
-            "energy_drift": self.energy_drift,
-            "momentum_drift": self.momentum_drift,
-            "first_divergence": self.first_divergence,
-            "matched_contacts": self.count("matched"),
-            "missed_contacts": self.count("missed"),
-            "phantom_contacts": self.count("phantom"),
-            "contacts_after_divergence": self.count("after_divergence"),
-            "max_contact_delay": max((abs(e.delta_time) for e in pairs if e.delta_time is not None), default=None),
-            "trusted_until": trusted_until,
-            "seconds": self.seconds,
-        }
-        return {
-            "engine": self.engine,
-            "status": self.status,
-            "reason": self.reason,
-            "settings": dict(self.settings),
-            "set": dict(self.set),
-            **{key: finite(value) for key, value in figures.items()},
-            "energy_against": self.energy_against,
-            "events": [_event(event) for event in events[:MOST_EVENTS]],
-            "missed": [_event(e) for e in [e for e in events if e.kind == "missed"][:MOST_EVENTS]],
-            "phantom": [_event(e) for e in [e for e in events if e.kind == "phantom"][:MOST_EVENTS]],
-            "why": [knob.document() for knob in self.why],
-            "verdict": self.verdict,
-        }
+    Raises:
+        UnknownEngineError: no engine has one of the names.
+        TooLargeError: the frames of all runs would not fit into memory together.
+        ValueError: the tolerance is not positive and finite; or a sweep is empty, too large, or has a key that
+            `settings` sets too.
+        SceneError: a swept key or value is invalid.
+        pydantic.ValidationError: a setting is invalid.
+    """
+    scene = as_scene(scene)
+    both = [key for key in sweep or () if short_key(key) in settings]
+    if both:
+        raise ValueError(f"{', '.join(both)}: is swept and set; leave one out")
+    if sweep and truth is not None:
+        raise ValueError("truth: is of one scene and one set of frames; leave it out with a sweep")
+    wanted = scene.solver.replace(**settings) if settings else scene.solver
+    scene_as_set = scene.model_copy(update={"solver": wanted}) if settings and sweep else scene
+    variants = variants_of(scene_as_set, sweep) if sweep else [Variant(scene)]
+    return compare_variants(
+        variants,
+        engines,
+        tolerance=tolerance,
+        why=why,
+        truth=truth,
+        on_progress=on_progress,
+        **({} if sweep else settings),
+    )
 
 
-@dataclass(frozen=True, eq=False)
-class Comparison(HtmlRepr):
-    """Scores of one scene on several engines, or with several values of a setting."""
+def compare_variants(
+    variants: Sequence[Variant],
+    engines: Sequence[str] | None = None,
+    *,
+    tolerance: float | None = None,
+    why: bool = False,
+    truth: Truth | None = None,
+    on_progress: ProgressCallback | None = None,
+    **settings: Any,
+) -> Comparison:
+    """Run the variants of a scene on engines, and score each run against the truth of its variant.
 
-    scene: Scene
-    """the scene; in a sweep, with its first value"""
-    best: Truth | None
-    """truth of `scene`; None if there is none: no engine can run the scene, or two methods disagree"""
+    Args:
+        variants: at least one variant; if there are several, `set` of each has its swept values.
+        engines: names of the engines; defaults as in `compare`.
+        tolerance: tolerance of positions, m.
+        why: explain the errors.
+        truth: truth of the first variant.
+        on_progress: progress callback; its message describes each stage.
+        settings: changes to `[solver]`.
+
+    Raises:
+        UnknownEngineError: no engine has one of the names.
+        TooLargeError: the frames of all runs would not fit into memory together.
+        ValueError: the tolerance is not positive and finite.
+        pydantic.ValidationError: a setting is invalid.
+    """
+    engines = [engines] if isinstance(engines, str) else engines
+    for name in engines or ():
+        engine_named(name)
+    first = variants[0].scene
+    wanted = [each.scene.solver.replace(**settings) if settings else each.scene.solver for each in variants]
+    plan = list(zip(variants, wanted, _engines_of(variants, wanted, engines), strict=True))
+    if tolerance is None:
+        tolerance = min(default_tolerance(each.scene) for each in variants)
+    if not 0.0 < tolerance < math.inf:
+        raise ValueError(f"a tolerance of {tolerance} m; it must be positive and finite")
+    count = sum(len(names) for _, _, names in plan)
+    for variant, own, _ in plan:
+        # All runs are in memory at once: those of the engines, the truths, and two more while a truth is found.
+        require_memory(variant.scene, own, len(variant.scene.bodies) * (count + len(variants) + 2))
+
+    truths: dict[tuple[str, float, int], Truth | str] = {}
+    if truth is not None:
+        truths[_truth_key(first, wanted[0])] = truth
+    scoring = _Scoring(tolerance, why, wanted, on_progress or ignore_progress, truths)
+    interrupted = False
+    try:
+        for variant, own, names in plan:
+            scoring.score_variant(variant, own, names)
+    except KeyboardInterrupt:
+        if not scoring.rows:
+            raise
+        interrupted = len(scoring.rows) < count
+    answer = truths[_truth_key(first, wanted[0])]
+    best, doubt = (answer, None) if isinstance(answer, Truth) else (None, answer)
+    return Comparison(
+        scene=first,
+        best=best,
+        tolerance=tolerance,
+        rows=tuple(scoring.rows),
+        trajectories=scoring.runs,
+        doubt=doubt,
+        interrupted=interrupted,
+        truths=scoring.row_truths,
+        same_scene=len(variants) == 1 or len({physics_of(each.scene) for each in variants}) == 1,
+    )
+
+
+@dataclass
+class _Scoring:
+    """Runs and scores of a comparison so far."""
+
     tolerance: float
-    """m, position error beyond which a run has diverged"""
-    rows: tuple[Row, ...]
-    """score of each engine and combination of values"""
-    trajectories: Mapping[str, Trajectory]
-    """run of each row that has one, by the row's `name`"""
-    doubt: str | None = None
-    """reason why there is no truth"""
-    interrupted: bool = False
-    """whether Ctrl-C was pressed before every engine had run"""
-    truths: Mapping[str, Truth | None] = field(default_factory=dict)
-    """truth of each row by its `name`, if a sweep changes the scene or the times of its frames; the other rows have
-    `best`"""
-    same_scene: bool = True
-    """whether all rows have the same scene: a sweep changes only its `[solver]`"""
+    why: bool
+    all_settings: Sequence[Settings]
+    """settings of all variants"""
+    report: ProgressCallback
+    truths: dict[tuple[str, float, int], Truth | str]
+    """truth, or the reason why there is none, by scene and times of the frames"""
+    rows: list[Row] = field(default_factory=list)
+    runs: dict[str, Trajectory] = field(default_factory=dict)
+    row_truths: dict[str, Truth | None] = field(default_factory=dict)
 
-    def truth_of(self, name: str) -> Truth | None:
-        """Return the truth that a row is scored against.
+    def score_variant(self, variant: Variant, settings: Settings, engines: Sequence[str]) -> None:
+        """Find the truth of a variant, and run and score each engine."""
+        truth = self._truth(variant.scene, settings)
+        for name in engines:
+            self.report(Progress(", ".join(filter(None, (name, set_text(variant.set))))))
+            run = timed_run(variant.scene, name, settings)
+            row = replace(score_run(variant.scene, name, settings, run, truth, self.tolerance), set=variant.set)
+            if self.why and truth is not None and _has_error(row, self.tolerance):
+                self.report(Progress(f"{row.name}: why"))
+                row = _with_attribution(variant.scene, row, settings, truth)
+            with defer_interrupt():
+                self.rows.append(row)
+                self.row_truths[row.name] = truth
+                if len(run.time):
+                    self.runs[row.name] = run
 
-        Args:
-            name: `name` of the row.
-        """
-        return self.truths.get(name, self.best)
-
-    def __repr__(self) -> str:
-        """Return the title, the truth, and the largest errors of the first rows."""
-        head = f"<Comparison {short_repr(self.scene.title)}: truth {self.truth or 'unknown'}"
-        if self.best is not None:
-            head += f", trusted until {self.best.trusted_until:.4g} s of {self.scene.world.duration:.4g} s"
-        lines = [f"{head}; tolerance {self.tolerance:.2g} m"]
-        for row in self.rows[:MAX_SHOWN]:
-            error = row.score.max_position
-            lines.append(f"{row.name}: {row.status}" + ("" if error is None else f", max error {error:.3g} m"))
-        if len(self.rows) > MAX_SHOWN:
-            lines[-1] += f"; and {len(self.rows) - MAX_SHOWN:,} more rows"
-        return "\n  ".join(lines) + ">"
-
-    @property
-    def truth(self) -> str | None:
-        """Kind of the truth: `closed_form`, `exact` or `refined`; None if there is none."""
-        return None if self.best is None else self.best.kind
-
-    @property
-    def trusted_until(self) -> float | None:
-        """Time up to which errors are measured, s; None if there is no truth."""
-        return None if self.best is None else self.best.trusted_until
-
-    def sentence(self) -> str:
-        """Return a sentence with the kind and source of the truth, its end and the tolerance."""
-        if self.best is None:
-            return f"truth: none ({self.doubt})"
-        whole = self.scene.world.duration
-        name = self.best.kind.replace("_", " ")
-        until = f"trusted until {self.best.trusted_until:.4g} s of {whole:.4g} s"
-        if self.best.difference:
-            until += f"; accurate to about {self.best.difference:.1g} m"
-        others = "" if self.same_scene else "; the truth of the first value: the sweep changes the scene"
-        return f"truth: {name} ({self.best.about}); {until}; tolerance {self.tolerance:.2g} m{others}"
-
-    def document(self, scene: str | None = None) -> dict[str, Any]:
-        """Return the comparison as one JSON document.
-
-        Args:
-            scene: name of the scene in the document, such as its path; default: its title.
-        """
-        return {
-            "scene": self.scene.title if scene is None else scene,
-            "title": self.scene.title,
-            "truth": self.truth,
-            "truth_about": self.doubt if self.best is None else self.best.about,
-            "truth_confirmed_by": None if self.best is None else self.best.witness,
-            "trusted_until": self.trusted_until,
-            "truth_difference": 0.0 if self.best is None else self.best.difference,
-            "duration": self.scene.world.duration,
-            "tolerance": self.tolerance,
-            "engines": [self._row_document(row) for row in self.rows],
-            "interrupted": self.interrupted,
-        }
-
-    def _row_document(self, row: Row) -> dict[str, Any]:
-        best = self.truth_of(row.name)
-        document = row.document(None if best is None else best.trusted_until)
-        return {**document, "truth": None if best is None else best.kind} if row.set else document
+    def _truth(self, scene: Scene, settings: Settings) -> Truth | None:
+        key = _truth_key(scene, settings)
+        if key not in self.truths:
+            self.report(Progress("the truth"))
+            self.truths[key] = find_truth(scene, truth_settings(settings, self.all_settings), self.tolerance)
+        found = self.truths[key]
+        return found if isinstance(found, Truth) else None
 
 
-def _event(event: Event) -> dict[str, Any]:
-    return {
-        "kind": event.kind,
-        "between": list(event.between),
-        "time": event.time,
-        "engine_time": event.engine_time,
-        "delta_time": event.delta_time,
-        "delta_position": finite(event.delta_position),
-        "delta_impulse": finite(event.delta_impulse),
-        "lasting": event.lasting,
-    }
+def _engines_of(
+    variants: Sequence[Variant], wanted: Sequence[Settings], engines: Sequence[str] | None
+) -> list[list[str]]:
+    """Return the engines that run each variant.
+
+    They are the named engines, or all engines if there is no sweep. In a sweep they are those that can run every
+    variant; if there are none, those that can run the variant.
+    """
+    if engines is not None:
+        return [list(dict.fromkeys(engines))] * len(variants)
+    if not variants[0].set:
+        return [list(ENGINES)] * len(variants)
+    each = [able(variant.scene, own) for variant, own in zip(variants, wanted, strict=True)]
+    common = [name for name in ENGINES if all(name in names for names in each)]
+    return [common or list(names) or [USUAL] for names in each]
+
+
+def _truth_key(scene: Scene, settings: Settings) -> tuple[str, float, int]:
+    """Return what a truth depends on: the scene, and the times of its frames."""
+    return physics_of(scene), settings.dt, settings.record_every
+
+
+def timed_run(scene: Scene, engine: str, settings: Settings) -> Trajectory:
+    """Run an engine. A short run is made twice and the faster one returned: the first may have loaded compiled code."""
+    first = run(scene, engine, audit=False, **settings.model_dump())
+    if first.status == "refused" or first.info["seconds"] > MAX_REPEATED_SECONDS:
+        return first
+    second = run(scene, engine, audit=False, **settings.model_dump())
+    return min(first, second, key=lambda each: float(each.info["seconds"]))
+
+
+def score_run(
+    scene: Scene, engine: str, settings: Settings, run: Trajectory, truth: Truth | None, tolerance: float
+) -> Row:
+    """Score a run against the truth; without a truth, only by the conservation laws.
+
+    Args:
+        scene: scene of the run.
+        engine: name of the engine.
+        settings: settings given to the engine.
+        run: the run.
+        truth: truth of the scene.
+        tolerance: position error beyond which the run has diverged, m.
+    """
+    row = Row(engine=engine, status=run.status, reason=run.reason, settings=run.info["settings"])
+    if run.status == "refused":
+        return row
+    row = replace(row, seconds=float(run.info["seconds"]), momentum_drift=momentum_drift(run, scene))
+    if truth is None:
+        energy = energy_drift(run, scene, None, False)
+        return replace(row, energy_drift=energy.share, energy_against=energy.against)
+    until, last = truth.trusted_until, float(run.time[-1])
+    position_errors = errors(run, truth.trajectory, ~scene.bodies.fixed)
+    first = position_errors.first_above(tolerance, until)
+    if first is None and run.status == "diverged" and last <= until:
+        first = last
+    energy = energy_drift(run, scene, truth.trajectory, until == scene.world.duration)
+    return replace(
+        row,
+        score=position_errors.until(until),
+        energy_drift=energy.share,
+        energy_against=energy.against,
+        first_divergence=first,
+        events=match_contacts(run, truth.trajectory, scene, settings.dt, tolerance, min(until, last)),
+    )
+
+
+def _has_error(row: Row, tolerance: float) -> bool:
+    error = row.score.max_position
+    return error is not None and error > NEGLIGIBLE * tolerance and bool(np.isfinite(error))
+
+
+def _with_attribution(scene: Scene, row: Row, settings: Settings, truth: Truth) -> Row:
+    before = row.score.max_position
+    assert before is not None
+    effects = one_at_a_time(scene, row.engine, settings, truth.trajectory, truth.trusted_until, before)
+    return replace(row, why=effects, verdict=verdict(row.engine, effects, before))

@@ -1,6 +1,6 @@
-"""Extremes: how far each engine and setting goes before it breaks, and whether the forecast saw it coming."""
+"""Extremes: boundaries beyond which an engine configuration fails, and whether the preflight checks predict them."""
 
-from sandbox.measure.extremes.cell import Cell
-from sandbox.measure.extremes.matrix import Extremes, Plan, extremes
+from sandbox.measure.extremes.outcome import Sample
+from sandbox.measure.extremes.runner import Extremes, ExtremesPlan, extremes
 
-__all__ = ["Cell", "Extremes", "Plan", "extremes"]
+__all__ = ["Extremes", "ExtremesPlan", "Sample", "extremes"]

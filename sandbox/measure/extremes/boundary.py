@@ -1,104 +1,173 @@
-"""Boundary: up to where an axis goes well, found by halving the way between what passed and what failed."""
+"""Boundary of an axis: the last level that passes, found by bisection."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sandbox.measure.extremes.axis import Scale
+from sandbox.measure.extremes.experiment import Axis, AxisPair, EngineSetup, Scale, Scenario
+from sandbox.measure.extremes.outcome import Outcome, Sample, Task
 
 TOLERANCE = 0.01
-"""Relative width within which a boundary is found; of whole numbers, one."""
-MOST_HALVINGS = 40
-BESIDE = (0.9, 1.1)
-"""What a boundary is multiplied by to look whether all is well before it, and nothing behind."""
+"""Relative width to which a boundary is found; whole numbers are found exactly."""
+MAX_HALVINGS = 40
+NEIGHBOUR_FACTORS = (0.9, 1.1)
+"""Factors of the levels beside a boundary at which it is checked that nothing fails before it, or passes behind it."""
 
-Passes = Callable[[float], bool]
+Predicate = Callable[[float], bool]
+Submit = Callable[[Task], Outcome]
+OnSample = Callable[[Sample], None]
 
 
 @dataclass(frozen=True)
-class Found:
-    """A boundary, from the easiest level on."""
+class Bracket:
+    """Levels on both sides of a boundary."""
 
     limit: float | None
-    """the last level that passes before the first failure; None where the easiest fails"""
+    """last level that passes before the first failure; None if the easiest level fails"""
     first_failure: float | None
-    """the first that fails; None where none does"""
+    """first level that fails; None if none does"""
     monotone: bool
-    """whether nothing passes behind it, and nothing fails before it, of what was looked at"""
+    """whether no sampled level passes behind the boundary, and none fails before it"""
 
 
 @dataclass(frozen=True)
-class Limit:
-    """How far a setup goes on an axis."""
+class Boundary:
+    """Boundary of an axis on an engine configuration."""
 
     axis: str
     engine: str
-    setup: str
     settings: Mapping[str, Any]
+    """settings of the engine configuration"""
+    setup: str
+    """name of the engine configuration"""
     limit: float | None
+    """last level that passes before the first failure; None if the easiest level fails"""
     first_failure: float | None
+    """first level that fails; None if none does"""
     reason: str
-    """why the first failure failed, or why there is no limit"""
+    """reason for the first failure, or for a missing boundary"""
     rule: str | None = None
+    """rule broken at the first failure"""
     monotone: bool = True
-    unit: str = ""
+    """whether no sampled level passes behind the boundary, and none fails before it"""
     refused: bool = False
-    """everywhere"""
-
-    def document(self) -> dict[str, Any]:
-        """Return it as JSON can hold it."""
-        return {
-            "axis": self.axis,
-            "engine": self.engine,
-            "settings": dict(self.settings),
-            "setup": self.setup,
-            "limit": self.limit,
-            "first_failure": self.first_failure,
-            "reason": self.reason,
-            "rule": self.rule,
-            "monotone": self.monotone,
-            "refused": self.refused,
-            "unit": self.unit,
-        }
+    """whether the engine refused every level"""
+    unit: str = ""
 
 
-def boundary(levels: Mapping[float, bool], passes: Passes | None, scale: Scale, tolerance: float = TOLERANCE) -> Found:
-    """Return the boundary between what passes and what fails.
+def run_axis(
+    axis: Axis,
+    setup: EngineSetup,
+    levels: Sequence[float],
+    overrides: tuple[str, ...],
+    submit: Submit,
+    on_sample: OnSample,
+    *,
+    bisect: bool = True,
+) -> Boundary:
+    """Run an axis on an engine configuration, level by level, and find its boundary.
+
+    Refused levels do not count: a boundary lies between a level that passed and one that failed.
 
     Args:
-        levels: what is known of some levels, from the easiest to the hardest: whether each passes.
-        passes: finds out about another; without, the boundary is somewhere between two of the levels.
-        scale: how the way between two levels is halved.
-        tolerance: relative width within which it is found.
+        axis: the axis.
+        setup: the engine configuration.
+        levels: levels from the easiest to the hardest.
+        overrides: `KEY=VALUE`, changes to every scene.
+        submit: runs a task.
+        on_sample: called with each finished sample.
+        bisect: whether to bisect between the levels.
+    """
+    samples: dict[float, Sample] = {}
+
+    def run_level(level: float) -> Sample:
+        outcome = submit(_task(axis.case, {axis.parameter: level}, setup, overrides))
+        samples[level] = Sample(axis.name, level, setup.engine, dict(setup.changes), setup.name, outcome)
+        on_sample(samples[level])
+        return samples[level]
+
+    for level in levels:
+        run_level(level)
+    known = {level: sample.passed for level, sample in samples.items() if sample.verdict != "refused"}
+    if not known:
+        bracket, reason, rule = Bracket(None, None, True), samples[levels[0]].outcome.reason, None
+    else:
+        # If the time limit stopped the first failure, another machine gets farther: that is not worth a bisection.
+        is_slow = next((each.outcome.slow for each in samples.values() if each.verdict == "failed"), False)
+        passes = None if is_slow or not bisect else lambda level: run_level(level).passed
+        bracket = find_boundary(known, passes, axis.scale)
+        reason, rule = "no level failed", None
+        if bracket.first_failure is not None:
+            failure = samples[bracket.first_failure].outcome
+            reason, rule = failure.reason, failure.rule
+    return Boundary(
+        axis=axis.name,
+        engine=setup.engine,
+        settings=dict(setup.changes),
+        setup=setup.name,
+        limit=bracket.limit,
+        first_failure=bracket.first_failure,
+        reason=reason,
+        rule=rule,
+        monotone=bracket.monotone,
+        refused=not known,
+        unit=axis.unit,
+    )
+
+
+def run_pair(
+    pair: AxisPair, setup: EngineSetup, overrides: tuple[str, ...], submit: Submit, on_sample: OnSample
+) -> None:
+    """Run every combination of a pair's levels on an engine configuration."""
+    for both in pair.levels:
+        parameters = {pair.first.parameter: both[0], pair.second.parameter: both[1]}
+        outcome = submit(_task(pair.case, parameters, setup, overrides))
+        on_sample(Sample(pair.name, both, setup.engine, dict(setup.changes), setup.name, outcome))
+
+
+def _task(scenario: Scenario, parameters: dict[str, float], setup: EngineSetup, overrides: tuple[str, ...]) -> Task:
+    return Task(scenario.name, parameters, setup.engine, dict(setup.changes), overrides)
+
+
+def find_boundary(
+    levels: Mapping[float, bool], passes: Predicate | None, scale: Scale, tolerance: float = TOLERANCE
+) -> Bracket:
+    """Return the boundary between the levels that pass and those that fail.
+
+    Args:
+        levels: whether each known level passes, from the easiest to the hardest.
+        passes: returns whether another level passes; None to use the known levels only.
+        scale: how the interval between two levels is halved.
+        tolerance: relative width to which the boundary is found.
     """
     known = dict(levels)
     order = list(levels)
-    rising = len(order) < 2 or order[-1] > order[0]
+    is_rising = len(order) < 2 or order[-1] > order[0]
     failed = next((k for k, level in enumerate(order) if not known[level]), None)
     if failed is None:
-        return Found(order[-1] if order else None, None, True)
+        return Bracket(order[-1] if order else None, None, True)
     if failed == 0:
-        return Found(None, order[0], not any(known.values()))
+        return Bracket(None, order[0], not any(known.values()))
     good, bad = order[failed - 1], order[failed]
     if passes is None:
-        return Found(good, bad, not any(known[level] for level in order[failed:]))
-    for _ in range(MOST_HALVINGS):
+        return Bracket(good, bad, not any(known[level] for level in order[failed:]))
+    for _ in range(MAX_HALVINGS):
         middle = halfway(good, bad, scale)
         if middle in (good, bad) or abs(bad - good) <= tolerance * max(abs(good), abs(bad)):
             break
         known[middle] = passes(middle)
         good, bad = (middle, bad) if known[middle] else (good, middle)
-    for level in _beside(good, bad, rising, scale, order):
+    for level in _neighbours(good, bad, is_rising, scale, order):
         if level not in known:
             known[level] = passes(level)
-    before = [well for level, well in known.items() if (level <= good if rising else level >= good)]
-    behind = [well for level, well in known.items() if (level >= bad if rising else level <= bad)]
-    return Found(good, bad, all(before) and not any(behind))
+    before = [passed for level, passed in known.items() if (level <= good if is_rising else level >= good)]
+    behind = [passed for level, passed in known.items() if (level >= bad if is_rising else level <= bad)]
+    return Bracket(good, bad, all(before) and not any(behind))
 
 
 def halfway(a: float, b: float, scale: Scale) -> float:
-    """Return what lies between two levels: their geometric mean, but from or to 0 and on linear scales the other."""
+    """Return the middle of two levels: the geometric mean, or the arithmetic one from or to 0 and on linear scales."""
     if scale == "whole":
         middle = round(math.sqrt(a * b)) if a > 0 and b > 0 else (a + b) // 2
         inside = min(a, b) < middle < max(a, b)
@@ -108,9 +177,9 @@ def halfway(a: float, b: float, scale: Scale) -> float:
     return 0.5 * (a + b)
 
 
-def _beside(good: float, bad: float, rising: bool, scale: Scale, order: list[float]) -> list[float]:
-    """Return levels shortly before and behind a boundary, within those that there are."""
-    less, more = BESIDE if rising else BESIDE[::-1]
+def _neighbours(good: float, bad: float, is_rising: bool, scale: Scale, order: list[float]) -> list[float]:
+    """Return a level shortly before and one shortly behind a boundary, within the range of the levels."""
+    less, more = NEIGHBOUR_FACTORS if is_rising else NEIGHBOUR_FACTORS[::-1]
     found = [good * less, bad * more]
     if scale == "whole":
         found = [round(level) for level in found]

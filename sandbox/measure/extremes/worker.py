@@ -1,75 +1,181 @@
-"""Worker: a process that serves tasks over its pipes, one JSON line each way.
+"""Worker process: limits of time and memory, and the tasks that it runs, one JSON line each way.
 
     python -m sandbox.measure.extremes.worker MEMORY_MIB
 
-It says {"ready": true} once it has imported everything, {"compiling": true} when an answer takes longer as kernels are
-compiled, and then one outcome for each task. It ends when its standard input does.
+It writes {"ready": true} when it has imported everything, {"compiling": true} when kernels are compiled, so that an
+answer takes longer, and one outcome for each task. It ends when its standard input does.
 """
 
 import json
 import os
+import signal
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import replace
+from time import perf_counter
 from typing import Any, TextIO
 
-from sandbox.measure.extremes.confine import allow_processor, limit_memory
+from pydantic import ValidationError
 
-Document = dict[str, Any]
-Answer = Callable[[Mapping[str, Any]], Document]
+from sandbox.engines.registry import engine_named
+from sandbox.jsonable import JsonObject
+from sandbox.measure.extremes.checks import RunUnderTest, classify
+from sandbox.measure.extremes.outcome import Outcome, Task
+from sandbox.measure.extremes.scenarios import SCENARIOS
+from sandbox.measure.preflight import warnings
+from sandbox.measure.run.recorder import TooLargeError
+from sandbox.measure.run.runner import run
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.world import Settings
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.load import from_document
 
-SPARE = 300.0
-"""s of processor time that a task may have beside its limit, as kernels may be compiled in it."""
+MEBIBYTE = 2**20
 
+MAX_FRAMES = 2_000
+"""Recorded frames of a run; of a longer run only every n-th frame is recorded."""
 
-def serve(answer: Answer, memory: int) -> None:
-    """Answer task after task.
+COMPILE_CPU_TIME = 300.0
+"""s of processor time that a task may have beyond its limit, because it may compile kernels."""
 
-    Args:
-        answer: makes an outcome's document of a task's.
-        memory: MiB that the process may have.
-    """
-    limit_memory(memory)
-    speak = _own_output()
-    speak.write('{"ready": true}\n')
-    _tell_of_compiling(speak)
-    for line in sys.stdin:
-        asked = json.loads(line)
-        allow_processor(asked["seconds"] + SPARE)
-        try:
-            told = answer(asked["task"])
-        except MemoryError:
-            told = {"verdict": "failed", "reason": "out of memory", "rule": "process"}
-        speak.write(json.dumps(told) + "\n")
-
-
-def _own_output() -> TextIO:
-    """Return a stream to whoever asks; what else is printed, also by libraries in C, goes to standard error."""
-    speak = os.fdopen(os.dup(1), "w", buffering=1, encoding="utf-8")
-    os.dup2(2, 1)
-    return speak
-
-
-def _tell_of_compiling(speak: TextIO) -> None:
-    from sandbox.engines.common.compile_clock import COMPILE_CLOCK
-
-    COMPILE_CLOCK.on_begin = lambda _: print('{"compiling": true}', file=speak)
-
-
-def _attempted(document: Mapping[str, Any]) -> Document:
-    from dataclasses import asdict
-
-    from sandbox.measure.extremes.cell import Task
-    from sandbox.measure.extremes.trial import attempt
-
-    return asdict(attempt(Task.read(document)))
+Answer = Callable[[Mapping[str, Any]], JsonObject]
 
 
 def main() -> None:
-    """Serve what is asked on standard input."""
+    """Run the tasks on standard input."""
     import sandbox.engines.common.kernel
-    import sandbox.measure.extremes.trial  # noqa: F401, what takes long is imported before it says that it is ready
+    import sandbox.measure.extremes.worker  # noqa: F401, imported before the worker reports that it is ready
 
-    serve(_attempted, int(sys.argv[1]))
+    serve(_evaluate_document, int(sys.argv[1]))
+
+
+def serve(answer: Answer, memory: int) -> None:
+    """Answer one task after the other.
+
+    Args:
+        answer: returns the document of an outcome for that of a task.
+        memory: memory limit of the process, MiB.
+    """
+    limit_memory(memory)
+    output = _private_stdout()
+    output.write('{"ready": true}\n')
+    _report_compiling(output)
+    for line in sys.stdin:
+        request = json.loads(line)
+        limit_cpu_time(request["seconds"] + COMPILE_CPU_TIME)
+        try:
+            document = answer(request["task"])
+        except MemoryError:
+            document = {"verdict": "failed", "reason": "out of memory", "rule": "process"}
+        output.write(json.dumps(document) + "\n")
+
+
+def _evaluate_document(document: Mapping[str, Any]) -> JsonObject:
+    from dataclasses import asdict
+
+    return asdict(evaluate_task(Task.from_json(document)))
+
+
+def evaluate_task(task: Task) -> Outcome:
+    """Run a task twice and return its outcome.
+
+    A scene, setting or run that the scene format, the settings or the engine refuse is `refused`. If the second run
+    does not end in the same state, bit for bit, the rule `repeat` is broken.
+    """
+    scenario = SCENARIOS[task.case]
+    began = perf_counter()
+    try:
+        scene = from_document(scenario.document(task.parameters), "the scene", task.overrides)
+        settings = _settings(scene, task)
+    except SceneError as error:
+        return Outcome("refused", f"invalid scene: {error.faults[0].message}")
+    except ValidationError as error:
+        first = error.errors()[0]
+        return Outcome("refused", f"invalid scene: {'.'.join(map(str, first['loc']))}: {first['msg']}")
+    predicted = tuple(dict.fromkeys(each.kind for each in warnings(scene, settings, task.engine)))
+    engine = engine_named(task.engine)
+    missing = engine.missing(scene, settings)
+    if missing:
+        return Outcome("refused", "; ".join(missing), predicted=predicted, solver=settings.model_dump(mode="json"))
+    resolved = engine.resolve(scene, settings)
+    solver = resolved.model_dump(mode="json")
+    try:
+        first_run = run(scene, task.engine, audit=False, **settings.model_dump())
+        outcome = classify(RunUnderTest(scenario, scene, resolved, first_run))
+        if outcome.verdict != "failed":
+            second_run = run(scene, task.engine, audit=False, **settings.model_dump())
+            if second_run.info["state_hash"] != first_run.info["state_hash"]:
+                outcome = Outcome("failed", "a repeated run ended in a different state", "repeat")
+    except TooLargeError as error:
+        return Outcome("refused", str(error), predicted=predicted, solver=solver)
+    except MemoryError:
+        outcome = Outcome("failed", "out of memory", "process")
+    return replace(outcome, predicted=predicted, solver=solver, seconds=perf_counter() - began)
+
+
+def _settings(scene: Scene, task: Task) -> Settings:
+    """Return the scene's settings with the task's changes and a bounded number of recorded frames."""
+    settings = scene.solver.replace(**task.changes)
+    frames = scene.world.duration / settings.dt
+    return settings.replace(record_every=max(1, int(frames // MAX_FRAMES)))
+
+
+def limit_memory(mebibytes: int) -> None:
+    """Limit the address space of this process, and disable core files; does nothing on Windows.
+
+    Args:
+        mebibytes: the limit, MiB.
+    """
+    if sys.platform == "win32":
+        return
+    import resource
+
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    wanted = mebibytes * MEBIBYTE
+    resource.setrlimit(resource.RLIMIT_AS, (wanted if hard == resource.RLIM_INFINITY else min(wanted, hard), hard))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def limit_cpu_time(seconds: float) -> None:
+    """Limit the processor time of this process from now on; the operating system ends the process beyond it.
+
+    The parent process limits the wall-clock time. This limit ends a process whose parent no longer exists.
+
+    Args:
+        seconds: the limit, s.
+    """
+    if sys.platform == "win32":
+        return
+    import resource
+
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+    wanted = int(used.ru_utime + used.ru_stime + seconds) + 1
+    resource.setrlimit(resource.RLIMIT_CPU, (wanted if hard == resource.RLIM_INFINITY else min(wanted, hard), hard))
+
+
+def exit_text(status: int) -> str:
+    """Return how a process ended, from its return code: the name of a signal, or the exit status."""
+    if status >= 0:
+        return f"the process ended with status {status}"
+    try:
+        name = signal.Signals(-status).name
+    except ValueError:
+        name = f"signal {-status}"
+    return f"the process was killed by {name}"
+
+
+def _private_stdout() -> TextIO:
+    """Return a stream for the answers; all other output, also of C libraries, goes to standard error."""
+    output = os.fdopen(os.dup(1), "w", buffering=1, encoding="utf-8")
+    os.dup2(2, 1)
+    return output
+
+
+def _report_compiling(output: TextIO) -> None:
+    from sandbox.engines.common.compile_clock import COMPILE_CLOCK
+
+    COMPILE_CLOCK.on_begin = lambda _: print('{"compiling": true}', file=output)
 
 
 if __name__ == "__main__":

@@ -1,21 +1,131 @@
-"""Metrics of the error. Each is a function of a run and its judge; None if it does not apply."""
+"""Error metrics of a trade-off, and the context in which they are evaluated."""
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from sandbox.arrays import FloatArray
-from sandbox.measure.collisions import are_collisions, collisions, together
-from sandbox.measure.compare.drift import energy_drift
-from sandbox.measure.compare.gaps import gap
-from sandbox.measure.compare.runs import common_frames, there
-from sandbox.measure.joint_error import joint_error
-from sandbox.measure.tradeoff.judge import Judge, strayed
+from sandbox.arrays import BoolArray, FloatArray
+from sandbox.measure.compare.ground_truth import Truth
+from sandbox.measure.metrics.clearance import clearance
+from sandbox.measure.metrics.contacts import are_collisions, collisions, share_layer
+from sandbox.measure.metrics.invariants import energy_drift, joint_error
+from sandbox.measure.metrics.trajectory_error import Errors, common_frames, errors
+from sandbox.scene.compile.scene import Scene
 from sandbox.trajectory import Trajectory
 
-Measure = Callable[[Trajectory, Judge], float | None]
+SCREEN_SIZE = 1280.0, 720.0
+"""px, window in which a scene is assumed to be drawn."""
+SCREEN_FILL = 0.9
+"""Fraction of the window that the motion fills."""
+REST_FRACTION = 0.01
+"""Fraction of its half width by which a body may move in the second half of a run and still count as at rest."""
+
+
+@dataclass(frozen=True, eq=False)
+class EvaluationContext:
+    """What runs are scored against: scene, truth and scale."""
+
+    scene: Scene
+    """the scene, with the seed of this context"""
+    truth: Truth | None
+    """truth of the scene; None if there is none"""
+    zoom: float
+    """px/m, scale of errors in pixels"""
+    doubt: str | None = None
+    """reason why there is no truth, if known"""
+    _last_errors: list[tuple[Trajectory, Errors]] = field(default_factory=list, init=False, repr=False)
+
+    @property
+    def until(self) -> float:
+        """Time up to which positions are compared with the truth, s."""
+        return self.scene.world.duration if self.truth is None else self.truth.trusted_until
+
+    @cached_property
+    def moving(self) -> BoolArray:
+        """Mask of the bodies that can move, (N,)."""
+        return ~self.scene.bodies.fixed
+
+    @cached_property
+    def down(self) -> FloatArray | None:
+        """Unit vector of gravity, (2,); None without gravity."""
+        strength = math.hypot(*self.scene.world.gravity)
+        return np.asarray(self.scene.world.gravity) / strength if strength > 0.0 else None
+
+    @cached_property
+    def rest_speed(self) -> FloatArray:
+        """Speed below which each body counts as at rest, (N,) m/s.
+
+        With gravity, it is the speed after a fall of 1 % of the half width; without, 1/1000 of the largest initial
+        speed.
+        """
+        bodies, gravity = self.scene.bodies, math.hypot(*self.scene.world.gravity)
+        if gravity > 0.0:
+            return np.sqrt(2.0 * gravity * REST_FRACTION * bodies.thin)
+        return np.full(len(bodies), 1e-3 * float(np.hypot(*bodies.velocity.T).max(initial=0.0)))
+
+    def errors(self, run: Trajectory) -> Errors:
+        """Return the errors of a run against the truth. Those of the last run are kept: several metrics need them."""
+        assert self.truth is not None
+        for known, found in self._last_errors:
+            if known is run:
+                return found
+        self._last_errors[:] = [(run, errors(run, self.truth.trajectory, self.moving))]
+        return self._last_errors[0][1]
+
+    @cached_property
+    def at_rest(self) -> BoolArray:
+        """Mask of the moving bodies that the truth has at rest in its second half, (N,); all False without a truth."""
+        if self.truth is None or not len(self.truth.trajectory.time):
+            return np.zeros(len(self.scene.bodies), dtype=np.bool_)
+        distance = displacement(self.truth.trajectory)
+        return np.asarray(self.moving & (distance <= REST_FRACTION * self.scene.bodies.thin))
+
+    @cached_property
+    def always_at_rest(self) -> BoolArray:
+        """Mask of the bodies at rest that never leave their initial position in the truth, (N,)."""
+        if not self.at_rest.any():
+            return self.at_rest
+        assert self.truth is not None
+        distance = displacement(self.truth.trajectory, since=0.0)
+        return np.asarray(self.at_rest & (distance <= REST_FRACTION * self.scene.bodies.thin))
+
+
+def displacement(run: Trajectory, since: float = 0.5) -> FloatArray:
+    """Return the largest distance of each body, in the last part of a run, from its position at the start of that part.
+
+    Args:
+        run: the run.
+        since: start of the part as a fraction of the duration; default: the second half.
+
+    Returns:
+        (N,) m.
+    """
+    part = run.position[run.time >= since * run.time[-1]]
+    # A diverged state is infinitely far away.
+    with np.errstate(over="ignore", invalid="ignore"):
+        distance = np.hypot(*np.moveaxis(part - part[0], 2, 0)).max(axis=0)
+    return np.where(np.isnan(distance), np.inf, distance)
+
+
+def default_zoom(scene: Scene, truth: Truth | None) -> float:
+    """Return the zoom at which all positions of the motion fill a window of 1280 × 720, px/m."""
+    bodies = scene.bodies
+    positions = bodies.position[None] if truth is None else truth.trajectory.position
+    reach = bodies.radius[:, None]
+    with np.errstate(invalid="ignore"):
+        low = np.nanmin(positions - reach, axis=(0, 1), initial=np.inf)
+        high = np.nanmax(positions + reach, axis=(0, 1), initial=-np.inf)
+    size = high - low
+    if not (np.isfinite(size).all() and (size > 0.0).all()):
+        return 100.0
+    return float(min(SCREEN_FILL * SCREEN_SIZE[0] / size[0], SCREEN_FILL * SCREEN_SIZE[1] / size[1]))
+
+
+Measure = Callable[[Trajectory, EvaluationContext], float | None]
 
 
 class Metric(NamedTuple):
@@ -29,135 +139,136 @@ class Metric(NamedTuple):
     measure: Measure
 
 
-def max_position(run: Trajectory, judge: Judge) -> float | None:
-    """Return the largest distance of any body from the truth, m, in any frame that the truth is trusted in."""
-    if judge.truth is None:
+def max_position(run: Trajectory, context: EvaluationContext) -> float | None:
+    """Return the largest distance of any body from the truth, m, up to the time to which the truth is trusted."""
+    if context.truth is None:
         return None
-    return judge.errors(run).until(judge.until).max_position
+    return context.errors(run).until(context.until).max_position
 
 
-def rms_position(run: Trajectory, judge: Judge) -> float | None:
-    """Return the root of the mean square distance from the truth, m."""
-    if judge.truth is None:
+def rms_position(run: Trajectory, context: EvaluationContext) -> float | None:
+    """Return the root mean square distance from the truth, m."""
+    if context.truth is None:
         return None
-    return judge.errors(run).until(judge.until).rms_position
+    return context.errors(run).until(context.until).rms_position
 
 
-def final_position(run: Trajectory, judge: Judge) -> float | None:
-    """Return the largest distance from the truth in the last frame that it is trusted in and any body is left, m."""
-    if judge.truth is None:
+def final_position(run: Trajectory, context: EvaluationContext) -> float | None:
+    """Return the largest distance from the truth, m, in the last trusted frame that still has a body."""
+    if context.truth is None:
         return None
-    found = judge.errors(run)
-    kept = np.flatnonzero((found.time <= judge.until) & (found.count > 0.0))
+    found = context.errors(run)
+    kept = np.flatnonzero((found.time <= context.until) & (found.count > 0.0))
     return float(found.position[kept[-1]]) if len(kept) else None
 
 
-def bounce_height(run: Trajectory, judge: Judge) -> float | None:
-    """Return by how much any body's highest place after its first contact differs from the truth's, m.
+def bounce_height(run: Trajectory, context: EvaluationContext) -> float | None:
+    """Return the largest error of a body's highest position after its first contact, m.
 
-    From the truth's first contact on, so that a body that fell through is told by the height it lacks. Both are looked
-    at in the same frames, those that they share. None without gravity, or where nothing is touched.
+    The first contact is that of the truth, so that a body that tunnelled counts with the height that it lacks. Both
+    heights are of the frames that run and truth share. None without gravity or without contacts.
     """
-    if judge.truth is None or judge.down is None:
+    if context.truth is None or context.down is None:
         return None
-    truth = judge.truth.trajectory
-    mine, its = common_frames(run, truth)
-    both = there(run, mine) & there(truth, its) & (truth.time[its] <= judge.until)[:, None]
+    truth = context.truth.trajectory
+    frames, truth_frames = common_frames(run, truth)
+    time = truth.time[truth_frames]
+    both = run.present(frames) & truth.present(truth_frames) & (time <= context.until)[:, None]
     worst, hits = None, are_collisions(truth)
-    for number in np.flatnonzero(judge.moving).tolist():
-        touched = truth.contact_time[(truth.contact_pair == number).any(axis=1) & hits]
-        kept = both[:, number] & (truth.time[its] >= np.min(touched, initial=np.inf))
+    for body in np.flatnonzero(context.moving).tolist():
+        contacts = truth.contact_time[(truth.contact_pair == body).any(axis=1) & hits]
+        kept = both[:, body] & (time >= np.min(contacts, initial=np.inf))
         if kept.any():
-            own, right = run.position[mine[kept], number], truth.position[its[kept], number]
-            off = abs(_highest(own, judge.down) - _highest(right, judge.down))
-            worst = off if worst is None else max(worst, off)
+            own, right = run.position[frames[kept], body], truth.position[truth_frames[kept], body]
+            error = abs(_highest(own, context.down) - _highest(right, context.down))
+            worst = error if worst is None else max(worst, error)
     return worst
 
 
-def _highest(places: FloatArray, down: FloatArray) -> float:
-    return -float((places @ down).min()) if np.isfinite(places).all() else math.inf
+def _highest(positions: FloatArray, down: FloatArray) -> float:
+    return -float((positions @ down).min()) if np.isfinite(positions).all() else math.inf
 
 
-def energy(run: Trajectory, judge: Judge) -> float | None:
-    """Return what energy drifted by, as a share of the energy in motion (`compare.drift`)."""
-    truth = None if judge.truth is None else judge.truth.trajectory
-    share = energy_drift(run, judge.scene, truth, judge.until == judge.scene.world.duration).share
+def energy(run: Trajectory, context: EvaluationContext) -> float | None:
+    """Return the energy drift as a fraction of the kinetic energy (`metrics.invariants.energy_drift`)."""
+    truth = None if context.truth is None else context.truth.trajectory
+    share = energy_drift(run, context.scene, truth, context.until == context.scene.world.duration).share
     return None if share is None else abs(share)
 
 
-def joints(run: Trajectory, judge: Judge) -> float | None:
-    """Return the largest error of any joint, as a share (`measure.joint_error`)."""
-    return joint_error(run, judge.scene)
+def joints(run: Trajectory, context: EvaluationContext) -> float | None:
+    """Return the largest constraint violation of any joint as a fraction (`metrics.invariants.joint_error`)."""
+    return joint_error(run, context.scene)
 
 
-def penetration(run: Trajectory, judge: Judge) -> float | None:
-    """Return the deepest overlap of any two that touched, in any frame, m. None where nothing touches.
+def penetration(run: Trajectory, context: EvaluationContext) -> float | None:
+    """Return the deepest overlap of any pair in contact, in any frame, m; None without contacts.
 
-    An overlap that is there in the first frame is the scene's, not the engine's: of such a pair only that counts by
-    which the two get deeper again than they have been since.
+    An overlap in the first frame is the scene's, not the engine's. Of such a pair, only depth that is regained after
+    the overlap has decreased counts.
     """
     pairs = np.unique(run.contact_pair[are_collisions(run)], axis=0)
     if not len(pairs):
         return None
-    scene = judge.scene
+    scene = context.scene
     with np.errstate(over="ignore", invalid="ignore"):
-        gaps = [gap(scene, scene.bodies, run.position, run.angle, (a, b)) for a, b in pairs.tolist()]
-        gaps = [np.where(together(run, scene, (a, b)), each, np.inf) for each, (a, b) in zip(gaps, pairs, strict=True)]
-        depths = [np.maximum(0.0, -each) for each in gaps]
+        gaps = [clearance(scene, scene.bodies, run.position, run.angle, (a, b)) for a, b in pairs.tolist()]
+        gaps = [np.where(share_layer(run, scene, (a, b)), gap, np.inf) for gap, (a, b) in zip(gaps, pairs, strict=True)]
+        depths = [np.maximum(0.0, -gap) for gap in gaps]
         return max(float(np.nanmax(each - np.fmin.accumulate(each), initial=0.0)) for each in depths)
 
 
-def drift(run: Trajectory, judge: Judge) -> float | None:
-    """Return how far any body gets that lies still in the truth, m. None where none does.
+def drift(run: Trajectory, context: EvaluationContext) -> float | None:
+    """Return the largest displacement of a body that the truth has at rest, m; None if there is no such body.
 
-    A body that stands still in the truth from the start on, as in a stack, is followed from the start on; one that
-    comes to rest there, through the second half of the run.
+    A body that is at rest in the truth from the start, such as a box in a stack, counts from the start; a body that
+    comes to rest counts in the second half of the run.
     """
-    if not judge.still.any():
+    if not context.at_rest.any():
         return None
-    standing = strayed(run, since=0.0)[judge.standing].max(initial=0.0)
-    return float(max(standing, strayed(run)[judge.still].max()))
+    always = displacement(run, since=0.0)[context.always_at_rest].max(initial=0.0)
+    return float(max(always, displacement(run)[context.at_rest].max()))
 
 
-def missed_contacts(run: Trajectory, _: Judge) -> float | None:
-    """Return how many contacts the engine never saw, by sweeping its own steps."""
+def missed_contacts(run: Trajectory, _: EvaluationContext) -> float | None:
+    """Return the number of contacts that the engine missed, as the audit counts them."""
     count = run.missed_contacts
     return None if count is None else float(count)
 
 
-def passes(run: Trajectory, _: Judge) -> float | None:
-    """Return the share of all meetings that were passed through unseen: 0.1 is 1 bullet in 10. None without any."""
+def passes(run: Trajectory, _: EvaluationContext) -> float | None:
+    """Return the fraction of all contacts that were missed: 0.1 is 1 bullet in 10. None without contacts."""
     missed = run.missed_contacts
     if missed is None or not missed + collisions(run):
         return None
     return missed / (missed + collisions(run))
 
 
-def settle_time(run: Trajectory, judge: Judge) -> float | None:
-    """Return by how much the time at which all has settled differs from the truth's, s; infinite if it never does.
+def settle_time(run: Trajectory, context: EvaluationContext) -> float | None:
+    """Return the error of the time at which all bodies are at rest, s; infinite if the run never comes to rest.
 
-    None where the truth does not settle, or is not trusted to its end.
+    None if the truth does not come to rest or is not trusted to its end.
     """
-    if judge.truth is None or judge.until < judge.scene.world.duration:
+    if context.truth is None or context.until < context.scene.world.duration:
         return None
-    own, right = _settled(run, judge), _settled(judge.truth.trajectory, judge)
+    own, right = _settled(run, context), _settled(context.truth.trajectory, context)
     return None if math.isinf(right) else abs(own - right)
 
 
-def _settled(run: Trajectory, judge: Judge) -> float:
-    """Return the time of the first frame from which on every body is slow, s; inf for never."""
+def _settled(run: Trajectory, context: EvaluationContext) -> float:
+    """Return the time of the first frame from which on every body is at rest, s; inf if there is none."""
     with np.errstate(over="ignore", invalid="ignore"):
         speed = np.hypot(*np.moveaxis(run.velocity, 2, 0))
-        loud = np.flatnonzero((~(speed <= judge.quiet))[:, judge.moving].any(axis=1))
-    if not len(loud):
+        moves = np.flatnonzero((~(speed <= context.rest_speed))[:, context.moving].any(axis=1))
+    if not len(moves):
         return 0.0
-    return float(run.time[loud[-1] + 1]) if loud[-1] + 1 < len(run.time) else math.inf
+    return float(run.time[moves[-1] + 1]) if moves[-1] + 1 < len(run.time) else math.inf
 
 
-def pixels(run: Trajectory, judge: Judge) -> float | None:
+def pixels(run: Trajectory, context: EvaluationContext) -> float | None:
     """Return the largest distance from the truth on the screen, px."""
-    away = max_position(run, judge)
-    return None if away is None else away * judge.zoom
+    distance = max_position(run, context)
+    return None if distance is None else distance * context.zoom
 
 
 METRICS: Mapping[str, Metric] = {
@@ -179,8 +290,8 @@ METRICS: Mapping[str, Metric] = {
 }
 
 
-def measured(run: Trajectory, judge: Judge) -> dict[str, float | None]:
-    """Return every metric of a run by name; all None where it has no frames."""
+def measure_all(run: Trajectory, context: EvaluationContext) -> dict[str, float | None]:
+    """Return every metric of a run by name; all are None if the run has no frames."""
     if not len(run.time):
         return dict.fromkeys(METRICS)
-    return {name: metric.measure(run, judge) for name, metric in METRICS.items()}
+    return {name: metric.measure(run, context) for name, metric in METRICS.items()}

@@ -1,242 +1,261 @@
-"""Search: which variants are worth a run. It refines near the front, and stops branches that are outdone.
+"""Search for configurations on the Pareto front: which ones are worth a run, and in which order.
 
-It is bounded and steered by counted cost (`cost.py`), so that the same search tries the same variants in the same order
-on every machine, unless a time limit ends it.
+The search is bounded and steered by counted cost (`run.bounded_run`), so that the same configurations are evaluated in
+the same order on every machine, unless a time limit ends it. Its phases are:
 
-First each engine's substeps are doubled until it meets the tolerance, if it can, so that there is an answer; and the
-ways together that are known to suit such a scene are tried. From its own settings on, the variants one choice away are
-tried then: of those trials that nothing outdoes on the same engine, the one that matters most for what is asked. At
-last the smallest number of substeps and of iterations that still meets the tolerance is closed in on.
+1. the scene's own settings of each engine, with the substeps doubled until the tolerance is met, so that there is an
+   answer;
+2. combinations of options that suit the scene (`SearchSpace.presets`);
+3. neighbours of evaluations that no other evaluation of the same engine dominates, in the order of their importance
+   for tolerance and budget;
+4. bisection for the smallest number of substeps and of iterations that meets the tolerance.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import cycle
 
-from sandbox.measure.bounded_run import working
-from sandbox.measure.told import Told
-from sandbox.measure.tradeoff.front import outdone
-from sandbox.measure.tradeoff.judge import Judge
-from sandbox.measure.tradeoff.trial import Trial, tried
-from sandbox.measure.tradeoff.variant import Space, Variant
+from sandbox.measure.run.bounded_run import clock_without_compilation
+from sandbox.measure.tradeoff.configuration import Configuration, Evaluation, SearchSpace, evaluate
+from sandbox.measure.tradeoff.metrics import EvaluationContext
+from sandbox.measure.tradeoff.objective import is_dominated
+from sandbox.progress import Progress, ProgressCallback
 from sandbox.trajectory import Trajectory
 
-MARGIN = 0.7
-"""A trial is outdone by one that has no more than this share of its counted cost and is at least as right; counted
-costs say no more of the time that each takes."""
-ENOUGH = 1e-6
-"""Errors below this share of the tolerance are as good as none; where none is tolerated, of a single miss."""
-SLOW = 0.2
-"""The share of the effort that one variant's run may take, for each seed."""
-FALLS = 0.8
-"""Where half the step leaves more than this share of an error, it was of no use."""
-FLAT = 2
-"""So often it may be of none."""
-FAR = 16
-"""times its own substeps an engine goes at first: beyond, another way of doing things may be the cheaper one."""
-WIDE = 0.8
-"""The share of trials and effort after which nothing new is looked for, so that some is left to close in."""
-LITTLE = 0.95
-"""What leaves more than this share of the error of something cheaper is not gone on from."""
+DOMINANCE_MARGIN = 0.7
+"""An evaluation is dominated by one that has less than this fraction of its counted cost and is at least as accurate:
+counted costs are no more accurate than that."""
+NEGLIGIBLE = 1e-6
+"""Errors below this fraction of the tolerance count as equal; if the tolerance is 0, below this error."""
+RUN_FRACTION = 0.2
+"""Fraction of the effort that the run of one configuration may take, for each seed."""
+MAX_USEFUL_RATIO = 0.8
+"""Halving the substep is useless if more than this fraction of the error remains."""
+MAX_USELESS = 2
+"""Useless halvings after which the doubling of substeps ends."""
+MAX_FIRST_FACTOR = 16
+"""Largest factor of the substeps in the first phase: beyond it, another option may be cheaper."""
+EXPLORE_FRACTION = 0.8
+"""Fraction of evaluations and effort for the first three phases; the rest is for the bisection."""
+MIN_IMPROVEMENT = 0.95
+"""An evaluation with more than this fraction of the error of a cheaper one is not explored further."""
 
-LEAST = 30.0
+MIN_RUN_COST = 30.0
 """Counted cost, s, that a run with an engine's own settings may always have, however small the effort."""
 
 
 @dataclass
-class Search:
-    """Trials so far, and what is tried next."""
+class SettingsSearch:
+    """Evaluations so far, and the choice of the next one."""
 
-    space: Space
-    judges: Sequence[Judge]
+    space: SearchSpace
+    contexts: Sequence[EvaluationContext]
     metric: str
+    """name of the metric of the error"""
     tolerance: float
-    """in the unit of the metric: errors near it matter most"""
+    """in the unit of the metric"""
     budget: float | None
-    """s for the whole run, where a cost is asked for"""
+    """s for the whole run; None if there is no budget"""
     effort: float
-    """counted cost that all trials together may have, s; every engine's own settings are tried even so"""
-    most: int
-    """trials"""
-    told: Told
+    """counted cost of all evaluations together, s; the own settings of every engine are evaluated in any case"""
+    max_evaluations: int
+    on_progress: ProgressCallback
     deadline: float = math.inf
-    """by the clock of `working`, s"""
+    """time of `clock_without_compilation`, s"""
     known: Mapping[str, Trajectory] = field(default_factory=dict)
-    """by engine: runs with its own settings that were made already"""
-    trials: dict[Variant, Trial] = field(default_factory=dict)
-    untried: set[Variant] = field(default_factory=set)
-    """variants that would have cost too much"""
+    """runs with an engine's own settings that exist already, by engine"""
+    evaluations: dict[Configuration, Evaluation] = field(default_factory=dict)
+    skipped: set[Configuration] = field(default_factory=set)
+    """configurations left out because of their cost"""
     interrupted: bool = False
-    """by the user; what was tried till then is kept"""
+    """whether Ctrl-C ended the search"""
     spent: float = 0.0
-    """counted cost of all trials, s"""
+    """counted cost of all evaluations, s"""
 
-    def run(self) -> list[Trial]:
-        """Try variants until none is worth it, or the effort is at its end; return all trials in order."""
+    def run(self) -> list[Evaluation]:
+        """Search until no configuration is worth a run or the effort is spent; return all evaluations in order."""
         try:
-            self._look()
+            self._search()
         except KeyboardInterrupt:
             self.interrupted = True
-        return list(self.trials.values())
+        return list(self.evaluations.values())
 
-    def _look(self) -> None:
-        expanded: set[Variant] = set()
-        starts = [self._try(variant) for variant in self.space.starts()[: self.most] if working() < self.deadline]
+    def _search(self) -> None:
+        own = self.space.starts()[: self.max_evaluations]
+        starts = [self._evaluate(each) for each in own if clock_without_compilation() < self.deadline]
         for start in starts:
-            self._reach(start)
-        by_engine = {start.variant.engine: start for start in starts if start is not None and start.status != "stopped"}
-        for variant in self.space.suited():
-            if variant.engine in by_engine and self._goes_on(WIDE):
-                self._try(variant, by_engine[variant.engine])
-        aims = (
-            [self._near_tolerance, self._near_budget, self._cheap]
-            if self.budget
-            else [self._near_tolerance, self._cheap]
-        )
-        turns = {engine: cycle(aims) for engine in self.space.engines}
-        while self._goes_on(WIDE):
-            open_trials = [t for v, t in self.trials.items() if v not in expanded and self._promising(t)]
-            if not open_trials:
-                break
-            # The engine that cost least so far is next: one that is slow leaves the others their share.
-            engine = min({t.variant.engine for t in open_trials}, key=self._spent_on)
-            best = min((t for t in open_trials if t.variant.engine == engine), key=next(turns[engine]))
-            expanded.add(best.variant)
-            for variant in self.space.near(best.variant):
-                if self._goes_on(WIDE) and (best.status != "stopped" or variant.work < best.variant.work):
-                    self._try(variant, best)
-        self._close_in()
+            self._refine_to_tolerance(start)
+        by_engine = {start.engine: start for start in starts if start is not None and start.status != "stopped"}
+        for configuration in self.space.presets():
+            if configuration.engine in by_engine and self._may_continue(EXPLORE_FRACTION):
+                self._evaluate(configuration, by_engine[configuration.engine])
+        self._explore()
+        self._bisect_all()
 
-    def _reach(self, trial: Trial | None) -> None:
-        """Double the substeps until the tolerance is met, or again and again leave the error what it is.
+    def _refine_to_tolerance(self, evaluation: Evaluation | None) -> None:
+        """Double the substeps until the tolerance is met, or until doubling is useless several times.
 
-        What is missed is missed by 2 and by 4 substeps as well, and by 8 no more: the first that changes nothing does
-        not end it, and where none may be missed, nothing but time.
+        The first useless doublings do not end it: a contact missed with 2 and with 4 substeps can be found with 8. If
+        the tolerance is 0, only the effort ends it.
         """
-        flat = 0
-        while trial is not None and trial.error(self.metric) > self.tolerance and trial.variant.engine != "exact":
-            finer = replace(trial.variant, substeps=2 * trial.variant.substeps)
-            if trial.status in ("refused", "stopped") or not self.space.sound(finer) or not self._goes_on():
+        useless = 0
+        while evaluation is not None and evaluation.ranking_error > self.tolerance and evaluation.engine != "exact":
+            configuration = evaluation.configuration
+            finer = replace(configuration, substeps=2 * configuration.substeps)
+            if evaluation.status in ("refused", "stopped") or not self.space.is_valid(finer):
                 return
-            if self.tolerance > 0.0 and finer.substeps > FAR * self.space.own(finer.engine).substeps:
+            if not self._may_continue():
                 return
-            found = self._try(finer, trial)
-            before = trial.error(self.metric)
-            if found is not None and math.isfinite(before) and found.error(self.metric) > FALLS * before:
-                flat += 1
-                if flat > FLAT and self.tolerance > 0.0:
+            if (
+                self.tolerance > 0.0
+                and finer.substeps > MAX_FIRST_FACTOR * self.space.own_settings(finer.engine).substeps
+            ):
+                return
+            found = self._evaluate(finer, evaluation)
+            before = evaluation.ranking_error
+            if found is not None and math.isfinite(before) and found.ranking_error > MAX_USEFUL_RATIO * before:
+                useless += 1
+                if useless > MAX_USELESS and self.tolerance > 0.0:
                     return
-            trial = found
+            evaluation = found
 
-    def _goes_on(self, share: float = 1.0) -> bool:
+    def _explore(self) -> None:
+        """Evaluate the neighbours of promising evaluations, the engine with the least cost so far first."""
+        expanded: set[Configuration] = set()
+        goals = (
+            [self._tolerance_distance, self._budget_distance, self._usable_cost]
+            if self.budget
+            else [self._tolerance_distance, self._usable_cost]
+        )
+        turns: Mapping[str, cycle[Callable[[Evaluation], float]]]
+        turns = {engine: cycle(goals) for engine in self.space.engines}
+        while self._may_continue(EXPLORE_FRACTION):
+            promising = [e for c, e in self.evaluations.items() if c not in expanded and self._is_promising(e)]
+            if not promising:
+                break
+            # A slow engine leaves the others their part of the effort.
+            engine = min({each.engine for each in promising}, key=self._spent_on)
+            best = min((each for each in promising if each.engine == engine), key=next(turns[engine]))
+            expanded.add(best.configuration)
+            for neighbour in self.space.neighbours(best.configuration):
+                is_faster = neighbour.work < best.configuration.work
+                if self._may_continue(EXPLORE_FRACTION) and (best.status != "stopped" or is_faster):
+                    self._evaluate(neighbour, best)
+
+    def _may_continue(self, fraction: float = 1.0) -> bool:
+        """Return whether a fraction of the evaluations and of the effort is not used up."""
         return (
-            len(self.trials) < share * self.most
-            and self._left > (1.0 - share) * self.effort
-            and working() < self.deadline
+            len(self.evaluations) < fraction * self.max_evaluations
+            and self._remaining > (1.0 - fraction) * self.effort
+            and clock_without_compilation() < self.deadline
         )
 
     def _spent_on(self, engine: str) -> tuple[float, int]:
-        """Return what an engine's trials have cost, and its place among the engines, which decides between equals."""
-        spent = sum(trial.spent for variant, trial in self.trials.items() if variant.engine == engine)
+        """Return the cost of an engine's evaluations so far, and its index, which decides between equals."""
+        spent = sum(each.spent_seconds for each in self.evaluations.values() if each.engine == engine)
         return spent, self.space.engines.index(engine)
 
     @property
-    def _left(self) -> float:
+    def _remaining(self) -> float:
         return self.effort - self.spent
 
-    def _try(self, variant: Variant, parent: Trial | None = None) -> Trial | None:
-        """Try a variant that was not tried, unless by its parent's counted cost it would cost too much."""
-        if variant in self.trials:
-            return self.trials[variant]
-        limit, known = max(self.effort, LEAST), self.known.get(variant.engine)
+    def _evaluate(self, configuration: Configuration, parent: Evaluation | None = None) -> Evaluation | None:
+        """Evaluate a configuration, unless the counted cost of its parent predicts that it would cost too much."""
+        if configuration in self.evaluations:
+            return self.evaluations[configuration]
+        limit, known = max(self.effort, MIN_RUN_COST), self.known.get(configuration.engine)
         if parent is not None:
-            limit, known = min(SLOW * self.effort, max(self._left, 0.0) / len(self.judges)), None
-            if parent.cost * variant.work / parent.variant.work > limit:
-                self.untried.add(variant)
+            limit, known = min(RUN_FRACTION * self.effort, max(self._remaining, 0.0) / len(self.contexts)), None
+            if parent.counted_seconds * configuration.work / parent.configuration.work > limit:
+                self.skipped.add(configuration)
                 return None
-        self.told(f"{len(self.trials) + 1} tried: {_called(variant)}")
-        found = tried(variant, self.space, self.judges, limit, self.deadline, known)
-        if found.status == "stopped" and working() >= self.deadline:
-            self.untried.add(variant)
+        self.on_progress(Progress(f"{len(self.evaluations) + 1} tried: {_describe(configuration)}"))
+        found = evaluate(configuration, self.space, self.contexts, self.metric, limit, self.deadline, known)
+        if found.status == "stopped" and clock_without_compilation() >= self.deadline:
+            self.skipped.add(configuration)
             return None
-        self.trials[variant] = found
-        self.spent += found.spent
+        self.evaluations[configuration] = found
+        self.spent += found.spent_seconds
         return found
 
-    def _error(self, trial: Trial) -> float:
-        """Return a trial's error, never 0: logarithms are taken of it."""
-        return max(trial.error(self.metric), ENOUGH * (self.tolerance or 1.0))
+    def _positive_error(self, evaluation: Evaluation) -> float:
+        """Return an error that is never 0, for logarithms."""
+        return max(evaluation.ranking_error, NEGLIGIBLE * (self.tolerance or 1.0))
 
-    def _promising(self, trial: Trial) -> bool:
-        """Tell whether to look around a trial: nothing on its engine outdoes it, or all there failed as it did."""
-        if trial.status == "refused":
+    def _is_promising(self, evaluation: Evaluation) -> bool:
+        """Return whether to explore the neighbours: no evaluation of the engine dominates it, or all have failed."""
+        if evaluation.status == "refused":
             return False
-        same = [t for t in self.trials.values() if t.variant.engine == trial.variant.engine]
-        good = [t for t in same if math.isfinite(t.error(self.metric))]
-        if trial.status == "stopped":  # what takes less may get to its end, as long as nothing does
-            return not good and trial.variant.work <= min(t.variant.work for t in same)
-        if math.isinf(trial.error(self.metric)):  # what is finer may do better, as long as nothing does well
-            if trial.status == "ok" and trial.metrics.get(self.metric) is None:
-                return not good and trial is same[0]
-            return not good and trial.variant.work >= max(t.variant.work for t in same)
-        others = [(t.cost, LITTLE * self._error(t)) for t in good]
-        return not outdone(trial.cost, self._error(trial), others, MARGIN)
+        same_engine = [each for each in self.evaluations.values() if each.engine == evaluation.engine]
+        successful = [each for each in same_engine if math.isfinite(each.ranking_error)]
+        work = evaluation.configuration.work
+        if evaluation.status == "stopped":  # less work may reach the end
+            return not successful and work <= min(each.configuration.work for each in same_engine)
+        if math.isinf(evaluation.ranking_error):  # a finer step may succeed
+            if evaluation.status == "ok" and evaluation.metrics.get(self.metric) is None:
+                return not successful and evaluation is same_engine[0]
+            return not successful and work >= max(each.configuration.work for each in same_engine)
+        others = [(each.counted_seconds, MIN_IMPROVEMENT * self._positive_error(each)) for each in successful]
+        return not is_dominated(evaluation.counted_seconds, self._positive_error(evaluation), others, DOMINANCE_MARGIN)
 
-    def _near_tolerance(self, trial: Trial) -> float:
-        error, wanted = self._error(trial), self.tolerance or ENOUGH
+    def _tolerance_distance(self, evaluation: Evaluation) -> float:
+        error, wanted = self._positive_error(evaluation), self.tolerance or NEGLIGIBLE
         return abs(math.log(error / wanted)) if math.isfinite(error) else math.inf
 
-    def _near_budget(self, trial: Trial) -> float:
+    def _budget_distance(self, evaluation: Evaluation) -> float:
         assert self.budget is not None
-        return abs(math.log(max(trial.cost, 1e-9) / self.budget))
+        return abs(math.log(max(evaluation.counted_seconds, 1e-9) / self.budget))  # 1 ns: a cost of 0 has no logarithm
 
-    def _cheap(self, trial: Trial) -> float:
-        return trial.cost if math.isfinite(trial.error(self.metric)) else math.inf
+    def _usable_cost(self, evaluation: Evaluation) -> float:
+        return evaluation.counted_seconds if math.isfinite(evaluation.ranking_error) else math.inf
 
-    def _close_in(self) -> None:
-        """Of what meets the tolerance, and is outdone by nothing, find the fewest substeps and iterations that do."""
-        knobs = ("substeps", "iterations") if self.space.iterates else ("substeps",)
-        for knob in knobs:
-            for meeting in [t for t in self.trials.values() if self._meets(t) and t.variant.engine != "exact"]:
-                if self._promising(meeting):
-                    self._fewer(knob, meeting)
+    def _bisect_all(self) -> None:
+        """Find the fewest substeps and iterations of each evaluation that meets the tolerance and is not dominated."""
+        for setting in ("substeps", "iterations") if self.space.has_coupling else ("substeps",):
+            meeting = [each for each in self.evaluations.values() if self._meets(each) and each.engine != "exact"]
+            for each in meeting:
+                if self._is_promising(each):
+                    self._halve(setting, each)
 
-    def _meets(self, trial: Trial) -> bool:
-        return trial.error(self.metric) <= self.tolerance
+    def _meets(self, evaluation: Evaluation) -> bool:
+        return evaluation.ranking_error <= self.tolerance
 
-    def _fewer(self, knob: str, meeting: Trial) -> None:
-        """Halve a number as long as the tolerance is met, then close the gap to what misses it."""
-        while self._goes_on():
-            value = getattr(meeting.variant, knob)
-            less = _with(meeting.variant, knob, value // 2)
-            found = self._try(less, meeting) if self.space.sound(less) else None
+    def _halve(self, setting: str, meeting: Evaluation) -> None:
+        """Halve a setting as long as the tolerance is met, then bisect between the last two values."""
+        while self._may_continue():
+            value = getattr(meeting.configuration, setting)
+            less = _with(meeting.configuration, setting, value // 2)
+            found = self._evaluate(less, meeting) if self.space.is_valid(less) else None
             if found is None:
                 return
             if not self._meets(found):
-                self._halve(knob, value // 2, value, meeting)
+                self._bisect(setting, value // 2, value, meeting)
                 return
             meeting = found
 
-    def _halve(self, knob: str, low: int, high: int, meeting: Trial) -> None:
-        while high - low > max(1, high // 8) and self._goes_on():
-            middle = _with(meeting.variant, knob, (low + high) // 2)
-            if not self.space.sound(middle):
+    def _bisect(self, setting: str, low: int, high: int, meeting: Evaluation) -> None:
+        """Bisect between a value that misses the tolerance and one that meets it, to 1/8 of the latter."""
+        while high - low > max(1, high // 8) and self._may_continue():
+            middle = _with(meeting.configuration, setting, (low + high) // 2)
+            if not self.space.is_valid(middle):
                 return
-            found = self._try(middle, meeting)
+            found = self._evaluate(middle, meeting)
             if found is None:
                 return
             if self._meets(found):
-                high = getattr(middle, knob)
+                high = getattr(middle, setting)
             else:
-                low = getattr(middle, knob)
+                low = getattr(middle, setting)
 
 
-def _with(variant: Variant, knob: str, value: int) -> Variant:
-    return replace(variant, substeps=value) if knob == "substeps" else replace(variant, iterations=value)
+def _with(configuration: Configuration, setting: str, value: int) -> Configuration:
+    if setting == "substeps":
+        return replace(configuration, substeps=value)
+    return replace(configuration, iterations=value)
 
 
-def _called(variant: Variant) -> str:
-    words = ", ".join(f"{key} {value}" for key, value in variant.words)
-    steps = f"dt / {variant.finer}" if variant.finer != 1 else "dt"
-    return f"{variant.engine}, {steps}, {variant.substeps} × {variant.iterations}{', ' if words else ''}{words}"
+def _describe(configuration: Configuration) -> str:
+    options = "".join(f", {key} {value}" for key, value in configuration.options)
+    steps = f"dt / {configuration.refinement}" if configuration.refinement != 1 else "dt"
+    return f"{configuration.engine}, {steps}, {configuration.substeps} × {configuration.iterations}{options}"

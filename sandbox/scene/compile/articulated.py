@@ -7,10 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.arrays import FloatArray
+from sandbox.scene.compile.bodies import Layout, link_length, rotated, uniform_layout
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
-from sandbox.scene.compile.layout import Layout, alike, pitch, turned
 from sandbox.scene.description.base import Point
-from sandbox.scene.description.generators import ENDS, STRIDE, BodySegment, Cloth, End, Ragdoll, Rope, segments
+from sandbox.scene.description.generators import ENDS, STRIDE, BodySegment, Cloth, Ragdoll, Rope, RopeEnd, segments
+from sandbox.scene.geometry.vectors import to_world
 
 STARTS_AT, ENDS_AT = -2, -3
 """In place of a body in a rope's links: the bodies that its start and its end are tied to."""
@@ -25,22 +26,24 @@ def node_count(rope: Rope) -> int:
 
 def rope_layout(rope: Rope, gravity: Point) -> Layout:
     """Return the start state of the nodes or planks of a rope, from its start to its end."""
-    place = course(rope, gravity)
+    position = rope_course(rope, gravity)
     if rope.kind == "planks":
-        step = np.diff(place, axis=0)
-        return alike(0.5 * (place[:-1] + place[1:]), rope.velocity, np.arctan2(step[:, 1], step[:, 0]), 0.0)
-    fixed = np.zeros(len(place), np.bool_)
+        step = np.diff(position, axis=0)
+        return uniform_layout(
+            0.5 * (position[:-1] + position[1:]), rope.velocity, np.arctan2(step[:, 1], step[:, 0]), 0.0
+        )
+    fixed = np.zeros(len(position), np.bool_)
     fixed[[0, -1]] = [rope.holds(end) for end in ENDS]
-    own = np.ones(len(place), np.bool_)
+    own = np.ones(len(position), np.bool_)
     own[[0, -1]] = [rope.tied(end) is None for end in ENDS]
-    return alike(place[own], rope.velocity, rope.angle, rope.angular_velocity, fixed[own])
+    return uniform_layout(position[own], rope.velocity, rope.angle, rope.angular_velocity, fixed[own])
 
 
-def course(rope: Rope, gravity: Point) -> FloatArray:
+def rope_course(rope: Rope, gravity: Point) -> FloatArray:
     """Return the ends of a rope's links, (links + 1, 2) m: on a straight line, or on an arc for a longer rope."""
     start, end = np.asarray(rope.start), np.asarray(rope.end)
     chord = end - start
-    distance, length = float(math.hypot(*chord)), pitch(rope)
+    distance, length = float(math.hypot(*chord)), link_length(rope)
     fraction = np.arange(rope.links + 1)[:, None] / rope.links
     half = half_turn(rope.links, distance / length)
     if half == 0.0:
@@ -79,7 +82,7 @@ def half_turn(links: int, ratio: float) -> float:
 
 def rope_joints(rope: Rope) -> JointArrays:
     """Return the joints of a rope by the indices of its own bodies, with `STARTS_AT` and `ENDS_AT` for other bodies."""
-    length, count = pitch(rope), node_count(rope)
+    length, count = link_length(rope), node_count(rope)
     if rope.kind != "planks":
         first, last = (rope.tied(end) is not None for end in ENDS)
         node = np.concatenate(([STARTS_AT] * first, np.arange(count), [ENDS_AT] * last)).astype(np.int64)
@@ -90,15 +93,15 @@ def rope_joints(rope: Rope) -> JointArrays:
         return JointArrays.alike(LinkKind.SPRING, node[:-1], node[1:], figures=figures)
     half, plank = 0.5 * length, np.arange(count)
     links = JointArrays.alike(LinkKind.PIVOT, plank[:-1], plank[1:], (half, 0.0), (-half, 0.0))
-    ends: tuple[tuple[End, int, Point, int, float], ...] = (
+    ends: tuple[tuple[RopeEnd, int, Point, int, float], ...] = (
         ("start", 0, rope.start, STARTS_AT, -half),
         ("end", count - 1, rope.end, ENDS_AT, half),
     )
-    for end, body, place, stand_in, anchor in ends:
+    for end, body, position, stand_in, anchor in ends:
         if rope.tied(end) is not None:
             held = JointArrays.alike(LinkKind.PIVOT, [stand_in], [body], (0.0, 0.0), (anchor, 0.0))
         elif rope.holds(end):
-            held = JointArrays.alike(LinkKind.PIVOT, [WORLD], [body], place, (anchor, 0.0))
+            held = JointArrays.alike(LinkKind.PIVOT, [WORLD], [body], position, (anchor, 0.0))
         else:
             continue
         links = links.joined(held)
@@ -111,7 +114,7 @@ def cloth_layout(cloth: Cloth) -> Layout:
     position = np.asarray(cloth.corner) + np.column_stack((column, -row)) * np.asarray(cloth.spacing)
     fixed = np.zeros(len(position), np.bool_)
     fixed[[column + row * cloth.columns for column, row in cloth.pinned]] = True
-    return alike(position, cloth.velocity, cloth.angle, cloth.angular_velocity, fixed)
+    return uniform_layout(position, cloth.velocity, cloth.angle, cloth.angular_velocity, fixed)
 
 
 def cloth_joints(cloth: Cloth) -> JointArrays:
@@ -161,7 +164,7 @@ def limb_layout(ragdoll: Ragdoll) -> Layout:
         _pose(name, parts, poses)
     ground = min(poses[name].middle[1] - parts[name].radius for name in parts if name.endswith("foot"))
     offset = np.asarray([(flip * pose.middle[0], pose.middle[1] - ground) for pose in (poses[name] for name in parts)])
-    offset = turned(offset * ragdoll.height, ragdoll.angle)
+    offset = rotated(offset * ragdoll.height, ragdoll.angle)
     spin = ragdoll.angular_velocity
     count = len(parts)
     angle = [axis_of(part, flip) + flip * poses[name].tilt + ragdoll.angle for name, part in parts.items()]
@@ -207,17 +210,15 @@ def _pose(name: str, parts: dict[str, BodySegment], poses: dict[str, Pose]) -> P
         tilt += parent.tilt
         base, away = drawn.joint if drawn.parent else middle_of(drawn), parent.tilt
         at = parent.joint if drawn.parent else parent.middle
-        joint = _carried(part.joint, base, at, away)
-    middle = _carried(middle_of(part), part.joint, joint, tilt) if part.parent else middle_of(part)
+        joint = _follow_parent(part.joint, base, at, away)
+    middle = _follow_parent(middle_of(part), part.joint, joint, tilt) if part.parent else middle_of(part)
     poses[name] = Pose(middle, joint, tilt)
     return poses[name]
 
 
-def _carried(point: Point, base: Point, at: Point, tilt: float) -> Point:
+def _follow_parent(point: Point, base: Point, at: Point, tilt: float) -> Point:
     """Return a point of a segment after a rotation about a base point that has moved."""
-    x, y = point[0] - base[0], point[1] - base[1]
-    cos, sin = math.cos(tilt), math.sin(tilt)
-    return at[0] + cos * x - sin * y, at[1] + sin * x + cos * y
+    return to_world((point[0] - base[0], point[1] - base[1]), math.cos(tilt), math.sin(tilt), at)
 
 
 def middle_of(part: BodySegment) -> Point:
@@ -239,11 +240,11 @@ def _anchor(part: BodySegment, joint: Point, flip: float, height: float) -> Floa
     """Return the position of a joint in the frame of a segment, (2,) m."""
     x, y = middle_of(part)
     away = np.asarray([[flip * (joint[0] - x), joint[1] - y]]) * height
-    return turned(away, -axis_of(part, flip)).reshape(2)
+    return rotated(away, -axis_of(part, flip)).reshape(2)
 
 
 def _bounds(part: BodySegment, parent: BodySegment, flip: float) -> tuple[float, float, float]:
     """Return the limits of a joint as limits of the angle between its bodies, rad."""
     straight = axis_of(part, flip) - axis_of(parent, flip)
-    least, most = sorted(flip * math.radians(bound) for bound in part.bounds)
-    return straight + least, straight + most, 0.0
+    lower, upper = sorted(flip * math.radians(bound) for bound in part.bounds)
+    return straight + lower, straight + upper, 0.0

@@ -1,4 +1,4 @@
-"""Bodies of a scene as arrays, in scene order.
+"""Bodies of a scene as arrays, in scene order, and the start states of its elements.
 
 Scene order is that of `Scene.kinds`: balls, then the balls of grids, scatters and emitters, then boxes and so on, each
 in the order of the file.
@@ -7,23 +7,156 @@ in the order of the file.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
-from sandbox.scene.compile.layout import NO_LAYOUT, Layout
 from sandbox.scene.description.base import GROUND, BodySource, BodySpec, Point
+from sandbox.scene.description.bodies import Capsule
 from sandbox.scene.description.discs import Ball, Disc
-from sandbox.scene.description.scene import default_name
+from sandbox.scene.description.generators import DEFAULT_MASS, FAR, NEAR, Cloth, Ragdoll, Rope, segments
+from sandbox.scene.description.scene import SceneDescription, default_name
 from sandbox.scene.description.surface import Spin
-from sandbox.scene.geometry.shapes import Shapes, form_of, shapes_of
+from sandbox.scene.geometry.shapes import Shapes, geometry_of, shapes_of
+from sandbox.scene.geometry.vectors import rotate, to_world
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Start state of n bodies."""
+
+    position: FloatArray
+    """(n, 2) m, centres of mass"""
+    velocity: FloatArray
+    """(n, 2) m/s"""
+    angle: FloatArray
+    """(n,) rad"""
+    angular_velocity: FloatArray
+    """(n,) rad/s"""
+    fixed: BoolArray
+    """(n,) never moves"""
+    element: IntArray
+    """(n,) index of each body's prototype within the element"""
+    endings: tuple[str, ...] | None = None
+    """suffix of each body's name; None if they are numbered from 1"""
+    alone: bool = False
+    """whether they do not collide with each other"""
+    elements: int = 1
+    """number of prototypes of the element"""
+    roll: FloatArray | None = None
+    """(n, 2) rad/s, angular velocity of spheres on a surface about x and y; None without rolling"""
+    lifetime: FloatArray | None = None
+    """(n,) s, lifetime of each; None if unlimited"""
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+
+NO_LAYOUT = Layout(
+    position=np.empty((0, 2)),
+    velocity=np.empty((0, 2)),
+    angle=np.empty(0),
+    angular_velocity=np.empty(0),
+    fixed=np.empty(0, np.bool_),
+    element=np.empty(0, np.int64),
+    elements=0,
+)
+"""Start state of no bodies."""
+
+
+def uniform_layout(
+    position: FloatArray,
+    velocity: FloatArray | Point,
+    angle: FloatArray | float,
+    spin: FloatArray | float,
+    fixed: BoolArray | None = None,
+) -> Layout:
+    """Return the start state of n bodies of one prototype; fixed ones are at rest."""
+    count = len(position)
+    still = np.zeros(count, np.bool_) if fixed is None else fixed
+    return Layout(
+        position=position,
+        velocity=np.where(still[:, None], 0.0, np.asarray(velocity, dtype=np.float64)),
+        angle=np.broadcast_to(np.asarray(angle, dtype=np.float64), (count,)).copy(),
+        angular_velocity=np.where(still, 0.0, np.asarray(spin, dtype=np.float64)),
+        fixed=still,
+        element=np.zeros(count, np.int64),
+    )
+
+
+def rotated(offset: FloatArray, angle: float) -> FloatArray:
+    """Return offsets (n, 2) rotated by an angle."""
+    x, y = offset.T
+    return np.column_stack(rotate(x, y, np.cos(angle), np.sin(angle)))
+
+
+SURFACE = ("material", "restitution", "restitution_falloff", "friction", "colour", "collides", "layer")
+
+
+def elements_of(source: BodySource) -> tuple[BodySource, ...]:
+    """Return the prototypes of an element: itself, a rope's node or plank, a cloth's node, a ragdoll's segments."""
+    match source:
+        case Rope(kind="planks"):
+            plank = Capsule(
+                position=(0.0, 0.0), length=link_length(source), radius=source.radius, **_mass_and_surface(source)
+            )
+            return (plank,)
+        case Rope() | Cloth():
+            return (Ball(position=(0.0, 0.0), radius=source.radius, **_mass_and_surface(source)),)
+        case Ragdoll():
+            return _ragdoll_elements(source)
+        case _:
+            return (source,)
+
+
+def elements_in(scene: SceneDescription) -> tuple[BodySource, ...]:
+    """Return shape and material of the bodies of a scene, in scene order."""
+    return tuple(element for source in scene.body_sources for element in elements_of(source))
+
+
+def link_length(rope: Rope) -> float:
+    """Return the rest length of a rope's links, m."""
+    return (math.dist(rope.start, rope.end) if rope.length is None else rope.length) / rope.links
+
+
+def _surface(source: BodySource) -> dict[str, Any]:
+    return {key: getattr(source, key) for key in SURFACE}
+
+
+def _mass_and_surface(source: BodySource) -> dict[str, Any]:
+    return {"mass": source.mass, "density": source.density, **_surface(source)}
+
+
+@lru_cache(maxsize=256)
+def _ragdoll_elements(ragdoll: Ragdoll) -> tuple[BodySource, ...]:
+    """Return the segments of a ragdoll: capsules, and a ball as its head."""
+    elements: list[BodySource] = []
+    parts, height = segments(ragdoll), ragdoll.height
+    behind = next(iter(parts)).partition("-")[0]
+    whole = DEFAULT_MASS if ragdoll.mass is None else ragdoll.mass
+    for name, segment in parts.items():
+        more: dict[str, Any] = {
+            "position": (0.0, 0.0),
+            "radius": segment.radius * height,
+            "mass": segment.mass_percent * 0.01 * whole,
+        }
+        more |= _surface(ragdoll)
+        if ragdoll.colour is None:
+            more["colour"] = FAR if name.startswith(behind) else NEAR
+        if len(segment.ends) == 1:
+            elements.append(Ball(**more))
+        else:
+            elements.append(Capsule(length=math.dist(*segment.ends) * height, **more))
+    return tuple(elements)
+
 
 STATE = ("position", "velocity", "angle", "angular_velocity")
 FORM = ("radius", "core", "thin", "mass", "moment")
 COLUMNS = (*STATE, *FORM, "fixed", "group", "born", "lifetime", "roll", "layer", "visits")
 
-OF_SPHERE = 0.8
+SPHERE_MOMENT_RATIO = 0.8
 """Moment of inertia of a sphere, ⅖ m r², relative to that of a disc, ½ m r²."""
 
 
@@ -63,7 +196,7 @@ class Bodies:
     layer: IntArray
     """(N,) collision layer, as an index into `layers`"""
     visits: IntArray
-    """(N, Z) state of each body in each zone: `AWAY`, `INSIDE`, `HELD` or `LET_GO`"""
+    """(N, Z) state of each body in each zone: `AWAY`, `INSIDE`, `HELD` or `RELEASED`"""
     element: IntArray
     """(N,) index into `elements`"""
     elements: tuple[BodySource, ...]
@@ -124,11 +257,10 @@ class Bodies:
 
 def centre_of(single: BodySpec) -> Point:
     """Return the start position of a body's centre of mass, m."""
-    (x, y), (dx, dy) = single.position, form_of(single).centre
-    if not (dx or dy):
+    centre = geometry_of(single).centre
+    if not any(centre):
         return single.position
-    cos, sin = math.cos(single.angle), math.sin(single.angle)
-    return x + cos * dx - sin * dy, y + sin * dx + cos * dy
+    return to_world(centre, math.cos(single.angle), math.sin(single.angle), single.position)
 
 
 def layout_of_singles(singles: list[BodySpec]) -> Layout:
@@ -169,10 +301,10 @@ def join_layouts(
     group = [np.full(len(each), number if each.alone else 0) for each, number in zip(layouts, alone, strict=True)]
     lives = [np.full(len(each), np.inf) if each.lifetime is None else each.lifetime for each in layouts]
     rolls = [np.zeros((len(each), 2)) if each.roll is None else each.roll for each in layouts]
-    forms = [form_of(each) for each in elements]
-    of_sphere = [OF_SPHERE if spheres and isinstance(each, Disc) else 1.0 for each in elements]
+    shapes = [geometry_of(each) for each in elements]
+    of_sphere = [SPHERE_MOMENT_RATIO if spheres and isinstance(each, Disc) else 1.0 for each in elements]
 
-    def of_form(values: list[float]) -> FloatArray:
+    def of_element(values: list[float]) -> FloatArray:
         return np.asarray(np.asarray(values, dtype=np.float64)[element])
 
     return Bodies(
@@ -181,11 +313,11 @@ def join_layouts(
         # another state, bit for bit.
         **{key: np.concatenate([getattr(each, key) for each in layouts]) + 0.0 for key in STATE},
         fixed=np.concatenate([each.fixed for each in layouts]),
-        radius=of_form([form.reach for form in forms]),
-        core=of_form([form.core for form in forms]),
-        thin=of_form([form.thin for form in forms]),
-        mass=of_form([form.mass for form in forms]),
-        moment=of_form([form.moment * fraction for form, fraction in zip(forms, of_sphere, strict=True)]),
+        radius=of_element([shape.bounding_radius for shape in shapes]),
+        core=of_element([shape.inner_radius for shape in shapes]),
+        thin=of_element([shape.half_width for shape in shapes]),
+        mass=of_element([shape.mass for shape in shapes]),
+        moment=of_element([shape.moment * fraction for shape, fraction in zip(shapes, of_sphere, strict=True)]),
         group=np.concatenate(group),
         born=np.zeros(len(names)),
         lifetime=np.concatenate(lives),

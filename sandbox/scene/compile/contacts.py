@@ -18,13 +18,13 @@ import numpy as np
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.drives import is_driven
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource, HasMaterial
 from sandbox.scene.description.bodies import Compound
 from sandbox.scene.description.fixed import Plane, Post, Wall, mask_of
 from sandbox.scene.description.world import Kick
-from sandbox.scene.geometry.shapes import form_of
-from sandbox.scene.scene import Scene
+from sandbox.scene.geometry.shapes import geometry_of
 
 
 class ContactMaterial(NamedTuple):
@@ -86,36 +86,36 @@ def pair_table(scene: Scene, bodies: Bodies) -> PairTable:
     Raises:
         KeyError: an element names a material that the scene does not declare.
     """
-    surfaces, of_bearer = index_surfaces(scene, bearers_of(bodies.elements))
+    surfaces, of_part = index_surfaces(scene, surface_parts(bodies.elements))
     more, of_fixed = index_surfaces(scene, scene.fixed, surfaces)
     surfaces = (*surfaces, *more)
     restitution, friction = _mix_pairs([s.restitution for s in surfaces]), _mix_pairs([s.friction for s in surfaces])
     falloff = np.add.outer(*[np.asarray([s.falloff or 0.0 for s in surfaces], dtype=np.float64)] * 2)
-    bearers: dict[str | None, list[int]] = {}
+    having: dict[str | None, list[int]] = {}
     for number, surface in enumerate(surfaces):
-        bearers.setdefault(surface.material, []).append(number)
+        having.setdefault(surface.material, []).append(number)
     for pair in scene.pairs:
-        first, second = (bearers.get(name, []) for name in pair.between)
+        first, second = (having.get(name, []) for name in pair.between)
         figures = (restitution, pair.restitution), (friction, pair.friction), (falloff, pair.restitution_falloff)
         for table, stated in figures:
             if stated is not None:
                 table[np.ix_(first, second)] = table[np.ix_(second, first)] = stated
-    counts = np.asarray([len(_bearers(element)) for element in bodies.elements], dtype=np.int64)
+    counts = np.asarray([len(_surface_parts(element)) for element in bodies.elements], dtype=np.int64)
     begin = np.cumsum(counts) - counts
-    of_body = of_bearer[begin[bodies.element]] if len(bodies) else np.empty(0, np.int64)
+    of_body = of_part[begin[bodies.element]] if len(bodies) else np.empty(0, np.int64)
     of_shape = of_body
     if not bodies.round.all():
         shapes = bodies.shapes
-        of_shape = of_bearer[begin[bodies.element[shapes.body]] + shapes.bearer]
+        of_shape = of_part[begin[bodies.element[shapes.body]] + shapes.part]
     return PairTable(surfaces, of_body, of_shape, of_fixed, restitution, friction, falloff)
 
 
-def bearers_of(elements: Sequence[BodySource]) -> list[HasMaterial]:
+def surface_parts(elements: Sequence[BodySource]) -> list[HasMaterial]:
     """Return the parts that have surfaces: each element itself, or each of its parts."""
-    return [each for element in elements for each in _bearers(element)]
+    return [each for element in elements for each in _surface_parts(element)]
 
 
-def _bearers(element: BodySource) -> Sequence[HasMaterial]:
+def _surface_parts(element: BodySource) -> Sequence[HasMaterial]:
     if not isinstance(element, Compound):
         return (element,)
     return [_with_body_surface(part, element) for part in element.parts]
@@ -223,9 +223,9 @@ class Kinds(NamedTuple):
     fixed: BoolArray
     """(K,)"""
     to_all: BoolArray
-    """(K,) of bodies that collide with everything"""
+    """(K,) of bodies whose `collides` is `all`"""
     to_any: BoolArray
-    """(K,) of bodies that collide with anything"""
+    """(K,) of bodies whose `collides` is not `none`"""
     layers: IntArray
     """(K,) bit mask of all layers that they can reach"""
     ball: BoolArray
@@ -237,7 +237,7 @@ class Kinds(NamedTuple):
 
 
 def contact_matrix(start: Scene | Setup, bodies: Bodies | None = None) -> ContactMatrix:
-    """Return the contact matrix: which bodies can ever collide with what.
+    """Return the contact matrix: which bodies can ever collide with which bodies and static colliders.
 
     Args:
         start: scene or setup.
@@ -246,7 +246,7 @@ def contact_matrix(start: Scene | Setup, bodies: Bodies | None = None) -> Contac
     setup = Setup.of(start)
     scene, bodies = setup.scene, setup.bodies if bodies is None else bodies
     surfaces = pair_table(scene, bodies)
-    reached = reach(scene, bodies)
+    reached = reachable_layers(scene, bodies)
     kinds = _kinds(bodies, surfaces, reached)
     surface, to_all = kinds.surface, kinds.to_all
     moving, still = ~kinds.fixed & kinds.to_any, kinds.fixed & kinds.to_any
@@ -258,19 +258,19 @@ def contact_matrix(start: Scene | Setup, bodies: Bodies | None = None) -> Contac
     touching = np.zeros((size, size), dtype=bool)
     rows, columns = np.nonzero(pair)
     touching[surface[rows], surface[columns]] = True
-    rubs = surfaces.friction > 0
+    has_friction = surfaces.friction > 0
     ground = [(moving & ((kinds.layers & mask) != 0), rows) for mask, rows in _by_layers(scene)]
     can_touch: BoolArray = np.asarray(pair.any(axis=1))
     for able, _ in ground:
         can_touch |= able
-    turned = np.asarray((pair & rubs[np.ix_(surface, surface)]).any(axis=1)) | (can_touch & ~kinds.ball)
+    turned = np.asarray((pair & has_friction[np.ix_(surface, surface)]).any(axis=1)) | (can_touch & ~kinds.ball)
 
     for able, rows in ground:
         fixed_surface = np.unique(surfaces.of_fixed[rows])
         reaching = surface[able]
         touching[np.ix_(reaching, fixed_surface)] = True
         touching[np.ix_(fixed_surface, reaching)] = True
-        turned |= able & rubs[np.ix_(surface, fixed_surface)].any(axis=1)
+        turned |= able & has_friction[np.ix_(surface, fixed_surface)].any(axis=1)
 
     links, body = setup.links, _body_of_piece(bodies)
     turnable = _any_of(body, (turned & moving)[kinds.of_piece], len(bodies)) | links.turned(len(bodies))
@@ -294,7 +294,7 @@ def contact_matrix(start: Scene | Setup, bodies: Bodies | None = None) -> Contac
     )
 
 
-def reach(scene: Scene, bodies: Bodies) -> IntArray:
+def reachable_layers(scene: Scene, bodies: Bodies) -> IntArray:
     """Return the bit mask of all layers that each body can reach from its own, (N,)."""
     layers = scene.layers
     if len(layers) == 1:
@@ -384,6 +384,6 @@ def _thrust_turned(scene: Scene, bodies: Bodies) -> BoolArray:
     for thrust in scene.thrusts:
         if thrust.body in bodies.number_of:
             number = bodies.number_of[thrust.body]
-            x, y = form_of(bodies.elements[bodies.element[number]]).centre
+            x, y = geometry_of(bodies.elements[bodies.element[number]]).centre
             found[number] |= (thrust.point[0] - x) * thrust.force[1] != (thrust.point[1] - y) * thrust.force[0]
     return found

@@ -11,9 +11,9 @@ import numpy as np
 
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
 from sandbox.scene.compile.joint_arrays import LinkKind
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.fixed import Plane, Post, Wall
-from sandbox.scene.scene import Scene
 
 
 class Demand(StrEnum):
@@ -157,9 +157,9 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     yield Demand.POLYGONS, matrix.solids, f"{why}, {others:,} of them can collide" if matrix.solids else why
 
     touch = bool(matrix.touching.any())
-    for demand, most in ((Demand.RESTITUTION, matrix.restitution), (Demand.FRICTION, matrix.friction)):
-        why = f"up to {most:g}" if most else "0 for every pair that can collide"
-        yield demand, most > 0, why if touch else "no collisions possible"
+    for demand, largest in ((Demand.RESTITUTION, matrix.restitution), (Demand.FRICTION, matrix.friction)):
+        why = f"up to {largest:g}" if largest else "0 for every pair that can collide"
+        yield demand, largest > 0, why if touch else "no collisions possible"
 
     yield from _surfaces(scene, matrix)
     yield from _joints(setup)
@@ -178,9 +178,9 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
 
 def _surfaces(scene: Scene, matrix: ContactMatrix) -> Iterator[tuple[Demand, bool, str]]:
     surfaces = matrix.surfaces
-    most = float(np.max(surfaces.falloff[matrix.touching & (surfaces.restitution > 0.0)], initial=0.0))
-    why = f"up to {most:g} s/m" if most else "restitution does not depend on speed"
-    yield Demand.FALLOFF, most > 0.0, why
+    largest = float(np.max(surfaces.falloff[matrix.touching & (surfaces.restitution > 0.0)], initial=0.0))
+    why = f"up to {largest:g} s/m" if largest else "restitution does not depend on speed"
+    yield Demand.FALLOFF, largest > 0.0, why
     touched = np.asarray(matrix.touching.any(axis=1))
     of_fixed = touched[surfaces.of_fixed]
     for demand, does, one, many, none in (
@@ -210,19 +210,19 @@ def _joints(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
 def _floor(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     scene = setup.scene
     floor, models = scene.surface, scene.contact_models
-    rubs = floor is not None and floor.rubs
+    has_friction = floor is not None and floor.has_friction
     why = "no [surface]" if floor is None else "the surface has no friction"
-    if floor is not None and rubs:
+    if floor is not None and has_friction:
         figures = (floor.sliding_friction, floor.rolling_friction, floor.spinning_friction)
         why = "friction: sliding {:g}, rolling {:g}, spinning {:g}".format(*figures)
-    yield Demand.SURFACE, rubs, why
+    yield Demand.SURFACE, has_friction, why
     pucks = floor is not None and floor.bodies == "pucks"
     slides = floor is not None and floor.sliding_friction > 0
-    rolls = floor is not None and not pucks and (slides or models.spins or bool(setup.bodies.roll.any()))
+    rolls = floor is not None and not pucks and (slides or models.depends_on_spin or bool(setup.bodies.roll.any()))
     yield Demand.SPIN, rolls, "spheres turn about three axes" if rolls else "bodies turn about z only"
     yield Demand.POCKETS, bool(scene.pockets), f"{len(scene.pockets):,}" if scene.pockets else "none"
-    flat = "flat discs slide and do not roll" if rubs else "without friction pucks are ordinary discs"
-    yield Demand.PUCKS, pucks and rubs, flat if pucks else "no pucks"
+    flat = "flat discs slide and do not roll" if has_friction else "without friction pucks are ordinary discs"
+    yield Demand.PUCKS, pucks and has_friction, flat if pucks else "no pucks"
     curl = floor.curl if floor is not None and slides and pucks else 0.0
     yield Demand.CURL, curl != 0.0, f"κ = {curl:g}: rotating pucks curl" if curl else "no puck curls"
 
@@ -242,7 +242,7 @@ def curls(start: Scene | Setup) -> bool:
 
 
 def unmodelled(start: Scene | Setup, capabilities: frozenset[Demand]) -> list[str]:
-    """Return what a scene demands beyond the capabilities of an engine: one message, or none."""
+    """Return the demands of a scene that exceed the capabilities of an engine, as one message; empty without any."""
     *others, last = "", *sorted(map(str, demands(start) - capabilities))
     listed = ", ".join(others[1:])
     if listed:

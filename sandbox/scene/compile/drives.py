@@ -9,8 +9,9 @@ import numpy as np
 from sandbox.arrays import BoolArray, FloatArray
 from sandbox.scene.compile.bodies import Bodies, centre_of
 from sandbox.scene.description.base import BodySpec, Point
-from sandbox.scene.description.forces import Drive, PlungerDrive, TorqueDrive
+from sandbox.scene.description.forces import AnyDrive, PlungerDrive, TorqueDrive
 from sandbox.scene.description.scene import SceneDescription, default_name
+from sandbox.scene.geometry.vectors import rotate
 
 
 class Mount(NamedTuple):
@@ -18,7 +19,7 @@ class Mount(NamedTuple):
 
     number: int
     """index of the drive"""
-    drive: Drive
+    drive: AnyDrive
     home: Point
     """start position of the body's centre of mass, m"""
     hinge: Point
@@ -49,9 +50,9 @@ def is_driven(scene: SceneDescription, bodies: Bodies, *, turning: bool = False)
 
 
 def is_immovable(scene: SceneDescription, bodies: Bodies) -> BoolArray:
-    """Return which bodies no joint can move, (N,): fixed ones, and those led by a stroke or a plunger."""
-    led = [drive.body for drive in scene.drives if not isinstance(drive, TorqueDrive)]
-    return bodies.fixed | np.isin(bodies.names, led) if led else bodies.fixed
+    """Return which bodies no joint can move, (N,): fixed bodies, and those of a stroke or plunger drive."""
+    prescribed = [drive.body for drive in scene.drives if not isinstance(drive, TorqueDrive)]
+    return bodies.fixed | np.isin(bodies.names, prescribed) if prescribed else bodies.fixed
 
 
 def with_drive_moments(scene: SceneDescription, bodies: Bodies) -> Bodies:
@@ -60,8 +61,8 @@ def with_drive_moments(scene: SceneDescription, bodies: Bodies) -> Bodies:
     for name, mount in mounts(scene).items():
         if isinstance(mount.drive, TorqueDrive) and mount.drive.moment is not None:
             number = bodies.number_of[name]
-            least = moment_of_mass(mount, float(bodies.mass[number]))
-            moment[number] = max(mount.drive.moment - least, 0.0)
+            lowest = moment_of_mass(mount, float(bodies.mass[number]))
+            moment[number] = max(mount.drive.moment - lowest, 0.0)
     return replace(bodies, moment=moment)
 
 
@@ -75,15 +76,14 @@ def single_bodies(scene: SceneDescription) -> dict[str, BodySpec]:
     }
 
 
-def _hinge(drive: Drive, single: BodySpec, home: Point) -> Point:
+def _hinge(drive: AnyDrive, single: BodySpec, home: Point) -> Point:
     if isinstance(drive, PlungerDrive):
         return 0.0, 0.0
     x, y = drive.pivot[0] - home[0], drive.pivot[1] - home[1]
-    cos, sin = math.cos(single.angle), math.sin(single.angle)
-    return cos * x + sin * y, cos * y - sin * x
+    return rotate(x, y, math.cos(single.angle), -math.sin(single.angle))
 
 
-def mount_of(number: int, drive: Drive, single: BodySpec) -> Mount:
+def mount_of(number: int, drive: AnyDrive, single: BodySpec) -> Mount:
     """Return how a drive holds a body, given the index of the drive."""
     home = centre_of(single)
     return Mount(number, drive, home, _hinge(drive, single, home))

@@ -14,14 +14,14 @@ import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.scene.compile.articulated import cloth_layout, limb_layout, node_count, rope_layout
-from sandbox.scene.compile.layout import Layout, alike, turned
+from sandbox.scene.compile.bodies import Layout, rotated, uniform_layout
 from sandbox.scene.description.base import BodySource, Point
 from sandbox.scene.description.discs import Emitter, Generator, Grid, Scatter
 from sandbox.scene.description.generators import Cloth, Ragdoll, Rope, Stack, segments
 from sandbox.scene.geometry.neighbours import near_pairs
 from sandbox.scene.random_streams import Stream, bits, draws
 
-ROUNDS = 400
+MAX_ROUNDS = 400
 """Rounds of placing the remaining balls before a scatter fails."""
 
 
@@ -33,7 +33,7 @@ class GeneratorError(Exception):
         self.location = location
 
 
-JAMMED = 0.6
+JAMMING_COVERAGE = 0.6
 """Random sequential addition of discs jams at a coverage of 0.547 (Feder 1980); a small box holds a little more."""
 
 
@@ -93,15 +93,15 @@ def _scatter(scatter: Scatter, random: np.random.Generator, index: int) -> tuple
     lower, upper = np.asarray(scatter.lower), np.asarray(scatter.upper)
     position = lower + random.random((scatter.count, 2)) * (upper - lower)
     if scatter.collides == "all":
-        reach = 2.0 * scatter.radius
-        covered = scatter.count * math.pi * scatter.radius**2 / float(np.prod(upper - lower + reach))
-        jams = scatter.count > 1 and covered >= JAMMED
-        rejected = np.arange(scatter.count) if jams else _overlapping(position, reach)
-        for _ in range(0 if jams else ROUNDS):
+        diameter = 2.0 * scatter.radius
+        covered = scatter.count * math.pi * scatter.radius**2 / float(np.prod(upper - lower + diameter))
+        jams = scatter.count > 1 and covered >= JAMMING_COVERAGE
+        rejected = np.arange(scatter.count) if jams else _overlapping(position, diameter)
+        for _ in range(0 if jams else MAX_ROUNDS):
             if not len(rejected):
                 break
             position[rejected] = lower + random.random((len(rejected), 2)) * (upper - lower)
-            rejected = _overlapping(position, reach)
+            rejected = _overlapping(position, diameter)
         if len(rejected):
             raise GeneratorError(
                 ("scatter", index, "count"),
@@ -113,9 +113,11 @@ def _scatter(scatter: Scatter, random: np.random.Generator, index: int) -> tuple
     return position, velocity
 
 
-def _overlapping(position: FloatArray, reach: float) -> IntArray:
+def _overlapping(position: FloatArray, diameter: float) -> IntArray:
     """Return the later ball of every overlapping pair."""
-    late = [np.maximum(i, j)[np.hypot(*(position[i] - position[j]).T) < reach] for i, j in near_pairs(position, reach)]
+    late = [
+        np.maximum(i, j)[np.hypot(*(position[i] - position[j]).T) < diameter] for i, j in near_pairs(position, diameter)
+    ]
     return np.unique(np.concatenate(late)) if late else np.empty(0, dtype=np.int64)
 
 
@@ -134,8 +136,8 @@ def stacked(stack: Stack, random: np.random.Generator) -> Layout:
     x = (column - 0.5 * (per_row[row] - 1)) * width
     x += (random.random(stack.count) * 2.0 - 1.0) * stack.jitter
     offset = np.column_stack((x, 0.5 * stack.size[1] + row * height))
-    position = np.asarray(stack.base) + (turned(offset, stack.angle) if stack.angle else offset)
-    return alike(position, stack.velocity, stack.angle, stack.angular_velocity)
+    position = np.asarray(stack.base) + (rotated(offset, stack.angle) if stack.angle else offset)
+    return uniform_layout(position, stack.velocity, stack.angle, stack.angular_velocity)
 
 
 def count_of(source: BodySource) -> int:
@@ -170,7 +172,7 @@ def layout_of(generator: BodySource, seed: int, index: int, gravity: Point) -> L
     match generator:
         case Grid() | Scatter() | Emitter():
             position, velocity = expand(generator, seed, index)
-            layout = alike(position, velocity, generator.angle, generator.angular_velocity)
+            layout = uniform_layout(position, velocity, generator.angle, generator.angular_velocity)
             if isinstance(generator, Emitter):
                 return replace(layout, lifetime=lifetimes(generator, seed, index))
             return layout

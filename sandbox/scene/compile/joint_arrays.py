@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.scene.geometry.vectors import rotate
 
 WORLD = -1
 """Index of the static world, as the first body of a joint."""
@@ -173,8 +174,14 @@ class JointArrays:
         return np.unique(np.sort(pair, axis=1), axis=0)
 
     def ends(self, position: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the anchors of each joint in the world, (J, 2) m each, for the given poses of the bodies (N,)."""
-        return _placed(self.a, self.anchor_a, position, angle), _placed(self.b, self.anchor_b, position, angle)
+        """Return the first and second anchor of each joint in the world, (J, 2) or (T, J, 2) m each.
+
+        Args:
+            position: (N, 2) m, centres of mass, or (T, N, 2) in T frames.
+            angle: (N,) or (T, N) rad.
+        """
+        first = _anchors(self.a, self.anchor_a, position, angle)
+        return first, _anchors(self.b, self.anchor_b, position, angle)
 
     def among(self, names: Sequence[str], old: Sequence[str]) -> Self:
         """Return the joints whose bodies, by their `old` names, are among new ones, with the new indices."""
@@ -187,8 +194,8 @@ class JointArrays:
         return replace(some, a=new[some.a], b=new[some.b])
 
 
-def _placed(number: IntArray, anchor: FloatArray, position: FloatArray, angle: FloatArray) -> FloatArray:
-    cos, sin = np.cos(angle[number]), np.sin(angle[number])
+def _anchors(body: IntArray, anchor: FloatArray, position: FloatArray, angle: FloatArray) -> FloatArray:
+    """Return the positions in the world of anchors on bodies; an anchor on the world is a position already."""
     x, y = anchor.T
-    turned = position[number] + np.column_stack((cos * x - sin * y, sin * x + cos * y))
-    return np.where((number >= 0)[:, None], turned, anchor)
+    offset = rotate(x, y, np.cos(angle[..., body]), np.sin(angle[..., body]))
+    return np.where((body >= 0)[:, None], position[..., body, :] + np.stack(offset, axis=-1), anchor)

@@ -7,13 +7,12 @@ import numpy as np
 
 from sandbox.arrays import FloatArray
 from sandbox.scene.compile.articulated import ENDS_AT, STARTS_AT, cloth_joints, limb_joints, rope_joints
-from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.bodies import Bodies, rotated
 from sandbox.scene.compile.drives import is_immovable
 from sandbox.scene.compile.generators import count_of
 from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
-from sandbox.scene.compile.layout import turned
 from sandbox.scene.description.base import BodySource, Point
-from sandbox.scene.description.generators import ENDS, Cloth, Ragdoll, Rope, Woven
+from sandbox.scene.description.generators import ENDS, Cloth, Ragdoll, Rope, SoftBody
 from sandbox.scene.description.joints import (
     Anchored,
     Gear,
@@ -28,7 +27,8 @@ from sandbox.scene.description.joints import (
     Spring,
 )
 from sandbox.scene.description.scene import SceneDescription, default_name
-from sandbox.scene.geometry.shapes import form_of
+from sandbox.scene.geometry.shapes import geometry_of
+from sandbox.scene.geometry.vectors import rotate, to_world
 
 
 def generator_joints(scene: SceneDescription, bodies: Bodies) -> JointArrays:
@@ -45,7 +45,7 @@ def generator_joints(scene: SceneDescription, bodies: Bodies) -> JointArrays:
             own = _joints_of(source, first, bodies)
             first += count_of(source)
             own = own.some(~(still[own.a] & still[own.b]))
-            if isinstance(source, Woven) and source.strength is not None:
+            if isinstance(source, SoftBody) and source.strength is not None:
                 own = replace(own, strength=np.full(len(own), source.strength))
             stem = source.name or default_name(kind, k)
             links = links.joined(replace(own, names=tuple(f"{stem}-joint-{n}" for n in range(1, len(own) + 1))))
@@ -66,7 +66,7 @@ def _joints_of(source: BodySource, first: int, bodies: Bodies) -> JointArrays:
 
 
 def _with_body_indices(links: JointArrays, first: int) -> JointArrays:
-    """Return joints by the indices of a scene's bodies; negative indices stand for something else."""
+    """Return joints by the indices of a scene's bodies; negative indices stand for the world or the ends of a rope."""
     return replace(
         links, a=np.where(links.a < 0, links.a, links.a + first), b=np.where(links.b < 0, links.b, links.b + first)
     )
@@ -74,11 +74,11 @@ def _with_body_indices(links: JointArrays, first: int) -> JointArrays:
 
 def _attach_rope_ends(links: JointArrays, rope: Rope, bodies: Bodies) -> JointArrays:
     """Return the joints of a rope with the bodies at its ends, anchored where the ends start."""
-    for end, place, stand_in in zip(ENDS, (rope.start, rope.end), (STARTS_AT, ENDS_AT), strict=True):
+    for end, position, stand_in in zip(ENDS, (rope.start, rope.end), (STARTS_AT, ENDS_AT), strict=True):
         name = rope.tied(end)
         if name is not None:
             number = bodies.number_of[name]
-            anchor = _to_body_frame(place, number, bodies)
+            anchor = _to_body_frame(position, number, bodies)
             first, second = links.a == stand_in, links.b == stand_in
             links = replace(
                 links,
@@ -90,9 +90,9 @@ def _attach_rope_ends(links: JointArrays, rope: Rope, bodies: Bodies) -> JointAr
     return links
 
 
-def _to_body_frame(place: Point, number: int, bodies: Bodies) -> FloatArray:
+def _to_body_frame(position: Point, number: int, bodies: Bodies) -> FloatArray:
     """Return a position in the world in the frame of a body about its centre of mass, (2,) m."""
-    return turned(np.asarray([place]) - bodies.position[number], -float(bodies.angle[number])).reshape(2)
+    return rotated(np.asarray([position]) - bodies.position[number], -float(bodies.angle[number])).reshape(2)
 
 
 KINDS: dict[type, LinkKind] = {
@@ -129,9 +129,9 @@ def _file_joints(scene: SceneDescription, bodies: Bodies) -> JointArrays:
         anchor_a=np.asarray(anchor_a, dtype=np.float64).reshape(-1, 2),
         anchor_b=np.asarray(anchor_b, dtype=np.float64).reshape(-1, 2),
         figures=np.asarray(figures, dtype=np.float64).reshape(-1, 3),
-        most_force=np.asarray([math.inf if most is None else most for most in motors]),
+        most_force=np.asarray([math.inf if limit is None else limit for limit in motors]),
         collide=np.asarray([joint.collide for joint in scene.joints], dtype=np.bool_),
-        strength=np.asarray([math.inf if most is None else most for most in strengths]),
+        strength=np.asarray([math.inf if limit is None else limit for limit in strengths]),
         number=np.arange(len(scene.joints)),
         names=tuple(joint.name or default_name("joint", k) for k, joint in enumerate(scene.joints)),
     )
@@ -143,10 +143,10 @@ def ends_of(joint: Rod, bodies: Bodies, number: dict[str, int]) -> tuple[Point, 
     return _world(anchor_a, a, bodies), _world(anchor_b, b, bodies)
 
 
-Row = tuple[int, int, Point, Point, tuple[float, float, float]]
+JointRow = tuple[int, int, Point, Point, tuple[float, float, float]]
 
 
-def _row(joint: Joint, bodies: Bodies, number: dict[str, int]) -> Row:
+def _row(joint: Joint, bodies: Bodies, number: dict[str, int]) -> JointRow:
     """Return bodies, anchors about the centres of mass, and parameters of a joint; the world comes first."""
     if len(joint.between) == 1:
         a, b = WORLD, number[joint.between[0]]
@@ -201,22 +201,20 @@ def _about_centre(point: Point, number: int, bodies: Bodies) -> Point:
     """Return a point of a body's described frame relative to its centre of mass."""
     if number == WORLD:
         return point
-    x, y = form_of(bodies.elements[bodies.element[number]]).centre
+    x, y = geometry_of(bodies.elements[bodies.element[number]]).centre
     return point[0] - x, point[1] - y
 
 
 def _world(anchor: Point, number: int, bodies: Bodies) -> Point:
     if number == WORLD:
         return anchor
-    cos, sin = math.cos(bodies.angle[number]), math.sin(bodies.angle[number])
     x, y = bodies.position[number].tolist()
-    return x + cos * anchor[0] - sin * anchor[1], y + sin * anchor[0] + cos * anchor[1]
+    return to_world(anchor, math.cos(bodies.angle[number]), math.sin(bodies.angle[number]), (x, y))
 
 
 def _local(at: Point, number: int, bodies: Bodies) -> Point:
     """Return a position in the world in the frame of a body about its centre of mass."""
     if number == WORLD:
         return at
-    cos, sin = math.cos(bodies.angle[number]), math.sin(bodies.angle[number])
     x, y = at[0] - float(bodies.position[number, 0]), at[1] - float(bodies.position[number, 1])
-    return cos * x + sin * y, -sin * x + cos * y
+    return rotate(x, y, math.cos(bodies.angle[number]), -math.sin(bodies.angle[number]))

@@ -5,9 +5,9 @@ import numpy as np
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.forces import Attraction
-from sandbox.scene.scene import Scene
 
 ROUNDING = 1e-12
 """Tolerance of a time, as a fraction of it."""
@@ -61,51 +61,51 @@ class Potential:
         """Return whether there is any potential."""
         return self.attracts or self.springs
 
-    def at(self, time: FloatArray, position: FloatArray, angle: FloatArray, there: BoolArray) -> FloatArray:
+    def at(self, time: FloatArray, position: FloatArray, angle: FloatArray, present: BoolArray) -> FloatArray:
         """Return the energy in each of T frames, (T,) J.
 
         Args:
             time: (T,) s; broken springs store nothing.
             position: (T, N, 2) m.
             angle: (T, N) rad.
-            there: (T, N) whether each body is present; removed ones neither hold nor attract others.
+            present: (T, N) whether each body is present; removed bodies neither attract others nor load springs.
         """
-        return self.of_springs(time, position, angle, there) + self.of_attraction(position, there)
+        return self.of_springs(time, position, angle, present) + self.of_attraction(position, present)
 
-    def of_springs(self, time: FloatArray, position: FloatArray, angle: FloatArray, there: BoolArray) -> FloatArray:
+    def of_springs(self, time: FloatArray, position: FloatArray, angle: FloatArray, present: BoolArray) -> FloatArray:
         """Return the energy of springs in each of T frames, (T,) J; arguments as in `at`."""
         stored = np.zeros(len(position))
         for links, breaks, strain in self._springs:
             if len(links):
                 energy = 0.5 * links.figures[:, 1] * np.square(strain(links, position, angle) - links.figures[:, 0])
-                holds = both_present(links, there) & ~is_broken_at(breaks, time)
+                holds = both_present(links, present) & ~is_broken_at(breaks, time)
                 stored += np.where(holds, energy, 0.0) @ self._fraction(links.a, links.b)
         return stored
 
-    def of_attraction(self, position: FloatArray, there: BoolArray) -> FloatArray:
+    def of_attraction(self, position: FloatArray, present: BoolArray) -> FloatArray:
         """Return the energy of attraction in each of T frames, (T,) J; arguments as in `at`."""
         stored = np.zeros(len(position))
         with np.errstate(invalid="ignore"):  # coincident bodies: an infinite potential; nan if both signs occur
             for attraction, toward in self._attractions:
                 if attraction.strength:
-                    stored += self._attracted(attraction, toward, position, there)
+                    stored += self._attracted(attraction, toward, position, present)
         return stored
 
     def _attracted(
-        self, attraction: Attraction, toward: int | None, position: FloatArray, there: BoolArray
+        self, attraction: Attraction, toward: int | None, position: FloatArray, present: BoolArray
     ) -> FloatArray:
         drawn = np.flatnonzero(self._mass)
         if toward is None:
-            place = np.asarray(attraction.toward, dtype=np.float64)
+            centre = np.asarray(attraction.toward, dtype=np.float64)
             fraction = np.ones(len(drawn)) if self._body is None else (drawn == self._body).astype(np.float64)
-            counts = there[:, drawn]
+            counts = present[:, drawn]
         else:
             drawn = drawn[drawn != toward]
-            place = position[:, toward, None]
+            centre = position[:, toward, None]
             fraction = self._fraction(np.full(len(drawn), toward), drawn)
-            counts = there[:, drawn] & there[:, toward, None]
+            counts = present[:, drawn] & present[:, toward, None]
         counts = counts & (fraction > 0.0)
-        away = position[:, drawn] - place
+        away = position[:, drawn] - centre
         distance, soft = np.hypot(away[..., 0], away[..., 1]), attraction.softening
         with np.errstate(divide="ignore"):
             depth = np.arctan2(soft, distance) / soft if soft > 0.0 else 1.0 / distance
@@ -120,9 +120,9 @@ class Potential:
         return np.asarray(mine / np.maximum(first.astype(np.float64) + second, 1.0))
 
 
-def both_present(links: JointArrays, there: BoolArray) -> BoolArray:
+def both_present(links: JointArrays, present: BoolArray) -> BoolArray:
     """Return which joints still have both bodies, (T, J), from the presence of bodies, (T, N)."""
-    return np.asarray(there[:, links.b] & (there[:, links.a] | (links.a < 0)))
+    return np.asarray(present[:, links.b] & (present[:, links.a] | (links.a < 0)))
 
 
 def is_broken_at(breaks: FloatArray, time: FloatArray) -> BoolArray:
@@ -135,31 +135,16 @@ def is_broken_at(breaks: FloatArray, time: FloatArray) -> BoolArray:
     return np.asarray(breaks * (1.0 - ROUNDING) <= time[:, None])
 
 
-def ends_over_time(links: JointArrays, position: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the anchors of joints in the world, (T, J, 2) m each, in T frames."""
-    return (
-        _placed(links.a, links.anchor_a, position, angle),
-        _placed(links.b, links.anchor_b, position, angle),
-    )
-
-
 def turned_by(links: JointArrays, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the angles of the first and second bodies of joints, (T, J) rad each; the world's is 0."""
     return np.where(links.a >= 0, angle[:, links.a], 0.0), angle[:, links.b]
 
 
 def _stretch(links: JointArrays, position: FloatArray, angle: FloatArray) -> FloatArray:
-    first, second = ends_over_time(links, position, angle)
+    first, second = links.ends(position, angle)
     return np.asarray(np.hypot(*np.moveaxis(second - first, 2, 0)))
 
 
 def _turn(links: JointArrays, _: FloatArray, angle: FloatArray) -> FloatArray:
     first, second = turned_by(links, angle)
     return np.asarray(second - first)
-
-
-def _placed(number: IntArray, anchor: FloatArray, position: FloatArray, angle: FloatArray) -> FloatArray:
-    cos, sin = np.cos(angle[:, number]), np.sin(angle[:, number])
-    x, y = anchor.T
-    turned = position[:, number] + np.stack((cos * x - sin * y, sin * x + cos * y), axis=2)
-    return np.where((number >= 0)[:, None], turned, anchor)

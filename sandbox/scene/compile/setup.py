@@ -8,8 +8,8 @@ from sandbox.arrays import FloatArray
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.drives import initial_drive_states
 from sandbox.scene.compile.joint_arrays import JointArrays
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Passing, PlaneReach
-from sandbox.scene.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,11 +20,11 @@ class Setup:
     """
 
     scene: Scene
-    """the scene; its own `bodies` and `links` are those of its start"""
+    """the scene; its `bodies` and `links` are those at its start"""
     bodies: Bodies
     """the N bodies that are present, in their state at `time`"""
     links: JointArrays
-    """the J joints that hold, with indices into `bodies`"""
+    """the J unbroken joints, with indices into `bodies`"""
     drives: FloatArray
     """(D, 3) state of each drive: level, torque or pull, rate of the pull"""
     time: float = 0.0
@@ -67,8 +67,8 @@ class Setup:
     def with_scene(self, scene: Scene) -> Self:
         """Return the same state with changed values of the scene.
 
-        Elements of the scene follow the change, elements of bodies that were added since stay. Bodies and joints are
-        not compiled anew: that would bring removed bodies and broken joints back, and hang ropes along a new gravity.
+        Elements of the scene change, elements of bodies that were added since stay. Bodies and joints are not compiled
+        again, because that would restore removed bodies and broken joints, and lay out ropes along the new gravity.
 
         Args:
             scene: scene with as many elements as this one, such as from `change_value`.

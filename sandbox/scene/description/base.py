@@ -99,11 +99,11 @@ class BodySource(HasMaterial):
     mass: Mass | None = None
     """mass, kg; default 1 if neither mass nor density is given"""
     density: Density | None = None
-    """kg/m²"""
+    """density, kg/m²"""
     angle: Annotated[float, Field(ge=-1e12, le=1e12)] = 0.0
     """initial angle, rad, counter-clockwise"""
     angular_velocity: AngularVelocity = 0.0
-    """rad/s"""
+    """initial angular velocity, rad/s"""
     collides: Collides = "all"
     """bodies that it collides with: `all`, `fixed` (only planes, walls, posts and fixed bodies) or `none`"""
     layer: Name = GROUND

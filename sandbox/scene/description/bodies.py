@@ -64,7 +64,7 @@ class BoxPart(Attached):
     """A rectangle that is part of a body."""
 
     size: tuple[Length, Length]
-    """width and height of a tank, m"""
+    """width and height before rotation, m"""
 
 
 class CapsulePart(Attached):

@@ -22,7 +22,7 @@ Lifetime = Annotated[float, Field(ge=1e-9, le=1e10)]
 
 
 class Disc(BodySource):
-    """What the balls of a scene and of its generators have in common: a uniform disc, I = ½ m r²."""
+    """Common fields of balls and of generators of balls: a uniform disc, I = ½ m r²."""
 
     radius: Radius
     """radius of the disc, m"""
@@ -83,11 +83,11 @@ class Emitter(Disc):
     radius: Radius = 0.05
     """radius of each particle, m"""
     collides: Collides = "none"
-    """bodies that they collide with: `all`, `fixed` (only planes, walls, posts and fixed bodies) or `none`"""
+    """bodies that the particles collide with: `all`, `fixed` (only planes, walls, posts and fixed bodies) or `none`"""
     lifetime: Lifetime | None = None
     """lifetime, s, after which a particle is removed; default: unlimited"""
     lifetime_jitter: Annotated[float, Field(ge=0, le=1e10)] = 0.0
-    """Largest random change ± of the lifetime, s; particles are numbered in the order of their ends."""
+    """Largest random change ± of the lifetime, s; particles are numbered in the order in which they are removed."""
     colours: Annotated[tuple[Colour, ...], Field(min_length=2, max_length=64)] | None = None
     """colours over the lifetime of a particle, with equal fades between them; replaces `colour`"""
 

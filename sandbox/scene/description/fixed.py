@@ -1,10 +1,8 @@
-"""Static elements: planes, walls, posts and zones.
+"""Static elements: planes, walls, posts and zones; collision layers.
 
-Zone: an area that detects bodies, `[[zone]]`, and its effects on them; and the collision layers of a scene.
-
-A visit begins when the centre of a body is inside the zone while the body is in one of the zone's layers. It ends when
-the centre is outside. A change of layer does not end it; each visit is recorded once. Bodies that collide with nothing
-(`collides = "none"`) and bodies held by a drive are not detected.
+A visit of a zone begins when the centre of a body is inside the zone while the body is in one of the zone's layers. It
+ends when the centre is outside. A change of layer does not end it; each visit is recorded once. Bodies with
+`collides = "none"` and bodies held by a drive are not detected.
 """
 
 from typing import Annotated, TypeAlias
@@ -18,13 +16,12 @@ Layers = Annotated[tuple[Name, ...], Field(min_length=1, max_length=10)]
 """Collision layers of an object; objects collide if they share a layer."""
 
 MAX_LAYERS = 10
-"""Largest number of layers of a scene: three kinds of bodies on each share the 32 bits of a filter with two bits for
-zones."""
+"""Largest number of layers of a scene: a 32-bit collision filter has three bits for each layer, and two for zones."""
 
 MAX_ZONES = 1000
-"""Largest number of zones of a scene: the state has an entry for each body and zone."""
+"""Largest number of zones of a scene: the state has an entry for each pair of a body and a zone."""
 
-AWAY, INSIDE, HELD, LET_GO = range(4)
+AWAY, INSIDE, HELD, RELEASED = range(4)
 """State of a body in a zone: outside; inside; held at the centre; released and still inside."""
 
 Width = Annotated[float, Field(gt=0, le=1e9)]

@@ -1,8 +1,8 @@
 """Attraction, thrusts and drives (flippers, diverters, plungers).
 
-A driven body moves only as its drive says; with a torque drive gravity and collisions act on it too. Air drag does not.
-A body led by a stroke or a plunger is never stopped: it pushes free bodies, and passes through static and other led
-bodies.
+A drive prescribes the motion of its body. With a torque drive, gravity and collisions act on the body too, air drag
+does not. With a stroke or plunger drive, no load stops the body: it pushes free bodies, and passes through static
+bodies and other bodies with such a drive.
 """
 
 from typing import Annotated, Literal
@@ -16,7 +16,7 @@ DriveKey = Literal[
 ]  # fmt: skip
 """Key of the window."""
 
-Turned = Annotated[float, Field(ge=-1e9, le=1e9)]
+StopAngle = Annotated[float, Field(ge=-1e9, le=1e9)]
 Torque = Annotated[float, Field(gt=0, le=1e30)]
 Moment = Annotated[float, Field(gt=0, le=1e30)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
@@ -25,10 +25,10 @@ Rate = Annotated[float, Field(gt=0, le=1e9)]
 
 
 class Driven(Part):
-    """What all drives have."""
+    """Fields of all drives."""
 
     name: Name | None = None
-    """without a name, it is called by its kind and its number in the file, such as `joint-1`"""
+    """without a name, it is called by its kind and its number in the file, such as `drive-1`"""
     body: Name
     """name of a single body that is at rest at the start"""
     key: DriveKey | None = None
@@ -47,10 +47,10 @@ class TorqueDrive(Driven):
     kind: Literal["torque"]
     pivot: Point
     """position of the hinge at the start, m"""
-    stops: tuple[Turned, Turned]
+    stops: tuple[StopAngle, StopAngle]
     """rest angle and driven angle of the body, rad; either sense"""
     torque: Torque
-    """N·m"""
+    """torque at level 1, N·m"""
     ramp: Second = 0.0
     """time in which the torque rises from 0 to its full value, s"""
     return_ratio: Fraction = 0.1
@@ -66,17 +66,17 @@ class TorqueDrive(Driven):
 
 
 class StrokeDrive(Driven):
-    """Turns a body about a hinge at a prescribed rate, whatever the load: a diverter, a windmill."""
+    """Turns a body about a hinge at a prescribed rate, independent of the load: a diverter, a windmill."""
 
     kind: Literal["stroke"]
     pivot: Point
     """position of the hinge at the start, m"""
-    stops: tuple[Turned, Turned]
+    stops: tuple[StopAngle, StopAngle]
     """rest angle and driven angle of the body, rad; it turns to the second while the level is above 0; either sense"""
     rate: Rate
-    """rad/s"""
+    """rate of rotation, rad/s"""
     return_rate: Annotated[float, Field(ge=0, le=1e9)] | None = None
-    """rate at level 0, rad/s; default: `rate`; 0 means that it stays where it is"""
+    """rate at level 0, rad/s; default: `rate`; at 0 the body keeps its angle"""
 
 
 class PlungerDrive(Driven):
@@ -97,7 +97,7 @@ class PlungerDrive(Driven):
     """duration of a full pull, s"""
 
 
-Drive = Annotated[TorqueDrive | StrokeDrive | PlungerDrive, Field(discriminator="kind")]
+AnyDrive = Annotated[TorqueDrive | StrokeDrive | PlungerDrive, Field(discriminator="kind")]
 
 
 Newton = Annotated[float, Field(ge=-1e30, le=1e30)]
@@ -110,20 +110,20 @@ class Attraction(Part):
     """Attracts every moving body towards a point or a body: a = strength / (r² + softening²)."""
 
     name: Name | None = None
-    """without a name, it is called by its kind and its number in the file, such as `joint-1`"""
+    """without a name, it is called by its kind and its number in the file, such as `attraction-1`"""
     toward: Point | Name
     """a point, m, or the name of a body; a body that can move is attracted by the reaction"""
     strength: Annotated[float, Field(ge=-1e30, le=1e30)]
     """G·M, m³/s²; negative values repel"""
     softening: Annotated[float, Field(ge=0, le=1e9)] = 0.0
-    """m"""
+    """length that limits the acceleration near the centre, m"""
 
 
 class Thrust(Part):
     """A force fixed to a body, such as a rocket engine: it turns with the body."""
 
     name: Name | None = None
-    """without a name, it is called by its kind and its number in the file, such as `joint-1`"""
+    """without a name, it is called by its kind and its number in the file, such as `thrust-1`"""
     body: Name
     """name of the body"""
     force: tuple[Newton, Newton]
@@ -131,7 +131,7 @@ class Thrust(Part):
     point: Point = (0.0, 0.0)
     """point of action in the frame of the body, m"""
     begin: Second = 0.0
-    """s"""
+    """start, s"""
     end: Second | None = None
     """end, s; default: unlimited"""
     key: ThrustKey | None = None

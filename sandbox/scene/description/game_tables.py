@@ -5,10 +5,9 @@ other tables are a `GameTable`.
 """
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
-from importlib import import_module
 from typing import Annotated, Any, TypeVar
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, create_model
@@ -16,12 +15,11 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, core_schema
 
+from sandbox.game_names import game_tables
+from sandbox.game_spec import import_part
 from sandbox.scene.description.base import Part
 
-GAMES = "sandbox.games.names"
-"""Module with the games, read through this import string: scenes import no game statically."""
-
-GAME_TABLES: dict[str, str] = import_module(GAMES).game_tables()
+GAME_TABLES: dict[str, str] = game_tables()
 """Import string, `module:name`, of the `GameTable` of each heading. Presets expand in this order."""
 
 PRESETS = tuple(heading for heading in GAME_TABLES if "." not in heading)
@@ -48,8 +46,7 @@ def game_table(heading: str) -> GameTable:
     Raises:
         KeyError: `GAME_TABLES` has no such heading.
     """
-    module, _, name = GAME_TABLES[heading].partition(":")
-    table = getattr(import_module(module), name)
+    table = import_part(GAME_TABLES[heading])
     assert isinstance(table, GameTable)
     return table
 
@@ -101,6 +98,11 @@ def with_game_tables(within: str = "") -> Callable[[type[Model]], type[Model]]:
 def is_generated(model: type) -> bool:
     """Return whether a model was created by `with_game_tables`, so that it has no source text."""
     return model.__module__ == __name__
+
+
+def has_preset(document: dict[str, Any], paths: Iterable[str] = ()) -> bool:
+    """Return whether a document has a preset, or an override adds one."""
+    return any(key in document for key in PRESETS) or any(path.startswith(PRESETS) for path in paths)
 
 
 def unexpanded(scene: Part) -> str | None:

@@ -3,10 +3,10 @@
 A rope of rods or springs, and a cloth, consist of small balls, the nodes, with a joint between neighbours. A rope of
 planks consists of capsules end to end, joined by pivots. `mass` is that of each node or plank.
 
-Lengths of a ragdoll are fractions of its height after Drillis and Contini (1966), as in Winter, Biomechanics and Motor
+Lengths of a ragdoll are fractions of its height, after Drillis and Contini (1966), as in Winter, Biomechanics and Motor
 Control of Human Movement, figure 4.1: heights of ankle .039, knee .285, hip .530, shoulder .818, chin .870; lengths of
 upper arm .186, forearm .146, hand .108, foot .152. Thicknesses, the middle of the back, the position of the ankle on
-the foot and the limits of the wrist are chosen freely. Angles of joints are positive where they bend forward, except
+the foot and the limits of the wrist are estimates. Angles of joints are positive where they bend forward, except
 for knees, which bend back, and ankles, which point the toes down.
 """
 
@@ -17,7 +17,7 @@ from pydantic import Field
 from sandbox.scene.description.base import MAX_BODIES, BodySource, Collides, Name, Part, Point, Radius, Velocity
 from sandbox.scene.description.bodies import Length
 from sandbox.scene.description.discs import Count
-from sandbox.scene.description.joints import Damping, Force, Stiffness
+from sandbox.scene.description.joints import Damping, JointStrength, Stiffness
 
 Gap = Annotated[float, Field(ge=0, le=1e9)]
 
@@ -40,10 +40,10 @@ class Stack(BodySource):
     jitter: Gap = 0.0
     """Largest random displacement ± of each box along its row, m."""
     velocity: Velocity = (0.0, 0.0)
-    """m/s"""
+    """initial velocity, m/s"""
 
     @property
-    def most_rows(self) -> int:
+    def max_rows(self) -> int:
         """Largest number of rows: the next row would have no box."""
         return MAX_BODIES if self.fewer == 0 else -(-self.columns // self.fewer)
 
@@ -53,15 +53,15 @@ class Stack(BodySource):
         return self.columns * self.rows - self.fewer * (self.rows * (self.rows - 1) // 2)
 
 
-End = Literal["start", "end"]
-ENDS: tuple[End, End] = ("start", "end")
+RopeEnd = Literal["start", "end"]
+ENDS: tuple[RopeEnd, RopeEnd] = ("start", "end")
 
 
-Place = Annotated[int, Field(ge=0, lt=MAX_BODIES)]
+NodeIndex = Annotated[int, Field(ge=0, lt=MAX_BODIES)]
 
 
-class Ties(Part):
-    """The bodies that hold the ends of a rope."""
+class RopeAttachment(Part):
+    """Bodies that hold the ends of a rope."""
 
     start: Name | None = None
     """name of the body at the first end"""
@@ -69,51 +69,51 @@ class Ties(Part):
     """name of the body at the last end"""
 
 
-class Woven(BodySource):
-    """What ropes and cloth have in common."""
+class SoftBody(BodySource):
+    """Common fields of ropes and cloths."""
 
     radius: Radius = 0.02
     """radius of each node, or half the thickness of planks, m"""
     collides: Collides = "none"
-    """Bodies that nodes or planks collide with; two bodies joined by a joint never collide."""
+    """Bodies that nodes or planks collide with; two bodies connected by a joint never collide."""
     velocity: Velocity = (0.0, 0.0)
     """initial velocity of all nodes that are not fixed, m/s"""
     stiffness: Stiffness | None = None
     """stiffness of each spring, N/m"""
     damping: Damping = 0.0
     """damping of each spring, N·s/m"""
-    strength: Force | None = None
+    strength: JointStrength | None = None
     """strength of each joint, N: a larger force breaks it; default: unbreakable"""
 
 
-class Rope(Woven):
-    """A rope of equal links. One longer than the distance of its ends starts in an arc that sags along gravity."""
+class Rope(SoftBody):
+    """A rope of equal links. If longer than the distance of its ends, it starts as an arc that sags along gravity."""
 
     kind: Literal["rods", "springs", "planks"] = "rods"
     """type of the links: rods or springs between nodes, or planks joined by pivots"""
     start: Point
     """position of the first end, m"""
     end: Point
-    """m"""
+    """position of the last end, m"""
     links: Count
     """number of rods, springs or planks"""
     length: Length | None = None
     """length of the whole rope at rest, m; default: the distance from start to end"""
-    fix: Annotated[tuple[End, ...], Field(max_length=2)] | None = None
+    fix: Annotated[tuple[RopeEnd, ...], Field(max_length=2)] | None = None
     """ends that are fixed in the world; default: both, except tied ends"""
-    tie: Ties = Field(default_factory=Ties)
+    tie: RopeAttachment = Field(default_factory=RopeAttachment)
     """bodies that the ends are tied to"""
 
-    def tied(self, end: End) -> str | None:
+    def tied(self, end: RopeEnd) -> str | None:
         """Return the name of the body that an end is tied to, or None."""
         return self.tie.start if end == "start" else self.tie.end
 
-    def holds(self, end: End) -> bool:
+    def holds(self, end: RopeEnd) -> bool:
         """Return whether an end is fixed in the world."""
         return self.tied(end) is None if self.fix is None else end in self.fix
 
 
-class Cloth(Woven):
+class Cloth(SoftBody):
     """A grid of nodes joined to their neighbours, numbered along each row from the upper left."""
 
     kind: Literal["springs", "rods"] = "springs"
@@ -130,7 +130,7 @@ class Cloth(Woven):
     """stiffness of diagonal springs, N/m; default: no diagonal springs"""
     bend: Stiffness | None = None
     """stiffness of springs from each node to the next but one, N/m; default: no such springs"""
-    pins: Literal["top", "corners", "left"] | tuple[tuple[Place, Place], ...] = "top"
+    pins: Literal["top", "corners", "left"] | tuple[tuple[NodeIndex, NodeIndex], ...] = "top"
     """fixed nodes: a row, a column, the upper corners, or a list of [column, row], counted from 0"""
 
     @property
@@ -152,18 +152,18 @@ DEFAULT_MASS = 75.0
 
 
 class Ragdoll(BodySource):
-    """A figure that stands upright in mid-stride; `angle` and `angular_velocity` turn all of it about its position."""
+    """A figure that stands in mid-stride; `angle` and `angular_velocity` turn the whole figure about its position."""
 
     position: Point
     """point on the ground under it, m"""
     height: Annotated[float, Field(ge=1e-3, le=1e6)] = 1.75
-    """m"""
+    """height of the figure, m"""
     mass: Annotated[float, Field(ge=1e-9, le=1e30)] | None = None
     """total mass, kg; default 75"""
     facing: Literal["right", "left"] = "right"
     """direction that it faces"""
     velocity: Velocity = (0.0, 0.0)
-    """m/s"""
+    """initial velocity, m/s"""
 
 
 class BodySegment(NamedTuple):
@@ -175,14 +175,14 @@ class BodySegment(NamedTuple):
     mass_percent: float
     """percentage of the mass of the body"""
     ends: tuple[Point, ...]
-    """the centres of its capsule's half discs; of the head the one of its ball"""
+    """centres of the half discs of its capsule; for the head, the centre of its disc"""
     radius: float
     parent: str = ""
-    """what a joint joins it to"""
+    """name of the segment that a joint connects it to; empty for the pelvis"""
     joint: Point = (0.0, 0.0)
-    """where"""
+    """position of that joint"""
     bounds: tuple[float, float] = (0.0, 0.0)
-    """least and most of its angle to its parent, degrees, positive anticlockwise"""
+    """limits of its angle to its parent, degrees, positive counter-clockwise"""
 
 
 TRUNK = {

@@ -10,15 +10,15 @@ from pydantic import Field
 
 from sandbox.scene.description.base import Name, Part, Point
 
-Force = Annotated[float, Field(gt=0, le=1e42)]
-Distance = Annotated[float, Field(ge=0, le=1e9)]
-Turned = Annotated[float, Field(ge=-1e12, le=1e12)]
+JointStrength = Annotated[float, Field(gt=0, le=1e42)]
+JointDistance = Annotated[float, Field(ge=0, le=1e9)]
+JointAngle = Annotated[float, Field(ge=-1e12, le=1e12)]
 Stiffness = Annotated[float, Field(gt=0, le=1e30)]
 Damping = Annotated[float, Field(ge=0, le=1e30)]
 
 
 class Joined(Part):
-    """What all joints have."""
+    """Fields of all joints."""
 
     name: Name | None = None
     """without a name, it is called by its kind and its number in the file, such as `joint-1`"""
@@ -26,12 +26,12 @@ class Joined(Part):
     """names of one body (joined to the world) or of two"""
     collide: bool = False
     """Allow collisions between the two bodies."""
-    strength: Force | None = None
+    strength: JointStrength | None = None
     """strength, N (N·m for joints that hold an angle): a larger load breaks the joint; default: unbreakable"""
 
 
 class Anchored(Joined):
-    """A joint that holds each body in one point."""
+    """A joint that acts on one point of each body."""
 
     anchors: tuple[Point, Point] = ((0.0, 0.0), (0.0, 0.0))
     """the two end points, m, in the order of `between`, each in the frame of its body. With one body, the second is a
@@ -42,8 +42,8 @@ class Rod(Anchored):
     """Keeps two points at a constant distance, as a massless rod. `pin` is a synonym (pymunk's term)."""
 
     kind: Literal["rod", "pin"]
-    length: Distance | None = None
-    """m; default: the distance at the start"""
+    length: JointDistance | None = None
+    """length, m; default: the distance at the start"""
 
 
 class Pivot(Joined):
@@ -61,10 +61,10 @@ class Slide(Anchored):
     """Keeps the distance of two points between two limits; a string if the lower limit is 0."""
 
     kind: Literal["slide"]
-    least: Distance = 0.0
+    least: JointDistance = 0.0
     """smallest distance, m"""
-    most: Distance
-    """m"""
+    most: JointDistance
+    """largest distance, m"""
 
 
 class Groove(Joined):
@@ -81,19 +81,19 @@ class RotaryLimit(Joined):
     """Keeps the angle between two bodies within limits."""
 
     kind: Literal["rotary_limit"]
-    least: Turned
+    least: JointAngle
     """smallest angle, rad"""
-    most: Turned
-    """rad"""
+    most: JointAngle
+    """largest angle, rad"""
 
 
 class Motor(Joined):
     """Turns the second body relative to the first at a constant rate."""
 
     kind: Literal["motor"]
-    rate: Turned
-    """rad/s"""
-    max_torque: Force | None = None
+    rate: JointAngle
+    """rate of rotation, rad/s"""
+    max_torque: JointStrength | None = None
     """largest torque, N·m; default: unlimited"""
 
 
@@ -103,32 +103,32 @@ class Gear(Joined):
     kind: Literal["gear"]
     ratio: Annotated[float, Field(ge=-1e6, le=1e6)]
     """angle₁ / angle₂"""
-    phase: Turned | None = None
-    """rad; default: as at the start"""
+    phase: JointAngle | None = None
+    """phase, rad; default: its value at the start"""
 
 
 class Spring(Anchored):
     """A damped spring between two points: F = −k (l − l₀) − c l̇ along their line."""
 
     kind: Literal["spring"]
-    rest_length: Distance | None = None
-    """m; default: the distance at the start"""
+    rest_length: JointDistance | None = None
+    """length without force, m; default: the distance at the start"""
     stiffness: Stiffness
-    """k, N/m"""
+    """stiffness k, N/m"""
     damping: Damping = 0.0
-    """c, N·s/m"""
+    """damping c, N·s/m"""
 
 
 class RotarySpring(Joined):
     """A damped spring of the angle between two bodies: τ = −k (φ − φ₀) − c φ̇."""
 
     kind: Literal["rotary_spring"]
-    rest_angle: Turned | None = None
-    """rad; default: as at the start"""
+    rest_angle: JointAngle | None = None
+    """angle without torque, rad; default: its value at the start"""
     stiffness: Stiffness
-    """k, N·m/rad"""
+    """stiffness k, N·m/rad"""
     damping: Damping = 0.0
-    """c, N·m·s/rad"""
+    """damping c, N·m·s/rad"""
 
 
 Joint = Annotated[

@@ -1,16 +1,16 @@
 """`[play]`: view, named spots, markings, and the roles of elements in a game."""
 
-from importlib import import_module
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticKnownError, core_schema
 
+from sandbox.game_names import game_names, is_game
 from sandbox.scene.description.base import Colour, Name, Part, Point, Radius, Velocity
-from sandbox.scene.description.game_tables import GAMES, with_game_tables
+from sandbox.scene.description.game_tables import with_game_tables
 
-Width = Annotated[float, Field(ge=0, le=1e9)]
+LineWidth = Annotated[float, Field(ge=0, le=1e9)]
 
 
 class Marking(Part):
@@ -26,7 +26,7 @@ class Marking(Part):
     """points of a line, or corners of a polygon, m"""
     filled: bool = True
     """true for a disc or polygon, false for a ring or line"""
-    width: Width = 0.0
+    width: LineWidth = 0.0
     """width of a ring or line, m; always drawn at least one pixel wide"""
 
 
@@ -37,9 +37,9 @@ def marking_fault(marking: Marking) -> str | None:
         return "must have either `position` and `radius` (a circle) or `points` (a polygon or line)"
     if of_circle:
         return None if marking.position and marking.radius else "must have both `position` and `radius`"
-    least, kind = (3, "a polygon") if marking.filled else (2, "a line")
-    if len(marking.points) < least:
-        return f"is {kind} and needs at least {least} points, has {len(marking.points)}"
+    required, kind = (3, "a polygon") if marking.filled else (2, "a line")
+    if len(marking.points) < required:
+        return f"is {kind} and needs at least {required} points, has {len(marking.points)}"
     return None
 
 
@@ -83,14 +83,13 @@ class _GameName:
         return core_schema.no_info_plain_validator_function(_check_game)
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        return {"enum": list(import_module(GAMES).game_names()), "type": "string"}
+        return {"enum": list(game_names()), "type": "string"}
 
 
 def _check_game(name: Any) -> str:
-    games = import_module(GAMES)
-    if isinstance(name, str) and games.is_game(name):
+    if isinstance(name, str) and is_game(name):
         return name
-    *others, last = map(repr, games.game_names())
+    *others, last = map(repr, game_names())
     raise PydanticKnownError("literal_error", {"expected": f"{', '.join(others)} or {last}"})
 
 
@@ -116,7 +115,7 @@ class _Header(Part):
     show: Literal["overlap"] | None = None
     """Colour bodies that overlap something."""
     game: Annotated[str, _GameName()] | None = None
-    """game whose rules apply: billiards only in the window, all other games also in `sandbox run`"""
+    """game whose rules apply, in the window and in runs; runs of a table need a player for that"""
     area: tuple[Point, Point] | None = None
     """lower left and upper right corner of the playing area of a table, m"""
     view: tuple[Point, Point] | None = None

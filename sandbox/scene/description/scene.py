@@ -3,9 +3,10 @@
 Generators are not expanded, and coefficients of pairs are not mixed: see `sandbox.scene.compile`.
 """
 
+import copy
 from collections.abc import Mapping, Sequence
-from functools import cache, cached_property
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from functools import cached_property
+from typing import TYPE_CHECKING, Annotated, Any, Self, cast
 
 from pydantic import Field, StringConstraints
 
@@ -13,7 +14,7 @@ from sandbox.scene.description.base import GROUND, BodySource, HasMaterial, Part
 from sandbox.scene.description.bodies import Box, Capsule, Compound, Polygon
 from sandbox.scene.description.discs import Ball, Emitter, Grid, Scatter
 from sandbox.scene.description.fixed import Plane, Post, Wall, Zone
-from sandbox.scene.description.forces import Attraction, Drive, Thrust
+from sandbox.scene.description.forces import AnyDrive, Attraction, Thrust
 from sandbox.scene.description.game_tables import with_game_tables
 from sandbox.scene.description.generators import Cloth, Ragdoll, Rope, Stack
 from sandbox.scene.description.joints import Joint
@@ -67,17 +68,17 @@ class SceneDescription(_Header):
     rotary_spring."""
     attractions: tuple[Attraction, ...] = Field((), alias="attraction")
     thrusts: tuple[Thrust, ...] = Field((), alias="thrust")
-    drives: tuple[Drive, ...] = Field((), alias="drive")
+    drives: tuple[AnyDrive, ...] = Field((), alias="drive")
     """Drive that moves a body between two positions: torque, stroke or plunger."""
     shots: tuple[Shot, ...] = Field((), alias="shot")
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """Return a copy, with other values for some fields. What is derived from the fields follows them."""
-        scene = super().model_copy(update=update, deep=deep)
-        if update:
-            for name in _derived(type(self)) & scene.__dict__.keys():
-                del scene.__dict__[name]
-        return scene
+        """Return a copy, with other values for some fields. Derived values are computed again from the fields."""
+        if not update:
+            return super().model_copy(deep=deep)
+        values = {name: getattr(self, name) for name in type(self).model_fields}
+        values = {**(copy.deepcopy(values) if deep else values), **update}
+        return cast("Self", type(self).model_construct(self.model_fields_set | update.keys(), **values))
 
     @property
     def kinds(self) -> dict[str, tuple[BodySource, ...]]:
@@ -137,14 +138,6 @@ class SceneDescription(_Header):
         return tuple(
             each.name or default_name(kind, k) for kind, those in kinds.items() for k, each in enumerate(those)
         )
-
-
-@cache
-def _derived(model: type) -> frozenset[str]:
-    """Return the names of the cached properties of a model."""
-    return frozenset(
-        name for base in model.__mro__ for name, value in vars(base).items() if isinstance(value, cached_property)
-    )
 
 
 def default_name(kind: str, index: int) -> str:

@@ -20,7 +20,7 @@ Spin = tuple[AngularVelocity, AngularVelocity, AngularVelocity]
 
 BallBall = Literal["elastic", "frictional"]
 Cushion = Literal["simple", "han2005", "mathavan2010"]
-Kind = Literal["spheres", "pucks"]
+TabletopBody = Literal["spheres", "pucks"]
 
 
 class Floor(Part):
@@ -35,14 +35,14 @@ class Floor(Part):
     spinning_friction: Friction = 0.0
     """μ_sp: torque μ_sp·m·g·R against ω_z, which decreases by 5·μ_sp·g / (2R) rad/s² for spheres and by 2·μ_sp·g / R
     for pucks"""
-    bodies: Kind = "spheres"
+    bodies: TabletopBody = "spheres"
     """type of the balls: `spheres`, or `pucks`, which are flat discs that slide and do not roll"""
     curl: Annotated[float, Field(ge=-10, le=10)] = 0.0
     """κ: sideways acceleration κ·μ_s·g of a sliding puck, to the left if it rotates counter-clockwise, to the right if
     clockwise. An empirical law of curling stones, not derived from first principles"""
 
     @property
-    def rubs(self) -> bool:
+    def has_friction(self) -> bool:
         """Whether the surface has any friction."""
         return bool(self.sliding_friction or self.rolling_friction or self.spinning_friction)
 
@@ -58,7 +58,7 @@ class ContactModels(Part):
     friction at the nose and at the floor during compression"""
 
     @property
-    def spins(self) -> bool:
+    def depends_on_spin(self) -> bool:
         """Whether a model depends on spin."""
         return self.ball_ball == "frictional" or self.cushion != "simple"
 

@@ -15,7 +15,7 @@ class World(Part):
     """Gravity, air, duration, random seed, and the bounds outside which bodies are removed."""
 
     gravity: tuple[Acceleration, Acceleration] = (0.0, 0.0)
-    """m/s²"""
+    """acceleration of free fall, m/s²"""
     duration: Annotated[float, Field(gt=0, le=1e9)] = 10.0
     """duration of a run without a window, s"""
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
@@ -25,17 +25,17 @@ class World(Part):
     quadratic_drag: Drag = 0.0
     """c, 1/m: a = −c |v − wind| (v − wind)"""
     wind: Velocity = (0.0, 0.0)
-    """m/s"""
+    """velocity of the air, m/s"""
     bounds: tuple[Point, Point] | None = None
     """Lower left and upper right corner, m. A body whose centre leaves the box is removed."""
 
 
-Integrator = Literal["explicit_euler", "semi_implicit_euler", "velocity_verlet", "leapfrog", "rk4"]
-Detection = Literal["discrete", "bisect", "swept", "shrink"]
+IntegratorName = Literal["explicit_euler", "semi_implicit_euler", "velocity_verlet", "leapfrog", "rk4"]
+DetectionName = Literal["discrete", "bisect", "swept", "shrink"]
 Response = Literal["impulse", "penalty"]
-Impact = Literal["newton", "dissipative"]
+ImpactLaw = Literal["newton", "dissipative"]
 Joints = Literal["impulses", "relaxation", "xpbd", "rattle"]
-BroadPhase = Literal["all_pairs", "circles", "sweep", "grid", "oriented"]
+BroadPhaseName = Literal["all_pairs", "circles", "sweep", "grid", "oriented"]
 
 
 COMMON = ("dt", "substeps", "iterations", "record_every")
@@ -52,7 +52,6 @@ class Settings(Part):
     """Settings of the solver. A setting that is left out is chosen by the engine, and reported with the run.
 
     An engine that does not support a given setting refuses the scene.
-
     """
 
     dt: Annotated[float, Field(ge=1e-9, le=10)] = 0.01
@@ -73,16 +72,16 @@ class Settings(Part):
     """Damping of penalty springs as a fraction of critical damping; default: from the restitution of each pair."""
     half_kick: bool = False
     """Start with the velocity v + g·h/2, which makes uniformly accelerated motion exact."""
-    integrator: Integrator | None = None
+    integrator: IntegratorName | None = None
     """Integrator of free motion; pymunk supports explicit_euler only."""
-    detection: Detection | None = None
+    detection: DetectionName | None = None
     """Contact detection: at the end of each step, by bisection, by time of impact, or by shorter steps."""
     response: Response | None = None
     """Contact response: impulses or penalty springs."""
-    impact: Impact | None = None
+    impact: ImpactLaw | None = None
     """Impact law: Newton's (separation = e times approach), or Newton's limited so that friction does not create
     energy."""
-    broad_phase: BroadPhase | None = None
+    broad_phase: BroadPhaseName | None = None
     """Search for candidate pairs; affects the cost and not the result."""
     joints: Joints | None = None
     """Joint solver: impulses on velocities, position relaxation, position with compliance (XPBD), or both positions and
@@ -132,7 +131,7 @@ class Material(Part):
     restitution: Restitution | None = None
     """e: speed of separation / speed of approach, 0 to 1"""
     restitution_falloff: Falloff | None = None
-    """s/m"""
+    """f, s/m: decrease of restitution with the speed of approach, e(v) = e / (1 + f·v)"""
     friction: Friction | None = None
     """Coulomb friction μ"""
 
@@ -143,14 +142,14 @@ class Pair(Part):
     between: tuple[Name, Name]
     """names of the two materials"""
     restitution: Restitution | None = None
-    """e of this pair, 0 to 1, whatever the values of the two materials"""
+    """e of this pair, 0 to 1, in place of the product of the two materials' values"""
     restitution_falloff: Falloff | None = None
-    """s/m"""
+    """f, s/m: decrease of restitution with the speed of approach, e(v) = e / (1 + f·v)"""
     friction: Friction | None = None
-    """μ of this pair, whatever the values of the two materials"""
+    """μ of this pair, in place of the product of the two materials' values"""
 
 
-LEAST_THRESHOLD = 1e-3
+MIN_THRESHOLD = 1e-3
 """m/s: at lower speeds of approach engines do not distinguish rest, micro-bounces and pressing."""
 
 
@@ -159,7 +158,7 @@ class Kick(Part):
 
     speed: Annotated[float, Field(ge=0, le=1e6)]
     """speed that is added, m/s; with the profile `middle`, the value in the middle"""
-    threshold: Annotated[float, Field(ge=LEAST_THRESHOLD, le=1e12)] = 0.05
+    threshold: Annotated[float, Field(ge=MIN_THRESHOLD, le=1e12)] = 0.05
     """smallest speed of approach along the normal, m/s"""
     profile: Literal["even", "middle"] = "even"
     """`even`: the same everywhere; `middle`: times 4 s (1 − s) along the length of a wall, s from 0 to 1"""

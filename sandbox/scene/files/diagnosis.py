@@ -11,13 +11,12 @@ from typing import Annotated, Any, get_args, get_origin
 from pydantic import ValidationError
 
 from sandbox.echo import shorten
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Wording
-from sandbox.scene.description.game_tables import PRESETS
+from sandbox.scene.description.game_tables import PRESETS, has_preset
 from sandbox.scene.errors import LocatedMessage, Location
-from sandbox.scene.files.document import read_model
-from sandbox.scene.files.presets import has_preset, place_of, written_out
-from sandbox.scene.files.tables import TAGGED, keys_of, list_tables, model_at
-from sandbox.scene.scene import Scene
+from sandbox.scene.files.document import TAGGED, keys_of, list_tables, model_at, read_model
+from sandbox.scene.files.presets import expanded_document, stated_location
 from sandbox.scene.validate.scene import crosscheck
 
 _EXPECTED = {
@@ -360,14 +359,14 @@ def check_valid_remainder(document: dict[str, Any], wrong: Iterable[Location]) -
                 holder[name] = PLACEHOLDERS[name]
     stated = document
     if has_preset(stated):
-        document = written_out(stated) or {}
+        document = expanded_document(stated) or {}
     try:
         scene = read_model(document)
     except ValueError:
         return []
     found = [f for f in crosscheck(scene) if touched.isdisjoint((f[0][:1], f[0][:2])) or f[0][2:3] in INDEPENDENT_KEYS]
     if document is not stated:
-        found = [(place_of(location, document, stated), message) for location, message in found]
+        found = [(stated_location(location, document, stated), message) for location, message in found]
     return [(_original_index(location, kept), message) for location, message in found]
 
 

@@ -11,9 +11,9 @@ from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Part
 from sandbox.scene.description.game_tables import game_table, is_generated, lazy_table
-from sandbox.scene.scene import Scene
 
 
 @cache  # reading the source takes 10 ms, and a scene may have many faults

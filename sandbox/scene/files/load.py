@@ -1,27 +1,27 @@
 """Reading, checking and writing of scene files. All faults of a file are reported at once.
 
-tomllib parses; pydantic validates in strict mode on JSON, so that arrays become tuples; `validate/scene.py` checks what
-no single model can, such as names that do not exist.
+tomllib parses; pydantic validates in strict mode on JSON, so that arrays become tuples; `validate/scene.py` checks
+relations between elements, such as references to bodies by name.
 """
 
 import re
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
-from sandbox.resource_limits import FILE_SIZE
+from sandbox.resource_limits import FILE_SIZE, read_limited
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.game_tables import has_preset
 from sandbox.scene.errors import Fault, Lines, LocatedMessage, Location, SceneError, path_of
 from sandbox.scene.files import presets
-from sandbox.scene.files.document import read_model, to_document
-from sandbox.scene.files.nesting import NestingError, check_text, check_value
+from sandbox.scene.files.document import NestingError, check_text, check_value, read_model, to_document
 from sandbox.scene.files.overrides import AddressError, assign, parse_assignment
 from sandbox.scene.files.shipped_scenes import UnknownSceneError, find
-from sandbox.scene.scene import Scene
 from sandbox.scene.validate.scene import crosscheck
-from sandbox.whole import read_whole
 
 NO_TIME = 5e-324
 """s, smallest duration of a scene: replaces 0 while the scene of a session without steps is checked."""
@@ -109,10 +109,10 @@ def from_document(
         raise SceneError([Fault(file, None, "", str(error))]) from None
     assignments, faults = _parse_overrides(overrides, file)
     stated, whole, changed = document, True, set[Location]()
-    if presets.has_preset(document, (path for path, _ in assignments)):
-        stated, changed, assignments, wrong = presets.set_first(document, assignments)
+    if has_preset(document, (path for path, _ in assignments)):
+        stated, changed, assignments, wrong = presets.apply_preset_overrides(document, assignments)
         faults += [Fault(file, None, "--set", message) for message in wrong]
-        written = presets.written_out(stated)
+        written = presets.expanded_document(stated)
         document, whole = (stated, False) if written is None else (written, True)
     remaining: list[Override] = []
     for path, value in assignments:
@@ -140,9 +140,7 @@ def from_document(
         found = [((), f"the scene cannot be read: {error}")]
     else:
         if not whole:
-            from sandbox.scene.files.presets import faults_of  # few scenes have presets
-
-            found = list(faults_of(scene))
+            found = list(presets.faults_of(scene))
             if not found:  # an override has removed the fault
                 return from_document(document, file, remaining, text)
         else:
@@ -150,14 +148,34 @@ def from_document(
             if not found:
                 return scene
 
-    lines = Lines(text)
+    stated_at = partial(presets.stated_location, document=document, stated=stated) if whole else None
+    raise SceneError(_located(found, file, text, document, changed, stated_at))
+
+
+def _located(
+    found: list[LocatedMessage],
+    file: str,
+    text: str,
+    document: dict[str, Any],
+    changed: set[Location],
+    stated_at: Callable[[Location], Location] | None,
+) -> list[Fault]:
+    """Return faults in the order of their lines.
+
+    Args:
+        found: locations in the document, and messages.
+        file: name of the document.
+        text: its source text, which has the lines.
+        document: the document, with presets expanded.
+        changed: locations that overrides have set; their faults have no line.
+        stated_at: returns the location in the source text of a location in the document; default: the same.
+    """
+    lines, faults = Lines(text), []
     for location, message in dict.fromkeys(found):
         is_set = any(location[: len(c)] == c for c in changed)
-        place = presets.place_of(location, document, stated) if whole else location
-        line = None if is_set else lines.find(place)
-        path = path_of(location, document) + (" (set)" if is_set else "")
-        faults.append(Fault(file, line, path, message))
-    raise SceneError(sorted(faults, key=lambda fault: (fault.line is None, fault.line or 0)))
+        line = None if is_set else lines.find(location if stated_at is None else stated_at(location))
+        faults.append(Fault(file, line, path_of(location, document) + (" (set)" if is_set else ""), message))
+    return sorted(faults, key=lambda fault: (fault.line is None, fault.line or 0))
 
 
 def from_session(document: dict[str, Any], file: str = "<session>", overrides: Iterable[Override] = ()) -> Scene:
@@ -212,7 +230,7 @@ def _read(path: str | Path) -> str:
     try:
         if (message := too_large(Path(path).stat().st_size)) is not None:
             raise SceneError([Fault(file, None, "", message)])
-        return read_whole(Path(path), FILE_SIZE.value).decode("utf-8-sig").replace("\r\n", "\n")
+        return read_limited(Path(path), FILE_SIZE.value).decode("utf-8-sig").replace("\r\n", "\n")
     except OSError as error:
         raise SceneError([Fault(file, None, "", f"cannot be read: {error.strerror or error}")]) from None
     except ValueError as error:

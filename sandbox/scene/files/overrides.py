@@ -16,11 +16,14 @@ from collections.abc import Sequence
 from itertools import product
 from typing import Any
 
+from pydantic import BaseModel
+
 from sandbox.echo import MAX_NAMED, short_count, short_repr, shorten
 from sandbox.resource_limits import RUNS
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.scene import default_name
 from sandbox.scene.errors import Location, quoted
-from sandbox.scene.files.nesting import MAX_DEPTH, check_text
+from sandbox.scene.files.document import MAX_DEPTH, TAGGED, check_text, keys_of, list_tables, model_at, to_json
 
 EVERY = "*"
 
@@ -226,8 +229,6 @@ def element_names(elements: list[Any], kind: str) -> list[str | None]:
 
 def _keys(location: Location) -> list[str]:
     """Return the keys of the table at a location; empty if there is no such table."""
-    from sandbox.scene.files.tables import TAGGED, keys_of, model_at
-
     if len(location) == 1 and location[0] in TAGGED:  # tables with a `kind`
         return [key for model in TAGGED[str(location[-1])][0].values() for key in keys_of(model)]
     try:
@@ -238,8 +239,6 @@ def _keys(location: Location) -> list[str]:
 
 def _is_list(table: str) -> bool:
     """Return whether a table may occur several times."""
-    from sandbox.scene.files.tables import list_tables
-
     return table in list_tables()
 
 
@@ -298,3 +297,54 @@ def combinations(axes: Sequence[tuple[str, Sequence[Any]]], seeds: int = 1) -> l
         raise AddressError(f"{factors} to {short_count(count)} runs; {RUNS.remedy(count)}")
     keys = [key for key, _ in axes]
     return [tuple(zip(keys, values, strict=True)) for values in product(*(values for _, values in axes))]
+
+
+_FIELDS = {field.alias or name: name for name, field in Scene.model_fields.items()}
+"""Field name of a scene by the heading of its table."""
+
+
+def change_value(scene: Scene, path: str, value: Any) -> Scene:
+    """Return a scene with one value changed; only the part that holds the value is validated.
+
+    The time needed does not grow with the scene. Unchanged parts and the bodies are the same objects as before: the
+    caller updates the bodies and checks references between parts (`crosscheck`). Raises pydantic's own errors;
+    `from_document` gives the full messages.
+
+    Args:
+        scene: not modified.
+        path: such as `world.gravity` or `ball.*.friction`.
+        value: as in TOML or JSON.
+
+    Raises:
+        ValueError: the path does not exist, or the value is invalid.
+    """
+    heading, *rest = parse_path(path)
+    part = getattr(scene, _FIELDS.get(heading, ""), None)
+    if isinstance(part, BaseModel) and rest:
+        changed: Any = _with(part, rest, path, value)
+    elif isinstance(part, tuple) and part and len(rest) > 1:
+        names = [{} if each.name is None else {"name": each.name} for each in part if hasattr(each, "name")]
+        names = names or [{} for _ in part]
+        every = rest[0] == EVERY and {"name": EVERY} not in names
+        those = range(len(part)) if every else [index_of(names, (heading, rest[0]), path)]
+        elements = list(part)
+        for k in those:
+            elements[k] = _with(elements[k], rest[1:], path, value)
+        changed = tuple(elements)
+    else:
+        raise AddressError(f"{path}: the scene has no such value")
+    return scene.model_copy(update={_FIELDS[heading]: changed})
+
+
+def _with(part: BaseModel, rest: list[str], path: str, value: Any) -> BaseModel:
+    """Return a part of a scene with the value at the rest of a path changed."""
+    document = part.model_dump(mode="json", by_alias=True, exclude_defaults=True)
+    assign_all(document, tuple(rest), path, value)
+    if len(rest) > 1:
+        return type(part).model_validate_json(to_json(document), by_alias=True, by_name=False)
+    # Only the one value is copied: a session without steps has the duration 0, which a file may not have.
+    if "duration" in document:
+        document["duration"] = 1.0
+    read = type(part).model_validate_json(to_json(document), by_alias=True, by_name=False)
+    name = next(name for name, field in type(part).model_fields.items() if (field.alias or name) == rest[0])
+    return part.model_copy(update={name: getattr(read, name)})

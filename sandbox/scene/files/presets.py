@@ -1,16 +1,18 @@
 """Presets: tables of games that are expanded into primitive elements before the scene is read."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.base import Part
 from sandbox.scene.description.game_tables import PRESETS, GameTable, game_table
+from sandbox.scene.description.world import Pair
 from sandbox.scene.errors import LocatedMessage, Location
 from sandbox.scene.files.document import read_model, to_document
 from sandbox.scene.files.overrides import AddressError, assign, parse_path
-from sandbox.scene.scene import Scene
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,9 +22,9 @@ class Preset(GameTable):
     faults_of: Callable[[Scene], Iterable[LocatedMessage]]
     """returns the reasons why a scene with the table cannot be expanded"""
     expanded: Callable[[Scene], Scene]
-    """returns the scene of elements that a scene with the table, which has no faults, stands for"""
+    """returns a scene, which has no faults, with the table replaced by its elements"""
     origins: Callable[[Scene], dict[str, Location]] | None = None
-    """returns the location within the table from which each element is made, by the name of the element"""
+    """returns the location within the table of the origin of each element, by the name of the element"""
     excludes: tuple[str, ...] = ()
     """tables of other presets that a scene cannot have besides"""
 
@@ -33,21 +35,16 @@ _LISTS = {field.alias for name, field in Scene.model_fields.items() if field.ali
 """Tables that may occur several times, to which a preset may add."""
 
 
-def has_preset(document: dict[str, Any], paths: Iterable[str] = ()) -> bool:
-    """Return whether a document has a preset, or an override adds one."""
-    return any(key in document for key in PRESETS) or any(path.startswith(PRESETS) for path in paths)
-
-
-def written_out(document: dict[str, Any]) -> dict[str, Any] | None:
-    """Return the expanded document of one with presets; None if it has faults."""
+def expanded_document(document: dict[str, Any]) -> dict[str, Any] | None:
+    """Return a document with its presets expanded; None if it has faults."""
     try:
         scene = read_model(document)
         return None if any(stated_faults_of(scene)) else to_document(expanded(scene))
-    except ValueError:  # the next reader reports it with all others
+    except ValueError:  # `from_document` reports it with all other faults
         return None
 
 
-def set_first(
+def apply_preset_overrides(
     document: dict[str, Any], assignments: list[Assignment]
 ) -> tuple[dict[str, Any], set[Location], list[Assignment], list[str]]:
     """Apply the overrides of presets and of values that take precedence over presets.
@@ -78,10 +75,10 @@ def _begins(path: str, key: str) -> bool:
     return path == key or path.startswith((f"{key}.", f"{key}["))
 
 
-def place_of(location: Location, document: dict[str, Any], stated: dict[str, Any]) -> Location:
+def stated_location(location: Location, document: dict[str, Any], stated: dict[str, Any]) -> Location:
     """Return the location in the stated document for a location in the expanded one.
 
-    It is the same location, except for an element that a preset created: then it is the preset, or an element of it.
+    It is the same location, except for an element that a preset created: then it is that of the preset or of its part.
     """
     if not _is_written(location, stated):
         return location
@@ -152,3 +149,23 @@ def presets_of(keys: Iterable[str]) -> dict[str, Preset]:
 def _stated(scene: Scene) -> list[str]:
     """Return the keys of the presets that a scene has."""
     return [key for key in PRESETS if getattr(scene, key) is not None]
+
+
+Stated = TypeVar("Stated", bound=Part)
+
+
+def stated(part: Stated, values: dict[str, Any]) -> Stated:
+    """Return a part with values for the keys that it does not state itself."""
+    return part.model_copy(update={key: value for key, value in values.items() if key not in part.model_fields_set})
+
+
+def added(own: Sequence[Any], more: Sequence[Any]) -> tuple[Any, ...]:
+    """Return the scene's own elements, and those of a preset that have other names."""
+    taken = {each.name for each in own}
+    return (*own, *(each for each in more if each.name not in taken))
+
+
+def paired(own: Sequence[Pair], more: Iterable[Pair]) -> tuple[Pair, ...]:
+    """Return the scene's own pairs of materials, and those of a preset for other pairs."""
+    taken = {frozenset(pair.between) for pair in own}
+    return (*own, *(pair for pair in more if frozenset(pair.between) not in taken))

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from sandbox.echo import MAX_ECHO, short_repr
-from sandbox.scene.files.nesting import check_text
 
 PACKAGE = Path(__file__).resolve().parents[2]
 SCHEMA = "scene.schema.json"
@@ -86,7 +85,8 @@ def scenes_in(text: str) -> tuple[str, ...]:
 
 
 def _has_scene_key(file: Path) -> bool:
-    from sandbox.scene.scene import Scene
+    from sandbox.scene.compile.scene import Scene
+    from sandbox.scene.files.document import check_text
 
     try:
         text = file.read_bytes().decode("utf-8-sig")

@@ -14,10 +14,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from sandbox.atomic_write import atomic_write
 from sandbox.scene.errors import TOKEN, Fault, SceneError
 from sandbox.scene.files.load import loads, too_large
 from sandbox.scene.files.shipped_scenes import PACKAGE
-from sandbox.whole import whole
 
 
 class Statement(NamedTuple):
@@ -131,7 +131,7 @@ def write_solver(path: str | Path, settings: Mapping[str, Any]) -> bool:
         result = with_solver(text, settings, file)
         if result == text:
             return False
-        with whole(target) as temporary:
+        with atomic_write(target) as temporary:
             temporary.write_bytes(result.encode("utf-8"))
             shutil.copymode(target, temporary)
     except UnicodeDecodeError:

@@ -15,12 +15,12 @@ _HALF_RING = ((0, 1), (1, -1), (1, 0), (1, 1))
 """Offsets of half of the eight neighbouring cells; with the cell itself they give every pair of cells once."""
 
 
-def near_pairs(position: FloatArray, reach: float) -> Iterator[tuple[IntArray, IntArray]]:
-    """Yield, in chunks, every pair (i, j) of points less than `reach` apart, and some that are farther apart.
+def near_pairs(position: FloatArray, distance: float) -> Iterator[tuple[IntArray, IntArray]]:
+    """Yield, in chunks, every pair (i, j) of points less than `distance` apart, and some that are farther apart.
 
     Args:
         position: points (N, 2), m, finite.
-        reach: m, positive; size of a cell.
+        distance: m, positive; size of a cell.
 
     Yields:
         Two index arrays (K,) each; no pair occurs twice. K is at most about `CHUNK`, unless a single cell holds more.
@@ -28,7 +28,7 @@ def near_pairs(position: FloatArray, reach: float) -> Iterator[tuple[IntArray, I
     """
     if len(position) < 2:
         return
-    column, row = (_compressed(np.floor(position[:, axis] / reach)) for axis in (0, 1))
+    column, row = (_compressed(np.floor(position[:, axis] / distance)) for axis in (0, 1))
     stride = int(row.max()) + 3  # so that row ± 1 stays in its column
     key = column * stride + row + 1
     order = np.argsort(key, kind="stable")

@@ -114,13 +114,13 @@ def outline_fault(points: Sequence[Point]) -> tuple[int | None, str] | None:
     Returns:
         The index of the corner, or None if the fault concerns the whole outline, and a message with a remedy.
     """
-    extent, least, n = extent_of(points), min_corner_distance(points), len(points)
+    extent, shortest, n = extent_of(points), min_corner_distance(points), len(points)
     for j in range(n):
-        i, away = (j - 1) % n, math.dist(points[j - 1], points[j])
-        if away < least:
+        i, length = (j - 1) % n, math.dist(points[j - 1], points[j])
+        if length < shortest:
             return j, (
-                f"points[{i}] and points[{j}] are {away:g} m apart; remove one of them, "
-                f"or place them at least {least:g} m apart"
+                f"points[{i}] and points[{j}] are {length:g} m apart; remove one of them, "
+                f"or place them at least {shortest:g} m apart"
             )
     for i in range(n):
         if _is_fold(points[i - 1], points[i], points[(i + 1) % n]):

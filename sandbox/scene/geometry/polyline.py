@@ -38,7 +38,7 @@ class Arc(NamedTuple):
     """angle of the arc, rad, positive to the left"""
 
     @property
-    def reach(self) -> float:
+    def tangent_length(self) -> float:
         """Distance from the corner to the tangent points on the edges, m."""
         return self.radius * math.tan(0.5 * abs(self.turn))
 
@@ -90,10 +90,10 @@ def arc_at(corners: Sequence[Corner], k: int, closed: bool = False) -> Arc | Non
     if abs(turn) > math.pi - 1e-6:
         raise RoundingError(k, "is a reversal, which cannot be rounded; remove its radius")
     side = math.copysign(1.0, turn)
-    reach = radius * math.tan(0.5 * abs(turn))
+    length = radius * math.tan(0.5 * abs(turn))
     centre = (
-        here[0] - come[0] * reach - come[1] * side * radius,
-        here[1] - come[1] * reach + come[0] * side * radius,
+        here[0] - come[0] * length - come[1] * side * radius,
+        here[1] - come[1] * length + come[0] * side * radius,
     )
     return Arc(centre, radius, math.atan2(-come[0] * side, come[1] * side), turn)
 
@@ -147,7 +147,7 @@ def _fit(corners: Sequence[Corner], arcs: Sequence[Arc | None], closed: bool) ->
     for k in range(len(corners) if closed else len(corners) - 1):
         n = (k + 1) % len(corners)
         room = math.dist(corners[k][:2], corners[n][:2])
-        wanted = sum(arc.reach for arc in (arcs[k], arcs[n]) if arc is not None)
+        wanted = sum(arc.tangent_length for arc in (arcs[k], arcs[n]) if arc is not None)
         if wanted > room + NEAREST:
             which = k if arcs[k] is not None else n
             message = f"has too large a radius: its arcs take {wanted:.4g} m of an edge that is {room:.4g} m long"

@@ -32,6 +32,7 @@ from sandbox.scene.description.fixed import Zone
 from sandbox.scene.description.generators import Stack
 from sandbox.scene.geometry.polygon import Moments, anticlockwise, capsule_moments, disc_moments, polygon_moments
 from sandbox.scene.geometry.triangulation import convex_parts
+from sandbox.scene.geometry.vectors import nearest_on_segment, to_world
 
 
 class Piece(NamedTuple):
@@ -41,11 +42,11 @@ class Piece(NamedTuple):
     """counter-clockwise, m, about the centre of mass of its body"""
     radius: float
     """m"""
-    bearer: int = 0
+    part: int = 0
     """index of the part of the body that it belongs to"""
 
 
-class Form(NamedTuple):
+class ElementGeometry(NamedTuple):
     """Pieces and mass properties of an element."""
 
     pieces: tuple[Piece, ...]
@@ -55,15 +56,15 @@ class Form(NamedTuple):
     """moment of inertia about the centre of mass, kg·m²"""
     centre: Point
     """centre of mass in the frame in which the element is described, m"""
-    reach: float
+    bounding_radius: float
     """distance from the centre of mass to the farthest point, m"""
-    core: float
+    inner_radius: float
     """radius of the largest disc about the centre of mass inside one piece, m; 0 if the centre is outside all pieces"""
-    thin: float
+    half_width: float
     """half the smallest width of the thinnest piece, m; of a disc its radius"""
 
 
-def form_of(element: BodySource) -> Form:
+def geometry_of(element: BodySource) -> ElementGeometry:
     """Return pieces, mass and moment of inertia of an element; of a generator, those of one of its bodies.
 
     Raises:
@@ -75,12 +76,14 @@ def form_of(element: BodySource) -> Form:
         piece = Piece(((0.0, 0.0),), element.radius)
         moment = 0.5 * mass * (element.radius * element.radius)
         radius = element.radius
-        return Form((piece,), mass, moment, (0.0, 0.0), reach=radius, core=radius, thin=radius)
-    return _solid_form(element)
+        return ElementGeometry(
+            (piece,), mass, moment, (0.0, 0.0), bounding_radius=radius, inner_radius=radius, half_width=radius
+        )
+    return _solid_geometry(element)
 
 
 @lru_cache(maxsize=4096)
-def _solid_form(element: BodySource) -> Form:
+def _solid_geometry(element: BodySource) -> ElementGeometry:
     drawn = tuple(_drawn(element))
     moments = [_moments(piece) for piece, _ in drawn]
     density = _densities(element, [stated for _, stated in drawn], [fraction.area for fraction in moments])
@@ -92,9 +95,9 @@ def _solid_form(element: BodySource) -> Form:
         for rho, w, s in zip(density, weight, moments, strict=True)
     )
     pieces = tuple(p._replace(corners=tuple((a - x, b - y) for a, b in p.corners)) for p, _ in drawn)
-    reach = max(math.hypot(*corner) + p.radius for p in pieces for corner in p.corners)
-    core, thin = max(map(_inside, pieces)), min(map(_half_width, pieces))
-    return Form(pieces, mass, moment, (x, y), reach, core, thin)
+    bounding_radius = max(math.hypot(*corner) + p.radius for p in pieces for corner in p.corners)
+    inner_radius, half_width = max(map(_inside, pieces)), min(map(_half_width, pieces))
+    return ElementGeometry(pieces, mass, moment, (x, y), bounding_radius, inner_radius, half_width)
 
 
 def _densities(element: BodySource, stated: list[float | None], area: list[float]) -> list[float]:
@@ -114,8 +117,8 @@ def _drawn(element: BodySource) -> list[tuple[Piece, float | None]]:
     """Return the pieces of an element in the frame in which it is described, with their stated densities."""
     if isinstance(element, Compound):
         return [
-            (_moved(piece, part)._replace(bearer=bearer), part.density)
-            for bearer, part in enumerate(element.parts)
+            (_moved(piece, part)._replace(part=index), part.density)
+            for index, part in enumerate(element.parts)
             for piece in _pieces_of(part)
         ]
     assert isinstance(element, Box | Capsule | Polygon | Stack)
@@ -139,8 +142,7 @@ def _pieces_of(shape: Box | Capsule | Polygon | Stack | AnyPart) -> list[Piece]:
 def _moved(piece: Piece, part: Attached) -> Piece:
     """Return a piece of a part in the frame of its body."""
     cos, sin = math.cos(part.angle), math.sin(part.angle)
-    px, py = part.position
-    return piece._replace(corners=tuple((px + cos * x - sin * y, py + sin * x + cos * y) for x, y in piece.corners))
+    return piece._replace(corners=tuple(to_world(corner, cos, sin, part.position) for corner in piece.corners))
 
 
 def _moments(piece: Piece) -> Moments:
@@ -157,11 +159,8 @@ def _inside(piece: Piece) -> float:
     """Return the radius of the largest disc about the origin inside a piece, m; 0 if the origin is outside."""
     corners = piece.corners
     if len(corners) < 3:
-        (ax, ay), (bx, by) = corners[0], corners[-1]
-        x, y = bx - ax, by - ay
-        length2 = x * x + y * y
-        fraction = min(max(-(ax * x + ay * y) / length2, 0.0), 1.0) if length2 else 0.0
-        return max(piece.radius - math.hypot(ax + fraction * x, ay + fraction * y), 0.0)
+        _, distance = nearest_on_segment((0.0, 0.0), corners[0], corners[-1])
+        return max(piece.radius - distance, 0.0)
     depth = math.inf
     for (ax, ay), (bx, by) in zip(corners, corners[1:] + corners[:1], strict=True):
         depth = min(depth, (ax * by - ay * bx) / math.hypot(bx - ax, by - ay))
@@ -170,14 +169,18 @@ def _inside(piece: Piece) -> float:
 
 def _half_width(piece: Piece) -> float:
     """Return half the smallest distance of two parallel lines enclosing a piece, m; one contains an edge."""
-    corners = piece.corners
-    if len(corners) < 3:
+    if len(piece.corners) < 3:
         return piece.radius
+    return 0.5 * _width(piece.corners) + piece.radius
+
+
+def _width(corners: tuple[Point, ...]) -> float:
+    """Return the smallest distance of two parallel lines enclosing a convex polygon, m."""
     width = math.inf
-    for (ax, ay), (bx, by) in zip(corners, corners[1:] + corners[:1], strict=True):
+    for (ax, ay), (bx, by) in zip(corners, (*corners[1:], corners[0]), strict=True):
         length = math.hypot(bx - ax, by - ay)
         width = min(width, max((bx - ax) * (y - ay) - (by - ay) * (x - ax) for x, y in corners) / length)
-    return 0.5 * width + piece.radius
+    return width
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,11 +197,11 @@ class Shapes:
     """(S,) m"""
     middle: FloatArray
     """(S, 2) m, centre of the bounding disc, in the same frame"""
-    reach: FloatArray
+    bounding_radius: FloatArray
     """(S,) m, radius of the disc about `middle` that contains the piece"""
     piece: IntArray
     """(S,) index of the piece within its element"""
-    bearer: IntArray
+    part: IntArray
     """(S,) index of the part within its element; 0 without parts"""
 
     def __len__(self) -> int:
@@ -217,27 +220,27 @@ def shapes_of(element: IntArray, elements: tuple[BodySource, ...]) -> Shapes:
         element: (N,) index of each body's element.
         elements: the elements.
     """
-    forms = [form_of(each).pieces for each in elements]
-    count = np.asarray([len(pieces) for pieces in forms], dtype=np.int64)
+    pieces_of_element = [geometry_of(each).pieces for each in elements]
+    count = np.asarray([len(pieces) for pieces in pieces_of_element], dtype=np.int64)
     of_body = count[element]
     body = np.repeat(np.arange(len(element)), of_body)
     piece = np.arange(len(body)) - np.repeat(np.cumsum(of_body) - of_body, of_body)
     begin = np.cumsum(count) - count
     which = begin[element[body]] + piece  # among all pieces of all elements
-    flat = [p for pieces in forms for p in pieces]
+    flat = [p for pieces in pieces_of_element for p in pieces]
     size = np.asarray([len(p.corners) for p in flat], dtype=np.int64)
     start = np.cumsum(size) - size
     every = np.asarray([c for p in flat for c in p.corners], dtype=np.float64).reshape(-1, 2)
     middle = np.asarray([_middle(p) for p in flat], dtype=np.float64).reshape(-1, 2)
     radius = np.asarray([p.radius for p in flat], dtype=np.float64)
-    reach = np.asarray(
+    bounding_radius = np.asarray(
         [max(math.dist(c, m) for c in p.corners) + p.radius for p, m in zip(flat, middle.tolist(), strict=True)]
     ).reshape(-1)
-    bearer = np.asarray([p.bearer for p in flat], dtype=np.int64)
+    part = np.asarray([p.part for p in flat], dtype=np.int64)
     own = size[which]
     first = np.concatenate(([0], np.cumsum(own)))
     row = np.repeat(start[which], own) + np.arange(first[-1]) - np.repeat(first[:-1], own)
-    return Shapes(body, first, every[row], radius[which], middle[which], reach[which], piece, bearer[which])
+    return Shapes(body, first, every[row], radius[which], middle[which], bounding_radius[which], piece, part[which])
 
 
 def _middle(piece: Piece) -> tuple[float, float]:
@@ -305,22 +308,10 @@ def _holds(piece: ZonePiece, point: Point) -> bool:
     if len(corners) > 2:
         sides = zip(corners, (*corners[1:], corners[0]), strict=True)
         return all((bx - ax) * (point[1] - ay) - (by - ay) * (point[0] - ax) >= 0.0 for (ax, ay), (bx, by) in sides)
-    (ax, ay), (bx, by) = corners[0], corners[-1]
-    x, y = bx - ax, by - ay
-    length2 = x * x + y * y
-    fraction = min(max(((point[0] - ax) * x + (point[1] - ay) * y) / length2, 0.0), 1.0) if length2 else 0.0
-    return math.hypot(point[0] - ax - fraction * x, point[1] - ay - fraction * y) < piece.radius
+    _, distance = nearest_on_segment(point, corners[0], corners[-1])
+    return distance < piece.radius
 
 
 def width_of(zone: Zone) -> float:
     """Return the approximate smallest width of a zone, m; a body that moves farther in one substep can miss it."""
     return min(2.0 * piece.radius if len(piece.corners) < 3 else _width(piece.corners) for piece in pieces_of(zone))
-
-
-def _width(corners: tuple[Point, ...]) -> float:
-    """Return the smallest distance of two parallel lines enclosing a convex polygon, m."""
-    width = math.inf
-    for (ax, ay), (bx, by) in zip(corners, (*corners[1:], corners[0]), strict=True):
-        length = math.hypot(bx - ax, by - ay)
-        width = min(width, max((bx - ax) * (y - ay) - (by - ay) * (x - ax) for x, y in corners) / length)
-    return width

@@ -158,13 +158,13 @@ def _from(part: list[int], corner: int) -> list[int]:
 
 def _check(points: Sequence[Point], parts: Sequence[tuple[Point, ...]], slack: float) -> None:
     """Raise `OutlineError` unless the parts are valid for engines and their areas add up to that of the outline."""
-    least = min_corner_distance(points)
+    shortest = min_corner_distance(points)
     for part in parts:
-        if any(math.dist(a, b) < least for a, b in pairwise((*part, part[0]))) or not is_convex(part, slack):
+        if any(math.dist(a, b) < shortest for a, b in pairwise((*part, part[0]))) or not is_convex(part, slack):
             x, y = part[0]
             raise OutlineError(
                 f"near ({x:g}, {y:g}) the outline is too narrow to be cut into convex parts; "
-                f"make it wider than {least:g} m there, or split it by hand"
+                f"make it wider than {shortest:g} m there, or split it by hand"
             )
     whole = signed_area(points)
     lost = abs(math.fsum(map(signed_area, parts)) - whole)

@@ -7,16 +7,16 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.resource_limits import MEMORY, OVERLAPS
-from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.bodies import Bodies, link_length
 from sandbox.scene.compile.generators import count_of
-from sandbox.scene.compile.layout import pitch
-from sandbox.scene.description.base import BACKING, MAX_BODIES, BodySource
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.base import BACKING, MAX_BODIES, BodySource, BodySpec
 from sandbox.scene.description.discs import Emitter
 from sandbox.scene.description.fixed import Plane
 from sandbox.scene.description.generators import ENDS, Cloth, Rope
 from sandbox.scene.errors import LocatedMessage, Location
 from sandbox.scene.geometry.neighbours import near_pairs
-from sandbox.scene.scene import Scene
+from sandbox.scene.geometry.vectors import rotate
 
 LocatedElement = tuple[Location, BodySource]
 
@@ -55,15 +55,14 @@ def check_start_positions(
             yield (*location, key), message
 
     movable = np.asarray([e.collides == "all" for e in bodies.elements], dtype=bool)[bodies.element] & ~bodies.fixed
-    most = MAX_OVERLAPS + MAX_OVERLAPS_EACH * int(movable.sum())
-    overlaps = count_overlaps(bodies.position[movable], bodies.core[movable], most)
-    location = max(elements, key=lambda e: count_of(e[1]))[0] if elements else ()
-    if overlaps > most:
+    max_overlaps = MAX_OVERLAPS + MAX_OVERLAPS_EACH * int(movable.sum())
+    overlaps = count_overlaps(bodies.position[movable], bodies.core[movable], max_overlaps)
+    if overlaps > max_overlaps:
         message = (
-            f"the scene starts with {overlaps:,} or more overlapping pairs of bodies; the limit is {most:,}. "
+            f"the scene starts with {overlaps:,} or more overlapping pairs of bodies; the limit is {max_overlaps:,}. "
             'Spread them, or let them pass through each other with collides = "none" or "fixed"'
         )
-        yield location, message
+        yield _largest(elements), message
         return
     if _is_crowded(bodies, movable):
         message = (
@@ -71,20 +70,28 @@ def check_start_positions(
             "them at every step. Spread the bodies, or use fewer pieces; "
             f"{OVERLAPS.remedy(2 * OVERLAPS.value)}"
         )
-        yield location, message
+        yield _largest(elements), message
     passing = touches & ~bodies.fixed
-    most = max(most, OVERLAPS.value)
-    if passing.sum() > movable.sum() and count_overlaps(bodies.position[passing], bodies.core[passing], most) > most:
+    max_overlaps = max(max_overlaps, OVERLAPS.value)
+    if (
+        passing.sum() > movable.sum()
+        and count_overlaps(bodies.position[passing], bodies.core[passing], max_overlaps) > max_overlaps
+    ):
         message = (
-            f"the scene starts with more than {most:,} overlapping pairs of bodies that pass through each other, which "
-            "must be tested at every step. Spread them, use fewer, or switch off all their collisions with "
-            f'collides = "none"; {OVERLAPS.remedy(2 * OVERLAPS.value)}'
+            f"the scene starts with more than {max_overlaps:,} overlapping pairs of bodies that pass through each "
+            "other, which must be tested at every step. Spread them, use fewer, or switch off all their collisions "
+            f'with collides = "none"; {OVERLAPS.remedy(2 * OVERLAPS.value)}'
         )
-        yield location, message
+        yield _largest(elements), message
     inside = _count_bodies_in_zones(scene, bodies.position[touches & ~bodies.fixed])
     refusal = OVERLAPS.refusal("the scene starts with bodies inside zones; the number of such pairs is", inside)
     if refusal is not None:
         yield ("zone", 0), refusal
+
+
+def _largest(elements: list[LocatedElement]) -> Location:
+    """Return the location of the element with the most bodies."""
+    return max(elements, key=lambda each: count_of(each[1]))[0] if elements else ()
 
 
 def _is_crowded(bodies: Bodies, movable: BoolArray) -> bool:
@@ -95,10 +102,10 @@ def _is_crowded(bodies: Bodies, movable: BoolArray) -> bool:
     shapes = bodies.shapes
     chosen = among[shapes.body]
     body = shapes.body[chosen]
-    cos, sin = np.cos(bodies.angle[body]), np.sin(bodies.angle[body])
     x, y = shapes.middle[chosen].T
-    centre = bodies.position[body] + np.column_stack((cos * x - sin * y, sin * x + cos * y))
-    return count_overlaps(centre, shapes.reach[chosen], OVERLAPS.value, body) > OVERLAPS.value
+    offset = rotate(x, y, np.cos(bodies.angle[body]), np.sin(bodies.angle[body]))
+    centre = bodies.position[body] + np.column_stack(offset)
+    return count_overlaps(centre, shapes.bounding_radius[chosen], OVERLAPS.value, body) > OVERLAPS.value
 
 
 def _count_bodies_in_zones(scene: Scene, position: FloatArray) -> int:
@@ -187,11 +194,11 @@ def check_generators(scene: Scene) -> Iterator[LocatedMessage]:
         for key, message in _check_lifetimes(emitter):
             yield ("emitter", k, key), message
     for k, stack in enumerate(scene.stacks):
-        if stack.rows > stack.most_rows:
-            most = stack.most_rows
+        if stack.rows > stack.max_rows:
+            limit = stack.max_rows
             message = (
-                f"must be at most {most}: with {stack.columns} columns and {stack.fewer} fewer in each "
-                f"row, row {most + 1} is empty"
+                f"must be at most {limit}: with {stack.columns} columns and {stack.fewer} fewer in each "
+                f"row, row {limit + 1} is empty"
             )
             yield ("stack", k, "rows"), message
     for k, rope in enumerate(scene.ropes):
@@ -214,7 +221,8 @@ def _check_counts(scene: Scene) -> Iterator[LocatedMessage]:
     total, last = 0, ("", 0)
     for kind, sources in scene.kinds.items():
         for k, source in enumerate(sources):
-            total, last = total + max(count_of(source), 0), (kind, k)
+            count = 1 if isinstance(source, BodySpec) else count_of(source)
+            total, last = total + max(count, 0), (kind, k)
     if total > MAX_BODIES:
         yield last, f"the scene would have {total:,} bodies; the limit is {MAX_BODIES:,}"
     taken = total * len(scene.zones) * BYTES_PER_VISIT
@@ -238,7 +246,7 @@ def _check_lifetimes(emitter: Emitter) -> Iterator[tuple[str, str]]:
 
 def _check_lengths(rope: Rope) -> Iterator[tuple[str, str]]:
     """Check the length of a rope and of its links."""
-    distance, each = math.dist(rope.start, rope.end), pitch(rope)
+    distance, each = math.dist(rope.start, rope.end), link_length(rope)
     key = "end" if rope.length is None else "length"
     if not SHORTEST <= each <= LONGEST:
         yield key, f"makes each link {each:g} m long; a link must be {SHORTEST:g} to {LONGEST:g} m long"
@@ -263,14 +271,14 @@ def _check_lengths(rope: Rope) -> Iterator[tuple[str, str]]:
                 yield which, "has no effect, because planks start at rest along the rope; remove it"
 
 
-def _check_springs(woven: Rope | Cloth, needed: bool) -> Iterator[tuple[str, str]]:
+def _check_springs(body: Rope | Cloth, needed: bool) -> Iterator[tuple[str, str]]:
     """Check that springs have a stiffness, and that nothing else has."""
-    if needed and woven.stiffness is None:
+    if needed and body.stiffness is None:
         yield "stiffness", "is missing; springs need a stiffness, N/m"
-    if not needed and woven.stiffness is not None:
-        yield "stiffness", f"applies to springs only, and `kind` is {woven.kind!r}; remove it"
-    if not needed and woven.damping and not (isinstance(woven, Cloth) and (woven.shear or woven.bend)):
-        yield "damping", f"applies to springs only, and `kind` is {woven.kind!r}; remove it"
+    if not needed and body.stiffness is not None:
+        yield "stiffness", f"applies to springs only, and `kind` is {body.kind!r}; remove it"
+    if not needed and body.damping and not (isinstance(body, Cloth) and (body.shear or body.bend)):
+        yield "damping", f"applies to springs only, and `kind` is {body.kind!r}; remove it"
 
 
 def _check_ends(rope: Rope) -> Iterator[tuple[str, str]]:
@@ -287,8 +295,8 @@ def _check_pins(cloth: Cloth) -> Iterator[tuple[str | tuple[str | int, ...], str
     if not isinstance(cloth.pins, str):
         for n, (column, row) in enumerate(cloth.pins):
             if column >= cloth.columns or row >= cloth.rows:
-                most = f"[{cloth.columns - 1}, {cloth.rows - 1}]"
-                yield ("pins", n), f"[{column}, {row}] is outside the cloth, whose last node is {most}"
+                last = f"[{cloth.columns - 1}, {cloth.rows - 1}]"
+                yield ("pins", n), f"[{column}, {row}] is outside the cloth, whose last node is {last}"
     if cloth.collides == "all" and cloth.columns * cloth.rows > 1 and 2.0 * cloth.radius > min(cloth.spacing):
         yield "radius", f'makes neighbours overlap; use at most {0.5 * min(cloth.spacing):g} m, or collides = "fixed"'
 

@@ -9,15 +9,16 @@ from collections import Counter
 from collections.abc import Iterator
 from itertools import pairwise
 
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BodySpec, Point
 from sandbox.scene.description.bodies import AnyPart, BallPart, BoxPart, CapsulePart, Compound, PolygonPart
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import MAX_LAYERS, MAX_ZONES, Plane, Wall, Zone
 from sandbox.scene.errors import LocatedMessage, Location
 from sandbox.scene.geometry.polygon import OutlineError, anticlockwise, extent_of, outline_fault, signed_area
-from sandbox.scene.geometry.shapes import contains, form_of, middle_of
+from sandbox.scene.geometry.shapes import contains, geometry_of, middle_of
 from sandbox.scene.geometry.triangulation import convex_parts
-from sandbox.scene.scene import Scene
+from sandbox.scene.geometry.vectors import to_world
 
 MIN_THICKNESS = 1e-9
 """Smallest thickness of a part, as a fraction of the body's extent from its position."""
@@ -115,13 +116,13 @@ def polygon_outlines(scene: Scene) -> Iterator[tuple[Location, tuple[Point, ...]
 MAX_REPEATS = 5_000
 """Identical shapes; half a second."""
 
-Key = tuple[float | str, ...]
+ShapeKey = tuple[float | str, ...]
 
 
 def check_repeats(scene: Scene) -> list[LocatedMessage]:
     """Return a fault for every kind of static collider that is repeated too often."""
     found: list[LocatedMessage] = []
-    seen: Counter[Key] = Counter()
+    seen: Counter[ShapeKey] = Counter()
     for location, key in _shapes(scene):
         seen[key] += 1
         if seen[key] == MAX_REPEATS + 1:
@@ -129,7 +130,7 @@ def check_repeats(scene: Scene) -> list[LocatedMessage]:
     return found
 
 
-def _shapes(scene: Scene) -> Iterator[tuple[Location, Key]]:
+def _shapes(scene: Scene) -> Iterator[tuple[Location, ShapeKey]]:
     for k, plane in enumerate(scene.planes):
         yield ("plane", k), _plane(plane)
     for k, wall in enumerate(scene.walls):
@@ -144,34 +145,33 @@ def _shapes(scene: Scene) -> Iterator[tuple[Location, Key]]:
                     yield (kind, k), key
 
 
-def _disc(position: Point, radius: float) -> Key:
+def _disc(position: Point, radius: float) -> ShapeKey:
     return "disc", *position, radius
 
 
-def _boxes(single: BodySpec) -> Iterator[Key]:
+def _boxes(single: BodySpec) -> Iterator[ShapeKey]:
     """Yield the bounding box of each piece of a fixed body; bodies with equal boxes count as identical."""
     if isinstance(single, Ball):
         yield _disc(single.position, single.radius)
         return
     cos, sin = math.cos(single.angle), math.sin(single.angle)
-    form = form_of(single)
+    form = geometry_of(single)
     x, y = form.centre
     for piece in form.pieces:
-        corners = [(a + x, b + y) for a, b in piece.corners]
-        xs = [single.position[0] + cos * a - sin * b for a, b in corners]
-        ys = [single.position[1] + sin * a + cos * b for a, b in corners]
+        corners = [to_world((a + x, b + y), cos, sin, single.position) for a, b in piece.corners]
+        xs, ys = [a for a, _ in corners], [b for _, b in corners]
         r = piece.radius
         yield "box", *(round(each, 9) for each in (min(xs) - r, max(xs) + r, min(ys) - r, max(ys) + r))
 
 
-def _plane(plane: Plane) -> Key:
+def _plane(plane: Plane) -> ShapeKey:
     """Return direction and distance from the origin of a plane; its point may be any point on it."""
     length = math.hypot(*plane.normal)
     x, y = (component / length for component in plane.normal) if length > 0 else plane.normal
     return "plane", round(x, 9), round(y, 9), round(x * plane.point[0] + y * plane.point[1], 9)
 
 
-def _segments(wall: Wall) -> Iterator[Key]:
+def _segments(wall: Wall) -> Iterator[ShapeKey]:
     ends = (*wall.points, wall.points[0]) if wall.closed else wall.points
     for a, b in pairwise(ends):
         low, high = sorted((a, b))

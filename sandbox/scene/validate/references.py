@@ -6,16 +6,16 @@ from collections.abc import Iterator, Sequence
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.drives import is_immovable, moment_of_mass, mount_of, single_bodies
 from sandbox.scene.compile.joints import ends_of
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BodySource, BodySpec
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import Post, Wall
-from sandbox.scene.description.forces import Attraction, Drive, Driven, PlungerDrive, Thrust, TorqueDrive
+from sandbox.scene.description.forces import AnyDrive, Attraction, Driven, PlungerDrive, Thrust, TorqueDrive
 from sandbox.scene.description.joints import Gear, Groove, Joint, Pivot, Rod, RotaryLimit, Slide
 from sandbox.scene.description.play import marking_fault
 from sandbox.scene.description.scene import default_name
 from sandbox.scene.description.surface import MISCUE, Floor, Shot, miscues
 from sandbox.scene.errors import LocatedMessage
-from sandbox.scene.scene import Scene
 
 ANGLE_ROUNDING = 1e-9
 """rad, tolerance of the start angle beyond the stops of a drive, for rounding in a file"""
@@ -23,7 +23,7 @@ ANGLE_ROUNDING = 1e-9
 SHORTEST = 1e-9
 """m, smallest length of rods and grooves"""
 
-LEAST_RATIO = 1e-6
+MIN_RATIO = 1e-6
 """Smallest magnitude of a gear ratio; engines divide by it."""
 
 
@@ -49,8 +49,8 @@ def _check_joints(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
         elif all(name in index and bodies.fixed[index[name]] for name in joint.between):
             yield ("joint", k, "between"), "all its bodies are fixed; at least one must be able to move"
         elif all(name in index and is_driven[index[name]] for name in joint.between):
-            led = next(name for name in joint.between if not bodies.fixed[index[name]])
-            message = f"no joint can move these bodies: the drive of {led!r} prescribes its motion"
+            driven = next(name for name in joint.between if not bodies.fixed[index[name]])
+            message = f"no joint can move these bodies: the drive of {driven!r} prescribes its motion"
             yield ("joint", k, "between"), message
         else:
             yield from _check_rod(k, joint, bodies, index)
@@ -94,8 +94,8 @@ def _check_joint(joint: Joint) -> Iterator[tuple[str, str]]:
             if joint.length is not None and joint.length < SHORTEST:
                 yield "length", f"must be at least {SHORTEST:g} m; use a pivot to hold two points together"
         case Gear():
-            if abs(joint.ratio) < LEAST_RATIO:
-                yield "ratio", f"must be at least {LEAST_RATIO:g} in magnitude"
+            if abs(joint.ratio) < MIN_RATIO:
+                yield "ratio", f"must be at least {MIN_RATIO:g} in magnitude"
         case Slide() | RotaryLimit():
             if joint.least > joint.most:
                 yield "most", "must not be smaller than `least`"
@@ -158,7 +158,7 @@ def _check_driven_body(drive: Driven, single: BodySpec, scene: Scene, twice: boo
         yield "body", f"{drive.body!r} has a thrust; only its drive can move a driven body"
 
 
-def _check_drive_values(drive: Drive, single: BodySpec, bodies: Bodies) -> Iterator[tuple[str, str]]:
+def _check_drive_values(drive: AnyDrive, single: BodySpec, bodies: Bodies) -> Iterator[tuple[str, str]]:
     if isinstance(drive, PlungerDrive):
         if not math.hypot(*drive.direction) > 0.0:
             yield "direction", f"{list(drive.direction)} has no direction; use a vector such as [0, 1] for upwards"
@@ -172,9 +172,9 @@ def _check_drive_values(drive: Drive, single: BodySpec, bodies: Bodies) -> Itera
             f"{drive.body!r} starts at {single.angle:g} rad; the angle must be between {low:g} and {high:g} rad",
         )
     if isinstance(drive, TorqueDrive) and drive.moment is not None:
-        least = moment_of_mass(mount_of(0, drive, single), float(bodies.mass[bodies.number_of[drive.body]]))
-        if drive.moment <= least:
-            yield "moment", f"must be greater than {least:.3g} kg·m², the moment of the body's mass about this pivot"
+        lowest = moment_of_mass(mount_of(0, drive, single), float(bodies.mass[bodies.number_of[drive.body]]))
+        if drive.moment <= lowest:
+            yield "moment", f"must be greater than {lowest:.3g} kg·m², the moment of the body's mass about this pivot"
 
 
 def _known(bodies: Bodies) -> str:

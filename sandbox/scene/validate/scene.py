@@ -5,16 +5,15 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.contacts import bearers_of, index_surfaces
+from sandbox.scene.compile.bodies import Bodies, elements_of
+from sandbox.scene.compile.contacts import index_surfaces, surface_parts
 from sandbox.scene.compile.generators import GeneratorError
-from sandbox.scene.compile.layout import elements_of
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import MAX_POSITION, MAX_SPEED, MAX_STEPS, BodySource, BodySpec, HasMaterial
-from sandbox.scene.description.fixed import Wall
+from sandbox.scene.description.fixed import Post, Wall
 from sandbox.scene.description.world import Material, Pair
 from sandbox.scene.errors import LocatedMessage, Location
-from sandbox.scene.geometry.shapes import form_of
-from sandbox.scene.scene import Scene
+from sandbox.scene.geometry.shapes import geometry_of
 from sandbox.scene.validate.bodies import (
     check_generators,
     check_rope_ties,
@@ -23,6 +22,7 @@ from sandbox.scene.validate.bodies import (
     has_direction,
 )
 from sandbox.scene.validate.geometry import (
+    MAX_REPEATS,
     check_layers,
     check_outlines,
     check_repeats,
@@ -39,19 +39,24 @@ SHORTEST = 1e-9
 
 
 def crosscheck(scene: Scene) -> list[LocatedMessage]:
-    """Return every fault across the elements of a scene; an empty list means that it can be run."""
-    materials, shapeless = list(_check_materials(scene)), [*check_generators(scene), *check_outlines(scene)]
-    found = [
-        *materials,
-        *_check_planes_and_walls(scene),
-        *check_zones(scene),
-        *check_layers(scene),
-        *shapeless,
-        *_check_world(scene),
-    ]
+    """Return every fault across the elements of a scene; an empty list means that it can be run.
+
+    Checks of tables that the scene does not have are left out.
+    """
+    materials, shapeless = list(_check_materials(scene)), list(check_generators(scene))
+    if scene.polygons or scene.compounds:
+        shapeless += check_outlines(scene)
+    found = [*materials, *_check_planes_and_walls(scene)]
+    if scene.zones:
+        found += check_zones(scene)
+    if len(scene.layers) > 1:
+        found += check_layers(scene)
+    found += [*shapeless, *_check_world(scene)]
     if shapeless:  # the other checks need the bodies
         return [*found, *_check_names_only(scene, {location[:2] for location, _ in shapeless})]
-    found += [*check_repeats(scene), *_check_masses(scene)]
+    if _may_repeat(scene):
+        found += check_repeats(scene)
+    found += _check_masses(scene)
     try:
         bodies = scene.bodies
     except GeneratorError as error:
@@ -60,11 +65,34 @@ def crosscheck(scene: Scene) -> list[LocatedMessage]:
         *_check_names(scene, bodies),
         *_check_initial_state(scene, bodies),
         *check_start_positions(scene, bodies, _elements(scene), _prototypes(scene)),
-        *check_play(scene, bodies),
-        *check_surface(scene, bodies),
     ]
-    found += [*check_attachments(scene, bodies), *check_rope_ties(scene, bodies)]
+    if scene.play.model_fields_set:
+        found += check_play(scene, bodies)
+    if _has_surface_keys(scene):
+        found += check_surface(scene, bodies)
+    if scene.joints or scene.thrusts or scene.attractions or scene.drives:
+        found += check_attachments(scene, bodies)
+    if scene.ropes:
+        found += check_rope_ties(scene, bodies)
     return found if materials else [*found, *_check_surface_count(scene, bodies)]
+
+
+def _may_repeat(scene: Scene) -> bool:
+    """Return whether a scene may have more than `MAX_REPEATS` identical static colliders, by their number."""
+    segments, singles = sum(len(wall.points) for wall in scene.walls), (scene.balls, scene.boxes, scene.capsules)
+    count = len(scene.planes) + segments + len(scene.posts) + sum(map(len, singles))
+    return count > MAX_REPEATS or bool(scene.polygons or scene.compounds)  # these may have many pieces
+
+
+def _has_surface_keys(scene: Scene) -> bool:
+    """Return whether a scene has a `[surface]`, or keys that need one."""
+    cushions: tuple[Wall | Post, ...] = (*scene.walls, *scene.posts)
+    return (
+        scene.surface is not None
+        or bool(scene.contact_models.model_fields_set or scene.shots)
+        or any(ball.spin is not None for ball in scene.balls)
+        or any(cushion.height is not None for cushion in cushions)
+    )
 
 
 def _check_names_only(scene: Scene, wrong: set[Location]) -> list[LocatedMessage]:
@@ -136,7 +164,7 @@ def _check_masses(scene: Scene) -> Iterator[LocatedMessage]:
         if element.mass is not None and element.density is not None:
             yield (*location, "density"), "cannot be combined with `mass`; remove one of the two"
             continue
-        mass, moment = form_of(element)[1:3]
+        mass, moment = geometry_of(element)[1:3]
         if not 1e-15 <= mass <= 1e30:
             key = "density" if element.density is not None else "mass"
             yield (*location, key), f"gives a mass of {mass:g} kg; a mass must be 1e-15 to 1e30 kg"
@@ -238,7 +266,10 @@ def _name_taken(name: str) -> str:
 
 
 def _check_surface_count(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
-    if len(index_surfaces(scene, (*bearers_of(bodies.elements), *scene.fixed))[0]) > MAX_SURFACES:
+    parts = sum(len(compound.parts) for compound in scene.compounds)
+    if len(bodies.elements) + parts + len(scene.fixed) <= MAX_SURFACES:
+        return
+    if len(index_surfaces(scene, (*surface_parts(bodies.elements), *scene.fixed))[0]) > MAX_SURFACES:
         yield (), f"more than {MAX_SURFACES} different surfaces; share materials between bodies"
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pygame
 
 from sandbox.window.capture.image_files import AtomicFile, CaptureError, Size, screenshot, unwritable_reason
-from sandbox.window.capture.recorder import Recorder, recorder_in, size_within
+from sandbox.window.capture.recorder import FilmRecorder, recorder_in, size_within
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.recorded import RecordedView
 
@@ -30,7 +30,7 @@ class CaptureController:
 
     def __init__(self, folder: Path, film: str, notify: Notify) -> None:
         self._folder, self._film, self._notify = folder, film, notify
-        self._recorder: Recorder | None = None
+        self._recorder: FilmRecorder | None = None
         self._seconds, self._pending_seconds = 0.0, 0.0
         self._seeking: tuple[LiveView, str] | None = None
         """a session to save under a name once its jump in time is complete"""

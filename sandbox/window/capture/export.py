@@ -1,7 +1,6 @@
 """Drawing of a recorded run, and its export to a picture or film file."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,19 +8,17 @@ import numpy as np
 import pygame
 
 from sandbox.arrays import FloatArray
-from sandbox.interrupt import uninterrupted
+from sandbox.progress import Progress, ProgressCallback
+from sandbox.signals import defer_interrupt
 from sandbox.window.camera import Camera
 from sandbox.window.capture.image_files import AtomicFile, Size, offscreen, save_image
-from sandbox.window.capture.recorder import Recorder, recorder_for
+from sandbox.window.capture.recorder import FilmRecorder, recorder_for
 from sandbox.window.playback.recorded import RecordedRun
 from sandbox.window.render.palette import FAINT, INK
 from sandbox.window.render.renderer import InsetRenderer, Renderer
 from sandbox.window.render.text import draw_text, text_size
 from sandbox.window.ui.energy_plot import RunGraph
 from sandbox.window.view_bounds import should_rotate
-
-Progress = Callable[[float], None]
-"""Called with the fraction of the film that is done, 0 to 1."""
 
 MIN_CAPTION_WIDTH = 320
 """px; a caption would cover too much of a narrower picture"""
@@ -112,7 +109,9 @@ def frame_times(start: float, end: float, fps: float, speed: float = 1.0) -> tup
     return np.asarray(start + np.arange(count) * (speed / fps)), shown
 
 
-def export_images(run: RecordedRun, options: ExportOptions, path: Path, progress: Progress | None = None) -> int:
+def export_images(
+    run: RecordedRun, options: ExportOptions, path: Path, on_progress: ProgressCallback | None = None
+) -> int:
     """Write a run to a `.png`, `.gif` or `.mp4`, and return the number of pictures.
 
     Needs no display. If it is interrupted, no file is left.
@@ -128,18 +127,18 @@ def export_images(run: RecordedRun, options: ExportOptions, path: Path, progress
         save_image(surface, AtomicFile.at(path))
         return 1
     times, shown = frame_times(options.start, options.end, options.fps, options.speed)
-    recorder: Recorder | None = None
+    recorder: FilmRecorder | None = None
     try:
-        with uninterrupted():
+        with defer_interrupt():
             recorder = recorder_for(path, options.size, options.fps)
         for k, (time, seconds) in enumerate(zip(times.tolist(), shown.tolist(), strict=True)):
             renderer.draw(surface, camera, time, options.overlays, options.speed)
             recorder.add(surface, seconds)
-            if progress is not None:
-                progress((k + 1) / len(times))
+            if on_progress is not None:
+                on_progress(Progress(fraction=(k + 1) / len(times)))
         recorder.close()
     finally:
         if recorder is not None:
-            with uninterrupted():
+            with defer_interrupt():
                 recorder.cancel()
     return len(times)

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pygame
 
-from sandbox.whole import temporary_path
+from sandbox.atomic_write import temporary_path
 from sandbox.window.render.palette import BACKGROUND
 
 MAX_STEM = 60

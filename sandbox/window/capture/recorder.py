@@ -10,7 +10,7 @@ from sandbox.window.capture.image_files import AtomicFile, CaptureError, Size
 from sandbox.window.capture.limits import FILM_SUFFIXES, MAX_GIF_FRAMES, NEEDS_VIDEO, can_make_mp4
 
 
-class Recorder(Protocol):
+class FilmRecorder(Protocol):
     """Writes surfaces to a film file."""
 
     def add(self, surface: pygame.Surface, seconds: float) -> None:
@@ -31,7 +31,7 @@ class Recorder(Protocol):
         """Remove the unfinished file. After `close` it has no effect."""
 
 
-def recorder_for(path: Path, size: Size, fps: float) -> Recorder:
+def recorder_for(path: Path, size: Size, fps: float) -> FilmRecorder:
     """Return a recorder by a path's suffix; an existing file is replaced.
 
     Args:
@@ -45,7 +45,7 @@ def recorder_for(path: Path, size: Size, fps: float) -> Recorder:
     return _recorder(AtomicFile.at(path), path.suffix.lower(), size, fps)
 
 
-def recorder_in(folder: Path, stem: str, suffix: str, size: Size, fps: float) -> Recorder:
+def recorder_in(folder: Path, stem: str, suffix: str, size: Size, fps: float) -> FilmRecorder:
     """Return a recorder that writes the first free of `sandbox-<stem>-1<suffix>`, `…-2<suffix>`, … when it is closed.
 
     Raises:
@@ -60,7 +60,7 @@ def size_within(size: Size, max_width: int) -> Size:
     return max(2 * round(size[0] * factor / 2), 2), max(2 * round(size[1] * factor / 2), 2)
 
 
-def _recorder(outfile: AtomicFile, suffix: str, size: Size, fps: float) -> Recorder:
+def _recorder(outfile: AtomicFile, suffix: str, size: Size, fps: float) -> FilmRecorder:
     if min(size) < 2 or not (math.isfinite(fps) and fps > 0):
         raise CaptureError(f"cannot record {size[0]} x {size[1]} pixels at {fps:g} frames per second")
     if suffix == ".gif":

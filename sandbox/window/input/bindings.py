@@ -10,12 +10,10 @@ from typing import NamedTuple
 import pygame
 
 from sandbox.action import Action, Drive, Throttle
-from sandbox.games.billiards.view import controls as cue_keys
-from sandbox.games.billiards.view.controls import CueControls
-from sandbox.games.contract import Control
+from sandbox.games.contract import Control, GameControls
 from sandbox.scene.compile.drives import names_of
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.scene import default_name
-from sandbox.scene.scene import Scene
 from sandbox.window.game_host import GameHost
 from sandbox.window.input.body_tools import BodyTools
 from sandbox.window.input.keymap import GLOBAL
@@ -126,19 +124,17 @@ class KeyBindings(NamedTuple):
     """(keys, action) for the help page"""
     released: dict[int, KeyHandler]
     """by key code"""
-
-    def handler_for(self, key: int, repeated: bool) -> KeyHandler | None:
-        """Return the handler of a pressed key. On key repeat, only arrow keys that move a body by steps have one."""
-        return None if repeated and (key not in ARROWS or key in self.released) else self.pressed.get(key)
+    repeated: frozenset[int] = frozenset()
+    """codes of the keys whose handlers also run on key repeat: arrow keys that move a body by steps"""
 
 
 NO_BINDINGS = KeyBindings({}, (), {})
 
 
 def key_bindings(
-    live: LiveView, tools: BodyTools, gestures: CueControls | None = None, host: GameHost | None = None
+    live: LiveView, tools: BodyTools, host: GameHost | None = None, controls: GameControls | None = None
 ) -> KeyBindings:
-    """Return the key bindings of a session: those of its scene, its billiard table and the controls of its game."""
+    """Return the key bindings of a session: those of its scene, and of the rules or the controls of its game."""
     scene = live.scene
     pressed: dict[int, KeyHandler] = {}
     released: dict[int, KeyHandler] = {}
@@ -151,7 +147,7 @@ def key_bindings(
     if generator is not None:
         pressed[pygame.K_SPACE] = partial(live.relaunch, generator)
         rows.append(("Space", f"relaunch {generator}"))
-    control_pressed, control_released = ({}, {}) if host is None else control_handlers(host)
+    control_pressed, control_released = ({}, {}) if host is None or controls is not None else control_handlers(host)
     for name, verb, on_press, on_release in thrust_and_drive_keys(scene):
         key = KEYS[name]
         if key in control_pressed:  # handled by the rules of the game
@@ -159,16 +155,16 @@ def key_bindings(
         pressed[key] = partial(_apply, live, on_press, pressed.get(key))
         released[key] = partial(_apply, live, on_release, released.get(key))
         rows.append((name.capitalize(), verb))
-    if host is not None:
+    if controls is not None:
+        own = controls.bindings()
+        pressed |= own.pressed
+        released |= own.released
+        rows += own.help_rows
+    elif host is not None:
         pressed |= control_pressed
         released |= control_released
         rows += control_help(host.controls)
-    if gestures is not None:
-        cue_pressed, cue_released = cue_keys.cue_key_handlers(gestures)
-        pressed |= cue_pressed
-        released |= cue_released
-        rows += cue_keys.CUE_KEY_HELP
-    return KeyBindings(pressed, tuple(rows), released)
+    return KeyBindings(pressed, tuple(rows), released, frozenset(ARROWS) - released.keys())
 
 
 def thrust_and_drive_keys(scene: Scene) -> Iterator[tuple[str, str, Action, Action]]:

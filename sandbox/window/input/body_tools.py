@@ -10,7 +10,7 @@ from sandbox.action import Action, ActionError, Impulse, Move, Pull, Remove, Set
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.description.bodies import Box
 from sandbox.scene.description.discs import Ball, Disc
-from sandbox.scene.geometry.shapes import form_of
+from sandbox.scene.geometry.shapes import geometry_of
 from sandbox.window.hit_test import Hull, hull_area, is_free, pick_body
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.recorded import RecordedView
@@ -27,7 +27,8 @@ class BodyTools:
     def __init__(self) -> None:
         self.picked: int | None = None
         """index of the selected body"""
-        self._held: str | None = None  # name
+        self.held: str | None = None
+        """name of the dragged body"""
         self._pick_position: Position = (0.0, 0.0)
         self._offset: Position = (0.0, 0.0)  # from the body's centre to the picked point, at the time of picking
         self._angle = 0.0  # rad, angle of the body at the time of picking
@@ -38,7 +39,7 @@ class BodyTools:
     @property
     def is_holding(self) -> bool:
         """Whether a body is being dragged."""
-        return self._held is not None
+        return self.held is not None
 
     def picked_index(self, live: LiveView) -> int | None:
         """Return the index of the selected body; None if it does not exist at the present time."""
@@ -77,7 +78,7 @@ class BodyTools:
         else:
             self._grip = _rotated(self._offset, -self._angle)
             live.apply(Pull(time=0.0, body=name, grip=self._grip, target=self._pick_position))
-        self._held = name
+        self.held = name
 
     def drag(self, live: LiveView, position: Position) -> None:
         """Drag the held body to a position.
@@ -86,13 +87,13 @@ class BodyTools:
             ActionError: the body cannot be moved there.
         """
         self._target = position
-        if self._held is None:
+        if self.held is None:
             return
         if self._moving:
             centre = position[0] - self._grip[0], position[1] - self._grip[1]
-            live.apply(Move(time=0.0, body=self._held, position=centre))
+            live.apply(Move(time=0.0, body=self.held, position=centre))
         else:
-            live.apply(Pull(time=0.0, body=self._held, grip=self._grip, target=position))
+            live.apply(Pull(time=0.0, body=self.held, grip=self._grip, target=position))
 
     def release(self, live: LiveView) -> None:
         """Release the held body.
@@ -100,23 +101,23 @@ class BodyTools:
         Raises:
             ActionError: the session has ended.
         """
-        held, self._held = self._held, None
+        held, self.held = self.held, None
         if held is not None and not self._moving:
             live.apply(Pull(time=0.0, body=held))
 
     def drop(self) -> None:
         """End the drag without an action on the session; the selection stays."""
-        self._held = None
+        self.held = None
 
     def reset(self) -> None:
         """Clear the drag and the selection."""
-        self._held = self.picked = None
+        self.held = self.picked = None
 
     def spring_line(self, live: LiveView) -> tuple[Position, Position] | None:
         """Return both ends of the mouse spring, m; None if no body is pulled."""
-        if self._held is None or self._moving or self._held not in live.bodies.names:
+        if self.held is None or self._moving or self.held not in live.bodies.names:
             return None
-        index = live.bodies.names.index(self._held)
+        index = live.bodies.names.index(self.held)
         frame = live.frame
         if index >= len(frame.position) or not frame.present[index]:
             return None
@@ -197,7 +198,7 @@ def _find_free_position(live: LiveView, made: Ball | Box) -> Ball | Box:
     """
     if made.collides == "none":
         return made
-    form = form_of(made)
+    form = geometry_of(made)
     hulls = [Hull(np.asarray(piece.corners), piece.radius) for piece in form.pieces]
     step = 0.5 * max(float(np.hypot(*hull.corners.T).max()) + hull.radius for hull in hulls)
     x, y = made.position
@@ -252,7 +253,7 @@ def _new_body_like(bodies: Bodies, index: int, position: Position, box: bool) ->
         return Ball(position=position, radius=element.radius, mass=element.mass, density=element.density, **surface)
     if box and isinstance(element, Box):
         return Box(position=position, size=element.size, mass=element.mass, density=element.density, **surface)
-    area = sum(hull_area(Hull(np.asarray(piece.corners), piece.radius)) for piece in form_of(element).pieces)
+    area = sum(hull_area(Hull(np.asarray(piece.corners), piece.radius)) for piece in geometry_of(element).pieces)
     radius = math.sqrt(area / math.pi)
     density = float(bodies.mass[index]) / area
     return _new_body(position, radius, box, density=density, **surface)

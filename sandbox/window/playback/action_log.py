@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 
 from sandbox.action import Action, Pull, Reshape, Switch, Toggle
 from sandbox.engines.switching import SwitchableSimulation
-from sandbox.scene.scene import Scene
+from sandbox.scene.compile.scene import Scene
 
 TIME_ROUNDING = 1e-9
 """Tolerance of due times as a fraction of a step: sums of dt have rounding errors."""

@@ -13,9 +13,9 @@ from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import ENGINES
 from sandbox.engines.segment import Checkpoint
 from sandbox.engines.switching import SwitchableSimulation
-from sandbox.measure.compare.errors import usual_tolerance
-from sandbox.measure.compare.horizon import perturb
-from sandbox.measure.run import Auditor
+from sandbox.measure.metrics.perturbation import perturb
+from sandbox.measure.metrics.trajectory_error import default_tolerance
+from sandbox.measure.run.runner import TimedAudit
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.description.world import COMMON
 from sandbox.trajectory import Frame
@@ -129,7 +129,7 @@ class DivergenceMonitor:
             Refusal: the engine cannot continue from there.
             ActionError: it refuses a persistent force.
         """
-        self.tolerance = usual_tolerance(point.scene)
+        self.tolerance = default_tolerance(point.scene)
         self.time = point.frame.time
         """of the session, s"""
         self.horizon: float | None = None
@@ -220,7 +220,7 @@ class MissedContactMonitor:
     """Live audit of missed contacts of a simulation."""
 
     def __init__(self, simulation: SwitchableSimulation) -> None:
-        self._auditor = Auditor(simulation.setup, simulation)
+        self._auditor = TimedAudit(simulation.setup, simulation)
         self._counted = 0
         self._markers: deque[tuple[tuple[float, float], float]] = deque(maxlen=MAX_MARKERS)
 
@@ -261,7 +261,7 @@ class Diagnostics:
         self.notifications: list[tuple[str, str]] = []
         """(level, text) of events; the reader empties the list"""
         self.divergence: DivergenceMonitor | None = None
-        self._ghost: ShadowRun | None = None
+        self.ghost: ShadowRun | None = None
         self._ghost_history = History()
         self._failed_engines: tuple[str, ...] = ()
         self._audit: MissedContactMonitor | None = None
@@ -287,7 +287,7 @@ class Diagnostics:
             self._restart_companions()
 
     def _restart_companions(self) -> None:
-        if self._ghost is not None:
+        if self.ghost is not None:
             self._start_ghost()
         if self.divergence is not None:
             self.watch_divergence(True)
@@ -302,7 +302,7 @@ class Diagnostics:
         self.trails.add(frame)
         if self._audit is not None:
             self._missed_times += [frame.time] * self._audit.update(frame)
-        for each in (self._ghost, self.divergence):
+        for each in (self.ghost, self.divergence):
             if each is None:
                 continue
             reached = each.step  # all actions up to there are applied; a step can have several
@@ -313,19 +313,19 @@ class Diagnostics:
             each.follow(step)
         if self.divergence is not None:
             self.divergence.update(frame, step)
-        if self._ghost is not None:
-            if self._ghost.frame is not None:
-                self._ghost_history.store(self._ghost.step, self._ghost.frame)
+        if self.ghost is not None:
+            if self.ghost.frame is not None:
+                self._ghost_history.store(self.ghost.step, self.ghost.frame)
             else:
-                self._replace_ghost(self._ghost)
+                self._replace_ghost(self.ghost)
 
     def apply(self, action: Action) -> None:
         """Forward a new action of the session to ghost and twin; one that is ahead of the session is restarted."""
         step = self._session.step_number
-        if self._ghost is not None and self._ghost.step > step:
+        if self.ghost is not None and self.ghost.step > step:
             self._start_ghost()
-        elif self._ghost is not None:
-            self._apply_to(self._ghost, action)
+        elif self.ghost is not None:
+            self._apply_to(self.ghost, action)
         if self.divergence is not None and (self.divergence.step > step or self.divergence.horizon is not None):
             self.watch_divergence(True)
         elif self.divergence is not None:
@@ -334,7 +334,7 @@ class Diagnostics:
 
     def _apply_to(self, each: ShadowRun | DivergenceMonitor, action: Action) -> None:
         """Apply an action of the session; the ghost keeps its own engine."""
-        own = ghost_action(action) if each is self._ghost else action
+        own = ghost_action(action) if each is self.ghost else action
         if own is not None:
             each.apply(own)
 
@@ -351,7 +351,7 @@ class Diagnostics:
     @property
     def has_ghost(self) -> bool:
         """Whether there is a ghost."""
-        return self._ghost is not None or self._recorded is not None
+        return self.ghost is not None or self._recorded is not None
 
     def show_ghost(self, on: bool) -> None:
         """Start a ghost from the present state, or end it."""
@@ -364,17 +364,17 @@ class Diagnostics:
         """Start a ghost from the present state, on the first engine that can and has not failed."""
         self._drop_ghost()
         try:
-            self._ghost, note = create_ghost(
+            self.ghost, note = create_ghost(
                 self._session.simulation.checkpoint(), self._session.step_number, self._failed_engines
             )
         except ActionError as error:
             self.notifications.append(("warning", f"no ghost: {error}"))
             return
         self._ghost_history = History()
-        if self._ghost.frame is not None:
-            self._ghost_history.store(self._ghost.step, self._ghost.frame)
+        if self.ghost.frame is not None:
+            self._ghost_history.store(self.ghost.step, self.ghost.frame)
         if note:
-            self.notifications.append(("info", f"ghost computed by {self._ghost.engine}: {note}"))
+            self.notifications.append(("info", f"ghost computed by {self.ghost.engine}: {note}"))
 
     def _replace_ghost(self, ended: ShadowRun) -> None:
         """Start a ghost on another engine from the present state."""
@@ -383,9 +383,9 @@ class Diagnostics:
         self._start_ghost()
 
     def _drop_ghost(self) -> None:
-        if self._ghost is not None:
-            self._ghost.close()
-            self._ghost = None
+        if self.ghost is not None:
+            self.ghost.close()
+            self.ghost = None
 
     def watch_divergence(self, on: bool) -> None:
         """Start a divergence monitor from the present state, or end it."""
@@ -404,10 +404,10 @@ class Diagnostics:
         if self._recorded is not None:
             return self._recorded.frame(self._session.time)
         time = self._session.time
-        if self._ghost is None or time < self._ghost.start_time - 1e-12:
+        if self.ghost is None or time < self.ghost.start_time - 1e-12:
             return None
         return (
-            self._ghost.frame if self._session.step_number == self._ghost.step else self._ghost_history.nearest(time)[1]
+            self.ghost.frame if self._session.step_number == self.ghost.step else self._ghost_history.nearest(time)[1]
         )
 
     @property
@@ -415,7 +415,7 @@ class Diagnostics:
         """Name of the engine of the ghost."""
         if self._recorded is not None:
             return f"stored run ({self._recorded.trajectory.info['engine']})"
-        return self._ghost.engine if self._ghost is not None else None
+        return self.ghost.engine if self.ghost is not None else None
 
     @property
     def ghost_distance(self) -> float | None:

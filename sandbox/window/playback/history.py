@@ -1,7 +1,8 @@
-"""Stored states and checkpoints of a session, detection of rest, and the position history of trails."""
+"""Stored states and checkpoints of a session, break times of its joints, and the position history of trails."""
 
 from bisect import bisect_left, bisect_right, insort
 from collections import deque
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -163,14 +164,24 @@ def _bytes(frame: Frame) -> int:
     return len(frame.position) * BYTES_PER_BODY + BYTES_PER_FRAME
 
 
-REST_SPEED = 1e-9
-"""m/s and rad/s; rounding errors of a body at rest are below it"""
+class BreakTimes:
+    """Break times of the joints."""
 
+    def __init__(self, joints: int) -> None:
+        """Start with all joints unbroken."""
+        self.times: FloatArray = np.full(joints, np.inf)
+        """(J,) s, inf if unbroken; replaced by an update, never changed in place"""
 
-def is_at_rest(frame: Frame) -> bool:
-    """Return whether all bodies are at rest."""
-    rates = (frame.velocity, frame.angular_velocity, *(() if frame.roll is None else (frame.roll,)))
-    return all(float(np.abs(rate).max(initial=0.0)) <= REST_SPEED for rate in rates)
+    def update(self, broken: Mapping[int, float]) -> None:
+        """Add break times, s. Times later than the present remain, as a replay reaches them again."""
+        numbers = list(broken)
+        if numbers and not np.isfinite(self.times[numbers]).all():
+            self.times = self.times.copy()
+            self.times[numbers] = list(broken.values())
+
+    def reset(self) -> None:
+        """Mark all joints as unbroken."""
+        self.times = np.full(len(self.times), np.inf)
 
 
 MIN_CONTACT_FREE = 8
@@ -192,7 +203,7 @@ class ContactFreeTimer:
         if self._substeps < max(MIN_CONTACT_FREE, 2 * (simulation.settings.persistence or 1)):
             return False
         # A state does not hold when a roll began: a continuation from there differs by rounding errors.
-        return simulation.scene.surface is None or is_at_rest(frame)
+        return simulation.scene.surface is None or frame.is_at_rest
 
 
 TRAIL_LENGTH = 120

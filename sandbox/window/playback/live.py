@@ -1,15 +1,15 @@
 """Interactive view of a session: drives it in real time, seeks in time slices, and shows any stored state."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from time import perf_counter
 
 from sandbox.action import Action, ActionError, Launch, Switch, Value
 from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 from sandbox.engines.common.energy_balance import energy_of
 from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.scene import zone_visits
 from sandbox.scene.description.world import COMMON, Settings
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
 from sandbox.window.hit_test import overlapping_bodies
 from sandbox.window.playback.action_log import SceneHistory
@@ -75,8 +75,6 @@ class LiveView:
         self._restart_companions = False  # the companions have seen actions that were retracted
         self._preview: tuple[int, Frame] | None = None  # step and state, if not the present one
         self._preview_scenes: SceneHistory | None = None  # while there is a preview
-        self.on_contacts: Callable[[Contacts], object] = len
-        """Called with the contacts of new steps."""
         self._contact_interval = session.settings.dt
         self._read_contacts()
         self._seed = session.scene.world.seed
@@ -236,9 +234,10 @@ class LiveView:
                 self.notifications.append(("info", "end of the recording; resume to play on from here"))
         compiled, started = COMPILE_CLOCK.seconds, perf_counter()
         budget = min(max(elapsed - self._step_time, MIN_STEP_BUDGET), MAX_STEP_BUDGET)
-        made = self._advance(asked, started + budget) if asked else 0
+        made = self._advance(asked, started + budget, hold=True) if asked else 0
         self._step_time = perf_counter() - started
-        if COMPILE_CLOCK.seconds > compiled:  # compilation is not part of the speed of the scene
+        # Neither compilation nor a wait for the player is part of the speed of the scene.
+        if COMPILE_CLOCK.seconds > compiled or self.session.waiting:
             self.clock.reset()
         else:
             self.clock.record_steps(elapsed, made, asked, dt)
@@ -252,11 +251,11 @@ class LiveView:
         self._advance(1, None)
         self.session.reset_interpolation()
 
-    def _advance(self, steps: int, until: float | None) -> int:
-        """Make steps, at most until a time (`perf_counter`, s); return how many were made."""
+    def _advance(self, steps: int, until: float | None, *, hold: bool = False) -> int:
+        """Make steps, at most until a time (`perf_counter`, s); return how many were made; see `Session.advance`."""
         before = self.session.time
         try:
-            made = self.session.advance(steps, until)
+            made = self.session.advance(steps, until, hold=hold)
         except ReplayMismatchError:
             self.session.history.disable_checkpoints()
             self.seek(self.session.step_number)
@@ -274,7 +273,6 @@ class LiveView:
 
     def _read_contacts(self) -> None:
         self._contacts = self.session.contacts()
-        self.on_contacts(self._contacts)
 
     # --- Actions -------------------------------------------------------------------------------------------------
 
@@ -286,7 +284,7 @@ class LiveView:
         """
         self._check_not_seeking()
         before = self.session.replaced
-        self.diagnostics.apply(self.session.apply(action))
+        self._inform_companions([self.session.apply(action)])
         self._notify_replaced(before)
         self._read_contacts()
 
@@ -303,8 +301,7 @@ class LiveView:
         finally:
             if self.session.simulation is not simulation:  # an action was refused, and the session was restored
                 self._restart_diagnostics()
-        for action in actions:
-            self.diagnostics.apply(action)
+        self._inform_companions(actions)
         self._notify_replaced(before)
         self._read_contacts()
 
@@ -329,15 +326,27 @@ class LiveView:
         self._restart_diagnostics(companions=True)
         return message
 
-    def retract(self, index: int) -> None:
+    def retract(self, index: int, inputs: int | None = None) -> None:
         """Undo the action of an index and all later ones, and start a seek to the time of that action.
+
+        Args:
+            index: of the action.
+            inputs: number of inputs of the game that remain; default: those before the time of that action.
 
         Raises:
             ActionError: another seek is active.
         """
         self._check_not_seeking()
-        step, self._restart_companions = self.session.retract(index), True
+        step, self._restart_companions = self.session.retract(index, inputs), True
         self.seek(step)
+
+    def _inform_companions(self, actions: Sequence[Action]) -> None:
+        """Forward new actions to ghost and twin, if there are any."""
+        if self.diagnostics.ghost is not None or self.diagnostics.divergence is not None:
+            for action in actions:
+                self.diagnostics.apply(action)
+        else:
+            self.session.take_replayed_actions()  # no companion repeats them
 
     def _check_not_seeking(self) -> None:
         if self._seek.is_active:

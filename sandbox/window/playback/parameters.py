@@ -8,9 +8,9 @@ from typing import get_args
 from sandbox.action import Action, SetParameter, Switch, heading_of
 from sandbox.engines.registry import ENGINES
 from sandbox.formatting import format_percent, format_si
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BodySource
-from sandbox.scene.description.world import Detection, Integrator, Settings
-from sandbox.scene.scene import Scene
+from sandbox.scene.description.world import DetectionName, IntegratorName, Settings
 from sandbox.window.playback.live import LiveView
 
 ParameterValue = float | str
@@ -133,8 +133,8 @@ class SessionParameters:
             Parameter("engine", "engine", value=live.engine, choices=tuple(ENGINES)),
             Parameter("dt", "dt", 1e-4, 0.1, settings.dt, log=True, step=0.1, unit="s", default=file.solver.dt),
             *_counts(live, file),
-            self._choice(live, "integrator", get_args(Integrator)),
-            self._choice(live, "detection", get_args(Detection)),
+            self._choice(live, "integrator", get_args(IntegratorName)),
+            self._choice(live, "detection", get_args(DetectionName)),
         )
 
     def _choice(self, live: LiveView, key: str, words: tuple[str, ...]) -> Parameter:

@@ -12,13 +12,13 @@ from sandbox.arrays import BoolArray, FloatArray
 from sandbox.engines.common.energy_balance import energy_of
 from sandbox.games.session import LampLog
 from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.scene import zone_visits
 from sandbox.scene.description.world import Settings
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.load import from_session
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame, Trajectory
-from sandbox.window.camera import Box
+from sandbox.window.camera import ViewBox
 from sandbox.window.hit_test import overlapping_bodies
 from sandbox.window.playback.action_log import SceneHistory
 from sandbox.window.playback.clock import FixedStepClock
@@ -70,7 +70,7 @@ class RecordedRun:
         return float(self.trajectory.time[-1])
 
     @cached_property
-    def bounds(self) -> Box:
+    def bounds(self) -> ViewBox:
         """Corners of a view of the whole run, m; without bodies that stray far from the rest."""
         if self.scene.play.area is not None or self.scene.play.view is not None:
             return view_bounds(self.scene)

@@ -23,12 +23,11 @@ from sandbox.engines.switching import SwitchableSimulation
 from sandbox.games.session import GameSession
 from sandbox.recording import Recording
 from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
 from sandbox.window.playback.action_log import TIME_ROUNDING, ActionLog, SceneHistory, insert_switch
-from sandbox.window.playback.history import ContactFreeTimer, History, Keyframe
-from sandbox.window.playback.snapshot import BreakTimes
+from sandbox.window.playback.history import BreakTimes, ContactFreeTimer, History, Keyframe
 
 STEP_TIMEOUT = 2.0
 """s that one step may take to compute, on engines that can interrupt a step"""
@@ -169,6 +168,19 @@ class Session:
         return self._log.has_future
 
     @property
+    def waiting(self) -> bool:
+        """Whether the rules of the game hold time until the player acts; never during a replay."""
+        return self.game is not None and self.ended is None and self.game.waiting and self.is_latest
+
+    @property
+    def is_latest(self) -> bool:
+        """Whether no later states, actions or inputs are known."""
+        end = self._recorded_until - TIME_ROUNDING * self.simulation.settings.dt
+        if self._step < self.history.last_step or self.simulation.time < end or self.has_future:
+            return False
+        return self.game is None or not self.game.future_presses
+
+    @property
     def break_times(self) -> FloatArray:
         """When each joint of the scene breaks, (J,) s, inf if never; also in states later than now."""
         return self._breaks.times
@@ -247,18 +259,19 @@ class Session:
 
     # --- Stepping ------------------------------------------------------------------------------------------------
 
-    def advance(self, steps: int = 1, until: float | None = None) -> int:
+    def advance(self, steps: int = 1, until: float | None = None, *, hold: bool = False) -> int:
         """Make steps; return how many were made.
 
         Args:
             steps: how many, at most.
             until: the time (`perf_counter`, s) by which to stop, after one step at least.
+            hold: whether to stop as soon as the rules wait for the player, also before the first step.
 
         Raises:
             ReplayMismatchError: a state differs from the one seen before; `seek` to the same step mends it.
         """
         made, last = 0, False
-        while made < steps and self.ended is None and not last:
+        while made < steps and self.ended is None and not last and not (hold and self.waiting):
             last = made + 1 == steps or (made > 0 and until is not None and perf_counter() > until)
             if last:
                 self._previous = self.simulation.frame()
@@ -271,6 +284,8 @@ class Session:
                 self._compare_with_history(None)
         if made:
             self._store_state()
+            if hold and self.waiting:  # no later state follows to which pictures could interpolate
+                self._previous = self._frame
         return made
 
     def _make_step(self) -> bool:
@@ -313,7 +328,8 @@ class Session:
         if self.history.get(0) is not None and self._step <= self.history.last_step:
             return True
         end = self._recorded_until + TIME_ROUNDING * self.simulation.settings.dt
-        return self.has_future or self.simulation.time <= end
+        inputs_left = self.game is not None and bool(self.game.future_presses)
+        return self.has_future or inputs_left or self.simulation.time <= end
 
     def _replay_actions(self) -> None:
         """Apply the logged actions of the present time."""
@@ -437,8 +453,12 @@ class Session:
         self._all_bodies = self.bodies
         self._breaks.reset()
 
-    def retract(self, index: int) -> int:
-        """Remove the action of an index and all later ones from the log, and discard the states after it.
+    def retract(self, index: int, inputs: int | None = None) -> int:
+        """Remove the action of an index and all later ones, and the inputs since then; discard the states after it.
+
+        Args:
+            index: of the action.
+            inputs: number of inputs of the game that remain; default: those before the time of that action.
 
         Returns:
             The step to seek: the one after which that action was applied. The present state changes only then.
@@ -446,8 +466,12 @@ class Session:
         Raises:
             IndexError: the log is shorter.
         """
-        step = self.history.nearest(self.actions[index].time)[0]
+        time = self.actions[index].time
+        step = self.history.nearest(time)[0]
         self._log.truncate(index)
+        if self.game is not None:
+            before = sum(press.time < time for press in self.game.all_presses)
+            self.game.truncate(before if inputs is None else inputs)
         self._complete = None
         self._discard_from(step)
         self._off_track = True

@@ -13,12 +13,12 @@ from sandbox.arrays import BoolArray, FloatArray
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.joint_arrays import JointArrays
 from sandbox.scene.compile.potential import is_broken_at
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource, Point
 from sandbox.scene.description.forces import Thrust
 from sandbox.scene.description.scene import default_name
-from sandbox.scene.geometry.shapes import form_of
-from sandbox.scene.scene import Scene
+from sandbox.scene.geometry.shapes import geometry_of
 from sandbox.trajectory import Contacts, Frame
 
 NOTIFICATION_INTERVAL = 1.0
@@ -28,26 +28,6 @@ NOTIFICATION_INTERVAL = 1.0
 def broken_joints(breaks: FloatArray, time: float) -> list[int]:
     """Return the indices of the joints that have broken by a time, s; `breaks` (J,) holds their break times."""
     return np.flatnonzero(is_broken_at(breaks, np.asarray([time]))[0]).tolist() if len(breaks) else []
-
-
-class BreakTimes:
-    """Break times of the joints."""
-
-    def __init__(self, joints: int) -> None:
-        """Start with all joints unbroken."""
-        self.times: FloatArray = np.full(joints, np.inf)
-        """(J,) s, inf if unbroken; replaced by an update, never changed in place"""
-
-    def update(self, broken: Mapping[int, float]) -> None:
-        """Add break times, s. Times later than the present remain, as a replay reaches them again."""
-        numbers = list(broken)
-        if numbers and not np.isfinite(self.times[numbers]).all():
-            self.times = self.times.copy()
-            self.times[numbers] = list(broken.values())
-
-    def reset(self) -> None:
-        """Mark all joints as unbroken."""
-        self.times = np.full(len(self.times), np.inf)
 
 
 class BreakNotifier:
@@ -242,4 +222,4 @@ def _level(thrust: Thrust, throttle: Throttle | None, time: float) -> float:
 @lru_cache(maxsize=64)
 def _centre(element: BodySource) -> Point:
     """Return the centre of mass in the frame in which an element is defined, m."""
-    return form_of(element).centre
+    return geometry_of(element).centre

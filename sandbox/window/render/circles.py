@@ -1,6 +1,7 @@
 """Antialiased discs and rings, blitted from cached sprites."""
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -8,7 +9,7 @@ import pygame
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.window.render.lines import SDL_COORDINATE_LIMIT, draw_line
-from sandbox.window.render.palette import BACKGROUND, Colour, ColourArray
+from sandbox.window.render.palette import BACKGROUND, ColourArray, RgbColour
 from sandbox.window.render.particles import packed_pixels
 from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf, sdf_surface, shade_sdf
 
@@ -72,7 +73,7 @@ class CircleRenderer:
             _paint(surface, x, y, float(radius[k]), (red, green, blue), style, len(large) > SPRITE_CROWD)
 
     def ring(
-        self, surface: pygame.Surface, centre: tuple[float, float], radius: float, colour: Colour, style: CircleStyle
+        self, surface: pygame.Surface, centre: tuple[float, float], radius: float, colour: RgbColour, style: CircleStyle
     ) -> None:
         """Draw one ring."""
         ring = style._replace(hollow=True)
@@ -117,7 +118,7 @@ def _sprite(key: int, style: CircleStyle) -> pygame.Surface:
     return sdf_surface(shade_sdf(distance(along[:, None], along[None, :]), _look(radius, (red, green, blue), style)))
 
 
-def _look(radius: float, colour: Colour, style: CircleStyle) -> ShapeStyle:
+def _look(radius: float, colour: RgbColour, style: CircleStyle) -> ShapeStyle:
     if style.hollow:
         return ShapeStyle(None, colour, style.line, antialias=style.antialias)
     rim = min(0.16 * radius, style.line * min(1.0 + radius / 80.0, 2.5))
@@ -125,7 +126,7 @@ def _look(radius: float, colour: Colour, style: CircleStyle) -> ShapeStyle:
 
 
 def _paint(
-    surface: pygame.Surface, x: float, y: float, radius: float, colour: Colour, style: CircleStyle, plain: bool
+    surface: pygame.Surface, x: float, y: float, radius: float, colour: RgbColour, style: CircleStyle, plain: bool
 ) -> None:
     """Draw a disc that is too large for a sprite."""
     area = surface.get_clip()
@@ -139,7 +140,7 @@ def _paint(
         draw_sdf(surface, disc_distance(x, y, radius), _look(radius, colour, style), within)
 
 
-def darken(colour: Colour) -> Colour:
+def darken(colour: RgbColour) -> RgbColour:
     """Return the colour of the rim and the rotation mark of a ball."""
     red, green, blue = (round(c + (b - c) * DARK) for c, b in zip(colour, BACKGROUND, strict=True))
     return red, green, blue
@@ -179,3 +180,27 @@ def draw_rotation_marks(
         red, green, blue = tones[k].tolist()
         width = min(0.08 * float(reach[k, 0]), 6.0)
         draw_line(surface, (ax, ay), (bx, by), (red, green, blue), width, antialias)
+
+
+OVERSAMPLING = 4
+"""per axis, of the images of `draw_disc`"""
+
+
+def draw_disc(
+    surface: pygame.Surface, position: tuple[float, float], radius: float, colour: RgbColour, hole: float = 0.0
+) -> None:
+    """Draw a small antialiased disc, or a ring with inner radius `hole` if that is positive; px."""
+    image = _disc_image(round(OVERSAMPLING * max(radius, 0.5)), colour, round(OVERSAMPLING * hole))
+    surface.blit(image, image.get_rect(center=(round(position[0]), round(position[1]))))
+
+
+@lru_cache(maxsize=256)
+def _disc_image(radius: int, colour: RgbColour, hole: int) -> pygame.Surface:
+    side = 2 * (radius // OVERSAMPLING) + 3  # odd, so that there is a centre pixel
+    large = pygame.Surface((side * OVERSAMPLING, side * OVERSAMPLING), pygame.SRCALPHA)
+    large.fill((*colour, 0))
+    middle = large.get_rect().center
+    pygame.draw.circle(large, colour, middle, radius)
+    if hole > 0:
+        pygame.draw.circle(large, (*colour, 0), middle, hole)
+    return pygame.transform.smoothscale(large, (side, side))

@@ -7,9 +7,9 @@ one view per game, which may cache sprites and the rolling orientation of balls 
 from typing import Protocol, runtime_checkable
 
 from sandbox.arrays import IntArray
-from sandbox.games.names import GAMES, game_specs, spec_of
-from sandbox.games.spec import GameSpec, import_part
-from sandbox.scene.scene import Scene
+from sandbox.game_names import GAMES, game_specs, spec_of
+from sandbox.game_spec import GameSpec, import_part
+from sandbox.scene.compile.scene import Scene
 from sandbox.window.render.draw_context import DrawContext
 
 
@@ -72,7 +72,7 @@ def view_path(scene: Scene) -> str | None:
 def _named_spec(game: str) -> GameSpec | None:
     try:
         return spec_of(game)
-    except (ImportError, AttributeError):
+    except (ImportError, AttributeError, ValueError):
         assert game not in GAMES
         return None  # an installed game that fails to import: starting the game reports the error
 

@@ -29,8 +29,8 @@ from sandbox.window.render.palette import (
     SKY,
     SURFACE,
     YELLOW,
-    Colour,
     ColourArray,
+    RgbColour,
     mix_colours,
 )
 from sandbox.window.render.particles import packed_pixels
@@ -175,7 +175,7 @@ MAX_DIALS = 60
 """Largest number of dials, the symbols of rotary joints, which take longer to draw."""
 SMALL_SYMBOL, LARGE_SYMBOL = 12.0, 34.0
 """px, smallest and largest radius of the arcs of rotary joints"""
-_TINTS: dict[LinkKind, Colour] = {
+_TINTS: dict[LinkKind, RgbColour] = {
     LinkKind.ROD: INK,
     LinkKind.PIVOT: YELLOW,
     LinkKind.SLIDE: SKY,
@@ -230,7 +230,7 @@ def draw_joint_symbols(view: DrawContext, joints: JointSegments, discs: CircleRe
             _rings(view, some.ends[:, 2:], _TINTS[kind], discs)
 
 
-def _dots(view: DrawContext, places: FloatArray, size: float, colour: Colour, discs: CircleRenderer) -> None:
+def _dots(view: DrawContext, places: FloatArray, size: float, colour: RgbColour, discs: CircleRenderer) -> None:
     kept = view.inside(places, 10.0 * view.ui_scale)
     for wide, tone in ((size + 1.2, BACKGROUND), (size, colour)):
         radius = np.full(len(kept), wide * view.ui_scale)
@@ -238,7 +238,7 @@ def _dots(view: DrawContext, places: FloatArray, size: float, colour: Colour, di
         discs.draw(view.surface, places[kept], radius, tint, CircleStyle(0.0, antialias=view.antialias))
 
 
-def _rings(view: DrawContext, places: FloatArray, colour: Colour, discs: CircleRenderer) -> None:
+def _rings(view: DrawContext, places: FloatArray, colour: RgbColour, discs: CircleRenderer) -> None:
     """Draw the symbol of a revolute joint: a ring on a dark disc."""
     _dots(view, places, 5.0, BACKGROUND, discs)
     kept = view.inside(places, 10.0 * view.ui_scale)
@@ -373,7 +373,7 @@ def spot(centre: Pixel, radius: float, angle: float) -> Pixel:
 
 
 def arc(
-    view: DrawContext, centre: Pixel, radius: float, first: float, span: float, colour: Colour, width: float
+    view: DrawContext, centre: Pixel, radius: float, first: float, span: float, colour: RgbColour, width: float
 ) -> None:
     """Draw an arc, with angles in world orientation (y up) and a dark outline."""
     low, half = min(first, first + span), min(0.5 * abs(span), math.pi)
@@ -382,7 +382,7 @@ def arc(
     _trace(view, distance, (x - radius, y - radius, x + radius, y + radius), colour, width)
 
 
-def path(view: DrawContext, spots: list[Pixel], colour: Colour, width: float) -> None:
+def path(view: DrawContext, spots: list[Pixel], colour: RgbColour, width: float) -> None:
     """Draw a polyline with a dark outline."""
     parts = [capsule_distance(a, b, 0.0) for a, b in pairwise(spots)]
     columns, rows = zip(*spots, strict=True)
@@ -391,7 +391,7 @@ def path(view: DrawContext, spots: list[Pixel], colour: Colour, width: float) ->
 
 
 def _trace(
-    view: DrawContext, distance: SignedDistance, box: tuple[float, float, float, float], colour: Colour, width: float
+    view: DrawContext, distance: SignedDistance, box: tuple[float, float, float, float], colour: RgbColour, width: float
 ) -> None:
     """Draw the zero contour of a signed distance within a box (left, top, right, bottom), px."""
     half, halo = 0.5 * width * view.ui_scale, 1.2 * view.ui_scale
@@ -447,7 +447,7 @@ def draw_stops(view: DrawContext) -> None:
 
 
 def _slide(
-    view: DrawContext, drive: PlungerDrive, place: Pixel, now: list[float], home: tuple[float, float], colour: Colour
+    view: DrawContext, drive: PlungerDrive, place: Pixel, now: list[float], home: tuple[float, float], colour: RgbColour
 ) -> None:
     """Draw the travel of a plunger as a line with end ticks, and a tick at its present position."""
     length = math.hypot(*drive.direction)

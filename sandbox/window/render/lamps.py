@@ -8,16 +8,16 @@ from typing import NamedTuple
 import numpy as np
 import pygame
 
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.play import PlayPart
-from sandbox.scene.scene import Scene
 from sandbox.window.camera import Camera
 from sandbox.window.render.lines import clip_segment
-from sandbox.window.render.palette import BACKGROUND, Colour, hex_colour, mix_colours
+from sandbox.window.render.palette import BACKGROUND, RgbColour, hex_colour, mix_colours
 from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
 
-AMBER: Colour = (255, 196, 84)
-WHITE: Colour = (255, 255, 255)
+AMBER: RgbColour = (255, 196, 84)
+WHITE: RgbColour = (255, 255, 255)
 RADIUS = 0.0065
 """m"""
 GLOW, STRENGTH = 6.5, 0.75
@@ -66,7 +66,7 @@ class LampRenderer:
     """Draws lit lamps, and caches their sprites."""
 
     def __init__(self) -> None:
-        self._sprites: dict[tuple[Colour, float], LampSprite] = {}
+        self._sprites: dict[tuple[RgbColour, float], LampSprite] = {}
 
     def draw(self, surface: pygame.Surface, camera: Camera, scene: Scene, lit: frozenset[str]) -> None:
         """Draw the lamps of the parts named in `lit`."""
@@ -83,7 +83,7 @@ class LampRenderer:
             surface.blit(glow, glow.get_rect(center=(round(x), round(y))), special_flags=pygame.BLEND_RGB_ADD)
             surface.blit(bulb, bulb.get_rect(center=(round(x), round(y))))
 
-    def _sprite(self, colour: Colour, radius: float) -> LampSprite:
+    def _sprite(self, colour: RgbColour, radius: float) -> LampSprite:
         known = self._sprites.get((colour, radius))
         if known is None:
             if len(self._sprites) >= MAX_SPRITES:  # sprites of earlier zoom levels
@@ -92,7 +92,7 @@ class LampRenderer:
         return known
 
 
-def _colour(part: PlayPart) -> Colour:
+def _colour(part: PlayPart) -> RgbColour:
     return AMBER if part.colour is None else hex_colour(part.colour)
 
 
@@ -103,7 +103,7 @@ def _distances(reach: float) -> "np.ndarray[tuple[int, int], np.dtype[np.float64
     return np.hypot(along[:, None], along[None, :])
 
 
-def _glow(colour: Colour, radius: float) -> pygame.Surface:
+def _glow(colour: RgbColour, radius: float) -> pygame.Surface:
     """Return the glow: intensity falls quadratically to 0 at its radius."""
     share = STRENGTH * np.maximum(1.0 - _distances(GLOW * radius) / (GLOW * radius), 0.0) ** 2
     surface = pygame.Surface(share.shape, 0, 32)
@@ -111,7 +111,7 @@ def _glow(colour: Colour, radius: float) -> pygame.Surface:
     return surface
 
 
-def _bulb(colour: Colour, radius: float) -> pygame.Surface:
+def _bulb(colour: RgbColour, radius: float) -> pygame.Surface:
     """Return the bulb: a disc that is nearly white at the centre."""
     size = radius + 1.0  # covers the rim of the unlit lamp for any sub-pixel offset
     away = _distances(size + 1.0)

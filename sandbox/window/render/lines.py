@@ -7,7 +7,7 @@ import numpy as np
 import pygame
 
 from sandbox.arrays import BoolArray, FloatArray
-from sandbox.window.render.palette import Colour
+from sandbox.window.render.palette import RgbColour
 from sandbox.window.render.particles import Packed, flat_pixels, is_flat
 
 SDL_COORDINATE_LIMIT = 16_000.0
@@ -53,7 +53,7 @@ def clip_segment(a: Pixel, b: Pixel, area: pygame.Rect, margin: float = 4.0) -> 
 
 
 def draw_line(
-    surface: pygame.Surface, a: Pixel, b: Pixel, colour: Colour, width: float = 1.0, antialias: bool = True
+    surface: pygame.Surface, a: Pixel, b: Pixel, colour: RgbColour, width: float = 1.0, antialias: bool = True
 ) -> None:
     """Draw a line with flat ends, `width` px wide."""
     part = clip_segment(a, b, surface.get_clip(), width + 4.0)
@@ -90,7 +90,7 @@ def draw_line(
     )
 
 
-def fill_polygon(surface: pygame.Surface, corners: list[Pixel], colour: Colour, antialias: bool = True) -> None:
+def fill_polygon(surface: pygame.Surface, corners: list[Pixel], colour: RgbColour, antialias: bool = True) -> None:
     """Fill a polygon whose corners lie on or near the surface."""
     moved = [(x - 0.5, y - 0.5) for x, y in corners]
     pygame.draw.polygon(surface, colour, [_whole(p) for p in moved])
@@ -122,10 +122,10 @@ def draw_arrow(
     surface: pygame.Surface,
     a: Pixel,
     b: Pixel,
-    colour: Colour,
+    colour: RgbColour,
     width: float = 2.0,
     antialias: bool = True,
-    edge: Colour | None = None,
+    edge: RgbColour | None = None,
 ) -> None:
     """Draw an arrow from `a` to `b`, with a head in proportion to its width and an outline of colour `edge`, if any."""
     length = math.hypot(b[0] - a[0], b[1] - a[1])
@@ -148,7 +148,11 @@ def draw_arrow(
 
 
 def draw_dashes(
-    surface: pygame.Surface, corners: Iterable[tuple[Pixel, Pixel]], colour: Colour, dash: float, antialias: bool = True
+    surface: pygame.Surface,
+    corners: Iterable[tuple[Pixel, Pixel]],
+    colour: RgbColour,
+    dash: float,
+    antialias: bool = True,
 ) -> None:
     """Draw dashed segments; the dashes are fixed to the segment, not to the clip rectangle."""
     area = surface.get_clip()

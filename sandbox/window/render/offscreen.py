@@ -9,7 +9,7 @@ import pygame
 from sandbox.action import Throttle
 from sandbox.games.contract import HasLamps, HasViewState, Rules
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.scene import Scene
+from sandbox.scene.compile.scene import Scene
 from sandbox.trajectory import Frame
 from sandbox.window.camera import Camera
 from sandbox.window.playback.snapshot import Snapshot, active_thrusters

@@ -21,7 +21,7 @@ from sandbox.window.render.circles import CircleRenderer
 from sandbox.window.render.draw_context import DrawContext
 from sandbox.window.render.joints import draw_hinges, draw_joint_symbols, draw_joints, draw_stops, joint_segments
 from sandbox.window.render.lines import SDL_COORDINATE_LIMIT, draw_line
-from sandbox.window.render.palette import BACKGROUND, FAINT, INK, ORANGE, YELLOW, Colour, ColourArray, mix_colours
+from sandbox.window.render.palette import BACKGROUND, FAINT, INK, ORANGE, YELLOW, ColourArray, RgbColour, mix_colours
 from sandbox.window.render.particles import ParticleRenderer, packed_pixels
 from sandbox.window.render.polygons import PolygonRenderer
 from sandbox.window.render.vectors import draw_contacts, draw_impulses, draw_velocities
@@ -53,7 +53,7 @@ def draw_flames(view: DrawContext) -> None:
             _tongue(view, begin, along, INNER, YELLOW)
 
 
-def _tongue(view: DrawContext, begin: list[float], along: tuple[float, float], size: float, colour: Colour) -> None:
+def _tongue(view: DrawContext, begin: list[float], along: tuple[float, float], size: float, colour: RgbColour) -> None:
     (x, y), (dx, dy) = begin, along
     sides = [*OUTLINE, *((share, -across) for share, across in reversed(OUTLINE[:-1]))]
     points = [(x + size * (a * dx - b * dy), y + size * (a * dy + b * dx)) for a, b in sides]
@@ -178,9 +178,12 @@ class OverlayRenderer:
             draw_impulses(view)
         if "contacts" in overlays:
             draw_contacts(view, self._discs)
-        draw_flashes(view)
-        draw_picked(view, self._discs, self._polygons)
-        draw_pull(view, self._discs)
+        if view.snapshot.flashes:
+            draw_flashes(view)
+        if view.snapshot.picked is not None:
+            draw_picked(view, self._discs, self._polygons)
+        if view.snapshot.pull is not None:
+            draw_pull(view, self._discs)
         if "names" in overlays:
             draw_names(view, self._polygons)
 

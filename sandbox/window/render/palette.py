@@ -10,43 +10,43 @@ from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.description.base import BodySpec, HasMaterial
 from sandbox.scene.description.discs import Emitter
 
-Colour = tuple[int, int, int]
+RgbColour = tuple[int, int, int]
 """sRGB, 0 to 255 per channel."""
 ColourArray = npt.NDArray[np.uint8]
 
-BACKGROUND: Colour = (20, 24, 31)
-PANEL: Colour = (29, 35, 44)
-PANEL_RAISED: Colour = (42, 50, 62)
-LINE: Colour = (56, 66, 80)
-GRID: Colour = (29, 34, 43)
-GRID_STRONG: Colour = (37, 44, 55)
-SOLID: Colour = (38, 46, 57)
+BACKGROUND: RgbColour = (20, 24, 31)
+PANEL: RgbColour = (29, 35, 44)
+PANEL_RAISED: RgbColour = (42, 50, 62)
+LINE: RgbColour = (56, 66, 80)
+GRID: RgbColour = (29, 34, 43)
+GRID_STRONG: RgbColour = (37, 44, 55)
+SOLID: RgbColour = (38, 46, 57)
 """Fill of planes and walls."""
-SURFACE: Colour = (138, 151, 168)
+SURFACE: RgbColour = (138, 151, 168)
 """Edge of solid geometry."""
-INK: Colour = (230, 235, 242)
-FAINT: Colour = (146, 158, 174)
-NEUTRAL: Colour = (126, 137, 152)
+INK: RgbColour = (230, 235, 242)
+FAINT: RgbColour = (146, 158, 174)
+NEUTRAL: RgbColour = (126, 137, 152)
 """Static bodies and posts."""
 
-ORANGE: Colour = (230, 159, 0)
-SKY: Colour = (86, 180, 233)
-GREEN: Colour = (0, 158, 115)
-YELLOW: Colour = (240, 228, 66)
-BLUE: Colour = (0, 114, 178)
-VERMILION: Colour = (213, 94, 0)
-PURPLE: Colour = (204, 121, 167)
-ACCENTS: tuple[Colour, ...] = (SKY, ORANGE, GREEN, YELLOW, PURPLE, VERMILION, BLUE)
+ORANGE: RgbColour = (230, 159, 0)
+SKY: RgbColour = (86, 180, 233)
+GREEN: RgbColour = (0, 158, 115)
+YELLOW: RgbColour = (240, 228, 66)
+BLUE: RgbColour = (0, 114, 178)
+VERMILION: RgbColour = (213, 94, 0)
+PURPLE: RgbColour = (204, 121, 167)
+ACCENTS: tuple[RgbColour, ...] = (SKY, ORANGE, GREEN, YELLOW, PURPLE, VERMILION, BLUE)
 """In the order in which they are assigned to elements."""
 
 TOUCHING, CLEAR = VERMILION, GREEN
 """Bodies with and without overlap, in scenes that show contact by colour."""
-WARNING: Colour = (255, 92, 80)
+WARNING: RgbColour = (255, 92, 80)
 """Used only together with text or a shape, because of colour vision deficiency."""
 
 FEW_BODIES = 8
 """Number of bodies up to which each body of a generator gets its own accent."""
-COMPANIONS: dict[Colour, Colour] = {
+COMPANIONS: dict[RgbColour, RgbColour] = {
     SKY: BLUE,
     ORANGE: VERMILION,
     GREEN: BLUE,
@@ -61,24 +61,24 @@ negative, towards white.
 """
 
 
-def hex_colour(text: str) -> Colour:
+def hex_colour(text: str) -> RgbColour:
     """Return the colour given as `#rrggbb`."""
     value = int(text[1:], 16)
     return value >> 16, value >> 8 & 255, value & 255
 
 
-def mix_colours(a: Colour, b: Colour, share: float) -> Colour:
+def mix_colours(a: RgbColour, b: RgbColour, share: float) -> RgbColour:
     """Return the linear mix of `a` and `b`: `a` at share 0, `b` at share 1."""
     red, green, blue = (round(x + (y - x) * share) for x, y in zip(a, b, strict=True))
     return red, green, blue
 
 
-def accent(number: int) -> Colour:
+def accent(number: int) -> RgbColour:
     """Return the accent of the element with this index."""
     return ACCENTS[number % len(ACCENTS)]
 
 
-def colour_of_fixed(thing: HasMaterial, otherwise: Colour = NEUTRAL) -> Colour:
+def colour_of_fixed(thing: HasMaterial, otherwise: RgbColour = NEUTRAL) -> RgbColour:
     """Return the colour of a plane, wall or post: its own, or `otherwise`."""
     return otherwise if thing.colour is None else hex_colour(thing.colour)
 
@@ -106,6 +106,6 @@ def colour_of(bodies: Bodies) -> ColourArray:
     return colours
 
 
-def _family(colour: Colour) -> list[Colour]:
+def _family(colour: RgbColour) -> list[RgbColour]:
     """Return the tints for the bodies of a larger generator."""
     return [mix_colours(colour, COMPANIONS[colour] if share > 0 else (255, 255, 255), abs(share)) for share in TINTS]

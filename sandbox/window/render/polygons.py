@@ -16,7 +16,7 @@ from sandbox.window.render.body_geometry import BodyGeometry, ScreenPose, clippe
 from sandbox.window.render.circles import DARK, CircleStyle, darken
 from sandbox.window.render.draw_context import DrawContext
 from sandbox.window.render.lines import SDL_COORDINATE_LIMIT, Pixel, clip_polygon, fill_polygon
-from sandbox.window.render.palette import BACKGROUND, Colour, ColourArray
+from sandbox.window.render.palette import BACKGROUND, ColourArray, RgbColour
 from sandbox.window.render.particles import flat_pixels, is_flat, packed_pixels
 from sandbox.window.render.sdf import ShapeStyle, draw_sdf
 
@@ -92,7 +92,7 @@ class PolygonRenderer:
         number: int,
         place: ScreenPose,
         gap: float,
-        colour: Colour,
+        colour: RgbColour,
         line: float,
         antialias: bool = True,
     ) -> None:
@@ -153,7 +153,7 @@ def _in_one_pass(
 
 
 def _draw_plain(
-    surface: pygame.Surface, hulls: list[Hull], colour: Colour, line: float, antialias: bool, near: bool
+    surface: pygame.Surface, hulls: list[Hull], colour: RgbColour, line: float, antialias: bool, near: bool
 ) -> None:
     """Draw a body as polygons: its pieces in the rim colour, then inset pieces in the fill colour."""
     reach = 2 * math.ceil(line) + 8
@@ -173,7 +173,7 @@ def _draw_plain(
 
 
 def _fill_hulls(
-    surface: pygame.Surface, hulls: list[Hull], colour: Colour, antialias: bool, area: pygame.Rect | None
+    surface: pygame.Surface, hulls: list[Hull], colour: RgbColour, antialias: bool, area: pygame.Rect | None
 ) -> None:
     for hull in hulls:
         corners = _corners(hull, area)

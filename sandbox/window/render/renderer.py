@@ -11,8 +11,8 @@ import pygame
 from sandbox.arrays import BoolArray, IntArray
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import contact_matrix
-from sandbox.scene.scene import Scene
-from sandbox.window.camera import Box, Camera
+from sandbox.scene.compile.scene import Scene
+from sandbox.window.camera import Camera, ViewBox
 from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.circles import CircleRenderer, draw_rotation_marks
 from sandbox.window.render.draw_context import DrawContext
@@ -358,7 +358,7 @@ class InsetRenderer:
         return place
 
 
-def _place(box: Box, free: pygame.Rect, margin: int, aside: int) -> pygame.Rect:
+def _place(box: ViewBox, free: pygame.Rect, margin: int, aside: int) -> pygame.Rect:
     """Return the largest permitted rectangle for the inset of a box."""
     (left, bottom), (right, top) = box
     room = free.width - 2 * margin - (aside + margin if aside else 0)

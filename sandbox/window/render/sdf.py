@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pygame
 
 from sandbox.arrays import FloatArray
-from sandbox.window.render.palette import Colour
+from sandbox.window.render.palette import RgbColour
 
 SignedDistance = Callable[[FloatArray, FloatArray], FloatArray]
 """Maps x and y, px, which broadcast, to the signed distance; Lipschitz constant at most 1."""
@@ -25,8 +25,8 @@ FAR_OUTSIDE = 1e6
 class ShapeStyle(NamedTuple):
     """Style of a shape: optional fill, and a rim inside the edge."""
 
-    fill: Colour | None
-    rim: Colour
+    fill: RgbColour | None
+    rim: RgbColour
     line: float
     """rim width, px"""
     opacity: float = 1.0
@@ -146,7 +146,7 @@ def draw_sdf(
     surface.set_clip(clip)
 
 
-def _fill(surface: pygame.Surface, full: npt.NDArray[np.bool_], area: pygame.Rect, colour: Colour) -> None:
+def _fill(surface: pygame.Surface, full: npt.NDArray[np.bool_], area: pygame.Rect, colour: RgbColour) -> None:
     """Fill the interior tiles, one rectangle for each run in a row."""
     if full.all():
         surface.fill(colour, area)

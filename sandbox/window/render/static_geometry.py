@@ -8,12 +8,12 @@ import numpy as np
 import pygame
 
 from sandbox.arrays import FloatArray, IntArray
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.fixed import Plane, Post, Wall, Zone, mask_of
 from sandbox.scene.description.play import Marking
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
-from sandbox.window.camera import Box, Camera
+from sandbox.window.camera import Camera, ViewBox
 from sandbox.window.render.lines import (
     SDL_COORDINATE_LIMIT,
     Pixel,
@@ -32,7 +32,7 @@ from sandbox.window.render.palette import (
     SKY,
     SOLID,
     SURFACE,
-    Colour,
+    RgbColour,
     colour_of_fixed,
     hex_colour,
     mix_colours,
@@ -71,14 +71,14 @@ def draw_static_bodies(
 
 
 def draw_bounds(
-    surface: pygame.Surface, camera: Camera, bounds: Box | None, unit: float = 1.0, antialias: bool = True
+    surface: pygame.Surface, camera: Camera, bounds: ViewBox | None, unit: float = 1.0, antialias: bool = True
 ) -> None:
     """Draw the box outside which bodies are retired, dashed."""
     if bounds is not None:
         draw_dashes(surface, outline(camera, bounds), FAINT, 8.0 * unit, antialias)
 
 
-def outline(camera: Camera, box: Box) -> list[tuple[Pixel, Pixel]]:
+def outline(camera: Camera, box: ViewBox) -> list[tuple[Pixel, Pixel]]:
     """Return the sides of a box, px."""
     (left, bottom), (right, top) = box
     world = np.asarray([(left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)])
@@ -117,7 +117,7 @@ def _hatch(
     out: Pixel,
     phase: float,
     reach: float,
-    colour: Colour,
+    colour: RgbColour,
     unit: float,
     antialias: bool,
 ) -> None:
@@ -169,7 +169,7 @@ def _wall(surface: pygame.Surface, camera: Camera, wall: Wall, unit: float, anti
 
 
 def _ways_through(
-    surface: pygame.Surface, a: Pixel, b: Pixel, half: float, colour: Colour, unit: float, antialias: bool
+    surface: pygame.Surface, a: Pixel, b: Pixel, half: float, colour: RgbColour, unit: float, antialias: bool
 ) -> None:
     """Draw small arrows on the left side of a wall, in its passing direction, at fixed points of the wall."""
     part, length = clip_segment(a, b, surface.get_clip(), half + 12.0 * unit), math.dist(a, b)
@@ -336,7 +336,7 @@ def _circle(
     camera: Camera,
     marking: Marking,
     circle: tuple[Point, float],
-    colour: Colour,
+    colour: RgbColour,
     unit: float,
     antialias: bool,
 ) -> None:
@@ -373,7 +373,7 @@ def draw_zones(
         draw_sdf(surface, distance, ShapeStyle(None, colour, LINE * unit, LINED, antialias), box)
 
 
-def colour_of_zone(zone: Zone) -> Colour:
+def colour_of_zone(zone: Zone) -> RgbColour:
     """Return the colour of a zone: its own, or one by its effect."""
     if zone.colour is not None:
         return hex_colour(zone.colour)

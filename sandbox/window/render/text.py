@@ -10,7 +10,7 @@ from pathlib import Path
 import pygame
 
 from sandbox.window.render.lines import SDL_COORDINATE_LIMIT
-from sandbox.window.render.palette import INK, LINE, PANEL, Colour
+from sandbox.window.render.palette import INK, LINE, PANEL, RgbColour
 
 MAX_TEXT_LENGTH = 400
 """Number of characters of a line that are rendered; limits the width of the surface."""
@@ -23,7 +23,7 @@ def draw_text(
     text: str,
     at: tuple[float, float],
     size: float,
-    colour: Colour,
+    colour: RgbColour,
     anchor: str = "topleft",
     bold: bool = False,
     mono: bool = False,
@@ -70,7 +70,7 @@ def renderable(text: str) -> str:
 
 
 @lru_cache(maxsize=512)
-def _rendered(text: str, size: int, colour: Colour, bold: bool, mono: bool) -> pygame.Surface:
+def _rendered(text: str, size: int, colour: RgbColour, bold: bool, mono: bool) -> pygame.Surface:
     if not text:
         return pygame.Surface((0, _font(size, bold, mono).get_height()), pygame.SRCALPHA)
     return _font(size, bold, mono).render(text, True, colour)
@@ -110,9 +110,9 @@ def draw_box(
     surface: pygame.Surface,
     rect: pygame.Rect,
     radius: float,
-    colour: Colour = PANEL,
+    colour: RgbColour = PANEL,
     opacity: int = OPACITY,
-    edge: Colour | None = LINE,
+    edge: RgbColour | None = LINE,
 ) -> None:
     """Draw a rounded translucent box; nothing if its area is empty."""
     if rect.width <= 0 or rect.height <= 0 or max(rect.size) > MAX_BOX:
@@ -121,7 +121,9 @@ def draw_box(
 
 
 @lru_cache(maxsize=64)
-def _plate(size: tuple[int, int], radius: int, colour: Colour, opacity: int, edge: Colour | None) -> pygame.Surface:
+def _plate(
+    size: tuple[int, int], radius: int, colour: RgbColour, opacity: int, edge: RgbColour | None
+) -> pygame.Surface:
     made = pygame.Surface(size, pygame.SRCALPHA)
     pygame.draw.rect(made, (*colour, opacity), made.get_rect(), border_radius=radius)
     if edge is not None:

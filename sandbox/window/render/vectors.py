@@ -11,7 +11,7 @@ from sandbox.window.hit_test import Hull, hull_gap, hulls_of
 from sandbox.window.render.circles import CircleRenderer, CircleStyle
 from sandbox.window.render.draw_context import DrawContext
 from sandbox.window.render.lines import draw_arrow, draw_line
-from sandbox.window.render.palette import BACKGROUND, INK, ORANGE, SKY, YELLOW, Colour, mix_colours
+from sandbox.window.render.palette import BACKGROUND, INK, ORANGE, SKY, YELLOW, RgbColour, mix_colours
 from sandbox.window.render.text import draw_text
 
 MOST_CURVED = 400
@@ -125,7 +125,7 @@ WEIGHT = 26.0
 LONGEST_ARROW = 80.0
 """px, length of the largest force if weights would make it longer"""
 _COOL = mix_colours(BACKGROUND, SKY, 0.8)
-HEAT: tuple[Colour, ...] = tuple(
+HEAT: tuple[RgbColour, ...] = tuple(
     mix_colours(_COOL, YELLOW, k / 16) if k < 16 else mix_colours(YELLOW, (255, 255, 255), k / 16 - 1.0)
     for k in range(33)
 )

@@ -8,11 +8,11 @@ import numpy as np
 import pygame
 
 from sandbox.formatting import format_si
-from sandbox.measure.energy import Energies, energies
+from sandbox.measure.metrics.energy import Energies, energies
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.scene import Scene
+from sandbox.scene.compile.scene import Scene
 from sandbox.trajectory import Trajectory
-from sandbox.window.render.palette import FAINT, INK, LINE, PURPLE, SKY, Colour
+from sandbox.window.render.palette import FAINT, INK, LINE, PURPLE, SKY, RgbColour
 from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size
 
 TIME_SPAN = 10.0
@@ -22,9 +22,9 @@ MAX_SAMPLES = 4096
 MIN_SCALE_USE = 0.4
 """fraction of the axis range that the curves must use; below it the range shrinks"""
 
-CURVES: tuple[tuple[str, Colour], ...] = (("kinetic", SKY), ("potential", PURPLE), ("total", INK))
+CURVES: tuple[tuple[str, RgbColour], ...] = (("kinetic", SKY), ("potential", PURPLE), ("total", INK))
 
-Sample = tuple[float, float, float, float]
+EnergySample = tuple[float, float, float, float]
 Limits = tuple[float, float]
 
 
@@ -33,7 +33,7 @@ class EnergyGraph:
 
     def __init__(self, span: float = TIME_SPAN) -> None:
         self.span = span
-        self.samples: list[Sample] = []
+        self.samples: list[EnergySample] = []
         """(time s, kinetic, potential, total J), oldest first"""
         self.limits: Limits = (0.0, 1.0)
         """axis limits, J"""
@@ -63,11 +63,11 @@ class EnergyGraph:
             if len(self.samples) > MAX_SAMPLES // 2:
                 self.samples = self.samples[:-1][::2] + self.samples[-1:]
 
-    def _visible_samples(self) -> list[Sample]:
+    def _visible_samples(self) -> list[EnergySample]:
         oldest = self.samples[-1][0] - self.span if self.samples else 0.0
         return [sample for sample in self.samples if sample[0] >= oldest]
 
-    def fit_limits(self, samples: Sequence[Sample]) -> Limits:
+    def fit_limits(self, samples: Sequence[EnergySample]) -> Limits:
         """Return axis limits that include all curves and zero; the present limits if they fit closely enough."""
         values = np.asarray(samples, np.float64).reshape(-1, 4)[:, 1:]
         values = values[np.isfinite(values)]
@@ -124,7 +124,7 @@ class EnergyGraph:
         return float(chart.bottom - min(max(fraction, 0.0), 1.0) * chart.height)
 
     def _draw_curves(
-        self, surface: pygame.Surface, chart: pygame.Rect, samples: Sequence[Sample], ui_scale: float
+        self, surface: pygame.Surface, chart: pygame.Rect, samples: Sequence[EnergySample], ui_scale: float
     ) -> None:
         if len(samples) < 2:
             return
@@ -146,7 +146,7 @@ class EnergyGraph:
                 start = gap + 1
 
     def _draw_labels(
-        self, surface: pygame.Surface, chart: pygame.Rect, left: int, samples: Sequence[Sample], size: float
+        self, surface: pygame.Surface, chart: pygame.Rect, left: int, samples: Sequence[EnergySample], size: float
     ) -> None:
         """Draw the name and value of each curve next to its end, and the axis ranges."""
         small = 0.9 * size
@@ -169,7 +169,7 @@ class EnergyGraph:
 
 
 def _draw_curve_piece(
-    surface: pygame.Surface, points: Sequence[tuple[float, float]], colour: Colour, thickness: int
+    surface: pygame.Surface, points: Sequence[tuple[float, float]], colour: RgbColour, thickness: int
 ) -> None:
     if len(points) < 2:
         return

@@ -6,18 +6,15 @@ from pathlib import Path
 
 import pygame
 
-from sandbox.games.billiards.view.hud import BilliardsHud
-from sandbox.games.billiards.view.table_game import PLAYERS
 from sandbox.games.contract import HasViewState
-from sandbox.window.app_state import AppState, scenes_to_pick
+from sandbox.window.app_state import MAX_MESSAGES, AppState, scenes_to_pick
 from sandbox.window.camera import Camera
-from sandbox.window.game_host import GameDisplay, ScoreDisplay
+from sandbox.window.game_host import GameDisplay, GameHost, ScoreDisplay
 from sandbox.window.input.body_tools import describe_loss
-from sandbox.window.messages import MAX_MESSAGES
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.parameters import Parameter, SessionParameters
 from sandbox.window.playback.recorded import RecordedView
-from sandbox.window.playback.snapshot import OVERLAYS
+from sandbox.window.playback.snapshot import OVERLAYS, HudStatus
 from sandbox.window.render.palette import BACKGROUND, INK
 from sandbox.window.render.renderer import InsetRenderer, Renderer
 from sandbox.window.render.text import draw_box, draw_text, text_size
@@ -49,7 +46,6 @@ class Gui:
         self.help = HelpOverlay()
         self.scene_browser: SceneBrowser | None = None
         """None while closed"""
-        self.billiards_hud = BilliardsHud()
         self._high_scores = HighScoreDialog()
         self._timeline = Timeline()
         self._graph = EnergyGraph()
@@ -58,6 +54,8 @@ class Gui:
         self._parameters = SessionParameters()
         self._size = size
         self._announces_keys = False  # whether the keys of a new scene are still to be announced
+        self._display: GameDisplay | None = None  # of the game, and status, from `update` to the end of `draw`
+        self._status: HudStatus | None = None
         self._score: tuple[object, ScoreLayout] | None = None  # arguments of the last layout, and the layout
         self._panel_inputs: tuple[object, ...] = ()  # values shown by the panel at its last update
         self._heard: object = None  # contacts that were last passed to the sounds
@@ -67,20 +65,23 @@ class Gui:
         self._plates: dict[str, pygame.Rect] = {}
 
     def on_scene_changed(self, same: bool) -> None:
-        """Reset the state that belongs to the previous scene; the keys of a new one are announced at its first frame.
-
-        Not earlier, as the first frame may compile kernels for longer than a message is shown.
-        """
+        """Reset the state that belongs to the previous scene; `same` if the new view is of the same scene."""
         self._graph.clear()
         self._panel_inputs = ()
         if not same:
             self._announces_keys = True
 
     def announce_keys(self, stage: AppState) -> None:
-        """Add messages that list the keys of the scene."""
+        """Add messages that list the keys of a new scene.
+
+        To be called after its first picture, which may compile kernels for longer than a message is shown.
+        """
+        if not self._announces_keys:
+            return
+        self._announces_keys = False
         help_lines = stage.key_bindings.help_rows
-        if stage.game is not None:
-            stage.messages.add("aim with the mouse, shoot with Space; H lists all keys")
+        if stage.controls is not None:
+            stage.messages.add(stage.controls.hint)
         elif len(help_lines) > MAX_MESSAGES:  # more than are shown at a time
             stage.messages.add(f"keys: {', '.join(keys for keys, _ in help_lines)} (F1: help)")
         else:
@@ -121,20 +122,24 @@ class Gui:
         show, area = stage.view, self.area
         if show is None:
             return []
-        status = hud_status(stage, stage.key_bindings.help_rows, 0.0, None)
-        rows = hud.layout_rows(replace(status, paused=True, waits_for_start=False), area, self.ui_scale)
+        status = self._status or hud_status(stage, stage.key_bindings.help_rows, 0.0, None)
+        longest = replace(status, paused=True, waits_for_start=False, frames_per_second=0.0, recording=None)
+        rows = hud.layout_rows(longest, area, self.ui_scale)
         found = [rows.rect]
-        if stage.gestures is not None:
-            found += self.billiards_hud.taken(stage.gestures.person, area, self._hud_width(show), self.ui_scale)
+        if stage.controls is not None:
+            found += stage.controls.hud.reserved(area, self._hud_width(show), self.ui_scale)
         elif stage.host is not None:
-            found.append(self._layout_score(stage.host.shown().board, show).rect)
+            found.append(self._layout_score(self._display_of(stage.host).board, show).rect)
         return found
 
     def score_margins(self, stage: AppState) -> tuple[int, int]:
         """Return the heights of the score panel at the top and at the bottom of the area, px."""
-        if stage.host is None or stage.gestures is not None or stage.view is None:
+        if stage.host is None or stage.controls is not None or stage.view is None:
             return 0, 0
-        return self._layout_score(stage.host.shown().board, stage.view).margins(self.area)
+        return self._layout_score(self._display_of(stage.host).board, stage.view).margins(self.area)
+
+    def _display_of(self, host: GameHost) -> GameDisplay:
+        return self._display or host.shown()
 
     def _layout_score(self, display: ScoreDisplay, show: LiveView | RecordedView) -> ScoreLayout:
         """Return the layout of the score panel, cached for the last arguments."""
@@ -180,7 +185,7 @@ class Gui:
         if self.scene_browser is not None and event.type != pygame.QUIT:
             self._browse(self.scene_browser, event, stage)
             return True
-        if stage.host is not None and self._high_scores.handle_event(event):
+        if stage.host is not None and self._high_scores.entry is not None and self._high_scores.handle_event(event):
             return True
         if (self.help.open and self.help.handle_event(event)) or self._close_faults(event, stage):
             return True
@@ -189,7 +194,7 @@ class Gui:
         if self.panel.handle_event(event):
             return True
         show = stage.view
-        if stage.gestures is not None and self.billiards_hud.handle(event, stage.gestures.person, stage.run_handler):
+        if stage.controls is not None and stage.controls.hud.handle_event(event, stage.run_handler):
             return True
         if show is not None and self._timeline_rect.height:
             held = self._timeline.held
@@ -222,39 +227,55 @@ class Gui:
         stage.faults = ()
         return True
 
-    def draw(
-        self, surface: pygame.Surface, camera: Camera, stage: AppState, frame_rate: float, recording: str | None
-    ) -> None:
-        """Draw the scene and all widgets.
+    def update(self, stage: AppState, frame_rate: float, recording: str | None) -> None:
+        """Update the status and the high-score dialog for the next picture.
+
+        Args:
+            stage: the application state.
+            frame_rate: frames per second.
+            recording: length and format of the film being recorded, if any.
+        """
+        host, controls = stage.host, stage.controls
+        self._display = None if host is None else host.shown()
+        if host is not None and not self.help.open and (controls is None or controls.is_own_score):
+            for note in self._high_scores.update(host):
+                stage.messages.add(note, "warning")
+        self._status = hud_status(stage, stage.key_bindings.help_rows, frame_rate, recording)
+
+    def draw(self, surface: pygame.Surface, camera: Camera, stage: AppState) -> None:
+        """Draw the scene and all widgets, with the status of the last `update`.
 
         Args:
             surface: the window.
             camera: its camera.
             stage: the application state.
-            frame_rate: frames per second.
-            recording: length and format of the film being recorded, if any.
         """
+        assert self._status is not None, "update comes first"
+        self._draw(surface, camera, stage, self._status, self._display)
+        self._status = self._display = None  # outdated by the next event
+
+    def _draw(
+        self,
+        surface: pygame.Surface,
+        camera: Camera,
+        stage: AppState,
+        status: HudStatus,
+        display: GameDisplay | None,
+    ) -> None:
         show = stage.view
         if self.scene_browser is not None:
             self.scene_browser.draw(surface, self.ui_scale)
             return
         plates: dict[str, pygame.Rect] = {}
-        display = stage.host.shown() if stage.host is not None else None
         if show is None:
             surface.fill(BACKGROUND)
         else:
             self._draw_scene(surface, camera, stage, show, display, plates)
             self._play_sounds(stage, show)
-        if stage.game is None:
-            self.billiards_hud.foot = 0
         if show is not None:
             if not self.help.open:
                 self._draw_game(surface, stage, show, display, plates)
             self._draw_graph(surface, stage, plates)
-        if self._announces_keys:
-            self._announces_keys = False
-            self.announce_keys(stage)
-        status = hud_status(stage, stage.key_bindings.help_rows, frame_rate, recording)
         self._faults = hud.draw_hud(
             surface,
             replace(status, out_of_sight=self.describe_out_of_view(stage)),
@@ -265,7 +286,7 @@ class Gui:
             plates=plates,
         )
         if show is not None:
-            if stage.host is not None and not self.help.open:
+            if self._high_scores.entry is not None and not self.help.open:
                 self._high_scores.draw(surface, self.area, self.ui_scale)
             if self.bottom_margin:
                 plates["timeline"] = rect = self._timeline_rect
@@ -276,7 +297,7 @@ class Gui:
         self._plates = plates
         if self.panel.visible:
             plates["panel"] = pygame.Rect(self._size[0] - self.panel.width, 0, self.panel.width, self._size[1])
-            self._update_panel(stage, recording is not None)
+            self._update_panel(stage, status.recording is not None)
             self.panel.draw(surface)
         if self.help.open:
             self.help.draw(surface, self.ui_scale, stage.key_bindings.help_rows)
@@ -291,15 +312,17 @@ class Gui:
         plates: dict[str, pygame.Rect],
     ) -> None:
         """Draw the scene and its inset, if any."""
-        pull = stage.body_tools.spring_line(show) if isinstance(show, LiveView) else None
+        pull = None
+        if isinstance(show, LiveView) and stage.body_tools.held is not None:
+            pull = stage.body_tools.spring_line(show)
         snapshot = show.snapshot(frozenset(self.overlays), stage.body_tools.picked, pull)
-        if stage.gestures is not None:
-            snapshot = stage.gestures.seen.over(snapshot)
         if stage.host is not None and display is not None:
             snapshot = replace(snapshot, lit=display.lit)
             rules = stage.host.rules
             if isinstance(rules, HasViewState):
                 snapshot = replace(snapshot, game=rules.view_state(snapshot.frame.time))
+        if stage.controls is not None:
+            snapshot = stage.controls.annotate(snapshot)
         status_plate = self._plates.get("state")
         if status_plate is not None:
             snapshot = replace(snapshot, below=float(status_plate.bottom))
@@ -343,17 +366,14 @@ class Gui:
         display: GameDisplay | None,
         plates: dict[str, pygame.Rect],
     ) -> None:
-        """Draw the score panel, or the controls of a billiard table."""
-        if stage.gestures is not None:
-            left = self._hud_width(show)
-            self.billiards_hud.draw(surface, stage.gestures.person, self.area, left, self.ui_scale)
-            plates |= self.billiards_hud.plates(self.area, self.ui_scale)
+        """Draw the score panel, or the HUD of a game that has its own."""
+        if stage.controls is not None:
+            stage.controls.hud.draw(surface, self.area, self._hud_width(show), self.ui_scale)
+            plates |= stage.controls.hud.plates(self.area, self.ui_scale)
         elif display is not None:
             layout = self._layout_score(display.board, show)
             draw_score(surface, layout)
             plates["score"] = layout.rect
-            for note in self._high_scores.update(stage.host):
-                stage.messages.add(note, "warning")
 
     def draw_wait(self, surface: pygame.Surface, text: str) -> None:
         """Draw a progress notice in the centre of the surface, which may be locked by an interrupted drawing call."""
@@ -396,7 +416,7 @@ class Gui:
 
     def _update_panel(self, stage: AppState, recording: bool) -> None:
         """Update the panel if any value that it shows has changed or a widget has been used."""
-        live, game = stage.live, stage.game
+        live, controls = stage.live, stage.controls
         toggles = {name: name in self.overlays for name in OVERLAYS}
         if live is not None:
             toggles |= {"ghost": live.diagnostics.has_ghost, "trust": live.diagnostics.divergence is not None}
@@ -417,8 +437,16 @@ class Gui:
             if live is None
             else (live.session, live.scene, live.settings, live.session.simulation.wanted, live.bodies)
         )
-        table = () if game is None else (game, game.players, game.misses)
-        inputs = (*session, *table, stage.file, stage.body_tools.picked, *toggles.values(), *buttons)
+        choices = () if controls is None else controls.parameters()
+        inputs = (
+            *session,
+            controls,
+            *(each.value for each in choices),
+            stage.file,
+            stage.body_tools.picked,
+            *toggles.values(),
+            *buttons,
+        )
         same = len(inputs) == len(self._panel_inputs) and all(map(is_, inputs, self._panel_inputs))
         if same and not self.panel.used:
             return
@@ -426,11 +454,7 @@ class Gui:
         parameters: tuple[Parameter, ...] = ()
         if live is not None and stage.file is not None:
             parameters = self._parameters.of(live, stage.file, stage.body_tools.picked)
-        if game is not None:
-            parameters = (*parameters, Parameter("players", "players", value=game.players, choices=PLAYERS))
-            if game.match.rules.name == "snooker":
-                misses = "on" if game.misses else "off"
-                parameters = (*parameters, Parameter("misses", "foul and a miss", value=misses, choices=("off", "on")))
+        parameters += tuple(Parameter(key, label, value=value, choices=each) for key, label, value, each in choices)
         self.panel.show(parameters, toggles, buttons)
 
     def close(self) -> None:

@@ -96,7 +96,7 @@ class HelpOverlay:
         _draw_columns(surface, columns, area.move(0, -round(self._scroll * size)), size, hint)
 
 
-Column = list[HelpGroup]
+HelpColumn = list[HelpGroup]
 
 
 def _group_widths(group: HelpGroup, size: float) -> tuple[int, int]:
@@ -110,12 +110,12 @@ def _group_height(group: HelpGroup, size: float) -> float:
     return (LINE_STEP * len(group.lines) + 2.9) * size
 
 
-def _column_widths(column: Column, size: float) -> tuple[int, int]:
+def _column_widths(column: HelpColumn, size: float) -> tuple[int, int]:
     widths = [_group_widths(group, size) for group in column]
     return max(keys for keys, _ in widths), max(words for _, words in widths)
 
 
-def _fit_columns(groups: Sequence[HelpGroup], area: pygame.Rect, ui_scale: float) -> tuple[float, list[Column]]:
+def _fit_columns(groups: Sequence[HelpGroup], area: pygame.Rect, ui_scale: float) -> tuple[float, list[HelpColumn]]:
     """Return the largest text size at which all groups fit, px, and the columns; at the smallest they may overflow."""
     for size in TEXT_SIZES:
         columns = _fill_columns(groups, area, size * ui_scale)
@@ -129,10 +129,10 @@ def _fit_columns(groups: Sequence[HelpGroup], area: pygame.Rect, ui_scale: float
     return smallest, [list(groups)]
 
 
-def _fill_columns(groups: Sequence[HelpGroup], area: pygame.Rect, size: float) -> list[Column] | None:
+def _fill_columns(groups: Sequence[HelpGroup], area: pygame.Rect, size: float) -> list[HelpColumn] | None:
     """Return the groups in the fewest columns that fit an area below the title; None if they do not fit."""
     max_height = area.height - TITLE_HEIGHT * size
-    columns: list[Column] = [[]]
+    columns: list[HelpColumn] = [[]]
     filled = 0.0
     for group in groups:
         height = _group_height(group, size)
@@ -148,8 +148,8 @@ def _fill_columns(groups: Sequence[HelpGroup], area: pygame.Rect, size: float) -
 
 
 def _balance_columns(
-    groups: Sequence[HelpGroup], area: pygame.Rect, size: float, columns: list[Column]
-) -> list[Column]:
+    groups: Sequence[HelpGroup], area: pygame.Rect, size: float, columns: list[HelpColumn]
+) -> list[HelpColumn]:
     """Return the same number of columns with heights as equal as possible."""
     for percent in range(40, 100, 4):
         lower = pygame.Rect(area.left, area.top, area.width, area.height * percent // 100)
@@ -159,7 +159,9 @@ def _balance_columns(
     return columns
 
 
-def _draw_columns(surface: pygame.Surface, columns: list[Column], area: pygame.Rect, size: float, hint: str) -> None:
+def _draw_columns(
+    surface: pygame.Surface, columns: list[HelpColumn], area: pygame.Rect, size: float, hint: str
+) -> None:
     widths = [_column_widths(column, size) for column in columns]
     gap = 2.4 * size
     total = sum(sum(width) + 1.2 * size for width in widths) + gap * (len(columns) - 1)

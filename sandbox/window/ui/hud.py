@@ -8,9 +8,9 @@ import pygame
 
 from sandbox.formatting import format_percent, format_si, format_time
 from sandbox.window.playback.snapshot import HudStatus
-from sandbox.window.render.palette import FAINT, GREEN, INK, ORANGE, PANEL, SKY, VERMILION, WARNING, Colour
+from sandbox.window.render.circles import draw_disc
+from sandbox.window.render.palette import FAINT, GREEN, INK, ORANGE, PANEL, SKY, VERMILION, WARNING, RgbColour
 from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size, wrap_text
-from sandbox.window.ui.icons import draw_disc
 
 MAX_SPEED_ERROR = 0.10
 """relative difference between real and requested speed above which both are shown"""
@@ -39,7 +39,7 @@ class HudRow(NamedTuple):
     """One row of the status plate."""
 
     text: str
-    colour: Colour = INK
+    colour: RgbColour = INK
     mark: Mark = ""
     """shape before the text, so that no state is shown by colour alone"""
     bold: bool = False
@@ -235,7 +235,7 @@ def _draw_rows(surface: pygame.Surface, rows: HudText, size: float) -> None:
 
 
 def draw_mark(
-    surface: pygame.Surface, mark: Mark, position: tuple[float, float], radius: float, colour: Colour
+    surface: pygame.Surface, mark: Mark, position: tuple[float, float], radius: float, colour: RgbColour
 ) -> None:
     """Draw the shape before a row."""
     x, y = position
@@ -254,7 +254,7 @@ def draw_mark(
             pygame.draw.rect(surface, colour, (x + side * radius, y - radius, 0.65 * radius, 2 * radius))
 
 
-def _draw_notice(surface: pygame.Surface, text: str, area: pygame.Rect, size: float, edge: Colour) -> None:
+def _draw_notice(surface: pygame.Surface, text: str, area: pygame.Rect, size: float, edge: RgbColour) -> None:
     """Draw a notice in the centre of the area."""
     lines = wrap_text(text, size, area.width - 2 * size, 3, bold=True)
     line_height = round(1.4 * size)

@@ -1,11 +1,11 @@
-"""Icons of buttons, and small discs, drawn oversampled and scaled down for smooth edges."""
+"""Icons of buttons, drawn oversampled and scaled down for smooth edges."""
 
 import math
 from functools import lru_cache
 
 import pygame
 
-from sandbox.window.render.palette import Colour
+from sandbox.window.render.palette import RgbColour
 
 ICON_NAMES = ("play", "pause", "step", "back", "restart", "camera", "record", "stop", "save", "help", "picker")
 _OVERSAMPLING = 4
@@ -14,7 +14,7 @@ _GRID = 24
 
 
 @lru_cache(maxsize=128)
-def icon(name: str, side: int, colour: Colour) -> pygame.Surface | None:
+def icon(name: str, side: int, colour: RgbColour) -> pygame.Surface | None:
     """Return an icon of `ICON_NAMES` with a side of `side` px; None for other names."""
     if name not in ICON_NAMES:
         return None
@@ -25,30 +25,10 @@ def icon(name: str, side: int, colour: Colour) -> pygame.Surface | None:
     return pygame.transform.smoothscale(large, (side, side))
 
 
-def draw_disc(
-    surface: pygame.Surface, position: tuple[float, float], radius: float, colour: Colour, hole: float = 0.0
-) -> None:
-    """Draw a small antialiased disc, or a ring with inner radius `hole` if that is positive; px."""
-    image = _disc(round(_OVERSAMPLING * max(radius, 0.5)), colour, round(_OVERSAMPLING * hole))
-    surface.blit(image, image.get_rect(center=(round(position[0]), round(position[1]))))
-
-
-@lru_cache(maxsize=256)
-def _disc(radius: int, colour: Colour, hole: int) -> pygame.Surface:
-    side = 2 * (radius // _OVERSAMPLING) + 3  # odd, so that there is a centre pixel
-    large = pygame.Surface((side * _OVERSAMPLING, side * _OVERSAMPLING), pygame.SRCALPHA)
-    large.fill((*colour, 0))
-    middle = large.get_rect().center
-    pygame.draw.circle(large, colour, middle, radius)
-    if hole > 0:
-        pygame.draw.circle(large, (*colour, 0), middle, hole)
-    return pygame.transform.smoothscale(large, (side, side))
-
-
 class _Pen:
     """Draws icons on a grid of 24 by 24 units."""
 
-    def __init__(self, surface: pygame.Surface, scale: float, colour: Colour) -> None:
+    def __init__(self, surface: pygame.Surface, scale: float, colour: RgbColour) -> None:
         self.surface, self.scale, self.colour = surface, scale, colour
 
     def draw(self, name: str) -> None:

@@ -13,11 +13,11 @@ import pygame
 from sandbox.engines.contract import Divergence, Exhaustion
 from sandbox.engines.registry import able, start
 from sandbox.scene.compile.generators import GeneratorError
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import load
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
-from sandbox.window.camera import Box, Camera
+from sandbox.window.camera import Camera, ViewBox
 from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.palette import BACKGROUND, FAINT, INK, LINE, PANEL, PANEL_RAISED, SKY, WARNING
 from sandbox.window.render.renderer import Renderer
@@ -70,7 +70,7 @@ def draw_thumbnail(scene: Scene, size: tuple[int, int], renderer: Renderer, ui_s
     return surface
 
 
-def _is_burst(scene: Scene, box: Box) -> bool:
+def _is_burst(scene: Scene, box: ViewBox) -> bool:
     """Return whether all bodies start close to one point and collide with nothing."""
     bodies = scene.bodies
     if len(bodies) < 2 or any(element.collides != "none" for element in bodies.elements):

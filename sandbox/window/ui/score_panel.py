@@ -5,9 +5,9 @@ from typing import NamedTuple
 import pygame
 
 from sandbox.window.game_host import ScoreDisplay
+from sandbox.window.render.circles import draw_disc
 from sandbox.window.render.palette import FAINT, GREEN, INK, LINE, WARNING
 from sandbox.window.render.text import draw_box, draw_text, ellipsis, text_size, wrap_text
-from sandbox.window.ui.icons import draw_disc
 
 FRAME_RATE_WIDTH = 66.0
 """px at UI scale 1, reserved at the right for the frame rate"""

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 import pygame
 
 from sandbox.formatting import format_time
+from sandbox.window.render.circles import draw_disc
 from sandbox.window.render.palette import FAINT, INK, LINE, ORANGE, PANEL_RAISED, SKY
 from sandbox.window.render.text import draw_box, draw_text, text_size
-from sandbox.window.ui.icons import draw_disc
 
 TIMELINE_HEIGHT = 34
 """px at UI scale 1"""

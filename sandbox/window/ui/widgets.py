@@ -9,9 +9,20 @@ from typing import Literal, NamedTuple
 import pygame
 
 from sandbox.window.playback.parameters import Parameter, ParameterValue
-from sandbox.window.render.palette import BACKGROUND, FAINT, INK, LINE, PANEL_RAISED, SKY, WARNING, Colour, mix_colours
+from sandbox.window.render.circles import draw_disc
+from sandbox.window.render.palette import (
+    BACKGROUND,
+    FAINT,
+    INK,
+    LINE,
+    PANEL_RAISED,
+    SKY,
+    WARNING,
+    RgbColour,
+    mix_colours,
+)
 from sandbox.window.render.text import draw_text, ellipsis, text_size
-from sandbox.window.ui.icons import draw_disc, icon
+from sandbox.window.ui.icons import icon
 
 WIDGET_TEXT_SIZE = 12.5
 """px at UI scale 1"""
@@ -81,7 +92,7 @@ class Widget:
         return (*self.rect, self.ui_scale, self.held, self.hovered, self.enabled)
 
     @property
-    def text_colour(self) -> Colour:
+    def text_colour(self) -> RgbColour:
         """Colour of label and value; dimmed while disabled."""
         return INK if self.enabled else mix_colours(FAINT, BACKGROUND, 0.35)
 

@@ -4,7 +4,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import accounts
 import numpy as np
 import pytest
 
@@ -12,8 +11,9 @@ import sandbox
 from sandbox.action import Impulse, Move, Remove, SetParameter, Spawn
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.registry import start
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
+from tests import accounts
 
 SCENES = Path(__file__).parents[3] / "scenes"
 G = 10.0

@@ -4,13 +4,15 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from strategies import Document, documents
 
 from sandbox.engines.contract import Divergence, Exhaustion
 from sandbox.engines.exact.engine import ExactEngine
 from sandbox.engines.exact.simulation import ExactSimulation
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
+from tests.strategies import Document, documents
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 
 @st.composite

@@ -10,6 +10,8 @@ from scipy.integrate import solve_ivp
 from sandbox.engines.exact.engine import ExactEngine
 from sandbox.scene.files.load import from_document
 
+pytestmark = pytest.mark.full  # long runs and sweeps
+
 G = 9.81
 mpmath.mp.dps = 40
 

@@ -183,7 +183,7 @@ def test_what_is_too_fast_is_given_up(monkeypatch):
 
 def test_refusals_name_what_is_missing_and_who_could():
     drag = from_document({**BOUNCE, "world": {"gravity": [0, -G], "linear_drag": 0.1}})
-    with pytest.raises(Refusal, match=r"exact refuses: it does not model drag; engines that can: .*pymunk"):
+    with pytest.raises(Refusal, match=r"^exact .* drag.*pymunk"):
         start(drag, "exact")
     scene, engine = from_document(BOUNCE), ExactEngine()
     for choice in (
@@ -206,7 +206,7 @@ def test_overlaps_are_refused_and_touches_are_not():
 
     engine = ExactEngine()
     (lack,) = engine.missing(balls(-0.1), balls(0).solver)
-    assert lack == "'ball-1' and 'ball-2' overlap by 0.1 m, and it cannot separate overlapping bodies"
+    assert lack.startswith("'ball-1' and 'ball-2' overlap by 0.1 m")
     assert engine.missing(balls(-1e-10), balls(0).solver) == ()
     assert engine.missing(balls(-0.1, collides="fixed"), balls(0).solver) == ()
     sunk = from_document({**BOUNCE, "ball": [{"position": [0, 0.4], "radius": 0.5}]})

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.engines.exact.roots import curved_entry, first_downward_root, polynomial, quadratic_roots
+from sandbox.engines.exact.common.roots import curved_entry, first_downward_root, polynomial, quadratic_roots
 
 small = st.floats(-10, 10).map(lambda x: round(x, 3))
 

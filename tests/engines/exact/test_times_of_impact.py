@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from sandbox.engines.exact.roots import line_entry, pair_entry
+from sandbox.engines.exact.common.roots import line_entry, pair_entry
 
 
 def touches(dx, dy, vx, vy, reach):

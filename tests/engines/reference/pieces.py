@@ -7,9 +7,9 @@ from typing import Any
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.contract import Simulation
 from sandbox.engines.registry import start
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.files.load import from_document, load
-from sandbox.scene.scene import Scene
 
 ROOT = Path(__file__).resolve().parents[3]
 

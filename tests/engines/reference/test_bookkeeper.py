@@ -14,12 +14,15 @@ from scipy.integrate import solve_ivp
 from sandbox.action import Action, Force, Impulse, Launch, Move, Pull, Remove, SetParameter, Spawn, Switch
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.switching import start
-from sandbox.measure.ledger import Ledger, ledger
-from sandbox.measure.run import run
+from sandbox.measure.metrics.energy import Ledger
+from sandbox.measure.run.runner import run
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.scene.scene import Scene
+from tests.accounts import ledger
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 CLOSED = 1e-9  # the promise; what is found is the rounding of sums, some 1e-11 at most
 G = 9.81
@@ -287,12 +290,13 @@ def test_an_account_opens_empty_and_late() -> None:
 
 SAME = """
 import json, sys
-from sandbox.measure.ledger import ledger
+from sandbox.jsonable import to_json
+from tests.accounts import ledger
 from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find
 scene = load(find("joints/ragdoll_stairs"))
 scene = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": 0.1})})
-print(json.dumps(ledger(scene, "reference").document()))
+print(json.dumps(to_json(ledger(scene, "reference").document())))
 """
 
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from pieces import ball, roster_of, running, scene_of, shipped, small_pile, stepped
 
 from sandbox.engines.reference.broad_phase import BROAD_PHASES, FIRST, SECOND, can_collide, cell_of, pair_key
 from sandbox.engines.reference.collision import CirclePipeline
+from tests.engines.reference.pieces import ball, roster_of, running, scene_of, shipped, small_pile, stepped
 
 WORDS = st.sampled_from(["all", "fixed", "none"])
 
@@ -159,10 +159,8 @@ def test_circles_tests_every_pair_that_may_meet_and_the_others_far_fewer():
         finder = CirclePipeline(store, name)
         finder.overlaps(store.position)
         tests[name] = finder.work["broad_tests"]
-    assert tests["all_pairs"] == 0
-    assert tests["circles"] == 400 * 399 // 2 + 400 * 2 + 2
-    assert tests["grid"] < 1000  # at most the neighbours of each
-    assert tests["sweep"] < 1000  # likewise
+    assert tests["circles"] >= 400 * 399 // 2  # each pair of moving balls
+    assert max(tests["grid"], tests["sweep"]) < tests["circles"] / 50  # at most the neighbours of each
 
 
 def test_one_huge_ball_spoils_the_grid_and_not_the_sweep():
@@ -173,8 +171,8 @@ def test_one_huge_ball_spoils_the_grid_and_not_the_sweep():
         finder = CirclePipeline(store, name)
         finder.overlaps(store.position)
         tests[name] = finder.work["broad_tests"]
-    assert tests["grid"] == 201 * 200 // 2  # all are in one cell, or in the next
-    assert tests["sweep"] < 500
+    assert tests["grid"] >= 200 * 199 // 2  # all are in one cell, or in the next
+    assert tests["sweep"] < tests["grid"] / 20
 
 
 def same_runs(scene, steps, **settings):

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from outlines import box, capsule, disc, met, met_plane, moved, pairs
 from shapely import LineString, Point
 
-from sandbox.engines.reference.polygon import FAVOUR, clip, closest_points
+from sandbox.engines.reference.polygon import REFERENCE_FACE_BIAS, clip, closest_points
+from tests.engines.reference.outlines import box, capsule, disc, met, met_plane, moved, pairs
 
 ROUNDING = 1e-15
 """some ulps of numbers about 1"""
@@ -54,7 +54,9 @@ def test_points_lie_midway():
             one, other = sorted((abs(near), abs(far)))
             assert one == pytest.approx(0.0, abs=1e-9 * size)  # SLACK; the reference face is the same at both points
             if separation == rows[:, 2].min():
-                assert other == pytest.approx(0.0, abs=FAVOUR * size)  # by it a corner may be beside the face
+                assert other == pytest.approx(
+                    0.0, abs=REFERENCE_FACE_BIAS * size
+                )  # by it a corner may be beside the face
 
 
 def test_features_are_counted_along_the_normal_turned_left():

@@ -1,7 +1,6 @@
 """Convex pieces: separations against shapely and qhull, contacts against pymunk, symmetries, extremes."""
 
 import math
-import os
 import subprocess
 import sys
 
@@ -9,7 +8,12 @@ import numpy as np
 import pymunk
 import pytest
 import shapely
-from outlines import (
+from scipy.spatial import ConvexHull
+
+from sandbox.engines.reference import polygon as convex
+from sandbox.engines.reference.manifold import circle_circle, circle_segment
+from sandbox.engines.reference.polygon import PARALLEL, REFERENCE_FACE_BIAS
+from tests.engines.reference.outlines import (
     any_outline,
     body_of,
     box,
@@ -23,12 +27,8 @@ from outlines import (
     ring,
     separation_of,
 )
-from pieces import ROOT
-from scipy.spatial import ConvexHull
-
-from sandbox.engines.reference import polygon as convex
-from sandbox.engines.reference.manifold import circle_circle, circle_segment
-from sandbox.engines.reference.polygon import FAVOUR, LEVEL
+from tests.engines.reference.pieces import ROOT
+from tests.environment import with_root_on_path
 
 PAIRS = 1000
 
@@ -54,7 +54,9 @@ def test_separations_are_shapelys_distances_and_qhulls_least_penetrations():
         overlaps += exact < 0.0
         one, other = nearest_to(exact, p, q)
         assert one == pytest.approx(exact, abs=1e-9 * size)  # SLACK
-        assert other == pytest.approx(exact, abs=FAVOUR * size)  # the first piece's face is favoured in one order
+        assert other == pytest.approx(
+            exact, abs=REFERENCE_FACE_BIAS * size
+        )  # the first piece's face is favoured in one order
     assert 0.3 * PAIRS < overlaps < 0.7 * PAIRS
 
 
@@ -74,7 +76,9 @@ def test_separations_hold_from_micrometres_to_a_thousand_kilometres():
         one, other = nearest_to(exact, p, q)
         rounding = 1e-14 * scales.max()  # some ulps of the coordinates
         assert one == pytest.approx(exact, abs=1e-9 * scales.min() + rounding)  # SLACK
-        assert other == pytest.approx(exact, abs=3 * FAVOUR * scales.min() + rounding)  # faces are up to 3 long
+        assert other == pytest.approx(
+            exact, abs=3 * REFERENCE_FACE_BIAS * scales.min() + rounding
+        )  # faces are up to 3 long
 
 
 def test_moved_along_the_normal_by_the_separation_pieces_just_touch():
@@ -82,7 +86,7 @@ def test_moved_along_the_normal_by_the_separation_pieces_just_touch():
         nx, ny, separation = deepest(met(p, q))[:3]
         assert math.hypot(nx, ny) == pytest.approx(1.0, abs=1e-15)  # two divisions, a root
         touching = moved(q, -separation * nx, -separation * ny)
-        assert separation_of(p, touching) == pytest.approx(0.0, abs=FAVOUR * size)  # as above
+        assert separation_of(p, touching) == pytest.approx(0.0, abs=REFERENCE_FACE_BIAS * size)  # as above
 
 
 def test_normals_of_what_is_apart_lie_along_the_shortest_line():
@@ -93,7 +97,7 @@ def test_normals_of_what_is_apart_lie_along_the_shortest_line():
             count += 1
             (ax, ay), (bx, by) = line.coords
             normal = (bx - ax) / line.length, (by - ay) / line.length
-            assert deepest(met(p, q))[:2] == pytest.approx(normal, abs=LEVEL)  # level faces may change roles
+            assert deepest(met(p, q))[:2] == pytest.approx(normal, abs=PARALLEL)  # level faces may change roles
     assert count > 0.3 * PAIRS
 
 
@@ -123,7 +127,7 @@ def test_swapping_the_pieces_turns_the_normal_round():
         one, other = met(p, q), met(q, p)
         if len(one) != len(other) or abs(one[0, :2] + other[0, :2]).max() > 1e-12:
             # Two faces part them as well, but for the favour.
-            assert deepest(one)[2] == pytest.approx(deepest(other)[2], abs=FAVOUR * size)
+            assert deepest(one)[2] == pytest.approx(deepest(other)[2], abs=REFERENCE_FACE_BIAS * size)
             continue
         same += 1
         # Left of the normal is right of its opposite: what was the first point is the second.
@@ -140,7 +144,9 @@ def test_turned_and_shifted_together_pieces_touch_as_before():
     for p, q, size in pairs(6, PAIRS):
         angle, shift = random.uniform(0, 2 * math.pi), random.normal(0, 10, 2)
         one, other = met(p, q), met(moved(p, *shift, angle), moved(q, *shift, angle))
-        assert deepest(one)[2] == pytest.approx(deepest(other)[2], abs=FAVOUR * size)  # a tie may be decided otherwise
+        assert deepest(one)[2] == pytest.approx(
+            deepest(other)[2], abs=REFERENCE_FACE_BIAS * size
+        )  # a tie may be decided otherwise
         turned = one.copy()
         turned[:, :2] = moved((one[:, :2], 0.0), 0.0, 0.0, angle)[0]
         turned[:, 3:5] = moved((one[:, 3:5], 0.0), *shift, angle)[0]
@@ -186,10 +192,10 @@ def test_the_tests_taken_are_those_that_fit(monkeypatch):
         "collide_disc",
         "disc_polygon",
         "collide_faces",
-        "facing",
+        "select_faces",
         "widest_gap",
         "clip",
-        "write",
+        "write_point",
     ):
         plain[name] = getattr(getattr(convex, name), "py_func", getattr(convex, name))
         monkeypatch.setattr(convex, name, plain[name])
@@ -331,11 +337,8 @@ def test_rings_of_a_thousand_corners_are_nearly_discs():
 
 HASH = """
 import hashlib
-import sys
-
-sys.path.insert(0, {here!r})
 import numpy as np
-from outlines import any_outline, met, met_plane, moved
+from tests.engines.reference.outlines import any_outline, met, met_plane, moved
 
 random = np.random.default_rng(11)
 digest = hashlib.sha256()
@@ -347,12 +350,11 @@ print(digest.hexdigest())
 
 
 def test_compiled_or_not_the_answers_are_the_same_to_the_bit():
-    script = HASH.format(here=str(ROOT / "tests" / "engines" / "reference"))
     told = set()
     for disabled in ("0", "1"):
-        environment = {**os.environ, "NUMBA_DISABLE_JIT": disabled}
+        environment = with_root_on_path(NUMBA_DISABLE_JIT=disabled)
         run = subprocess.run(
-            [sys.executable, "-c", script], env=environment, cwd=ROOT, capture_output=True, text=True, check=True
+            [sys.executable, "-c", HASH], env=environment, cwd=ROOT, capture_output=True, text=True, check=True
         )
         told.add(run.stdout)
     assert len(told) == 1

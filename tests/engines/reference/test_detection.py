@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pieces import EARTH, FLOOR, ball, running, scene_of, shipped, stepped
 
 from sandbox.action import ActionError, Spawn
 from sandbox.engines.contract import Exhaustion
 from sandbox.engines.reference.continuous import DETECTIONS, MAX_IMPACTS
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
 from sandbox.scene.description.bodies import Box
+from tests.engines.reference.pieces import EARTH, FLOOR, ball, running, scene_of, shipped, stepped
+
+pytestmark = pytest.mark.full  # hundreds of combinations
 
 UNSEEING, SEEING = ["discrete", "bisect"], ["swept", "shrink"]
 

@@ -7,11 +7,13 @@ from hypothesis import strategies as st
 
 import sandbox
 from sandbox.engines.energy_ledger import Cause
-from sandbox.engines.reference.dissipation import largest_fractions
-from sandbox.measure.forecast import forecast
-from sandbox.measure.ledger import ledger
+from sandbox.engines.reference.sequential_impulses import largest_fractions
+from sandbox.measure.preflight import run_preflight
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
+from tests.accounts import ledger
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 ROOM = [
     {"point": [0, -2], "normal": [0, 1]},
@@ -121,10 +123,10 @@ def test_check_foretells_what_impacts_create(engine: str) -> None:
             "box": [{**box, "angle": 1.36}],
         }
     )
-    (told,) = [each for each in forecast(scene, engine=engine).warnings if each.kind == "energy"]
+    (told,) = [each for each in run_preflight(scene, engine=engine).warnings if each.kind == "energy"]
     assert "dissipative" in told.message
     cut = scene.solver.replace(impact="dissipative")
-    assert not [each for each in forecast(scene, cut, "reference").warnings if each.kind == "energy"]
+    assert not [each for each in run_preflight(scene, cut, "reference").warnings if each.kind == "energy"]
 
 
 def test_largest_share_is_where_the_work_ends_to_take() -> None:

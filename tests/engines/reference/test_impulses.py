@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pieces import EARTH, FLOOR, ball, running, scene_of, stepped
 
 from sandbox.engines.reference.manifold import Manifolds
 from sandbox.engines.reference.sequential_impulses import (
     approach,
+    match_impulses,
     rebound_speeds,
-    remembered,
     solve_overlaps,
     solve_velocities,
 )
+from tests.engines.reference.pieces import EARTH, FLOOR, ball, running, scene_of, stepped
 
 
 def contacts(*rows):
@@ -29,7 +29,7 @@ def contacts(*rows):
         normal=np.array(normal, float),
         separation=np.array(separation, float),
         point=np.zeros((count, 2)),
-        arm=np.array(arms, float),
+        anchor=np.array(arms, float),
         offset=np.zeros((count, 2)),
         friction=np.array(friction, float),
         surface_pair=np.arange(count),
@@ -159,7 +159,7 @@ def test_remembered_are_those_of_the_same_key(old, new):
     old_key, key = np.array(sorted(old), np.int64), np.array(sorted(new), np.int64)
     values = np.column_stack((old_key + 0.5, -old_key - 1.0)).astype(float).reshape(-1, 2)
     impulse = np.zeros((len(key), 2))
-    remembered(key, old_key, values, impulse)
+    match_impulses(key, old_key, values, impulse)
     expected = [[k + 0.5, -k - 1.0] if k in old else [0.0, 0.0] for k in key.tolist()]
     assert impulse.tolist() == expected
 

@@ -4,11 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from joint_rig import G, Rig, compile_joints, link
 from scipy.optimize import brentq
 
-from sandbox.engines.reference.joints import CAP
+from sandbox.engines.reference.joints import MAX_STRETCH
 from sandbox.scene.compile.joint_arrays import LinkKind
+from tests.engines.reference.joint_rig import G, Rig, compile_joints, link
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 
 def discrete_sag(links=20, span=1.0, length=1.4):
@@ -73,13 +75,13 @@ def test_relaxation_is_as_stiff_as_it_has_iterations():
 
 def test_capped_springs_stretch_to_their_cap_and_no_farther():
     _, free = hanging("relaxation", 50, stiffness=60.0)
-    _, capped = hanging("relaxation", 50, stiffness=60.0, cap=CAP)
+    _, capped = hanging("relaxation", 50, stiffness=60.0, cap=MAX_STRETCH)
     assert free.max() > 1.5 * 0.1  # it takes a cap
     assert capped.max() < 0.11 * (1 + 1e-3)  # as far as 50 passes converge: measured 4e-4
 
 
 def test_springs_of_no_rest_length_have_no_cap():
     held = compile_joints(link(LinkKind.SPRING, -1, 0, 0.0, 10.0))
-    one = Rig(held, [1, 0], how="relaxation", cap=CAP).run(0.3, 0.01)
+    one = Rig(held, [1, 0], how="relaxation", cap=MAX_STRETCH).run(0.3, 0.01)
     other = Rig(held, [1, 0], how="relaxation").run(0.3, 0.01)
     assert np.array_equal(one.x, other.x)

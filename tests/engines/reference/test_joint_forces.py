@@ -4,9 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from joint_rig import Rig, compile_joints
 
-from sandbox.engines.reference.forces import attract, thrust
+from sandbox.engines.reference.forces import add_attraction, add_thrust
+from tests.engines.reference.joint_rig import Rig, compile_joints
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 
 def pull(inverse_mass, *, target=-1, place=(0.0, 0.0), strength=1.0, softening=0.0):
@@ -15,7 +17,7 @@ def pull(inverse_mass, *, target=-1, place=(0.0, 0.0), strength=1.0, softening=0
 
     def forces(x):
         out = np.zeros_like(x[1])
-        attract(x[0], *arrays, np.asarray(inverse_mass, dtype=float), out)
+        add_attraction(x[0], *arrays, np.asarray(inverse_mass, dtype=float), out)
         return out
 
     return forces
@@ -81,7 +83,7 @@ def push_of(throttle, *, force, point=(0.0, 0.0), inverse_mass=0.5, inverse_mome
 
     def forces(x):
         out = np.zeros_like(x[1])
-        thrust(x[0], *own, np.array([inverse_mass]), np.array([inverse_moment]), out)
+        add_thrust(x[0], *own, np.array([inverse_mass]), np.array([inverse_moment]), out)
         return out
 
     return forces

@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from joint_rig import BIAS, G, Rig, compile_joints, link
 
 from sandbox.engines.reference.integrators import INTEGRATORS
-from sandbox.engines.reference.joints import LACKING, METHODS, JointSolver
+from sandbox.engines.reference.joints import METHODS, UNSUPPORTED, JointSolver
 from sandbox.scene.compile.joint_arrays import LinkKind
+from tests.engines.reference.joint_rig import BIAS, G, Rig, compile_joints, link
 
 HOW = [
     *((how, "semi_implicit_euler") for how in METHODS),
@@ -174,7 +174,7 @@ def test_a_single_short_step_between_long_ones_is_no_blow():
     assert np.abs(rig.rates).max() < quiet + 2 * G / 120  # at most a step of falling where passes are too few
 
 
-@pytest.mark.parametrize("kind", LACKING)
+@pytest.mark.parametrize("kind", UNSUPPORTED)
 def test_kinds_that_are_lacking_are_refused_by_name(kind):
     with pytest.raises(ValueError, match=kind.name.lower()):
         JointSolver(compile_joints(link(kind, -1, 0)), np.ones(1), np.ones(1), BIAS, 10, "impulses")

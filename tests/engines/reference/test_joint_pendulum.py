@@ -5,10 +5,12 @@ import math
 import numpy as np
 import pymunk
 import pytest
-from joint_rig import BIAS, G, Rig, compile_joints, link, pendulum
 from scipy.special import ellipk
 
 from sandbox.scene.compile.joint_arrays import LinkKind
+from tests.engines.reference.joint_rig import BIAS, G, Rig, compile_joints, link, pendulum
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 PERIODS = {5: 2.0070219, 90: 2.3678419, 170: 4.8935243}
 """By amplitude in degrees: 4 √(L/g) K(sin²(θ₀/2)), s, for L = 1 m"""

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from joint_rig import G, Rig, compile_joints, link
 
 from sandbox.scene.compile.joint_arrays import LinkKind
+from tests.engines.reference.joint_rig import G, Rig, compile_joints, link
 
 OMEGA = 2 * math.pi
 

@@ -10,7 +10,10 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from pieces import ROOT
+
+from tests.engines.reference.pieces import ROOT
+
+pytestmark = pytest.mark.full  # child processes and pages
 
 HERE = Path(__file__).resolve().parent
 
@@ -18,7 +21,7 @@ ANNOUNCEMENT = "compiling some functions for the first time; later runs start at
 
 HASHES = """
 import json
-from pieces import EARTH, FLOOR, ball, running, scene_of, shipped, small_pile, stepped
+from tests.engines.reference.pieces import EARTH, FLOOR, ball, running, scene_of, shipped, small_pile, stepped
 
 def court(**more):
     balls = [ball(-2 + 1.1 * k, 2 + 0.3 * k, velocity=[9 - 5 * k, -6], name=f"b{k}", friction=0.3) for k in range(4)]
@@ -142,7 +145,7 @@ def test_where_nothing_can_be_written_it_works_all_the_same(tmp_path):
 
 
 SLOW = """
-from pieces import ball, running, scene_of
+from tests.engines.reference.pieces import ball, running, scene_of
 for _ in range(2):
     running(scene_of(*(ball(3 * k, 0, name=f"b{k}") for k in range(COUNT))))
 """

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from pieces import ball, roster_of, scene_of
 
 from sandbox.engines.reference import manifold as narrow_phase
 from sandbox.engines.reference.collision import CirclePipeline
 from sandbox.engines.reference.manifold import circle_circle, circle_half_plane, circle_segment
+from tests.engines.reference.pieces import ball, roster_of, scene_of
 
 mpmath.mp.dps = 50
 
@@ -149,4 +149,4 @@ def test_points_lie_midway_in_the_overlap(x, y, radius, angle, near):
         px, py = contacts.point[0]
         depth_a, depth_b = radius - math.dist((px, py), (x, y)), other - math.dist((px, py), (bx, by))
         assert depth_a == pytest.approx(depth_b, abs=1e-12)  # ulps of 140 m
-        assert contacts.arm[0].tolist() == [radius, other]
+        assert contacts.anchor[0].tolist() == [radius, other]

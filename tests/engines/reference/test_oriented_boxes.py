@@ -5,13 +5,23 @@ import math
 import numpy as np
 import pytest
 import shapely
-from outlines import any_outline, box, capsule, disc, laid_out, moved, ring, separation_of, size_of
 
-from sandbox.engines.reference.polygon_contacts import box_of, boxes_apart
+from sandbox.engines.reference.polygon_contacts import are_separated, oriented_box
+from tests.engines.reference.outlines import (
+    any_outline,
+    box,
+    capsule,
+    disc,
+    laid_out,
+    moved,
+    ring,
+    separation_of,
+    size_of,
+)
 
 
 def boxed(outline):
-    return box_of(*laid_out(outline), 0)
+    return oriented_box(*laid_out(outline), 0)
 
 
 def rectangle(oriented):
@@ -53,9 +63,9 @@ def test_boxes_are_apart_exactly_where_an_axis_parts_them():
     for _ in range(1500):
         a, b = boxed(any_outline(random)), boxed(moved(any_outline(random), *random.normal(0, 1.5, 2)))
         distance = rectangle(a).distance(rectangle(b))
-        apart = boxes_apart(a, b, 0.0)
-        assert apart == boxes_apart(b, a, 0.0)
-        assert apart == boxes_apart(np.array(a), np.array(b), 0.0)  # rows will do
+        apart = are_separated(a, b, 0.0)
+        assert apart == are_separated(b, a, 0.0)
+        assert apart == are_separated(np.array(a), np.array(b), 0.0)  # rows will do
         told[apart] += 1
         if abs(distance) > 1e-12 or rectangle(a).intersection(rectangle(b)).area > 1e-12:  # not just touching
             assert apart == (distance > 0.0)
@@ -68,7 +78,7 @@ def test_no_pieces_nearer_than_the_margin_are_called_apart():
     for _ in range(1500):
         p, q = any_outline(random), moved(any_outline(random), *random.normal(0, 2, 2))
         margin = random.choice([0.0, 0.1, 1.0])
-        separation, apart = separation_of(p, q), boxes_apart(boxed(p), boxed(q), margin)
+        separation, apart = separation_of(p, q), are_separated(boxed(p), boxed(q), margin)
         if separation <= margin:
             near += 1
             assert not apart
@@ -83,8 +93,8 @@ def test_boxes_that_touch_are_not_called_apart_far_from_the_origin(offset, angle
     reach = 1.5 * math.cos(angle), 1.5 * math.sin(angle)
     p = box(offset, -offset, 1.0, 1.0, angle)
     q = box(offset + reach[0], -offset + reach[1], 2.0, 1.0, angle)
-    assert not boxes_apart(boxed(p), boxed(q), 0.0)
-    assert boxes_apart(boxed(p), boxed(moved(q, *(0.1 * each for each in reach))), 0.0)
+    assert not are_separated(boxed(p), boxed(q), 0.0)
+    assert are_separated(boxed(p), boxed(moved(q, *(0.1 * each for each in reach))), 0.0)
 
 
 def test_the_box_of_a_ring_is_a_square():

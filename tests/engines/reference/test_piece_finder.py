@@ -13,6 +13,8 @@ from sandbox.engines.reference.collision import ConvexPipeline
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.files.load import from_document
 
+pytestmark = pytest.mark.full  # property tests with many examples
+
 BROAD = ("all_pairs", "circles", "sweep", "grid", "oriented")
 
 coordinates = st.floats(-3, 3)

@@ -13,10 +13,22 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pieces import EARTH, FLOOR, PYMUNK_WAY, ball, running, scene_of, shipped, side_by_side, stepped
 
 from sandbox.action import Force, Impulse, Move, Remove, SetParameter, Spawn
 from sandbox.scene.description.discs import Ball
+from tests.engines.reference.pieces import (
+    EARTH,
+    FLOOR,
+    PYMUNK_WAY,
+    ball,
+    running,
+    scene_of,
+    shipped,
+    side_by_side,
+    stepped,
+)
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 
 def difference(theirs, ours):

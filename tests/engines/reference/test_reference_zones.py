@@ -10,14 +10,16 @@ from hypothesis import strategies as st
 
 import sandbox
 from sandbox.action import Impulse, Reshape, Spawn, Toggle
-from sandbox.engines.reference.zones import precincts_of, within
+from sandbox.engines.reference.zones import is_inside, make_zone_shapes
 from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.bodies import Box
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import HELD, Zone
 from sandbox.scene.files.load import from_document
 from sandbox.scene.geometry.shapes import contains
-from sandbox.scene.scene import Scene
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 H = 0.001
 """s, the substep"""
@@ -167,11 +169,11 @@ def test_outlines_agree_with_convex_pieces(spokes: list[tuple[float, float]], x:
     share = np.clip((off * lines).sum(axis=1) / (lines * lines).sum(axis=1), 0.0, 1.0)[:, None]
     on_edge = np.hypot(*(off - share * lines).T).min() < 1e-9  # where rounding decides
     zones = [Zone(points=corners), Zone(points=corners, thickness=0.2), Zone(position=(0.1, 0.2), radius=0.5)]
-    edge, first, reach, _ = precincts_of(zones)
+    edge, first, reach, _ = make_zone_shapes(zones)
     for k, zone in enumerate(zones):
         if k == 0 and (on_edge or np.diff(angles).max() > math.pi):
             continue
-        assert within(edge, first[k], first[k + 1], reach[k], x, y) == contains(zone, (x, y))
+        assert is_inside(edge, first[k], first[k + 1], reach[k], x, y) == contains(zone, (x, y))
 
 
 @given(st.floats(-0.9, 0.6), st.floats(0.3, 30.0))

@@ -5,11 +5,11 @@ import math
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
-from pieces import ball, roster_of, scene_of
 
 from sandbox.engines.reference.broad_phase import SegmentBoxes, pair_key
 from sandbox.engines.reference.collision import CirclePipeline
 from sandbox.engines.reference.manifold import circle_segment
+from tests.engines.reference.pieces import ball, roster_of, scene_of
 
 corner = st.tuples(st.integers(-40, 40), st.integers(-40, 40)).map(lambda c: [c[0] / 4, c[1] / 4])
 
@@ -98,5 +98,5 @@ def test_boxes_are_sorted_and_know_whose_they_are():
     boxes = SegmentBoxes(roster_of(scene).fixtures)
     assert boxes.box.tolist() == [[-2.0, -2.0, 2.0, 2.0], [0.75, -0.25, 3.25, 2.25]]
     assert boxes.index.tolist() == [1, 0]
-    assert (len(boxes), boxes.widest) == (2, 4.0)
-    assert math.isclose(boxes.widest, (boxes.box[:, 2] - boxes.box[:, 0]).max())
+    assert (len(boxes), boxes.max_width) == (2, 4.0)
+    assert math.isclose(boxes.max_width, (boxes.box[:, 2] - boxes.box[:, 0]).max())

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pieces import EARTH, FLOOR, ball, running, scene_of, stepped
 from scipy.integrate import solve_ivp
 
 from sandbox.engines.reference.integrators import INTEGRATORS
-from sandbox.engines.reference.penalty import LEAST_RESTITUTION, damping_of, restitution_of
+from sandbox.engines.reference.penalty import MIN_RESTITUTION, damping_of, restitution_of
+from tests.engines.reference.pieces import EARTH, FLOOR, ball, running, scene_of, stepped
 
 
-@given(st.floats(LEAST_RESTITUTION, 1.0))
+@given(st.floats(MIN_RESTITUTION, 1.0))
 def test_damping_and_restitution_are_each_others_inverse(e):
     assert restitution_of(damping_of(e)) == pytest.approx(e, rel=1e-12)  # the slope times the bisection's 1e-15, ample
 

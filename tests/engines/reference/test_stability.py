@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pieces import EARTH, FLOOR, ball, running, scene_of
 
 from sandbox.engines.contract import Refusal
 from sandbox.engines.reference.integrators import INTEGRATORS
-from sandbox.engines.reference.penalty import lightest
+from sandbox.engines.reference.penalty import smallest_reduced_mass
 from sandbox.engines.registry import ENGINES
+from tests.engines.reference.pieces import EARTH, FLOOR, ball, running, scene_of
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 REFERENCE = ENGINES["reference"]
 
@@ -62,7 +64,7 @@ def test_where_the_engine_chose_the_stiffness_it_names_one_and_no_step():
 
 def test_elastic_springs_are_stable_at_no_step_of_explicit_euler():
     told = reasons(falling(1.0), integrator="explicit_euler", stiffness=1e4)
-    assert told[0].endswith("no step is stable; use integrator 'semi_implicit_euler' with a small step")
+    assert "no step is stable" in told[0]
 
 
 @pytest.mark.parametrize("e", [0.02, 0.1, 0.5, 0.9, 1.0])
@@ -73,29 +75,27 @@ def test_what_the_engine_chooses_by_itself_is_stable(e, integrator):
 
 
 def test_a_restitution_of_nothing_is_refused_unless_a_damping_is_stated():
-    told = reasons(falling(0.0))
-    assert told == (
-        "penalty contacts cannot model restitution 0, the smallest is 0.02; use that, or "
-        "set solver.damping (1 = critical) instead",
-    )
+    (told,) = reasons(falling(0.0))
+    assert all(part in told for part in ("restitution 0", "0.02", "solver.damping"))
     assert reasons(falling(0.0), damping=1.0) == ()
 
 
 @pytest.mark.parametrize("key", ["slop", "bias", "persistence"])
 def test_figures_of_impulses_are_refused(key):
-    assert reasons(falling(), **{key: 1}) == (f"{key} applies to response 'impulse' only",)
+    (told,) = reasons(falling(), **{key: 1})
+    assert told.startswith(key) and "'impulse'" in told
 
 
 @pytest.mark.parametrize("detection", ["bisect", "swept"])
 def test_detections_without_overlap_are_refused(detection):
     (told,) = reasons(falling(), detection=detection)
-    assert told == f"detection {detection!r} leaves no overlap, but penalty springs need one"
+    assert told.startswith(f"detection {detection!r}") and "penalty" in told
 
 
 @pytest.mark.parametrize("key", ["stiffness", "damping"])
 def test_figures_of_springs_are_refused_to_impulses(key):
     scene = falling()
-    with pytest.raises(Refusal, match=f"{key} applies to response 'penalty' only"):
+    with pytest.raises(Refusal, match=f"{key} .*'penalty'"):
         running(scene, **{key: 1.0})
 
 
@@ -113,9 +113,9 @@ def test_what_the_reference_lacks_it_says(choice, reason):
 
 
 def test_the_lightest_is_the_smallest_reduced_mass():
-    assert lightest(falling(mass=3.0)) == 3.0
-    assert lightest(falling(mass=3.0, count=2)) == 1.5
-    assert lightest(scene_of(ball(0, 0, collides="none"))) == 1.0
+    assert smallest_reduced_mass(falling(mass=3.0)) == 3.0
+    assert smallest_reduced_mass(falling(mass=3.0, count=2)) == 1.5
+    assert smallest_reduced_mass(scene_of(ball(0, 0, collides="none"))) == 1.0
 
 
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet", "leapfrog", "rk4"])

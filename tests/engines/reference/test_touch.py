@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from pieces import FLOOR, ball, roster_of, scene_of
 
 from sandbox.engines.reference.collision import CirclePipeline
 from sandbox.engines.reference.manifold import KIND, circle_segment
 from sandbox.engines.reference.time_of_impact import NEVER, touch_circle, touch_line, touch_segment
+from tests.engines.reference.pieces import FLOOR, ball, roster_of, scene_of
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 
 def figures(most):

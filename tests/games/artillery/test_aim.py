@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from grounds import hills, world
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -16,6 +15,9 @@ from sandbox.games.artillery.bot_planner import ANGLE_ERROR, BotPlanner, choose_
 from sandbox.games.artillery.scene import Edges
 from sandbox.games.artillery.targeting import AimSolver, FiringSolution, TargetingProblem
 from sandbox.scene.files.load import loads
+from tests.games.artillery.grounds import hills, world
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 AIRS = [(0.0, 0.0), (0.06, 0.0), (0.0, 0.002)]
 RADIUS = WEAPONS[0].radius

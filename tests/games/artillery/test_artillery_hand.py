@@ -3,7 +3,6 @@
 import math
 
 import pytest
-from dueling import two_tanks
 
 from sandbox.games.artillery.battlefield import WEAPONS
 from sandbox.games.artillery.bot import ArtilleryBot
@@ -12,9 +11,12 @@ from sandbox.games.contract import Policy, UnsuitableSceneError
 from sandbox.games.players import POLICIES, ScriptedInput
 from sandbox.games.registry import rules_of
 from sandbox.games.session import HeadlessGame
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
 from sandbox.scene.files.load import load, loads
 from sandbox.scene.files.shipped_scenes import find
+from tests.games.artillery.dueling import two_tanks
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 FIELD = two_tanks("duration = 12.0", "money = 0", blue="bot = 0.0")
 

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from dueling import two_tanks
 
 from sandbox.action import Action, SetParameter, actions_from_json
 from sandbox.engines.switching import start
@@ -19,13 +18,16 @@ from sandbox.games.contract import Press, UnsuitableSceneError
 from sandbox.games.players import NoInput, ScriptedInput
 from sandbox.games.registry import rules_of
 from sandbox.games.session import GameSession, HeadlessGame
-from sandbox.measure.replay import rerun
-from sandbox.measure.run import run
-from sandbox.measure.seeds import seeded
+from sandbox.measure.run.runner import run
+from sandbox.measure.run.sessions import rerun
+from sandbox.measure.seeds import with_seed
 from sandbox.recording import Recording
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Trajectory
+from tests.games.artillery.dueling import two_tanks
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 WORLD, GAME = "linear_drag = 0.03\nduration = 14.0\nseed = 2", "speed = 60.0\nwind = 6.0"
 TEXT, BOTS = two_tanks(WORLD, GAME), two_tanks(WORLD, GAME, red="bot = 1.0", blue="bot = 0.9")
@@ -109,7 +111,7 @@ def test_miss_is_told_along_each_axis() -> None:
 def test_seeds_are_other_games() -> None:
     """Other hills, other winds, other errors."""
     scene = loads(BOTS, overrides=["world.duration=12", "artillery.player.Red.bot=0.5"])
-    rules = [played(seeded(scene, seed))[0] for seed in range(6)]
+    rules = [played(with_seed(scene, seed))[0] for seed in range(6)]
     assert len({each.field.ground.points for each in rules}) == 6
     assert len({each.shots[0].place for each in rules}) == 6
 

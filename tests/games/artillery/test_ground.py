@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from grounds import flat, hills
 from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.games.artillery.scene import QUANTUM
 from sandbox.games.artillery.terrain import Crater, Ground
+from tests.games.artillery.grounds import flat, hills
 
 CENTRES = st.tuples(st.floats(-20, 320), st.floats(-20, 80))
 RADII = st.floats(0.01, 40)

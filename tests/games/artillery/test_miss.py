@@ -4,15 +4,15 @@ import math
 
 import numpy as np
 import pytest
-from grounds import G, world
 
 from sandbox.arrays import FloatArray
 from sandbox.engines.contract import Refusal
 from sandbox.engines.reference.integrators import INTEGRATORS
 from sandbox.games.artillery import landing_error as miss
-from sandbox.games.artillery.ballistics import Landing
+from sandbox.games.artillery.ballistics import ShellImpact
 from sandbox.games.artillery.landing_error import landing_error_table
 from sandbox.scene.description.world import Settings, World
+from tests.games.artillery.grounds import G, world
 
 DTS = 0.1, 0.05, 0.025
 
@@ -52,10 +52,10 @@ def test_what_never_comes_down_is_told() -> None:
 
 
 def test_refusal_of_one_integrator_leaves_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fly(world: World, velocity: FloatArray, engine: str, settings: Settings) -> Landing:
+    def fly(world: World, velocity: FloatArray, engine: str, settings: Settings) -> ShellImpact:
         if settings.integrator == "rk4" or engine == "exact":
             raise Refusal(engine, ("not this one",), ())
-        return Landing(1.0, (1.0, 0.0))
+        return ShellImpact(1.0, (1.0, 0.0))
 
     monkeypatch.setattr(miss, "simulated_landing", fly)
     found = landing_error_table(world(), 50.0, math.radians(45.0), DTS)

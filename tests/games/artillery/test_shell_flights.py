@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from grounds import G, flat, hills, shot, world
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -12,14 +11,17 @@ from scipy.optimize import brentq
 
 from sandbox.engines.reference.integrators import INTEGRATORS, transition
 from sandbox.games.artillery.ballistics import Flight, crossing, first_strike, inputs_of, landing, rk4
-from sandbox.games.artillery.landing_error import _exact
+from sandbox.games.artillery.landing_error import exact_landing
 from sandbox.games.artillery.terrain import Ground
 from sandbox.scene.description.world import World
+from tests.games.artillery.grounds import G, flat, hills, shot, world
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 
 def down(air: World, velocity: np.ndarray) -> tuple[float, float]:
     """Return how far off and when a shot over level ground comes down."""
-    found = _exact(air, velocity)
+    found = exact_landing(air, velocity)
     return found.place[0], found.time
 
 

@@ -7,11 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.games.artillery.scene import QUANTUM, Terrain, columns_of, course_of, heights_of, settled
-from sandbox.measure.seeds import seeded
+from sandbox.measure.seeds import with_seed
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import dumps, from_document, loads
-from sandbox.scene.scene import Scene
 
 DUEL = """
 [world]
@@ -96,19 +96,19 @@ def test_it_is_the_same_read_written_and_read_again() -> None:
 @given(st.integers(0, 2**63 - 1))
 def test_another_seed_lays_out_other_hills_also_where_they_were_written_out(seed: int) -> None:
     scene = loads(DUEL)
-    assert seeded(scene, seed) == loads(DUEL, overrides=[f"world.seed={seed}"])
-    assert seeded(seeded(scene, seed), scene.world.seed) == scene
+    assert with_seed(scene, seed) == loads(DUEL, overrides=[f"world.seed={seed}"])
+    assert with_seed(with_seed(scene, seed), scene.world.seed) == scene
 
 
 def test_another_seed_leaves_what_was_changed_by_hand() -> None:
     scene = loads(DUEL, overrides=["wall.terrain.restitution=0.3", "box.Red.position=[30.0, 90.0]"])
-    other = seeded(scene, 6)
+    other = with_seed(scene, 6)
     assert columns(other) == columns(loads(DUEL, overrides=["world.seed=6"]))
     assert other.walls[0].restitution == 0.3
     assert other.boxes[0].position == (30.0, 90.0)
     points = course_of([2.0] * 100, 200.0)
     flat = from_document(to_document(scene), "<scene>", [("wall.terrain.points", [list(each) for each in points])])
-    assert columns(seeded(flat, 6)) == (2.0,) * 100
+    assert columns(with_seed(flat, 6)) == (2.0,) * 100
 
 
 def test_stated_heights_are_the_ground() -> None:

@@ -3,20 +3,20 @@
 from collections.abc import Iterable
 from typing import Any
 
-from sandbox.games.billiards.rules.base import Ruleset, ShotCall, ShotEvent, ShotResult
+from sandbox.games.billiards.rules.base import BallEvent, Ruleset, Ruling, ShotCall
 
 KINDS = {"hits": "ball", "at": "cushion", "in": "pocket"}
 
 
-def shot(*lines: str | tuple[str, ...]) -> tuple[ShotEvent, ...]:
+def shot(*lines: str | tuple[str, ...]) -> tuple[BallEvent, ...]:
     return tuple(
-        ShotEvent(float(time), ball, KINDS[verb], other)
+        BallEvent(float(time), ball, KINDS[verb], other)
         for time, line in enumerate(lines)
         for ball, verb, other in (each.split() for each in ([line] if isinstance(line, str) else line))
     )
 
 
-def played(rules: Ruleset[Any], state: Any, *lines: str | tuple[str, ...], **call: Any) -> ShotResult[Any]:
+def played(rules: Ruleset[Any], state: Any, *lines: str | tuple[str, ...], **call: Any) -> Ruling[Any]:
     return rules.judge(state, ShotCall(**call), shot(*lines))
 
 

@@ -5,11 +5,10 @@ from pathlib import Path
 from typing import Any
 
 from sandbox.engines.contract import Simulation
-from sandbox.games.billiards.game import is_at_rest
 from sandbox.games.billiards.match import Match
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.files.load import load
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts
 
 SCENES = Path(__file__).parents[3] / "scenes" / "billiards"
@@ -38,6 +37,6 @@ def lying(name: str, places: dict[str, Point], **terms: Any) -> Match:
 def run_until_rest(simulation: Simulation) -> Contacts:
     """Step until every ball is at rest; return the contacts since they were last asked for."""
     simulation.step()
-    while not is_at_rest(simulation.frame()):
+    while not simulation.frame().is_at_rest:
         simulation.step()
     return simulation.contacts()

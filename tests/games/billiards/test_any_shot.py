@@ -8,9 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sandbox.games.billiards.rules.base import GameError, Ruleset, ShotCall, ShotEvent, ShotResult, Situation
+from sandbox.games.billiards.rules.base import BallEvent, GameError, Ruleset, Ruling, ShotCall, Situation
 from sandbox.games.billiards.rules.registry import RULESETS
 from sandbox.games.billiards.rules.snooker import SnookerState, remaining
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 POCKETS = ("left", "right")
 CAROM = ("three-cushion", "straight-rail")
@@ -24,20 +26,20 @@ turns = st.lists(
 )
 
 
-def happenings(rules: Ruleset[Any], state: Any, events: list[tuple[str, int, int]]) -> tuple[ShotEvent, ...]:
+def shot_of(rules: Ruleset[Any], state: Any, events: list[tuple[str, int, int]]) -> tuple[BallEvent, ...]:
     """Events of balls that are there; a cue ball that touches what is on is as likely as anything else."""
     cue = rules.cue_ball(state)
     balls = (cue, *(ball for ball in state.table if ball != cue))
     targets = sorted(rules.legal_targets(state))
-    told: list[ShotEvent] = []
+    told: list[BallEvent] = []
     for time, (kind, a, b) in enumerate(events):
         if kind == "ball":
             pair = (cue, targets[b % len(targets)]) if a % 2 else (balls[a % len(balls)], balls[b % len(balls)])
-            told.append(ShotEvent(time - a % 2, pair[0], "ball", pair[1]))
+            told.append(BallEvent(time - a % 2, pair[0], "ball", pair[1]))
         elif kind == "pocket" and rules.name not in CAROM:
-            told.append(ShotEvent(time, balls[a % len(balls)], "pocket", POCKETS[b % 2]))
+            told.append(BallEvent(time, balls[a % len(balls)], "pocket", POCKETS[b % 2]))
         else:
-            told.append(ShotEvent(time, balls[a % len(balls)], "cushion", "rail"))
+            told.append(BallEvent(time, balls[a % len(balls)], "cushion", "rail"))
     return tuple(told)
 
 
@@ -62,7 +64,7 @@ def is_sound(rules: Ruleset[Any], state: Any) -> None:
     assert rules.restored(json.loads(json.dumps(rules.document(state)))) == state
 
 
-def follows(rules: Ruleset[Any], before: Any, verdict: ShotResult[Any]) -> None:
+def follows(rules: Ruleset[Any], before: Any, verdict: Ruling[Any]) -> None:
     """What one shot may do."""
     after = verdict.state
     gained = tuple(now - then for now, then in zip(after.scores, before.scores, strict=True))
@@ -70,7 +72,7 @@ def follows(rules: Ruleset[Any], before: Any, verdict: ShotResult[Any]) -> None:
     assert min(gained) >= 0
     assert set(after.table) <= set(before.table)
     assert {each.ball for each in verdict.respot} <= set(after.table)
-    assert verdict.goes_on <= (after.turn == before.turn and not after.over)
+    assert verdict.continues <= (after.turn == before.turn and not after.over)
     if isinstance(after, SnookerState) and not before.free:  # a free ball brings a colour with it, as a red does
         level = "scores level: the black is respotted" in verdict.messages
         assert level or remaining(after) <= remaining(before)
@@ -92,7 +94,7 @@ def test_any_shots_leave_a_sound_state(name: str, players: int, turns: list[Any]
             is_sound(rules, state)
             if state.over:
                 break
-        shot, call = happenings(rules, state, events), call_of(rules, state, pick)
+        shot, call = shot_of(rules, state, events), call_of(rules, state, pick)
         verdict = rules.judge(state, call, shot)
         assert rules.judge(state, call, shot) == verdict  # nothing but the state is remembered
         is_sound(rules, verdict.state)
@@ -117,15 +119,15 @@ def test_frame_of_players_who_make_what_is_on_ends(name: str, players: int, mist
     balls = 2 * len(state.table) + 110  # a colour with each red; the distances of carom
     for turn in range(len(mistakes) + balls):
         cue, target = rules.cue_ball(state), min(rules.legal_targets(state), key=len)
-        touch = ShotEvent(0.0, cue, "ball", target)
+        touch = BallEvent(0.0, cue, "ball", target)
         lines = [touch]
         if name in CAROM:
             third = next(ball for ball in state.table if ball not in (cue, target))
-            lines += [ShotEvent(1.0, cue, "cushion", "rail")] * 3 + [ShotEvent(2.0, cue, "ball", third)]
+            lines += [BallEvent(1.0, cue, "cushion", "rail")] * 3 + [BallEvent(2.0, cue, "ball", third)]
         else:
-            lines.append(ShotEvent(1.0, target, "pocket", "left"))
+            lines.append(BallEvent(1.0, target, "pocket", "left"))
         if turn < len(mistakes):
-            scratch = ShotEvent(1.0, cue, "pocket", "left")
+            scratch = BallEvent(1.0, cue, "pocket", "left")
             lines = [[], [touch], [touch, *([] if name in CAROM else [scratch])]][mistakes[turn]]
         asked = rules.choices(state)
         call = ShotCall(target if target in asked.balls else None, "left" if asked.pocket else None)

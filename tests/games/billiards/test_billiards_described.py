@@ -7,11 +7,10 @@ import pytest
 
 from sandbox.games.billiards.rules.registry import RULESETS
 from sandbox.games.billiards.scene import RACKS, expanded
-from sandbox.games.billiards.tables import BALLS, Billiards
-from sandbox.games.names import TableGame
+from sandbox.games.billiards.tables import BALLS, Billiards, TableGame
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import dumps, from_document, loads
-from sandbox.scene.scene import Scene
 
 EIGHT: dict[str, Any] = {"billiards": {"table": "pool-9ft", "game": "8-ball"}}
 SHOT = {"name": "break", "aim": 1.5, "speed": 8.0}

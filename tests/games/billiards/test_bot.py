@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from tables_by_hand import lying, match, table
 
 from sandbox.engines.exact.tabletop.shots import Table
 from sandbox.games.billiards.bot import MAX_AIM_ERROR, MIN_AIM_ERROR, BilliardsBot, parse_bots
@@ -12,6 +11,9 @@ from sandbox.games.billiards.rules.base import GameError
 from sandbox.games.billiards.shot_search import ease, pot_options
 from sandbox.games.billiards.table_geometry import TableGeometry
 from sandbox.scene.description.base import Point
+from tests.games.billiards.tables_by_hand import lying, match, table
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 FAR = {str(k): (0.06 + 0.075 * k, 0.12) for k in range(2, 10)}
 

@@ -3,11 +3,11 @@
 from dataclasses import replace
 
 import pytest
-from shot_by_hand import played
 
 from sandbox.games.billiards.rules.base import GameError, Situation
 from sandbox.games.billiards.rules.carom import Carom
 from sandbox.games.billiards.rules.registry import RULESETS
+from tests.games.billiards.shot_by_hand import played
 
 THREE, STRAIGHT = (RULESETS[name] for name in ("three-cushion", "straight-rail"))
 assert isinstance(THREE, Carom)
@@ -21,7 +21,7 @@ MADE = ("white hits red", RAIL, RAIL, RAIL, "white hits yellow")
 def test_three_cushions_before_the_second_ball_in_any_order_score(before: int) -> None:
     lines = (*[RAIL] * before, "white hits red", *[RAIL] * (3 - before), "white hits yellow")
     verdict = played(THREE, PLAY, *lines)
-    assert verdict.goes_on
+    assert verdict.continues
     assert verdict.points == (1, 0)
     assert verdict.state.turn == 0
 
@@ -53,8 +53,8 @@ def test_players_strike_their_own_balls() -> None:
 
 def test_straight_rail_needs_no_cushion() -> None:
     state = replace(STRAIGHT.start(), opening=False)
-    assert played(STRAIGHT, state, "white hits red", "white hits yellow").goes_on
-    assert not played(STRAIGHT, state, "white hits red", "red hits yellow").goes_on
+    assert played(STRAIGHT, state, "white hits red", "white hits yellow").continues
+    assert not played(STRAIGHT, state, "white hits red", "red hits yellow").continues
 
 
 def test_opening_shot_must_touch_the_red_first() -> None:
@@ -63,7 +63,7 @@ def test_opening_shot_must_touch_the_red_first() -> None:
     assert verdict.fouls == ("the opening shot must hit the red first",)
     assert (verdict.state.turn, verdict.state.scores) == (1, (0, 0))
     made = played(THREE, START, *MADE)
-    assert made.goes_on
+    assert made.continues
     assert not made.state.opening
 
 

@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 import pytest
-from shot_by_hand import fallen, played
 
 from sandbox.games.billiards.rules.base import GameError
 from sandbox.games.billiards.rules.pool import GROUPS, EightBall, EightBallState
+from tests.games.billiards.shot_by_hand import fallen, played
 
 RULES = EightBall()
 START = RULES.start()
@@ -25,7 +25,7 @@ def test_break_may_touch_any_ball() -> None:
 
 def test_break_that_makes_a_ball_goes_on_and_leaves_the_table_open() -> None:
     verdict = played(RULES, START, "cue hits 1", "9 in left")
-    assert verdict.goes_on
+    assert verdict.continues
     assert verdict.state.turn == 0
     assert verdict.state.groups == (None, None)
     assert "9" not in verdict.state.table
@@ -57,7 +57,7 @@ def test_cue_ball_does_not_count_among_the_four() -> None:
 def test_scratch_on_the_break_is_in_hand_behind_the_head_string() -> None:
     verdict = played(RULES, START, *DRY, "9 in left", "cue in left")
     assert verdict.fouls == ("scratch",)
-    assert not verdict.goes_on
+    assert not verdict.continues
     assert (verdict.state.turn, verdict.state.in_hand) == (1, "behind the head string")
     assert "9" not in verdict.state.table
 
@@ -95,7 +95,7 @@ def test_open_table_has_all_but_the_eight_on() -> None:
 @pytest.mark.parametrize(("ball", "groups"), [("2", ("solids", "stripes")), ("14", ("stripes", "solids"))])
 def test_first_ball_made_chooses_the_groups(ball: str, groups: tuple[str, str]) -> None:
     verdict = played(RULES, OPEN, f"cue hits {ball}", f"{ball} in left")
-    assert verdict.goes_on
+    assert verdict.continues
     assert verdict.state.groups == groups
     assert verdict.state.scores == (1, 0)
 
@@ -131,7 +131,7 @@ FOULS = {
 def test_foul_gives_the_other_the_ball_anywhere(why: str) -> None:
     verdict = played(RULES, MINE, *FOULS[why])
     assert verdict.fouls == (why,)
-    assert not verdict.goes_on
+    assert not verdict.continues
     assert (verdict.state.turn, verdict.state.in_hand) == (1, "anywhere")
 
 
@@ -140,7 +140,7 @@ def test_two_at_one_time_are_fair_if_one_is_on() -> None:
 
 
 def test_own_ball_goes_on_the_others_does_not() -> None:
-    assert played(RULES, MINE, "cue hits 1", "1 in left").goes_on
+    assert played(RULES, MINE, "cue hits 1", "1 in left").continues
     verdict = played(RULES, MINE, "cue hits 1", "9 in left")
     assert (verdict.state.turn, verdict.state.scores) == (1, (0, 1))
     assert not verdict.fouls
@@ -218,7 +218,7 @@ def test_one_who_plays_alone_keeps_the_turn_and_may_win_or_lose() -> None:
 
 
 def test_what_is_not_offered_cannot_be_decided() -> None:
-    with pytest.raises(GameError, match="'pass' is not offered now; options: none"):
+    with pytest.raises(GameError, match="'pass' is not offered"):
         RULES.decide(START, "pass")
 
 

@@ -3,15 +3,15 @@
 from dataclasses import replace
 
 import pytest
-from tables_by_hand import match, table
 
 from sandbox.games.billiards.bot import BilliardsBot
 from sandbox.games.billiards.headless import FramePlan, FrameRecord, FrameTurn, play_frame
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.base import Decision, GameError
-from sandbox.measure.replay import rerun
+from sandbox.measure.run.sessions import rerun
 from sandbox.recording import Recording
 from sandbox.scene.description.surface import Stroke
+from tests.games.billiards.tables_by_hand import match, table
 
 TERMS = {"three-cushion": {"distance": 2}, "straight-rail": {"distance": 3}, "snooker": {"misses": True}}
 GAMES = ["8-ball", "9-ball", "snooker", "three-cushion", "straight-rail"]
@@ -38,7 +38,7 @@ def sound(turn: FrameTurn, now: Match) -> None:
 
 def frame(name: str, skills: tuple[float, float], seed: int = 1) -> FrameRecord:
     begun = Match.begin(table(name, seed), **TERMS.get(name, {}))
-    return play_frame(begun, [BilliardsBot(skill, 2 * seed + k) for k, skill in enumerate(skills)], told=sound)
+    return play_frame(begun, [BilliardsBot(skill, 2 * seed + k) for k, skill in enumerate(skills)], on_turn=sound)
 
 
 def test_frame_of_9_ball_ends_and_replays() -> None:
@@ -90,7 +90,7 @@ def test_replay_of_turns_that_do_not_fit_is_refused() -> None:
 def test_free_play_takes_any_table_and_one_player() -> None:
     begun = Match.begin(table("three-cushion"), "free", players=1)
     assert begun.cue == "white"
-    played = play_frame(begun, [BilliardsBot(0.9)], most=4, told=sound)
+    played = play_frame(begun, [BilliardsBot(0.9)], most=4, on_turn=sound)
     assert not played.match.over
 
 

@@ -1,9 +1,8 @@
 """Frames on engines of fixed steps: the same rules read what these tell of a shot."""
 
-from tables_by_hand import match
-
 from sandbox.games.billiards.bot import BilliardsBot
 from sandbox.games.billiards.headless import play_frame
+from tests.games.billiards.tables_by_hand import match
 
 
 def test_shots_on_pymunk_are_judged_and_replay() -> None:

@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 import pytest
-from shot_by_hand import played
 
 from sandbox.games.billiards.rules.base import GameError
 from sandbox.games.billiards.rules.pool import ALWAYS, FreePlay
+from tests.games.billiards.shot_by_hand import played
 
 RULES = FreePlay()
 START = RULES.start()

@@ -6,7 +6,6 @@ import math
 from typing import Any
 
 import pytest
-from tables_by_hand import match, table
 
 import sandbox
 from sandbox.action import Action, Move, Strike
@@ -16,12 +15,14 @@ from sandbox.games.billiards.rules.base import ShotCall
 from sandbox.games.contract import Rules, StepInfo, UnsuitableSceneError
 from sandbox.games.registry import has_rules, required_rules, rules_of
 from sandbox.games.session import GameSession
-from sandbox.measure.play_out import Played, play_out
-from sandbox.measure.replay import rerun
+from sandbox.measure.run.sessions import PlayedGame, play_out, rerun
 from sandbox.recording import Recording
 from sandbox.scene.description.surface import Stroke
 from sandbox.scene.files.load import load
 from sandbox.trajectory import Contacts
+from tests.games.billiards.tables_by_hand import match, table
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 GAMES = ["8-ball", "9-ball", "snooker", "three-cushion", "straight-rail"]
 UP = 0.5 * math.pi
@@ -145,7 +146,7 @@ def test_another_ball_than_the_cue_ball_is_not_judged() -> None:
     assert table.rules.match.position == tuple((x, y) for x, y in table.simulation.frame().position.tolist())
 
 
-def played(name: str, player: str, duration: float) -> Played:
+def played(name: str, player: str, duration: float) -> PlayedGame:
     scene = load(name, [("world.duration", duration)])
     return play_out(scene, player, "exact")
 

@@ -4,7 +4,6 @@ import json
 
 import numpy as np
 import pytest
-from tables_by_hand import lying, match, run_until_rest, table
 
 import sandbox
 from sandbox.arrays import FloatArray
@@ -13,6 +12,7 @@ from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.placement import placement_refusal
 from sandbox.games.billiards.rules.base import GameError, ShotCall
 from sandbox.scene.description.surface import Stroke
+from tests.games.billiards.tables_by_hand import lying, match, run_until_rest, table
 
 UP = 0.5 * np.pi
 
@@ -113,7 +113,7 @@ def test_cue_ball_in_hand_behind_the_head_string_has_to_cross_it_to_a_ball_behin
     others = {str(k): (1.0, 1.2 + 0.08 * k) for k in range(2, 16)}
     now = after_break({**others, "1": ball, "cue": (0.5, 0.4)}, "8-ball", in_hand="behind the head string")
     outcome = table_of(now).shoot(Stroke(aim=float(aim), speed=6.0), "cue")
-    assert next(each.other for each in now.happenings(outcome.contacts) if each.kind == "ball") == "1"
+    assert next(each.other for each in now.events(outcome.contacts) if each.kind == "ball") == "1"
     after = now.played(outcome.contacts, outcome.position)
     assert after.verdict is not None
     wrong = [foul for foul in after.verdict.fouls if "behind the head string" in foul]

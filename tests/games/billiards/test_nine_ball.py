@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 import pytest
-from shot_by_hand import fallen, played
 
 from sandbox.games.billiards.rules.base import GameError
 from sandbox.games.billiards.rules.pool import NineBall
+from tests.games.billiards.shot_by_hand import fallen, played
 
 RULES = NineBall()
 START = RULES.start()
@@ -22,7 +22,7 @@ def test_break_and_every_shot_have_the_lowest_on() -> None:
 
 def test_break_that_makes_a_ball_goes_on_and_may_push_out() -> None:
     verdict = played(RULES, START, "cue hits 1", "5 in left")
-    assert verdict.goes_on
+    assert verdict.continues
     assert verdict.points == (1, 0)
     assert not verdict.state.opening
     assert RULES.choices(verdict.state).push_out
@@ -92,7 +92,7 @@ def test_foul_gives_the_other_the_ball_anywhere(why: str) -> None:
 
 
 def test_any_ball_made_fairly_goes_on_and_none_passes() -> None:
-    assert played(RULES, PLAY, "cue hits 1", "6 in left").goes_on
+    assert played(RULES, PLAY, "cue hits 1", "6 in left").continues
     verdict = played(RULES, PLAY, "cue hits 1", "1 at rail")
     assert (verdict.state.turn, verdict.state.in_hand) == (1, None)
 
@@ -108,7 +108,7 @@ def test_push_out_needs_no_ball_and_no_rail_and_the_other_chooses() -> None:
 
 def test_push_out_that_makes_balls_does_not_go_on_and_spots_the_nine() -> None:
     verdict = played(RULES, SECOND, "cue hits 5", "5 in left", "9 in left", push_out=True)
-    assert not verdict.goes_on
+    assert not verdict.continues
     assert not verdict.state.over
     assert verdict.state.turn == 1
     assert verdict.state.scores == (0, 0)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tables_by_hand import table
 
 from sandbox.games.billiards.placement import allowed, nearest, placement_refusal, spread
-from sandbox.games.billiards.rules.base import Place
+from sandbox.games.billiards.rules.base import PlacementRegion
 from sandbox.games.billiards.table_geometry import PlacedDisc, TableGeometry
+from tests.games.billiards.tables_by_hand import table
 
 POOL, SNOOKER = TableGeometry.of(table("9-ball")), TableGeometry.of(table("snooker"))
 R = POOL.radius[0]
@@ -58,7 +58,9 @@ def test_nearest_beside_a_ball_touches_it_but_for_a_hair() -> None:
     at=st.tuples(st.floats(-1.0, 2.5), st.floats(-1.0, 4.5)),
     seed=st.integers(0, 50),
 )
-def test_nearest_is_legal_and_nothing_on_a_grid_is_nearer(place: Place, at: tuple[float, float], seed: int) -> None:
+def test_nearest_is_legal_and_nothing_on_a_grid_is_nearer(
+    place: PlacementRegion, at: tuple[float, float], seed: int
+) -> None:
     radius, random = SNOOKER.radius[0], np.random.default_rng(seed)
     (x0, y0), (x1, y1) = SNOOKER.area
     others = [

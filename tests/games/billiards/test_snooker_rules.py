@@ -3,10 +3,10 @@
 from dataclasses import replace
 
 import pytest
-from shot_by_hand import fallen, played
 
 from sandbox.games.billiards.rules.base import GameError, Situation
 from sandbox.games.billiards.rules.snooker import COLOURS, REDS, VALUES, Snooker, SnookerState, remaining
+from tests.games.billiards.shot_by_hand import fallen, played
 
 RULES = Snooker()
 START = RULES.start()
@@ -27,7 +27,7 @@ def test_start_is_in_the_d_with_reds_on_and_147_to_be_made() -> None:
 
 def test_red_scores_one_stays_down_and_a_colour_is_next() -> None:
     verdict = played(RULES, START, "cue hits red-1", "red-1 in left")
-    assert verdict.goes_on
+    assert verdict.continues
     assert verdict.points == (1, 0)
     assert (verdict.state.on, verdict.state.run, verdict.state.opening) == ("colour", 1, False)
     assert RULES.legal_targets(verdict.state) == set(COLOURS)
@@ -42,7 +42,7 @@ def test_each_red_of_a_stroke_scores() -> None:
 def test_colour_scores_its_value_comes_back_and_red_is_next(colour: str) -> None:
     verdict = played(RULES, COLOUR, f"cue hits {colour}", f"{colour} in left", ball=colour)
     assert verdict.points == (VALUES[colour], 0)
-    assert (verdict.state.on, verdict.goes_on) == ("red", True)
+    assert (verdict.state.on, verdict.continues) == ("red", True)
     assert [each.spots[0] for each in verdict.respot] == [colour]
     assert verdict.state.table == COLOUR.table
 

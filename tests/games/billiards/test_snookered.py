@@ -2,10 +2,9 @@
 
 from dataclasses import replace
 
-from shot_by_hand import played
-
 from sandbox.games.billiards.rules.base import Situation
 from sandbox.games.billiards.rules.snooker import COLOURS, REDS, Snooker
+from tests.games.billiards.shot_by_hand import played
 
 RULES = Snooker()
 PLAY = replace(RULES.start(), opening=False, in_hand=None)

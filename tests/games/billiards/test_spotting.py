@@ -3,12 +3,12 @@
 import math
 
 import pytest
-from tables_by_hand import table
 
 from sandbox.games.billiards.referee import respotted_position
 from sandbox.games.billiards.rules.base import GameError, Respot
 from sandbox.games.billiards.rules.snooker import respots
 from sandbox.games.billiards.table_geometry import TableGeometry
+from tests.games.billiards.tables_by_hand import table
 
 POOL, SNOOKER = TableGeometry.of(table("9-ball")), TableGeometry.of(table("snooker"))
 R = POOL.radius[0]

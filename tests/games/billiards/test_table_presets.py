@@ -10,8 +10,8 @@ import shapely
 from shapely import LineString, Point, Polygon, box, unary_union
 
 from sandbox.games.billiards.tables import BCA_CORNER, BCA_SIDE, INCH, TABLES, WPA_CORNER, WPA_SIDE, TableName, spots_of
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
 
 NAMES = get_args(TableName)
 POCKETED = [name for name in NAMES if name != "carom-10ft"]

@@ -1,12 +1,12 @@
 """Telling: contacts of engines as happenings by names."""
 
 import numpy as np
-from tables_by_hand import lying, table
 
 from sandbox.games.billiards.referee import shot_events, touching_pairs
-from sandbox.games.billiards.rules.base import ShotEvent
+from sandbox.games.billiards.rules.base import BallEvent
 from sandbox.games.billiards.table_geometry import TableGeometry
 from sandbox.trajectory import Contacts
+from tests.games.billiards.tables_by_hand import lying, table
 
 POOL = TableGeometry.of(table("9-ball"))
 FIXED = POOL.scene.fixed_names
@@ -22,10 +22,10 @@ def test_balls_cushions_jaws_and_pockets_are_named() -> None:
     jaw, pocket = FIXED.index("right pocket jaw 1"), FIXED.index("right pocket")
     told = shot_events(POOL, contacts((3.0, 0, 1), (3.1, 1, -1), (3.2, 1, -1 - jaw), (3.3, 1, -1 - pocket)), 2.5)
     assert told == (
-        ShotEvent(0.5, "cue", "ball", "1"),
-        ShotEvent(3.1 - 2.5, "1", "cushion", FIXED[0]),
-        ShotEvent(3.2 - 2.5, "1", "cushion", "right pocket jaw 1"),
-        ShotEvent(3.3 - 2.5, "1", "pocket", "right pocket"),
+        BallEvent(0.5, "cue", "ball", "1"),
+        BallEvent(3.1 - 2.5, "1", "cushion", FIXED[0]),
+        BallEvent(3.2 - 2.5, "1", "cushion", "right pocket jaw 1"),
+        BallEvent(3.3 - 2.5, "1", "pocket", "right pocket"),
     )
 
 

@@ -4,10 +4,10 @@ from sandbox.engines.contract import Simulation
 from sandbox.engines.registry import start
 from sandbox.games.curling.rules import Curling
 from sandbox.games.session import GameSession
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.scene.scene import Scene
 
 DT = 0.05
 """s: motion is exact whatever it is, and hits are taken back to when they were"""

@@ -11,10 +11,10 @@ from sandbox.engines.registry import start
 from sandbox.engines.tabletop.motion import curled
 from sandbox.games.curling.delivery import Delivery, Ice
 from sandbox.games.curling.sheet import RELEASE, STONE, WEIGHT
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.scene.scene import Scene
 
 SCENE = load(find("games/curling"))
 assert SCENE.surface is not None

@@ -4,7 +4,6 @@ import copy
 import json
 
 import pytest
-from ice import Rink, sheet
 
 import sandbox
 from sandbox.action import Move, SetParameter, actions_from_json
@@ -16,6 +15,7 @@ from sandbox.games.registry import rules_of
 from sandbox.games.session import HeadlessGame
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
+from tests.games.curling.ice import Rink, sheet
 
 
 @pytest.fixture

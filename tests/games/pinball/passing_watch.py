@@ -7,8 +7,8 @@ import math
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.forces import PlungerDrive
-from sandbox.scene.scene import Scene
 
 LENGTH, BASE, TIP = 0.0702, 0.0116, 0.007
 """m, of the bats of all tables: between the middles of their ends, and the radii of these"""

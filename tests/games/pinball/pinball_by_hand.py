@@ -7,9 +7,9 @@ import numpy as np
 
 from sandbox.action import Action, Drive, Move, Toggle
 from sandbox.games.contract import StepInfo
-from sandbox.games.pinball.rules import Pinball
+from sandbox.games.pinball.rules import PinballRules
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
 
 DT = 0.01
@@ -79,14 +79,14 @@ class Table:
     """A game in progress, and the world that a test says there is."""
 
     scene: Scene
-    game: Pinball = field(init=False)
+    game: PinballRules = field(init=False)
     step: int = 0
     actions: list[Action] = field(default_factory=list)
     """all that the rules did so far"""
     cues: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.game = Pinball(self.scene, self.scene.bodies)
+        self.game = PinballRules(self.scene, self.scene.bodies)
         self.position = self.scene.bodies.position.copy()
         self.velocity = np.zeros_like(self.position)
         self.present = np.ones(len(self.position), np.bool_)

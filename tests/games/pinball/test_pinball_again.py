@@ -5,7 +5,7 @@ from pathlib import Path
 
 from sandbox.action import actions_from_json
 from sandbox.games.players import PlayerSpec
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
 from sandbox.recording import Press, Recording
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import load

@@ -4,10 +4,10 @@ import copy
 
 import numpy as np
 import pytest
-from pinball_by_hand import OPEN, SERVE, Table, drives, moves, table, thrown
 
 from sandbox.action import Move
 from sandbox.games.pinball.game_flow import BALL_SAVE_TIME, BONUS_TIME
+from tests.games.pinball.pinball_by_hand import OPEN, SERVE, Table, drives, moves, table, thrown
 
 WAIT = BONUS_TIME + 0.05
 """s, until the next ball is there"""
@@ -221,7 +221,7 @@ def test_control_that_there_is_not_is_refused() -> None:
 
 
 def test_unknown_before_the_first_look_does_nothing() -> None:
-    from sandbox.games.pinball.rules import Pinball
+    from sandbox.games.pinball.rules import PinballRules
 
     scene = table()
-    assert Pinball(scene, scene.bodies).on_input("left flipper", 1.0) == ()
+    assert PinballRules(scene, scene.bodies).on_input("left flipper", 1.0) == ()

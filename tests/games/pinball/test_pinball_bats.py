@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from passing_watch import TIP, Watch
 
 from sandbox.action import Drive, Move
 from sandbox.engines.switching import start
 from sandbox.scene.files.load import loads
+from tests.games.pinball.passing_watch import TIP, Watch
 
 TEXT = """
 [solver]

@@ -2,10 +2,10 @@
 
 from hypothesis import given
 from hypothesis import strategies as st
-from pinball_by_hand import thrown
 
 from sandbox.action import Move
 from sandbox.games.pinball.devices import CoilVariation
+from tests.games.pinball.pinball_by_hand import thrown
 
 
 @given(st.integers(0, 2**63 - 1), st.floats(-5.0, 5.0), st.floats(0.1, 5.0))

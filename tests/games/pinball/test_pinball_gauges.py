@@ -1,6 +1,6 @@
 """What an environment observes of pinball: the panel and the lamps, as numbers."""
 
-from pinball_by_hand import OPEN, Table, table
+from tests.games.pinball.pinball_by_hand import OPEN, Table, table
 
 NAMES = tuple(name for name, _ in Table(table()).game.observation())
 

@@ -1,13 +1,13 @@
 """The player who watches the ball: what is pressed, and when."""
 
 import pytest
-from pinball_by_hand import OPEN, Table, table
 
 from sandbox.games.contract import StepInfo, UnsuitableSceneError
 from sandbox.games.pinball.bot import HELD, PULL, PinballBot
 from sandbox.games.players import POLICIES
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Contacts
+from tests.games.pinball.pinball_by_hand import OPEN, Table, table
 
 BAT = "left bat"
 

@@ -3,12 +3,12 @@
 import copy
 
 import pytest
-from pinball_by_hand import DT, OPEN, Table, table
 
 from sandbox.games.contract import HasLamps
 from sandbox.games.pinball.devices import FLASH
 from sandbox.games.pinball.drop_targets import FALL
 from sandbox.games.pinball.rules import BLINK_PERIOD
+from tests.games.pinball.pinball_by_hand import DT, OPEN, Table, table
 
 
 @pytest.fixture

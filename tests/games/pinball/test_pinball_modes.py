@@ -1,8 +1,7 @@
 """Modes and multiball: how they are lit, begun, and ended."""
 
-from pinball_by_hand import OPEN, SERVE, Table, moves, table, thrown
-
 from sandbox.action import Move
+from tests.games.pinball.pinball_by_hand import OPEN, SERVE, Table, moves, table, thrown
 
 
 def ready(*leave_out: str) -> Table:

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from pinball_by_hand import MASS, OPEN, SERVE, Table, drives, moves, table
 
 from sandbox.action import Action, Force, Impulse
 from sandbox.games.pinball.tilt import GRAVITY, JOLT, JOLT_TIME, SAME_PUSH_TIME, TiltBob
+from tests.games.pinball.pinball_by_hand import MASS, OPEN, SERVE, Table, drives, moves, table
 
 
 @pytest.fixture

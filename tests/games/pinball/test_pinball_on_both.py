@@ -7,8 +7,10 @@ import pytest
 
 from sandbox.games.contract import Press
 from sandbox.games.players import ScriptedInput
-from sandbox.measure.play_out import play_out
+from sandbox.measure.run.sessions import play_out
 from sandbox.scene.files.load import load
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 TABLES = sorted((Path(__file__).parents[3] / "scenes" / "pinball").glob("*.toml"))
 

@@ -11,13 +11,15 @@ from sandbox.games.contract import StepInfo, UnsuitableSceneError
 from sandbox.games.pinball.bot import PinballBot
 from sandbox.games.players import PlayerSpec
 from sandbox.games.registry import required_rules, rules_of
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
 from sandbox.recording import Press, Recording
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import load, loads
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Trajectory
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 TABLE = """
 title = "Plain"

@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from passing_watch import TIP, Watch
 
 from sandbox.action import Move
 from sandbox.arrays import FloatArray, IntArray
@@ -16,14 +15,17 @@ from sandbox.games.contract import Policy
 from sandbox.games.pinball.ball_control import SEARCH_AFTER
 from sandbox.games.pinball.bot import PinballBot
 from sandbox.games.pinball.playfield import MARGIN
-from sandbox.games.pinball.rules import Pinball
+from sandbox.games.pinball.rules import PinballRules
 from sandbox.games.players import RandomInput
 from sandbox.games.session import GameSession
-from sandbox.measure.play_out import play_out
-from sandbox.measure.run import Auditor
+from sandbox.measure.run.runner import TimedAudit
+from sandbox.measure.run.sessions import play_out
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import load
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
+from tests.games.pinball.passing_watch import TIP, Watch
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 TABLES = sorted((Path(__file__).parents[3] / "scenes" / "pinball").glob("*.toml"))
 
@@ -46,7 +48,7 @@ def seeded(path: Path, seed: int) -> Scene:
 class Game(NamedTuple):
     """What became of one."""
 
-    rules: Pinball
+    rules: PinballRules
     said: list[tuple[float, str]]
     """and when, s"""
     seconds: float
@@ -61,7 +63,7 @@ class Game(NamedTuple):
 class Keeper:
     """Looks after balls: all are finite and on the table, and none lies where nobody can help it."""
 
-    def __init__(self, rules: Pinball, dt: float) -> None:
+    def __init__(self, rules: PinballRules, dt: float) -> None:
         self.rules, self.dt, self.rest = rules, dt, dict.fromkeys(rules.board.balls, 0.0)
         self.low, self.high = np.add(rules.board.corners, [[MARGIN], [-MARGIN]])  # of all that is fixed
 
@@ -87,8 +89,8 @@ def play(scene: Scene, policy: Policy, seconds: float, audit: bool = False) -> G
     """Play one game, for so long at most, s."""
     simulation = start(scene, "pymunk")
     simulation.contacts()
-    auditor = Auditor(scene, simulation) if audit else None
-    rules = Pinball(scene, simulation.bodies)
+    auditor = TimedAudit(scene, simulation) if audit else None
+    rules = PinballRules(scene, simulation.bodies)
     watch = Watch(scene, simulation.bodies, rules.board.balls)
     if auditor is not None:
         simulation.watch(_Both(auditor, watch))
@@ -158,7 +160,7 @@ def test_multiball_of_the_full_table_puts_all_balls_into_play() -> None:
     scene = seeded(next(path for path in TABLES if path.stem == "full"), 1)
     simulation = start(scene, "pymunk")
     simulation.contacts()
-    rules = Pinball(scene, simulation.bodies)
+    rules = PinballRules(scene, simulation.bodies)
     referee, hand = GameSession(rules), PinballBot(1, 0.8)
     store = simulation.frame().position[rules.board.balls[1]].copy()
     most = 0

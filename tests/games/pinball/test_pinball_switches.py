@@ -3,11 +3,11 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pinball_by_hand import MASS, Table, contacts, table
 
 from sandbox.games.contract import StepInfo
 from sandbox.games.pinball.events import Switches
 from sandbox.games.pinball.playfield import Playfield
+from tests.games.pinball.pinball_by_hand import MASS, Table, contacts, table
 
 SCENE = table()
 BOARD = Playfield.of(SCENE, SCENE.bodies)

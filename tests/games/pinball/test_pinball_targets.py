@@ -3,11 +3,11 @@
 import math
 
 import pytest
-from pinball_by_hand import OPEN, Table, moves, table, thrown, toggles
 
 from sandbox.action import Move
 from sandbox.games.pinball.devices import DECAY, HOLD_TIME, PLATE_RADIUS
 from sandbox.games.pinball.drop_targets import FALL, REST
+from tests.games.pinball.pinball_by_hand import OPEN, Table, moves, table, thrown, toggles
 
 
 @pytest.fixture

@@ -4,11 +4,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.measure.extremes.axis import Scale
-from sandbox.measure.extremes.boundary import Found, boundary, halfway
+from sandbox.measure.extremes.boundary import Bracket, find_boundary, halfway
+from sandbox.measure.extremes.experiment import Scale
 
 
-def found(edge: float, levels: tuple[float, ...], scale: Scale = "log", falling: bool = False) -> tuple[Found, int]:
+def found(edge: float, levels: tuple[float, ...], scale: Scale = "log", falling: bool = False) -> tuple[Bracket, int]:
     asked = 0
 
     def passes(level: float) -> bool:
@@ -18,7 +18,7 @@ def found(edge: float, levels: tuple[float, ...], scale: Scale = "log", falling:
 
     known = {level: passes(level) for level in levels}
     asked = 0
-    return boundary(known, passes, scale), asked
+    return find_boundary(known, passes, scale), asked
 
 
 @given(st.floats(1.0, 9.9e5))
@@ -46,14 +46,14 @@ def test_whole_numbers_are_told_from_their_neighbours(edge: int) -> None:
 
 
 def test_axis_that_never_fails_has_its_last_level_and_one_that_always_does_has_none() -> None:
-    assert found(1e9, (1.0, 10.0))[0] == Found(10.0, None, True)
-    assert found(0.5, (1.0, 10.0))[0] == Found(None, 1.0, True)
-    assert boundary({}, None, "log") == Found(None, None, True)
+    assert found(1e9, (1.0, 10.0))[0] == Bracket(10.0, None, True)
+    assert found(0.5, (1.0, 10.0))[0] == Bracket(None, 1.0, True)
+    assert find_boundary({}, None, "log") == Bracket(None, None, True)
 
 
 def test_without_a_way_to_look_the_boundary_is_between_levels() -> None:
-    assert boundary({1.0: True, 2.0: False, 3.0: False}, None, "log") == Found(1.0, 2.0, True)
-    assert boundary({1.0: True, 2.0: False, 3.0: True}, None, "log") == Found(1.0, 2.0, False)
+    assert find_boundary({1.0: True, 2.0: False, 3.0: False}, None, "log") == Bracket(1.0, 2.0, True)
+    assert find_boundary({1.0: True, 2.0: False, 3.0: True}, None, "log") == Bracket(1.0, 2.0, False)
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_without_a_way_to_look_the_boundary_is_between_levels() -> None:
 )
 def test_failing_that_is_not_monotone_is_noticed(passes: object, limit: float) -> None:
     assert callable(passes)
-    result = boundary({x: passes(x) for x in (1.0, 4.0, 100.0)}, passes, "log")
+    result = find_boundary({x: passes(x) for x in (1.0, 4.0, 100.0)}, passes, "log")
     assert not result.monotone
     assert result.limit is not None
     assert result.limit == pytest.approx(limit, rel=0.15)  # one of the edges there are

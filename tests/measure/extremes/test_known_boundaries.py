@@ -4,20 +4,20 @@ import math
 
 import pytest
 
-from sandbox.measure.extremes.axes import AXES, PAIRS
-from sandbox.measure.extremes.axis import Axis
-from sandbox.measure.extremes.boundary import Limit
-from sandbox.measure.extremes.cell import Cell, Task
-from sandbox.measure.extremes.line import axis_line
-from sandbox.measure.extremes.setup import Setup
-from sandbox.measure.extremes.trial import attempt
+from sandbox.measure.extremes.boundary import Boundary, run_axis
+from sandbox.measure.extremes.experiment import Axis, EngineSetup
+from sandbox.measure.extremes.outcome import Sample, Task
+from sandbox.measure.extremes.scenarios import AXES, PAIRS
+from sandbox.measure.extremes.worker import evaluate_task
 from sandbox.scene.files.load import dumps, from_document
 
+pytestmark = pytest.mark.full  # long runs and sweeps
 
-def limit_of(axis: Axis, levels: tuple[float, ...], name: str) -> Limit:
+
+def limit_of(axis: Axis, levels: tuple[float, ...], name: str) -> Boundary:
     (setup,) = (setup for setup in axis.setups if setup.name == name)
-    cells: list[Cell] = []
-    found = axis_line(axis, setup, levels, (), attempt, cells.append)
+    cells: list[Sample] = []
+    found = run_axis(axis, setup, levels, (), evaluate_task, cells.append)
     assert found.monotone
     return found
 
@@ -87,13 +87,13 @@ def test_unknown_parameter_is_an_error() -> None:
     ],
 )
 def test_what_is_refused_is_refused_with_its_reason(task: Task, words: str) -> None:
-    outcome = attempt(task)
+    outcome = evaluate_task(task)
     assert outcome.verdict == "refused"
     assert words in outcome.reason
 
 
 def test_same_task_has_the_same_outcome_but_for_its_time() -> None:
-    for setup in (Setup("a", "pymunk"), Setup("b", "reference"), Setup("c", "exact")):
+    for setup in (EngineSetup("a", "pymunk"), EngineSetup("b", "reference"), EngineSetup("c", "exact")):
         task = Task("rack", {"iterations": 10}, setup.engine)
-        first, again = (attempt(task).__dict__ | {"seconds": 0.0} for _ in range(2))
+        first, again = (evaluate_task(task).__dict__ | {"seconds": 0.0} for _ in range(2))
         assert first == again

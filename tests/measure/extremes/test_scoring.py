@@ -2,13 +2,15 @@
 
 import pytest
 
-from sandbox.measure.extremes.axes import AXES
-from sandbox.measure.extremes.cell import Cell, Outcome, Word
-from sandbox.measure.extremes.scoring import Score, scores
+from sandbox.measure.extremes.outcome import Outcome, Sample, Verdict
+from sandbox.measure.extremes.runner import PredictionScore, prediction_scores
+from sandbox.measure.extremes.scenarios import AXES
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 
-def cell(verdict: Word, predicted: tuple[str, ...] = (), rule: str | None = None, axis: str = "speed") -> Cell:
-    return Cell(axis, 1.0, "pymunk", "pymunk", {}, Outcome(verdict, "", rule, predicted=predicted))
+def cell(verdict: Verdict, predicted: tuple[str, ...] = (), rule: str | None = None, axis: str = "speed") -> Sample:
+    return Sample(axis, 1.0, "pymunk", {}, "pymunk", Outcome(verdict, "", rule, predicted=predicted))
 
 
 def test_warnings_are_held_against_what_came() -> None:
@@ -21,20 +23,20 @@ def test_warnings_are_held_against_what_came() -> None:
         *[cell("refused", ("tunnelling",))] * 7,
         cell("failed", ("tunnelling",), "through", axis="friction"),  # an axis that is about no kind
     ]
-    (score,) = scores(cells, [AXES["speed"], AXES["friction"]])
-    assert score == Score("tunnelling", 3, 2, 2, 5)
+    (score,) = prediction_scores(cells, [AXES["speed"], AXES["friction"]])
+    assert score == PredictionScore("tunnelling", 3, 2, 2, 5)
     assert score.precision == pytest.approx(3 / 5, rel=1e-15)  # one rounding
     assert score.recall == pytest.approx(3 / 5, rel=1e-15)  # as above
 
 
 def test_shares_of_nothing_are_unknown() -> None:
-    (score,) = scores([cell("exact")], [AXES["speed"]])
-    assert score == Score("tunnelling", 0, 0, 0, 1)
+    (score,) = prediction_scores([cell("exact")], [AXES["speed"]])
+    assert score == PredictionScore("tunnelling", 0, 0, 0, 1)
     assert (score.precision, score.recall) == (None, None)
-    assert scores([], []) == ()
+    assert prediction_scores([], []) == ()
 
 
 def test_kinds_of_several_axes_are_one_score() -> None:
     axes = [AXES["stack"], AXES["tower_iterations"]]
     cells = [cell("failed", ("stack",), "stands", each.name) for each in axes]
-    assert scores(cells, axes) == (Score("stack", 2, 0, 0, 0),)
+    assert prediction_scores(cells, axes) == (PredictionScore("stack", 2, 0, 0, 0),)

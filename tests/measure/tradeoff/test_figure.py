@@ -2,7 +2,7 @@
 
 import pytest
 
-from sandbox.measure.tradeoff.figure import figure
+from sandbox.formatting import format_quantity
 
 
 @pytest.mark.parametrize(
@@ -20,4 +20,4 @@ from sandbox.measure.tradeoff.figure import figure
     ],
 )
 def test_figure_is_told_in_the_unit_that_reads_best(value: float, unit: str, told: str) -> None:
-    assert figure(value, unit) == told
+    assert format_quantity(value, unit) == told

@@ -4,16 +4,15 @@ import math
 
 import numpy as np
 import pytest
-from runs_by_hand import BALLS, run_of, scene_of
-from trials_by_hand import judge_of, shifted
 
-from sandbox.measure.run import run as run_scene
-from sandbox.measure.tradeoff.aim import choose_metric
-from sandbox.measure.tradeoff.judge import strayed, zoom_of
-from sandbox.measure.tradeoff.metrics import METRICS, measured
+from sandbox.measure.run.runner import run as run_scene
+from sandbox.measure.tradeoff.metrics import METRICS, default_zoom, displacement, measure_all
+from sandbox.measure.tradeoff.objective import choose_metric
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
+from tests.measure.tradeoff.evaluations_by_hand import context_of, shifted
+from tests.runs_by_hand import BALLS, run_of, scene_of
 
 OF_TRUTH = ("max_position", "final_position", "rms_position", "pixels", "bounce_height", "settle_time", "drift")
 
@@ -26,7 +25,7 @@ def scene() -> Scene:
 def test_distances_are_of_the_worst_body_in_its_worst_frame(scene: Scene) -> None:
     still = run_of(scene)
     run = run_of(scene, shifted(still, 7, 1, (0.03, 0.04)))
-    found = measured(run, judge_of(scene, zoom=200.0))
+    found = measure_all(run, context_of(scene, zoom=200.0))
     assert found["max_position"] == pytest.approx(0.05, rel=1e-12)  # 3-4-5, to rounding
     assert found["pixels"] == pytest.approx(10.0, rel=1e-12)  # × 200 px/m
     assert found["final_position"] == 0.0
@@ -36,18 +35,18 @@ def test_distances_are_of_the_worst_body_in_its_worst_frame(scene: Scene) -> Non
 
 def test_what_is_fixed_does_not_count(scene: Scene) -> None:
     run = run_of(scene, shifted(run_of(scene), slice(None), 2, (1.0, 0.0)))
-    assert measured(run, judge_of(scene))["max_position"] == 0.0
+    assert measure_all(run, context_of(scene))["max_position"] == 0.0
 
 
 def test_nothing_counts_beyond_what_the_truth_is_trusted_for(scene: Scene) -> None:
     run = run_of(scene, shifted(run_of(scene), slice(11, None), 0, (1.0, 0.0)))
-    short, whole = (measured(run, judge_of(scene, until=until)) for until in (1.0, None))
+    short, whole = (measure_all(run, context_of(scene, until=until)) for until in (1.0, None))
     assert (short["max_position"], short["final_position"], short["settle_time"]) == (0.0, 0.0, None)
     assert (whole["max_position"], whole["final_position"], whole["settle_time"]) == (1.0, 1.0, 0.0)
 
 
 def test_without_a_truth_only_what_needs_none_is_told(scene: Scene) -> None:
-    found = measured(run_of(scene), judge_of(scene, until=0.0))
+    found = measure_all(run_of(scene), context_of(scene, until=0.0))
     assert [name for name in OF_TRUTH if found[name] is not None] == []
     assert found["energy"] == 0.0
 
@@ -56,7 +55,7 @@ def test_refused_run_has_no_figures() -> None:
     scene = scene_of(BALLS + "[[joint]]\nkind = 'rod'\nbetween = ['a', 'b']\n")
     run = run_scene(scene, "exact")
     assert run.status == "refused"
-    assert set(measured(run, judge_of(scene)).values()) == {None}
+    assert set(measure_all(run, context_of(scene)).values()) == {None}
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e300])
@@ -66,7 +65,7 @@ def test_state_that_is_not_finite_is_infinitely_far_off(scene: Scene, bad: float
     velocity = np.zeros_like(position)
     velocity[12:, 0] = bad
     run = run_of(scene, position, velocity=velocity, contacts=[(0.5, (0, -1))])
-    found = measured(run, judge_of(scene, run_of(scene, contacts=[(0.5, (0, -1))])))
+    found = measure_all(run, context_of(scene, run_of(scene, contacts=[(0.5, (0, -1))])))
     for name in ("max_position", "final_position", "bounce_height", "drift", "settle_time"):
         value = found[name]
         assert value is not None
@@ -77,18 +76,18 @@ def test_state_that_is_not_finite_is_infinitely_far_off(scene: Scene, bad: float
 def test_bounce_height_is_of_what_follows_the_first_contact(scene: Scene) -> None:
     truth = run_of(scene, contacts=[(1.05, (0, -1))])
     before = run_of(scene, shifted(truth, slice(0, 11), 0, (0.0, 3.0)))
-    assert measured(before, judge_of(scene, truth))["bounce_height"] == 0.0
+    assert measure_all(before, context_of(scene, truth))["bounce_height"] == 0.0
     after = run_of(scene, shifted(truth, 15, 0, (5.0, 0.25)))
-    assert measured(after, judge_of(scene, truth))["bounce_height"] == 0.25
+    assert measure_all(after, context_of(scene, truth))["bounce_height"] == 0.25
     fallen = run_of(scene, shifted(truth, slice(11, None), 0, (0.0, -2.0)))
-    assert measured(fallen, judge_of(scene, truth))["bounce_height"] == 2.0
+    assert measure_all(fallen, context_of(scene, truth))["bounce_height"] == 2.0
 
 
 def test_bounce_height_needs_a_contact_and_gravity(scene: Scene) -> None:
-    assert measured(run_of(scene), judge_of(scene))["bounce_height"] is None
+    assert measure_all(run_of(scene), context_of(scene))["bounce_height"] is None
     weightless = scene_of(BALLS.replace("gravity = [0.0, -10.0]", ""))
     touched = run_of(weightless, contacts=[(0.5, (0, -1))])
-    assert measured(touched, judge_of(weightless, touched))["bounce_height"] is None
+    assert measure_all(touched, context_of(weightless, touched))["bounce_height"] is None
 
 
 def test_bounce_height_of_fewer_frames_is_of_those_that_both_have(scene: Scene) -> None:
@@ -97,7 +96,7 @@ def test_bounce_height_of_fewer_frames_is_of_those_that_both_have(scene: Scene) 
     truth = run_of(scene, place, contacts=[(0.3, (0, -1))])
     same = run_of(scene, place[::2], time=truth.time[::2])
     # Its first frame after the contact is a step later, and lower; it is right all the same.
-    assert measured(same, judge_of(scene, truth))["bounce_height"] == 0.0
+    assert measure_all(same, context_of(scene, truth))["bounce_height"] == 0.0
 
 
 def test_energy_is_a_share_of_the_energy_in_motion(scene: Scene) -> None:
@@ -106,19 +105,25 @@ def test_energy_is_a_share_of_the_energy_in_motion(scene: Scene) -> None:
     truth = run_of(scene, velocity=velocity)
     faster = velocity.copy()
     faster[-1, 0, 0] = 3.0  # 4.5 J where 2 J are right: 2.5 J of 2 J
-    assert measured(run_of(scene, velocity=faster), judge_of(scene, truth))["energy"] == pytest.approx(1.25, rel=1e-12)
+    assert measure_all(run_of(scene, velocity=faster), context_of(scene, truth))["energy"] == pytest.approx(
+        1.25, rel=1e-12
+    )
     slower = velocity.copy()
     slower[-1, 0, 0] = 1.0
-    assert measured(run_of(scene, velocity=slower), judge_of(scene, truth))["energy"] == pytest.approx(0.75, rel=1e-12)
+    assert measure_all(run_of(scene, velocity=slower), context_of(scene, truth))["energy"] == pytest.approx(
+        0.75, rel=1e-12
+    )
 
 
 def test_penetration_is_the_deepest_of_any_that_touched(scene: Scene) -> None:
     place = shifted(run_of(scene), 4, 0, (0.0, -4.6))  # centre 0.4 m above the ground, radius 0.5 m
-    assert measured(run_of(scene, place), judge_of(scene))["penetration"] is None  # nobody saw it
+    assert measure_all(run_of(scene, place), context_of(scene))["penetration"] is None  # nobody saw it
     touched = run_of(scene, place, contacts=[(0.4, (0, -1)), (0.5, (1, -1))])
-    assert measured(touched, judge_of(scene))["penetration"] == pytest.approx(0.1, rel=1e-12)  # rounding of 5 − 4.6
+    assert measure_all(touched, context_of(scene))["penetration"] == pytest.approx(
+        0.1, rel=1e-12
+    )  # rounding of 5 − 4.6
     clear = run_of(scene, contacts=[(0.4, (0, -1))])
-    assert measured(clear, judge_of(scene))["penetration"] == 0.0
+    assert measure_all(clear, context_of(scene))["penetration"] == 0.0
 
 
 def test_overlap_at_the_start_counts_only_where_it_gets_deeper_again(scene: Scene) -> None:
@@ -126,54 +131,54 @@ def test_overlap_at_the_start_counts_only_where_it_gets_deeper_again(scene: Scen
     place = run_of(scene).position.copy()
     place[:, 0, 1] = height
     run = run_of(scene, place, contacts=[(0.4, (0, -1))])
-    assert measured(run, judge_of(scene))["penetration"] == pytest.approx(0.2, rel=1e-12)  # from 0.2 to 0.4 m deep
+    assert measure_all(run, context_of(scene))["penetration"] == pytest.approx(0.2, rel=1e-12)  # from 0.2 to 0.4 m deep
     place[:, 0, 1] = np.maximum.accumulate(height)
-    assert measured(run_of(scene, place, contacts=[(0.4, (0, -1))]), judge_of(scene))["penetration"] == 0.0
+    assert measure_all(run_of(scene, place, contacts=[(0.4, (0, -1))]), context_of(scene))["penetration"] == 0.0
 
 
 def test_drift_is_of_what_lies_still_in_truth_and_of_the_second_half(scene: Scene) -> None:
     moving = run_of(scene).position.copy()
     moving[:, 1, 0] += np.linspace(0.0, 1.0, 21)  # b wanders in truth: it does not count
     moving[:5, 0, 1] += np.linspace(1.0, 0.0, 5)  # a falls in truth before it lies still
-    judge = judge_of(scene, run_of(scene, moving))
+    context = context_of(scene, run_of(scene, moving))
     early = shifted(run_of(scene, moving), slice(0, 5), 0, (1.0, 0.0))
-    assert measured(run_of(scene, early), judge)["drift"] == 0.0
+    assert measure_all(run_of(scene, early), context)["drift"] == 0.0
     late = shifted(run_of(scene, moving), slice(15, None), 0, (0.0, 0.02))
-    assert measured(run_of(scene, late), judge)["drift"] == pytest.approx(0.02, rel=1e-12)
+    assert measure_all(run_of(scene, late), context)["drift"] == pytest.approx(0.02, rel=1e-12)
 
 
 def test_drift_of_what_stands_in_truth_from_the_start_counts_from_there(scene: Scene) -> None:
     """A stack that falls at once lies still in the second half too."""
-    judge = judge_of(scene, run_of(scene))
+    context = context_of(scene, run_of(scene))
     fallen = shifted(run_of(scene), slice(5, None), 0, (0.3, -0.4))
-    assert measured(run_of(scene, fallen), judge)["drift"] == pytest.approx(0.5, rel=1e-12)
+    assert measure_all(run_of(scene, fallen), context)["drift"] == pytest.approx(0.5, rel=1e-12)
 
 
 def test_stack_whose_truth_is_trusted_for_a_short_time_is_scored_by_drift_and_not_by_overlaps(scene: Scene) -> None:
-    metric, reason = choose_metric(judge_of(scene, run_of(scene), until=0.5))
+    metric, reason = choose_metric(context_of(scene, run_of(scene), until=0.5))
     assert metric.name == "drift"
     assert reason == "positions are predictable for 0.5 s of 2 s only, and 2 bodies should stay at rest"
     tumbling = run_of(scene).position + np.linspace(0.0, 1.0, 21)[:, None, None]
-    metric, _ = choose_metric(judge_of(scene, run_of(scene, tumbling), until=0.5))
+    metric, _ = choose_metric(context_of(scene, run_of(scene, tumbling), until=0.5))
     assert metric.name == "penetration"
-    metric, reason = choose_metric(judge_of(scene, run_of(scene)))
+    metric, reason = choose_metric(context_of(scene, run_of(scene)))
     assert (metric.name, reason) == ("max_position", "the truth (exact) is trusted to the end, 2 s")
 
 
 def test_nothing_drifts_where_all_moves(scene: Scene) -> None:
     moving = run_of(scene).position + np.linspace(0.0, 1.0, 21)[:, None, None]
-    assert measured(run_of(scene, moving), judge_of(scene, run_of(scene, moving)))["drift"] is None
+    assert measure_all(run_of(scene, moving), context_of(scene, run_of(scene, moving)))["drift"] is None
 
 
 def test_missed_contacts_and_passes_are_counted_of_audited_runs(scene: Scene) -> None:
     rows = [(0.1 * k, (0, -1)) for k in range(3)]
     blind = run_of(scene, contacts=rows)
-    assert [measured(blind, judge_of(scene))[name] for name in ("missed_contacts", "passes")] == [None, None]
+    assert [measure_all(blind, context_of(scene))[name] for name in ("missed_contacts", "passes")] == [None, None]
     run = run_of(scene, contacts=rows, audited=True)
-    assert [measured(run, judge_of(scene))[name] for name in ("missed_contacts", "passes")] == [0.0, 0.0]
+    assert [measure_all(run, context_of(scene))[name] for name in ("missed_contacts", "passes")] == [0.0, 0.0]
     missed = with_missed(run, 1)
-    assert [measured(missed, judge_of(scene))[name] for name in ("missed_contacts", "passes")] == [1.0, 0.25]
-    assert measured(run_of(scene, audited=True), judge_of(scene))["passes"] is None  # of no meetings
+    assert [measure_all(missed, context_of(scene))[name] for name in ("missed_contacts", "passes")] == [1.0, 0.25]
+    assert measure_all(run_of(scene, audited=True), context_of(scene))["passes"] is None  # of no meetings
 
 
 def with_missed(run: Trajectory, count: int) -> Trajectory:
@@ -188,30 +193,30 @@ def test_settle_time_is_of_the_last_body_and_infinite_where_it_never_does(scene:
         velocity[:frame, 1, 0] = 1.0
         return run_of(scene, velocity=velocity)
 
-    judge = judge_of(scene, settling(10))
-    assert measured(settling(10), judge)["settle_time"] == 0.0
-    assert measured(settling(13), judge)["settle_time"] == pytest.approx(0.3, rel=1e-12)  # 1.3 s − 1.0 s
-    assert measured(settling(6), judge)["settle_time"] == pytest.approx(0.4, rel=1e-12)
-    assert measured(settling(21), judge)["settle_time"] == math.inf
-    assert measured(settling(10), judge_of(scene, settling(21)))["settle_time"] is None
+    context = context_of(scene, settling(10))
+    assert measure_all(settling(10), context)["settle_time"] == 0.0
+    assert measure_all(settling(13), context)["settle_time"] == pytest.approx(0.3, rel=1e-12)  # 1.3 s − 1.0 s
+    assert measure_all(settling(6), context)["settle_time"] == pytest.approx(0.4, rel=1e-12)
+    assert measure_all(settling(21), context)["settle_time"] == math.inf
+    assert measure_all(settling(10), context_of(scene, settling(21)))["settle_time"] is None
 
 
 def test_bodies_that_are_gone_do_not_count(scene: Scene) -> None:
     truth = run_of(scene, retired=[0.95, 0.95, np.nan])
     run = run_of(scene, shifted(truth, slice(10, None), 0, (7.0, 0.0)), retired=[0.95, 0.95, np.nan])
-    found = measured(run, judge_of(scene, truth))
+    found = measure_all(run, context_of(scene, truth))
     assert found["max_position"] == 0.0
     assert found["final_position"] == 0.0
     # Gone from the first frame on: there is nothing to tell.
     gone = run_of(scene, retired=[0.0, 0.0, np.nan])
-    nothing = measured(gone, judge_of(scene, gone))
+    nothing = measure_all(gone, context_of(scene, gone))
     assert [nothing[name] for name in ("max_position", "final_position", "rms_position")] == [None, None, None]
 
 
 def test_last_frame_that_counts_is_the_last_with_a_body_left(scene: Scene) -> None:
     truth = run_of(scene, retired=[0.95, 0.95, np.nan])
     run = run_of(scene, shifted(truth, slice(None), 0, (0.5, 0.0)), retired=[0.95, 0.95, np.nan])
-    assert measured(run, judge_of(scene, truth))["final_position"] == 0.5
+    assert measure_all(run, context_of(scene, truth))["final_position"] == 0.5
 
 
 def test_each_metric_bears_its_name_and_says_what_it_is() -> None:
@@ -220,14 +225,14 @@ def test_each_metric_bears_its_name_and_says_what_it_is() -> None:
 
 def test_zoom_fills_the_window() -> None:
     scene = loads("[[ball]]\nname = 'a'\nposition = [0, 0]\nradius = 1.0\n")
-    assert zoom_of(scene, None) == 0.9 * 720.0 / 2.0  # 2 m high
+    assert default_zoom(scene, None) == 0.9 * 720.0 / 2.0  # 2 m high
     empty = loads(
         "[[plane]]\nname = 'p'\npoint = [0, 0]\nnormal = [0, 1]\n[[ball]]\nposition = [1e9, 0]\nradius = 1e-9\n"
     )
-    assert math.isfinite(zoom_of(empty, None))
+    assert math.isfinite(default_zoom(empty, None))
 
 
 def test_strayed_is_of_the_second_half(scene: Scene) -> None:
     run = run_of(scene)
-    assert strayed(run_of(scene, shifted(run, 9, 0, (9.0, 0.0)))).tolist() == [0.0, 0.0, 0.0]
-    assert strayed(run_of(scene, shifted(run, 10, 0, (0.0, 2.0)))).tolist() == [2.0, 0.0, 0.0]  # the middle itself
+    assert displacement(run_of(scene, shifted(run, 9, 0, (9.0, 0.0)))).tolist() == [0.0, 0.0, 0.0]
+    assert displacement(run_of(scene, shifted(run, 10, 0, (0.0, 2.0)))).tolist() == [2.0, 0.0, 0.0]  # the middle itself

@@ -1,4 +1,4 @@
-"""The search, on landscapes made by hand: error and counted cost are functions of the variant alone."""
+"""The search, on landscapes made by hand: error and counted cost are functions of the configuration alone."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -7,19 +7,19 @@ from random import Random
 from typing import Any
 
 import pytest
-from runs_by_hand import DROP, scene_of
-from trials_by_hand import judge_of
 
 from sandbox.measure.tradeoff import search as module
-from sandbox.measure.tradeoff.judge import Judge
-from sandbox.measure.tradeoff.metrics import METRICS
-from sandbox.measure.tradeoff.search import Search
-from sandbox.measure.tradeoff.trial import Trial
-from sandbox.measure.tradeoff.variant import Space, Variant
-from sandbox.scene.scene import Scene
+from sandbox.measure.tradeoff.configuration import Configuration, Evaluation, SearchSpace
+from sandbox.measure.tradeoff.metrics import METRICS, EvaluationContext
+from sandbox.measure.tradeoff.search import SettingsSearch
+from sandbox.scene.compile.scene import Scene
+from tests.measure.tradeoff.evaluations_by_hand import context_of
+from tests.runs_by_hand import DROP, scene_of
 
-Law = Callable[[Variant], float | None]
-"""The error of a variant; infinite where it diverges, None where the metric says nothing of it."""
+pytestmark = pytest.mark.full  # long runs and sweeps
+
+Law = Callable[[Configuration], float | None]
+"""The error of a configuration; infinite where it diverges, None where the metric says nothing of it."""
 
 CHAIN = """
 [world]
@@ -38,36 +38,64 @@ fix = ["start"]
 """
 
 
-def steps(variant: Variant) -> float:
+def steps(configuration: Configuration) -> float:
     """Return substeps in one of the scene's steps."""
-    return float(variant.finer) * variant.substeps
+    return float(configuration.refinement) * configuration.substeps
 
 
 def order(power: float, at_one: float = 1.0, floor: float = 0.0) -> Law:
-    return lambda variant: at_one * steps(variant) ** -power + floor
+    return lambda configuration: at_one * steps(configuration) ** -power + floor
 
 
 class Landscape:
-    """Trials as a law has them; costs are the variant's work, and those of some words more."""
+    """Trials as a law has them; costs are the configuration's work, and those of some options more."""
 
     def __init__(
         self,
         law: Law,
-        price: Callable[[Variant], float] = lambda variant: 1.0,
+        price: Callable[[Configuration], float] = lambda configuration: 1.0,
         clock: Callable[[], float] = lambda: 0.0,
     ) -> None:
         self.law, self.price = law, price
-        self.asked: list[Variant] = []
+        self.asked: list[Configuration] = []
         self.clock = clock
 
-    def __call__(self, variant: Variant, space: Space, judges: Sequence[Judge], limit: float, *_: Any) -> Trial:
-        self.asked.append(variant)
-        error = self.law(variant)
+    def __call__(
+        self,
+        configuration: Configuration,
+        space: SearchSpace,
+        contexts: Sequence[EvaluationContext],
+        metric: str,
+        limit: float,
+        *_: Any,
+    ) -> Evaluation:
+        self.asked.append(configuration)
+        error = self.law(configuration)
         bad = error is not None and math.isinf(error)
         metrics = {**dict.fromkeys(METRICS), "max_position": None if bad else error}
-        cost = 1e-3 * variant.work * self.price(variant)
+        cost = 1e-3 * configuration.work * self.price(configuration)
         status, reason = ("diverged", "by law") if bad else ("ok", None)
-        return Trial(variant, space.settings(variant), status, reason, metrics, cost, cost, self.clock(), {})
+        settings = space.settings(configuration)
+        return Evaluation(
+            configuration=configuration,
+            engine=configuration.engine,
+            asked=settings,
+            settings=settings,
+            changes={},
+            error=metrics[metric],
+            cost=None,
+            cost_median=None,
+            repeats=0,
+            counted=None,
+            is_own=False,
+            status=status,
+            reason=reason,
+            metrics=metrics,
+            work={},
+            counted_seconds=cost,
+            spent_seconds=cost,
+            seconds=self.clock(),
+        )
 
 
 def searched(
@@ -80,20 +108,20 @@ def searched(
     budget: float | None = None,
     most: int = 150,
     effort: float = 1e6,
-    trying: Callable[..., Trial] | None = None,
-) -> Search:
-    monkeypatch.setattr(module, "tried", trying or landscape)
+    trying: Callable[..., Evaluation] | None = None,
+) -> SettingsSearch:
+    monkeypatch.setattr(module, "evaluate", trying or landscape)
     scene = scene_of(DROP) if scene is None else scene
-    judges = [judge_of(scene, until=0.0)]
-    space = Space(scene, scene.solver, engines, frame=1.0)
-    found = Search(space, judges, "max_position", tolerance, budget, effort, most, lambda _: None)
+    contexts = [context_of(scene, until=0.0)]
+    space = SearchSpace(scene, scene.solver, engines, frame=1.0)
+    found = SettingsSearch(space, contexts, "max_position", tolerance, budget, effort, most, lambda _: None)
     found.run()
     return found
 
 
-def cheapest(search: Search) -> Trial:
-    good = [trial for trial in search.trials.values() if trial.error("max_position") <= search.tolerance]
-    return min(good, key=lambda trial: trial.cost)
+def cheapest(search: SettingsSearch) -> Evaluation:
+    good = [evaluation for evaluation in search.evaluations.values() if evaluation.ranking_error <= search.tolerance]
+    return min(good, key=lambda evaluation: evaluation.counted_seconds)
 
 
 @pytest.mark.parametrize(("power", "tolerance"), [(1.0, 0.3), (1.0, 0.0023), (2.0, 0.011), (4.0, 0.0023)])
@@ -102,80 +130,93 @@ def test_fewest_steps_within_the_tolerance_are_found(
 ) -> None:
     search = searched(monkeypatch, Landscape(order(power)), tolerance)
     needed = tolerance ** (-1.0 / power)
-    got = steps(cheapest(search).variant)
+    got = steps(cheapest(search).configuration)
     # It closes in to an eighth of what it takes, or to the next whole number.
     assert needed <= got <= max(needed * 9.0 / 8.0, math.ceil(needed)) + 1e-9
 
 
 def test_coarser_than_the_scene_is_found_where_it_will_do(monkeypatch: pytest.MonkeyPatch) -> None:
     search = searched(monkeypatch, Landscape(order(1.0)), 5.0)
-    assert steps(cheapest(search).variant) == 0.25  # 1/4 of the steps: 4 times the error; 1/8 leaves too few steps
+    assert (
+        steps(cheapest(search).configuration) == 0.25
+    )  # 1/4 of the steps: 4 times the error; 1/8 leaves too few steps
 
 
 def test_errors_of_nothing_are_no_trap(monkeypatch: pytest.MonkeyPatch) -> None:
     search = searched(monkeypatch, Landscape(lambda _: 0.0), 1e-3)
-    assert steps(cheapest(search).variant) == 0.25
+    assert steps(cheapest(search).configuration) == 0.25
 
 
 @pytest.mark.parametrize("needed", [1, 3, 40])
 def test_nothing_tolerated_is_no_trap(monkeypatch: pytest.MonkeyPatch, needed: int) -> None:
     search = searched(monkeypatch, Landscape(lambda v: 0.0 if steps(v) >= needed else 2.0), 0.0)
-    assert needed <= steps(cheapest(search).variant) <= max(needed * 9 / 8, needed)
+    assert needed <= steps(cheapest(search).configuration) <= max(needed * 9 / 8, needed)
 
 
 def test_floor_of_the_model_is_not_dug_at(monkeypatch: pytest.MonkeyPatch) -> None:
     landscape = Landscape(order(1.0, floor=0.5))
     search = searched(monkeypatch, landscape, 0.1)
-    assert not [t for t in search.trials.values() if t.error("max_position") <= 0.1]
+    assert not [t for t in search.evaluations.values() if t.ranking_error <= 0.1]
     # 64 substeps leave 0.97 of what 32 do: that is not gone on from.
     assert max(map(steps, landscape.asked)) == 64.0
 
 
 def test_better_way_is_found_where_the_usual_one_has_a_floor(monkeypatch: pytest.MonkeyPatch) -> None:
-    def law(variant: Variant) -> float:
-        good = dict(variant.words).get("integrator") == "rk4"
-        return steps(variant) ** -4.0 * 0.1 if good else 0.5 + 1.0 / steps(variant)
+    def law(configuration: Configuration) -> float:
+        good = dict(configuration.options).get("integrator") == "rk4"
+        return steps(configuration) ** -4.0 * 0.1 if good else 0.5 + 1.0 / steps(configuration)
 
     search = searched(monkeypatch, Landscape(law), 0.01, engines=("reference",), most=60)
-    found = cheapest(search).variant
-    assert dict(found.words)["integrator"] == "rk4"
+    found = cheapest(search).configuration
+    assert dict(found.options)["integrator"] == "rk4"
     assert steps(found) == 2.0
 
 
 def test_two_words_that_only_help_together_with_steps_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    def law(variant: Variant) -> float:
-        words = dict(variant.words)
-        helping = (words.get("integrator") == "velocity_verlet") + (words.get("detection") == "swept")
-        return 10.0 ** (-2 * helping) / steps(variant)
+    def law(configuration: Configuration) -> float:
+        options = dict(configuration.options)
+        helping = (options.get("integrator") == "velocity_verlet") + (options.get("detection") == "swept")
+        return 10.0 ** (-2 * helping) / steps(configuration)
 
     search = searched(monkeypatch, Landscape(law), 0.5e-4, engines=("reference",), most=80)
-    assert dict(cheapest(search).variant.words) == {"detection": "swept", "integrator": "velocity_verlet"}
-    assert steps(cheapest(search).variant) == 2.0
+    assert dict(cheapest(search).configuration.options) == {"detection": "swept", "integrator": "velocity_verlet"}
+    assert steps(cheapest(search).configuration) == 2.0
 
 
 def test_iterations_that_are_needed_are_found_and_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
     search = searched(monkeypatch, Landscape(lambda v: 30.0 / v.iterations), 1.0, scene=scene_of(CHAIN))
-    assert 30 <= cheapest(search).variant.iterations <= 33
-    assert steps(cheapest(search).variant) <= 1.0
+    assert 30 <= cheapest(search).configuration.iterations <= 33
+    assert steps(cheapest(search).configuration) <= 1.0
 
 
 def test_start_that_diverges_is_refined(monkeypatch: pytest.MonkeyPatch) -> None:
     search = searched(monkeypatch, Landscape(lambda v: 0.01 if steps(v) >= 13 else math.inf), 0.1)
-    assert 13 <= steps(cheapest(search).variant) <= 14
-    failed = [trial for trial in search.trials.values() if trial.status == "diverged"]
-    assert [trial.reason for trial in failed] == ["by law"] * len(failed)
-    assert any(trial.variant == Variant("pymunk") for trial in failed)
+    assert 13 <= steps(cheapest(search).configuration) <= 14
+    failed = [evaluation for evaluation in search.evaluations.values() if evaluation.status == "diverged"]
+    assert [evaluation.reason for evaluation in failed] == ["by law"] * len(failed)
+    assert any(evaluation.configuration == Configuration("pymunk") for evaluation in failed)
 
 
 def test_coarser_steps_are_tried_where_the_scenes_own_take_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
     landscape = Landscape(order(1.0))
 
-    def bounded(variant: Variant, space: Space, judges: Sequence[Judge], limit: float, *_: Any) -> Trial:
-        found = landscape(variant, space, judges, limit)
-        return found if steps(variant) <= 0.25 else replace(found, status="stopped", metrics=dict.fromkeys(METRICS))
+    def bounded(
+        configuration: Configuration,
+        space: SearchSpace,
+        contexts: Sequence[EvaluationContext],
+        metric: str,
+        limit: float,
+        *_: Any,
+    ) -> Evaluation:
+        found = landscape(configuration, space, contexts, metric, limit)
+        return (
+            found
+            if steps(configuration) <= 0.25
+            else replace(found, status="stopped", error=None, metrics=dict.fromkeys(METRICS))
+        )
 
     search = searched(monkeypatch, landscape, 5.0, trying=bounded)
-    assert steps(cheapest(search).variant) == 0.25
+    assert steps(cheapest(search).configuration) == 0.25
     assert max(map(steps, landscape.asked)) == 1.0
     assert landscape.asked[1].work < landscape.asked[0].work  # nothing as slow is tried beside it
 
@@ -187,31 +228,31 @@ def test_metric_that_says_nothing_is_not_sought_for_long(monkeypatch: pytest.Mon
 
 
 def test_dominated_branches_are_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where words only cost, each is tried beside the front and none is gone on from."""
-    landscape = Landscape(order(1.0), price=lambda variant: 3.0 ** len(variant.words))
+    """Where options only cost, each is tried beside the front and none is gone on from."""
+    landscape = Landscape(order(1.0), price=lambda configuration: 3.0 ** len(configuration.options))
     search = searched(monkeypatch, landscape, 0.1, engines=("reference",))
-    assert not cheapest(search).variant.words
-    together = {variant for variant in landscape.asked if len(variant.words) > 1}
-    assert together == {variant for variant in search.space.suited() if len(variant.words) > 1}
+    assert not cheapest(search).configuration.options
+    together = {configuration for configuration in landscape.asked if len(configuration.options) > 1}
+    assert together == {configuration for configuration in search.space.presets() if len(configuration.options) > 1}
 
 
 def test_ways_that_only_help_together_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """Exact flight and impacts within a step: each alone leaves the other's error, and costs more."""
     both = {("integrator", "velocity_verlet"), ("detection", "swept")}
     landscape = Landscape(
-        lambda variant: 1e-9 if both <= set(variant.words) else 1.0 / steps(variant),
-        price=lambda variant: 3.0 ** len(variant.words),
+        lambda configuration: 1e-9 if both <= set(configuration.options) else 1.0 / steps(configuration),
+        price=lambda configuration: 3.0 ** len(configuration.options),
     )
     search = searched(monkeypatch, landscape, 1e-6, engines=("reference",))
-    assert set(cheapest(search).variant.words) == both
+    assert set(cheapest(search).configuration.options) == both
 
 
 def test_no_variant_is_tried_twice(monkeypatch: pytest.MonkeyPatch) -> None:
     landscape = Landscape(order(1.0))
     search = searched(monkeypatch, landscape, 0.01, engines=("pymunk", "exact", "reference"), most=60)
     assert len(set(landscape.asked)) == len(landscape.asked)
-    assert list(search.trials) == landscape.asked
-    filled = {(v.engine, search.space.filled(v)) for v in landscape.asked}
+    assert list(search.evaluations) == landscape.asked
+    filled = {(v.engine, search.space.resolved(v)) for v in landscape.asked}
     assert len(filled) == len(landscape.asked)
 
 
@@ -235,14 +276,23 @@ def test_most_is_kept(monkeypatch: pytest.MonkeyPatch, most: int) -> None:
 def test_effort_is_kept_by_the_counted_cost_of_the_trials(monkeypatch: pytest.MonkeyPatch) -> None:
     landscape, allowed = Landscape(order(1.0)), []
 
-    def noted(variant: Variant, space: Space, judges: Sequence[Judge], limit: float, *_: Any) -> Trial:
+    def noted(
+        configuration: Configuration,
+        space: SearchSpace,
+        contexts: Sequence[EvaluationContext],
+        metric: str,
+        limit: float,
+        *_: Any,
+    ) -> Evaluation:
         allowed.append(limit)
-        return landscape(variant, space, judges, limit)
+        return landscape(configuration, space, contexts, metric, limit)
 
     search = searched(monkeypatch, landscape, 1e-3, effort=0.1, most=400, trying=noted)
-    assert search.spent == pytest.approx(sum(trial.spent for trial in search.trials.values()), rel=1e-12)  # a sum
+    assert search.spent == pytest.approx(
+        sum(evaluation.spent_seconds for evaluation in search.evaluations.values()), rel=1e-12
+    )  # a sum
     assert search.spent <= 0.1 + 1e-12  # what would cost more than what is left was left out
-    assert search.untried
+    assert search.skipped
     assert max(allowed[1:]) <= 0.2 * 0.1  # a fifth of it, for one
 
 
@@ -259,45 +309,54 @@ def test_a_time_limit_ends_the_search_and_keeps_what_was_tried(monkeypatch: pyte
     now = [0.0]
     landscape = Landscape(order(1.0))
 
-    def slow(variant: Variant, space: Space, judges: Sequence[Judge], limit: float, *_: Any) -> Trial:
+    def slow(
+        configuration: Configuration,
+        space: SearchSpace,
+        contexts: Sequence[EvaluationContext],
+        metric: str,
+        limit: float,
+        *_: Any,
+    ) -> Evaluation:
         now[0] += 1.0
-        return landscape(variant, space, judges, limit)
+        return landscape(configuration, space, contexts, metric, limit)
 
-    monkeypatch.setattr(module, "working", lambda: now[0])
-    monkeypatch.setattr(module, "tried", slow)
+    monkeypatch.setattr(module, "clock_without_compilation", lambda: now[0])
+    monkeypatch.setattr(module, "evaluate", slow)
     scene = scene_of(DROP)
-    space = Space(scene, scene.solver, ("pymunk",))
-    search = Search(space, [judge_of(scene, until=0.0)], "max_position", 1e-3, None, 1e6, 400, lambda _: None, 5.0)
+    space = SearchSpace(scene, scene.solver, ("pymunk",))
+    search = SettingsSearch(
+        space, [context_of(scene, until=0.0)], "max_position", 1e-3, None, 1e6, 400, lambda _: None, 5.0
+    )
     assert len(search.run()) == 5
 
 
 def test_own_settings_of_every_engine_are_tried_whatever_they_cost(monkeypatch: pytest.MonkeyPatch) -> None:
     landscape = Landscape(order(1.0))
     search = searched(monkeypatch, landscape, 1e-3, engines=("pymunk", "exact", "reference"), effort=1e-9)
-    assert list(search.trials) == search.space.starts()
+    assert list(search.evaluations) == search.space.starts()
 
 
 def test_budget_is_aimed_at(monkeypatch: pytest.MonkeyPatch) -> None:
     """The tolerance is met at once; what the budget buys is looked for all the same, and a finer step is better."""
-    budget = 1e-3 * Variant("pymunk", substeps=20).work
+    budget = 1e-3 * Configuration("pymunk", substeps=20).work
     search = searched(monkeypatch, Landscape(order(1.0)), 2.0, budget=budget)
-    able = [trial for trial in search.trials.values() if trial.cost <= budget]
-    best = min(able, key=lambda trial: trial.error("max_position"))
-    assert steps(best.variant) >= 10.0  # within a factor of 2 of what it buys
+    able = [evaluation for evaluation in search.evaluations.values() if evaluation.counted_seconds <= budget]
+    best = min(able, key=lambda evaluation: evaluation.ranking_error)
+    assert steps(best.configuration) >= 10.0  # within a factor of 2 of what it buys
 
 
 def test_every_engine_gets_its_turn(monkeypatch: pytest.MonkeyPatch) -> None:
     landscape = Landscape(order(1.0))
     searched(monkeypatch, landscape, 0.05, engines=("pymunk", "exact", "reference"), most=60)
-    assert {variant.engine for variant in landscape.asked} == {"pymunk", "exact", "reference"}
+    assert {configuration.engine for configuration in landscape.asked} == {"pymunk", "exact", "reference"}
 
 
 def test_nobody_to_ask_is_no_trap(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert searched(monkeypatch, Landscape(order(1.0)), 0.1, engines=()).trials == {}
+    assert searched(monkeypatch, Landscape(order(1.0)), 0.1, engines=()).evaluations == {}
 
 
 def test_steps_of_a_scene_longer_than_its_duration_are_tried_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = scene_of(DROP.replace("dt = 0.02", "dt = 1.0"))
     search = searched(monkeypatch, Landscape(order(1.0)), 0.1, scene=scene)
-    assert search.space.starts()[0] in search.trials
-    assert 10.0 <= steps(cheapest(search).variant) <= 11.25  # an eighth more at most
+    assert search.space.starts()[0] in search.evaluations
+    assert 10.0 <= steps(cheapest(search).configuration) <= 11.25  # an eighth more at most

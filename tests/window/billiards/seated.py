@@ -1,10 +1,10 @@
 """Tables for tests: few balls, so that strokes are short."""
 
-from sandbox.games.billiards.table_geometry import TableGeometry
-from sandbox.games.billiards.view.table_game import BilliardsGame, Players
+from sandbox.games.billiards.view.controls import BilliardsControls
+from sandbox.games.billiards.view.player import Players
 from sandbox.scene.files.load import loads
-from sandbox.window.playback.live import LiveView
-from sandbox.window.playback.session import Session
+from sandbox.window.app_state import Messages, create_session
+from sandbox.window.game_host import controls_of, host_of
 
 RADIUS = 0.028575
 """m, of pool balls"""
@@ -31,24 +31,31 @@ side = 0.2
 """
 
 
-def game_of(text: str, players: Players | None = None) -> BilliardsGame:
-    """Sit down at a table."""
+def controls_at(text: str, players: Players | None = None) -> BilliardsControls:
+    """Return the controls of a new frame on the exact engine."""
     scene = loads(text)
-    live = LiveView(Session(TableGeometry.of(scene).scene, "exact"))
-    return BilliardsGame(live, players, scene.shots[0] if scene.shots else None)
+    live = create_session(scene, "exact", None, Messages())
+    assert live is not None
+    host = host_of(live)
+    assert host is not None
+    controls = controls_of(host, scene, {} if players is None else {"players": players})
+    assert isinstance(controls, BilliardsControls)
+    return controls
 
 
-def turn(game: BilliardsGame, elapsed: float = 1.0 / 60.0) -> None:
-    """Let real time pass, s, as the stage does."""
-    game.live.update(elapsed, game.waits)
-    game.go_on(elapsed)
+def turn(controls: BilliardsControls, elapsed: float = 1.0 / 60.0) -> None:
+    """Let real time pass, s, as the window does."""
+    host = controls.player.host
+    host.live.update(elapsed, host.waiting)
+    controls.update(elapsed)
 
 
-def roll_out(game: BilliardsGame, until: float = 60.0) -> None:
-    """Let the balls roll until the table waits."""
-    turn(game)
-    while not game.waits:
-        assert game.live.session.time < until
-        if game.live.busy is None and not game.waits:
-            game.live.step()
-        turn(game, 0.0)
+def roll_out(controls: BilliardsControls, until: float = 60.0) -> None:
+    """Let the balls roll until the rules wait."""
+    host = controls.player.host
+    turn(controls)
+    while not host.waiting:
+        assert host.live.session.time < until
+        if host.live.busy is None and not host.waiting:
+            host.live.step()
+        turn(controls, 0.0)

@@ -10,13 +10,15 @@ import imageio_ffmpeg
 import numpy as np
 import pygame
 import pytest
-from films import gif_frames, mp4_frames
 from PIL import Image
 
 from sandbox.window.capture import recorder as capture
 from sandbox.window.capture.gif import MAX_ERROR, PaletteQuantiser
 from sandbox.window.capture.image_files import CaptureError, fit_image, offscreen, rgb_pixels, safe_stem, screenshot
-from sandbox.window.capture.recorder import Recorder, recorder_for, recorder_in, size_within
+from sandbox.window.capture.recorder import FilmRecorder, recorder_for, recorder_in, size_within
+from tests.films import gif_frames, mp4_frames
+
+pytestmark = pytest.mark.full  # a window or a film
 
 SIZE = (96, 54)
 BACK, BALL = (20, 24, 31), (86, 180, 233)
@@ -333,7 +335,9 @@ def test_size_within_a_width_is_even(size: tuple[int, int], width: int, within: 
 
 
 def test_recorders_keep_the_protocol(tmp_path: Path) -> None:
-    recorders: list[Recorder] = [recorder_for(tmp_path / f"film{suffix}", SIZE, 30.0) for suffix in (".gif", ".mp4")]
+    recorders: list[FilmRecorder] = [
+        recorder_for(tmp_path / f"film{suffix}", SIZE, 30.0) for suffix in (".gif", ".mp4")
+    ]
     for recorder in recorders:
         recorder.cancel()
         recorder.cancel()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sandbox.action import Action, Move, Remove, Spawn
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import loads

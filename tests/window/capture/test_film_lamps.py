@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sandbox.games.players import PlayerSpec
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import load
 from sandbox.trajectory import Trajectory

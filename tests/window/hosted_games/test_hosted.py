@@ -1,20 +1,18 @@
 """Games with rules in the window: keys, gamepads, the panel, going back, starting again."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pygame
 import pytest
-from pressing import FOCUS_LOST, key, key_up
-from toy_game import TOY, Toy
-from windowed import turned, window_on
 
+from sandbox.action import Action, Impulse
 from sandbox.games import registry
-from sandbox.games.contract import Control
+from sandbox.games.contract import Control, StepInfo
 from sandbox.games.registry import RULES, rules_of
-from sandbox.measure.replay import rerun
+from sandbox.measure.run.sessions import rerun
 from sandbox.recording import Recording
 from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find, shipped
@@ -28,6 +26,11 @@ from sandbox.window.render.palette import WARNING
 from sandbox.window.sound import CUE_NOTES, Sounds, cue_notes, cue_sound
 from sandbox.window.ui.score_panel import draw_score, layout_score
 from sandbox.window.view_bounds import view_bounds
+from tests.toy_game import TOY, Toy
+from tests.window.pressing import FOCUS_LOST, key, key_up
+from tests.window.windowed import turned, window_on
+
+pytestmark = pytest.mark.full  # a window or a film
 
 UP, LEFT, R, P = pygame.K_UP, pygame.K_LEFT, pygame.K_r, pygame.K_p
 
@@ -452,3 +455,49 @@ def test_a_game_of_many_keys_says_where_they_are_told() -> None:
     said = [text for _, text in opened.app_state.messages.visible()]
     assert said == ["keys: Left, Right, Up, Down, W, Space, Gamepad Start (F1: help)"]
     opened.close()
+
+
+class Patient(Buttons):
+    """The toy in a world where time stops unless the ball has just been kicked."""
+
+    until = 0.0
+
+    def on_step(self, info: StepInfo) -> Sequence[Action]:
+        self.now = info.time
+        if info.actions:
+            self.until = info.time + 0.195  # s, between two steps
+        return super().on_step(info)
+
+    @property
+    def waiting(self) -> bool:
+        return self.now >= self.until
+
+
+def test_time_stops_while_the_rules_wait_for_the_player(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setitem(registry.RULES, "landing", Patient)
+    with window_on(TOY, tmp_path) as window:
+        window.app_state.start_game()
+        for _ in range(5):
+            live = turned(window)
+        assert live.session.time == 0.0
+        assert host_of(window).waiting
+        turned(window, key(UP))
+        for _ in range(10):
+            live = turned(window)
+        # The rules see the kick after its step, of 0.01 s; then 20 steps follow, which end within a picture.
+        assert live.session.time == pytest.approx(0.21, abs=1e-9)  # the sum of steps
+        assert live.clock.real_speed == live.clock.speed  # the wait does not count as slowness
+        live.step()
+        assert live.session.time == pytest.approx(0.22, abs=1e-9)  # steps by hand are made all the same
+        live.apply(Impulse(time=0.0, body="a", impulse=(0.0, 1.0)))  # an action of the player, without a control
+        for _ in range(10):
+            live = turned(window)
+        assert live.session.time == pytest.approx(0.43, abs=1e-9)
+        session = live.session.recording()
+        live.seek(5)
+        live.finish_seek()
+        assert not host_of(window).waiting  # what was played is shown again
+        for _ in range(20):
+            live = turned(window)
+        assert live.session.time == pytest.approx(0.43, abs=1e-9)
+        assert live.session.recording() == session

@@ -10,15 +10,13 @@ from types import ModuleType
 import numpy as np
 import pygame
 import pytest
-from pressing import key
 
+from sandbox import game_names as names
 from sandbox.engines.switching import start
-from sandbox.games import names
-from sandbox.games.names import game_names, register_game
-from sandbox.games.spec import GameSpec
+from sandbox.game_names import game_names, register_game
+from sandbox.game_spec import GameSpec
 from sandbox.gym import SandboxEnv
-from sandbox.measure.play_out import play_out
-from sandbox.measure.replay import rerun
+from sandbox.measure.run.sessions import play_out, rerun
 from sandbox.scene.files.load import loads
 from sandbox.window.app import App
 from sandbox.window.app_state import AppState
@@ -27,6 +25,9 @@ from sandbox.window.capture.image_files import offscreen
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.renderer import Renderer
+from tests.window.pressing import key
+
+pytestmark = pytest.mark.full  # a window or a film
 
 PAGE = Path(__file__).parents[3] / "docs/howto/write-a-game.md"
 GOLD, WHITE = (255, 215, 0), (255, 255, 255)
@@ -102,4 +103,10 @@ def test_game_is_a_gymnasium_environment(keepy: ModuleType) -> None:
 def test_game_of_this_package_is_not_replaced() -> None:
     with pytest.raises(ValueError, match="'pinball'"):
         register_game(GameSpec(names=("keepy-uppy", "pinball")))
+    assert "keepy-uppy" not in game_names()
+
+
+def test_registered_game_cannot_add_scene_tables() -> None:
+    with pytest.raises(ValueError, match=r"\[keepy\]"):
+        register_game(GameSpec(names=("keepy-uppy",), tables={"keepy": "keepy_uppy:TABLE"}))
     assert "keepy-uppy" not in game_names()

@@ -6,12 +6,10 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
-from pressing import key, key_up, move
-from windowed import turned, window_on
 
 from sandbox.action import Action, ActionError, Impulse, Move, Remove, SetParameter, Spawn
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.replay import rerun
+from sandbox.measure.run.sessions import rerun
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
@@ -22,6 +20,10 @@ from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.parameters import SessionParameters
 from sandbox.window.playback.parameters import turned as turned_knob
 from sandbox.window.playback.session import Session
+from tests.window.pressing import key, key_up, move
+from tests.window.windowed import turned, window_on
+
+pytestmark = pytest.mark.full  # every shipped scene
 
 REST = """
 title = "Rest"

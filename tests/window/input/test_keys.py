@@ -2,10 +2,10 @@
 
 import pygame
 import pytest
-from pressing import FOCUS_LOST, key, key_up
 
 from sandbox.window.input.keymap import BINDINGS, GLOBAL, Command, Keyboard, command_for
 from sandbox.window.playback.snapshot import OVERLAYS
+from tests.window.pressing import FOCUS_LOST, key, key_up
 
 CTRL = pygame.KMOD_LCTRL
 PLAIN = {

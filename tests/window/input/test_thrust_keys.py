@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pygame
 import pytest
-from pressing import FOCUS_LOST, key, key_up
-from windowed import turned, window_on
 
 from sandbox.action import Throttle
 from sandbox.window.app import App
 from sandbox.window.playback.live import LiveView
+from tests.window.pressing import FOCUS_LOST, key, key_up
+from tests.window.windowed import turned, window_on
 
 SHIP = """
 title = "Ship"

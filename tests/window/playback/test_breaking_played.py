@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from sandbox.action import Force, Switch
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import loads
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 from sandbox.window.playback import live as module
 from sandbox.window.playback.live import LiveView

@@ -7,13 +7,13 @@ import pytest
 
 from sandbox.action import ActionError, Force, Impulse, Pull, Remove, Spawn, Switch
 from sandbox.engines.registry import ENGINES
-from sandbox.measure.compare.errors import usual_tolerance
-from sandbox.measure.compare.truth import truth_of
+from sandbox.measure.compare.ground_truth import truth_of
+from sandbox.measure.metrics.trajectory_error import default_tolerance
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.scene.scene import Scene
 from sandbox.window.playback import diagnostics as companions
 from sandbox.window.playback.diagnostics import (
     Diagnostics,
@@ -24,6 +24,8 @@ from sandbox.window.playback.diagnostics import (
     max_body_distance,
 )
 from sandbox.window.playback.session import Session
+
+pytestmark = pytest.mark.full  # a window or a film
 
 BOUNCE = load(find("bounce"))
 
@@ -158,13 +160,13 @@ def test_exact_ghost_of_a_heap_gives_up_and_says_so(monkeypatch: pytest.MonkeyPa
 
 def test_twin_loses_trust_when_compare_says_so() -> None:
     scene = gas()
-    truth = truth_of(scene, scene.solver, usual_tolerance(scene))
+    truth = truth_of(scene, scene.solver, default_tolerance(scene))
     assert truth is not None
     assert truth.trusted_until < scene.world.duration
     for engine in ("pymunk", "exact"):
         session = Session(scene, engine)
         trust = DivergenceMonitor(session.simulation.checkpoint())
-        assert trust.tolerance == usual_tolerance(scene)
+        assert trust.tolerance == default_tolerance(scene)
         spreads = []
         while trust.state == "trusted" and session.time < 3.0 * truth.trusted_until:
             session.advance(5)

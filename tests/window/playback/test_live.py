@@ -8,18 +8,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sandbox.action import Action, ActionError, Impulse, Move, Pull, Remove, Reshape, Spawn, Toggle
-from sandbox.measure.replay import rerun
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
+from sandbox.measure.run.sessions import rerun
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Trajectory
 from sandbox.window.playback import live as journey
 from sandbox.window.playback import live as module
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.recorded import RecordedRun, RecordedView
 from sandbox.window.playback.session import Session
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 ALL = frozenset({"shapes", "trails", "contacts"})
 

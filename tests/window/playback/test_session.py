@@ -13,17 +13,19 @@ from hypothesis import strategies as st
 from sandbox.action import Action, ActionError, Impulse, Move, Pull, Remove, SetParameter, Spawn, Strike, Switch
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import ENGINES, UnknownEngineError
-from sandbox.measure.replay import rerun
+from sandbox.measure.run.sessions import rerun
 from sandbox.recording import Recording
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document, load, loads
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 from sandbox.window.playback import history as history_module
 from sandbox.window.playback.history import Keyframe
 from sandbox.window.playback.live import switch_engine
 from sandbox.window.playback.session import ReplayMismatchError, Session
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 
 def shipped(name: str) -> Scene:

@@ -5,15 +5,17 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from toy_game import Toy, toy_game, toy_scene
 
 from sandbox.action import Action, ActionError, Impulse, Remove, Switch
 from sandbox.engines.switching import SwitchableSimulation
 from sandbox.games import registry
 from sandbox.games.session import GameSession
-from sandbox.measure.replay import rerun
+from sandbox.measure.run.sessions import rerun
 from sandbox.recording import Recording
 from sandbox.window.playback.session import ReplayMismatchError, Session
+from tests.toy_game import Toy, toy_game, toy_scene
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 
 @pytest.fixture(autouse=True)
@@ -285,4 +287,38 @@ def test_whatever_is_done_replays(deeds: list[tuple[str, Any]]) -> None:
             go(session, value)
         else:
             session.press(what, value)
+    assert_replays(session)
+
+
+def test_retract_removes_the_inputs_since_the_action() -> None:
+    session = session_of()
+    session.press("aim", 0.25)
+    session.advance(10)
+    session.press("aim", 0.75)
+    session.press("kick", 1.0)
+    session.advance(10)
+    session.press("kick", 0.0)
+    assert session.game is not None
+    kick = next(k for k, action in enumerate(session.actions) if action.time == pytest.approx(0.1))
+    go(session, session.retract(kick))
+    assert [(press.control, press.value) for press in session.game.all_presses] == [("aim", 0.25)]
+    assert not session.has_future
+    assert (session.step_number, dict(rules_of(session).display_lines())["aim"]) == (10, "0.25")
+    session.advance(40)
+    assert_replays(session)
+
+
+def test_retract_keeps_the_stated_inputs() -> None:
+    session = session_of()
+    session.advance(10)
+    session.press("aim", 0.75)
+    session.press("kick", 1.0)
+    session.advance(5)
+    kick = next(k for k, action in enumerate(session.actions) if action.time == pytest.approx(0.1))
+    go(session, session.retract(kick, 1))
+    assert session.game is not None
+    assert [press.control for press in session.game.all_presses] == ["aim"]
+    assert (session.step_number, dict(rules_of(session).display_lines())["aim"]) == (10, "0.75")
+    assert session.game.future_presses == ()  # it is repeated, though no action follows
+    session.advance(40)
     assert_replays(session)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from sandbox.action import Impulse
-from sandbox.measure.replay import rerun
+from sandbox.measure.run.sessions import rerun
 from sandbox.recording import Recording
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import HELD
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.scene.scene import Scene
 from sandbox.window.playback.session import Session
 
 HOLES: list[dict[str, Any]] = [

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 import pygame
 
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts, Frame
 from sandbox.window.camera import Camera
 from sandbox.window.playback.snapshot import Snapshot
-from sandbox.window.render.palette import Colour
+from sandbox.window.render.palette import RgbColour
 from sandbox.window.render.renderer import Renderer
 
 SIZE = (200, 120)
@@ -57,7 +57,7 @@ def drawn(what: Snapshot, camera: Camera = CAMERA, *, picture: Renderer | None =
     return pygame.surfarray.array3d(surface)
 
 
-def at(picture: np.ndarray, x: float, y: float, camera: Camera = CAMERA) -> Colour:
+def at(picture: np.ndarray, x: float, y: float, camera: Camera = CAMERA) -> RgbColour:
     """Return the colour of the pixel that shows a place, m."""
     column, row = np.floor(camera.to_screen(np.asarray((x, y)))).astype(int)
     return tuple(int(channel) for channel in picture[column, row])

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from drawn import at, drawn, frame, scene, sight
 
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.window.render import particles as ageing
 from sandbox.window.render.particles import SHADES, LifetimeColours, fade_colours
 from sandbox.window.render.renderer import Renderer
+from tests.window.render.drawn import at, drawn, frame, scene, sight
 
 FADING = {
     "velocity_min": [0.0, 0.0],

@@ -6,8 +6,6 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
-from pressing import key, key_up
-from windowed import turned, window_on
 
 from sandbox.action import Reshape
 from sandbox.games.artillery.rules import ArtilleryRules
@@ -16,10 +14,10 @@ from sandbox.games.artillery.view import sky_image, sky_tone
 from sandbox.games.artillery.view_state import ArtilleryViewState, ExplosionView, FallingDirt
 from sandbox.games.players import NoInput
 from sandbox.games.session import HeadlessGame
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
 from sandbox.recording import Recording
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 from sandbox.window.app import App
 from sandbox.window.camera import Camera
@@ -28,6 +26,8 @@ from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.recorded import RecordedRun
 from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.renderer import Renderer
+from tests.window.pressing import key, key_up
+from tests.window.windowed import turned, window_on
 
 SIZE = (400, 240)
 AIM_TIME = 0.05

@@ -4,15 +4,15 @@ import math
 
 import pytest
 
-from sandbox.games.billiards.table_geometry import table_bounds, table_width
 from sandbox.games.billiards.tables import TABLES
 from sandbox.games.billiards.view.table import (
     DEPTH,
     cushion_outlines,
     other_walls,
 )
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
-from sandbox.scene.scene import Scene
+from sandbox.window.view_bounds import area_bounds, shorter_side
 
 
 def table(name: str) -> Scene:
@@ -28,13 +28,13 @@ def test_every_cushion_is_found_and_lies_between_area_and_wood(name: str) -> Non
     found = cushion_outlines(scene, area)
     assert len(found) == (4 if name.startswith("carom") else 6)
     (left, bottom), (right, top) = area
-    depth = DEPTH * table_width(area)
+    depth = DEPTH * shorter_side(area)
     for each in found:
         for x, y in each.outline:
             # A facing may end behind the line of the wood, where its hole is.
             out = max(left - x, x - right, bottom - y, y - top)
             assert -1e-9 < out < max(depth, 0.1)
-    assert table_bounds(area)[0][0] < left - depth
+    assert area_bounds(area)[0][0] < left - depth
 
 
 def test_noses_with_jaws_are_tangent_to_them() -> None:

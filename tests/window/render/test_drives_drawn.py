@@ -3,9 +3,12 @@
 import math
 
 import numpy as np
-from drawn import at, changed, drawn, frame, scene, sight
+import pytest
 
 from sandbox.window.render.palette import BACKGROUND
+from tests.window.render.drawn import at, changed, drawn, frame, scene, sight
+
+pytestmark = pytest.mark.full  # every shipped scene
 
 BAR = {"name": "bar", "position": [1.0, 0.0], "size": [2.0, 1.0]}
 TORQUE = {"kind": "torque", "body": "bar", "pivot": [0.0, 0.0], "stops": [0.0, 1.0], "torque": 1.0}

@@ -4,7 +4,6 @@ from itertools import pairwise
 import numpy as np
 import pygame
 import pytest
-from drawn import CAMERA, SIZE, at, changed, drawn, scene, sight
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
@@ -12,6 +11,7 @@ from sandbox.window.camera import Camera
 from sandbox.window.render.grid import NARROWEST, draw_grid, draw_scale, step_of
 from sandbox.window.render.palette import BACKGROUND, FAINT, GRID, GRID_STRONG, SOLID, SURFACE
 from sandbox.window.render.static_geometry import draw_static_bodies
+from tests.window.render.drawn import CAMERA, SIZE, at, changed, drawn, scene, sight
 
 
 def fixtures(camera=CAMERA, *, antialias=True, **tables) -> np.ndarray:

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pygame
-from drawn import frame
 
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
 from sandbox.window.camera import Camera
 from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.palette import hex_colour
 from sandbox.window.render.renderer import HIGH, WIDE, InsetRenderer, Renderer
+from tests.window.render.drawn import frame
 
 SIZE = (800, 600)
 FREE = pygame.Rect(0, 0, 700, 560)

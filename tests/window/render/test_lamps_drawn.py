@@ -4,14 +4,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from drawn import SIZE, ball, scene, sight
 
 from sandbox.games.pinball import view
-from sandbox.scene.scene import Scene
+from sandbox.scene.compile.scene import Scene
 from sandbox.window.camera import Camera
 from sandbox.window.capture.image_files import offscreen
 from sandbox.window.render.lamps import GLOW, MAX_LAMP_RADIUS, RADIUS
 from sandbox.window.render.renderer import Renderer
+from tests.window.render.drawn import SIZE, ball, scene, sight
 
 SCALE = 1000.0
 CLOSE = Camera((0.0, 0.0), SCALE, SIZE)

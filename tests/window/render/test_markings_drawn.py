@@ -4,14 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from drawn import CAMERA, at, ball, changed, drawn, frame, scene, sight
 from hypothesis import given
 from hypothesis import strategies as st
 
 from sandbox.games.curling.view import GRANITE
 from sandbox.scene.errors import SceneError
 from sandbox.window.camera import Camera
-from sandbox.window.render.palette import Colour, hex_colour
+from sandbox.window.render.palette import RgbColour, hex_colour
+from tests.window.render.drawn import CAMERA, at, ball, changed, drawn, frame, scene, sight
 
 ICE, LINE = "#dce7ec", "#b5433c"
 SHEET = {"colour": ICE, "points": [[-4, -2], [4, -2], [4, 2], [-4, 2]]}
@@ -21,7 +21,7 @@ def painted(*markings: dict, **tables: object) -> np.ndarray:
     return drawn(sight(scene(play={"marking": list(markings)}, **tables)))
 
 
-def near(seen: Colour, colour: str) -> bool:
+def near(seen: RgbColour, colour: str) -> bool:
     """Tell whether a pixel has a colour, but for one of 255: shapes are mixed from it in floats."""
     return all(abs(a - b) <= 1 for a, b in zip(seen, hex_colour(colour), strict=True))
 
@@ -63,6 +63,12 @@ def test_no_marking_is_too_far_or_too_large(x: float, y: float, size: float, pow
         {"colour": LINE, "points": corners, "filled": False, "width": size},
     ]
     drawn(sight(scene(play={"marking": markings})), camera)
+    disc, bare = (drawn(sight(scene(play={"marking": some})), camera) for some in (markings[:1], []))
+    distance, half = math.hypot(x, y), 26.0 / camera.scale  # half a diagonal of 25 pixels, and the smooth edge
+    if distance > size + half:
+        assert not changed(disc, bare).any()
+    if distance + half < size:
+        assert changed(disc, bare).mean() > 0.5  # all but the lines of the grid, which is above it
 
 
 def test_a_puck_is_a_stone_with_a_coloured_top_and_a_handle_that_turns() -> None:

@@ -2,12 +2,12 @@ import math
 
 import numpy as np
 import pytest
-from drawn import CAMERA, at, ball, changed, contact, drawn, frame, scene, sight
 
 from sandbox.trajectory import Contacts
 from sandbox.window.playback.snapshot import MissedContactMarker
 from sandbox.window.render.palette import ORANGE, YELLOW
 from sandbox.window.render.vectors import HEAT
+from tests.window.render.drawn import CAMERA, at, ball, changed, contact, drawn, frame, scene, sight
 
 ONE = scene(balls=[ball(0, 0, velocity=[5.0, 0.0])])
 WEIGHT = 9.81

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
-from drawn import ball, scene
 
 from sandbox.scene.description.discs import Ball
 from sandbox.window.render.palette import ACCENTS, NEUTRAL, colour_of, colour_of_fixed, hex_colour, mix_colours
+from tests.window.render.drawn import ball, scene
 
 SPARKS = {"position": [0.0, 0.0], "velocity_min": [-1.0, 0.0], "velocity_max": [1.0, 1.0]}
 

@@ -1,11 +1,11 @@
 import numpy as np
 import pygame
 import pytest
-from drawn import CAMERA, SIZE, at, ball, changed, drawn, frame, scene, sight
 
 from sandbox.window.camera import Camera
 from sandbox.window.render.palette import ACCENTS, BACKGROUND, CLEAR, FAINT, SOLID, TOUCHING
 from sandbox.window.render.renderer import Renderer
+from tests.window.render.drawn import CAMERA, SIZE, at, ball, changed, drawn, frame, scene, sight
 
 FLOOR = [{"point": [0.0, -2.0], "normal": [0.0, 1.0]}]
 

@@ -1,7 +1,6 @@
 import numpy as np
 import pygame
 import pytest
-from drawn import ball, contact, drawn, frame, scene, sight
 from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as st_numpy
@@ -10,6 +9,9 @@ from sandbox.trajectory import Contacts
 from sandbox.window.camera import Camera
 from sandbox.window.playback.snapshot import OVERLAYS, MissedContactMarker
 from sandbox.window.render.renderer import Renderer
+from tests.window.render.drawn import ball, contact, drawn, frame, scene, sight
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 ANY = st.floats(allow_nan=True, allow_infinity=True)
 FAR = st.floats(-1e16, 1e16)

@@ -6,7 +6,6 @@ import numpy as np
 import pygame
 import pytest
 import shapely
-from drawn import SIZE, at, ball, drawn, scene, sight
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -15,6 +14,7 @@ from sandbox.window.capture.image_files import offscreen
 from sandbox.window.render.lines import clip_polygon
 from sandbox.window.render.palette import BACKGROUND
 from sandbox.window.render.renderer import Renderer
+from tests.window.render.drawn import SIZE, at, ball, drawn, scene, sight
 
 BED: dict[str, Any] = {"points": [[-4, -2], [4, -2], [4, 2], [-4, 2]], "colour": "#102030"}
 SPOT: dict[str, Any] = {"position": [2, 0], "radius": 1, "colour": "#405060"}

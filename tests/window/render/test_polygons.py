@@ -5,15 +5,15 @@ import math
 import numpy as np
 import pygame
 import pytest
-from drawn import CAMERA, at, ball, changed, drawn, frame, scene, sight
 
 from sandbox.engines.common import kernel
-from sandbox.scene.scene import Scene
+from sandbox.scene.compile.scene import Scene
 from sandbox.window.render import kernels as stencil
 from sandbox.window.render import polygons as module
 from sandbox.window.render.circles import CircleStyle, darken
 from sandbox.window.render.palette import ACCENTS, NEUTRAL, YELLOW
 from sandbox.window.render.polygons import PolygonRenderer
+from tests.window.render.drawn import CAMERA, at, ball, changed, drawn, frame, scene, sight
 
 STAR = [
     [math.cos(k * math.pi / 5) * (1.0 if k % 2 else 2.5), math.sin(k * math.pi / 5) * (1.0 if k % 2 else 2.5)]

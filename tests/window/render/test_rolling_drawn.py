@@ -20,10 +20,10 @@ def frame(time: float, spin: tuple[float, float, float]) -> Frame:
 def turned(spin: tuple[float, float, float], seconds: float, pictures: int) -> np.ndarray:
     """Return the rotation that a ball has made, (3, 3)."""
     rolling = BallOrientations()
-    rolling.go_on(frame(0.0, spin))
+    rolling.advance(frame(0.0, spin))
     before = rolling.turned[0].copy()
     for k in range(1, pictures + 1):
-        rolling.go_on(frame(seconds * k / pictures, spin))
+        rolling.advance(frame(seconds * k / pictures, spin))
     return rolling.turned[0] @ before.T
 
 
@@ -53,9 +53,9 @@ def test_long_rolling_leaves_a_rotation() -> None:
 
 def test_time_that_stands_or_runs_backwards_turns_nothing() -> None:
     rolling = BallOrientations()
-    rolling.go_on(frame(1.0, (1.0, 2.0, 3.0)))
+    rolling.advance(frame(1.0, (1.0, 2.0, 3.0)))
     before, version = rolling.turned.copy(), rolling.version.copy()
-    rolling.go_on(frame(1.0, (1.0, 2.0, 3.0)))
-    rolling.go_on(frame(0.2, (1.0, 2.0, 3.0)))
+    rolling.advance(frame(1.0, (1.0, 2.0, 3.0)))
+    rolling.advance(frame(0.2, (1.0, 2.0, 3.0)))
     assert (rolling.turned == before).all()
     assert (rolling.version == version).all()

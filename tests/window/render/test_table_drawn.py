@@ -7,8 +7,8 @@ import pytest
 from sandbox.games.billiards.view.balls import IVORY, paint_texture, texture_of
 from sandbox.games.billiards.view.prediction import CueAim
 from sandbox.games.billiards.view.table import CAROM, HOLE, POOL, SNOOKER
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Frame
 from sandbox.window.camera import Camera
 from sandbox.window.playback.snapshot import Snapshot

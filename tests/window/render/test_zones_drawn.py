@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from drawn import at, ball, drawn, frame, scene, sight
 
 from sandbox.trajectory import Contacts
 from sandbox.window.hit_test import overlapping_bodies
 from sandbox.window.render.palette import BACKGROUND, SOLID
+from tests.window.render.drawn import at, ball, drawn, frame, scene, sight
 
 ZONES: dict[str, tuple[dict[str, Any], tuple[float, float], tuple[float, float]]] = {
     "circle": ({"position": [0, 0], "radius": 1.5}, (0.5, 0.5), (1.3, 1.3)),

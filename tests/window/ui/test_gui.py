@@ -5,8 +5,6 @@ from typing import Any
 
 import pygame
 import pytest
-from pressing import press, release
-from windowed import turned, window_on
 
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.window import app_state
@@ -15,6 +13,8 @@ from sandbox.window.app_state import AppState
 from sandbox.window.playback.parameters import SessionParameters
 from sandbox.window.ui import gui
 from sandbox.window.ui.panel import SidePanel
+from tests.window.pressing import press, release
+from tests.window.windowed import turned, window_on
 
 ROOM = """
 [world]

@@ -4,10 +4,10 @@ import pygame
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pressing import key, press, wheel
 
 from sandbox.window.input.keymap import BINDINGS
 from sandbox.window.ui.help import SCENE_GROUP, HelpOverlay, help_groups
+from tests.window.pressing import key, press, wheel
 
 CLAIMS = (("S (hold)", "stroke"), ("Space", "shoot"), ("G", "ball in hand"))
 

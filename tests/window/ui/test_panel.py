@@ -7,12 +7,12 @@ import pygame
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pressing import FOCUS_LOST, move, press, release, wheel
 
 from sandbox.window.playback.parameters import Parameter
 from sandbox.window.playback.snapshot import OVERLAYS
 from sandbox.window.ui.panel import SidePanel
 from sandbox.window.ui.widgets import Checkbox, ParameterSlider, PushButton, Widget
+from tests.window.pressing import FOCUS_LOST, move, press, release, wheel
 
 SIZE = (1280, 800)
 BUTTONS = ("play", "step", "back", "restart", "camera", "record", "save")

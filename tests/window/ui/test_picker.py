@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
-from pressing import key, move, press, release, wheel
 
 from sandbox.scene.files.load import loads
 from sandbox.scene.files.shipped_scenes import shipped
 from sandbox.window.render.palette import BACKGROUND
 from sandbox.window.render.renderer import Renderer
 from sandbox.window.ui.scene_browser import SceneBrowser, draw_thumbnail, read_scene
+from tests.window.pressing import key, move, press, release, wheel
 
 BALL = 'title = "{title}"\nabout = "{about}"\n[world]\ngravity = [0, -9.81]\n[[ball]]\nposition = [0, 0]\nradius = 1\n'
 

@@ -6,10 +6,10 @@ import pygame
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pressing import FOCUS_LOST, move, press, release
 
 from sandbox.window.render.palette import ORANGE
 from sandbox.window.ui.timeline import Timeline
+from tests.window.pressing import FOCUS_LOST, move, press, release
 
 AREA = pygame.Rect(10, 100, 600, 34)
 

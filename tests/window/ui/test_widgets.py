@@ -5,7 +5,6 @@ import weakref
 
 import pygame
 import pytest
-from pressing import move, press, release
 
 from sandbox.window.playback.parameters import Parameter
 from sandbox.window.ui.icons import ICON_NAMES, icon
@@ -18,6 +17,7 @@ from sandbox.window.ui.widgets import (
     Widget,
     WidgetEvent,
 )
+from tests.window.pressing import move, press, release
 
 ROW = pygame.Rect(20, 20, 214, 34)  # a slider's track is then 200 px long
 KNOB = Parameter("friction", "friction", 0.0, 2.0, 0.5, step=0.01, default=0.3)

@@ -9,8 +9,8 @@ import math
 from sandbox.arrays import FloatArray
 from sandbox.engines.common.body_store import ALL, NOTHING
 from sandbox.engines.common.kernel import bare_kernel as kernel
-from sandbox.engines.exact.roots import MAX_OVERLAP, first_touch, gap_zero_time, return_time
-from sandbox.engines.exact.state import DONE, FULL, PAUSED, TOO_MANY
+from sandbox.engines.exact.common.roots import MAX_OVERLAP, first_touch, gap_zero_time, return_time
+from sandbox.engines.exact.common.state import DONE, FULL, PAUSED, TOO_MANY
 from sandbox.engines.exact.tabletop import state as c
 from sandbox.engines.exact.tabletop.impact import (
     advance_to,
@@ -169,7 +169,7 @@ EVENTS_PER_CALL = 20_000
 
 
 @kernel
-def restart(data: TabletopState, t: float) -> None:
+def rebuild_all(data: TabletopState, t: float) -> None:
     """Start all balls from a time, s, with their present velocity and spin, and predict all events.
 
     A ball inside a pocket is captured at once; a captured ball that was moved within its pocket returns to the centre.

@@ -8,8 +8,8 @@ import math
 
 from sandbox.arrays import FloatArray
 from sandbox.engines.common.kernel import bare_kernel as kernel
-from sandbox.engines.exact.record import account_contact
-from sandbox.engines.exact.roots import CREEP_ACCELERATION
+from sandbox.engines.exact.common.record import account_contact
+from sandbox.engines.exact.common.roots import CREEP_ACCELERATION
 from sandbox.engines.exact.tabletop import state as c
 from sandbox.engines.exact.tabletop.state import TabletopState
 from sandbox.engines.tabletop.collisions import STILL, Five, collide_balls, collide_cushion, collide_pucks

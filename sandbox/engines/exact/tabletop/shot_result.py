@@ -10,7 +10,7 @@ from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.exact.tabletop import state as c
 from sandbox.engines.exact.tabletop.state import contacts_of
 from sandbox.html_repr import HtmlRepr
-from sandbox.scene.scene import Scene
+from sandbox.scene.compile.scene import Scene
 from sandbox.trajectory import Contacts
 
 KINDS = {c.BALL: "ball", c.LINE: "cushion", c.VERTEX: "jaw", c.POCKET: "pocket"}

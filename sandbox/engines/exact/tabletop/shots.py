@@ -21,10 +21,10 @@ import numpy as np
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.contract import Exhaustion, Refusal
-from sandbox.engines.exact.engine import ExactEngine, overlap_of
-from sandbox.engines.exact.state import DONE, FULL, PAUSED, TOO_MANY
+from sandbox.engines.exact.common.requirements import overlap_of, unsupported
+from sandbox.engines.exact.common.state import DONE, FULL, PAUSED, TOO_MANY
 from sandbox.engines.exact.tabletop import state as c
-from sandbox.engines.exact.tabletop.events import advance, restart
+from sandbox.engines.exact.tabletop.events import advance, rebuild_all
 from sandbox.engines.exact.tabletop.impact import advance_all_to, record_path
 from sandbox.engines.exact.tabletop.shot_result import ShotResult
 from sandbox.engines.exact.tabletop.simulation import TabletopSimulation, too_many_events, with_log_rows, with_path_rows
@@ -33,9 +33,9 @@ from sandbox.engines.tabletop.motion import CAPTURED, RESTING
 from sandbox.engines.tabletop.requirements import pockets_at
 from sandbox.resource_limits import EVENTS as EVENT_LIMIT
 from sandbox.scene.compile.demands import on_floor
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.surface import Stroke, struck
-from sandbox.scene.scene import Scene
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -59,22 +59,22 @@ class ShotBatch:
         return f"<ShotBatch: {shots:,} shots of {balls:,} balls>"
 
 
-CUT = 4
+TIME_LIMIT = 4
 """Status of a shot that ends at its time limit with balls in motion, besides the return codes of the event loop."""
 
-UNSTRUCK = -1
+NO_BALL = -1
 """Index in place of the struck ball: all balls continue with their present motion."""
 
 
 @kernel
 def shoot(data: TabletopState, state: FloatArray, tags: IntArray, ball: int, motion: FloatArray, until: float) -> int:
-    """Play a shot; return `DONE` if all balls are at rest, `CUT` if not, else the return code of `advance`.
+    """Play a shot; return `DONE` if all balls are at rest, `TIME_LIMIT` if not, else the return code of `advance`.
 
     Args:
         data: state arrays to play on; their contents are overwritten.
         state: (N, 19) rows of the balls before the shot.
         tags: (N, 3) likewise.
-        ball: index of the struck ball, or `UNSTRUCK`.
+        ball: index of the struck ball, or `NO_BALL`.
         motion: (5,) its velocity, m/s, and spin, rad/s, after the stroke.
         until: time limit, s.
     """
@@ -95,7 +95,7 @@ def shoot(data: TabletopState, state: FloatArray, tags: IntArray, ball: int, mot
         for k in range(3):
             data.state[ball, c.WX + k] = motion[2 + k]
     data.world[c.NOW] = 0.0
-    restart(data, 0.0)
+    rebuild_all(data, 0.0)
     if counts[c.RECORDING_PATHS] != 0:
         for i in range(len(state)):
             record_path(data, i)
@@ -104,7 +104,7 @@ def shoot(data: TabletopState, state: FloatArray, tags: IntArray, ball: int, mot
         status = advance(data, until)
     if status == DONE and counts[c.MOVING] != 0:
         advance_all_to(data, until if until < math.inf else data.world[c.NOW])
-        status = CUT
+        status = TIME_LIMIT
     return status
 
 
@@ -157,7 +157,7 @@ BATCH = 256
 
 NO_MOTION = (0.0, 0.0, 0.0, 0.0, 0.0)
 
-ROOM = 512
+MIN_LOG_ROWS = 512
 """Initial rows of the event log and of the paths; more for many balls."""
 
 
@@ -181,24 +181,25 @@ class Table:
         Raises:
             Refusal: the exact engine does not support the scene, or the scene has no floor.
         """
-        engine = ExactEngine()
-        missing = engine.missing(scene, scene.solver)
+        missing = unsupported(Setup.of(scene), scene.solver)
         if not missing and not on_floor(scene):
             missing = ("a shot needs a floor; add a [surface]",)
         if missing:
-            raise Refusal(engine.name, missing, ())
+            raise Refusal("exact", missing, ())
         self.scene = scene
         self.names = scene.bodies.names
         self._fixed_names = scene.fixed_names
         self._number = {name: k for k, name in enumerate(self.names)}
         simulation = TabletopSimulation(Setup.of(scene), scene.solver)
         count = len(scene.bodies)
-        data = with_path_rows(with_log_rows(simulation.data, max(ROOM, 2 * count)), max(ROOM, 4 * count))
+        data = with_path_rows(
+            with_log_rows(simulation.data, max(MIN_LOG_ROWS, 2 * count)), max(MIN_LOG_ROWS, 4 * count)
+        )
         data.counts[c.RECORDING], data.counts[c.MAX_EVENTS] = 1, EVENT_LIMIT.value
         self._data = data
         self._state, self._tags = data.state.copy(), data.tags.copy()
         self._motion = np.zeros(5)
-        self._turn = Lock()
+        self._lock = Lock()
         self._fixed = scene.bodies.fixed
         self._mass, self._radius = scene.bodies.mass.tolist(), scene.bodies.radius.tolist()
 
@@ -224,7 +225,7 @@ class Table:
             Exhaustion: the shot has more events than the limit.
         """
         if stroke is None:
-            return self._play(UNSTRUCK, NO_MOTION, until, ways)
+            return self._play(NO_BALL, NO_MOTION, until, ways)
         number = self._free(ball)
         velocity, spin = struck(stroke, self._mass[number], self._radius[number])
         return self._play(number, (*velocity, *spin), until, ways)
@@ -374,15 +375,18 @@ class Table:
 
     def _copy(self) -> Self:
         other = object.__new__(type(self))
-        other.__dict__.update(self.__dict__)
+        for name, value in vars(self).items():  # the arrays to play on and their lock are shared
+            setattr(other, name, value)
         other._state, other._tags = self._state.copy(), self._tags.copy()
         return other
 
     def __getstate__(self) -> dict[str, Any]:
-        return {key: polynomial for key, polynomial in self.__dict__.items() if key != "_turn"}
+        return {name: value for name, value in vars(self).items() if name != "_lock"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state, _turn=Lock())
+        for name, value in state.items():
+            setattr(self, name, value)
+        self._lock = Lock()
 
     def _free(self, ball: str) -> int:
         """Return the index of a ball that can be struck."""
@@ -395,15 +399,15 @@ class Table:
 
     def _own(self) -> TabletopState:
         """Return state arrays for another thread, which record nothing."""
-        with self._turn:
+        with self._lock:
             own: TabletopState = deepcopy(self._data)
         own.counts[c.RECORDING] = own.counts[c.RECORDING_PATHS] = 0
         return own
 
     def _play(self, number: int, motion: tuple[float, ...], until: float, ways: bool) -> ShotResult:
         _check_time(until)
-        with self._turn:  # copies of a table share its state arrays
-            if number != UNSTRUCK:
+        with self._lock:  # copies of a table share its state arrays
+            if number != NO_BALL:
                 self._motion[:] = motion
             return self._played(number, until, ways)
 

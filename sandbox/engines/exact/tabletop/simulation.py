@@ -8,12 +8,12 @@ import numpy as np
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.energy_balance import record_energy_change
 from sandbox.engines.energy_ledger import Cause
-from sandbox.engines.exact.bodies import EventDrivenBodies
-from sandbox.engines.exact.event_driven import FIRST_LOG_ROWS, EventDrivenSimulation, last_event_bodies
+from sandbox.engines.exact.common.bodies import EventDrivenBodies
+from sandbox.engines.exact.common.event_driven import FIRST_LOG_ROWS, EventDrivenSimulation, last_event_bodies
 from sandbox.engines.exact.tabletop import state as c
-from sandbox.engines.exact.tabletop.events import advance, restart
+from sandbox.engines.exact.tabletop.events import advance, rebuild_all
 from sandbox.engines.exact.tabletop.impact import account_floor, advance_all_to, evaluate
-from sandbox.engines.exact.tabletop.state import TabletopState, contacts_of, make_tabletop_state, rebuilt
+from sandbox.engines.exact.tabletop.state import TabletopState, contacts_of, make_tabletop_state, rebuild
 from sandbox.resource_limits import EVENTS as EVENT_LIMIT
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
@@ -74,7 +74,7 @@ class TabletopSimulation(EventDrivenSimulation[TabletopState]):
         store = EventDrivenBodies(setup, settings.dt)
         super().__init__(settings, make_tabletop_state(store), store)
         with np.errstate(all="ignore"):
-            self._restart(0.0)
+            self._rebuild_rows(0.0)
 
     @property
     def data(self) -> TabletopState:
@@ -114,19 +114,19 @@ class TabletopSimulation(EventDrivenSimulation[TabletopState]):
             state = (store.position, store.velocity, store.roll, store.angle, store.angular_velocity)
             evaluate(self._data, self.time, *state)
 
-    def _remove(self, numbers: IntArray) -> None:
+    def _remove(self, indices: IntArray) -> None:
         """Remove bodies by index; they keep their positions and have no velocity."""
         with record_energy_change(self._ledger, Cause.RETIRED, self), np.errstate(all="ignore"):
-            self._store.remove_bodies(numbers, self.time)
-        self._load_bodies()
+            self._store.remove_bodies(indices, self.time)
+        self._rebuild()
 
-    def _load_bodies(self) -> None:
+    def _rebuild(self) -> None:
         """Copy the changes of an action from the body store into the state arrays, and predict again."""
         advance_all_to(self._data, self.time)  # with the friction that held until now
-        self._data = rebuilt(self._data, self._store)
-        self._restart(self.time)
+        self._data = rebuild(self._data, self._store)
+        self._rebuild_rows(self.time)
 
-    def _restart(self, time: float) -> None:
+    def _rebuild_rows(self, time: float) -> None:
         rows = int(self._data.counts[c.LOG_ROWS]) + len(self.bodies)  # each ball may be captured at once
         if self._data.counts[c.RECORDING] and rows > len(self._data.log):
             self._data = with_log_rows(self._data, 2 * rows)
@@ -134,5 +134,5 @@ class TabletopSimulation(EventDrivenSimulation[TabletopState]):
         state[:, c.T] = state[:, c.ENERGY_UNTIL] = time
         state[:, c.X : c.Y + 1], state[:, c.VX : c.VY + 1] = store.position, store.velocity
         state[:, c.WX : c.WY + 1], state[:, c.WZ] = store.roll, store.angular_velocity
-        restart(self._data, time)
+        rebuild_all(self._data, time)
         self._evaluate()

@@ -13,11 +13,11 @@ import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.body_store import BodyStore
-from sandbox.engines.exact import state as discs
+from sandbox.engines.exact.common import state as discs
 from sandbox.engines.tabletop.collisions import BALL_BALL, CUSHION
 from sandbox.engines.tabletop.motion import RESTING, SurfaceFriction, figures_of
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Post, Wall
-from sandbox.scene.scene import Scene
 from sandbox.trajectory import Contacts
 
 T, X, Y, VX, VY, AX, AY, WX, WY, WZ, ROLL_RATE_X, ROLL_RATE_Y, PATH_WIDTH = range(13)
@@ -162,10 +162,10 @@ def make_tabletop_state(store: BodyStore) -> TabletopState:
         path=np.empty((0, PATH_WIDTH)),
         path_tags=np.empty((0, 2), np.int64),
     )
-    return rebuilt(data, store)
+    return rebuild(data, store)
 
 
-def rebuilt(data: TabletopState, store: BodyStore) -> TabletopState:
+def rebuild(data: TabletopState, store: BodyStore) -> TabletopState:
     """Return the state with the bodies, masses and surfaces that the store now has.
 
     New bodies are appended.

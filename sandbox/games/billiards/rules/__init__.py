@@ -9,7 +9,7 @@ A frame proceeds as follows:
         verdict = rules.decide(state, "play")       # if choices.decisions is not empty
         verdict = rules.judge(state, ShotCall(), shot)  # once every ball is at rest
         ...                                         # respot, rerack or restore the balls
-        verdict = rules.settle(verdict.state, lie)  # balls that touch, and snookers
+        verdict = rules.settle(verdict.state, situation)  # balls that touch, and snookers
         state = verdict.state
 
 States are immutable, so undo returns to an earlier one. The rules identify balls, cushions, pockets and spots by name.

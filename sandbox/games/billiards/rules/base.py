@@ -14,7 +14,7 @@ class GameError(ValueError):
 
 
 @dataclass(frozen=True)
-class ShotEvent:
+class BallEvent:
     """Contact of a ball with a ball or a cushion, or its fall into a pocket.
 
     A cushion is a wall or a jaw. A cushion to which a ball is frozen when the shot begins counts only after the ball
@@ -34,7 +34,7 @@ class ShotSummary:
     """Summary of a shot for the rules."""
 
     cue: str
-    happenings: tuple[ShotEvent, ...]
+    events: tuple[BallEvent, ...]
     """in order of time"""
     first: tuple[str, ...]
     """balls that the cue ball touched first; several if it touched them at the same time"""
@@ -61,12 +61,12 @@ class ShotSummary:
 
 
 def summarise(
-    happenings: Iterable[ShotEvent], cue: str, table: tuple[str, ...], stayed_behind: bool = False
+    events: Iterable[BallEvent], cue: str, table: tuple[str, ...], stayed_behind: bool = False
 ) -> ShotSummary:
     """Return the summary of a shot.
 
     Args:
-        happenings: events, in any order.
+        events: of the shot, in any order.
         cue: name of the ball that was struck.
         table: the other balls on the table.
         stayed_behind: as in `ShotSummary`.
@@ -74,7 +74,7 @@ def summarise(
     Raises:
         GameError: an event names a ball that is not on the table.
     """
-    ordered = tuple(sorted(happenings, key=lambda each: each.time))
+    ordered = tuple(sorted(events, key=lambda each: each.time))
     here = {cue, *table}
     named = {each.ball for each in ordered} | {each.other for each in ordered if each.kind == "ball"}
     if not named <= here:
@@ -90,7 +90,7 @@ def summarise(
     return ShotSummary(cue, ordered, first, tuple(fell.items()), driven, stayed_behind)
 
 
-def balls_touched_by(cue: str, each: ShotEvent) -> str | None:
+def balls_touched_by(cue: str, each: BallEvent) -> str | None:
     """Return the ball that a cue ball touched in an event; None for other events."""
     if each.kind != "ball" or cue not in (each.ball, each.other) or each.ball == each.other:
         return None
@@ -147,7 +147,7 @@ class ShotChoices:
         """
         wrong = [
             *(
-                [f"{call.ball!r} cannot be called now{_those(self.balls)}"]
+                [f"{call.ball!r} cannot be called now{_list_choices(self.balls)}"]
                 if call.ball not in (None, *self.balls)
                 else []
             ),
@@ -159,12 +159,12 @@ class ShotChoices:
             raise GameError("; ".join(wrong))
 
 
-def _those(balls: Iterable[str]) -> str:
+def _list_choices(balls: Iterable[str]) -> str:
     named = ", ".join(balls)
     return f"; possible: {named}" if named else ""
 
 
-Place = Literal["anywhere", "behind the head string", "in the D"]
+PlacementRegion = Literal["anywhere", "behind the head string", "in the D"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,7 +186,7 @@ class RulesState:
     """object balls that are not pocketed"""
     opening: bool = True
     """whether the next shot opens the frame"""
-    in_hand: Place | None = None
+    in_hand: PlacementRegion | None = None
     """area in which the cue ball may be placed before the shot; None if it is not in hand"""
     decisions: tuple[Decision, ...] = ()
     """decisions that are offered before the shot; the first is always `play`"""
@@ -242,7 +242,7 @@ class Respot:
 
 
 @dataclass(frozen=True)
-class ShotResult(Generic[S]):
+class Ruling(Generic[S]):
     """Result of a shot or a decision: the new state, the reasons for it, and the changes of the table."""
 
     state: S
@@ -256,7 +256,7 @@ class ShotResult(Generic[S]):
     """whether all balls return to their initial positions"""
     restore: bool = False
     """whether all balls return to their positions before the last shot"""
-    goes_on: bool = False
+    continues: bool = False
     """whether the turn of the player continues"""
     messages: tuple[str, ...] = ()
     """messages for the players"""
@@ -332,15 +332,13 @@ class Ruleset(ABC, Generic[S]):
         """Return the decisions and calls that are possible before the next shot."""
         return ShotChoices(decisions=() if state.over else state.decisions)
 
-    def judge(
-        self, state: S, call: ShotCall, happenings: Iterable[ShotEvent], stayed_behind: bool = False
-    ) -> ShotResult[S]:
+    def judge(self, state: S, call: ShotCall, events: Iterable[BallEvent], stayed_behind: bool = False) -> Ruling[S]:
         """Return the result of a shot. Without a decision, `play` is implied.
 
         Args:
             state: state before the shot.
             call: call before the shot.
-            happenings: events, in any order.
+            events: of the shot, in any order.
             stayed_behind: whether a cue ball in hand behind the head string hit a ball there before it crossed the
                 string.
 
@@ -351,10 +349,10 @@ class Ruleset(ABC, Generic[S]):
             raise GameError("the frame is over")
         self.choices(state).check(call)
         cue = self.cue_ball(state)
-        shot = summarise(happenings, cue, state.without((cue,)), stayed_behind)
+        shot = summarise(events, cue, state.without((cue,)), stayed_behind)
         return self._judge(replace(state, decisions=()), call, shot)
 
-    def decide(self, state: S, decision: Decision) -> ShotResult[S]:
+    def decide(self, state: S, decision: Decision) -> Ruling[S]:
         """Return the result of a decision.
 
         Raises:
@@ -365,9 +363,9 @@ class Ruleset(ABC, Generic[S]):
             raise GameError(f"{decision!r} is not offered now; options: {', '.join(offered) or 'none'}")
         return self._decide(replace(state, decisions=()), decision)
 
-    def settle(self, state: S, lie: Situation) -> ShotResult[S]:  # noqa: ARG002
+    def settle(self, state: S, situation: Situation) -> Ruling[S]:  # noqa: ARG002
         """Return the result of the situation after a shot or decision and respotting."""
-        return ShotResult(state)
+        return Ruling(state)
 
     def document(self, state: S) -> dict[str, Any]:
         """Return a state as a JSON object."""
@@ -391,9 +389,9 @@ class Ruleset(ABC, Generic[S]):
         return TypeAdapter(self.kind)
 
     @abstractmethod
-    def _judge(self, state: S, call: ShotCall, shot: ShotSummary) -> ShotResult[S]: ...
+    def _judge(self, state: S, call: ShotCall, shot: ShotSummary) -> Ruling[S]: ...
 
-    def _decide(self, state: S, decision: Decision) -> ShotResult[S]:
+    def _decide(self, state: S, decision: Decision) -> Ruling[S]:
         if decision == "pass":
-            return ShotResult(replace(state, turn=state.other))
-        return ShotResult(state)
+            return Ruling(replace(state, turn=state.other))
+        return Ruling(state)

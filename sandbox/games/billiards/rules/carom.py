@@ -12,8 +12,8 @@ from sandbox.games.billiards.rules.base import (
     Respot,
     Ruleset,
     RulesState,
+    Ruling,
     ShotCall,
-    ShotResult,
     ShotSummary,
     Situation,
     balls_touched_by,
@@ -77,50 +77,52 @@ class Carom(Ruleset[CaromState]):
             return frozenset()
         return frozenset((RED,) if state.opening else state.without((self.cue_ball(state),)))
 
-    def settle(self, state: CaromState, lie: Situation) -> ShotResult[CaromState]:
+    def settle(self, state: CaromState, situation: Situation) -> Ruling[CaromState]:
         """Return the state with the touching balls; the player may have them spotted, or play away (UMB 27)."""
         if state.over:
-            return ShotResult(state)
-        decisions: tuple[Decision, ...] = ("play", "spot") if lie.touching else ()
-        told = (f"the cue ball is frozen to the {' and the '.join(lie.touching)}",) if lie.touching else ()
-        return ShotResult(replace(state, touching=lie.touching, decisions=decisions), messages=told)
+            return Ruling(state)
+        decisions: tuple[Decision, ...] = ("play", "spot") if situation.touching else ()
+        messages = (
+            (f"the cue ball is frozen to the {' and the '.join(situation.touching)}",) if situation.touching else ()
+        )
+        return Ruling(replace(state, touching=situation.touching, decisions=decisions), messages=messages)
 
-    def _decide(self, state: CaromState, decision: Decision) -> ShotResult[CaromState]:
+    def _decide(self, state: CaromState, decision: Decision) -> Ruling[CaromState]:
         after = replace(state, touching=())
         if decision != "spot":
-            return ShotResult(after)
+            return Ruling(after)
         if self.cushions == 0:  # in straight rail all three balls return to the starting position
-            return ShotResult(replace(after, opening=True), rerack=True)
+            return Ruling(replace(after, opening=True), rerack=True)
         # UMB 83: the red goes to the foot spot, the cue ball to the head spot, the other white to the centre. A ball
         # whose spot is occupied by the third ball goes to the spot of the third ball.
         cue = self.cue_ball(state)
         spots = {RED: "foot", cue: "head", next(ball for ball in WHITES if ball != cue): "centre"}
         lifted = [ball for ball in CAROM_NAMES if ball == cue or ball in state.touching]
         rest = tuple(spots[ball] for ball in CAROM_NAMES if ball not in lifted)
-        return ShotResult(after, respot=tuple(Respot(ball, (spots[ball], *rest)) for ball in lifted))
+        return Ruling(after, respot=tuple(Respot(ball, (spots[ball], *rest)) for ball in lifted))
 
-    def _judge(self, state: CaromState, call: ShotCall, shot: ShotSummary) -> ShotResult[CaromState]:  # noqa: ARG002
-        if any(each.kind == "pocket" for each in shot.happenings):
+    def _judge(self, state: CaromState, call: ShotCall, shot: ShotSummary) -> Ruling[CaromState]:  # noqa: ARG002
+        if any(each.kind == "pocket" for each in shot.events):
             raise GameError("a carom table has no pockets")
         after = replace(state, opening=False, touching=())
         if state.opening and shot.first and RED not in shot.first:
             fouls = ("the opening shot must hit the red first",)
             return self._ended(after, fouls)
-        if not self._made(shot):
+        if not self._is_scored(shot):
             return self._ended(after, ())
         after = replace(after, scores=state.scored(state.turn, 1), run=state.run + 1)
         points = tuple(int(each == state.turn) for each in range(state.players))
         if after.scores[state.turn] >= state.distance:
-            told = f"{player_name(state.turn)} has reached {state.distance}"
+            text = f"{player_name(state.turn)} has reached {state.distance}"
             verdict = self._ended(replace(after, last=after.last or state.turn == state.players - 1), (), full=True)
-            return replace(verdict, points=points, messages=(told, *verdict.messages))
-        return ShotResult(after, points=points, goes_on=True)
+            return replace(verdict, points=points, messages=(text, *verdict.messages))
+        return Ruling(after, points=points, continues=True)
 
-    def _made(self, shot: ShotSummary) -> bool:
+    def _is_scored(self, shot: ShotSummary) -> bool:
         """Return whether the cue ball touched both balls, after enough cushion contacts, repeated ones included."""
         touched: set[str] = set()
         cushions = 0
-        for each in shot.happenings:
+        for each in shot.events:
             if each.kind == "cushion" and each.ball == shot.cue:
                 cushions += 1
             ball = balls_touched_by(shot.cue, each)
@@ -130,10 +132,10 @@ class Carom(Ruleset[CaromState]):
                     return cushions >= self.cushions
         return False
 
-    def _ended(self, state: CaromState, fouls: tuple[str, ...], full: bool = False) -> ShotResult[CaromState]:
+    def _ended(self, state: CaromState, fouls: tuple[str, ...], full: bool = False) -> Ruling[CaromState]:
         """Return the result of the end of a turn: the other player's turn, the last turn, or the end of the frame."""
         none = (0,) * state.players
-        told = tuple(f"foul: {each}" for each in fouls)
+        messages = tuple(f"foul: {each}" for each in fouls)
         innings = tuple(count + (each == state.turn) for each, count in enumerate(state.innings))
         after = replace(state, innings=innings, run=0)
         if state.last:
@@ -141,9 +143,9 @@ class Carom(Ruleset[CaromState]):
             winner = state.scores.index(top) if state.scores.count(top) == 1 else None
             ends = f"{player_name(winner)} wins" if winner is not None else "the frame is drawn"
             over = replace(after, over=True, winner=winner)
-            return ShotResult(over, fouls, none, messages=(*told, ends))
+            return Ruling(over, fouls, none, messages=(*messages, ends))
         after = replace(after, turn=state.other, last=full, opening=full)
         if not full:
-            return ShotResult(after, fouls, none, messages=told)
+            return Ruling(after, fouls, none, messages=messages)
         ends = f"{player_name(state.other)} has a last turn, from the starting position"
-        return ShotResult(after, fouls, none, rerack=True, messages=(*told, ends))
+        return Ruling(after, fouls, none, rerack=True, messages=(*messages, ends))

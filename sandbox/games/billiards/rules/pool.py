@@ -20,9 +20,9 @@ from sandbox.games.billiards.rules.base import (
     Respot,
     Ruleset,
     RulesState,
+    Ruling,
     ShotCall,
     ShotChoices,
-    ShotResult,
     ShotSummary,
     counted,
     first_ball_hit,
@@ -43,7 +43,7 @@ def wrong_ball(shot: ShotSummary, targets: frozenset[str]) -> list[str]:
     if not shot.first:
         return ["the cue ball hit no ball"]
     if targets.isdisjoint(shot.first):
-        return [f"{first_ball_hit(shot)} hit first instead of {_of(targets)}"]
+        return [f"{first_ball_hit(shot)} hit first instead of {_list_targets(targets)}"]
     return []
 
 
@@ -74,7 +74,7 @@ def at_foot(ball: str) -> Respot:
     return Respot(ball, ("foot",))
 
 
-def _of(targets: frozenset[str]) -> str:
+def _list_targets(targets: frozenset[str]) -> str:
     named = sorted(targets, key=lambda ball: (len(ball), ball))
     return f"the {named[0]}" if len(named) == 1 else f"one of {', '.join(named)}"
 
@@ -117,8 +117,8 @@ class EightBall(Ruleset[EightBallState]):
         if state.opening:
             return frozenset(state.table)
         group = state.groups[state.turn]
-        mine = GROUPS[group] if group is not None else tuple(ball for ball in EIGHT_BALL_NAMES if ball != EIGHT)
-        return frozenset(mine).intersection(state.table) or frozenset((EIGHT,))
+        own_group = GROUPS[group] if group is not None else tuple(ball for ball in EIGHT_BALL_NAMES if ball != EIGHT)
+        return frozenset(own_group).intersection(state.table) or frozenset((EIGHT,))
 
     def choices(self, state: EightBallState) -> ShotChoices:
         """Return the possible calls; on the eight a pocket must be called (WPA 3.6)."""
@@ -128,10 +128,10 @@ class EightBall(Ruleset[EightBallState]):
         named = tuple(ball for ball in state.table if ball in balls)
         return ShotChoices(state.decisions, named, pocket=True, needed=named == (EIGHT,), safety=True)
 
-    def _judge(self, state: EightBallState, call: ShotCall, shot: ShotSummary) -> ShotResult[EightBallState]:
+    def _judge(self, state: EightBallState, call: ShotCall, shot: ShotSummary) -> Ruling[EightBallState]:
         return _counted(state, self._shot(state, call, shot))
 
-    def _shot(self, state: EightBallState, call: ShotCall, shot: ShotSummary) -> ShotResult[EightBallState]:
+    def _shot(self, state: EightBallState, call: ShotCall, shot: ShotSummary) -> Ruling[EightBallState]:
         fouls = standard(shot, self.legal_targets(state))
         if state.opening:
             return self._break(state, shot, fouls)
@@ -139,20 +139,20 @@ class EightBall(Ruleset[EightBallState]):
             return self._eight(state, call, shot, fouls)
         after = replace(state, table=state.without(shot.down), in_hand=None)
         if fouls:
-            told = f"foul: {fouls[0]}; {player_name(state.other)} has the ball in hand"
+            text = f"foul: {fouls[0]}; {player_name(state.other)} has the ball in hand"
             after = replace(after, turn=state.other, in_hand="anywhere")
-            return ShotResult(after, fouls=fouls, messages=(told,))
-        made = self._made(state, call, shot)
+            return Ruling(after, fouls=fouls, messages=(text,))
+        made = self._called_ball_pocketed(state, call, shot)
         if made is None or call.safety:
-            return ShotResult(replace(after, turn=state.other))
+            return Ruling(replace(after, turn=state.other))
         if state.groups[state.turn] is not None:
-            return ShotResult(after, goes_on=True)
-        mine: Group = "solids" if made in GROUPS["solids"] else "stripes"
-        its: Group = "stripes" if mine == "solids" else "solids"
-        after = replace(after, groups=tuple(mine if each == state.turn else its for each in range(state.players)))
-        return ShotResult(after, goes_on=True, messages=(f"{player_name(state.turn)} plays {mine}",))
+            return Ruling(after, continues=True)
+        own_group: Group = "solids" if made in GROUPS["solids"] else "stripes"
+        its: Group = "stripes" if own_group == "solids" else "solids"
+        after = replace(after, groups=tuple(own_group if each == state.turn else its for each in range(state.players)))
+        return Ruling(after, continues=True, messages=(f"{player_name(state.turn)} plays {own_group}",))
 
-    def _made(self, state: EightBallState, call: ShotCall, shot: ShotSummary) -> str | None:
+    def _called_ball_pocketed(self, state: EightBallState, call: ShotCall, shot: ShotSummary) -> str | None:
         """Return the pocketed ball that counts, the called one, else the first ball on; None if there is none."""
         able = (call.ball,) if call.ball is not None else tuple(self.legal_targets(state))
         for ball in shot.down:
@@ -160,13 +160,13 @@ class EightBall(Ruleset[EightBallState]):
                 return ball
         return None
 
-    def _break(self, state: EightBallState, shot: ShotSummary, fouls: tuple[str, ...]) -> ShotResult[EightBallState]:
+    def _break(self, state: EightBallState, shot: ShotSummary, fouls: tuple[str, ...]) -> Ruling[EightBallState]:
         """Judge a break (WPA 3.3). A weak break is not a foul, but the other player may ask for a rerack."""
         respot = (at_foot(EIGHT),) if EIGHT in shot.down else ()
         table = state.without(tuple(ball for ball in shot.down if ball != EIGHT))
         place: Literal["behind the head string"] | None = "behind the head string" if scratch(shot) else None
         after = replace(state, table=table, opening=False, in_hand=place)
-        weak, goes_on = not broke(shot), bool(shot.down) and not fouls
+        weak, continues = not broke(shot), bool(shot.down) and not fouls
         offered: tuple[Decision, ...] = ()
         if weak:
             also: tuple[Decision, ...] = ("rerack and pass",) if state.players == 2 else ()
@@ -175,14 +175,14 @@ class EightBall(Ruleset[EightBallState]):
             offered = ("play", "rerack")
         if fouls and not scratch(shot):  # (h)
             offered = (*(offered or ("play",)), "in hand")
-        after = replace(after, turn=state.turn if goes_on else state.other, decisions=offered)
+        after = replace(after, turn=state.turn if continues else state.other, decisions=offered)
         why = [f"foul: {each}" for each in fouls] + (["illegal break"] if weak else [])
-        told = why + (["the 8 was pocketed on the break and is spotted"] if respot else [])
-        return ShotResult(after, fouls=fouls, respot=respot, goes_on=goes_on, messages=tuple(told))
+        messages = why + (["the 8 was pocketed on the break and is spotted"] if respot else [])
+        return Ruling(after, fouls=fouls, respot=respot, continues=continues, messages=tuple(messages))
 
     def _eight(
         self, state: EightBallState, call: ShotCall, shot: ShotSummary, fouls: tuple[str, ...]
-    ) -> ShotResult[EightBallState]:
+    ) -> Ruling[EightBallState]:
         """Judge a shot that pockets the eight: it wins or loses (WPA 3.8)."""
         lost = None
         if fouls:
@@ -194,19 +194,19 @@ class EightBall(Ruleset[EightBallState]):
         winner = state.turn if lost is None else state.opponent
         after = replace(state, table=state.without(shot.down), in_hand=None, over=True, winner=winner)
         ends = f"{player_name(winner)} wins" if winner is not None else "the rack is lost"
-        told = (ends,) if lost is None else (lost, ends)
-        return ShotResult(after, fouls=fouls, messages=told)
+        messages = (ends,) if lost is None else (lost, ends)
+        return Ruling(after, fouls=fouls, messages=messages)
 
-    def _decide(self, state: EightBallState, decision: Decision) -> ShotResult[EightBallState]:
+    def _decide(self, state: EightBallState, decision: Decision) -> Ruling[EightBallState]:
         if decision in ("rerack", "rerack and pass"):
             turn = state.turn if decision == "rerack" else state.other
-            return ShotResult(replace(self.start(state.players), turn=turn), rerack=True)
+            return Ruling(replace(self.start(state.players), turn=turn), rerack=True)
         if decision == "in hand":  # offered only after a break
-            return ShotResult(replace(state, in_hand="behind the head string"))
+            return Ruling(replace(state, in_hand="behind the head string"))
         return super()._decide(state, decision)
 
 
-def _counted(before: EightBallState, verdict: ShotResult[EightBallState]) -> ShotResult[EightBallState]:
+def _counted(before: EightBallState, verdict: Ruling[EightBallState]) -> Ruling[EightBallState]:
     """Return a result with scores and points by the pocketed balls of each group."""
     after = verdict.state
     scores = tuple(
@@ -254,7 +254,7 @@ class NineBall(Ruleset[NineBallState]):
         """Return the possible calls: only a push-out, on the shot after a fair break (WPA 2.4)."""
         return replace(super().choices(state), push_out=state.push_out and not state.over)
 
-    def _judge(self, state: NineBallState, call: ShotCall, shot: ShotSummary) -> ShotResult[NineBallState]:
+    def _judge(self, state: NineBallState, call: ShotCall, shot: ShotSummary) -> Ruling[NineBallState]:
         fouls = self._fouls(state, call, shot)
         fair = not fouls and not call.push_out
         table = state.without(shot.down if fair else tuple(ball for ball in shot.down if ball != NINE))
@@ -278,14 +278,14 @@ class NineBall(Ruleset[NineBallState]):
         if call.push_out:
             decisions: tuple[Decision, ...] = ("play", "pass") if state.players == 2 else ()
             after = replace(after, turn=state.other, decisions=decisions)
-            return ShotResult(
+            return Ruling(
                 after, respot=respot, points=points, messages=(f"{player_name(state.turn)} played a push-out",)
             )
         if NINE in shot.down:
             after = replace(after, over=True, winner=state.turn)
-            return ShotResult(after, points=points, messages=(f"{player_name(state.turn)} wins",))
-        goes_on = bool(shot.down)
-        return ShotResult(after if goes_on else replace(after, turn=state.other), points=points, goes_on=goes_on)
+            return Ruling(after, points=points, messages=(f"{player_name(state.turn)} wins",))
+        continues = bool(shot.down)
+        return Ruling(after if continues else replace(after, turn=state.other), points=points, continues=continues)
 
     def _fouls(self, state: NineBallState, call: ShotCall, shot: ShotSummary) -> tuple[str, ...]:
         """Return the fouls: on a push-out only a scratch (WPA 2.4), on a break also a weak break (2.3)."""
@@ -297,20 +297,20 @@ class NineBall(Ruleset[NineBallState]):
         return (*wrong, *(["illegal break"] if shot.first and not broke(shot) else []))
 
 
-def _foul(after: NineBallState, fouls: tuple[str, ...]) -> ShotResult[NineBallState]:
+def _foul(after: NineBallState, fouls: tuple[str, ...]) -> Ruling[NineBallState]:
     """Return the result of a foul: ball in hand for the other player, or the end of the frame."""
     row, who = after.fouls[after.turn], player_name(after.turn)
     if row >= MAX_CONSECUTIVE_FOULS:
         winner = after.opponent
         ends = f"{player_name(winner)} wins" if winner is not None else "the rack is lost"
         lost = replace(after, over=True, winner=winner)
-        return ShotResult(
+        return Ruling(
             lost, fouls, messages=(f"foul: {fouls[0]}", f"{who} fouled {MAX_CONSECUTIVE_FOULS} times in a row", ends)
         )
-    told = [f"foul: {fouls[0]}; {player_name(after.other)} has the ball in hand"]
+    messages = [f"foul: {fouls[0]}; {player_name(after.other)} has the ball in hand"]
     if row == MAX_CONSECUTIVE_FOULS - 1:  # WPA 6.14: the player must be warned
-        told.append(f"{who} is on {row} fouls; one more loses the rack")
-    return ShotResult(replace(after, turn=after.other, in_hand="anywhere"), fouls, messages=tuple(told))
+        messages.append(f"{who} is on {row} fouls; one more loses the rack")
+    return Ruling(replace(after, turn=after.other, in_hand="anywhere"), fouls, messages=tuple(messages))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -359,31 +359,29 @@ class FreePlay(Ruleset[FreePlayState]):
         """Return every object ball on the table."""
         return frozenset() if state.over else frozenset(state.table)
 
-    def _judge(self, state: FreePlayState, call: ShotCall, shot: ShotSummary) -> ShotResult[FreePlayState]:  # noqa: ARG002
+    def _judge(self, state: FreePlayState, call: ShotCall, shot: ShotSummary) -> Ruling[FreePlayState]:  # noqa: ARG002
         table, made = state.without(shot.down), len(shot.down)
-        goes_on = made > 0 and not shot.scratched
+        continues = made > 0 and not shot.scratched
         points = tuple(made if each == state.turn else 0 for each in range(state.players))
         after = replace(
             state,
-            turn=state.turn if goes_on else state.other,
+            turn=state.turn if continues else state.other,
             scores=state.scored(state.turn, made),
             table=table,
             opening=False,
             in_hand="anywhere" if shot.scratched else None,
             decisions=ALWAYS,
         )
-        told = ("scratch: cue ball in hand",) if shot.scratched else ()
+        messages = ("scratch: cue ball in hand",) if shot.scratched else ()
         if table or not state.rack:
-            return ShotResult(after, points=points, goes_on=goes_on, messages=told)
+            return Ruling(after, points=points, continues=continues, messages=messages)
         top = max(after.scores)
         winner = after.scores.index(top) if after.scores.count(top) == 1 else None
         ends = f"table cleared: {player_name(winner)} wins" if winner is not None else "table cleared: a draw"
         over = replace(after, over=True, winner=winner, in_hand=None, decisions=())
-        return ShotResult(over, points=points, messages=(*told, ends))
+        return Ruling(over, points=points, messages=(*messages, ends))
 
-    def _decide(self, state: FreePlayState, decision: Decision) -> ShotResult[FreePlayState]:
+    def _decide(self, state: FreePlayState, decision: Decision) -> Ruling[FreePlayState]:
         if decision == "rerack":
-            return ShotResult(replace(self.start(state.players, state.rack, state.cue), turn=state.turn), rerack=True)
-        return ShotResult(
-            replace(state, in_hand="anywhere" if decision == "in hand" else state.in_hand, decisions=ALWAYS)
-        )
+            return Ruling(replace(self.start(state.players, state.rack, state.cue), turn=state.turn), rerack=True)
+        return Ruling(replace(state, in_hand="anywhere" if decision == "in hand" else state.in_hand, decisions=ALWAYS))

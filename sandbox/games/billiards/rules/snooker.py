@@ -13,9 +13,9 @@ from sandbox.games.billiards.rules.base import (
     Respot,
     Ruleset,
     RulesState,
+    Ruling,
     ShotCall,
     ShotChoices,
-    ShotResult,
     ShotSummary,
     Situation,
     counted,
@@ -208,28 +208,28 @@ class Snooker(Ruleset[SnookerState]):
         named = tuple(ball for ball in state.table if (ball in on) != state.free)
         return replace(base, balls=named)
 
-    def settle(self, state: SnookerState, lie: Situation) -> ShotResult[SnookerState]:
+    def settle(self, state: SnookerState, situation: Situation) -> Ruling[SnookerState]:
         """Return the state with the touching balls, and with a free ball or a foul if the player is snookered.
 
         After a foul that leaves a snooker, any ball is free. A snooker behind the free ball itself is a foul, unless
         only pink and black are left.
         """
-        after = replace(state, touching=lie.touching, freed=None)
-        if state.over or not lie.snookered:
-            return ShotResult(after)
-        if state.freed is not None and state.freed in lie.by and set(state.table) != {"pink", "black"}:
+        after = replace(state, touching=situation.touching, freed=None)
+        if state.over or not situation.snookered:
+            return Ruling(after)
+        if state.freed is not None and state.freed in situation.by and set(state.table) != {"pink", "black"}:
             penalty = max(MIN_FOUL_POINTS, VALUES.get(state.on, 1))
             why = f"the free ball, {state.freed}, snookers the opponent"
             points = tuple(penalty * (each == state.turn) for each in range(state.players))
             scores = state.scored(state.turn if state.players == 2 else None, penalty)
             after = replace(after, scores=scores, fouled=True, free=True, decisions=_answers(state, False))
-            told = (f"foul: {why}; {penalty} points", "free ball")
-            return ShotResult(after, (why,), points if state.players == 2 else (0,), messages=told)
+            messages = (f"foul: {why}; {penalty} points", "free ball")
+            return Ruling(after, (why,), points if state.players == 2 else (0,), messages=messages)
         if not state.fouled:
-            return ShotResult(after)
-        return ShotResult(replace(after, free=True), messages=("free ball",))
+            return Ruling(after)
+        return Ruling(replace(after, free=True), messages=("free ball",))
 
-    def _judge(self, state: SnookerState, call: ShotCall, shot: ShotSummary) -> ShotResult[SnookerState]:
+    def _judge(self, state: SnookerState, call: ShotCall, shot: ShotSummary) -> Ruling[SnookerState]:
         played = snooker_shot(shot, state.on, state.table, call.ball, state.free, state.touching)
         clean = replace(
             state,
@@ -244,7 +244,7 @@ class Snooker(Ruleset[SnookerState]):
         fouls = played.fouls
         return self._foul(state, clean, played, fouls) if fouls else self._fair(clean, played)
 
-    def _fair(self, state: SnookerState, played: SnookerShot) -> ShotResult[SnookerState]:
+    def _fair(self, state: SnookerState, played: SnookerShot) -> Ruling[SnookerState]:
         """Return the result of a fair stroke."""
         down, points = played.shot.down, played.points
         last = state.on not in ("red", "colour")
@@ -255,45 +255,43 @@ class Snooker(Ruleset[SnookerState]):
         after = replace(state, table=table, scores=state.scored(state.turn, points), run=state.run + points)
         if not points:
             after = replace(after, turn=state.other, on=_next(table), run=0, freed=played.free)
-            return ShotResult(_claimable(after), points=gained)
+            return Ruling(_claimable(after), points=gained)
         if not table:
             return replace(_ended(after), points=gained)
         after = replace(after, on="colour" if state.on == "red" else _next(table))
-        return ShotResult(_claimable(after), points=gained, respot=respots(back), goes_on=True)
+        return Ruling(_claimable(after), points=gained, respot=respots(back), continues=True)
 
     def _foul(
         self, state: SnookerState, clean: SnookerState, played: SnookerShot, fouls: tuple[tuple[int, str], ...]
-    ) -> ShotResult[SnookerState]:
+    ) -> Ruling[SnookerState]:
         """Return the result of a foul: the highest penalty counts, reds stay down, colours are respotted (Fouls)."""
         penalty, down = max(fouls)[0], played.shot.down
         why = tuple(each for _, each in fouls)
         table = state.without(reds(down))
         after = replace(clean, table=table, scores=state.scored(state.opponent, penalty), run=0, fouled=True)
         gained = tuple(penalty * (each == state.opponent) for each in range(state.players))
-        told = f"foul: {why[0]}; {penalty} points"
+        text = f"foul: {why[0]}; {penalty} points"
         if state.table == ("black",):  # End of Frame: the first score or foul ends the frame
             ended = _ended(after)
-            return replace(ended, fouls=why, points=gained, messages=(told, *ended.messages))
+            return replace(ended, fouls=why, points=gained, messages=(text, *ended.messages))
         after = replace(after, turn=state.other, on=_next(table))
         missed = state.misses and not played.hit and not _needed(state) and not _needed(after)
         after = replace(
             after, decisions=_answers(after, missed), before=replace(state, before=None) if missed else None
         )
-        messages = (told, "foul and a miss: the shot may be replayed from the same position") if missed else (told,)
+        messages = (text, "foul and a miss: the shot may be replayed from the same position") if missed else (text,)
         colours_down = tuple(ball for ball in down if ball in VALUES)
-        return ShotResult(after, why, gained, respot=respots(colours_down), messages=messages)
+        return Ruling(after, why, gained, respot=respots(colours_down), messages=messages)
 
-    def _decide(self, state: SnookerState, decision: Decision) -> ShotResult[SnookerState]:
+    def _decide(self, state: SnookerState, decision: Decision) -> Ruling[SnookerState]:
         after = replace(state, before=None)
         if decision == "pass":  # there is no free ball if the offender plays again
-            return ShotResult(replace(after, turn=state.other, free=False, fouled=False))
+            return Ruling(replace(after, turn=state.other, free=False, fouled=False))
         if decision == "restore" and state.before is not None:
-            return ShotResult(replace(state.before, scores=state.scores), restore=True)
+            return Ruling(replace(state.before, scores=state.scores), restore=True)
         if decision == "claim":
-            return ShotResult(
-                replace(after, over=True, winner=state.turn), messages=(f"{player_name(state.turn)} wins",)
-            )
-        return ShotResult(after)
+            return Ruling(replace(after, over=True, winner=state.turn), messages=(f"{player_name(state.turn)} wins",))
+        return Ruling(after)
 
 
 def balls_on(state: SnookerState) -> frozenset[str]:
@@ -330,13 +328,13 @@ def _claimable(state: SnookerState) -> SnookerState:
     return replace(state, decisions=("play", "claim"))
 
 
-def _ended(state: SnookerState) -> ShotResult[SnookerState]:
+def _ended(state: SnookerState) -> Ruling[SnookerState]:
     """Return the end of the frame. At level scores the black is respotted, and the other player may play or pass."""
     if state.players == 2 and state.scores[0] == state.scores[1]:
         after = replace(
             state, table=("black",), on="black", turn=state.other, in_hand="in the D", run=0, decisions=("play", "pass")
         )
         after = replace(after, fouled=False)
-        return ShotResult(after, respot=respots(("black",)), messages=("scores level: the black is respotted",))
+        return Ruling(after, respot=respots(("black",)), messages=("scores level: the black is respotted",))
     winner = state.scores.index(max(state.scores))
-    return ShotResult(replace(state, over=True, winner=winner), messages=(f"{player_name(winner)} wins",))
+    return Ruling(replace(state, over=True, winner=winner), messages=(f"{player_name(winner)} wins",))

@@ -18,8 +18,8 @@ from sandbox.window.render.palette import (
     SKY,
     WARNING,
     YELLOW,
-    Colour,
     ColourArray,
+    RgbColour,
     mix_colours,
 )
 from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
@@ -32,7 +32,7 @@ LENGTH = 1.47
 """m: length of a cue for balls of radius `BALL`; it scales with the ball"""
 BALL = 0.028575
 """m: ball radius for which the dimensions of the cue are given"""
-PARTS: tuple[tuple[float, float, float, Colour], ...] = (
+PARTS: tuple[tuple[float, float, float, RgbColour], ...] = (
     (0.000, 0.008, 0.0064, (64, 128, 190)),
     (0.008, 0.030, 0.0066, (238, 234, 222)),
     (0.030, 0.740, 0.0068, (214, 176, 120)),
@@ -48,40 +48,42 @@ BUTT = 0.0148
 
 def draw_paths(view: DrawContext, aim: CueAim, colours: ColourArray) -> None:
     """Draw the predicted paths of the cue ball and of the first ball that it hits; drawn below the balls."""
-    found = aim.forecast
+    found = aim.prediction
     if found is None:
         return
-    if found.onward is not None and found.hit is not None:
+    if found.object_path is not None and found.hit is not None:
         red, green, blue = colours[found.hit].tolist()
-        _way(view, found.onward, mix_colours((red, green, blue), INK, 0.45), 2.0)
-        _end(view, found.onward, aim, found.hit in found.falls, mix_colours((red, green, blue), INK, 0.45))
-    _way(view, found.way, INK, 1.6)
-    _end(view, found.way, aim, aim.ball in found.falls, INK)
+        _draw_path(view, found.object_path, mix_colours((red, green, blue), INK, 0.45), 2.0)
+        _draw_end(view, found.object_path, aim, found.hit in found.pocketed, mix_colours((red, green, blue), INK, 0.45))
+    _draw_path(view, found.cue_path, INK, 1.6)
+    _draw_end(view, found.cue_path, aim, aim.ball in found.pocketed, INK)
 
 
-def _faded(view: DrawContext, colour: Colour, share: float) -> Colour:
-    """Return a colour blended with the cloth or the background; `share` is the opacity."""
+def _faded(view: DrawContext, colour: RgbColour, opacity: float) -> RgbColour:
+    """Return a colour blended with the cloth or the background."""
     scene = view.snapshot.scene
-    return mix_colours(BACKGROUND if scene.play.area is None else felt_of(scene).bed, colour, share)
+    return mix_colours(BACKGROUND if scene.play.area is None else felt_of(scene).bed, colour, opacity)
 
 
-def _way(view: DrawContext, points: FloatArray, colour: Colour, width: float) -> None:
+def _draw_path(view: DrawContext, points: FloatArray, colour: RgbColour, width: float) -> None:
     """Draw a path that fades along its length."""
     pixels = view.camera.to_screen(points).tolist()
     steps = np.hypot(*np.diff(points, axis=0).T)
     bright = np.maximum(0.5 ** (np.cumsum(steps) / FADE), FAINTEST).tolist()
-    for (a, b), share in zip(pairwise(pixels), bright, strict=True):
-        draw_line(view.surface, a, b, _faded(view, colour, share), width * view.ui_scale, view.antialias)
+    for (a, b), opacity in zip(pairwise(pixels), bright, strict=True):
+        draw_line(view.surface, a, b, _faded(view, colour, opacity), width * view.ui_scale, view.antialias)
 
 
-def _end(view: DrawContext, points: FloatArray, aim: CueAim, falls: bool, colour: Colour) -> None:
+def _draw_end(view: DrawContext, points: FloatArray, aim: CueAim, pocketed: bool, colour: RgbColour) -> None:
     """Draw the end of a path: a ring where the ball comes to rest, a smaller, bolder one if it is pocketed."""
     radius = float(view.snapshot.bodies.radius[aim.ball])
-    tint = colour if falls else _faded(view, colour, 0.45)
-    _ring(view, points[-1], (0.55 if falls else 1.0) * radius, tint, 2.2 if falls else 1.2)
+    tint = colour if pocketed else _faded(view, colour, 0.45)
+    _draw_ring(view, points[-1], (0.55 if pocketed else 1.0) * radius, tint, 2.2 if pocketed else 1.2)
 
 
-def _ring(view: DrawContext, at: FloatArray, radius: float, colour: Colour, line: float, opacity: float = 1.0) -> None:
+def _draw_ring(
+    view: DrawContext, at: FloatArray, radius: float, colour: RgbColour, line: float, opacity: float = 1.0
+) -> None:
     (x, y), size = view.camera.to_screen(at).tolist(), radius * view.camera.scale
     side = math.ceil(size) + 3
     within = pygame.Rect(math.floor(x) - side, math.floor(y) - side, 2 * side + 1, 2 * side + 1)
@@ -93,20 +95,20 @@ def draw_aim(view: DrawContext, aim: CueAim) -> None:
     """Draw the layer above the balls: called pocket and ball, ghost ball, ball in hand, and cue."""
     radius = float(view.snapshot.bodies.radius[aim.ball])
     if aim.called is not None:
-        _ring(view, np.asarray(aim.called[0]), aim.called[1] + 0.25 * radius, YELLOW, 2.5)
+        _draw_ring(view, np.asarray(aim.called[0]), aim.called[1] + 0.25 * radius, YELLOW, 2.5)
     if aim.nominated is not None:
-        _ring(view, view.snapshot.frame.position[aim.nominated], 1.35 * radius, YELLOW, 2.0)
+        _draw_ring(view, view.snapshot.frame.position[aim.nominated], 1.35 * radius, YELLOW, 2.0)
     if aim.carried:
-        _ring(view, np.asarray(aim.place), 1.5 * radius, WARNING if aim.refused else SKY, 2.0)
+        _draw_ring(view, np.asarray(aim.place), 1.5 * radius, WARNING if aim.refused else SKY, 2.0)
         return
-    if aim.forecast is not None and aim.forecast.ghost is not None:
-        _ring(view, np.asarray(aim.forecast.ghost), radius, INK, 1.5, opacity=0.9)
-    elif aim.forecast is None:
-        _straight(view, aim)
-    _cue(view, aim, radius)
+    if aim.prediction is not None and aim.prediction.ghost is not None:
+        _draw_ring(view, np.asarray(aim.prediction.ghost), radius, INK, 1.5, opacity=0.9)
+    elif aim.prediction is None:
+        _draw_line_of_aim(view, aim)
+    _draw_cue(view, aim, radius)
 
 
-def _straight(view: DrawContext, aim: CueAim) -> None:
+def _draw_line_of_aim(view: DrawContext, aim: CueAim) -> None:
     """Draw a straight line along the cue, for shots without a prediction."""
     x, y = aim.place
     ends = np.asarray([(x, y), (x + 10.0 * math.cos(aim.angle), y + 10.0 * math.sin(aim.angle))])
@@ -114,7 +116,7 @@ def _straight(view: DrawContext, aim: CueAim) -> None:
     draw_line(view.surface, a, b, ORANGE, 1.2 * view.ui_scale, view.antialias)
 
 
-def _cue(view: DrawContext, aim: CueAim, radius: float) -> None:
+def _draw_cue(view: DrawContext, aim: CueAim, radius: float) -> None:
     """Draw the cue behind the ball, and its shadow."""
     size = radius / BALL
     x, y = aim.place
@@ -144,7 +146,7 @@ def _cue(view: DrawContext, aim: CueAim, radius: float) -> None:
             _taper(view, a, b, (0.3 * thin, 0.3 * thick), mix_colours(colour, INK, 0.12))
 
 
-def _taper(view: DrawContext, a: Pixel, b: Pixel, halves: tuple[float, float], colour: Colour) -> None:
+def _taper(view: DrawContext, a: Pixel, b: Pixel, halves: tuple[float, float], colour: RgbColour) -> None:
     """Draw a tapered segment with flat ends; `halves` are the half widths at `a` and `b`, px."""
     length = math.hypot(b[0] - a[0], b[1] - a[1])
     if length < 1e-3:

@@ -17,15 +17,15 @@ from sandbox.scene.compile.bodies import Bodies
 from sandbox.trajectory import Frame
 from sandbox.window.camera import Camera
 from sandbox.window.render.draw_context import DrawContext
-from sandbox.window.render.palette import Colour, hex_colour
+from sandbox.window.render.palette import RgbColour, hex_colour
 from sandbox.window.render.sdf import sdf_surface
 from sandbox.window.render.text import draw_text
 
 TextureKind = Literal["plain", "solid", "stripe", "spots"]
 
-IVORY: Colour = hex_colour(WHITE)
-RED: Colour = (196, 44, 40)
-DARK: Colour = (24, 24, 28)
+IVORY: RgbColour = hex_colour(WHITE)
+RED: RgbColour = (196, 44, 40)
+DARK: RgbColour = (24, 24, 28)
 STRIPE = 0.58
 """half width of a stripe, in ball radii"""
 DISC = 0.46
@@ -42,11 +42,11 @@ class BallTexture(NamedTuple):
     """Pattern and colour of a ball."""
 
     kind: TextureKind
-    colour: Colour
+    colour: RgbColour
     label: str = ""
 
 
-def texture_of(name: str, colour: Colour, struck: bool) -> BallTexture:
+def texture_of(name: str, colour: RgbColour, struck: bool) -> BallTexture:
     """Return the texture of a ball.
 
     Args:
@@ -78,9 +78,9 @@ def paint_texture(coat: BallTexture, ball: FloatArray, radius: float) -> FloatAr
         return np.broadcast_to(own, ball.shape)
     if coat.kind == "spots":
         off = 1.0 - np.abs(ball).max(axis=1)  # 1 − cos of the angle to the nearest axis; the chord is √(2·off)
-        share = np.clip((SPOT - np.sqrt(2.0 * off)) * soft + 0.5, 0.0, 1.0)
+        coverage = np.clip((SPOT - np.sqrt(2.0 * off)) * soft + 0.5, 0.0, 1.0)
         spot = RED if sum(coat.colour) > BRIGHT else IVORY
-        return np.asarray(own + (np.asarray(spot) - own) * share[:, None])
+        return np.asarray(own + (np.asarray(spot) - own) * coverage[:, None])
     colours = np.broadcast_to(own, ball.shape)
     if coat.kind == "stripe":
         white = np.clip((np.abs(ball[:, 1]) - STRIPE) * soft + 0.5, 0.0, 1.0)
@@ -118,30 +118,30 @@ class BallOrientations:
         self.version: IntArray = np.empty(0, np.int64)
         """(N,) counter that increases whenever a ball turns"""
         self._time: float | None = None
-        self.goes_on = False
+        self.is_continuous = False
         """whether the last frame directly follows the one before, within `MAX_STEP`"""
 
-    def go_on(self, frame: Frame) -> None:
+    def advance(self, frame: Frame) -> None:
         """Integrate the rotations up to a frame. A step back in time leaves them unchanged."""
         count, known = len(frame.position), len(self.turned)
         if count > known:
-            self.turned = np.concatenate((self.turned, [_thrown(k) for k in range(known, count)]))
+            self.turned = np.concatenate((self.turned, [_initial_orientation(k) for k in range(known, count)]))
             self.version = np.append(self.version, np.zeros(count - known, np.int64))
         dt = 0.0 if self._time is None else frame.time - self._time
-        self._time, self.goes_on = frame.time, 0.0 < dt < MAX_STEP
-        if not self.goes_on:
+        self._time, self.is_continuous = frame.time, 0.0 < dt < MAX_STEP
+        if not self.is_continuous:
             return
         spin = np.zeros((count, 3))
         spin[:, 2] = frame.angular_velocity
         if frame.roll is not None:
             spin[:, :2] = frame.roll
-        who = np.flatnonzero(np.isfinite(spin).all(axis=1) & (spin != 0.0).any(axis=1))
-        if len(who):
-            self.turned[who] = _squared_up(_rotations(spin[who] * dt) @ self.turned[who])
-            self.version[who] += 1
+        indices = np.flatnonzero(np.isfinite(spin).all(axis=1) & (spin != 0.0).any(axis=1))
+        if len(indices):
+            self.turned[indices] = _orthonormalised(_rotations(spin[indices] * dt) @ self.turned[indices])
+            self.version[indices] += 1
 
 
-def _thrown(number: int) -> FloatArray:
+def _initial_orientation(number: int) -> FloatArray:
     """Return the initial orientation of a ball, (3, 3), with its index as the random seed."""
     random = np.random.default_rng(number)
     tilt = random.uniform(-0.45, 0.45, 3)
@@ -160,7 +160,7 @@ def _rotations(vectors: FloatArray) -> FloatArray:
     return np.asarray(np.eye(3) + sin * cross + (1.0 - cos) * (cross @ cross))
 
 
-def _squared_up(matrices: FloatArray) -> FloatArray:
+def _orthonormalised(matrices: FloatArray) -> FloatArray:
     """Return rotation matrices re-orthonormalised against rounding errors."""
     x = matrices[:, :, 0] / np.linalg.norm(matrices[:, :, 0], axis=1)[:, None]
     z = np.cross(x, matrices[:, :, 1])
@@ -201,52 +201,52 @@ class BallRenderer:
 
     def __init__(self) -> None:
         self._rolling = BallOrientations()
-        self._known: Bodies | None = None
-        self._coats: tuple[BallTexture, ...] = ()
+        self._bodies: Bodies | None = None
+        self._textures: tuple[BallTexture, ...] = ()
         self._sprites: dict[int, tuple[tuple[object, ...], pygame.Surface]] = {}
-        self._fell: dict[int, float] = {}
+        self._fall_times: dict[int, float] = {}
 
     def draw(self, view: DrawContext) -> None:
         """Draw the visible balls; a pocketed ball sinks and disappears."""
         bodies, frame = view.snapshot.bodies, view.snapshot.frame
-        self._know(view)
-        self._rolling.go_on(frame)
-        sunk = self._sunk(view)
-        seen = [k for k, number in enumerate(view.shown.tolist()) if sunk.get(number, 0.0) < 1.0]
+        self._update_bodies(view)
+        self._rolling.advance(frame)
+        sinking = self._sinking(view)
+        seen = [k for k, number in enumerate(view.shown.tolist()) if sinking.get(number, 0.0) < 1.0]
         places = [(k, int(view.shown[k]), *view.centre[k].tolist(), float(view.radius[k])) for k in seen]
         for _, number, x, y, radius in places:
-            if number not in sunk and radius >= 2.0:
+            if number not in sinking and radius >= 2.0:
                 shadow = _shadow(round(radius * 2.0))
                 half = shadow.get_width() / 2.0
                 view.surface.blit(shadow, (round(x + 0.20 * radius - half), round(y + 0.26 * radius - half)))
         moving = (frame.velocity != 0.0).any(axis=1) | (frame.angular_velocity != 0.0)
         for _, number, x, y, radius in places:
-            depth = sunk.get(number, 0.0)
+            depth = sinking.get(number, 0.0)
             size = radius * (1.0 - 0.35 * depth)
             if not bodies.round[number]:
                 continue
             self._ball(view, number, (x, y), size, bool(moving[number]) or depth > 0.0, 1.0 - depth)
 
-    def _know(self, view: DrawContext) -> None:
+    def _update_bodies(self, view: DrawContext) -> None:
         bodies = view.snapshot.bodies
-        if self._known is bodies:
+        if self._bodies is bodies:
             return
-        if self._known is None or self._known.names != bodies.names[: len(self._known.names)]:
-            self._rolling, self._fell = BallOrientations(), {}
-        self._known = bodies
+        if self._bodies is None or self._bodies.names != bodies.names[: len(self._bodies.names)]:
+            self._rolling, self._fall_times = BallOrientations(), {}
+        self._bodies = bodies
         self._sprites.clear()
         struck = {name for name in STRUCK if name != "yellow" or "white" in bodies.names}
         if view.snapshot.scene.play.game is None:  # no game, a study of spin: spots on all balls
             struck = set(bodies.names)
         colours = dict(zip(view.shown.tolist(), view.colours.tolist(), strict=True))
-        self._coats = tuple(
-            texture_of(name, _three(colours.get(number, (128, 128, 128))), name in struck)
+        self._textures = tuple(
+            texture_of(name, _rgb(colours.get(number, (128, 128, 128))), name in struck)
             for number, name in enumerate(bodies.names)
         )
         if len(colours) < len(bodies):  # balls outside the view have no colour yet
-            self._known = None
+            self._bodies = None
 
-    def _sunk(self, view: DrawContext) -> dict[int, float]:
+    def _sinking(self, view: DrawContext) -> dict[int, float]:
         """Return the progress of the sinking animation of pocketed balls by index, 0 to 1."""
         frame, scene = view.snapshot.frame, view.snapshot.scene
         found: dict[int, float] = {}
@@ -254,10 +254,10 @@ class BallRenderer:
             within = (frame.position == np.asarray(hole.position)).all(axis=1) & frame.present
             for number in np.flatnonzero(within).tolist():
                 # A ball that was pocketed before the first drawn frame, or during a jump in time, is not animated.
-                since = self._fell.setdefault(number, frame.time if self._rolling.goes_on else -math.inf)
+                since = self._fall_times.setdefault(number, frame.time if self._rolling.is_continuous else -math.inf)
                 found[number] = min((frame.time - since) / DROP, 1.0)
-        for number in [each for each in self._fell if each not in found or self._fell[each] > frame.time]:
-            del self._fell[number]
+        for number in [each for each in self._fall_times if each not in found or self._fall_times[each] > frame.time]:
+            del self._fall_times[number]
         return found
 
     def _ball(
@@ -272,7 +272,7 @@ class BallRenderer:
         known = self._sprites.get(number)
         if known is None or known[0] != key:
             turned = self._rolling.turned[number]
-            sprite = _sprite(self._coats[number], turned, size, offset, view.camera, bright)
+            sprite = _sprite(self._textures[number], turned, size, offset, view.camera, bright)
             if larger != 1.0:
                 side = round(sprite.get_width() * larger)
                 sprite = pygame.transform.smoothscale(sprite, (side, side))
@@ -341,6 +341,6 @@ def _shadow(diameter: int) -> pygame.Surface:
     return sdf_surface(np.asarray(dark << 24, np.uint32), encoded=False)
 
 
-def _three(colour: tuple[int, ...]) -> tuple[int, int, int]:
+def _rgb(colour: tuple[int, ...]) -> tuple[int, int, int]:
     red, green, blue = colour
     return red, green, blue

@@ -2,7 +2,6 @@
 
 import math
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import replace
 from typing import NamedTuple
 
 from sandbox.games.billiards.bot import BilliardsBot
@@ -18,8 +17,8 @@ DRAW_BACK = 0.02
 """m of draw-back per m/s of cue speed"""
 
 
-class BotThought(NamedTuple):
-    """Result of a search."""
+class BotTurn(NamedTuple):
+    """Decision and shot that a search has found."""
 
     decision: Decision | None
     """decision before the stroke"""
@@ -33,60 +32,47 @@ class BotPlayer:
     def __init__(self, skill: float = 0.7, seed: int = 0) -> None:
         self._bot = BilliardsBot(skill, seed)
         self._pool = ThreadPoolExecutor(1, "bot")
-        self._future: Future[BotThought] | None = None
+        self._future: Future[BotTurn] | None = None
         self._match: Match | None = None
         self._since = -1.0
         self._from: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
-    @property
-    def is_aiming(self) -> bool:
-        """Whether the search is complete and the cue moves to the shot."""
-        return self._since >= 0.0
-
-    def thought(self, match: Match) -> BotThought | None:
+    def search(self, match: Match) -> BotTurn | None:
         """Return the result of the search for a match; None while it runs. The first call starts it."""
         if self._match is not match or self._future is None:
             if self._future is not None and not self._future.done():
                 return None  # a search for an earlier match, which cannot be cancelled
-            self._match, self._since = match, -1.0  # the cue has not moved yet
-            self._future = self._pool.submit(self._think, match)
+            self._match = match
+            self._future = self._pool.submit(self._find_shot, match)
         return self._future.result() if self._future.done() else None
 
-    def _think(self, match: Match) -> BotThought:
+    def _find_shot(self, match: Match) -> BotTurn:
         decision: Decision | None = None
         if match.choices.decisions and match.rules.name != "free":
             decision = self._bot.decide(match)
             after = match.decide(decision)
             if after.over or after.turn != match.turn:
-                return BotThought(decision, None)
+                return BotTurn(decision, None)
             match = after
-        return BotThought(decision, self._bot.plan(match))
+        return BotTurn(decision, self._bot.plan(match))
 
-    def moves(self, cue: CueState, stroke: Stroke, elapsed: float) -> bool:
+    def animate(self, cue: CueState, stroke: Stroke, elapsed: float) -> bool:
         """Move the cue towards a stroke by some real time, s; return whether the animation is complete."""
         if self._since < 0.0:
             self._since, self._from = 0.0, (cue.aim, cue.side, cue.height)
         self._since += elapsed
-        share = min(self._since / TURNING, 1.0)
-        share = share * share * (3.0 - 2.0 * share)
+        progress = min(self._since / TURNING, 1.0)
+        progress = progress * progress * (3.0 - 2.0 * progress)
         aim, side, height = self._from
-        cue.aim = aim + math.remainder(stroke.aim - aim, math.tau) * share
-        cue.tip_at(side + (stroke.side - side) * share, height + (stroke.height - height) * share)
+        cue.aim = aim + math.remainder(stroke.aim - aim, math.tau) * progress
+        cue.tip_at(side + (stroke.side - side) * progress, height + (stroke.height - height) * progress)
         cue.speed = stroke.speed
         drawn = min(max(self._since - TURNING, 0.0) / DRAWING, 1.0)
         cue.back = DRAW_BACK * stroke.speed * drawn
         return self._since > TURNING + 1.15 * DRAWING
 
-    def stays(self, match: Match) -> None:
-        """Keep the result for a match in which its decision and placement have been applied."""
-        if self._future is None:
-            return
-        self._match, thought = match, self._future.result()
-        self._future = Future()
-        self._future.set_result(BotThought(None, thought.plan and replace(thought.plan, place=None)))
-
-    def forget(self) -> None:
-        """Discard the result."""
+    def reset(self) -> None:
+        """Discard the result of the search, and the animation."""
         self._match, self._since = None, -1.0
 
     def close(self) -> None:

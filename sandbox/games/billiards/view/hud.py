@@ -12,10 +12,10 @@ from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.base import Decision, renamed
 from sandbox.games.billiards.rules.pool import EightBallState
 from sandbox.games.billiards.view.balls import IVORY, BallTexture, texture_of
-from sandbox.games.billiards.view.controls import HumanPlayer
+from sandbox.games.billiards.view.player import BOT, BilliardsPlayer
 from sandbox.games.billiards.view.prediction import CueState
-from sandbox.games.billiards.view.table_game import BOT, BilliardsGame
 from sandbox.scene.description.surface import MISCUE
+from sandbox.window.render.circles import draw_disc
 from sandbox.window.render.palette import (
     FAINT,
     INK,
@@ -25,13 +25,12 @@ from sandbox.window.render.palette import (
     PANEL_RAISED,
     SKY,
     VERMILION,
-    Colour,
+    RgbColour,
     hex_colour,
     mix_colours,
 )
 from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
 from sandbox.window.render.text import draw_box, draw_text, text_size, wrap_text
-from sandbox.window.ui.icons import draw_disc
 
 MAX_SCOREBOARD_WIDTH = 470.0
 """px at unit 1"""
@@ -58,12 +57,12 @@ class ScoreboardLayout(NamedTuple):
 
 
 def layout_scoreboard(
-    person: HumanPlayer, free: pygame.Rect, left: int, unit: float, aside: int = 0
+    player: BilliardsPlayer, free: pygame.Rect, left: int, unit: float, aside: int = 0
 ) -> ScoreboardLayout:
     """Return the layout of the scoreboard: at the top of the free area, or at the bottom if the top is too narrow.
 
     Args:
-        person: player at the window.
+        player: player at the window.
         free: free area, px.
         left: right edge of the status plate at the upper left, px.
         unit: UI scale, 1 on a display of 1080 lines.
@@ -75,8 +74,8 @@ def layout_scoreboard(
     if not above:
         left, right = free.left + margin, free.right - max(margin, aside)
     width = min(right - left, round(MAX_SCOREBOARD_WIDTH * unit))
-    lines = wrap_text(status_line(person), size, width - 2 * pad - 1.3 * size, 2)
-    rows = 1 + len(lines) + bool(_down(person.game.match)) + bool(_choices(person))
+    lines = wrap_text(status_line(player), size, width - 2 * pad - 1.3 * size, 2)
+    rows = 1 + len(lines) + bool(_pocketed(player.match)) + bool(_offered(player))
     rect = pygame.Rect((left + right - width) // 2, free.top + margin, width, rows * round(1.5 * size) + 2 * pad)
     if not above:
         rect.bottomleft = left, free.bottom - margin
@@ -84,83 +83,85 @@ def layout_scoreboard(
 
 
 def draw_scoreboard(
-    surface: pygame.Surface, person: HumanPlayer, free: pygame.Rect, left: int, unit: float, aside: int = 0
+    surface: pygame.Surface, player: BilliardsPlayer, free: pygame.Rect, left: int, unit: float, aside: int = 0
 ) -> ScoreboardText:
     """Draw the scoreboard; the arguments are those of `layout_scoreboard`."""
-    rect, lines = layout_scoreboard(person, free, left, unit, aside)
-    size, pad, game, match = 13.0 * unit, round(9 * unit), person.game, person.game.match
-    line, choices, down = round(1.5 * size), _choices(person), _down(match)
+    rect, lines = layout_scoreboard(player, free, left, unit, aside)
+    size, pad, match = 13.0 * unit, round(9 * unit), player.match
+    line, choices, down = round(1.5 * size), _offered(player), _pocketed(match)
     draw_box(surface, rect, 8 * unit)
     y = rect.top + pad + line / 2
-    _players(surface, game, rect, y, size)
+    _draw_players(surface, player, rect, y, size)
     y += line
     if down:
-        _row_of_balls(surface, match, down, rect, y, size)
+        _draw_ball_row(surface, match, down, rect, y, size)
         y += line
-    mark = ORANGE if match.verdict is not None and match.verdict.fouls and game.resting else SKY
+    mark = ORANGE if match.verdict is not None and match.verdict.fouls and player.is_at_rest else SKY
     draw_disc(surface, (rect.left + pad + 0.4 * size, y), 0.3 * size, mark)
     for text in lines:
         draw_text(surface, text, (rect.left + pad + 1.2 * size, y), size, INK, "midleft")
         y += line
-    return ScoreboardText(rect, _draw_choices(surface, person.choice, choices, rect, y, size) if choices else ())
+    return ScoreboardText(rect, _draw_choices(surface, player.choice, choices, rect, y, size) if choices else ())
 
 
-def _players(surface: pygame.Surface, game: BilliardsGame, rect: pygame.Rect, y: float, size: float) -> None:
-    match = game.match
+def _draw_players(surface: pygame.Surface, player: BilliardsPlayer, rect: pygame.Rect, y: float, size: float) -> None:
+    match = player.match
     state = match.state
     cell = (rect.width - 1.4 * size) / state.players
-    for player in range(state.players):
-        left = rect.left + 0.7 * size + player * cell
-        on = player == state.turn and not state.over
+    for index in range(state.players):
+        left = rect.left + 0.7 * size + index * cell
+        on = index == state.turn and not state.over
         if on:
             marked = pygame.Rect(round(left - 0.3 * size), round(y - 0.75 * size), round(cell), round(1.5 * size))
             pygame.draw.rect(surface, PANEL_RAISED, marked, border_radius=round(0.4 * size))
-        name = game.names[player]
+        name = player.names[index]
         if state.players == 1:
             name = "free play" if match.rules.name == "free" else match.rules.name
         group = ""
         if isinstance(state, EightBallState):
-            group = state.groups[player] or "open table"
-        won = state.over and state.winner == player
+            group = state.groups[index] or "open table"
+        won = state.over and state.winner == index
         spot = draw_text(surface, name, (left, y), size, INK if on or won else FAINT, "midleft", bold=on or won)
         if group:
             draw_text(surface, group, (spot.right + 0.6 * size, y), 0.86 * size, FAINT, "midleft")
         if not (match.rules.name == "free" and not match.layout.pockets):
-            score = str(state.scores[player])
+            score = str(state.scores[index])
             draw_text(surface, score, (left + cell - 0.9 * size, y), size, INK, "midright", bold=True, mono=True)
 
 
-def status_line(person: HumanPlayer) -> str:
+def status_line(player: BilliardsPlayer) -> str:
     """Return the status line: messages of the last shot, and the next action."""
-    game, match = person.game, person.game.match
-    if not game.resting:
+    match = player.match
+    if not player.is_at_rest:
         return "balls rolling"
-    before = renamed("; ".join(match.messages), game.names)
+    before = renamed("; ".join(match.messages), player.names)
     if match.over:
         return f"{before or 'the frame is over'}; press R for a new frame"
-    who = game.names[match.turn]
-    if game.opponent is not None and match.turn == BOT:
-        now = f"{who} is {'thinking' if game.bot_is_thinking else 'aiming'}"
-    elif person.carried is not None:
+    who = player.names[match.turn]
+    if player.opponent is not None and match.turn == BOT:
+        now = f"{who} is {'thinking' if player.is_bot_thinking else 'aiming'}"
+    elif player.carried is not None:
         now = "click to place the cue ball"
-    elif match.choices.needed and game.call.pocket is None:
+    elif match.choices.needed and player.call.pocket is None:
         now = f"{who}: click the pocket of the {match.choices.balls[0] if match.choices.balls else 'ball'}"
     elif match.state.in_hand is not None and match.rules.name != "free":
         now = f"{who} has the ball in hand {match.state.in_hand}".removesuffix(" anywhere")
     elif match.state.players == 1:
-        now = _asked(game)
+        now = _single_player_line(player)
     else:
-        now = f"{who} shoots{_on(match)}"
-    if game.call.safety:
+        now = f"{who} shoots{_ball_on(match)}"
+    if player.call.safety:
         now += " (safety)"
     return f"{before}; {now}" if before and now not in before else now
 
 
-def _asked(game: BilliardsGame) -> str:
-    return "aim and shoot" if game.strokes == 0 else f"{game.strokes} {'stroke' if game.strokes == 1 else 'strokes'}"
+def _single_player_line(player: BilliardsPlayer) -> str:
+    return (
+        "aim and shoot" if player.strokes == 0 else f"{player.strokes} {'stroke' if player.strokes == 1 else 'strokes'}"
+    )
 
 
-def _on(match: Match) -> str:
+def _ball_on(match: Match) -> str:
     """Return the ball on as the end of the status line; empty if there are several, except in snooker."""
     targets = match.targets
     if match.rules.name == "snooker":
@@ -169,7 +170,7 @@ def _on(match: Match) -> str:
     return f"; the {next(iter(targets))} is on" if len(targets) == 1 else ""
 
 
-def _down(match: Match) -> tuple[str, ...]:
+def _pocketed(match: Match) -> tuple[str, ...]:
     """Return the pocketed balls, in the order of the bodies."""
     if not match.layout.pockets:
         return ()
@@ -177,7 +178,7 @@ def _down(match: Match) -> tuple[str, ...]:
     return tuple(name for name in match.layout.names if name not in here)
 
 
-def _row_of_balls(
+def _draw_ball_row(
     surface: pygame.Surface, match: Match, down: tuple[str, ...], rect: pygame.Rect, y: float, size: float
 ) -> None:
     room = int((rect.width - 1.4 * size) / (1.35 * size))
@@ -185,12 +186,12 @@ def _row_of_balls(
     for k, name in enumerate(down[-room:]):
         colour = hex_colour(colours.get(name) or "#808080")
         at = rect.left + 1.3 * size + k * 1.35 * size, y
-        sprite = _small(texture_of(name, colour, struck=False), round(1.16 * size))
+        sprite = _ball_icon(texture_of(name, colour, struck=False), round(1.16 * size))
         surface.blit(sprite, sprite.get_rect(center=(round(at[0]), round(at[1]))))
 
 
 @lru_cache(maxsize=128)
-def _small(coat: BallTexture, side: int) -> pygame.Surface:
+def _ball_icon(coat: BallTexture, side: int) -> pygame.Surface:
     """Return a small flat icon of a ball, `side` px wide."""
     over = 4
     large = pygame.Surface((side * over, side * over), pygame.SRCALPHA)
@@ -217,14 +218,13 @@ def _small(coat: BallTexture, side: int) -> pygame.Surface:
     return pygame.transform.smoothscale(large, (side, side))
 
 
-def _choices(person: HumanPlayer) -> tuple[Decision, ...]:
+def _offered(player: BilliardsPlayer) -> tuple[Decision, ...]:
     """Return the decisions to show; in free play only after another one than `play` was selected."""
-    game = person.game
-    if not game.mine or game.match.over:
+    if not player.is_own_turn or player.match.over:
         return ()
-    decisions = game.match.choices.decisions
-    if game.match.rules.name == "free":
-        return decisions if person.choice not in (None, "play") else ()
+    decisions = player.match.choices.decisions
+    if player.match.rules.name == "free":
+        return decisions if player.choice not in (None, "play") else ()
     return decisions if len(decisions) > 1 else ()
 
 
@@ -244,7 +244,7 @@ def _draw_choices(
         if spot.right > rect.right - 0.5 * size:
             break
         chosen = each == now
-        edge: Colour = SKY if chosen else LINE
+        edge: RgbColour = SKY if chosen else LINE
         draw_box(surface, spot, 0.4 * size, PANEL_RAISED, 255, edge)
         draw_text(surface, each, spot.center, 0.92 * size, INK if chosen else FAINT, "center")
         found.append((spot, each))
@@ -311,81 +311,69 @@ POWER_BAR = 18.0
 MIN_HUD = 420, 300
 """px at unit 1: width and height of the free area below which no HUD is drawn"""
 
-DecisionHandler = Callable[[Callable[[], object]], bool]
-
 
 class BilliardsHud:
     """Scoreboard, english dial and power bar, with their mouse input."""
 
-    def __init__(self) -> None:
-        self._tip = self._power = pygame.Rect(0, 0, 0, 0)
+    def __init__(self, player: BilliardsPlayer) -> None:
+        self._player = player
+        self._tip = self._power = self._board = pygame.Rect(0, 0, 0, 0)
         self._choices: tuple[tuple[pygame.Rect, Decision], ...] = ()
-        self.foot = 0
-        """px: height of the scoreboard if it is at the bottom, where the window shows messages; else 0"""
-        self.board = pygame.Rect(0, 0, 0, 0)
-        """rectangle of the scoreboard, px"""
         self._held = ""
 
-    def draw(self, surface: pygame.Surface, person: HumanPlayer, free: pygame.Rect, left: int, unit: float) -> None:
-        """Draw the HUD.
-
-        Args:
-            surface: target.
-            person: player at the window.
-            free: free area, px.
-            left: right edge of the status plate at the upper left, px.
-            unit: UI scale, 1 on a display of 1080 lines.
-        """
-        self._tip = self._power = pygame.Rect(0, 0, 0, 0)
-        self._choices, self.foot, self.board = (), 0, pygame.Rect(0, 0, 0, 0)
+    def draw(self, surface: pygame.Surface, free: pygame.Rect, left: int, unit: float) -> None:
+        """Draw the HUD; see `GameHud`."""
+        player = self._player
+        self._tip = self._power = self._board = pygame.Rect(0, 0, 0, 0)
+        self._choices = ()
         if free.width < MIN_HUD[0] * unit or free.height < MIN_HUD[1] * unit:
             return
         scale = _scale(free, unit)
-        board = draw_scoreboard(surface, person, free, left, scale, _aside(scale))
-        self._choices, self.board = board.choices, board.rect
-        if board.rect.top > free.centery:
-            self.foot = free.bottom - board.rect.top
-        if not person.game.aiming:
+        board = draw_scoreboard(surface, player, free, left, scale, _aside(scale))
+        self._choices, self._board = board.choices, board.rect
+        if not player.can_shoot:
             return
         self._tip, self._power = _dials(free, scale)
-        draw_power(surface, self._power, person.game.cue, scale)
-        draw_tip(surface, self._tip, person.game.cue, scale)
+        draw_power(surface, self._power, player.cue, scale)
+        draw_tip(surface, self._tip, player.cue, scale)
 
-    def taken(self, person: HumanPlayer, free: pygame.Rect, left: int, unit: float) -> list[pygame.Rect]:
-        """Return the rectangles of the HUD, px, with the dials even if they are hidden now; arguments as for `draw`."""
+    def reserved(self, free: pygame.Rect, left: int, unit: float) -> list[pygame.Rect]:
+        """Return the rectangles of the HUD, px, with the dials even if they are hidden now."""
         if free.width < MIN_HUD[0] * unit or free.height < MIN_HUD[1] * unit:
             return []
         scale = _scale(free, unit)
-        board = layout_scoreboard(person, free, left, scale, _aside(scale)).rect
+        board = layout_scoreboard(self._player, free, left, scale, _aside(scale)).rect
         return [board, *(tip_box(dial, scale) for dial in _dials(free, scale))]
 
     def plates(self, free: pygame.Rect, unit: float) -> dict[str, pygame.Rect]:
         """Return the rectangles of the elements as last drawn, by name, px."""
         scale = _scale(free, unit)
-        dials = {name: tip_box(rect, scale) for name, rect in self._rects() if rect.width}
-        return {"score": self.board, **dials}
+        return {"score": self._board} | {name: tip_box(rect, scale) for name, rect in self.dials.items() if rect.width}
 
-    def handle(self, event: pygame.event.Event, person: HumanPlayer, act: DecisionHandler) -> bool:
+    @property
+    def dials(self) -> dict[str, pygame.Rect]:
+        """Rectangles of the dials `tip` and `power` as last drawn, px; empty ones while they are hidden."""
+        return {"tip": self._tip, "power": self._power}
+
+    def handle_event(self, event: pygame.event.Event, run: Callable[[Callable[[], object]], bool]) -> bool:
         """Handle a mouse event; return whether it was used."""
+        player = self._player
         if event.type == pygame.MOUSEBUTTONDOWN and event.button == 1:
             clicked = next((each for rect, each in self._choices if rect.collidepoint(event.pos)), None)
             if clicked is not None:
-                act(lambda: person.decide(clicked))
+                run(lambda: player.decide(clicked))
                 return True
-            self._held = next((name for name, rect in self._rects() if rect.collidepoint(event.pos)), "")
-            if self._held and person.game.mine:
-                self._set(event.pos, person.game.cue)
+            self._held = next((name for name, rect in self.dials.items() if rect.collidepoint(event.pos)), "")
+            if self._held and player.is_own_turn:
+                self._set(event.pos, player.cue)
             return bool(self._held)
         if event.type == pygame.MOUSEMOTION and self._held:
-            if person.game.mine:
-                self._set(event.pos, person.game.cue)
+            if player.is_own_turn:
+                self._set(event.pos, player.cue)
             return True
         if event.type in (pygame.MOUSEBUTTONUP, pygame.WINDOWFOCUSLOST):
             self._held = ""
         return False
-
-    def _rects(self) -> tuple[tuple[str, pygame.Rect], ...]:
-        return ("tip", self._tip), ("power", self._power)
 
     def _set(self, at: tuple[int, int], cue: CueState) -> None:
         if self._held == "tip" and self._tip.width:

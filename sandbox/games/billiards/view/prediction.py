@@ -8,9 +8,9 @@ from sandbox.arrays import FloatArray
 from sandbox.engines.contract import Exhaustion, Refusal
 from sandbox.engines.exact.tabletop.shots import Table
 from sandbox.games.billiards.game import MAX_CUE_SPEED, MAX_TIP_OFFSET, MIN_CUE_SPEED
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.surface import Shot, Stroke
-from sandbox.scene.scene import Scene
 
 DEFAULT_SPEED = 2.5
 """m/s, cue speed at the start of a game"""
@@ -32,7 +32,7 @@ class CueState:
     """m by which the cue is drawn back"""
 
     @classmethod
-    def laid(cls, shot: Shot) -> "CueState":
+    def for_shot(cls, shot: Shot) -> "CueState":
         """Return the state of the cue for a shot of the scene."""
         return cls(shot.aim, min(max(shot.speed, MIN_CUE_SPEED), MAX_CUE_SPEED), shot.side, shot.height)
 
@@ -47,19 +47,19 @@ class CueState:
         return self.speed / MAX_CUE_SPEED
 
     @power.setter
-    def power(self, share: float) -> None:
-        self.speed = min(max(share * MAX_CUE_SPEED, MIN_CUE_SPEED), MAX_CUE_SPEED)
+    def power(self, fraction: float) -> None:
+        self.speed = min(max(fraction * MAX_CUE_SPEED, MIN_CUE_SPEED), MAX_CUE_SPEED)
 
     @property
-    def way(self) -> tuple[float, float]:
+    def direction(self) -> tuple[float, float]:
         """Unit vector along the cue, towards the ball."""
         return math.cos(self.aim), math.sin(self.aim)
 
     def tip_at(self, side: float, height: float) -> None:
         """Set the offset of the tip in radii, limited to `MAX_TIP_OFFSET`."""
-        off = math.hypot(side, height)
-        share = min(1.0, MAX_TIP_OFFSET / off) if off > 0.0 else 1.0
-        self.side, self.height = side * share, height * share
+        offset = math.hypot(side, height)
+        scale = min(1.0, MAX_TIP_OFFSET / offset) if offset > 0.0 else 1.0
+        self.side, self.height = side * scale, height * scale
 
     def centre(self) -> None:
         """Reset english and draw-back."""
@@ -73,15 +73,15 @@ SPACING = 0.05
 class ShotPrediction(NamedTuple):
     """Predicted result of a stroke."""
 
-    way: FloatArray
+    cue_path: FloatArray
     """(K, 2) m, path of the cue ball"""
     ghost: Point | None
     """centre of the cue ball at its first contact with another ball, m"""
     hit: int | None
     """index of that ball"""
-    onward: FloatArray | None
+    object_path: FloatArray | None
     """(K, 2) m, path of that ball"""
-    falls: tuple[int, ...]
+    pocketed: tuple[int, ...]
     """indices of those of the two balls that are pocketed"""
 
 
@@ -95,9 +95,9 @@ class ShotPredictor:
         self._scene = scene
         self._table: Table | None = None
         self._refused = False
-        self._known: tuple[object, ShotPrediction | None] | None = None
+        self._last: tuple[object, ShotPrediction | None] | None = None
 
-    def of(self, stroke: Stroke, ball: int, position: tuple[Point, ...]) -> ShotPrediction | None:
+    def predict(self, stroke: Stroke, ball: int, position: tuple[Point, ...]) -> ShotPrediction | None:
         """Return the prediction of a stroke; None if it cannot be computed.
 
         Args:
@@ -106,19 +106,19 @@ class ShotPredictor:
             position: positions of all bodies at rest, m.
         """
         key = (stroke, ball, position)
-        if self._known is None or self._known[0] != key:
-            self._known = key, self._tried(stroke, ball, position)
-        return self._known[1]
+        if self._last is None or self._last[0] != key:
+            self._last = key, self._compute(stroke, ball, position)
+        return self._last[1]
 
-    def _tried(self, stroke: Stroke, ball: int, position: tuple[Point, ...]) -> ShotPrediction | None:
+    def _compute(self, stroke: Stroke, ball: int, position: tuple[Point, ...]) -> ShotPrediction | None:
         if self._refused:
             return None
         try:
             if self._table is None:
                 self._table = Table(self._scene)
             names = self._table.names
-            stands = self._table.with_balls(dict(zip(names, position, strict=False)))
-            outcome = stands.shoot(stroke, names[ball], ways=True)
+            table = self._table.with_balls(dict(zip(names, position, strict=False)))
+            outcome = table.shoot(stroke, names[ball], ways=True)
         except (Refusal, Exhaustion) as error:
             self._refused = isinstance(error, Refusal)
             return None
@@ -132,15 +132,14 @@ class ShotPredictor:
             x, y = event.point
             own, its = (float(self._scene.bodies.radius[each]) for each in (ball, hit))
             bx, by = position[hit]  # it has not moved yet
-            share = own / its  # the contact point divides the line of centres in the ratio of the radii
-            ghost = x + (x - bx) * share, y + (y - by) * share
-        fallen = outcome.pocketed
+            ratio = own / its  # in which the contact point divides the line of centres
+            ghost = x + (x - bx) * ratio, y + (y - by) * ratio
         return ShotPrediction(
             outcome.way(name, SPACING),
             ghost,
             hit,
             outcome.way(names[hit], SPACING) if hit is not None else None,
-            tuple(k for k in (ball, hit) if k is not None and names[k] in fallen),
+            tuple(k for k in (ball, hit) if k is not None and names[k] in outcome.pocketed),
         )
 
 
@@ -158,7 +157,7 @@ class CueAim:
     """offset of the tip to the right, in radii"""
     back: float
     """m by which the cue is drawn back"""
-    forecast: ShotPrediction | None = None
+    prediction: ShotPrediction | None = None
     carried: bool = False
     """whether the ball is being placed by hand; no cue is drawn then"""
     refused: bool = False

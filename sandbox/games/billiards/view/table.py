@@ -12,15 +12,15 @@ from typing import NamedTuple
 import numpy as np
 import pygame
 
-from sandbox.games.billiards.table_geometry import RAIL, table_width
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point, Vector
 from sandbox.scene.description.fixed import Post, Wall
-from sandbox.scene.scene import Scene
-from sandbox.window.camera import Box, Camera
+from sandbox.window.camera import Camera, ViewBox
 from sandbox.window.render.lines import Pixel, clip_segment, draw_line, fill_polygon
-from sandbox.window.render.palette import BACKGROUND, Colour, mix_colours
+from sandbox.window.render.palette import BACKGROUND, RgbColour, mix_colours
 from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
 from sandbox.window.render.static_geometry import draw_static_bodies
+from sandbox.window.view_bounds import RAIL, shorter_side
 
 DEPTH = 0.036
 """width of a cushion from the nose to the wood, as a fraction of the table width"""
@@ -41,15 +41,15 @@ class CushionOutline(NamedTuple):
     """unit vector out of the playing area"""
 
 
-def cushion_outlines(scene: Scene, area: Box) -> tuple[CushionOutline, ...]:
+def cushion_outlines(scene: Scene, area: ViewBox) -> tuple[CushionOutline, ...]:
     """Return the cushions among the walls of a scene."""
-    depth = DEPTH * table_width(area)
+    depth = DEPTH * shorter_side(area)
     noses = {k: out for k, wall in enumerate(scene.walls) if (out := _out(wall, area)) is not None}
     facings = [wall for k, wall in enumerate(scene.walls) if k not in noses and len(wall.points) == 2]
     return tuple(_cushion(scene.walls[k], out, scene, facings, depth) for k, out in noses.items())
 
 
-def other_walls(scene: Scene, area: Box) -> tuple[tuple[Wall, ...], tuple[Post, ...]]:
+def other_walls(scene: Scene, area: ViewBox) -> tuple[tuple[Wall, ...], tuple[Post, ...]]:
     """Return the walls and posts that are not part of a cushion."""
     noses = [(wall, out) for wall in scene.walls if (out := _out(wall, area)) is not None]
     jaws = [jaw for wall, out in noses for end in wall.points if (jaw := _jaw(end, out, scene)) is not None]
@@ -65,7 +65,7 @@ def _jaw(end: Point, out: Vector, scene: Scene) -> Post | None:
     return next((post for post in scene.posts if math.dist(post.position, _moved(end, out, post.radius)) < TOUCH), None)
 
 
-def _out(wall: Wall, area: Box) -> Vector | None:
+def _out(wall: Wall, area: ViewBox) -> Vector | None:
     """Return the outward unit vector of a wall along an edge of the area; None for other walls."""
     if len(wall.points) != 2 or wall.closed:
         return None
@@ -130,17 +130,17 @@ def _from_jaw(wall: Wall, jaw: Post) -> tuple[Point, Point] | None:
     return None
 
 
-def _moved(point: Point, way: Vector, distance: float) -> Point:
-    return point[0] + way[0] * distance, point[1] + way[1] * distance
+def _moved(point: Point, direction: Vector, distance: float) -> Point:
+    return point[0] + direction[0] * distance, point[1] + direction[1] * distance
 
 
-WOOD: Colour = (66, 45, 36)
-WOOD_LIGHT: Colour = (104, 74, 56)
-WOOD_DARK: Colour = (44, 30, 25)
-IRON: Colour = (26, 24, 26)
-HOLE: Colour = (8, 8, 10)
-PEARL: Colour = (206, 200, 184)
-CHALK: Colour = (226, 236, 232)
+WOOD: RgbColour = (66, 45, 36)
+WOOD_LIGHT: RgbColour = (104, 74, 56)
+WOOD_DARK: RgbColour = (44, 30, 25)
+IRON: RgbColour = (26, 24, 26)
+HOLE: RgbColour = (8, 8, 10)
+PEARL: RgbColour = (206, 200, 184)
+CHALK: RgbColour = (226, 236, 232)
 LIT, UNLIT = 1.12, 0.80
 """brightness of the cloth in the middle and at the corners, as a factor"""
 
@@ -148,9 +148,9 @@ LIT, UNLIT = 1.12, 0.80
 class ClothColours(NamedTuple):
     """Colours of a cloth: bed, cushions, and the line along their noses."""
 
-    bed: Colour
-    rubber: Colour
-    edge: Colour
+    bed: RgbColour
+    rubber: RgbColour
+    edge: RgbColour
 
 
 POOL = ClothColours((22, 106, 104), (17, 84, 84), (58, 150, 146))
@@ -165,7 +165,7 @@ def felt_of(scene: Scene) -> ClothColours:
 
 
 def draw_table(
-    surface: pygame.Surface, camera: Camera, scene: Scene, area: Box, unit: float = 1.0, antialias: bool = True
+    surface: pygame.Surface, camera: Camera, scene: Scene, area: ViewBox, unit: float = 1.0, antialias: bool = True
 ) -> None:
     """Draw the visible part of a table.
 
@@ -179,7 +179,7 @@ def draw_table(
     """
     felt = felt_of(scene)
     pen = _TablePen(surface, camera, unit, antialias)
-    rubber, width = cushion_outlines(scene, area), table_width(area)
+    rubber, width = cushion_outlines(scene, area), shorter_side(area)
     _wood(pen, area, width)
     for hole in scene.pockets:
         pen.disc(hole.position, hole.radius + 0.016 * width, IRON, rim=mix_colours(IRON, PEARL, 0.25), line=1.0)
@@ -214,10 +214,10 @@ class _TablePen:
     def at(self, points: tuple[Point, ...]) -> list[Pixel]:
         return [(x, y) for x, y in self.camera.to_screen(np.asarray(points)).tolist()]
 
-    def polygon(self, points: tuple[Point, ...], colour: Colour) -> None:
+    def polygon(self, points: tuple[Point, ...], colour: RgbColour) -> None:
         fill_polygon(self.surface, self.at(points), colour, self.antialias)
 
-    def box(self, box: Box, colour: Colour, rounding: float = 0.0) -> None:
+    def box(self, box: ViewBox, colour: RgbColour, rounding: float = 0.0) -> None:
         """Fill a box, with its sides rounded to whole pixels so that they are sharp."""
         (left, top), (right, bottom) = _corners(self.camera, box)
         area = self.surface.get_rect().inflate(400, 400)
@@ -226,12 +226,14 @@ class _TablePen:
         rect = pygame.Rect(round(left), round(top), round(right) - round(left), round(bottom) - round(top))
         pygame.draw.rect(self.surface, colour, rect, border_radius=round(rounding * self.camera.scale))
 
-    def line(self, points: tuple[Point, ...], colour: Colour, width: float) -> None:
+    def line(self, points: tuple[Point, ...], colour: RgbColour, width: float) -> None:
         places = self.at(points)
         for a, b in pairwise(places):
             draw_line(self.surface, a, b, colour, width, self.antialias)
 
-    def disc(self, at: Point, radius: float, colour: Colour, rim: Colour | None = None, line: float = 0.0) -> None:
+    def disc(
+        self, at: Point, radius: float, colour: RgbColour, rim: RgbColour | None = None, line: float = 0.0
+    ) -> None:
         ((x, y),), r = self.at((at,)), radius * self.camera.scale
         if clip_segment((x, y), (x, y), self.surface.get_rect(), r + 4.0) is None:
             return
@@ -240,13 +242,13 @@ class _TablePen:
         draw_sdf(self.surface, disc_distance(x, y, r), look, within)
 
 
-def _corners(camera: Camera, box: Box) -> tuple[Pixel, Pixel]:
+def _corners(camera: Camera, box: ViewBox) -> tuple[Pixel, Pixel]:
     """Return the upper left and the lower right corner of a box on the screen, px."""
     (ax, ay), (bx, by) = camera.to_screen(np.asarray(box)).tolist()
     return (min(ax, bx), min(ay, by)), (max(ax, bx), max(ay, by))
 
 
-def _wood(pen: _TablePen, area: Box, width: float) -> None:
+def _wood(pen: _TablePen, area: ViewBox, width: float) -> None:
     """Draw the rails as nested boxes: a dark outer edge, a light bevel, the wood, and a dark inner edge."""
     rim, depth = RAIL * width, DEPTH * width
     for out, colour in (
@@ -261,10 +263,10 @@ def _wood(pen: _TablePen, area: Box, width: float) -> None:
 
 
 def _throat(
-    pen: _TablePen, hole: Point, radius: float, rubber: tuple[CushionOutline, ...], area: Box, colour: Colour
+    pen: _TablePen, hole: Point, radius: float, rubber: tuple[CushionOutline, ...], area: ViewBox, colour: RgbColour
 ) -> None:
     """Draw the cloth in the mouth of a pocket, between the ends of its two cushions."""
-    reach = 3.0 * radius + 0.1 * table_width(area)
+    reach = 3.0 * radius + 0.1 * shorter_side(area)
     ends = [nose for each in rubber for nose in (each.nose, each.nose[::-1]) if math.dist(nose[0], hole) < reach]
     ends.sort(key=lambda nose: math.dist(nose[0], hole))
     if len(ends) >= 2:
@@ -273,10 +275,10 @@ def _throat(
         pen.polygon((hole, *a, *reversed(b)), colour)
 
 
-def _light(surface: pygame.Surface, camera: Camera, area: Box) -> None:
+def _light(surface: pygame.Surface, camera: Camera, area: ViewBox) -> None:
     """Brighten the middle of the bed and darken its corners."""
     (left, top), (right, bottom) = _corners(camera, area)
-    depth = DEPTH * table_width(area) * camera.scale
+    depth = DEPTH * shorter_side(area) * camera.scale
     seen = surface.get_rect()
     rect = pygame.Rect(0, 0, 0, 0)
     rect.left, rect.top = max(math.floor(left - depth), 0), max(math.floor(top - depth), 0)
@@ -296,7 +298,7 @@ def _light(surface: pygame.Surface, camera: Camera, area: Box) -> None:
         surface.blit(pygame.transform.smoothscale(layer, rect.size), rect, special_flags=flag)
 
 
-def _marks(pen: _TablePen, scene: Scene, area: Box, felt: ClothColours) -> None:
+def _marks(pen: _TablePen, scene: Scene, area: ViewBox, felt: ClothColours) -> None:
     """Draw the head string or baulk line, the D, and the spots."""
     spots = {spot.name: spot.position for spot in scene.play.spots}
     faint, (left, bottom), (right, top) = mix_colours(felt.bed, CHALK, 0.32), *area
@@ -312,7 +314,7 @@ def _marks(pen: _TablePen, scene: Scene, area: Box, felt: ClothColours) -> None:
     elif "head" in spots and scene.pockets:
         x, y = spots["head"]
         pen.line(((left, y), (right, y)) if tall else ((x, bottom), (x, top)), mix_colours(felt.bed, CHALK, 0.2), thin)
-    size = 0.0042 * table_width(area)
+    size = 0.0042 * shorter_side(area)
     for place in spots.values():
         pen.disc(place, max(size, 1.2 * pen.unit / pen.camera.scale), mix_colours(felt.bed, CHALK, 0.5))
 
@@ -325,7 +327,7 @@ def _shadow(pen: _TablePen, cushion: CushionOutline, felt: ClothColours, reach: 
         pen.polygon((*moved, *cushion.nose[::-1]), mix_colours(felt.bed, HOLE, dark))
 
 
-def _diamonds(pen: _TablePen, scene: Scene, area: Box, width: float) -> None:
+def _diamonds(pen: _TablePen, scene: Scene, area: ViewBox, width: float) -> None:
     """Draw the diamonds on the rails; snooker tables have none."""
     if scene.play.game == "snooker" or not scene.play.spots or any(s.name == "brown" for s in scene.play.spots):
         return

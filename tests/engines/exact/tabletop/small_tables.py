@@ -2,8 +2,8 @@
 
 from typing import Any
 
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
-from sandbox.scene.scene import Scene
 
 G, SLIDING, ROLLING, SPINNING = 9.81, 0.2, 0.01, 0.0127
 MASS, R = 0.170097, 0.028575

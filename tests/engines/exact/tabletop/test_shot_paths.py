@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from sandbox.engines.exact.tabletop.shots import Table
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.surface import Stroke
 from sandbox.scene.files.load import load
-from sandbox.scene.scene import Scene
 
 CASES = Path(__file__).parent / "cases"
 

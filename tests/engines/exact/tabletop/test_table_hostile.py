@@ -7,15 +7,17 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from small_tables import R, ball, table
 
 from sandbox.action import Action, ActionError, Impulse, Move, SetParameter, Spawn, Strike
 from sandbox.engines.exact.tabletop.shots import BATCH, Table
 from sandbox.engines.switching import start
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.surface import Stroke
 from sandbox.scene.files.load import from_document, loads
+from tests.engines.exact.tabletop.small_tables import R, ball, table
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 HOLE = {"name": "hole", "position": [0.5, 1.5], "radius": 0.06}
 UP = Stroke(aim=0.5 * math.pi, speed=1.0)

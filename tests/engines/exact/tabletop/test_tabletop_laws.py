@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from small_tables import LENGTH, WIDTH, G, R, ball, rack, table
 
 from sandbox.engines.exact.tabletop.shots import Table
 from sandbox.engines.registry import start
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.surface import Stroke
-from sandbox.scene.scene import Scene
+from tests.engines.exact.tabletop.small_tables import LENGTH, WIDTH, G, R, ball, rack, table
+
+pytestmark = pytest.mark.full  # property tests with many examples
 
 HOPS = 5e-8  # J: what one hop of balls pressed together may give
 MODELS = [True, False]

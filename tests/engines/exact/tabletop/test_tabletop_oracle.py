@@ -9,8 +9,10 @@ import pytest
 
 from sandbox.engines.exact.tabletop.shot_result import ShotEvent, ShotResult
 from sandbox.engines.exact.tabletop.shots import Table
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
 from sandbox.scene.files.load import load
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 CASES = Path(__file__).parent / "cases"
 NAMES = sorted(path.stem for path in CASES.glob("*.json"))

@@ -5,16 +5,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from small_tables import MASS, SLIDING, G, R, ball, rack, table
 
 from sandbox.action import Action, ActionError, Impulse, Move, Remove, SetParameter, Spawn, Strike
 from sandbox.engines.common.energy_balance import total_energy
 from sandbox.engines.contract import Exhaustion, Refusal
 from sandbox.engines.registry import ENGINES
 from sandbox.engines.switching import SwitchableSimulation, start
-from sandbox.measure.run import run
+from sandbox.measure.run.runner import run
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
-from sandbox.scene.scene import Scene
+from tests.engines.exact.tabletop.small_tables import MASS, SLIDING, G, R, ball, rack, table
 
 HOLE = {"name": "hole", "position": [0.5, 1.5], "radius": 0.06}
 UP = 0.5 * math.pi

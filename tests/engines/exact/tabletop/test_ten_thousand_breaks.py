@@ -8,9 +8,11 @@ import pytest
 from sandbox.arrays import FloatArray
 from sandbox.engines.common.kernel import COMPILED
 from sandbox.engines.exact.tabletop.shots import Table
+from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find
-from sandbox.scene.scene import Scene
+
+pytestmark = pytest.mark.full  # long runs and sweeps
 
 NAMES = ["billiards/8-ball", "billiards/9-ball", "billiards/snooker", "billiards/three-cushion"]
 DEEP = 1e-9  # m: what touches may stand so deep

@@ -1,0 +1,174 @@
+"""Commands `scenes`, `engines` and `schema`."""
+
+import difflib
+import json
+import tomllib
+from typing import Any
+
+import click
+
+from sandbox.cli.options import json_option
+from sandbox.cli.streams import print_json
+from sandbox.cli.tables import new_table, print_folded_table
+from sandbox.echo import short_repr
+from sandbox.scene.files.shipped_scenes import shipped
+
+
+@click.command(name="engines")
+@json_option
+def engines_command(as_json: bool) -> int:
+    """List the engines and the physics that each models."""
+    from sandbox.engines.registry import ENGINES  # imports numpy, which `scenes` does not need
+
+    rows = [{"name": e.name, "about": e.about, "models": sorted(map(str, e.capabilities))} for e in ENGINES.values()]
+    if as_json:
+        print_json({"engines": rows})
+        return 0
+    for row in rows:
+        click.echo(f"{row['name']}  {row['about']}; models {', '.join(row['models'])}")
+    return 0
+
+
+@click.command(name="scenes")
+@json_option
+def scenes_command(as_json: bool) -> int:
+    """List the shipped scenes: name, title, and what to observe."""
+    rows = []
+    for scene in shipped():
+        document = tomllib.loads(scene.path.read_text(encoding="utf-8"))
+        rows.append({"name": scene.name, "title": document["title"], "about": document["about"]})
+    if as_json:
+        print_json({"scenes": rows})
+        return 0
+    width = max((len(row["name"]) for row in rows), default=0)
+    for row in rows:
+        click.echo(f"{row['name']:<{width}}  {row['title']}. {row['about']}")
+    return 0
+
+
+Node = dict[str, Any]
+"""A JSON Schema."""
+
+
+@click.command(name="schema")
+@click.argument("table", required=False)
+@click.option(
+    "--json", "as_json", is_flag=True, help="print TABLE as JSON Schema too; without TABLE the output is always JSON"
+)
+def schema_command(table: str | None, as_json: bool) -> int:
+    """Print the keys of a table of the scene file, or the JSON Schema of the whole file.
+
+    TABLE is the name of a table, such as ball, solver, joint, body.box or pinball.bumper. Without it, the JSON Schema
+    is printed, for editors and other programs.
+    """
+    from sandbox.scene.files.json_schema import dumps, schema  # imports the whole scene
+
+    if table is None:
+        click.echo(dumps(), nl=False)
+        return 0
+    whole = schema()
+    found = _find(whole, table.strip("[]"))
+    if as_json:
+        one = found[0] if len(found) == 1 else {"oneOf": found}
+        print_json({"$schema": whole["$schema"], **one, "$defs": whole["$defs"]})
+        return 0
+    for node in found:
+        _print_table(whole, table, node)
+    return 0
+
+
+def _find(whole: Node, path: str) -> list[Node]:
+    """Return the tables at a path: one, or several kinds of joints or drives.
+
+    Raises:
+        click.UsageError: there is no table at the path.
+    """
+    here = [whole]
+    for part in path.split("."):
+        nested = _nested(whole, part) if here == [whole] and part not in whole["properties"] else []
+        if nested:
+            here = nested
+            continue
+        known = dict.fromkeys(key for node in here for key in node.get("properties", {}))
+        if part not in known:
+            close = difflib.get_close_matches(part, known, n=1)
+            hint = f"did you mean {close[0]!r}?" if close else f"known keys: {', '.join(known)}"
+            raise click.UsageError(f"{short_repr(path)}: no key {short_repr(part)}; {hint}")
+        inner = (node["properties"][part] for node in here if part in node.get("properties", {}))
+        here = list({node.get("title", ""): node for each in inner for node in _tables(whole, each)}.values())
+        if not here:
+            raise click.UsageError(f"{short_repr(path)}: {short_repr(part)} is a value, not a table")
+    return here
+
+
+def _nested(whole: Node, name: str) -> list[Node]:
+    """Return the distinct tables of a name that are keys of other tables, such as kick."""
+    within = (node["properties"][name] for node in whole["$defs"].values() if name in node.get("properties", {}))
+    return list({node.get("title", ""): node for each in within for node in _tables(whole, each)}.values())
+
+
+def _tables(whole: Node, node: Node) -> list[Node]:
+    """Return the tables that a value may be, or that its elements may be."""
+    if "$ref" in node:
+        node = whole["$defs"][node["$ref"].rpartition("/")[2]]
+    if "properties" in node:
+        return [node]
+    inner = [*node.get("anyOf", ()), *node.get("oneOf", ()), *([node["items"]] if "items" in node else ())]
+    return [table for each in inner for table in _tables(whole, each)]
+
+
+def _print_table(whole: Node, name: str, node: Node) -> None:
+    """Print the keys of a table, one per line: type and range, default, description."""
+    from rich.text import Text
+
+    kinds = _kinds(node)
+    about = _line(node.get("description", "").partition("\n\n")[0])
+    click.echo(f"{name}{f', kind {kinds}' if kinds else ''}: {about}".rstrip(": "))
+    table = new_table()
+    for head in ("key", "value", "default", ""):
+        table.add_column(head, no_wrap=head == "key")
+    for key, each in node["properties"].items():
+        needed = "required" if key in node.get("required", ()) else json.dumps(each.get("default"))
+        default = "–" if needed == "null" else needed
+        table.add_row(*map(Text, (key, _value(whole, each), default, _line(each.get("description", "")))))
+    print_folded_table(table)
+
+
+LARGE = 1e5
+"""Bounds beyond this, or below its reciprocal, only guard the engines against nonsense, and are not printed."""
+
+
+def _line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _kinds(node: Node) -> str:
+    kind = node["properties"].get("kind", {})
+    return " or ".join(kind.get("enum", [kind["const"]] if "const" in kind else []))
+
+
+def _value(whole: Node, node: Node) -> str:
+    """Return the type and range of a value in words."""
+    if "$ref" in node:
+        node = whole["$defs"][node["$ref"].rpartition("/")[2]]
+    if "properties" in node:
+        return "table"
+    if "enum" in node or "const" in node:
+        return " · ".join(map(str, node.get("enum", [node.get("const")])))
+    forms = [*node.get("anyOf", ()), *node.get("oneOf", ())]
+    if forms:
+        return " or ".join(dict.fromkeys(_value(whole, each) for each in forms))
+    if node.get("type") == "array":
+        if "prefixItems" in node:
+            return f"[{', '.join(_value(whole, each) for each in node['prefixItems'])}]"
+        of = _value(whole, node["items"])
+        return "tables" if "table" in of else f"array of {of}"
+    low, high = (node.get(f"{way}imum", node.get(f"exclusive{way.capitalize()}imum")) for way in ("min", "max"))
+    words = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false"}
+    word = words.get(str(node.get("type")), str(node.get("type", "value")))
+    low, high = (None if bound is None or abs(bound) >= LARGE else bound for bound in (low, high))
+    if low is not None and 0 < low < 1 / LARGE:
+        low, word = None, f"{word} > 0"
+    if low is not None:
+        return f"{word} ≥ {low:g}" if high is None else f"{word} {low:g} … {high:g}"
+    return word if high is None else f"{word} ≤ {high:g}"

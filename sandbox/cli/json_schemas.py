@@ -1,0 +1,26 @@
+"""JSON Schemas of the documents that commands print with `--json`."""
+
+import importlib
+from typing import Any
+
+from sandbox.jsonable import json_schema
+
+DOCUMENTS = {
+    "compare": "sandbox.measure.compare.result:ComparisonDocument",
+    "extremes": "sandbox.measure.extremes.runner:ExtremesDocument",
+    "shots": "sandbox.games.billiards.shots.study:StudyDocument",
+    "tradeoff": "sandbox.measure.tradeoff.result:TradeoffDocument",
+}
+"""Dataclass of the document of each command, as `module:class`."""
+
+
+def document_schema(command: str) -> dict[str, Any]:
+    """Return the JSON Schema of the document of a command.
+
+    The document itself may have further keys: an option can add its own, such as `minimised` of `compare --minimise`.
+
+    Args:
+        command: name of the command, one of `DOCUMENTS`.
+    """
+    module, name = DOCUMENTS[command].split(":")
+    return json_schema(getattr(importlib.import_module(module), name), is_open=True)

@@ -1,0 +1,81 @@
+"""Options that several commands have, each with one spelling and one help text."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+import click
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutputOptions:
+    """Options of what a command prints; the base of the options of each command."""
+
+    as_json: bool
+    quiet: bool
+
+    @property
+    def is_silent(self) -> bool:
+        """No progress and no result in words is printed."""
+        return self.quiet or self.as_json
+
+
+CommandFunction = TypeVar("CommandFunction", bound=Callable[..., Any])
+
+
+class Decorator(Protocol):
+    """Adds an option to a command."""
+
+    def __call__(self, command: CommandFunction, /) -> CommandFunction:
+        """Return the command with the option."""
+        ...
+
+
+json_option = click.option("--json", "as_json", is_flag=True, help="one JSON document on standard output")
+verbose_option = click.option("-v", "--verbose", is_flag=True, help="explain every column of the table")
+sweep_option = click.option(
+    "--sweep",
+    "sweeps",
+    multiple=True,
+    metavar="KEY=A,B,C",
+    help="run once per value; a range is KEY=LOW:HIGH:N[:log]; several sweeps multiply",
+)
+
+
+def engines_option(default: str, verb: str = "run") -> Decorator:
+    """Return `--engine NAME[,NAME]`, also spelled `--engines`, with what is run without it."""
+    text = f"engine or engines to {verb}; default: {default}"
+    return click.option("--engine", "--engines", "engines", metavar="NAME[,NAME]", help=text)
+
+
+def set_option(text: str = "set a value of the scene") -> Decorator:
+    """Return `--set KEY=VALUE`."""
+    return click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help=text)
+
+
+def quiet_option(text: str = "print no table and no progress") -> Decorator:
+    """Return `--quiet`."""
+    return click.option("--quiet", is_flag=True, help=text)
+
+
+def out_option(text: str) -> Decorator:
+    """Return `--out DIR`."""
+    return click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help=text)
+
+
+def plot_option(text: str) -> Decorator:
+    """Return `--plot FILE`."""
+    return click.option("--plot", type=click.Path(path_type=Path), metavar="FILE", help=text)
+
+
+def workers_option(default: int | None, text: str) -> Decorator:
+    """Return `--workers N` with its default, and the text that states it."""
+    text = f"number of worker processes; default: {text}"
+    return click.option("--workers", type=click.IntRange(1, 256), default=default, metavar="N", help=text)
+
+
+def time_limit_option(text: str) -> Decorator:
+    """Return `--time-limit S`, also spelled `--patience`."""
+    seconds = click.FloatRange(min=0.0, min_open=True)
+    return click.option("--time-limit", "--patience", "time_limit", type=seconds, metavar="S", help=text)

@@ -1,0 +1,359 @@
+"""Tables of `run` and `match`: runs, energy ledgers, score histograms."""
+
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import click
+
+from sandbox.cli.tables import add_columns, heads_of, new_table, print_legend, print_line, print_table
+from sandbox.engines.energy_ledger import Cause
+from sandbox.games.scores import QUANTILES, Scores
+from sandbox.jsonable import JsonObject
+
+if TYPE_CHECKING:
+    from rich.text import Text
+
+STEP = ("dt", "substeps")
+"""Settings that share a column."""
+
+MAX_TIMED = 20
+"""Runs in a table that shows first contacts and final positions; in a longer one they are columns without much use."""
+
+SHORTEST_NAME = 8
+"""Width to which the column of scene names is folded on a narrow terminal."""
+
+
+LEGEND = {
+    "scene": "the scene as given",
+    "engine": "the physics engine",
+    "dt": "time step of a frame, s",
+    "dt × substeps": "time step of a frame, s, and the number of solver steps in it",
+    "seed": "seed of the random numbers of the scene",
+    "status": "ok; diverged: a state is not finite; refused: the engine cannot model the scene; failed: it stopped",
+    "× real time": "simulated time / computing time (without compilation); above 1 is faster than real time",
+    "energy, J": "kinetic + potential energy at the start → at the end, J",
+    "joint error": "largest error of any joint in any recorded frame, relative to its length",
+    "broken": "joints that broke",
+    "first contact, s": "time at which the first contact begins, s",
+    "contacts": "contacts; one that lasts counts once",
+    "missed": "contacts that the engine missed because a body passed through another within a step (tunnelling)",
+    "final position, m": "position of the body at the end, m",
+    "score": "final score of the game",
+    "game": "how the game ended",
+    "falls": "balls in pockets, and the pocket of each",
+}
+"""Columns of the table and their meaning, for `--verbose`."""
+
+
+def print_runs(rows: Sequence[JsonObject], verbose: bool = False) -> None:
+    """Print a table with a line for each run.
+
+    Args:
+        rows: the runs.
+        verbose: explain every column below the table.
+    """
+    from rich.text import Text
+
+    show = _Columns.of(rows)
+    table = new_table()
+    if show.scenes:
+        table.add_column("scene", overflow="fold", min_width=SHORTEST_NAME)
+    add_columns(table, ["engine"])
+    numbers = ("dt × substeps" if show.substeps else "dt", *show.swept, *show.differing)
+    add_columns(table, (*numbers, *(["seed"] if show.seeds else [])), "right")
+    add_columns(table, ["status"])
+    joints = *(("joint error",) if show.joint_errors else ()), *(("broken",) if show.broken_joints else ())
+    ends = *(("first contact, s",) if show.first_contacts else ()), *(("final position, m",) if show.positions else ())
+    add_columns(table, ("× real time", "energy, J", *joints, *ends, "contacts", "missed"), "right")
+    if show.games:
+        add_columns(table, ["score"], "right")
+        add_columns(table, ["game"])
+    if show.pocketed:
+        add_columns(table, ["falls"])
+    for row in rows:
+        table.add_row(*_cells(row, show))
+
+    # One scene stands above its runs: a long path would take the room of the numbers. Of several, only names fold.
+    foldable = max(Text(row["scene"]).cell_len for row in rows) - SHORTEST_NAME if show.scenes else 0
+    if not show.scenes:
+        print_line(rows[0]["scene"])
+    print_table(table, max(foldable, 0))
+    if len(rows) == 1 and rows[0]["first_contact"] is not None and not show.games:
+        position = _final_position(rows[0])
+        final = f"; final position {position} m" if position else ""
+        print_line(f"first contact at {_number(rows[0]['first_contact'], 6)} s{final}")
+    if verbose:
+        meanings = {key: f"setting `solver.{key}`" for key in show.differing}
+        meanings |= {key: f"value of {key!r}" for key in show.swept}
+        print_legend(heads_of(table), LEGEND | meanings)
+    elif sys.stdout.isatty():  # without a terminal, every line of the output is a row of the table
+        print_line("; ".join(_legend(show)), "dim", fold=True)
+
+
+class _Columns(NamedTuple):
+    """Optional columns of a table of runs."""
+
+    scenes: bool
+    swept: list[str]
+    """keys of the scene with different values"""
+    differing: list[str]
+    """settings of the solver with different values"""
+    substeps: bool
+    seeds: bool
+    joint_errors: bool
+    broken_joints: bool
+    first_contacts: bool
+    positions: bool
+    games: bool
+    pocketed: bool
+
+    @classmethod
+    def of(cls, rows: Sequence[JsonObject]) -> "_Columns":
+        """Return the columns that have something to show."""
+        swept = [key for key in rows[0]["set"] if key != "world.seed" and not key.startswith("solver.")]
+        scenes = len({row["scene"] for row in rows}) > 1
+        games = any("score" in row for row in rows)
+        # Scores are the results of games, and runs of several scenes are not compared with each other.
+        few = 1 < len(rows) <= MAX_TIMED and not games and not scenes
+        is_timed = few and all(row["first_contact"] is not None for row in rows)
+        return cls(
+            scenes=scenes,
+            swept=[key for key in swept if len({str(row["set"][key]) for row in rows}) > 1],
+            differing=[key for key in rows[0]["settings"] if key not in STEP and _differs(rows, key)],
+            substeps=any(row["settings"]["substeps"] > 1 for row in rows),
+            seeds=len({row["seed"] for row in rows}) > 1,
+            joint_errors=any(row["joint_error"] is not None for row in rows),
+            broken_joints=any(row["broken_joints"] for row in rows),
+            first_contacts=is_timed or _first_contacts_differ(rows),
+            positions=few and len({_final_position(row) for row in rows} - {""}) > 1,
+            games=games,
+            pocketed=any(row["pocketed"] for row in rows),
+        )
+
+
+def _cells(row: JsonObject, show: _Columns) -> "Iterator[str | Text]":
+    """Yield the cells of a run."""
+    from rich.text import Text
+
+    settings = row["settings"]
+    if show.scenes:
+        yield Text(row["scene"])
+    yield row["engine"]
+    yield f"{settings['dt']:.4g}" + (f" × {settings['substeps']}" if show.substeps else "")
+    yield from (_setting(row["set"][key]) for key in show.swept)
+    yield from (_setting(settings[key]) for key in show.differing)
+    if show.seeds:
+        yield str(row["seed"])
+    status = Text(row["status"], style="green" if row["status"] == "ok" else "bold red")
+    yield status.append(" stored", style="dim") if row["repeated"] else status
+    yield _number(row["realtime_factor"], 3)
+    start, end = row["energy_start"], row["energy_end"]
+    yield "–" if start is None else f"{_number(start)} → {_number(end)}"
+    if show.joint_errors:
+        yield _percent_error(row["joint_error"])
+    if show.broken_joints:
+        yield f"{row['broken_joints']:,}"
+    if show.first_contacts:
+        yield _number(row["first_contact"], 6)
+    if show.positions:
+        yield _final_position(row) or "–"
+    is_refused, missed = row["status"] == "refused", row["missed_contacts"]
+    yield "–" if is_refused else f"{row['contacts']:,}"
+    yield "–" if is_refused else "?" if missed is None else f"{missed:,}"
+    if show.games:
+        yield _number(row.get("score"))
+        yield Text(_game_end(row))
+    if show.pocketed:
+        yield Text(", ".join(f"{ball}: {pocket}" for ball, pocket in row["pocketed"].items()))
+
+
+def _legend(show: _Columns) -> Iterator[str]:
+    """Yield the meaning of the columns that need one."""
+    yield "× real time: simulated time / computing time"
+    yield "energy: start → end"
+    if show.joint_errors:
+        yield "joint error: largest, relative to the length of the joint"
+    if show.first_contacts:
+        yield "first contact: start of the first collision"
+    yield "missed: contacts that the engine missed"
+    yield "-v explains every column"
+
+
+def _final_position(row: JsonObject) -> str:
+    """Return the position of the only body at the end, m; "" if the run has no body or several."""
+    final = row.get("final") or {}
+    if len(final) != 1:
+        return ""
+    (body,) = final.values()
+    return f"({', '.join('–' if x is None else f'{x:.4g}' for x in body['position'])})"
+
+
+def _first_contacts_differ(rows: Sequence[JsonObject]) -> bool:
+    """Tell whether the first contact of one scene and seed differs between engines or settings.
+
+    If energies and counts are equal, it is what shows the effect of the setting.
+    """
+    times: dict[tuple[str, int], set[float | None]] = {}
+    for row in rows:
+        if row["status"] != "refused":
+            times.setdefault((row["scene"], row["seed"]), set()).add(row["first_contact"])
+    return any(len(each) > 1 for each in times.values())
+
+
+def _game_end(row: JsonObject) -> str:
+    """Return how a game ended; a dash if none was played."""
+    return "–" if row.get("score") is None else row.get("over") or "in progress"
+
+
+def _differs(rows: Sequence[JsonObject], key: str) -> bool:
+    """Tell whether a setting differs between runs of one scene; between scenes, defaults of engines differ anyway."""
+    values: dict[str, set[str]] = {}
+    for row in rows:
+        values.setdefault(row["scene"], set()).add(str(row["settings"][key]))
+    return any(len(each) > 1 for each in values.values())
+
+
+def _percent_error(value: float | None) -> str:
+    return "–" if value is None else f"{100.0 * value:.2g} %"
+
+
+def _setting(value: object) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _number(value: float | None, digits: int = 4) -> str:
+    if value is None:
+        return "–"
+    return f"{value:,.0f}" if 10 ** (digits - 1) <= abs(value) < 1e6 else f"{value:.{digits}g}"
+
+
+MAX_LEDGERS = 5
+"""Runs in one table of ledgers, which then fits a terminal; further runs have a table of their own."""
+
+ROUNDING = 1e-12
+"""Fraction of the largest energy below which an entry is a rounding error and has no line: sums of 1e4 terms of double
+precision are exact to about that."""
+
+
+def print_ledgers(rows: Sequence[JsonObject]) -> None:
+    """Print the energy ledgers of runs, those of one scene side by side."""
+    from rich.text import Text
+
+    kept = [row for row in rows if row["ledger"] is not None]
+    for group in _groups(kept):
+        table = new_table()
+        table.add_column(Text(f"energy of {group[0]['scene']}, J"), overflow="fold")
+        for row in group:
+            table.add_column(Text(_label(row, group)), justify="right", no_wrap=True)
+            table.add_column("", justify="right", style="dim", no_wrap=True)
+        ledgers = [row["ledger"] for row in group]
+        table.add_row("start", *_ledger_cells(ledgers, [each["start"] for each in ledgers], fractions=False))
+        for cause in ledgers[0]["causes"]:
+            values = [each["causes"].get(cause) for each in ledgers]
+            if cause == Cause.PHANTOM or any(map(_is_significant, ledgers, values)):
+                table.add_row(f"  {cause}", *_ledger_cells(ledgers, values))
+        table.add_row("sum", *_ledger_cells(ledgers, [_sum(each) for each in ledgers]))
+        table.add_row("end", *_ledger_cells(ledgers, [each["end"] for each in ledgers], fractions=False))
+        table.add_row("residual", *_ledger_cells(ledgers, [each["residual"] for each in ledgers], threshold=0.0))
+        click.echo()
+        print_table(table)
+    if kept:
+        print_line("%: of the largest kinetic energy or the largest entry, whichever is greater", "dim", fold=True)
+
+
+def _groups(rows: Sequence[JsonObject]) -> Iterator[list[JsonObject]]:
+    """Yield the runs of each scene, at most `MAX_LEDGERS` at a time."""
+    for scene in dict.fromkeys(row["scene"] for row in rows):
+        own = [row for row in rows if row["scene"] == scene]
+        for first in range(0, len(own), MAX_LEDGERS):
+            yield own[first : first + MAX_LEDGERS]
+
+
+def _label(row: JsonObject, group: Sequence[JsonObject]) -> str:
+    """Return the engine of a run, and the values in which it differs from the others of its group."""
+    differing = [key for key in row["set"] if len({str(other["set"].get(key)) for other in group}) > 1]
+    values = (f"{key.rpartition('.')[2]}={row['set'][key]}" for key in differing)
+    return " ".join((row["engine"], *values))
+
+
+def _ledger_cells(
+    ledgers: Sequence[dict[str, Any]],
+    values: Sequence[float | None],
+    fractions: bool = True,
+    threshold: float = ROUNDING,
+) -> Iterator[str]:
+    """Yield, for each run, a value and its fraction of the largest energy."""
+    for ledger, value in zip(ledgers, values, strict=True):
+        if value is None or (fractions and not _is_significant(ledger, value, threshold)):
+            yield from ("?" if value is None else "0", "")
+        else:
+            yield f"{value:.5g}"
+            yield _percent(value / ledger["scale"]) if fractions and ledger["scale"] else ""
+
+
+def _percent(fraction: float) -> str:
+    return f"{100.0 * fraction:.1f} %" if abs(fraction) >= 0.001 else f"{100.0 * fraction:.1g} %"
+
+
+def _is_significant(ledger: dict[str, Any], value: float | None, threshold: float = ROUNDING) -> bool:
+    """Tell whether an entry is unknown, or larger than rounding errors."""
+    return value is None or abs(value) > threshold * (ledger["scale"] or 0.0)
+
+
+def _sum(ledger: dict[str, Any]) -> float | None:
+    values = list(ledger["causes"].values())
+    return None if None in values else sum(values)
+
+
+BAR = 40
+"""characters, the longest bar"""
+EIGHTHS = " ▏▎▍▌▋▊▉█"
+"""Block characters by their width in eighths of a character."""
+
+
+def score_rows(rows: Sequence[JsonObject]) -> list[dict[str, Any]]:
+    """Return the distribution of scores over games that differ only in their seed, in the order of the rows.
+
+    Games that diverged or failed are left out; groups of fewer than two games have no entry.
+    """
+    found: dict[str, tuple[dict[str, Any], list[float]]] = {}
+    for row in rows:
+        if row.get("score") is None or row["status"] != "ok":
+            continue
+        point = {key: value for key, value in row["set"].items() if key != "world.seed"}
+        group = {"scene": row["scene"], "engine": row["engine"], "player": row["player"], "set": point}
+        found.setdefault(json.dumps(group, default=str), (group, []))[1].append(float(row["score"]))
+    return [group | Scores.of(scores).document() for group, scores in found.values() if len(scores) > 1]
+
+
+def print_scores(rows: Sequence[dict[str, Any]]) -> None:
+    """Print what `score_rows` returned."""
+    for row in rows:
+        swept = "".join(f", {key} = {value}" for key, value in row["set"].items())
+        click.echo(f"\nscores of {row['scene']}, {row['engine']}{swept}: {row['count']} games, player {row['player']}")
+        click.echo(f"  mean {_score(row['mean'])} ± {_score(row['deviation'])} per game")
+        names = {0.0: "min", 0.5: "median", 1.0: "max"}
+        values = ((names.get(q, f"{q:.0%}"), row["quantiles"][f"{q:g}"]) for q in QUANTILES)
+        click.echo(f"  {' · '.join(f'{name} {_score(value)}' for name, value in values)}")
+        _print_histogram(row["histogram"]["edges"], row["histogram"]["counts"])
+
+
+def _score(value: float) -> str:
+    """Return a score as text; large ones are whole numbers with thousands separators."""
+    return f"{value:,.0f}" if abs(value) >= 1000.0 else f"{value:.4g}"
+
+
+def _print_histogram(edges: Sequence[float], counts: Sequence[int]) -> None:
+    bounds = [_score(edge) for edge in edges]
+    width, largest = max(map(len, bounds)), max(counts)
+    for low, high, count in zip(bounds, bounds[1:], counts, strict=False):
+        click.echo(f"  {low:>{width}} … {high:<{width}} {_bar(count / largest)} {count}")
+
+
+def _bar(fraction: float) -> str:
+    """Return a bar with a resolution of an eighth of a character; a positive fraction has at least one eighth."""
+    eighths = max(round(fraction * BAR * 8), 1 if fraction > 0.0 else 0)
+    bar = EIGHTHS[8] * (eighths // 8) + (EIGHTHS[eighths % 8] if eighths % 8 else "")
+    return f"{bar:<{BAR}}"

@@ -1,0 +1,167 @@
+"""Body store of an event-driven simulation, which records the changes that actions make."""
+
+import numpy as np
+
+from sandbox.action import ActionError
+from sandbox.arrays import BoolArray, FloatArray
+from sandbox.engines.common.actions import has_same_bodies
+from sandbox.engines.common.body_store import ALL, COLLISION_MASKS, FIXED, NOTHING, BodyStore
+from sandbox.engines.common.colliders import static_colliders
+from sandbox.engines.exact.common.requirements import overlap_message, overlapping_collider, touch_tolerance
+from sandbox.engines.tabletop.requirements import pockets_at, unsupported_on_surface
+from sandbox.scene.compile.demands import curls, on_floor
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.base import BodySource, BodySpec
+from sandbox.scene.description.discs import Ball
+
+
+class EventDrivenBodies(BodyStore):
+    """Bodies of a running event-driven scene, and which of them the last action has changed."""
+
+    def __init__(self, setup: Setup, h: float) -> None:
+        super().__init__(setup, h)
+        self.velocity_set: set[int] = set()
+        """indices of bodies whose velocity or spin has been set"""
+        self.position_set: set[int] = set()
+        """indices of bodies whose position has been set"""
+        self.scene_changed = False
+        """whether gravity, coefficients, walls or the set of bodies have changed"""
+        self.walls_changed = False
+        """whether points of walls have changed"""
+
+    def clear_changes(self) -> None:
+        """Forget the changes of the last action."""
+        self.velocity_set.clear()
+        self.position_set.clear()
+        self.scene_changed = self.walls_changed = False
+
+    def set_velocity(self, number: int, velocity: FloatArray) -> None:
+        """Set the velocity of a body, m/s.
+
+        Raises:
+            ActionError: it is in a pocket.
+        """
+        self._check_in_play(number)
+        super().set_velocity(number, velocity)
+        self.velocity_set.add(number)
+
+    def set_spin(self, number: int, spin: float) -> None:
+        """Set the angular velocity of a body, rad/s.
+
+        Raises:
+            ActionError: it is in a pocket.
+        """
+        self._check_in_play(number)
+        super().set_spin(number, spin)
+        self.velocity_set.add(number)
+
+    def set_constant_force(self, number: int, force: FloatArray, torque: float) -> None:
+        """Refuse a constant force: only uniform gravity has the closed forms of motion that events are found from.
+
+        Raises:
+            ActionError: always, unless force and torque are zero.
+        """
+        if force.any() or torque:
+            raise ActionError(
+                f"exact does not model a steady force on one body, here on {self.bodies.names[number]!r}; "
+                "pymunk and reference do"
+            )
+
+    def move_body(self, number: int, position: FloatArray) -> None:
+        """Set the position of a body, m.
+
+        Raises:
+            ActionError: it would overlap something.
+        """
+        others = np.arange(len(self.bodies)) != number
+        kind, fixed = int(self.collision_mask[number]), bool(self.bodies.fixed[number])
+        self._check_free(self.bodies.names[number], position, float(self.radius[number]), kind, fixed, others)
+        super().move_body(number, position)
+        self.position_set.add(number)
+
+    def change(self, setup: Setup, spawned: tuple[BodySource, ...] | None = None) -> None:
+        """Replace the scene by one that differs in gravity, coefficients, wall points or solid walls alone.
+
+        Raises:
+            ActionError: it has drag, or gravity along a `[surface]`, or more surfaces than a scene may have; or a ball
+                overlaps a collider that becomes solid.
+        """
+        scene = setup.scene
+        if scene.world.linear_drag or scene.world.quadratic_drag:
+            raise ActionError("exact does not model drag; pymunk and reference do")
+        checked = scene.world is self.scene.world and has_same_bodies(scene, self.scene)
+        if not checked and on_floor(setup) and (lacks := next(unsupported_on_surface(setup, self.bodies), None)):
+            raise ActionError(lacks)
+        if curls(setup):
+            raise ActionError("exact does not model curl; pymunk does")
+        candidates = np.flatnonzero((self.collision_mask != NOTHING) & self.moving)
+        if len(candidates) and any(new is not old for new, old in zip(scene.fixed, self.scene.fixed, strict=True)):
+            found = overlapping_collider(self.position[candidates], self.radius[candidates], static_colliders(scene))
+            if found is not None:
+                raise ActionError(
+                    overlap_message(self.bodies.names[candidates[found[0]]], scene.fixed_names[found[1]], found[2])
+                )
+        walls_changed = [wall.points for wall in scene.walls] != [wall.points for wall in self.scene.walls]
+        super().change(setup, spawned)
+        self.scene_changed, self.walls_changed = True, walls_changed
+
+    def add(self, single: BodySpec, name: str) -> int:
+        """Add a validated body and return its index.
+
+        Raises:
+            ActionError: it overlaps something, is not a ball, differs from the balls on a `[surface]`, or makes more
+                surfaces than a scene may have.
+        """
+        if isinstance(single, Ball):
+            others = np.ones(len(self.bodies), dtype=np.bool_)
+            position, kind = np.asarray(single.position), COLLISION_MASKS[single.collides]
+            self._check_free(name, position, single.radius, kind, single.fixed, others)
+            if on_floor(self.setup) and (
+                lacks := next(unsupported_on_surface(self.setup, self.bodies.joined_by(single, name)), None)
+            ):
+                raise ActionError(lacks)
+        elif single.collides != "none":
+            raise ActionError(f"exact does not model polygons, such as {name!r}; pymunk and reference do")
+        number = super().add(single, name)
+        self.scene_changed = True
+        return number
+
+    def _check_in_play(self, number: int) -> None:
+        """Refuse to set a ball in motion that is in a pocket. A ball being moved there is not captured yet.
+
+        Raises:
+            ActionError: it is in a pocket.
+        """
+        if number in self.position_set or self.collision_mask[number] == NOTHING:
+            return
+        if pockets_at(self.scene, self.position[number : number + 1])[0] >= 0:
+            raise ActionError(f"{self.bodies.names[number]!r} is in a pocket; move it back into play first")
+
+    def _check_free(
+        self, name: str, position: FloatArray, radius: float, kind: int, fixed: bool, others: BoolArray
+    ) -> None:
+        """Refuse a position at which a ball would overlap another or a static collider.
+
+        Raises:
+            ActionError: it would.
+        """
+        if kind == NOTHING:
+            return
+        still = self.bodies.fixed
+        if pockets_at(self.scene, position[None, :])[0] >= 0:
+            return
+        others = others & (pockets_at(self.scene, self.position) < 0)  # captured balls do not collide
+        collides = others & (self.collision_mask == ALL) & ~still if kind == ALL else np.zeros_like(others)
+        collides |= others & (self.collision_mask == FIXED) & ~still if fixed and kind == ALL else False
+        collides |= others & (self.collision_mask == ALL) & still & (not fixed)
+        apart = self.position - position
+        depth = self.radius + radius - np.hypot(apart[:, 0], apart[:, 1])
+        here = np.broadcast_to(position, self.position.shape)
+        deep = np.flatnonzero(collides & (depth > touch_tolerance(self.position, here)))
+        if len(deep):
+            raise ActionError(overlap_message(name, self.bodies.names[deep[0]], float(depth[deep[0]])))
+        if fixed:
+            return
+        found = overlapping_collider(position[None, :], np.array([radius]), self.fixtures)
+        if found is not None:
+            raise ActionError(overlap_message(name, self.scene.fixed_names[found[1]], found[2]))

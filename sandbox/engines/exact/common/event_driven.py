@@ -1,0 +1,290 @@
+"""Base class of the event-driven simulations: discs in the plane, and balls or pucks on a surface."""
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from time import perf_counter
+from typing import ClassVar, Generic, NoReturn, Protocol, TypeVar
+
+import numpy as np
+
+from sandbox.action import Action
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.common.actions import apply_action
+from sandbox.engines.common.base import BEYOND, BaseSimulation
+from sandbox.engines.common.compile_clock import COMPILE_CLOCK
+from sandbox.engines.common.contact_log import too_many_contacts
+from sandbox.engines.common.energy_balance import record_energy_change
+from sandbox.engines.common.kernel import warn_if_uncompiled
+from sandbox.engines.contract import Divergence, Exhaustion, Observer
+from sandbox.engines.energy_ledger import Cause, EnergyLedger
+from sandbox.engines.exact.common import state as c
+from sandbox.engines.exact.common.bodies import EventDrivenBodies
+from sandbox.resource_limits import CONTACTS, PAIRS
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.world import Settings
+from sandbox.trajectory import Contacts, Frame
+
+FIRST_LOG_ROWS = 1024
+"""Initial number of rows of the contact log."""
+
+
+class StateArrays(Protocol):
+    """State arrays that both simulations have, with the columns of `state`."""
+
+    @property
+    def world(self) -> FloatArray:
+        """Global numbers, as `EventState.world`."""
+
+    @property
+    def counts(self) -> IntArray:
+        """Global integers, as `EventState.counts`."""
+
+    @property
+    def line_tags(self) -> IntArray:
+        """(F, …) tags of lines."""
+
+    @property
+    def vertex_tags(self) -> IntArray:
+        """(K, …) tags of vertices."""
+
+
+Data = TypeVar("Data", bound=StateArrays)
+
+
+class EventDrivenSimulation(BaseSimulation, Generic[Data]):
+    """A simulation that advances from event to event in closed form.
+
+    A kernel, the event loop, works on state arrays. Frames are evaluated between events and do not change these, so the
+    motion does not depend on dt, bit for bit.
+    """
+
+    ENERGY_COLUMNS: ClassVar[Mapping[Cause, tuple[int, ...]]]
+    """columns of `world` with the energy changes of each cause, J"""
+
+    def __init__(self, settings: Settings, data: Data, store: EventDrivenBodies) -> None:
+        """Take over the state arrays of a scene.
+
+        Args:
+            settings: solver settings; dt is the interval of frames.
+            data: state arrays.
+            store: bodies of the scene.
+        """
+        super().__init__(settings)
+        self._store = store
+        self._data: Data = data
+        self._stopped: float | None = None
+        self._ledger: EnergyLedger | None = None
+        warn_if_uncompiled(len(store.bodies))
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s; after an `Exhaustion`, the time of the last event."""
+        return super().time if self._stopped is None else self._stopped
+
+    @property
+    def setup(self) -> Setup:
+        """State from which the simulation started, with the changes that actions have made to its scene."""
+        return self._store.setup
+
+    @property
+    def bodies(self) -> Bodies:
+        """The bodies by index, as they started; spawned bodies are appended."""
+        return self._store.bodies
+
+    @property
+    def retired(self) -> Mapping[int, float]:
+        """Time of removal of each removed body by index, s. Balls in pockets are not removed."""
+        return self._store.retired
+
+    @property
+    def work(self) -> Mapping[str, int]:
+        """Number of events, of predictions, and of balls, colliders and pockets tested in them, so far."""
+        counts = self._data.counts
+        return {
+            "events": int(counts[c.EVENTS]),
+            "predictions": int(counts[c.PREDICTIONS]),
+            "pair_tests": int(counts[c.PAIR_TESTS]),
+        }
+
+    def step(self) -> None:
+        """Advance by one dt.
+
+        Raises:
+            Divergence: a body is not finite or out of range. The state can still be read.
+            Exhaustion: too many events, contacts or pairs, or more time than `patience`.
+        """
+        with self._lock:
+            self._check_running()
+            self._advance((self._steps + 1) * self._settings.dt)
+            self._steps += 1
+            self._finish_step()
+
+    def finish(self, part: float) -> None:
+        """Advance by a last fraction of dt, 0 < part < 1.
+
+        Raises:
+            Divergence: as `step`.
+            Exhaustion: as `step`.
+            ValueError: the fraction is out of range.
+        """
+        self._check_part(part)
+        with self._lock:
+            self._check_running()
+            self._advance((self._steps + part) * self._settings.dt)
+            self._part = part
+            self._finish_step()
+            self._ended = True
+
+    def apply(self, action: Action) -> None:
+        """Apply an action now.
+
+        Raises:
+            ActionError: it cannot be applied. The simulation is unchanged.
+        """
+        with self._lock, np.errstate(all="ignore"):
+            self._check_running()
+            self._store.clear_changes()
+            with record_energy_change(self._ledger, Cause.ACTIONS, self):
+                leaving = apply_action(action, self._store)
+            self._rebuild()
+            if leaving is not None:
+                self._remove(np.asarray([leaving]))
+
+    def watch(self, observer: Observer) -> None:
+        """Do nothing: there are no substeps after which an observer could be called, and no contact is missed."""
+
+    def frame(self) -> Frame:
+        """Return the present state."""
+        store = self._store
+        return Frame(
+            self.time,
+            store.position.copy(),
+            store.velocity.copy(),
+            store.angle.copy(),
+            store.angular_velocity.copy(),
+            store.present.copy(),
+            self._roll(),
+        )
+
+    @abstractmethod
+    def contacts(self) -> Contacts:
+        """Return the contacts since the last call; the first call starts the recording."""
+
+    def account(self) -> Mapping[Cause, float]:
+        """Return the energy change by cause since the first call, J; the first call starts the accounting.
+
+        Motion between events is in closed form, so there is no integration error and no correction of positions. What
+        remains unexplained is rounding: at most 1e-9 of the kinetic energy.
+        """
+        with np.errstate(all="ignore"):
+            if self._ledger is None:
+                self._ledger = EnergyLedger()
+                self._data.counts[c.ACCOUNTING] = 1
+                self._start_accounting()
+            self._account_motion()
+            entries = dict(self._ledger.entries())
+            for cause, columns in self.ENERGY_COLUMNS.items():
+                entries[cause] += sum(float(self._data.world[column]) for column in columns)
+            return entries
+
+    @abstractmethod
+    def _call_event_loop(self, until: float) -> int:
+        """Process events up to a time, s; return `DONE`, `PAUSED`, `FULL` or the code of an exceeded limit."""
+
+    @abstractmethod
+    def _too_many_events(self, status: int) -> str:
+        """Return the message for an exceeded event limit."""
+
+    @abstractmethod
+    def _double_log(self) -> None:
+        """Double the number of rows of the contact log."""
+
+    @abstractmethod
+    def _evaluate(self) -> None:
+        """Write the motion at the present time into the body store."""
+
+    @abstractmethod
+    def _remove(self, indices: IntArray) -> None:
+        """Remove bodies by index; they keep their positions and have no velocity."""
+
+    @abstractmethod
+    def _rebuild(self) -> None:
+        """Copy the changes of an action from the body store into the state arrays, and predict again."""
+
+    @abstractmethod
+    def _start_accounting(self) -> None:
+        """Mark the present time as the start of the accounting in each ball's row."""
+
+    @abstractmethod
+    def _account_motion(self) -> None:
+        """Add the work of friction between events up to the present time."""
+
+    def _roll(self) -> FloatArray | None:
+        """Return the angular velocity about x and y, (N, 2) rad/s, for scenes that have one."""
+        return None
+
+    def _advance(self, until: float) -> None:
+        """Process all events up to a time, s; between calls of the event loop check the limits and grow the log."""
+        began, compiled = perf_counter(), COMPILE_CLOCK.seconds
+        tests, max_tests = self.work["pair_tests"], PAIRS.value
+        with np.errstate(all="ignore"):
+            while (status := self._call_event_loop(until)) != c.DONE:
+                waited = perf_counter() - began - (COMPILE_CLOCK.seconds - compiled)
+                if self.patience is not None and waited > self.patience:
+                    self._exhaust(f"a step of {self._settings.dt:g} s takes longer than {self.patience:g} s to compute")
+                if self.work["pair_tests"] - tests > max_tests:
+                    self._exhaust(
+                        f"a step of {self._settings.dt:g} s has more than {PAIRS.shown(max_tests)} pairs to test, "
+                        f"after {self.work['events']:,} events; {PAIRS.remedy(10 * max_tests)}"
+                    )
+                if status == c.FULL:
+                    rows = int(self._data.counts[c.LOG_ROWS])
+                    if rows > CONTACTS.value:
+                        self._exhaust(too_many_contacts(rows))
+                    self._double_log()
+                elif status != c.PAUSED:
+                    self._exhaust(self._too_many_events(status))
+
+    def _exhaust(self, reason: str) -> NoReturn:
+        """End the simulation at the time of the last event."""
+        self._ended = True
+        self._stopped = float(self._data.world[c.NOW])
+        self._evaluate()
+        raise Exhaustion(reason)
+
+    def _finish_step(self) -> None:
+        """Evaluate the state, check that it is finite and in range, and remove expired bodies."""
+        self._evaluate()
+        beyond = self._store.beyond()
+        if beyond is not None:
+            self._ended = True
+            raise Divergence(self.time, self.bodies.names[beyond], BEYOND)
+        expired = self._store.expired(self.time)
+        if len(expired):
+            self._remove(expired)
+
+
+def last_event_bodies(
+    data: StateArrays,
+    names: Sequence[str],
+    fixed_names: Sequence[str],
+    kinds: tuple[int, int, int],
+) -> str:
+    """Return the quoted names of the bodies of the last event.
+
+    Args:
+        data: state arrays.
+        names: of the bodies.
+        fixed_names: of the static colliders.
+        kinds: codes of collisions with a line, a vertex and a ball.
+    """
+    kind, partner = int(data.counts[c.EVENT_KIND]), int(data.counts[c.EVENT_PARTNER])
+    line, vertex, ball = kinds
+    first = repr(names[data.counts[c.EVENT_BODY]])
+    if kind == ball:
+        return f"{first} and {names[partner]!r}"
+    if kind in (line, vertex):
+        collider = (data.line_tags if kind == line else data.vertex_tags)[partner, c.COLLIDER]
+        return f"{first} and {fixed_names[collider]!r}"
+    return first

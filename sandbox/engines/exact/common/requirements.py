@@ -1,0 +1,190 @@
+"""Requirements of the exact engine: supported demands and settings, number of pairs, and no overlap at the start.
+
+This module imports no kernels, because every validation of a scene for this engine uses it.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.engines.common.colliders import StaticColliders, static_colliders
+from sandbox.engines.tabletop.requirements import pockets_at, unsupported_on_surface
+from sandbox.resource_limits import MEMORY, PAIRS
+from sandbox.scene.compile.demands import BALLS, FLOOR, SURFACES, Demand, on_floor, unmodelled
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.world import Settings
+from sandbox.scene.geometry.neighbours import near_pairs
+from sandbox.scene.geometry.segments import nearest_fractions
+
+CAPABILITIES = BALLS - {Demand.DRAG} | FLOOR | SURFACES - {Demand.ONE_WAY}
+"""Demands that the engine models"""
+
+STEPS = ("integrator", "detection", "response", "impact", "broad_phase", "joints", "stretch")
+"""Settings of solvers with time steps."""
+
+OVERLAP = ("slop", "bias", "persistence")
+"""Settings of solvers that detect overlaps and correct them."""
+
+SPRINGS = ("stiffness", "damping")
+"""Settings of penalty springs."""
+
+TOUCH_GAP = 1e-9
+"""m: bodies that overlap by no more than this touch."""
+
+
+ROUNDING = 4.0 * 2.0**-52
+"""Rounding error of the difference of two coordinates, relative to the larger."""
+
+
+def touch_tolerance(*coordinates: FloatArray) -> FloatArray:
+    """Return the overlap, m, (K,), that counts as contact at positions (K, 2), m."""
+    largest = np.max([np.abs(each).max(axis=-1) for each in coordinates], axis=0)
+    return np.asarray(TOUCH_GAP + ROUNDING * largest)
+
+
+def overlapping_balls(
+    position: FloatArray, radius: FloatArray, to_all: BoolArray, to_fixed: BoolArray, fixed: BoolArray
+) -> tuple[int, int, float] | None:
+    """Return the first pair of balls that can collide and overlap, and the depth, m; None if there is none.
+
+    Args:
+        position: (N, 2) m.
+        radius: (N,) m.
+        to_all: (N,) collides with everything.
+        to_fixed: (N,) collides with static colliders and fixed bodies only.
+        fixed: (N,) never moves.
+    """
+    chosen = np.flatnonzero(to_all | to_fixed)
+    if len(chosen) < 2:
+        return None
+    found: list[tuple[int, int, float]] = []
+    for a, b in near_pairs(position[chosen], 2.0 * float(radius[chosen].max()) * (1.0 + 1e-9)):
+        i, j = chosen[np.minimum(a, b)], chosen[np.maximum(a, b)]
+        apart = position[j] - position[i]
+        depth = radius[i] + radius[j] - np.hypot(apart[:, 0], apart[:, 1])
+        collides = (to_all[i] & to_all[j] & ~(fixed[i] & fixed[j])) | (to_all[i] & fixed[i] & ~fixed[j])
+        collides |= to_all[j] & fixed[j] & ~fixed[i]
+        deep = np.flatnonzero(collides & (depth > touch_tolerance(position[i], position[j])))
+        if len(deep):
+            first = deep[np.lexsort((j[deep], i[deep]))[0]]
+            found.append((int(i[first]), int(j[first]), float(depth[first])))
+    return min(found, default=None)
+
+
+def overlapping_collider(
+    position: FloatArray, radius: FloatArray, fixtures: StaticColliders
+) -> tuple[int, int, float] | None:
+    """Return the first static collider that a ball overlaps, as (ball, collider, depth in m); None if there is none.
+
+    Args:
+        position: (N, 2) m, of balls that can collide with it.
+        radius: (N,) m.
+        fixtures: static colliders.
+    """
+    if not len(position):
+        return None
+    for (px, py, nx, ny), collider in zip(fixtures.planes, fixtures.plane_collider.tolist(), strict=True):
+        gap = (position[:, 0] - px) * nx + (position[:, 1] - py) * ny
+        point = np.broadcast_to(np.array([px, py]), position.shape)
+        deep = np.flatnonzero(radius - gap > touch_tolerance(position, point))
+        if len(deep):
+            return int(deep[0]), collider, float(radius[deep[0]] - gap[deep[0]])
+    for k, near in _near_segments(position, float(radius.max()), fixtures):
+        gap = _gap(position[near], fixtures.segments[k])
+        ends = np.broadcast_to(fixtures.segments[k, :4], (len(near), 4))
+        deep = np.flatnonzero(radius[near] - gap > touch_tolerance(position[near], ends))
+        if len(deep):
+            ball = int(near[deep[0]])
+            return ball, int(fixtures.segment_collider[k]), float(radius[ball] - gap[deep[0]])
+    return None
+
+
+def _near_segments(position: FloatArray, widest: float, fixtures: StaticColliders) -> Iterator[tuple[int, IntArray]]:
+    """Yield each segment with the indices, ascending, of the balls near it in x, or in y if those are fewer.
+
+    Args:
+        position: (N, 2) m.
+        widest: largest radius, m.
+        fixtures: static colliders.
+    """
+    ends, extent = fixtures.segments[:, :4].reshape(-1, 2, 2), fixtures.segments[:, 4:] + widest
+    slack = 1e-9 + 8.0 * ROUNDING * np.abs(ends).max(axis=(1, 2), initial=0.0)[:, None]
+    low, high = ends.min(axis=1) - extent - slack, ends.max(axis=1) + extent + slack
+    orders = [np.argsort(position[:, axis], kind="stable") for axis in range(2)]
+    along = [position[order, axis] for axis, order in enumerate(orders)]
+    first = np.column_stack([np.searchsorted(along[axis], low[:, axis], "left") for axis in range(2)])
+    last = np.column_stack([np.searchsorted(along[axis], high[:, axis], "right") for axis in range(2)])
+    fewer = np.argmin(last - first, axis=1)
+    for k, axis in enumerate(fewer.tolist()):
+        begin, end = int(first[k, axis]), int(last[k, axis])
+        if begin < end:
+            yield k, np.sort(orders[axis][begin:end])
+
+
+def _gap(position: FloatArray, segment: FloatArray) -> FloatArray:
+    """Return the distances (N,) of centres from a segment, m."""
+    ax, ay, bx, by, half = segment
+    x, y = position.T
+    fraction = nearest_fractions(ax, ay, bx, by, x, y)
+    return np.asarray(np.hypot(x - ax - fraction * (bx - ax), y - ay - fraction * (by - ay)) - half)
+
+
+def overlap_message(first: str, second: str, depth: float) -> str:
+    """Return the message for two overlapping objects."""
+    return f"{first!r} and {second!r} overlap by {depth:.3g} m, and it cannot separate overlapping bodies"
+
+
+def unsupported(setup: Setup, settings: Settings) -> tuple[str, ...]:
+    """Return what a scene and its settings require and the engine does not support."""
+    missing = unmodelled(setup, CAPABILITIES)
+    for key in STEPS + OVERLAP + SPRINGS:
+        stated = getattr(settings, key)
+        if stated is not None:
+            why = "uses no time steps" if key in STEPS else "allows no overlap"
+            missing.append(f"{key} {stated!r} is not supported (it {why}; remove it)")
+    if settings.half_kick:
+        missing.append("half_kick is not supported (it uses no time steps; remove it)")
+    if on_floor(setup):
+        missing += unsupported_on_surface(setup)
+    overload = too_many_pairs(setup)
+    if overload is not None:
+        return (*missing, overload)
+    overlap = overlap_of(setup, setup.bodies.position)
+    return (*missing, overlap) if overlap else tuple(missing)
+
+
+def too_many_pairs(setup: Setup) -> str | None:
+    """Return why a scene has too many balls, or None: all pairs of balls and colliders are tested."""
+    scene, bodies = setup.scene, setup.bodies
+    touching = np.asarray([element.collides != "none" for element in bodies.elements], np.bool_)[bodies.element]
+    balls, moving = int(touching.sum()), int((touching & ~bodies.fixed).sum())
+    if on_floor(setup):  # the table of pairs has a row for every ball
+        refusal = MEMORY.refusal(f"the table of pairs of {len(bodies):,} balls takes", 8 * len(bodies) ** 2)
+        if refusal is not None:
+            return refusal
+    fixed = sum(2 * len(wall.points) for wall in scene.walls) + len(scene.planes) + len(scene.posts)
+    pairs = moving * (balls + fixed + len(scene.pockets))
+    return PAIRS.refusal(
+        f"the number of pairs of {moving:,} moving balls with {balls + fixed:,} balls and surfaces is", pairs
+    )
+
+
+def overlap_of(start: Scene | Setup, position: FloatArray) -> str | None:
+    """Return a message naming two overlapping objects with the bodies at positions (N, 2), m; None without overlap."""
+    setup = Setup.of(start)
+    scene, bodies = setup.scene, setup.bodies
+    if not bodies.round.any():
+        return None
+    kinds = np.asarray([element.collides for element in bodies.elements])[bodies.element]
+    in_play = bodies.round & (pockets_at(scene, position) < 0)  # captured balls do not collide
+    to_all, to_fixed = (kinds == "all") & in_play, (kinds == "fixed") & in_play
+    pair = overlapping_balls(position, bodies.radius, to_all, to_fixed, bodies.fixed)
+    if pair is not None:
+        return overlap_message(bodies.names[pair[0]], bodies.names[pair[1]], pair[2])
+    candidates = np.flatnonzero((to_all | to_fixed) & ~bodies.fixed)
+    found = overlapping_collider(position[candidates], bodies.radius[candidates], static_colliders(scene))
+    if found is not None:
+        return overlap_message(bodies.names[candidates[found[0]]], scene.fixed_names[found[1]], found[2])
+    return None

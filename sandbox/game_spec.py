@@ -1,0 +1,71 @@
+"""Specification of a game: its names in scene files, and the import strings of its parts.
+
+Parts are named by import strings, `module:Name`, and imported when they are first used, so that reading a scene
+imports neither rules nor pygame. This module imports nothing of the package. Other packages register a game by an entry
+point of the group `sandbox.games` whose object is a `GameSpec`, see `sandbox.game_names`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Environment:
+    """Gymnasium environment of a game."""
+
+    name: str
+    """in the environment id: `sandbox/<name>-v0`"""
+    scene: str
+    """name of a shipped scene"""
+    frame_skip: int = 1
+    """number of steps per action"""
+    engine: str = "pymunk"
+    """name of the engine"""
+
+
+@dataclass(frozen=True)
+class GameSpec:
+    """A game: its names in a scene file, and the import strings of its parts."""
+
+    names: tuple[str, ...]
+    """values of `[play] game`"""
+    rules: str | None = None
+    """`(scene, bodies) -> Rules`, a class or a function; it may raise `UnsuitableSceneError`"""
+    tables: Mapping[str, str] = field(default_factory=dict)
+    """tables of scene files: heading → `GameTable` or `Preset`; only for games of this package, others are refused"""
+    bot: str | None = None
+    """`(seed) -> Policy`: the player `skilled`"""
+    view: str | None = None
+    """`() -> GameView`: draws the game-specific elements; only this part and `controls` import pygame"""
+    controls: str | None = None
+    """`(host, scene, options) -> GameControls`: input of the window, for games with other input than the keys of
+    `Rules.controls`; `scene` is as in its file, `options` has the chosen values of `GameControls.parameters`"""
+    environments: tuple[Environment, ...] = ()
+    """Gymnasium environments; only for games of this package"""
+    rules_on_request: bool = False
+    """whether scenes also run without the rules: the window always starts them, commands only if a player is given or
+    for a recording of a game"""
+    plays: str | None = None
+    """`(scene) -> bool`: whether the window plays the game on a scene that names no game; default: it does not"""
+    prepare: str | None = None
+    """`(scene) -> scene`: the scene as the window plays it, for scenes that name the game"""
+    real_time: bool = False
+    """whether the game runs in real time from the first step: the window waits for a key press to start it"""
+    presents: str | None = None
+    """`(scene) -> bool`: whether `view` draws a scene; default: scenes whose `[play] game` is one of `names`"""
+    needs_player: str | None = None
+    """`(scene) -> str | None`: the reason why the game does not proceed without input, with the player `none`; None if
+    it does"""
+
+
+def import_part(path: str) -> Any:
+    """Return the object that an import string, `module:Name`, refers to.
+
+    Raises:
+        ImportError: there is no such module.
+        AttributeError: the module has no such name.
+    """
+    module, _, name = path.partition(":")
+    return getattr(import_module(module), name)

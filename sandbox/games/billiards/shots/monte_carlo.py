@@ -1,0 +1,298 @@
+"""Success odds and final positions of a shot under execution noise, by Monte Carlo.
+
+Source of the confidence interval: E. B. Wilson 1927, J. Am. Stat. Assoc. 22, 209; unlike p ± z √(p(1−p)/n), it also
+holds near 0 and 1.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import ClassVar
+
+import numpy as np
+
+from sandbox.arrays import FloatArray
+from sandbox.echo import short_repr
+from sandbox.engines.exact.tabletop.shot_result import ShotResult
+from sandbox.engines.exact.tabletop.shots import ShotBatch
+from sandbox.games.billiards.shots.shot import (
+    ShotSetup,
+    Spread,
+    perturb_stroke,
+    shot_setup,
+    without_miscues,
+)
+from sandbox.html_repr import HtmlRepr
+from sandbox.progress import Progress, ProgressCallback
+from sandbox.scene.compile.scene import Scene
+from sandbox.signals import defer_interrupt
+
+Z_95 = 1.959963984540054
+"""half width of the 95 % interval in standard deviations"""
+
+
+def wilson(hits: int, trials: int, z: float = Z_95) -> tuple[float, float]:
+    """Return the Wilson score interval of a probability, (0, 1) without trials.
+
+    Args:
+        hits: number of trials with the event.
+        trials: number of trials.
+        z: half width in standard deviations; default: 95 %.
+
+    Raises:
+        ValueError: `hits` is negative or exceeds `trials`.
+    """
+    if not 0 <= hits <= trials:
+        raise ValueError(f"{hits} of {trials} is not a count of trials")
+    if trials == 0:
+        return 0.0, 1.0
+    fraction, square = hits / trials, z * z / trials
+    middle = (fraction + 0.5 * square) / (1.0 + square)
+    half = math.sqrt(fraction * (1.0 - fraction) * square + 0.25 * square * square) / (1.0 + square)
+    low = 0.0 if hits == 0 else middle - half  # rounding would leave 1e-19
+    return low, 1.0 if hits == trials else middle + half
+
+
+DEFAULT_COUNT = 10_000
+"""Default number of shots: the standard error of a probability of one half is 0.5 %, its 95 % interval ±1 %."""
+
+SHOTS_PER_CHECK = 512
+"""Shots of a thread between two checks for Ctrl-C: 0.2 s for break shots."""
+
+
+@dataclass(frozen=True)
+class Proportion:
+    """Frequency of an event in a number of shots."""
+
+    hits: int
+    """number of shots with the event"""
+    trials: int
+    """number of shots"""
+
+    json_properties: ClassVar = ("probability", "low", "high")
+
+    @property
+    def probability(self) -> float:
+        """Estimate of the probability, hits / trials; nan without trials."""
+        return self.hits / self.trials if self.trials else math.nan
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % confidence interval of the probability (Wilson 1927)."""
+        return wilson(self.hits, self.trials)
+
+    @property
+    def low(self) -> float:
+        """Lower end of the 95 % confidence interval."""
+        return self.interval[0]
+
+    @property
+    def high(self) -> float:
+        """Upper end of the 95 % confidence interval."""
+        return self.interval[1]
+
+    def __str__(self) -> str:
+        """Return the probability with its confidence interval, in per cent."""
+        if not self.trials:
+            return "unknown"
+        low, high = self.interval
+        return f"{100.0 * self.probability:.1f} % (95 % interval {100.0 * low:.1f} to {100.0 * high:.1f} %)"
+
+
+@dataclass(frozen=True)
+class RestStatistics:
+    """Final position of a ball, over the shots after which it is on the table."""
+
+    count: int
+    """number of these shots"""
+    mean: tuple[float, float]
+    """m, mean of x and y"""
+    spread: tuple[float, float]
+    """m, standard deviation of x and y"""
+
+
+@dataclass(frozen=True, eq=False)
+class Odds(HtmlRepr):
+    """Results of M strokes with random errors at a table of N balls.
+
+    A miscue is not played; it counts as a stroke that pots nothing.
+    """
+
+    shot: ShotSetup
+    """the shot"""
+    spread: Spread
+    """standard deviations of the errors"""
+    seed: int
+    """seed of the random errors"""
+    nominal: ShotResult
+    """result of the intended stroke"""
+    errors: FloatArray
+    """(M, 4) errors of the strokes: aim in rad, speed as a fraction, side and height as fractions of the radius"""
+    batch: ShotBatch
+    """results of the M − `miscues` played shots"""
+    miscues: int
+    """number of miscues"""
+    interrupted: bool = False
+    """whether Ctrl-C was pressed before all shots were played"""
+
+    def __repr__(self) -> str:
+        """Return the shot, the number of strokes, and the odds of a pot and of a scratch."""
+        setup = self.shot
+        where = f"{short_repr(setup.table.scene.title)}, shot {short_repr(setup.name)} at {short_repr(setup.ball)}"
+        lines = [
+            f"<Odds {where}: {self.count:,} strokes, seed {self.seed}, {self.miscues:,} miscues",
+            f"any other ball potted: {self.any_pot}",
+            f"struck ball potted: {self.scratch}",
+        ]
+        return "\n  ".join(lines) + ">"
+
+    @property
+    def count(self) -> int:
+        """M, the number of strokes."""
+        return len(self.errors)
+
+    @property
+    def unfinished(self) -> int:
+        """Number of incomplete shots: not all balls at rest within the time limit, or too many events."""
+        return int(np.count_nonzero(~np.asarray(self.batch.complete, np.bool_)))
+
+    def chance(self, ball: str, pocket: str | None = None) -> Proportion:
+        """Return how often a ball fell into a pocket.
+
+        Args:
+            ball: name of the ball.
+            pocket: name of the pocket; default: any pocket.
+
+        Raises:
+            NoSuchShotError: no ball or pocket has that name.
+        """
+        into = self.batch.pocket[:, self.shot.ball_index(ball)]
+        fell = into >= 0 if pocket is None else into == self.shot.pocket_index(pocket)
+        return Proportion(int(np.count_nonzero(fell)), self.count)
+
+    @property
+    def scratch(self) -> Proportion:
+        """Frequency of a scratch: the struck ball fell into a pocket."""
+        return self.chance(self.shot.ball)
+
+    @property
+    def any_pot(self) -> Proportion:
+        """Frequency of a pot: another ball fell into a pocket, and the struck ball did not."""
+        fell = self.batch.pocket >= 0
+        own = self.shot.ball_index(self.shot.ball)
+        others = np.delete(fell, own, axis=1).any(axis=1)
+        return Proportion(int(np.count_nonzero(others & ~fell[:, own])), self.count)
+
+    def rest(self, ball: str) -> RestStatistics | None:
+        """Return the statistics of the final position of a ball; None if it never remained on the table.
+
+        Args:
+            ball: name of the ball.
+
+        Raises:
+            NoSuchShotError: no ball has that name.
+        """
+        number = self.shot.ball_index(ball)
+        stayed = self.batch.position[self.batch.pocket[:, number] < 0, number]
+        if not len(stayed):
+            return None
+        (x, y), (dx, dy) = stayed.mean(axis=0).tolist(), stayed.std(axis=0).tolist()
+        return RestStatistics(len(stayed), (x, y), (dx, dy))
+
+    def document(self) -> "OddsDocument":
+        """Return the odds as they appear in JSON documents, without the single shots."""
+        balls = {}
+        for ball in self.shot.table.names:
+            into = {pocket: self.chance(ball, pocket) for pocket in self.shot.pockets}
+            pockets = {pocket: chance for pocket, chance in into.items() if chance.hits}
+            balls[ball] = BallOdds(self.chance(ball), pockets, self.rest(ball))
+        return OddsDocument(
+            count=self.count,
+            seed=self.seed,
+            spread=self.spread,
+            interrupted=self.interrupted,
+            miscues=self.miscues,
+            unfinished=self.unfinished,
+            scratch=self.scratch,
+            any_pot=self.any_pot,
+            balls=balls,
+        )
+
+
+@dataclass(frozen=True)
+class BallOdds:
+    """JSON document of the odds of one ball."""
+
+    potted: Proportion
+    pockets: Mapping[str, Proportion]
+    """by the names of the pockets into which it fell"""
+    rest: RestStatistics | None
+
+
+@dataclass(frozen=True)
+class OddsDocument:
+    """JSON document of the odds of a shot."""
+
+    count: int
+    seed: int
+    spread: Spread
+    interrupted: bool
+    miscues: int
+    unfinished: int
+    scratch: Proportion
+    any_pot: Proportion
+    balls: Mapping[str, BallOdds]
+
+
+def odds(
+    scene: Scene | ShotSetup,
+    shot: str | None = None,
+    *,
+    spread: Spread | None = None,
+    count: int = DEFAULT_COUNT,
+    seed: int | None = None,
+    threads: int = 1,
+    errors: FloatArray | None = None,
+    on_progress: ProgressCallback | None = None,
+) -> Odds:
+    """Play a shot many times with random errors of the stroke, and count the results.
+
+    Equal seeds give equal odds, bit for bit, with any number of threads. An interrupt keeps the shots played so far.
+
+    Args:
+        scene: scene with a `[surface]` and a `[[shot]]`.
+        shot: name of the shot; default: the first.
+        spread: standard deviations of the errors; default: `Spread()`.
+        count: number of strokes.
+        seed: seed of the random errors; default: the seed of the scene.
+        threads: number of threads.
+        errors: (M, 4) errors to play in place of random ones: aim in rad, speed as a fraction, side and height as
+            fractions of the radius.
+        on_progress: progress callback; its fraction is the part of the shots that are played.
+
+    Raises:
+        NoSuchShotError: the scene has no such shot.
+        Refusal: the exact engine does not support the scene.
+        Exhaustion: the intended shot has too many events.
+    """
+    setup = shot_setup(scene, shot)
+    spread = Spread() if spread is None else spread
+    seed = setup.table.scene.world.seed if seed is None else seed
+    drawn = spread.draw(count, seed) if errors is None else np.asarray(errors, np.float64).reshape(-1, 4)
+    nominal, done, miscues = setup.simulate(), 0, 0
+    parts: list[ShotBatch] = []
+    try:
+        while done < len(drawn) or not parts:
+            errors_of_part = drawn[done : done + SHOTS_PER_CHECK * threads]
+            strokes, kept = without_miscues(perturb_stroke(setup.stroke, errors_of_part))
+            batch = setup.simulate_batch(strokes, threads)
+            with defer_interrupt():
+                parts.append(batch)
+                done, miscues = done + len(errors_of_part), miscues + int(np.count_nonzero(~kept))
+            if on_progress is not None:
+                on_progress(Progress(fraction=done / max(len(drawn), 1)))
+    except KeyboardInterrupt:
+        if not parts:
+            raise
+    whole = ShotBatch(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(ShotBatch)))
+    return Odds(setup, spread, seed, nominal, drawn[:done], whole, miscues, done < len(drawn))

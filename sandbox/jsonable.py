@@ -1,0 +1,176 @@
+"""JSON documents from dataclasses: the values of a document, and its JSON Schema from the same types.
+
+A dataclass becomes an object with its fields in order. The metadata of `in_json` rename, omit or inline a field; the
+properties that a class lists in `json_properties` follow the fields. JSON has no number for nan and infinity: they
+become null, so that every float may be null in the schema.
+"""
+
+import math
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import Field, fields, is_dataclass
+from types import NoneType, UnionType
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+from pydantic import BaseModel
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+JsonObject = dict[str, Any]
+"""JSON object: values by key"""
+
+
+def in_json(*, key: str | None = None, omit: bool = False, inline: bool = False) -> dict[str, Any]:
+    """Return the `metadata` of a dataclass field that says how it appears in JSON documents.
+
+    Args:
+        key: key in the document; default: the name of the field.
+        omit: leave the field out of the document.
+        inline: merge the value, an object, into the object of the dataclass.
+    """
+    return {"json": (key, omit, inline)}
+
+
+def _options(each: "Field[Any]") -> tuple[str, bool, bool]:
+    """Return key, omit and inline of a field."""
+    key, omit, inline = each.metadata.get("json", (None, False, False))
+    return key or each.name, omit, inline
+
+
+def finite(value: float | None) -> float | None:
+    """Return a number, or None if it is unknown or not finite."""
+    return value if value is not None and math.isfinite(value) else None
+
+
+def to_json(value: Any) -> Any:
+    """Return a value as JSON can hold it; a number that is not finite becomes None.
+
+    Args:
+        value: dataclass, named tuple, pydantic model, mapping, sequence, set, array, number, string or None.
+
+    Raises:
+        TypeError: JSON cannot hold a value of that type.
+    """
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, float):
+        return finite(value)
+    if isinstance(value, BaseModel):
+        return value.model_dump(mode="json")
+    if is_dataclass(value) and not isinstance(value, type):
+        return _object(value)
+    if isinstance(value, Mapping):
+        return {str(key): to_json(each) for key, each in value.items()}
+    if isinstance(value, tuple) and hasattr(value, "_fields"):
+        return {name: to_json(getattr(value, name)) for name in value._fields}
+    if isinstance(value, Sequence | Set):
+        return [to_json(each) for each in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return to_json(value.tolist())
+    raise TypeError(f"JSON cannot hold a {type(value).__name__}")
+
+
+def _object(value: Any) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for each in fields(value):
+        key, omit, inline = _options(each)
+        if omit:
+            continue
+        own = to_json(getattr(value, each.name))
+        if inline:
+            found |= own
+        else:
+            found[key] = own
+    for name in getattr(value, "json_properties", ()):
+        found[name] = to_json(getattr(value, name))
+    return found
+
+
+def json_schema(document: type, *, is_open: bool = False) -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of the documents that `to_json` makes of a dataclass.
+
+    Args:
+        document: the dataclass of the document.
+        is_open: whether the document may have further keys.
+    """
+    definitions: dict[str, Any] = {}
+    schema = _object_schema(document, definitions)
+    schema["additionalProperties"] |= is_open
+    return {"$schema": DIALECT, **schema, **({"$defs": dict(sorted(definitions.items()))} if definitions else {})}
+
+
+def _object_schema(cls: type, definitions: dict[str, Any]) -> dict[str, Any]:
+    """Return the schema of a dataclass or named tuple."""
+    hints = get_type_hints(cls)
+    properties: dict[str, Any] = {}
+    required: list[str] = []
+    is_open = False
+    for name, key, omit, inline in _members(cls):
+        if omit:
+            continue
+        if not inline:
+            properties[key] = _schema(hints[name], definitions)
+            required.append(key)
+        elif is_dataclass(hints[name]):
+            inner = _object_schema(hints[name], definitions)
+            properties |= inner["properties"]
+            required += inner["required"]
+            is_open |= inner["additionalProperties"]
+        else:
+            is_open = True  # the keys of a mapping are not known
+    for name in getattr(cls, "json_properties", ()):
+        properties[name] = _schema(get_type_hints(getattr(cls, name).fget)["return"], definitions)
+        required.append(name)
+    return {"type": "object", "properties": properties, "required": required, "additionalProperties": is_open}
+
+
+def _members(cls: Any) -> list[tuple[str, str, bool, bool]]:
+    """Return name, key, omit and inline of each field of a dataclass or named tuple."""
+    if is_dataclass(cls):
+        return [(each.name, *_options(each)) for each in fields(cls)]
+    return [(name, name, False, False) for name in cls._fields]
+
+
+def _schema(hint: Any, definitions: dict[str, Any]) -> dict[str, Any]:
+    """Return the schema of a type."""
+    origin, arguments = get_origin(hint), get_args(hint)
+    if hint is Any or hint is object:
+        return {}
+    if origin in (Union, UnionType):
+        return _union([_schema(each, definitions) for each in arguments])
+    if origin is Literal:
+        return {"enum": list(arguments)}
+    simple = {NoneType: "null", bool: "boolean", int: "integer", str: "string"}
+    if hint in simple:
+        return {"type": simple[hint]}
+    if hint is float:
+        return {"type": ["number", "null"]}
+    if isinstance(hint, type) and issubclass(hint, BaseModel):
+        return {"type": "object"}
+    if isinstance(hint, type) and (is_dataclass(hint) or hasattr(hint, "_fields")):
+        if hint.__name__ not in definitions:
+            definitions[hint.__name__] = {}  # a type may refer to itself
+            definitions[hint.__name__] = _object_schema(hint, definitions)
+        return {"$ref": f"#/$defs/{hint.__name__}"}
+    if isinstance(origin, type) and issubclass(origin, Mapping):
+        values = _schema(arguments[1], definitions)
+        return {"type": "object", **({"additionalProperties": values} if values else {})}
+    if origin is tuple and arguments[-1:] != (Ellipsis,):
+        items = [_schema(each, definitions) for each in arguments]
+        return {"type": "array", "prefixItems": items, "minItems": len(items), "maxItems": len(items)}
+    if isinstance(origin, type) and issubclass(origin, Sequence | Set):
+        return {"type": "array", "items": _schema(arguments[0], definitions)}
+    raise TypeError(f"no JSON Schema for {hint}")
+
+
+def _union(schemas: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return a schema that allows any of several."""
+    if any(not each for each in schemas):
+        return {}
+    if all(set(each) == {"type"} for each in schemas):
+        names: list[str] = []
+        for each in schemas:
+            names += each["type"] if isinstance(each["type"], list) else [each["type"]]
+        unique = list(dict.fromkeys(names))
+        return {"type": unique if len(unique) > 1 else unique[0]}
+    return {"anyOf": schemas}

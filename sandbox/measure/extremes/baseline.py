@@ -1,0 +1,157 @@
+"""Baseline: boundaries stored in a file, and the comparison of new boundaries with them."""
+
+import json
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sandbox.atomic_write import atomic_write
+from sandbox.echo import short_repr
+from sandbox.measure.extremes.boundary import TOLERANCE, Boundary
+from sandbox.measure.extremes.runner import Extremes
+from sandbox.resource_limits import read_limited
+from sandbox.scene.files.document import check_text
+
+SLACK = 2.0
+"""Multiple of the tolerance by which a boundary may have moved: old and new are known to within it."""
+
+MAX_BYTES = 64 * 2**20
+
+StoredBoundaries = Sequence[Mapping[str, Any]]
+
+
+class StoredError(ValueError):
+    """The file contains no boundaries."""
+
+
+@dataclass(frozen=True)
+class BoundaryChange:
+    """Boundary that has moved."""
+
+    axis: str
+    setup: str
+    """name of the engine configuration"""
+    before: float | None
+    """last level that passed in the baseline; None if none did"""
+    now: float | None
+    """last level that passes now; None if none does"""
+    worse: bool
+    """whether fewer levels pass now"""
+    why: str
+    """reason for the first failure now"""
+
+    def __str__(self) -> str:
+        """Describe the change in one line."""
+        word = "worse" if self.worse else "better"
+        before, now = (_level_text(value) for value in (self.before, self.now))
+        return f"{self.axis} on {self.setup}: {word}: passed up to {before} before, up to {now} now: {self.why}"
+
+
+def _level_text(value: float | None) -> str:
+    return "no level" if value is None else f"{value:.4g}"
+
+
+def store(result: Extremes, path: str | Path, others: StoredBoundaries = ()) -> Path:
+    """Write boundaries into a file, with versions and tolerance, by way of a temporary file.
+
+    Args:
+        result: results with the boundaries.
+        path: the file.
+        others: further boundaries, which come first.
+    """
+    whole_document = result.document()
+    kept = {key: whole_document[key] for key in ("tolerance", "timeout", "memory", "versions", "machine")}
+    document = {**kept, "limits": [*map(dict, others), *whole_document["limits"]]}
+    path = Path(path)
+    with atomic_write(path) as temporary:
+        text = json.dumps(document, ensure_ascii=False, allow_nan=False, indent=1)
+        temporary.write_text(text + "\n", encoding="utf-8")
+    return path
+
+
+def read(path: str | Path) -> list[dict[str, Any]]:
+    """Return the boundaries of a file that `store` wrote, or of an `extremes.json`.
+
+    Raises:
+        StoredError: the file cannot be read or contains no boundaries.
+    """
+    try:
+        text = read_limited(Path(path), MAX_BYTES).decode("utf-8")
+        check_text(text)
+        document = json.loads(text)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise StoredError(f"{path}: cannot be read: {reason}") from None
+    limits = document.get("limits") if isinstance(document, dict) else None
+    if not isinstance(limits, list) or not all(isinstance(each, dict) and _is_limit(each) for each in limits):
+        raise StoredError(f"{path}: contains no boundaries; use an extremes.json of `sandbox extremes --out DIR`")
+    for each in limits:
+        if not all(each[key] is None or _is_number(each[key]) for key in ("limit", "first_failure")):
+            raise StoredError(f"{path}: a limit of {short_repr(each['axis'])} is not a number")
+    return limits
+
+
+def _is_limit(document: dict[str, Any]) -> bool:
+    named = all(isinstance(document.get(key), str) for key in ("axis", "setup"))
+    return named and {"limit", "first_failure"} <= document.keys()
+
+
+def _is_number(value: Any) -> bool:
+    """Tell whether a JSON value is a number that is finite as a float."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
+
+
+def changes(before: StoredBoundaries, now: Sequence[Boundary], tolerance: float = TOLERANCE) -> list[BoundaryChange]:
+    """Return the boundaries that have moved by more than their tolerance, of those that exist in both.
+
+    Args:
+        before: boundaries of the baseline.
+        now: new boundaries.
+        tolerance: relative tolerance to which each is known.
+    """
+    known = {(each["axis"], each["setup"]): each for each in before}
+    found = []
+    for limit in now:
+        old = known.get((limit.axis, limit.setup))
+        if old is None:
+            continue
+        moved = _compare(limit, old, tolerance)
+        if moved:
+            found.append(BoundaryChange(limit.axis, limit.setup, old["limit"], limit.limit, moved < 0, limit.reason))
+    return found
+
+
+def _compare(limit: Boundary, old: Mapping[str, Any], tolerance: float) -> int:
+    """Return 1 if more levels pass now, −1 if fewer do, 0 if the boundary has not moved."""
+    from sandbox.measure.extremes.scenarios import AXES
+
+    then, now, axis = old["limit"], limit.limit, AXES.get(limit.axis)
+    slack = 1.0 if axis is not None and axis.scale == "whole" else 0.0
+    if then is None or now is None:
+        return (then is None and now is not None) - (now is None and then is not None)
+    if math.isclose(then, now, rel_tol=SLACK * tolerance) or abs(then - now) <= slack:
+        return _compare_unbroken(limit.first_failure, old["first_failure"])
+    # Levels become harder towards the last one of the axis.
+    rising = axis is None or axis.levels[-1] >= axis.levels[0]
+    if _ranges_overlap(_range(now, limit.first_failure, rising), _range(then, old["first_failure"], rising)):
+        return 0
+    return 1 if (now > then) == rising else -1
+
+
+def _range(limit: float, failure: float | None, rising: bool) -> tuple[float, float]:
+    """Return the interval that contains a boundary, the lower end first; without a failure it is unbounded."""
+    beyond = failure if failure is not None else math.inf if rising else -math.inf
+    return min(limit, beyond), max(limit, beyond)
+
+
+def _ranges_overlap(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    """Return whether one boundary can lie in both intervals: without bisection it is known to a level only."""
+    return max(one[0], other[0]) < min(one[1], other[1])
+
+
+def _compare_unbroken(now: float | None, then: float | None) -> int:
+    """Return 1 if no level fails any more, −1 if no level failed before and one does now."""
+    return (now is None and then is not None) - (then is None and now is not None)

@@ -1,0 +1,99 @@
+"""Outcome of one sample: one scenario with one set of parameters on one engine."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, Self
+
+from sandbox.jsonable import in_json
+
+Verdict = Literal["exact", "degraded", "refused", "failed"]
+
+VERDICTS: tuple[Verdict, ...] = ("exact", "degraded", "refused", "failed")
+MEANINGS: dict[Verdict, str] = {
+    "exact": "within 1e-6 of the known solution",
+    "degraded": "inaccurate, but no rule is broken",
+    "refused": "refused before the run, with a reason",
+    "failed": "a rule is broken, or the error is too large to be useful",
+}
+PASSED = ("exact", "degraded")
+
+
+@dataclass(frozen=True)
+class Task:
+    """Request to a worker process: a scenario with its parameters, on an engine."""
+
+    case: str
+    """name of the scenario"""
+    parameters: Mapping[str, float]
+    """parameters that differ from the scenario's defaults"""
+    engine: str
+    """name of the engine"""
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    """changes to the settings of the scene"""
+    overrides: tuple[str, ...] = ()
+    """`KEY=VALUE`, changes to the scene"""
+
+    @classmethod
+    def from_json(cls, document: Mapping[str, Any]) -> Self:
+        """Return the task of a JSON document."""
+        return cls(**{**document, "overrides": tuple(document["overrides"])})
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Result of a task."""
+
+    verdict: Verdict
+    reason: str
+    """reason for the verdict"""
+    rule: str | None = None
+    """name of the first broken rule"""
+    error: float | None = None
+    """error as a fraction; None if the solution is not known or the run has none"""
+    predicted: tuple[str, ...] = ()
+    """kinds of the diagnostics of the preflight checks"""
+    figures: Mapping[str, float] = field(default_factory=dict)
+    """further quantities of the run, by name"""
+    solver: Mapping[str, Any] = field(default_factory=dict)
+    """settings as the engine resolved them"""
+    seconds: float = 0.0
+    """s, time of the task"""
+    slow: bool = False
+    """whether the time limit stopped it: the verdict then depends on the machine"""
+
+    @classmethod
+    def from_json(cls, document: Mapping[str, Any]) -> Self:
+        """Return the outcome of a JSON document."""
+        return cls(**{**document, "predicted": tuple(document["predicted"])})
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One level of an axis, or a pair of levels, on one engine configuration."""
+
+    axis: str
+    """name of the axis or pair"""
+    level: float | tuple[float, float]
+    """the level; two of a pair"""
+    engine: str
+    """name of the engine"""
+    settings: Mapping[str, Any]
+    """settings of the engine configuration"""
+    setup: str
+    """name of the engine configuration"""
+    outcome: Outcome = field(metadata=in_json(inline=True))
+
+    @property
+    def verdict(self) -> Verdict:
+        """Verdict of the outcome."""
+        return self.outcome.verdict
+
+    @property
+    def rule(self) -> str | None:
+        """Name of the first broken rule."""
+        return self.outcome.rule
+
+    @property
+    def passed(self) -> bool:
+        """Whether the run broke no rule."""
+        return self.verdict in PASSED

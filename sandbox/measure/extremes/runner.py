@@ -1,0 +1,339 @@
+"""Runner of a whole plan of samples in parallel worker processes, and the score of the predictions."""
+
+import os
+import threading
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from queue import Empty, SimpleQueue
+from time import perf_counter
+from typing import Any, ClassVar
+
+from sandbox.jsonable import in_json, to_json
+from sandbox.measure.extremes.boundary import TOLERANCE, Boundary, OnSample, Submit, run_axis, run_pair
+from sandbox.measure.extremes.experiment import Axis, AxisPair, EngineSetup, setups_of_engines
+from sandbox.measure.extremes.isolation import IsolatedWorker
+from sandbox.measure.extremes.outcome import Sample
+from sandbox.measure.extremes.scenarios import AXES, PAIRS
+from sandbox.progress import Progress, ProgressCallback, ignore_progress
+from sandbox.provenance import machine, versions
+
+
+@dataclass(frozen=True)
+class PredictionScore:
+    """Confusion matrix of the diagnostics of one kind, over the samples of the axes that test it.
+
+    Refused samples, and those that the time limit stopped, are left out: their result is unknown.
+    """
+
+    kind: str
+    """kind of the diagnostics"""
+    true_positives: int = 0
+    false_positives: int = 0
+    false_negatives: int = 0
+    true_negatives: int = 0
+
+    json_properties: ClassVar = ("precision", "recall")
+
+    @property
+    def precision(self) -> float | None:
+        """Fraction of the predicted problems that occurred; None if none was predicted."""
+        predicted = self.true_positives + self.false_positives
+        return self.true_positives / predicted if predicted else None
+
+    @property
+    def recall(self) -> float | None:
+        """Fraction of the problems that were predicted; None if none occurred."""
+        occurred = self.true_positives + self.false_negatives
+        return self.true_positives / occurred if occurred else None
+
+
+def prediction_scores(samples: Iterable[Sample], axes: Iterable[Axis]) -> tuple[PredictionScore, ...]:
+    """Return a score for each kind of diagnostic that an axis tests, in the order of the axes."""
+    tested = {axis.name: axis for axis in axes if axis.kind is not None}
+    counts: dict[str, dict[tuple[bool, bool], int]] = {}
+    for axis in tested.values():
+        counts.setdefault(str(axis.kind), {})
+    for sample in samples:
+        its = tested.get(sample.axis)
+        if its is None or sample.verdict == "refused" or sample.outcome.slow:
+            continue
+        key = (its.kind in sample.outcome.predicted, its.occurred(sample))
+        count = counts[str(its.kind)]
+        count[key] = count.get(key, 0) + 1
+    return tuple(
+        PredictionScore(
+            kind,
+            true_positives=count.get((True, True), 0),
+            false_positives=count.get((True, False), 0),
+            false_negatives=count.get((False, True), 0),
+            true_negatives=count.get((False, False), 0),
+        )
+        for kind, count in counts.items()
+    )
+
+
+SAMPLE_SECONDS, WORKER_MEMORY = 30.0, 2048
+"""Default limits: s for a sample, and MiB for a worker. The libraries alone take 600 MiB of address space."""
+
+
+@dataclass(frozen=True)
+class ExtremesPlan:
+    """What is run, with which limits."""
+
+    axes: tuple[Axis, ...] = tuple(AXES.values())
+    pairs: tuple[AxisPair, ...] = PAIRS
+    engines: tuple[str, ...] | None = None
+    """names of the engines; None for all"""
+    overrides: tuple[str, ...] = ()
+    """`KEY=VALUE`, changes to every scene"""
+    quick: bool = False
+    """few levels, and no bisection between them"""
+    seconds: float = SAMPLE_SECONDS
+    """s, time limit of a sample"""
+    memory: int = WORKER_MEMORY
+    """MiB, memory limit of a worker"""
+    workers: int = field(default_factory=lambda: os.cpu_count() or 1)
+    """number of worker processes"""
+
+    def levels(self, axis: Axis) -> tuple[float, ...]:
+        """Return the levels of an axis that are run."""
+        return axis.quick if self.quick else axis.levels
+
+    def setups(self, of: Axis | AxisPair) -> tuple[EngineSetup, ...]:
+        """Return the engine configurations of an axis or a pair.
+
+        Those that set a parameter which a pair varies are left out.
+        """
+        setups = setups_of_engines(of.setups, self.engines)
+        varied = {of.first.parameter, of.second.parameter} if isinstance(of, AxisPair) else set()
+        return tuple(setup for setup in setups if not varied & set(setup.changes))
+
+
+@dataclass(frozen=True)
+class Extremes:
+    """Results of a plan."""
+
+    plan: ExtremesPlan
+    cells: tuple[Sample, ...]
+    """samples at the levels of the axes"""
+    probes: tuple[Sample, ...]
+    """samples between the levels, from the bisection"""
+    limits: tuple[Boundary, ...]
+    """boundary of each axis on each engine configuration"""
+    pairs: tuple[Sample, ...]
+    """samples of the pairs of axes"""
+    seconds: float
+    """s, time of the whole plan"""
+    interrupted: bool = False
+    """whether Ctrl-C ended the plan; the finished samples are kept"""
+
+    @property
+    def predictions(self) -> tuple[PredictionScore, ...]:
+        """Scores of the preflight checks at the levels of the axes. Probes are left out: they lie at the boundaries."""
+        return prediction_scores(self.cells, self.plan.axes)
+
+    def document(self) -> dict[str, Any]:
+        """Return the results as one JSON document."""
+        found: dict[str, Any] = to_json(
+            ExtremesDocument(
+                cells=self.cells,
+                limits=self.limits,
+                predictions=self.predictions,
+                pairs=[PairSample(each.axis.split(": ")[1].split(" × "), each) for each in self.pairs],
+                probes=self.probes,
+                tolerance=None if self.plan.quick else TOLERANCE,
+                quick=self.plan.quick,
+                set=self.plan.overrides,
+                interrupted=self.interrupted,
+                timeout=self.plan.seconds,
+                memory=self.plan.memory,
+                workers=self.plan.workers,
+                seconds=self.seconds,
+                versions=versions(),
+                machine=machine(),
+            )
+        )
+        return found
+
+
+@dataclass(frozen=True)
+class PairSample:
+    """Sample of a pair, with the names of its two parameters."""
+
+    axes: Sequence[str]
+    sample: Sample = field(metadata=in_json(inline=True))
+
+
+@dataclass(frozen=True)
+class ExtremesDocument:
+    """JSON document of the results of a plan; the fields are those of `Extremes` and `ExtremesPlan`."""
+
+    cells: Sequence[Sample]
+    limits: Sequence[Boundary]
+    predictions: Sequence[PredictionScore]
+    pairs: Sequence[PairSample]
+    probes: Sequence[Sample]
+    tolerance: float | None
+    quick: bool
+    set: Sequence[str]
+    interrupted: bool
+    timeout: float
+    memory: int
+    workers: int
+    seconds: float
+    versions: Mapping[str, str]
+    machine: Mapping[str, Any]
+
+
+SampleJob = Callable[[Submit, OnSample], Boundary | None]
+RunnerMessage = Sample | tuple[Boundary | None, str] | BaseException
+
+
+def extremes(plan: ExtremesPlan, on_progress: ProgressCallback | None = None) -> Extremes:
+    """Run a plan. Ctrl-C ends it early with the finished samples.
+
+    Args:
+        plan: what to run.
+        on_progress: progress callback; its message has the number of samples and what was finished last, its fraction
+            is the finished part of the axes and pairs.
+
+    Raises:
+        WorkerError: no worker process can be started.
+    """
+    began = perf_counter()
+    jobs = list(_jobs(plan))
+    results = _run_jobs(jobs, plan, on_progress or ignore_progress)
+    cells = [each for each in results.samples if each.axis in AXES]
+    order = _order(plan)
+    on_levels = {axis.name: set(plan.levels(axis)) for axis in plan.axes}
+    return Extremes(
+        plan=plan,
+        cells=tuple(sorted((c for c in cells if c.level in on_levels[c.axis]), key=order)),
+        probes=tuple(sorted((c for c in cells if c.level not in on_levels[c.axis]), key=order)),
+        limits=tuple(sorted(results.boundaries, key=order)),
+        pairs=tuple(sorted((c for c in results.samples if c.axis not in AXES), key=order)),
+        seconds=perf_counter() - began,
+        interrupted=results.interrupted,
+    )
+
+
+def _jobs(plan: ExtremesPlan) -> Iterator[tuple[str, SampleJob]]:
+    """Yield the description and the function of each job: an axis or a pair on an engine configuration."""
+    for axis in plan.axes:
+        for setup in plan.setups(axis):
+            yield f"{axis.name} on {setup.name}", _axis_job(plan, axis, setup)
+    for pair in plan.pairs:
+        for setup in plan.setups(pair):
+            yield f"{pair.name} on {setup.name}", _pair_job(plan, pair, setup)
+
+
+def _axis_job(plan: ExtremesPlan, axis: Axis, setup: EngineSetup) -> SampleJob:
+    def job(submit: Submit, on_sample: OnSample) -> Boundary | None:
+        levels = plan.levels(axis)
+        return run_axis(axis, setup, levels, plan.overrides, submit, on_sample, bisect=not plan.quick)
+
+    return job
+
+
+def _pair_job(plan: ExtremesPlan, pair: AxisPair, setup: EngineSetup) -> SampleJob:
+    def job(submit: Submit, on_sample: OnSample) -> Boundary | None:
+        run_pair(pair, setup, plan.overrides, submit, on_sample)
+        return None
+
+    return job
+
+
+@dataclass
+class _Results:
+    samples: list[Sample] = field(default_factory=list)
+    boundaries: list[Boundary] = field(default_factory=list)
+    interrupted: bool = False
+
+
+def _run_jobs(jobs: list[tuple[str, SampleJob]], plan: ExtremesPlan, on_progress: ProgressCallback) -> _Results:
+    """Do all jobs in as many threads as there are workers. Each thread has a worker process and waits for it."""
+    waiting: SimpleQueue[tuple[str, SampleJob]] = SimpleQueue()
+    for each in jobs:
+        waiting.put(each)
+    messages: SimpleQueue[RunnerMessage] = SimpleQueue()
+    count = min(plan.workers, max(len(jobs), 1))
+    workers = [IsolatedWorker(plan.seconds, plan.memory) for _ in range(count)]
+    threads = [threading.Thread(target=_work, args=(worker, waiting, messages), daemon=True) for worker in workers]
+    results, done, failed = _Results(), 0, 0
+    try:
+        for thread in threads:
+            thread.start()
+        while done < len(jobs):
+            try:
+                message = messages.get(timeout=0.2)  # otherwise a signal would have to wait
+            except Empty:
+                continue
+            if isinstance(message, BaseException):
+                raise message
+            if isinstance(message, Sample):
+                results.samples.append(message)
+                failed += message.verdict == "failed"
+                continue
+            boundary, what = message
+            done += 1
+            if boundary is not None:
+                results.boundaries.append(boundary)
+            text = f"{len(results.samples)} cells, {failed} failed; {what}"
+            on_progress(Progress(text, done / len(jobs)))
+    except KeyboardInterrupt:
+        results.interrupted = True
+    finally:
+        while not _close(workers, threads):
+            results.interrupted = True
+    return results
+
+
+def _close(workers: Sequence[IsolatedWorker], threads: Sequence[threading.Thread]) -> bool:
+    """End all workers and wait for the threads; return False if another Ctrl-C cut this short."""
+    try:
+        for worker in workers:
+            worker.close()
+        for thread in threads:
+            if thread.is_alive():
+                thread.join(timeout=5.0)
+    except KeyboardInterrupt:
+        return False
+    return True
+
+
+def _work(
+    worker: IsolatedWorker, waiting: "SimpleQueue[tuple[str, SampleJob]]", messages: "SimpleQueue[RunnerMessage]"
+) -> None:
+    """Do jobs until there are none left or the worker is closed."""
+    while True:
+        try:
+            what, job = waiting.get_nowait()
+        except Empty:
+            return
+        try:
+            messages.put((job(worker.submit, messages.put), what))
+        except InterruptedError:
+            return
+        except BaseException as error:  # noqa: BLE001, every exception is raised again in the main thread
+            messages.put(error)
+            return
+
+
+def _order(plan: ExtremesPlan) -> Callable[[Sample | Boundary], tuple[int, ...]]:
+    """Return a sort key by axis, engine configuration and level, in the order of the plan: threads finish in any."""
+    every: tuple[Axis | AxisPair, ...] = (*plan.axes, *plan.pairs)
+    names = {each.name: k for k, each in enumerate(every)}
+    setups: Mapping[tuple[str, str], int] = {
+        (each.name, setup.name): k for each in every for k, setup in enumerate(plan.setups(each))
+    }
+    levels: dict[tuple[str, float | tuple[float, float]], int] = {}
+    for axis in plan.axes:
+        levels |= {(axis.name, level): k for k, level in enumerate(plan.levels(axis))}
+    for pair in plan.pairs:
+        levels |= {(pair.name, both): k for k, both in enumerate(pair.levels)}
+
+    def key(each: Sample | Boundary) -> tuple[int, ...]:
+        index = names[each.axis], setups[each.axis, each.setup]
+        return (*index, levels.get((each.axis, each.level), 0)) if isinstance(each, Sample) else index
+
+    return key

@@ -1,0 +1,1 @@
+"""Quantities of a recorded run: energy, clearance, contacts, conservation laws, errors against another run."""

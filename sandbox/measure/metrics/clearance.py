@@ -1,0 +1,278 @@
+"""Clearance: signed distance of pairs of shapes in each frame."""
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from sandbox.arrays import BoolArray, FloatArray
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.drives import is_driven
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.fixed import Plane, Post, Wall, Zone
+from sandbox.scene.geometry.neighbours import near_pairs
+from sandbox.scene.geometry.shapes import pieces_of
+
+CHUNK = 1_000_000
+"""Frames × corners × corners that are processed at once."""
+
+
+def hull_distance(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return the distance of two convex hulls in T frames, (T,) m; minus the penetration depth if they overlap.
+
+    Overlap is found by separating axes, the normals of the edges. Otherwise a corner of one hull is nearest to the
+    other.
+
+    Args:
+        first: (T, A, 2) m, counter-clockwise; one corner is a point, two are a segment.
+        second: (T, B, 2) m, counter-clockwise.
+    """
+    frames = len(first)
+    step = max(1, CHUNK // (first.shape[1] * second.shape[1]))
+    parts = [_frame_hull_distance(first[k : k + step], second[k : k + step]) for k in range(0, frames, step)]
+    return np.concatenate((np.empty(0), *parts))
+
+
+def _frame_hull_distance(first: FloatArray, second: FloatArray) -> FloatArray:
+    with np.errstate(over="ignore", invalid="ignore"):
+        apart = np.minimum(_corners_off(first, second), _corners_off(second, first))
+        separation = np.maximum(_separation(first, second), _separation(second, first))
+    return np.where(separation < 0.0, np.where(np.isneginf(separation), apart, separation), apart)
+
+
+def _corners_off(corners: FloatArray, hull: FloatArray) -> FloatArray:
+    """Return the smallest distance of any corner from any edge, (T,) m."""
+    along = np.roll(hull, -1, axis=1) - hull
+    away = offset_from_segment(corners[:, :, None], hull[:, None], along[:, None])
+    return np.asarray(np.hypot(away[..., 0], away[..., 1]).min(axis=(1, 2)))
+
+
+def _separation(hull: FloatArray, corners: FloatArray) -> FloatArray:
+    """Return the largest separation by an edge of a hull, (T,) m; −inf for a point, which has no edge."""
+    if hull.shape[1] < 2:
+        return np.full(len(hull), -np.inf)
+    along = np.roll(hull, -1, axis=1) - hull
+    length = np.hypot(along[..., 0], along[..., 1])
+    normal = np.stack((along[..., 1], -along[..., 0]), axis=2) / np.where(length > 0.0, length, 1.0)[..., None]
+    beyond = ((corners[:, None] - hull[:, :, None]) * normal[:, :, None]).sum(axis=3)
+    return np.asarray(beyond.min(axis=2).max(axis=1))
+
+
+def offset_from_segment(point: FloatArray, tail: FloatArray, along: FloatArray) -> FloatArray:
+    """Return the shortest offsets from segments, tail to tail + along, to points, (…, 2) m.
+
+    A segment of length 0 is its tail. The arguments are broadcast.
+
+    Args:
+        point: (…, 2) m.
+        tail: (…, 2) m.
+        along: (…, 2) m.
+    """
+    offset = point - tail
+    squared = along[..., 0] * along[..., 0] + along[..., 1] * along[..., 1]
+    projection = offset[..., 0] * along[..., 0] + offset[..., 1] * along[..., 1]
+    fraction = (projection / np.where(squared > 0.0, squared, 1.0)).clip(0.0, 1.0)
+    return np.asarray(offset - fraction[..., None] * along)
+
+
+def rotate(vectors: FloatArray, angle: FloatArray) -> FloatArray:
+    """Return vectors rotated counter-clockwise, (…, 2).
+
+    Args:
+        vectors: (…, 2).
+        angle: (…) rad; broadcast with the vectors.
+    """
+    cos, sin = np.cos(angle), np.sin(angle)
+    x, y = vectors[..., 0], vectors[..., 1]
+    return np.stack((cos * x - sin * y, sin * x + cos * y), axis=-1)
+
+
+def posed_pieces(
+    bodies: Bodies, number: int, position: FloatArray, angle: FloatArray
+) -> Iterator[tuple[FloatArray, float]]:
+    """Yield the corners (T, V, 2) m, counter-clockwise, and the radius, m, of each convex piece of a body.
+
+    Args:
+        bodies: the bodies.
+        number: index of the body.
+        position: centre of mass, (T, 2) m.
+        angle: (T,) rad.
+    """
+    shapes = bodies.shapes
+    begin, end = np.searchsorted(shapes.body, (number, number + 1)).tolist()
+    for piece in range(begin, end):
+        corners = shapes.corner[shapes.first[piece] : shapes.first[piece + 1]]
+        yield position[:, None] + rotate(corners, angle[:, None]), float(shapes.radius[piece])
+
+
+def plane_clearance(
+    bodies: Bodies, number: int, position: FloatArray, angle: FloatArray, point: FloatArray, normal: FloatArray
+) -> FloatArray:
+    """Return the clearance of a body from a plane, (T,) m; negative if part of it is behind the plane.
+
+    Args:
+        bodies: the bodies.
+        number: index of the body.
+        position: centre of mass, (T, 2) m.
+        angle: (T,) rad.
+        point: point of the plane, (2,) m.
+        normal: unit normal of the plane, (2,).
+    """
+    if bodies.round[number]:
+        return np.asarray((position - point) @ normal - float(bodies.radius[number]))
+    gaps = [
+        ((corners - point) @ normal).min(axis=1) - radius
+        for corners, radius in posed_pieces(bodies, number, position, angle)
+    ]
+    return np.asarray(np.minimum.reduce(gaps))
+
+
+IndexPair = tuple[int, int]
+"""Indices as in `Contacts`: the second can be −1 − k for the k-th static object."""
+
+
+def clearance(
+    scene: Scene, bodies: Bodies, position: FloatArray, angle: FloatArray, pair: tuple[int, int]
+) -> FloatArray:
+    """Return the distance of the surfaces of a pair, (T,) m; negative if they overlap.
+
+    Args:
+        scene: scene with the static objects.
+        bodies: the bodies.
+        position: (T, N, 2) m.
+        angle: (T, N) rad.
+        pair: indices as in `Contacts`: the second can be −1 − k for the k-th static object.
+    """
+    first, second = pair
+    centre = position[:, first]
+    if -1 - second >= len(scene.fixed) + len(scene.pockets):
+        return _zone_clearance(centre, scene.zones[-1 - second - len(scene.fixed) - len(scene.pockets)])
+    if -1 - second >= len(scene.fixed):  # a body is in a pocket if its centre is
+        pocket = scene.pockets[-1 - second - len(scene.fixed)]
+        return _length(centre - np.asarray(pocket.position)) - pocket.radius
+    thing = scene.fixed[-1 - second] if second < 0 else None
+    if isinstance(thing, Plane):
+        normal = np.asarray(thing.normal) / math.hypot(*thing.normal)
+        return plane_clearance(bodies, first, centre, angle[:, first], np.asarray(thing.point), normal)
+    if bodies.round[first] and (second < 0 or bodies.round[second]):
+        other, its_radius = (centre, 0.0) if second < 0 else (position[:, second], float(bodies.radius[second]))
+        return _disc_clearance(centre, float(bodies.radius[first]), thing, other, its_radius)
+    if thing is None:
+        others = list(posed_pieces(bodies, second, position[:, second], angle[:, second]))
+    else:
+        others = list(_pieces_of(thing, len(position)))
+    gaps = np.full(len(position), np.inf)
+    for corners, radius in posed_pieces(bodies, first, centre, angle[:, first]):
+        for its_corners, its_radius in others:
+            _lower_to_distance(gaps, corners, its_corners, radius + its_radius)
+    return gaps
+
+
+def close_pairs(start: Scene | Setup, reach: float = 0.0) -> list[tuple[IndexPair, float]]:
+    """Return the pairs that can collide and whose clearance at the start is at most `reach`, with the clearance, m.
+
+    At least one of a pair can move. A negative clearance is an overlap. Pairs have the indices of `Contacts`.
+    """
+    setup = Setup.of(start)
+    scene, bodies, meet = setup.scene, setup.bodies, contact_matrix(setup)
+    still = bodies.fixed | is_driven(scene, bodies)
+    meeting = meet.touches | bodies.fixed
+    found = []
+    for i, j in _near_pairs(bodies, meeting, reach):
+        if not (still[i] and still[j]) and (bodies.group[i] != bodies.group[j] or bodies.group[i] == 0):
+            found.append(((i, j), _initial_clearance(setup, (i, j))))
+    apart = set(map(tuple, setup.links.apart().tolist()))  # joined bodies that do not collide
+    found = [(pair, clear) for pair, clear in found if clear <= reach and pair not in apart]
+    movable = np.flatnonzero(~still & meeting)
+    for k, thing in enumerate(scene.fixed):
+        clear = bounding_clearances(thing, bodies.position, bodies.radius)
+        near = ((number, -1 - k) for number in movable[clear[movable] <= reach].tolist())
+        exact = ((p, float(clear[p[0]]) if bodies.round[p[0]] else _initial_clearance(setup, p)) for p in near)
+        found += [(pair, own) for pair, own in exact if own <= reach]
+    return found
+
+
+def _initial_clearance(setup: Setup, pair: IndexPair) -> float:
+    bodies = setup.bodies
+    return float(clearance(setup.scene, bodies, bodies.position[None], bodies.angle[None], pair)[0])
+
+
+def _near_pairs(bodies: Bodies, meeting: BoolArray, reach: float) -> Iterator[IndexPair]:
+    """Yield the pairs of bodies whose bounding discs are no farther apart than `reach`."""
+    chosen = np.flatnonzero(meeting)
+    if len(chosen) < 2:
+        return
+    position, radius = bodies.position, bodies.radius
+    for a, b in near_pairs(position[chosen], (2.0 * float(radius[chosen].max()) + reach) * (1.0 + 1e-9)):  # rounding
+        i, j = chosen[np.minimum(a, b)], chosen[np.maximum(a, b)]
+        close = np.hypot(*(position[j] - position[i]).T) - radius[i] - radius[j] <= reach
+        yield from zip(i[close].tolist(), j[close].tolist(), strict=True)
+
+
+def bounding_clearances(thing: Plane | Wall | Post, position: FloatArray, radius: FloatArray) -> FloatArray:
+    """Return the clearance of bounding discs, (N, 2) m and (N,) m, from a static object, (N,) m; exact for balls."""
+    if isinstance(thing, Plane):
+        normal = np.asarray(thing.normal) / math.hypot(*thing.normal)
+        return np.asarray((position - np.asarray(thing.point)) @ normal - radius)
+    return _disc_clearance(position, radius, thing, position, 0.0)
+
+
+def _zone_clearance(centre: FloatArray, zone: Zone) -> FloatArray:
+    """Return the distance of a centre from a zone, (T,) m: a body enters a zone with its centre."""
+    nearest = np.full(len(centre), np.inf)
+    for corners, radius in pieces_of(zone):
+        own = np.broadcast_to(np.asarray(corners), (len(centre), len(corners), 2))
+        _lower_to_distance(nearest, centre[:, None], own, radius)
+    return nearest
+
+
+def _disc_clearance(
+    centre: FloatArray, radius: FloatArray | float, thing: Wall | Post | None, other: FloatArray, its_radius: float
+) -> FloatArray:
+    """Return the clearance of a disc from another, or from a static object, (T,) m."""
+    if thing is None:
+        return _length(centre - other) - radius - its_radius
+    if isinstance(thing, Post):
+        return _length(centre - np.asarray(thing.position)) - radius - thing.radius
+    nearest = np.full(len(centre), np.inf)
+    for tail, tip in pairwise(_line(thing)):
+        nearest = np.fmin(nearest, _from_segment(centre, np.asarray(tail), np.asarray(tip)))
+    return nearest - radius - 0.5 * thing.thickness
+
+
+def _line(wall: Wall) -> list[tuple[float, float]]:
+    return [*wall.points, wall.points[0]] if wall.closed else list(wall.points)
+
+
+def _pieces_of(thing: Wall | Post, frames: int) -> Iterator[tuple[FloatArray, float]]:
+    """Yield the corners, (T, 1 or 2, 2) m, and the radius of each piece of a static object."""
+    if isinstance(thing, Post):
+        yield np.broadcast_to(np.asarray(thing.position), (frames, 1, 2)), thing.radius
+        return
+    for ends in pairwise(_line(thing)):
+        yield np.broadcast_to(np.asarray(ends), (frames, 2, 2)), 0.5 * thing.thickness
+
+
+def _lower_to_distance(gaps: FloatArray, first: FloatArray, second: FloatArray, radii: float) -> None:
+    """Lower clearances (T,) to the distance of two pieces, where their bounding discs do not exclude that."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        a, b = first.mean(axis=1), second.mean(axis=1)
+        reach = np.hypot(*np.moveaxis(first - a[:, None], 2, 0)).max(axis=1)
+        reach = reach + np.hypot(*np.moveaxis(second - b[:, None], 2, 0)).max(axis=1)
+        near = np.flatnonzero(~(_length(a - b) - reach - radii >= gaps))
+    gaps[near] = np.fmin(gaps[near], hull_distance(first[near], second[near]) - radii)
+
+
+def _length(vector: FloatArray) -> FloatArray:
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.asarray(np.hypot(vector[:, 0], vector[:, 1]))
+
+
+def _from_segment(centre: FloatArray, tail: FloatArray, tip: FloatArray) -> FloatArray:
+    along = tip - tail
+    squared = float(along @ along)
+    share = ((centre - tail) @ along / squared).clip(0.0, 1.0) if squared > 0.0 else np.zeros(len(centre))
+    return _length(centre - tail - share[:, None] * along)

@@ -1,0 +1,212 @@
+"""Invariants of a run: drift of energy and momentum, and constraint violation of joints."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from sandbox.arrays import BoolArray, FloatArray
+from sandbox.measure.metrics.clearance import rotate
+from sandbox.measure.metrics.energy import energies
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
+from sandbox.scene.compile.potential import both_present, is_broken_at, turned_by
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.world import Settings
+from sandbox.schedule import frame_count
+from sandbox.trajectory import Trajectory
+
+AT_REST_FRACTION = 1e-4
+"""A scene with other bodies than balls counts as at rest if its kinetic energy is below this fraction of the energy
+that lifts all bodies by their own width. Its motion is then an artefact of the solver, and a relative drift means
+nothing.
+"""
+
+
+class EnergyDrift(NamedTuple):
+    """Energy drift as a fraction of the kinetic energy, and its reference."""
+
+    share: float | None
+    against: str
+    """`truth` or `start`"""
+
+
+def energy_drift(run: Trajectory, scene: Scene, truth: Trajectory | None, trusted: bool) -> EnergyDrift:
+    """Return the change of the total energy over a run as a fraction of the largest kinetic energy of any frame.
+
+    If the truth is trusted to the end, its energy change is subtracted first, so that impacts and drag do not count;
+    otherwise the change is relative to the start. The kinetic energy is the truth's if there is one. Unlike the total
+    energy, it does not depend on the zero of the potential energy. None if the run did not reach its end, or if its
+    energy changed while nothing moved; a stack of boxes at rest (`AT_REST_FRACTION`) does not count as moving.
+
+    Args:
+        run: the run.
+        scene: scene of the run.
+        truth: truth of the scene.
+        trusted: whether the truth is trusted to the end.
+    """
+    against = "truth" if trusted and truth is not None else "start"
+    if not len(run.time) or run.status != "ok":
+        return EnergyDrift(None, against)
+    own = energies(run, scene)
+    change, scale = float(own.total[-1] - own.total[0]), float(own.kinetic.max())
+    if truth is not None:
+        its = energies(truth, scene)
+        scale = float(its.kinetic.max())
+        if trusted:
+            change -= float(its.total[-1] - its.total[0])
+    if not scene.bodies.round.all() and scale < AT_REST_FRACTION * _lift_energy(scene):
+        return EnergyDrift(0.0 if change == 0.0 else None, against)
+    return EnergyDrift(_share(change, scale), against)
+
+
+def _lift_energy(scene: Scene) -> float:
+    """Return the energy that lifts every body by its own width, J."""
+    bodies = scene.bodies
+    weight = np.where(bodies.fixed, 0.0, bodies.mass) * math.hypot(*scene.world.gravity)
+    return float(weight @ (2.0 * bodies.thin))
+
+
+def momentum_drift(run: Trajectory, scene: Scene) -> float | None:
+    """Return the unexplained momentum at the end as a fraction of the largest Σ|m v| of any frame.
+
+    Gravity explains momentum, and so do the recorded impulses between moving and static bodies; joints and attraction
+    between moving bodies conserve momentum. None with drag, thrusts, drives, joints or attraction between moving and
+    static bodies, or zones that stop or lift bodies, whose impulses are not recorded; if a body was retired with its
+    momentum; or if the run did not reach its end or ended within a step, whose contacts are not recorded.
+    """
+    bodies, world = scene.bodies, scene.world
+    if run.status != "ok" or np.isfinite(run.retired_time).any():
+        return None
+    if frame_count(scene, Settings.model_validate(run.info["settings"]))[1] > 0.0:
+        return None
+    if world.linear_drag or world.quadratic_drag or scene.thrusts or scene.drives or _acts_on_static(scene):
+        return None
+    if any(zone.holds or zone.gravity is not None for zone in scene.zones):
+        return None
+    mass = np.where(bodies.fixed, 0.0, bodies.mass)
+    explained = mass.sum() * np.asarray(world.gravity) * run.time[-1]
+    still = np.append(bodies.fixed, np.ones(len(scene.fixed_names), dtype=np.bool_))  # −1 − k counts from the end
+    first, second = (still[run.contact_pair[:, side]] for side in (0, 1))
+    explained = explained - run.contact_impulse[~first & second].sum(axis=0)
+    explained = explained + run.contact_impulse[first & ~second].sum(axis=0)
+    momentum = np.einsum("n,tnk->tk", mass, run.velocity[[0, -1]])
+    scale = max(float(np.hypot(*np.moveaxis(frame, 1, 0)) @ mass) for frame in run.velocity)
+    return _share(float(np.hypot(*(momentum[1] - momentum[0] - explained))), scale)
+
+
+def _acts_on_static(scene: Scene) -> bool:
+    """Return whether a joint or an attraction acts between a moving and a static body."""
+    bodies, links = scene.bodies, scene.links
+    still = {name for name, fixed in zip(bodies.names, bodies.fixed.tolist(), strict=True) if fixed}
+    drawn = any(not isinstance(each.toward, str) or each.toward in still for each in scene.attractions)
+    return drawn or bool(((links.a < 0) | bodies.fixed[links.a] | bodies.fixed[links.b]).any())
+
+
+def _share(change: float, scale: float) -> float | None:
+    if change == 0.0:
+        return 0.0
+    return change / scale if math.isfinite(change) and math.isfinite(scale) and scale > 0.0 else None
+
+
+CHUNK = 2_000_000
+"""Frames × joints that are processed at once."""
+
+CONSTRAINT_KINDS = (
+    LinkKind.ROD,
+    LinkKind.PIVOT,
+    LinkKind.SLIDE,
+    LinkKind.GROOVE,
+    LinkKind.ROTARY_LIMIT,
+    LinkKind.GEAR,
+)
+"""Kinds of joints that hold something in place; springs and motors do not."""
+
+
+def joint_errors(trajectory: Trajectory, start: Scene | Setup) -> FloatArray:
+    """Return the error of each joint in each frame, (T, J).
+
+    It is nan for springs, motors and joints that broke or lost a body. In m: of a rod |l − length|, of a pivot the
+    distance of its two points, of a slide the excess of the distance over its bounds, of a groove the distance of the
+    point from the groove. In rad: of a rotary limit the excess of the angle over its bounds, of a gear |angle_b·ratio −
+    angle_a − phase|. The error of a diverged state is infinite.
+
+    Args:
+        trajectory: the run; its first bodies are those of `start`.
+        start: scene or setup with the joints.
+    """
+    links = Setup.of(start).links
+    found = np.full((len(trajectory.time), len(links)), np.nan)
+    breaks = trajectory.breaks(len(links))
+    step = max(1, CHUNK // max(1, len(links)))
+    for begin in range(0, len(found), step):
+        rows = slice(begin, begin + step)
+        there = both_present(links, trajectory.present(rows)) & ~is_broken_at(breaks, trajectory.time[rows])
+        found[rows] = _errors(links, trajectory.position[rows], trajectory.angle[rows], there)
+    return found
+
+
+def starting_errors(scene: Scene) -> FloatArray:
+    """Return the error of each joint at the start of a scene, (J,), as in `joint_errors`."""
+    bodies, links = scene.bodies, scene.links
+    there = np.ones((1, len(links)), np.bool_)
+    return np.asarray(_errors(links, bodies.position[None], bodies.angle[None], there)[0])
+
+
+def joint_error(trajectory: Trajectory, start: Scene | Setup) -> float | None:
+    """Return the largest relative error of any joint in any frame; None if the scene has no joint that holds.
+
+    Lengths are relative to the length of the rod or the bound of the slide; if that is 0, and for pivots and grooves,
+    to the diameter of the smaller body. Angles are in rad. Only recorded frames count, so that with `record_every`
+    larger errors can occur between them. The error of a diverged state is infinite.
+    """
+    setup = Setup.of(start)
+    links = setup.links
+    if not np.isin(links.kind, CONSTRAINT_KINDS).any() or not len(trajectory.time):
+        return None
+    errors = joint_errors(trajectory, setup) / joint_scales(links, setup.bodies)
+    there = errors[~np.isnan(errors)]
+    return float(there.max()) if len(there) else None
+
+
+def joint_scales(links: JointArrays, bodies: Bodies) -> FloatArray:
+    """Return the scale of the error of each joint, (J,): a length in m, or 1 rad."""
+    own = 2.0 * np.minimum(bodies.radius[links.b], np.where(links.a >= 0, bodies.radius[links.a], np.inf))
+    length = np.where(links.kind == LinkKind.ROD, links.figures[:, 0], 0.0)
+    length = np.where(links.kind == LinkKind.SLIDE, links.figures[:, 1], length)
+    turning = np.isin(links.kind, (LinkKind.ROTARY_LIMIT, LinkKind.GEAR))
+    return np.asarray(np.where(turning, 1.0, np.where(length > 0.0, length, own)))
+
+
+def _errors(links: JointArrays, position: FloatArray, angle: FloatArray, there: BoolArray) -> FloatArray:
+    x, y, _ = links.figures.T
+    # The distances of a diverged state are infinite.
+    with np.errstate(over="ignore", invalid="ignore"):
+        first, second = links.ends(position, angle)
+        apart = np.hypot(*np.moveaxis(second - first, 2, 0))
+        angle_a, angle_b = turned_by(links, angle)
+        by_kind = {
+            LinkKind.ROD: np.abs(apart - x),
+            LinkKind.PIVOT: apart,
+            LinkKind.SLIDE: np.maximum(x - apart, apart - y),
+            LinkKind.GROOVE: _from_groove(links, position, angle, second),
+            LinkKind.ROTARY_LIMIT: np.maximum(x - (angle_b - angle_a), angle_b - angle_a - y),
+            LinkKind.GEAR: np.abs(angle_b * y - angle_a - x),
+        }
+    found = np.full(there.shape, np.nan)
+    for kind, error in by_kind.items():
+        found = np.where(links.kind == kind, np.maximum(np.where(np.isnan(error), math.inf, error), 0.0), found)
+    return np.where(there, found, np.nan)
+
+
+def _from_groove(links: JointArrays, position: FloatArray, angle: FloatArray, point: FloatArray) -> FloatArray:
+    """Return the distance of points (T, J, 2) from the grooves of their joints, (T, J) m."""
+    near, _ = links.ends(position, angle)
+    turn, along = np.where(links.a >= 0, angle[:, links.a], 0.0), links.figures[:, :2] - links.anchor_a
+    way = rotate(along, turn)
+    squared = (along * along).sum(axis=1)
+    offset = point - near
+    share = (offset * way).sum(axis=2) / np.where(squared > 0.0, squared, 1.0)
+    away = offset - share.clip(0.0, 1.0)[..., None] * way
+    return np.asarray(np.hypot(away[..., 0], away[..., 1]))

@@ -1,0 +1,127 @@
+"""Error of a run against another one, in the frames that both have."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.scene.compile.scene import Scene
+from sandbox.trajectory import Trajectory
+
+SAME_TIME = 1e-6
+"""Frames closer than this fraction of the shortest interval have the same time: k·dt is rounded."""
+
+
+def common_frames(a: Trajectory, b: Trajectory) -> tuple[IntArray, IntArray]:
+    """Return the indices of the frames with equal times in two runs, (K,) each."""
+    if not len(a.time) or not len(b.time):
+        return np.empty(0, np.int64), np.empty(0, np.int64)
+    after = np.searchsorted(b.time, a.time).clip(1, max(len(b.time) - 1, 1))
+    before = after - 1
+    after = after.clip(0, len(b.time) - 1)
+    nearest = np.where(np.abs(b.time[before] - a.time) <= np.abs(b.time[after] - a.time), before, after)
+    slack = SAME_TIME * min(float(np.min(np.diff(each.time), initial=np.inf)) for each in (a, b))
+    same = np.abs(b.time[nearest] - a.time) <= slack
+    return np.flatnonzero(same), nearest[same]
+
+
+CHUNK = 2_000_000
+"""Frames × bodies worked on at once."""
+TOLERANCE = 0.01
+"""Default tolerance as a fraction of the smallest radius, or half width, of the moving bodies."""
+
+
+class Score(NamedTuple):
+    """Errors over all moving bodies and all frames up to a time; None if there are no such frames or bodies."""
+
+    max_position: float | None = None
+    """m, largest position error"""
+    rms_position: float | None = None
+    """m, root mean square over frames and bodies"""
+    max_velocity: float | None = None
+    """m/s, largest velocity error"""
+    rms_velocity: float | None = None
+    """m/s, root mean square over frames and bodies"""
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """Distances between a run and the truth in their K common frames, over the bodies that are present in both."""
+
+    time: FloatArray
+    """(K,) s"""
+    position: FloatArray
+    """(K,) m, largest distance; inf if the run is no longer finite"""
+    velocity: FloatArray
+    """(K,) m/s, largest velocity difference"""
+    squares: FloatArray
+    """(2, K) sums of the squares of both over the bodies"""
+    count: FloatArray
+    """(K,) number of compared bodies"""
+
+    def until(self, end: float) -> Score:
+        """Return the score of the frames up to a time, s, inclusive."""
+        kept = self.time <= end
+        count = float(self.count[kept].sum())
+        if count == 0.0:
+            return Score()
+        position, velocity = np.sqrt(self.squares[:, kept].sum(axis=1) / count).tolist()
+        return Score(float(self.position[kept].max()), position, float(self.velocity[kept].max()), velocity)
+
+    def first_above(self, tolerance: float, end: float) -> float | None:
+        """Return the time of the first frame up to `end`, s, whose position error exceeds a tolerance, m; or None."""
+        above = (self.position > tolerance) & (self.time <= end)
+        return float(self.time[above.argmax()]) if above.any() else None
+
+
+def divergence_times(run: Trajectory, truth: Trajectory, tolerance: float) -> FloatArray:
+    """Return the time of the first common frame in which each body has an error above a tolerance, (N,) s; else inf.
+
+    A body that is present in only one of the two has an infinite error.
+    """
+    mine, its = common_frames(run, truth)
+    found = np.full(len(run.names), np.inf)
+    step = max(1, CHUNK // max(1, len(found)))
+    for begin in range(0, len(mine), step):
+        rows = slice(begin, begin + step)
+        with np.errstate(over="ignore", invalid="ignore"):
+            away = np.hypot(*np.moveaxis(run.position[mine[rows]] - truth.position[its[rows]], 2, 0))
+        off = ~(away <= tolerance) | (run.present(mine[rows]) != truth.present(its[rows]))
+        first = np.where(off.any(axis=0), run.time[mine[rows]][off.argmax(axis=0)], np.inf)
+        found = np.minimum(found, first)
+    return found
+
+
+def errors(run: Trajectory, truth: Trajectory, moving: BoolArray) -> Errors:
+    """Return the errors of a run against the truth.
+
+    Args:
+        run: the run.
+        truth: the truth; only frames with equal times are compared.
+        moving: bodies that count, (N,).
+    """
+    mine, its = common_frames(run, truth)
+    size = len(mine)
+    largest, squares, count = np.zeros((2, size)), np.zeros((2, size)), np.zeros(size)
+    numbers = np.flatnonzero(moving)
+    step = max(1, CHUNK // max(1, len(numbers)))
+    for begin in range(0, size if len(numbers) else 0, step):
+        rows = slice(begin, begin + step)
+        both = (run.present(mine[rows]) & truth.present(its[rows]))[:, numbers]
+        count[rows] = both.sum(axis=1)
+        for k, name in enumerate(("position", "velocity")):
+            found, right = getattr(run, name)[mine[rows]], getattr(truth, name)[its[rows]]
+            # The distances of a diverged state are infinite.
+            with np.errstate(over="ignore", invalid="ignore"):
+                away = np.hypot(*np.moveaxis(found[:, numbers] - right[:, numbers], 2, 0))
+                away = np.where(both, np.where(np.isnan(away), np.inf, away), 0.0)
+                largest[k, rows], squares[k, rows] = away.max(axis=1), np.square(away).sum(axis=1)
+    return Errors(run.time[mine], largest[0], largest[1], squares, count)
+
+
+def default_tolerance(scene: Scene) -> float:
+    """Return 1 % of the smallest radius or half width of the moving bodies, m; 1 mm if no body moves."""
+    bodies = scene.bodies
+    thin = bodies.thin[~bodies.fixed]
+    return TOLERANCE * float(thin.min()) if len(thin) else 1e-3

@@ -1,0 +1,268 @@
+"""Detector of missed contacts: contacts that an engine never detected, or detected too late.
+
+A fixed-step engine tests for overlap at the end of each substep only. A contact that begins and ends within a substep
+is lost; a body that it finds on the far side of an obstacle is pushed out there.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.measure.missed_contacts.contact_history import ContactHistory, pair_keys
+from sandbox.measure.missed_contacts.static_geometry import StaticGeometry, SweptCircles
+from sandbox.measure.missed_contacts.swept_geometry import CLEAR, DEEP, JUMP, approaching, closest_to_origin, dot
+from sandbox.measure.missed_contacts.verlet_list import VerletList
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.compile.setup import Setup
+
+MAX_BATCH = 32
+"""Largest number of substeps that are examined together, which spreads the cost of numpy calls."""
+BATCH_ROWS = 1 << 14
+"""Centres in a batch of several substeps, so that they stay in the cache."""
+
+CHUNK = 1 << 13
+"""Encounters that are examined together, so that they stay in the cache."""
+
+MAX_COORDINATE = 1e50
+"""m: a body farther out is diverging and does not count; fourth powers of this are still finite."""
+
+
+class Audit:
+    """Counter of missed contacts; an `Observer` that is called after every substep.
+
+    Every centre moves along a straight line within a substep. A pair that can collide misses a contact if
+
+    1. it jumps: its relative displacement is at least `JUMP` (7 %) of its contact distance. A pair that moves less
+       cannot pass through before the next test;
+    2. it is clear at the start: no deeper than half the tolerance, and not in contact at the end of the last substep;
+    3. it is deep somewhere on its path: by more than `TOLERANCE` (0.5 %) of its contact distance;
+    4. the engine does not detect it in time: the pair is not in contact at the end, or it is but no longer approaches
+       there, because its closest approach is already over.
+
+    The contact distance is the sum of the radii; for a wall it is the radius and half the thickness. A plane is a solid
+    that is `BACKING` deep: condition 4 is then no contact, or a centre deeper than the backing. A wall is one object:
+    it is approached if any of its segments in reach is. A body that passes through the line of a segment of which it
+    was clear has missed the wall, whatever the engine finds on the far side and on whichever other segment the body
+    rested. Bodies whose position is nan before or after the substep do not count.
+
+    A passage therefore counts once: a pair that has passed or is still inside is not clear, or moves apart.
+
+    This is exact for discs. Of any other body, the radius is `Bodies.core`, the largest disc about the centre of mass
+    inside the body: whatever passes through that was missed, so that there are no false alarms, but a contact with a
+    corner only is not counted. A body with a core of 0, whose centre of mass lies outside, is left out. Pairs that a
+    joint keeps from colliding, bodies of one group, bodies on different layers or that change their layer within the
+    substep, and bodies that strokes and plungers move through static objects miss nothing.
+
+    Limits: motion is taken to be straight, as in pymunk. The cost grows with (bodies that jump) × (segments and
+    planes), and among balls with the number of close pairs.
+    """
+
+    def __init__(self, start: Scene | Setup, bodies: Bodies | None = None) -> None:
+        setup = Setup.of(start)
+        scene = setup.scene
+        self._static_geometry = StaticGeometry.of(scene)
+        self._apart = setup.links.apart()
+        self._led = frozenset(drive.body for drive in scene.drives if drive.kind != "torque")
+        self._times: list[FloatArray] = []
+        self._pairs: list[IntArray] = []
+        self._history = ContactHistory()
+        self._history.add(np.empty((0, 2), np.int64))
+        self._on: IntArray = np.zeros((0, 0), np.int64)  # layers as bits; empty if there is a single layer
+        self._lay_out(setup.bodies if bodies is None else bodies)
+
+    def joined(self, bodies: Bodies) -> None:
+        """Include bodies that were added.
+
+        Args:
+            bodies: all bodies.
+        """
+        self._examine()
+        self._lay_out(bodies)
+
+    def changed(self, scene: Scene, bodies: Bodies) -> None:
+        """Include changes of the static objects.
+
+        Args:
+            scene: scene with the present static objects.
+            bodies: all bodies.
+        """
+        self._examine()
+        self._static_geometry = StaticGeometry.of(scene)
+        self._lay_out(bodies)
+
+    def __call__(
+        self, time: float, start: FloatArray, end: FloatArray, touching: IntArray, on: IntArray | None = None
+    ) -> None:
+        """Record one substep; several are examined together. The arrays are copied.
+
+        Args:
+            time: start of the substep, s.
+            start: centres at the start, (N, 2) m.
+            end: centres at the end, (N, 2) m.
+            touching: pairs (K, 2) in contact at the end, with the indices of `Contacts`.
+            on: layer of each body throughout the substep as a bit, (N,), if there are several layers; bodies on
+                different layers cannot collide.
+
+        Raises:
+            ValueError: N is not the number of bodies; `joined` adds bodies.
+        """
+        if len(start) != self._number:
+            raise ValueError(f"{len(start)} bodies, where the audit knows of {self._number}")
+        if not len(self._core):
+            return
+        row = len(self._time)
+        self._start[row] = start[self._part]
+        self._end[row] = end[self._part]
+        if on is not None:
+            if not len(self._on):
+                self._on = np.zeros(self._start.shape[:2], np.int64)
+            self._on[row] = on[self._part]
+        self._history.add(touching)
+        self._time.append(time)
+        if len(self._time) == len(self._start):
+            self._examine()
+
+    @property
+    def times(self) -> FloatArray:
+        """Start of the substep of each missed contact, (M,) s."""
+        self._examine()
+        return np.concatenate((np.empty(0), *self._times))
+
+    @property
+    def pairs(self) -> IntArray:
+        """Pairs that missed a contact, (M, 2), with the indices of `Contacts`; sorted by time, then by index."""
+        self._examine()
+        return np.concatenate((np.empty((0, 2), np.int64), *self._pairs))
+
+    def missed(self) -> tuple[FloatArray, IntArray]:
+        """Return `times` and `pairs`."""
+        return self.times, self.pairs
+
+    def _lay_out(self, bodies: Bodies) -> None:
+        """Derive which bodies can collide with what, and the smallest displacement that can miss a contact."""
+        every = np.asarray([e.collides == "all" for e in bodies.elements], np.bool_)[bodies.element]
+        some = np.asarray([e.collides != "none" for e in bodies.elements], np.bool_)[bodies.element]
+        every, some = every & (bodies.core > 0.0), some & (bodies.core > 0.0)
+        moves, to_all, still = some & ~bodies.fixed, every & ~bodies.fixed, every & bodies.fixed
+        member = to_all | still | (moves & bool(still.any()))
+
+        # If a pair jumps, one of the two moves at least half as far.
+        least = np.full(len(bodies), np.inf)
+        cores = bodies.core[member]
+        if len(cores) > 1:
+            least[member] = JUMP * (cores + cores.min()) / 2
+        if len(self._static_geometry):
+            least[moves] = np.minimum(least, JUMP * bodies.core)[moves]
+
+        # Bodies of one kind are adjacent: those before the first and after the last relevant one cost nothing.
+        matter = np.flatnonzero(np.isfinite(least))
+        self._number = len(bodies)
+        self._offset = int(matter[0]) if len(matter) else 0
+        self._part = part = slice(self._offset, int(matter[-1]) + 1 if len(matter) else 0)
+        self._moves, self._to_all, self._still = moves[part], to_all[part], still[part]
+        self._core = bodies.core[part]
+        self._lands = self._moves
+        if self._led:  # bodies led by a stroke or a plunger pass through static objects
+            self._lands = self._moves & ~np.isin(bodies.names[part], [*self._led])
+        self._group = bodies.group[part] if bodies.group.any() else None
+        self._least2 = least[part] ** 2 * (1 - 1e-9)  # rounding must not hide a pair from the exact test
+        self._verlet_list = VerletList(self._core, member[part], self._meet)
+
+        batch = max(1, min(MAX_BATCH, BATCH_ROWS // max(1, len(self._core))))
+        self._time: list[float] = []
+        self._start = np.empty((batch, len(self._core), 2))
+        self._end = np.empty_like(self._start)
+        self._on = np.zeros((0, 0), np.int64)
+
+    def _examine(self) -> None:
+        """Examine the recorded substeps."""
+        start, end = self._start[: len(self._time)], self._end[: len(self._time)]
+        with np.errstate(invalid="ignore", over="ignore"):  # diverging bodies reach inf and are left out here
+            move = end - start
+            move *= move
+            length2 = move[..., 0] + move[..., 1]
+        fast = length2 >= self._least2
+        if fast.any():
+            lost = ~(length2 < MAX_COORDINATE**2)
+            when, body = np.nonzero(fast)
+            lost[when, body] |= (np.abs(start[when, body]) > MAX_COORDINATE).any(axis=1)
+            if lost.any():
+                start[lost] = end[lost] = np.nan
+                length2[lost] = 0.0
+                fast &= ~lost
+            nearing = 2 * float(np.sqrt(length2.max()))
+            found = self._balls(start, end, fast, nearing), self._fixed(start, end, fast)
+            when = np.concatenate([when for when, _ in found])
+            pairs = np.concatenate([pairs for _, pairs in found])
+            if len(when):
+                order = np.lexsort((pairs[:, 1], pairs[:, 0], when))
+                self._times.append(np.asarray(self._time)[when[order]])
+                self._pairs.append(pairs[order])
+        self._time.clear()
+        self._history.forget()
+
+    def _fixed(self, start: FloatArray, end: FloatArray, fast: BoolArray) -> tuple[IntArray, IntArray]:
+        """Return substeps (M,) and pairs (M, 2) of a body and a static object that missed a contact."""
+        when, body = np.nonzero(fast & self._lands)
+        on = self._on[when, body] if len(self._on) else None
+        paths = SweptCircles(when, body + self._offset, start[when, body], end[when, body], self._core[body], on)
+        return self._static_geometry.missed(paths, self._history)
+
+    def _meet(self, i: IntArray, j: IntArray) -> BoolArray:
+        """Return which pairs of bodies can collide."""
+        able = self._to_all[i] & self._to_all[j]
+        able |= self._moves[i] & self._still[j]
+        able |= self._still[i] & self._moves[j]
+        if self._group is not None:
+            able &= (self._group[i] == 0) | (self._group[i] != self._group[j])
+        if len(self._apart):
+            pair = pair_keys(np.minimum(i, j) + self._offset, np.maximum(i, j) + self._offset)
+            able &= ~np.isin(pair, pair_keys(*self._apart.T))
+        return np.asarray(able)
+
+    def _balls(self, start: FloatArray, end: FloatArray, fast: BoolArray, nearing: float) -> tuple[IntArray, IntArray]:
+        """Return substeps (M,) and pairs (M, 2) of bodies that missed a contact.
+
+        No pair approaches by more than `nearing`, m.
+        """
+        when, i, j = self._verlet_list.encounters(start, end, fast)
+        if len(self._on):
+            near = (self._on[when, i] & self._on[when, j]) != 0
+            when, i, j = when[near], i[near], j[near]
+        parts = len(when) // CHUNK + 1
+        at = np.concatenate(
+            [
+                begin + self._deep(start, end, nearing, *(column[begin:stop] for column in (when, i, j)))
+                for begin, stop in pairwise(np.linspace(0, len(when), parts + 1, dtype=np.int64).tolist())
+            ]
+        )
+        when, pair = when[at], np.column_stack((i[at], j[at])) + self._offset
+        last = _offset(end, when, i[at], j[at])
+        late = ~approaching(last, last - _offset(start, when, i[at], j[at]))
+        late[~late] = ~self._history.found(when[~late] + 1, pair[~late])
+        when, pair = when[late], pair[late]
+        new = ~self._history.found(when, pair)
+        return when[new], pair[new]
+
+    def _deep(
+        self, start: FloatArray, end: FloatArray, nearing: float, when: IntArray, i: IntArray, j: IntArray
+    ) -> IntArray:
+        """Return which encounters lead from clear into deep contact on a path that can skip a test."""
+        gap = _offset(start, when, i, j)
+        distance2, contact = dot(gap, gap), self._core[i] + self._core[j]
+        at = np.flatnonzero((distance2 >= (CLEAR * contact) ** 2) & (distance2 <= (contact + nearing) ** 2))
+        gap, contact = gap[at], contact[at]
+        move = _offset(end, when[at], i[at], j[at]) - gap
+        able = (dot(gap, move) < 0) & (dot(move, move) >= (JUMP * contact) ** 2)
+        able &= closest_to_origin(gap, move) < (DEEP * contact) ** 2
+        return at[able]
+
+
+def _offset(place: FloatArray, when: IntArray, i: IntArray, j: IntArray) -> FloatArray:
+    """Return the offset from the first to the second of each pair, (K, 2) m."""
+    # As complex numbers, both coordinates are fetched at once, three times as fast as rows of an array.
+    point, row = place.view(np.complex128).reshape(-1), when * place.shape[1]
+    between = point.take(row + j) - point.take(row + i)
+    return np.asarray(between.view(np.float64).reshape(-1, 2))

@@ -1,0 +1,268 @@
+"""Table of all preflight checks, and the diagnostics that they give for a scene."""
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sandbox.measure.preflight.diagnostic import ROUNDING, Details, Diagnostic, floor_3_digits
+from sandbox.measure.preflight.initial_contacts import InitialContacts, initial_contacts, overlap_warnings
+from sandbox.measure.preflight.joint_chains import chain_warnings, joint_start_warnings, stretch_warnings
+from sandbox.measure.preflight.predictability import event_warnings
+from sandbox.measure.preflight.speed_bound import SpeedBounds
+from sandbox.measure.preflight.stacks import stack_warnings
+from sandbox.measure.preflight.stiffness import damper_warnings, orbit_warnings, spring_warnings
+from sandbox.measure.preflight.tunnelling import (
+    ANOTHER,
+    ANOTHER_BODY,
+    TunnellingRisk,
+    detection_factor,
+    entry_warnings,
+    tunnelling_risks,
+)
+from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix, reachable_layers
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.fixed import Plane, mask_of
+from sandbox.scene.description.world import Settings
+
+
+def kick_warnings(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterator[Diagnostic]:
+    """Yield a diagnostic if one substep of gravity makes a resting body fast enough to trigger a kick.
+
+    Contacts are detected at the end of a substep: a body in contact has then gained g·h.
+    """
+    fall = math.hypot(*scene.world.gravity) * settings.h
+    touched = meet.touching.any(axis=1)
+    for name, number in zip(scene.fixed_names, meet.surfaces.of_fixed.tolist(), strict=False):  # pockets come last
+        kick = meet.surfaces.surfaces[number].kick
+        if kick is not None and bool(np.asarray(touched)[number]) and fall >= kick.threshold:
+            safe = settings.dt * kick.threshold / fall
+            message = (
+                f"{name!r} kicks bodies that approach at {kick.threshold:g} m/s, which one substep of gravity gives to "
+                f"a body that rests there; use dt < {floor_3_digits(safe)} s or a higher threshold"
+            )
+            yield Diagnostic("kick_threshold", message, {"thing": name, "threshold": kick.threshold, "fall": fall})
+
+
+MIN_ITERATIONS = 3
+"""With fewer iterations, groups of bouncing bodies can gain energy on pymunk. Measured on break shots of 6 to 36 balls,
+e = 0.95 and 1, 240 to 3840 Hz: up to a factor of five with one iteration, in 5 of 54 cases a tenth with two, never with
+three. The reference engine gained none with one.
+"""
+
+MAX_ROUNDING = 1e-3
+"""Largest rounding of positions as a fraction of a radius."""
+
+MAX_LOST_FRACTION = 0.1
+"""Largest rounding of the displacement in a substep as a fraction: positions are sums of displacements, which are all
+rounded alike. Measured with a ball of 1 m at 1 m/s, steps of 0.01 s (`sandbox extremes --axes offset`).
+"""
+
+FAILED = "failed_forecast"
+"""Kind of the diagnostic of a check that raised an exception."""
+
+EVENT_DRIVEN = frozenset({"exact"})
+"""Engines without a time step, which refuse overlaps."""
+
+
+@dataclass(frozen=True)
+class PreflightContext:
+    """Scene and settings, and quantities that several checks derive from them."""
+
+    scene: Scene
+    settings: Settings
+
+    @cached_property
+    def meet(self) -> ContactMatrix:
+        """Which bodies can collide with what."""
+        return contact_matrix(self.scene)
+
+    @cached_property
+    def close(self) -> InitialContacts:
+        """Pairs of bodies in contact or overlap at the start."""
+        return initial_contacts(self.scene)
+
+
+@dataclass(frozen=True)
+class Check:
+    """One check: a function of a situation, and the engines that it applies to."""
+
+    find: Callable[[PreflightContext], Iterable[Diagnostic]]
+    engines: frozenset[str] | None = None
+    """None for every engine with a time step"""
+
+    def concerns(self, engine: str) -> bool:
+        """Return whether it applies to an engine."""
+        return engine not in EVENT_DRIVEN if self.engines is None else engine in self.engines
+
+
+def warnings(scene: Scene, settings: Settings | None = None, engine: str | None = None) -> list[Diagnostic]:
+    """Return the diagnostics of a scene by formulas, without running it.
+
+    A check that raises an exception becomes a diagnostic of kind `failed_forecast`; the other checks are not affected.
+
+    Args:
+        scene: the scene.
+        settings: settings of the run; default: those of the scene.
+        engine: name of the engine; default: the checks of all engines.
+    """
+    situation = PreflightContext(scene, scene.solver if settings is None else settings)
+    found: list[Diagnostic] = []
+    for name, forecast in CHECKS.items():
+        if engine is not None and not forecast.concerns(engine):
+            continue
+        try:
+            found += forecast.find(situation)
+        except Exception as error:  # noqa: BLE001, one forecast's fault must not cost the answers of the others
+            message = f"the forecast {name!r} failed with {type(error).__name__}: {error}; please report this scene"
+            found.append(Diagnostic(FAILED, message, {"forecast": name}))
+    return found
+
+
+def _duration(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
+    if settings.dt > scene.world.duration * (1.0 + ROUNDING):
+        message = (
+            f"dt, {settings.dt:g} s, is longer than the run, {scene.world.duration:g} s: it ends within its first "
+            "step, in which no contact is found"
+        )
+        yield Diagnostic("duration", message, {"dt": settings.dt, "duration": scene.world.duration})
+
+
+def _tunnelling(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterator[Diagnostic]:
+    times = detection_factor(settings)
+    at_risk = [passage for passage in tunnelling_risks(scene, meet) if passage.odds(settings.h / times) > ROUNDING]
+    own = {passage.thing for passage in at_risk if not passage.struck}
+    at_risk = [passage for passage in at_risk if not passage.struck or passage.thing not in own]
+    for passage, things in group_alike(at_risk):
+        odds = passage.odds(settings.h / times)
+        safe = passage.safe_h * settings.substeps * times
+        way = passage.speed * settings.h
+        thing = passage.thing if passage.thing in (ANOTHER, ANOTHER_BODY) else repr(passage.thing)
+        if things:
+            thing += f" and {things:,} other{'s' if things > 1 else ''} like it"
+        ball = repr(passage.ball)
+        if passage.others:
+            ball += f" and {passage.others:,} other{'s' if passage.others > 1 else ''} about as fast"
+        if passage.struck:
+            ball += ", struck by others,"
+        message = (
+            f"{ball} can approach {thing} at up to {passage.speed:.4g} m/s, {way:.3g} m per substep, and tunnel "
+            f"through it undetected: odds up to {100 * odds:.3g} %; dt <= {floor_3_digits(safe)} s is safe"
+        )
+        details: Details = {
+            "ball": passage.ball,
+            "thing": passage.thing,
+            "others": things,
+            "speed": passage.speed,
+            "odds": odds,
+            "safe_dt": safe,
+        }
+        if passage.struck:
+            details["struck"] = True
+        yield Diagnostic("tunnelling", message, details)
+
+
+def _depth(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterator[Diagnostic]:
+    """Yield bodies that can penetrate a plane by more than their half width before the contact is detected.
+
+    A contact is detected at the end of a substep, up to v·h deep. `bisect`, `swept` and `shrink` return to the time of
+    impact.
+    """
+    if settings.detection not in (None, "discrete"):
+        return
+    bodies, speeds = scene.bodies, SpeedBounds(scene, meet)
+    layers = reachable_layers(scene, bodies)
+    movers = meet.touches & ~bodies.fixed & (bodies.thin > 0.0)
+    found: dict[tuple[str, float], tuple[str, float, int]] = {}
+    for plane, name in zip(scene.fixed, scene.fixed_names, strict=False):
+        able = np.flatnonzero(movers & (layers & mask_of(plane.layers, scene.layers) != 0))
+        if not isinstance(plane, Plane) or not len(able):
+            continue
+        speed = speeds.toward(plane)[able]
+        k = int(np.argmax(speed / bodies.thin[able]))
+        key = bodies.names[able[k]], float(speed[k])
+        first, half, count = found.get(key, (name, float(bodies.thin[able[k]]), -1))
+        found[key] = first, half, count + 1
+    for (body, top), (name, half, others) in found.items():
+        way = top * settings.h
+        if way <= half * (1.0 + ROUNDING):
+            continue
+        safe = settings.dt * half / way
+        more = f" and {others:,} other{'s' if others > 1 else ''} like it" if others else ""
+        message = (
+            f"{body!r} can hit {name!r}{more} at up to {top:.4g} m/s and penetrate by {way:.3g} m before the contact "
+            f"is detected; dt <= {floor_3_digits(safe)} s keeps that below its half width, {half:.3g} m"
+        )
+        details: Details = {"ball": body, "thing": name, "speed": top, "depth": way, "safe_dt": safe}
+        yield Diagnostic("depth", message, details)
+
+
+def group_alike(found: Iterable[TunnellingRisk]) -> list[tuple[TunnellingRisk, int]]:
+    """Return the first of the risks that differ only in the obstacle, and the number of others."""
+    groups: dict[tuple[str, float, float], tuple[TunnellingRisk, int]] = {}
+    for passage in found:
+        key = passage.ball, passage.speed, passage.safe_h
+        first, count = groups.get(key, (passage, -1))
+        groups[key] = first, count + 1
+    return list(groups.values())
+
+
+def _iterations(settings: Settings, meet: ContactMatrix) -> Iterator[Diagnostic]:
+    if meet.mutual and settings.iterations < MIN_ITERATIONS and meet.restitution > 0:
+        what = "balls" if meet.ball_ball else "bodies"
+        noun = "iteration" if settings.iterations == 1 else "iterations"
+        message = (
+            f"{settings.iterations} {noun} with bouncing {what}: groups can gain energy; "
+            f"use iterations >= {MIN_ITERATIONS}"
+        )
+        yield Diagnostic("iterations", message, {"iterations": settings.iterations})
+
+
+def _rounding(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterator[Diagnostic]:
+    bodies = scene.bodies
+    colliders = meet.touches & ~bodies.fixed
+    if colliders.any():
+        spacing = np.spacing(np.abs(bodies.position[colliders]).max(axis=1)) / bodies.thin[colliders]
+        worst = float(spacing.max())
+        if worst > MAX_ROUNDING:
+            name = bodies.names[int(np.flatnonzero(colliders)[np.argmax(spacing)])]
+            message = (
+                f"{name!r} is so far from the origin that its position is rounded to {worst:.2g} of its radius; "
+                "move the scene closer to it"
+            )
+            yield Diagnostic("rounding", message, {"ball": name, "share": worst})
+            return
+        way = np.hypot(*bodies.velocity[colliders].T) * settings.h
+        size = np.spacing(np.abs(bodies.position[colliders]).max(axis=1))
+        lost = np.divide(0.5 * size, way, out=np.zeros_like(way), where=way > 0.0)
+        worst = float(lost.max())
+        if worst > MAX_LOST_FRACTION:
+            name = bodies.names[int(np.flatnonzero(colliders)[np.argmax(lost)])]
+            message = (
+                f"{name!r} is so far from the origin that rounding changes its displacement of "
+                f"{way[np.argmax(lost)]:.3g} m per substep by up to {100 * worst:.2g} %; move the scene closer to it"
+            )
+            yield Diagnostic("rounding", message, {"ball": name, "share": worst})
+
+
+CHECKS: dict[str, Check] = {
+    "duration": Check(lambda s: _duration(s.scene, s.settings)),
+    "tunnelling": Check(lambda s: _tunnelling(s.scene, s.settings, s.meet)),
+    "depth": Check(lambda s: _depth(s.scene, s.settings, s.meet)),
+    "entry": Check(lambda s: entry_warnings(s.scene, s.settings, s.meet)),
+    "overlap": Check(lambda s: overlap_warnings(s.scene, s.meet, s.close)),
+    "iterations": Check(lambda s: _iterations(s.settings, s.meet), frozenset({"pymunk"})),
+    "rounding": Check(lambda s: _rounding(s.scene, s.settings, s.meet)),
+    "kicks": Check(lambda s: kick_warnings(s.scene, s.settings, s.meet)),
+    "joints": Check(lambda s: joint_start_warnings(s.scene)),
+    "springs": Check(lambda s: spring_warnings(s.scene, s.settings)),
+    "dampers": Check(lambda s: damper_warnings(s.scene, s.settings), frozenset({"reference"})),
+    "orbits": Check(lambda s: orbit_warnings(s.scene, s.settings, s.meet)),
+    "chains": Check(lambda s: chain_warnings(s.scene, s.settings)),
+    "stretch": Check(lambda s: stretch_warnings(s.scene, s.settings)),
+    "stacks": Check(lambda s: stack_warnings(s.scene, s.settings, s.close)),
+    "events": Check(lambda s: event_warnings(s.scene, s.meet), EVENT_DRIVEN),
+}
+"""All checks, in the order in which their diagnostics are listed. A new check is a function and a line here."""

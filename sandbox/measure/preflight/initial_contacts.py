@@ -1,0 +1,205 @@
+"""Bodies in contact or overlap at the start of a scene."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.engines.common.base import SLOP_PER_RADIUS
+from sandbox.measure.metrics.clearance import bounding_clearances, clearance, hull_distance, posed_pieces
+from sandbox.measure.preflight.diagnostic import Diagnostic
+from sandbox.measure.preflight.tunnelling import collide_with_all
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.contacts import ContactMatrix, reachable_layers
+from sandbox.scene.compile.drives import is_driven
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.fixed import Plane, Post, Wall, mask_of
+from sandbox.scene.geometry.neighbours import near_pairs
+from sandbox.scene.validate.bodies import MAX_OVERLAPS, MAX_OVERLAPS_EACH, OVERLAP_BUDGET, count_overlaps
+
+CONTACT_FRACTION = 0.02
+"""Largest clearance of a contact as a fraction of the half width of the thinner body."""
+MAX_PAIRS = 4000
+"""Largest number of measured pairs, at about 0.1 ms each; the others are ignored."""
+
+
+class InitialContacts(NamedTuple):
+    """K pairs of bodies close together; at least one of each pair is not a ball."""
+
+    first: IntArray
+    """(K,)"""
+    second: IntArray
+    """(K,)"""
+    clearance: FloatArray
+    """(K,) m, negative for an overlap"""
+
+
+def initial_contacts(scene: Scene) -> InitialContacts:
+    """Return the pairs that can collide and are in contact or overlap (`CONTACT_FRACTION`).
+
+    At least one of a pair can move, and at least one is not a ball.
+    """
+    bodies = scene.bodies
+    among = np.flatnonzero(collide_with_all(bodies) & (bodies.core >= 0.0))
+    found: list[tuple[int, int, float]] = []
+    apart = {(a, b) for a, b in scene.links.apart().tolist()}
+    if len(among) < 2 or bodies.round[among].all():
+        return InitialContacts(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
+    looked = 0
+    for i, j in near_pairs(bodies.position[among], 2.05 * float(bodies.radius[among].max())):
+        a, b = np.minimum(among[i], among[j]), np.maximum(among[i], among[j])
+        slack = CONTACT_FRACTION * np.minimum(bodies.thin[a], bodies.thin[b])
+        away = np.hypot(*(bodies.position[a] - bodies.position[b]).T) - bodies.radius[a] - bodies.radius[b]
+        able = (bodies.group[a] == 0) | (bodies.group[a] != bodies.group[b])
+        able &= (away < slack) & ~(bodies.round[a] & bodies.round[b]) & ~(bodies.fixed[a] & bodies.fixed[b])
+        for first, second, most in zip(a[able].tolist(), b[able].tolist(), slack[able].tolist(), strict=True):
+            looked += 1
+            if looked > MAX_PAIRS:
+                break
+            if (first, second) not in apart and (gap := _pair_clearance(bodies, first, second)) <= most:
+                found.append((first, second, gap))
+        if looked > MAX_PAIRS:
+            break
+    ones, others, gaps = ([row[k] for row in found] for k in range(3))
+    return InitialContacts(
+        np.asarray(ones, dtype=np.int64), np.asarray(others, dtype=np.int64), np.asarray(gaps, dtype=np.float64)
+    )
+
+
+def _pair_clearance(bodies: Bodies, first: int, second: int) -> float:
+    """Return the clearance of two bodies at the start, m."""
+    one, other = (
+        list(posed_pieces(bodies, n, bodies.position[n][None], bodies.angle[n][None])) for n in (first, second)
+    )
+    return min(float(hull_distance(a, b)[0]) - r - s for a, r in one for b, s in other)
+
+
+GRAZE_FRACTION = 1e-6
+"""Overlap by rounding of bodies that are placed in contact, as a fraction of a half width."""
+
+Overlap = tuple[float, str, str]
+"""Depth of an overlap, m, and the names of the two."""
+
+
+def overlap_warnings(scene: Scene, meet: ContactMatrix, close: InitialContacts) -> Iterator[Diagnostic]:
+    """Yield a diagnostic for the overlaps at the start, with the deepest one.
+
+    Pairs that a joint keeps from colliding do not count. Of bodies in planes, walls and posts, only overlaps deeper
+    than the slop of the engines count.
+    """
+    pairs, deepest, what = 0, (0.0, "", ""), "balls"
+    if meet.mutual:
+        balls, pair = _balls(scene, meet)
+        if balls > 0:
+            pairs, deepest = balls, pair
+        bodies = scene.bodies
+        deep = close.clearance < -GRAZE_FRACTION * np.minimum(bodies.thin[close.first], bodies.thin[close.second])
+        deep &= ~bodies.fixed[close.first] & ~bodies.fixed[close.second]
+        if deep.any():
+            k = int(np.argmin(np.where(deep, close.clearance, 0.0)))
+            names = bodies.names[int(close.first[k])], bodies.names[int(close.second[k])]
+            pairs, what = pairs + int(deep.sum()), "bodies"
+            deepest = max(deepest, (-float(close.clearance[k]), *names))
+    held = list(_overlaps_with_static(scene, meet))
+    if held:
+        what = f"{what} and fixed elements" if pairs else "bodies and fixed elements"
+        pairs, deepest = pairs + len(held), max(deepest, max(held))
+    if pairs > 0:
+        depth, first, second = deepest
+        count = "overlapping pair" if pairs == 1 else "overlapping pairs"
+        message = (
+            f"{pairs:,} {count} of {what} at the start, {first!r} and {second!r} by {depth:.3g} m; "
+            "the engine will push them apart"
+        )
+        yield Diagnostic("overlap", message, {"pairs": pairs, "depth": depth, "first": first, "second": second})
+
+
+def _balls(scene: Scene, meet: ContactMatrix) -> tuple[int, Overlap]:
+    """Return the number of overlapping pairs of moving balls, and the deepest of them."""
+    bodies = scene.bodies
+    among = np.flatnonzero(collide_with_all(bodies) & meet.touches & ~bodies.fixed & bodies.round)
+    most = MAX_OVERLAPS + MAX_OVERLAPS_EACH * len(among)  # a scene with more is refused
+    owner = np.where(bodies.group > 0, bodies.group, -1 - np.arange(len(bodies)))[among]
+    position, radius = bodies.position[among], bodies.radius[among]
+    count = count_overlaps(position, radius, most, owner)
+    first, second = scene.links.apart().T
+    joined = np.isin(first, among) & np.isin(second, among)
+    joined &= (bodies.group[first] == 0) | (bodies.group[first] != bodies.group[second])
+    away = (
+        np.hypot(*(bodies.position[first] - bodies.position[second]).T) - bodies.radius[first] - bodies.radius[second]
+    )
+    count -= int((joined & (away < 0.0)).sum())
+    if count <= 0:
+        return 0, (0.0, "", "")
+    keys = np.minimum(first, second) * len(bodies) + np.maximum(first, second)
+    deepest, i, j = _deepest(position, radius, owner, among, keys, len(bodies))
+    return count, (deepest, bodies.names[i], bodies.names[j])
+
+
+def _deepest(
+    position: FloatArray, radius: FloatArray, owner: IntArray, among: IntArray, apart: IntArray, count: int
+) -> tuple[float, int, int]:
+    """Return the depth, m, and the indices of the two discs that overlap most.
+
+    Args:
+        position: (M, 2) m.
+        radius: (M,) m.
+        owner: (M,); two discs of one owner are no pair.
+        among: (M,) indices among all bodies.
+        apart: (K,) pairs that do not collide, as index of the first × count + index of the second.
+        count: number of all bodies.
+    """
+    deepest, looked_at = (0.0, int(among[0]), int(among[0])), 0
+    for i, j in near_pairs(position, 2.0 * float(radius.max())):
+        low, high = np.minimum(among[i], among[j]), np.maximum(among[i], among[j])
+        depth = radius[i] + radius[j] - np.hypot(*(position[i] - position[j]).T)
+        depth[(owner[i] == owner[j]) | np.isin(low * count + high, apart)] = -np.inf
+        k = int(np.argmax(depth)) if len(depth) else -1
+        if k >= 0 and depth[k] > deepest[0]:
+            deepest = float(depth[k]), int(low[k]), int(high[k])
+        looked_at += len(i)
+        if looked_at > OVERLAP_BUDGET:
+            break
+    return deepest
+
+
+def _overlaps_with_static(scene: Scene, meet: ContactMatrix) -> Iterator[Overlap]:
+    """Yield the bodies that start in a plane, wall or post, deeper than the slop of the engines.
+
+    Scenes with a `[surface]`, one-way walls and driven bodies are left out: cushions are hit at a height, a body in a
+    one-way wall may pass, and a driven body stays where its drive holds it.
+    """
+    if scene.surface is not None:
+        return
+    bodies, layers = scene.bodies, reachable_layers(scene, scene.bodies)
+    able = meet.touches & ~bodies.fixed & (bodies.thin > 0.0) & ~is_driven(scene, bodies)
+    looked_at = measured = 0
+    for k, (thing, name) in enumerate(zip(scene.fixed, scene.fixed_names, strict=False)):
+        if (not isinstance(thing, Plane) and not thing.solid) or (isinstance(thing, Wall) and thing.one_way):
+            continue
+        near = np.flatnonzero(able & (layers & mask_of(thing.layers, scene.layers) != 0) & _near(bodies, thing))
+        looked_at += len(near) * (len(thing.points) if isinstance(thing, Wall) else 1)
+        if looked_at > OVERLAP_BUDGET:
+            return
+        depths = -bounding_clearances(thing, bodies.position[near], bodies.radius[near])
+        for number, depth in zip(near[depths > 0.0].tolist(), depths[depths > 0.0].tolist(), strict=True):
+            if not bodies.round[number]:
+                measured += 1
+                if measured > MAX_PAIRS:
+                    return
+                place = bodies.position[None], bodies.angle[None]
+                depth = -float(clearance(scene, bodies, *place, (number, -1 - k))[0])
+            if depth > SLOP_PER_RADIUS * float(bodies.thin[number]):
+                yield depth, bodies.names[number], name
+
+
+def _near(bodies: Bodies, thing: Plane | Wall | Post) -> BoolArray:
+    """Return which bounding discs overlap the box about a wall or post, (N,); for a plane, all."""
+    if isinstance(thing, Plane):
+        return np.ones(len(bodies), dtype=np.bool_)
+    corners = np.asarray(thing.points if isinstance(thing, Wall) else [thing.position])
+    half = thing.thickness / 2.0 if isinstance(thing, Wall) else thing.radius
+    low, high = corners.min(axis=0) - half, corners.max(axis=0) + half
+    away = np.maximum(low - bodies.position, 0.0) + np.maximum(bodies.position - high, 0.0)
+    return np.asarray(np.hypot(*away.T) < bodies.radius)

@@ -1,0 +1,247 @@
+"""Chains of joints: convergence of the solver, stretch, and joints that start with an error.
+
+An iterative solver propagates information from joint to joint, once an iteration. Since impulses are kept, it can
+converge over several substeps, but only if it converges faster than the position correction acts; otherwise the joints
+come apart. The impulses of the slowest mode converge at 2λ per iteration, with λ the least eigenvalue of the joint
+matrix J·M⁻¹·Jᵀ with its diagonal scaled to 1. The rate of the correction is r = (1 − bias^h)/h, with pymunk's default
+bias 6.3 per second. So iterations/h has to be r/(2λ).
+
+Measured on pymunk 7.3.1, chains of n equal balls on rods, and of boxes on pivots, fixed at one end, links of 0.025 to
+1.6 m, 60 to 480 Hz, 4 s: they hold from iterations/h = 2.4 n² on, which is 60 for 5 links, 240 for 10, 960 for 20, 3840
+for 40, and come apart (joint error 0.2 to 20 of a link) below 0.75 of it; r/(2λ) is 2.56 n². With n = 2 and a load of
+100 times a link's mass at the end it takes between 480 and 960 (r/(2λ): 637), of 1000 times 4800 to 7680 (6325); with n
+= 10 and 100 times 3840 to 7680 (5862). With another bias, 1e-6, 2.2 times r, it takes 2.2 times as much. Not covered:
+the stretch of a swinging chain, which decreases with h alone (20 links from the horizontal at 480 Hz: by 40 % of a
+link), and pivots of links so short that g·h²·n is more than half of one.
+
+Relaxation, XPBD and RATTLE correct each joint in turn, and each pass propagates only part of the fall in the substep,
+g·h². Measured on the reference, chains of 10 to 100 rods of 0.1 m that hang at rest, 60 and 240 Hz, 2 to 50 iterations:
+the uppermost joint stretches by c·n·g·h²/iterations, c = 0.8 to 1.8, which grows with n/iterations.
+"""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.engines.common.base import BIAS
+from sandbox.measure.metrics.invariants import joint_scales, starting_errors
+from sandbox.measure.preflight.diagnostic import ROUNDING, Details, Diagnostic, floor_3_digits, required_iterations
+from sandbox.measure.preflight.stiffness import Product, connected_groups, extreme_eigenvalues
+from sandbox.scene.compile.joint_arrays import WORLD, JointArrays, LinkKind
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.world import Settings
+
+MEASURED_FRACTION = 0.93
+"""Fraction of r/(2λ) from which on chains hold, as measured."""
+IMPULSE_KINDS = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.GROOVE)
+MIN_MASS_RATIO = 10.0
+"""A joint between masses whose ratio exceeds this is named."""
+
+
+def chain_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
+    """Yield a diagnostic for each group of joints that need more iterations.
+
+    Its kind is `mass_ratio` if equal masses would suffice, otherwise `chain`. Only joints held by impulses count;
+    springs and motors hold nothing.
+    """
+    if settings.joints not in (None, "impulses"):
+        return
+    links = scene.links.of(*IMPULSE_KINDS)
+    if len(links) < 2:
+        return
+    bodies, has = scene.bodies, settings.iterations / settings.h
+    bias = BIAS if settings.bias is None else settings.bias
+    rate = (1.0 - bias**settings.h) / settings.h
+    free = np.where(bodies.fixed, -1, np.arange(len(bodies)))
+    a, b = np.where(links.a >= 0, free[links.a], -1), free[links.b]
+    home = connected_groups(a, b, len(bodies))[np.where(b >= 0, b, a)]
+    for group in np.unique(home).tolist():
+        mine = np.flatnonzero(home == group)
+        some = links.some(mine)
+        inverse = np.where(bodies.fixed, 0.0, 1.0 / bodies.mass)
+        needed = MEASURED_FRACTION * 0.5 * rate / least_eigenvalue(some, inverse)
+        if needed <= has * (1.0 + ROUNDING):
+            continue
+        alike = MEASURED_FRACTION * 0.5 * rate / least_eigenvalue(some, (inverse > 0.0).astype(np.float64))
+        iterations, dt = required_iterations(needed, settings.h, settings.substeps)
+        details: Details = {"joints": len(some), "joint": some.names[0], "needed": needed, "has": has, "safe_dt": dt}
+        right = f"use solver.iterations >= {iterations:,} or dt <= {floor_3_digits(dt)} s ({needed:.3g} a second)"
+        short = f"with {settings.iterations} iterations every {settings.h:.3g} s ({has:.3g} a second)"
+        k, ratio = _most_unequal(some, inverse)
+        if alike <= has * (1.0 + ROUNDING) and ratio >= MIN_MASS_RATIO:
+            first, second = bodies.names[int(some.a[k])], bodies.names[int(some.b[k])]
+            message = (
+                f"the joint {some.names[k]!r} connects {first!r} and {second!r}, one of which is {ratio:.3g} times as "
+                f"heavy; {short} it would come apart; {right}"
+            )
+            yield Diagnostic("mass_ratio", message, {**details, "joint": some.names[k], "ratio": ratio})
+        else:
+            name = f"the joint {some.names[0]!r} is heavily loaded"
+            if len(some) > 1:
+                name = f"{len(some):,} joints, {some.names[0]!r} among them, are connected"
+            message = f"{name}; {short} {'it' if len(some) == 1 else 'they'} would come apart; {right}"
+            yield Diagnostic("chain", message, details)
+
+
+def least_eigenvalue(links: JointArrays, inverse_mass: FloatArray) -> float:
+    """Return λ, the least eigenvalue but 0 of the matrix of connected joints, its diagonal scaled to 1.
+
+    The joints are assumed to lie in one line, the critical case: one joint is then one row, with 1/m at its bodies and
+    −1/m towards the adjacent joints. M^−½ Jᵀ D⁻¹ J M^−½ has the same eigenvalues, and allows redundant joints.
+
+    Args:
+        links: joints of one group.
+        inverse_mass: (N,) 1/kg; 0 for static bodies.
+    """
+    known, place = np.unique(np.concatenate((np.where(links.a >= 0, links.a, links.b), links.b)), return_inverse=True)
+    place = place.reshape(-1)
+    first, second = place[: len(links)], place[len(links) :]
+    root = np.sqrt(inverse_mass[known])
+    on_a, on_b = -root[first] * (links.a >= 0), root[second]
+    own = on_a**2 + on_b**2
+
+    def product(vector: FloatArray) -> FloatArray:
+        pull = (on_a * vector[first] + on_b * vector[second]) / own
+        both = np.bincount(first, pull * on_a, len(known)) + np.bincount(second, pull * on_b, len(known))
+        return both.astype(np.float64)
+
+    moving = np.flatnonzero(root > 0.0)
+    anchored = bool(((on_a == 0.0) | (on_b == 0.0)).any())
+    null = None
+    if not anchored:  # a common translation is possible
+        null = np.zeros(len(known))
+        null[moving] = 1.0 / root[moving]
+        null /= np.linalg.norm(null)
+    least, _ = extreme_eigenvalues(
+        _restricted(product, moving, len(known)), len(moving), null if null is None else null[moving]
+    )
+    return max(least, 1e-12)
+
+
+def _restricted(product: Product, moving: IntArray, count: int) -> Product:
+    """Return the product with the rows and columns of the moving bodies."""
+
+    def inner(vector: FloatArray) -> FloatArray:
+        whole = np.zeros(count)
+        whole[moving] = vector
+        return np.asarray(product(whole)[moving])
+
+    return inner
+
+
+def _most_unequal(links: JointArrays, inverse_mass: FloatArray) -> tuple[int, float]:
+    """Return the index of the joint between the most unequal moving masses, and their ratio."""
+    first = np.where(links.a >= 0, inverse_mass[links.a], 0.0)
+    second = inverse_mass[links.b]
+    both = (first > 0.0) & (second > 0.0)
+    ratio = np.where(both, np.maximum(first, second) / np.where(both, np.minimum(first, second), 1.0), 1.0)
+    k = int(ratio.argmax())
+    return k, float(ratio[k]) if math.isfinite(ratio[k]) else 1.0
+
+
+STRETCH_COEFFICIENT = 1.6
+"""c, see above."""
+MAX_STRETCH = 0.01
+"""Largest error of a joint as a fraction of its length."""
+
+
+def stretch_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
+    """Yield a diagnostic if the rods of a hanging chain stretch by more than `MAX_STRETCH`.
+
+    Only rods held by position corrections count.
+    """
+    pull = math.hypot(*scene.world.gravity)
+    if settings.joints not in ("relaxation", "xpbd", "rattle") or pull == 0.0:
+        return
+    links, deep = scene.links.of(LinkKind.ROD), 0
+    if not len(links):
+        return
+    still = np.append(scene.bodies.fixed, True)  # the world is −1, the last
+    reached = still.copy()
+    while True:  # one joint farther from the static bodies each time
+        fresh = reached[links.a] ^ reached[links.b]
+        if not fresh.any():
+            break
+        deep += 1
+        reached[links.a[fresh]] = reached[links.b[fresh]] = True
+    length = float(links.figures[:, 0].min())
+    share = STRETCH_COEFFICIENT * deep * pull * settings.h**2 / settings.iterations / length if length > 0.0 else 0.0
+    if share > MAX_STRETCH:
+        more = share / MAX_STRETCH
+        iterations, dt = math.ceil(settings.iterations * more), settings.dt / math.sqrt(more)
+        message = (
+            f"a chain with {links.names[0]!r} hangs {deep:,} joints deep; {settings.joints} with {settings.iterations} "
+            f"iterations every {settings.h:.3g} s stretches it by {share:.2g} of a joint's length; "
+            f"solver.iterations >= {iterations:,} or dt <= {floor_3_digits(dt)} s keeps that to {MAX_STRETCH:g}"
+        )
+        details: Details = {"joints": deep, "joint": links.names[0], "share": share, "safe_dt": dt}
+        yield Diagnostic("chain", message, details)
+
+
+MAX_START_ERROR = 0.01
+"""An error below this fraction of a joint's length is rounding of the numbers in a file, which have two or three
+digits.
+"""
+
+FAR_ANCHOR_RADII = 2.0
+"""An anchor farther from the centre of its body than this many radii is a lever without mass, or a mistake."""
+
+ANGLE_KINDS = (LinkKind.ROTARY_LIMIT, LinkKind.GEAR)
+ANCHORED_KINDS = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.SPRING)
+
+ANCHOR_ORDER = (
+    "in a joint with one body, the first of `anchors` is in the frame of the body, the second in world coordinates"
+)
+
+
+def joint_start_warnings(scene: Scene) -> Iterator[Diagnostic]:
+    """Yield a diagnostic for the largest initial joint error, and one for the first joint with swapped anchors.
+
+    Anchors count as swapped if a joint with one body holds it at a point far outside of it while the other anchor would
+    be within the body; not so for a pivot that starts satisfied, since the other order would violate it.
+    """
+    links = scene.links
+    if not len(links):
+        return
+    errors = starting_errors(scene)
+    shares = np.nan_to_num(errors / joint_scales(links, scene.bodies))
+    swapped = _swapped(scene, links) & ~((links.kind == LinkKind.PIVOT) & (shares <= MAX_START_ERROR))
+    off = (shares > MAX_START_ERROR) & ~swapped
+    if off.any():
+        worst = int(np.argmax(np.where(off, shares, 0.0)))
+        yield _start_warning(links, worst, float(errors[worst]), int(off.sum()) - 1)
+    if swapped.any():
+        k, others = int(np.argmax(swapped)), int(swapped.sum()) - 1
+        name, body = links.names[k], scene.bodies.names[int(links.b[k])]
+        x, y = links.anchor_b[k].tolist()
+        message = (
+            f"the joint {name!r} is attached to {body!r} at ({x:g}, {y:g}), outside the body and "
+            f"{np.hypot(x, y):.3g} m from its centre: {ANCHOR_ORDER}; swapped, they would fit{_and_others(others)}"
+        )
+        yield Diagnostic("anchors", message, {"joint": name, "body": body, "others": others})
+
+
+def _start_warning(links: JointArrays, k: int, error: float, others: int) -> Diagnostic:
+    """Return the diagnostic of a joint that starts with an error, m or rad."""
+    unit, name = "rad" if links.kind[k] in ANGLE_KINDS else "m", links.names[k]
+    message = (
+        f"the joint {name!r} starts with an error of {error:.3g} {unit}{_and_others(others)}; "
+        "the first steps correct it, which adds energy"
+    )
+    details: Details = {"joint": name, "error": error, "others": others}
+    return Diagnostic("joint_start", message, details)
+
+
+def _and_others(count: int) -> str:
+    return f" (and {count:,} other{'s' if count > 1 else ''})" if count else ""
+
+
+def _swapped(scene: Scene, links: JointArrays) -> BoolArray:
+    """Return which joints of one body with the world have anchors that would fit in the other order, (J,)."""
+    radius = scene.bodies.radius[links.b]
+    own, other = np.hypot(*links.anchor_b.T), np.hypot(*links.anchor_a.T)
+    stated = np.arange(len(links)) < len(scene.joints)
+    held = stated & (links.a == WORLD) & np.isin(links.kind, ANCHORED_KINDS)
+    return np.asarray(held & (own > FAR_ANCHOR_RADII * radius) & (other <= radius))

@@ -1,0 +1,122 @@
+"""Notes: facts about a scene that are worth knowing and are no problems."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from sandbox.measure.preflight.diagnostic import Diagnostic
+from sandbox.measure.preflight.predictability import break_notes, horizon_notes
+from sandbox.measure.preflight.speed_bound import top_speeds
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.base import BodySource
+from sandbox.scene.description.bodies import Compound, Polygon, PolygonPart
+from sandbox.scene.geometry.shapes import geometry_of
+
+MAX_OUTLINES = 20
+"""Largest number of outlines with a note of their own."""
+
+
+def notes(scene: Scene) -> list[Diagnostic]:
+    """Return notes: units that look like pixels, concave outlines, limits of the audit, predictability."""
+    return [
+        *_pixels(scene),
+        *_flight(scene),
+        *_outlines(scene),
+        *_audit(scene),
+        *horizon_notes(scene),
+        *break_notes(scene),
+    ]
+
+
+def _pixels(scene: Scene) -> Iterator[Diagnostic]:
+    """Yield a note if bodies are metres wide, and gravity points up or is far stronger than on any planet."""
+    bodies, (_, upward) = scene.bodies, scene.world.gravity
+    pull, moves = math.hypot(*scene.world.gravity), ~bodies.fixed
+    if not moves.any() or pull == 0.0:
+        return
+    width = 2.0 * float(np.median(bodies.thin[moves]))
+    if width >= PIXEL_WIDTH and (pull >= PIXEL_GRAVITY or upward > 0.0):
+        points = ", and points up, as y does here" if upward > 0.0 else ""
+        message = (
+            f"bodies are {width:.3g} m wide, and gravity is {pull:.4g} m/s²{points}: are these pixels? Lengths are in "
+            "metres and y points up; for 100 pixels per metre, divide lengths, speeds and gravity by 100"
+        )
+        yield Diagnostic("pixels", message, {"width": width, "gravity": pull})
+
+
+PIXEL_WIDTH, PIXEL_GRAVITY = 5.0, 100.0
+"""Median width of bodies, m, and gravity, m/s², from which on numbers look like pixels."""
+
+
+FIRST_ORDER = (None, "explicit_euler", "semi_implicit_euler")
+"""Integrators whose flight under gravity has an error of g·h·t/2; None is explicit Euler."""
+
+
+def _flight(scene: Scene) -> Iterator[Diagnostic]:
+    """Yield a note if a first-order integrator displaces a body by more than its half width within one flight."""
+    bodies, solver, pull = scene.bodies, scene.solver, math.hypot(*scene.world.gravity)
+    meet = contact_matrix(scene)
+    able = np.flatnonzero(meet.touches & ~bodies.fixed & (bodies.thin > 0.0))
+    if pull == 0.0 or not len(able) or solver.half_kick or solver.integrator not in FIRST_ORDER:
+        return
+    time = np.minimum(scene.world.duration, top_speeds(scene, meet)[able] / pull)
+    off = 0.5 * pull * solver.h * time
+    k = int(np.argmax(off / bodies.thin[able]))
+    if off[k] <= float(bodies.thin[able[k]]):
+        return
+    body, scheme = bodies.names[able[k]], solver.integrator or "explicit_euler"
+    message = (
+        f"{scheme} displaces {body!r} by g·h·t/2, up to {off[k]:.3g} m within one flight of {time[k]:.3g} s, more than "
+        f"its half width, {bodies.thin[able[k]]:.3g} m; solver.half_kick on pymunk, velocity_verlet on the reference, "
+        "and `exact` have no such error"
+    )
+    yield Diagnostic("flight", message, {"body": body, "error": float(off[k])})
+
+
+def _outlines(scene: Scene) -> Iterator[Diagnostic]:
+    bodies = scene.bodies
+    several = [(k, element) for k, element in enumerate(bodies.elements) if isinstance(element, Polygon | Compound)]
+    count_of_notes = 0
+    for k, element in several:
+        name = bodies.names[int(np.flatnonzero(bodies.element == k)[0])]
+        for part, count in _pieces(element):
+            count_of_notes += 1
+            if count_of_notes > MAX_OUTLINES:
+                return
+            which = f"the outline of {name!r}" if part is None else f"outline {part + 1} of {name!r}"
+            message = f"{which} is concave and is decomposed into {count} convex pieces"
+            yield Diagnostic("outline", message, {"body": name, "pieces": count})
+
+
+def _pieces(element: BodySource) -> list[tuple[int | None, int]]:
+    """Return which outlines of an element are decomposed, by index among its polygons, and into how many pieces."""
+    pieces = geometry_of(element).pieces
+    if isinstance(element, Polygon):
+        return [(None, len(pieces))] if len(pieces) > 1 else []
+    assert isinstance(element, Compound)
+    found: list[tuple[int | None, int]] = []
+    outlines = 0
+    for bearer, part in enumerate(element.parts):
+        if isinstance(part, PolygonPart):
+            count = sum(piece.part == bearer for piece in pieces)
+            if count > 1:
+                found.append((outlines, count))
+            outlines += 1
+    return found
+
+
+def _audit(scene: Scene) -> Iterator[Diagnostic]:
+    bodies = scene.bodies
+    some = contact_matrix(scene).touches & ~bodies.round
+    count, without = int(some.sum()), int((some & (bodies.core <= 0.0)).sum())
+    if not count:
+        return
+    message = (
+        f"missed contacts are a lower bound: of the {count:,} bodies that are not balls, only passages of the largest "
+        "inscribed disc about the centre of mass are counted"
+    )
+    if without:
+        message += f"; {without:,} have no such disc and are not counted"
+    yield Diagnostic("audit", message, {"bodies": count, "without": without})

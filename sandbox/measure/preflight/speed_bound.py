@@ -1,0 +1,332 @@
+"""Upper bounds of the speed of each body, from energy, time, tethers, and impacts by heavier bodies."""
+
+import heapq
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sandbox.arrays import FloatArray
+from sandbox.measure.preflight.diagnostic import ROUNDING
+from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
+from sandbox.scene.compile.joint_arrays import WORLD, LinkKind
+from sandbox.scene.compile.potential import Potential
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.base import MAX_SPEED
+from sandbox.scene.description.fixed import Plane, Post, Wall
+from sandbox.scene.description.forces import Attraction
+from sandbox.scene.validate.bodies import height_above
+
+Paths = list[list[tuple[int, float]]]
+
+
+def tether_reach(scene: Scene, down: FloatArray) -> FloatArray:
+    """Return how far along `down` each body can move at most, (N,) m; inf if it is not tethered to a static point.
+
+    From each anchor in the world or on a static body, the reach is the sum of the rods, the slides at their longest,
+    and the paths through the bodies between their joints.
+    """
+    bodies, links = scene.bodies, scene.links
+    links = links.of(LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE)
+    length = np.where(links.kind == LinkKind.ROD, links.figures[:, 0], 0.0)
+    length = np.where(links.kind == LinkKind.SLIDE, links.figures[:, 1], length)
+    arm_a, arm_b = (np.hypot(*each.T) for each in (links.anchor_a, links.anchor_b))
+    still = np.append(bodies.fixed, True)  # the world is −1, the last
+    ways: Paths = [[] for _ in range(len(bodies))]
+    begin: list[tuple[int, float, FloatArray]] = []
+    first, second = links.ends(bodies.position, bodies.angle)
+    for k, (a, b) in enumerate(zip(links.a.tolist(), links.b.tolist(), strict=True)):
+        if still[a] and not still[b]:
+            begin.append((b, float(length[k] + arm_b[k]), first[k]))
+        elif a != WORLD and still[b] and not still[a]:
+            begin.append((a, float(length[k] + arm_a[k]), second[k]))
+        elif not still[a] and not still[b]:
+            way = float(length[k] + arm_a[k] + arm_b[k])
+            ways[a].append((b, way))
+            ways[b].append((a, way))
+    fall = np.full(len(bodies), math.inf)
+    for place, reach in _by_anchor(begin):
+        lowest = float(place @ down) + _shortest_paths(reach, ways)
+        fall = np.minimum(fall, lowest - bodies.position @ down)
+    return fall
+
+
+def _by_anchor(begin: list[tuple[int, float, FloatArray]]) -> list[tuple[FloatArray, list[tuple[float, int]]]]:
+    """Group the tethered bodies by their anchor."""
+    found: dict[tuple[float, float], list[tuple[float, int]]] = {}
+    for number, way, place in begin:
+        found.setdefault((float(place[0]), float(place[1])), []).append((way, number))
+    few = list(found.items())[:MAX_ANCHORS]
+    return [(np.asarray(place), reach) for place, reach in few]
+
+
+MAX_ANCHORS = 100
+"""Largest number of anchors: each costs a search over all joints. The bounds of the others are left out."""
+
+
+def _shortest_paths(reach: list[tuple[float, int]], ways: Paths) -> FloatArray:
+    """Return the shortest path to each body, (N,) m, from the bodies at an anchor (E. W. Dijkstra 1959)."""
+    shortest = np.full(len(ways), math.inf)
+    heap = list(reach)
+    heapq.heapify(heap)
+    while heap:
+        way, number = heapq.heappop(heap)
+        if way >= shortest[number]:
+            continue
+        shortest[number] = way
+        for other, more in ways[number]:
+            if way + more < shortest[other]:
+                heapq.heappush(heap, (way + more, other))
+    return shortest
+
+
+MAX_MASS_CLASSES = 200
+"""Largest number of different masses in a chain of impacts; beyond it, neighbouring ones count as one."""
+
+
+@dataclass(frozen=True)
+class SpeedBounds:
+    """Upper bounds of the speeds of the N bodies of a scene."""
+
+    scene: Scene
+    meet: ContactMatrix
+
+    @cached_property
+    def unknown(self) -> tuple[str, ...]:
+        """Causes that accelerate bodies by an amount that no formula bounds."""
+        scene, found = self.scene, []
+        if any(self._is_steep(each) for each in scene.attractions):
+            found.append("attraction without softening")
+        if scene.drives:
+            found.append("drives")
+        if len(scene.links.of(LinkKind.MOTOR)):
+            found.append("motors")
+        if any(thrust.key is not None for thrust in scene.thrusts):
+            found.append("thrusts on keys")
+        return tuple(found)
+
+    @cached_property
+    def bounded(self) -> bool:
+        """Whether all causes of acceleration are included."""
+        return not self.unknown
+
+    @cached_property
+    def start(self) -> FloatArray:
+        """(N,) m/s, speed at the start."""
+        return np.asarray(np.hypot(*self.scene.bodies.velocity.T))
+
+    @cached_property
+    def squared(self) -> FloatArray:
+        """(N,) m²/s², square of the speed at the start, and what springs and attraction can add."""
+        scene, bodies = self.scene, self.scene.bodies
+        squared = np.square(self.start)
+        springs = scene.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)
+        if len(springs):
+            there = np.ones((1, len(bodies)), np.bool_)
+            stored = Potential(scene, bodies).of_springs(np.zeros(1), bodies.position[None], bodies.angle[None], there)
+            held = np.zeros(len(bodies), np.bool_)
+            held[springs.b] = True
+            held[springs.a[springs.a >= 0]] = True
+            squared += np.where(held, 2.0 * float(stored[0]) / bodies.mass, 0.0)
+        for each in scene.attractions:
+            if each.strength != 0.0 and not self._is_steep(each):
+                squared += 2.0 * abs(each.strength) * self._fallen(each)
+        return np.asarray(squared)
+
+    @cached_property
+    def thrust(self) -> FloatArray:
+        """(N,) m/s, what thrusts without a key can add."""
+        scene, bodies = self.scene, self.scene.bodies
+        added = np.zeros(len(bodies))
+        for each in scene.thrusts:
+            if each.key is None and each.body in bodies.number_of:
+                number = bodies.number_of[each.body]
+                end = scene.world.duration if each.end is None else min(each.end, scene.world.duration)
+                added[number] += math.hypot(*each.force) * max(0.0, end - each.begin) / bodies.mass[number]
+        return added
+
+    @cached_property
+    def gravity(self) -> float:
+        """Gravity, m/s²."""
+        return math.hypot(*self.scene.world.gravity)
+
+    @cached_property
+    def down(self) -> FloatArray:
+        """(2,) unit vector of gravity; only with gravity."""
+        return np.asarray(self.scene.world.gravity) / self.gravity
+
+    @cached_property
+    def own(self) -> FloatArray:
+        """(N,) m/s, bound by the start, fall and forces of each body.
+
+        It falls from the start until a level floor below it or the end of the run; in scenes with joints or other
+        bodies than balls, also until its tether is taut or it has passed all obstacles.
+        """
+        scene, bodies = self.scene, self.scene.bodies
+        speed = np.sqrt(self.squared) + self.gravity * scene.world.duration
+        if self.gravity > 0:
+            for plane in scene.planes:
+                normal = np.asarray(plane.normal) / math.hypot(*plane.normal)
+                # Level up to rounding: on other planes bodies slide down without end.
+                if float(normal @ self.down) < -1.0 + 1e-12:
+                    drop = np.maximum(height_above(plane, bodies.position) - bodies.core, 0.0)
+                    speed = np.where(~self.meet.touches, speed, np.minimum(speed, self._after(drop)))
+            if len(scene.links) or not bodies.round.all():
+                speed = np.minimum(speed, self._after(np.maximum(self._fall(), 0.0)))
+        return self._moved(speed)
+
+    def toward(self, thing: Plane | Wall | Post) -> FloatArray:
+        """Return the bound by the start, fall and forces of each body at a contact with a static object, (N,) m/s."""
+        bodies = self.scene.bodies
+        if isinstance(thing, Plane):
+            return self._across(thing)
+        if self.gravity == 0.0:
+            return self.own
+        if isinstance(thing, Wall):
+            depths, half = np.asarray(thing.points) @ self.down, 0.5 * thing.thickness
+        else:
+            depths, half = np.asarray([np.asarray(thing.position) @ self.down]), thing.radius
+        depth, lowest = bodies.position @ self.down, float(depths.max()) + half
+        level = float(np.ptp(depths)) == 0.0 and isinstance(thing, Wall)
+        # A body that falls onto a level wall touches its upper side first; otherwise at its lowest point at the latest.
+        on_top = level & (depth + bodies.core <= float(depths.max()) - half)
+        drop = np.where(on_top, float(depths.max()) - half - bodies.core - depth, lowest + bodies.radius - depth)
+        return np.minimum(self.own, self._moved(self._after(drop)))
+
+    def _across(self, plane: Plane) -> FloatArray:
+        """Return the bound at a contact with a plane, (N,) m/s.
+
+        If nothing else can deflect the body, only the component across the plane counts.
+        """
+        scene, bodies = self.scene, self.scene.bodies
+        others = len(scene.links) or self.meet.mutual or scene.attractions or scene.thrusts or scene.drives
+        if len(scene.fixed) > 1 or others or any(scene.world.wind):
+            return self.own
+        normal = np.asarray(plane.normal) / math.hypot(*plane.normal)
+        pull = max(0.0, -float(np.asarray(scene.world.gravity) @ normal))
+        height = np.maximum(height_above(plane, bodies.position) - bodies.core, 0.0)
+        return np.minimum(self.own, self._moved(np.sqrt(np.square(bodies.velocity @ normal) + 2.0 * pull * height)))
+
+    @cached_property
+    def struck(self) -> FloatArray:
+        """(N,) m/s, bound after any series of kicks and impacts by others; 0 if it is no larger.
+
+        Impacts are limited by the energy of the others. A body that falls past all obstacles causes no further impacts.
+        """
+        bodies, meet = self.scene.bodies, self.meet
+        movers = ~bodies.fixed & meet.touches
+        own = self.own
+        if self.gravity > 0:
+            own = np.minimum(own, self._moved(self._after(np.maximum(self._fall(), 0.0))))
+        speed = np.where(movers, np.maximum(own, _kick_speed(meet)), own)
+        if meet.mutual and movers.any():
+            # From heavy to light: a resting body of mass m takes up to 2M/(M + m) of the speed of the one that hits it.
+            masses, of_body = np.unique(bodies.mass[movers], return_inverse=True)
+            of_body = of_body.reshape(-1)
+            fastest = np.zeros(len(masses))
+            np.maximum.at(fastest, of_body, speed[movers])
+            energy = 0.5 * float((bodies.mass * np.square(speed))[movers].sum())
+            for k in np.unique(np.linspace(0, len(masses) - 1, MAX_MASS_CLASSES).round().astype(int))[::-1].tolist():
+                fastest = np.maximum(fastest, fastest[k] * 2.0 / (1.0 + masses / masses[k]))
+            if not meet.surfaces.kicks.any():
+                fastest = np.minimum(fastest, np.sqrt(2.0 * energy / masses))
+            speed[movers] = np.maximum(speed[movers], fastest[of_body])
+        return np.where(speed > own * (1.0 + ROUNDING), speed, 0.0)
+
+    def core(self, attraction: Attraction) -> float:
+        """Return the smallest distance of bodies from the centre of an attraction, m: to solid objects there."""
+        scene, bodies = self.scene, self.scene.bodies
+        if isinstance(attraction.toward, str):
+            core = float(bodies.core[bodies.number_of[attraction.toward]])
+            return core if self.meet.mutual else 0.0
+        posts = (
+            post for post in scene.posts if post.solid and math.dist(post.position, attraction.toward) < post.radius
+        )
+        cores = [post.radius - math.dist(post.position, attraction.toward) for post in posts]
+        fixed = bodies.fixed & (bodies.core > 0.0)
+        away = np.hypot(*(bodies.position - np.asarray(attraction.toward)).T)
+        cores += (bodies.core - away)[fixed].tolist() if self.meet.mutual else []
+        return max(0.0, *cores, 0.0)
+
+    def _fallen(self, attraction: Attraction) -> FloatArray:
+        """Return the integral of 1/(r² + ε²) over each body's path to the centre, or far away from it, (N,) 1/m."""
+        bodies, soft, near = self.scene.bodies, attraction.softening, self.core(attraction)
+        toward = attraction.toward
+        place = bodies.position[bodies.number_of[toward]] if isinstance(toward, str) else np.asarray(toward)
+        away = np.maximum(np.hypot(*(bodies.position - place).T), near)
+        drawn = attraction.strength > 0.0
+        if soft == 0.0:
+            with np.errstate(divide="ignore"):
+                return np.asarray(1.0 / near - 1.0 / away if drawn else 1.0 / away)
+        angle = np.arctan(away / soft)
+        return np.asarray((angle - math.atan(near / soft) if drawn else 0.5 * math.pi - angle) / soft)
+
+    def _is_steep(self, attraction: Attraction) -> bool:
+        """Return whether an attraction can accelerate bodies beyond the speed limit, so that nothing bounds them."""
+        near = max(attraction.softening, self.core(attraction))
+        return abs(attraction.strength) >= near * MAX_SPEED**2 and attraction.strength != 0.0
+
+    def _after(self, drop: FloatArray) -> FloatArray:
+        """Return the speeds after a drop, or 0 if a body cannot rise so high, (N,) m/s."""
+        return np.asarray(np.sqrt(np.maximum(self.squared + 2.0 * self.gravity * drop, 0.0)))
+
+    def _moved(self, speed: FloatArray) -> FloatArray:
+        """Return speeds with the contributions of thrusts and wind; 0 for static bodies."""
+        world, bodies = self.scene.world, self.scene.bodies
+        if world.linear_drag or world.quadratic_drag:
+            if not len(self.scene.links) and not self.scene.attractions:
+                speed = np.minimum(speed, np.maximum(self.start, self._terminal))
+            speed = speed + math.hypot(*world.wind)
+        speed = speed + self.thrust
+        return np.where(bodies.fixed, 0.0, speed)
+
+    @property
+    def _terminal(self) -> float:
+        """Speed through the air at which drag balances gravity, m/s."""
+        linear, quadratic = self.scene.world.linear_drag, self.scene.world.quadratic_drag
+        by_linear = self.gravity / linear if linear > 0.0 else math.inf
+        return min(by_linear, math.sqrt(self.gravity / quadratic) if quadratic > 0.0 else math.inf)
+
+    def _fall(self) -> FloatArray:
+        """Return how far each body can fall, (N,) m, until its tether is taut or no obstacle is below it."""
+        scene, bodies, down = self.scene, self.scene.bodies, self.down
+        held = tether_reach(scene, down)
+        if scene.planes:  # a plane that is not level descends without end
+            return held
+        depth = bodies.position @ down
+        stays = np.where(bodies.fixed, 0.0, held)
+        lowest = float(np.max((depth + stays + bodies.radius)[np.isfinite(stays)], initial=-np.inf))
+        for wall in scene.walls:
+            lowest = max(lowest, float((np.asarray(wall.points) @ down).max()) + wall.thickness / 2.0)
+        for post in scene.posts:
+            lowest = max(lowest, float(np.asarray(post.position) @ down) + post.radius)
+        return np.minimum(held, lowest - depth + bodies.radius) if math.isfinite(lowest) else held
+
+
+def unknown_speeds(scene: Scene) -> tuple[str, ...]:
+    """Return the causes that accelerate bodies of a scene by an amount that no formula bounds."""
+    return SpeedBounds(scene, contact_matrix(scene)).unknown
+
+
+def top_speeds(scene: Scene, meet: ContactMatrix) -> FloatArray:
+    """Return the approximate top speed of each body, (N,) m/s: an upper bound if `SpeedBounds.bounded`."""
+    speeds = SpeedBounds(scene, meet)
+    return np.maximum(speeds.own, speeds.struck)
+
+
+def _kick_speed(meet: ContactMatrix) -> float:
+    """Return the speed that kicks give a body that always returns, m/s; that of one kick if there is no limit."""
+    surfaces, fastest = meet.surfaces, 0.0
+    for b in np.flatnonzero(surfaces.kicks).tolist():
+        kick = surfaces.surfaces[b].kick
+        assert kick is not None
+        for a in np.flatnonzero(meet.touching[b]).tolist():
+            e, f = float(surfaces.restitution[a, b]), float(surfaces.falloff[a, b])
+            # v = e v/(1 + f v) + k, that is f v² + (1 − e − k f) v − k = 0
+            half = 0.5 * (1.0 - e - kick.speed * f)
+            root = half + math.sqrt(half * half + f * kick.speed)
+            # and, where k adds to the approach, v = e (v + k)/(1 + f (v + k)): the same equation for v + k
+            met = kick.speed / root if root > 0.0 else (1.0 + (kick.adds_to == "approach")) * kick.speed
+            fastest = max(fastest, met - kick.speed if kick.adds_to == "approach" else met)
+    return fastest

@@ -1,0 +1,236 @@
+"""Tunnelling: bodies that may pass through a thin object or a zone within one substep.
+
+A discrete engine tests for overlap once a substep. A ball whose centre crosses the middle of a thin object within one
+substep is not stopped: it tunnels. With a random phase the odds are 1 − reach/(v·h), where the reach is the ball's
+radius and half the thickness of the object, or both radii for two balls with their relative speed. For any other body,
+half its smallest width counts as the radius.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.measure.preflight.diagnostic import ROUNDING, Diagnostic, floor_3_digits
+from sandbox.measure.preflight.speed_bound import SpeedBounds, top_speeds
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix, reachable_layers
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.base import BACKING
+from sandbox.scene.description.fixed import Plane, Post, Wall, mask_of
+from sandbox.scene.description.world import Settings
+from sandbox.scene.geometry.shapes import width_of
+
+ANOTHER = "another ball"
+ANOTHER_BODY = "another body"
+
+
+@dataclass(frozen=True)
+class TunnellingRisk:
+    """Body that can tunnel through an object, and the substep from which on it can."""
+
+    ball: str
+    thing: str
+    speed: float
+    """m/s, largest closing speed"""
+    reach: float
+    """m, displacement in a substep that is safe"""
+    others: int = 0
+    """number of other bodies that need about as short a substep"""
+    struck: bool = False
+    """whether the body reaches the speed only by impacts of others"""
+
+    @property
+    def safe_h(self) -> float:
+        """Longest safe substep, s."""
+        return self.reach / self.speed if self.speed > 0 else math.inf
+
+    def odds(self, h: float) -> float:
+        """Return the probability of a missed contact with a substep h, s, and a random phase."""
+        way = self.speed * h
+        return 1.0 - self.reach / way if way > self.reach else 0.0
+
+
+def largest_safe_dt(scene: Scene, settings: Settings | None = None) -> float | None:
+    """Return the largest dt at which nothing in the scene can tunnel, s, at its number of substeps.
+
+    It is infinite if nothing can tunnel at any dt, and None if bodies can collide and something accelerates them by an
+    amount that no formula bounds.
+    """
+    settings = scene.solver if settings is None else settings
+    meet = contact_matrix(scene)
+    found, times = tunnelling_risks(scene, meet), detection_factor(settings)
+    if found and math.isfinite(times) and SpeedBounds(scene, meet).unknown:
+        return None
+    return min((p.safe_h for p in found), default=math.inf) * settings.substeps * times
+
+
+def detection_factor(settings: Settings) -> float:
+    """Return the factor by which a detection method extends the safe displacement in a substep: 1 or inf.
+
+    `swept` tests the whole path, and `shrink` divides it into short pieces. `bisect` only tests the end of a substep,
+    and misses a body that is already past the middle. Measured with a bullet at a wall (`sandbox extremes --axes
+    speed`): it passes from v·h of 1.00 times r + w/2 on, also with `bisect`; with the other two it does not pass at 100
+    times.
+    """
+    return math.inf if settings.detection in ("swept", "shrink") else 1.0
+
+
+MAX_PER_OBJECT = 5
+"""Largest number of risks of one object: those that need the shortest substeps."""
+SAME_RISK_RATIO = 1.1
+"""Ratio of the safe substeps of two bodies up to which they are one risk."""
+
+
+def tunnelling_risks(scene: Scene, meet: ContactMatrix | None = None) -> list[TunnellingRisk]:
+    """Return which bodies can tunnel through each object, and through each other, each at its own speed.
+
+    Bodies with about the same safe substep are one risk with the numbers of the worst of them. If impacts by others can
+    make a body faster than any is by itself, the worst such risk is added.
+    """
+    meet = contact_matrix(scene) if meet is None else meet
+    bodies = scene.bodies
+    movers = np.flatnonzero(meet.touches & ~bodies.fixed)
+    if not len(movers):
+        return []
+    speeds = SpeedBounds(scene, meet)
+    half, struck = bodies.thin[movers], speeds.struck[movers]
+    found: list[TunnellingRisk] = []
+
+    def add(able: BoolArray, reach: FloatArray, speed: FloatArray, thing: str) -> None:
+        rows = np.flatnonzero(able)
+        if not len(rows):
+            return
+        own = _groups(bodies.names, movers[rows], reach[rows], speed[rows], thing)
+        found.extend(own)
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # bodies at rest never tunnel
+            worst = rows[int(np.argmin(reach[rows] / struck[rows]))]
+        fastest = TunnellingRisk(
+            bodies.names[movers[worst]], thing, float(struck[worst]), float(reach[worst]), struck=True
+        )
+        if fastest.safe_h < own[0].safe_h * (1.0 - ROUNDING):
+            found.append(fastest)
+
+    layers = reachable_layers(scene, bodies)[movers]
+    for thing, name in zip(scene.fixed, scene.fixed_names, strict=False):
+        if isinstance(thing, Plane) or thing.solid:
+            shares = layers & mask_of(thing.layers, scene.layers) != 0
+            add(shares, half + _half_depth(thing), speeds.toward(thing)[movers], name)
+    fixed = np.flatnonzero(bodies.fixed & meet.touches)
+    if meet.mutual and len(fixed):
+        thinnest = fixed[bodies.thin[fixed].argmin()]
+        add(
+            np.ones(len(movers), np.bool_),
+            half + float(bodies.thin[thinnest]),
+            speeds.own[movers],
+            bodies.names[thinnest],
+        )
+    among = np.flatnonzero(collide_with_all(bodies)[movers])
+    if meet.mutual and len(among) > 1:
+        found.extend(_mutual(scene, speeds, movers[among]))
+    return found
+
+
+def _groups(
+    names: tuple[str, ...], number: IntArray, reach: FloatArray, speed: FloatArray, thing: str
+) -> list[TunnellingRisk]:
+    """Return a risk for each group of similar bodies, the shortest safe substep first, at most `MAX_PER_OBJECT`."""
+    with np.errstate(divide="ignore", over="ignore"):  # bodies at rest never tunnel
+        order = np.argsort(reach / speed, kind="stable")
+    found: list[TunnellingRisk] = []
+    for k in order.tolist():
+        each = TunnellingRisk(names[number[k]], thing, float(speed[k]), float(reach[k]))
+        if found and (each.safe_h <= SAME_RISK_RATIO * found[-1].safe_h or not math.isfinite(each.safe_h)):
+            found[-1] = replace(found[-1], others=found[-1].others + 1)
+        elif len(found) == MAX_PER_OBJECT:
+            break
+        else:
+            found.append(each)
+    return found
+
+
+MAX_MUTUAL = 200
+"""Bodies of which every pair is examined: the fastest and the thinnest."""
+
+
+def _mutual(scene: Scene, speeds: SpeedBounds, number: IntArray) -> list[TunnellingRisk]:
+    """Return the risks of bodies through each other: the worst of each body, and similar ones once."""
+    bodies = scene.bodies
+    another = ANOTHER if bodies.round[number].all() else ANOTHER_BODY
+    if len(number) > MAX_MUTUAL:
+        with np.errstate(divide="ignore", over="ignore"):
+            order = np.argsort(bodies.thin[number] / speeds.own[number], kind="stable")
+        number = number[order[:MAX_MUTUAL]]
+    half, own = bodies.thin[number], speeds.own[number]
+    struck = np.maximum(own, speeds.struck[number])
+    reach = half[:, None] + half
+    two = len(number) == 2 and not scene.fixed and not bodies.fixed.any()
+    closing = own[:, None] + own
+    if two and not len(scene.links) and not (scene.attractions or scene.thrusts or scene.drives):
+        velocity = bodies.velocity[number]
+        closing = np.full((2, 2), float(np.hypot(*(velocity[0] - velocity[1]))))
+    other, _ = _shortest_safe(reach, closing)
+    rows = np.arange(len(number))
+    found = _groups(bodies.names, number, reach[rows, other], closing[rows, other], another)
+    found = [replace(found[0], others=0)] if len(number) == 2 else found
+    closing = struck[:, None] + struck
+    other, safe = _shortest_safe(reach, closing)
+    k = int(safe.argmin())
+    last = other[k]
+    fastest = TunnellingRisk(
+        bodies.names[number[k]], another, float(closing[k, last]), float(reach[k, last]), struck=True
+    )
+    return [*found, fastest] if not two and fastest.safe_h < found[0].safe_h * (1.0 - ROUNDING) else found
+
+
+def _shortest_safe(reach: FloatArray, closing: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Return the other body with which each has the shortest safe substep, (N,), and that substep, (N,) s."""
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # bodies at rest never tunnel
+        safe = np.where(closing > 0.0, reach / closing, np.inf)
+    safe[np.eye(len(safe), dtype=np.bool_)] = np.inf
+    other = safe.argmin(axis=1)
+    other = np.where(other == np.arange(len(safe)), (other + 1) % len(safe), other)  # where all are inf
+    return other, safe.min(axis=1)
+
+
+def collide_with_all(bodies: Bodies) -> BoolArray:
+    """Return which bodies can collide with other bodies, (N,)."""
+    return np.asarray([e.collides == "all" for e in bodies.elements], dtype=np.bool_)[bodies.element]
+
+
+def _half_depth(thing: Plane | Wall | Post) -> float:
+    """Return the depth behind its face up to which an object pushes a centre back, m."""
+    match thing:
+        case Plane():
+            return BACKING
+        case Wall():
+            return thing.thickness / 2.0
+        case Post():
+            return thing.radius
+
+
+def entry_warnings(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterator[Diagnostic]:
+    """Yield a diagnostic for each zone whose smallest width the fastest body can cross in a substep."""
+    noted = np.flatnonzero(meet.can_enter_zone)
+    if not len(noted):
+        return
+    speeds, layers = top_speeds(scene, meet)[noted], reachable_layers(scene, scene.bodies)[noted]
+    names = scene.fixed_names[len(scene.fixed) + len(scene.pockets) :]
+    for zone, name in zip(scene.zones, names, strict=True):
+        able = np.flatnonzero(layers & mask_of(zone.layers, scene.layers))
+        if not len(able):
+            continue
+        k = int(able[np.argmax(speeds[able])])
+        body, speed, width = scene.bodies.names[noted[k]], float(speeds[k]), width_of(zone)
+        odds = 1.0 - width / (speed * settings.h) if speed > 0.0 else 0.0
+        if odds <= ROUNDING:
+            continue
+        safe = width / speed * settings.substeps
+        message = (
+            f"{body!r} can reach {speed:.4g} m/s, {speed * settings.h:.3g} m per substep, and pass through the zone "
+            f"{name!r}, {width:.3g} m wide at its narrowest, undetected: odds up to {100 * odds:.3g} %; "
+            f"dt <= {floor_3_digits(safe)} s is safe"
+        )
+        yield Diagnostic("entry", message, {"ball": body, "thing": name, "speed": speed, "odds": odds, "safe_dt": safe})

@@ -1,0 +1,1 @@
+"""Headless runs: the step loop, the recorder, replays, played games."""

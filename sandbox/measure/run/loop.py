@@ -1,0 +1,223 @@
+"""Step loop of a run: step, apply actions and record frames, to the end or to the failure that ends the run early."""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import chain, repeat
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+
+from sandbox.action import Action, ActionError
+from sandbox.engines.contract import Divergence, Exhaustion, Simulation
+from sandbox.games.session import HeadlessGame
+from sandbox.measure.run.recorder import Recorder
+from sandbox.progress import Progress, ProgressCallback
+from sandbox.schedule import ROUNDING, Stretch
+from sandbox.trajectory import Contacts, Frame
+
+WorkCallback = Callable[[int, Mapping[str, int]], None]
+"""Called from time to time, and at the end, with the steps done and the work counters. It may raise to end the run."""
+
+REPORT_INTERVAL = 0.1
+"""s between two calls of the callbacks."""
+
+MAX_PENDING_CONTACTS = 1024
+"""Steps of a game whose contacts are kept apart before they are merged, which bounds memory."""
+
+
+class RunEnd(NamedTuple):
+    """Outcome of a step loop."""
+
+    status: str
+    """`ok`, `diverged` or `failed`"""
+    reason: str | None
+    """reason for a status other than `ok`"""
+    steps: int
+    """steps made"""
+    contacts: Contacts
+    """all contacts of the run"""
+    done: tuple[Action, ...]
+    """the given actions and those of a game, in the order in which they were applied"""
+
+
+class RunCallbacks(NamedTuple):
+    """Callbacks of a step loop."""
+
+    on_progress: ProgressCallback | None = None
+    on_work: WorkCallback | None = None
+
+
+def run_loop(
+    duration: float,
+    simulation: Simulation,
+    stretches: list[Stretch],
+    actions: Sequence[Action],
+    recorder: Recorder,
+    game: HeadlessGame | None = None,
+    callbacks: RunCallbacks | None = None,
+) -> RunEnd:
+    """Step a simulation to the end of a run.
+
+    Args:
+        duration: duration of the run, s.
+        simulation: simulation at its start.
+        stretches: schedule of the steps.
+        actions: actions in order of time.
+        recorder: recorder of the frames.
+        game: game played during the run; the run ends with the game.
+        callbacks: callbacks for progress and work.
+    """
+    queue = _ActionQueue(simulation, actions, game)
+    loop = _StepLoop(duration, simulation, stretches, queue, recorder, game, callbacks or RunCallbacks())
+    status, reason = "ok", None
+    try:
+        loop.step_all()
+        loop.finish()
+    except Divergence as divergence:
+        status, reason = "diverged", str(divergence)
+        recorder.record(simulation.frame(), divergence.time)
+    except ActionError as error:
+        status, reason = "failed", f"at {simulation.time:g} s: {error}"
+        recorder.record_unless_recorded(simulation.frame())
+    except Exhaustion as error:  # within a step, which has no frame
+        status, reason = "failed", f"at {simulation.time:g} s: {error}"
+    loop.report(1.0)
+    return RunEnd(status, reason, loop.step, loop.queue.contacts(), loop.queue.done)
+
+
+class _StepLoop:
+    """A run in progress."""
+
+    def __init__(
+        self,
+        duration: float,
+        simulation: Simulation,
+        stretches: list[Stretch],
+        queue: "_ActionQueue",
+        recorder: Recorder,
+        game: HeadlessGame | None,
+        callbacks: RunCallbacks,
+    ) -> None:
+        self.step = 0
+        """steps made"""
+        self.queue = queue
+        self._duration, self._simulation, self._stretches = duration, simulation, stretches
+        self._recorder, self._game, self._callbacks = recorder, game, callbacks
+        self._count = sum(stretch.steps for stretch in stretches)
+        self._part = stretches[-1].part
+        """length of the last, incomplete step as a fraction of dt"""
+        self._reported = perf_counter()
+        simulation.contacts()
+        recorder.record(simulation.frame(), 0.0)
+
+    def step_all(self) -> None:
+        """Make all whole steps; a game can end them."""
+        simulation, recorder, queue = self._simulation, self._recorder, self.queue
+        has_callbacks = any(each is not None for each in self._callbacks)
+        for dt in self._step_sizes():
+            now = simulation.time + ROUNDING * dt
+            if now >= queue.next:
+                queue.apply_due(now)
+                if self._is_game_over():
+                    return
+            simulation.step()
+            self.step += 1
+            is_last = self.step == self._count and self._part == 0.0
+            queue.frame = None
+            if recorder.is_due(self.step, is_last):
+                queue.frame = simulation.frame()
+                recorder.record(queue.frame, self._duration if is_last else simulation.time)
+            if has_callbacks and perf_counter() - self._reported > REPORT_INTERVAL:
+                self._reported = perf_counter()
+                self.report(self.step / (self._count + self._part))
+
+    def _step_sizes(self) -> Iterator[float]:
+        return chain.from_iterable(repeat(stretch.dt, stretch.steps) for stretch in self._stretches)
+
+    def _is_game_over(self) -> bool:
+        return self._game is not None and self._game.finished
+
+    def finish(self) -> None:
+        """Make the last, incomplete step, and apply the actions at the end of the run."""
+        simulation, recorder = self._simulation, self._recorder
+        now = simulation.time + ROUNDING * self._stretches[-1].dt
+        if self._is_game_over():
+            recorder.record_end(simulation.frame())
+        elif self._part > 0.0:
+            self.queue.apply_due(now)
+            simulation.finish(self._part)
+            self.queue.frame = simulation.frame()
+            recorder.record(self.queue.frame, self._duration)
+            self.queue.notify_end()
+        elif self.queue.apply_due(now, is_last=True):
+            recorder.replace_last(simulation.frame())
+
+    def report(self, fraction: float) -> None:
+        """Call the callbacks."""
+        if self._callbacks.on_work is not None:
+            self._callbacks.on_work(self.step, self._simulation.work)
+        if self._callbacks.on_progress is not None:
+            self._callbacks.on_progress(Progress(fraction=fraction))
+
+
+class _ActionQueue:
+    """Actions between steps: those that were given, and those of a game."""
+
+    def __init__(self, simulation: Simulation, actions: Sequence[Action], game: HeadlessGame | None) -> None:
+        self._simulation, self._actions, self._game = simulation, actions, game
+        self._due = 0
+        self.next = -math.inf
+        """s, time of the next action; with a game, every step has one"""
+        self._done: list[Action] = []
+        self._pending: list[Contacts] = []
+        self.frame: Frame | None = None
+        """the present frame, if it was just read, so that a game need not read it again"""
+
+    def apply_due(self, now: float, is_last: bool = False) -> bool:
+        """Apply all actions whose time has come by `now`, s; return whether there were any."""
+        begin = self._due
+        while self._due < len(self._actions) and self._actions[self._due].time <= now:
+            self._due += 1
+            if self._game is None:
+                self._simulation.apply(self._actions[self._due - 1])
+        if self._game is None:
+            self.next = self._actions[self._due].time if self._due < len(self._actions) else math.inf
+            return self._due > begin
+        actions = self._game_turn(self._actions[begin : self._due], is_last)
+        for action in actions:
+            self._simulation.apply(action)
+            self._done.append(action)
+        return bool(actions)
+
+    def notify_end(self) -> None:
+        """Show a game the end of a run within a step, when no action is possible any more."""
+        if self._game is not None:
+            self._game_turn((), is_last=True)
+
+    def _game_turn(self, given: Sequence[Action], is_last: bool) -> Sequence[Action]:
+        assert self._game is not None
+        simulation, contacts = self._simulation, self._simulation.contacts()
+        if len(contacts):
+            self._pending.append(contacts)
+            if len(self._pending) == MAX_PENDING_CONTACTS:
+                self._pending = [Contacts.joined(self._pending).merged()]
+        frame = simulation.frame() if self.frame is None else self.frame
+        return self._game.actions_between_steps(simulation.time, frame, contacts, given, is_last)
+
+    @property
+    def done(self) -> tuple[Action, ...]:
+        """All given actions, or with a game all that were applied."""
+        return tuple(self._actions) if self._game is None else tuple(self._done)
+
+    def contacts(self) -> Contacts:
+        """Return all contacts of the run."""
+        rest = self._simulation.contacts()
+        return _by_pair(Contacts.joined([*self._pending, rest]).merged() if self._pending else rest)
+
+
+def _by_pair(contacts: Contacts) -> Contacts:
+    """Return contacts sorted by time and, at equal times, by pair; the order of an engine is arbitrary."""
+    order = np.lexsort((contacts.pair[:, 1], contacts.pair[:, 0], contacts.time))
+    vectors = (each[order] for each in (contacts.point, contacts.normal, contacts.impulse))
+    return Contacts(contacts.time[order], contacts.pair[order], *vectors)

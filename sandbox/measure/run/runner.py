@@ -1,0 +1,250 @@
+"""Runner: computes a scene on an engine from start to end, with recording and audit."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from sandbox.action import Action, Spawn, actions_to_json, in_order
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.common.compile_clock import COMPILE_CLOCK
+from sandbox.engines.common.energy_balance import total_energy
+from sandbox.engines.contract import Refusal, Simulation
+from sandbox.engines.energy_ledger import Cause
+from sandbox.engines.registry import engine_named
+from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.games.session import HeadlessGame
+from sandbox.measure.metrics.energy import energies
+from sandbox.measure.metrics.invariants import joint_error
+from sandbox.measure.missed_contacts import Audit
+from sandbox.measure.run.loop import RunCallbacks, RunEnd, WorkCallback, run_loop
+from sandbox.measure.run.recorder import EnergyReader, Recorder, TooLargeError
+from sandbox.progress import ProgressCallback
+from sandbox.provenance import versions
+from sandbox.scene.compile.contacts import bits_of
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.base import MAX_STEPS
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.document import to_document
+from sandbox.scene.files.load import as_scene
+from sandbox.schedule import Stretch, schedule
+from sandbox.signals import reraise_interrupt
+from sandbox.trajectory import Contacts, Trajectory
+
+
+@reraise_interrupt()
+def run(
+    scene: Scene | Setup | str | Path,
+    engine: str = "pymunk",
+    *,
+    actions: Sequence[Action] = (),
+    audit: bool = True,
+    account: bool = False,
+    on_progress: ProgressCallback | None = None,
+    bout: HeadlessGame | None = None,
+    on_work: WorkCallback | None = None,
+    **settings: Any,
+) -> Trajectory:
+    """Run a scene from start to end.
+
+    Args:
+        scene: the scene, or its name or path, as `load` takes it; or a setup, to start from another state.
+        engine: name of the engine.
+        actions: actions applied during the run, each before the first step that starts at its time or later. Actions at
+            the end of the run are applied after the last step.
+        audit: count the contacts that the engine misses.
+        account: record the energy account at every frame, which `measure.metrics.energy.ledger_of` reads.
+        on_progress: progress callback; its fraction is the completed part of the run.
+        bout: game played during the run; the run ends with the game. Its actions are among those of the result.
+        on_work: callback with the steps done and the work counters. An exception that it raises ends the run without a
+            result.
+        settings: changes to the scene's `[solver]`, such as `dt=0.001`.
+
+    Returns:
+        The recorded run up to its end or failure. Its `status` is `ok`; `diverged` if the state left the bounds of
+        position or speed; `failed` if an action could not be applied, such as one for a removed body, or if the
+        contacts exceeded memory; `refused`, without frames, if the engine does not support the scene or a setting.
+        `reason` has the details.
+
+    Raises:
+        UnknownEngineError: no engine has that name.
+        SceneError: the name or path is not that of a valid scene.
+        TooLargeError: the frames would not fit into memory, or the number of steps exceeds the limit.
+        pydantic.ValidationError: a setting is invalid.
+        KeyboardInterrupt: Ctrl-C was pressed, even if a library converted it to another exception.
+    """
+    setup = scene if isinstance(scene, Setup) else Setup.of(as_scene(scene))
+    scene = setup.scene
+    chosen = engine_named(engine)
+    wanted = scene.solver.replace(**settings) if settings else scene.solver
+    actions = in_order(tuple(actions))
+    stretches = _schedule(scene, wanted, actions)
+    try:
+        simulation = start(setup, engine, wanted)
+    except Refusal as refusal:
+        return run_without_frames(setup, engine, wanted, actions, "refused", str(refusal))
+    resolved = chosen.resolve(setup, wanted)
+    bodies = len(setup.bodies) + sum(isinstance(action, Spawn) for action in actions)
+    recorder = Recorder(scene, resolved, bodies, actions, _energy_reader(simulation) if account else None, len(Cause))
+    timed_audit = TimedAudit(setup, simulation) if audit else None
+
+    began, compiled = perf_counter(), COMPILE_CLOCK.seconds
+    callbacks = RunCallbacks(on_progress, on_work)
+    end = run_loop(scene.world.duration, simulation, stretches, actions, recorder, bout, callbacks)
+    seconds = perf_counter() - began - (timed_audit.seconds if timed_audit else 0.0)
+    seconds -= COMPILE_CLOCK.seconds - compiled
+    work, state_hash = dict(simulation.work), simulation.state_hash()
+
+    outcome = {"status": end.status, "reason": end.reason, "steps": end.steps, "seconds": seconds, "work": work}
+    outcome |= {"audited": audit, "state_hash": state_hash, "broken": len(simulation.broken)}
+    info = _info(scene, engine, resolved, end.done, **outcome)
+    if bout is not None:
+        info["game"] = bout.to_dict(scene.play.game or "")
+    if account:
+        info["causes"] = [cause.value for cause in Cause]
+    trajectory = _recorded_run(setup, simulation, recorder, end, timed_audit, info)
+    simulation.close()
+    return trajectory
+
+
+def _schedule(scene: Scene, settings: Settings, actions: tuple[Action, ...]) -> list[Stretch]:
+    """Return the step schedule of a run, after checking the number of steps."""
+    stretches = schedule(scene.world.duration, settings.dt, actions)
+    substeps = sum(stretch.steps + stretch.part for stretch in stretches) * settings.substeps
+    if substeps > MAX_STEPS:
+        raise TooLargeError(f"{substeps:.3g} steps in a run; the limit is {MAX_STEPS:g}")
+    return stretches
+
+
+def _energy_reader(simulation: Simulation) -> EnergyReader:
+    """Return a function that reads the present energy of a simulation, J, and the entries of its account in order."""
+
+    def read_energy() -> tuple[float, list[float]]:
+        return total_energy(simulation), list(simulation.account().values())
+
+    return read_energy
+
+
+def _recorded_run(
+    setup: Setup,
+    simulation: SwitchableSimulation,
+    recorder: Recorder,
+    end: RunEnd,
+    audit: "TimedAudit | None",
+    info: dict[str, Any],
+) -> Trajectory:
+    """Return the trajectory of a run that has ended; `info` gets its energies and joint error."""
+    bodies = simulation.bodies
+    retired = np.full(len(bodies), np.nan)
+    for number, time in simulation.retired.items():
+        retired[number] = time
+    broken = np.full(len(setup.links), np.nan)
+    broken[list(simulation.broken)] = list(simulation.broken.values())
+    missed_time, missed_pair = audit.missed if audit else (None, None)
+    trajectory = Trajectory.from_frames(
+        {**recorder.arrays(len(bodies)), "layer": recorder.layers(len(bodies))},
+        bodies.names,
+        end.contacts,
+        retired,
+        info,
+        missed_time=missed_time,
+        missed_pair=missed_pair,
+        broken_time=broken,
+    )
+    total = energies(trajectory.at([0, -1]), setup, bodies=bodies).total
+    info |= {"energy_start": float(total[0]), "energy_end": float(total[-1])}
+    info["joint_error"] = joint_error(trajectory, setup)
+    return trajectory
+
+
+def run_without_frames(
+    start: Scene | Setup, engine: str, settings: Settings, actions: tuple[Action, ...], status: str, reason: str
+) -> Trajectory:
+    """Return the trajectory of a run that recorded nothing.
+
+    Args:
+        start: scene or setup of the run.
+        engine: name of the engine.
+        settings: settings of the run.
+        actions: actions of the run.
+        status: status of the run, `refused` or `failed`.
+        reason: reason for the status.
+    """
+    setup = Setup.of(start)
+    scene, count = setup.scene, len(setup.bodies)
+    outcome = {"status": status, "reason": reason, "steps": 0, "seconds": 0.0, "work": {}, "audited": False}
+    outcome |= {"state_hash": None, "broken": 0}
+    info = _info(scene, engine, settings, actions, **outcome, energy_start=None, energy_end=None, joint_error=None)
+    shapes = {"position": (0, count, 2), "velocity": (0, count, 2), "angle": (0, count), "angular_velocity": (0, count)}
+    frames = {"time": np.empty(0)} | {name: np.empty(shape) for name, shape in shapes.items()}
+    unbroken = np.full(len(setup.links), np.nan)
+    return Trajectory.from_frames(
+        frames, setup.bodies.names, Contacts.none(), np.full(count, np.nan), info, broken_time=unbroken
+    )
+
+
+def _info(scene: Scene, engine: str, settings: Settings, actions: tuple[Action, ...], **outcome: Any) -> dict[str, Any]:
+    return {
+        "scene": to_document(scene),
+        "engine": engine,
+        "settings": settings.model_dump(mode="json"),
+        "actions": actions_to_json(actions),
+        "seed": scene.world.seed,
+        "versions": dict(versions()),
+        **outcome,
+    }
+
+
+class TimedAudit:
+    """Audit of a simulation that measures its own time, so that the time of a run is the engine's."""
+
+    def __init__(self, start: Scene | Setup, simulation: Simulation) -> None:
+        """Watch every substep of a simulation.
+
+        Args:
+            start: scene or setup of the simulation.
+            simulation: the simulation, before its first step.
+        """
+        setup = Setup.of(start)
+        self._audit = Audit(setup, simulation.bodies)
+        self._simulation = simulation
+        self._known, self._scene = len(simulation.bodies), simulation.scene
+        self._layers_before = self._layers() if len(setup.scene.layers) > 1 else None
+        self.seconds = 0.0
+        """s, time spent in the audit"""
+        simulation.watch(self)
+
+    def __call__(self, time: float, start: FloatArray, end: FloatArray, touching: IntArray) -> None:
+        """Audit one substep."""
+        began = perf_counter()
+        if (now := self._simulation.scene) is not self._scene:
+            if now.fixed != self._scene.fixed:
+                self._audit.changed(now, self._simulation.bodies)
+            self._scene = now
+        if len(end) != self._known:
+            self._audit.joined(self._simulation.bodies)
+            self._known = len(end)
+        self._audit(time, start, end, touching, self._shared_layers())
+        self.seconds += perf_counter() - began
+
+    def _layers(self) -> IntArray:
+        """Return the layer of each body as a bit, (N,)."""
+        frame = self._simulation.frame()
+        return bits_of(frame.layer, len(frame.position))
+
+    def _shared_layers(self) -> IntArray | None:
+        """Return the layer of each body throughout the last substep as a bit; 0 for a body that changed its layer."""
+        if self._layers_before is None:
+            return None
+        before, self._layers_before = self._layers_before, self._layers()
+        shared = self._layers_before.copy()
+        shared[: len(before)] &= before
+        return shared
+
+    @property
+    def missed(self) -> tuple[FloatArray, IntArray]:
+        """Times, (M,) s, and pairs, (M, 2), of the missed contacts."""
+        return self._audit.missed()

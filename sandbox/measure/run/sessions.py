@@ -1,0 +1,255 @@
+"""Sessions without a window: replays of recordings, games played by a policy, episodes of an environment."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from sandbox.action import Action, Switch, actions_from_json
+from sandbox.engines.registry import UnknownEngineError, engine_named
+from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.games.contract import Control, Policy, Press, Rules
+from sandbox.games.players import RECORDED, PlayerSpec
+from sandbox.games.registry import required_rules, rules_of
+from sandbox.games.session import GameSession, HeadlessGame
+from sandbox.measure.run.runner import run
+from sandbox.progress import ProgressCallback
+from sandbox.recording import Recording
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.errors import Fault, SceneError
+from sandbox.trajectory import Contacts, Frame, Trajectory
+
+
+def read_session(path: str | Path) -> Recording:
+    """Read a session, and check that the engines and settings of the session and of its `switch` actions exist.
+
+    Raises:
+        SceneError: the file cannot be read or is no session; or with every engine and setting that does not exist.
+    """
+    session = Recording.load(path)
+    faults = []
+
+    def check_engine(name: str, key: str) -> None:
+        try:
+            engine_named(name)
+        except UnknownEngineError as error:
+            faults.append(Fault(str(path), None, key, str(error)))
+
+    check_engine(session.engine, "engine")
+    for k, action in enumerate(session.actions):
+        if not isinstance(action, Switch):
+            continue
+        if action.engine is not None:
+            check_engine(action.engine, f"actions[{k}].engine")
+        try:
+            session.settings.replace(**action.settings)
+        except ValidationError as error:
+            for each in error.errors():
+                key = ".".join(("settings", *map(str, each["loc"])))
+                faults.append(Fault(str(path), None, f"actions[{k}].{key}", each["msg"]))
+    if faults:
+        raise SceneError(faults)
+    return session
+
+
+def rerun(
+    recording: Recording, engine: str | None = None, *, audit: bool = True, on_progress: ProgressCallback | None = None
+) -> Trajectory:
+    """Run a session again.
+
+    With its own engine and the same versions it ends in the same state, bit for bit: `info["state_hash"]` is that of
+    the recording. Another engine computes the whole session, even if the session switched engines.
+
+    The rules of a game run along: `info["game"]` has their score, and in `otherwise` the time, s, from which on they
+    would have acted differently from the recording, which does not happen on the same engine.
+
+    Args:
+        recording: the session.
+        engine: name of another engine; default: the session's own.
+        audit: count the contacts that the engine misses.
+        on_progress: progress callback; its fraction is the completed part.
+
+    Raises:
+        UnknownEngineError: no engine has that name.
+        TooLargeError: the frames would not fit into memory.
+        UnfitError: the scene lacks an element that its game needs.
+    """
+    chosen = recording if engine is None else recording.on(engine)
+    rules = rules_of(chosen.scene, on_request=recording.has_game)
+    return run(
+        chosen.whole_scene,
+        chosen.engine,
+        actions=chosen.actions,
+        audit=audit,
+        on_progress=on_progress,
+        bout=None if rules is None else HeadlessGame(rules, None, RECORDED, chosen.presses),
+        **chosen.settings.model_dump(),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class PlayedGame:
+    """Result of a game."""
+
+    score: float
+    """score at the end"""
+    over: str | None
+    """reason why the game ended; None if it lasted to the end of the scene's duration"""
+    recording: Recording
+    """all controls and actions; `measure.replay.rerun` reproduces score and state from it"""
+    trajectory: Trajectory
+    """recorded run with its contacts; its `status` is `ok` if the physics reached the end"""
+
+
+def play_out(
+    scene: Scene,
+    player: Policy | str = "random",
+    engine: str = "pymunk",
+    *,
+    audit: bool = False,
+    on_progress: ProgressCallback | None = None,
+    **settings: Any,
+) -> PlayedGame:
+    """Play the game of a scene until it is over, or for the scene's duration.
+
+    Args:
+        scene: scene with a game; its seed determines all random numbers, also those of the `random` player.
+        player: `random`, `none`, the path of a script, or a policy.
+        engine: name of the engine.
+        audit: count the contacts that the engine misses.
+        on_progress: progress callback; its fraction is the completed part.
+        settings: changes to the scene's `[solver]`, such as `dt=0.001`.
+
+    Raises:
+        UnfitError: the scene has no game with rules, or lacks an element that its game needs.
+        SceneError: the script has faults.
+        UnknownEngineError: no engine has that name.
+        TooLargeError: the frames would not fit into memory.
+    """
+    rules = required_rules(scene)
+    game = (
+        PlayerSpec.parse(player).start_game(scene)
+        if isinstance(player, str)
+        else HeadlessGame(rules, player, type(player).__name__)
+    )
+    assert game is not None
+    trajectory = run(scene, engine, audit=audit, on_progress=on_progress, bout=game, **settings)
+    return PlayedGame(
+        game.score, game.game_over, _recording(scene, engine, trajectory, game.presses, settings), trajectory
+    )
+
+
+def _recording(
+    scene: Scene, engine: str, run: Trajectory, presses: tuple[Press, ...], settings: dict[str, Any]
+) -> Recording:
+    return Recording(
+        scene=scene,
+        engine=engine,
+        settings=scene.solver.replace(**settings) if settings else scene.solver,
+        actions=actions_from_json(json.dumps(run.info["actions"])),
+        duration=float(run.time[-1]) if len(run.time) else 0.0,
+        state_hash=run.info["state_hash"],
+        presses=presses,
+        score=run.info["game"]["score"] if "game" in run.info else None,
+    )
+
+
+class Episode:
+    """Scene with a game that runs step by step, for environments."""
+
+    def __init__(self, scene: Scene, engine: str) -> None:
+        """Start the scene and its game.
+
+        Raises:
+            UnfitError: the scene has no game with rules, or lacks an element that its game needs.
+            Refusal: the engine does not support the scene.
+        """
+        self.scene, self.engine = scene, engine
+        self._referee = GameSession(required_rules(scene))
+        self.relay: SwitchableSimulation = start(scene, engine)
+        """what runs"""
+        self.relay.contacts()
+        self._done: list[Action] = []
+        self._levels = [0.0] * len(self.rules.controls)
+        self._look(Contacts.none())
+
+    @property
+    def rules(self) -> Rules:
+        """Rules of the game in their present state."""
+        return self._referee.rules
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self.relay.time
+
+    @property
+    def late(self) -> bool:
+        """Whether the duration of the scene is over."""
+        return self.relay.time >= self.scene.world.duration - 0.5 * self.scene.solver.dt
+
+    @property
+    def ended(self) -> bool:
+        """Whether the scene or the game is over."""
+        return self.late or self.rules.game_over is not None
+
+    def frame(self) -> Frame:
+        """Return the present state."""
+        return self.relay.frame()
+
+    def press(self, levels: Sequence[float]) -> None:
+        """Set each control to a level from 0 to 1; a digital control is on above one half.
+
+        Raises:
+            ActionError: an action of the game is invalid.
+        """
+        for k, (control, level) in enumerate(zip(self.rules.controls, levels, strict=True)):
+            value = _value(control, level)
+            if value != self._levels[k]:
+                self._levels[k] = value
+                acts = self._referee.press(self.relay.time, control.name, value)
+                self._do(acts)
+                self._referee.note_actions(acts)
+
+    def step(self) -> None:
+        """Advance by one dt and apply the actions of the rules.
+
+        Raises:
+            Divergence, Exhaustion: the engine cannot continue.
+            ActionError: an action of the rules is invalid.
+        """
+        self.relay.step()
+        self._look(self.relay.contacts())
+
+    def recording(self) -> Recording:
+        """Return the session so far as a recording."""
+        return Recording(
+            scene=self.scene,
+            engine=self.engine,
+            settings=self.scene.solver,
+            actions=tuple(self._done),
+            duration=self.relay.time,
+            state_hash=self.relay.state_hash(),
+            presses=self._referee.presses,
+            score=self.rules.score,
+        )
+
+    def close(self) -> None:
+        """Release the engine."""
+        self.relay.close()
+
+    def _look(self, contacts: Contacts) -> None:
+        """Show the rules the present state, and apply their actions."""
+        self._do(self._referee.on_step(self.relay.time, self.relay.frame(), contacts))
+
+    def _do(self, acts: Sequence[Action]) -> None:
+        for act in acts:
+            self.relay.apply(act)
+            self._done.append(act)
+
+
+def _value(control: Control, level: float) -> float:
+    return level if control.analogue else float(level > 0.5)

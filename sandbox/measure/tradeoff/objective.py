@@ -1,0 +1,156 @@
+"""Objective of a trade-off: metric, tolerance and budget, and the Pareto front of error and cost."""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+
+from sandbox.echo import short_repr
+from sandbox.measure.metrics.invariants import CONSTRAINT_KINDS
+from sandbox.measure.metrics.trajectory_error import default_tolerance
+from sandbox.measure.tradeoff.metrics import METRICS, EvaluationContext, Metric
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.scene import Scene
+
+T = TypeVar("T")
+
+DEFAULT_TOLERANCES = {"px": 1.0, "s": 0.05, "": 0.01}
+"""Default tolerances by unit; for lengths it is that of `compare`: 1 % of the smallest radius."""
+COUNT_METRICS = frozenset({"missed_contacts"})
+"""Metrics that are counts: their default tolerance is 0."""
+AUDIT_METRICS = frozenset({"missed_contacts", "passes"})
+"""Metrics that only an audited run has."""
+
+
+class UnknownMetricError(ValueError):
+    """No metric has that name."""
+
+
+class Objective(NamedTuple):
+    """Metric of the error, largest accepted error, and computing time available."""
+
+    metric: Metric
+    """metric of the error"""
+    tolerance: float
+    """largest accepted error, in the unit of the metric"""
+    budget: float | None
+    """ms, computing time per frame; None if not given"""
+    fps: float
+    """frames per second of the budget"""
+    max_dt: float = math.inf
+    """s, longest dt of a recommended configuration: between its steps the error is unknown"""
+    reason: str = "it was requested"
+    """reason for the choice of the metric, as a clause"""
+
+    @property
+    def seconds_budget(self) -> float | None:
+        """The budget in s per simulated second."""
+        return None if self.budget is None else 1e-3 * self.budget * self.fps
+
+
+def check_objective(metric: str | None, tolerance: float | None, budget: float | None, fps: float) -> None:
+    """Check an objective before anything is run.
+
+    Raises:
+        UnknownMetricError: no metric has that name.
+        ValueError: a number is not positive and finite; only the tolerance of a count may be 0.
+    """
+    counted = metric is not None and metric_named(metric).name in COUNT_METRICS
+    if tolerance is not None and not (0.0 < tolerance < math.inf or (tolerance == 0.0 and counted)):
+        raise ValueError(f"the tolerance is {tolerance:g}; it must be positive and finite")
+    for what, value in (("budget", budget), ("fps", fps)):
+        if value is not None and not 0.0 < value < math.inf:
+            raise ValueError(f"the {what} is {value:g}; it must be positive and finite")
+
+
+def complete_objective(
+    context: EvaluationContext, metric: str | None, tolerance: float | None, budget: float | None, fps: float
+) -> Objective:
+    """Return an objective that passed `check_objective`, with defaults for what was not given."""
+    chosen, reason = choose_metric(context) if metric is None else (metric_named(metric), "it was requested")
+    if tolerance is None:
+        fallback = default_tolerance(context.scene)
+        tolerance = 0.0 if chosen.name in COUNT_METRICS else DEFAULT_TOLERANCES.get(chosen.unit, fallback)
+    return Objective(chosen, tolerance, budget, fps, reason=reason)
+
+
+def metric_named(name: str) -> Metric:
+    """Return the metric with a name.
+
+    Raises:
+        UnknownMetricError: no metric has that name; the message lists the names.
+    """
+    try:
+        return METRICS[name]
+    except KeyError:
+        raise UnknownMetricError(f"unknown metric {short_repr(name)}; metrics: {', '.join(METRICS)}") from None
+
+
+def choose_metric(context: EvaluationContext) -> tuple[Metric, str]:
+    """Return the default metric of a scene, and the reason for it as a clause.
+
+    It is the distance from the truth if that is trusted to the end. Otherwise it is the first invariant that applies:
+    the joint error if there are joints; energy if it is conserved; the displacement of bodies that the truth has at
+    rest, as in a stack; the penetration if bodies can collide. If none applies, it is the distance from the truth up to
+    the trusted time, or energy if there is no truth or nothing moves.
+    """
+    scene, duration = context.scene, context.scene.world.duration
+    if not context.moving.any():
+        return METRICS["energy"], "no body in the scene can move"
+    if context.truth is not None and context.until >= duration:
+        kind = context.truth.kind.replace("_", " ")
+        return METRICS["max_position"], f"the truth ({kind}) is trusted to the end, {duration:.4g} s"
+    if context.truth is None:
+        doubt = f"no truth is known{f' ({context.doubt})' if context.doubt else ''}"
+    else:
+        doubt = f"positions are predictable for {context.until:.3g} s of {duration:.4g} s only"
+    if np.isin(scene.links.kind, CONSTRAINT_KINDS).any():
+        return METRICS["joint_error"], f"{doubt}, and the scene has joints"
+    if conserves_energy(scene):
+        return METRICS["energy"], f"{doubt}, and energy is conserved"
+    if context.at_rest.any():
+        return METRICS["drift"], f"{doubt}, and {int(context.at_rest.sum())} bodies should stay at rest"
+    if contact_matrix(scene).touches.any():
+        return METRICS["penetration"], f"{doubt}, and bodies can collide"
+    if context.truth is None:
+        return METRICS["energy"], doubt
+    return METRICS["max_position"], f"{doubt}; errors count up to that time"
+
+
+def conserves_energy(scene: Scene) -> bool:
+    """Return whether a scene conserves energy: no drag, friction, damper, thrust or drive, and elastic contacts."""
+    if scene.world.linear_drag or scene.world.quadratic_drag or scene.thrusts or scene.drives:
+        return False
+    if scene.links.figures[:, 2].any():
+        return False
+    meet = contact_matrix(scene)
+    elastic = (meet.surfaces.restitution == 1.0) & meet.surfaces.fixed_coefficients
+    return bool(elastic[meet.touching].all() and meet.friction == 0.0)
+
+
+def pareto(items: Iterable[T], cost: Callable[[T], float], error: Callable[[T], float]) -> list[T]:
+    """Return the items that no other item beats in both cost and error, cheapest first; of equal items the first.
+
+    Args:
+        items: the items.
+        cost: cost of an item.
+        error: error of an item.
+    """
+    found: list[T] = []
+    for item in sorted(items, key=lambda each: (cost(each), error(each))):
+        if not found or error(item) < error(found[-1]):
+            found.append(item)
+    return found
+
+
+def is_dominated(cost: float, error: float, others: Sequence[tuple[float, float]], margin: float) -> bool:
+    """Return whether another (cost, error) is at least as accurate and costs less than `margin` times as much.
+
+    Args:
+        cost: cost of the item.
+        error: error of the item.
+        others: (cost, error) of the other items.
+        margin: factor of the cost, such as 0.8.
+    """
+    return any(its_cost < margin * cost and its_error <= error for its_cost, its_error in others)

@@ -1,0 +1,183 @@
+"""Recommendation: the evaluation that answers a question, or the nearest one if there is none."""
+
+from collections.abc import Callable, Sequence
+
+from sandbox.formatting import format_quantity
+from sandbox.measure.tradeoff.configuration import Evaluation
+from sandbox.measure.tradeoff.objective import Objective
+from sandbox.measure.tradeoff.result import Recommendation
+from sandbox.scene.description.world import Settings
+
+VALIDATION_SEEDS = 3
+"""Seeds, not used in the search, with which a recommended configuration is run again."""
+
+FRAME_TOLERANCE = 1.01
+"""A step may be this many times longer than a frame, such as 0.0167 s at 60 fps."""
+
+NOISE_FACTOR = 1.5
+"""Times of different engines within this factor count as equal, and counted work decides. The minimum of 5 repeats in
+turns varied by 2 to 7 % in 8 measurements of 8 settings on a machine at a load of 5; the rest is room for more load."""
+
+WORK_FACTOR = 4.0
+"""Within one engine, counted work, which has no noise, decides up to this factor of the least time; beyond it, the time
+does. Counted works are within a factor of 2.5 of the time (`bounded_run.COST_WEIGHTS`)."""
+
+EQUAL_WORK_FACTOR = 1.05
+"""Counted works within this factor of the least count as equal, and the setting with fewer changes is taken: the
+weights of the counters are no more accurate than that."""
+
+Validate = Callable[[Evaluation], float]
+"""Runs a configuration with the validation seeds and returns the largest error; infinite if a run fails."""
+
+
+def recommend_cheapest(
+    points: Sequence[Evaluation], objective: Objective, seeds: Sequence[int], validate: Validate
+) -> Recommendation | None:
+    """Return the cheapest evaluation within the tolerance, also with the validation seeds; None if there is none.
+
+    Args:
+        points: the evaluations.
+        objective: what is asked for.
+        seeds: validation seeds; empty if the scene has no randomness.
+        validate: returns the error with these seeds.
+    """
+    candidates = [
+        p for p in _recommendable(points, objective) if p.error is not None and p.error <= objective.tolerance
+    ]
+    for point in by_cost(candidates):
+        error = validate(point) if seeds else None
+        if error is None or error <= objective.tolerance:
+            return Recommendation(point, describe(point, objective, error), tuple(seeds), error)
+    return None
+
+
+def recommend_most_accurate(
+    points: Sequence[Evaluation], objective: Objective, seeds: Sequence[int], validate: Validate
+) -> Recommendation | None:
+    """Return the evaluation with the smallest error whose frames are within the budget, or None.
+
+    Of equal errors it is the one with the least counted work. The arguments are those of `recommend_cheapest`.
+    """
+    if objective.budget is None:
+        return None
+    candidates = [p for p in _recommendable(points, objective) if p.frame_time(objective.fps) <= objective.budget]
+    point = min(candidates, key=lambda each: (each.error or 0.0, _counted_cost(each)), default=None)
+    if point is None:
+        return None
+    error = validate(point) if seeds else None
+    return Recommendation(point, describe(point, objective, error), tuple(seeds), error)
+
+
+def nearest_to_tolerance(points: Sequence[Evaluation], objective: Objective) -> Recommendation | None:
+    """Return the evaluation with the smallest error, of equals the one with the fewest changes; None without any."""
+    candidates = _recommendable(points, objective)
+    point = min(candidates, key=lambda p: (p.error or 0.0, len(p.changes), _counted_cost(p)), default=None)
+    return None if point is None else Recommendation(point, describe(point, objective, None), (), None)
+
+
+def nearest_to_budget(points: Sequence[Evaluation], objective: Objective) -> Recommendation | None:
+    """Return the evaluation whose most expensive frame takes the least time; None without any."""
+    point = min(_recommendable(points, objective), key=lambda p: p.frame_time(objective.fps), default=None)
+    return None if point is None else Recommendation(point, describe(point, objective, None), (), None)
+
+
+def by_cost(points: Sequence[Evaluation]) -> list[Evaluation]:
+    """Return evaluations from the cheapest on: of one engine by counted work, of several by time up to its noise.
+
+    Evaluations that were timed separately come first: the times of the others include recording and audit.
+    """
+    timed = [p for p in points if p.repeats]
+    engines = [
+        _by_work_and_time([p for p in timed if p.engine == name]) for name in dict.fromkeys(p.engine for p in timed)
+    ]
+    found = []
+    while engines:
+        least = min(own[0].cost or 0.0 for own in engines)
+        close = [own for own in engines if (own[0].cost or 0.0) <= NOISE_FACTOR * least]
+        found.append(min(close, key=lambda own: _counted_cost(own[0])).pop(0))
+        engines = [own for own in engines if own]
+    return [*found, *sorted((p for p in points if not p.repeats), key=_counted_cost)]
+
+
+def _by_work_and_time(points: Sequence[Evaluation]) -> list[Evaluation]:
+    """Return the evaluations of one engine from the cheapest on."""
+    by_time = sorted(points, key=lambda each: each.cost or 0.0)
+    near = [p for p in by_time if (p.cost or 0.0) <= WORK_FACTOR * (by_time[0].cost or 0.0)]
+    return [*_by_work(near), *by_time[len(near) :]]
+
+
+def _by_work(points: Sequence[Evaluation]) -> list[Evaluation]:
+    """Return evaluations by counted work; those with about the least work by their changes and error."""
+    ordered = sorted(points, key=_counted_cost)
+    equal = [p for p in ordered if _counted_cost(p) <= EQUAL_WORK_FACTOR * _counted_cost(ordered[0])]
+    return [*sorted(equal, key=lambda p: (len(p.changes), p.error or 0.0)), *ordered[len(equal) :]]
+
+
+def _recommendable(points: Sequence[Evaluation], objective: Objective) -> list[Evaluation]:
+    return [p for p in points if p.is_usable and p.settings.dt <= objective.max_dt]
+
+
+def _counted_cost(point: Evaluation) -> float:
+    return point.counted or 0.0
+
+
+def describe(point: Evaluation, objective: Objective, validation_error: float | None) -> str:
+    """Describe a setting: engine and changes, error, cost per simulated second and per frame.
+
+    Example: `pymunk with dt = 0.01, substeps = 4: max_position 310 µm, 12 ms per simulated second (1.2 % of real time),
+    0.2 ms per frame of the budget of 4 ms`.
+    """
+    assert point.error is not None and point.cost is not None
+    unit = objective.metric.unit
+    error = f"{objective.metric.name} {format_quantity(point.error, unit)}"
+    if objective.metric.name == "passes" and point.error > 0.0:
+        error += f", 1 in {1.0 / point.error:.3g} contacts missed"
+    validated = "" if validation_error is None else f", {format_quantity(validation_error, unit)} with other seeds"
+    percent = point.cost / 10.0
+    is_long = point.settings.dt > FRAME_TOLERANCE / objective.fps
+    note = f"; a step is longer than a frame at {objective.fps:g} fps: interpolate for drawing" if is_long else ""
+    cost = f"{point.cost:.3g} ms per simulated second ({percent:.2g} % of real time), {_frame_text(point, objective)}"
+    return f"{label(point)}: {error}{validated}, {cost}{note}"
+
+
+def _frame_text(point: Evaluation, objective: Objective) -> str:
+    """Return the time of the most expensive frame, compared with the budget if there is one."""
+    time = point.frame_time(objective.fps)
+    text = f"{time:.3g} ms per frame"
+    if objective.budget is None:
+        return f"{text} at {objective.fps:g} fps"
+    return f"{text}{' of' if time <= objective.budget else ', more than'} the budget of {objective.budget:g} ms"
+
+
+def label(point: Evaluation) -> str:
+    """Return an engine and the changes of its settings: `reference with integrator = rk4`."""
+    changes = ", ".join(f"{key} = {format_value(value)}" for key, value in point.changes.items() if value is not None)
+    dropped = ", ".join(key for key, value in point.changes.items() if value is None)
+    parts = [f"{word} {what}" for word, what in (("with", changes), ("without", dropped)) if what]
+    return " ".join([point.engine, *parts]) if parts else f"{point.engine} with the settings of the scene"
+
+
+def format_value(value: object) -> str:
+    """Return the value of a setting as in a scene file, with at most 6 digits."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def pymunk_lines(settings: Settings) -> list[str]:
+    """Return lines of Python that give a `pymunk.Space` the resolved settings of the pymunk engine.
+
+    They do not include what the engine does to bodies and shapes, such as drag and moments of inertia.
+    """
+    lines = [
+        f"space.iterations = {settings.iterations}",
+        f"space.collision_slop = {settings.slop!r}",
+        f"space.collision_bias = {settings.bias!r}",
+        f"space.collision_persistence = {settings.persistence}",
+    ]
+    if settings.half_kick:
+        half = f"{settings.dt!r} / {2 * settings.substeps}"
+        lines.append(f"body.velocity += space.gravity * {half}  # every dynamic body, once before the first step")
+    if settings.substeps == 1:
+        return [*lines, f"space.step({settings.dt!r})"]
+    return [*lines, f"for _ in range({settings.substeps}):", f"    space.step({settings.dt!r} / {settings.substeps})"]

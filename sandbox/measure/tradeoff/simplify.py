@@ -1,0 +1,230 @@
+"""Model simplifications: cheaper models of the same scene, each run and measured before it is proposed.
+
+A closed form needs no engine, and a scene that demands less physics costs less. A simplification is proposed if its
+error against the truth of the unchanged scene stays within the tolerance.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sandbox.arrays import IntArray
+from sandbox.engines.registry import ENGINES
+from sandbox.formatting import format_quantity
+from sandbox.jsonable import in_json
+from sandbox.measure.analytic.trajectory import solved_run
+from sandbox.measure.run.bounded_run import RunTimeoutError, bounded_run, clock_without_compilation
+from sandbox.measure.tradeoff.metrics import EvaluationContext, Metric
+from sandbox.measure.tradeoff.timing import TimedRun, Timing, time_in_turns
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.world import Settings
+from sandbox.scene.errors import SceneError
+from sandbox.scene.files.document import to_document
+from sandbox.scene.files.load import from_document
+
+MAX_COST_RATIO = 0.9
+"""Largest cost of a simplification relative to the setting that it replaces: a smaller saving is within the noise."""
+
+Change = Callable[[dict[str, Any]], None]
+
+
+class ModelChange(NamedTuple):
+    """Part of the physics that may be left out."""
+
+    what: str
+    """short description of the simpler model"""
+    advice: str
+    """the same as a clause"""
+    change: Change
+    """removes it from the document of a scene"""
+
+
+@dataclass(frozen=True)
+class Simplification:
+    """Cheaper model of a scene whose error is within the tolerance."""
+
+    what: str
+    """description of the model"""
+    engine: str | None
+    """name of the engine; None for a formula"""
+    error: float
+    """value of the chosen metric against the truth of the unchanged scene"""
+    cost: float = field(metadata=in_json(key="cost_ms_per_second"))
+    """ms per simulated second"""
+    ratio: float
+    """cost / cost of the setting that it replaces, timed in turns"""
+    sentence: str
+    """description of the model, its error and its cost"""
+
+
+@dataclass(frozen=True)
+class ReplacedSetting:
+    """Setting that a simplification replaces, and what the simplification has to satisfy."""
+
+    engine: str
+    settings: Settings
+    """choices left to the engine are None"""
+    metric: Metric
+    tolerance: float
+    """largest accepted error, in the unit of the metric"""
+    limit: float
+    """counted cost that one run may have, s"""
+    deadline: float = math.inf
+    """time of `clock_without_compilation` after which a run is stopped, s"""
+    repeats: int = 3
+    """number of timings"""
+
+
+def model_simplifications(contexts: Sequence[EvaluationContext], replaced: ReplacedSetting) -> list[Simplification]:
+    """Return the cheaper models whose error is within the tolerance, the cheapest first.
+
+    Args:
+        contexts: contexts of the scene with different seeds: a model has to satisfy the tolerance with each.
+        replaced: the setting that the models replace.
+    """
+    found = [*_closed_form(contexts, replaced)]
+    for change in _applicable_changes(contexts):
+        error, simpler = 0.0, None
+        for context in contexts:
+            changed = _changed(context.scene, change.change)
+            own = None if changed is None else _error(context, changed, replaced)
+            error = max(error, math.inf if own is None else own)
+            if not error <= replaced.tolerance:
+                break
+            simpler = simpler or changed
+        if simpler is None or not error <= replaced.tolerance:
+            continue
+        scenes = contexts[0].scene, simpler
+        before, after = time_in_turns(
+            [TimedRun(s, replaced.engine, replaced.settings) for s in scenes], replaced.repeats
+        )
+        if before is not None and after is not None and after.least <= MAX_COST_RATIO * before.least:
+            found.append(_simplification(change.what, change.advice, replaced.engine, error, after, before, replaced))
+    return sorted(found, key=lambda each: each.ratio)
+
+
+def _closed_form(contexts: Sequence[EvaluationContext], replaced: ReplacedSetting) -> Iterator[Simplification]:
+    """Yield the closed form of the whole scene, if it has one."""
+    if any(context.truth is None or context.truth.kind != "closed_form" for context in contexts):
+        return
+    scene, settings, metric = contexts[0].scene, replaced.settings, replaced.metric
+    runs = [solved_run(context.scene, settings) for context in contexts]
+    errors = [None if r is None else metric.measure(r, context) for r, context in zip(runs, contexts, strict=True)]
+    worst = max(math.inf if each is None or math.isnan(each) else each for each in errors)
+    (before,) = time_in_turns([TimedRun(scene, replaced.engine, settings)], replaced.repeats)
+    if worst > replaced.tolerance or before is None:
+        return
+    taken = []
+    for _ in range(replaced.repeats):
+        began = clock_without_compilation()
+        solved_run(scene, settings)
+        taken.append(clock_without_compilation() - began)
+    after = Timing.of(taken, scene.world.duration)
+    if after.least <= MAX_COST_RATIO * before.least:
+        what = "no simulation: the scene has a closed-form solution"
+        advice = (
+            "as long as no input changes the motion, it can also be computed from a formula, without an engine (the "
+            "scene has a closed-form solution)"
+        )
+        yield _simplification(what, advice, None, worst, after, before, replaced)
+
+
+def _error(context: EvaluationContext, scene: Scene, replaced: ReplacedSetting) -> float | None:
+    """Return the error of a changed scene against the truth of the unchanged one; None if it cannot be measured."""
+    if ENGINES[replaced.engine].missing(scene, replaced.settings):
+        return None
+    try:
+        run, _ = bounded_run(scene, replaced.engine, replaced.settings, replaced.limit, replaced.deadline)
+    except RunTimeoutError:
+        return None
+    return replaced.metric.measure(run, context) if run.status == "ok" else None
+
+
+def _simplification(
+    what: str,
+    advice: str,
+    engine: str | None,
+    error: float,
+    after: Timing,
+    before: Timing,
+    replaced: ReplacedSetting,
+) -> Simplification:
+    ratio = after.least / before.least
+    sentence = (
+        f"{advice}: {replaced.metric.name} {format_quantity(error, replaced.metric.unit)}, {after.least:.3g} ms per "
+        f"simulated second, {ratio:.2g} times the cost of simulating the scene as it is"
+    )
+    return Simplification(what, engine, error, after.least, ratio, sentence)
+
+
+def _changed(scene: Scene, change: Change) -> Scene | None:
+    """Return a changed scene; None if it is invalid or places its bodies differently."""
+    document = to_document(scene)
+    change(document)
+    try:
+        simpler = from_document(document)
+    except SceneError:
+        return None
+    return simpler if simpler.bodies.position.tobytes() == scene.bodies.position.tobytes() else None
+
+
+def _applicable_changes(contexts: Sequence[EvaluationContext]) -> Iterator[ModelChange]:
+    """Yield the changes that the scene and the truths of all seeds allow."""
+    scene = contexts[0].scene
+    world, meet = scene.world, contact_matrix(scene)
+    pairs = _contact_pairs(contexts)
+    if pairs is not None and meet.touches.any():
+        if not len(pairs):
+            yield ModelChange(
+                'no collisions occur: collides = "none" for all moving bodies',
+                'the scene can also be simulated without collisions (collides = "none" for all moving bodies), '
+                "because none occur",
+                _set_collides(scene, "none"),
+            )
+        elif meet.mutual and not (pairs >= 0).all(axis=1).any():
+            yield ModelChange(
+                'no two bodies collide: collides = "fixed" for all moving bodies',
+                'the scene can also be simulated without collisions between bodies (collides = "fixed" for all moving '
+                "bodies), because none occur",
+                _set_collides(scene, "fixed"),
+            )
+    if world.linear_drag or world.quadratic_drag:
+        yield ModelChange("no drag", "the scene can also be simulated without drag", _remove_drag)
+    if any(each.friction for each in (*scene.materials, *scene.pairs, *scene.body_sources, *scene.fixed)):
+        yield ModelChange("no friction", "the scene can also be simulated without friction", _remove_friction)
+
+
+def _contact_pairs(contexts: Sequence[EvaluationContext]) -> IntArray | None:
+    """Return the pairs in contact in any of the truths, (C, 2); None if a truth is not trusted to its end."""
+    found = []
+    for context in contexts:
+        if context.truth is None or context.until < context.scene.world.duration:
+            return None
+        found.append(context.truth.trajectory.contact_pair)
+    return np.concatenate(found)
+
+
+def _set_collides(scene: Scene, value: str) -> Change:
+    def change(document: dict[str, Any]) -> None:
+        for heading in scene.kinds:
+            for element in document.get(heading, ()):
+                if not element.get("fixed"):
+                    element["collides"] = value
+
+    return change
+
+
+def _remove_drag(document: dict[str, Any]) -> None:
+    for key in ("linear_drag", "quadratic_drag", "wind"):
+        document["world"].pop(key, None)
+
+
+def _remove_friction(document: dict[str, Any]) -> None:
+    for elements in document.values():
+        for element in elements if isinstance(elements, list) else ():
+            if isinstance(element, dict) and "friction" in element:
+                element["friction"] = 0.0

@@ -1,0 +1,455 @@
+"""Study of the trade-off of a scene: engines and settings are tried, timed and scored against the best known truth.
+
+Which settings are tried, in which order, and their errors depend on the scene and on the counted work that is allowed,
+never on the clock, unless there is a time limit. Times are of this machine; if two are too close to be told apart,
+counted work decides which is cheaper.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from pydantic import ValidationError
+
+from sandbox.engines.registry import ENGINES, engine_named
+from sandbox.measure.compare.ground_truth import Truth, find_truth
+from sandbox.measure.metrics.trajectory_error import default_tolerance
+from sandbox.measure.preflight.checks import warnings
+from sandbox.measure.preflight.diagnostic import ROUNDING, Diagnostic
+from sandbox.measure.preflight.tunnelling import largest_safe_dt
+from sandbox.measure.run.bounded_run import clock_without_compilation
+from sandbox.measure.run.recorder import require_memory
+from sandbox.measure.seeds import is_random, with_seed
+from sandbox.measure.tradeoff.configuration import (
+    Configuration,
+    Evaluation,
+    SearchSpace,
+    evaluate,
+    refused_evaluation,
+)
+from sandbox.measure.tradeoff.error_budget import ErrorBudget, error_budget
+from sandbox.measure.tradeoff.metrics import EvaluationContext, default_zoom
+from sandbox.measure.tradeoff.objective import (
+    AUDIT_METRICS,
+    Objective,
+    check_objective,
+    complete_objective,
+    is_dominated,
+    metric_named,
+)
+from sandbox.measure.tradeoff.recommendation import (
+    FRAME_TOLERANCE,
+    VALIDATION_SEEDS,
+    nearest_to_budget,
+    nearest_to_tolerance,
+    recommend_cheapest,
+    recommend_most_accurate,
+)
+from sandbox.measure.tradeoff.result import Recommendation, Tradeoff, front_of
+from sandbox.measure.tradeoff.search import RUN_FRACTION, SettingsSearch
+from sandbox.measure.tradeoff.simplify import ReplacedSetting, Simplification, model_simplifications
+from sandbox.measure.tradeoff.timing import TimedRun, Timing, time_in_turns
+from sandbox.progress import Progress, ProgressCallback, ignore_progress
+from sandbox.provenance import machine, versions
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.load import as_scene
+from sandbox.trajectory import Trajectory
+
+DEFAULT_EFFORT = 10.0
+"""Default counted work of the search, about seconds; truth and timing come on top."""
+DEFAULT_REPEATS = 5
+MAX_POINTS = 120
+TIMED_MARGIN = 0.5
+"""A setting is not timed separately if another one of its engine is as accurate at less than this fraction of its
+counted cost."""
+TIMING_FRACTION = 0.5
+"""Fraction of the effort for separate timings."""
+MIN_REPEATS = 2
+"""Repeats that are made even if the timing exceeds its part of the effort, unless fewer were asked for."""
+SEED_COUNT = 2**63
+"""Seeds wrap around to 0."""
+
+
+def tradeoff(
+    scene: Scene | str | Path,
+    engines: Sequence[str] | None = None,
+    *,
+    metric: str | None = None,
+    tolerance: float | None = None,
+    budget: float | None = None,
+    fps: float = 60.0,
+    seeds: int = 1,
+    zoom: float | None = None,
+    effort: float = DEFAULT_EFFORT,
+    time_limit: float | None = None,
+    repeats: int = DEFAULT_REPEATS,
+    most: int = MAX_POINTS,
+    truth: Truth | str | None = None,
+    runs: Mapping[str, Trajectory] = MappingProxyType({}),
+    on_progress: ProgressCallback | None = None,
+    **settings: Any,
+) -> Tradeoff:
+    """Measure the error and the cost of engines and settings for a scene, and find the Pareto front.
+
+    The error is measured against the best known truth, the cost in computing time per simulated second. The settings
+    that are tried depend on the scene and on `effort`, not on the speed of the machine, unless `time_limit` is given.
+
+    Args:
+        scene: the scene, or its name or path, as `load` takes it.
+        engines: names of the engines, or one name; default: all. An engine that cannot run the scene gets a
+            point with the reason.
+        metric: metric of the error (`metrics.METRICS`); default: the largest distance from the truth if the truth is
+            trusted to the end, otherwise an invariant of the scene.
+        tolerance: largest accepted error, in the unit of the metric; default: 1 % of the smallest radius, 1 px, 1 %, or
+            no missed contact.
+        budget: computing time per frame, ms, for which the most accurate setting is sought.
+        fps: frames per second of the budget. A recommended setting has at least this step rate, or the step rate of the
+            scene if that is lower.
+        seeds: number of seeds, from the scene's own upwards; each error is the largest over the seeds.
+        zoom: px/m, for errors in pixels; default: the motion fills a window of 1280 × 720.
+        effort: counted work of the search, about seconds of computing. The same settings are tried on every machine.
+            The default settings of each engine are tried even with a small effort.
+        time_limit: time after which no more settings are tried, s; the tried settings then depend on the machine.
+        repeats: number of timings of settings near the front.
+        most: largest number of settings that are tried.
+        truth: truth of this scene and its frames, as accurate as the tolerance requires, or the reason why there is
+            none, if already known.
+        runs: runs of this scene with its own settings by engine, if already made.
+        on_progress: progress callback; its message describes each stage.
+        settings: changes to the scene's `[solver]`, such as `dt=0.001`.
+
+    Raises:
+        UnknownEngineError: no engine has one of the names.
+        UnknownMetricError: no metric has that name.
+        TooLargeError: the frames would not fit into memory.
+        ValueError: an argument is out of range.
+        pydantic.ValidationError: a setting is invalid.
+    """
+    scene, on_progress = as_scene(scene), on_progress or ignore_progress
+    engines = [engines] if isinstance(engines, str) else engines
+    names = tuple(dict.fromkeys(ENGINES if engines is None else engines))
+    for name in names:
+        engine_named(name)
+    _check_arguments(seeds, zoom, effort, time_limit, repeats, most)
+    check_objective(metric, tolerance, budget, fps)
+    base = scene.solver.replace(**settings) if settings else scene.solver
+    require_memory(scene, base, 4 * len(scene.bodies))
+    deadline = math.inf if time_limit is None else clock_without_compilation() + time_limit
+
+    on_progress(Progress("the truth"))
+    seeding = _seeds(scene, seeds)
+    closeness = _truth_tolerance(scene, metric, tolerance)
+    contexts = _contexts(scene, base, closeness, seeding.search, zoom, truth)
+    if (
+        metric is not None
+        and metric_named(metric).unit == "px"
+        and tolerance
+        and tolerance / contexts[0].zoom < closeness
+    ):
+        closeness = tolerance / contexts[0].zoom
+        contexts = _contexts(scene, base, closeness, seeding.search, contexts[0].zoom)
+    objective = complete_objective(contexts[0], metric, tolerance, budget, fps)
+    study = _Study(
+        space=SearchSpace(scene, base, tuple(name for name in names if not _refusal(scene, name, base)), 1.0 / fps),
+        contexts=contexts,
+        objective=objective._replace(max_dt=max(base.dt, FRAME_TOLERANCE / fps)),
+        seeding=seeding,
+        closeness=closeness,
+        effort=effort,
+        deadline=deadline,
+        on_progress=on_progress,
+        refused=tuple(_refused(scene, names, base)),
+    )
+    return study.run(runs, repeats, most)
+
+
+def _check_arguments(
+    seeds: int, zoom: float | None, effort: float, time_limit: float | None, repeats: int, most: int
+) -> None:
+    for what, count in (("seeds", seeds), ("repeats", repeats), ("most", most)):
+        if count < 1:
+            raise ValueError(f"{what} is {count}; it must be at least 1")
+    for what, value in (("zoom", zoom), ("effort", effort), ("time limit", time_limit)):
+        if value is not None and not 0.0 < value < math.inf:
+            raise ValueError(f"{what} is {value:g}; it must be positive and finite")
+
+
+@dataclass(frozen=True)
+class _Seeding:
+    """Seeds of the contexts of a study."""
+
+    search: tuple[int, ...]
+    """seeds of the search, the scene's own first"""
+    validation: tuple[int, ...]
+    """seeds for recommended settings; empty if the scene has no randomness"""
+
+
+def _seeds(scene: Scene, count: int) -> _Seeding:
+    """Return the seeds of the search, from the scene's own upwards, and the following ones for validation."""
+    if not is_random(scene):
+        return _Seeding((scene.world.seed,), ())
+    found = tuple((scene.world.seed + k) % SEED_COUNT for k in range(count + VALIDATION_SEEDS))
+    return _Seeding(found[:count], found[count:])
+
+
+def _truth_tolerance(scene: Scene, metric: str | None, tolerance: float | None) -> float:
+    """Return the error that a truth may have, m."""
+    closeness = default_tolerance(scene)
+    if tolerance is not None and tolerance > 0.0 and (metric is None or metric_named(metric).unit == "m"):
+        closeness = min(closeness, tolerance)
+    return closeness
+
+
+def _contexts(
+    scene: Scene,
+    base: Settings,
+    closeness: float,
+    seeds: Sequence[int],
+    zoom: float | None,
+    known: Truth | str | None = None,
+) -> list[EvaluationContext]:
+    """Return a context for each seed; the truth for the scene's own seed may be known."""
+    found: list[EvaluationContext] = []
+    for seed in seeds:
+        is_own = seed == scene.world.seed
+        seeded = scene if is_own else with_seed(scene, seed)
+        result = known if is_own and known is not None else find_truth(seeded, base, closeness)
+        truth, doubt = (result, None) if isinstance(result, Truth) else (None, result)
+        zoom = default_zoom(seeded, truth) if zoom is None else zoom  # one scale for all seeds
+        found.append(EvaluationContext(seeded, truth, zoom, doubt))
+    return found
+
+
+def _refusal(scene: Scene, engine: str, base: Settings) -> str | None:
+    """Return the reason why an engine cannot run a scene with any settings; None if it can."""
+    if not ENGINES[engine].missing(scene, base):
+        return None
+    missing = ENGINES[engine].missing(scene, base.common())
+    return "; ".join(missing) if missing else None
+
+
+def _refused(scene: Scene, names: Sequence[str], base: Settings) -> list[Evaluation]:
+    reasons = ((name, _refusal(scene, name, base)) for name in names)
+    return [refused_evaluation(name, base, reason) for name, reason in reasons if reason is not None]
+
+
+@dataclass
+class _Study:
+    """A trade-off in progress."""
+
+    space: SearchSpace
+    contexts: Sequence[EvaluationContext]
+    objective: Objective
+    seeding: _Seeding
+    closeness: float
+    """m, error that a truth may have"""
+    effort: float
+    deadline: float
+    on_progress: ProgressCallback
+    refused: tuple[Evaluation, ...]
+    """evaluations of the engines that cannot run the scene"""
+    _validation_contexts: list[EvaluationContext] = field(default_factory=list)
+    _validation_errors: dict[Configuration, float] = field(default_factory=dict)
+
+    def run(self, runs: Mapping[str, Trajectory], repeats: int, most: int) -> Tradeoff:
+        """Search, time and recommend. After Ctrl-C, recommend from what was evaluated, with the times of those runs."""
+        budget, duration = self.objective.seconds_budget, self.space.scene.world.duration
+        search = SettingsSearch(
+            space=self.space,
+            contexts=self.contexts,
+            metric=self.objective.metric.name,
+            tolerance=self.objective.tolerance,
+            budget=None if budget is None else budget * duration,
+            effort=self.effort,
+            max_evaluations=most,
+            on_progress=self.on_progress,
+            deadline=self.deadline,
+            known=self._reusable(runs),
+        )
+        evaluations = search.run()
+        if not search.interrupted:
+            try:
+                return self._result(search, evaluations, repeats, self.seeding.validation)
+            except KeyboardInterrupt:
+                self.on_progress(Progress("interrupted"))
+        return self._result(search, evaluations, 0, ())
+
+    def _reusable(self, runs: Mapping[str, Trajectory]) -> dict[str, Trajectory]:
+        """Return the runs that the engines' own settings in this search would repeat, as far as the metric needs."""
+        found: dict[str, Trajectory] = {}
+        for name in self.space.engines:
+            run = runs.get(name)
+            if run is None or (self.objective.metric.name in AUDIT_METRICS and not run.info["audited"]):
+                continue
+            own = ENGINES[name].resolve(self.space.scene, self.space.own_settings(name)).model_dump(mode="json")
+            if run.info["settings"] == own and run.info["seed"] == self.space.scene.world.seed:
+                found[name] = run
+        return found
+
+    def _result(
+        self, search: SettingsSearch, evaluations: Sequence[Evaluation], repeats: int, seeds: Sequence[int]
+    ) -> Tradeoff:
+        """Time the evaluations and recommend; with 0 repeats, use the times of the scored runs."""
+        self.on_progress(Progress("timing"))
+        points = [*self._timed(evaluations, repeats), *self.refused]
+        self.on_progress(Progress("checking the recommended setting with other seeds"))
+        within_tolerance = recommend_cheapest(points, self.objective, seeds, self._validate)
+        within_budget = recommend_most_accurate(points, self.objective, seeds, self._validate)
+        splits: list[ErrorBudget] = []
+        proposals: list[Simplification] = []
+        if repeats and clock_without_compilation() < self.deadline:
+            self.on_progress(Progress("splitting the error into its sources, and trying simpler models"))
+            splits = self._error_budgets()
+            proposals = self._simplifications(within_tolerance)
+        by_engine = {name: [p for p in points if p.engine == name] for name in self.space.engines}
+        cheapest = {n: recommend_cheapest(own, self.objective, seeds, self._validate) for n, own in by_engine.items()}
+        near_tolerance = None if within_tolerance else nearest_to_tolerance(points, self.objective)
+        has_answer = within_budget or self.objective.budget is None
+        near_budget = None if has_answer else nearest_to_budget(points, self.objective)
+        context = self.contexts[0]
+        return Tradeoff(
+            scene=self.space.scene,
+            best=context.truth,
+            doubt=context.doubt,
+            metric=self.objective.metric,
+            metric_reason=self.objective.reason,
+            zoom=context.zoom,
+            points=tuple(points),
+            pareto=tuple(front_of(points)),
+            splits=tuple(splits),
+            proposals=tuple(proposals),
+            tolerance=self.objective.tolerance,
+            budget=self.objective.budget,
+            fps=self.objective.fps,
+            within_tolerance=self._with_warnings(within_tolerance),
+            within_budget=self._with_warnings(within_budget),
+            cheapest_by_engine={name: self._with_warnings(each) for name, each in cheapest.items()},
+            nearest_to_tolerance=self._with_warnings(near_tolerance),
+            nearest_to_budget=self._with_warnings(near_budget),
+            seeds=self.seeding.search,
+            untried=len(search.skipped - set(search.evaluations)),
+            effort=self.effort,
+            spent=search.spent,
+            out_of_time=clock_without_compilation() >= self.deadline,
+            machine=machine(),
+            versions=versions(),
+            max_dt=self.objective.max_dt,
+            interrupted=not repeats,
+        )
+
+    def _timed(self, evaluations: Sequence[Evaluation], repeats: int) -> list[Evaluation]:
+        """Return the evaluations with costs: those near the front of their engine are timed in turns.
+
+        For the others, the time of the recorded run is accurate enough. The scene's own settings are always timed.
+        """
+        duration = self.space.scene.world.duration
+        timings = {
+            each.configuration: Timing.of([each.seconds], duration)._replace(repeats=0)
+            for each in evaluations
+            if each.status == "ok"
+        }
+        near = self._near_front(evaluations)
+        if repeats and near:
+            once = sum(each.counted_seconds for each in near)
+            affordable = int(TIMING_FRACTION * self.effort / once) if once else repeats
+            runs = [TimedRun(self.space.scene, each.engine, each.asked) for each in near]
+            found = time_in_turns(runs, min(repeats, max(MIN_REPEATS, affordable)))
+            for each, timing in zip(near, found, strict=True):
+                if timing is None:
+                    timings.pop(each.configuration, None)
+                else:
+                    timings[each.configuration] = timing
+        return [each.with_timing(timings.get(each.configuration)) for each in evaluations]
+
+    def _near_front(self, evaluations: Sequence[Evaluation]) -> list[Evaluation]:
+        """Return the successful evaluations that are near the front of their engine, or have the scene's settings."""
+        near: list[Evaluation] = []
+        for engine in self.space.engines:
+            own = [each for each in evaluations if each.status == "ok" and each.engine == engine]
+            others = [(each.counted_seconds, each.ranking_error) for each in own]
+            near += [
+                each
+                for each in own
+                if each.is_own or not is_dominated(each.counted_seconds, each.ranking_error, others, TIMED_MARGIN)
+            ]
+        return near
+
+    def _validate(self, point: Evaluation) -> float:
+        """Return the error of a configuration with the validation seeds; their truths are found at the first call."""
+        if not self._validation_contexts:
+            scene, base, zoom = self.space.scene, self.space.base, self.contexts[0].zoom
+            self._validation_contexts = _contexts(scene, base, self.closeness, self.seeding.validation, zoom)
+        known = self._validation_errors
+        if point.configuration not in known:
+            found = evaluate(
+                point.configuration,
+                self.space,
+                self._validation_contexts,
+                self.objective.metric.name,
+                RUN_FRACTION * self.effort,
+            )
+            known[point.configuration] = found.ranking_error
+        return known[point.configuration]
+
+    def _error_budgets(self) -> list[ErrorBudget]:
+        """Return the error budgets of the engines with a time step, with their own settings."""
+        limit = RUN_FRACTION * self.effort
+        found = (
+            error_budget(self.contexts[0], name, self.space.own_settings(name), limit, self.deadline)
+            for name in self.space.engines
+            if name != "exact"
+        )
+        return [each for each in found if each is not None]
+
+    def _simplifications(self, chosen: Recommendation | None) -> list[Simplification]:
+        """Return cheaper models than a recommended setting; without one, than the first engine's own settings."""
+        if not self.space.engines:
+            return []
+        engine = self.space.engines[0] if chosen is None else chosen.point.engine
+        replaced = ReplacedSetting(
+            engine=engine,
+            settings=self.space.own_settings(engine) if chosen is None else chosen.point.asked,
+            metric=self.objective.metric,
+            tolerance=self.objective.tolerance,
+            limit=RUN_FRACTION * self.effort,
+            deadline=self.deadline,
+        )
+        return model_simplifications(self.contexts, replaced)
+
+    def _with_warnings(self, chosen: Recommendation | None) -> Recommendation | None:
+        """Return a recommendation with the diagnostics of its setting."""
+        if chosen is None:
+            return None
+        found = setting_warnings(self.space.scene, chosen.point.engine, chosen.point.asked)
+        return replace(chosen, warnings=tuple(found))
+
+
+def setting_warnings(scene: Scene, engine: str, settings: Settings) -> list[Diagnostic]:
+    """Return the diagnostics of a setting, without a trial run.
+
+    Those of tunnelling also state the number of substeps from which on no body can tunnel at the dt of the setting.
+    """
+    found = warnings(scene, settings, engine)
+    limits = [float(each.details["safe_dt"]) for each in found if each.kind == "tunnelling"]
+    if not limits:
+        return found
+    safe = largest_safe_dt(scene, settings)
+    # It is unknown if something can add any speed; then the speeds in the diagnostics decide.
+    effect = "prevents tunnelling at these speeds" if safe is None else "prevents tunnelling"
+    safe = min(limits) if safe is None else safe
+    ratio = settings.substeps * settings.dt / safe if safe > 0.0 else math.inf
+    try:
+        needed = settings.replace(substeps=math.ceil(ratio * (1.0 - ROUNDING))).substeps
+    except (OverflowError, ValidationError):  # more than a setting may have
+        return found
+    remedy = f"; at dt = {settings.dt:.4g} s, substeps >= {needed} {effect}"
+    return [
+        replace(each, message=each.message + remedy, details={**each.details, "safe_substeps": needed})
+        if each.kind == "tunnelling"
+        else each
+        for each in found
+    ]

@@ -1,0 +1,214 @@
+"""HTML pages from Jinja2 templates: page shell with its content security policy, sections, tables.
+
+Templates escape every text that is not `Markup`. Style and scripts are files in `static/`, copied into the page. The
+content security policy names them by their hashes: no other script runs, no other style applies, nothing is fetched.
+"""
+
+import base64
+import hashlib
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from sandbox.atomic_write import atomic_write
+from sandbox.formatting import format_change, format_count, format_number, format_plural
+from sandbox.report.style import css_class_of
+
+SCRIPTS = ("charts.js", "renderer.js", "replay.js")
+"""In the order in which they run."""
+_CONTROL_CHARACTERS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ufffe\uffff]")
+
+Content = str | Markup | None
+"""Text, which a template escapes, or markup, which it does not."""
+Shade = Literal["good", "fair", "bad", "none"]
+"""Class of a badge."""
+
+
+def fragment(template: str, macro: str, *arguments: Any, **named: Any) -> Markup:
+    """Return what a macro of a template renders."""
+    return Markup(getattr(_environment().get_template(template).module, macro)(*arguments, **named))
+
+
+@cache
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("sandbox.report.html"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    # JSON in a page must be read by JavaScript, which knows no NaN; `tojson` also escapes < > & and '.
+    environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
+    formats = {"number": format_number, "change": format_change, "count": format_count, "plural": format_plural}
+    environment.filters.update(formats)
+    return environment
+
+
+class HtmlColumn(NamedTuple):
+    """A column of a table."""
+
+    head: str
+    numeric: bool = False
+    """Cells are flush right, with digits of equal width."""
+    about: str | None = None
+    """Explanation, shown when the pointer is over the head."""
+
+
+def table(columns: Sequence[HtmlColumn], rows: Sequence[Sequence[Content]], caption: str, wide: bool = False) -> Markup:
+    """Return a table, which scrolls by itself where it is wider than the page.
+
+    Args:
+        columns: of the table; the first one names the rows. An empty cell in it continues the row above.
+        rows: a cell for each column.
+        caption: description for screen readers.
+        wide: take the whole width of the page.
+
+    Raises:
+        ValueError: a row has more or fewer cells than there are columns.
+    """
+    cells = [list(zip(columns, row, strict=True)) for row in rows]
+    return fragment("parts.html.j2", "table", columns, cells, caption, wide)
+
+
+def column_key(*tables: Sequence[HtmlColumn]) -> Markup:
+    """Return the explanations of the columns of some tables, each once."""
+    return definitions({column.head: column.about for columns in tables for column in columns if column.about})
+
+
+def definitions(rows: Mapping[str, Content]) -> Markup:
+    """Return terms and their values as a list in two columns."""
+    return fragment("parts.html.j2", "definitions", rows)
+
+
+def isolated(text: str) -> Markup:
+    """Return a text of the user, isolated: right-to-left writing does not change the order of the texts around it."""
+    return Markup("<bdi>{}</bdi>").format(text)
+
+
+def paragraph(text: Content, css_class: str = "soft") -> Markup:
+    """Return a paragraph."""
+    return Markup('<p class="{}">{}</p>').format(css_class, text)
+
+
+def concatenated(*parts: Content) -> Markup:
+    """Return texts and markup, one after the other; None is left out."""
+    return Markup("").join(part for part in parts if part is not None)
+
+
+def badge(word: str, shade: Shade, about: str | None = None) -> Markup:
+    """Return a word on a coloured background.
+
+    Args:
+        word: to show.
+        shade: its colours.
+        about: explanation, shown when the pointer is over it.
+    """
+    return fragment("parts.html.j2", "badge", word, shade, about)
+
+
+def engine_name(engine: str, css_class: str | None = None) -> Markup:
+    """Return the name of an engine, or of a row, beside its colour.
+
+    Args:
+        engine: the name.
+        css_class: class that has the colour; by default that of the engine.
+    """
+    return fragment("parts.html.j2", "engine_name", engine, css_class_of(engine) if css_class is None else css_class)
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of a page with a heading."""
+
+    title: str
+    body: Markup
+    anchor: str | None = None
+    """identifier for links"""
+    lead: Content = None
+    """a sentence below the heading"""
+    level: int = 2
+
+    def markup(self) -> Markup:
+        """Return it as HTML."""
+        return fragment("parts.html.j2", "section", self)
+
+
+@dataclass(frozen=True)
+class Page:
+    """A whole page."""
+
+    title: str
+    kind: str
+    """kind of page, above the title"""
+    sections: Sequence[Section]
+    lead: Content = None
+    """summary in a sentence or two"""
+    versions: Mapping[str, str] = field(default_factory=dict)
+    machine: Mapping[str, str | int] = field(default_factory=dict)
+
+    def html(self, compact: bool = False) -> str:
+        """Return the page as one HTML document.
+
+        Control characters, which HTML cannot hold, and lone surrogates become a replacement character.
+
+        Args:
+            compact: with small margins and headings, for a frame within another page, to which it reports its height.
+        """
+        style, script = _static("page.css"), "\n".join(map(_static, SCRIPTS))
+        if compact:
+            style = f"{style}\n{_static('compact.css')}"
+            script = f"{script}\n{_static('frame_height.js')}"
+        policy = f"default-src 'none'; img-src data:; style-src {_source(style)}; script-src {_source(script)}"
+        text = (
+            _environment()
+            .get_template("page.html.j2")
+            .render(
+                page=self,
+                provenance=_provenance(self.machine, self.versions),
+                policy=Markup(policy),
+                style=Markup(style),
+                script=Markup(script),
+            )
+        )
+        return _CONTROL_CHARACTERS.sub("\N{REPLACEMENT CHARACTER}", text.encode("utf-8", "replace").decode("utf-8"))
+
+
+def write_page(page: Page, path: str | Path) -> Path:
+    """Write a page, to a temporary name first, and return its path.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    path = Path(path)
+    text = page.html()
+    with atomic_write(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+    return path
+
+
+def _provenance(machine: Mapping[str, str | int], versions: Mapping[str, str]) -> list[Markup]:
+    """Return the machine with the date, and the versions, as two lists; none where neither is known."""
+    if not versions and not machine:
+        return []
+    facts = {**{key: str(value) for key, value in machine.items()}, "date": f"{datetime.now(UTC):%Y-%m-%d}"}
+    return [definitions(facts), definitions(versions)]
+
+
+@cache
+def _static(name: str) -> str:
+    return files("sandbox.report.html").joinpath("static", name).read_text(encoding="utf-8")
+
+
+def _source(text: str) -> str:
+    """Return how a content security policy names a script or style, by its SHA-256."""
+    digest = hashlib.sha256(f"\n{text}\n".encode()).digest()
+    return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"

@@ -1,0 +1,395 @@
+"""HTML page of a trade-off: recommendations, diagram, error budget and all settings."""
+
+from collections.abc import Collection, Sequence
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement
+
+from markupsafe import Markup
+
+from sandbox.formatting import UNKNOWN, format_number, format_plural
+from sandbox.measure.compare import Comparison
+from sandbox.measure.tradeoff import Tradeoff
+from sandbox.measure.tradeoff.recommendation import FRAME_TOLERANCE
+from sandbox.report.html.comparison import HOW_TO_REPLAY, linked_plots, settings_text
+from sandbox.report.html.inline_svg import markup_of, svg_of
+from sandbox.report.html.page import (
+    Content,
+    HtmlColumn,
+    Page,
+    Section,
+    badge,
+    concatenated,
+    engine_name,
+    fragment,
+    paragraph,
+    table,
+    write_page,
+)
+from sandbox.report.style import css_class_of
+from sandbox.report.tradeoff_plot import (
+    POINT,
+    TradeoffMapping,
+    WorkPoint,
+    describe,
+    draw_tradeoff,
+    frame_time,
+    is_longer_than_frame,
+    pareto_of,
+    point_of,
+    work_points,
+)
+
+TEMPLATE = "tradeoff.html.j2"
+PARTS = (("model", "model"), ("time_step", "time step"), ("solver", "solver"), ("left", "error at the finest step"))
+"""Parts of an error: key in the document, and name."""
+BAR_WIDTH, BAR_HEIGHT = 320.0, 14.0
+HIT_RADIUS, RING_RADIUS = 9.0, 9.5
+"""Points of the diagram: radius within which a point is clicked, and of the ring around a recommended one."""
+
+
+def write_tradeoff(document: TradeoffMapping, path: str | Path, comparison: Comparison | None = None) -> Path:
+    """Write the page of a trade-off, to a temporary name first, and return its path.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    return write_page(tradeoff_page(document, comparison), path)
+
+
+def tradeoff_page(document: TradeoffMapping, comparison: Comparison | None = None) -> Page:
+    """Return the page of a trade-off.
+
+    Args:
+        document: what `sandbox tradeoff --json` prints.
+        comparison: of the engines on the scene, for a replay.
+    """
+    sections = [Section("Error against cost", diagram(document, "cost"), lead=HOW_TO_CLICK), *details(document)]
+    if comparison is not None and comparison.trajectories:
+        how = f"Each engine runs with the scene's own settings. {HOW_TO_REPLAY}"
+        sections.append(Section("Replay", linked_plots(comparison, "plot"), lead=how))
+    lead = concatenated(answers(document), paragraph(truth_sentence(document)))
+    title = document.get("title") or str(document.get("scene") or "Untitled scene")
+    return Page(title, "Trade-off", sections, lead, document.get("versions") or {}, document.get("machine") or {})
+
+
+def page_of_tradeoff(found: Tradeoff) -> Page:
+    """Return the page of a trade-off that was just measured."""
+    return tradeoff_page(found.document())
+
+
+LONG, OVER = ">frame", ">budget"
+"""Marks of settings whose dt is longer than a frame, and of those whose most expensive frame exceeds the budget."""
+HOW_TO_CLICK = (
+    "Each point is one setting of one engine. Click it for its [solver] table, to be copied into the scene file."
+)
+
+
+def answers(document: TradeoffMapping) -> Markup | None:
+    """Return the recommendations, each with the warnings of `check` for it, and the error metric."""
+    sentences = document.get("answers") or []
+    if not sentences:
+        return None
+    picks, shown = _picks(document), set[tuple[str, str]]()
+    items = []
+    for text in sentences:
+        pick = next((each for each in picks if text.endswith(each["sentence"])), None)
+        notes = [] if pick is None else _new_warnings(pick, shown)
+        items.append((f"{text[:1].upper()}{text[1:]}", notes))
+    return fragment(TEMPLATE, "answers", items, metric_sentence(document))
+
+
+def _picks(document: TradeoffMapping) -> list[TradeoffMapping]:
+    """Return the recommended settings, or the nearest ones where none can be recommended."""
+    found = [document.get("within_tolerance") or document.get("nearest_to_tolerance")]
+    found += [document.get("within_budget") or document.get("nearest_to_budget")]
+    found += (document.get("cheapest_by_engine") or {}).values()
+    return [pick for pick in found if pick]
+
+
+def _new_warnings(pick: TradeoffMapping, shown: set[tuple[str, str]]) -> list[str]:
+    """Return the warnings for a recommended setting that are not shown yet, and add them to those that are."""
+    keys = dict.fromkeys((str(pick["sentence"]), str(each["message"])) for each in pick.get("warnings") or ())
+    found = [key for key in keys if key not in shown]
+    shown.update(found)
+    return [message for _, message in found]
+
+
+def metric_sentence(document: TradeoffMapping) -> str:
+    """Return which error metric is used, and why."""
+    name = str(document["metric"]).replace("_", " ")
+    about = f" ({document['metric_about']})" if document.get("metric_about") else ""
+    reason = f", chosen because {document['metric_reason']}" if document.get("metric_reason") else ""
+    return f"Error metric: {name}{about}{reason}."
+
+
+def truth_sentence(document: TradeoffMapping) -> str:
+    """Return the truth that errors are measured against."""
+    if not document.get("truth"):
+        why = f": {document['truth_about']}" if document.get("truth_about") else ""
+        return f"No truth is available to measure errors against{why}."
+    about = f" ({document['truth_about']})" if document.get("truth_about") else ""
+    until = document.get("trusted_until")
+    trusted = "" if until is None else f", trusted until {format_number(until, 4)} s"
+    return f"Errors are measured against the truth: {str(document['truth']).replace('_', ' ')}{about}{trusted}."
+
+
+def diagram(document: TradeoffMapping, name: str) -> Markup:
+    """Return the diagram, whose points can be selected, beside the facts about the selected point.
+
+    Args:
+        document: of the trade-off.
+        name: of the diagram, unique in the page.
+    """
+    points = work_points(document)
+    metric = document["metric"].replace("_", " ")
+    label = f"{metric} against cost, {format_plural(len(points), 'point')}; arrow keys move along the Pareto front"
+    root = svg_of(draw_tradeoff(document, with_title=False), name, label, "chart broad points")
+    root.set("role", "group")  # not an image: it contains buttons
+    front = {point.index for point in pareto_of(document, points)}
+    recommended = [point_of(points, document.get(key)) for key in ("within_tolerance", "within_budget")]
+    ringed = {point.index for point in recommended if point is not None}
+    groups = {group.get("data-gid", ""): group for group in root.iter("g")}
+    for point in points:
+        _make_button(groups[f"{POINT}{point.index}"], point, document, front, ringed)
+    return fragment(TEMPLATE, "diagram", markup_of(root), [_facts(point, document) for point in points])
+
+
+def _make_button(
+    group: Element, point: WorkPoint, document: TradeoffMapping, front: Collection[int], ringed: Collection[int]
+) -> None:
+    """Make a point of the diagram a button with a label, a large enough area to click, and a ring if recommended."""
+    lines = list(describe(point, document["metric"], document.get("unit") or ""))
+    mark = next(group.iter("use"))
+    centre = {"cx": mark.get("x", "0"), "cy": mark.get("y", "0")}
+    del group.attrib["data-gid"]
+    attributes = {"class": css_class_of(point.engine), "data-point": str(point.index), "role": "button"}
+    group.attrib.update(
+        attributes | {"tabindex": "0" if point.index in front else "-1", "aria-label": "; ".join(lines)}
+    )
+    if point.index in front:
+        group.set("data-front", "")
+    if point.index in ringed:
+        SubElement(group, "circle", {**centre, "r": f"{RING_RADIUS}", "class": "best"})
+    SubElement(group, "circle", {**centre, "r": f"{HIT_RADIUS}", "class": "hit-area"})
+    title = Element("title")
+    title.text = "\n".join(lines)
+    group.insert(0, title)
+
+
+def _facts(point: WorkPoint, document: TradeoffMapping) -> dict[str, Any]:
+    """Return the facts about a point that are shown when it is selected."""
+    unit, metric = document.get("unit") or "", document["metric"].replace("_", " ")
+    row = point.row
+    repeats = row.get("repeats")
+    median = format_number(row.get("cost_median_ms_per_second"))
+    figures = [
+        (metric, f"{format_number(point.error)} {unit}".rstrip() if point.error is not None else UNKNOWN),
+        ("cost", f"{format_number(point.cost)} ms per s" if point.cost is not None else UNKNOWN),
+        ("median cost", f"{median} ms per s" if repeats else UNKNOWN),
+        ("repeats", str(repeats) if repeats else UNKNOWN),
+        ("time per frame", _frame_text(point, document)),
+        *((str(name).replace("_", " "), f"{count:,}") for name, count in (row.get("work") or {}).items()),
+    ]
+    if point.status != "ok":
+        figures.insert(0, (point.status, row.get("reason") or "no reason given"))
+    elif is_longer_than_frame(point, document):
+        figures.insert(0, (LONG, f"not recommended: {_long_reason(document)}"))
+    own = [pick for pick in _picks(document) if point_of([point], pick) is not None]
+    messages = dict.fromkeys(str(each["message"]) for pick in own for each in pick.get("warnings") or ())
+    figures += [("note", message) for message in messages]
+    title = next(describe(point, document["metric"], unit))
+    return {"title": title, "figures": figures, "text": settings_text(point.settings, point.engine)}
+
+
+def _frame_text(point: WorkPoint, document: TradeoffMapping) -> str:
+    """Return the computing time of the most expensive frame, compared with the budget if there is one."""
+    time, budget = frame_time(point, document), document.get("budget")
+    if time is None:
+        return UNKNOWN
+    if budget is None:
+        return f"{format_number(time)} ms at {document['fps']:g} fps"
+    relation = " of" if time <= budget else ", more than"
+    return f"{format_number(time)} ms{relation} the budget of {format_number(budget)} ms"
+
+
+def _long_reason(document: TradeoffMapping) -> str:
+    """Return the meaning of `LONG`."""
+    own = "" if document["max_dt"] <= FRAME_TOLERANCE / document["fps"] else " and than the dt of the scene"
+    return f"dt is longer than a frame at {document['fps']:g} fps{own}"
+
+
+def details(document: TradeoffMapping) -> list[Section]:
+    """Return the sections below the diagram, those that the document has results for."""
+    found = []
+    points = work_points(document)
+    front = pareto_of(document, points)
+    if front:
+        lead = (
+            "From the cheapest to the most accurate. No other setting that was tried is both cheaper and more accurate."
+        )
+        body = concatenated(_front_table(front, document), _long_legend(front, document))
+        found.append(Section("The Pareto front", body, lead=lead))
+    if document.get("split"):
+        lead = (
+            "Model: error that remains as the time step goes to 0. Solver: error that more iterations remove. "
+            "Time step: the rest."
+        )
+        found.append(Section("Sources of error", error_budget(document["split"]), lead=lead))
+    if document.get("proposals"):
+        found.append(Section("Cheaper models", _proposals(document["proposals"], document.get("unit") or "")))
+    summary = f"{format_plural(len(points), 'point')}, with metrics and work counters"
+    rows = _points_table(points, document), _long_legend(points, document)
+    found.append(Section("All settings tried", fragment(TEMPLATE, "all_settings", summary, *rows)))
+    return found
+
+
+def error_budget(rows: Sequence[TradeoffMapping]) -> Markup:
+    """Return the parts of each engine's error as a table with bars of equal length.
+
+    Args:
+        rows: each with `engine`, `total`, `model`, `time_step`, `solver` and `left`, in m; unknown parts are None.
+            The error at the finest step, `left`, is that of the model where the latter is known.
+    """
+    columns = [HtmlColumn("engine"), HtmlColumn("shares"), HtmlColumn("error, m", True)]
+    columns += [HtmlColumn(f"{name}, m", True) for _, name in PARTS]
+    cells = [
+        [
+            engine_name(row["engine"]),
+            _bar(row),
+            format_number(row["total"]),
+            *(format_number(row.get(key)) for key, _ in PARTS),
+        ]
+        for row in rows
+    ]
+    return concatenated(table(columns, cells, "Sources of error"), fragment(TEMPLATE, "bar_key", PARTS))
+
+
+def _bar(row: TradeoffMapping) -> Markup:
+    """Return the bar of an engine: the fractions of its error."""
+    parts = {key: max(float(row.get(key) or 0.0), 0.0) for key, _ in PARTS}
+    if row.get("model") is not None:
+        parts["left"] = 0.0
+    total = sum(parts.values())
+    x, bars, words = 0.0, [], []
+    for key, name in PARTS:
+        width = BAR_WIDTH * parts[key] / total if total > 0.0 else 0.0
+        if width > 0.0:
+            bars.append({"x": f"{x:.6g}", "width": f"{width:.6g}", "key": key})
+        words.append(f"{name} {100.0 * width / BAR_WIDTH:.0f} %")
+        x += width
+    return fragment(TEMPLATE, "bar", ", ".join(words), f"{BAR_WIDTH:g}", f"{BAR_HEIGHT:g}", bars)
+
+
+def _long_legend(points: Sequence[WorkPoint], document: TradeoffMapping) -> Markup | None:
+    """Return the meaning of `LONG`, if a point of a table has that mark."""
+    if not any(is_longer_than_frame(point, document) for point in points):
+        return None
+    return paragraph(f"{LONG}: {_long_reason(document)}, so the setting is not recommended.")
+
+
+def _metric_column(document: TradeoffMapping) -> HtmlColumn:
+    unit = document.get("unit") or ""
+    return HtmlColumn(f"{document['metric'].replace('_', ' ')}{', ' if unit else ''}{unit}", True)
+
+
+COST = HtmlColumn("ms per s", True, "milliseconds per simulated second, minimum of the repeats")
+
+
+def _front_table(points: Sequence[WorkPoint], document: TradeoffMapping) -> Markup:
+    """Return a row for each point of the front."""
+    at = f" at {document['fps']:g} fps" if document.get("fps") else ""
+    columns = (
+        HtmlColumn("engine"),
+        HtmlColumn("changes"),
+        _metric_column(document),
+        COST,
+        HtmlColumn("median", True, "milliseconds per simulated second, median of the repeats"),
+        HtmlColumn("ms per frame", True, f"median of the most expensive frame{at}"),
+        HtmlColumn("repeats", True),
+    )
+    rows = [
+        [
+            engine_name(point.engine),
+            _marked_changes(point, document),
+            format_number(point.error),
+            format_number(point.cost),
+            format_number(point.row.get("cost_median_ms_per_second")),
+            _frame_cell(point, document),
+            str(point.row.get("repeats", UNKNOWN)),
+        ]
+        for point in points
+    ]
+    return table(columns, rows, "The Pareto front")
+
+
+def _points_table(points: Sequence[WorkPoint], document: TradeoffMapping) -> Markup:
+    """Return a row for each point, with every metric and counter that any of them has."""
+    metrics = [key for key in _keys(points, "metrics") if key != document["metric"]]
+    counters = _keys(points, "work")
+    columns = [HtmlColumn("engine"), HtmlColumn("changes"), HtmlColumn("verdict"), _metric_column(document), COST]
+    columns += [HtmlColumn(name.replace("_", " "), True) for name in (*metrics, *counters)]
+    rows = []
+    for point in points:
+        cells: list[Content] = [engine_name(point.engine), _marked_changes(point, document)]
+        cells.append(badge(point.status, "good" if point.is_drawable else "bad", point.row.get("reason")))
+        cells += [format_number(point.error), format_number(point.cost)]
+        cells += [format_number((point.row.get("metrics") or {}).get(name)) for name in metrics]
+        counts = point.row.get("work") or {}
+        cells += [f"{counts[name]:,}" if name in counts else UNKNOWN for name in counters]
+        rows.append(cells)
+    return table(columns, rows, "All points")
+
+
+def _keys(points: Sequence[WorkPoint], field: str) -> list[str]:
+    return list(dict.fromkeys(key for point in points for key in point.row.get(field) or {}))
+
+
+def _frame_cell(point: WorkPoint, document: TradeoffMapping) -> Content:
+    """Return the computing time of the most expensive frame, marked where it is more than the budget."""
+    time, budget = frame_time(point, document), document.get("budget")
+    if time is None or budget is None or time <= budget:
+        return format_number(time)
+    mark = badge(OVER, "fair", f"more than the budget of {format_number(budget)} ms")
+    return concatenated(mark, " ", format_number(time))
+
+
+def _marked_changes(point: WorkPoint, document: TradeoffMapping) -> Content:
+    """Return the changes of a point, marked where its dt is longer than a frame."""
+    if not is_longer_than_frame(point, document):
+        return _changes(point)
+    mark = badge(LONG, "fair", f"{_long_reason(document)}, so it is not recommended")
+    return concatenated(_changes(point), " ", mark)
+
+
+def _changes(point: WorkPoint) -> str:
+    """Return the changes of a point to the scene's own solver, in a line."""
+    changes = point.row.get("changes") or {}
+    words = [
+        f"{key} {format_number(value, 4) if isinstance(value, float) else value}" for key, value in changes.items()
+    ]
+    text = ", ".join(words).replace("_", " ") or "the scene's own settings"
+    return f"{text} (the scene's own)" if changes and point.row.get("scene_setting") else text
+
+
+def _proposals(proposals: Sequence[TradeoffMapping], unit: str) -> Markup:
+    columns = (
+        HtmlColumn("instead"),
+        HtmlColumn("engine"),
+        HtmlColumn(f"error{', ' if unit else ''}{unit}", True),
+        HtmlColumn("ms per s", True),
+        HtmlColumn("relative cost", True),
+    )
+    rows = [
+        [
+            str(each.get("what")).replace("_", " "),
+            engine_name(each["engine"]) if each.get("engine") else UNKNOWN,
+            format_number(each.get("error")),
+            format_number(each.get("cost_ms_per_second")),
+            f"×{format_number(each['ratio'])}" if each.get("ratio") is not None else UNKNOWN,
+        ]
+        for each in proposals
+    ]
+    sentences = [each["sentence"] for each in proposals if each.get("sentence")]
+    listed = fragment("parts.html.j2", "items", sentences, "plain") if sentences else None
+    return concatenated(listed, table(columns, rows, "Cheaper models"))

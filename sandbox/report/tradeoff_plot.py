@@ -1,0 +1,300 @@
+"""Work-precision diagram of a trade-off: error against cost."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from operator import itemgetter
+from pathlib import Path
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import LogFormatter
+
+from sandbox.formatting import format_plural
+from sandbox.measure.tradeoff.objective import pareto
+from sandbox.report.style import FAINT, GRID, INK, add_legend, colour_of, literal, shortened, write_figure
+
+TradeoffMapping = Mapping[str, Any]
+"""What `sandbox tradeoff --json` prints, or a part of it."""
+
+CHOICES = ("integrator", "detection", "response", "joints", "iterations", "broad_phase", "half_kick")
+"""Settings by which methods differ; along the curve of a method dt and substeps change."""
+FLOOR_METRIC = "max_position"
+"""The metric whose error limits a document states."""
+SMALLEST = 1e-16
+"""Smaller errors, such as 0, are drawn at this value of the logarithmic axis."""
+
+
+@dataclass(frozen=True)
+class WorkPoint:
+    """One configuration as the diagram needs it: a row of the document with its method. Unknown values are None."""
+
+    index: int
+    """position in the document"""
+    engine: str
+    method: str
+    """settings other than the step that differ from the first row of its engine; empty if none does"""
+    error: float | None
+    cost: float | None
+    """ms per simulated second"""
+    row: TradeoffMapping
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """Settings by name."""
+        found: Mapping[str, Any] = self.row["settings"]
+        return found
+
+    @property
+    def status(self) -> str:
+        """`ok`, or how its run failed."""
+        return str(self.row["status"])
+
+    @property
+    def substep(self) -> float:
+        """Duration of a substep, s."""
+        return float(self.settings["dt"]) / int(self.settings.get("substeps") or 1)
+
+    @property
+    def is_drawable(self) -> bool:
+        """Whether it has both an error and a cost."""
+        return self.status == "ok" and self.error is not None and self.cost is not None and self.cost > 0.0
+
+    @property
+    def position(self) -> tuple[float, float]:
+        """Cost and error as the axes show them, of a point that is drawable."""
+        assert self.cost is not None
+        assert self.error is not None
+        return self.cost, shown_error(self.error)
+
+
+def work_points(document: TradeoffMapping) -> list[WorkPoint]:
+    """Return the points of a document, each with its method."""
+    first: dict[str, TradeoffMapping] = {}
+    for row in document["points"]:
+        first.setdefault(row["engine"], row["settings"])
+    return [
+        WorkPoint(
+            k,
+            row["engine"],
+            _method(row["settings"], first[row["engine"]]),
+            row["error"],
+            row["cost_ms_per_second"],
+            row,
+        )
+        for k, row in enumerate(document["points"])
+    ]
+
+
+def _method(settings: TradeoffMapping, first: TradeoffMapping) -> str:
+    """Return the choices of settings that differ from those of the first row of the engine, as a text."""
+    words = []
+    for key in CHOICES:
+        value = settings.get(key)
+        if value is None or value is False or value == first.get(key):
+            continue
+        if key == "iterations":
+            words.append(format_plural(value, "iteration"))
+        else:
+            words.append(key if value is True else str(value))
+    return ", ".join(words).replace("_", " ")
+
+
+def methods(points: Sequence[WorkPoint]) -> dict[tuple[str, str], list[WorkPoint]]:
+    """Return the drawable points by engine and method, each by decreasing substep."""
+    found: dict[tuple[str, str], list[WorkPoint]] = {}
+    for point in points:
+        if point.is_drawable:
+            found.setdefault((point.engine, point.method), []).append(point)
+    engines = sorted(found, key=itemgetter(0))
+    return {key: sorted(found[key], key=lambda point: -point.substep) for key in engines}
+
+
+def pareto_of(document: TradeoffMapping, points: Sequence[WorkPoint]) -> list[WorkPoint]:
+    """Return the points of the Pareto front by increasing cost."""
+    front = [point for row in document["pareto"] if (point := point_of(points, row)) is not None and point.is_drawable]
+    return sorted(front, key=lambda point: (point.cost or 0.0, -(point.error or 0.0)))
+
+
+def point_of(points: Sequence[WorkPoint], row: TradeoffMapping | None) -> WorkPoint | None:
+    """Return the point that has the engine and settings of a row of the document."""
+    if row is None:
+        return None
+    return next((p for p in points if p.engine == row["engine"] and p.settings == row["settings"]), None)
+
+
+def shown_error(error: float) -> float:
+    """Return an error as a logarithmic axis can show it."""
+    return max(error, SMALLEST)
+
+
+def floors_of(document: TradeoffMapping) -> dict[str, float]:
+    """Return the error limit of each engine at any step, m; it is one of positions, so other metrics have none."""
+    if document["metric"] != FLOOR_METRIC:
+        return {}
+    return {engine: float(floor) for engine, floor in (document.get("floors") or {}).items() if floor is not None}
+
+
+def budget_of(document: TradeoffMapping) -> float | None:
+    """Return the budget, ms per simulated second; a document states it per frame."""
+    budget = document.get("budget")
+    return None if budget is None else float(budget) * float(document.get("fps") or 1.0)
+
+
+def is_longer_than_frame(point: WorkPoint, document: TradeoffMapping) -> bool:
+    """Return whether dt of a point is longer than a frame, so that the point is not recommended."""
+    longest = document.get("max_dt")
+    return longest is not None and float(point.settings["dt"]) > float(longest)
+
+
+def frame_time(point: WorkPoint, document: TradeoffMapping) -> float | None:
+    """Return the computing time of the most expensive frame of a point, ms; None if the cost is unknown.
+
+    It is the median of the repeats; if dt is longer than a frame, it is the time of one step.
+    """
+    cost = point.row.get("cost_median_ms_per_second")
+    fps = document.get("fps")
+    if cost is None or not fps:
+        return None
+    return float(cost) * max(1.0 / float(fps), float(point.settings["dt"]))
+
+
+def describe(point: WorkPoint, metric: str, unit: str) -> Iterator[str]:
+    """Yield lines that describe a point: method, step, error, cost, failure."""
+    yield f"{point.engine}{', ' if point.method else ''}{point.method}"
+    yield f"dt {point.settings['dt']:.4g} s, {format_plural(point.settings.get('substeps', 1), 'substep')}"
+    if point.error is not None:
+        yield f"{metric.replace('_', ' ')} {point.error:.3g} {unit}".rstrip()
+    if point.cost is not None:
+        yield f"{point.cost:.3g} ms per simulated second"
+    if point.status != "ok":
+        yield f"{point.status}: {point.row.get('reason') or 'no reason given'}"
+
+
+MARKERS = "osD^vP*X<>"
+"""One for each method of an engine."""
+MAX_METHODS = 12
+"""Up to this number of methods, the legend names each of them; otherwise engines only."""
+FAILURE_DISTANCE = 2.2
+"""Factor by which failures lie beyond all other points."""
+FRONT: dict[str, Any] = {"color": INK, "lw": 3.0, "alpha": 0.85, "zorder": 1.5, "marker": "o", "ms": 11, "mfc": "none"}
+"""A ring around each point, so that a front of one point is visible too."""
+BOUND: dict[str, Any] = {"color": FAINT, "lw": 1.1, "ls": (0, (1.5, 2.5))}
+FLOOR: dict[str, Any] = {"lw": 1.3, "ls": (0, (6, 4))}
+POINT = "point:"
+"""Begins the gid of a point; its index follows."""
+
+
+class MinorCosts(LogFormatter):
+    """Labels of minor ticks as plain numbers, omitted where the axis spans so many decades that they would collide."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """Return the label of a tick."""
+        return f"{x:g}" if super().__call__(x, pos) else ""
+
+
+def plot_tradeoff(document: TradeoffMapping, path: str | Path) -> Path:
+    """Draw the diagram of a document into a file, `.png`, `.svg` or `.pdf`; written to a temporary name first.
+
+    Raises:
+        OSError: the file cannot be written.
+        KeyError: the suffix is none of those.
+    """
+    return write_figure(draw_tradeoff(document), Path(path))
+
+
+def draw_tradeoff(document: TradeoffMapping, with_title: bool = True) -> Figure:
+    """Return error against milliseconds per simulated second, log–log: a line through the best settings of each method.
+
+    The Pareto front of all methods is bold. A dashed line is the error limit of an engine, however small its step.
+    Failures are crosses: at the top where only their error is unknown, at the right where their cost is.
+
+    Args:
+        document: what `sandbox tradeoff --json` prints.
+        with_title: with the title of the scene above the diagram.
+    """
+    points = work_points(document)
+    figure = Figure(figsize=(9.0, 6.4), facecolor="white", layout="constrained")
+    panel = figure.subplots()
+    panel.set(xscale="log", yscale="log", xlabel="ms per simulated second")
+    panel.xaxis.set_major_formatter("{x:g}")  # costs span a few decades: 20 reads better than 2 × 10¹
+    panel.xaxis.set_minor_formatter(MinorCosts())
+    name, unit = document["metric"].replace("_", " "), document.get("unit") or ""
+    panel.set_ylabel(f"{name}, {unit}" if unit else name)
+    entries = _draw_methods(panel, points)
+    front = pareto_of(document, points)
+    if front:
+        panel.plot(*zip(*(point.position for point in front), strict=True), **FRONT)
+        entries.append(("Pareto front", Line2D([], [], **FRONT)))
+    entries += _draw_bounds(panel, document)
+    _draw_failures(panel, points, document, entries)
+    panel.grid(color=GRID, lw=0.6)
+    panel.set_axisbelow(True)
+    panel.spines[["top", "right"]].set_visible(False)
+    if with_title:
+        heading = shortened(document.get("title") or "untitled scene", 60)
+        literal(figure.suptitle(heading, x=0.01, ha="left", fontsize=16, weight="bold", color=INK))
+    if entries:
+        add_legend(figure, entries, max_length=56, loc="outside lower center", ncols=2)
+    return figure
+
+
+def _draw_methods(panel: Axes, points: Sequence[WorkPoint]) -> list[tuple[str, Line2D]]:
+    """Draw each method's points, and a line through the best of them; return the entries of the legend."""
+    entries: list[tuple[str, Line2D]] = []
+    counts: dict[str, int] = {}
+    for (engine, method), own in methods(points).items():
+        marker = MARKERS[counts.setdefault(engine, 0) % len(MARKERS)]
+        counts[engine] += 1
+        colour = colour_of(engine)
+        best = pareto((point.position for point in own), itemgetter(0), itemgetter(1))
+        panel.plot(*zip(*best, strict=True), color=colour, lw=0.9, alpha=0.45)
+        style: dict[str, Any] = {"color": colour, "lw": 0, "marker": marker, "ms": 6.5, "mec": "white", "mew": 0.6}
+        for point in own:  # each a line of its own, so that a page can refer to it
+            x, y = point.position
+            panel.plot([x], [y], **style, zorder=3, gid=f"{POINT}{point.index}")
+        label = f"{engine}: {method}" if method else engine
+        entries.append((label, Line2D([], [], color=colour, marker=marker, lw=0.9, ms=6.5)))
+    if len(entries) <= MAX_METHODS:
+        return entries
+    return [  # a legend of all would leave the plot no room
+        (f"{engine}: {count} methods", Line2D([], [], color=colour_of(engine), marker="o", lw=0.9, ms=6.5))
+        for engine, count in counts.items()
+    ]
+
+
+def _draw_bounds(panel: Axes, document: TradeoffMapping) -> list[tuple[str, Line2D]]:
+    """Draw error limits, tolerance and budget; return the entries of the legend."""
+    entries = []
+    for engine, floor in floors_of(document).items():
+        panel.axhline(shown_error(floor), color=colour_of(engine), **FLOOR)
+        entries.append((f"{engine}: error limit at any step", Line2D([], [], color=colour_of(engine), **FLOOR)))
+    tolerance, budget = document.get("tolerance"), budget_of(document)
+    if tolerance:
+        panel.axhline(tolerance, **BOUND)
+        entries.append((f"tolerance {tolerance:.3g} {document.get('unit') or ''}", Line2D([], [], **BOUND)))
+    if budget:
+        panel.axvline(budget, **BOUND)
+        entries.append((f"budget {budget:.3g} ms per s", Line2D([], [], **BOUND)))
+    return entries
+
+
+def _draw_failures(
+    panel: Axes, points: Sequence[WorkPoint], document: TradeoffMapping, entries: list[tuple[str, Line2D]]
+) -> None:
+    """Draw failures as crosses beyond the other points, and add them to the legend."""
+    failed = [point for point in points if not point.is_drawable]
+    if not failed:
+        return
+    costs = [point.cost for point in points if point.cost is not None]
+    errors = [point.position[1] for point in points if point.is_drawable]
+    errors += map(shown_error, floors_of(document).values())
+    right = FAILURE_DISTANCE * (max((*costs, budget_of(document) or 0.0)) or 1.0)
+    top = FAILURE_DISTANCE * (max((*errors, document.get("tolerance") or 0.0)) or 1.0)
+    for point in failed:
+        x = right if point.cost is None or not point.cost > 0.0 else point.cost
+        y = top if point.error is None or point.status != "ok" else shown_error(point.error)
+        style: dict[str, Any] = {"marker": "x", "ms": 7.5, "mew": 1.8, "lw": 0, "clip_on": False, "zorder": 4}
+        panel.plot([x], [y], color=colour_of(point.engine), **style, gid=f"{POINT}{point.index}")
+    entries.append((f"failed ({len(failed)})", Line2D([], [], color=INK, marker="x", lw=0, ms=7.5, mew=1.8)))

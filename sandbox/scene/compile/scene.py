@@ -1,0 +1,120 @@
+"""Scene: the contents of a scene file, with the start state that follows from them."""
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from sandbox.echo import short_repr
+from sandbox.html_repr import HtmlRepr
+from sandbox.scene.description.base import BodySource, BodySpec
+from sandbox.scene.description.game_tables import unexpanded
+from sandbox.scene.description.scene import SceneDescription, default_name
+from sandbox.scene.description.surface import Stroke, struck
+
+if TYPE_CHECKING:  # reading a file needs no numpy
+    from sandbox.scene.compile.bodies import Bodies
+    from sandbox.scene.compile.joint_arrays import JointArrays
+
+
+class Scene(SceneDescription, HtmlRepr):
+    """Contents of a scene file."""
+
+    @cached_property
+    def bodies(self) -> "Bodies":
+        """Bodies in scene order as arrays, with generators expanded."""
+        return start_bodies(self)
+
+    @cached_property
+    def links(self) -> "JointArrays":
+        """Joints as arrays; they refer to the indices of `bodies`."""
+        from sandbox.scene.compile.joints import compile_joints
+
+        return compile_joints(self, self.bodies)
+
+    @cached_property
+    def elements(self) -> tuple[BodySource, ...]:
+        """Shape and material of the bodies in scene order; generators are expanded."""
+        from sandbox.scene.compile.bodies import elements_in
+
+        return elements_in(self)
+
+    def source_index(self, element: int) -> int:
+        """Return the index in `body_sources` of the source to which an element belongs.
+
+        Elements that were added to a running scene continue the numbering after the last source.
+        """
+        from sandbox.scene.compile.bodies import elements_of
+
+        if len(self.elements) == len(self.body_sources):
+            return element
+        for index, source in enumerate(self.body_sources):
+            element -= len(elements_of(source))
+            if element < 0:
+                return index
+        return len(self.body_sources) + element
+
+    def __repr__(self) -> str:
+        """Return the title, the counts of elements and the key figures, as `str` does."""
+        elements = {"plane": self.planes, "wall": self.walls, "post": self.posts, "pocket": self.pockets}
+        counts = [_counted(len(self.bodies), "body", "bodies")]
+        counts += [
+            _counted(len(each), kind, f"{kind}s") for kind, each in {**elements, "zone": self.zones}.items() if each
+        ]
+        if len(self.links):
+            counts.append(_counted(len(self.links), "joint", "joints"))
+        x, y = self.world.gravity
+        figures = f"gravity ({x:g}, {y:g}) m/s², duration {self.world.duration:g} s, dt {self.solver.dt:g} s"
+        return f"<Scene {short_repr(self.title)}: {', '.join(counts)}\n  {figures}>"
+
+    __str__ = __repr__
+
+
+def start_bodies(scene: SceneDescription) -> "Bodies":
+    """Return the bodies of a scene in scene order, in the state in which the scene starts.
+
+    Generators are expanded, cue strokes applied, and moments of inertia set by drives.
+
+    Raises:
+        GeneratorError: the balls of a generator do not fit.
+        OutlineError: an outline cannot be cut into convex pieces.
+        ValueError: the scene was built in code and has a preset that is not expanded.
+    """
+    from sandbox.scene.compile.bodies import Layout, elements_in, join_layouts, layout_of_singles
+
+    preset = unexpanded(scene)
+    if preset is not None:
+        raise ValueError(f"its [{preset}] is not expanded; sandbox.scene.files.presets.expanded does that")
+    names: list[str] = []
+    layouts: list[Layout] = []
+    for kind, those in scene.kinds.items():
+        singles = [each for each in those if isinstance(each, BodySpec)]
+        if singles:
+            layouts.append(layout_of_singles(singles))
+            names += [each.name or default_name(kind, k) for k, each in enumerate(those)]
+            continue
+        for k, each in enumerate(those):
+            from sandbox.scene.compile.generators import layout_of
+
+            layout, stem = layout_of(each, scene.world.seed, k, scene.world.gravity), each.name or default_name(kind, k)
+            layouts.append(layout)
+            names += [f"{stem}-{ending}" for ending in layout.endings or range(1, len(layout) + 1)]
+    spheres = scene.surface is not None and scene.surface.bodies == "spheres"
+    bodies = join_layouts(names, elements_in(scene), layouts, spheres, scene.layers, len(scene.zones))
+    for shot in scene.shots:
+        if shot.ball in names:
+            _strike(bodies, names.index(shot.ball), shot)
+    if not scene.drives:
+        return bodies
+    from sandbox.scene.compile.drives import with_drive_moments
+
+    return with_drive_moments(scene, bodies)
+
+
+def _strike(bodies: "Bodies", index: int, stroke: Stroke) -> None:
+    """Give a sphere the velocity and spin of a cue stroke, in place."""
+    velocity, spin = struck(stroke, float(bodies.mass[index]), float(bodies.radius[index]))
+    bodies.velocity[index] = velocity
+    bodies.roll[index], bodies.angular_velocity[index] = spin[:2], spin[2]
+
+
+def _counted(count: int, noun: str, nouns: str) -> str:
+    return f"{count:,} {noun if count == 1 else nouns}"

@@ -1,0 +1,142 @@
+"""Executors: the same rows from each, an index per job, and workers that die or cannot start."""
+
+import os
+import pickle
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from functools import partial
+from multiprocessing.context import SpawnProcess
+from pathlib import Path
+from typing import Any, NoReturn
+
+import pytest
+
+from sandbox.batch import executors, worker
+from sandbox.batch.executors import Executor, ExecutorError, InProcessExecutor, JobError, ProcessExecutor, Result
+from sandbox.batch.job import RunOptions, RunRecord, run_or_fetch
+from sandbox.batch.plan import Job
+from sandbox.batch.store import Store
+from sandbox.jsonable import JsonObject
+from sandbox.scene.files.load import loads
+
+DROP = """
+[world]
+gravity = [0.0, -10.0]
+duration = 0.05
+[[ball]]
+name = "a"
+position = [0, {height}]
+radius = 1
+"""
+TIMES = ("seconds", "steps_per_second", "realtime_factor")
+"""of a row, which depend on the machine"""
+
+LARGE = 50_000_000
+"""bytes of a row, far more than the buffer of a pipe: it is being sent for some 10 ms"""
+
+
+def jobs(count: int) -> list[Job]:
+    return [Job(f"drop {k}", loads(DROP.format(height=k)), "pymunk") for k in range(count)]
+
+
+def results_of(executor: Executor, some: list[Job]) -> dict[int, Result]:
+    """Run jobs, check that each is reported once under its index, and return the results by index."""
+    assert [executor.submit(job) for job in some] == list(range(len(some)))
+    found: list[Result] = []
+    executor.wait(found.append)
+    assert sorted(result.index for result in found) == list(range(len(some)))
+    return {result.index: result for result in found}
+
+
+def lasting(row: JsonObject) -> JsonObject:
+    return {key: value for key, value in row.items() if key not in TIMES}
+
+
+def test_every_executor_gives_the_same_rows(tmp_path: Path) -> None:
+    with Store(tmp_path / "one") as store:
+        alone = results_of(InProcessExecutor(RunOptions(tmp_path / "one"), store), jobs(4))
+    apart = results_of(ProcessExecutor(RunOptions(tmp_path / "two"), 2), jobs(4))
+    for index, result in alone.items():
+        assert result.row["scene"] == f"drop {index}"
+        assert result.record is not None and result.record.trajectory.status == "ok"
+        assert apart[index].record is None
+        mine, theirs = ({**lasting(each[index].row), "path": None} for each in (alone, apart))
+        assert mine == theirs
+        assert Path(apart[index].row["path"]).is_file()
+
+
+def test_jobs_options_and_results_travel_by_value() -> None:
+    (job,) = jobs(1)
+    result = results_of(InProcessExecutor(RunOptions()), [job])[0]
+    for value in (job, RunOptions(), result.row):
+        assert pickle.loads(pickle.dumps(value)) == value
+
+
+def test_progress_names_the_job_that_runs() -> None:
+    seen: list[tuple[int, float]] = []
+    results_of(InProcessExecutor(RunOptions(), progress=lambda *where: seen.append(where)), jobs(2))
+    assert (seen[0], seen[-1]) == ((0, 0.0), (1, 1.0))
+    assert seen == sorted(seen)
+
+
+def test_job_that_cannot_be_stored_ends_the_others_in_every_executor(tmp_path: Path) -> None:
+    some = jobs(2)
+    with Store(tmp_path) as store:
+        path = run_or_fetch(some[0], store).path
+        assert path is not None
+        path.unlink()
+        path.mkdir()
+        for executor in (InProcessExecutor(RunOptions(tmp_path), store), ProcessExecutor(RunOptions(tmp_path), 1)):
+            for job in some:
+                executor.submit(job)
+            with pytest.raises(JobError, match="Is a directory"):
+                executor.wait(lambda _: None)
+
+
+def test_process_that_cannot_be_started_is_an_error_of_the_executor(monkeypatch: pytest.MonkeyPatch) -> None:
+    def start(_: SpawnProcess) -> NoReturn:
+        raise OSError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(SpawnProcess, "start", start)
+    executor = ProcessExecutor(RunOptions(), 2)
+    executor.submit(jobs(1)[0])
+    with pytest.raises(ExecutorError, match="Resource temporarily unavailable"):
+        executor.wait(lambda _: None)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="needs /proc/self/task/*/syscall")
+def test_run_of_a_worker_that_is_killed_while_it_sends_the_row_is_made_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(executors, "serve", partial(serve_large_rows, tmp_path / "killed"))
+    found = results_of(ProcessExecutor(RunOptions(), 2), jobs(3))
+    assert (tmp_path / "killed").exists()
+    assert [len(found[index].row["reason"]) for index in range(3)] == [LARGE] * 3
+
+
+def serve_large_rows(mark: Path, pipe: Any, options: RunOptions) -> None:
+    """Serve with rows that take long to send; the first worker to send one kills itself in the middle."""
+    worker.run_or_fetch = partial(large_record, mark)
+    worker.serve(pipe, options)
+
+
+def large_record(mark: Path, job: Job, *more: Any) -> RunRecord:
+    record = run_or_fetch(job, *more)
+    record.trajectory.info["reason"] = " " * LARGE
+    try:
+        mark.touch(exist_ok=False)
+    except FileExistsError:
+        return record
+    threading.Thread(target=kill_in_write, args=(os.getpid(),), daemon=True).start()
+    return record
+
+
+def kill_in_write(main: int, is_large: Callable[[int], bool] = lambda size: size > LARGE // 100) -> None:
+    """Wait until the main thread is within a large write (system call 1 on x86-64, 64 on ARM), and kill the process."""
+    number = {"x86_64": "1", "aarch64": "64"}[os.uname().machine]
+    while True:
+        call = Path(f"/proc/self/task/{main}/syscall").read_text().split()
+        if call[0] == number and is_large(int(call[3], 16)):
+            os.kill(main, signal.SIGKILL)

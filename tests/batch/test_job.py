@@ -1,0 +1,218 @@
+"""Jobs: a run that is made or fetched, and its row."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sandbox import run_file
+from sandbox.action import Force, Remove, Spawn
+from sandbox.batch.job import RunOptions, run_or_fetch
+from sandbox.batch.plan import Job
+from sandbox.batch.store import Store, StoreError
+from sandbox.engines.registry import UnknownEngineError
+from sandbox.resource_limits import TooLargeError
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import loads
+from sandbox.trajectory import Trajectory
+
+pytestmark = pytest.mark.full  # child processes and command lines that run long
+
+SCENE = loads("""
+title = "Two"
+[world]
+gravity = [0.0, -10.0]
+duration = 0.1
+seed = 3
+[[ball]]
+name = "a"
+position = [0, 0]
+radius = 1
+[[ball]]
+name = "b"
+position = [5, 0]
+radius = 1
+""")
+JOB = Job("label", SCENE, "pymunk")
+
+
+def test_row_tells_of_the_run() -> None:
+    record = run_or_fetch(JOB)
+    row, run = record.row(), record.trajectory
+    assert json.loads(json.dumps(row, allow_nan=False)) == row
+    assert (row["id"], row["scene"], row["title"], row["seed"]) == (record.id, "label", "Two", 3)
+    assert (row["status"], row["reason"], row["steps"], row["path"], row["repeated"]) == ("ok", None, 10, None, False)
+    assert row["seconds"] > 0
+    assert row["realtime_factor"] == pytest.approx(0.1 / row["seconds"])
+    assert row["settings"] == run.info["settings"]
+    assert row["final"]["b"]["position"] == run.position[-1, 1].tolist()
+    assert row["final"]["b"]["velocity"] == run.velocity[-1, 1].tolist()
+    assert {**row, "final": None} == {**record.row(final=False), "final": None}
+    assert "final" not in record.row(final=False)
+
+
+def test_run_is_made_once_and_then_read(tmp_path: Path) -> None:
+    told: list[float] = []
+    with Store(tmp_path) as store:
+        made = run_or_fetch(JOB, store, progress=told.append)
+        assert told[-1] == 1.0
+        told.clear()
+        found = run_or_fetch(JOB, store, progress=told.append)
+        assert told == []
+    assert (made.repeated, found.repeated, made.id, made.path) == (False, True, found.id, found.path)
+    assert made.path == tmp_path / f"{made.id}.npz"
+    assert np.array_equal(made.trajectory.position, found.trajectory.position)
+    assert {**found.row(), "repeated": False} == made.row()
+
+
+def test_id_depends_on_actions_seed_and_resolved_settings() -> None:
+    action = Remove(time=0.05, body="a")
+    plain = run_or_fetch(JOB).id
+    assert run_or_fetch(replace(JOB, label="other")).id == plain
+    assert run_or_fetch(replace(JOB, actions=(action,))).id != plain
+    stated = SCENE.model_copy(update={"solver": SCENE.solver.replace(slop=0.01)})  # what the engine takes anyway
+    assert run_or_fetch(replace(JOB, scene=stated)).id == plain
+    other = SCENE.model_copy(update={"solver": SCENE.solver.replace(slop=0.02)})
+    assert run_or_fetch(replace(JOB, scene=other)).id != plain
+
+
+def test_what_is_gone_is_told_and_what_is_not_finite_is_null() -> None:
+    actions = (
+        Remove(time=0.05, body="a"),
+        Spawn(time=0.05, ball=Ball(name="c", position=(9.0, 9.0), radius=1.0)),
+        Force(time=0.05, body="b", force=(9e13, 0.0)),  # 9e11 m/s a step: beyond all bounds after twelve
+    )
+    longer = SCENE.model_copy(update={"world": SCENE.world.model_copy(update={"duration": 1.0})})
+    row = run_or_fetch(replace(JOB, scene=longer, actions=actions)).row()
+    assert (row["status"], row["retired"]) == ("diverged", {"a": 0.05})
+    assert list(row["final"]) == ["a", "b", "c"]
+    json.dumps(row, allow_nan=False)
+
+
+def test_refused_job_has_no_final_state(tmp_path: Path) -> None:
+    scene = SCENE.model_copy(update={"solver": SCENE.solver.replace(integrator="rk4")})
+    with Store(tmp_path) as store:
+        record = run_or_fetch(replace(JOB, scene=scene), store)
+        again = run_or_fetch(replace(JOB, scene=scene), store)
+    row = record.row()
+    assert (row["status"], row["final"], row["realtime_factor"], row["missed_contacts"]) == ("refused", {}, None, None)
+    assert again.repeated
+    assert again.row()["reason"] == row["reason"]
+
+
+def test_unknown_engine_is_an_error() -> None:
+    with pytest.raises(UnknownEngineError, match="unknown engine 'none'"):
+        run_or_fetch(replace(JOB, engine="none"))
+
+
+def test_damaged_run_is_made_again_and_replaced(tmp_path: Path) -> None:
+    with Store(tmp_path) as store:
+        first = run_or_fetch(JOB, store)
+        assert first.path is not None
+        first.path.write_bytes(b"damaged")
+        again = run_or_fetch(JOB, store)
+        assert (again.repeated, again.path) == (False, first.path)
+        assert again.damaged is not None
+        assert again.damaged.startswith(f"{first.path} is not a stored run: ")
+        assert again.row()["damaged"] == again.damaged
+        found = run_or_fetch(JOB, store)
+        assert (found.repeated, found.damaged, "damaged" in found.row()) == (True, None, False)
+        assert found.trajectory.info["state_hash"] == first.trajectory.info["state_hash"]
+        assert [row.seconds for row in store.rows()] == [again.trajectory.info["seconds"]]
+    assert {entry.name for entry in tmp_path.iterdir()} == {"runs.sqlite", first.path.name}
+
+
+OTHERS = [
+    ("scene", replace(JOB, scene=SCENE.model_copy(update={"title": "Three"}))),
+    ("seed", replace(JOB, scene=SCENE.model_copy(update={"world": SCENE.world.model_copy(update={"seed": 4})}))),
+    ("engine", replace(JOB, engine="reference")),
+    ("settings", replace(JOB, scene=SCENE.model_copy(update={"solver": SCENE.solver.replace(slop=0.02)}))),
+    ("actions", replace(JOB, actions=(Remove(time=0.05, body="a"),))),
+]
+
+
+@pytest.mark.parametrize(("key", "other"), OTHERS)
+def test_run_under_the_id_of_another_is_made_again(key: str, other: Job, tmp_path: Path) -> None:
+    with Store(tmp_path) as store:
+        path, theirs = run_or_fetch(JOB, store).path, run_or_fetch(other, store).path
+        assert path is not None
+        assert theirs is not None
+        path.write_bytes(theirs.read_bytes())
+        again = run_or_fetch(JOB, store)
+        assert again.damaged is not None
+        assert f"is not the run of its id: its info.{'scene' if key == 'seed' else key} is" in again.damaged
+        assert run_or_fetch(JOB, store).repeated
+        assert run_or_fetch(other, store).repeated
+
+
+@pytest.mark.parametrize("error", [PermissionError(13, "Permission denied"), OSError(5, "Input/output error")])
+def test_stored_run_that_cannot_be_opened_is_a_fault_of_the_store(
+    error: OSError, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Store(tmp_path) as store:
+        path = run_or_fetch(JOB, store).path
+
+        def load(path: Path) -> Trajectory:
+            raise error
+
+        monkeypatch.setattr(Trajectory, "load", load)
+        with pytest.raises(StoreError, match=rf"{path}: {error.strerror}"):
+            run_or_fetch(JOB, store)
+
+
+def test_stored_run_that_does_not_fit_into_memory_is_not_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Store(tmp_path) as store:
+        path = run_or_fetch(JOB, store).path
+        assert path is not None
+        before = path.read_bytes()
+        monkeypatch.setattr(run_file, "free_memory", lambda: 1000)
+        with pytest.raises(TooLargeError, match="delete the file to repeat the run"):
+            run_or_fetch(JOB, store)
+        assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("changes", [{}, {"solver": SCENE.solver.replace(integrator="rk4")}])
+def test_sessions_with_actions_and_refused_runs_are_found_again(changes: dict[str, Any], tmp_path: Path) -> None:
+    actions = (Remove(time=0.05, body="a"), Remove(time=0.01, body="b"))  # not in order
+    job = replace(JOB, scene=SCENE.model_copy(update=changes), actions=actions)
+    with Store(tmp_path) as store:
+        first, found = run_or_fetch(job, store), run_or_fetch(job, store)
+    assert (first.trajectory.status, found.repeated) == ("refused" if changes else "ok", True)
+
+
+def test_ledger_made_later_keeps_the_audit_that_was_stored(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    run_or_fetch(JOB, store)
+    again = run_or_fetch(JOB, store, RunOptions(audit=False, ledger=True))
+    assert not again.repeated
+    assert again.trajectory.missed_contacts == 0  # nothing meets; None where it was not looked for
+    found = run_or_fetch(JOB, store, RunOptions(audit=False, ledger=True))
+    assert (found.repeated, found.trajectory.missed_contacts, len(found.trajectory.energy)) == (True, 0, 11)
+    store.close()
+
+
+def test_row_tells_what_fell_and_the_spins_of_a_scene_that_has_them() -> None:
+    floor = "[world]\nduration = 3\n[surface]\nsliding_friction = 0.2\nrolling_friction = 0.01\n"
+    balls = '[[ball]]\nname = "a"\nposition = [0, 0]\nradius = 0.03\nvelocity = [1, 0]\n'
+    balls += '[[ball]]\nname = "b"\nposition = [0, 1]\nradius = 0.03\nspin = [0, 0, 9]\n'
+    scene = loads(f'{floor}{balls}[[pocket]]\nname = "hole"\nposition = [0.5, 0.0]\nradius = 0.06\n')
+    row = run_or_fetch(Job("label", scene, "exact")).row()
+    assert row["pocketed"] == {"a": "hole"}
+    assert row["final"]["a"] | {"angle": 0.0} == {
+        "position": [0.5, 0.0],
+        "velocity": [0.0, 0.0],
+        "angle": 0.0,
+        "angular_velocity": 0.0,
+        "spin": [0.0, 0.0, 0.0],
+    }
+    assert row["final"]["b"]["spin"] == [0.0, 0.0, 9.0]  # nothing stops what only spins
+    zoned = loads(f"{balls.replace('spin = [0, 0, 9]', '')}[[zone]]\nposition = [0.5, 0.0]\nradius = 0.06\n")
+    assert run_or_fetch(Job("label", zoned, "pymunk")).row()["pocketed"] == {}
+    plain = run_or_fetch(JOB).row()
+    assert plain["pocketed"] == {}
+    assert "spin" not in plain["final"]["a"]

@@ -1,0 +1,53 @@
+"""Floors with a shot whose outcome is known on paper: balls without rubbing, pockets without jaws."""
+
+import sandbox
+from sandbox.scene.compile.scene import Scene
+
+R = 0.028575
+
+FLOOR = """
+[world]
+seed = 7
+
+[surface]
+gravity = 9.81
+sliding_friction = 0.2
+rolling_friction = 0.01
+spinning_friction = 0.0127
+
+[contact_models]
+ball_ball = "elastic"
+
+[[material]]
+name = "phenolic"
+
+[[pair]]
+between = ["phenolic", "phenolic"]
+restitution = 1.0
+"""
+
+
+def ball(name: str, x: float, y: float = 0.0) -> str:
+    """Return a ball at rest."""
+    figures = f'radius = {R}\nmass = 0.17\nmaterial = "phenolic"'
+    return f'\n[[ball]]\nname = "{name}"\nposition = [{x!r}, {y!r}]\n{figures}\n'
+
+
+def pocket(name: str, x: float, y: float = 0.0, radius: float = 0.06) -> str:
+    """Return a pocket."""
+    return f'\n[[pocket]]\nname = "{name}"\nposition = [{x!r}, {y!r}]\nradius = {radius!r}\n'
+
+
+def shot(aim: float = 0.0, speed: float = 2.0, side: float = 0.0, height: float = 0.0) -> str:
+    """Return a shot at the cue ball."""
+    return f'\n[[shot]]\nname = "it"\naim = {aim!r}\nspeed = {speed!r}\nside = {side!r}\nheight = {height!r}\n'
+
+
+def floor(*parts: str) -> Scene:
+    """Return a scene with a cue ball at the origin."""
+    return sandbox.loads(FLOOR + ball("cue", 0.0) + "".join(parts))
+
+
+def straight_pot(d: float, far: float, speed: float = 2.0, aim: float = 0.0) -> Scene:
+    """Return a shot at a ball in line with a pocket: d between the balls' centres, `far` from there to the pocket."""
+    return floor(ball("object", d), pocket("hole", d + far), shot(aim, speed))

@@ -1,0 +1,181 @@
+"""Witnesses: a refined truth ends where a second method contradicts it, or where it breaks a conservation law."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import pytest
+
+from sandbox.engines import registry
+from sandbox.engines.contract import Simulation
+from sandbox.engines.pymunk_adapter.engine import PymunkEngine
+from sandbox.measure.compare import compare
+from sandbox.measure.compare import ground_truth as witness
+from sandbox.measure.compare import self_convergence as refined
+from sandbox.measure.compare.ground_truth import find_truth, truth_of
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.world import Settings
+from sandbox.scene.files.load import from_document, loads
+
+pytestmark = pytest.mark.full  # long runs and sweeps
+
+DROP = """
+[world]
+gravity = [0.0, -10.0]
+duration = 1.0
+[solver]
+dt = 0.01
+[[plane]]
+point = [0.0, 0.0]
+normal = [0.0, 1.0]
+[[ball]]
+position = [0.0, 0.745]
+radius = 0.1
+restitution = 0.5
+"""
+"""It falls 0.645 m and meets the floor at √0.129 = 0.359 s."""
+MEETS = 0.129**0.5
+TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True)
+class Another:
+    """pymunk with another world than the scene's: it converges, and to something else."""
+
+    gravity: float = 1.0
+    """a factor"""
+    restitution: float = 1.0
+    """likewise"""
+    name: str = "another"
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(PymunkEngine(), name)
+
+    def start(self, start: Scene | Setup, settings: Settings | None = None) -> Simulation:
+        setup = Setup.of(start)
+        scene = setup.scene
+        world = scene.world.model_copy(update={"gravity": tuple(self.gravity * g for g in scene.world.gravity)})
+        balls = tuple(
+            b.model_copy(update={"restitution": self.restitution * (b.restitution or 0.0)}) for b in scene.balls
+        )
+        changed = replace(setup, scene=scene.model_copy(update={"world": world}))
+        return PymunkEngine().start(replace(changed, bodies=replace(setup.bodies, elements=balls)), settings)
+
+
+def install(monkeypatch: pytest.MonkeyPatch, **engines: Any) -> None:
+    """Leave only these engines in the registry, and no formula."""
+    monkeypatch.setattr("sandbox.measure.compare.ground_truth.solution", lambda _: None)
+    for name in [*reversed(registry.ENGINES)]:  # put back in the opposite order: that of the registry
+        monkeypatch.delitem(registry.ENGINES, name)
+    for name, engine in engines.items():
+        monkeypatch.setitem(registry.ENGINES, name, engine)
+
+
+def test_two_engines_that_agree_confirm_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, pymunk=PymunkEngine(), another=Another())
+    truth = truth_of(loads(DROP), loads(DROP).solver, TOLERANCE)
+    assert truth is not None
+    assert (truth.kind, truth.trusted_until, truth.witness) == ("refined", 1.0, "another")
+    assert "confirmed by another" in truth.about
+
+
+def test_a_truth_ends_where_two_engines_part(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, pymunk=PymunkEngine(), another=Another(restitution=0.5))
+    comparison = compare(loads(DROP), ["pymunk"], tolerance=TOLERANCE)
+    # After the impact at 3.6 m/s they differ by 0.9 m/s, so by the tolerance within 1.2 ms: 0.36 s is the first frame.
+    assert comparison.trusted_until is not None
+    assert MEETS - 0.01 <= comparison.trusted_until <= MEETS + 0.01  # frames are 0.01 s apart
+    until = f"no truth is known after {comparison.trusted_until:.4g} s"
+    assert f"{until}: pymunk and another converge to different results" in comparison.sentence()
+    (row,) = comparison.rows
+    assert row.count("missed") == row.count("phantom") == 0
+
+
+@pytest.mark.slow
+def test_where_two_engines_never_agree_there_is_no_truth(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, pymunk=PymunkEngine(), another=Another(gravity=10.0))
+    scene = loads(DROP)
+    found = find_truth(scene, scene.solver, 1e-4)  # ½·90·0.01² is 4.5 mm in the first frame
+    assert isinstance(found, str)
+    document = compare(scene, ["pymunk"], tolerance=1e-4).document()
+    assert (document["truth"], document["trusted_until"]) == (None, None)
+    assert "pymunk and another converge to different results" in document["truth_about"]
+    (row,) = document["engines"]
+    assert row["status"] == "ok"
+    assert row["energy_drift"] is not None  # what is conserved needs no truth
+    assert row["max_position_error"] is row["missed_contacts"] is row["first_divergence"] is None
+
+
+def test_energy_that_grows_without_a_source_ends_the_truth(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, one=Another(restitution=2.2), other=Another(restitution=2.2))  # 1.1: both are wrong alike
+    comparison = compare(loads(DROP), ["one"], tolerance=TOLERANCE)
+    assert comparison.trusted_until is not None
+    assert MEETS - 0.01 <= comparison.trusted_until <= MEETS + 0.01  # frames are 0.01 s apart
+    assert "the energy in one grows" in comparison.sentence()
+
+
+@pytest.mark.slow
+def test_one_method_alone_confirms_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    dragged = loads(DROP.replace("duration", "linear_drag = 0.1\nduration"))  # with which half_kick is no choice
+    install(monkeypatch, pymunk=PymunkEngine())
+    found = find_truth(dragged, dragged.solver, TOLERANCE)
+    assert isinstance(found, str)
+    assert "no second engine or method" in found
+
+
+@pytest.mark.slow
+def test_another_method_of_the_same_engine_is_a_witness(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, pymunk=PymunkEngine())
+    scene = loads(DROP)
+    truth = truth_of(scene, scene.solver, TOLERANCE)
+    assert truth is not None
+    assert truth.witness == "pymunk without half_kick"
+    assert truth.trusted_until == 1.0
+
+
+def test_a_witness_takes_half_the_work_of_the_answer_or_three_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(witness, "MIN_WORK", 0)
+    steps: dict[str, int] = {}
+    for module in (refined, witness):
+        honest = module.bounded_run
+
+        def counted(
+            start: Scene | Setup, engine: str, settings: Settings, limit: float,
+            *, name: str = module.__name__, honest: Any = honest, **options: Any,
+        ) -> Any:  # fmt: skip
+            steps[name] = steps.get(name, 0) + round(Setup.of(start).scene.world.duration / settings.h)
+            return honest(start, engine, settings, limit, **options)
+
+        monkeypatch.setattr(module, "bounded_run", counted)
+    install(monkeypatch, pymunk=PymunkEngine(), another=Another(restitution=0.9))
+    assert truth_of(loads(DROP), loads(DROP).solver, TOLERANCE) is not None
+    assert 0 < steps[witness.__name__] <= max(0.5 * steps[refined.__name__], (1 + 2 + 4) * 100)
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4])
+def test_a_method_of_the_first_order_confirms_what_it_converges_to(tolerance: float) -> None:
+    scene = from_document(
+        {
+            "world": {"gravity": [0.0, -9.81], "duration": 1.5, "linear_drag": 1e-4},
+            "solver": {"dt": 0.01},
+            "plane": [{"point": [0.0, 0.0], "normal": [0.0, 1.0], "restitution": 0.8}],
+            "ball": [{"name": "a", "position": [0.0, 5.5], "radius": 0.5}],
+        }
+    )
+    truth = truth_of(scene, scene.solver, tolerance)
+    assert truth is not None
+    assert truth.witness is not None
+    assert truth.trusted_until == 1.5
+
+
+def test_energy_that_wind_brings_has_a_source() -> None:
+    scene = from_document(
+        {
+            "world": {"duration": 1.0, "linear_drag": 1.0, "quadratic_drag": 0.1, "wind": [4.0, 0.0]},
+            "solver": {"dt": 0.01},
+            "ball": [{"name": "a", "position": [0.0, 0.0], "radius": 0.5}],
+        }
+    )
+    truth = truth_of(scene, scene.solver, 1e-3)
+    assert truth is not None
+    assert (truth.kind, truth.trusted_until) == ("refined", 1.0)

@@ -1,0 +1,186 @@
+"""Comparing scenes with boxes and joints: truths against formulas, and what is told of the engines."""
+
+import math
+
+import numpy as np
+import pytest
+
+from sandbox.engines.registry import ENGINES
+from sandbox.measure.analytic import closed_form
+from sandbox.measure.analytic.trajectory import solved_run
+from sandbox.measure.compare.attribution import setting_changes
+from sandbox.measure.compare.comparison import compare
+from sandbox.measure.compare.self_convergence import refine
+from sandbox.measure.metrics.clearance import clearance
+from sandbox.measure.metrics.invariants import energy_drift, momentum_drift
+from sandbox.measure.metrics.perturbation import PERTURBATION, perturb
+from sandbox.measure.metrics.trajectory_error import default_tolerance
+from sandbox.measure.run.runner import run
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.files.load import loads
+
+pytestmark = pytest.mark.full  # long runs and sweeps
+
+PENDULUM = (
+    "[world]\ngravity = [0.0, -9.81]\nduration = 1.0\n[solver]\ndt = 0.01\n"
+    "[[ball]]\nname = 'bob'\nposition = [1.0, 0.0]\nradius = 0.1\n"
+    "[[joint]]\nname = 'rod'\nkind = 'rod'\nbetween = ['bob']\nanchors = [[0, 0], [0, 0]]\n"
+)
+SLOPE = math.radians(30.0)
+
+
+def sliding(friction: float) -> Scene:
+    """A crate of 0.4 m laid on a slope of 30°, touching it."""
+    sin, cos = math.sin(SLOPE), math.cos(SLOPE)
+    return loads(
+        f"[world]\ngravity = [0.0, -9.81]\nduration = 0.5\n[solver]\ndt = 0.005\n"
+        f"[[plane]]\nname = 'slope'\npoint = [0, 0]\nnormal = [{-sin!r}, {cos!r}]\nfriction = {friction}\n"
+        f"[[box]]\nname = 'crate'\nposition = [{-0.2 * sin!r}, {0.2 * cos!r}]\nangle = {SLOPE!r}\nsize = [0.4, 0.4]\n"
+        "friction = 1.0\n"
+    )
+
+
+def tower(boxes: int) -> Scene:
+    text = "[world]\ngravity = [0.0, -9.81]\nduration = 0.5\n[solver]\ndt = 0.005\n"
+    text += "[[plane]]\nname = 'g'\npoint = [0, 0]\nnormal = [0, 1]\nfriction = 0.5\n"
+    for k in range(boxes):
+        text += f"[[box]]\nname = 'b{k}'\nposition = [0, {k + 0.5}]\nsize = [1, 1]\nfriction = 1.0\n"
+    return loads(text)
+
+
+def test_a_crate_that_slides_is_refined_to_the_formula() -> None:
+    scene = sliding(0.3)
+    truth = refine(scene, scene.solver, default_tolerance(scene))
+    assert truth is not None
+    assert truth.agrees_until == 0.5
+    way = -(truth.trajectory.position[:, 0] - scene.bodies.position[0]) @ (math.cos(SLOPE), math.sin(SLOPE))
+    right = 0.5 * 9.81 * (math.sin(SLOPE) - 0.3 * math.cos(SLOPE)) * truth.trajectory.time**2
+    assert way == pytest.approx(right, abs=0.1 * default_tolerance(scene))  # to which successive answers agree
+
+
+def test_a_pendulum_is_refined_until_it_is_at_the_bottom_after_a_quarter_of_its_period() -> None:
+    scene = loads(PENDULUM)
+    truth = refine(scene, scene.solver, 1e-3)
+    assert truth is not None
+    assert truth.agrees_until == 1.0
+    # From the horizontal the period of 1 m is 2.3678419 s: after a quarter the bob is below what holds it.
+    x = np.interp(2.3678419 / 4.0, truth.trajectory.time, truth.trajectory.position[:, 0, 0])
+    assert x == pytest.approx(0.0, abs=3e-4)  # the agreement, and a chord of 4.4 m/s · 10 ms that bends by 1e-4 m
+
+
+def test_pendulum_is_compared_and_the_way_its_rod_is_held_is_a_knob() -> None:
+    found = compare(loads(PENDULUM), ["pymunk", "reference"], tolerance=1e-3, why=True)
+    for row in found.rows:
+        assert row.status == "ok"
+        assert 1e-3 < (row.score.max_position or 0.0) < 0.1
+        assert row.momentum_drift is None  # the rod's pull on the world is not recorded
+        assert (row.count("missed"), row.count("phantom")) == (0, 0)
+    tried = {(effect.setting, effect.value): effect for effect in found.rows[1].why}
+    assert tried["joints", "rattle"].ratio is not None
+    assert tried["joints", "rattle"].ratio < 0.2
+    assert found.rows[1].verdict is not None
+    assert "joints = rattle" in found.rows[1].verdict
+
+
+def test_joints_are_a_knob_only_where_there_are_some() -> None:
+    jointed, free = loads(PENDULUM), sliding(0.3)
+    names = [
+        {name for name, _, _ in setting_changes(ENGINES["reference"].resolve(s, s.solver))} for s in (jointed, free)
+    ]
+    assert names[0] - names[1] == {"joints"}
+
+
+def test_tower_touches_from_the_start_and_its_trembling_is_no_energy_drift() -> None:
+    scene = tower(3)
+    found = compare(scene, ["pymunk"])
+    (row,) = found.rows
+    assert (row.status, row.count("matched"), row.count("missed"), row.count("phantom")) == ("ok", 3, 0, 0)
+    assert row.first_divergence is None
+    assert row.energy_drift is None
+    assert row.momentum_drift == pytest.approx(0.0, abs=1e-9)  # Σ impulses of the ground = weight · time, but rounding
+
+
+def test_gaps_are_those_of_turned_boxes() -> None:
+    scene = loads(
+        "[[plane]]\nname = 'p'\npoint = [0, -1]\nnormal = [0, 1]\n"
+        "[[wall]]\nname = 'w'\npoints = [[3, -1], [3, 1]]\nthickness = 0.2\n"
+        "[[post]]\nname = 'q'\nposition = [0, 3]\nradius = 0.5\n"
+        "[[ball]]\nname = 'ball'\nposition = [-2, 0]\nradius = 0.25\n"
+        "[[box]]\nname = 'box'\nposition = [0, 0]\nsize = [2.0, 1.0]\n"
+    )
+    bodies, root = scene.bodies, math.sqrt(1.25)
+    position = np.tile(bodies.position, (3, 1, 1))
+    angle = np.array([[0.0, 0.0], [0.0, math.pi / 2], [0.0, math.atan2(1.0, 2.0)]])
+    gaps = {k: clearance(scene, bodies, position, angle, (1, k)) for k in (-1, -2, -3)}
+    # Lying, standing, and with a corner towards the right; about its diagonal the top and bottom are 2·sin + cos high.
+    high = math.sin(angle[2, 1]) + 0.5 * math.cos(angle[2, 1])
+    assert gaps[-1] == pytest.approx([0.5, 0.0, 1.0 - high], abs=1e-15)  # sines
+    assert gaps[-2] == pytest.approx([1.9, 2.4, 2.9 - root], abs=1e-15)  # likewise
+    assert gaps[-3][:2] == pytest.approx([2.0, 1.5], abs=1e-15)  # likewise
+    assert clearance(scene, bodies, position, angle, (0, 1))[:2] == pytest.approx([0.75, 1.25], abs=1e-15)  # likewise
+
+
+def test_nudge_moves_a_box_and_leaves_its_joints() -> None:
+    scene = loads(PENDULUM.replace("[[ball]]", "[[box]]").replace("radius = 0.1", "size = [0.2, 0.2]"))
+    other = perturb(scene)
+    assert other is not None
+    assert np.hypot(*(other.bodies.position - scene.bodies.position)[0]) == pytest.approx(
+        PERTURBATION, rel=1e-3
+    )  # 1 + 1e-12
+    assert other.links.figures.tolist() == scene.links.figures.tolist()
+
+
+@pytest.mark.parametrize(
+    "extra",
+    [
+        "[[joint]]\nkind = 'spring'\nbetween = ['a']\nstiffness = 1.0\n",
+        "[[thrust]]\nbody = 'a'\nforce = [1.0, 0.0]\n",
+        "[[attraction]]\ntoward = [9.0, 9.0]\nstrength = 1.0\n",
+    ],
+    ids=["joined", "thrust", "attracted"],
+)
+@pytest.mark.parametrize("collides", ["none", "all"])
+def test_what_is_joined_attracted_or_thrust_has_no_closed_form(extra: str, collides: str) -> None:
+    text = (
+        "[world]\ngravity = [0, -10]\nduration = 0.5\n[[plane]]\npoint = [0, 0]\nnormal = [0, 1]\n"
+        f"[[ball]]\nname = 'a'\nposition = [0, 5]\nradius = 0.5\ncollides = '{collides}'\n"
+    )
+    free, bound = loads(text), loads(text + extra)
+    assert solved_run(free, free.solver) is not None
+    assert solved_run(bound, bound.solver) is None
+    assert closed_form(run(free, audit=False), free, 0) is not None
+    assert closed_form(run(bound, audit=False), bound, 0) is None
+
+
+def test_boxes_fly_by_formula_until_a_corner_touches() -> None:
+    scene = loads(
+        "[world]\ngravity = [0, -10]\nduration = 1.0\n[solver]\ndt = 0.001\n"
+        "[[plane]]\npoint = [0, 0]\nnormal = [0, 1]\n"
+        "[[box]]\nname = 'b'\nposition = [0, 3]\nangle = 0.7853981633974483\nsize = [1, 1]\n"
+    )
+    assert solved_run(scene, scene.solver) is None  # it may meet the plane, and is no ball
+    form = closed_form(run(scene, audit=False), scene, 0)
+    assert form is not None
+    last = form.valid.nonzero()[0][-1] * 0.001
+    # Half a diagonal above the ground, which it has left to fall: ½·10·t² = 3 − √½.
+    assert last == pytest.approx(math.sqrt((3.0 - math.sqrt(0.5)) / 5.0), abs=0.0011)  # a step
+    free = loads(
+        "[world]\ngravity = [0, -10]\nduration = 1.0\n"
+        "[[box]]\nname = 'b'\nposition = [0, 3]\nsize = [1, 1]\nangular_velocity = 2.0\n"
+    )
+    whole = solved_run(free, free.solver)
+    assert whole is not None
+    assert whole.angle[-1, 0] == pytest.approx(2.0, rel=1e-15)  # a product
+
+
+def test_drift_of_a_spring_counts_what_it_stores() -> None:
+    scene = loads(
+        "[world]\nduration = 0.9\n[solver]\ndt = 0.001\n[[ball]]\nname = 'a'\nposition = [0, 0]\nradius = 0.1\n"
+        "[[ball]]\nname = 'b'\nposition = [2, 0]\nradius = 0.1\n"
+        "[[joint]]\nkind = 'spring'\nbetween = ['a', 'b']\nrest_length = 1.0\nstiffness = 50.0\n"
+    )
+    found = run(scene, audit=False)
+    share, _ = energy_drift(found, scene, None, False)
+    # ω = 10: within the band ωh/2 of the scheme; without what is stored it would be the whole, or a part of it.
+    assert share == pytest.approx(0.0, abs=0.005)
+    assert momentum_drift(found, scene) == pytest.approx(0.0, abs=1e-12)  # the two pull each other

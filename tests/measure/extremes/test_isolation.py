@@ -1,0 +1,135 @@
+"""Wardens: a task that hangs, eats memory, aborts or crashes is told with its reason, and the next one runs."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from sandbox.measure.extremes.isolation import MAX_ATTEMPTS, IsolatedWorker, WorkerError
+from sandbox.measure.extremes.outcome import Task
+from sandbox.measure.extremes.worker import exit_text
+
+pytestmark = pytest.mark.full  # long runs and sweeps
+
+MISBEHAVING = """
+import ctypes, os, signal, sys, time
+from sandbox.measure.extremes.worker import serve
+
+def answer(task):
+    match task["case"]:
+        case "sleep":
+            time.sleep(60)
+        case "memory":
+            bytearray(4 * 2**30)
+        case "abort":
+            print("Aborting: it was too much", file=sys.stderr, flush=True)
+            os.abort()
+        case "crash":
+            ctypes.string_at(0)
+        case "quit":
+            os._exit(3)
+        case "chatter":
+            print("this is no answer", flush=True)
+            os.write(1, b"nor is this\\n")
+        case "stop":
+            os.kill(os.getpid(), signal.SIGSTOP)
+        case "killed" | "killed once" as case:
+            marks = open(sys.argv[1], "a+")
+            first = not marks.tell()
+            marks.write("!")
+            marks.close()
+            if first or case == "killed":
+                os.kill(os.getpid(), 9)
+        case "raise":
+            raise ValueError("made up")
+    return {"verdict": "exact", "reason": "well"}
+
+serve(answer, 1024)
+"""
+
+
+def warden(folder: Path, seconds: float = 20.0) -> IsolatedWorker:
+    script = folder / "worker.py"
+    script.write_text(MISBEHAVING, encoding="utf-8")
+    return IsolatedWorker(seconds, 1024, [sys.executable, str(script), str(folder / "marks")])
+
+
+def task(case: str) -> Task:
+    return Task(case, {}, "pymunk")
+
+
+def test_whatever_happens_is_told_and_the_run_goes_on(tmp_path: Path) -> None:
+    told = {}
+    with warden(tmp_path) as worker:
+        for case in ("well", "memory", "abort", "crash", "quit", "chatter", "raise"):
+            outcome = worker.submit(task(case))
+            told[case] = outcome.verdict, outcome.rule, outcome.reason
+            assert worker.submit(task("well")).verdict == "exact"
+        assert worker.started == 5  # the first, and one after each death
+    assert told["well"] == told["chatter"] == ("exact", None, "well")
+    assert told["memory"] == ("failed", "process", "out of memory")
+    assert told["abort"] == ("failed", "process", "the process was killed by SIGABRT: Aborting: it was too much")
+    assert told["crash"] == ("failed", "process", "the process was killed by SIGSEGV")
+    assert told["quit"] == ("failed", "process", "the process ended with status 3")
+    assert told["raise"][2].endswith("ValueError: made up")
+
+
+def test_task_whose_worker_is_killed_from_outside_is_asked_again(tmp_path: Path) -> None:
+    with warden(tmp_path) as worker:
+        assert worker.submit(task("killed once")).verdict == "exact"
+        assert worker.started == 2
+        (tmp_path / "marks").unlink()
+        outcome = worker.submit(task("killed"))
+        assert (outcome.verdict, outcome.reason) == ("failed", "the process was killed by SIGKILL")
+        assert (tmp_path / "marks").read_text() == "!" * MAX_ATTEMPTS
+        assert worker.submit(task("well")).verdict == "exact"
+
+
+def test_worker_that_is_stopped_is_ended_in_time(tmp_path: Path) -> None:
+    with warden(tmp_path, seconds=0.5) as worker:
+        assert worker.submit(task("well")).verdict == "exact"
+        assert worker.submit(task("stop")).slow
+        assert worker.submit(task("well")).verdict == "exact"
+
+
+def test_task_that_hangs_is_stopped_in_time(tmp_path: Path) -> None:
+    with warden(tmp_path, seconds=0.5) as worker:
+        outcome = worker.submit(task("sleep"))
+        assert outcome.reason == "took longer than 0.5 s, and was stopped"
+        assert (outcome.verdict, outcome.rule, outcome.slow) == ("failed", "process", True)
+        assert worker.submit(task("well")).verdict == "exact"
+
+
+def test_worker_that_cannot_start_is_an_error_with_its_last_words() -> None:
+    command = [sys.executable, "-c", "raise SystemExit('no such thing')"]
+    with IsolatedWorker(5.0, 1024, command) as worker, pytest.raises(WorkerError, match="status 1: no such thing"):
+        worker.submit(task("well"))
+
+
+@pytest.mark.parametrize("kills", [1, MAX_ATTEMPTS])
+def test_worker_that_is_killed_while_it_starts_is_started_again(kills: int, tmp_path: Path) -> None:
+    script = tmp_path / "worker.py"
+    die = "marks = open(sys.argv[1], 'a+')\ncount = marks.tell()\nmarks.write('!')\nmarks.close()\n"
+    die += f"if count < {kills}:\n    os.kill(os.getpid(), 9)\n"
+    script.write_text(MISBEHAVING.replace("serve(answer", f"{die}serve(answer"), encoding="utf-8")
+    with IsolatedWorker(20.0, 1024, [sys.executable, str(script), str(tmp_path / "marks")]) as worker:
+        if kills < MAX_ATTEMPTS:
+            assert worker.submit(task("well")).verdict == "exact"
+            assert worker.started == kills + 1
+        else:
+            with pytest.raises(WorkerError, match="SIGKILL") as caught:
+                worker.submit(task("well"))
+            assert caught.value.was_killed
+
+
+def test_closed_warden_interrupts_who_asks(tmp_path: Path) -> None:
+    worker = warden(tmp_path)
+    worker.close()
+    with pytest.raises(InterruptedError):
+        worker.submit(task("well"))
+
+
+def test_causes_of_death_have_names() -> None:
+    assert exit_text(-9) == "the process was killed by SIGKILL"
+    assert exit_text(-64) in ("the process was killed by SIGRTMAX", "the process was killed by signal 64")
+    assert exit_text(1) == "the process ended with status 1"

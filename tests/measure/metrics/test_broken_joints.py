@@ -1,0 +1,147 @@
+"""Runs in which joints break: when, how many, and what is measured of them from then on."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sandbox.batch.job import run_or_fetch
+from sandbox.batch.plan import Job
+from sandbox.engines.common.energy_balance import energy_of
+from sandbox.measure.metrics.energy import energies
+from sandbox.measure.metrics.invariants import joint_error, joint_errors
+from sandbox.measure.run.runner import run
+from sandbox.measure.run.sessions import rerun
+from sandbox.recording import Recording
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.files.load import loads
+from sandbox.trajectory import Frame, Trajectory
+
+every_engine = pytest.mark.parametrize("engine", ["pymunk", "reference"])
+
+APART = """
+[world]
+duration = 1.0
+[solver]
+dt = 0.01
+substeps = 3
+[[ball]]
+name = "a"
+position = [0.0, 0.0]
+velocity = [-1.0, 0.0]
+radius = 0.1
+mass = 1.0
+[[ball]]
+name = "b"
+position = [1.0, 0.0]
+velocity = [1.0, 0.0]
+radius = 0.1
+mass = 1.0
+[[ball]]
+name = "c"
+position = [1.0, 1.0]
+velocity = [1.0, 0.0]
+radius = 0.1
+mass = 1.0
+[[joint]]
+kind = "rod"
+between = ["b", "c"]
+[[joint]]
+kind = "spring"
+between = ["a", "b"]
+stiffness = 20.0
+strength = 5.0
+[[joint]]
+kind = "rod"
+between = ["c"]
+anchors = [[0.0, 0.0], [1.0, 3.0]]
+strength = 0.01
+"""
+"""The spring breaks where it stores ½·F²/k = 0.625 J; the rod to the world at once."""
+
+
+def scene() -> Scene:
+    return loads(APART)
+
+
+@every_engine
+def test_run_tells_when_each_joint_broke(engine: str) -> None:
+    found = run(scene(), engine)
+    assert np.isfinite(found.broken_time).tolist() == [False, True, True]
+    assert found.info["broken"] == 2
+    assert found.broken_time[2] < 0.05
+    spring = float(found.broken_time[1])
+    assert spring * 300 == pytest.approx(round(spring * 300), abs=1e-9)  # at the end of a substep
+    assert found.breaks(3).tolist() == [np.inf, *found.broken_time[1:].tolist()]
+    with pytest.raises(ValueError, match="3 joints"):
+        found.breaks(2)
+
+
+@every_engine
+def test_broken_spring_stores_nothing(engine: str) -> None:
+    found = run(scene(), engine)
+    stored = energies(found, scene()).potential
+    over = found.time >= found.broken_time[1] - 1e-9
+    assert 0 < np.count_nonzero(over) < len(over)
+    assert not stored[over].any()
+    assert 0.5 < stored[~over].max() <= 0.626  # J: up to its strength, and in a frame before that
+    for k in (len(over) // 2, -1):
+        state = found.position[k], found.velocity[k], found.angle[k], found.angular_velocity[k]
+        frame = Frame(float(found.time[k]), *(each.copy() for each in state), np.ones(3, np.bool_))
+        told = energy_of(frame, scene().bodies, (0.0, 0.0), scene(), found.breaks(3))
+        assert told[1] == pytest.approx(stored[k], rel=1e-12)
+
+
+@every_engine
+def test_break_at_the_time_of_a_frame_counts_from_that_frame_on(engine: str) -> None:
+    """Times of frames are products, and those of what broke in a later leg are sums: they round."""
+    found = run(scene(), engine)
+    k = int(np.searchsorted(found.time, found.broken_time[1]))
+    for nudge in (-1e-15, 0.0, 1e-15):
+        breaks = found.broken_time.copy()
+        breaks[1] = found.time[k] + nudge
+        at_frame = Trajectory(**{**vars(found), "broken_time": breaks})
+        assert energies(at_frame, scene()).potential[k] == 0.0
+        assert energies(at_frame, scene()).potential[k - 1] > 0.0
+
+
+@every_engine
+def test_broken_rod_has_no_error(engine: str) -> None:
+    found = run(scene(), engine)
+    errors = joint_errors(found, scene())
+    over = found.time >= found.broken_time[2] - 1e-9
+    assert np.isnan(errors[over, 2]).all()
+    assert not np.isnan(errors[~over, 2]).any()
+    whole = joint_error(found, scene())
+    unbroken = joint_error(Trajectory(**{**vars(found), "broken_time": np.empty(0)}), scene())
+    assert whole is not None
+    assert unbroken is not None
+    assert whole < 0.01 < unbroken  # of its length: the rod that holds, and the one that was left behind
+
+
+@every_engine
+def test_stored_run_keeps_what_broke_and_older_ones_are_read_as_whole(engine: str, tmp_path: Path) -> None:
+    found = run(scene(), engine)
+    path = found.save(tmp_path / "run.npz")
+    assert np.array_equal(Trajectory.load(path).broken_time, found.broken_time, equal_nan=True)
+    with np.load(path) as arrays:
+        older = {name: arrays[name] for name in arrays.files if name != "broken_time"}
+    np.savez(tmp_path / "older.npz", **older)
+    assert Trajectory.load(tmp_path / "older.npz").breaks(3).tolist() == [np.inf] * 3
+
+
+@every_engine
+def test_replay_breaks_the_same_at_the_same_times(engine: str) -> None:
+    first = run(scene(), engine)
+    session = Recording(scene(), engine, scene().solver, (), 1.0, first.info["state_hash"])
+    again = rerun(Recording.from_json(session.to_json()))
+    assert again.info["state_hash"] == first.info["state_hash"]
+    assert np.array_equal(again.broken_time, first.broken_time, equal_nan=True)
+
+
+def test_row_tells_how_many_broke() -> None:
+    record = run_or_fetch(Job("apart", scene(), "pymunk"))
+    assert record.row()["broken_joints"] == 2
+    refused = run_or_fetch(Job("apart", scene(), "exact"))
+    assert refused.trajectory.status == "refused"
+    assert refused.row()["broken_joints"] == 0

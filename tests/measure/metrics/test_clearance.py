@@ -1,0 +1,79 @@
+"""How far bodies are above a plane, and hulls from each other, against sampling and by hand."""
+
+import math
+
+import numpy as np
+import pytest
+
+from sandbox.measure.metrics.clearance import hull_distance, plane_clearance, posed_pieces
+from sandbox.scene.files.load import loads
+
+SCENE = loads(
+    '[[box]]\nname = "box"\nposition = [0, 0]\nsize = [2.0, 1.0]\n'
+    '[[capsule]]\nname = "rod"\nposition = [0, 0]\nlength = 2.0\nradius = 0.25\n'
+    '[[ball]]\nname = "ball"\nposition = [0, 0]\nradius = 0.5\n'
+)
+ANGLES = np.linspace(0.0, math.pi, 9)
+
+
+@pytest.mark.parametrize(
+    ("name", "reach"),
+    [
+        ("ball", np.full(9, 0.5)),
+        ("box", np.abs(np.sin(ANGLES)) + 0.5 * np.abs(np.cos(ANGLES))),
+        ("rod", np.abs(np.sin(ANGLES)) + 0.25),
+    ],
+)
+def test_gap_above_a_plane_is_the_height_of_the_lowest_point(name: str, reach: np.ndarray) -> None:
+    number = SCENE.bodies.names.index(name)
+    at = np.tile((7.0, 3.0), (9, 1))
+    gap = plane_clearance(SCENE.bodies, number, at, ANGLES, np.array([-5.0, 1.0]), np.array([0.0, 1.0]))
+    assert gap == pytest.approx(2.0 - reach, abs=1e-15)  # sines and their sums
+
+
+def hull(rng: np.random.Generator, corners: int) -> np.ndarray:
+    angle = np.sort(rng.uniform(0.0, 2.0 * math.pi, corners))
+    return np.column_stack((np.cos(angle), np.sin(angle))) * rng.uniform(0.2, 1.5) + rng.uniform(-2.0, 2.0, 2)
+
+
+def sampled(shape: np.ndarray, among: int = 200) -> np.ndarray:
+    """Return points along the border of a hull."""
+    share = np.linspace(0.0, 1.0, among)[:, None]
+    return np.concatenate([a + share * (b - a) for a, b in zip(shape, np.roll(shape, -1, axis=0), strict=True)])
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_distance_of_hulls_is_that_of_points_sampled_along_them(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    a, b = hull(rng, 1 + seed % 5), hull(rng, 1 + seed // 5 % 6)
+    found = float(hull_distance(a[None], b[None])[0])
+    assert found == pytest.approx(float(hull_distance(b[None], a[None])[0]), abs=1e-12)  # rounding, in another order
+    nearest = np.hypot(*(sampled(a)[:, None] - sampled(b)).reshape(-1, 2).T).min()
+    if found > 0.0:
+        # No sampled point is nearer; the nearest is off by half a sample's length at most, 1.5 % of 3 m.
+        assert found - 1e-12 <= nearest <= found + 0.025
+        return
+    # They overlap: moved apart by the depth along some direction they touch, and along none by less.
+    directions = np.linspace(0.0, 2.0 * math.pi, 721)
+    ways = np.column_stack((np.cos(directions), np.sin(directions)))
+    least = min(float((a @ way).max() - (b @ way).min()) for way in ways)
+    assert -found <= least + 1e-12
+    assert least <= -found + 0.03  # half a degree of a way out of 3 m at most
+
+
+def test_hulls_that_touch_or_cross_are_no_distance_apart() -> None:
+    square = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]])
+    assert hull_distance(square, square + np.array([1.0, 0.0])).tolist() == [0.0]
+    assert hull_distance(square, square + np.array([0.75, 0.0])).tolist() == [-0.25]
+    cross = np.array([[[0.5, -1.0], [0.5, 2.0]]])
+    assert hull_distance(square, cross).tolist() == [-0.5]
+    assert hull_distance(cross, np.array([[[0.0, 0.0], [1.0, 0.0]]])).tolist() == [-0.5]
+    assert hull_distance(np.array([[[0.5, 0.25]]]), square).tolist() == [-0.25]
+    assert hull_distance(np.array([[[2.0, 0.0]]]), np.array([[[0.0, 0.0], [1.0, 0.0]]])).tolist() == [1.0]
+
+
+def test_pieces_turn_with_their_body() -> None:
+    number = SCENE.bodies.names.index("rod")
+    ((corners, radius),) = posed_pieces(SCENE.bodies, number, np.array([[1.0, 2.0]]), np.array([math.pi / 2]))
+    assert radius == 0.25
+    assert corners[0] == pytest.approx(np.array([[1.0, 1.0], [1.0, 3.0]]), abs=1e-15)  # cosine of a right angle

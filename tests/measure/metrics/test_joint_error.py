@@ -1,0 +1,116 @@
+"""Joint errors against distances known by hand, and against what engines leave."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from sandbox.measure.metrics.invariants import joint_error, joint_errors
+from sandbox.measure.run.runner import run
+from sandbox.scene.files.load import loads
+from tests.measure.metrics.test_energy import still
+
+TWO = """
+[[box]]
+name = "a"
+position = [0.0, 0.0]
+size = [2.0, 0.2]
+[[box]]
+name = "b"
+position = [3.0, 0.0]
+size = [2.0, 0.2]
+"""
+
+
+def off(joint: str, position: tuple[float, float] = (3.0, 0.0), angle: float = 0.0) -> float:
+    """Return the error of one joint where the second box lies elsewhere than it started."""
+    scene = loads(f'{TWO}[[joint]]\nbetween = ["a", "b"]\n{joint}\n')
+    moved, turned = still(scene).position, still(scene).angle
+    moved[:, 1], turned[:, 1] = position, angle
+    (error,) = joint_errors(still(scene, position=moved, angle=turned), scene)[-1]
+    return float(error)
+
+
+GROOVE = 'kind = "groove"\ngroove = [[0.0, 0.0], [0.0, 4.0]]'
+
+
+@pytest.mark.parametrize(
+    ("joint", "position", "angle", "error"),
+    [
+        ('kind = "rod"', (3.0, 0.0), 0.0, 0.0),
+        ('kind = "rod"', (3.0, 4.0), 0.0, 2.0),
+        ('kind = "rod"', (1.0, 0.0), 0.0, 2.0),
+        ('kind = "pivot"\nanchors = [[1.5, 0.0], [-1.5, 0.0]]', (3.0, 0.5), 0.0, 0.5),
+        ('kind = "pivot"\nanchors = [[1.5, 0.0], [-1.5, 0.0]]', (1.5, 1.5), math.pi / 2, 0.0),
+        ('kind = "slide"\nleast = 1.0\nmost = 4.0', (2.0, 0.0), 0.0, 0.0),
+        ('kind = "slide"\nleast = 1.0\nmost = 4.0', (4.5, 0.0), 0.0, 0.5),
+        ('kind = "slide"\nleast = 1.0\nmost = 4.0', (0.25, 0.0), 0.0, 0.75),
+        (GROOVE, (0.0, 3.0), 0.0, 0.0),
+        (GROOVE, (0.5, 3.0), 0.0, 0.5),
+        (GROOVE, (3.0, 8.0), 0.0, 5.0),
+        ('kind = "rotary_limit"\nleast = -0.5\nmost = 0.5', (9.0, 9.0), 0.75, 0.25),
+        ('kind = "rotary_limit"\nleast = -0.5\nmost = 0.5', (9.0, 9.0), -0.25, 0.0),
+        ('kind = "gear"\nratio = 2.0', (9.0, 9.0), 0.5, 1.0),
+    ],
+)
+def test_error_is_the_distance_from_what_is_held(
+    joint: str, position: tuple[float, float], angle: float, error: float
+) -> None:
+    assert off(joint, position, angle) == pytest.approx(error, abs=1e-15)  # sines of right angles round
+
+
+@pytest.mark.parametrize("joint", ['kind = "spring"\nstiffness = 1.0', 'kind = "motor"\nrate = 1.0'])
+def test_springs_and_motors_hold_nothing(joint: str) -> None:
+    assert math.isnan(off(joint, (9.0, 9.0)))
+    scene = loads(f'{TWO}[[joint]]\nbetween = ["a", "b"]\n{joint}\n')
+    assert joint_error(still(scene), scene) is None
+
+
+def test_joint_ends_with_its_body() -> None:
+    scene = loads(f'{TWO}[[joint]]\nkind = "rod"\nbetween = ["a", "b"]\n')
+    gone = still(scene, retired_time=np.array([np.nan, 2.0]))
+    assert np.isnan(joint_errors(gone, scene)[:, 0]).tolist() == [False, False, True, True]
+
+
+@pytest.mark.parametrize(
+    ("joint", "share"),
+    [
+        ('kind = "rod"', 1.0 / 3.0),
+        ('kind = "slide"\nmost = 2.0', 1.0),
+        ('kind = "pivot"\nanchors = [[1.5, 0.0], [-1.5, 0.0]]', 1.0 / math.hypot(2.0, 0.2)),
+    ],
+)
+def test_largest_error_is_a_share_of_a_length(joint: str, share: float) -> None:
+    scene = loads(f'{TWO}[[joint]]\nbetween = ["a", "b"]\n{joint}\n')
+    moved = still(scene).position
+    moved[2, 1] = (4.0, 0.0)
+    assert joint_error(still(scene, position=moved), scene) == pytest.approx(share, rel=1e-14)  # a few roundings
+
+
+def test_a_diverged_joint_is_infinitely_far_off() -> None:
+    scene = loads(f'{TWO}[[joint]]\nkind = "rod"\nbetween = ["a", "b"]\n')
+    position = still(scene).position
+    position[3, 1] = np.nan
+    assert joint_error(still(scene, position=position), scene) == math.inf
+
+
+def test_scene_without_joints_has_no_joint_error() -> None:
+    scene = loads(TWO)
+    assert run(scene, audit=False).info["joint_error"] is None
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference"])
+def test_joint_error_of_a_pendulum_falls_with_the_step(engine: str) -> None:
+    """A rod is put right after each step that left its circle by (v·h)²/2L: what stays is of the order of h."""
+    found = []
+    for dt in (0.01, 0.005, 0.0025):
+        scene = loads(
+            f"[world]\ngravity = [0, -9.81]\nduration = 2.0\n[solver]\ndt = {dt}\n"
+            '[[ball]]\nname = "b"\nposition = [1, 0]\nradius = 0.1\n'
+            '[[joint]]\nkind = "rod"\nbetween = ["b"]\nanchors = [[0, 0], [0, 0]]\n'
+        )
+        found.append(run(scene, engine, audit=False).info["joint_error"])
+    assert found[0] < 0.1
+    orders = [math.log2(a / b) for a, b in pairwise(found)]
+    assert orders == pytest.approx([1.0, 1.0], abs=0.2)  # higher powers of h

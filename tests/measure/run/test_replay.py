@@ -1,0 +1,213 @@
+"""Replays: a session without its window ends in the same state, bit for bit, on every engine that can."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sandbox.action import (
+    Action,
+    ActionError,
+    Impulse,
+    Launch,
+    Move,
+    Pull,
+    Remove,
+    SetParameter,
+    Spawn,
+    Switch,
+)
+from sandbox.engines.registry import ENGINES, UnknownEngineError
+from sandbox.measure.run.sessions import rerun
+from sandbox.recording import Recording
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import from_document
+from sandbox.window.playback.session import Session
+
+pytestmark = pytest.mark.full  # property tests with many examples
+
+SCENE = from_document(
+    {
+        "world": {"gravity": [0, -9.81], "seed": 3, "bounds": [[-9, -1], [9, 30]], "duration": 1.0},
+        "solver": {"dt": 1 / 60},
+        "plane": [{"name": "floor", "point": [0, 0], "normal": [0, 1], "restitution": 1, "friction": 0.3}],
+        "wall": [{"points": [[3, 0], [3, 3]], "restitution": 1}],
+        "ball": [
+            {"name": "a", "position": [-2, 2], "velocity": [3, 0], "radius": 0.25, "restitution": 0.6, "friction": 0.5},
+            {"name": "b", "position": [0, 0.6], "radius": 0.5, "mass": 3, "restitution": 0.6},
+            {"name": "post", "position": [1.5, 3], "radius": 0.2, "fixed": True, "restitution": 1},
+        ],
+        "grid": [
+            {"name": "g", "origin": [-1, 5], "columns": 3, "rows": 2, "spacing": [0.6, 0.6], "jitter": 0.02,
+             "radius": 0.2, "restitution": 0.5},
+        ],
+        "emitter": [{"name": "s", "position": [0, 0], "count": 5, "velocity_min": [-4, 1], "velocity_max": [4, 9]}],
+    }
+)  # fmt: skip
+
+small = st.floats(-5.0, 5.0)
+bodies = st.sampled_from(["a", "b", "post", "g-1", "g-4", "s-2", "new", "spawned-15", "zzz"])
+
+
+def done() -> st.SearchStrategy[Action]:
+    """Actions of every kind that all engines know, and that lead nowhere near the limits."""
+    places = st.tuples(st.floats(-4.0, 2.0), st.floats(1.0, 8.0))
+    pairs = st.tuples(small, small)
+    balls = st.builds(
+        Ball, position=places, radius=st.sampled_from([0.1, 0.3]), name=st.sampled_from([None, "new"]),
+        restitution=st.just(0.5), collides=st.sampled_from(["all", "none"]),
+    )  # fmt: skip
+    paths = st.sampled_from(["ball.*.restitution", "plane.floor.friction", "grid.g.restitution", "world.linear_drag"])
+    values: dict[str, Any] = {"dt": st.sampled_from([0.005, 0.01, 1 / 60, 0.02]), "substeps": st.integers(1, 3)}
+    kinds: list[st.SearchStrategy[Action]] = [
+        st.builds(Impulse, time=st.just(0.0), body=bodies, impulse=pairs, angular=small),
+        st.builds(Move, time=st.just(0.0), body=bodies, position=places, velocity=st.none() | pairs),
+        st.builds(Pull, time=st.just(0.0), body=bodies, grip=st.just((0.05, 0.0)), target=st.none() | places),
+        st.builds(Remove, time=st.just(0.0), body=bodies),
+        st.builds(Spawn, time=st.just(0.0), ball=balls),
+        st.builds(SetParameter, time=st.just(0.0), path=paths, value=st.floats(0.0, 1.0)),
+        st.builds(SetParameter, time=st.just(0.0), path=st.just("world.gravity"), value=pairs.map(list)),
+        st.builds(Launch, time=st.just(0.0), generator=st.sampled_from(["g", "s", "zzz"]), seed=st.integers(0, 9)),
+        st.builds(Switch, time=st.just(0.0), engine=st.sampled_from([None, *ENGINES]), settings=st.just({})),
+        st.builds(Switch, time=st.just(0.0), settings=st.fixed_dictionaries({}, optional=values)),
+    ]
+    return st.one_of(kinds)
+
+
+Played = list[tuple[int, int | None, Action]]
+"""Steps to make, then perhaps steps to go back, then what is done."""
+
+
+def played(engine: str, plan: Played, scene: Scene = SCENE) -> Session:
+    """Return a session in which all was done that could be."""
+    session = Session(scene, engine)
+    for steps, back, action in plan:
+        session.advance(steps)
+        if back is not None:
+            for _ in session.seek(session.step_number - back):
+                pass
+        if session.ended is None:
+            try:
+                session.apply(action)
+            except ActionError as error:
+                assert str(error)
+    session.advance(5)
+    for _ in session.seek(session.history.last_step):  # a recording goes to the last step, also after a way back
+        pass
+    return session
+
+
+plans = st.lists(st.tuples(st.integers(0, 25), st.none() | st.integers(0, 30), done()), max_size=10)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@given(plan=plans)
+@settings(max_examples=12)
+def test_session_replays_to_the_same_state_through_json(engine: str, plan: Played) -> None:
+    session = played(engine, plan)
+    recording = session.recording()
+    again = Recording.from_json(recording.to_json())
+    assert again == recording
+    found = rerun(again, audit=False)
+    if session.ended is None:
+        assert (found.status, found.reason) == ("ok", None)
+    if recording.state_hash is not None:
+        assert found.info["state_hash"] == recording.state_hash
+    assert tuple(found.names.tolist()) == session.bodies.names
+    assert set(np.flatnonzero(~np.isnan(found.retired_time)).tolist()) == set(session.simulation.retired)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_session_of_every_kind_of_action_replays_on_every_engine(engine: str) -> None:
+    """What is done here every engine can do, whatever came before."""
+    plan: Played = [
+        (10, None, Impulse(time=0.0, body="a", impulse=(0.5, 1.0), angular=0.1)),
+        (5, None, Pull(time=0.0, body="b", grip=(0.1, 0.2), target=(0.5, 1.5))),
+        (20, None, Switch(time=0.0, engine="exact")),
+        (5, None, Pull(time=0.0, body="b")),
+        (5, 7, Move(time=0.0, body="a", position=(-4.0, 9.0), velocity=(0.0, 0.0))),
+        (1, None, Spawn(time=0.0, ball=Ball(position=(-6.0, 8.0), radius=0.2))),
+        (1, None, SetParameter(time=0.0, path="ball.*.restitution", value=0.4)),
+        (3, None, Switch(time=0.0, engine="reference", settings={"dt": 0.01})),
+        (9, None, Remove(time=0.0, body="g-1")),
+        (9, None, Launch(time=0.0, generator="s", seed=8)),
+        (9, None, Switch(time=0.0, engine="pymunk", settings={"substeps": 2})),
+    ]
+    session = played(engine, plan)
+    recording = session.recording()
+    assert [action.kind for action in recording.actions if action.kind != "switch"] == [
+        "impulse", "pull", "pull", "move", "spawn", "set", "remove", "launch",
+    ]  # fmt: skip
+    own = rerun(recording)
+    assert own.info["state_hash"] == recording.state_hash
+    assert own.time[-1] == recording.duration
+    for other in ENGINES:
+        found = rerun(recording, other)
+        assert (found.status, found.reason) == ("ok", None)
+        assert found.info["engine"] == other
+        assert found.time[-1] == recording.duration
+        assert found.names.tolist() == own.names.tolist()
+        assert found.number("g-1") in np.flatnonzero(~np.isnan(found.retired_time))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_session_that_was_just_started_replays(engine: str) -> None:
+    session = Session(SCENE, engine)
+    recording = session.recording()
+    assert recording.duration == 0.0
+    assert rerun(recording).info["state_hash"] == recording.state_hash
+    session.apply(Impulse(time=0.0, body="a", impulse=(1.0, 0.0)))
+    recording = session.recording()
+    found = rerun(recording)
+    assert found.info["state_hash"] == recording.state_hash
+    assert found.velocity[-1, 0, 0] == 4.0
+    session.apply(SetParameter(time=0.0, path="world.gravity", value=[0.0, 1.0]))
+    recording = session.recording()
+    found = rerun(recording)
+    assert (found.status, found.reason) == ("ok", None)
+    assert found.info["state_hash"] == recording.state_hash
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_what_is_done_at_the_very_end_is_in_the_last_frame(engine: str) -> None:
+    session = Session(SCENE, engine)
+    session.advance(10)
+    session.apply(Move(time=0.0, body="a", position=(-5.0, 9.0), velocity=(0.0, 0.0)))
+    recording = session.recording()
+    found = rerun(recording)
+    assert found.info["state_hash"] == recording.state_hash
+    assert found.position[-1, 0].tolist() == [-5.0, 9.0]
+    assert len(found.time) == 11
+
+
+def test_action_that_another_engine_cannot_do_ends_its_replay_with_the_reason() -> None:
+    session = Session(SCENE, "reference")
+    session.advance(10)
+    session.apply(Switch(time=0.0, settings={"detection": "swept"}))
+    session.advance(10)
+    found = rerun(session.recording(), "exact")
+    assert found.status == "failed"
+    assert "exact refuses" in str(found.reason)
+    assert found.time[-1] == pytest.approx(10 / 60, rel=1e-12)  # rounding
+
+
+@pytest.mark.parametrize("engine", ["exact", "reference"])
+def test_session_that_diverged_replays_to_its_end(engine: str) -> None:
+    ball = {"name": "a", "position": [9.9e15, 0], "radius": 1, "velocity": [1e12, 0]}
+    session = Session(from_document({"ball": [ball], "solver": {"dt": 10.0}}), engine)
+    session.advance(10_000)
+    assert session.ended is not None
+    assert session.step_number == 9011  # 9.9e15 + 9011 · 1e13 is the first beyond 1e17
+    recording = session.recording()
+    found = rerun(recording)
+    assert found.status == "diverged"
+    assert found.reason == session.ended
+    assert found.info["state_hash"] == recording.state_hash
+
+
+def test_unknown_engine_is_told() -> None:
+    with pytest.raises(UnknownEngineError, match="engines: "):
+        rerun(Session(SCENE).recording(), "zzz")

@@ -1,0 +1,96 @@
+"""Costs are timed in turns, with nothing recorded. No time is asserted on."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from sandbox.engines.contract import Divergence, Exhaustion, Simulation
+from sandbox.measure.tradeoff import timing as module
+from sandbox.measure.tradeoff.timing import (
+    TimedRun,
+    Timing,
+    run_seconds,
+    time_in_turns,
+    warm_up,
+)
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.description.world import Settings
+from tests.runs_by_hand import DROP, scene_of
+
+
+def test_cost_is_scaled_to_a_simulated_second() -> None:
+    assert Timing.of([0.2, 0.1, 0.6], 4.0) == Timing(25.0, 50.0, 3)
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "exact"])
+def test_run_is_stepped_to_its_end(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = scene_of(DROP)
+    real, ended = module.start, []
+
+    def watched(scene: Scene, engine: str, settings: Settings) -> object:
+        simulation = real(scene, engine, settings)
+        close = simulation.close
+        simulation.close = lambda: (ended.append(simulation.frame().time), close())  # type: ignore[method-assign]
+        return simulation
+
+    monkeypatch.setattr(module, "start", watched)
+    for dt in (0.02, 0.03):  # 20 whole steps; 13 and a third
+        seconds = run_seconds(scene, engine, scene.solver.replace(dt=dt))
+        assert seconds is not None
+        assert seconds > 0.0
+    assert ended == pytest.approx([0.4, 0.4], rel=1e-12)  # the sum of the steps
+
+
+@pytest.mark.parametrize("error", [Divergence(0.1, "a", "is gone"), Exhaustion("enough")])
+def test_run_that_does_not_end_has_no_cost_and_is_closed(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+    closed = []
+
+    def step() -> None:
+        raise error
+
+    broken = SimpleNamespace(step=step, frame=lambda: None, close=lambda: closed.append(True))
+    monkeypatch.setattr(module, "start", lambda *_: broken)
+    scene = scene_of(DROP)
+    assert time_in_turns([TimedRun(scene, "pymunk", scene.solver)], 3) == [None]
+    assert closed == [True, True]  # the warm-up and the first turn; it is not tried again
+
+
+def test_ways_are_warmed_up_and_timed_in_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+    order: list[str] = []
+
+    def seconds(scene: Scene, engine: str, settings: Settings) -> float:
+        order.append(engine)
+        return 1.0
+
+    monkeypatch.setattr(module, "run_seconds", seconds)
+    monkeypatch.setattr(module, "warm_up", lambda _, engine, settings: order.append(f"warm {engine}"))
+    scene = scene_of(DROP)
+    found = time_in_turns([TimedRun(scene, "a", scene.solver), TimedRun(scene, "b", scene.solver)], 3)
+    assert order == ["warm a", "warm b"] + ["a", "b"] * 3
+    assert [each.repeats for each in found if each is not None] == [3, 3]
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "exact", "reference"])
+@pytest.mark.parametrize(
+    ("dt", "end"),
+    [
+        (0.02, 0.02 * module.WARM_UP_STEPS),  # of a run of 0.4 s
+        (0.4, 0.4),
+        (0.5, 0.4),  # a step that the end of the run cuts
+    ],
+)
+def test_warm_up_is_short_and_also_of_a_run_of_one_step(
+    engine: str, dt: float, end: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real, started = module.start, list[Simulation]()
+
+    def begin(*arguments: Any) -> Simulation:
+        started.append(real(*arguments))
+        return started[-1]
+
+    monkeypatch.setattr(module, "start", begin)
+    scene = scene_of(DROP)
+    warm_up(scene, engine, scene.solver.replace(dt=dt))
+    (simulation,) = started
+    assert simulation.time == pytest.approx(end, rel=1e-12)  # rounding of a sum

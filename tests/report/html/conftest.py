@@ -1,0 +1,108 @@
+"""Pages in a browser: a headless Chromium that may ask no network for anything, and a scene that tries to break out."""
+
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from selenium import webdriver
+from selenium.webdriver.chrome.options import Options
+from selenium.webdriver.chrome.service import Service
+
+from sandbox.measure.compare import Comparison, compare
+from sandbox.report.html.comparison import write_comparison
+from sandbox.report.html.extremes import write_extremes
+from sandbox.report.html.overview import Overview, SceneReport
+from sandbox.report.html.page import write_page
+from sandbox.report.html.tradeoff import write_tradeoff
+from sandbox.scene.files.load import loads
+from tests.report.html.page_documents import HOSTILE, SCENE, extremes_document, tradeoff_document
+
+FLAGS = (
+    *("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
+    *("--disable-background-networking", "--disable-component-update", "--disable-dev-shm-usage"),
+    "--window-size=1300,1200",
+)
+
+
+class Browser:
+    """A browser that shows one page."""
+
+    def __init__(self, driver: webdriver.Chrome) -> None:
+        self.driver = driver
+
+    def show(self, page: Path, **features: str) -> None:
+        """Show a page from its file, in a window of 1300 × 1000 px."""
+        self.log()
+        self.requests()
+        told = [{"name": key.replace("_", "-"), "value": value} for key, value in features.items()]
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": told})
+        size = {"width": 1300, "height": 1000, "deviceScaleFactor": 1, "mobile": False}
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+        self.driver.get(page.as_uri())
+        self.do("document.documentElement.style.scrollBehavior = 'auto'")  # who clicks does not wait for scrolling
+
+    def do(self, script: str, *arguments: object) -> Any:
+        """Run a script in the page and return what it returns."""
+        return self.driver.execute_script(script, *arguments)
+
+    def wait(self, script: str) -> Any:
+        """Wait until an expression is true."""
+        return self.driver.execute_async_script(
+            f"const done = arguments[0]; const ask = () => {{ const it = {script}; "
+            "if (it) done(it); else setTimeout(ask, 10); }; ask();"
+        )
+
+    def log(self) -> list[str]:
+        """Return what the console has told since the last call."""
+        return [f"{entry['level']}: {entry['message']}" for entry in self.driver.get_log("browser")]
+
+    def requests(self) -> list[str]:
+        """Return what the page has fetched since the last call, itself included; not the browser's own first tab."""
+        events = [json.loads(entry["message"])["message"] for entry in self.driver.get_log("performance")]
+        sent = [event["params"] for event in events if event["method"] == "Network.requestWillBeSent"]
+        return [each["request"]["url"] for each in sent if each["documentURL"].startswith("file:")]
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """One browser for a module's tests."""
+    programs = {name: shutil.which(name) for name in ("chromium", "chromedriver")}
+    missing = [name for name, path in programs.items() if path is None]
+    if missing:
+        pytest.skip(f"seeing pages in a browser needs {' and '.join(missing)} (Debian: chromium, chromium-driver)")
+    options = Options()
+    options.binary_location = str(programs["chromium"])
+    for flag in (*FLAGS, f"--user-data-dir={tmp_path_factory.mktemp('profile')}"):
+        options.add_argument(flag)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    driver = webdriver.Chrome(options=options, service=Service(str(programs["chromedriver"])))
+    driver.set_script_timeout(30)
+    try:
+        yield Browser(driver)
+    finally:
+        driver.quit()
+
+
+@pytest.fixture(scope="module")
+def comparison() -> Comparison:
+    """Two engines on a scene whose names and texts are markup."""
+    return compare(loads(SCENE, "hostile.toml"), ("pymunk", "exact"))
+
+
+@pytest.fixture(scope="module")
+def pages(comparison: Comparison, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A page of each kind."""
+    folder = tmp_path_factory.mktemp("pages")
+    overview = Overview(asked=3)
+    overview.add(SceneReport("one", comparison, tradeoff=tradeoff_document()))
+    overview.add(SceneReport(HOSTILE, failure=HOSTILE))
+    overview.add(SceneReport("two", comparison))
+    return {
+        "comparison": write_comparison(comparison, folder / "comparison.html"),
+        "tradeoff": write_tradeoff(tradeoff_document(), folder / "tradeoff.html", comparison),
+        "extremes": write_extremes(extremes_document(), folder / "extremes.html"),
+        "overview": write_page(overview.page(), folder / "overview.html"),
+    }

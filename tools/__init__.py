@@ -1,0 +1,1 @@
+"""Development tools: benchmarks, oracles, calibration, pictures of the documentation, and the fuzzer."""

@@ -1,0 +1,124 @@
+"""Benchmarks: what this project claims about speed, as ratios against a peer in the same run.
+
+    python tools/bench.py [NAME…] [--json] [--repeats N]
+
+Each row first checks that both sides compute the same, where they should. After a warm-up they then take turns, so that
+a noisy machine affects both; the ratio is that of the medians.
+The rows are those of suite.py and games.py. Times are seconds unless the unit says otherwise.
+"""
+
+import argparse
+import gc
+import json
+import statistics
+import sys
+from datetime import UTC, datetime
+
+from sandbox.provenance import machine, versions
+from tools.benchmarks.row import Bench
+from tools.benchmarks.suite import BENCHES
+from tools.benchmarks.workloads import Timed
+
+
+def measure(bench: Bench, repeats: int) -> dict[str, object]:
+    """Check that both sides compute the same, time them in turns and return the row.
+
+    The side that goes first alternates, and the garbage collector runs between the timings, not in them.
+
+    Raises:
+        AssertionError: the sides do not compute the same.
+    """
+    if bench.same is not None:
+        bench.same()
+    ours, peer = bench.ours(), bench.peer()
+    ours(), peer()
+    best = max if bench.rate else min
+    mine: list[float] = []
+    theirs: list[float] = []
+    for k in range(repeats):
+        turns = [(ours, mine), (peer, theirs)]
+        for work, figures in turns if k % 2 == 0 else reversed(turns):
+            figures.append(_without_collection(work))
+    own, other = statistics.median(mine), statistics.median(theirs)
+    claimed = own - other if bench.above else own / other
+    met = None if bench.target is None else own >= bench.target if bench.rate else claimed <= bench.target
+    return {
+        "name": bench.name,
+        "about": bench.about,
+        "ours": own - other if bench.above else own,
+        "peer": other,
+        "unit": f"{bench.unit} above" if bench.above else bench.unit,
+        "ratio": (own - other) / other if bench.above else own / other,
+        "target": bench.target,
+        "met": met,
+        "repeats": repeats,
+        "ours_best": min(mine) - min(theirs) if bench.above else best(mine),
+        "peer_best": best(theirs),
+        "spread": max(theirs) / min(theirs) - 1.0,
+        "ours_spread": max(mine) / min(mine) - 1.0,
+        "same": "checked" if bench.same is not None else None,
+    }
+
+
+def _without_collection(work: Timed) -> float:
+    """Return what a piece of work measures, with the garbage collector off."""
+    gc.collect()
+    gc.disable()
+    try:
+        return work()
+    finally:
+        gc.enable()
+
+
+def main() -> int:
+    """Run the benches named, or all."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(bench.name for bench in BENCHES))
+    parser.add_argument("--json", action="store_true", help="one JSON document on standard output")
+    parser.add_argument("--repeats", type=int, default=7, metavar="N")
+    arguments = parser.parse_args()
+    unknown = set(arguments.names) - {bench.name for bench in BENCHES}
+    if unknown or arguments.repeats < 1:
+        parser.error(f"no bench {', '.join(sorted(unknown))}" if unknown else "--repeats is 1 or more")
+
+    rows, skipped = [], []
+    if not arguments.json:
+        print(f"{datetime.now(UTC):%Y-%m-%d}", *(f"{k} {v}" for k, v in {**machine(), **versions()}.items()), sep=" · ")
+    for bench in BENCHES:
+        if arguments.names and bench.name not in arguments.names:
+            continue
+        if bench.missing and (reason := bench.missing()):
+            skipped.append({"name": bench.name, "reason": reason})
+            if not arguments.json:
+                print(f"{bench.name:<24} left out: {reason}", flush=True)
+            continue
+        row = measure(bench, arguments.repeats)
+        rows.append(row)
+        if not arguments.json:
+            print(told(row), flush=True)
+    if arguments.json:
+        date = f"{datetime.now(UTC):%Y-%m-%d}"
+        told_of = {"machine": {**machine(), "date": date}, "versions": versions(), "rows": rows}
+        print(json.dumps({**told_of, "skipped": skipped} if skipped else told_of))
+    return 0
+
+
+def told(row: dict[str, object]) -> str:
+    """Return a row as two lines."""
+    verdict = {None: "", True: ", met", False: ", MISSED"}[row["met"]]
+    rate = str(row["unit"]).endswith("/s")
+    goal = "" if row["target"] is None else f"   target {'>=' if rate else '<='} {row['target']:.3g}{verdict}"
+    figure = f"{row['ours']:.3f} s above" if row["unit"] == "s above" else f"{row['ratio']:.3g} ×"
+    if rate:
+        figure = f"{row['ours']:.3g} /s"
+    unit = str(row["unit"]).split()[0]
+    return (
+        f"{row['name']:<24}{figure:>14}{goal}   (median {row['ours']:.4g} / {row['peer']:.4g} {unit}, "
+        f"best {row['ours_best']:.4g} / {row['peer_best']:.4g}, {row['repeats']} repeats, "
+        f"spread {row['ours_spread']:.0%} / {row['spread']:.0%})\n"
+        f"{'':<24}{row['about']}"
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

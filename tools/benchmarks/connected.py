@@ -1,0 +1,136 @@
+"""Connected and stacked bodies: the cloth and the tower that the benches step, and a cloth of bare pymunk springs."""
+
+import time
+from collections.abc import Callable
+
+import pymunk
+
+from sandbox.engines.registry import start
+from sandbox.measure.run.runner import run
+from sandbox.scene.compile.joint_arrays import WORLD
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.files.load import loads
+
+Timed = Callable[[], float]
+
+CLOTH = """
+[world]
+gravity = [0.0, -9.81]
+duration = 1000.0
+[solver]
+dt = 0.001
+[[cloth]]
+name = "sheet"
+corner = [0.0, 3.2]
+columns = 64
+rows = 64
+spacing = [0.05, 0.05]
+radius = 0.01
+mass = 0.002
+stiffness = 100.0
+damping = 0.02
+pins = "top"
+"""
+"""64 × 64 nodes on 8,001 springs, its uppermost row pinned"""
+
+
+def cloth(engine: str, steps: int, **settings: str) -> Timed:
+    """Return the work of stepping the cloth; it tells steps a second."""
+    scene = loads(CLOTH)
+
+    def work() -> float:
+        simulation = start(scene, engine, scene.solver.replace(**settings))
+        simulation.step()
+        began = time.perf_counter()
+        for _ in range(steps):
+            simulation.step()
+        took = time.perf_counter() - began
+        simulation.close()
+        return steps / took
+
+    return work
+
+
+def springs(steps: int) -> Timed:
+    """Return the same of the same cloth, written by hand with pymunk's springs; it tells steps a second."""
+    scene = loads(CLOTH)
+
+    def work() -> float:
+        space = cloth_space(scene)
+        h = scene.solver.h
+        space.step(h)
+        began = time.perf_counter()
+        for _ in range(steps):
+            space.step(h)
+        return steps / (time.perf_counter() - began)
+
+    return work
+
+
+def cloth_space(scene: Scene) -> pymunk.Space:
+    """Return a cloth as a space of pymunk's bodies and damped springs."""
+    space = pymunk.Space()
+    space.gravity = scene.world.gravity
+    bodies = []
+    for place, mass, fixed in zip(
+        scene.bodies.position.tolist(), scene.bodies.mass.tolist(), scene.bodies.fixed.tolist(), strict=True
+    ):
+        body = pymunk.Body(mass, float("inf"), body_type=pymunk.Body.STATIC if fixed else pymunk.Body.DYNAMIC)
+        body.position = place
+        space.add(body)
+        bodies.append(body)
+    links = scene.links
+    for a, b, (rest, stiffness, damping) in zip(
+        links.a.tolist(), links.b.tolist(), links.figures.tolist(), strict=True
+    ):
+        first = space.static_body if a == WORLD else bodies[a]
+        space.add(pymunk.DampedSpring(first, bodies[b], (0, 0), (0, 0), rest, stiffness, damping))
+    return space
+
+
+def standing(scene: Scene, engine: str, most_drift: float, **settings: int) -> Timed:
+    """Return the work of a run of a tower on an engine, at settings that keep it from drifting; it tells seconds.
+
+    Raises:
+        AssertionError: a box came to lie farther aside than `most_drift`, m: the settings are not those claimed.
+    """
+    whole = scene.solver.replace(record_every=10_000, **settings)
+    scene = scene.model_copy(update={"solver": whole})
+
+    def work() -> float:
+        began = time.perf_counter()
+        done = run(scene, engine, audit=False)
+        took = time.perf_counter() - began
+        aside = float(abs(done.position[-1, :, 0] - done.position[0, :, 0]).max())
+        assert aside <= most_drift, f"{engine}: {aside:g} m aside"
+        return took
+
+    return work
+
+
+def heap() -> Scene:
+    """Return 60 long planks that fall into a box."""
+    rows = "".join(
+        f'[[box]]\nname = "plank {k}"\nposition = [{0.05 * (k % 3)}, {0.3 + 0.12 * k}]\n'
+        f"size = [4.0, 0.08]\nangle = {0.02 * (k % 5 - 2)}\nfriction = 0.3\n"
+        for k in range(60)
+    )
+    return loads(
+        "[world]\ngravity = [0.0, -9.81]\nduration = 1.0\n[solver]\ndt = 0.005\n"
+        "[[wall]]\npoints = [[-2.5, 9.0], [-2.5, 0.0], [2.5, 0.0], [2.5, 9.0]]\nfriction = 0.3\n" + rows
+    )
+
+
+def planks(broad_phase: str) -> Timed:
+    """Return the work of a second of a heap of planks on the reference; it returns seconds."""
+    scene = heap()
+
+    def work() -> float:
+        simulation = start(scene, "reference", scene.solver.replace(broad_phase=broad_phase))
+        simulation.step()
+        began = time.perf_counter()
+        for _ in range(200):
+            simulation.step()
+        return time.perf_counter() - began
+
+    return work

@@ -1,0 +1,275 @@
+"""Peers: what the benchmarks compare with, written as directly as it can be done."""
+
+import math
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pymunk
+from pymunk.batch import ArbiterFields, BodyFields, Buffer, get_space_arbiters, get_space_bodies
+
+from sandbox.arrays import FloatArray
+from sandbox.engines.common.base import BIAS, SLOP_PER_RADIUS
+from sandbox.engines.contract import Simulation
+from sandbox.engines.pymunk_adapter.engine import PERSISTENCE
+from sandbox.engines.registry import start
+from sandbox.measure.analytic import bounces
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.files.load import from_document
+
+STATE = BodyFields.POSITION | BodyFields.ANGLE | BodyFields.VELOCITY | BodyFields.ANGULAR_VELOCITY
+TOUCH = (
+    ArbiterFields.BODY_A_ID
+    | ArbiterFields.BODY_B_ID
+    | ArbiterFields.TOTAL_IMPULSE
+    | ArbiterFields.NORMAL
+    | ArbiterFields.CONTACT_COUNT
+    | ArbiterFields.POINT_A_1
+    | ArbiterFields.POINT_B_1
+)
+
+
+def pile_loop(scene: Scene) -> Callable[[], float]:
+    """Time a pile as one would write it for pymunk alone, recording what a `Trajectory` holds.
+
+    No guard, no audit, no checks, no choice of engine; contacts are rows of a pair while it lasts.
+    """
+
+    def work() -> float:
+        began = time.perf_counter()
+        pile_arrays(scene)
+        return time.perf_counter() - began
+
+    return work
+
+
+def pile_arrays(scene: Scene) -> tuple[FloatArray, FloatArray]:
+    """Run a pile of equal balls and return its frames (T, N, 6) and its contacts (C, 9).
+
+    A frame has position, angle, velocity and angular velocity of each ball; a contact has time, numbers, normal, point
+    and impulse.
+    """
+    radius, mass = float(scene.bodies.radius[0]), float(scene.bodies.mass[0])
+    (pair,) = scene.pairs
+    friction, restitution = pair.friction**0.5, pair.restitution**0.5  # pymunk multiplies those of two shapes
+    dt, steps = scene.solver.dt, round(scene.world.duration / scene.solver.dt)
+    space = pymunk.Space()
+    space.gravity = scene.world.gravity
+    space.iterations = scene.solver.iterations
+    space.collision_slop, space.collision_bias = SLOP_PER_RADIUS * radius, BIAS
+    space.collision_persistence = PERSISTENCE
+
+    bodies = []
+    for x, y in scene.bodies.position.tolist():
+        body = pymunk.Body(mass, 0.5 * mass * radius**2)
+        body.position = x, y
+        shape = pymunk.Circle(body, radius)
+        shape.elasticity, shape.friction = restitution, friction
+        space.add(body, shape)
+        bodies.append(body)
+    for plane in scene.planes:
+        (x, y), (across, up) = plane.point, plane.normal
+        x, y = x - 1e3 * across, y - 1e3 * up
+        a, b = (x - 1e4 * up, y - 1e4 * across), (x + 1e4 * up, y + 1e4 * across)
+        body = pymunk.Body(body_type=pymunk.Body.STATIC)
+        shape = pymunk.Segment(body, a, b, 1e3)
+        shape.elasticity, shape.friction = restitution, friction
+        space.add(body, shape)
+        bodies.append(body)
+
+    count, ids = len(scene.bodies), np.array([body.id for body in bodies])
+    order = np.argsort(ids)
+    ids = ids[order]
+    frames = np.empty((steps + 1, count, 6))
+    states, touches = Buffer(), Buffer()
+    row_of = np.full((len(bodies), len(bodies)), -1, np.int32)
+    last, contacts = np.full(100_000, -9, np.int64), np.zeros((100_000, 9))
+    rows = 0
+    for k in range(steps + 1):
+        if k:
+            space.step(dt)
+        states.clear()
+        get_space_bodies(space, STATE, states)
+        frames[k] = np.frombuffer(states.float_buf()).reshape(-1, 6)[:count]
+        touches.clear()
+        get_space_arbiters(space, TOUCH, touches)
+        words = np.frombuffer(touches.int_buf(), np.int64).reshape(-1, 3)
+        table = np.frombuffer(touches.float_buf()).reshape(-1, 8)
+        live = words[:, 2] > 0
+        words, table = words[live], table[live]
+        a, b = order[np.searchsorted(ids, words[:, 0])], order[np.searchsorted(ids, words[:, 1])]
+        row = row_of[a, b]
+        new = np.flatnonzero((row < 0) | (last[row] < k - 1))
+        row[new] = rows + np.arange(len(new))
+        opened = slice(rows, rows + len(new))
+        contacts[opened, 0] = k * dt
+        contacts[opened, 1], contacts[opened, 2] = a[new], b[new]
+        contacts[opened, 3:5] = table[new, 2:4]
+        contacts[opened, 5:7] = (table[new, 4:6] + table[new, 6:8]) / 2
+        rows += len(new)
+        row_of[a, b] = row
+        last[row] = k
+        contacts[row, 7:9] += table[:, 0:2]
+    return frames, contacts[:rows]
+
+
+def bodies_without_shapes(count: int, steps: int) -> Callable[[], float]:
+    """Time pymunk bodies in free flight, stepped and read in one batch each frame."""
+
+    def work() -> float:
+        space = pymunk.Space()
+        space.gravity = 0.0, -9.81
+        for k in range(count):
+            body = pymunk.Body(1.0, 1.0)
+            body.velocity = k % 100, k % 37
+            space.add(body)
+        states = Buffer()
+        space.step(0.01)
+        began = time.perf_counter()
+        for _ in range(steps):
+            space.step(0.01)
+            states.clear()
+            get_space_bodies(space, STATE, states)
+            np.frombuffer(states.float_buf()).reshape(-1, 6).copy()
+        return time.perf_counter() - began
+
+    return work
+
+
+def copying(size: int, times: int) -> Callable[[], float]:
+    """Time copying so many bytes so often: each is read once and written once."""
+    source, target = np.ones(size // 8), np.ones(size // 8)
+
+    def work() -> float:
+        began = time.perf_counter()
+        for _ in range(times):
+            np.copyto(target, source)
+        return time.perf_counter() - began
+
+    return work
+
+
+def fly(position: FloatArray, velocity: FloatArray, h: float, steps: int) -> None:
+    """Advance particles in free flight, in place, as one would write it in numpy."""
+    gravity = np.array([0.0, -9.81])
+    for _ in range(steps):
+        position += velocity * h
+        velocity += gravity * h
+
+
+def naive_flight(count: int) -> Callable[[], float]:
+    """Return the particle-steps a second of numpy's two lines for free flight."""
+    position, velocity = np.zeros((count, 2)), np.ones((count, 2))
+    steps = max(5, 5_000_000 // count)
+
+    def work() -> float:
+        began = time.perf_counter()
+        fly(position, velocity, 0.01, steps)
+        return count * steps / (time.perf_counter() - began)
+
+    return work
+
+
+def copied(count: int) -> Callable[[], float]:
+    """Return of how many particles positions and velocities are copied in a second: as a step reads and writes them."""
+    times = max(10, 20_000_000 // count)
+    copy = copying(count * 4 * 8, times)
+    return lambda: count * times / copy()
+
+
+def give_moments(simulation: Simulation, scene: Scene) -> None:
+    """Give every body of a pymunk simulation the moment that the engine left out as nothing can turn it."""
+    space_bodies = simulation._population.space_bodies  # type: ignore[attr-defined]
+    for number, moment in enumerate(scene.bodies.moment.tolist()):
+        space_bodies.give_moment(number, moment)
+
+
+def gas(count: int, speed: float, **more: object) -> Scene:
+    """Return an elastic gas of 16, 100 or 1,000 balls in a box, as dilute as the shipped one, with more if stated.
+
+    The same gas at any speed, m/s, but for the clock. Exact is asked for a fast one, so that many events lie between
+    two frames; pymunk is slow at high speeds, as its tree widens boxes by a tenth of a second's way.
+    """
+    columns, rows = {16: (4, 4), 100: (10, 10), 1000: (40, 25)}[count]
+    sides = [([0, 0], [1, 0]), ([0, 0], [0, 1]), ([columns, rows], [-1, 0]), ([columns, rows], [0, -1])]
+    return from_document(
+        {
+            "world": {"duration": 1e4, "seed": 1},
+            "solver": {"dt": 0.005 / speed},
+            "material": [{"name": "elastic"}],
+            "pair": [{"between": ["elastic", "elastic"], "restitution": 1.0}],
+            "plane": [{"point": point, "normal": normal, "material": "elastic"} for point, normal in sides],
+            "grid": [
+                {
+                    "origin": [0.5, 0.5],
+                    "columns": columns,
+                    "rows": rows,
+                    "spacing": [1.0, 1.0],
+                    "radius": 0.25,
+                    "velocity_jitter": speed,
+                    "material": "elastic",
+                }
+            ],
+            **more,
+        }
+    )
+
+
+def contacts_a_second(count: int) -> Callable[[], float]:
+    """Return the contacts a second that pymunk gets through in the same gas, 1/50 of a radius a step."""
+
+    def work() -> float:
+        simulation = start(gas(count, 1.0), "pymunk")
+        simulation.contacts()
+        began = time.perf_counter()
+        for _ in range(2000 if count < 1000 else 400):
+            simulation.step()
+        seconds = time.perf_counter() - began
+        return len(simulation.contacts()) / seconds
+
+    return work
+
+
+def bounce_truth(scene: Scene) -> FloatArray:
+    """Return the height of a ball dropped from 5 cm, restitution 0.8, at the frames of a scene, m."""
+    frames = round(scene.world.duration / scene.solver.dt)
+    height, _ = bounces(scene.solver.dt * np.arange(1, frames + 1), 0.05, 0.0, 9.81, 0.8)
+    return height
+
+
+def bounce_to(scene: Scene, tolerance: float) -> Callable[[], float]:
+    """Time a bounce in pymunk alone, at the largest dt = scene's / 2ⁿ whose frames are right to a tolerance, m.
+
+    The dt is sought first, against the closed form; velocities start half a kick ahead, so that flight is exact, and
+    what is left is the time of impact.
+    """
+    frames, height = round(scene.world.duration / scene.solver.dt), 0.05
+    truth = bounce_truth(scene)
+    each = 1
+    while True:
+        found, seconds = _bounced(scene, frames, each, height)
+        if np.abs(found - truth).max() <= tolerance:
+            break
+        if seconds > 60.0:
+            raise RuntimeError(f"pymunk does not get within {tolerance:g} m in a minute")
+        each *= 2
+    return lambda: _bounced(scene, frames, each, height)[1]
+
+
+def _bounced(scene: Scene, frames: int, each: int, height: float) -> tuple[FloatArray, float]:
+    """Return the ball's heights at the frames, with so many steps each, and the seconds that took."""
+    dt = scene.solver.dt / each
+    space = pymunk.Space()
+    space.gravity, space.collision_slop = (0.0, -9.81), 1e-9
+    body, ground = pymunk.Body(1.0, math.inf), pymunk.Body(body_type=pymunk.Body.STATIC)
+    body.position, body.velocity = (0.0, 0.5 + height), (0.0, -9.81 * dt / 2)
+    ball, floor = pymunk.Circle(body, 0.5), pymunk.Segment(ground, (-1e4, -1e3), (1e4, -1e3), 1e3)
+    ball.elasticity, floor.elasticity = 0.8, 1.0
+    space.add(body, ball, ground, floor)
+    found = np.empty(frames)
+    began = time.perf_counter()
+    for frame in range(frames):
+        for _ in range(each):
+            space.step(dt)
+        found[frame] = body.position.y - 0.5
+    return found, time.perf_counter() - began

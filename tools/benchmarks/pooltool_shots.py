@@ -1,0 +1,197 @@
+"""A peer for billiards: full shots, from the strike to rest, played and timed by pooltool.
+
+    python -m tools.benchmarks.pooltool_shots [NAME…] [--corrected] [--repeats N] [--json]
+
+The scenes lie in tools/benchmarks/shots. They hold tables, cushions, jaws, pockets, models and balls of pooltool, so
+that another engine can play the same shot. Pooltool runs in a process and with a home folder of its own, under the
+Python that `POOLTOOL_PYTHON` names, or this one. Its handling of touching balls and degenerate quartics is unchanged
+unless `corrected`; the law of friction between balls is always ours.
+"""
+
+import argparse
+import atexit
+import contextlib
+import functools
+import importlib.util
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+SHOTS = Path(__file__).resolve().parent / "shots"
+NAMES = ("nine_ball_break", "eight_ball_break", "snooker_break", "three_cushions")
+SPACER = 1e-9
+"""m, by which bodies that met are parted where pooltool is corrected."""
+
+
+class Played(NamedTuple):
+    """A shot that was played."""
+
+    seconds: float
+    events: int
+    """Collisions and transitions."""
+    meetings: int
+    """Of them those of two balls."""
+    rest: float
+    """s, when all lay still"""
+
+
+class MissingError(RuntimeError):
+    """Pooltool is not to be had."""
+
+
+def path(name: str) -> Path:
+    """Return the scene file of a shot."""
+    return SHOTS / f"{name}.toml"
+
+
+def missing() -> str | None:
+    """Return why pooltool cannot be asked, if so."""
+    if "POOLTOOL_PYTHON" in os.environ or importlib.util.find_spec("pooltool"):
+        return None
+    return "pooltool-billiards is not installed here; POOLTOOL_PYTHON can name a Python that has it"
+
+
+def peer(name: str, corrected: bool = False) -> Callable[[], float]:
+    """Time a shot of pooltool's, from the strike to rest, its table and balls set up before.
+
+    Raises:
+        MissingError: there is no pooltool.
+    """
+    player = playing(corrected)
+    return lambda: player(name).seconds
+
+
+@functools.cache
+def playing(corrected: bool = False) -> "Player":
+    """Start pooltool once, as it is or corrected, and return what has it play.
+
+    Raises:
+        MissingError: there is no pooltool.
+    """
+    return Player(corrected)
+
+
+class Player:
+    """Pooltool in a process of its own, which plays shots by name."""
+
+    def __init__(self, corrected: bool) -> None:
+        if reason := missing():
+            raise MissingError(reason)
+        self.folder = tempfile.TemporaryDirectory(prefix="pooltool-")
+        surroundings = {**os.environ, "HOME": self.folder.name}
+        if corrected:  # compiled code that is patched is not to be mixed with pooltool's own
+            surroundings["NUMBA_CACHE_DIR"] = self.folder.name
+        self.process = subprocess.Popen(
+            [
+                os.environ.get("POOLTOOL_PYTHON", sys.executable),
+                *("-m", "tools.benchmarks.pooltool_shots", "--serve"),
+                *["--corrected"] * corrected,
+            ],
+            cwd=Path(__file__).resolve().parents[2],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env=surroundings,
+        )
+        atexit.register(self.close)
+
+    def __call__(self, name: str) -> Played:
+        """Play a shot.
+
+        Raises:
+            MissingError: pooltool has ended; it said why on standard error.
+        """
+        assert self.process.stdin is not None and self.process.stdout is not None
+        with contextlib.suppress(BrokenPipeError):  # no answer tells as much
+            self.process.stdin.write(f"{path(name)}\n")
+            self.process.stdin.flush()
+        answer = self.process.stdout.readline()
+        if not answer:
+            raise MissingError(f"pooltool ended with status {self.process.wait()}")
+        return Played(*json.loads(answer))
+
+    def close(self) -> None:
+        """End the process, and remove its folder."""
+        self.process.communicate()
+        self.folder.cleanup()
+
+
+def serve(corrected: bool) -> None:
+    """Play the scene files named on standard input, and answer each with a line."""
+    answers, sys.stdout = sys.stdout, sys.stderr  # whatever pooltool prints is not an answer
+    import pooltool as pt
+
+    from tools.oracles import pooltool_world as world
+
+    if corrected:
+        world.correct(SPACER)
+    for line in sys.stdin:
+        document = tomllib.loads(Path(line.strip()).read_text())
+        system, engine = world.system(document), world.engine(document)
+        began = time.perf_counter()
+        pt.simulate(system, engine=engine, inplace=True)
+        seconds = time.perf_counter() - began
+        kinds = [str(event.event_type) for event in system.events]
+        events = len(kinds) - kinds.count("none")
+        answers.write(json.dumps([seconds, events, kinds.count("ball_ball"), float(system.t)]) + "\n")
+        answers.flush()
+
+
+def measured(name: str, repeats: int, corrected: bool) -> dict[str, Any]:
+    """Return the median and least time of a shot, after one that warms up, and what happened in it."""
+    play = playing(corrected)
+    first = play(name)
+    times = [play(name).seconds for _ in range(repeats)]
+    return {
+        "name": name,
+        "median": statistics.median(times),
+        "best": min(times),
+        "unit": "s",
+        "repeats": repeats,
+        "events": first.events,
+        "ball_ball": first.meetings,
+        "rest": first.rest,
+    }
+
+
+def main() -> int:
+    """Time the shots that are named, or all."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(NAMES))
+    parser.add_argument("--corrected", action="store_true", help="without the faults that are known of it")
+    parser.add_argument("--repeats", type=int, default=7, metavar="N")
+    parser.add_argument("--json", action="store_true", help="one JSON document on standard output")
+    parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
+    arguments = parser.parse_args()
+    if arguments.serve:
+        serve(arguments.corrected)
+        return 0
+    if set(arguments.names) - set(NAMES) or arguments.repeats < 1:
+        parser.error("a name that is not among the shots, or --repeats below 1")
+    rows = []
+    try:
+        for name in arguments.names or NAMES:
+            rows.append(measured(name, arguments.repeats, arguments.corrected))
+            if not arguments.json:
+                print(
+                    "{name:18} median {median:.4g} s, best {best:.4g} s of {repeats}; "
+                    "{events} events, {ball_ball} of two balls, at rest after {rest:.2f} s".format(**rows[-1])
+                )
+    except MissingError as told:
+        print(told, file=sys.stderr)
+        return 1
+    if arguments.json:
+        print(json.dumps({"rows": rows}))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

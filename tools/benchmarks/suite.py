@@ -1,0 +1,257 @@
+"""The rows of the benchmarks: engines, pictures and commands; those of games come last."""
+
+from tools.benchmarks import agreement, connected, drawing, peers
+from tools.benchmarks.games import GAMES
+from tools.benchmarks.row import Bench
+from tools.benchmarks.turning import turns
+from tools.benchmarks.workloads import command, events, flying, rolling, running, scene, staged, stepping
+
+SPARKS = ("world.duration=1.0", "solver.record_every=1")
+PILE = scene("benchmark/pile")
+TOWER = scene("benchmark/tower")
+SETTLED = scene("benchmark/pile", "world.duration=1.0")
+BOUNCE = scene("tutorial/bounce")
+LOW = scene("tutorial/bounce", "ball.ball.position=[0, 0.55]", "world.duration=0.25")
+
+BENCHES = (
+    Bench(
+        "pile",
+        "sandbox.run on the 1,000-ball pile, not audited / a hand-written pymunk loop that records the same arrays",
+        lambda: running(PILE, audit=False),
+        lambda: peers.pile_loop(PILE),
+        1.05,
+        same=lambda: agreement.pile(PILE),
+    ),
+    Bench(
+        "audit",
+        "the same run with the audit of missed contacts, as is the default / without",
+        lambda: running(PILE),
+        lambda: running(PILE, audit=False),
+        same=lambda: agreement.audited(PILE),
+    ),
+    *(
+        Bench(
+            f"flight-{name}",
+            f"particle-steps a second of {count:,} particles, stepped and not read / of numpy as one would write it",
+            lambda count=count: flying(count),
+            lambda count=count: peers.naive_flight(count),
+            5e8 if count == 100_000 else None,
+            "steps/s",
+            rate=True,
+            same=agreement.flight,
+        )
+        for name, count in (("1e3", 1_000), ("1e4", 10_000), ("1e5", 100_000), ("1e6", 1_000_000))
+    ),
+    Bench(
+        "flight-substeps",
+        "substeps a second of 100,000 particles, 16 to a frame / of numpy as one would write it",
+        lambda: flying(100_000, substeps=16),
+        lambda: peers.naive_flight(100_000),
+        unit="steps/s",
+        rate=True,
+        same=lambda: agreement.flight(substeps=16),
+    ),
+    Bench(
+        "flight-drag",
+        "the same of particles that air slows and wind carries / of numpy as one would write it, without",
+        lambda: flying(100_000, substeps=16, drag=0.3),
+        lambda: peers.naive_flight(100_000),
+        unit="steps/s",
+        rate=True,
+    ),
+    Bench(
+        "flight-copy",
+        "the particle-steps a second of 100,000 particles / how many particles' bytes are copied in a second",
+        lambda: flying(100_000),
+        lambda: peers.copied(100_000),
+        unit="steps/s",
+        rate=True,
+    ),
+    Bench(
+        "particles-pymunk",
+        "100,000 collision-free particles, stepped and read / 100,000 pymunk bodies, which are not meant for particles",
+        lambda: stepping(scene("particles/fireworks_100k", *SPARKS), 30, contacts=False),
+        lambda: peers.bodies_without_shapes(100_000, 30),
+        1 / 20,
+    ),
+    Bench(
+        "particles-copy",
+        "a step of those, not read / copying the bytes that it reads and writes",
+        lambda: stepping(scene("particles/fireworks_100k", *SPARKS), 100, record=False, contacts=False),
+        lambda: peers.copying(100_000 * 4 * 8, 100),
+    ),
+    Bench(
+        "omit-space",
+        "1,000 balls that meet nothing, outside of the space / the same, made to meet each other, in it",
+        lambda: stepping(scene("benchmark/pile", "grid.ball.collides=none"), 120, contacts=False),
+        lambda: stepping(scene("benchmark/pile"), 120, contacts=False),
+    ),
+    Bench(
+        "omit-ball-ball",
+        "225 balls of a gas that meet only the box / that meet each other too",
+        lambda: stepping(scene("benchmark/gas", "grid.0.collides=fixed"), 400, contacts=False),
+        lambda: stepping(scene("benchmark/gas"), 400, contacts=False),
+    ),
+    Bench(
+        "omit-contacts",
+        "the pile, contacts not asked for / recorded",
+        lambda: stepping(SETTLED, 120, contacts=False),
+        lambda: stepping(SETTLED, 120),
+        same=lambda: agreement.without_contacts(SETTLED),
+    ),
+    Bench(
+        "omit-rotation",
+        "225 frictionless balls, which nothing can turn, without a moment / with one",
+        lambda: stepping(scene("benchmark/gas"), 400, contacts=False),
+        lambda: stepping(scene("benchmark/gas"), 400, contacts=False, turning=True),
+        same=lambda: agreement.without_rotation(scene("benchmark/gas")),
+    ),
+    Bench(
+        "reference-pile",
+        "two seconds of the 1,000-ball pile on the reference, compiled / on pymunk; both stepped and read",
+        lambda: stepping(PILE, 240, contacts=False, engine="reference"),
+        lambda: stepping(PILE, 240, contacts=False),
+        1.0,
+        same=lambda: agreement.pile_on_engines(PILE),
+    ),
+    *(
+        Bench(
+            f"exact-{count}",
+            f"events a second of exact in an elastic gas of {count:,} balls / contacts a second of pymunk in it",
+            lambda count=count: events(count),
+            lambda count=count: peers.contacts_a_second(count),
+            target,
+            "events/s",
+            rate=True,
+        )
+        for count, target in ((16, 1e6), (100, 2e5), (1000, 3e4))
+    ),
+    Bench(
+        "bounce-1e-6",
+        "a ball dropped from 5 cm for 0.25 s, right to 1e-6 m: exact / pymunk by hand, at the dt that gets there",
+        lambda: stepping(LOW, 250, contacts=False, engine="exact"),
+        lambda: peers.bounce_to(LOW, 1e-6),
+        same=lambda: agreement.bounce(LOW, 1e-6),
+    ),
+    Bench(
+        "one-ball",
+        "a step of one ball above a plane on the reference / on pymunk through the adapter",
+        lambda: stepping(BOUNCE, 2000, record=False, contacts=False, engine="reference"),
+        lambda: stepping(BOUNCE, 2000, record=False, contacts=False),
+        same=lambda: agreement.one_ball(BOUNCE),
+    ),
+    *(
+        Bench(
+            f"one-ball-{name}",
+            f"of such a step on the reference, {about} / the whole step",
+            lambda name=name: staged(BOUNCE, name),
+            lambda: staged(BOUNCE, "step"),
+        )
+        for name, about in (("move", "forces and advance"), ("look", "detect"), ("resolve", "resolve"))
+    ),
+    Bench(
+        "cloth",
+        "steps a second of a cloth of 64 × 64 nodes on the reference, springs as forces / on pymunk's springs, by hand",
+        lambda: connected.cloth("reference", 200),
+        lambda: connected.springs(100),
+        unit="steps/s",
+        rate=True,
+        same=lambda: agreement.cloth("reference"),
+    ),
+    Bench(
+        "cloth-pymunk",
+        "the same on pymunk through the adapter / on pymunk's springs, by hand",
+        lambda: connected.cloth("pymunk", 100),
+        lambda: connected.springs(100),
+        unit="steps/s",
+        rate=True,
+        same=lambda: agreement.cloth("pymunk"),
+    ),
+    Bench(
+        "cloth-xpbd",
+        "the same on the reference by XPBD, ten passes / on the reference, springs as forces",
+        lambda: connected.cloth("reference", 100, joints="xpbd"),
+        lambda: connected.cloth("reference", 100),
+        unit="steps/s",
+        rate=True,
+    ),
+    *(
+        Bench(
+            f"spin-{count}",
+            f"steps a second of {count:,} balls on a floor, with three spins, on pymunk / of the same as discs without",
+            lambda count=count: rolling(count, floor=True),
+            lambda count=count: rolling(count, floor=False),
+            unit="steps/s",
+            rate=True,
+        )
+        for count in (16, 100, 1000)
+    ),
+    Bench(
+        "tower",
+        "20 boxes stand for 10 s and drift by 5 mm at most: the reference at its cheapest / pymunk at its cheapest",
+        lambda: connected.standing(TOWER, "reference", 0.005, substeps=4, iterations=10),
+        lambda: connected.standing(TOWER, "pymunk", 0.005, substeps=4, iterations=200),
+    ),
+    Bench(
+        "oriented",
+        "a second of a heap of 60 long planks on the reference, looked at by oriented boxes / by discs around them",
+        lambda: connected.planks("oriented"),
+        lambda: connected.planks("circles"),
+        same=agreement.planks,
+    ),
+    Bench(
+        "turn",
+        "a turn of the window in which a body is dragged, and seen where the hand is at its end / one with no event",
+        lambda: turns("gas", hand=True),
+        lambda: turns("gas", hand=False),
+    ),
+    Bench(
+        "check-start",
+        "`sandbox check bounce` above a bare interpreter / the bare interpreter",
+        lambda: command("-m", "sandbox", "check", "bounce"),
+        lambda: command("-c", "pass"),
+        0.35,
+        above=True,
+    ),
+    Bench(
+        "check-formulas",
+        "`sandbox check --no-trial bounce` above a bare interpreter / the bare interpreter",
+        lambda: command("-m", "sandbox", "check", "--no-trial", "bounce"),
+        lambda: command("-c", "pass"),
+        above=True,
+    ),
+    Bench(
+        "help-start",
+        "`sandbox --help` above a bare interpreter / the bare interpreter",
+        lambda: command("-m", "sandbox", "--help"),
+        lambda: command("-c", "pass"),
+        0.12,
+        above=True,
+    ),
+    Bench(
+        "draw-plain",
+        "a picture of the 1,000-ball pile, edges not smooth / pymunk.pygame_util's debug draw of the same balls",
+        lambda: drawing.drawing(SETTLED, 120, antialias=False),
+        lambda: drawing.debug_drawing(SETTLED, 120),
+        0.25,
+        same=lambda: agreement.picture(SETTLED, 120, antialias=False),
+    ),
+    Bench(
+        "draw-antialiased",
+        "the same picture with smooth edges / pymunk.pygame_util's debug draw of the same balls",
+        lambda: drawing.drawing(SETTLED, 120, antialias=True),
+        lambda: drawing.debug_drawing(SETTLED, 120),
+        0.5,
+        same=lambda: agreement.picture(SETTLED, 120, antialias=True),
+    ),
+    Bench(
+        "draw-particles",
+        "pictures a second of 100,000 particles of 1 px that fade / in one colour by surfarray, as one would write it",
+        lambda: drawing.particles(scene("particles/fireworks_100k", *SPARKS), 150),
+        lambda: drawing.particles_by_array(scene("particles/fireworks_100k", *SPARKS), 150),
+        300.0,
+        "frames/s",
+        rate=True,
+    ),
+    *GAMES,
+)

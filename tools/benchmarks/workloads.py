@@ -1,0 +1,214 @@
+"""Workloads: what the benches time of ours, each set up first and then returned as a piece of work to be timed."""
+
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import sandbox
+from sandbox.action import SetParameter
+from sandbox.engines.common.body_store import BodyStore
+from sandbox.engines.reference.engine import ReferenceEngine
+from sandbox.engines.reference.step import WorldState
+from sandbox.engines.registry import start
+from sandbox.measure.run.runner import run
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.files.load import from_document, load
+from sandbox.scene.files.shipped_scenes import find
+from tools.benchmarks import peers
+
+Timed = Callable[[], float]
+"""Does the work once and returns what it took."""
+
+
+def timed(work: Callable[[], object]) -> float:
+    """Return the seconds that a piece of work takes."""
+    began = time.perf_counter()
+    work()
+    return time.perf_counter() - began
+
+
+def scene(name: str, *overrides: str) -> Scene:
+    """Return a shipped scene."""
+    return load(find(name), overrides)
+
+
+def running(which: Scene, audit: bool = True) -> Timed:
+    """Time a whole recorded run."""
+    return lambda: timed(lambda: run(which, audit=audit))
+
+
+def shooting(which: Scene, shots: int = 20) -> Timed:
+    """Time a whole shot to rest, its events kept, through the public interface; the mean of some."""
+    table = sandbox.Table(which)
+
+    def go() -> None:
+        for _ in range(shots):
+            table.shoot()
+
+    return lambda: timed(go) / shots
+
+
+def fanning(which: Scene, shots: int, threads: int) -> Timed:
+    """Return how many shots a second a fan plays: each a little stronger than the one before."""
+    table = sandbox.Table(which)
+    cue = which.bodies.names.index("cue")
+    motion = (*which.bodies.velocity[cue], *which.bodies.roll[cue], which.bodies.angular_velocity[cue])
+    motions = np.multiply.outer(np.linspace(0.9, 1.1, shots), motion)
+    return lambda: shots / timed(lambda: table.fan_of(motions, threads=threads))
+
+
+def stepping(
+    which: Scene,
+    steps: int,
+    record: bool = True,
+    contacts: bool = True,
+    turning: bool = False,
+    engine: str = "pymunk",
+) -> Timed:
+    """Time some steps, from the start, of a simulation that is set up before."""
+
+    def work() -> float:
+        simulation = start(which, engine)
+        if contacts:
+            simulation.contacts()
+        if turning:
+            peers.give_moments(simulation, which)
+
+        def go() -> None:
+            for _ in range(steps):
+                simulation.step()
+                if record:
+                    simulation.frame()
+
+        return timed(go)
+
+    return work
+
+
+def setting(which: Scene, steps: int, path: str, values: tuple[Any, Any]) -> Timed:
+    """Time some changes of a value, one to the other and back, of a scene that has run for as many steps."""
+
+    def work() -> float:
+        simulation = start(which)
+        simulation.contacts()
+        for _ in range(steps):
+            simulation.step()
+
+        def go() -> None:
+            for k in range(steps):
+                simulation.apply(SetParameter(time=0.0, path=path, value=values[k % 2]))
+
+        return timed(go)
+
+    return work
+
+
+def flying(count: int, substeps: int = 1, drag: float = 0.0) -> Callable[[], float]:
+    """Return the particle-steps a second of particles that touch nothing, each of a frame's substeps counted."""
+    which = particles_in_flight(count, substeps, drag)
+
+    def work() -> float:
+        simulation = start(which, "pymunk")
+        simulation.step()
+        frames = max(10, 20_000_000 // (count * substeps))
+        seconds = timed(lambda: [simulation.step() for _ in range(frames)])
+        return count * substeps * frames / seconds
+
+    return work
+
+
+def particles_in_flight(count: int, substeps: int = 1, drag: float = 0.0) -> Scene:
+    """Return particles that touch nothing, at 100 frames a second."""
+    return from_document(
+        {
+            "world": {"gravity": [0.0, -9.81], "linear_drag": drag, "wind": [1.0, 0.0], "duration": 1e4},
+            "solver": {"dt": 0.01, "substeps": substeps},
+            "emitter": [
+                {"position": [0, 0], "count": count, "velocity_min": [-20, 10], "velocity_max": [20, 40]},
+            ],
+        }
+    )
+
+
+def playing(which: Scene) -> Timed:
+    """Return how many seconds of a game are played in one: rules, a random player, contacts; not audited."""
+
+    def work() -> float:
+        begun = time.perf_counter()
+        played = sandbox.play_out(which, "random", audit=False)
+        return float(played.trajectory.time[-1]) / (time.perf_counter() - begun)
+
+    return work
+
+
+def simulated(which: Scene, seconds: float) -> Timed:
+    """Return how many seconds are simulated in one where nobody looks: neither contacts nor frames, no rules."""
+    steps = round(seconds / which.solver.dt)
+    bare = stepping(which, steps, record=False, contacts=False)
+    return lambda: seconds / bare()
+
+
+def command(*arguments: str) -> Timed:
+    """Time a Python process from start to end."""
+    line = [sys.executable, *arguments]
+    return lambda: timed(lambda: subprocess.run(line, check=True, capture_output=True))
+
+
+def events(count: int) -> Timed:
+    """Return the events a second of `exact` in an elastic gas of so many balls, in steps of many thousand events."""
+
+    def work() -> float:
+        gas = peers.gas(count, 100.0)
+        simulation = start(gas, "exact", gas.solver.replace(dt=160.0 / count))
+        simulation.step()
+        began, before = time.perf_counter(), simulation.work["events"]
+        while simulation.work["events"] < before + 100_000:
+            simulation.step()
+        return (simulation.work["events"] - before) / (time.perf_counter() - began)
+
+    return work
+
+
+def rolling(count: int, floor: bool) -> Callable[[], float]:
+    """Return the steps a second of a gas of so many balls on pymunk, on a floor with three spins, or as discs."""
+    surface = {"sliding_friction": 0.2, "rolling_friction": 0.01, "spinning_friction": 0.01}
+    more = {"surface": surface, "contact_models": {"ball_ball": "frictional"}} if floor else {}
+
+    def work() -> float:
+        simulation = start(peers.gas(count, 1.0, **more), "pymunk")
+        steps = 200_000 // (count + 100)
+        simulation.step()
+        return steps / timed(lambda: [simulation.step() for _ in range(steps)])
+
+    return work
+
+
+def staged(which: Scene, name: str, steps: int = 2000) -> Timed:
+    """Time one stage of a reference step with one ball: "move", "look", "resolve", or "step" for the whole."""
+
+    def work() -> float:
+        simulation = ReferenceEngine().start(which)
+        h = which.solver.h
+        world = WorldState(BodyStore(Setup.of(which), h), simulation.settings)
+        motion = world.advance(h)
+        contacts = world.solver.detect(motion)
+
+        def resolve() -> None:
+            solution = world.solver.solve(motion, contacts, h)
+            world.solver.correct(solution, h)
+            world.commit(motion, solution, h)
+
+        stages = {
+            "move": lambda: world.advance(h),
+            "look": lambda: world.solver.detect(motion),
+            "resolve": resolve,
+            "step": simulation.step,
+        }
+        return timed(lambda: [stages[name]() for _ in range(steps)])
+
+    return work

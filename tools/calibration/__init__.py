@@ -1,0 +1,1 @@
+"""Calibration: measurements behind the thresholds of forecasts and the stored limits of the engines."""

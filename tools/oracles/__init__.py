@@ -1,0 +1,1 @@
+"""Oracles: independent programs whose results the tests compare with."""
