@@ -137,6 +137,7 @@ class App:
     def draw(self) -> None:
         """Draw the scene and the GUI."""
         context = self.context
+        context.gui.has_gamepad = self._gamepads.is_connected
         context.gui.update(self.app_state, self._clock.get_fps(), context.capture.status)
         context.refit_if_covered()
         context.gui.bodies_out_of_view = context.is_out_of_view

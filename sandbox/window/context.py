@@ -1,6 +1,5 @@
 """Window context: application state, GUI, camera, and state that outlives a scene."""
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +18,7 @@ from sandbox.window.render.renderer import Renderer
 from sandbox.window.render.text import largest_area, renderable
 from sandbox.window.ui.gui import Gui
 from sandbox.window.ui.scene_browser import frame_in_flight
-from sandbox.window.view_bounds import Corners, bounding_box, should_rotate, view_bounds
+from sandbox.window.view_bounds import Corners, bounding_box, field_rect, has_field, should_rotate, view_bounds
 
 TITLE = "sandbox"
 MAX_FOLLOW_ZOOM = 1.5
@@ -199,7 +198,7 @@ class WindowContext:
         size, room, show = self.surface.get_size(), self.gui.area, self.app_state.view
         self._covered = head, foot = self.gui.score_margins(self.app_state)
         lies = show is not None and should_rotate(show.scene, room.size)
-        if self._has_field:  # plates must not cover any part of the field
+        if show is not None and has_field(show.scene):  # plates must not cover any part of the field
             (left, bottom), (right, top) = box
             shape = max(right - left, 1e-9), max(top - bottom, 1e-9)
             room = largest_area(shape[::-1] if lies else shape, room, self.gui.permanent_plates(self.app_state))
@@ -208,28 +207,16 @@ class WindowContext:
         inset = self.gui.panel.width
         return Camera.fitting(box, size, inset=inset, foot=foot + self.gui.bottom_margin, turned=lies, head=head)
 
-    @property
-    def _has_field(self) -> bool:
-        """Whether the scene has a field that must stay uncovered: a table, a game, or an explicit view."""
-        show = self.app_state.view
-        if show is None:
-            return False
-        play = show.scene.play
-        return play.area is not None or play.view is not None or play.game is not None
-
     def refit_if_covered(self) -> None:
         """Fit the scene again if a plate has grown over it, for example by a new row or the result of a game."""
         if not self.is_fitted or self.following is not None:
             return
         covered, show = self.gui.score_margins(self.app_state), self.app_state.view
         grown = any(now > then for now, then in zip(covered, self._covered, strict=True))
-        if self._has_field and show is not None:
+        if show is not None and has_field(show.scene):
             taken = self.gui.permanent_plates(self.app_state)
             if taken != self._plates:
-                corners = self.camera.to_screen(np.asarray(view_bounds(show.scene)))
-                (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
-                field = pygame.Rect(math.ceil(left), math.ceil(top), int(right - left), int(bottom - top))
-                grown, self._plates = field.collidelist(taken) >= 0, taken
+                grown, self._plates = field_rect(show.scene, self.camera).collidelist(taken) >= 0, taken
         if grown:
             self.fit_scene()
 

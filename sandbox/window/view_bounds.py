@@ -1,6 +1,9 @@
 """View bounds: the initial view box of a scene before it runs, or of a stored run."""
 
+import math
+
 import numpy as np
+import pygame
 
 from sandbox.arrays import BoolArray, FloatArray
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
@@ -9,7 +12,7 @@ from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.joint_arrays import LinkKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
-from sandbox.window.camera import ViewBox
+from sandbox.window.camera import Camera, ViewBox
 
 RAIL = 0.115
 """width of the rails around a playing area, from the inner edge of the cushion, as a fraction of its shorter side"""
@@ -45,6 +48,18 @@ def area_bounds(area: ViewBox) -> ViewBox:
     rail = RAIL * shorter_side(area)
     (left, bottom), (right, top) = area
     return (left - rail, bottom - rail), (right + rail, top + rail)
+
+
+def has_field(scene: Scene) -> bool:
+    """Return whether a scene has a field that must stay uncovered: a table, a game, or an explicit view."""
+    return scene.play.area is not None or scene.play.view is not None or scene.play.game is not None
+
+
+def field_rect(scene: Scene, camera: Camera) -> pygame.Rect:
+    """Return the rectangle of `view_bounds` in the window, px."""
+    corners = camera.to_screen(np.asarray(view_bounds(scene)))
+    (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    return pygame.Rect(math.ceil(left), math.ceil(top), int(right - left), int(bottom - top))
 
 
 def view_bounds(scene: Scene, reach: ViewBox | None = None) -> ViewBox:

@@ -63,6 +63,7 @@ class Driven:
         """
         self.display, self.folder = display, folder
         self.size = SIZE
+        self._held: set[str] = set()
         self._env = environment(**{"SDL_VIDEODRIVER": "x11", "DISPLAY": display, **changes})
         self._out, self._err = folder / "stdout.txt", folder / "stderr.txt"
         size = f"{SIZE[0]}x{SIZE[1]}"
@@ -109,11 +110,13 @@ class Driven:
 
     def hold(self, name: str) -> None:
         """Press a key, and keep it down."""
+        self._held.add(name)
         self._do("keydown", name)
 
     def let_go(self, name: str) -> None:
         """Release a key that is held."""
         self._do("keyup", name)
+        self._held.discard(name)
 
     def focus(self) -> None:
         """Give the window the keyboard."""
@@ -232,6 +235,9 @@ class Driven:
         if self.process.poll() is None:
             self.process.kill()
             self.process.wait(LIMIT)
+        # The next window of the same server must not find keys or buttons down.
+        for name in sorted(self._held):
+            self._run("keyup", name)
         self._run("mouseup", 1, "mouseup", 3)
 
 

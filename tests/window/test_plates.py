@@ -16,7 +16,7 @@ from sandbox.window.app_state import AppState
 from sandbox.window.playback.snapshot import OVERLAYS
 from sandbox.window.render.text import largest_area
 from sandbox.window.ui import score_panel
-from sandbox.window.view_bounds import view_bounds
+from sandbox.window.view_bounds import field_rect, view_bounds
 
 pytestmark = pytest.mark.full  # every shipped scene
 
@@ -70,6 +70,23 @@ def test_no_two_plates_overlap(name: str, tmp_path: Path, monkeypatch: pytest.Mo
             assert overlaps(window) == [], (width, height, unit)
             free = window.context.gui.area
             assert 2 * free.width * free.height > width * height, (width, height, unit)
+    finally:
+        window.close()
+
+
+@pytest.mark.parametrize("name", [name for name in FIELD_SCENES if name.startswith("pinball")])
+def test_messages_leave_the_field_free_beside_it(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    window = opened(name, tmp_path, monkeypatch)
+    try:
+        resize(window, 900, 600, 1.0)
+        window.app_state.messages.add("a message that is long enough to need more than one line beside the table")
+        window.run_frame(0.0)
+        gui, view = window.context.gui, window.app_state.view
+        assert view is not None
+        field = field_rect(view.scene, window.context.camera)
+        messages = [rect for plate, rect in gui.plates.items() if plate.startswith("message")]
+        assert messages
+        assert field.collidelist(messages) == -1
     finally:
         window.close()
 

@@ -70,15 +70,18 @@ def control_handlers(host: GameHost) -> tuple[dict[int, KeyHandler], dict[int, K
 
 
 def control_help(controls: tuple[Control, ...]) -> tuple[tuple[str, str], ...]:
-    """Return (keys, action) rows of a game's controls for the help page."""
-    rows = []
-    for control in controls:
-        keys = " or ".join(" ".join(word.capitalize() for word in key.split()) for key in control.keys)
-        pad = f"; gamepad: {_buttons(control.pad)}" if control.pad else ""
-        rows.append((keys or "Gamepad", f"{control.about}{pad}"))
-    if any(control.pad for control in controls):
-        rows.append(("Gamepad Start", "pause / resume"))
-    return tuple(rows)
+    """Return (keys, action) rows of a game's controls for the help page; controls without a key are left out."""
+    return tuple(
+        (" or ".join(" ".join(word.capitalize() for word in key.split()) for key in control.keys), control.about)
+        for control in controls
+        if control.keys
+    )
+
+
+def gamepad_help(controls: tuple[Control, ...]) -> tuple[tuple[str, str], ...]:
+    """Return (buttons, action) rows of a game's controls on a gamepad; empty if the game does not use gamepads."""
+    rows = tuple((_buttons(control.pad), control.about) for control in controls if control.pad)
+    return (*rows, ("start", "pause / resume")) if rows else ()
 
 
 def _buttons(pad: str) -> str:
@@ -126,6 +129,8 @@ class KeyBindings(NamedTuple):
     """by key code"""
     repeated: frozenset[int] = frozenset()
     """codes of the keys whose handlers also run on key repeat: arrow keys that move a body by steps"""
+    gamepad_rows: tuple[tuple[str, str], ...] = ()
+    """(buttons, action) for the help page, shown while a gamepad is connected"""
 
 
 NO_BINDINGS = KeyBindings({}, (), {})
@@ -164,7 +169,8 @@ def key_bindings(
         pressed |= control_pressed
         released |= control_released
         rows += control_help(host.controls)
-    return KeyBindings(pressed, tuple(rows), released, frozenset(ARROWS) - released.keys())
+    pad_rows = () if host is None else gamepad_help(host.controls)
+    return KeyBindings(pressed, tuple(rows), released, frozenset(ARROWS) - released.keys(), pad_rows)
 
 
 def thrust_and_drive_keys(scene: Scene) -> Iterator[tuple[str, str, Action, Action]]:

@@ -80,6 +80,11 @@ class Gamepads:
         self._notify, self._open_device = notify, open_device
         self._devices: dict[int, tuple[GamepadDevice, GamepadLayout]] = {}
 
+    @property
+    def is_connected(self) -> bool:
+        """Whether any gamepad is connected."""
+        return bool(self._devices)
+
     def start(self) -> None:
         """Start to receive events, including those of connected devices; without joystick support, show a message."""
         try:

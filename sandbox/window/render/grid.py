@@ -45,6 +45,12 @@ def draw_grid(surface: pygame.Surface, camera: Camera, unit: float = 1.0) -> Non
         surface.fill(GRID_STRONG if strong else GRID, rect)
 
 
+def scale_rect(camera: Camera, unit: float = 1.0, foot: float = 0.0) -> pygame.Rect:
+    """Return the rectangle that `draw_scale` covers, px, its label included."""
+    width, height = round(step_of(camera, unit) * camera.scale + 4 * unit), round(28 * unit)
+    return pygame.Rect(round(16 * unit), round(camera.size[1] - 16 * unit - foot) - height, width, height)
+
+
 def draw_scale(surface: pygame.Surface, camera: Camera, unit: float = 1.0, foot: float = 0.0) -> None:
     """Draw the scale bar in the lower left corner, `foot` px above the lower edge."""
     step = step_of(camera, unit)

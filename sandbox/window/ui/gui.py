@@ -7,7 +7,7 @@ from pathlib import Path
 import pygame
 
 from sandbox.games.contract import HasViewState
-from sandbox.window.app_state import MAX_MESSAGES, AppState, scenes_to_pick
+from sandbox.window.app_state import AppState, scenes_to_pick
 from sandbox.window.camera import Camera
 from sandbox.window.game_host import GameDisplay, GameHost, ScoreDisplay
 from sandbox.window.input.body_tools import describe_loss
@@ -15,6 +15,7 @@ from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.parameters import Parameter, SessionParameters
 from sandbox.window.playback.recorded import RecordedView
 from sandbox.window.playback.snapshot import OVERLAYS, HudStatus
+from sandbox.window.render.grid import scale_rect
 from sandbox.window.render.palette import BACKGROUND, INK
 from sandbox.window.render.renderer import InsetRenderer, Renderer
 from sandbox.window.render.text import draw_box, draw_text, text_size
@@ -23,12 +24,13 @@ from sandbox.window.ui import hud
 from sandbox.window.ui.energy_plot import EnergyGraph
 from sandbox.window.ui.help import HelpOverlay
 from sandbox.window.ui.high_score_dialog import HighScoreDialog
-from sandbox.window.ui.hud import hud_width
+from sandbox.window.ui.hud import MAX_SHOWN_MESSAGES, hud_width
 from sandbox.window.ui.panel import SidePanel
 from sandbox.window.ui.scene_browser import SceneBrowser
 from sandbox.window.ui.score_panel import ScoreLayout, draw_score, layout_score
 from sandbox.window.ui.status import hud_status, settings_text
 from sandbox.window.ui.timeline import TIMELINE_HEIGHT, Timeline
+from sandbox.window.view_bounds import field_rect, has_field
 
 GRAPH_SIZE = (300, 130)
 """px at UI scale 1"""
@@ -42,6 +44,8 @@ class Gui:
         self.overlays: set[str] = {"shapes"}
         """enabled ones of `OVERLAYS`"""
         self.antialias = True
+        self.has_gamepad = False
+        """whether a gamepad is connected, whose buttons the help overlay lists then"""
         self.panel = SidePanel(size, ui_scale)
         self.help = HelpOverlay()
         self.scene_browser: SceneBrowser | None = None
@@ -82,11 +86,11 @@ class Gui:
         help_lines = stage.key_bindings.help_rows
         if stage.controls is not None:
             stage.messages.add(stage.controls.hint)
-        elif len(help_lines) > MAX_MESSAGES:  # more than are shown at a time
-            stage.messages.add(f"keys: {', '.join(keys for keys, _ in help_lines)} (F1: help)")
-        else:
-            for keys, about in help_lines:
-                stage.messages.add(f"{keys}: {about}")
+            return
+        if len(help_lines) > MAX_SHOWN_MESSAGES:
+            help_lines = (*help_lines[: MAX_SHOWN_MESSAGES - 1], ("F1", "all keys"))
+        for keys, about in help_lines:
+            stage.messages.add(f"{keys}: {about}")
 
     def resize(self, size: tuple[int, int]) -> None:
         """Lay out all widgets for a window of another size, px."""
@@ -283,6 +287,7 @@ class Gui:
             right=self.panel.width,
             bottom=self.bottom_margin,
             taken=[rect for rect in plates.values() if rect.width and rect.height],
+            uncovered=self._uncovered(camera, stage),
             plates=plates,
         )
         if show is not None:
@@ -300,7 +305,12 @@ class Gui:
             self._update_panel(stage, status.recording is not None)
             self.panel.draw(surface)
         if self.help.open:
-            self.help.draw(surface, self.ui_scale, stage.key_bindings.help_rows)
+            self.help.draw(
+                surface,
+                self.ui_scale,
+                stage.key_bindings.help_rows,
+                stage.key_bindings.gamepad_rows if self.has_gamepad else (),
+            )
 
     def _draw_scene(
         self,
@@ -336,6 +346,14 @@ class Gui:
         inset = self._inset.draw(surface, camera, snapshot, area, antialias=antialias, unit=ui_scale, aside=aside)
         if inset is not None:
             plates["inset"] = inset
+
+    def _uncovered(self, camera: Camera, stage: AppState) -> list[pygame.Rect]:
+        """Return the rectangles, px, that messages leave free if there is space: scale bar and playing field."""
+        if stage.view is None:
+            return []
+        scale = scale_rect(camera, self.ui_scale, self.bottom_margin + self.score_margins(stage)[1])
+        scene = stage.view.scene
+        return [scale, field_rect(scene, camera)] if has_field(scene) else [scale]
 
     def _play_sounds(self, stage: AppState, show: LiveView | RecordedView) -> None:
         """Play the sounds of new contacts and of game events."""

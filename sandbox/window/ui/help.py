@@ -39,8 +39,10 @@ class HelpGroup(NamedTuple):
     """(keys, action)"""
 
 
-def help_groups(scene_keys: Sequence[tuple[str, str]] = ()) -> tuple[HelpGroup, ...]:
-    """Return all groups: keys of the scene, other bindings, mouse."""
+def help_groups(
+    scene_keys: Sequence[tuple[str, str]] = (), gamepad: Sequence[tuple[str, str]] = ()
+) -> tuple[HelpGroup, ...]:
+    """Return all groups: keys of the scene, gamepad, other bindings, and the mouse actions that the scene leaves."""
     titles = dict.fromkeys(binding.group for binding in BINDINGS)
     taken = {name for label, _ in scene_keys for name in _key_names(label)}
     own = tuple(
@@ -48,7 +50,9 @@ def help_groups(scene_keys: Sequence[tuple[str, str]] = ()) -> tuple[HelpGroup, 
         for title in titles
     )
     first = (HelpGroup(SCENE_GROUP, tuple(scene_keys)),) if scene_keys else ()
-    return (*first, *own, HelpGroup("Mouse", MOUSE_HELP))
+    second = (HelpGroup("Gamepad", tuple(gamepad)),) if gamepad else ()
+    mouse = tuple(line for line in MOUSE_HELP if line[0].split(",")[0] not in taken)
+    return (*first, *second, *own, HelpGroup("Mouse", mouse))
 
 
 def _key_names(label: str) -> list[str]:
@@ -83,10 +87,16 @@ class HelpOverlay:
             return True
         return False
 
-    def draw(self, surface: pygame.Surface, ui_scale: float, scene_keys: Sequence[tuple[str, str]] = ()) -> None:
+    def draw(
+        self,
+        surface: pygame.Surface,
+        ui_scale: float,
+        scene_keys: Sequence[tuple[str, str]] = (),
+        gamepad: Sequence[tuple[str, str]] = (),
+    ) -> None:
         """Draw the overlay over the whole window, regardless of `open`."""
         draw_box(surface, surface.get_rect(), 0, BACKGROUND, 236, None)
-        groups = help_groups(scene_keys)
+        groups = help_groups(scene_keys, gamepad)
         margin = round(min(28 * ui_scale, 0.04 * min(surface.get_size())))
         area = surface.get_rect().inflate(-2 * margin, -2 * margin)
         size, columns = _fit_columns(groups, area, ui_scale)

@@ -163,6 +163,7 @@ def draw_hud(
     right: int = 0,
     bottom: int = 0,
     taken: Sequence[pygame.Rect] = (),
+    uncovered: Sequence[pygame.Rect] = (),
     plates: dict[str, pygame.Rect] | None = None,
 ) -> pygame.Rect:
     """Draw all plates of the head-up display; plates without space are dropped, the least important first.
@@ -174,6 +175,7 @@ def draw_hud(
         right: px covered at the right.
         bottom: px covered at the bottom.
         taken: rectangles of other plates, which are kept free.
+        uncovered: rectangles of the scene that messages do not cover where there is space beside or above them.
         plates: receives the rectangle of each plate.
 
     Returns:
@@ -194,7 +196,7 @@ def draw_hud(
         return _draw_faults(surface, status.faults, below if below.height > 6 * size else area, size)
     plates["picked"] = _draw_picked(surface, status.picked, area, [rows.rect, plates["rate"], *taken], size)
     others = [rows.rect, plates["rate"], plates["picked"], *taken]
-    for k, rect in enumerate(_draw_messages(surface, status.messages, area, others, size)):
+    for k, rect in enumerate(_draw_messages(surface, status.messages, area, others, uncovered, size)):
         plates[f"message {k}"] = rect
     if status.question is not None:
         _draw_notice(surface, status.question, area, size, WARNING)
@@ -318,9 +320,14 @@ def _draw_messages(
     messages: tuple[tuple[str, str], ...],
     area: pygame.Rect,
     taken: Sequence[pygame.Rect],
+    uncovered: Sequence[pygame.Rect],
     size: float,
 ) -> list[pygame.Rect]:
     """Draw the newest messages at the lower left, beside or above other plates; return their rectangles."""
+    narrowest = round(MIN_MESSAGE_WIDTH * size)
+    low = area.top + area.height // 2  # a message above the middle would be mistaken for a part of the status
+    spared = [each for each in uncovered if each.left - area.left >= narrowest or each.top >= low]
+    taken = [*taken, *spared]
     pad, line_height, mark_room = _pad(size), round(1.35 * size), round(1.6 * size)
     drawn: list[pygame.Rect] = []
     bottom = area.bottom
@@ -330,7 +337,7 @@ def _draw_messages(
         slot = pygame.Rect(area.left, 0, min(area.width, round(44 * size)), 2 * line_height + 2 * pad)
         slot.bottom = bottom
         for each in taken:
-            if each.colliderect(slot) and each.left - area.left >= round(MIN_MESSAGE_WIDTH * size):
+            if each.colliderect(slot) and each.left - area.left >= narrowest:
                 slot.width = min(slot.width, each.left - pad - area.left)
         room = slot.width - 2 * pad - mark_room
         lines = wrap_text(text, size, room, 2)

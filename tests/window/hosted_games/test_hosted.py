@@ -19,7 +19,7 @@ from sandbox.scene.files.shipped_scenes import find, shipped
 from sandbox.window.app import App
 from sandbox.window.app_state import AppState
 from sandbox.window.game_host import MAX_ENTRIES, DisplayHistory, GameDisplay, GameHost, ScoreDisplay
-from sandbox.window.input.bindings import KeyNameError, codes_of, control_help
+from sandbox.window.input.bindings import KeyNameError, codes_of, control_help, gamepad_help
 from sandbox.window.input.gamepad import ANALOGUE_LEVELS, LAYOUTS, PLAYSTATION, XBOX, Gamepads, layout_of
 from sandbox.window.playback.live import LiveView
 from sandbox.window.render.palette import WARNING
@@ -92,18 +92,17 @@ def test_who_looks_elsewhere_lets_go(window: App) -> None:
 
 
 def test_help_lists_controls_and_scene_keys_are_theirs(window: App) -> None:
-    claims = window.app_state.key_bindings
-    assert claims.help_rows == (
-        ("Up or Left Shift", "kick it; gamepad: A, stick up"),
-        ("Left", "how far; gamepad: LT"),
-        ("Gamepad Start", "pause / resume"),
-    )
-    assert {UP, LEFT, pygame.K_LSHIFT} <= window.app_state.key_bindings.pressed.keys()
+    bindings = window.app_state.key_bindings
+    assert bindings.help_rows == (("Up or Left Shift", "kick it"), ("Left", "how far"))
+    assert bindings.gamepad_rows == (("A, stick up", "kick it"), ("LT", "how far"), ("start", "pause / resume"))
+    assert {UP, LEFT, pygame.K_LSHIFT} <= bindings.pressed.keys()
 
 
 def test_help_tells_the_cross_of_a_gamepad_from_its_stick() -> None:
-    (_, what), *_ = control_help((Control("go", "go", ("left",), "y left +leftx up"),))
-    assert what == "go; gamepad: Y, D-pad left, stick right, D-pad up"
+    assert gamepad_help((Control("go", "go", ("left",), "y left +leftx up"),))[0] == (
+        "Y, D-pad left, stick right, D-pad up",
+        "go",
+    )
 
 
 def test_restart_is_a_new_game(window: App) -> None:
@@ -319,6 +318,8 @@ def plugged(window: App) -> Callable[[str], None]:
 def test_gamepad_plays(window: App, plugged: Callable[[str], None]) -> None:
     plugged("Xbox 360 Controller")
     assert ("info", "gamepad connected: Xbox 360 Controller") in window.app_state.messages.visible()
+    window.draw()
+    assert window.context.gui.has_gamepad
     live = turned(window, joy(pygame.JOYBUTTONDOWN, button=0))
     live = turned(window, joy(pygame.JOYBUTTONUP, button=0))
     assert presses_of(live) == [("kick", 1.0), ("kick", 0.0)]
@@ -448,12 +449,12 @@ def test_scene_that_its_game_does_not_fit_is_shown_without(tmp_path: Path, monke
     stage.close()
 
 
-def test_a_game_of_many_keys_says_where_they_are_told() -> None:
+def test_game_with_many_keys_announces_the_first_and_where_all_are_listed() -> None:
     opened = App(AppState(), size=(900, 600), say=lambda _: None)
     opened.app_state.open(find("duel"))
     opened.run_frame(0.02)
     said = [text for _, text in opened.app_state.messages.visible()]
-    assert said == ["keys: Left, Right, Up, Down, W, Space, Gamepad Start (F1: help)"]
+    assert said == ["Left: turn the barrel left", "Right: turn the barrel right", "Up: more power", "F1: all keys"]
     opened.close()
 
 

@@ -43,6 +43,17 @@ def test_claimed_keys_come_first_and_are_taken_from_ours() -> None:
     assert "ghost: another engine's run" not in ours
 
 
+def test_gamepad_rows_are_listed_if_given() -> None:
+    rows = (("A", "fire"),)
+    assert [group.lines for group in help_groups(CLAIMS, rows) if group.title == "Gamepad"] == [rows]
+    assert all(group.title != "Gamepad" for group in help_groups(CLAIMS))
+
+
+def test_mouse_actions_of_a_game_replace_those_of_the_window() -> None:
+    mouse = dict(help_groups((("Left-drag", "draw the cue back"), ("Click", "call a ball")))[-1].lines)
+    assert list(mouse) == ["Wheel", "Right-drag"]
+
+
 def test_claim_on_a_global_key_takes_nothing() -> None:
     ours = {about: label for group in help_groups((("P", "x"), ("Esc", "y")))[1:] for label, about in group.lines}
     assert ours["pause / resume"] == "P or Space"
