@@ -113,6 +113,17 @@ def _without_zeros(text: str) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
+def format_signed(value: float, digits: int) -> str:
+    """Return a number with a sign and `digits` decimals, such as `+1.5` or `−0.2`; zero has no sign.
+
+    Args:
+        value: finite.
+        digits: number of decimals.
+    """
+    text = f"{value:+.{digits}f}"
+    return _signed(text) if float(text) else text[1:]
+
+
 def _signed(text: str) -> str:
     return f"−{text[1:]}" if text.startswith("-") else text
 

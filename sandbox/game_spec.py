@@ -53,6 +53,8 @@ class GameSpec:
     """`(scene) -> scene`: the scene as the window plays it, for scenes that name the game"""
     real_time: bool = False
     """whether the game runs in real time from the first step: the window waits for a key press to start it"""
+    hint: str = ""
+    """the most important keys in one line, announced when a scene is opened; default: the first keys of the rules"""
     presents: str | None = None
     """`(scene) -> bool`: whether `view` draws a scene; default: scenes whose `[play] game` is one of `names`"""
     needs_player: str | None = None

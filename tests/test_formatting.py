@@ -13,6 +13,7 @@ from sandbox.formatting import (
     format_percent,
     format_plural,
     format_si,
+    format_signed,
     format_time,
 )
 
@@ -123,3 +124,11 @@ def test_counts_have_separators_and_plurals() -> None:
     assert [format_count(n) for n in (None, 0, 12345)] == ["–", "0", "12,345"]
     assert [format_plural(n, "point") for n in (0, 1, 2)] == ["0 points", "1 point", "2 points"]
     assert format_plural(1200, "body", "bodies") == "1,200 bodies"
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "text"),
+    [(1.26, 1, "+1.3"), (-0.25, 2, "−0.25"), (0.0, 1, "0.0"), (-0.04, 1, "0.0"), (-12.0, 0, "−12")],
+)
+def test_signed_numbers_have_a_typographic_minus(value: float, digits: int, text: str) -> None:
+    assert format_signed(value, digits) == text

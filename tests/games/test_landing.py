@@ -175,5 +175,5 @@ def test_panel_tells_what_would_be_a_crash() -> None:
     lines = dict(rules.display_lines())
     assert lines["fuel"] == "100 %"
     assert lines["sideways"] == "+5.0 m/s !"
-    assert lines["tilt"] == "+0°"
+    assert lines["tilt"] == "0°"
     relay.close()

@@ -10,6 +10,7 @@ GAME = GameSpec(
         "artillery": "sandbox.games.artillery.scene:ARTILLERY",
     },
     bot="sandbox.games.artillery.bot:ArtilleryBot",
+    hint="Left, Right: barrel · Up, Down: power · W: weapon · Space: fire · F1: all keys",
     view="sandbox.games.artillery.view:ArtilleryView",
     environments=(
         Environment("ArtilleryDuel", "artillery/duel", 10),

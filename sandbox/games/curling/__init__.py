@@ -6,6 +6,7 @@ GAME = GameSpec(
     names=("curling",),
     rules="sandbox.games.curling.rules:Curling",
     tables={"play.curling": "sandbox.games.curling.scene:MATCH"},
+    hint="Arrows: broom and weight · T: turn · Space: throw · S: sweep · F1: all keys",
     view="sandbox.games.curling.view:CurlingView",
     environments=(Environment("Curling", "games/curling", 10),),
     needs_player="sandbox.games.curling.scene:needs_player",

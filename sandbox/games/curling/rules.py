@@ -17,6 +17,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from sandbox.action import Action, Impulse, Move, SetParameter
+from sandbox.formatting import format_signed
 from sandbox.games.contract import Control, StepInfo, UnsuitableSceneError
 from sandbox.games.curling.bot import CurlingBot
 from sandbox.games.curling.delivery import Delivery, Ice
@@ -361,5 +362,5 @@ def _weight(beyond_tee: float) -> str:
     if beyond_tee < -1.9:
         return f"guard, {-beyond_tee:.1f} m short of the tee"
     if beyond_tee <= 1.9:
-        return f"draw, tee {beyond_tee:+.1f} m"
+        return f"draw, tee {format_signed(beyond_tee, 1)} m"
     return f"take-out, {beyond_tee:.1f} m past the tee"

@@ -16,6 +16,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from sandbox.action import Action, Move, Throttle
+from sandbox.formatting import format_signed
 from sandbox.games.contract import Control, StepInfo, UnsuitableSceneError
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.scene import Scene
@@ -173,9 +174,9 @@ class Landing:
         return (
             fuel,
             ("height", f"{max(self._height(self._now), 0.0):.1f} m"),
-            ("down", _marked(f"{0.0 - up:.1f} m/s", -up > DOWN)),
-            ("sideways", _marked(f"{aside:+.1f} m/s", abs(aside) > ASIDE)),
-            ("tilt", _marked(f"{-round(math.degrees(tilt)):+d}°", abs(tilt) > TILT)),
+            ("down", _marked(f"{format_signed(-up, 1)} m/s", -up > DOWN)),
+            ("sideways", _marked(f"{format_signed(aside, 1)} m/s", abs(aside) > ASIDE)),
+            ("tilt", _marked(f"{format_signed(-math.degrees(tilt), 0)}°", abs(tilt) > TILT)),
         )
 
     def observation(self) -> Sequence[tuple[str, float]]:

@@ -13,5 +13,6 @@ GAME = GameSpec(
         Environment("PinballFull", "pinball/full", 2),
     ),
     real_time=True,
+    hint="Left, Right Shift: flippers · Enter: plunger · Space: nudge · F1: all keys",
     presents="sandbox.games.pinball.scene:presents",
 )

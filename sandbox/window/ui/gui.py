@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pygame
 
+from sandbox.game_names import spec_of
 from sandbox.games.contract import HasViewState
 from sandbox.window.app_state import AppState, scenes_to_pick
 from sandbox.window.camera import Camera
@@ -87,6 +88,10 @@ class Gui:
         if stage.controls is not None:
             stage.messages.add(stage.controls.hint)
             return
+        spec = None if stage.host is None or stage.view is None else spec_of(stage.view.scene.play.game)
+        if spec is not None and spec.hint:
+            stage.messages.add(spec.hint)
+            return
         if len(help_lines) > MAX_SHOWN_MESSAGES:
             help_lines = (*help_lines[: MAX_SHOWN_MESSAGES - 1], ("F1", "all keys"))
         for keys, about in help_lines:
@@ -141,6 +146,10 @@ class Gui:
         if stage.host is None or stage.controls is not None or stage.view is None:
             return 0, 0
         return self._layout_score(self._display_of(stage.host).board, stage.view).margins(self.area)
+
+    def _scale_foot(self, stage: AppState) -> float:
+        """Return the height at the lower edge of the window that the scale bar leaves free, px."""
+        return float(self.bottom_margin + self.score_margins(stage)[1])
 
     def _display_of(self, host: GameHost) -> GameDisplay:
         return self._display or host.shown()
@@ -287,7 +296,8 @@ class Gui:
             right=self.panel.width,
             bottom=self.bottom_margin,
             taken=[rect for rect in plates.values() if rect.width and rect.height],
-            uncovered=self._uncovered(camera, stage),
+            scale=None if show is None else scale_rect(camera, self.ui_scale, self._scale_foot(stage)),
+            field=None if show is None or not has_field(show.scene) else field_rect(show.scene, camera),
             plates=plates,
         )
         if show is not None:
@@ -338,7 +348,7 @@ class Gui:
             snapshot = replace(snapshot, below=float(status_plate.bottom))
         top, bottom = self.score_margins(stage)
         antialias, ui_scale = self.antialias, self.ui_scale
-        foot = float(self.bottom_margin + bottom)
+        foot = self._scale_foot(stage)
         self._renderer.draw(surface, camera, snapshot, antialias=antialias, unit=ui_scale, foot=foot)
         area = self.area
         area = pygame.Rect(area.left, area.top + top, area.width, max(area.height - top - bottom, 0))
@@ -346,14 +356,6 @@ class Gui:
         inset = self._inset.draw(surface, camera, snapshot, area, antialias=antialias, unit=ui_scale, aside=aside)
         if inset is not None:
             plates["inset"] = inset
-
-    def _uncovered(self, camera: Camera, stage: AppState) -> list[pygame.Rect]:
-        """Return the rectangles, px, that messages leave free if there is space: scale bar and playing field."""
-        if stage.view is None:
-            return []
-        scale = scale_rect(camera, self.ui_scale, self.bottom_margin + self.score_margins(stage)[1])
-        scene = stage.view.scene
-        return [scale, field_rect(scene, camera)] if has_field(scene) else [scale]
 
     def _play_sounds(self, stage: AppState, show: LiveView | RecordedView) -> None:
         """Play the sounds of new contacts and of game events."""

@@ -163,7 +163,8 @@ def draw_hud(
     right: int = 0,
     bottom: int = 0,
     taken: Sequence[pygame.Rect] = (),
-    uncovered: Sequence[pygame.Rect] = (),
+    scale: pygame.Rect | None = None,
+    field: pygame.Rect | None = None,
     plates: dict[str, pygame.Rect] | None = None,
 ) -> pygame.Rect:
     """Draw all plates of the head-up display; plates without space are dropped, the least important first.
@@ -175,7 +176,8 @@ def draw_hud(
         right: px covered at the right.
         bottom: px covered at the bottom.
         taken: rectangles of other plates, which are kept free.
-        uncovered: rectangles of the scene that messages do not cover where there is space beside or above them.
+        scale: of the scale bar at the lower left; messages are drawn beside it.
+        field: of a playing field, which messages leave free if there is enough space to its left.
         plates: receives the rectangle of each plate.
 
     Returns:
@@ -196,7 +198,8 @@ def draw_hud(
         return _draw_faults(surface, status.faults, below if below.height > 6 * size else area, size)
     plates["picked"] = _draw_picked(surface, status.picked, area, [rows.rect, plates["rate"], *taken], size)
     others = [rows.rect, plates["rate"], plates["picked"], *taken]
-    for k, rect in enumerate(_draw_messages(surface, status.messages, area, others, uncovered, size)):
+    message_area = _message_area(area, scale, field, size)
+    for k, rect in enumerate(_draw_messages(surface, status.messages, message_area, others, size)):
         plates[f"message {k}"] = rect
     if status.question is not None:
         _draw_notice(surface, status.question, area, size, WARNING)
@@ -315,19 +318,25 @@ def _draw_picked(
     return rect
 
 
+def _message_area(area: pygame.Rect, scale: pygame.Rect | None, field: pygame.Rect | None, size: float) -> pygame.Rect:
+    """Return the area for messages: beside the scale bar and left of the field, as far as both leave enough width."""
+    left, right = area.left, area.right
+    if field is not None and field.left - _pad(size) - left >= round(MIN_MESSAGE_WIDTH * size):
+        right = min(right, field.left - _pad(size))
+    if scale is not None and right - scale.right - _pad(size) >= round(MIN_MESSAGE_WIDTH * size):
+        left = max(left, scale.right + _pad(size))
+    return pygame.Rect(left, area.top, right - left, area.height)
+
+
 def _draw_messages(
     surface: pygame.Surface,
     messages: tuple[tuple[str, str], ...],
     area: pygame.Rect,
     taken: Sequence[pygame.Rect],
-    uncovered: Sequence[pygame.Rect],
     size: float,
 ) -> list[pygame.Rect]:
     """Draw the newest messages at the lower left, beside or above other plates; return their rectangles."""
     narrowest = round(MIN_MESSAGE_WIDTH * size)
-    low = area.top + area.height // 2  # a message above the middle would be mistaken for a part of the status
-    spared = [each for each in uncovered if each.left - area.left >= narrowest or each.top >= low]
-    taken = [*taken, *spared]
     pad, line_height, mark_room = _pad(size), round(1.35 * size), round(1.6 * size)
     drawn: list[pygame.Rect] = []
     bottom = area.bottom

@@ -449,13 +449,21 @@ def test_scene_that_its_game_does_not_fit_is_shown_without(tmp_path: Path, monke
     stage.close()
 
 
-def test_game_with_many_keys_announces_the_first_and_where_all_are_listed() -> None:
+@pytest.mark.parametrize("name", ["duel", "curling", "pinball/full", "8-ball"])
+def test_game_announces_its_hint(name: str) -> None:
     opened = App(AppState(), size=(900, 600), say=lambda _: None)
-    opened.app_state.open(find("duel"))
+    opened.app_state.open(find(name))
     opened.run_frame(0.02)
-    said = [text for _, text in opened.app_state.messages.visible()]
-    assert said == ["Left: turn the barrel left", "Right: turn the barrel right", "Up: more power", "F1: all keys"]
+    (text,) = (text for _, text in opened.app_state.messages.visible())
+    assert text.endswith("F1: all keys")
     opened.close()
+
+
+def test_game_without_a_hint_announces_its_first_keys(window: App) -> None:
+    window.context.gui.on_scene_changed(False)
+    window.draw()
+    texts = [text for _, text in window.app_state.messages.visible()]
+    assert texts[-2:] == ["Up or Left Shift: kick it", "Left: how far"]
 
 
 class Patient(Buttons):

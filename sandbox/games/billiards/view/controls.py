@@ -245,7 +245,7 @@ def _angle_step() -> float:
 class BilliardsControls:
     """Controls of billiards in the window: player, cue, prediction, HUD and the choices in the panel."""
 
-    hint = "aim with the mouse, shoot with Space; H lists all keys"
+    hint = "Mouse: aim · Space: shoot · F1: all keys"
 
     def __init__(self, host: GameHost, file: Scene, options: Mapping[str, str]) -> None:
         """Start a frame.

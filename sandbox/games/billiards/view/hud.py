@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import pygame
 
+from sandbox.formatting import format_signed
 from sandbox.games.billiards.game import MAX_CUE_SPEED
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.base import Decision, renamed
@@ -274,7 +275,7 @@ def draw_tip(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, unit: fl
     at = x + cue.side * radius, y - cue.height * radius
     _disc(surface, at, TIP * radius, ShapeStyle(SKY, mix_colours(SKY, PANEL, 0.6), 1.5 * unit, opacity=0.95))
     if cue.side or cue.height:
-        text = f"{cue.side:+.2f}  {cue.height:+.2f}"
+        text = f"{format_signed(cue.side, 2)}  {format_signed(cue.height, 2)}"
         draw_text(surface, text, (x, rect.top - 8 * unit), 11 * unit, FAINT, "midbottom", mono=True)
 
 
@@ -294,8 +295,8 @@ def draw_power(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, unit: 
     for k in range(1, MARKS):
         level = rect.bottom - rect.height * k / MARKS
         pygame.draw.line(surface, PANEL, (rect.left, level), (rect.left + rect.width // 3, level))
-    shown = f"{cue.power * MAX_CUE_SPEED:.1f}"
-    draw_text(surface, shown, (rect.centerx, rect.top - 8 * unit), 11 * unit, INK, "midbottom", mono=True)
+    shown = f"{cue.power * MAX_CUE_SPEED:.1f} m/s"
+    draw_text(surface, shown, (rect.right + 5 * unit, rect.top - 8 * unit), 11 * unit, INK, "bottomright", mono=True)
 
 
 def _disc(surface: pygame.Surface, at: tuple[float, float], radius: float, look: ShapeStyle) -> None:
