@@ -24,6 +24,11 @@ BLUE, ORANGE, GREEN, YELLOW, PINK, SKY = COLOURS
 INTEGRATORS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "leapfrog", "rk4")
 
 
+def _legend_outside(axes: Axes) -> None:
+    """Draw the legend to the right of the axes, for plots whose curves fill the whole area."""
+    axes.legend(loc="center left", bbox_to_anchor=(1.02, 0.5), frameon=False)
+
+
 def ball(axes: Axes) -> None:
     """Draw a fall by two first-order integrators beside the closed form."""
     scene = sandbox.load("ball")
@@ -47,8 +52,9 @@ def order(axes: Axes) -> None:
             error = np.abs(run.position[:, 0, 0] - 1 - 0.1 * np.cos(2 * np.pi * run.time))
             errors.append(error[run.time < 1 + dt / 2].max())
         axes.loglog(steps, errors, mark + "-", color=colour, label=integrator)
-    axes.set(xlabel="dt, s", ylabel="largest error in the first second, m")
-    axes.legend()
+    axes.set(xlabel="dt, s", ylabel="largest error in the first second, m", xticks=steps, xticklabels=map(str, steps))
+    axes.minorticks_off()
+    _legend_outside(axes)
 
 
 def fireworks(axes: Axes) -> None:
@@ -60,7 +66,7 @@ def fireworks(axes: Axes) -> None:
         corner = (-t, 8 * t - 9.81 / 2 * t * t)
         axes.add_patch(Rectangle(corner, 2 * t, 4 * t, fill=False, edgecolor=colour))
     axes.set(xlabel="x, m", ylabel="y, m", aspect="equal")
-    axes.legend()
+    _legend_outside(axes)
 
 
 def circle(axes: Axes) -> None:
@@ -109,7 +115,7 @@ def kepler(axes: Axes) -> None:
         axes.plot(*run.position[::20, 0].T, color=colour, linewidth=1, label=integrator)
     axes.plot(0, 0, "*", color=YELLOW, markersize=12)
     axes.set(xlabel="x", ylabel="y", aspect="equal")
-    axes.legend(loc="lower left")
+    _legend_outside(axes)
 
 
 def cradle(axes: Axes) -> None:

@@ -111,21 +111,33 @@ def _row_height(size: float) -> int:
 
 
 def _rows(display: ScoreDisplay, max_width: float, size: float, gap: int) -> list[tuple[list[ScoreCell], list[int]]]:
-    """Return the cells arranged in rows that fit, with their widths, px; the score comes first."""
-    cells = [("score", display.score), *display.lines[:MAX_LINES]]
-    rows: list[tuple[list[ScoreCell], list[int]]] = [([], [])]
-    for name, text in cells:
+    """Return the cells in as few rows as fit, of about equal widths, with the widths of cells, px; score first."""
+    cells: list[ScoreCell] = []
+    widths: list[int] = []
+    grain = round(1.5 * size)  # widths are rounded up, so that a value of another length does not move other cells
+    for name, text in [("score", display.score), *display.lines[:MAX_LINES]]:
         label = name[:1].upper() + name[1:]
         text = ellipsis(text, 1.25 * size, max_width, mono=True)
         width = max(text_size(label, 0.82 * size)[0], text_size(text, 1.25 * size, mono=True)[0])
-        width += -width % round(
-            1.5 * size
-        )  # rounded up, so that the other cells do not move when a value changes its length
-        if rows[-1][1] and sum(rows[-1][1]) + gap * len(rows[-1][1]) + width > max_width:
-            rows.append(([], []))
-        rows[-1][0].append((label, text))
-        rows[-1][1].append(width)
-    return rows
+        cells.append((label, text))
+        widths.append(-(-width // grain) * grain)
+    ends = _row_ends(widths, max_width, gap)
+    narrower = max_width - grain
+    while narrower >= max(widths) and len(balanced := _row_ends(widths, narrower, gap)) == len(ends):
+        ends, narrower = balanced, narrower - grain
+    starts = [0, *ends[:-1]]
+    return [(cells[a:b], widths[a:b]) for a, b in zip(starts, ends, strict=True)]
+
+
+def _row_ends(widths: list[int], max_width: float, gap: int) -> list[int]:
+    """Return the index after the last cell of each row, filling one row after the other."""
+    ends: list[int] = []
+    start = 0
+    for k in range(1, len(widths) + 1):
+        if k > start + 1 and sum(widths[start:k]) + gap * (k - start - 1) > max_width:
+            ends.append(k - 1)
+            start = k - 1
+    return [*ends, len(widths)]
 
 
 def _draw_cells(

@@ -276,7 +276,7 @@ def draw_tip(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, unit: fl
     _disc(surface, at, TIP * radius, ShapeStyle(SKY, mix_colours(SKY, PANEL, 0.6), 1.5 * unit, opacity=0.95))
     if cue.side or cue.height:
         text = f"{format_signed(cue.side, 2)}  {format_signed(cue.height, 2)}"
-        draw_text(surface, text, (x, rect.top - 8 * unit), 11 * unit, FAINT, "midbottom", mono=True)
+        draw_text(surface, text, (rect.left - 5 * unit, rect.top - 8 * unit), 11 * unit, FAINT, "bottomleft", mono=True)
 
 
 def tip_box(rect: pygame.Rect, unit: float) -> pygame.Rect:
