@@ -16,7 +16,7 @@ from sandbox.cli.common import (
     scene_path,
     write_json,
 )
-from sandbox.cli.options import OutputOptions, json_option, out_option, quiet_option, set_option
+from sandbox.cli.options import OutputOptions, json_option, out_option, quiet_option, set_option, verbose_option
 from sandbox.cli.progress import status_line
 from sandbox.cli.shots_table import print_study
 from sandbox.cli.streams import print_json
@@ -55,6 +55,7 @@ class _Options(OutputOptions):
     by: By
     tolerance: float
     out: Path | None
+    verbose: bool
 
 
 @dataclass
@@ -153,6 +154,7 @@ class _Request:
     help="position difference that ends the horizon, m; default: 0.001",
 )
 @out_option("write shots.json, rests.png and aims.png")
+@verbose_option
 @json_option
 @quiet_option()
 def shots_command(**given: Any) -> int:
@@ -178,7 +180,7 @@ def shots_command(**given: Any) -> int:
     if options.as_json:
         print_json(document)
     elif not options.quiet:
-        print_study(options.scene, found)
+        print_study(options.scene, found, options.verbose)
     status = 0 if found.answered else 1
     if found.odds.interrupted:
         played = f"{found.odds.count:,} of {options.count:,} shots were played and are counted"

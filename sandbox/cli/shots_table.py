@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from sandbox.cli.tables import add_columns, new_table, print_line, print_table
+from sandbox.cli.tables import add_columns, new_table, print_legend, print_line, print_table
 from sandbox.games.billiards.shots.aim_windows import Windows
 from sandbox.games.billiards.shots.monte_carlo import Odds, Proportion
 from sandbox.games.billiards.shots.predictability import Horizon, Separation
@@ -17,23 +17,39 @@ from sandbox.games.billiards.shots.study import ShotStudy
 if TYPE_CHECKING:
     from rich.table import Table
 
-ODDS_HEADS = ("ball", "pocketed", "95 % interval", "into", "mean rest, m", "std, m", "without error")
-OF_POCKETS = slice(1, 4)
-"""Columns about pockets, left out if the table has none."""
-
 MAX_POCKETS = 3
 """Pockets listed for each ball; `--json` has all."""
+
+ODDS_HEADS = ("ball", "pocketed", "95 % interval", "into", "mean rest, m", "std, m", "without error")
+LEGEND = {
+    "pocketed": "fraction of the shots after which the ball is in a pocket",
+    "95 % interval": "95 % confidence interval of that fraction (Wilson)",
+    "into": f"pockets with the fraction of the shots, the {MAX_POCKETS} most frequent ones",
+    "mean rest, m": "mean position at rest, over the shots after which the ball is on the table",
+    "std, m": "standard deviation of that position",
+    "without error": "position at rest, or pocket, of the shot that is played without error",
+}
+"""Columns of the table of odds and their meaning, for `--verbose`."""
+SLOPE_LEGEND = {
+    "d/d(…)": "derivative of the position at rest, (x, y); `not smooth`: a neighbouring shot has other collisions",
+    "same contacts within": "change of the aim up to which every ball has the same collisions",
+}
+"""Columns of the table of sensitivities and their meaning, for `--verbose`."""
+
+OF_POCKETS = slice(1, 4)
+"""Columns about pockets, left out if the table has none."""
 
 MAX_WINDOWS = 3
 """Intervals listed for each pot, the nearest ones; `--json` has all."""
 
 
-def print_study(scene: str, found: ShotStudy) -> None:
+def print_study(scene: str, found: ShotStudy, verbose: bool = False) -> None:
     """Print the shot, the odds of each ball, and the other results that were requested.
 
     Args:
         scene: the scene as the user named it.
         found: what to print.
+        verbose: explain every column below its table.
     """
     title = found.shot.table.scene.title
     print_line(f"{scene}: {title}" if title else scene)
@@ -44,11 +60,15 @@ def print_study(scene: str, found: ShotStudy) -> None:
         for row in rows:
             del row[OF_POCKETS]
     print_table(_table(rows[0], rows[1:]))
+    if verbose:
+        print_legend(rows[0], LEGEND)
     for line in _in_all(found.odds):
         click.echo(line)
     if found.slopes is not None:
         heads = [f"d/d({variable}), m/{UNITS[variable]}" for variable in VARIABLES]
         print_table(_table(["ball", *heads, "same contacts within"], _slope_rows(found.slopes)))
+        if verbose:
+            print_legend(list(SLOPE_LEGEND), SLOPE_LEGEND)
     for each in found.windows:
         for line in _window(each):
             click.echo(line)

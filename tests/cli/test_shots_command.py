@@ -142,6 +142,15 @@ def test_table_has_a_line_a_ball_and_sentences_below(scene: str, capfd: pytest.C
     assert "predictable to 1 mm, by the accuracy of the aim in rad: 1e-02: " in text
 
 
+def test_verbose_explains_every_column(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = lines_of(capfd, "shots", scene, "--count", "20", "--sensitivity", "--verbose")
+    assert status == 0
+    explained = {line[2:].partition("  ")[0] for line in out if line.startswith("  ")}
+    (head,) = (line for line in out if "95 % interval" in line and not line.startswith("  "))
+    assert {each for each in re.split(r" {2,}", head.strip()) if each != "ball"} <= explained
+    assert "same contacts within" in explained
+
+
 def test_another_shot_is_asked_for_by_its_name(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
     status, document, _ = json_of(capfd, "shots", scene, *FEW, "--shot", "soft")
     assert (status, document["shot"]["ball"]) == (0, "bystander")
