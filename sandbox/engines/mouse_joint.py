@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from sandbox.action import ActionError, Impulse, Pull
 from sandbox.engines.contract import Simulation
-from sandbox.scene.geometry.segments import rotate
+from sandbox.scene.geometry.vectors import rotate
 
 FREQUENCY = 7.5  # Hz
 DAMPING_RATIO = 1.0
@@ -111,7 +111,7 @@ class MouseJoints:
                 del self._pulls[name]
                 continue
             cos, sin = math.cos(frame.angle[index]), math.sin(frame.angle[index])
-            arm = rotate(cos, sin, *pull.grip)
+            arm = rotate(*pull.grip, cos, sin)
             x, y = frame.position[index].tolist()
             vx, vy = frame.velocity[index].tolist()
             impulse, angular = mouse_joint_impulse(

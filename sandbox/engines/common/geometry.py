@@ -1,6 +1,6 @@
-"""Plane geometry in kernels: the functions of `scene.geometry.segments`, compiled."""
+"""Plane geometry in kernels: functions of `scene.geometry.vectors`, compiled."""
 
 from sandbox.engines.common.kernel import bare_kernel
-from sandbox.scene.geometry import segments
+from sandbox.scene.geometry import vectors
 
-nearest_fraction, rotate = bare_kernel(segments.nearest_fraction), bare_kernel(segments.rotate)
+nearest_fraction, rotate = bare_kernel(vectors.nearest_fraction), bare_kernel(vectors.rotate)

@@ -16,7 +16,7 @@ from itertools import pairwise
 
 from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.scene.description.base import Point
-from sandbox.scene.geometry.segments import nearest_fraction
+from sandbox.scene.geometry.vectors import nearest_fraction
 
 
 def rebound(restitution: float, falloff: float, closing: float) -> float:

@@ -3,10 +3,12 @@
 import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
-from sandbox.scene.geometry.segments import Number, rotate
+from sandbox.scene.geometry.vectors import Component, rotate
 
 
-def spring_law(rest: Number, stiffness: Number, damping: Number, extent: Number, rate: Number) -> Number:
+def spring_law(
+    rest: Component, stiffness: Component, damping: Component, extent: Component, rate: Component
+) -> Component:
     """Return the force of a spring, N, or the torque of a rotary spring, N·m; positive if it increases the extent.
 
     Args:
@@ -35,7 +37,7 @@ def anchors_in_world(
     if rotated.any():  # most anchors are at the centre
         at = index[rotated]
         x, y = anchor[rotated].T
-        arm[rotated] = np.column_stack(rotate(np.cos(angle[at]), np.sin(angle[at]), x, y))
+        arm[rotated] = np.column_stack(rotate(x, y, np.cos(angle[at]), np.sin(angle[at])))
         point[rotated] += arm[rotated]
     point[world] = anchor[world]
     return arm, point

@@ -20,8 +20,8 @@ from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.forces import Attraction, Thrust
 from sandbox.scene.description.world import World
-from sandbox.scene.geometry.segments import rotate
 from sandbox.scene.geometry.shapes import geometry_of
+from sandbox.scene.geometry.vectors import rotate
 
 
 class SpaceForceField:
@@ -93,7 +93,7 @@ class SpaceForceField:
             if thrusts:
                 cos, sin = body.rotation_vector  # math.cos would raise if the angle is not finite
                 fx, fy, torque = self._thrust(thrusts)
-                thrust = rotate(cos, sin, fx, fy)
+                thrust = rotate(fx, fy, cos, sin)
                 ax += thrust[0] / body.mass
                 ay += thrust[1] / body.mass
                 body.torque += torque

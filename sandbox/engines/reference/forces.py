@@ -85,7 +85,7 @@ def add_thrust(
         i = body[k]
         x, y = throttle[k] * force[k, 0], throttle[k] * force[k, 1]
         cos, sin = math.cos(pose[i, 2]), math.sin(pose[i, 2])
-        world_x, world_y = rotate(cos, sin, x, y)
+        world_x, world_y = rotate(x, y, cos, sin)
         out[i, 0] += inverse_mass[i] * world_x
         out[i, 1] += inverse_mass[i] * world_y
         out[i, 2] += inverse_moment[i] * (point[k, 0] * y - point[k, 1] * x)

@@ -78,12 +78,12 @@ def anchor_separation(joints: JointData, k: int, pose: FloatArray) -> tuple[Anch
     ax, ay, bx, by = joints.anchor[k, 0], joints.anchor[k, 1], joints.anchor[k, 2], joints.anchor[k, 3]
     if bx != 0.0 or by != 0.0:
         cos, sin = math.cos(pose[j, 2]), math.sin(pose[j, 2])
-        bx, by = rotate(cos, sin, bx, by)
+        bx, by = rotate(bx, by, cos, sin)
     if i < 0:
         return (0.0, 0.0, bx, by), pose[j, 0] + bx - ax, pose[j, 1] + by - ay
     if ax != 0.0 or ay != 0.0:
         cos, sin = math.cos(pose[i, 2]), math.sin(pose[i, 2])
-        ax, ay = rotate(cos, sin, ax, ay)
+        ax, ay = rotate(ax, ay, cos, sin)
     return (ax, ay, bx, by), pose[j, 0] + bx - (pose[i, 0] + ax), pose[j, 1] + by - (pose[i, 1] + ay)
 
 

@@ -39,7 +39,7 @@ from sandbox.resource_limits import STEP_WORK
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.fixed import Post, Wall
 from sandbox.scene.description.world import Kick, Settings
-from sandbox.scene.geometry.segments import nearest_fraction
+from sandbox.scene.geometry.vectors import nearest_fraction
 
 
 class Rebound(NamedTuple):

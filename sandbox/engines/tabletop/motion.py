@@ -162,7 +162,7 @@ def curled(vx: float, vy: float, slowing: float, curl: float, time: float) -> tu
         x, y = far * (along * vx - left * vy), far * (along * vy + left * vx)
     turn = -curl * math.log1p(-lost)
     cos, sin, fraction = math.cos(turn), math.sin(turn), 1.0 - lost
-    vx, vy = rotate(cos, sin, vx, vy)
+    vx, vy = rotate(vx, vy, cos, sin)
     return x, y, fraction * vx, fraction * vy
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from sandbox.arrays import BoolArray, FloatArray
 from sandbox.measure.analytic.bouncing import PLANE
 from sandbox.measure.analytic.model import TOUCH_TOLERANCE, BodyMotion, SceneFacts, normal_of, parallel, perpendicular
-from sandbox.measure.metrics.clearance import rotate
+from sandbox.measure.metrics.clearance import rotate_points
 from sandbox.trajectory import ContactEvent
 
 MAX_BOXES = 1000
@@ -120,7 +120,7 @@ def _upright(facts: SceneFacts, point: FloatArray, normal: FloatArray) -> Boxes 
     shapes = bodies.shapes
     if len(shapes.body) != len(bodies) or shapes.radius.any() or (np.diff(shapes.first) != 4).any():
         return None
-    corner = bodies.position[:, None] + rotate(shapes.corner.reshape(-1, 4, 2), bodies.angle[:, None]) - point
+    corner = bodies.position[:, None] + rotate_points(shapes.corner.reshape(-1, 4, 2), bodies.angle[:, None]) - point
     sides = []
     for axis in (perpendicular(normal), normal):
         place = np.sort(corner @ axis, axis=1)

@@ -78,7 +78,7 @@ def offset_from_segment(point: FloatArray, tail: FloatArray, along: FloatArray) 
     return np.asarray(offset - fraction[..., None] * along)
 
 
-def rotate(vectors: FloatArray, angle: FloatArray) -> FloatArray:
+def rotate_points(vectors: FloatArray, angle: FloatArray) -> FloatArray:
     """Return vectors rotated counter-clockwise, (…, 2).
 
     Args:
@@ -105,7 +105,7 @@ def posed_pieces(
     begin, end = np.searchsorted(shapes.body, (number, number + 1)).tolist()
     for piece in range(begin, end):
         corners = shapes.corner[shapes.first[piece] : shapes.first[piece + 1]]
-        yield position[:, None] + rotate(corners, angle[:, None]), float(shapes.radius[piece])
+        yield position[:, None] + rotate_points(corners, angle[:, None]), float(shapes.radius[piece])
 
 
 def plane_clearance(

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray
-from sandbox.measure.metrics.clearance import rotate
+from sandbox.measure.metrics.clearance import rotate_points
 from sandbox.measure.metrics.energy import energies
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
@@ -204,7 +204,7 @@ def _from_groove(links: JointArrays, position: FloatArray, angle: FloatArray, po
     """Return the distance of points (T, J, 2) from the grooves of their joints, (T, J) m."""
     near, _ = links.ends(position, angle)
     turn, along = np.where(links.a >= 0, angle[:, links.a], 0.0), links.figures[:, :2] - links.anchor_a
-    way = rotate(along, turn)
+    way = rotate_points(along, turn)
     squared = (along * along).sum(axis=1)
     offset = point - near
     share = (offset * way).sum(axis=2) / np.where(squared > 0.0, squared, 1.0)

@@ -1,11 +1,13 @@
 """Rotation of plane vectors, and nearest points of segments. Angles are counter-clockwise.
 
 Cosine and sine are arguments: numpy and the math module may round them differently, and a start state must not depend
-on which function computes it.
+on which function computes it. The functions are plain Python; `engines.common.geometry` has them compiled, for kernels.
 """
 
 import math
 from typing import TypeVar
+
+import numpy as np
 
 from sandbox.arrays import FloatArray
 from sandbox.scene.description.base import Point
@@ -33,13 +35,25 @@ def to_world(point: Point, cos: float, sin: float, origin: Point) -> Point:
     return origin[0] + cos * point[0] - sin * point[1], origin[1] + sin * point[0] + cos * point[1]
 
 
-def nearest_on_segment(point: Point, a: Point, b: Point) -> tuple[float, float]:
-    """Return the point of a segment that is nearest to a point, as a fraction from a to b, and its distance, m.
+def nearest_fraction(ax: float, ay: float, bx: float, by: float, x: float, y: float) -> float:
+    """Return the fraction, 0 to 1, of the segment from a to b at its point nearest to (x, y); 0 if its length is 0."""
+    ux, uy = bx - ax, by - ay
+    length2 = ux * ux + uy * uy
+    fraction = ((x - ax) * ux + (y - ay) * uy) / length2 if length2 > 0.0 else 0.0
+    return min(max(fraction, 0.0), 1.0)
 
-    A segment of no length has the fraction 0.
-    """
+
+def nearest_fractions(ax: float, ay: float, bx: float, by: float, x: FloatArray, y: FloatArray) -> FloatArray:
+    """Return `nearest_fraction` for points (x, y) as arrays (N,)."""
+    ux, uy = bx - ax, by - ay
+    length2 = ux * ux + uy * uy
+    if not length2 > 0.0:
+        return np.zeros(len(x))
+    return np.clip(((x - ax) * ux + (y - ay) * uy) / length2, 0.0, 1.0)
+
+
+def nearest_on_segment(point: Point, a: Point, b: Point) -> tuple[float, float]:
+    """Return `nearest_fraction` of the segment from a to b, and the distance of the point from it, m."""
+    fraction = nearest_fraction(*a, *b, *point)
     x, y = b[0] - a[0], b[1] - a[1]
-    length2 = x * x + y * y
-    along = (point[0] - a[0]) * x + (point[1] - a[1]) * y
-    fraction = min(max(along / length2, 0.0), 1.0) if length2 else 0.0
     return fraction, math.hypot(point[0] - a[0] - fraction * x, point[1] - a[1] - fraction * y)

@@ -16,7 +16,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
 from sandbox.scene.geometry.neighbours import near_pairs
-from sandbox.scene.geometry.segments import nearest_fractions
+from sandbox.scene.geometry.vectors import nearest_fractions
 
 CAPABILITIES = BALLS - {Demand.DRAG} | FLOOR | SURFACES - {Demand.ONE_WAY}
 """Demands that the engine models"""
