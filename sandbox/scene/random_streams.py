@@ -46,6 +46,8 @@ class Stream(Enum):
     """errors of a curling team, by the team"""
     FLIPPERS = 0x68616E64
     """errors of a skilled pinball player"""
+    PILOT = 0x70696C74
+    """errors of a skilled pilot in landing"""
     LANDING = 0x6C616E64
     """start position of a ship"""
     KEYS = 0x706C6179

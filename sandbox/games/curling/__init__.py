@@ -7,6 +7,7 @@ GAME = GameSpec(
     rules="sandbox.games.curling.rules:Curling",
     tables={"play.curling": "sandbox.games.curling.scene:MATCH"},
     hint="Arrows: broom and weight · T: turn · Space: throw · S: sweep · F1: all keys",
+    bot="sandbox.games.curling.player:CurlingPlayer",
     view="sandbox.games.curling.view:CurlingView",
     environments=(Environment("Curling", "games/curling", 10),),
     needs_player="sandbox.games.curling.scene:needs_player",

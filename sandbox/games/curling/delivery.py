@@ -64,6 +64,10 @@ class Ice(NamedTuple):
         """Return the speed, m/s, of a stone that comes to rest at a straight-line distance, m, from its release."""
         return math.sqrt(distance * self.slowing * abs(2.0 - 1j * self.curl))
 
+    def distance_for(self, speed: float) -> float:
+        """Return the straight-line distance from its release, m, at which a stone of a speed, m/s, comes to rest."""
+        return speed**2 / (self.slowing * abs(2.0 - 1j * self.curl))
+
     def to_rest(self, target: Point, turn: int) -> Delivery:
         """Return the delivery of a stone that comes to rest at a position, m."""
         far = complex(target[0] - RELEASE, target[1])

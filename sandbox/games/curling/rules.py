@@ -19,7 +19,7 @@ from typing import NamedTuple
 from sandbox.action import Action, Impulse, Move, SetParameter
 from sandbox.formatting import format_signed
 from sandbox.games.contract import Control, StepInfo, UnsuitableSceneError
-from sandbox.games.curling.bot import CurlingBot
+from sandbox.games.curling.bot import CurlingBot, Stones
 from sandbox.games.curling.delivery import Delivery, Ice
 from sandbox.games.curling.scene import CurlingMatch
 from sandbox.games.curling.sheet import (
@@ -114,6 +114,27 @@ CONTROLS = (
 )
 
 
+class CurlingAim(NamedTuple):
+    """Aim of a delivery, as the controls set it."""
+
+    broom: float
+    """m, position of the broom to the left of the centre line"""
+    weight: float
+    """m past the tee at which the stone would come to rest"""
+    turn: int
+    """as in `Delivery`"""
+
+    def limited(self) -> "CurlingAim":
+        """Return the nearest aim within the bounds of broom and weight."""
+        broom = min(max(self.broom, -MAX_BROOM_OFFSET), MAX_BROOM_OFFSET)
+        return self._replace(broom=broom, weight=min(max(self.weight, WEIGHTS[0]), WEIGHTS[1]))
+
+
+def broom_offset(heading: float) -> float:
+    """Return the position of a broom on the tee line, m to the left of the centre line, for a heading, rad."""
+    return -RELEASE * math.tan(heading)
+
+
 class Curling:
     """Rules of a match."""
 
@@ -172,6 +193,33 @@ class Curling:
     def _is_bot_turn(self) -> bool:
         return self._score.team >= self._people
 
+    @property
+    def present_score(self) -> CurlingScore:
+        """The score of the match."""
+        return self._score
+
+    @property
+    def ice(self) -> Ice:
+        """Properties of the ice."""
+        return self._ice
+
+    @property
+    def stones(self) -> Stones:
+        """Team, and position, m, of each stone in play."""
+        return [(k // STONES, place) for k, place in self._places.items()]
+
+    @property
+    def has_last_stone(self) -> bool:
+        """Whether the team that delivers next has the hammer."""
+        return self._score.hammer == self._score.team
+
+    @property
+    def aim(self) -> CurlingAim | None:
+        """Present aim of a person who may deliver now; None while stones run and in a turn of a bot."""
+        if not self._ready or self._is_bot_turn:
+            return None
+        return CurlingAim(self._broom, self._weight, self._turn)
+
     def on_input(self, control: str, value: float) -> Sequence[Action]:
         """Return the actions of an input; it has no effect in a turn of a bot."""
         (self._held.add if value > 0.0 else self._held.discard)(control)
@@ -221,12 +269,10 @@ class Curling:
 
     def _choose(self) -> Sequence[Action]:
         """Choose the delivery of a bot, and place its broom."""
-        stones = [(k // STONES, place) for k, place in self._places.items()]
-        last = self._score.hammer == self._score.team
-        self._meant = self._teams[self._score.team].delivery(stones, self._score.thrown, last)
+        self._meant = self._teams[self._score.team].delivery(self.stones, self._score.thrown, self.has_last_stone)
         self._turn = self._meant.turn
-        self._weight = self._meant.speed**2 / self._ice.speed_for(1.0) ** 2 + RELEASE
-        return (self._hold(-RELEASE * math.tan(self._meant.heading)),)
+        self._weight = self._ice.distance_for(self._meant.speed) + RELEASE
+        return (self._hold(broom_offset(self._meant.heading)),)
 
     def _deliver(self, delivery: Delivery) -> Sequence[Action]:
         assert self._frame is not None
@@ -343,7 +389,7 @@ class Curling:
             ("broom", self._broom),
             ("weight", self._weight),
             ("turn", self._turn),
-            ("may throw", self._ready and not self._is_bot_turn),
+            ("may throw", self.aim is not None),
             ("stones run", self._running),
             ("team", score.team),
             ("hammer", score.hammer),

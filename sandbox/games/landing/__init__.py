@@ -5,6 +5,7 @@ from sandbox.game_spec import Environment, GameSpec
 GAME = GameSpec(
     names=("landing",),
     rules="sandbox.games.landing.rules:Landing",
+    bot="sandbox.games.landing.bot:LandingBot",
     environments=(Environment("Landing", "games/landing", 5),),
     real_time=True,
 )

@@ -57,25 +57,33 @@ class Landing:
         Raises:
             UnsuitableSceneError: the scene has no ship, no pad, or no thrust with a key on the ship.
         """
-        self._thrusts = {
+        self.thrusts = {
             thrust.name or default_name("thrust", k): thrust
             for k, thrust in enumerate(scene.thrusts)
             if thrust.body == SHIP and thrust.key is not None
         }
-        if SHIP not in bodies.names or PAD not in scene.fixed_names or not self._thrusts:
+        """thrusts of the ship that are controls, by name"""
+        if SHIP not in bodies.names or PAD not in scene.fixed_names or not self.thrusts:
             raise UnsuitableSceneError(
                 f"landing needs a body {SHIP!r}, a fixed element {PAD!r}, and a thrust on the ship that has a key"
             )
-        self.controls = tuple(_control(name, thrust) for name, thrust in self._thrusts.items())
+        self.controls = tuple(_control(name, thrust) for name, thrust in self.thrusts.items())
         self.score = 0
         self.game_over: str | None = None
-        self._ship, self._pad = bodies.names.index(SHIP), -1 - scene.fixed_names.index(PAD)
-        self._place, self._solid = _place(scene), len(scene.fixed)
-        form = geometry_of(bodies.elements[int(bodies.element[self._ship])])
+        self.ship = bodies.names.index(SHIP)
+        """index of the body"""
+        self.mass, self.moment = float(bodies.mass[self.ship]), float(bodies.moment[self.ship])
+        """kg and kg·m² of the ship"""
+        self.gravity = -scene.world.gravity[1]
+        """m/s², downwards"""
+        self.pad = _pad_position(scene)
+        """m, centre of the top of the pad"""
+        self._pad_number, self._solid = -1 - scene.fixed_names.index(PAD), len(scene.fixed)
+        form = geometry_of(bodies.elements[int(bodies.element[self.ship])])
         self._corners = [(x, y, piece.radius) for piece in form.pieces for x, y in piece.corners]
-        self._tank = self._full = TANK * float(bodies.mass[self._ship])
-        self._levels = dict.fromkeys(self._thrusts, 0.0)
-        self._start = _start(scene, bodies, self._ship)
+        self._tank = self._full = TANK * self.mass
+        self._levels = dict.fromkeys(self.thrusts, 0.0)
+        self._start = _start(scene, bodies, self.ship)
         self._time, self._still = 0.0, 0.0
         self._before: Frame | None = None
         self._now: Frame | None = None
@@ -106,7 +114,7 @@ class Landing:
         for action in info.actions:
             if isinstance(action, Throttle) and action.thrust in self._levels:
                 self._levels[action.thrust] = action.level
-        burnt = math.fsum(level * math.hypot(*self._thrusts[name].force) for name, level in self._levels.items())
+        burnt = math.fsum(level * math.hypot(*self.thrusts[name].force) for name, level in self._levels.items())
         had, self._tank = self._tank, max(self._tank - burnt * elapsed, 0.0)
         if self._tank > 0.0 or had == 0.0:
             return ()
@@ -117,13 +125,13 @@ class Landing:
 
     def _ended(self, info: StepInfo, elapsed: float) -> str | None:
         """Return the reason why the game is over, and set the score of a landing; None while it runs."""
-        frame, ship = info.frame, self._ship
+        frame, ship = info.frame, self.ship
         if not frame.present[ship]:
             return "lost in space"
         touched = {int(pair[1]) if pair[0] == ship else int(pair[0]) for pair in info.contacts.pair if ship in pair}
-        if any(number >= -self._solid for number in touched - {self._pad}):  # smaller numbers are zones
+        if any(number >= -self._solid for number in touched - {self._pad_number}):  # smaller numbers are zones
             return "crashed outside the pad"
-        if self._pad not in touched:
+        if self._pad_number not in touched:
             self._still = 0.0
             return None
         first, self._touched = not self._touched, True
@@ -132,7 +140,7 @@ class Landing:
             if fault is not None:
                 return fault
             self._cues.append("touch")
-        if abs(self._tilt(frame)) > FALLEN:
+        if abs(self.tilt(frame)) > FALLEN:
             return "tipped over"
         speed = float(np.hypot(*frame.velocity[ship]))
         self._still = self._still + elapsed if speed < STILL else 0.0
@@ -144,12 +152,12 @@ class Landing:
     def _hard(self) -> str | None:
         """Return the reason why the first touch is a crash, from the state before it; None if it is none."""
         assert self._before is not None
-        aside, up = self._before.velocity[self._ship].tolist()
+        aside, up = self._before.velocity[self.ship].tolist()
         if -up > DOWN:
             return f"crashed: {-up:.1f} m/s down (limit {DOWN:g})"
         if abs(aside) > ASIDE:
             return f"crashed: {abs(aside):.1f} m/s sideways (limit {ASIDE:g})"
-        tilt = abs(self._tilt(self._before))
+        tilt = abs(self.tilt(self._before))
         return (
             f"crashed: tilted by {math.degrees(tilt):.0f}° (limit {math.degrees(TILT):.0f}°)" if tilt > TILT else None
         )
@@ -157,23 +165,24 @@ class Landing:
     def _consolation(self) -> int:
         """Return the points of a crash."""
         assert self._before is not None
-        place, speed = self._before.position[self._ship], float(np.hypot(*self._before.velocity[self._ship]))
-        near = max(1.0 - math.dist(place.tolist(), self._place) / FAR, 0.0)
+        place, speed = self._before.position[self.ship], float(np.hypot(*self._before.velocity[self.ship]))
+        near = max(1.0 - math.dist(place.tolist(), self.pad) / FAR, 0.0)
         return round(FOR_A_CRASH * near * max(1.0 - speed / FAST, 0.0))
 
-    def _tilt(self, frame: Frame) -> float:
-        return math.remainder(float(frame.angle[self._ship]), math.tau)
+    def tilt(self, frame: Frame) -> float:
+        """Return the angle of the ship, rad, −π to π; positive if it leans to the left."""
+        return math.remainder(float(frame.angle[self.ship]), math.tau)
 
     def display_lines(self) -> Sequence[tuple[str, str]]:
         """Return fuel, height, speeds and tilt; values beyond the limits of a landing are marked by `!`."""
         fuel = ("fuel", f"{100.0 * self._tank / self._full:.0f} %")
-        if self._now is None or not self._now.present[self._ship]:
+        if self._now is None or not self._now.present[self.ship]:
             return (fuel,)
-        aside, up = self._now.velocity[self._ship].tolist()
-        tilt = self._tilt(self._now)
+        aside, up = self._now.velocity[self.ship].tolist()
+        tilt = self.tilt(self._now)
         return (
             fuel,
-            ("height", f"{max(self._height(self._now), 0.0):.1f} m"),
+            ("height", f"{max(self.height(self._now), 0.0):.1f} m"),
             ("down", _marked(f"{format_signed(-up, 1)} m/s", -up > DOWN)),
             ("sideways", _marked(f"{format_signed(aside, 1)} m/s", abs(aside) > ASIDE)),
             ("tilt", _marked(f"{format_signed(-math.degrees(tilt), 0)}°", abs(tilt) > TILT)),
@@ -183,11 +192,11 @@ class Landing:
         """Return the fuel as a fraction of a full tank."""
         return (("fuel", self._tank / self._full),)
 
-    def _height(self, frame: Frame) -> float:
+    def height(self, frame: Frame) -> float:
         """Return the height of the lowest point of the ship above the pad, m."""
-        sine, cosine = math.sin(frame.angle[self._ship]), math.cos(frame.angle[self._ship])
+        sine, cosine = math.sin(frame.angle[self.ship]), math.cos(frame.angle[self.ship])
         lowest = min(x * sine + y * cosine - radius for x, y, radius in self._corners)
-        return float(frame.position[self._ship, 1]) + lowest - self._place[1]
+        return float(frame.position[self.ship, 1]) + lowest - self.pad[1]
 
     def sounds(self) -> Sequence[str]:
         """Return the names of the sounds since the last call."""
@@ -200,7 +209,7 @@ def _control(name: str, thrust: Thrust) -> Control:
     return Control(name, name, (thrust.key,), PADS.get(thrust.key), analogue=True)
 
 
-def _place(scene: Scene) -> Point:
+def _pad_position(scene: Scene) -> Point:
     """Return the centre of the top of the pad, m.
 
     Raises:
