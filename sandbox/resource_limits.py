@@ -217,9 +217,9 @@ def free_memory() -> int:
 
 def _free_in_system() -> float:
     """Return the bytes that are free, or half of what there is where that is unknown, or 4 GiB."""
-    for name, share in (("SC_AVPHYS_PAGES", 1.0), ("SC_PHYS_PAGES", 0.5)):
+    for name, fraction in (("SC_AVPHYS_PAGES", 1.0), ("SC_PHYS_PAGES", 0.5)):
         try:
-            return os.sysconf("SC_PAGE_SIZE") * os.sysconf(name) * share
+            return os.sysconf("SC_PAGE_SIZE") * os.sysconf(name) * fraction
         except (AttributeError, ValueError, OSError):
             continue
     return 4.0 * 2**30

@@ -199,8 +199,8 @@ def _parted(each: Separation, within: str) -> str:
     return f"{each.ball!r} differs by {within} from t = {each.time:.4g} s on{grown}"
 
 
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.1f} %"
+def _percent(fraction: float) -> str:
+    return f"{100.0 * fraction:.1f} %"
 
 
 def _bounds(chance: Proportion) -> str:

@@ -56,7 +56,7 @@ class Scores:
             "count": self.count,
             "mean": self.mean,
             "deviation": self.deviation,
-            "quantiles": {f"{share:g}": value for share, value in zip(QUANTILES, self.quantiles, strict=True)},
+            "quantiles": {f"{fraction:g}": value for fraction, value in zip(QUANTILES, self.quantiles, strict=True)},
             "histogram": {"edges": list(self.edges), "counts": list(self.counts)},
         }
 

@@ -115,21 +115,21 @@ class Preferences:
     parameters: dict[str, Any] = field(default_factory=dict)
     """parameter values of the open scene by path"""
 
-    def apply(self, company: Diagnostics, trusting: bool) -> None:
+    def apply(self, diagnostics: Diagnostics, trusting: bool) -> None:
         """Apply the ghost and twin preferences to a new session; `trusting` is the default of the twin."""
-        company.watch_divergence(trusting if self.trusting is None else self.trusting)
-        if self.ghosted and not company.has_ghost:
-            company.show_ghost(True)
+        diagnostics.watch_divergence(trusting if self.trusting is None else self.trusting)
+        if self.ghosted and not diagnostics.has_ghost:
+            diagnostics.show_ghost(True)
 
-    def toggle_ghost(self, company: Diagnostics) -> None:
+    def toggle_ghost(self, diagnostics: Diagnostics) -> None:
         """Start or stop the ghost, also for later scenes."""
-        self.ghosted = not company.has_ghost
-        company.show_ghost(self.ghosted)
+        self.ghosted = not diagnostics.has_ghost
+        diagnostics.show_ghost(self.ghosted)
 
-    def toggle_trust(self, company: Diagnostics) -> None:
+    def toggle_trust(self, diagnostics: Diagnostics) -> None:
         """Start or stop the perturbed twin, also for later scenes."""
-        self.trusting = company.divergence is None
-        company.watch_divergence(self.trusting)
+        self.trusting = diagnostics.divergence is None
+        diagnostics.watch_divergence(self.trusting)
 
     def store_parameter(self, action: SetParameter) -> None:
         """Store a parameter value for restarts."""
@@ -414,16 +414,16 @@ class AppState:
         if self.live is None:
             self._warn_no_session("has no ghost; replay it with --engine NAME")
             return
-        company = self.live.diagnostics
-        self.compute(lambda: self._preferences.toggle_ghost(company))
+        diagnostics = self.live.diagnostics
+        self.compute(lambda: self._preferences.toggle_ghost(diagnostics))
 
     def toggle_trust(self) -> None:
         """Start the divergence monitor at the present time, or stop it."""
         if self.live is None:
             self._warn_no_session("has no predictability horizon; open its scene with `sandbox play`")
             return
-        company = self.live.diagnostics
-        self.compute(lambda: self._preferences.toggle_trust(company))
+        diagnostics = self.live.diagnostics
+        self.compute(lambda: self._preferences.toggle_trust(diagnostics))
 
     def switch_to_next_engine(self) -> None:
         """Switch to the next engine that supports the scene; each skipped engine adds its reason as a warning."""

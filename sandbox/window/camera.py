@@ -139,11 +139,11 @@ class Camera:
         It does not move while the position is in the inner part, eases up to the outer part, and jumps beyond it.
         """
         moved = self
-        for part, share in ((INNER_FRACTION, 1.0 - math.exp(-elapsed / PAN_TIME)), (OUTER_FRACTION, 1.0)):
+        for part, fraction in ((INNER_FRACTION, 1.0 - math.exp(-elapsed / PAN_TIME)), (OUTER_FRACTION, 1.0)):
             pixel, by = moved.to_screen(place), []
             for k in range(2):
                 middle, half = (free[k] + free[k + 2]) / 2.0, part * (free[k + 2] - free[k]) / 2.0
-                by.append(float(min(max(pixel[k], middle - half), middle + half) - pixel[k]) * share)
+                by.append(float(min(max(pixel[k], middle - half), middle + half) - pixel[k]) * fraction)
             moved = moved.panned((by[0], by[1])) if any(by) else moved
         return moved
 

@@ -81,8 +81,8 @@ def rk4(world: World, knot: Knot, h: float) -> Knot:
     (gx, gy), (wind_x, wind_y), linear, quadratic = world.gravity, world.wind, world.linear_drag, world.quadratic_drag
     x, y, vx, vy = knot
     sum_x = sum_y = sum_vx = sum_vy = ax = ay = 0.0
-    for weight, share in ((1.0, 0.0), (2.0, 0.5), (2.0, 0.5), (1.0, 1.0)):
-        here_x, here_y = vx + share * h * ax, vy + share * h * ay
+    for weight, fraction in ((1.0, 0.0), (2.0, 0.5), (2.0, 0.5), (1.0, 1.0)):
+        here_x, here_y = vx + fraction * h * ax, vy + fraction * h * ay
         aside, up = here_x - wind_x, here_y - wind_y
         drag = linear + quadratic * math.sqrt(aside * aside + up * up)
         ax, ay = gx - drag * aside, gy - drag * up
@@ -279,18 +279,18 @@ def first_strike(discs: FloatArray, a: FloatArray, b: FloatArray) -> tuple[float
     able = np.flatnonzero((root > 0.0) & (along < 0.0) & (outside > 0.0) & (square > 0.0))
     if not len(able):
         return None
-    share = (-along[able] - np.sqrt(root[able])) / square
-    k = int(np.argmin(share))
-    return (float(share[k]), int(able[k])) if share[k] <= 1.0 else None
+    fraction = (-along[able] - np.sqrt(root[able])) / square
+    k = int(np.argmin(fraction))
+    return (float(fraction[k]), int(able[k])) if fraction[k] <= 1.0 else None
 
 
-def _struck(flight: Flight, disc: FloatArray, begin: float, end: float, share: float) -> float:
+def _struck(flight: Flight, disc: FloatArray, begin: float, end: float, fraction: float) -> float:
     """Return the time, s, at which a trajectory enters a disc, given the fraction at which the chord does."""
 
     def apart(time: float) -> float:
         return math.dist(flight.at(time)[0], disc[:2]) - float(disc[2])
 
-    here = begin + share * (end - begin)
+    here = begin + fraction * (end - begin)
     inside = min(here + 0.1 * float(disc[2]) / max(float(np.hypot(*flight.at(here)[1])), 1e-9), end)
     if apart(begin) > 0.0 >= apart(inside):
         return bracketed_root(apart, begin, inside, IMPACT_TIME_TOLERANCE)

@@ -161,9 +161,9 @@ class Tanks:
         hurt = []
         for tank in self.alive:
             far = max(math.dist(tank.place, place) - self.radius, 0.0)
-            share = 1.0 - far / (2.0 * weapon.radius)
-            if share > 0.0 and weapon.damage > 0.0:
-                self.hurt(tank, weapon.damage * share, shooter)
+            fraction = 1.0 - far / (2.0 * weapon.radius)
+            if fraction > 0.0 and weapon.damage > 0.0:
+                self.hurt(tank, weapon.damage * fraction, shooter)
                 hurt.append(tank)
         return hurt
 

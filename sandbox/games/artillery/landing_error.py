@@ -161,8 +161,8 @@ def simulated_landing(world: World, velocity: FloatArray, engine: str, settings:
     half = 1.0 + 2.0 * abs(float(now.position[0, 0]))
     step = FlightSegment(_state(before, half), _state(now, half), now.time - before.time)
     found = step.meets(Ground(np.zeros(2), 2.0 * half), NO_DISCS, 1.0)
-    share = 1.0 if found is None else found[0]
-    return ShellImpact(before.time + share * (now.time - before.time), (float(step.at(share)[0]) - half, 0.0))
+    fraction = 1.0 if found is None else found[0]
+    return ShellImpact(before.time + fraction * (now.time - before.time), (float(step.at(fraction)[0]) - half, 0.0))
 
 
 def _state(frame: Frame, aside: float) -> tuple[FloatArray, FloatArray]:

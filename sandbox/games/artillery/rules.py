@@ -231,22 +231,22 @@ class ArtilleryRules:
 
     def display_lines(self) -> Sequence[tuple[str, str]]:
         """Return state of the tanks, setting of the gun, and result of the last shot."""
-        told = []
+        lines = []
         for tank in self.field.tanks.every:
             mark = "▸ " if tank is self.shooter and self._over is None else ""
             points = f"{tank.points:,} point{'' if tank.points == 1 else 's'}"
             state = f"{tank.health:.0f} %, {points}, ${tank.money:,}" if tank.alive else f"out, {points}"
-            told.append((f"{mark}{tank.name}", state))
+            lines.append((f"{mark}{tank.name}", state))
         wind = self.world.wind[0]
         side = "to the right" if wind > 0 else "to the left"
-        told.append(("wind", f"{abs(wind):.1f} m/s {side}" if wind else "none"))
+        lines.append(("wind", f"{abs(wind):.1f} m/s {side}" if wind else "none"))
         tank, weapon = self.shooter, WEAPONS[self.shooter.weapon]
         gun = f"{math.degrees(tank.angle):.1f}°, {100.0 * tank.power:.1f} %, {self.speed(tank):.1f} m/s"
-        told.append(("gun", f"{tank.name} is thinking" if self.thinking else gun))
-        told.append(("weapon", f"{weapon.name}, ${weapon.cost:,}" if weapon.cost else weapon.name))
+        lines.append(("gun", f"{tank.name} is thinking" if self.thinking else gun))
+        lines.append(("weapon", f"{weapon.name}, ${weapon.cost:,}" if weapon.cost else weapon.name))
         if self.shots:
-            told.append(("last shot", self.shots[-1].brief.replace("exact solution", "exact")))
-        return told
+            lines.append(("last shot", self.shots[-1].brief.replace("exact solution", "exact")))
+        return lines
 
     def observation(self) -> Sequence[tuple[str, float]]:
         """Return turn, wind, state of every tank and its gun, last impact, and terrain heights."""

@@ -142,8 +142,8 @@ def heights_of(terrain: Terrain, seed: int) -> tuple[float, ...]:
         return tuple(settled(height) for height in terrain.heights)
     line = displaced(terrain.columns, 2.0 ** -(1.0 - terrain.roughness), seed)
     low, high = float(line.min()), float(line.max())
-    share = (line - low) / (high - low)
-    return tuple(settled(terrain.base + terrain.height * each) for each in share.tolist())
+    fraction = (line - low) / (high - low)
+    return tuple(settled(terrain.base + terrain.height * each) for each in fraction.tolist())
 
 
 def displaced(count: int, shrink: float, seed: int) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

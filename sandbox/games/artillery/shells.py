@@ -74,17 +74,17 @@ class FlightSegment:
         """Create a segment from two states, each a position, m, and a velocity, m/s, and the time between them, s."""
         self._start, self._end, self._time = start, end, time
 
-    def at(self, share: float) -> FloatArray:
+    def at(self, fraction: float) -> FloatArray:
         """Return the position (2,), m, at a fraction of the time."""
-        s, (a, v), (b, w), h = share, self._start, self._end, self._time
+        s, (a, v), (b, w), h = fraction, self._start, self._end, self._time
         level = s * s * (3.0 - 2.0 * s)
         return np.asarray(
             a + level * (b - a) + h * (s * (1.0 - s) ** 2 * v - s * s * (1.0 - s) * w),
         )
 
-    def velocity(self, share: float) -> FloatArray:
+    def velocity(self, fraction: float) -> FloatArray:
         """Return the velocity (2,), m/s, at a fraction of the time, by linear interpolation."""
-        return np.asarray(self._start[1] + share * (self._end[1] - self._start[1]))
+        return np.asarray(self._start[1] + fraction * (self._end[1] - self._start[1]))
 
     def meets(self, ground: Ground, discs: FloatArray, until: float) -> tuple[float, int | None] | None:
         """Return the first impact before the fraction `until`: fraction of the time and the disc's index, or None.
@@ -95,13 +95,13 @@ class FlightSegment:
         found, struck = crossing(ground, a, b), first_strike(discs, a, b)
         if struck is not None and (found is None or struck[0] < found.here):
             disc = discs[struck[1]]
-            share = self._root(lambda s: math.dist(self.at(s), disc[:2]) - float(disc[2]), 0.0, struck[0] * until)
-            return share, struck[1]
+            fraction = self._root(lambda s: math.dist(self.at(s), disc[:2]) - float(disc[2]), 0.0, struck[0] * until)
+            return fraction, struck[1]
         if found is None:
             return None
 
-        def gap(share: float) -> float:
-            place = self.at(share)
+        def gap(fraction: float) -> float:
+            place = self.at(fraction)
             return float(place[1] - ground.surface(place[0]))
 
         return self._root(gap, found.before * until, found.here * until, found.after * until), None
@@ -275,12 +275,12 @@ class Projectiles:
         return []
 
     def _come_down(
-        self, shell: Shell, step: FlightSegment, share: float, struck: int | None, time: float, passed: float
+        self, shell: Shell, step: FlightSegment, fraction: float, struck: int | None, time: float, passed: float
     ) -> list[Action]:
         """Explode a shell at its impact, at a fraction of the last step, or let a roller start there."""
-        x, y = step.at(share).tolist()
+        x, y = step.at(fraction).tolist()
         shell.place = np.array([x, y])
-        self._tell(shell, (x, y), time - (1.0 - share) * passed)
+        self._tell(shell, (x, y), time - (1.0 - fraction) * passed)
         if shell.weapon.kind != "roller" or struck is not None:
             return self._go_off(shell, (x, y), time)
         ground = self._field.ground
@@ -288,7 +288,7 @@ class Projectiles:
         along = np.array([high - low, float(ground.surface(high) - ground.surface(low))])
         along /= np.hypot(*along)
         place = np.array([x, y]) + (ROLLER + LIFT) * np.array([-along[1], along[0]])
-        velocity = float(step.velocity(share) @ along) * along
+        velocity = float(step.velocity(fraction) @ along) * along
         self.shells.remove(shell)
         rolling = self._shell(time, shell.shooter, shell.weapon, place, velocity, rolls=True)
         return [Remove(time=time, body=shell.name), rolling]

@@ -84,10 +84,10 @@ class TrialShots:
         open_ = self._edges == "open"
         self._gap = now = state[0, :, 1] - ground.surface(x if open_ else np.clip(x, 0.0, ground.width))
         down = (now <= 0.0) & np.isfinite(now)
-        share = gap[down] / (gap[down] - now[down])
-        share[~np.isfinite(share)] = 1.0  # through a side of the terrain
-        self.place[self._number[down]] = was[down] + share * (x[down] - was[down])
-        self.when[self._number[down]] = (self._k + share) * self._h
+        fraction = gap[down] / (gap[down] - now[down])
+        fraction[~np.isfinite(fraction)] = 1.0  # through a side of the terrain
+        self.place[self._number[down]] = was[down] + fraction * (x[down] - was[down])
+        self.when[self._number[down]] = (self._k + fraction) * self._h
         self._k += 1
         if open_:
             self._keep(~(down | ((state[0, :, 1] < 0.0) & ((x < 0.0) | (x > ground.width)))))
@@ -187,8 +187,8 @@ class AimSolver:
         """the shot; None until the search is complete"""
         self._range = range_
         self._stage: Stage = "fan"
-        angle, share = (each.reshape(-1) for each in np.meshgrid(ANGLES, SHARES))
-        self._angle, self._speed = angle, range_.full * share  # of the trial shots
+        angle, fraction = (each.reshape(-1) for each in np.meshgrid(ANGLES, SHARES))
+        self._angle, self._speed = angle, range_.full * fraction  # of the trial shots
         self._volley = range_.volley(self._angle, self._speed, COARSE)
         self._brackets = np.empty((0, 3))  # two angles, between which the miss changes sign, and the speed
         self._closer = 0
@@ -259,9 +259,11 @@ class AimSolver:
             return
         short, far = miss[row, k], miss[row, k + 1]
         between = short - far
-        share = np.where(np.isfinite(between) & (between != 0.0), short / np.where(between == 0.0, 1.0, between), 0.0)
+        fraction = np.where(
+            np.isfinite(between) & (between != 0.0), short / np.where(between == 0.0, 1.0, between), 0.0
+        )
         low, high, speed = self._brackets.T
-        angle = low + np.clip(share, 0.0, 1.0) * (high - low)
+        angle = low + np.clip(fraction, 0.0, 1.0) * (high - low)
         self._angle = (angle + np.array([[0.0], [-SHAKE], [SHAKE]])).reshape(-1)
         self._speed, self._stage = np.tile(speed, 3), "shaken"
         self._volley = self._range.volley(self._angle, self._speed, CLOSE)

@@ -151,10 +151,10 @@ def _setting(view: DrawContext, gunnery: ArtilleryViewState, gun: GunView, at: P
     reach = max(AIM_REACH * view.camera.scale, 90.0 * view.ui_scale)
     first, count = BARREL_LENGTH * width + 6.0 * view.ui_scale, 14
     for k in range(count):
-        share = (k + 1) / count
-        lit = share <= gun.power + 0.5 / count
-        far = first + share * reach
-        colour = mix_colours(YELLOW, ORANGE, share) if lit else (150, 150, 164)
+        fraction = (k + 1) / count
+        lit = fraction <= gun.power + 0.5 / count
+        far = first + fraction * reach
+        colour = mix_colours(YELLOW, ORANGE, fraction) if lit else (150, 150, 164)
         size = (2.6 if lit else 1.4) * view.ui_scale
         draw_dot(view.surface, (turret[0] + far * way[0], turret[1] + far * way[1]), size, colour)
     wide, high = 64.0 * view.ui_scale, 7.0 * view.ui_scale
@@ -223,11 +223,11 @@ def sky_image(size: tuple[int, int]) -> pygame.Surface:
     return whole
 
 
-def sky_tone(share: float) -> RgbColour:
+def sky_tone(fraction: float) -> RgbColour:
     """Return the colour of the sky at a fraction of the height of the picture, from the top."""
     for (above, first), (below, second) in pairwise(SKY_TONES):
-        if share <= below:
-            return mix_colours(first, second, (share - above) / (below - above))
+        if fraction <= below:
+            return mix_colours(first, second, (fraction - above) / (below - above))
     return SKY_TONES[-1][1]
 
 
@@ -361,12 +361,12 @@ def _way(view: DrawContext, way: FloatArray, flying: bool) -> None:
     places = view.camera.to_screen(np.vstack((points, way[-1:]))).tolist()
     for k in range(len(places) - 1):
         age = 1.0 - k / len(places)
-        share = max(0.75 - age, 0.16) if flying else 0.22
+        fraction = max(0.75 - age, 0.16) if flying else 0.22
         if not flying and k % 3 == 2:
             continue  # dashed after the flight
-        colour = mix_colours((70, 72, 104), SMOKE, share)
+        colour = mix_colours((70, 72, 104), SMOKE, fraction)
         (ax, ay), (bx, by) = places[k], places[k + 1]
-        draw_line(view.surface, (ax, ay), (bx, by), colour, (1.0 + 1.4 * share) * view.ui_scale, view.antialias)
+        draw_line(view.surface, (ax, ay), (bx, by), colour, (1.0 + 1.4 * fraction) * view.ui_scale, view.antialias)
 
 
 def _clod(view: DrawContext, clod: FallingDirt) -> None:
@@ -391,15 +391,15 @@ def _clod(view: DrawContext, clod: FallingDirt) -> None:
 
 def _burst(view: DrawContext, burst: ExplosionView) -> None:
     """Draw an explosion: a disc that grows, changes colour, and fades."""
-    share = min(burst.age / EXPLOSION_DURATION, 1.0)
+    fraction = min(burst.age / EXPLOSION_DURATION, 1.0)
     x, y = view.camera.to_screen(np.asarray(burst.place)).tolist()
-    radius = burst.radius * view.camera.scale * (0.35 + 0.75 * share**0.4)
+    radius = burst.radius * view.camera.scale * (0.35 + 0.75 * fraction**0.4)
     tones = ((150, 118, 84), (120, 94, 70), (96, 78, 62), (80, 70, 62)) if burst.dirt else FLAME
-    place = share * (len(tones) - 1)
+    place = fraction * (len(tones) - 1)
     k = min(int(place), len(tones) - 2)
     colour = mix_colours(tones[k], tones[k + 1], place - k)
     for part, opacity in ((1.0, 0.45), (0.72, 0.6), (0.4, 0.8)):
-        hidden = round(255 * opacity * (1.0 - share))
+        hidden = round(255 * opacity * (1.0 - fraction))
         draw_glow(view.surface, (x, y), radius * part, mix_colours(colour, tones[0], 1.0 - part), hidden)
 
 

@@ -85,7 +85,7 @@ class CurlingBot:
         if not len(others):
             return math.inf
         shares = np.linspace(1.0, 0.0, PATH_POINTS)
-        places = np.asarray([RELEASE + self._ice.way(way, share) for share in shares.tolist()])
+        places = np.asarray([RELEASE + self._ice.way(way, fraction) for fraction in shares.tolist()])
         if target is not None:
             places = places[places.real < target[0] - 2.0 * STONE]
         return float(np.abs(places[:, None] - others).min(initial=math.inf)) - 2.0 * STONE

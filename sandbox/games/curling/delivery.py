@@ -54,10 +54,10 @@ class Ice(NamedTuple):
         """Return the ice of a surface."""
         return cls(floor.sliding_friction * floor.gravity, floor.curl)
 
-    def way(self, delivery: Delivery, share: float) -> complex:
+    def way(self, delivery: Delivery, fraction: float) -> complex:
         """Return the displacement from the release, m, at a remaining fraction of the speed: x + iy."""
         power = 2.0 - 1j * self.curl * delivery.turn
-        gone = 1.0 - (cmath.exp(power * math.log(share)) if share > 0.0 else 0.0)
+        gone = 1.0 - (cmath.exp(power * math.log(fraction)) if fraction > 0.0 else 0.0)
         return delivery.speed**2 / self.slowing * gone / power * cmath.exp(1j * delivery.heading)
 
     def speed_for(self, distance: float) -> float:
@@ -89,9 +89,9 @@ class Ice(NamedTuple):
                 high = middle
         return self._turned(straight, far, high)
 
-    def _turned(self, delivery: Delivery, far: complex, share: float) -> Delivery:
+    def _turned(self, delivery: Delivery, far: complex, fraction: float) -> Delivery:
         """Return a delivery with the heading that leads in the direction of `far`, at a fraction of the speed."""
-        way = self.way(delivery, share)
+        way = self.way(delivery, fraction)
         # not `cmath.phase`, which raises where an angle is too small for a float
         heading = math.atan2(far.imag, far.real) - math.atan2(way.imag, way.real)
         return delivery._replace(heading=heading)

@@ -235,12 +235,12 @@ def drops(to: Building, name: str, of: DropTargets) -> None:
         to.part(f"{name} {k + 1}", "drop", of, group=of.group or name, step=k, light=light)
 
 
-def darker(colour: str | None, share: float) -> str | None:
+def darker(colour: str | None, fraction: float) -> str | None:
     """Return a colour so much of the way to the dark."""
     if colour is None:
         return None
     parts = zip((colour[1:3], colour[3:5], colour[5:7]), (DARK[1:3], DARK[3:5], DARK[5:7]), strict=True)
-    return "#" + "".join(f"{round(int(a, 16) + (int(b, 16) - int(a, 16)) * share):02x}" for a, b in parts)
+    return "#" + "".join(f"{round(int(a, 16) + (int(b, 16) - int(a, 16)) * fraction):02x}" for a, b in parts)
 
 
 def unit(way: Vector) -> Vector:

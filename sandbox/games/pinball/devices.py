@@ -52,8 +52,8 @@ class CoilVariation:
 
     def throw(self, velocity: Vector) -> Vector:
         """Return a velocity, m/s, that is at most the one that is stated."""
-        share = float(self._chance.uniform(WEAKEST, 1.0))
-        return velocity[0] * share, velocity[1] * share
+        fraction = float(self._chance.uniform(WEAKEST, 1.0))
+        return velocity[0] * fraction, velocity[1] * fraction
 
 
 HOLD_TIME = 0.8

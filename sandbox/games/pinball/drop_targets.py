@@ -91,9 +91,9 @@ def _distance(point: Point, a: Point, b: Point) -> float:
     """Return how far a point is from a segment, m."""
     along = (b[0] - a[0], b[1] - a[1])
     length = along[0] ** 2 + along[1] ** 2
-    share = ((point[0] - a[0]) * along[0] + (point[1] - a[1]) * along[1]) / length if length else 0.0
-    share = min(max(share, 0.0), 1.0)
-    return math.hypot(point[0] - a[0] - share * along[0], point[1] - a[1] - share * along[1])
+    fraction = ((point[0] - a[0]) * along[0] + (point[1] - a[1]) * along[1]) / length if length else 0.0
+    fraction = min(max(fraction, 0.0), 1.0)
+    return math.hypot(point[0] - a[0] - fraction * along[0], point[1] - a[1] - fraction * along[1])
 
 
 def banks_of(board: Playfield) -> tuple[DropTargetBanks, ...]:

@@ -50,13 +50,13 @@ def _coloured(scene: Scene) -> Scene:
 def _cap(surface: pygame.Surface, camera: Camera, post: Post, unit: float, antialias: bool) -> None:
     """Draw the cap of a bumper: a bright ring, a lid in its colour, a light on it."""
     colour = colour_of_fixed(post)
-    for share, inner, rim in (
+    for fraction, inner, rim in (
         (1.0, mix_colours(DARK, colour, 0.45), mix_colours(colour, INK, 0.35)),
         (RAISED + 0.12, INK, mix_colours(INK, colour, 0.3)),
         (RAISED, colour, mix_colours(colour, DARK, 0.35)),
     ):
         draw_spot(
-            surface, camera, post.position, share * post.radius, ShapeStyle(inner, rim, 1.5 * unit, 1.0, antialias)
+            surface, camera, post.position, fraction * post.radius, ShapeStyle(inner, rim, 1.5 * unit, 1.0, antialias)
         )
     glint = post.position[0] - 0.2 * post.radius, post.position[1] + 0.22 * post.radius
     draw_spot(surface, camera, glint, 0.2 * post.radius, ShapeStyle(INK, INK, 0.0, 0.35, antialias))

@@ -71,8 +71,8 @@ def _flight(tau: FloatArray, e: float) -> tuple[FloatArray, FloatArray]:
         return tau - np.floor(tau), np.ones_like(tau)
     end, log_e = e / (1.0 - e), math.log(e)
     flying = tau < end
-    share = np.where(flying, tau, 0.0) / end
-    done = np.floor(np.log1p(-share) / log_e)
+    fraction = np.where(flying, tau, 0.0) / end
+    done = np.floor(np.log1p(-fraction) / log_e)
     # The logarithm may round into a neighbouring flight.
     done -= tau < -end * np.expm1(done * log_e)
     done += tau >= -end * np.expm1((done + 1.0) * log_e)

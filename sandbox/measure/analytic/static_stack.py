@@ -174,8 +174,8 @@ def _share_load(bearings: list[Bearing], size: float, place: float, known: bool)
         one = max(left, key=lambda b: b.left + b.right)
         other = min(right, key=lambda b: b.left + b.right)
         x, y = 0.5 * (one.left + one.right), 0.5 * (other.left + other.right)
-        share = size * (place - x) / (y - x)
-        return {one.number: Load(size - share, x, False), other.number: Load(share, y, False)}
+        fraction = size * (place - x) / (y - x)
+        return {one.number: Load(size - fraction, x, False), other.number: Load(fraction, y, False)}
     spare = min((EDGE_FRACTION * (b.right - b.left) for b in bearings), default=0.0)
     under = next((b for b in bearings if b.left + spare < place < b.right - spare), None)
     return None if under is None else {under.number: Load(size, place, known and len(bearings) == 1)}

@@ -263,7 +263,7 @@ def score_run(
     row = replace(row, seconds=float(run.info["seconds"]), momentum_drift=momentum_drift(run, scene))
     if truth is None:
         energy = energy_drift(run, scene, None, False)
-        return replace(row, energy_drift=energy.share, energy_against=energy.against)
+        return replace(row, energy_drift=energy.fraction, energy_against=energy.against)
     until, last = truth.trusted_until, float(run.time[-1])
     position_errors = errors(run, truth.trajectory, ~scene.bodies.fixed)
     first = position_errors.first_above(tolerance, until)
@@ -273,7 +273,7 @@ def score_run(
     return replace(
         row,
         score=position_errors.until(until),
-        energy_drift=energy.share,
+        energy_drift=energy.fraction,
         energy_against=energy.against,
         first_divergence=first,
         events=match_contacts(run, truth.trajectory, scene, settings.dt, tolerance, min(until, last)),

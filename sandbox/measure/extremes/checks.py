@@ -164,10 +164,10 @@ def settles(tested: RunUnderTest) -> str | None:
 
 def stands(tested: RunUnderTest) -> str | None:
     """Stacked bodies stay where they are."""
-    share = np.where(tested.scene.bodies.fixed, 0.0, tested.displacement / tested.width)
-    worst = int(share.argmax())
-    if share[worst] > MAX_STACK_DISPLACEMENT:
-        return f"{tested.scene.bodies.names[worst]!r} moved by {share[worst]:.3g} of its width"
+    fraction = np.where(tested.scene.bodies.fixed, 0.0, tested.displacement / tested.width)
+    worst = int(fraction.argmax())
+    if fraction[worst] > MAX_STACK_DISPLACEMENT:
+        return f"{tested.scene.bodies.names[worst]!r} moved by {fraction[worst]:.3g} of its width"
     return None
 
 

@@ -274,5 +274,5 @@ def _length(vector: FloatArray) -> FloatArray:
 def _from_segment(centre: FloatArray, tail: FloatArray, tip: FloatArray) -> FloatArray:
     along = tip - tail
     squared = float(along @ along)
-    share = ((centre - tail) @ along / squared).clip(0.0, 1.0) if squared > 0.0 else np.zeros(len(centre))
-    return _length(centre - tail - share[:, None] * along)
+    fraction = ((centre - tail) @ along / squared).clip(0.0, 1.0) if squared > 0.0 else np.zeros(len(centre))
+    return _length(centre - tail - fraction[:, None] * along)

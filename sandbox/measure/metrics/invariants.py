@@ -27,7 +27,7 @@ nothing.
 class EnergyDrift(NamedTuple):
     """Energy drift as a fraction of the kinetic energy, and its reference."""
 
-    share: float | None
+    fraction: float | None
     against: str
     """`truth` or `start`"""
 
@@ -207,6 +207,6 @@ def _from_groove(links: JointArrays, position: FloatArray, angle: FloatArray, po
     way = rotate_points(along, turn)
     squared = (along * along).sum(axis=1)
     offset = point - near
-    share = (offset * way).sum(axis=2) / np.where(squared > 0.0, squared, 1.0)
-    away = offset - share.clip(0.0, 1.0)[..., None] * way
+    fraction = (offset * way).sum(axis=2) / np.where(squared > 0.0, squared, 1.0)
+    away = offset - fraction.clip(0.0, 1.0)[..., None] * way
     return np.asarray(np.hypot(away[..., 0], away[..., 1]))

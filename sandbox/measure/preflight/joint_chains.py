@@ -167,16 +167,16 @@ def stretch_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
         deep += 1
         reached[links.a[fresh]] = reached[links.b[fresh]] = True
     length = float(links.figures[:, 0].min())
-    share = STRETCH_COEFFICIENT * deep * pull * settings.h**2 / settings.iterations / length if length > 0.0 else 0.0
-    if share > MAX_STRETCH:
-        more = share / MAX_STRETCH
+    fraction = STRETCH_COEFFICIENT * deep * pull * settings.h**2 / settings.iterations / length if length > 0.0 else 0.0
+    if fraction > MAX_STRETCH:
+        more = fraction / MAX_STRETCH
         iterations, dt = math.ceil(settings.iterations * more), settings.dt / math.sqrt(more)
         message = (
             f"a chain with {links.names[0]!r} hangs {deep:,} joints deep; {settings.joints} with {settings.iterations} "
-            f"iterations every {settings.h:.3g} s stretches it by {share:.2g} of a joint's length; "
+            f"iterations every {settings.h:.3g} s stretches it by {fraction:.2g} of a joint's length; "
             f"solver.iterations >= {iterations:,} or dt <= {floor_3_digits(dt)} s keeps that to {MAX_STRETCH:g}"
         )
-        details: Details = {"joints": deep, "joint": links.names[0], "share": share, "safe_dt": dt}
+        details: Details = {"joints": deep, "joint": links.names[0], "share": fraction, "safe_dt": dt}
         yield Diagnostic("chain", message, details)
 
 

@@ -190,19 +190,19 @@ class TrialRun:
         stacked = np.unique(np.concatenate((close.first, close.second)))
         stacked = stacked[~bodies.fixed[stacked]]
         moved = np.hypot(*np.moveaxis(run.position[:, stacked] - run.position[0, stacked], 2, 0)).max(axis=0)
-        share = moved / (2.0 * bodies.thin[stacked])
-        if not len(share) or share.max() <= MAX_STACK_DISPLACEMENT:
+        fraction = moved / (2.0 * bodies.thin[stacked])
+        if not len(fraction) or fraction.max() <= MAX_STACK_DISPLACEMENT:
             return
-        k = int(share.argmax())
+        k = int(fraction.argmax())
         both = ~bodies.fixed[close.first] & ~bodies.fixed[close.second]
         mass_a, mass_b = bodies.mass[close.first[both]], bodies.mass[close.second[both]]
         ratio = float((np.maximum(mass_a, mass_b) / np.minimum(mass_a, mass_b)).max(initial=1.0))
         message = (
-            f"the stacked body {bodies.names[stacked[k]]!r} moves by {share[k]:.3g} of its width in {self.said}; "
+            f"the stacked body {bodies.names[stacked[k]]!r} moves by {fraction[k]:.3g} of its width in {self.said}; "
             "more solver.iterations or a smaller dt may stabilise the stack"
         )
         kind = "mass_ratio" if ratio >= MIN_MASS_RATIO else "stack"
-        yield Diagnostic(kind, message, {"body": bodies.names[stacked[k]], "moved": float(share[k])})
+        yield Diagnostic(kind, message, {"body": bodies.names[stacked[k]], "moved": float(fraction[k])})
 
     def _gained(self) -> Iterator[Diagnostic]:
         gain = energy_gain(self.run, self.scene)

@@ -192,8 +192,8 @@ def _highest(positions: FloatArray, down: FloatArray) -> float:
 def energy(run: Trajectory, context: EvaluationContext) -> float | None:
     """Return the energy drift as a fraction of the kinetic energy (`metrics.invariants.energy_drift`)."""
     truth = None if context.truth is None else context.truth.trajectory
-    share = energy_drift(run, context.scene, truth, context.until == context.scene.world.duration).share
-    return None if share is None else abs(share)
+    fraction = energy_drift(run, context.scene, truth, context.until == context.scene.world.duration).fraction
+    return None if fraction is None else abs(fraction)
 
 
 def joints(run: Trajectory, context: EvaluationContext) -> float | None:

@@ -45,17 +45,17 @@ class Parameter:
         """Whether the parameter takes integers only."""
         return not self.log and self.step >= 1 and self.step == int(self.step)
 
-    def at(self, share: float) -> float:
+    def at(self, fraction: float) -> float:
         """Return the value at a fraction of the range from `low` to `high`, snapped to the grid; the ends are exact."""
-        if share <= 0 or self.high <= self.low:
+        if fraction <= 0 or self.high <= self.low:
             return self.low
-        if share >= 1:
+        if fraction >= 1:
             return self.high
         if self.log:
-            return self._snapped(self.low * (self.high / self.low) ** share)
-        return self._snapped(self.low + share * (self.high - self.low))
+            return self._snapped(self.low * (self.high / self.low) ** fraction)
+        return self._snapped(self.low + fraction * (self.high - self.low))
 
-    def share(self, value: ParameterValue) -> float:
+    def fraction(self, value: ParameterValue) -> float:
         """Return the position of a value on the scale, 0 at `low` to 1 at `high`, clamped."""
         if isinstance(value, str) or not math.isfinite(value) or self.high <= self.low:
             return 0.0

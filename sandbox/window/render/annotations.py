@@ -121,13 +121,13 @@ def draw_verdicts(view: DrawContext) -> None:
 def draw_flashes(view: DrawContext) -> None:
     """Draw a ring that expands and fades at each recently missed contact."""
     for flash in view.snapshot.flashes[-MOST_FLASHES:]:
-        share = flash.age / FLASH
+        fraction = flash.age / FLASH
         with np.errstate(invalid="ignore", over="ignore"):
             x, y = view.camera.to_screen(np.asarray(flash.position)).tolist()
-        if not (0.0 <= share < 1.0 and abs(x) < SDL_COORDINATE_LIMIT and abs(y) < SDL_COORDINATE_LIMIT):
+        if not (0.0 <= fraction < 1.0 and abs(x) < SDL_COORDINATE_LIMIT and abs(y) < SDL_COORDINATE_LIMIT):
             continue
-        radius = (8.0 + 40.0 * math.sqrt(share)) * view.ui_scale
-        look = ShapeStyle(None, WARNING, 3.0 * view.ui_scale, opacity=1.0 - share, antialias=view.antialias)
+        radius = (8.0 + 40.0 * math.sqrt(fraction)) * view.ui_scale
+        look = ShapeStyle(None, WARNING, 3.0 * view.ui_scale, opacity=1.0 - fraction, antialias=view.antialias)
         side = 2 * math.ceil(radius + 1.0)
         within = pygame.Rect(round(x) - side // 2, round(y) - side // 2, side, side)
         draw_sdf(view.surface, disc_distance(x, y, radius), look, within)

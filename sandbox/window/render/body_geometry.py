@@ -64,9 +64,9 @@ class BodyGeometry:
         np.maximum.at(self._girth, np.repeat(np.arange(len(bodies)), np.diff(pieces.piece)), girth)
         self.pieces = _with_patches(pieces, girth)
 
-    def rims(self, who: IntArray, scale: float, line: float) -> FloatArray:
+    def rims(self, indices: IntArray, scale: float, line: float) -> FloatArray:
         """Return the rim widths of bodies, (K,) px: those of discs of about the same thickness."""
-        girth = self._girth[who] * scale
+        girth = self._girth[indices] * scale
         return np.asarray(np.minimum(0.16 * girth, line * np.minimum(1.0 + girth / 80.0, 2.5)))
 
     def hulls(self, number: int, place: ScreenPose) -> list[Hull]:
@@ -93,13 +93,13 @@ class BodyGeometry:
         high = np.max([hull.corners.max(axis=0) + hull.radius for hull in hulls], axis=0) + margin
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
-    def boxes(self, who: IntArray, centre: FloatArray, angle: FloatArray, scale: float) -> FloatArray:
+    def boxes(self, indices: IntArray, centre: FloatArray, angle: FloatArray, scale: float) -> FloatArray:
         """Return left, top, right and bottom of the bounding boxes of bodies, (K, 4) px.
 
         `centre` (K, 2) is in px, `angle` (K,) in rad, finite, and `scale` in px/m.
         """
         pieces = self.pieces
-        begin, end = pieces.first[pieces.piece[who]], pieces.first[pieces.piece[who + 1]]
+        begin, end = pieces.first[pieces.piece[indices]], pieces.first[pieces.piece[indices + 1]]
         count = end - begin
         start = np.cumsum(count) - count
         row = np.repeat(begin - start, count) + np.arange(int(count.sum()))
@@ -107,7 +107,7 @@ class BodyGeometry:
         x, y = pieces.corner[row].T
         wide = np.repeat(pieces.radius, np.diff(pieces.first))[row]
         right, down = cos * x - sin * y, -(sin * x + cos * y)
-        if not len(who):
+        if not len(indices):
             return np.empty((0, 4))
         low = [np.minimum.reduceat(each - wide, start) for each in (right, down)]
         high = [np.maximum.reduceat(each + wide, start) for each in (right, down)]
@@ -186,8 +186,8 @@ def _room_around(point: FloatArray, polygons: list[FloatArray], tolerance: float
     for polygon in polygons:
         along = np.roll(polygon, -1, axis=0) - polygon
         length = np.maximum(np.hypot(*along.T), 1e-300)
-        share = np.clip(((point - polygon) * along).sum(axis=1) / length**2, 0.0, 1.0)
-        away = np.hypot(*(polygon + share[:, None] * along - point).T)
+        fraction = np.clip(((point - polygon) * along).sum(axis=1) / length**2, 0.0, 1.0)
+        away = np.hypot(*(polygon + fraction[:, None] * along - point).T)
         (sides,) = np.nonzero(away <= tolerance)
         if not len(sides):
             continue

@@ -129,8 +129,8 @@ def strain(springs: JointSegments, scale: float) -> IntArray:
     rest = springs.links.figures[:, 0] * scale
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         stretch = np.where(rest > 0.0, springs.length / rest - 1.0, 1.0)
-        share = stretch / (np.abs(stretch) + STRAINED)
-    return np.rint(32.0 + 32.0 * np.nan_to_num(share, nan=1.0)).astype(np.int64)
+        fraction = stretch / (np.abs(stretch) + STRAINED)
+    return np.rint(32.0 + 32.0 * np.nan_to_num(fraction, nan=1.0)).astype(np.int64)
 
 
 def _solid_rods(view: DrawContext, rods: JointSegments, colour: tuple[int, int, int], width: float) -> None:
@@ -419,10 +419,10 @@ def draw_hinges(view: DrawContext, discs: CircleRenderer) -> None:
     for mount, number, place in _seen(view):
         if not isinstance(mount.drive, PlungerDrive):
             size = min(PIN * view.ui_scale, SHARE * float(bodies.core[number]) * view.camera.scale)
-            for share, colour in ((1.0, BACKGROUND), (0.55, mix_colours(BACKGROUND, INK, 0.85))):
+            for fraction, colour in ((1.0, BACKGROUND), (0.55, mix_colours(BACKGROUND, INK, 0.85))):
                 tint = np.asarray([colour], np.uint8)
                 style = CircleStyle(0.0, antialias=view.antialias)
-                discs.draw(view.surface, np.asarray([place]), np.asarray([share * size]), tint, style)
+                discs.draw(view.surface, np.asarray([place]), np.asarray([fraction * size]), tint, style)
 
 
 def draw_stops(view: DrawContext) -> None:

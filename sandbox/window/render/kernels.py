@@ -20,11 +20,11 @@ FULL = 256
 
 
 @bare_kernel
-def blend_packed(under: int, over: int, share: int) -> int:
+def blend_packed(under: int, over: int, fraction: int) -> int:
     """Return `under` blended with `over` by share / `FULL`; all four bytes alike, two per multiplication."""
-    rest = FULL - share
-    even = ((under & 0xFF00FF) * rest + (over & 0xFF00FF) * share + 0x800080) >> 8 & 0xFF00FF
-    odd = ((under >> 8 & 0xFF00FF) * rest + (over >> 8 & 0xFF00FF) * share + 0x800080) & 0xFF00FF00
+    rest = FULL - fraction
+    even = ((under & 0xFF00FF) * rest + (over & 0xFF00FF) * fraction + 0x800080) >> 8 & 0xFF00FF
+    odd = ((under >> 8 & 0xFF00FF) * rest + (over >> 8 & 0xFF00FF) * fraction + 0x800080) & 0xFF00FF00
     return even | odd
 
 
@@ -180,8 +180,8 @@ class PolygonPose(NamedTuple):
 def _side_distance2(x: float, y: float, ax: float, ay: float, bx: float, by: float) -> float:
     """Return the squared distance from a segment."""
     dx, dy, px, py = bx - ax, by - ay, x - ax, y - ay
-    share = min(max((px * dx + py * dy) / max(dx * dx + dy * dy, 1e-300), 0.0), 1.0)
-    px, py = px - share * dx, py - share * dy
+    fraction = min(max((px * dx + py * dy) / max(dx * dx + dy * dy, 1e-300), 0.0), 1.0)
+    px, py = px - fraction * dx, py - fraction * dy
     return px * px + py * py
 
 
@@ -306,7 +306,7 @@ def rasterise_polygons(
     area: tuple[int, int, int, int],
     pieces: ConvexPieces,
     room: FloatArray,
-    who: IntArray,
+    indices: IntArray,
     pose: FloatArray,
     line: FloatArray,
     fill: npt.NDArray[np.uint32],
@@ -322,7 +322,7 @@ def rasterise_polygons(
         area: left, top, right and bottom of the clip rectangle, px.
         pieces: of all bodies.
         room: (V, 9) scratch array.
-        who: (K,) indices of the bodies that are drawn.
+        indices: (K,) indices of the bodies that are drawn.
         pose: (K, 5) as in `PolygonPose`.
         line: (K,) rim widths, px.
         fill: (K,) colours in the pixel format of the surface.
@@ -330,8 +330,8 @@ def rasterise_polygons(
         hollow: whether only the rims are drawn.
         antialias: whether edges are smooth.
     """
-    for k in range(len(who)):
-        body, here = who[k], PolygonPose(pose[k, 0], pose[k, 1], pose[k, 2], pose[k, 3], pose[k, 4])
+    for k in range(len(indices)):
+        body, here = indices[k], PolygonPose(pose[k, 0], pose[k, 1], pose[k, 2], pose[k, 3], pose[k, 4])
         begin, end = pieces.piece[body], pieces.piece[body + 1]
         low, high = pieces.first[begin], pieces.first[end]
         left, top, right, bottom = _place(pieces, body, here, room)
@@ -410,12 +410,12 @@ def rasterise_lines(
         across_low, across_high = (left, right) if steep else (top, bottom)
         tone = int(tones[k])
         for along in range(max(first, along_low), min(last + 1, along_high)):
-            share = min(along + 0.5, bx) - max(along - 0.5, ax) if last > first else max(bx - ax, 0.5)
+            fraction = min(along + 0.5, bx) - max(along - 0.5, ax) if last > first else max(bx - ax, 0.5)
             across = ay + slope * (along - ax)
             row = math.floor(across)
             part = across - row
             for side in range(2):
-                cover = share * (part if side else 1.0 - part)
+                cover = fraction * (part if side else 1.0 - part)
                 if across_low <= row + side < across_high:
                     place = along * stride + row + side if steep else (row + side) * stride + along
                     pixels[place] = blend_packed(int(pixels[place]), tone, int(cover * FULL + 0.5))

@@ -105,9 +105,9 @@ def _distances(reach: float) -> "np.ndarray[tuple[int, int], np.dtype[np.float64
 
 def _glow(colour: RgbColour, radius: float) -> pygame.Surface:
     """Return the glow: intensity falls quadratically to 0 at its radius."""
-    share = STRENGTH * np.maximum(1.0 - _distances(GLOW * radius) / (GLOW * radius), 0.0) ** 2
-    surface = pygame.Surface(share.shape, 0, 32)
-    pygame.surfarray.blit_array(surface, np.rint(share[:, :, None] * colour).astype(np.uint8))
+    fraction = STRENGTH * np.maximum(1.0 - _distances(GLOW * radius) / (GLOW * radius), 0.0) ** 2
+    surface = pygame.Surface(fraction.shape, 0, 32)
+    pygame.surfarray.blit_array(surface, np.rint(fraction[:, :, None] * colour).astype(np.uint8))
     return surface
 
 

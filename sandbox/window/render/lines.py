@@ -112,8 +112,8 @@ def clip_polygon(corners: list[Pixel], area: pygame.Rect) -> list[Pixel]:
             if here >= 0.0:
                 kept.append(a)
             if (here >= 0.0) != (there >= 0.0):
-                share = here / (here - there)
-                kept.append((a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])))
+                fraction = here / (here - there)
+                kept.append((a[0] + fraction * (b[0] - a[0]), a[1] + fraction * (b[1] - a[1])))
         corners = kept
     return corners if len(corners) > 2 else []
 

@@ -42,7 +42,7 @@ class OffscreenRenderer:
         lit = rules.lit_lamps() if isinstance(rules, HasLamps) else frozenset[str]()
         game = rules.view_state(frame.time) if isinstance(rules, HasViewState) else None
         flames = active_thrusters(scene, bodies, throttles, frame.time)
-        sight = Snapshot(scene, bodies, frame, flames=flames, lit=lit, game=game)
-        self._picture.draw(self._surface, camera, sight, hud=False)
-        self._inset.draw(self._surface, camera, sight, self._surface.get_rect())
+        snapshot = Snapshot(scene, bodies, frame, flames=flames, lit=lit, game=game)
+        self._picture.draw(self._surface, camera, snapshot, hud=False)
+        self._inset.draw(self._surface, camera, snapshot, self._surface.get_rect())
         return np.ascontiguousarray(pygame.surfarray.array3d(self._surface).swapaxes(0, 1))

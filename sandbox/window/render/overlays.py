@@ -55,7 +55,7 @@ def draw_flames(view: DrawContext) -> None:
 
 def _tongue(view: DrawContext, begin: list[float], along: tuple[float, float], size: float, colour: RgbColour) -> None:
     (x, y), (dx, dy) = begin, along
-    sides = [*OUTLINE, *((share, -across) for share, across in reversed(OUTLINE[:-1]))]
+    sides = [*OUTLINE, *((fraction, -across) for fraction, across in reversed(OUTLINE[:-1]))]
     points = [(x + size * (a * dx - b * dy), y + size * (a * dy + b * dx)) for a, b in sides]
     pygame.draw.polygon(view.surface, colour, points)
     if view.antialias:
@@ -142,9 +142,9 @@ class OverlayRenderer:
         self._points = points
         self._polygons = polygons
 
-    def need_bodies(self, sight: Snapshot) -> bool:
+    def need_bodies(self, snapshot: Snapshot) -> bool:
         """Return whether an overlay needs all visible bodies, including those drawn as points."""
-        return not BODILY.isdisjoint(sight.overlays) or sight.overlapping is not None
+        return not BODILY.isdisjoint(snapshot.overlays) or snapshot.overlapping is not None
 
     def below(self, view: DrawContext) -> None:
         """Draw the overlays below the bodies."""
@@ -207,8 +207,8 @@ class OverlayRenderer:
         size, bodies = radius[seen] * camera.scale, view.snapshot.bodies
         lone = bodies.round[seen] | (size < 2.0 * view.ui_scale)
         self._discs.draw(view.surface, centre[lone], np.maximum(size[lone], 2.0 * view.ui_scale), tint[lone], style)
-        who, angle = seen[~lone], ghost.angle[seen[~lone]]
-        self._polygons.draw(view.surface, bodies, who, centre[~lone], angle, camera.scale, tint[~lone], style)
+        indices, angle = seen[~lone], ghost.angle[seen[~lone]]
+        self._polygons.draw(view.surface, bodies, indices, centre[~lone], angle, camera.scale, tint[~lone], style)
         with np.errstate(invalid="ignore", over="ignore"):
             gap = np.hypot(*(centre - own).T)
         for k in np.flatnonzero((gap > APART * view.ui_scale) & frame.present[seen]).tolist():

@@ -67,9 +67,9 @@ def hex_colour(text: str) -> RgbColour:
     return value >> 16, value >> 8 & 255, value & 255
 
 
-def mix_colours(a: RgbColour, b: RgbColour, share: float) -> RgbColour:
+def mix_colours(a: RgbColour, b: RgbColour, fraction: float) -> RgbColour:
     """Return the linear mix of `a` and `b`: `a` at share 0, `b` at share 1."""
-    red, green, blue = (round(x + (y - x) * share) for x, y in zip(a, b, strict=True))
+    red, green, blue = (round(x + (y - x) * fraction) for x, y in zip(a, b, strict=True))
     return red, green, blue
 
 
@@ -108,4 +108,7 @@ def colour_of(bodies: Bodies) -> ColourArray:
 
 def _family(colour: RgbColour) -> list[RgbColour]:
     """Return the tints for the bodies of a larger generator."""
-    return [mix_colours(colour, COMPANIONS[colour] if share > 0 else (255, 255, 255), abs(share)) for share in TINTS]
+    return [
+        mix_colours(colour, COMPANIONS[colour] if fraction > 0 else (255, 255, 255), abs(fraction))
+        for fraction in TINTS
+    ]

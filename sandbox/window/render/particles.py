@@ -142,7 +142,7 @@ class LifetimeColours:
         numbers = np.flatnonzero(row >= 0)
         first = int(numbers[0]) if len(numbers) else 0
         consecutive = len(numbers) == 0 or int(numbers[-1]) == first + len(numbers) - 1
-        self.who: slice | IntArray = slice(first, first + len(numbers)) if consecutive else numbers
+        self.indices: slice | IntArray = slice(first, first + len(numbers)) if consecutive else numbers
         """(F,) indices of the fading bodies"""
         self._place = np.full(len(bodies), -1, np.int64)
         self._place[numbers] = np.arange(len(numbers))
@@ -161,12 +161,12 @@ class LifetimeColours:
             time: s.
         """
         if (
-            isinstance(self.who, slice)
+            isinstance(self.indices, slice)
             and len(self) >= MANY_PARTICLES
-            and self._compiled(tones[self.who], shades, time)
+            and self._compiled(tones[self.indices], shades, time)
         ):
             return
-        tones[self.who] = shades[self._shade(time, slice(None))]
+        tones[self.indices] = shades[self._shade(time, slice(None))]
 
     def _compiled(self, tones: Packed, shades: Packed, time: float) -> bool:
         """Fade in one compiled pass; return whether that was possible."""

@@ -35,7 +35,7 @@ class PolygonRenderer:
     def __init__(self) -> None:
         self._known: tuple[Bodies, BodyGeometry] | None = None
 
-    def anatomy(self, bodies: Bodies) -> BodyGeometry:
+    def geometry(self, bodies: Bodies) -> BodyGeometry:
         """Return the geometry of bodies, cached for the last `Bodies`."""
         if self._known is None or self._known[0] is not bodies:
             self._known = bodies, BodyGeometry(bodies)
@@ -45,7 +45,7 @@ class PolygonRenderer:
         self,
         surface: pygame.Surface,
         bodies: Bodies,
-        who: IntArray,
+        indices: IntArray,
         centre: FloatArray,
         angle: FloatArray,
         scale: float,
@@ -57,33 +57,33 @@ class PolygonRenderer:
         Args:
             surface: the target.
             bodies: all N bodies.
-            who: (K,) indices of the bodies that are drawn.
+            indices: (K,) indices of the bodies that are drawn.
             centre: (K, 2) px, finite.
             angle: (K,) rad, counter-clockwise, as in the world (y up); non-finite values count as 0.
             scale: px/m.
             colours: (K, 3).
             style: of all bodies; hollow draws only the rim, in the colour of the body.
         """
-        if not len(who):
+        if not len(indices):
             return
-        anatomy = self.anatomy(bodies)
+        geometry = self.geometry(bodies)
         angle = np.where(np.isfinite(angle), angle, 0.0)
-        line = anatomy.rims(who, scale, style.line)
+        line = geometry.rims(indices, scale, style.line)
         if style.hollow:
-            line = np.full(len(who), style.line)
-        near = bool((np.abs(centre).max(axis=1) + bodies.radius[who] * scale < SDL_COORDINATE_LIMIT).all())
-        worth = len(who) > FEW_POLYGONS or "numba" in sys.modules
-        if worth and near and _in_one_pass(surface, anatomy, who, centre, angle, scale, colours, line, style):
+            line = np.full(len(indices), style.line)
+        near = bool((np.abs(centre).max(axis=1) + bodies.radius[indices] * scale < SDL_COORDINATE_LIMIT).all())
+        worth = len(indices) > FEW_POLYGONS or "numba" in sys.modules
+        if worth and near and _in_one_pass(surface, geometry, indices, centre, angle, scale, colours, line, style):
             return
         rows = zip(
-            who.tolist(), centre.tolist(), angle.tolist(), map(tuple, colours.tolist()), line.tolist(), strict=True
+            indices.tolist(), centre.tolist(), angle.tolist(), map(tuple, colours.tolist()), line.tolist(), strict=True
         )
         for number, (x, y), turned, colour, width in rows:
             pose = ScreenPose(x, y, turned, scale)
             if style.hollow:
                 self.ring(surface, bodies, number, pose, 0.0, colour, width, style.antialias)
             else:
-                _draw_plain(surface, anatomy.hulls(number, pose), colour, width, style.antialias, near)
+                _draw_plain(surface, geometry.hulls(number, pose), colour, width, style.antialias, near)
 
     def ring(
         self,
@@ -97,9 +97,9 @@ class PolygonRenderer:
         antialias: bool = True,
     ) -> None:
         """Draw an outline of a body, `line` px wide, with its outer edge at `gap` px from the body."""
-        anatomy = self.anatomy(bodies)
-        distance = anatomy.distance(number, place)
-        within = clipped_box(anatomy.within(number, place, gap + 2.0), surface.get_clip())
+        geometry = self.geometry(bodies)
+        distance = geometry.distance(number, place)
+        within = clipped_box(geometry.within(number, place, gap + 2.0), surface.get_clip())
         if within.width:
             look = ShapeStyle(None, colour, line, antialias=antialias)
             draw_sdf(surface, lambda x, y: np.asarray(distance(x, y) - gap), look, within)
@@ -108,13 +108,13 @@ class PolygonRenderer:
         """Return left, top, right and bottom of the bounding boxes of the visible bodies, (K, 4) px."""
         angle = view.snapshot.frame.angle[view.shown]
         angle = np.where(np.isfinite(angle), angle, 0.0)
-        return self.anatomy(view.snapshot.bodies).boxes(view.shown, view.centre, angle, view.camera.scale)
+        return self.geometry(view.snapshot.bodies).boxes(view.shown, view.centre, angle, view.camera.scale)
 
 
 def _in_one_pass(
     surface: pygame.Surface,
-    anatomy: BodyGeometry,
-    who: IntArray,
+    geometry: BodyGeometry,
+    indices: IntArray,
     centre: FloatArray,
     angle: FloatArray,
     scale: float,
@@ -131,7 +131,7 @@ def _in_one_pass(
 
     area = surface.get_clip()
     edges = area.left, area.top, area.right, area.bottom
-    pose = np.column_stack((centre, np.cos(angle), np.sin(angle), np.full(len(who), scale)))
+    pose = np.column_stack((centre, np.cos(angle), np.sin(angle), np.full(len(indices), scale)))
     inner = outer = packed_pixels(colours, surface)
     if not style.hollow and style.line:
         outer = packed_pixels(np.rint(colours * (1.0 - DARK) + np.asarray(BACKGROUND) * DARK).astype(np.uint8), surface)
@@ -139,9 +139,9 @@ def _in_one_pass(
         flat_pixels(surface),
         surface.get_pitch() // 4,
         edges,
-        anatomy.pieces,
-        np.empty((len(anatomy.pieces.corner), 9)),
-        who,
+        geometry.pieces,
+        np.empty((len(geometry.pieces.corner), 9)),
+        indices,
         pose,
         line,
         inner,

@@ -90,7 +90,7 @@ class Renderer:
         self,
         surface: pygame.Surface,
         camera: Camera,
-        sight: Snapshot,
+        snapshot: Snapshot,
         *,
         antialias: bool = True,
         unit: float = 1.0,
@@ -103,44 +103,44 @@ class Renderer:
         Args:
             surface: of any format and of size `camera.size`.
             camera: the view.
-            sight: the snapshot. Bodies at nan or inf, and absent bodies, are skipped.
+            snapshot: the snapshot. Bodies at nan or inf, and absent bodies, are skipped.
             antialias: whether edges are smooth; without it, drawing takes about half the time.
             unit: px, width of a line that is one pixel wide on a 1080p display; line widths and text scale with it.
             foot: px at the lower edge that will be covered.
             scale: whether to draw the scale bar.
             hud: whether the view of a game may draw its HUD.
         """
-        self._blit_background(surface, camera, sight, antialias, unit)
-        if sight.lit:
-            self._lamps.draw(surface, camera, sight.scene, sight.lit)
-        self._know(sight)
-        sizes = self._sized(sight.bodies, camera.scale, unit)
+        self._blit_background(surface, camera, snapshot, antialias, unit)
+        if snapshot.lit:
+            self._lamps.draw(surface, camera, snapshot.scene, snapshot.lit)
+        self._know(snapshot)
+        sizes = self._sized(snapshot.bodies, camera.scale, unit)
         colours, ageing = self._colours, self._ageing
-        if sight.overlapping is not None:
-            colours, ageing = _by_contact(sight.overlapping, len(sight.bodies)), None
-        if "shapes" in sight.overlays and sizes.side:
-            self._draw_points(surface, camera, sight, sizes, colours, ageing)
+        if snapshot.overlapping is not None:
+            colours, ageing = _by_contact(snapshot.overlapping, len(snapshot.bodies)), None
+        if "shapes" in snapshot.overlays and sizes.side:
+            self._draw_points(surface, camera, snapshot, sizes, colours, ageing)
 
-        shown = _in_sight(camera, sight, None if self._overlays.need_bodies(sight) else sizes.large)
-        tint = colours[shown] if ageing is None else ageing.over(colours[shown], shown, sight.frame.time)
+        shown = _in_sight(camera, snapshot, None if self._overlays.need_bodies(snapshot) else sizes.large)
+        tint = colours[shown] if ageing is None else ageing.over(colours[shown], shown, snapshot.frame.time)
         view = DrawContext(
             surface=surface,
             camera=camera,
-            snapshot=sight,
+            snapshot=snapshot,
             ui_scale=unit,
             antialias=antialias,
             shown=shown,
-            centre=camera.to_screen(sight.frame.position[shown]),
-            radius=sight.bodies.radius[shown] * camera.scale,
+            centre=camera.to_screen(snapshot.frame.position[shown]),
+            radius=snapshot.bodies.radius[shown] * camera.scale,
             colours=tint,
             body_colours=self._colours,
             has_points=sizes.side > 0,
         )
-        game = self._games.view_of(sight.scene)
+        game = self._games.view_of(snapshot.scene)
         self._overlays.below(view)
         if game is not None:
             game.below(view)
-        if "shapes" in sight.overlays:
+        if "shapes" in snapshot.overlays:
             drawn = np.empty(0, np.int64) if game is None else game.bodies(view)
             which = np.flatnonzero(~sizes.tiny[shown]) if sizes.side else None
             if len(drawn):
@@ -195,7 +195,7 @@ class Renderer:
         self,
         surface: pygame.Surface,
         camera: Camera,
-        sight: Snapshot,
+        snapshot: Snapshot,
         sizes: "BodySizes",
         colours: ColourArray,
         ageing: LifetimeColours | None,
@@ -205,11 +205,11 @@ class Renderer:
         if self._tones is None or self._tones[0] is not colours or self._tones[1] != form:
             self._tones = colours, form, packed_pixels(colours, surface)
         if ageing is not None:
-            ageing.fade(self._tones[2], packed_pixels(ageing.shades, surface), sight.frame.time)
-        frame = sight.frame
+            ageing.fade(self._tones[2], packed_pixels(ageing.shades, surface), snapshot.frame.time)
+        frame = snapshot.frame
         count = min(len(frame.position), len(colours))
-        who = None if sizes.all_tiny and frame.present.all() else frame.present[:count] & sizes.tiny[:count]
-        self._points.draw(surface, camera, frame.position[:count], self._tones[2][:count], who, sizes.side)
+        indices = None if sizes.all_tiny and frame.present.all() else frame.present[:count] & sizes.tiny[:count]
+        self._points.draw(surface, camera, frame.position[:count], self._tones[2][:count], indices, sizes.side)
 
     def _sized(self, bodies: Bodies, scale: float, unit: float) -> "BodySizes":
         """Return the classification of bodies at a scale, cached for the last arguments."""
@@ -225,45 +225,45 @@ class Renderer:
             self._sizes = known = BodySizes(bodies, scale, unit, tiny, bool(tiny.all()), np.flatnonzero(~tiny), side)
         return known
 
-    def _know(self, sight: Snapshot) -> None:
+    def _know(self, snapshot: Snapshot) -> None:
         """Compute what is constant for given bodies: their colours, and which can rotate."""
-        bodies, scene = sight.bodies, sight.scene
+        bodies, scene = snapshot.bodies, snapshot.scene
         if self._known is not None and self._known[0] is bodies and self._known[1] is scene:
             return
         self._known, self._colours = (bodies, scene), colour_of(bodies)
         ageing = LifetimeColours(bodies)
         self._ageing = ageing if len(ageing) else None
         turned = (bodies.angle != 0.0) | (bodies.angular_velocity != 0.0)
-        self._turning = turned | contact_matrix(sight.setup or scene, bodies).turnable
+        self._turning = turned | contact_matrix(snapshot.setup or scene, bodies).turnable
 
     def _blit_background(
-        self, surface: pygame.Surface, camera: Camera, sight: Snapshot, antialias: bool, unit: float
+        self, surface: pygame.Surface, camera: Camera, snapshot: Snapshot, antialias: bool, unit: float
     ) -> None:
         form = (surface.get_size(), surface.get_masks(), surface.get_bytesize())
-        wanted = CachedBackground(sight.scene, camera, "bounds" in sight.overlays, antialias, unit, form)
+        wanted = CachedBackground(snapshot.scene, camera, "bounds" in snapshot.overlays, antialias, unit, form)
         known = self._background
         if known is None or known[0].scene is not wanted.scene or known[0][1:] != wanted[1:]:
             drawn = pygame.Surface(surface.get_size(), 0, surface)
             drawn.fill(BACKGROUND)
-            game = self._games.view_of(sight.scene)
-            if game is None or not game.background(_background_context(drawn, camera, sight, antialias, unit)):
+            game = self._games.view_of(snapshot.scene)
+            if game is None or not game.background(_background_context(drawn, camera, snapshot, antialias, unit)):
                 draw_grid(drawn, camera, unit)
-                draw_markings(drawn, camera, sight.scene, unit, antialias)
-                draw_lamps(drawn, camera, sight.scene, unit, antialias)
-                draw_zones(drawn, camera, sight.scene, unit, antialias)
-                ground = sight.scene if len(sight.scene.layers) == 1 else on_layer(sight.scene, 0)
+                draw_markings(drawn, camera, snapshot.scene, unit, antialias)
+                draw_lamps(drawn, camera, snapshot.scene, unit, antialias)
+                draw_zones(drawn, camera, snapshot.scene, unit, antialias)
+                ground = snapshot.scene if len(snapshot.scene.layers) == 1 else on_layer(snapshot.scene, 0)
                 draw_static_bodies(drawn, camera, ground, unit, antialias)
             if wanted.bounds:
-                draw_bounds(drawn, camera, sight.scene.world.bounds, unit, antialias)
+                draw_bounds(drawn, camera, snapshot.scene.world.bounds, unit, antialias)
             self._background = known = (wanted, drawn)
         surface.blit(known[1], (0, 0))
 
 
-def _in_sight(camera: Camera, sight: Snapshot, among: IntArray | None) -> IntArray:
+def _in_sight(camera: Camera, snapshot: Snapshot, among: IntArray | None) -> IntArray:
     """Return the indices of the bodies that are present and at least partly visible."""
-    frame = sight.frame
-    count = min(len(frame.position), len(sight.bodies))
-    position, radius, present = frame.position[:count], sight.bodies.radius[:count], frame.present[:count]
+    frame = snapshot.frame
+    count = min(len(frame.position), len(snapshot.bodies))
+    position, radius, present = frame.position[:count], snapshot.bodies.radius[:count], frame.present[:count]
     if among is not None and len(among) < count:
         among = among[among < count]
         position, radius, present = position[among], radius[among], present[among]
@@ -275,14 +275,14 @@ def _in_sight(camera: Camera, sight: Snapshot, among: IntArray | None) -> IntArr
 
 
 def _background_context(
-    surface: pygame.Surface, camera: Camera, sight: Snapshot, antialias: bool, unit: float
+    surface: pygame.Surface, camera: Camera, snapshot: Snapshot, antialias: bool, unit: float
 ) -> DrawContext:
     """Return a context without bodies, for the cached background."""
     none = np.empty((0, 3), np.uint8)
     return DrawContext(
         surface=surface,
         camera=camera,
-        snapshot=sight,
+        snapshot=snapshot,
         ui_scale=unit,
         antialias=antialias,
         shown=np.empty(0, np.int64),
@@ -320,7 +320,7 @@ class InsetRenderer:
         self,
         surface: pygame.Surface,
         camera: Camera,
-        sight: Snapshot,
+        snapshot: Snapshot,
         free: pygame.Rect,
         *,
         antialias: bool = True,
@@ -332,13 +332,13 @@ class InsetRenderer:
         Args:
             surface: with the main view already drawn.
             camera: of the main view.
-            sight: the snapshot.
+            snapshot: the snapshot.
             free: area not covered by other elements.
             antialias: whether edges are smooth.
             unit: px, width of a line that is one pixel wide on a 1080p display.
             aside: px at the lower right that are occupied.
         """
-        box = sight.scene.play.inset
+        box = snapshot.scene.play.inset
         if box is None:
             return None
         place = _place(box, free, round(MARGIN * unit), aside)
@@ -347,7 +347,7 @@ class InsetRenderer:
             return None
         if self._surface is None or self._surface.get_size() != place.size:
             self._surface = pygame.Surface(place.size, 0, surface)
-        self._picture.draw(self._surface, near, sight, antialias=antialias, unit=unit, scale=False, hud=False)
+        self._picture.draw(self._surface, near, snapshot, antialias=antialias, unit=unit, scale=False, hud=False)
         surface.blit(self._surface, place)
         thick = max(round(1.5 * unit), 1)
         pygame.draw.rect(surface, EDGE, place, thick)

@@ -75,8 +75,8 @@ def capsule_distance(a: tuple[float, float], b: tuple[float, float], radius: flo
 
     def distance(px: FloatArray, py: FloatArray) -> FloatArray:
         x, y = px - a[0], py - a[1]
-        share = np.clip((x * along[0] + y * along[1]) / squared, 0.0, 1.0)
-        return np.asarray(np.sqrt((x - share * along[0]) ** 2 + (y - share * along[1]) ** 2) - radius)
+        fraction = np.clip((x * along[0] + y * along[1]) / squared, 0.0, 1.0)
+        return np.asarray(np.sqrt((x - fraction * along[0]) ** 2 + (y - fraction * along[1]) ** 2) - radius)
 
     return distance
 

@@ -107,8 +107,8 @@ def _nearest(wall: Wall, centre: FloatArray) -> FloatArray:
     """Return the point of a wall's centre line that is closest to a point, m."""
     ends = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points)
     start, along = ends[:-1], np.diff(ends, axis=0)
-    share = np.clip(((centre - start) * along).sum(1) / (along**2).sum(1), 0.0, 1.0)
-    nearest = start + share[:, None] * along
+    fraction = np.clip(((centre - start) * along).sum(1) / (along**2).sum(1), 0.0, 1.0)
+    nearest = start + fraction[:, None] * along
     return np.asarray(nearest[np.argmin(np.hypot(*(nearest - centre).T))])
 
 
@@ -187,11 +187,11 @@ def draw_impulses(view: DrawContext) -> None:
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         force = np.hypot(*contacts.impulse[seen].T) / view.snapshot.seconds
         force[~np.isfinite(force)] = 0.0
-        share = force / max(float(force.max()), 1e-300)
+        fraction = force / max(float(force.max()), 1e-300)
         weights = (
             force / (_lighter(view, contacts.pair[seen]) * gravity) if gravity > 0.0 else np.full_like(force, np.inf)
         )
-        length = np.minimum(WEIGHT * float(np.max(weights)), LONGEST_ARROW) * share * view.ui_scale
+        length = np.minimum(WEIGHT * float(np.max(weights)), LONGEST_ARROW) * fraction * view.ui_scale
     drawn = np.flatnonzero(length > 1.0)
     drawn = drawn[np.argsort(force[drawn], kind="stable")][-MAX_ARROWS:]  # the strongest last, on top
     for k in drawn.tolist():

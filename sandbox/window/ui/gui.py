@@ -76,7 +76,7 @@ class Gui:
         if not same:
             self._announces_keys = True
 
-    def announce_keys(self, stage: AppState) -> None:
+    def announce_keys(self, app_state: AppState) -> None:
         """Add messages that list the keys of a new scene.
 
         To be called after its first picture, which may compile kernels for longer than a message is shown.
@@ -84,18 +84,18 @@ class Gui:
         if not self._announces_keys:
             return
         self._announces_keys = False
-        help_lines = stage.key_bindings.help_rows
-        if stage.controls is not None:
-            stage.messages.add(stage.controls.hint)
+        help_lines = app_state.key_bindings.help_rows
+        if app_state.controls is not None:
+            app_state.messages.add(app_state.controls.hint)
             return
-        spec = None if stage.host is None or stage.view is None else spec_of(stage.view.scene.play.game)
+        spec = None if app_state.host is None or app_state.view is None else spec_of(app_state.view.scene.play.game)
         if spec is not None and spec.hint:
-            stage.messages.add(spec.hint)
+            app_state.messages.add(spec.hint)
             return
         if len(help_lines) > MAX_SHOWN_MESSAGES:
             help_lines = (*help_lines[: MAX_SHOWN_MESSAGES - 1], ("F1", "all keys"))
         for keys, about in help_lines:
-            stage.messages.add(f"{keys}: {about}")
+            app_state.messages.add(f"{keys}: {about}")
 
     def resize(self, size: tuple[int, int]) -> None:
         """Lay out all widgets for a window of another size, px."""
@@ -123,33 +123,33 @@ class Gui:
         """Rectangles of the plates as last drawn, px, by name."""
         return {name: rect for name, rect in self._plates.items() if rect.width and rect.height}
 
-    def permanent_plates(self, stage: AppState) -> list[pygame.Rect]:
+    def permanent_plates(self, app_state: AppState) -> list[pygame.Rect]:
         """Return the rectangles of the plates that are always shown for the open scene, px; messages are excluded.
 
         The status plate is measured with its pause line, so that pausing does not move anything.
         """
-        show, area = stage.view, self.area
+        show, area = app_state.view, self.area
         if show is None:
             return []
-        status = self._status or hud_status(stage, stage.key_bindings.help_rows, 0.0, None)
+        status = self._status or hud_status(app_state, app_state.key_bindings.help_rows, 0.0, None)
         longest = replace(status, paused=True, waits_for_start=False, frames_per_second=0.0, recording=None)
         rows = hud.layout_rows(longest, area, self.ui_scale)
         found = [rows.rect]
-        if stage.controls is not None:
-            found += stage.controls.hud.reserved(area, self._hud_width(show), self.ui_scale)
-        elif stage.host is not None:
-            found.append(self._layout_score(self._display_of(stage.host).board, show).rect)
+        if app_state.controls is not None:
+            found += app_state.controls.hud.reserved(area, self._hud_width(show), self.ui_scale)
+        elif app_state.host is not None:
+            found.append(self._layout_score(self._display_of(app_state.host).board, show).rect)
         return found
 
-    def score_margins(self, stage: AppState) -> tuple[int, int]:
+    def score_margins(self, app_state: AppState) -> tuple[int, int]:
         """Return the heights of the score panel at the top and at the bottom of the area, px."""
-        if stage.host is None or stage.controls is not None or stage.view is None:
+        if app_state.host is None or app_state.controls is not None or app_state.view is None:
             return 0, 0
-        return self._layout_score(self._display_of(stage.host).board, stage.view).margins(self.area)
+        return self._layout_score(self._display_of(app_state.host).board, app_state.view).margins(self.area)
 
-    def _scale_foot(self, stage: AppState) -> float:
+    def _scale_foot(self, app_state: AppState) -> float:
         """Return the height at the lower edge of the window that the scale bar leaves free, px."""
-        return float(self.bottom_margin + self.score_margins(stage)[1])
+        return float(self.bottom_margin + self.score_margins(app_state)[1])
 
     def _display_of(self, host: GameHost) -> GameDisplay:
         return self._display or host.shown()
@@ -186,96 +186,96 @@ class Gui:
             return "sound off", "info"
         return ("sound on", "info") if self._sounds.enable() else (self._sounds.why, "warning")
 
-    def handle_event(self, event: pygame.event.Event, stage: AppState) -> bool:
+    def handle_event(self, event: pygame.event.Event, app_state: AppState) -> bool:
         """Pass an event to the topmost widget; return whether it was consumed.
 
         Events that end a drag are never consumed, as they also end drags elsewhere.
         """
         ends_drag = event.type in (pygame.MOUSEBUTTONUP, pygame.WINDOWFOCUSLOST)
-        return self._route(event, stage) and not ends_drag
+        return self._route(event, app_state) and not ends_drag
 
-    def _route(self, event: pygame.event.Event, stage: AppState) -> bool:
+    def _route(self, event: pygame.event.Event, app_state: AppState) -> bool:
         if self.scene_browser is not None and event.type != pygame.QUIT:
-            self._browse(self.scene_browser, event, stage)
+            self._browse(self.scene_browser, event, app_state)
             return True
-        if stage.host is not None and self._high_scores.entry is not None and self._high_scores.handle_event(event):
+        if app_state.host is not None and self._high_scores.entry is not None and self._high_scores.handle_event(event):
             return True
-        if (self.help.open and self.help.handle_event(event)) or self._close_faults(event, stage):
+        if (self.help.open and self.help.handle_event(event)) or self._close_faults(event, app_state):
             return True
         if event.type in (pygame.KEYDOWN, pygame.KEYUP):  # panel, HUD and timeline use the mouse only
             return self._timeline.held
         if self.panel.handle_event(event):
             return True
-        show = stage.view
-        if stage.controls is not None and stage.controls.hud.handle_event(event, stage.run_handler):
+        show = app_state.view
+        if app_state.controls is not None and app_state.controls.hud.handle_event(event, app_state.run_handler):
             return True
         if show is not None and self._timeline_rect.height:
             held = self._timeline.held
             time = self._timeline.handle_event(event, self._timeline_rect)
             if time is not None:
-                stage.paused = True
+                app_state.paused = True
                 show.scrub(time)
             if held and not self._timeline.held:
-                stage.compute(show.commit_scrub)
+                app_state.compute(show.commit_scrub)
             return held or self._timeline.held
         return False
 
-    def _browse(self, browser: SceneBrowser, event: pygame.event.Event, stage: AppState) -> None:
+    def _browse(self, browser: SceneBrowser, event: pygame.event.Event, app_state: AppState) -> None:
         """Pass an event to the scene browser, and open a chosen scene."""
         path = browser.handle_event(event)
-        unsaved = stage.count_unsaved()
+        unsaved = app_state.count_unsaved()
         if path is not None and unsaved and browser.confirmed != path:
             browser.ask(path, describe_loss(unsaved, "choose it again to open it anyway"))
             return
         if path is not None:
-            stage.open_other(path)
+            app_state.open_other(path)
         if path is not None or browser.closed:
             self.scene_browser = None
 
-    def _close_faults(self, event: pygame.event.Event, stage: AppState) -> bool:
+    def _close_faults(self, event: pygame.event.Event, app_state: AppState) -> bool:
         escape = event.type == pygame.KEYDOWN and event.key == pygame.K_ESCAPE
         click = event.type == pygame.MOUSEBUTTONDOWN and event.button <= 3 and self._faults.collidepoint(event.pos)
-        if not stage.faults or not (escape or click):
+        if not app_state.faults or not (escape or click):
             return False
-        stage.faults = ()
+        app_state.faults = ()
         return True
 
-    def update(self, stage: AppState, frame_rate: float, recording: str | None) -> None:
+    def update(self, app_state: AppState, frame_rate: float, recording: str | None) -> None:
         """Update the status and the high-score dialog for the next picture.
 
         Args:
-            stage: the application state.
+            app_state: the application state.
             frame_rate: frames per second.
             recording: length and format of the film being recorded, if any.
         """
-        host, controls = stage.host, stage.controls
+        host, controls = app_state.host, app_state.controls
         self._display = None if host is None else host.shown()
         if host is not None and not self.help.open and (controls is None or controls.is_own_score):
             for note in self._high_scores.update(host):
-                stage.messages.add(note, "warning")
-        self._status = hud_status(stage, stage.key_bindings.help_rows, frame_rate, recording)
+                app_state.messages.add(note, "warning")
+        self._status = hud_status(app_state, app_state.key_bindings.help_rows, frame_rate, recording)
 
-    def draw(self, surface: pygame.Surface, camera: Camera, stage: AppState) -> None:
+    def draw(self, surface: pygame.Surface, camera: Camera, app_state: AppState) -> None:
         """Draw the scene and all widgets, with the status of the last `update`.
 
         Args:
             surface: the window.
             camera: its camera.
-            stage: the application state.
+            app_state: the application state.
         """
         assert self._status is not None, "update comes first"
-        self._draw(surface, camera, stage, self._status, self._display)
+        self._draw(surface, camera, app_state, self._status, self._display)
         self._status = self._display = None  # outdated by the next event
 
     def _draw(
         self,
         surface: pygame.Surface,
         camera: Camera,
-        stage: AppState,
+        app_state: AppState,
         status: HudStatus,
         display: GameDisplay | None,
     ) -> None:
-        show = stage.view
+        show = app_state.view
         if self.scene_browser is not None:
             self.scene_browser.draw(surface, self.ui_scale)
             return
@@ -283,20 +283,20 @@ class Gui:
         if show is None:
             surface.fill(BACKGROUND)
         else:
-            self._draw_scene(surface, camera, stage, show, display, plates)
-            self._play_sounds(stage, show)
+            self._draw_scene(surface, camera, app_state, show, display, plates)
+            self._play_sounds(app_state, show)
         if show is not None:
             if not self.help.open:
-                self._draw_game(surface, stage, show, display, plates)
-            self._draw_graph(surface, stage, plates)
+                self._draw_game(surface, app_state, show, display, plates)
+            self._draw_graph(surface, app_state, plates)
         self._faults = hud.draw_hud(
             surface,
-            replace(status, out_of_sight=self.describe_out_of_view(stage)),
+            replace(status, out_of_sight=self.describe_out_of_view(app_state)),
             self.ui_scale,
             right=self.panel.width,
             bottom=self.bottom_margin,
             taken=[rect for rect in plates.values() if rect.width and rect.height],
-            scale=None if show is None else scale_rect(camera, self.ui_scale, self._scale_foot(stage)),
+            scale=None if show is None else scale_rect(camera, self.ui_scale, self._scale_foot(app_state)),
             field=None if show is None or not has_field(show.scene) else field_rect(show.scene, camera),
             plates=plates,
         )
@@ -312,43 +312,43 @@ class Gui:
         self._plates = plates
         if self.panel.visible:
             plates["panel"] = pygame.Rect(self._size[0] - self.panel.width, 0, self.panel.width, self._size[1])
-            self._update_panel(stage, status.recording is not None)
+            self._update_panel(app_state, status.recording is not None)
             self.panel.draw(surface)
         if self.help.open:
             self.help.draw(
                 surface,
                 self.ui_scale,
-                stage.key_bindings.help_rows,
-                stage.key_bindings.gamepad_rows if self.has_gamepad else (),
+                app_state.key_bindings.help_rows,
+                app_state.key_bindings.gamepad_rows if self.has_gamepad else (),
             )
 
     def _draw_scene(
         self,
         surface: pygame.Surface,
         camera: Camera,
-        stage: AppState,
+        app_state: AppState,
         show: LiveView | RecordedView,
         display: GameDisplay | None,
         plates: dict[str, pygame.Rect],
     ) -> None:
         """Draw the scene and its inset, if any."""
         pull = None
-        if isinstance(show, LiveView) and stage.body_tools.held is not None:
-            pull = stage.body_tools.spring_line(show)
-        snapshot = show.snapshot(frozenset(self.overlays), stage.body_tools.picked, pull)
-        if stage.host is not None and display is not None:
+        if isinstance(show, LiveView) and app_state.body_tools.held is not None:
+            pull = app_state.body_tools.spring_line(show)
+        snapshot = show.snapshot(frozenset(self.overlays), app_state.body_tools.picked, pull)
+        if app_state.host is not None and display is not None:
             snapshot = replace(snapshot, lit=display.lit)
-            rules = stage.host.rules
+            rules = app_state.host.rules
             if isinstance(rules, HasViewState):
                 snapshot = replace(snapshot, game=rules.view_state(snapshot.frame.time))
-        if stage.controls is not None:
-            snapshot = stage.controls.annotate(snapshot)
+        if app_state.controls is not None:
+            snapshot = app_state.controls.annotate(snapshot)
         status_plate = self._plates.get("state")
         if status_plate is not None:
             snapshot = replace(snapshot, below=float(status_plate.bottom))
-        top, bottom = self.score_margins(stage)
+        top, bottom = self.score_margins(app_state)
         antialias, ui_scale = self.antialias, self.ui_scale
-        foot = self._scale_foot(stage)
+        foot = self._scale_foot(app_state)
         self._renderer.draw(surface, camera, snapshot, antialias=antialias, unit=ui_scale, foot=foot)
         area = self.area
         area = pygame.Rect(area.left, area.top + top, area.width, max(area.height - top - bottom, 0))
@@ -357,39 +357,39 @@ class Gui:
         if inset is not None:
             plates["inset"] = inset
 
-    def _play_sounds(self, stage: AppState, show: LiveView | RecordedView) -> None:
+    def _play_sounds(self, app_state: AppState, show: LiveView | RecordedView) -> None:
         """Play the sounds of new contacts and of game events."""
         if show.contacts is not self._heard:
             self._heard = show.contacts
             if self._sounds.enabled:
                 self._sounds.hits(show.contacts, show.bodies)
-        for cue in stage.host.cues() if stage.host is not None else ():
+        for cue in app_state.host.cues() if app_state.host is not None else ():
             self._sounds.cue(cue)
 
-    def describe_out_of_view(self, stage: AppState) -> str | None:
+    def describe_out_of_view(self, app_state: AppState) -> str | None:
         """Return the notice for a view without moving bodies; None if any is visible."""
-        show = stage.view
+        show = app_state.view
         if show is None or not self.bodies_out_of_view:
             return None
         moving = show.frame.present[: len(show.bodies)] & ~show.bodies.fixed[: len(show.frame.present)]
         words = ["All bodies are out of view: Home fits the view, F follows" if moving.any() else "No bodies are left"]
         launched = show.scene.play.relaunch
-        if launched is not None and stage.live is not None:
+        if launched is not None and app_state.live is not None:
             words.append(f"Space relaunches {launched}")
         return " · ".join(words)
 
     def _draw_game(
         self,
         surface: pygame.Surface,
-        stage: AppState,
+        app_state: AppState,
         show: LiveView | RecordedView,
         display: GameDisplay | None,
         plates: dict[str, pygame.Rect],
     ) -> None:
         """Draw the score panel, or the HUD of a game that has its own."""
-        if stage.controls is not None:
-            stage.controls.hud.draw(surface, self.area, self._hud_width(show), self.ui_scale)
-            plates |= stage.controls.hud.plates(self.area, self.ui_scale)
+        if app_state.controls is not None:
+            app_state.controls.hud.draw(surface, self.area, self._hud_width(show), self.ui_scale)
+            plates |= app_state.controls.hud.plates(self.area, self.ui_scale)
         elif display is not None:
             layout = self._layout_score(display.board, show)
             draw_score(surface, layout)
@@ -414,14 +414,14 @@ class Gui:
         pixels = pygame.surfarray.array3d(note)[area.left : area.right, area.top : area.bottom]
         pygame.surfarray.pixels3d(surface)[seen.left : seen.right, seen.top : seen.bottom] = pixels
 
-    def _draw_graph(self, surface: pygame.Surface, stage: AppState, plates: dict[str, pygame.Rect]) -> None:
+    def _draw_graph(self, surface: pygame.Surface, app_state: AppState, plates: dict[str, pygame.Rect]) -> None:
         """Draw the energy graph at the lower right, above other plates; smaller if there is little space."""
-        show = stage.view
+        show = app_state.view
         if show is None or "energy" not in self.overlays:
             return
         self._graph.add(show.frame.time, *show.energy())
         area, margin = self.area, round(10 * self.ui_scale)
-        taken = [*self.permanent_plates(stage), *plates.values()]
+        taken = [*self.permanent_plates(app_state), *plates.values()]
         bottoms = sorted({area.bottom, *(rect.top for rect in taken if rect.height)}, reverse=True)
         for scale in (1.0, 0.8, 0.6, 0.45):
             rect = pygame.Rect(
@@ -434,15 +434,15 @@ class Gui:
                     self._graph.draw(surface, rect, self.ui_scale)
                     return
 
-    def _update_panel(self, stage: AppState, recording: bool) -> None:
+    def _update_panel(self, app_state: AppState, recording: bool) -> None:
         """Update the panel if any value that it shows has changed or a widget has been used."""
-        live, controls = stage.live, stage.controls
+        live, controls = app_state.live, app_state.controls
         toggles = {name: name in self.overlays for name in OVERLAYS}
         if live is not None:
             toggles |= {"ghost": live.diagnostics.has_ghost, "trust": live.diagnostics.divergence is not None}
         toggles |= {"sound": self._sounds.enabled, "antialias": self.antialias}
         buttons = (
-            "play" if stage.paused else "pause",
+            "play" if app_state.paused else "pause",
             "back",
             "step",
             "restart",
@@ -462,8 +462,8 @@ class Gui:
             *session,
             controls,
             *(each.value for each in choices),
-            stage.file,
-            stage.body_tools.picked,
+            app_state.file,
+            app_state.body_tools.picked,
             *toggles.values(),
             *buttons,
         )
@@ -472,8 +472,8 @@ class Gui:
             return
         self._panel_inputs, self.panel.used = inputs, False
         parameters: tuple[Parameter, ...] = ()
-        if live is not None and stage.file is not None:
-            parameters = self._parameters.of(live, stage.file, stage.body_tools.picked)
+        if live is not None and app_state.file is not None:
+            parameters = self._parameters.of(live, app_state.file, app_state.body_tools.picked)
         parameters += tuple(Parameter(key, label, value=value, choices=each) for key, label, value, each in choices)
         self.panel.show(parameters, toggles, buttons)
 

@@ -73,34 +73,34 @@ def settings_text(settings: Settings) -> str:
 
 
 def hud_status(
-    stage: AppState, scene_keys: tuple[tuple[str, str], ...], frame_rate: float, recording: str | None
+    app_state: AppState, scene_keys: tuple[tuple[str, str], ...], frame_rate: float, recording: str | None
 ) -> HudStatus:
     """Return the values of the head-up display.
 
     Args:
-        stage: the application state.
+        app_state: the application state.
         scene_keys: (keys, action) bound by the scene.
         frame_rate: frames per second.
         recording: format and length of the film being recorded, if any.
     """
-    show, messages = stage.view, stage.messages.visible()
+    show, messages = app_state.view, app_state.messages.visible()
     if show is None:
-        return HudStatus("No scene", "Ctrl+O", "opens a scene", 0, 0.0, messages=messages, faults=stage.faults)
-    picked = stage.body_tools.picked
-    live = stage.live
+        return HudStatus("No scene", "Ctrl+O", "opens a scene", 0, 0.0, messages=messages, faults=app_state.faults)
+    picked = app_state.body_tools.picked
+    live = app_state.live
     diagnostics = live.diagnostics if live is not None else None
     contacts = show.contacts.some(~zone_visits(show.contacts.pair, show.scene))
     divergence = diagnostics.divergence if diagnostics is not None else None
     return HudStatus(
-        title=show.scene.title or (stage.path.stem if stage.path is not None else "scene"),
+        title=show.scene.title or (app_state.path.stem if app_state.path is not None else "scene"),
         engine=show.engine,
         settings=settings_text(show.settings),
         step=show.step_number,
         time=show.frame.time,
-        paused=stage.paused,
-        waits_for_start=stage.waits_for_start,
-        question=stage.question,
-        unfocused=stage.unfocused,
+        paused=app_state.paused,
+        waits_for_start=app_state.waits_for_start,
+        question=app_state.question,
+        unfocused=app_state.unfocused,
         ended=_ended(show),
         replay=live is None,
         speed=show.clock.speed,
@@ -115,7 +115,7 @@ def hud_status(
         busy=show.busy,
         picked=body_facts(show.bodies, show.frame, contacts, picked) if picked is not None else (),
         messages=messages,
-        faults=stage.faults,
+        faults=app_state.faults,
         claimed=scene_keys,
     )
 

@@ -231,12 +231,12 @@ class ParameterSlider(ParameterWidget):
     def show_parameter(self, parameter: Parameter) -> None:
         """Update the parameter without an event; during a drag the displayed value is kept."""
         super().show_parameter(parameter)
-        self.fraction = parameter.share(self.value)
+        self.fraction = parameter.fraction(self.value)
 
     def change(self, value: ParameterValue, final: bool) -> None:
         """Set a new value and queue its event."""
         super().change(value, final)
-        self.fraction = self.parameter.share(value)
+        self.fraction = self.parameter.fraction(value)
 
     def handle_event(self, event: pygame.event.Event) -> None:
         """Process a mouse event; a drag continues outside the widget and ends with a final event."""
@@ -296,7 +296,7 @@ class ParameterSlider(ParameterWidget):
         thickness = max(round(4 * self.ui_scale), 2)
         bar = pygame.Rect(track.left, track.centery - thickness // 2, track.width, thickness)
         pygame.draw.rect(self.surface, LINE, bar, border_radius=thickness)
-        zero = self.parameter.share(0.0) if not self.parameter.log and self.parameter.low < 0 else 0.0
+        zero = self.parameter.fraction(0.0) if not self.parameter.log and self.parameter.low < 0 else 0.0
         ends = sorted(bar.left + round(part * bar.width) for part in (zero, self.fraction))
         bar.left, bar.width = ends[0], ends[1] - ends[0]
         pygame.draw.rect(self.surface, SKY if self.enabled else PANEL_RAISED, bar, border_radius=thickness)

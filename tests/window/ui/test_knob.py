@@ -19,8 +19,8 @@ KNOBS = [GRAVITY, STEP, SUBSTEPS, Parameter("e", "restitution"), Parameter("mu",
 def test_ends_are_exact_and_values_clamp(knob: Parameter) -> None:
     assert knob.at(0.0) == knob.at(-3.0) == knob.low
     assert knob.at(1.0) == knob.at(3.0) == knob.high
-    assert knob.share(knob.low) == knob.share(knob.low - 1e-5) == 0.0
-    assert knob.share(knob.high) == knob.share(knob.high + 5.0) == 1.0
+    assert knob.fraction(knob.low) == knob.fraction(knob.low - 1e-5) == 0.0
+    assert knob.fraction(knob.high) == knob.fraction(knob.high + 5.0) == 1.0
 
 
 @pytest.mark.parametrize("knob", KNOBS)
@@ -31,7 +31,7 @@ def test_values_lie_within_and_grow_with_the_share(knob: Parameter, share: float
     assert knob.at(share / 2) <= value
     # a value is at most half a step, or 5 % where two digits are kept, beside the place that it was asked at
     half = math.log10(1.05) / math.log10(knob.high / knob.low) if knob.log else 0.5 * knob.step / (knob.high - knob.low)
-    assert abs(knob.share(value) - share) <= half + 1e-12  # rounding of the shares
+    assert abs(knob.fraction(value) - share) <= half + 1e-12  # rounding of the shares
 
 
 def test_values_are_whole_steps_without_crumbs() -> None:

@@ -299,17 +299,19 @@ class NineBall(Ruleset[NineBallState]):
 
 def _foul(after: NineBallState, fouls: tuple[str, ...]) -> Ruling[NineBallState]:
     """Return the result of a foul: ball in hand for the other player, or the end of the frame."""
-    row, who = after.fouls[after.turn], player_name(after.turn)
+    row, shooter = after.fouls[after.turn], player_name(after.turn)
     if row >= MAX_CONSECUTIVE_FOULS:
         winner = after.opponent
         ends = f"{player_name(winner)} wins" if winner is not None else "the rack is lost"
         lost = replace(after, over=True, winner=winner)
         return Ruling(
-            lost, fouls, messages=(f"foul: {fouls[0]}", f"{who} fouled {MAX_CONSECUTIVE_FOULS} times in a row", ends)
+            lost,
+            fouls,
+            messages=(f"foul: {fouls[0]}", f"{shooter} fouled {MAX_CONSECUTIVE_FOULS} times in a row", ends),
         )
     messages = [f"foul: {fouls[0]}; {player_name(after.other)} has the ball in hand"]
     if row == MAX_CONSECUTIVE_FOULS - 1:  # WPA 6.14: the player must be warned
-        messages.append(f"{who} is on {row} fouls; one more loses the rack")
+        messages.append(f"{shooter} is on {row} fouls; one more loses the rack")
     return Ruling(replace(after, turn=after.other, in_hand="anywhere"), fouls, messages=tuple(messages))
 
 

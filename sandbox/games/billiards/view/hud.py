@@ -138,19 +138,19 @@ def status_line(player: BilliardsPlayer) -> str:
     before = renamed("; ".join(match.messages), player.names)
     if match.over:
         return f"{before or 'the frame is over'}; press R for a new frame"
-    who = player.names[match.turn]
+    shooter = player.names[match.turn]
     if player.opponent is not None and match.turn == BOT:
-        now = f"{who} is {'thinking' if player.is_bot_thinking else 'aiming'}"
+        now = f"{shooter} is {'thinking' if player.is_bot_thinking else 'aiming'}"
     elif player.carried is not None:
         now = "click to place the cue ball"
     elif match.choices.needed and player.call.pocket is None:
-        now = f"{who}: click the pocket of the {match.choices.balls[0] if match.choices.balls else 'ball'}"
+        now = f"{shooter}: click the pocket of the {match.choices.balls[0] if match.choices.balls else 'ball'}"
     elif match.state.in_hand is not None and match.rules.name != "free":
-        now = f"{who} has the ball in hand {match.state.in_hand}".removesuffix(" anywhere")
+        now = f"{shooter} has the ball in hand {match.state.in_hand}".removesuffix(" anywhere")
     elif match.state.players == 1:
         now = _single_player_line(player)
     else:
-        now = f"{who} shoots{_ball_on(match)}"
+        now = f"{shooter} shoots{_ball_on(match)}"
     if player.call.safety:
         now += " (safety)"
     return f"{before}; {now}" if before and now not in before else now

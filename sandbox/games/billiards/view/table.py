@@ -321,8 +321,8 @@ def _marks(pen: _TablePen, scene: Scene, area: ViewBox, felt: ClothColours) -> N
 
 def _shadow(pen: _TablePen, cushion: CushionOutline, felt: ClothColours, reach: float) -> None:
     """Draw the shadow of a nose on the cloth, up to `reach` m."""
-    for share, dark in ((1.0, 0.10), (0.62, 0.20), (0.3, 0.32)):
-        by = reach * share
+    for fraction, dark in ((1.0, 0.10), (0.62, 0.20), (0.3, 0.32)):
+        by = reach * fraction
         moved = tuple((x - cushion.out[0] * by, y - cushion.out[1] * by) for x, y in cushion.nose)
         pen.polygon((*moved, *cushion.nose[::-1]), mix_colours(felt.bed, HOLE, dark))
 

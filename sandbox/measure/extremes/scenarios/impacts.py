@@ -214,8 +214,8 @@ def _head_on(p: Parameters) -> JsonObject:
 def _after(scene: Scene) -> FloatArray:
     """Return the velocities after the impact, v₁′ = (m₁ − m₂)v/M and v₂′ = 2m₁v/M."""
     first, second = scene.bodies.mass.tolist()
-    share: float = SPEED / (first + second)
-    return np.asarray([(first - second) * share, 2.0 * first * share])
+    fraction: float = SPEED / (first + second)
+    return np.asarray([(first - second) * fraction, 2.0 * first * fraction])
 
 
 def _velocity_error(scene: Scene, run: Trajectory) -> float:
