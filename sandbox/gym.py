@@ -231,7 +231,7 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
             from sandbox.window.render.offscreen import OffscreenRenderer  # pygame is needed only to render
 
             self._canvas = OffscreenRenderer(SIZE)
-        relay = episode.relay
+        relay = episode.simulation
         return self._canvas.picture(relay.scene, relay.bodies, episode.frame(), episode.rules, relay.throttles)
 
     def close(self) -> None:

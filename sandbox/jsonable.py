@@ -8,8 +8,9 @@ become null, so that every float may be null in the schema.
 import math
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import Field, fields, is_dataclass
+from enum import Enum
 from types import NoneType, UnionType
-from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Any, Literal, NamedTuple, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 from pydantic import BaseModel
@@ -20,21 +21,33 @@ JsonObject = dict[str, Any]
 """JSON object: values by key"""
 
 
-def in_json(*, key: str | None = None, omit: bool = False, inline: bool = False) -> dict[str, Any]:
+def in_json(
+    *, key: str | None = None, omit: bool = False, inline: bool = False, optional: bool = False
+) -> dict[str, Any]:
     """Return the `metadata` of a dataclass field that says how it appears in JSON documents.
 
     Args:
         key: key in the document; default: the name of the field.
         omit: leave the field out of the document.
         inline: merge the value, an object, into the object of the dataclass.
+        optional: leave the field out of a document in which its value is None.
     """
-    return {"json": (key, omit, inline)}
+    return {"json": JsonField(key, omit, inline, optional)}
 
 
-def _options(each: "Field[Any]") -> tuple[str, bool, bool]:
-    """Return key, omit and inline of a field."""
-    key, omit, inline = each.metadata.get("json", (None, False, False))
-    return key or each.name, omit, inline
+class JsonField(NamedTuple):
+    """How a field appears in documents, see `in_json`."""
+
+    key: str | None = None
+    omit: bool = False
+    inline: bool = False
+    optional: bool = False
+
+
+def _options(each: "Field[Any]") -> JsonField:
+    """Return how a field appears in documents, with its key."""
+    found: JsonField = each.metadata.get("json", JsonField())
+    return found._replace(key=found.key or each.name)
 
 
 def finite(value: float | None) -> float | None:
@@ -51,6 +64,8 @@ def to_json(value: Any) -> Any:
     Raises:
         TypeError: JSON cannot hold a value of that type.
     """
+    if isinstance(value, Enum):
+        return value.value
     if value is None or isinstance(value, bool | int | str):
         return value
     if isinstance(value, float):
@@ -73,14 +88,14 @@ def to_json(value: Any) -> Any:
 def _object(value: Any) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for each in fields(value):
-        key, omit, inline = _options(each)
-        if omit:
+        key, omit, inline, optional = _options(each)
+        own = getattr(value, each.name)
+        if omit or (optional and own is None):
             continue
-        own = to_json(getattr(value, each.name))
         if inline:
-            found |= own
+            found |= to_json(own)
         else:
-            found[key] = own
+            found[str(key)] = to_json(own)
     for name in getattr(value, "json_properties", ()):
         found[name] = to_json(getattr(value, name))
     return found
@@ -105,12 +120,12 @@ def _object_schema(cls: type, definitions: dict[str, Any]) -> dict[str, Any]:
     properties: dict[str, Any] = {}
     required: list[str] = []
     is_open = False
-    for name, key, omit, inline in _members(cls):
+    for name, (key, omit, inline, optional) in _members(cls):
         if omit:
             continue
         if not inline:
-            properties[key] = _schema(hints[name], definitions)
-            required.append(key)
+            properties[str(key)] = _schema(hints[name], definitions)
+            required += [] if optional else [str(key)]
         elif is_dataclass(hints[name]):
             inner = _object_schema(hints[name], definitions)
             properties |= inner["properties"]
@@ -124,11 +139,11 @@ def _object_schema(cls: type, definitions: dict[str, Any]) -> dict[str, Any]:
     return {"type": "object", "properties": properties, "required": required, "additionalProperties": is_open}
 
 
-def _members(cls: Any) -> list[tuple[str, str, bool, bool]]:
-    """Return name, key, omit and inline of each field of a dataclass or named tuple."""
+def _members(cls: Any) -> list[tuple[str, JsonField]]:
+    """Return the fields of a dataclass or named tuple, and how they appear in documents."""
     if is_dataclass(cls):
-        return [(each.name, *_options(each)) for each in fields(cls)]
-    return [(name, name, False, False) for name in cls._fields]
+        return [(each.name, _options(each)) for each in fields(cls)]
+    return [(name, JsonField(name)) for name in cls._fields]
 
 
 def _schema(hint: Any, definitions: dict[str, Any]) -> dict[str, Any]:
@@ -140,6 +155,8 @@ def _schema(hint: Any, definitions: dict[str, Any]) -> dict[str, Any]:
         return _union([_schema(each, definitions) for each in arguments])
     if origin is Literal:
         return {"enum": list(arguments)}
+    if isinstance(hint, type) and issubclass(hint, Enum):
+        return {"enum": [each.value for each in hint]}
     simple = {NoneType: "null", bool: "boolean", int: "integer", str: "string"}
     if hint in simple:
         return {"type": simple[hint]}

@@ -1,4 +1,4 @@
-"""Accounts of energy that have to close, whoever keeps them."""
+"""Energy accounts that must balance, on any engine."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -15,42 +15,42 @@ from sandbox.measure.run.runner import run
 from sandbox.scene.compile.scene import Scene
 
 Timed = Sequence[tuple[int, Action]]
-"""What is done, and before which step."""
+"""Actions, each with the index of the step before which it is applied."""
 
 
-def kept(
+def closed_account(
     scene: Scene, steps: int, actions: Timed = (), part: float | None = None, *, engine: str, closes: float
 ) -> Mapping[Cause, float]:
-    """Run a scene with an account and a twin without one, which end alike; return the account, which closes.
+    """Run a scene with an account and without one; check that both end alike and that the account balances; return it.
 
     Args:
-        scene: what is run.
-        steps: how many.
-        actions: what is done meanwhile.
-        part: of a last step, where there is one.
-        engine: on what.
-        closes: to what share of the largest energy.
+        scene: scene that is run.
+        steps: number of whole steps.
+        actions: actions and the steps before which they are applied.
+        part: fraction of a last, cut step; None for none.
+        engine: name of the engine.
+        closes: largest error of the balance, as a fraction of the largest energy.
     """
     simulation, twin = start(scene, engine), start(scene, engine)
     assert not any(simulation.account().values())
-    began = total_energy(simulation)
-    seen = [began]
+    start_energy = total_energy(simulation)
+    energies = [start_energy]
     for k in range(steps):
-        for at, action in actions:
-            if at == k:
+        for index, action in actions:
+            if index == k:
                 simulation.apply(action)
                 twin.apply(action)
         simulation.step()
         twin.step()
-        simulation.account()  # the exact engine books a slide in as many pieces as it is asked for
-        seen.append(total_energy(simulation))
+        simulation.account()  # the exact engine books a slide in as many pieces as there are calls
+        energies.append(total_energy(simulation))
     if part is not None:
         simulation.finish(part)
         twin.finish(part)
     assert simulation.state_hash() == twin.state_hash()
     account = simulation.account()
-    scale = max(np.abs(seen).max(), max(map(abs, account.values())))
-    assert total_energy(simulation) - began == pytest.approx(sum(account.values()), abs=closes * scale)
+    scale = max(np.abs(energies).max(), max(map(abs, account.values())))
+    assert total_energy(simulation) - start_energy == pytest.approx(sum(account.values()), abs=closes * scale)
     return account
 
 

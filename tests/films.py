@@ -1,4 +1,4 @@
-"""Reading films back: what each picture shows, and how long."""
+"""Readers of gif and mp4 files: pixels of each frame and its duration."""
 
 import re
 import subprocess
@@ -13,22 +13,22 @@ Pictures = list[npt.NDArray[np.int64]]
 
 
 def gif_frames(path: Path) -> tuple[Pictures, list[int]]:
-    """Return each picture of a gif as it is seen, (H, W, 3), and how long, ms."""
+    """Return each composed frame of a gif, (H, W, 3), and its duration, ms."""
     with Image.open(path) as image:
-        seen, shown = [], []
+        frames, durations = [], []
         for k in range(image.n_frames):
             image.seek(k)
-            seen.append(np.asarray(image.convert("RGB")).astype(np.int64))
-            shown.append(image.info["duration"])
-    return seen, shown
+            frames.append(np.asarray(image.convert("RGB")).astype(np.int64))
+            durations.append(image.info["duration"])
+    return frames, durations
 
 
 def mp4_frames(path: Path) -> tuple[Pictures, str]:
-    """Return each picture of an mp4, (H, W, 3), and what ffmpeg says of it."""
+    """Return each frame of an mp4, (H, W, 3), and ffmpeg's description of the file."""
     command = [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(path), "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
     done = subprocess.run(command, capture_output=True, check=True, timeout=60)
-    about = done.stderr.decode()
-    size = re.search(r"Video: .*?, (\d+)x(\d+)", about)
+    description = done.stderr.decode()
+    size = re.search(r"Video: .*?, (\d+)x(\d+)", description)
     assert size is not None
     pictures = np.frombuffer(done.stdout, np.uint8).reshape(-1, int(size[2]), int(size[1]), 3)
-    return list(pictures.astype(np.int64)), about
+    return list(pictures.astype(np.int64)), description

@@ -1,4 +1,4 @@
-"""The command line as a process that Ctrl-C reaches, wherever the tests were started from."""
+"""The command line as a child process that handles SIGINT, even if the tests were started with SIGINT ignored."""
 
 import signal
 import subprocess
@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-# A shell may start its children with SIGINT ignored, and they would inherit that.
+# A shell may start its children with SIGINT ignored; their own children inherit that.
 _MAIN = """
 import runpy, signal
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -16,12 +16,12 @@ runpy.run_module("sandbox", run_name="__main__", alter_sys=True)
 
 
 def interruptible(*words: str) -> list[str]:
-    """Return what runs the command line in a process that heeds SIGINT."""
+    """Return the command that runs the command line in a process that handles SIGINT."""
     return [sys.executable, "-c", _MAIN, *words]
 
 
 def interrupted(words: Sequence[str], ready: Callable[[], bool], folder: Path | None = None) -> tuple[int, str, str]:
-    """Send Ctrl-C to a command, in a folder, once it is so far; return its status, its output, and its errors."""
+    """Run a command in a folder, send SIGINT once `ready` returns true; return its exit status, stdout and stderr."""
     pipe = subprocess.PIPE
     command = subprocess.Popen(interruptible(*words), stdout=pipe, stderr=pipe, text=True, cwd=folder)
     try:

@@ -1,4 +1,4 @@
-"""Runs made by hand: frames and contacts as a test wants them, and the scenes that they are of."""
+"""Synthetic runs: scenes, and trajectories with given frames and contacts."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -53,7 +53,7 @@ position = [0.0, 1.0]
 radius = 0.5
 restitution = 0.5
 """
-"""Half a metre above the ground, which is reached after 0.316 s. It has a closed form."""
+"""A ball half a metre above the ground, which it reaches after 0.316 s. The scene has a closed form."""
 
 SWING = """
 [world]
@@ -74,7 +74,7 @@ radius = 0.1
 kind = "rod"
 between = ["hook", "bob"]
 """
-"""A ball on a rod, level with what it hangs on."""
+"""A pendulum: a ball on a rod, level with its fixed hook."""
 
 Row = tuple[float, tuple[int, int]] | tuple[float, tuple[int, int], float]
 """Time and pair of a contact, and its impulse along y, by default 0."""
@@ -95,20 +95,20 @@ def run_of(
     retired: Sequence[float] | None = None,
     **info: Any,
 ) -> Trajectory:
-    """Make a run in which nothing moves, but for what is given.
+    """Make a run in which all bodies stay at their initial positions, except where arrays are given.
 
     Args:
-        scene: of what.
+        scene: scene of the run.
         position: (T, N, 2) m.
         time: (T,) s, by default every step.
         velocity: (T, N, 2) m/s.
-        contacts: in the order of time.
-        retired: (N,) s.
-        info: what differs in the run's `info`.
+        contacts: rows in the order of time.
+        retired: (N,) s, times at which bodies were removed, nan for none.
+        info: entries to replace in the run's `info`.
     """
     dt = scene.solver.dt
-    when = np.arange(round(scene.world.duration / dt) + 1) * dt if time is None else time
-    at = np.repeat(scene.bodies.position[None], len(when), axis=0) if position is None else position
+    times = np.arange(round(scene.world.duration / dt) + 1) * dt if time is None else time
+    positions = np.repeat(scene.bodies.position[None], len(times), axis=0) if position is None else position
     rows = Contacts(
         np.asarray([row[0] for row in contacts], dtype=np.float64),
         np.asarray([row[1] for row in contacts], dtype=np.int64).reshape(-1, 2),
@@ -116,8 +116,13 @@ def run_of(
         np.tile([0.0, -1.0], (len(contacts), 1)),
         np.asarray([[0.0, row[2] if len(row) > 2 else 0.0] for row in contacts]).reshape(-1, 2),
     )
-    state = (at, np.zeros_like(at) if velocity is None else velocity, np.zeros(at.shape[:2]), np.zeros(at.shape[1]))
-    gone = np.full(len(scene.bodies), np.nan) if retired is None else np.asarray(retired)
-    run = run_without_engine(scene, scene.solver, when, state, rows, gone)
+    state = (
+        positions,
+        np.zeros_like(positions) if velocity is None else velocity,
+        np.zeros(positions.shape[:2]),
+        np.zeros(positions.shape[1]),
+    )
+    retired_time = np.full(len(scene.bodies), np.nan) if retired is None else np.asarray(retired)
+    run = run_without_engine(scene, scene.solver, times, state, rows, retired_time)
     run.info.update(info)  # type: ignore[attr-defined] # it is a dict
     return run

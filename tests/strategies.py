@@ -1,4 +1,4 @@
-"""Hypothesis strategies: scene documents as TOML would hold them, whole and sound, and the texts that say them."""
+"""Hypothesis strategies: valid scene documents as parsed from TOML, and TOML texts of them."""
 
 import json
 import math
@@ -29,11 +29,11 @@ def numbers(low: float, high: float) -> st.SearchStrategy[float]:
 
 @cache
 def names() -> st.SearchStrategy[str]:
-    """Names of bodies and materials: any text without control characters; none that leads to a default name."""
+    """Names of bodies and materials: any text without control characters that cannot equal a default name."""
     letters = st.characters(exclude_categories=["Cc", "Cs", "Zl", "Zp"], exclude_characters="-")
     return st.sampled_from(["cue", "8 ball", "a.b", "it's", 'say "hi"', "[x]", "#1", "=", "0"]) | st.text(
         letters, min_size=1, max_size=12
-    ).filter(lambda name: name not in NAMEABLE)  # a grid called "wall" has a ball "wall-1", as a first wall is called
+    ).filter(lambda name: name not in NAMEABLE)  # a grid "wall" has a ball "wall-1", the default name of a first wall
 
 
 @cache
@@ -65,17 +65,17 @@ def _elements(draw: st.DrawFn, required: Document, optional: Document, materials
 
 @st.composite
 def documents(draw: st.DrawFn, most: int = 2) -> Document:
-    """Sound scene documents of up to `most` elements of each kind.
+    """Valid scene documents of up to `most` elements of each kind.
 
-    With planes everything stays within some hundred metres, so that nothing starts deep behind one; without, places
-    reach 1e15 m.
+    With planes all coordinates are at most some hundred metres, so that no body starts far behind a plane; without,
+    they reach 1e15 m.
     """
     document: Document = draw(
         st.fixed_dictionaries({}, optional={"title": st.text(max_size=20), "about": st.text(max_size=40)})
     )
 
-    def listed(one: st.SearchStrategy[Document]) -> list[Document]:
-        return draw(st.lists(one, max_size=most))
+    def elements_of(element: st.SearchStrategy[Document]) -> list[Document]:
+        return draw(st.lists(element, max_size=most))
 
     materials = draw(st.lists(names(), unique=True, max_size=3))
     document["material"] = [
@@ -88,16 +88,18 @@ def documents(draw: st.DrawFn, most: int = 2) -> Document:
             {"between": two, **draw(st.fixed_dictionaries({}, optional=_coefficients()))} for two in between
         ]
 
-    document["plane"] = listed(
+    document["plane"] = elements_of(
         _elements({"point": pairs(-300, 300), "normal": pairs(-1e3, 1e3).filter(any_length)}, {}, materials)
     )
     far = 300.0 if document["plane"] else 1e15
     corners = st.lists(st.tuples(st.integers(-99, 99), st.integers(-99, 99)), min_size=3, max_size=5, unique=True)
     points = corners.map(lambda rows: [[x * 0.25, y * 0.25] for x, y in rows])
-    document["wall"] = listed(
+    document["wall"] = elements_of(
         _elements({"points": points}, {"thickness": numbers(0, 10), "closed": st.booleans()}, materials)
     )
-    document["post"] = listed(_elements({"position": pairs(-far, far), "radius": numbers(1e-9, 1e9)}, {}, materials))
+    document["post"] = elements_of(
+        _elements({"position": pairs(-far, far), "radius": numbers(1e-9, 1e9)}, {}, materials)
+    )
 
     disc = {
         "angle": numbers(-1e12, 1e12),
@@ -110,7 +112,7 @@ def documents(draw: st.DrawFn, most: int = 2) -> Document:
     small = numbers(1e-2, 0.1)
     ball = {"position": pairs(-far, far), "radius": numbers(1e-9, 1e9)}
     moving = {"velocity": pairs(-speed, speed)}
-    document["ball"] = listed(
+    document["ball"] = elements_of(
         _elements(ball, {**disc, **spin, **moving, **heavy}, materials)
         | _elements({**ball, "radius": small, **dense}, {**disc, **spin, **moving}, materials)
         | _elements({**ball, "fixed": st.just(True)}, {**disc, **heavy}, materials)
@@ -122,27 +124,29 @@ def documents(draw: st.DrawFn, most: int = 2) -> Document:
         "radius": small,
     }
     jitter = {"jitter": numbers(0, 1), "velocity_jitter": numbers(0, 1e11), "rows": st.integers(1, 3)}
-    document["grid"] = listed(_elements(grid, {**disc, **spin, **jitter, **heavy}, materials))
+    document["grid"] = elements_of(_elements(grid, {**disc, **spin, **jitter, **heavy}, materials))
     scatter = {
         "count": st.integers(1, 6),
         "lower": pairs(-100, 0),
         "upper": pairs(3, 100),
         "radius": small,
     }
-    document["scatter"] = listed(_elements(scatter, {**disc, **spin, **dense}, materials))
+    document["scatter"] = elements_of(_elements(scatter, {**disc, **spin, **dense}, materials))
     emitter = {
         "position": pairs(-100, 100),
         "count": st.integers(1, 6),
         "velocity_min": pairs(-speed, 0),
         "velocity_max": pairs(0, speed),
     }
-    document["emitter"] = listed(_elements(emitter, {**disc, **spin, **heavy}, materials))
+    document["emitter"] = elements_of(_elements(emitter, {**disc, **spin, **heavy}, materials))
 
-    things = [thing for kind in NAMEABLE for thing in document[kind]]
-    called = draw(st.lists(st.none() | names(), min_size=len(things), max_size=len(things), unique_by=_unless_none()))
-    for thing, name in zip(things, called, strict=True):
+    elements = [element for kind in NAMEABLE for element in document[kind]]
+    drawn_names = draw(
+        st.lists(st.none() | names(), min_size=len(elements), max_size=len(elements), unique_by=_unless_none())
+    )
+    for element, name in zip(elements, drawn_names, strict=True):
         if name is not None:
-            thing["name"] = name
+            element["name"] = name
     document["world"] = draw(
         st.fixed_dictionaries(
             {},
@@ -178,8 +182,8 @@ def documents(draw: st.DrawFn, most: int = 2) -> Document:
             },
         )
     )
-    kept = {key: value for key, value in document.items() if value not in ([], {})}
-    return kept or {"title": ""}
+    filled = {key: value for key, value in document.items() if value not in ([], {})}
+    return filled or {"title": ""}
 
 
 OUTLINES = (
@@ -188,13 +192,13 @@ OUTLINES = (
     [[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]],
     [[0, 0], [3, 0], [3, 1], [1, 1], [1, 2], [3, 2], [3, 3], [0, 3]],
 )
-"""Clockwise and not, convex and not."""
+"""Clockwise and counterclockwise, convex and concave outlines."""
 
 
 @st.composite
 def solids(draw: st.DrawFn) -> Document:
-    """The tables of some boxes, capsules, polygons and bodies of several parts, all named, and of their joints."""
-    size, spot = numbers(1e-3, 3), pairs(-100, 100)
+    """Tables of named boxes, capsules, polygons and compound bodies, of their joints and of forces on them."""
+    size, position = numbers(1e-3, 3), pairs(-100, 100)
     shape: dict[str, Document] = {
         "ball": {"radius": size},
         "box": {"size": st.lists(size, min_size=2, max_size=2)},
@@ -206,15 +210,15 @@ def solids(draw: st.DrawFn) -> Document:
     moving = {"velocity": pairs(-10, 10), "angular_velocity": numbers(-10, 10), "mass": numbers(1e-2, 1e2)}
     document: Document = {}
     for kind in ("box", "capsule", "polygon"):
-        either = st.fixed_dictionaries({"position": spot, **shape[kind]}, optional={**state, **moving})
-        fixed = st.fixed_dictionaries({"position": spot, **shape[kind], "fixed": st.just(True)}, optional=state)
+        either = st.fixed_dictionaries({"position": position, **shape[kind]}, optional={**state, **moving})
+        fixed = st.fixed_dictionaries({"position": position, **shape[kind], "fixed": st.just(True)}, optional=state)
         document[kind] = draw(st.lists(either | fixed, max_size=2))
     parts = {
         kind: st.lists(st.fixed_dictionaries(keys, optional={**part, "position": pairs(-2, 2)}), min_size=1, max_size=2)
         for kind, keys in shape.items()
     }
     more = {kind: those for kind, those in parts.items() if kind != "box"}
-    some = st.fixed_dictionaries({"position": spot, "box": parts["box"]}, optional={**state, **moving, **more})
+    some = st.fixed_dictionaries({"position": position, "box": parts["box"]}, optional={**state, **moving, **more})
     document["body"] = draw(st.lists(some, max_size=2))
     names = []
     for kind, those in document.items():
@@ -224,7 +228,7 @@ def solids(draw: st.DrawFn) -> Document:
     if names:
         document["joint"] = draw(st.lists(_joints(names), max_size=4))
         document["thrust"] = draw(st.lists(_thrusts(names), max_size=2))
-        toward = st.sampled_from(names) | spot
+        toward = st.sampled_from(names) | position
         pull = st.fixed_dictionaries({"toward": toward, "strength": numbers(-10, 10)}, optional={"softening": size})
         document["attraction"] = draw(st.lists(pull, max_size=2))
     return {kind: those for kind, those in document.items() if those}
@@ -232,17 +236,17 @@ def solids(draw: st.DrawFn) -> Document:
 
 @st.composite
 def _joints(draw: st.DrawFn, names: list[str]) -> Document:
-    """A joint of movable bodies, sound whatever it joins."""
-    spot, figure = pairs(-3, 3), numbers(1e-3, 10)
+    """A joint of movable bodies, valid for any of them."""
+    point, coefficient = pairs(-3, 3), numbers(1e-3, 10)
     kinds: dict[str, Document] = {
-        "pivot": {"at": spot},
-        "slide": {"most": figure},
-        "groove": {"groove": st.just([[0, 0], [1, 2]]), "anchor": spot},
+        "pivot": {"at": point},
+        "slide": {"most": coefficient},
+        "groove": {"groove": st.just([[0, 0], [1, 2]]), "anchor": point},
         "rotary_limit": {"least": numbers(-3, 0), "most": numbers(0, 3)},
-        "motor": {"rate": numbers(-10, 10), "max_torque": figure},
-        "gear": {"ratio": figure},
-        "spring": {"stiffness": figure, "damping": figure, "rest_length": figure},
-        "rotary_spring": {"stiffness": figure, "rest_angle": numbers(-3, 3)},
+        "motor": {"rate": numbers(-10, 10), "max_torque": coefficient},
+        "gear": {"ratio": coefficient},
+        "spring": {"stiffness": coefficient, "damping": coefficient, "rest_length": coefficient},
+        "rotary_spring": {"stiffness": coefficient, "rest_angle": numbers(-3, 3)},
     }
     kind = draw(st.sampled_from(list(kinds)))
     between = st.lists(st.sampled_from(names), min_size=1, max_size=2, unique=True)
@@ -251,7 +255,7 @@ def _joints(draw: st.DrawFn, names: list[str]) -> Document:
 
 
 def drives(names: list[str]) -> st.SearchStrategy[Document]:
-    """The drive of a body that starts at rest and at an angle of 0, sound whatever it holds."""
+    """A drive of a body that starts at rest at an angle of 0, valid for any such body."""
     common = {"body": st.sampled_from(names)}
     level = numbers(0, 1)
     hinged = {**common, "pivot": pairs(-100, 100), "stops": st.sampled_from([[0, 1], [0, -1], [-0.5, 0.5]])}
@@ -282,7 +286,7 @@ def _thrusts(names: list[str]) -> st.SearchStrategy[Document]:
 
 @st.composite
 def solid_documents(draw: st.DrawFn) -> Document:
-    """Sound scene documents of solids, joints and forces over a floor, small and slow enough to be run."""
+    """Valid scene documents of solids, joints and forces over a floor, small and slow enough to be run."""
     world = st.fixed_dictionaries({}, optional={"gravity": pairs(-10, 10), "linear_drag": numbers(0, 1)})
     floor = {"point": [0, -200], "normal": [0, 1], "restitution": 0.5, "friction": 0.5}
     document: Document = {"world": draw(world), "plane": [floor], "solver": {"dt": 0.01}, **draw(solids())}
@@ -290,27 +294,27 @@ def solid_documents(draw: st.DrawFn) -> Document:
 
 
 def solid_scenes() -> st.SearchStrategy[Scene]:
-    """Sound scenes of solids, joints and forces."""
+    """Valid scenes of solids, joints and forces."""
     return solid_documents().map(from_document)
 
 
 def any_length(vector: list[float]) -> bool:
-    """Tell whether a vector is long enough to have a direction."""
+    """Return whether a vector is long enough to have a direction."""
     return math.hypot(*vector) > 1e-90
 
 
 def _unless_none() -> Any:
-    """Return a key for `unique_by` under which every None is another."""
+    """Return a key for `unique_by` that treats every None as distinct."""
     return lambda name: object() if name is None else name
 
 
 def scenes(most: int = 2) -> st.SearchStrategy[Scene]:
-    """Sound scenes."""
+    """Valid scenes."""
     return documents(most).map(from_document)
 
 
 def junk() -> st.SearchStrategy[Any]:
-    """Values of any kind that TOML or JSON can hold, most of them wrong wherever they stand."""
+    """Values of any type that TOML or JSON can hold, most of them invalid for any key."""
     leaves = (
         st.none()
         | st.booleans()
@@ -328,7 +332,7 @@ def junk() -> st.SearchStrategy[Any]:
 
 
 class Rendered:
-    """A document written as TOML in one of its many ways, and the line of every location of it."""
+    """A document written as TOML in a random layout, and the line of every location in it."""
 
     def __init__(self, document: Document, chance: random.Random) -> None:
         self._chance = chance
@@ -347,7 +351,7 @@ class Rendered:
             self.lines.setdefault(location[:length], self._line)
 
     def _fill(self) -> None:
-        """Write blank lines and comments, some of them traps."""
+        """Write blank lines and comments; some comments look like keys, headings or open strings."""
         traps = ["", "   ", "# [[ball]]", "# radius = 1", '# """', "# '", "#\u2028]", "# ]\x85}", '\t# name = "x']
         for _ in range(self._chance.choice((0, 0, 1, 2))):
             self._write(self._chance.choice(traps) + "\n")
@@ -374,8 +378,8 @@ class Rendered:
         several = {key: isinstance(value, list) for key, value in tables}
         written = dict.fromkeys(several, 0)
         while waiting:
-            place = self._chance.randrange(len(waiting))
-            key, values = waiting[place]
+            index = self._chance.randrange(len(waiting))
+            key, values = waiting[index]
             self._fill()
             heading = f"[[{self._key(key)}]]" if several[key] else f"[ {self._key(key)} ]"
             location: Location = (key, written[key]) if several[key] else (key,)
@@ -385,7 +389,7 @@ class Rendered:
             self._table(location, values[written[key]])
             written[key] += 1
             if written[key] == len(values):
-                del waiting[place]
+                del waiting[index]
 
     def _shuffled(self, items: Any) -> list[Any]:
         items = list(items)
@@ -428,24 +432,24 @@ class Rendered:
     def _scalar(self, value: Any) -> str:
         if isinstance(value, str):
             plain = json.dumps(value).replace("\x7f", "\\u007f")
-            ways = [_toml_escapes(plain)]
+            forms = [_toml_escapes(plain)]
             if value and value.isprintable() and "'" not in value:
-                ways += [f"'{value}'", f"'''\n{value}'''"]
+                forms += [f"'{value}'", f"'''\n{value}'''"]
             if "\\" not in plain and value.isprintable():
-                ways.append(f'"""\\\n   {value}"""' if value.strip() == value else f'"""{value}"""')
-            return self._chance.choice(ways)
+                forms.append(f'"""\\\n   {value}"""' if value.strip() == value else f'"""{value}"""')
+            return self._chance.choice(forms)
         if isinstance(value, bool):
             return "true" if value else "false"
         return repr(value)
 
 
 def _toml_escapes(text: str) -> str:
-    """Turn JSON's pairs of surrogates into characters; TOML has no such escapes."""
+    """Replace JSON's surrogate pairs by characters; TOML has no such escapes."""
     return json.dumps(json.loads(text), ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 @st.composite
 def rendered(draw: st.DrawFn, of: st.SearchStrategy[Document] | None = None) -> tuple[Document, Rendered]:
-    """A document and a text that says it."""
+    """A document and a TOML text of it."""
     document = draw(documents() if of is None else of)
     return document, Rendered(document, draw(st.randoms(use_true_random=False)))

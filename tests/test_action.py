@@ -1,4 +1,4 @@
-"""Actions: timed values, read strictly."""
+"""Actions: validation, JSON, order in time."""
 
 import json
 import math
@@ -38,16 +38,16 @@ GOOD: list[dict[str, Any]] = [
 
 
 def actions() -> st.SearchStrategy[tuple[Action, ...]]:
-    """Sound actions of every kind."""
+    """Valid actions of every kind."""
     time, amount = numbers(0, 1e9), numbers(-1e42, 1e42)
     pair, velocity = st.tuples(amount, amount), st.tuples(numbers(-7e11, 7e11), numbers(-7e11, 7e11))
-    place = st.tuples(numbers(-1e16, 1e16), numbers(-1e16, 1e16))
+    position = st.tuples(numbers(-1e16, 1e16), numbers(-1e16, 1e16))
     value = st.floats(allow_nan=False, allow_infinity=False) | st.integers() | st.booleans() | st.text() | st.none()
-    ball = st.builds(Ball, position=place, velocity=velocity, radius=numbers(1e-9, 1e9), name=st.none() | names())
+    ball = st.builds(Ball, position=position, velocity=velocity, radius=numbers(1e-9, 1e9), name=st.none() | names())
     kinds: list[st.SearchStrategy[Action]] = [
         st.builds(Impulse, time=time, body=names(), impulse=pair, angular=amount),
         st.builds(Force, time=time, body=names(), force=pair, torque=amount),
-        st.builds(Move, time=time, body=names(), position=place, velocity=st.none() | velocity),
+        st.builds(Move, time=time, body=names(), position=position, velocity=st.none() | velocity),
         st.builds(Spawn, time=time, ball=ball),
         st.builds(Remove, time=time, body=names()),
         st.builds(SetParameter, time=time, path=names(), value=value | st.lists(st.floats(-9, 9))),
@@ -59,7 +59,7 @@ def read(*documents: dict[str, Any]) -> tuple[Action, ...]:
     return actions_from_json(json.dumps(documents))
 
 
-def test_every_kind_is_read() -> None:
+def test_every_kind_of_action_is_read_from_json() -> None:
     kinds = [type(action) for action in read(*GOOD)]
     assert kinds == [Impulse, Force, Move, Spawn, Remove, SetParameter]
     assert read(GOOD[0]) == (Impulse(time=0.0, body="a", impulse=(1.0, 2.0), angular=0.0),)
@@ -70,7 +70,7 @@ def test_actions_written_and_read_again_are_equal(given_actions: tuple[Action, .
     assert actions_from_json(json.dumps(actions_to_json(given_actions))) == given_actions
 
 
-def test_value_set_keeps_its_type() -> None:
+def test_set_parameter_keeps_the_type_of_its_value() -> None:
     for value in (1, 1.5, True, False, "x", [1.0, 2.0], None):
         action = read({"kind": "set", "time": 0, "path": "p", "value": value})[0]
         assert isinstance(action, SetParameter)
@@ -93,7 +93,7 @@ def test_action_with_a_wrong_value_is_refused(good: dict[str, Any], change: dict
 
 
 @pytest.mark.parametrize("good", GOOD)
-def test_action_without_one_of_its_values_is_refused(good: dict[str, Any]) -> None:
+def test_action_without_a_required_field_is_refused(good: dict[str, Any]) -> None:
     for key in good.keys() - {"velocity", "torque"}:
         with pytest.raises(ActionError):
             read({other: value for other, value in good.items() if other != key})
@@ -112,7 +112,7 @@ def test_action_without_one_of_its_values_is_refused(good: dict[str, Any]) -> No
         (5, {"value": [math.inf]}), (5, {"value": ["1"]}),
     ],
 )  # fmt: skip
-def test_action_out_of_its_bounds_is_refused(kind: int, change: dict[str, Any]) -> None:
+def test_action_with_a_field_out_of_bounds_is_refused(kind: int, change: dict[str, Any]) -> None:
     with pytest.raises(ActionError):
         read({**GOOD[kind], **change})
 
@@ -120,12 +120,12 @@ def test_action_out_of_its_bounds_is_refused(kind: int, change: dict[str, Any]) 
 @pytest.mark.parametrize(
     "text", ["", "null", "{}", "3", "[3]", "[[]]", "[{}]", "[", '"x"', "[" * 100_000, '[{"kind": "\\ud800"}]', "[nan]"]
 )
-def test_text_that_is_no_array_of_actions_is_refused(text: str) -> None:
+def test_text_that_is_not_an_array_of_actions_is_refused(text: str) -> None:
     with pytest.raises(ActionError):
         actions_from_json(text)
 
 
-def test_error_names_every_wrong_place_on_a_line_of_its_own() -> None:
+def test_error_has_one_line_with_the_path_of_each_fault() -> None:
     with pytest.raises(ActionError) as caught:
         read({**GOOD[0], "time": -1}, GOOD[1], {**GOOD[4], "body": 3})
     first, second = str(caught.value).splitlines()
@@ -133,7 +133,7 @@ def test_error_names_every_wrong_place_on_a_line_of_its_own() -> None:
     assert second.startswith("2.remove.body: ")
 
 
-def test_order_is_by_time_and_otherwise_as_given() -> None:
+def test_actions_are_sorted_by_time_stably() -> None:
     one, two, three = (Remove(time=t, body=b) for t, b in ((1.0, "x"), (0.0, "y"), (1.0, "a")))
     assert in_order((one, two, three)) == (two, one, three)
     assert in_order(()) == ()
@@ -148,11 +148,11 @@ def test_order_is_by_time_and_otherwise_as_given() -> None:
         ("world", False), ("world.gravity.1", False), ("frictions", False),
     ],
 )  # fmt: skip
-def test_only_air_gravity_and_surfaces_are_settable(path: str, can: bool) -> None:
+def test_only_air_gravity_and_surface_coefficients_are_settable(path: str, can: bool) -> None:
     assert is_settable(path) is can
 
 
-def test_speed_is_limited_and_must_be_a_number() -> None:
+def test_speed_above_the_limit_or_not_finite_is_refused() -> None:
     check_speed(1e12, "a")
     for speed in (math.nextafter(1e12, math.inf), math.inf, math.nan):
         with pytest.raises(ActionError, match="out of range"):

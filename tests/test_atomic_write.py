@@ -1,4 +1,4 @@
-"""Whole files: what a killed process leaves of one is removed by the next that writes there, and nothing else is."""
+"""Atomic writes: temporary files of dead processes are removed by the next write in that folder, and no others."""
 
 import os
 import subprocess
@@ -31,7 +31,7 @@ DAYS = 3 * 86_400.0
 
 
 def writing(path: Path) -> subprocess.Popen[str]:
-    """Start a process that is in the middle of writing a file."""
+    """Start a process that stops in the middle of writing a file."""
     pipe = subprocess.PIPE
     process = subprocess.Popen([sys.executable, "-c", HALF, str(path)], stdin=pipe, stdout=pipe, text=True)
     assert process.stdout is not None and process.stdout.readline() == "ready\n"
@@ -42,7 +42,7 @@ def names(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
 
-def test_next_write_removes_what_a_killed_process_left_and_not_what_a_live_one_writes(tmp_path: Path) -> None:
+def test_next_write_removes_temporary_files_of_killed_processes_only(tmp_path: Path) -> None:
     with writing(tmp_path / "a") as killed, writing(tmp_path / "b") as alive:
         killed.kill()
         killed.wait()
@@ -56,9 +56,7 @@ def test_next_write_removes_what_a_killed_process_left_and_not_what_a_live_one_w
 
 
 @pytest.mark.parametrize("stopped", [True, False])
-def test_process_that_is_dead_but_not_waited_for_is_gone_and_a_stopped_one_is_not(
-    tmp_path: Path, stopped: bool
-) -> None:
+def test_temporary_file_of_a_zombie_is_stale_but_not_of_a_stopped_process(tmp_path: Path, stopped: bool) -> None:
     import signal
 
     with writing(tmp_path / "a") as process:
@@ -77,11 +75,11 @@ def with_part(path: Path, part: str, value: str) -> Path:
     return path.with_name(path.name[:start] + value + path.name[end:])
 
 
-def test_temporary_file_of_another_start_of_the_same_process_number_is_stale(tmp_path: Path) -> None:
+def test_temporary_file_with_another_start_time_of_the_same_pid_is_stale(tmp_path: Path) -> None:
     own = temporary_path(tmp_path)
     own.write_text("mine")
-    with_part(own, "start", "1").write_text("of one before me")
-    with_part(own, "pid", "9999999999").write_text("of none that can be")
+    with_part(own, "start", "1").write_text("of an earlier process")
+    with_part(own, "pid", "9999999999").write_text("of an impossible process")
     remove_stale(tmp_path)
     assert names(tmp_path) == {own.name}
 
@@ -95,28 +93,28 @@ def test_temporary_file_of_another_host_is_stale_after_a_day(tmp_path: Path) -> 
     assert names(tmp_path) == {fresh.name}
 
 
-def test_file_that_another_process_removes_first_does_not_keep_the_others(
+def test_stale_file_removed_by_another_process_does_not_stop_the_cleanup(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for _ in range(3):
         old = with_part(temporary_path(tmp_path), "host", "0" * 8)
         old.write_text("")
         os.utime(old, (0, 0))
-    is_stale, seen = module._is_stale, list[str]()
+    is_stale, checked = module._is_stale, list[str]()
 
-    def meanwhile(entry: "os.DirEntry[str]") -> bool:
-        if not seen:
+    def remove_first_then_check(entry: "os.DirEntry[str]") -> bool:
+        if not checked:
             Path(entry.path).unlink()
-        seen.append(entry.name)
+        checked.append(entry.name)
         return is_stale(entry)
 
-    monkeypatch.setattr(module, "_is_stale", meanwhile)
+    monkeypatch.setattr(module, "_is_stale", remove_first_then_check)
     remove_stale(tmp_path)
-    assert len(seen) == 3
+    assert len(checked) == 3
     assert names(tmp_path) == set()
 
 
-def test_what_is_not_ours_stays(tmp_path: Path) -> None:
+def test_folders_links_and_files_with_other_names_are_kept(tmp_path: Path) -> None:
     dead = with_part(temporary_path(tmp_path), "pid", "9999999999")
     dead.mkdir()
     others = {".sandbox-notes.tmp", ".0123456789abcdef.tmp", f"a{dead.name}", f"{dead.name}.tmp"}
@@ -128,7 +126,7 @@ def test_what_is_not_ours_stays(tmp_path: Path) -> None:
     assert names(tmp_path) == others | {dead.name, with_part(dead, "start", "2").name}
 
 
-def test_folder_that_is_not_there_is_an_error_of_the_write(tmp_path: Path) -> None:
+def test_write_into_a_missing_folder_raises(tmp_path: Path) -> None:
     remove_stale(tmp_path / "none")
     with pytest.raises(FileNotFoundError), atomic_write(tmp_path / "none" / "a") as temporary:
         temporary.write_text("")

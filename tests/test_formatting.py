@@ -1,4 +1,4 @@
-"""Text of quantities: significant digits, prefixes, and any float."""
+"""Formatting of quantities: significant digits, SI prefixes, and every float."""
 
 import math
 
@@ -42,7 +42,7 @@ from sandbox.formatting import (
         (-math.inf, "J", "−∞ J"),
     ],
 )
-def test_figure_has_three_digits_and_a_prefix(value: float, unit: str, text: str) -> None:
+def test_si_text_has_three_digits_and_a_prefix(value: float, unit: str, text: str) -> None:
     assert format_si(value, unit) == text
 
 
@@ -58,12 +58,12 @@ def test_figure_has_three_digits_and_a_prefix(value: float, unit: str, text: str
         (2e13, "2e13 m"),
     ],
 )
-def test_round_figures_need_one_digit(metres: float, text: str) -> None:
+def test_si_text_with_one_digit_has_no_trailing_zeros(metres: float, text: str) -> None:
     assert format_si(metres, "m", digits=1) == text
 
 
 @given(st.floats(1e-12, 9.99e11))
-def test_figure_says_the_value_to_half_its_last_digit(value: float) -> None:
+def test_si_text_is_right_to_half_its_last_digit(value: float) -> None:
     number, unit = format_si(value, "m").split()
     power = {"p": -12, "n": -9, "µ": -6, "m": -3, "k": 3, "M": 6, "G": 9}[unit[0]] if len(unit) > 1 else 0
     # half of the third digit is at most 0.5 %, reached at 1.00
@@ -72,24 +72,24 @@ def test_figure_says_the_value_to_half_its_last_digit(value: float) -> None:
 
 
 @given(st.floats(), st.sampled_from(["", "m", "m/s²", "%"]))
-def test_figures_of_any_float_are_short(value: float, unit: str) -> None:
+def test_texts_of_any_float_are_short(value: float, unit: str) -> None:
     assert len(format_si(value, unit)) < 20
     assert len(format_percent(value)) < 20
     assert len(format_time(value, abs(value))) < 24
 
 
 @pytest.mark.parametrize(
-    ("share", "text"), [(1.0, "100 %"), (0.63, "63 %"), (0.004, "0.400 %"), (0.0, "0 %"), (math.inf, "∞ %")]
+    ("fraction", "text"), [(1.0, "100 %"), (0.63, "63 %"), (0.004, "0.400 %"), (0.0, "0 %"), (math.inf, "∞ %")]
 )
-def test_percent_keeps_small_shares_apart_from_nothing(share: float, text: str) -> None:
-    assert format_percent(share) == text
+def test_percent_of_a_small_fraction_is_not_zero(fraction: float, text: str) -> None:
+    assert format_percent(fraction) == text
 
 
 @pytest.mark.parametrize(
     ("time", "step", "text"),
     [(12.3, 0.01, "12.30 s"), (1.5, 1e-4, "1.5000 s"), (3.0, 1.0, "3.00 s"), (0.5, 0.0, "0.50 s")],
 )
-def test_clock_shows_each_step(time: float, step: float, text: str) -> None:
+def test_time_has_enough_decimals_to_show_each_step(time: float, step: float, text: str) -> None:
     assert format_time(time, step) == text
 
 
@@ -112,11 +112,11 @@ def test_clock_shows_each_step(time: float, step: float, text: str) -> None:
         (100.0, "100"),
     ],
 )
-def test_numbers_of_tables_have_powers_of_ten_far_from_one(value: float | None, text: str) -> None:
+def test_numbers_far_from_one_are_shown_with_powers_of_ten(value: float | None, text: str) -> None:
     assert format_number(value) == text
 
 
-def test_changes_are_in_percent_with_a_sign() -> None:
+def test_relative_changes_are_signed_percentages() -> None:
     assert [format_change(x) for x in (None, 0.0, 0.0512, -0.5, 1e-14)] == ["–", "0", "+5.1 %", "−50 %", "≈ 0"]
 
 

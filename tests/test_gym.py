@@ -1,4 +1,4 @@
-"""Environments to learn in: they keep the interface of gymnasium, and are the same games as everywhere else."""
+"""Gymnasium environments: interface, observations, actions, seeds, and agreement with recorded sessions."""
 
 import copy
 import pickle
@@ -23,24 +23,24 @@ from tests.toy_game import TOY, Toy
 pytestmark = pytest.mark.full  # long runs and sweeps
 
 
-def played(env: SandboxEnv, seed: int | None, chances: int = 1) -> list[tuple[bytes, float, bool, bool]]:
+def play_episode(env: SandboxEnv, seed: int | None, action_seed: int = 1) -> list[tuple[bytes, float, bool, bool]]:
     observation, _ = env.reset(seed=seed)
-    found = [(observation.tobytes(), 0.0, False, False)]
-    env.action_space.seed(chances)
-    while not (found[-1][2] or found[-1][3]):
-        observation, reward, over, late, _ = env.step(env.action_space.sample())
-        found.append((observation.tobytes(), reward, over, late))
-    return found
+    transitions = [(observation.tobytes(), 0.0, False, False)]
+    env.action_space.seed(action_seed)
+    while not (transitions[-1][2] or transitions[-1][3]):
+        observation, reward, terminated, truncated, _ = env.step(env.action_space.sample())
+        transitions.append((observation.tobytes(), reward, terminated, truncated))
+    return transitions
 
 
 @pytest.mark.parametrize("name", GAMES)
-def test_shipped_games_keep_the_interface(name: str) -> None:
+def test_shipped_games_pass_gymnasiums_checker(name: str) -> None:
     # pytest turns warnings into errors, those of the checker among them
     check_env(gymnasium.make(f"sandbox/{name}-v0").unwrapped)
 
 
 @pytest.mark.parametrize("name", GAMES)
-def test_each_number_that_is_observed_has_a_name_of_its_own(name: str) -> None:
+def test_observed_numbers_have_distinct_names_and_stay_in_the_space(name: str) -> None:
     env = gymnasium.make(f"sandbox/{name}-v0").unwrapped
     assert isinstance(env, SandboxEnv)
     assert len(set(env.observed)) == len(env.observed)
@@ -55,17 +55,17 @@ def test_each_number_that_is_observed_has_a_name_of_its_own(name: str) -> None:
 
 def test_every_shipped_game_has_an_id() -> None:
     games = {scene.name for scene in shipped() if load(scene.path).play.game in RULES}
-    on_request = {"billiards/8-ball", "billiards/9-ball"}  # of the games whose rules start only on request
+    on_request = {"billiards/8-ball", "billiards/9-ball"}  # scenes whose rules start only on request
     assert {scene for scene, _ in GAMES.values()} == games | on_request
 
 
-def test_episodes_of_a_seed_are_the_same() -> None:
+def test_episodes_with_the_same_seed_are_equal() -> None:
     env = SandboxEnv("landing", every=10)
-    assert played(env, 5) == played(SandboxEnv("landing", every=10), 5)
-    assert played(env, 5) != played(env, 6)
+    assert play_episode(env, 5) == play_episode(SandboxEnv("landing", every=10), 5)
+    assert play_episode(env, 5) != play_episode(env, 6)
 
 
-def test_first_episode_has_the_scenes_seed_and_later_ones_others() -> None:
+def test_first_episode_has_the_seed_of_the_scene_and_later_ones_others() -> None:
     env = SandboxEnv("landing")
     seeds = [env.reset()[1]["seed"] for _ in range(3)]
     assert seeds[0] == env.scene.world.seed
@@ -73,17 +73,17 @@ def test_first_episode_has_the_scenes_seed_and_later_ones_others() -> None:
     assert seeds == [env.reset()[1]["seed"] for env in [SandboxEnv("landing")] for _ in range(3)]
 
 
-def test_episode_is_a_session_that_replays() -> None:
+def test_recording_of_an_episode_replays_with_equal_hash_and_score() -> None:
     env = SandboxEnv("landing", every=5)
-    told = played(env, 3)
+    episode = play_episode(env, 3)
     recording = env.recording()
     run = rerun(recording, audit=False)
     assert run.info["state_hash"] == recording.state_hash
-    assert run.info["game"]["score"] == recording.score == sum(reward for _, reward, _, _ in told)
+    assert run.info["game"]["score"] == recording.score == sum(reward for _, reward, _, _ in episode)
     assert run.info["game"]["otherwise"] is None
 
 
-def test_agent_sees_the_bodies_the_time_and_the_score() -> None:
+def test_observation_has_bodies_gauges_time_and_score() -> None:
     env = SandboxEnv("landing", every=2)
     first, _ = env.reset()
     observation, _, _, _, info = env.step([0.0, 0.0, 0.0])
@@ -92,12 +92,12 @@ def test_agent_sees_the_bodies_the_time_and_the_score() -> None:
     dt, gravity = env.scene.solver.dt, env.scene.world.gravity[1]
     assert observation[-2] == pytest.approx(2 * dt)  # s
     assert observation[-1] == info["score"] == 0
-    assert observation[2] == first[2]  # nothing pushes aside
+    assert observation[2] == first[2]  # no horizontal force
     assert observation[3] == pytest.approx(2 * dt * gravity, rel=1e-5)  # free fall; float32
-    assert observation[6] == 1.0  # it is there
+    assert observation[6] == 1.0  # the body exists
 
 
-def test_engine_fires_as_far_as_an_action_says() -> None:
+def test_analogue_action_sets_the_thrust() -> None:
     env = SandboxEnv("landing", every=50)
     env.reset()
     half, mass = 0.5, 1.0
@@ -107,30 +107,30 @@ def test_engine_fires_as_far_as_an_action_says() -> None:
     assert [press.value for press in env.recording().presses] == [half]
 
 
-def test_duration_truncates(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_episode_is_truncated_at_the_duration(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(registry.RULES, "landing", Toy)
     env = SandboxEnv(loads(TOY), every=30)
-    told = played(env, None)
-    assert told[-1][2:] == (False, True)
-    assert len(told) == 1 + 7  # 200 steps of 0.01 s
+    episode = play_episode(env, None)
+    assert episode[-1][2:] == (False, True)
+    assert len(episode) == 1 + 7  # 200 steps of 0.01 s
 
 
 class Digital(Toy):
     controls = (Control("kick", "up", ("up",)),)
 
 
-def test_controls_without_shades_are_0_or_1(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_digital_controls_have_a_discrete_action_space(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(registry.RULES, "landing", Digital)
     env = SandboxEnv(loads(TOY), every=10)
-    check_env(env, skip_render_check=True)  # which would make it anew from an id
+    check_env(env, skip_render_check=True)  # the render check makes an environment from an id
     assert env.action_space == gymnasium.spaces.MultiDiscrete([2])
     env.reset()
     _, reward, *_ = env.step(np.array([1]))
     assert reward == 0.5
-    assert env.step(np.array([1]))[1] == 0.0  # it is held: it was pressed once
+    assert env.step(np.array([1]))[1] == 0.0  # still held: one press gives one reward
 
 
-def test_pictures_are_of_the_scene() -> None:
+def test_rendered_picture_shows_the_ship_and_changes() -> None:
     env = SandboxEnv("landing", render_mode="rgb_array")
     env.reset()
     picture = env.render()
@@ -143,8 +143,8 @@ def test_pictures_are_of_the_scene() -> None:
     assert (env.render() != picture).any()
 
 
-def test_pictures_show_what_the_rules_alone_know() -> None:
-    """The barrel, and the flame of an engine: no body is there, and still they are seen."""
+def test_rendered_picture_shows_overlays_of_the_rules() -> None:
+    """The barrel and the flame of an engine are drawn by the rules, not by bodies."""
     duel = SandboxEnv("duel", every=60, render_mode="rgb_array")
     duel.reset()
     before = duel.render()
@@ -152,12 +152,12 @@ def test_pictures_show_what_the_rules_alone_know() -> None:
     assert duel.render().shape == before.shape
     assert (duel.render() != before).any()
     ship = SandboxEnv("landing", render_mode="rgb_array")
-    off, on = (drawn_after(ship, level) for level in (0.0, 1.0))
+    off, on = (render_after_step(ship, level) for level in (0.0, 1.0))
     changed = (off != on).any(axis=2)
     assert 10 < changed.sum() < 2000  # the flame, not the ship, which one step moves by 0.2 mm
 
 
-def drawn_after(env: SandboxEnv, engine: float) -> np.ndarray:
+def render_after_step(env: SandboxEnv, engine: float) -> np.ndarray:
     env.reset(seed=1)
     env.step([engine, 0.0, 0.0])
     return np.asarray(env.render())
@@ -167,7 +167,7 @@ def drawn_after(env: SandboxEnv, engine: float) -> np.ndarray:
     "action",
     [[np.nan, 0.0, 0.0], [np.inf, 0.0, 0.0], [0.0, 0.0], [0.0] * 4, [[0.0] * 3], 0.5, "up", None, [0.0, 0.0, "up"]],
 )
-def test_an_action_that_is_none_is_told_and_nothing_happens(action: object) -> None:
+def test_invalid_action_raises_and_leaves_the_environment_unchanged(action: object) -> None:
     env = SandboxEnv("landing")
     env.reset(seed=1)
     with pytest.raises(ValueError, match="3 numbers, 0 to 1, for engine, turn left, turn right; not"):
@@ -175,7 +175,7 @@ def test_an_action_that_is_none_is_told_and_nothing_happens(action: object) -> N
     assert (env.recording().presses, env.recording().duration) == ((), 0.0)
 
 
-def test_actions_beyond_their_bounds_are_cut_off_there() -> None:
+def test_analogue_actions_are_clipped_and_digital_ones_refused() -> None:
     env = SandboxEnv("landing", every=5)
     env.reset(seed=1)
     env.step([7.0, -3.0, 0.5])
@@ -187,60 +187,60 @@ def test_actions_beyond_their_bounds_are_cut_off_there() -> None:
             duel.step(action)
 
 
-def test_nothing_follows_the_end() -> None:
+def test_step_after_the_end_raises_until_reset() -> None:
     env = SandboxEnv("landing", every=50)
-    told = played(env, 3)
+    episode = play_episode(env, 3)
     end = env.recording()
     with pytest.raises(gymnasium.error.ResetNeeded, match="the episode has ended"):
         env.step([0.0, 0.0, 0.0])
     assert env.recording() == end
-    assert played(env, 3) == told  # another may begin
+    assert play_episode(env, 3) == episode  # a reset starts another episode
 
 
-def gauge(env: SandboxEnv, observation: np.ndarray, name: str) -> float:
+def observed_value(env: SandboxEnv, observation: np.ndarray, name: str) -> float:
     return float(observation[env.observed.index(name)])
 
 
-def test_gunner_sees_the_gun_the_wind_and_the_ground() -> None:
+def test_duel_observes_barrel_weapon_wind_and_terrain() -> None:
     env = SandboxEnv("duel", every=10)
     first, info = env.reset(seed=2)
-    assert gauge(env, first, "may fire") == 1.0
-    assert info["lines"]["wind"].startswith(f"{abs(gauge(env, first, 'wind')):.1f} m/s")
+    assert observed_value(env, first, "may fire") == 1.0
+    assert info["lines"]["wind"].startswith(f"{abs(observed_value(env, first, 'wind')):.1f} m/s")
     turned, *_ = env.step([1, 0, 0, 0, 1, 0])
-    assert gauge(env, turned, "Red barrel") > gauge(env, first, "Red barrel")
-    assert gauge(env, turned, "Red weapon") == 1.0
-    assert gauge(env, turned, "Blue barrel") == gauge(env, first, "Blue barrel")
+    assert observed_value(env, turned, "Red barrel") > observed_value(env, first, "Red barrel")
+    assert observed_value(env, turned, "Red weapon") == 1.0
+    assert observed_value(env, turned, "Blue barrel") == observed_value(env, first, "Blue barrel")
     flying, *_ = env.step([0, 0, 0, 0, 0, 1])
-    assert (gauge(env, flying, "may fire"), gauge(env, flying, "shells")) == (0.0, 1.0)
+    assert (observed_value(env, flying, "may fire"), observed_value(env, flying, "shells")) == (0.0, 1.0)
     heights = [k for k, name in enumerate(env.observed) if name.startswith("height")]
     other, _ = env.reset(seed=3)
     assert (first[heights] != other[heights]).any()
     for _ in range(100):
         later, *_ = env.step([0, 0, 0, 0, 0, 1])
-    assert gauge(env, later, "landed x") > 0.0
+    assert observed_value(env, later, "landed x") > 0.0
 
 
-def test_skip_sees_the_broom_the_weight_and_whose_turn_it_is() -> None:
+def test_curling_observes_broom_weight_turn_and_team() -> None:
     env = SandboxEnv("curling", every=20)
     env.reset(seed=2)
     while not env.step([0] * 7)[0][env.observed.index("may throw")]:
         pass
-    seen, *_ = env.step([1, 0, 1, 0, 1, 0, 0])
-    found = [gauge(env, seen, name) for name in ("broom", "weight", "turn", "team", "thrown", "stones run")]
+    aimed, *_ = env.step([1, 0, 1, 0, 1, 0, 0])
+    found = [observed_value(env, aimed, name) for name in ("broom", "weight", "turn", "team", "thrown", "stones run")]
     assert found == [pytest.approx(0.1), pytest.approx(0.5), -1.0, 0.0, 0.0, 0.0]  # 0.2 s at 0.5 and 2.5 m/s
     thrown, *_ = env.step([0, 0, 0, 0, 0, 1, 0])
-    assert gauge(env, thrown, "stones run") == 1.0
+    assert observed_value(env, thrown, "stones run") == 1.0
 
 
-def test_games_go_on_side_by_side() -> None:
-    """In processes of their own or one after the other: what a seed and actions lead to is the same."""
+def test_sync_and_async_vector_environments_agree() -> None:
+    """Equal seeds and actions give equal observations in one process and in several."""
     found = []
     for mode in ("sync", "async"):
         games = gymnasium.make_vec("sandbox/ArtilleryDuel-v0", num_envs=2, vectorization_mode=mode)
-        seen, info = games.reset(seed=5)
+        observations, info = games.reset(seed=5)
         assert info["seed"].tolist() == [5, 6]
         games.action_space.seed(1)
-        rows = [seen] + [games.step(games.action_space.sample())[0] for _ in range(20)]
+        rows = [observations] + [games.step(games.action_space.sample())[0] for _ in range(20)]
         found.append(np.stack(rows))
         games.close()
     assert found[0].tobytes() == found[1].tobytes()
@@ -249,16 +249,16 @@ def test_games_go_on_side_by_side() -> None:
 
 def test_environment_is_pickled_and_copied_before_an_episode() -> None:
     env = SandboxEnv("landing", every=20)
-    told = played(SandboxEnv("landing", every=20), 4)
-    assert played(pickle.loads(pickle.dumps(env)), 4) == played(copy.deepcopy(env), 4) == told
+    episode = play_episode(SandboxEnv("landing", every=20), 4)
+    assert play_episode(pickle.loads(pickle.dumps(env)), 4) == play_episode(copy.deepcopy(env), 4) == episode
     env.reset()
     with pytest.raises(TypeError, match="a running simulation cannot be copied"):
         pickle.dumps(env)
     env.close()
-    assert played(pickle.loads(pickle.dumps(env)), 4) == told
+    assert play_episode(pickle.loads(pickle.dumps(env)), 4) == episode
 
 
-def test_what_cannot_be_played_is_told() -> None:
+def test_invalid_scene_option_or_engine_raises() -> None:
     with pytest.raises(UnsuitableSceneError, match="has no game with rules"):
         SandboxEnv("bounce")
     with pytest.raises(ValueError, match="no body is named 'shop'"):
@@ -280,9 +280,9 @@ def test_what_cannot_be_played_is_told() -> None:
         SandboxEnv("landing").reset(options={"wind": 1})
 
 
-def test_gymnasium_is_imported_only_when_asked_for() -> None:
+def test_gymnasium_is_imported_only_by_sandbox_gym() -> None:
     code = "import sandbox, sandbox.measure.run.runner, sys; assert 'gymnasium' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True)
     code = "import sys; sys.modules['gymnasium'] = None\ntry:\n import sandbox.gym\nexcept ImportError as e: print(e)"
-    told = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
-    assert told == "sandbox.gym needs gymnasium: pip install -e '.[gym]'\n"
+    printed = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    assert printed == "sandbox.gym needs gymnasium: pip install -e '.[gym]'\n"

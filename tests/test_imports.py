@@ -1,4 +1,4 @@
-"""Imports within the package form no cycle, neither of modules nor of folders; import strings are listed here."""
+"""Imports within the package form no cycle of modules or of folders; import strings are listed here."""
 
 import ast
 import graphlib
@@ -23,7 +23,7 @@ def _modules() -> dict[str, Path]:
 
 
 def _imports(path: Path, modules: dict[str, Path]) -> set[str]:
-    """Return the modules that one imports: at its top, late in functions, or for type checkers alone."""
+    """Return the modules that a module imports: at the top, within functions, or for type checkers only."""
     found: set[str] = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         names: list[str] = []
@@ -43,11 +43,11 @@ def _graph() -> dict[str, set[str]]:
     return {name: _imports(path, modules) - {name} for name, path in modules.items()}
 
 
-def test_no_two_modules_import_each_other_directly_or_through_others() -> None:
+def test_imports_of_modules_form_no_cycle() -> None:
     graph = _graph()
     assert len(graph) > 100
     assert graph["sandbox.engines.registry"]
-    # The package itself names its modules as text, and imports them for type checkers only.
+    # The package itself names its modules in strings, and imports them for type checkers only.
     inside = {name: needs - {"sandbox"} for name, needs in graph.items() if name != "sandbox"}
     graphlib.TopologicalSorter(inside).prepare()  # a CycleError names the modules
 
@@ -55,7 +55,7 @@ def test_no_two_modules_import_each_other_directly_or_through_others() -> None:
 TOLERATED_FOLDER_IMPORTS = {
     ("sandbox", "games", "window"),
 }
-"""Package, and the two of its direct members whose import is left out of the graph."""
+"""Imports that are omitted from the graph: package, and the importing and the imported member."""
 
 
 def _folder_graph(package: str, graph: dict[str, set[str]]) -> dict[str, set[str]]:
@@ -75,14 +75,14 @@ def _folder_graph(package: str, graph: dict[str, set[str]]) -> dict[str, set[str
     return found
 
 
-def test_no_two_members_of_a_package_import_each_other() -> None:
+def test_imports_between_members_of_a_package_form_no_cycle() -> None:
     graph = _graph()
     assert "description" in _folder_graph("sandbox.scene", graph)["compile"]
     for package in (name for name, path in _modules().items() if path.name == "__init__.py"):
         graphlib.TopologicalSorter(_folder_graph(package, graph)).prepare()  # a CycleError names the members
 
 
-def test_a_cycle_of_folders_is_found() -> None:
+def test_import_cycle_of_folders_is_detected() -> None:
     graph = {"p.a.one": {"p.b.one"}, "p.b.two": {"p.a.two"}, "p.a.two": set[str](), "p.b.one": set[str]()}
     with pytest.raises(graphlib.CycleError):
         graphlib.TopologicalSorter(_folder_graph("p", graph)).prepare()
@@ -103,11 +103,11 @@ IMPORT_STRINGS = {
     "sandbox.measure.extremes.isolation": "module that a subprocess runs",
     "sandbox.notebook": "pages by type",
 }
-"""Modules that name modules of the package by text, and for what."""
+"""Modules that contain names of modules of the package as strings, and what for."""
 
 
 def _import_strings(name: str, path: Path, modules: dict[str, Path]) -> set[str]:
-    """Return the modules that a module names as `package.module` or `package.module:name`, without its own packages."""
+    """Return the modules that a module names in strings `package.module[:name]`, without its own packages."""
     nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
     texts = [node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)]
     named = [re.fullmatch(r"(sandbox(?:\.\w+)+)(?::\w+)?", text) for text in texts]
@@ -115,12 +115,12 @@ def _import_strings(name: str, path: Path, modules: dict[str, Path]) -> set[str]
     return {module for module in found if not name.startswith(f"{module}.")}
 
 
-def test_modules_that_name_others_by_text_are_listed() -> None:
+def test_modules_with_import_strings_are_listed() -> None:
     modules = _modules()
     assert {name for name, path in modules.items() if _import_strings(name, path, modules)} == set(IMPORT_STRINGS)
 
 
-def test_a_cycle_is_found(tmp_path: Path) -> None:
+def test_imports_within_functions_and_type_checking_are_found(tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text("def f():\n    import b\n")
     (tmp_path / "b.py").write_text("from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from a import f\n")
     modules = {name: tmp_path / f"{name}.py" for name in "ab"}

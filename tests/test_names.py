@@ -1,4 +1,4 @@
-"""No two public classes or type aliases have one name: a name in a message, a hint or a search means one type."""
+"""Public classes and type aliases have distinct names, so that a name in a message or a hint means one type."""
 
 import ast
 from collections import defaultdict
@@ -30,13 +30,13 @@ def _types(tree: ast.Module) -> Iterator[str]:
 
 
 def test_public_types_have_distinct_names() -> None:
-    homes: dict[str, list[str]] = defaultdict(list)
+    paths_of: dict[str, list[str]] = defaultdict(list)
     for path in sorted(ROOT.rglob("*.py")):
         for name in _types(ast.parse(path.read_text(encoding="utf-8"))):
-            homes[name].append(str(path.relative_to(ROOT)))
-    assert len(homes) > 800
-    shared = [f"{name}: {', '.join(paths)}" for name, paths in sorted(homes.items()) if len(paths) > 1]
-    assert not shared, "\n".join(shared)
+            paths_of[name].append(str(path.relative_to(ROOT)))
+    assert len(paths_of) > 800
+    duplicates = [f"{name}: {', '.join(paths)}" for name, paths in sorted(paths_of.items()) if len(paths) > 1]
+    assert not duplicates, "\n".join(duplicates)
 
 
 def test_types_are_found_by_their_definition() -> None:

@@ -1,4 +1,4 @@
-"""Display in notebooks: self-contained, escaped, bounded, and imported only when it is needed."""
+"""HTML display in notebooks: self-contained, escaped, of limited size, imported only when needed."""
 
 import html
 import re
@@ -52,17 +52,17 @@ def displayed(scene: sandbox.Scene) -> dict[str, str]:
     run = sandbox.run(scene)
     swept = sandbox.compare(scene, ["pymunk"], sweep={"solver.dt": [0.01, 0.005]})
     moved = sandbox.compare(scene, ["pymunk"], sweep={"world.gravity": [[0, -10], [0, -5]]})
-    both = {
+    values = {
         "scene": scene,
         "run": run,
         "comparison": sandbox.compare(scene, ["pymunk"]),
         "sweep": swept,
         "moved": moved,
     }
-    return {name: value._repr_html_() for name, value in both.items()}
+    return {name: value._repr_html_() for name, value in values.items()}
 
 
-def test_displays_are_frames_that_hold_hostile_texts_as_texts(scene: sandbox.Scene) -> None:
+def test_displays_escape_hostile_texts_within_a_sandboxed_frame(scene: sandbox.Scene) -> None:
     for name, text in displayed(scene).items():
         document = document_in(text)
         assert "<script>alert" not in document, name
@@ -73,7 +73,7 @@ def test_displays_are_frames_that_hold_hostile_texts_as_texts(scene: sandbox.Sce
         assert len(text) < MAX_CHARACTERS, name
 
 
-def test_run_has_a_replay_and_figures_and_a_scene_a_picture(scene: sandbox.Scene) -> None:
+def test_run_shows_a_replay_and_figures_and_a_scene_a_picture(scene: sandbox.Scene) -> None:
     found = displayed(scene)
     run = document_in(found["run"])
     assert "<canvas" in run
@@ -85,10 +85,10 @@ def test_run_has_a_replay_and_figures_and_a_scene_a_picture(scene: sandbox.Scene
     assert "(0, −10) m/s²" in picture
     assert "pymunk, dt 0.005" in document_in(found["sweep"])
     assert "<canvas" in document_in(found["sweep"])
-    assert "<canvas" not in document_in(found["moved"])  # it has no one scene to be drawn
+    assert "<canvas" not in document_in(found["moved"])  # its runs have different scenes
 
 
-def test_refused_run_says_why(scene: sandbox.Scene) -> None:
+def test_display_of_a_refused_run_gives_the_reason(scene: sandbox.Scene) -> None:
     run = sandbox.run(scene, "pymunk", integrator="rk4")
     document = document_in(run._repr_html_())
     assert "refused" in document
@@ -101,7 +101,7 @@ def test_run_with_added_bodies_is_displayed(scene: sandbox.Scene) -> None:
     assert "added during the run" in document_in(run._repr_html_())
 
 
-def test_display_that_would_be_too_long_has_no_replay(scene: sandbox.Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_display_beyond_the_size_limit_has_no_replay(scene: sandbox.Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     run = sandbox.run(scene)
     monkeypatch.setattr("sandbox.notebook.MAX_CHARACTERS", 1000)
     document = document_in(run._repr_html_())
@@ -138,7 +138,7 @@ def table() -> sandbox.Table:
     return sandbox.Table(sandbox.loads(TABLE))
 
 
-def test_shot_has_a_replay_paths_and_figures(table: sandbox.Table) -> None:
+def test_shot_shows_a_replay_paths_and_figures(table: sandbox.Table) -> None:
     shot = table.shoot(sandbox.Stroke(aim=0.0, speed=2.0), ways=True)
     assert shot.pocketed["<b>bold</b>"] == "<i>hole</i>"
     text = shot._repr_html_()
@@ -151,7 +151,7 @@ def test_shot_has_a_replay_paths_and_figures(table: sandbox.Table) -> None:
     assert len(text) < MAX_CHARACTERS
 
 
-def test_shot_without_paths_shows_its_end_and_how_to_record_them(table: sandbox.Table) -> None:
+def test_shot_without_recorded_paths_shows_its_end_and_a_hint(table: sandbox.Table) -> None:
     shot = table.shoot(sandbox.Stroke(aim=1.0, speed=2.0))
     document = document_in(shot._repr_html_())
     assert "<canvas" not in document
@@ -165,7 +165,9 @@ def test_shot_that_moves_nothing_is_displayed(table: sandbox.Table) -> None:
     assert "all balls at rest" in document
 
 
-def test_page_of_a_shot_is_shorter_without_its_replay(table: sandbox.Table, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_display_of_a_shot_beyond_the_size_limit_has_no_replay(
+    table: sandbox.Table, monkeypatch: pytest.MonkeyPatch
+) -> None:
     shot = table.shoot(sandbox.Stroke(aim=0.0, speed=2.0), ways=True)
     monkeypatch.setattr("sandbox.notebook.MAX_CHARACTERS", 1000)
     document = document_in(shot._repr_html_())
@@ -173,7 +175,7 @@ def test_page_of_a_shot_is_shorter_without_its_replay(table: sandbox.Table, monk
     assert 'class="paths"' in document
 
 
-def test_odds_and_tradeoff_are_displayed() -> None:
+def test_odds_are_displayed_and_represented() -> None:
     odds = sandbox.odds(sandbox.load("9-ball"), count=50)
     document = document_in(odds._repr_html_())
     assert "data:image/png;base64," in document
@@ -191,12 +193,12 @@ def test_tradeoff_is_displayed_and_represented(scene: sandbox.Scene) -> None:
     assert len(repr(found).splitlines()) <= 5
 
 
-def test_nothing_else_is_displayed() -> None:
+def test_display_of_another_type_raises() -> None:
     with pytest.raises(TypeError, match="no display for int"):
         html_of(1)
 
 
-def test_renderer_is_imported_when_something_is_displayed() -> None:
+def test_renderer_is_not_imported_by_a_run() -> None:
     code = (
         f"import sys, sandbox; run = sandbox.run(sandbox.loads({TEXT!r}));"
         "print([n for n in sys.modules if n.startswith(('sandbox.report', 'sandbox.notebook', 'matplotlib'))])"

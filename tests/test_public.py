@@ -1,4 +1,4 @@
-"""The public interface: what `import sandbox` offers, and what it costs."""
+"""The public interface: names of `import sandbox`, their behaviour, and the cost of the import."""
 
 import subprocess
 import sys
@@ -88,7 +88,7 @@ NAMES = [
 TEXT = '[world]\nduration = 0.1\n[[ball]]\nname = "a"\nposition = [0, 0]\nvelocity = [1, 0]\nradius = 1\n'
 
 
-def test_names_are_those_promised() -> None:
+def test_public_names_are_the_listed_ones() -> None:
     assert sandbox.__all__ == NAMES
     assert dir(sandbox) == sorted(NAMES)
 
@@ -102,7 +102,7 @@ def test_name_is_importable_and_documented(name: str) -> None:
         assert value.__doc__
 
 
-def test_signatures_name_the_fields() -> None:
+def test_signatures_of_models_list_their_fields() -> None:
     names = [*ACTIONS, "Ball", "Settings", "Stroke"]
     code = f"import inspect, sandbox\nfor n in {names}: print(*inspect.signature(getattr(sandbox, n)).parameters)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120)
@@ -119,13 +119,13 @@ def test_version_is_that_of_the_package() -> None:
     assert sandbox.__version__ == version("sandbox2d")
 
 
-def test_actions_are_done_in_a_run_and_one_that_cannot_be_ends_it() -> None:
+def test_run_applies_actions_and_fails_at_an_impossible_one() -> None:
     scene = sandbox.loads(TEXT)
     kick = sandbox.Impulse(time=0.0, body="a", impulse=(1.0, 0.0))
     ball = sandbox.Ball(name="b", position=(5.0, 0.0), radius=1.0)
-    done = sandbox.run(scene, actions=[kick, sandbox.Spawn(time=0.05, ball=ball)])
-    assert (done.status, done.names.tolist()) == ("ok", ["a", "b"])
-    assert done.velocity[-1, 0].tolist() == [2.0, 0.0]  # 1 m/s, and 1 N·s on 1 kg
+    completed = sandbox.run(scene, actions=[kick, sandbox.Spawn(time=0.05, ball=ball)])
+    assert (completed.status, completed.names.tolist()) == ("ok", ["a", "b"])
+    assert completed.velocity[-1, 0].tolist() == [2.0, 0.0]  # 1 m/s, and 1 N·s on 1 kg
     failed = sandbox.run(scene, actions=[sandbox.Remove(time=0.0, body="nobody")])
     assert failed.status == "failed"
     assert "no body is named 'nobody'" in str(failed.reason)
@@ -138,19 +138,19 @@ def test_shipped_scene_is_loaded_by_name_anywhere(tmp_path: Path, monkeypatch: p
         sandbox.load("bounc")
 
 
-def test_star_brings_all_of_them() -> None:
-    brought: dict[str, object] = {}
-    exec("from sandbox import *", brought)
-    assert set(NAMES) <= set(brought)
+def test_star_import_brings_all_public_names() -> None:
+    namespace: dict[str, object] = {}
+    exec("from sandbox import *", namespace)
+    assert set(NAMES) <= set(namespace)
 
 
-def test_other_names_are_not_there() -> None:
+def test_unknown_name_raises_attribute_error() -> None:
     with pytest.raises(AttributeError, match=r"^module 'sandbox' has no attribute 'nonsense'$"):
         sandbox.nonsense  # noqa: B018, the point of the test
     assert not hasattr(sandbox, "__path_to_nowhere__")
 
 
-def test_scene_is_loaded_run_saved_and_read_again(tmp_path: Path) -> None:
+def test_scene_is_loaded_run_saved_and_loaded_again(tmp_path: Path) -> None:
     path = tmp_path / "scene.toml"
     path.write_text(TEXT)
     scene = sandbox.load(path)
@@ -209,10 +209,10 @@ def test_scene_is_run_by_its_name_or_path(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "right"), [("Dt", "did you mean 'dt'"), ("seed", r"load\(…, \['world.seed=2'\]\)"), ("zzz", "known: dt, ")]
+    ("name", "hint"), [("Dt", "did you mean 'dt'"), ("seed", r"load\(…, \['world.seed=2'\]\)"), ("zzz", "known: dt, ")]
 )
-def test_setting_that_does_not_exist_is_refused_with_what_is_right(name: str, right: str) -> None:
+def test_unknown_setting_is_refused_with_a_hint(name: str, hint: str) -> None:
     scene = sandbox.loads(TEXT)
     for call in (sandbox.run, sandbox.compare, sandbox.tradeoff):
-        with pytest.raises(ValueError, match=right):
+        with pytest.raises(ValueError, match=hint):
             call(scene, **{name: 0.1})

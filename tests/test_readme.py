@@ -1,4 +1,4 @@
-"""The README: one page, with a scene, messages, links and commands that are right. Its examples run in tests/docs."""
+"""The README: length, scene, messages, links and commands are right. Its examples run in tests/docs."""
 
 import re
 from pathlib import Path
@@ -16,32 +16,32 @@ CHANGES = (
     ("radius = 0.5", "radius = -0.5"),
     ("restitution = 0.8", 'material = "rubbr"'),
 )
-"""The changes that the text names, which make the faulty file of the first scene."""
+"""Changes named in the text that make a faulty file of the first scene."""
 
 
 def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
 
 
-def test_the_scene_in_ten_lines_runs():
+def test_readme_scene_has_ten_lines_and_runs():
     (text,) = blocks("toml")
     lines = [line for line in text.splitlines() if line and not line.startswith("#")]
     assert len(lines) <= 10
     assert run(loads(text)).status == "ok"
 
 
-def test_it_is_one_page():
+def test_readme_is_one_page():
     assert len(README.splitlines()) <= 150
 
 
-def test_links_lead_somewhere():
+def test_relative_links_of_the_readme_exist():
     links = re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", README)
     assert len(links) > 20
     root = Path(__file__).parents[1]
     assert [link for link in links if not link.startswith("http") and not (root / link).exists()] == []
 
 
-def test_faults_read_as_shown():
+def test_faults_in_the_readme_are_the_reported_ones():
     (bad,) = blocks("toml")
     for right, wrong in CHANGES:
         assert right in bad
@@ -52,6 +52,6 @@ def test_faults_read_as_shown():
     assert shown == [str(fault) for fault in error.value.faults]
 
 
-def test_two_commands_are_those_of_a_new_machine():
+def test_readme_has_two_setup_commands():
     setups = re.findall(r"^python3 -m venv .*$", README, re.MULTILINE)
     assert [bool(re.search(r"sandbox run|pytest$", line)) for line in setups] == [True, True]

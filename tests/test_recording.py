@@ -33,7 +33,7 @@ def document() -> dict[str, Any]:
     return dict(json.loads(RECORDING.to_json()))
 
 
-def paths(text: str) -> list[str]:
+def fault_paths(text: str) -> list[str]:
     with pytest.raises(SceneError) as caught:
         Recording.from_json(text, "r.json")
     for fault in caught.value.faults:
@@ -42,15 +42,15 @@ def paths(text: str) -> list[str]:
     return [fault.path for fault in caught.value.faults]
 
 
-def test_recording_written_and_read_again_is_equal() -> None:
+def test_recording_round_trips_through_json() -> None:
     assert Recording.from_json(RECORDING.to_json()) == RECORDING
 
 
 @given(strategies.scenes(), actions(), st.floats(0, 1e9), st.none() | st.text(max_size=9))
-def test_any_recording_written_and_read_again_is_equal(
-    scene: Scene, done: tuple[Action, ...], duration: float, state_hash: str | None
+def test_any_recording_round_trips_through_json(
+    scene: Scene, applied: tuple[Action, ...], duration: float, state_hash: str | None
 ) -> None:
-    recording = Recording(scene, "reference", scene.solver, done, duration, state_hash)
+    recording = Recording(scene, "reference", scene.solver, applied, duration, state_hash)
     text = recording.to_json()
     assert Recording.from_json(text) == recording
     assert Recording.from_json(text).to_json() == text
@@ -62,7 +62,7 @@ def test_recording_is_read_from_a_file(tmp_path: Path) -> None:
     assert Recording.load(path) == RECORDING
 
 
-def test_recording_that_cannot_be_read_is_a_fault(tmp_path: Path) -> None:
+def test_unreadable_file_is_a_fault_with_its_path(tmp_path: Path) -> None:
     binary = tmp_path / "b.json"
     binary.write_bytes(b"\xff\xfe\x00")
     for path in (tmp_path / "none.json", tmp_path, binary):
@@ -75,15 +75,15 @@ def test_recording_that_cannot_be_read_is_a_fault(tmp_path: Path) -> None:
     "text",
     ["", "null", "[]", "3", "{", "{}", '{"format": 2}', "[" * 100_000, "1" * 5000, '{"format": "1"}', "nan", "\x00"],
 )
-def test_text_that_is_no_recording_is_a_fault(text: str) -> None:
-    assert paths(text) == [""]
+def test_text_that_is_not_a_recording_is_a_fault(text: str) -> None:
+    assert fault_paths(text) == [""]
 
 
 @pytest.mark.parametrize("key", ["format", "scene", "engine", "settings", "actions", "duration"])
-def test_recording_without_one_of_its_parts_is_a_fault(key: str) -> None:
+def test_recording_without_a_required_key_is_a_fault(key: str) -> None:
     without = document()
     del without[key]
-    assert paths(json.dumps(without)) == [""]
+    assert fault_paths(json.dumps(without)) == [""]
 
 
 @pytest.mark.parametrize(
@@ -99,14 +99,14 @@ def test_recording_without_one_of_its_parts_is_a_fault(key: str) -> None:
         ({"scene": {"title": "\ud800"}}, ""), ({"scene": {"balls": [{"x": 1}]}}, "balls"),
     ],
 )  # fmt: skip
-def test_recording_with_a_wrong_part_is_a_fault(change: dict[str, Any], path: str) -> None:
-    assert paths(json.dumps({**document(), **change})) == [path]
+def test_recording_with_a_wrong_value_is_a_fault_at_its_path(change: dict[str, Any], path: str) -> None:
+    assert fault_paths(json.dumps({**document(), **change})) == [path]
 
 
 @given(st.sampled_from(sorted(document())), strategies.junk())
 @example("settings", {"": 1})
 @example("scene", {})
-def test_any_part_gives_a_recording_or_a_scene_error(key: str, value: Any) -> None:
+def test_any_value_gives_a_recording_or_a_scene_error(key: str, value: Any) -> None:
     text = json.dumps({**document(), key: value}, default=str)
     try:
         assert isinstance(Recording.from_json(text), Recording)

@@ -19,33 +19,33 @@ DOCS = Path(__file__).parents[1] / "docs"
     ("text", "value"),
     [("80GiB", 80 * 2**30), ("1.5 gib", 3 * 2**29), ("2_000MB", 2 * 10**9), ("4096", 4096), ("", MEMORY.default)],
 )
-def test_memory_is_stated_in_bytes_or_with_a_unit(text: str, value: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_memory_limit_is_read_in_bytes_or_with_a_unit(text: str, value: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SANDBOX_MAX_MEMORY", text)
     assert MEMORY.value == value
 
 
 @pytest.mark.parametrize(("text", "value"), [("2_000_000", 2_000_000), ("5e9", 5 * 10**9), ("1e99", 2**62)])
-def test_counts_are_plain_numbers(text: str, value: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_count_limit_is_read_as_a_number(text: str, value: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SANDBOX_MAX_PAIRS", text)
     assert PAIRS.value == value
 
 
 @pytest.mark.parametrize("text", ["much", "-1", "16GiB", "nan", "1" * 4000, "٣"])
-def test_wrong_value_of_a_variable_names_it_and_is_shown_in_part(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_message_of_a_wrong_value_names_the_variable_and_is_short(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SANDBOX_MAX_PAIRS", text)
     with pytest.raises(LimitValueError, match="SANDBOX_MAX_PAIRS") as error:
         resource_limits.check_environment()
     assert len(str(error.value)) < 200
 
 
-def test_wrong_value_of_a_variable_is_wrong_input(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+def test_wrong_value_of_a_variable_exits_with_status_2(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     monkeypatch.setenv("SANDBOX_MAX_MEMORY", "plenty")
     assert call(["scenes"]) == 2
     assert capsys.readouterr().err.startswith("sandbox: the environment variable SANDBOX_MAX_MEMORY is 'plenty'")
 
 
 @pytest.mark.parametrize("limit", LIMITS, ids=lambda limit: limit.variable)
-def test_what_a_message_says_to_set_is_enough(limit, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_value_that_a_message_recommends_is_sufficient(limit, monkeypatch: pytest.MonkeyPatch) -> None:
     for needed in (limit.default + 1, 3.7 * limit.default, 123_456_789_012_345):
         message = limit.refusal("it takes", needed)
         assert message is not None
@@ -56,7 +56,7 @@ def test_what_a_message_says_to_set_is_enough(limit, monkeypatch: pytest.MonkeyP
     assert limit.refusal("it takes", limit.default) is None
 
 
-def test_nothing_is_recommended_that_no_value_allows() -> None:
+def test_no_value_is_recommended_beyond_the_largest_one() -> None:
     assert "set SANDBOX" not in str(PAIRS.refusal("it takes", 1e30))
 
 
@@ -70,7 +70,7 @@ def test_scene_file_beyond_the_limit_is_read_once_the_limit_is_raised(tmp_path: 
     assert len(load(path).balls) == 1
 
 
-def test_scene_of_50_000_balls_with_all_their_keys_is_no_larger_than_the_limit() -> None:
+def test_file_size_limit_allows_50_000_balls_with_all_keys() -> None:
     ball = '[[ball]]\nname = "ball-12345"\nposition = [12.345678, 12.345678]\nvelocity = [0.123456, -1.234567]\n'
     ball += "radius = 0.5\nmass = 1.25\nrestitution = 0.9\nfriction = 0.3\n"
     assert too_large(50_000 * len(ball)) is None
@@ -99,7 +99,7 @@ def test_engine_names_the_limit_that_a_scene_exceeds(
     assert f"set {variable}=" in reason
 
 
-def test_memory_that_runs_out_is_one_line_and_a_failure(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+def test_memory_error_exits_with_status_1_and_one_line(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     def exhausted(*_: object, **__: object) -> None:
         raise MemoryError
 

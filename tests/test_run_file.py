@@ -1,4 +1,4 @@
-"""Run files: a stored run is read whole and sound, or refused with the array or key that is wrong."""
+"""Run files: a valid stored run is read completely; a damaged one is refused with the array or key at fault."""
 
 import dataclasses
 import io
@@ -49,13 +49,13 @@ Members = dict[str, bytes]
 
 
 @pytest.fixture(scope="module")
-def sound() -> Trajectory:
+def stored_run() -> Trajectory:
     return run(SCENE, actions=ACTIONS, account=True)
 
 
 @pytest.fixture
-def path(sound: Trajectory, tmp_path: Path) -> Path:
-    return sound.save(tmp_path / "run.npz")
+def path(stored_run: Trajectory, tmp_path: Path) -> Path:
+    return stored_run.save(tmp_path / "run.npz")
 
 
 def members_of(path: Path) -> Members:
@@ -76,7 +76,7 @@ def array(values: object, pickled: bool = False) -> bytes:
 
 
 def header(shape: object, descr: str = "<f8") -> bytes:
-    """Return an array of which only the header is there."""
+    """Return a .npy file that ends after its header."""
     text = f"{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}\n".encode()
     return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text
 
@@ -90,18 +90,18 @@ def refusal(path: Path) -> str:
     return message.removeprefix(f"{path} is not a stored run: ")
 
 
-def test_every_array_of_a_trajectory_has_a_shape() -> None:
+def test_every_array_of_a_trajectory_has_a_declared_shape() -> None:
     assert {field.name for field in dataclasses.fields(Trajectory)} == set(SHAPES)
 
 
-def test_info_is_modelled_as_a_run_writes_it(sound: Trajectory) -> None:
-    assert set(sound.info) | {"game"} == set(Info.model_fields)
+def test_info_model_has_the_keys_that_a_run_writes(stored_run: Trajectory) -> None:
+    assert set(stored_run.info) | {"game"} == set(Info.model_fields)
 
 
-def test_sound_run_is_read(path: Path, sound: Trajectory) -> None:
+def test_valid_run_is_read(path: Path, stored_run: Trajectory) -> None:
     found = Trajectory.load(path)
-    assert found.info == sound.info
-    assert found.account.tobytes() == sound.account.tobytes()
+    assert found.info == stored_run.info
+    assert found.account.tobytes() == stored_run.account.tobytes()
     assert found.names.tolist() == ["a", "b", "c"]
     assert found.position.flags.writeable
 
@@ -180,10 +180,10 @@ def test_damaged_array_is_refused(name: str, content: bytes, message: str, path:
 
 @pytest.mark.parametrize("value", [-3, 3, -(2**63), 2**63 - 1])
 @pytest.mark.parametrize("column", [0, 1])
-def test_pair_of_what_the_scene_does_not_have_is_refused(
-    value: int, column: int, path: Path, sound: Trajectory
+def test_contact_pair_with_an_unknown_index_is_refused(
+    value: int, column: int, path: Path, stored_run: Trajectory
 ) -> None:
-    pair = sound.contact_pair.copy()
+    pair = stored_run.contact_pair.copy()
     pair[-1, column] = value
     write(path, members_of(path) | {"contact_pair": array(pair)})
     assert "contact_pair: refers to an object that the scene does not have" in refusal(path)
@@ -234,33 +234,31 @@ def test_pair_of_what_the_scene_does_not_have_is_refused(
         ({"game": {"score": 1, "lamps": [[0.0, "left"]]}}, "info.game.lamps.0.1: "),
     ],
 )
-def test_info_that_no_run_writes_is_refused(
-    changes: dict[str, Any], message: str, path: Path, sound: Trajectory
-) -> None:
-    write(path, members_of(path) | {"info": array(json.dumps({**sound.info, **changes}))})
+def test_invalid_info_is_refused(changes: dict[str, Any], message: str, path: Path, stored_run: Trajectory) -> None:
+    write(path, members_of(path) | {"info": array(json.dumps({**stored_run.info, **changes}))})
     assert message in refusal(path)
 
 
-def test_info_that_lacks_a_key_is_refused_and_one_of_earlier_versions_is_not(path: Path, sound: Trajectory) -> None:
+def test_info_without_a_required_key_is_refused_and_optional_keys_may_lack(path: Path, stored_run: Trajectory) -> None:
     members, needed = members_of(path), []
-    for key in sound.info:
-        write(path, members | {"info": array(json.dumps({k: v for k, v in sound.info.items() if k != key}))})
+    for key in stored_run.info:
+        write(path, members | {"info": array(json.dumps({k: v for k, v in stored_run.info.items() if k != key}))})
         if Info.model_fields[key].is_required():
             needed.append(key)
             assert refusal(path) == f"info.{key}: Field required"
-        elif key not in ("actions", "causes"):  # by which this run has one more body, and an account
-            assert Trajectory.load(path).info == {k: v for k, v in sound.info.items() if k != key}
+        elif key not in ("actions", "causes"):  # the third body of this run and its account need them
+            assert Trajectory.load(path).info == {k: v for k, v in stored_run.info.items() if k != key}
     assert {"scene", "engine", "settings", "seed", "status", "reason", "steps", "seconds"} <= set(needed)
 
 
 @pytest.mark.parametrize("name", SHAPES)
-def test_missing_array_is_named_but_what_earlier_versions_lack(name: str, path: Path) -> None:
+def test_missing_array_is_named_unless_optional(name: str, path: Path) -> None:
     members = members_of(path)
     members.pop(name, None)
     write(path, members)
     if name not in run_file.OPTIONAL:
         assert refusal(path) == f"it has no {name}"
-    elif name not in ("energy", "account"):  # one needs the other
+    elif name not in ("energy", "account"):  # each needs the other
         assert len(Trajectory.load(path).time) == 51
 
 
@@ -279,14 +277,16 @@ def test_members_under_other_names_are_refused(change: Callable[[Members], Membe
 
 
 @pytest.mark.filterwarnings("ignore:Duplicate name:UserWarning")
-def test_member_that_is_there_twice_is_refused(path: Path) -> None:
+def test_duplicate_member_is_refused(path: Path) -> None:
     time = members_of(path)["time"]
     with zipfile.ZipFile(path, "a") as archive:
         archive.writestr("time.npy", time)
     assert refusal(path) == "it has time twice"
 
 
-def test_directory_of_many_members_is_not_read(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_archive_with_too_many_members_is_refused_before_it_is_opened(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with zipfile.ZipFile(path, "a") as archive:
         for number in range(2000):
             archive.writestr(f"{number}.npy", b"")
@@ -295,7 +295,7 @@ def test_directory_of_many_members_is_not_read(path: Path, monkeypatch: pytest.M
         Trajectory.load(path)
 
 
-def test_directory_of_an_archive_beyond_4_gib_is_bounded_too(path: Path, sound: Trajectory) -> None:
+def test_size_of_a_zip64_directory_is_limited_too(path: Path, stored_run: Trajectory) -> None:
     content = path.read_bytes()
     end = content[-22:]
     size, offset = struct.unpack("<2L", end[12:20])
@@ -304,20 +304,20 @@ def test_directory_of_an_archive_beyond_4_gib_is_bounded_too(path: Path, sound: 
         locator = struct.pack("<4sLQL", b"PK\6\7", 0, len(content) - 22, 1)
         path.write_bytes(content[:-22] + record + locator + end)
         if stated == size:
-            assert Trajectory.load(path).info == sound.info
+            assert Trajectory.load(path).info == stored_run.info
         else:
             with pytest.raises(ValueError, match="the directory of the archive"):
                 Trajectory.load(path)
 
 
 @pytest.mark.parametrize("content", [b"", b"PK", b"PK\5\6" + bytes(17), b"PK\5\6" + bytes(17) + b"\1"])
-def test_archive_without_an_end_is_refused(content: bytes, path: Path) -> None:
+def test_archive_without_an_end_record_is_refused(content: bytes, path: Path) -> None:
     path.write_bytes(content)
     with pytest.raises(ValueError, match=r"run\.npz is not a stored run: the end of the archive"):
         Trajectory.load(path)
 
 
-def test_method_of_compression_that_numpy_does_not_use_is_refused(path: Path) -> None:
+def test_archive_with_another_compression_method_is_refused(path: Path) -> None:
     members = members_of(path)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_LZMA) as archive:
         for name, content in members.items():
@@ -325,9 +325,9 @@ def test_method_of_compression_that_numpy_does_not_use_is_refused(path: Path) ->
     assert "compressed by another method" in refusal(path)
 
 
-def test_fortran_order_is_only_another_order(path: Path, sound: Trajectory) -> None:
-    write(path, members_of(path) | {"position": array(np.asfortranarray(sound.position))})
-    assert np.array_equal(Trajectory.load(path).position, sound.position, equal_nan=True)
+def test_array_in_fortran_order_is_read(path: Path, stored_run: Trajectory) -> None:
+    write(path, members_of(path) | {"position": array(np.asfortranarray(stored_run.position))})
+    assert np.array_equal(Trajectory.load(path).position, stored_run.position, equal_nan=True)
 
 
 def test_arrays_that_do_not_fit_into_memory_are_not_read(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -336,12 +336,12 @@ def test_arrays_that_do_not_fit_into_memory_are_not_read(path: Path, monkeypatch
         Trajectory.load(path)
 
 
-def test_archive_made_to_expand_is_not_expanded(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_zip_bomb_is_refused_before_it_is_expanded(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     contacts = 400_000
     pairs = np.zeros((contacts, 2))
     names = ("contact_point", "contact_normal", "contact_impulse")
-    many = dict.fromkeys(names, array(pairs)) | {"contact_pair": array(pairs.astype(np.int64))}
-    write(path, members_of(path) | many | {"contact_time": array(pairs[:, 0])})
+    bomb = dict.fromkeys(names, array(pairs)) | {"contact_pair": array(pairs.astype(np.int64))}
+    write(path, members_of(path) | bomb | {"contact_time": array(pairs[:, 0])})
     monkeypatch.setattr(run_file, "free_memory", lambda: 2**24)
     assert path.stat().st_size < 2**18
     with pytest.raises(TooLargeError, match="can be used"):
@@ -360,17 +360,17 @@ def test_info_beyond_the_size_of_a_session_is_not_read(path: Path, monkeypatch: 
         Trajectory.load(path)
 
 
-def test_message_is_one_printable_line(path: Path, sound: Trajectory) -> None:
-    write(path, members_of(path) | {"info": array(json.dumps({**sound.info, "work": {"\x1b[31m\n": "x"}}))})
+def test_message_is_one_printable_line(path: Path, stored_run: Trajectory) -> None:
+    write(path, members_of(path) | {"info": array(json.dumps({**stored_run.info, "work": {"\x1b[31m\n": "x"}}))})
     assert refusal(path).isprintable()
 
 
-def test_run_that_was_given_up_has_no_frames(tmp_path: Path) -> None:
-    given_up = run_without_frames(SCENE, "pymunk", SCENE.solver, (), "failed", "its process was killed")
-    assert not len(Trajectory.load(given_up.save(tmp_path / "run.npz")).time)
+def test_run_whose_process_was_killed_is_stored_without_frames(tmp_path: Path) -> None:
+    killed = run_without_frames(SCENE, "pymunk", SCENE.solver, (), "failed", "its process was killed")
+    assert not len(Trajectory.load(killed.save(tmp_path / "run.npz")).time)
 
 
-def test_folder_is_no_damage(tmp_path: Path) -> None:
+def test_folder_raises_is_a_directory_error(tmp_path: Path) -> None:
     with pytest.raises(IsADirectoryError):
         Trajectory.load(tmp_path)
 

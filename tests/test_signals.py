@@ -1,4 +1,4 @@
-"""Interrupts held back, and reraise_interrupt wherever they fall."""
+"""Signals: `defer_interrupt` delays SIGINT, `reraise_interrupt` restores a SIGINT that was lost or replaced."""
 
 import gc
 import signal
@@ -19,14 +19,14 @@ pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 
 @pytest.fixture(autouse=True)
-def interruptible() -> Iterator[None]:
-    """Python's own handler, whatever the tests were started with."""
+def default_handler() -> Iterator[None]:
+    """Install Python's own SIGINT handler, even if the tests were started with another."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
 
 
-def test_interrupt_waits_for_the_end() -> None:
+def test_deferred_interrupt_is_raised_at_the_end_of_the_block() -> None:
     done = []
     with pytest.raises(KeyboardInterrupt), defer_interrupt():
         signal.raise_signal(signal.SIGINT)
@@ -36,13 +36,13 @@ def test_interrupt_waits_for_the_end() -> None:
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_nothing_happens_without_an_interrupt() -> None:
+def test_defer_interrupt_restores_the_handler_without_an_interrupt() -> None:
     with defer_interrupt():
         assert signal.getsignal(signal.SIGINT) is not signal.default_int_handler
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_fault_within_is_told_and_the_handler_comes_back() -> None:
+def test_error_within_defer_interrupt_is_raised_and_the_handler_restored() -> None:
     with pytest.raises(ValueError, match="broken"), defer_interrupt():
         raise ValueError("broken")
     with pytest.raises(KeyboardInterrupt):
@@ -56,7 +56,7 @@ def test_ignored_interrupts_stay_ignored() -> None:
     assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
 
 
-def test_other_threads_go_on_undisturbed() -> None:
+def test_defer_interrupt_does_nothing_in_other_threads() -> None:
     done = []
 
     def work() -> None:
@@ -69,16 +69,16 @@ def test_other_threads_go_on_undisturbed() -> None:
     assert done == [signal.default_int_handler]
 
 
-def test_interrupt_in_disguise_is_an_interrupt() -> None:
+def test_interrupt_replaced_by_another_exception_is_raised_again() -> None:
     with pytest.raises(KeyboardInterrupt), reraise_interrupt():
         try:
             signal.raise_signal(signal.SIGINT)
         except KeyboardInterrupt:
-            raise TypeError("as C makes of it") from None
+            raise TypeError("raised by C code") from None
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
-def test_interrupt_that_was_lost_comes_at_the_end() -> None:
+def test_suppressed_interrupt_is_raised_at_the_end_of_the_block() -> None:
     done = []
     with pytest.raises(KeyboardInterrupt), reraise_interrupt():
         with suppress(KeyboardInterrupt):
@@ -87,7 +87,7 @@ def test_interrupt_that_was_lost_comes_at_the_end() -> None:
     assert done == ["all of it"]
 
 
-def test_faults_of_its_own_are_told_and_a_handler_that_raises_nothing_is_no_interrupt() -> None:
+def test_reraise_interrupt_keeps_other_errors_and_custom_handlers() -> None:
     with pytest.raises(ValueError, match="broken"), reraise_interrupt():
         raise ValueError("broken")
     done = []
@@ -97,7 +97,7 @@ def test_faults_of_its_own_are_told_and_a_handler_that_raises_nothing_is_no_inte
     assert done == ["handled"]
 
 
-def test_deferred_within_reraise_comes_at_the_end() -> None:
+def test_interrupt_deferred_within_reraise_is_raised_at_the_end() -> None:
     done = []
     with pytest.raises(KeyboardInterrupt), reraise_interrupt(), defer_interrupt():
         signal.raise_signal(signal.SIGINT)
@@ -106,50 +106,50 @@ def test_deferred_within_reraise_comes_at_the_end() -> None:
 
 
 @contextmanager
-def falling_into(function: str) -> Iterator[list[str]]:
-    """Send SIGINT when a function of some name is called, once; yield where it fell."""
-    fell: list[str] = []
+def interrupt_in(function: str) -> Iterator[list[str]]:
+    """Send SIGINT at the first call of a function with this name; yield the list of functions interrupted."""
+    interrupted: list[str] = []
 
     def watch(frame: FrameType, event: str, _: object) -> None:
-        if event == "call" and frame.f_code.co_name == function and not fell:
-            fell.append(function)
+        if event == "call" and frame.f_code.co_name == function and not interrupted:
+            interrupted.append(function)
             signal.raise_signal(signal.SIGINT)
 
     sys.setprofile(watch)
     try:
-        yield fell
+        yield interrupted
     finally:
         sys.setprofile(None)
 
 
 def test_interrupt_within_numpy_ends_a_run() -> None:
     scene = load(find("bounce"), ["world.duration=0.05"])
-    # numpy calls it where it compares rows, in C that does not pass on what it raises.
-    with falling_into("_promote_fields") as fell, pytest.raises(KeyboardInterrupt):
+    # numpy calls it when it compares rows, from C code that swallows exceptions.
+    with interrupt_in("_promote_fields") as interrupted, pytest.raises(KeyboardInterrupt):
         run(scene)
-    assert fell
+    assert interrupted
 
 
-def test_interrupt_while_a_space_is_freed_is_neither_lost_nor_printed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_interrupt_while_a_space_is_freed_is_raised_and_not_printed(monkeypatch: pytest.MonkeyPatch) -> None:
     printed: list[object] = []
     monkeypatch.setattr(sys, "unraisablehook", printed.append)
     scene = load(find("bounce"), ["world.duration=0.05"])
-    with falling_into("spacefree") as fell, pytest.raises(KeyboardInterrupt), reraise_interrupt():
+    with interrupt_in("spacefree") as interrupted, pytest.raises(KeyboardInterrupt), reraise_interrupt():
         run(scene)
-        gc.collect()  # a space and its bodies know each other
-    assert len(fell) == 1
+        gc.collect()  # a space and its bodies form a reference cycle
+    assert len(interrupted) == 1
     assert printed == []
 
 
-def test_command_interrupted_within_numpy_tells_so(capfd: pytest.CaptureFixture[str]) -> None:
-    with falling_into("_promote_fields") as fell:
+def test_command_interrupted_within_numpy_exits_with_status_130(capfd: pytest.CaptureFixture[str]) -> None:
+    with interrupt_in("_promote_fields") as interrupted:
         status = call(["run", "bounce", "--quiet"])
-    assert fell
+    assert interrupted
     assert (status, capfd.readouterr().err) == (130, "interrupted: 0 of 1 runs are complete and kept\n")
 
 
 class Finalised:
-    """Does something when it is freed; Python prints and forgets what that raises."""
+    """Calls a function when it is freed; Python prints and drops exceptions raised there."""
 
     def __init__(self, action: Callable[[], object]) -> None:
         self.action = action

@@ -1,4 +1,4 @@
-"""Every test can fail: it asserts, expects an exception or a warning, or calls a helper of the tests that does."""
+"""Every test can fail: it asserts, expects an exception or a warning, or calls a test helper that does."""
 
 import ast
 from collections import defaultdict
@@ -11,7 +11,7 @@ EXPECTING = frozenset({"raises", "warns", "fail", "check_env"})  # of pytest and
 NO_ASSERTION = {
     "scene/test_nesting.py::test_any_text_is_checked_in_linear_time": "quadratic time exceeds the time limit of a test",
 }
-"""Tests without an assertion, each with the reason why it can fail all the same."""
+"""Tests without an assertion, each with the reason why it can still fail."""
 
 
 def _called(function: ast.AST) -> Iterator[str]:
@@ -34,10 +34,10 @@ def _asserts(function: ast.AST) -> bool:
 
 
 def without_assertion(sources: dict[str, str]) -> set[str]:
-    """Return the tests, as "path::name", of some sources by path that neither assert nor call what asserts.
+    """Return the tests, as "path::name", of some sources by path that neither assert nor call a helper that asserts.
 
-    A helper is a function of the caller's file, or of the file that it is imported from; a method is found by its name,
-    and where several have it, all of them must assert.
+    A helper is a function of the caller's file or of the file that it is imported from. A method is found by its name;
+    if several methods have that name, all of them must assert.
     """
     trees = {path: ast.parse(source) for path, source in sources.items()}
     functions = [
@@ -75,7 +75,7 @@ def test_every_test_can_fail() -> None:
     assert without_assertion(sources) == set(NO_ASSERTION)
 
 
-def test_a_test_that_asserts_nothing_is_found() -> None:
+def test_test_without_assertion_is_detected() -> None:
     source = """
 def test_asserts(): assert 1
 def test_expects():

@@ -1,4 +1,4 @@
-"""Trajectories: arrays that are stored whole or not at all."""
+"""Trajectories: saving, loading, contacts and status."""
 
 import dataclasses
 import math
@@ -17,7 +17,7 @@ ARRAYS = [field.name for field in dataclasses.fields(Trajectory) if field.name !
 
 
 def trajectory(frames: int = 4, bodies: int = 3, contacts: int = 2, **info: Any) -> Trajectory:
-    """Return a trajectory of random numbers; its scene has as many bodies, and as many planes as there are contacts."""
+    """Return a trajectory of random numbers; its scene has that many bodies and one plane per contact."""
     draw = np.random.default_rng(1).standard_normal
     names = [f"bödy {k} 🎱" for k in range(bodies)]
     ramp = {"position": [0.0, 0.0], "radius": 1.0, "to_layer": "ramp"}
@@ -60,18 +60,18 @@ def trajectory(frames: int = 4, bodies: int = 3, contacts: int = 2, **info: Any)
 
 
 def equal(a: Trajectory, b: Trajectory) -> bool:
-    """Tell whether two trajectories are the same to the bit, types of their arrays too."""
+    """Return whether two trajectories are equal bit by bit, including the types of their arrays."""
     same = all(
         getattr(a, key).dtype == getattr(b, key).dtype
         and getattr(a, key).shape == getattr(b, key).shape
         and getattr(a, key).tobytes() == getattr(b, key).tobytes()
         for key in ARRAYS
     )
-    return same and repr(a.info) == repr(b.info)  # of which nan is a part
+    return same and repr(a.info) == repr(b.info)  # repr, because info contains nan
 
 
 @pytest.mark.parametrize("shape", [(4, 3, 2), (1, 0, 0), (0, 0, 0), (2, 1, 0)])
-def test_trajectory_saved_and_loaded_is_the_same_to_the_bit(tmp_path: Path, shape: tuple[int, int, int]) -> None:
+def test_trajectory_round_trips_bit_for_bit(tmp_path: Path, shape: tuple[int, int, int]) -> None:
     before = trajectory(*shape)
     path = before.save(tmp_path / "run.npz")
     assert path == tmp_path / "run.npz"
@@ -79,20 +79,20 @@ def test_trajectory_saved_and_loaded_is_the_same_to_the_bit(tmp_path: Path, shap
     assert [entry.name for entry in tmp_path.iterdir()] == ["run.npz"]
 
 
-def test_special_numbers_survive(tmp_path: Path) -> None:
+def test_nan_infinities_and_subnormals_round_trip(tmp_path: Path) -> None:
     before = trajectory()
-    before.info["status"] = "diverged"  # a complete run has no such states
+    before.info["status"] = "diverged"  # a complete run must have finite states
     before.position[:] = np.resize([math.nan, math.inf, -math.inf, -0.0, 5e-324, 1.7e308], before.position.shape)
     assert equal(Trajectory.load(before.save(tmp_path / "run.npz")), before)
 
 
-def test_stored_arrays_bear_the_names_of_the_attributes(tmp_path: Path) -> None:
+def test_stored_arrays_have_the_names_of_the_attributes(tmp_path: Path) -> None:
     with np.load(trajectory().save(str(tmp_path / "run.npz")), allow_pickle=False) as stored:
         assert set(stored.files) == {*ARRAYS, "info"}
         assert stored["position"].shape == (4, 3, 2)
 
 
-def test_name_of_the_file_is_kept_as_it_is(tmp_path: Path) -> None:
+def test_file_is_saved_under_the_given_name(tmp_path: Path) -> None:
     for name in ("run", "run.tmp", "a b.é.npz", ".hidden"):
         path = trajectory().save(tmp_path / name)
         assert path.name == name
@@ -100,7 +100,7 @@ def test_name_of_the_file_is_kept_as_it_is(tmp_path: Path) -> None:
     assert len(list(tmp_path.iterdir())) == 4
 
 
-def test_saving_again_replaces(tmp_path: Path) -> None:
+def test_saving_again_replaces_the_file(tmp_path: Path) -> None:
     path = tmp_path / "run.npz"
     trajectory(4).save(path)
     trajectory(9).save(path)
@@ -108,53 +108,51 @@ def test_saving_again_replaces(tmp_path: Path) -> None:
 
 
 class Interrupted(BaseException):
-    """Stands for Ctrl+C."""
+    """Stand-in for KeyboardInterrupt."""
 
 
 @pytest.mark.parametrize("error", [OSError("disk full"), Interrupted(), MemoryError()])
-def test_failing_write_leaves_neither_file_nor_temporary(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException
-) -> None:
-    def half(stream: Any, **arrays: Any) -> None:
+def test_failed_write_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
+    def write_half(stream: Any, **arrays: Any) -> None:
         stream.write(b"half a file")
         raise error
 
-    monkeypatch.setattr(np, "savez_compressed", half)
+    monkeypatch.setattr(np, "savez_compressed", write_half)
     with pytest.raises(type(error)):
         trajectory().save(tmp_path / "run.npz")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_failing_write_keeps_what_was_there(tmp_path: Path) -> None:
+def test_failed_write_keeps_the_previous_file(tmp_path: Path) -> None:
     path = trajectory().save(tmp_path / "run.npz")
     before = path.read_bytes()
     with pytest.raises(TypeError):
-        trajectory(9, reason=object()).save(path)  # no JSON value
+        trajectory(9, reason=object()).save(path)  # not a JSON value
     assert path.read_bytes() == before
     assert [entry.name for entry in tmp_path.iterdir()] == ["run.npz"]
 
 
-def test_failing_rename_leaves_no_temporary(tmp_path: Path) -> None:
+def test_failed_rename_leaves_no_temporary_file(tmp_path: Path) -> None:
     (tmp_path / "run.npz").mkdir()
     with pytest.raises(OSError, match=r"run\.npz"):
         trajectory().save(tmp_path / "run.npz")
     assert [entry.name for entry in tmp_path.iterdir()] == ["run.npz"]
 
 
-def test_writing_into_a_folder_that_is_not_there_fails(tmp_path: Path) -> None:
+def test_saving_into_a_missing_folder_raises(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         trajectory().save(tmp_path / "none" / "run.npz")
 
 
 @pytest.mark.parametrize("content", [b"", b"\x00" * 100, b"PK\x03\x04", b"title = 'x'", b"\x93NUMPY\x01\x00"])
-def test_file_that_is_no_archive_is_refused(tmp_path: Path, content: bytes) -> None:
+def test_file_that_is_not_an_archive_is_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "run.npz"
     path.write_bytes(content)
     with pytest.raises(ValueError, match="is not a stored run"):
         Trajectory.load(path)
 
 
-def test_other_arrays_are_refused(tmp_path: Path) -> None:
+def test_archive_of_other_arrays_is_refused(tmp_path: Path) -> None:
     np.savez(tmp_path / "run.npz", time=np.zeros(3))
     with pytest.raises(ValueError, match="it has no angle"):
         Trajectory.load(tmp_path / "run.npz")
@@ -163,21 +161,21 @@ def test_other_arrays_are_refused(tmp_path: Path) -> None:
         Trajectory.load(tmp_path / "one.npy")
 
 
-def test_arrays_of_objects_are_refused_unpickled(tmp_path: Path) -> None:
+def test_arrays_of_objects_are_refused_without_unpickling(tmp_path: Path) -> None:
     arrays = {key: np.zeros(1) for key in ARRAYS} | {"info": np.asarray("{}"), "time": np.array([{}], dtype=object)}
     np.savez(tmp_path / "run.npz", allow_pickle=True, **arrays)
     with pytest.raises(ValueError, match="is not a stored run"):
         Trajectory.load(tmp_path / "run.npz")
 
 
-def test_info_that_is_no_json_is_refused(tmp_path: Path) -> None:
+def test_info_that_is_not_json_is_refused(tmp_path: Path) -> None:
     arrays: dict[str, Any] = {key: np.zeros(1) for key in ARRAYS}
     np.savez(tmp_path / "run.npz", **arrays, info=np.asarray("{"))
     with pytest.raises(ValueError, match="is not a stored run"):
         Trajectory.load(tmp_path / "run.npz")
 
 
-def test_missing_file_says_so(tmp_path: Path) -> None:
+def test_missing_file_raises_file_not_found(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         Trajectory.load(tmp_path / "none.npz")
 
@@ -199,20 +197,20 @@ def test_damaged_file_is_refused_or_read(tmp_path: Path, chance: random.Random, 
         assert "is not a stored run" in str(error)
 
 
-def test_number_finds_a_body_by_name() -> None:
+def test_number_returns_the_index_of_a_named_body() -> None:
     assert trajectory().number("bödy 1 🎱") == 1
     with pytest.raises(KeyError):
         trajectory().number("bödy")
 
 
-def test_status_reason_and_missed_contacts_are_those_of_the_run() -> None:
+def test_status_reason_and_missed_contacts_are_read_from_info() -> None:
     done = trajectory(status="diverged", reason="too fast")
     assert (done.status, done.reason, done.missed_contacts) == ("diverged", "too fast", 1)
     assert trajectory().reason is None
     assert trajectory(audited=False).missed_contacts is None
 
 
-def test_contacts_are_rows() -> None:
+def test_contacts_iterate_as_contact_events() -> None:
     run = trajectory(contacts=2)
     contacts = Contacts(run.contact_time, run.contact_pair, run.contact_point, run.contact_normal, run.contact_impulse)
     rows = list(contacts)
@@ -227,7 +225,7 @@ def test_contacts_are_rows() -> None:
     assert [type(value) for value in (rows[1].time, *rows[1].pair)] == [float, int, int]
 
 
-def test_no_contacts_are_empty_arrays_of_the_same_kinds() -> None:
+def test_empty_contacts_have_arrays_of_the_same_types() -> None:
     none = Contacts.none()
     assert len(none) == 0
     assert list(none) == []
@@ -236,18 +234,18 @@ def test_no_contacts_are_empty_arrays_of_the_same_kinds() -> None:
     assert none.pair.dtype == np.int64
 
 
-def test_contacts_told_in_parts_are_merged() -> None:
-    """Rows of one time and pair are one contact: its first row, and the sum of all impulses."""
+def test_contacts_recorded_in_parts_are_merged() -> None:
+    """Rows with equal time and pair merge into one contact: the first row with the sum of all impulses."""
     lasting, other = (0.5, (0, -1)), (0.5, (1, -1))
     rows = [(lasting, 1.0), (other, 2.0), ((0.7, (0, -1)), 4.0), (lasting, 8.0), (other, 16.0), (lasting, 32.0)]
     time = np.array([key[0] for key, _ in rows])
     pair = np.array([key[1] for key, _ in rows], np.int64)
-    place = np.arange(12.0).reshape(6, 2)
-    impulse = np.array([[size, -size] for _, size in rows])
-    merged = Contacts(time, pair, place, place + 100.0, impulse).merged()
+    points = np.arange(12.0).reshape(6, 2)
+    impulse = np.array([[value, -value] for _, value in rows])
+    merged = Contacts(time, pair, points, points + 100.0, impulse).merged()
     assert [(event.time, event.pair) for event in merged] == [lasting, other, (0.7, (0, -1))]
     assert merged.impulse.tolist() == [[41.0, -41.0], [18.0, -18.0], [4.0, -4.0]]
-    assert merged.point.tolist() == place[:3].tolist()
-    assert merged.normal.tolist() == (place[:3] + 100.0).tolist()
+    assert merged.point.tolist() == points[:3].tolist()
+    assert merged.normal.tolist() == (points[:3] + 100.0).tolist()
     assert merged.merged() is merged
     assert len(Contacts.none().merged()) == 0

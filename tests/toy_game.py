@@ -1,4 +1,4 @@
-"""A toy game for tests of hosts: it draws chances, acts by itself, spawns, remembers presses, and ends."""
+"""A toy game for tests of game hosts: it draws random numbers, acts, spawns bodies, counts presses, and ends."""
 
 import math
 import random
@@ -36,7 +36,7 @@ restitution = 0.9
 
 
 class Toy:
-    """A point a bounce, and what presses add; each bounce kicks the ball aside by chance, every third spawns one."""
+    """One point per bounce, 0.5 per impulse; each bounce kicks the ball aside at random, every third spawns a ball."""
 
     controls = (
         Control("kick", "up", ("up",), "a"),
@@ -45,7 +45,7 @@ class Toy:
 
     def __init__(self, scene: Scene, bodies: Bodies) -> None:
         assert bodies.names[0] == "a"
-        self._chance = random.Random(scene.world.seed)  # copied with all else, unlike a module's
+        self._random = random.Random(scene.world.seed)  # own state, so that a copy of the game has it too
         self.score = 0.0
         self.game_over: str | None = None
         self._aim, self._bounces, self._last = 0.5, 0, -1.0
@@ -53,7 +53,7 @@ class Toy:
         self.ends_at = math.inf
 
     def on_input(self, control: str, value: float) -> Sequence[Action]:
-        if control == "aim":  # nothing comes of it now, but of the next kick
+        if control == "aim":  # affects only later kicks
             self._aim = value
             return ()
         return (Impulse(time=99.0, body="a", impulse=(0.0, 3.0 * self._aim)),) if value else ()
@@ -62,13 +62,13 @@ class Toy:
         self.score += sum(0.5 for action in info.actions if isinstance(action, Impulse))
         acts: list[Action] = []
         if info.time == 0.0:
-            acts.append(Impulse(time=0.0, body="a", impulse=(self._chance.uniform(-0.1, 0.1), 0.0)))
+            acts.append(Impulse(time=0.0, body="a", impulse=(self._random.uniform(-0.1, 0.1), 0.0)))
         for contact in info.contacts:
             if contact.pair == (0, -1) and contact.time > self._last:
                 self._last, self._bounces = contact.time, self._bounces + 1
                 self.score += 1
                 self._cues.append("bounce")
-                acts.append(Impulse(time=0.0, body="a", impulse=(self._chance.uniform(-0.1, 0.1), 0.0)))
+                acts.append(Impulse(time=0.0, body="a", impulse=(self._random.uniform(-0.1, 0.1), 0.0)))
                 if self._bounces % 3 == 0:
                     acts.append(Spawn(time=0.0, ball=Ball(position=(5.0 + self._bounces, 3.0), radius=0.1)))
         if self.score >= self.ends_at:

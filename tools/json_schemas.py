@@ -12,12 +12,12 @@ FOLDER = Path(__file__).parents[1] / "docs" / "reference" / "schemas"
 
 
 def schema_text(command: str) -> str:
-    """Return the text of the file of a command."""
+    """Return the text of the schema file of a command."""
     return json.dumps(document_schema(command), indent=1, ensure_ascii=False) + "\n"
 
 
 def main() -> None:
-    """Write a file for each command."""
+    """Write the schema file of each command."""
     FOLDER.mkdir(exist_ok=True)
     for command in DOCUMENTS:
         (FOLDER / f"{command}.schema.json").write_text(schema_text(command), encoding="utf-8")

@@ -1,22 +1,25 @@
 """Command `check`: validate scenes; print required physics, engines that can run them, and predicted problems."""
 
-import math
 import shutil
 import sys
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import click
 
-from sandbox.cli.common import exit_with_errors, expand_folders, fault_rows, print_faults, scene_path
+from sandbox.cli.common import exit_with_errors, expand_folders, print_faults, scene_path
 from sandbox.cli.options import json_option, quiet_option, set_option
 from sandbox.cli.streams import print_json
+from sandbox.echo import MAX_MESSAGE, shorten
 from sandbox.engines.registry import ENGINES, UnknownEngineError, engine_named
+from sandbox.games.contract import Control
 from sandbox.games.registry import fitting_rules
+from sandbox.jsonable import finite, in_json, to_json
 from sandbox.measure.preflight import (
     FAILED,
-    PreflightResult,
+    Diagnostic,
+    TrialCoverage,
     floor_3_digits,
     largest_safe_dt,
     notes,
@@ -29,14 +32,63 @@ from sandbox.scene.errors import Fault, SceneError
 from sandbox.scene.files.load import dumps, load
 
 
+class EngineSupport(NamedTuple):
+    """Whether an engine can run a scene."""
+
+    ok: bool
+    missing: tuple[str, ...]
+    """physics of the scene that it does not model"""
+
+
+class StepSettings(NamedTuple):
+    """Step of a scene."""
+
+    dt: float
+    """s"""
+    substeps: int
+
+
+class GameSummary(NamedTuple):
+    """Game of a scene."""
+
+    name: str
+    controls: tuple[Control, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckDocument:
+    """JSON document of a scene: its faults, or the physics that it requires and the problems to expect."""
+
+    scene: str
+    """as the user named it"""
+    title: str | None = None
+    ok: bool
+    """whether the scene has no fault"""
+    faults: Sequence[Fault] = ()
+    demands: Sequence[str] = ()
+    """the required physics"""
+    bill: Sequence[Item] = ()
+    """every demand, and whether the scene makes it"""
+    engines: Mapping[str, EngineSupport] = field(default_factory=dict)
+    step: StepSettings | None = None
+    safe_dt: float | None = None
+    """s, largest dt without tunnelling; None if any dt is safe, or it is unknown"""
+    safe_dt_known: bool = False
+    trial: TrialCoverage | None = None
+    """the trial run; None if there was none"""
+    warnings: Sequence[Diagnostic] = ()
+    notes: Sequence[Diagnostic] = ()
+    game: GameSummary | None = field(default=None, metadata=in_json(optional=True))
+
+
 @dataclass
 class _Answers:
     """JSON documents of the scenes checked so far, and the exit status."""
 
-    documents: list[dict[str, Any]] = field(default_factory=list)
+    documents: list[CheckDocument] = field(default_factory=list)
     status: int = 0
 
-    def add(self, document: dict[str, Any], status: int = 0) -> None:
+    def add(self, document: CheckDocument, status: int = 0) -> None:
         """Add a scene's document; the highest status counts."""
         self.documents.append(document)
         self.status = max(self.status, status)
@@ -78,7 +130,7 @@ def check_command(
     answers, names = _Answers(), expand_folders(scenes)
     for name in names:
         try:
-            scene, document, items = _check(name, overrides, engine, 0.0 if no_trial else 1.0)
+            scene, document = _check(name, overrides, engine, 0.0 if no_trial else 1.0)
         except KeyboardInterrupt:
             answers.status = 130
             click.echo(f"interrupted: {len(answers.documents):,} of {len(names):,} scenes were checked", err=True)
@@ -95,32 +147,52 @@ def check_command(
         else:
             answers.add(document, _status(document, engine))
             if not as_json:
-                _print(name, scene, document, items, quiet)
+                _print(scene, document, quiet)
     if as_json:
-        print_json(answers.documents[0] if len(answers.documents) == len(names) == 1 else {"scenes": answers.documents})
+        documents = to_json(answers.documents)
+        print_json(documents[0] if len(documents) == len(names) == 1 else {"scenes": documents})
     return answers.status
 
 
-def _check(
-    name: str, overrides: tuple[str, ...], engine: str | None, cover: float
-) -> tuple[Scene, dict[str, Any], tuple[Item, ...]]:
-    """Return a scene, its JSON document, and the physics that it requires; see `_checked`.
+def _check(name: str, overrides: tuple[str, ...], engine: str | None, cover: float) -> tuple[Scene, CheckDocument]:
+    """Return a scene and its document.
+
+    Args:
+        name: the scene as the user named it.
+        overrides: values to set first.
+        engine: engine of the warnings and the trial run; None for the default.
+        cover: fraction of the longest allowed trial run; 0 for none.
 
     Raises:
         SceneError: the scene has faults.
     """
     scene = load(scene_path(name), overrides)
     rules = fitting_rules(scene, scene_path(name))
-    document, items = _checked(name, scene, engine, cover)
-    if rules is not None:
-        document["game"] = {"name": scene.play.game, "controls": [each._asdict() for each in rules.controls]}
-    return scene, document, items
+    items = bill(scene)
+    missing = {each.name: each.missing(scene, scene.solver) for each in ENGINES.values()}
+    safe = largest_safe_dt(scene)
+    answer = run_preflight(scene, engine=engine, cover=cover)
+    return scene, CheckDocument(
+        scene=name,
+        title=scene.title,
+        ok=True,
+        demands=[str(item.demand) for item in items if item.on],
+        bill=items,
+        engines={known: EngineSupport(not lacking, tuple(lacking)) for known, lacking in missing.items()},
+        step=StepSettings(scene.solver.dt, scene.solver.substeps),
+        safe_dt=finite(safe),
+        safe_dt_known=safe is not None,
+        trial=answer.tried,
+        warnings=answer.warnings,
+        notes=[*notes(scene), *answer.refuted],
+        game=None if rules is None else GameSummary(scene.play.game or "", tuple(rules.controls)),
+    )
 
 
-def _status(document: dict[str, Any], engine: str | None) -> int:
+def _status(document: CheckDocument, engine: str | None) -> int:
     """Return the exit status of a scene: 1 if no engine can run it (or the named one), or if it fails."""
-    is_able = any(each["ok"] for known, each in document["engines"].items() if engine in (None, known))
-    fails = any(warning["kind"] == FAILED for warning in document["warnings"])
+    is_able = any(each.ok for known, each in document.engines.items() if engine in (None, known))
+    fails = any(warning.kind == FAILED for warning in document.warnings)
     return 1 if fails or not is_able else 0
 
 
@@ -133,83 +205,43 @@ def _expand(name: str, overrides: tuple[str, ...]) -> int:
     return 0
 
 
-def _faulty(name: str, faults: Sequence[Fault]) -> dict[str, Any]:
-    """Return the JSON document of a scene with faults."""
-    empty: dict[str, Any] = {"demands": [], "engines": {}, "warnings": [], "notes": []}
-    return {"scene": name, "title": None, "ok": False, "faults": fault_rows(faults), **empty}
+def _faulty(name: str, faults: Sequence[Fault]) -> CheckDocument:
+    """Return the document of a scene with faults."""
+    shown = [replace(fault, message=shorten(fault.message, MAX_MESSAGE)) for fault in faults]
+    return CheckDocument(scene=name, ok=False, faults=shown)
 
 
-def _checked(name: str, scene: Scene, engine: str | None, cover: float) -> tuple[dict[str, Any], tuple[Item, ...]]:
-    """Return the JSON document of a scene, and the physics that it requires.
-
-    Args:
-        name: the scene as the user named it.
-        scene: the scene.
-        engine: engine of the warnings and the trial run; None for the default.
-        cover: fraction of the longest allowed trial run; 0 for none.
-    """
-    items = bill(scene)
-    engines = {}
-    for each in ENGINES.values():
-        missing = each.missing(scene, scene.solver)
-        engines[each.name] = {"ok": not missing, "missing": list(missing)}
-    safe = largest_safe_dt(scene)
-    answer = run_preflight(scene, engine=engine, cover=cover)
-    document = {
-        "scene": name,
-        "title": scene.title,
-        "ok": True,
-        "faults": [],
-        "demands": [str(item.demand) for item in items if item.on],
-        "bill": [{"demand": str(item.demand), "on": item.on, "why": item.why} for item in items],
-        "engines": engines,
-        "step": {"dt": scene.solver.dt, "substeps": scene.solver.substeps},
-        "safe_dt": safe if safe is not None and math.isfinite(safe) else None,
-        "safe_dt_known": safe is not None,
-        "trial": _trial(answer),
-        "warnings": [{"kind": w.kind, "message": w.message, **w.details} for w in answer.warnings],
-        "notes": [{"kind": n.kind, "message": n.message, **n.details} for n in (*notes(scene), *answer.refuted)],
-    }
-    return document, items
-
-
-def _trial(answer: PreflightResult) -> dict[str, Any] | None:
-    """Return the engine and the duration of the trial run; None if there was none."""
-    if answer.tried is None:
-        return None
-    return {"engine": answer.tried.engine, "duration": answer.tried.duration, "whole": answer.tried.whole}
-
-
-def _print(name: str, scene: Scene, document: dict[str, Any], items: tuple[Item, ...], quiet: bool) -> None:
+def _print(scene: Scene, document: CheckDocument, quiet: bool) -> None:
     """Print the result for a scene; with `quiet`, only the warnings."""
+    name = document.scene
     if quiet:
-        for warning in document["warnings"]:
-            click.echo(f"{name}: warning: {warning['message']}")
+        for warning in document.warnings:
+            click.echo(f"{name}: warning: {warning.message}")
         return
     click.echo(f"{name}: {scene.title}" if scene.title else name)
-    for is_on, what, why in _demand_lines(items):
+    for is_on, what, why in _demand_lines(document.bill):
         mark = click.style("on ", fg="green", bold=True) if is_on else click.style("off", dim=True)
         click.echo(f"  {mark}  {what:<14} {why}")
-    for engine, verdict in document["engines"].items():
-        _print_item(f"engine {engine}: {'; '.join(verdict['missing']) or 'models everything in the scene'}")
+    for engine, support in document.engines.items():
+        _print_item(f"engine {engine}: {'; '.join(support.missing) or 'models everything in the scene'}")
     _print_item(_step_text(scene, document))
-    if (trial := document["trial"]) is not None and not trial["whole"]:
-        covered = f"{trial['duration']:.3g} s of {scene.world.duration:g} s"
-        _print_item(f"the trial run on {trial['engine']} covered {covered}")
-    if "game" in document:
-        keys = (f"{each['name']} ({' or '.join(each['keys'])})" for each in document["game"]["controls"])
-        _print_item(f"game {document['game']['name']}: {', '.join(keys)}")
-    for note in document["notes"]:
-        _print_item(f"note: {note['message']}")
-    for warning in document["warnings"]:
-        _print_item(f"warning: {warning['message']}")
+    if (trial := document.trial) is not None and not trial.whole:
+        covered = f"{trial.duration:.3g} s of {scene.world.duration:g} s"
+        _print_item(f"the trial run on {trial.engine} covered {covered}")
+    if document.game is not None:
+        keys = (f"{each.name} ({' or '.join(each.keys)})" for each in document.game.controls)
+        _print_item(f"game {document.game.name}: {', '.join(keys)}")
+    for note in document.notes:
+        _print_item(f"note: {note.message}")
+    for warning in document.warnings:
+        _print_item(f"warning: {warning.message}")
 
 
-def _step_text(scene: Scene, document: dict[str, Any]) -> str:
+def _step_text(scene: Scene, document: CheckDocument) -> str:
     """Return the largest dt without tunnelling, and the step of the scene."""
-    safe, step = document["safe_dt"], scene.solver
+    safe, step = document.safe_dt, scene.solver
     limit = "no dt lets a body tunnel" if safe is None else f"no body can tunnel up to dt = {floor_3_digits(safe)} s"
-    if not document["safe_dt_known"]:
+    if not document.safe_dt_known:
         causes = ", ".join(unknown_speeds(scene))
         limit = f"the largest dt without tunnelling is unknown, because {causes} may add any speed"
     own = f"dt is {step.dt:g} s"
@@ -218,7 +250,7 @@ def _step_text(scene: Scene, document: dict[str, Any]) -> str:
     return f"{limit}; the scene's {own}"
 
 
-def _demand_lines(items: tuple[Item, ...]) -> Iterator[tuple[bool, str, str]]:
+def _demand_lines(items: Sequence[Item]) -> Iterator[tuple[bool, str, str]]:
     """Yield the required physics; of joints only the kinds that are required, or one line if none is."""
     has_joints = any(item.on for item in items if item.demand in JOINTS)
     is_listed = False

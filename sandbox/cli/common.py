@@ -183,19 +183,19 @@ def scene_path(name: str) -> str:
             stored run; the fault then names the command for it.
     """
     path = scene_paths([name])[0][1]
-    for ending, what in ((".json", "a recorded session"), (".npz", "a stored run")):
+    for ending, kind in ((".json", "a recorded session"), (".npz", "a stored run")):
         if path.lower().endswith(ending):
-            raise SceneError([Fault(name, None, "", f"is {what}, not a scene; use `sandbox replay {shorten(name)}`")])
+            raise SceneError([Fault(name, None, "", f"is {kind}, not a scene; use `sandbox replay {shorten(name)}`")])
     return path
 
 
 @contextmanager
-def collect_errors(faults: list[Fault], place: str = "", also: tuple[type[Exception], ...] = ()) -> Iterator[None]:
+def collect_errors(faults: list[Fault], source: str = "", also: tuple[type[Exception], ...] = ()) -> Iterator[None]:
     """Add errors to a list of faults instead of raising them, so that all faults are reported at once.
 
     Args:
         faults: the list.
-        place: option or argument at fault, for errors other than a `SceneError`.
+        source: option or argument at fault, for errors other than a `SceneError`.
         also: exceptions to collect besides `SceneError`.
     """
     try:
@@ -203,7 +203,7 @@ def collect_errors(faults: list[Fault], place: str = "", also: tuple[type[Except
     except SceneError as error:
         faults += error.faults
     except also as error:
-        faults.append(Fault(place, None, "", str(error)))
+        faults.append(Fault(source, None, "", str(error)))
 
 
 def fault_rows(faults: Sequence[Fault]) -> list[dict[str, Any]]:
@@ -251,23 +251,23 @@ def only_engine(
     """Return the only engine that can run all scenes, if a setting that not all engines have is set or swept.
 
     Args:
-        scenes: with all values set.
+        scenes: the scenes, with all values set.
         overrides: `KEY=VALUE`, as given to `--set`.
         sweeps: keys and their values, as given to `--sweep`.
 
     Returns:
         None if no such setting is set or swept, or if no or several engines can run all scenes.
     """
-    asked = [*filter(None, map(_assignment, overrides)), *((key, list(values)) for key, values in sweeps)]
-    special = {key.removeprefix(_SOLVER): values for key, values in asked if _is_special(key)}
+    assigned = [*filter(None, map(_assignment, overrides)), *((key, list(values)) for key, values in sweeps)]
+    special = {key.removeprefix(_SOLVER): values for key, values in assigned if _is_special(key)}
     if not special or not scenes:
         return None
     engines = set(ENGINES).intersection(*(able(scene) for scene in scenes))
     if len(engines) != 1:
         return None
     (engine,) = engines
-    has = " and ".join(f"{key.replace('_', ' ')} {', '.join(map(str, values))}" for key, values in special.items())
-    return EngineChoice(engine, f"engine: {engine}, the only one that has {has}")
+    settings = " and ".join(f"{key.replace('_', ' ')} {', '.join(map(str, values))}" for key, values in special.items())
+    return EngineChoice(engine, f"engine: {engine}, the only one that has {settings}")
 
 
 def _is_special(key: str) -> bool:

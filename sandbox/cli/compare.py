@@ -50,7 +50,7 @@ ONE_SIDED = {"missed": "truth only", "phantom": "run only"}
 """Heads of unmatched contacts by their JSON names. `run` has another meaning of missed: tunnelling."""
 
 NO_EFFECT = 1e-6
-"""Relative change of the error below which a setting has no effect: far below any that is worth a change."""
+"""Relative change of the error below which a setting counts as without effect."""
 HEADS = (
     "max error, m", "rms error, m", "max error, m/s", "diverges, s", "energy", "momentum", "contacts",
     *ONE_SIDED.values(), "after", "seconds",
@@ -61,7 +61,7 @@ LEGEND = (
     "contacts: also in the truth; truth only, run only: in one of the two alone; "
     "after: either, once a body has diverged",
 )
-"""Meaning of the columns, in short."""
+"""Short meanings of the columns."""
 COLUMNS = {
     "engine": "the physics engine",
     "dt": "time step of a frame, s",
@@ -86,9 +86,9 @@ def print_comparison(scene: str, comparison: Comparison, why: bool, refusals: bo
 
     Args:
         scene: the scene as the user named it.
-        comparison: what to print.
-        why: print the settings that matter most.
-        refusals: print why engines refuse the scene.
+        comparison: the comparison.
+        why: print the settings with the largest effect.
+        refusals: print the reasons of refusals.
         verbose: explain every column, not only some in short.
     """
     from rich.text import Text
@@ -119,18 +119,18 @@ def print_comparison(scene: str, comparison: Comparison, why: bool, refusals: bo
     print_table(table)
     if verbose:
         print_legend(heads_of(table), COLUMNS | {short_key(key): f"value of {key!r}" for key in swept})
-    for line in _below(comparison, why, refusals, not verbose):
+    for line in _lines_below_table(comparison, why, refusals, not verbose):
         click.echo(line)
 
 
-def _below(comparison: Comparison, why: bool, refusals: bool, legend: bool) -> list[str]:
+def _lines_below_table(comparison: Comparison, why: bool, refusals: bool, legend: bool) -> list[str]:
     """Return the lines below the table."""
     lines = [*LEGEND] if legend and any(row.status != "refused" for row in comparison.rows) else []
     if any(row.energy_against == "start" and row.energy_drift for row in comparison.rows):
         lines.append(
             "energy: change since the start, which includes correct losses, because the truth ends before the run does"
         )
-    lines += [*_below_accuracy(comparison), *_joint_order(comparison)]
+    lines += [*_accuracy_lines(comparison), *_joint_order(comparison)]
     for row in comparison.rows:
         if refusals and row.status == "refused":
             lines.append(str(row.reason))
@@ -143,7 +143,7 @@ def _below(comparison: Comparison, why: bool, refusals: bool, legend: bool) -> l
     return lines
 
 
-def _below_accuracy(comparison: Comparison) -> Iterator[str]:
+def _accuracy_lines(comparison: Comparison) -> Iterator[str]:
     """Yield a line for each error that is smaller than the accuracy of the truth."""
     for row in comparison.rows:
         best, error = comparison.truth_of(row.name), row.score.max_position
@@ -174,23 +174,27 @@ def _explained(row: Row) -> list[str]:
     if row.verdict is None:
         return [f"{row.name}: no error to explain"]
     found = sorted((knob for knob in row.why if knob.ratio is not None), key=lambda knob: knob.ratio or 0.0)
-    idle = [knob for knob in found if abs((knob.ratio or 0.0) - 1.0) < NO_EFFECT]
+    without_effect = [knob for knob in found if abs((knob.ratio or 0.0) - 1.0) < NO_EFFECT]
     heads = ("change", "max error, m", "of the original")
     cells = [
         heads,
-        *((k.label, format_optional(k.max_position_error), f"×{k.ratio:.3g}") for k in found if k not in idle),
+        *(
+            (k.label, format_optional(k.max_position_error), f"×{k.ratio:.3g}")
+            for k in found
+            if k not in without_effect
+        ),
     ]
-    wide = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     lines = [row.verdict]
-    lines += [f"  {a:<{wide[0]}}  {b:>{wide[1]}}  {c:>{wide[2]}}" for a, b, c in cells] if len(cells) > 1 else []
-    for what, some in (
-        ("no effect", idle),
+    lines += [f"  {a:<{widths[0]}}  {b:>{widths[1]}}  {c:>{widths[2]}}" for a, b, c in cells] if len(cells) > 1 else []
+    for heading, knobs in (
+        ("no effect", without_effect),
         ("failed", [knob for knob in row.why if knob.ratio is None and knob.status != "refused"]),
         ("refused", [knob for knob in row.why if knob.status == "refused"]),
     ):
-        if some:
-            named = (f"{knob.label} ({knob.status})" if what == "failed" else knob.label for knob in some)
-            lines.append(f"  {what}: {', '.join(named)}")
+        if knobs:
+            named = (f"{knob.label} ({knob.status})" if heading == "failed" else knob.label for knob in knobs)
+            lines.append(f"  {heading}: {', '.join(named)}")
     return lines
 
 
@@ -221,7 +225,7 @@ class _Options(OutputOptions):
 
 
 class _Request(NamedTuple):
-    """What to compare: the checked command line."""
+    """Checked command line: engines, sweeps and variants to compare."""
 
     engines: list[str] | None
     axes: list[tuple[str, Sequence[Any]]]
@@ -298,7 +302,7 @@ def compare_command(**given: Any) -> int:
 
 
 def _checked(options: _Options, faults: list[Fault]) -> _Request:
-    """Return what to compare; add what is wrong with the command line to the faults."""
+    """Return the request of the command line; add its errors to the faults."""
     names = parse_engines(options.engines, faults)
     axes: list[tuple[str, Sequence[Any]]] = []
     for sweep in options.sweeps:
@@ -351,8 +355,8 @@ def _report_problems(scene: str, comparison: Comparison, is_engine_chosen: bool)
     for row in comparison.rows:
         if row.status != "ok" and (row.status != "refused" or is_engine_chosen):
             status = 1
-            what = row.reason if row.status == "refused" else f"{row.name} {row.status}: {row.reason}"
-            click.echo(f"{scene}: {what}", err=True)
+            problem = row.reason if row.status == "refused" else f"{row.name} {row.status}: {row.reason}"
+            click.echo(f"{scene}: {problem}", err=True)
     return status
 
 
@@ -360,13 +364,13 @@ def _minimise(comparison: Comparison, request: _Request, options: _Options, docu
     """Reduce the scene, enter the result into the document, and return the exit status."""
     assert request.smallest is not None
     with status_line(options.is_silent) as progress:
-        answer = minimised(options.scene, comparison, request.engines, request.smallest, progress)
-    document["minimised"] = answer.document
-    if answer.status:
-        click.echo(answer.sentence, err=True)
+        minimised_scene = minimised(options.scene, comparison, request.engines, request.smallest, progress)
+    document["minimised"] = minimised_scene.document
+    if minimised_scene.status:
+        click.echo(minimised_scene.sentence, err=True)
     elif not options.is_silent:
-        click.echo(answer.sentence)
-    return answer.status
+        click.echo(minimised_scene.sentence)
+    return minimised_scene.status
 
 
 def _variants(path: str, overrides: Sequence[str], axes: Sequence[tuple[str, Sequence[Any]]]) -> list[Variant]:

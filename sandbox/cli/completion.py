@@ -101,7 +101,7 @@ def _scenes_and_sessions(_ctx: click.Context, incomplete: str) -> Iterable[str]:
 
 
 def _shipped(incomplete: str) -> list[str]:
-    """Return names of shipped scenes: short names, or full names once a folder is typed."""
+    """Return names of shipped scenes: short names, or full names after a folder."""
     from sandbox.scene.files.shipped_scenes import shipped
 
     names = [scene.name for scene in shipped()]
@@ -113,7 +113,7 @@ def _shipped(incomplete: str) -> list[str]:
 
 
 def _files(incomplete: str, endings: Sequence[str]) -> list[str]:
-    """Return the files and folders that complete a path; hidden ones only once the dot is typed."""
+    """Return the files and folders that complete a path; hidden ones only after the dot."""
     folder, slash, beginning = incomplete.rpartition("/")
     found: list[str] = []
     within = Path(folder + slash or ".")

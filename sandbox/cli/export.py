@@ -159,7 +159,7 @@ def _trajectory(run: str, source: Trajectory | Recording, bars: ProgressBars) ->
 def _export(
     run: str, options: Options, trajectory: Trajectory, files: list[dict[str, Any]], bars: ProgressBars
 ) -> None:
-    """Write all files, and enter each into the list when it is complete.
+    """Write all files, and add each to the list when it is complete.
 
     Raises:
         SceneError: a file cannot be written, or the run is damaged.
@@ -173,7 +173,7 @@ def _export(
             files.append({"path": target, "format": kind[1:], "rows": rows})
             continue
         film = film or _film(run, trajectory)
-        frames = _shoot(options, film, path, bars.callback(f"drawing {target}"))
+        frames = _export_images(options, film, path, bars.callback(f"drawing {target}"))
         files.append({"path": target, "format": kind[1:], "frames": frames})
 
 
@@ -214,21 +214,21 @@ def _between(run: Trajectory, options: Options) -> Trajectory:
 
 
 def _film(run: str, trajectory: Trajectory) -> "RecordedRun":
-    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # nothing but results on standard output
+    os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # only results on standard output
     from sandbox.window.playback.recorded import RecordedRun
 
     return RecordedRun(trajectory, run)
 
 
-def _shoot(options: Options, film: "RecordedRun", path: Path, on_progress: ProgressCallback | None) -> int:
+def _export_images(options: Options, film: "RecordedRun", path: Path, on_progress: ProgressCallback | None) -> int:
     from sandbox.window.capture.export import ExportOptions, export_images
     from sandbox.window.capture.image_files import CaptureError
 
-    still = path.suffix.lower() == ".png"
+    is_png = path.suffix.lower() == ".png"
     last = film.duration if options.until is None else min(options.until, film.duration)
-    if still and options.at is not None:
+    if is_png and options.at is not None:
         last = min(options.at, film.duration)
-    shot = ExportOptions(
+    export_options = ExportOptions(
         start=min(options.start or 0.0, last),
         end=last,
         size=options.picture_size,
@@ -237,6 +237,6 @@ def _shoot(options: Options, film: "RecordedRun", path: Path, on_progress: Progr
         overlays=frozenset({"shapes", *options.overlays}),
     )
     try:
-        return export_images(film, shot, path, on_progress)
+        return export_images(film, export_options, path, on_progress)
     except CaptureError as error:
         raise SceneError([Fault("--to", None, "", f"{path}: {error}")]) from None

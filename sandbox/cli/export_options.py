@@ -14,11 +14,11 @@ TABLES = (".csv", ".parquet")
 FILMS = (".gif", ".mp4")
 PICTURES = (*FILMS, ".png")
 MIN_SIZE, MAX_WIDTH, MAX_HEIGHT = 16, 7680, 4320
-"""px: a smaller picture shows nothing, and few players take more than 8K"""
+"""px: a smaller picture is illegible, and few players support more than 8K"""
 MAX_RATE = 240.0
-"""frames/s, more than any display"""
+"""frames/s, more than any display supports"""
 MAX_FRAMES = 1_000_000
-"""of one film: nine hours at 30 frames/s"""
+"""Largest number of frames of a film: nine hours at 30 frames/s."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +60,14 @@ def check_options(options: Options) -> None:
     """Check the options that do not depend on the run.
 
     Raises:
-        SceneError: with all faults.
+        SceneError: an option is invalid; the error has all faults.
     """
-    messages = [*_of_targets(options), *_of_use(options), *_of_values(options), *_of_runs(options)]
+    messages = [
+        *_target_faults(options),
+        *_unused_options(options),
+        *_value_faults(options),
+        *_run_table_faults(options),
+    ]
     if messages:
         raise SceneError([Fault(option, None, "", message) for option, message in messages])
 
@@ -75,7 +80,7 @@ def check_times(options: Options, end: float | None) -> None:
         end: end of the run, s; None if it has no frames.
 
     Raises:
-        SceneError: with all faults.
+        SceneError: an option is invalid; the error has all faults.
     """
     faults: list[tuple[str, str]] = []
     for option, time in (("--from", options.start), ("--at", options.at)):
@@ -103,7 +108,7 @@ def _max_frames(options: Options) -> int | None:
     return MAX_FRAMES if ".mp4" in options.suffixes else None
 
 
-def _of_targets(options: Options) -> list[tuple[str, str]]:
+def _target_faults(options: Options) -> list[tuple[str, str]]:
     """Return the faults of the files to write."""
     found = []
     if not options.targets:
@@ -130,7 +135,7 @@ def _of_targets(options: Options) -> list[tuple[str, str]]:
     return found
 
 
-def _of_use(options: Options) -> list[tuple[str, str]]:
+def _unused_options(options: Options) -> list[tuple[str, str]]:
     """Return the options that apply to none of the files."""
     uses = (
         ("--contacts", options.contacts or None, TABLES),
@@ -149,7 +154,7 @@ def _of_use(options: Options) -> list[tuple[str, str]]:
     ]
 
 
-def _of_runs(options: Options) -> list[tuple[str, str]]:
+def _run_table_faults(options: Options) -> list[tuple[str, str]]:
     """Return the options that do not apply to a table of runs."""
     if not options.runs:
         return []
@@ -159,7 +164,7 @@ def _of_runs(options: Options) -> list[tuple[str, str]]:
     return found + [("--runs", f"{shorten(target, MAX_NAMED)}: is no table") for target in pictures]
 
 
-def _of_values(options: Options) -> list[tuple[str, str]]:
+def _value_faults(options: Options) -> list[tuple[str, str]]:
     """Return the faults of times, speed, frame rate, size and overlays."""
     found = []
     for option, time in (("--from", options.start), ("--until", options.until), ("--at", options.at)):
@@ -169,7 +174,7 @@ def _of_values(options: Options) -> list[tuple[str, str]]:
         found.append(("--until", f"is {options.until:g} s, before --from at {options.start:g} s"))
     if options.speed is not None and not 1e-6 <= options.speed <= 1e6:
         found.append(("--speed", f"is {options.speed:g}; it must be between 1e-6 and 1e6 (1 is real time)"))
-    found += _of_rate(options) + _of_size(options)
+    found += _rate_faults(options) + _size_faults(options)
     unknown = [name for name in options.overlays if name not in OVERLAYS]
     if unknown:
         found.append(
@@ -178,7 +183,7 @@ def _of_values(options: Options) -> list[tuple[str, str]]:
     return found
 
 
-def _of_rate(options: Options) -> list[tuple[str, str]]:
+def _rate_faults(options: Options) -> list[tuple[str, str]]:
     from sandbox.window.capture.limits import MAX_GIF_RATE
 
     if options.fps is None:
@@ -190,7 +195,7 @@ def _of_rate(options: Options) -> list[tuple[str, str]]:
     return []
 
 
-def _of_size(options: Options) -> list[tuple[str, str]]:
+def _size_faults(options: Options) -> list[tuple[str, str]]:
     option = "--width" if options.size is None else "--size"
     if options.width is not None and options.size is not None:
         return [("--width", "cannot be combined with --size; give one of them")]

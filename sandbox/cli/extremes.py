@@ -47,7 +47,7 @@ from sandbox.progress import Progress, ProgressCallback
 from sandbox.scene.errors import Fault
 
 MIN_WIDTH = 60
-"""Columns to which a line of results is cut at least, on however narrow a terminal."""
+"""Smallest width to which a line of results is cut on a narrow terminal."""
 LETTERS = {"exact": "E", "degraded": "d", "refused": "–", "failed": "✗"}
 STYLES = {"exact": "bold green", "degraded": "yellow", "refused": "dim", "failed": "bold red"}
 
@@ -90,23 +90,25 @@ def print_extremes(result: Extremes) -> None:
 
 
 def _print_limits(result: Extremes) -> None:
-    """Print a line for each axis and setup: a letter per level, and how far it passes."""
+    """Print a line for each axis and setup: a letter per level, and the boundary."""
     from rich.text import Text
 
     console = new_console()
-    first = max((len(limit.axis) for limit in result.limits), default=0)
-    second = max((len(limit.setup) for limit in result.limits), default=0)
-    across = max((len(list(_row(result, limit))) for limit in result.limits), default=0)
-    last = ""
+    axis_width = max((len(limit.axis) for limit in result.limits), default=0)
+    setup_width = max((len(limit.setup) for limit in result.limits), default=0)
+    levels = max((len(list(_row(result, limit))) for limit in result.limits), default=0)
+    previous_axis = ""
     for limit in result.limits:
-        line = Text(f"{limit.axis if limit.axis != last else '':<{first}}  {limit.setup:<{second}}  ")
+        line = Text(
+            f"{limit.axis if limit.axis != previous_axis else '':<{axis_width}}  {limit.setup:<{setup_width}}  "
+        )
         cells = list(_row(result, limit))
         for cell in cells:
             line.append(LETTERS[cell.verdict], STYLES[cell.verdict])
-        line.append(f"{'':<{across - len(cells)}}  {_reached(limit)}")
+        line.append(f"{'':<{levels - len(cells)}}  {_reached(limit)}")
         line.truncate(max(console.width, MIN_WIDTH), overflow="ellipsis")
         console.print(line, soft_wrap=True)
-        last = limit.axis
+        previous_axis = limit.axis
     if result.limits:
         legend = ", ".join(f"{letter} {word}" for word, letter in LETTERS.items())
         print_line(f"one letter per level, from the easiest to the hardest: {legend}", "dim")
@@ -118,16 +120,16 @@ def _row(result: Extremes, limit: Boundary) -> Iterator[Sample]:
 
 def _summary(result: Extremes) -> Iterator[str]:
     """Yield the number of cells by verdict, and the computing time."""
-    for what, cells in (("single axes", result.cells), ("boundaries", result.probes), ("pairs", result.pairs)):
+    for group, cells in (("single axes", result.cells), ("boundaries", result.probes), ("pairs", result.pairs)):
         if cells:
             count = Counter(cell.verdict for cell in cells)
             verdicts = ", ".join(f"{count[word]:,} {word}" for word in VERDICTS if count[word])
-            yield f"{what}: {len(cells):,} cells: {verdicts}"
+            yield f"{group}: {len(cells):,} cells: {verdicts}"
     yield f"{result.seconds:.0f} s on {plural(result.plan.workers, 'worker')}"
 
 
 def _reached(limit: Boundary) -> str:
-    """Return the level up to which a setup passes, and why it fails beyond."""
+    """Return the level up to which a setup passes, and the reason for the first failure."""
     if limit.refused:
         return f"refused: {limit.reason}"
     reached, failed = format_optional(limit.limit, ".4g"), format_optional(limit.first_failure, ".4g")
@@ -140,7 +142,7 @@ def _reached(limit: Boundary) -> str:
 
 
 MIN_MEMORY = 1024
-"""MiB, more than the libraries of a worker take."""
+"""MiB, more than the libraries of a worker need."""
 
 
 @click.command(name="extremes")
@@ -202,7 +204,7 @@ def extremes_command(**given: Any) -> int:
 
 
 def _plan(options: _Options, faults: list[Fault]) -> ExtremesPlan:
-    """Return what to run; add what is wrong with the command line to the faults."""
+    """Return the plan of the command line; add its errors to the faults."""
     chosen = _axes(options.axes, faults)
     names = parse_engines(options.engines, faults)
     if not math.isfinite(options.timeout):

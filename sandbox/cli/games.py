@@ -63,7 +63,7 @@ class _Options(OutputOptions):
 
     @property
     def names(self) -> list[str]:
-        """Players as they were named."""
+        """Names of the players as given."""
         return [name.strip() for name in self.players.split(",")]
 
     @property
@@ -92,11 +92,11 @@ class _MatchScore:
     def text(self, names: list[str]) -> str:
         """Return the result of all frames as one line."""
         players = enumerate(zip(names, self.wins, strict=True), 1)
-        each = ", ".join(f"player {number} ({name}) {won}" for number, (name, won) in players)
+        wins_text = ", ".join(f"player {number} ({name}) {won}" for number, (name, won) in players)
         drawn = len(self.rows) - sum(self.wins) - self.unfinished
         counts = ((drawn, "drawn"), (self.unfinished, "abandoned"))
-        rest = "".join(f", {what} {count}" for count, what in counts if count)
-        return f"{len(self.rows)} frames: {each}{rest}"
+        other_counts = "".join(f", {outcome} {count}" for count, outcome in counts if count)
+        return f"{len(self.rows)} frames: {wins_text}{other_counts}"
 
 
 @click.command(name="match")
@@ -179,7 +179,7 @@ def match_command(**given: Any) -> int:
 
 
 def _table(options: _Options, faults: list[Fault]) -> Scene | None:
-    """Return the scene; add what is wrong with the command line to the faults."""
+    """Return the scene; add the errors of the command line to the faults."""
     with collect_errors(faults, "--engine", (UnknownEngineError,)):
         engine_named(options.engine)
     if options.time_limit is not None and math.isnan(options.time_limit):
@@ -205,7 +205,7 @@ def _table(options: _Options, faults: list[Fault]) -> Scene | None:
 
 
 def _play_frames(options: _Options, first_seed: int, score: _MatchScore) -> None:
-    """Play all frames, and enter each into the score as it ends."""
+    """Play all frames, and add each to the score when it ends."""
     path, count = scene_path(options.scene), len(options.names)
     for k in range(options.frames):
         table = load(path, (*options.overrides, ("world.seed", first_seed + k)))
@@ -220,8 +220,8 @@ def _play_frames(options: _Options, first_seed: int, score: _MatchScore) -> None
                 time_limit=options.time_limit,
                 on_turn=None if progress is None else _turn_progress(progress, k + 1, options.frames, seats),
             )
-        won = frame.match.state.winner
-        winner = None if won is None else seats[won]
+        winning_seat = frame.match.state.winner
+        winner = None if winning_seat is None else seats[winning_seat]
         if winner is not None:
             score.wins[winner] += 1
         score.rows.append({**frame.document(), "seed": first_seed + k, "seats": seats, "winner": winner})
@@ -242,7 +242,7 @@ def _play_frames(options: _Options, first_seed: int, score: _MatchScore) -> None
 def _turn_progress(
     progress: ProgressCallback, number: int, frames: int, seats: list[int]
 ) -> Callable[[FrameTurn, Match], None]:
-    """Return a callback that shows after each turn how far a frame is."""
+    """Return a callback that shows the progress of a frame after each turn."""
     done = 0
 
     def after(_: FrameTurn, match: Match) -> None:

@@ -66,58 +66,58 @@ def schema_command(table: str | None, as_json: bool) -> int:
     if table is None:
         click.echo(dumps(), nl=False)
         return 0
-    whole = schema()
-    found = _find(whole, table.strip("[]"))
+    root = schema()
+    found = _find(root, table.strip("[]"))
     if as_json:
         one = found[0] if len(found) == 1 else {"oneOf": found}
-        print_json({"$schema": whole["$schema"], **one, "$defs": whole["$defs"]})
+        print_json({"$schema": root["$schema"], **one, "$defs": root["$defs"]})
         return 0
     for node in found:
-        _print_table(whole, table, node)
+        _print_table(root, table, node)
     return 0
 
 
-def _find(whole: Node, path: str) -> list[Node]:
+def _find(root: Node, path: str) -> list[Node]:
     """Return the tables at a path: one, or several kinds of joints or drives.
 
     Raises:
         click.UsageError: there is no table at the path.
     """
-    here = [whole]
+    tables = [root]
     for part in path.split("."):
-        nested = _nested(whole, part) if here == [whole] and part not in whole["properties"] else []
+        nested = _nested(root, part) if tables == [root] and part not in root["properties"] else []
         if nested:
-            here = nested
+            tables = nested
             continue
-        known = dict.fromkeys(key for node in here for key in node.get("properties", {}))
+        known = dict.fromkeys(key for node in tables for key in node.get("properties", {}))
         if part not in known:
             close = difflib.get_close_matches(part, known, n=1)
             hint = f"did you mean {close[0]!r}?" if close else f"known keys: {', '.join(known)}"
             raise click.UsageError(f"{short_repr(path)}: no key {short_repr(part)}; {hint}")
-        inner = (node["properties"][part] for node in here if part in node.get("properties", {}))
-        here = list({node.get("title", ""): node for each in inner for node in _tables(whole, each)}.values())
-        if not here:
+        inner = (node["properties"][part] for node in tables if part in node.get("properties", {}))
+        tables = list({node.get("title", ""): node for each in inner for node in _tables(root, each)}.values())
+        if not tables:
             raise click.UsageError(f"{short_repr(path)}: {short_repr(part)} is a value, not a table")
-    return here
+    return tables
 
 
-def _nested(whole: Node, name: str) -> list[Node]:
+def _nested(root: Node, name: str) -> list[Node]:
     """Return the distinct tables of a name that are keys of other tables, such as kick."""
-    within = (node["properties"][name] for node in whole["$defs"].values() if name in node.get("properties", {}))
-    return list({node.get("title", ""): node for each in within for node in _tables(whole, each)}.values())
+    within = (node["properties"][name] for node in root["$defs"].values() if name in node.get("properties", {}))
+    return list({node.get("title", ""): node for each in within for node in _tables(root, each)}.values())
 
 
-def _tables(whole: Node, node: Node) -> list[Node]:
+def _tables(root: Node, node: Node) -> list[Node]:
     """Return the tables that a value may be, or that its elements may be."""
     if "$ref" in node:
-        node = whole["$defs"][node["$ref"].rpartition("/")[2]]
+        node = root["$defs"][node["$ref"].rpartition("/")[2]]
     if "properties" in node:
         return [node]
     inner = [*node.get("anyOf", ()), *node.get("oneOf", ()), *([node["items"]] if "items" in node else ())]
-    return [table for each in inner for table in _tables(whole, each)]
+    return [table for each in inner for table in _tables(root, each)]
 
 
-def _print_table(whole: Node, name: str, node: Node) -> None:
+def _print_table(root: Node, name: str, node: Node) -> None:
     """Print the keys of a table, one per line: type and range, default, description."""
     from rich.text import Text
 
@@ -130,12 +130,12 @@ def _print_table(whole: Node, name: str, node: Node) -> None:
     for key, each in node["properties"].items():
         needed = "required" if key in node.get("required", ()) else json.dumps(each.get("default"))
         default = "–" if needed == "null" else needed
-        table.add_row(*map(Text, (key, _value(whole, each), default, _line(each.get("description", "")))))
+        table.add_row(*map(Text, (key, _value(root, each), default, _line(each.get("description", "")))))
     print_folded_table(table)
 
 
 LARGE = 1e5
-"""Bounds beyond this, or below its reciprocal, only guard the engines against nonsense, and are not printed."""
+"""Bounds beyond this, or below its reciprocal, only protect the engines from extreme values, and are not printed."""
 
 
 def _line(text: str) -> str:
@@ -147,23 +147,23 @@ def _kinds(node: Node) -> str:
     return " or ".join(kind.get("enum", [kind["const"]] if "const" in kind else []))
 
 
-def _value(whole: Node, node: Node) -> str:
+def _value(root: Node, node: Node) -> str:
     """Return the type and range of a value in words."""
     if "$ref" in node:
-        node = whole["$defs"][node["$ref"].rpartition("/")[2]]
+        node = root["$defs"][node["$ref"].rpartition("/")[2]]
     if "properties" in node:
         return "table"
     if "enum" in node or "const" in node:
         return " · ".join(map(str, node.get("enum", [node.get("const")])))
     forms = [*node.get("anyOf", ()), *node.get("oneOf", ())]
     if forms:
-        return " or ".join(dict.fromkeys(_value(whole, each) for each in forms))
+        return " or ".join(dict.fromkeys(_value(root, each) for each in forms))
     if node.get("type") == "array":
         if "prefixItems" in node:
-            return f"[{', '.join(_value(whole, each) for each in node['prefixItems'])}]"
-        of = _value(whole, node["items"])
-        return "tables" if "table" in of else f"array of {of}"
-    low, high = (node.get(f"{way}imum", node.get(f"exclusive{way.capitalize()}imum")) for way in ("min", "max"))
+            return f"[{', '.join(_value(root, each) for each in node['prefixItems'])}]"
+        element = _value(root, node["items"])
+        return "tables" if "table" in element else f"array of {element}"
+    low, high = (node.get(f"{end}imum", node.get(f"exclusive{end.capitalize()}imum")) for end in ("min", "max"))
     words = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false"}
     word = words.get(str(node.get("type")), str(node.get("type", "value")))
     low, high = (None if bound is None or abs(bound) >= LARGE else bound for bound in (low, high))

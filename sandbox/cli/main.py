@@ -41,10 +41,10 @@ COMMANDS = {
     "miss": ("games:miss_command", "measure how far a projectile lands off target, by engine, integrator and step"),
     "match": ("games:match_command", "play frames of billiards between bots and print the score"),
 }
-"""Each command: module of this package and function, and one line of help. Help needs to import none of them."""
+"""Each command: module of this package and function, and one line of help. Help is printed without importing them."""
 
 COMPLETION = "_SANDBOX_COMPLETE"
-"""Environment variable of shell completion, as click names it."""
+"""Environment variable of shell completion, with the name that click uses."""
 
 GREETING = """\
 sandbox runs one physics scene on several engines and measures the error and the cost of each.
@@ -140,7 +140,7 @@ def main(arguments: list[str] | None = None) -> None:
     """
     prepare_streams()
     status = call(arguments)
-    gc.freeze()  # the interpreter would look for garbage at exit, to no use
+    gc.freeze()  # prevents a useless garbage collection at exit
     sys.exit(status)
 
 
@@ -190,13 +190,13 @@ def call(arguments: list[str] | None = None) -> int:
 
 def _undecodable(arguments: Sequence[str]) -> str:
     """Return the fault of the first argument that is not text; "" if all are."""
-    for number, argument in enumerate(arguments, 1):
+    for position, argument in enumerate(arguments, 1):
         try:
             argument.encode()
         except UnicodeEncodeError:
-            return f"argument {number}, {short_repr(argument)}, is not UTF-8 text"
+            return f"argument {position}, {short_repr(argument)}, is not UTF-8 text"
         if "\0" in argument:
-            return f"argument {number}, {short_repr(argument)}, contains a NUL character"
+            return f"argument {position}, {short_repr(argument)}, contains a NUL character"
     return ""
 
 

@@ -59,20 +59,20 @@ def minimised(
         progress: called with the progress.
     """
     engines = _diverging(comparison, names)
-    reason = _no_answer(comparison, engines)
+    reason = _obstacle(comparison, engines)
     if reason:
-        return _nothing(scene, comparison, reason)
-    asked = DivergenceTest(engines, comparison.tolerance)
+        return _no_reduction(scene, comparison, reason)
+    test = DivergenceTest(engines, comparison.tolerance)
     try:
-        found = minimise(comparison.scene, asked, on_progress=progress)
+        found = minimise(comparison.scene, test, on_progress=progress)
     except RunTimeoutError as error:
-        return _nothing(scene, comparison, f"a run of the scene takes too long: {error}")
+        return _no_reduction(scene, comparison, f"a run of the scene takes too long: {error}")
     if found.divergence is None:
-        reason = f"{asked} agree within {comparison.tolerance:.2g} m for as long as the comparison is reliable"
-        return _nothing(scene, comparison, reason, found.runs)
-    document, text = _document(found, path), _text(scene, found, asked, path)
-    if asked.of(loads(text)) is None:
-        return _nothing(scene, comparison, "the reduced scene does not reproduce the divergence", found.runs)
+        reason = f"{test} agree within {comparison.tolerance:.2g} m for as long as the comparison is reliable"
+        return _no_reduction(scene, comparison, reason, found.runs)
+    document, text = _document(found, path), _text(scene, found, test, path)
+    if test.of(loads(text)) is None:
+        return _no_reduction(scene, comparison, "the reduced scene does not reproduce the divergence", found.runs)
     try:
         with atomic_write(path) as temporary:
             temporary.write_text(text, encoding="utf-8")
@@ -80,7 +80,7 @@ def minimised(
         message = f"{path}: {error.strerror or error}"
         return MinimiseAnswer(2, f"--minimise: {message}", {**document, "path": None, "error": message})
     interrupted = found.ended == "interrupted"
-    sentence = f"{_counted(found)}, in {found.runs:,} tries\n{_sentence(found, asked)}\nwritten: {path}"
+    sentence = f"{_counted(found)}, in {found.runs:,} tries\n{_sentence(found, test)}\nwritten: {path}"
     if found.ended is not None:
         sentence += f"\n{found.ended}: a smaller scene may exist"
     return MinimiseAnswer(130 if interrupted else 0, sentence, document)
@@ -90,13 +90,13 @@ def _diverging(comparison: Comparison, names: Sequence[str] | None) -> list[str]
     """Return the two engines to compare, or the one to compare with the truth; empty if none diverges."""
     if names is not None and len(names) == 2:
         return list(names)
-    off = [row for row in comparison.rows if row.first_divergence is not None]
-    first = min(off, key=lambda row: row.first_divergence or 0.0, default=None)
+    diverged = [row for row in comparison.rows if row.first_divergence is not None]
+    first = min(diverged, key=lambda row: row.first_divergence or 0.0, default=None)
     return [first.engine] if first is not None else []
 
 
-def _no_answer(comparison: Comparison, engines: Sequence[str]) -> str:
-    """Return why there is nothing to reduce; "" if there may be."""
+def _obstacle(comparison: Comparison, engines: Sequence[str]) -> str:
+    """Return the reason why there is nothing to reduce; "" if there is none."""
     refusing = [row.engine for row in comparison.rows if row.engine in engines and row.status == "refused"]
     if refusing:
         return f"{' and '.join(refusing)} cannot run the scene"
@@ -108,7 +108,7 @@ def _no_answer(comparison: Comparison, engines: Sequence[str]) -> str:
     return f"no engine differs from the truth by more than {comparison.tolerance:.2g} m {until}"
 
 
-def _nothing(scene: str, comparison: Comparison, reason: str, runs: int = 0) -> MinimiseAnswer:
+def _no_reduction(scene: str, comparison: Comparison, reason: str, runs: int = 0) -> MinimiseAnswer:
     bodies, fixed = len(comparison.scene.bodies), len(comparison.scene.fixed)
     document: dict[str, Any] = {
         "path": None,
@@ -147,24 +147,24 @@ def _several(number: int, one: str, more: str) -> str:
     return f"{number:,} {one if number == 1 else more}"
 
 
-def _sentence(found: ReducedScene, asked: DivergenceTest) -> str:
-    """Return which engines diverge, from which time on, and the first body to diverge."""
+def _sentence(found: ReducedScene, test: DivergenceTest) -> str:
+    """Return the engines that diverge, the time of the divergence, and the first body to diverge."""
     parting = found.divergence
     assert parting is not None
     first = "" if parting.body is None else f", {json.dumps(parting.body, ensure_ascii=False)} first"
-    return f"{asked} differ by more than {asked.tolerance:.4g} m from t = {parting.time:.6g} s on{first}"
+    return f"{test} differ by more than {test.tolerance:.4g} m from t = {parting.time:.6g} s on{first}"
 
 
-def _text(scene: str, found: ReducedScene, asked: DivergenceTest, path: Path) -> str:
-    """Return the scene as TOML, with comments that say what it shows and how to reproduce it."""
-    again = (
-        f"sandbox compare {shlex.quote(path.name)} --engines {','.join(asked.engines)} --tolerance {asked.tolerance!r}"
+def _text(scene: str, found: ReducedScene, test: DivergenceTest, path: Path) -> str:
+    """Return the scene as TOML, with comments on its divergence and on how to reproduce it."""
+    command = (
+        f"sandbox compare {shlex.quote(path.name)} --engines {','.join(test.engines)} --tolerance {test.tolerance!r}"
     )
     lines = (
-        f"{_sentence(found, asked)}.",
+        f"{_sentence(found, test)}.",
         f"{_counted(found).capitalize()}, from {Path(scene).name}.",
-        f"Reproduce: {again}",
+        f"Reproduce: {command}",
     )
-    shown = ("".join(letter if letter.isprintable() else " " for letter in line) for line in lines)
+    comments = ("".join(letter if letter.isprintable() else " " for letter in line) for line in lines)
     words = {"title": f"{found.scene.title or Path(scene).stem}, minimised"[-200:], "about": lines[0]}
-    return "".join(f"# {line}\n" for line in shown) + "\n" + dumps(found.scene.model_copy(update=words))
+    return "".join(f"# {line}\n" for line in comments) + "\n" + dumps(found.scene.model_copy(update=words))

@@ -1,4 +1,4 @@
-"""Options that several commands have, each with one spelling and one help text."""
+"""Options shared by several commands, each with one spelling and one help text."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,14 +10,14 @@ import click
 
 @dataclass(frozen=True, kw_only=True)
 class OutputOptions:
-    """Options of what a command prints; the base of the options of each command."""
+    """Output options; base class of the options of each command."""
 
     as_json: bool
     quiet: bool
 
     @property
     def is_silent(self) -> bool:
-        """No progress and no result in words is printed."""
+        """Whether neither progress nor results as text are printed."""
         return self.quiet or self.as_json
 
 
@@ -44,7 +44,7 @@ sweep_option = click.option(
 
 
 def engines_option(default: str, verb: str = "run") -> Decorator:
-    """Return `--engine NAME[,NAME]`, also spelled `--engines`, with what is run without it."""
+    """Return `--engine NAME[,NAME]`, also spelled `--engines`, with its default."""
     text = f"engine or engines to {verb}; default: {default}"
     return click.option("--engine", "--engines", "engines", metavar="NAME[,NAME]", help=text)
 

@@ -30,31 +30,31 @@ def status_line(silent: bool) -> Iterator[ProgressCallback | None]:
 
 
 class ProgressBar:
-    """A bar with a description; without a terminal, nothing."""
+    """Progress bar with a description; does nothing without a terminal."""
 
     def __init__(self, bars: "RichProgress | None", text: str, total: float | None) -> None:
         self._bars = bars
         self._task: TaskID | None = None if bars is None else bars.add_task(text, total=total)
 
     def update(self, completed: float, text: str | None = None, total: float | None = None) -> None:
-        """Show how much of the total is done, and a new description or total if they are given."""
+        """Show the completed amount, and a new description or total if given."""
         if self._bars is not None and self._task is not None:
             self._bars.update(self._task, completed=completed, description=text, total=total)
 
 
 class ProgressBars:
-    """Bars, one below the other."""
+    """Several progress bars, one below the other."""
 
     def __init__(self, bars: "RichProgress | None" = None) -> None:
         self._bars = bars
 
     @property
     def is_shown(self) -> bool:
-        """There is a terminal to show them, and the command is not silent."""
+        """Whether there is a terminal, and the command is not silent."""
         return self._bars is not None
 
     def add(self, text: str, total: float | None = None) -> ProgressBar:
-        """Add a bar; its total is not known yet if it is None."""
+        """Add a bar; a total of None is not known yet."""
         return ProgressBar(self._bars, text, total)
 
     def callback(self, text: str) -> ProgressCallback | None:

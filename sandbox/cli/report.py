@@ -58,7 +58,7 @@ class _Options(OutputOptions):
 
 @dataclass
 class _Report:
-    """The scenes of the command, and what has been found so far."""
+    """Scenes of the command, and the results so far."""
 
     engines: list[str] | None
     scenes: list[tuple[str, Scene]]
@@ -133,7 +133,7 @@ def report_command(**given: Any) -> int:
 
 
 def _read_scenes(options: _Options, faults: list[Fault]) -> list[tuple[str, Scene]]:
-    """Return the names and scenes; add what is wrong with them, and numbers out of range, to the faults."""
+    """Return the names and scenes; add faults of scenes and numbers out of range to the faults."""
     read: list[tuple[str, Scene]] = []
     default = (scene.name for scene in shipped() if scene.name.startswith(DEFAULT_SCENES))
     for name in expand_folders(options.scenes) or default:
@@ -153,7 +153,7 @@ def _add_scene(report: _Report, name: str, scene: Scene, options: _Options) -> N
     """Compare a scene on all engines, search its trade-off, and add both to the report.
 
     Raises:
-        KeyboardInterrupt: what was complete before is in the report.
+        KeyboardInterrupt: Ctrl-C was pressed; completed results are in the report.
     """
     from sandbox.report.html.overview import SceneReport
 

@@ -77,7 +77,7 @@ class _Options(OutputOptions):
 
 @dataclass
 class _Batch:
-    """The runs of the command: jobs, and what has been completed."""
+    """Runs of the command: jobs and completed runs."""
 
     jobs: list[Job]
     rows: dict[int, JsonObject] = field(default_factory=dict)
@@ -88,7 +88,7 @@ class _Batch:
     """exit status: 130 interrupted, 2 a job could not be run, 1 no worker could be started"""
 
     def add(self, result: Result) -> None:
-        """Enter a completed run."""
+        """Add a completed run."""
         self.rows[result.index] = result.row
         if len(self.jobs) == 1:
             self.single = result.record
@@ -159,7 +159,7 @@ def run_command(**given: Any) -> int:
 
 
 def _planned_jobs(options: _Options, faults: list[Fault]) -> list[Job]:
-    """Return all jobs of the command; add what is wrong with it to the faults."""
+    """Return all jobs of the command; add its errors to the faults."""
     names = parse_engines(options.engines, faults)
     found: list[tuple[str, str]] = []
     for scene in expand_folders(options.scenes):
@@ -189,7 +189,7 @@ def _planned_jobs(options: _Options, faults: list[Fault]) -> list[Job]:
 
 
 def _run_all(batch: _Batch, options: _Options, store: Store | None) -> None:
-    """Run all jobs, and enter each run into the batch as it completes; an interrupt or error ends the batch."""
+    """Run all jobs, and add each run to the batch when it completes; an interrupt or error ends the batch."""
     jobs = batch.jobs
     is_single = all(len(job.scene.bodies) == 1 for job in jobs)  # then the table can show the final position
     run_options = RunOptions(options.out, options.audit, options.ledger, options.as_json or is_single)
@@ -226,7 +226,7 @@ def _run_all(batch: _Batch, options: _Options, store: Store | None) -> None:
 
 
 def _report_problems(batch: _Batch, is_engine_chosen: bool) -> int:
-    """Print a line for each run that did not end as it should, and return the exit status."""
+    """Print a line for each failed or repeated run, and return the exit status."""
     status = batch.status
     for index, row in sorted(batch.rows.items()):
         if row["status"] != "ok":
@@ -237,8 +237,10 @@ def _report_problems(batch: _Batch, is_engine_chosen: bool) -> int:
             click.echo(f"{row['damaged']}; the run was repeated", err=True)
         if row.get("replayed") is False:
             status = status or 1
-            what = "state" if row.get("otherwise") is None else f"game, from {row['otherwise']:g} s on,"
-            message = f"ended in a different {what} than the session; a possible cause is another version of an engine"
+            subject = "state" if row.get("otherwise") is None else f"game, from {row['otherwise']:g} s on,"
+            message = (
+                f"ended in a different {subject} than the session; a possible cause is another version of an engine"
+            )
             click.echo(f"{row['scene']}: {message}", err=True)
     return status
 
@@ -247,8 +249,8 @@ def _print_results(batch: _Batch, options: _Options, status: int) -> None:
     """Print the JSON document, or the tables."""
     rows = batch.ordered_rows
     if options.as_json:
-        spread = score_rows(rows) if options.seeds is not None else []
-        scores = {"scores": spread} if spread else {}
+        score_documents = score_rows(rows) if options.seeds is not None else []
+        scores = {"scores": score_documents} if score_documents else {}
         print_json({"runs": rows, **scores, "interrupted": batch.status == 130})
     elif not options.quiet and rows:
         print_runs(rows, options.verbose)
@@ -282,7 +284,7 @@ def _draw(batch: _Batch, options: _Options, status: int) -> int:
 
 
 def _runnable(paths: list[tuple[str, str]]) -> list[tuple[str, str]]:
-    """Return the names and files of scenes and sessions as they are.
+    """Return the names and files of scenes and sessions unchanged.
 
     Raises:
         SceneError: one is a stored run.
@@ -295,17 +297,17 @@ def _runnable(paths: list[tuple[str, str]]) -> list[tuple[str, str]]:
 
 
 def _choose_engines(jobs: list[Job], overrides: Sequence[str], sweeps: Sequence[str], quiet: bool) -> list[Job]:
-    """Return the jobs; where the default engine lacks a setting that is given, on the only engine that has it.
+    """Return the jobs; if the default engine lacks a given setting, on the only engine that has it.
 
-    All runs of a scene stay on one engine. A recorded session stays on its own.
+    All runs of a scene are on one engine. The engine of a recorded session is not changed.
     """
     axes = [parse_sweep(sweep) for sweep in sweeps]
     found: dict[str, EngineChoice] = {}
     for label in dict.fromkeys(job.label for job in jobs if not job.recorded):
-        own = [job for job in jobs if job.label == label]
-        if all(own[0].engine in able(job.scene) for job in own):
+        scene_jobs = [job for job in jobs if job.label == label]
+        if all(scene_jobs[0].engine in able(job.scene) for job in scene_jobs):
             continue
-        choice = only_engine([job.scene for job in own], overrides, axes)
+        choice = only_engine([job.scene for job in scene_jobs], overrides, axes)
         if choice is not None:
             found[label] = choice
     if not quiet:
@@ -348,8 +350,8 @@ def _check_drawing(plot: Path | None, bodies: tuple[str, ...], jobs: list[Job]) 
     if plot is not None:
         if len(jobs) != 1:
             remedy = "run one scene on one --engine, without --sweep and --seeds"
-            several = "sandbox compare SCENE --out DIR plots several engines"
-            fault("--plot", f"draws a single run, but this command makes {len(jobs):,}; {remedy}; {several}")
+            alternative = "sandbox compare SCENE --out DIR plots several engines"
+            fault("--plot", f"draws a single run, but this command makes {len(jobs):,}; {remedy}; {alternative}")
         with collect_errors(faults):
             require_plot_file(plot)
         names = jobs[0].scene.bodies.names
@@ -361,15 +363,17 @@ def _check_drawing(plot: Path | None, bodies: tuple[str, ...], jobs: list[Job]) 
 
 
 def _report_equal_seeds(jobs: list[Job]) -> None:
-    """Report scenes in which nothing is random, so that several seeds give the same run."""
+    """Report scenes without randomness, in which several seeds give the same run."""
     for label in dict.fromkeys(job.label for job in jobs):
         if any(job.label == label and job.player is not None for job in jobs):
             continue  # the game and its player are random
-        alike = max(job.seeds for job in jobs if job.label == label)
-        if alike > 1:
-            where = "" if all(job.seeds > 1 for job in jobs if job.label == label) else "for some of the swept values, "
+        seed_count = max(job.seeds for job in jobs if job.label == label)
+        if seed_count > 1:
+            prefix = (
+                "" if all(job.seeds > 1 for job in jobs if job.label == label) else "for some of the swept values, "
+            )
             click.echo(
-                f"{label}: {where}nothing is random, so the seeds 1 to {alike} give one and the same run, "
+                f"{label}: {prefix}nothing is random, so the seeds 1 to {seed_count} give one and the same run, "
                 "which is made once",
                 err=True,
             )

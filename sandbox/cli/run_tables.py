@@ -19,9 +19,9 @@ STEP = ("dt", "substeps")
 """Settings that share a column."""
 
 MAX_TIMED = 20
-"""Runs in a table that shows first contacts and final positions; in a longer one they are columns without much use."""
+"""Runs in a table that shows first contacts and final positions; in a longer table these columns are omitted."""
 
-SHORTEST_NAME = 8
+MIN_NAME_WIDTH = 8
 """Width to which the column of scene names is folded on a narrow terminal."""
 
 
@@ -59,7 +59,7 @@ def print_runs(rows: Sequence[JsonObject], verbose: bool = False) -> None:
     show = _Columns.of(rows)
     table = new_table()
     if show.scenes:
-        table.add_column("scene", overflow="fold", min_width=SHORTEST_NAME)
+        table.add_column("scene", overflow="fold", min_width=MIN_NAME_WIDTH)
     add_columns(table, ["engine"])
     numbers = ("dt × substeps" if show.substeps else "dt", *show.swept, *show.differing)
     add_columns(table, (*numbers, *(["seed"] if show.seeds else [])), "right")
@@ -75,8 +75,9 @@ def print_runs(rows: Sequence[JsonObject], verbose: bool = False) -> None:
     for row in rows:
         table.add_row(*_cells(row, show))
 
-    # One scene stands above its runs: a long path would take the room of the numbers. Of several, only names fold.
-    foldable = max(Text(row["scene"]).cell_len for row in rows) - SHORTEST_NAME if show.scenes else 0
+    # A single scene is printed above its runs, because a long path would take the space of the numbers. With several
+    # scenes, only their names fold.
+    foldable = max(Text(row["scene"]).cell_len for row in rows) - MIN_NAME_WIDTH if show.scenes else 0
     if not show.scenes:
         print_line(rows[0]["scene"])
     print_table(table, max(foldable, 0))
@@ -111,13 +112,13 @@ class _Columns(NamedTuple):
 
     @classmethod
     def of(cls, rows: Sequence[JsonObject]) -> "_Columns":
-        """Return the columns that have something to show."""
+        """Return the columns that are not empty or constant."""
         swept = [key for key in rows[0]["set"] if key != "world.seed" and not key.startswith("solver.")]
         scenes = len({row["scene"] for row in rows}) > 1
         games = any("score" in row for row in rows)
         # Scores are the results of games, and runs of several scenes are not compared with each other.
-        few = 1 < len(rows) <= MAX_TIMED and not games and not scenes
-        is_timed = few and all(row["first_contact"] is not None for row in rows)
+        is_small = 1 < len(rows) <= MAX_TIMED and not games and not scenes
+        is_timed = is_small and all(row["first_contact"] is not None for row in rows)
         return cls(
             scenes=scenes,
             swept=[key for key in swept if len({str(row["set"][key]) for row in rows}) > 1],
@@ -127,7 +128,7 @@ class _Columns(NamedTuple):
             joint_errors=any(row["joint_error"] is not None for row in rows),
             broken_joints=any(row["broken_joints"] for row in rows),
             first_contacts=is_timed or _first_contacts_differ(rows),
-            positions=few and len({_final_position(row) for row in rows} - {""}) > 1,
+            positions=is_small and len({_final_position(row) for row in rows} - {""}) > 1,
             games=games,
             pocketed=any(row["pocketed"] for row in rows),
         )
@@ -191,9 +192,9 @@ def _final_position(row: JsonObject) -> str:
 
 
 def _first_contacts_differ(rows: Sequence[JsonObject]) -> bool:
-    """Tell whether the first contact of one scene and seed differs between engines or settings.
+    """Return whether the first contact of one scene and seed differs between engines or settings.
 
-    If energies and counts are equal, it is what shows the effect of the setting.
+    If energies and counts are equal, only the first contact shows the effect of a setting.
     """
     times: dict[tuple[str, int], set[float | None]] = {}
     for row in rows:
@@ -208,7 +209,7 @@ def _game_end(row: JsonObject) -> str:
 
 
 def _differs(rows: Sequence[JsonObject], key: str) -> bool:
-    """Tell whether a setting differs between runs of one scene; between scenes, defaults of engines differ anyway."""
+    """Return whether a setting differs between runs of one scene; between scenes, defaults of engines differ anyway."""
     values: dict[str, set[str]] = {}
     for row in rows:
         values.setdefault(row["scene"], set()).add(str(row["settings"][key]))
@@ -230,7 +231,7 @@ def _number(value: float | None, digits: int = 4) -> str:
 
 
 MAX_LEDGERS = 5
-"""Runs in one table of ledgers, which then fits a terminal; further runs have a table of their own."""
+"""Runs in one table of ledgers, which then fits a terminal; further runs are in another table."""
 
 ROUNDING = 1e-12
 """Fraction of the largest energy below which an entry is a rounding error and has no line: sums of 1e4 terms of double
@@ -266,9 +267,9 @@ def print_ledgers(rows: Sequence[JsonObject]) -> None:
 def _groups(rows: Sequence[JsonObject]) -> Iterator[list[JsonObject]]:
     """Yield the runs of each scene, at most `MAX_LEDGERS` at a time."""
     for scene in dict.fromkeys(row["scene"] for row in rows):
-        own = [row for row in rows if row["scene"] == scene]
-        for first in range(0, len(own), MAX_LEDGERS):
-            yield own[first : first + MAX_LEDGERS]
+        scene_rows = [row for row in rows if row["scene"] == scene]
+        for first in range(0, len(scene_rows), MAX_LEDGERS):
+            yield scene_rows[first : first + MAX_LEDGERS]
 
 
 def _label(row: JsonObject, group: Sequence[JsonObject]) -> str:
@@ -298,7 +299,7 @@ def _percent(fraction: float) -> str:
 
 
 def _is_significant(ledger: dict[str, Any], value: float | None, threshold: float = ROUNDING) -> bool:
-    """Tell whether an entry is unknown, or larger than rounding errors."""
+    """Return whether an entry is unknown, or larger than rounding errors."""
     return value is None or abs(value) > threshold * (ledger["scale"] or 0.0)
 
 
@@ -329,7 +330,7 @@ def score_rows(rows: Sequence[JsonObject]) -> list[dict[str, Any]]:
 
 
 def print_scores(rows: Sequence[dict[str, Any]]) -> None:
-    """Print what `score_rows` returned."""
+    """Print the distributions of `score_rows`."""
     for row in rows:
         swept = "".join(f", {key} = {value}" for key, value in row["set"].items())
         click.echo(f"\nscores of {row['scene']}, {row['engine']}{swept}: {row['count']} games, player {row['player']}")

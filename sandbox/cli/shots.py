@@ -60,7 +60,7 @@ class _Options(OutputOptions):
 
 @dataclass
 class _Request:
-    """What to analyse: the checked command line."""
+    """Checked command line: shot, errors and pots to analyse."""
 
     spread: Spread
     shot: ShotSetup | None
@@ -68,7 +68,7 @@ class _Request:
     pots: list[tuple[str, str]]
     """ball and pocket of each `--window`"""
     refusal: str = ""
-    """why the exact engine cannot run the scene"""
+    """reason why the exact engine cannot run the scene"""
 
 
 @click.command(name="shots")
@@ -193,7 +193,7 @@ def shots_command(**given: Any) -> int:
 
 
 def _checked(options: _Options, faults: list[Fault]) -> _Request:
-    """Return what to analyse; add what is wrong with the command line to the faults."""
+    """Return the request of the command line; add its errors to the faults."""
     request = _Request(DEFAULT, None, [])
     with collect_errors(faults, "--aim-error, --speed-error, --side-error, --height-error", (ValueError,)):
         request.spread = Spread(options.aim_error, options.speed_error, options.side_error, options.height_error)
@@ -244,7 +244,7 @@ def _study(attempt: ShotSetup, request: _Request, options: _Options) -> ShotStud
 
 
 def _failed(options: _Options, status: str, reason: str) -> int:
-    """Print why there are no odds, and return the exit status."""
+    """Print the reason why there are no odds, and return the exit status."""
     click.echo(f"{options.scene}: {status}: {reason}", err=True)
     if options.as_json:
         print_json({"scene": options.scene, "status": status, "reason": reason, "odds": None})

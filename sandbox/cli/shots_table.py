@@ -48,12 +48,12 @@ def print_study(scene: str, found: ShotStudy, verbose: bool = False) -> None:
 
     Args:
         scene: the scene as the user named it.
-        found: what to print.
+        found: the study.
         verbose: explain every column below its table.
     """
     title = found.shot.table.scene.title
     print_line(f"{scene}: {title}" if title else scene)
-    for line in _about(found):
+    for line in _shot_lines(found):
         click.echo(line)
     rows = [list(ODDS_HEADS), *_odds_rows(found.odds)]
     if not found.shot.pockets:
@@ -62,7 +62,7 @@ def print_study(scene: str, found: ShotStudy, verbose: bool = False) -> None:
     print_table(_table(rows[0], rows[1:]))
     if verbose:
         print_legend(rows[0], LEGEND)
-    for line in _in_all(found.odds):
+    for line in _totals(found.odds):
         click.echo(line)
     if found.slopes is not None:
         heads = [f"d/d({variable}), m/{UNITS[variable]}" for variable in VARIABLES]
@@ -89,47 +89,47 @@ def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> "Table":
     return table
 
 
-def _about(found: ShotStudy) -> Iterator[str]:
+def _shot_lines(found: ShotStudy) -> Iterator[str]:
     attempt, odds = found.shot, found.odds
     stroke = attempt.stroke
-    off = f", tip at ({stroke.side:+g}, {stroke.height:+g}) R" if stroke.side or stroke.height else ""
-    yield f"{attempt.name}: {attempt.ball!r} struck at {stroke.speed:g} m/s at an aim of {stroke.aim:.6g} rad{off}"
+    offset = f", tip at ({stroke.side:+g}, {stroke.height:+g}) R" if stroke.side or stroke.height else ""
+    yield f"{attempt.name}: {attempt.ball!r} struck at {stroke.speed:g} m/s at an aim of {stroke.aim:.6g} rad{offset}"
     errors = odds.spread
     sides = f", tip ± ({errors.side:g}, {errors.height:g}) R" if errors.side or errors.height else ""
-    missed = f"; {odds.miscues:,} miscues" if odds.miscues else ""
-    given = f"; {odds.unfinished:,} did not come to rest" if odds.unfinished else ""
-    stray = f"aim ± {1e3 * errors.aim:g} mrad, speed ± {100.0 * errors.speed:g} %{sides}"
-    yield f"{odds.count:,} shots, {stray} (standard deviations), seed {odds.seed}{missed}{given}"
+    miscue_text = f"; {odds.miscues:,} miscues" if odds.miscues else ""
+    unfinished_text = f"; {odds.unfinished:,} did not come to rest" if odds.unfinished else ""
+    errors_text = f"aim ± {1e3 * errors.aim:g} mrad, speed ± {100.0 * errors.speed:g} %{sides}"
+    yield f"{odds.count:,} shots, {errors_text} (standard deviations), seed {odds.seed}{miscue_text}{unfinished_text}"
 
 
 def _odds_rows(odds: Odds) -> list[list[str]]:
     nominal = odds.nominal
     rows = []
-    for number, ball in enumerate(nominal.names):
+    for index, ball in enumerate(nominal.names):
         fell, rest = odds.chance(ball), odds.rest(ball)
-        into = {pocket: odds.chance(ball, pocket) for pocket in odds.shot.pockets}
-        often = sorted((each for each in into.items() if each[1].hits), key=lambda each: -each[1].hits)
-        meant = nominal.pocketed.get(ball) or _place(nominal.position[number].tolist())
+        by_pocket = {pocket: odds.chance(ball, pocket) for pocket in odds.shot.pockets}
+        most_frequent = sorted((each for each in by_pocket.items() if each[1].hits), key=lambda each: -each[1].hits)
+        without_error = nominal.pocketed.get(ball) or _position_text(nominal.position[index].tolist())
         rows.append(
             [
                 ball,
                 _percent(fell.probability),
                 _bounds(fell),
-                _into(often),
-                "–" if rest is None else _place(rest.mean),
-                "–" if rest is None else _place(rest.spread),
-                meant,
+                _pockets_text(most_frequent),
+                "–" if rest is None else _position_text(rest.mean),
+                "–" if rest is None else _position_text(rest.spread),
+                without_error,
             ]
         )
     return rows
 
 
-def _into(often: Sequence[tuple[str, Proportion]]) -> str:
-    named = [f"{pocket} {_percent(chance.probability)}" for pocket, chance in often[:MAX_POCKETS]]
-    return ", ".join([*named, *(["…"] if len(often) > MAX_POCKETS else [])]) or "–"
+def _pockets_text(most_frequent: Sequence[tuple[str, Proportion]]) -> str:
+    named = [f"{pocket} {_percent(chance.probability)}" for pocket, chance in most_frequent[:MAX_POCKETS]]
+    return ", ".join([*named, *(["…"] if len(most_frequent) > MAX_POCKETS else [])]) or "–"
 
 
-def _in_all(odds: Odds) -> Iterator[str]:
+def _totals(odds: Odds) -> Iterator[str]:
     if not odds.shot.pockets:
         return
     pot, scratch = odds.any_pot, odds.scratch
@@ -160,43 +160,44 @@ def _window(found: Windows) -> Iterator[str]:
     if nearest is None:
         yield f"{pot}: for no aim within {found.reach:g} rad of {found.aim:.6g}"
         return
-    near = sorted(found.found, key=lambda each: each.off(found.aim))[:MAX_WINDOWS]
-    for each in sorted(near, key=lambda each: each.low):
+    nearest_windows = sorted(found.found, key=lambda each: each.off(found.aim))[:MAX_WINDOWS]
+    for each in sorted(nearest_windows, key=lambda each: each.low):
         ends = f"[{each.low:.9f}, {each.high:.9f}] rad, ± {1e3 * each.half:.4g} mrad about {each.centre:.9f}"
         yield f"{pot}: for an aim in {ends}"
-    if len(found.found) > len(near):
-        yield f"{pot}: {len(found.found) - len(near)} more intervals within {found.reach:g} rad, farther from the aim"
-    off = 1e3 * (found.aim - nearest.centre)
-    side = "left" if off > 0.0 else "right"
+    if len(found.found) > len(nearest_windows):
+        others = len(found.found) - len(nearest_windows)
+        yield f"{pot}: {others} more intervals within {found.reach:g} rad, farther from the aim"
+    distance = 1e3 * (found.aim - nearest.centre)
+    side = "left" if distance > 0.0 else "right"
     inside = "within" if found.aim in nearest else "outside"
-    yield f"{pot}: the aim of the shot is {inside} it, {abs(off):.4g} mrad to the {side} of its centre"
+    yield f"{pot}: the aim of the shot is {inside} it, {abs(distance):.4g} mrad to the {side} of its centre"
 
 
 def _horizon(found: Horizon) -> Iterator[str]:
     unit = "rad in aim" if found.by == "aim" else "m in position"
-    within = f"{1e3 * found.tolerance:g} mm"
-    yield f"perturbed by {found.separation.nudge:g} {unit}: {_parted(found.separation, within)}"
-    yield f"perturbed by {found.separation.nudge:g} {unit}: {_parted(found.by_a_radius, 'a radius')}"
+    tolerance = f"{1e3 * found.tolerance:g} mm"
+    yield f"perturbed by {found.separation.nudge:g} {unit}: {_separation_text(found.separation, tolerance)}"
+    yield f"perturbed by {found.separation.nudge:g} {unit}: {_separation_text(found.by_a_radius, 'a radius')}"
     if found.player is not None:
-        yield f"perturbed by the player's error: {_parted(found.player, 'a radius')}"
-    rungs = [f"{each.nudge:.0e}: {each.time:.3g} s" for each in found.ladder if each.time is not None]
-    whole = [each.nudge for each in found.ladder if each.time is None]
-    rungs += [f"{max(whole):.0e}: the whole shot"] if whole else []
-    yield f"predictable to {within}, by the accuracy of the aim in rad: {', '.join(rungs)}"
+        yield f"perturbed by the player's error: {_separation_text(found.player, 'a radius')}"
+    steps = [f"{each.nudge:.0e}: {each.time:.3g} s" for each in found.ladder if each.time is not None]
+    never_separated = [each.nudge for each in found.ladder if each.time is None]
+    steps += [f"{max(never_separated):.0e}: the whole shot"] if never_separated else []
+    yield f"predictable to {tolerance}, by the accuracy of the aim in rad: {', '.join(steps)}"
     digits = found.digits_per_second
     if digits is not None:
         yield f"each further second needs {digits:.2g} more digits of the aim"
 
 
-def _parted(each: Separation, within: str) -> str:
+def _separation_text(each: Separation, distance: str) -> str:
     if each.time is None:
-        return f"no ball ever differs by {within}; the largest difference is {1e3 * each.farthest:.2g} mm"
-    grown = ""
+        return f"no ball ever differs by {distance}; the largest difference is {1e3 * each.farthest:.2g} mm"
+    growth = ""
     if each.growth_per_hit is not None and each.growth_per_second is not None:
         decade = math.log(10.0) / each.growth_per_second
         times = f"a factor of 10 per {decade:.2g} s" if decade > 0.0 else "no growth"
-        grown = f", after {each.hits} collisions in a row, × {each.growth_per_hit:.3g} each, {times}"
-    return f"{each.ball!r} differs by {within} from t = {each.time:.4g} s on{grown}"
+        growth = f", after {each.hits} collisions in a row, × {each.growth_per_hit:.3g} each, {times}"
+    return f"{each.ball!r} differs by {distance} from t = {each.time:.4g} s on{growth}"
 
 
 def _percent(fraction: float) -> str:
@@ -208,5 +209,5 @@ def _bounds(chance: Proportion) -> str:
     return f"{100.0 * low:.1f}–{100.0 * high:.1f} %"
 
 
-def _place(xy: Sequence[float]) -> str:
+def _position_text(xy: Sequence[float]) -> str:
     return f"({xy[0]:.3f}, {xy[1]:.3f})"

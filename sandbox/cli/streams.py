@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class OutputError(Exception):
-    """Standard output cannot be written: the disk is full, or it is closed. `str()` says which."""
+    """Standard output cannot be written: the disk is full, or it is closed. `str()` is the reason."""
 
 
 def prepare_streams() -> None:
@@ -27,7 +27,7 @@ def prepare_streams() -> None:
     only, so that a write to it fails. Characters that an encoding lacks are written as escapes.
 
     The first failed write to standard output raises `OutputError`; further output is dropped, also at the exit of the
-    interpreter. Standard error drops what cannot be written, because there is no other stream to report it on.
+    interpreter. Standard error drops output that cannot be written, because there is no other stream for the report.
     """
     for descriptor, flags in enumerate((os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)):
         try:
@@ -42,7 +42,7 @@ def prepare_streams() -> None:
 
 
 def can_write_unicode() -> bool:
-    """Tell whether standard output can encode every character."""
+    """Return whether standard output can encode every character."""
     encoding = getattr(sys.stdout, "encoding", None)
     return encoding is None or codecs.lookup(encoding).name.startswith("utf")
 
@@ -83,7 +83,7 @@ class _Errors(io.FileIO):
     """Standard error, unbuffered."""
 
     def write(self, data: "ReadableBuffer", /) -> int:
-        """Write bytes, or drop what cannot be written."""
+        """Write bytes, or drop them if they cannot be written."""
         with suppress(OSError):
             return super().write(data)
         return memoryview(data).nbytes

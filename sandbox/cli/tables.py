@@ -13,10 +13,10 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-WIDE = 240
+WIDTH_WITHOUT_TERMINAL = 240
 """Columns of an output that is no terminal: programs read it line by line, so lines are not wrapped."""
 UNBOUNDED = 10_000
-"""Columns for measuring a table: more than any table has."""
+"""Width for measuring a table, in columns: larger than any table."""
 
 
 def new_table() -> "Table":
@@ -46,7 +46,7 @@ def new_console() -> "Console":
     """Return a console of the terminal's width, or `WIDE` without a terminal."""
     from rich.console import Console
 
-    return Console(width=None if sys.stdout.isatty() else WIDE)
+    return Console(width=None if sys.stdout.isatty() else WIDTH_WITHOUT_TERMINAL)
 
 
 def print_table(table: "Table", foldable: int = 0) -> None:

@@ -78,11 +78,11 @@ COLUMNS = {
 
 
 def print_tradeoff(scene: str, found: Tradeoff, verbose: bool = False) -> None:
-    """Print the metric, the front of each engine, how its error splits up, and the recommended settings.
+    """Print the metric, the front and the error budget of each engine, and the recommended settings.
 
     Args:
         scene: the scene as the user named it.
-        found: what to print.
+        found: the trade-off.
         verbose: explain every column and mark below the table.
     """
     from rich.text import Text
@@ -134,11 +134,11 @@ def _about(found: Tradeoff) -> str:
 
 def _thinned(front: Sequence[Evaluation], found: Tradeoff) -> list[Evaluation]:
     """Return at most `MAX_ROWS` settings of the front of an engine, and all recommended ones."""
-    asked = [point for point in front if set(_marks(point, found)) - {"front"}]
+    recommended = [point for point in front if set(_marks(point, found)) - {"front"}]
     if len(front) <= MAX_ROWS:
         return list(front)
     evenly = [front[round(k * (len(front) - 1) / (MAX_ROWS - 1))] for k in range(MAX_ROWS)]
-    return [point for point in front if point in evenly or point in asked]
+    return [point for point in front if point in evenly or point in recommended]
 
 
 def _marks(point: Evaluation, found: Tradeoff) -> list[str]:
@@ -157,8 +157,8 @@ def _legend(rows: Sequence[Evaluation], found: Tradeoff) -> str:
 
 
 def _long_legend(found: Tradeoff) -> str:
-    own = " and than the dt of the scene" if found.max_dt > FRAME_TOLERANCE / found.fps else ""
-    return f"{LONG}: dt is longer than a frame at {found.fps:g} fps{own}, so the setting is not recommended"
+    exception = " and than the dt of the scene" if found.max_dt > FRAME_TOLERANCE / found.fps else ""
+    return f"{LONG}: dt is longer than a frame at {found.fps:g} fps{exception}, so the setting is not recommended"
 
 
 def _cells(point: Evaluation) -> list[str]:
@@ -186,16 +186,16 @@ def _failures(found: Tradeoff) -> list[str]:
     counted = Counter(point.status for point in failed)
     lines = [f"{count} {status}" for status, count in counted.items()]
     reasons = [f"{label(p)} {p.status}: {p.reason}" for p in failed[:MAX_REASONS]]
-    left = [f"{found.untried} skipped because they would have taken too long"] if found.untried else []
-    summary = ", ".join([*lines, *left])
+    skipped = [f"{found.untried} skipped because they would have taken too long"] if found.untried else []
+    summary = ", ".join([*lines, *skipped])
     return ([summary] if summary else []) + reasons
 
 
 def _split(each: ErrorBudget, found: Tradeoff) -> str:
-    left = (
+    residual = (
         f"at most {_part(each.residual)} from the model (the error left with {each.substep_factor} times the substeps)"
     )
-    model = left if each.model is None else f"{_part(each.model)} from the model"
+    model = residual if each.model is None else f"{_part(each.model)} from the model"
     parts = f"{_part(each.time_step)} from the time step, {_part(each.solver)} from the iterations, {model}"
     trusted = found.scene.world.duration if found.best is None else found.best.trusted_until
     until = f", while the truth is trusted ({trusted:.3g} s)" if trusted < found.scene.world.duration else ""
@@ -399,7 +399,7 @@ def _check_numbers(options: _Options, faults: list[Fault]) -> None:
 
 
 def _read(options: _Options, faults: list[Fault]) -> tuple[str, Scene | None]:
-    """Return the file of the scene and the scene; add to the faults what is wrong with it or with a file to write."""
+    """Return the file of the scene and the scene; add faults of the scene and of files to write to the faults."""
     read: Scene | None = None
     path = options.scene
     with collect_errors(faults):
@@ -423,7 +423,7 @@ def _read(options: _Options, faults: list[Fault]) -> tuple[str, Scene | None]:
 
 
 def _write_results(found: Tradeoff, document: dict[str, object], path: str, options: _Options) -> int:
-    """Write the scene, the plot and the folder that are asked for; return 2 if one of them cannot be written."""
+    """Write the requested scene, plot and folder; return 2 if one of them cannot be written."""
     faults: list[Fault] = []
     if options.write and not found.interrupted:
         with collect_errors(faults):

@@ -102,7 +102,7 @@ def run_window(
 
     Args:
         app_state: state of the window.
-        begin: called once the window is open, to open the first scene.
+        begin: called after the window has opened, to open the first scene.
         options: the options of the window.
         has_scene_list: start with the list of scenes.
     """
@@ -302,7 +302,7 @@ def _fitting(settings: Settings, scene: Scene, engine: str) -> Settings:
     """
     chosen, fitting = engine_named(engine), settings.common()
     for key in sorted(Settings.model_fields, key=lambda key: key != "response"):  # others require it, so it comes first
-        tried = fitting.replace(**{key: getattr(settings, key)})
-        if not chosen.missing(scene, tried):
-            fitting = tried
+        candidate = fitting.replace(**{key: getattr(settings, key)})
+        if not chosen.missing(scene, candidate):
+            fitting = candidate
     return fitting

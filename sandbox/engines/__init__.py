@@ -1,1 +1,1 @@
-"""Engines: interchangeable ways to compute what a scene does."""
+"""Engines: interchangeable simulators of a scene."""

@@ -54,22 +54,22 @@ def mouse_joint_impulse(
     x, y = arm
     a, b, d = 1.0 / mass + y * y / moment, -x * y / moment, 1.0 / mass + x * x / moment
     a, d = a + softness, d + softness
-    right = (
+    rhs = (
         -(velocity[0] - spin * y + bias * offset[0]),
         -(velocity[1] + spin * x + bias * offset[1]),
     )
     determinant = a * d - b * b
     if determinant > 0.0:
-        jx, jy = (d * right[0] - b * right[1]) / determinant, (a * right[1] - b * right[0]) / determinant
+        jx, jy = (d * rhs[0] - b * rhs[1]) / determinant, (a * rhs[1] - b * rhs[0]) / determinant
     else:  # lost in rounding, far from the centre: Sherman–Morrison formula for K = c·1 + u·uᵀ / moment
         c = 1.0 / mass + softness
-        along = (x * right[1] - y * right[0]) / (c * moment + x * x + y * y)
-        jx, jy = (right[0] + along * y) / c, (right[1] - along * x) / c
+        along = (x * rhs[1] - y * rhs[0]) / (c * moment + x * x + y * y)
+        jx, jy = (rhs[0] + along * y) / c, (rhs[1] - along * x) / c
 
     max_impulse = MAX_FORCE_WEIGHTS * mass * (gravity or GRAVITY) * h
-    size = math.hypot(jx, jy)
-    if size > max_impulse:
-        jx, jy = jx * max_impulse / size, jy * max_impulse / size
+    magnitude = math.hypot(jx, jy)
+    if magnitude > max_impulse:
+        jx, jy = jx * max_impulse / magnitude, jy * max_impulse / magnitude
     return (jx, jy), x * jy - y * jx
 
 

@@ -38,8 +38,8 @@ def engine_named(name: str) -> Engine:
 
 def usual(scene: Scene) -> str:
     """Return the engine that the window uses by default: `exact` on a `[surface]` without curl, else `pymunk`."""
-    bends = scene.surface is not None and scene.surface.curl != 0.0  # `exact` needs parabolic paths
-    return "exact" if scene.surface is not None and not bends else USUAL
+    has_curl = scene.surface is not None and scene.surface.curl != 0.0  # `exact` needs parabolic paths
+    return "exact" if scene.surface is not None and not has_curl else USUAL
 
 
 def able(start: Scene | Setup, settings: Settings | None = None) -> tuple[str, ...]:

@@ -52,16 +52,16 @@ class Checkpoint:
 def present_bodies(bodies: Bodies, frame: Frame) -> Bodies:
     """Return the present bodies, in the state of a frame."""
     present = np.flatnonzero(frame.present)
-    some = bodies.some(present)
+    selected = bodies.some(present)
     return replace(
-        some,
+        selected,
         position=frame.position[present],
         velocity=frame.velocity[present],
         angle=frame.angle[present],
         angular_velocity=frame.angular_velocity[present],
-        roll=some.roll if frame.roll is None else frame.roll[present],
-        layer=some.layer if frame.layer is None else frame.layer[present],
-        visits=some.visits if frame.visits is None else frame.visits[present],
+        roll=selected.roll if frame.roll is None else frame.roll[present],
+        layer=selected.layer if frame.layer is None else frame.layer[present],
+        visits=selected.visits if frame.visits is None else frame.visits[present],
     )
 
 
@@ -93,25 +93,29 @@ class Segment:
     """s, time from which its steps are counted"""
     steps: float = 0.0
     """number of steps since `origin`; after a resumption, including those before it"""
-    whole: Setup | None = None
-    """setup of the whole session, with all its bodies and joints; None for the first segment, whose own setup it is"""
+    session_setup: Setup | None = None
+    """setup of the whole session, with all its bodies and joints; None for the first segment: its own setup"""
 
     @property
     def setup(self) -> Setup:
         """Setup of the whole session, as this segment began, with the scene as it is now."""
-        own = self.simulation.setup
-        if self.whole is None:
-            return own
-        return replace(self.whole, scene=own.scene, bodies=replace(self.whole.bodies, elements=own.bodies.elements))
+        own_setup = self.simulation.setup
+        if self.session_setup is None:
+            return own_setup
+        return replace(
+            self.session_setup,
+            scene=own_setup.scene,
+            bodies=replace(self.session_setup.bodies, elements=own_setup.bodies.elements),
+        )
 
     @property
     def broken(self) -> Mapping[int, float]:
         """Time in s, by session index, at which joints broke in this segment."""
-        own = self.simulation.broken
+        broken = self.simulation.broken
         if self.before is None:
-            return own
-        number = self.simulation.setup.links.number
-        return {int(number[k]): self._start + time for k, time in own.items()}
+            return broken
+        joint_index = self.simulation.setup.links.number
+        return {int(joint_index[k]): self._start + time for k, time in broken.items()}
 
     @property
     def time(self) -> float:
@@ -135,17 +139,18 @@ class Segment:
             return frame
         if self.body_indices is None:
             return replace(frame, time=self.time)
-        count, known = len(self.bodies), len(self.before.position)
+        count, before_count = len(self.bodies), len(self.before.position)
         position, velocity, angle, spin = np.zeros((count, 2)), np.zeros((count, 2)), np.zeros(count), np.zeros(count)
         present = np.zeros(count, np.bool_)
-        position[:known], angle[:known] = self.before.position, self.before.angle  # last state of bodies that are gone
-        for total, own in (
+        # Bodies that are gone keep their last state.
+        position[:before_count], angle[:before_count] = self.before.position, self.before.angle
+        for session_array, own_array in (
             (position, frame.position),
             (velocity, frame.velocity),
             (angle, frame.angle),
             (spin, frame.angular_velocity),
         ):
-            total[self.body_indices] = own
+            session_array[self.body_indices] = own_array
         present[self.body_indices] = frame.present
         roll = None
         if frame.roll is not None:
@@ -158,30 +163,30 @@ class Segment:
             passing = np.column_stack((self.body_indices[passing[:, 0]], passing[:, 1]))
         return Frame(self.time, position, velocity, angle, spin, present, roll, layer, visits, frame.drives, passing)
 
-    def _expanded(self, own: IntArray | None, everyone: IntArray, before: IntArray | None = None) -> IntArray | None:
-        """Return an array of the simulation with a row for every body of the session; absent bodies keep `before`."""
-        if own is None:
+    def _expanded(self, values: IntArray | None, initial: IntArray, last: IntArray | None = None) -> IntArray | None:
+        """Return an array of the simulation with a row for every body of the session; absent bodies keep `last`."""
+        if values is None:
             return None
-        everyone = everyone.copy()
-        if before is not None:
-            everyone[: len(before)] = before
-        everyone[self.body_indices] = own
-        return everyone
+        initial = initial.copy()
+        if last is not None:
+            initial[: len(last)] = last
+        initial[self.body_indices] = values
+        return initial
 
     def contacts(self) -> Contacts:
         """Return the contacts since the last call."""
-        found = self.simulation.contacts()
+        contacts = self.simulation.contacts()
         if self.before is None:
-            return found
-        return replace(found, time=found.time + self._start, pair=self._session_pairs(found.pair))
+            return contacts
+        return replace(contacts, time=contacts.time + self._start, pair=self._session_pairs(contacts.pair))
 
     @property
     def retired(self) -> Mapping[int, float]:
         """Time in s, by session index, at which bodies left the scene in this segment."""
-        own = self.simulation.retired
+        retired = self.simulation.retired
         if self.before is None:
-            return own
-        return {self._session_index(n): self._start + time for n, time in own.items()}
+            return retired
+        return {self._session_index(n): self._start + time for n, time in retired.items()}
 
     def watch(self, observer: Observer) -> None:
         """Register an observer that is called after every substep."""
@@ -199,8 +204,8 @@ class Segment:
 
         self.simulation.watch(observe)
 
-    def _session_index(self, own: int) -> int:
-        return own if self.body_indices is None else int(self.body_indices[own])
+    def _session_index(self, index: int) -> int:
+        return index if self.body_indices is None else int(self.body_indices[index])
 
     def _session_pairs(self, pair: IntArray) -> IntArray:
         """Return pairs (K, 2) in session indices. Static colliders have the same indices in every segment."""
@@ -212,9 +217,9 @@ class Segment:
         """Return the centres of all bodies, (N, 2) m; nan for bodies that are gone."""
         if self.body_indices is None:
             return position
-        everyone = np.full((len(self.bodies), 2), np.nan)
-        everyone[self.body_indices[: len(position)]] = position
-        return everyone
+        expanded = np.full((len(self.bodies), 2), np.nan)
+        expanded[self.body_indices[: len(position)]] = position
+        return expanded
 
 
 def setup_at(
@@ -259,23 +264,25 @@ def start_segment(
         ActionError: the engine cannot take over a constant force.
     """
     simulation = start_engine(setup_at(setup, bodies, frame, broken, plane_reach), engine, wanted)
-    for each in persistent:
+    for action in persistent:
         try:
-            simulation.apply(each)
+            simulation.apply(action)
         except ActionError as error:
             simulation.close()
             description = (
-                f"the constant force on {each.body!r}" if isinstance(each, Force) else f"the thrust {each.thrust!r}"
+                f"the constant force on {action.body!r}"
+                if isinstance(action, Force)
+                else f"the thrust {action.thrust!r}"
             )
             raise ActionError(f"{engine} cannot continue with {description}: {error}") from None
     body_indices = None if frame.present.all() else np.flatnonzero(frame.present)
     columns = ("position", "velocity", "angle", "angular_velocity")
-    everyone = replace(bodies, **{column: getattr(frame, column) for column in columns})
+    session_bodies = replace(bodies, **{column: getattr(frame, column) for column in columns})
     if frame.roll is not None:
-        everyone = replace(everyone, roll=frame.roll)
+        session_bodies = replace(session_bodies, roll=frame.roll)
     if frame.layer is not None:
-        everyone = replace(everyone, layer=frame.layer)
+        session_bodies = replace(session_bodies, layer=frame.layer)
     if frame.visits is not None:
-        everyone = replace(everyone, visits=frame.visits)
-    whole = replace(setup, bodies=everyone, time=frame.time)
-    return Segment(simulation, bodies, frame, body_indices, frame.time, whole=whole)
+        session_bodies = replace(session_bodies, visits=frame.visits)
+    session_setup = replace(setup, bodies=session_bodies, time=frame.time)
+    return Segment(simulation, bodies, frame, body_indices, frame.time, session_setup=session_setup)

@@ -1,7 +1,7 @@
 """A simulation whose engine, settings and bodies can be changed while it runs.
 
 Each segment is a simulation of its own that starts from the last state of the segment before; body indices and time
-continue. Other engine state, such as the impulses of lasting contacts, starts again.
+continue. Other engine state, such as the impulses of lasting contacts, is reset.
 """
 
 from collections import Counter
@@ -54,9 +54,9 @@ class PersistentActions:
         elif isinstance(action, Remove):
             self._forces.pop(action.body, None)
 
-    def remove_forces(self, gone: Iterable[str]) -> None:
+    def remove_forces(self, removed: Iterable[str]) -> None:
         """Remove the forces on bodies that have left the scene."""
-        for name in gone:
+        for name in removed:
             self._forces.pop(name, None)
 
     @property
@@ -80,7 +80,7 @@ def launch_state(action: Launch, scene: Scene, bodies: Bodies, frame: Frame) -> 
     Bodies of the generator that were gone return; lifetimes start again.
 
     Raises:
-        ActionError: there is no such generator, or its bodies do not fit.
+        ActionError: there is no such generator, or there is no space for its bodies.
     """
     found = next(((index, source) for name, index, source in generators(scene) if name == action.generator), None)
     if found is None:
@@ -408,16 +408,16 @@ class SwitchableSimulation:
 
     def _replace_segment(self, segment: Segment, retired: dict[int, float], broken: dict[int, float]) -> None:
         """Replace the present segment, and close its simulation."""
-        old = self._segment
-        if segment.simulation.settings.dt == old.simulation.settings.dt:  # keeps frames at k·dt
-            segment.origin, segment.steps = old.origin, old.steps
-        segment.simulation.patience = old.simulation.patience
+        previous = self._segment
+        if segment.simulation.settings.dt == previous.simulation.settings.dt:  # keeps frames at k·dt
+            segment.origin, segment.steps = previous.origin, previous.steps
+        segment.simulation.patience = previous.simulation.patience
         if self._earlier_contacts is not None:
-            self._earlier_contacts.append(old.contacts())
+            self._earlier_contacts.append(previous.contacts())
             segment.simulation.contacts()
-        self._work.update(old.simulation.work)
+        self._work.update(previous.simulation.work)
         self._retired, self._broken = retired, broken
-        old.simulation.close()
+        previous.simulation.close()
         self._segment = segment
         if self._observer is not None:
             self._segment.watch(self._observer)
@@ -439,8 +439,8 @@ class SwitchableSimulation:
         A contact that lasts through a change of engine becomes a new contact.
         """
         earlier, self._earlier_contacts = self._earlier_contacts or [], []
-        found = self._segment.contacts()
-        return Contacts.joined([*earlier, found]) if earlier else found
+        present = self._segment.contacts()
+        return Contacts.joined([*earlier, present]) if earlier else present
 
     def account(self) -> Mapping[Cause, float]:
         """Return the energy change, J, by each cause since the first call, summed over all engines used."""

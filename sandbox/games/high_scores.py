@@ -91,17 +91,17 @@ class HighScores:
             OSError: the file cannot be read or written.
             ValueError: the file is damaged.
         """
-        place = self.rank(table, score)
-        if place is None:
+        rank = self.rank(table, score)
+        if rank is None:
             return None
         tables = self._read()
         rows = tables.setdefault(table, [])
-        rows.insert(place - 1, (initials_of(initials), score))
+        rows.insert(rank - 1, (initials_of(initials), score))
         del rows[BEST:]
         self.path.parent.mkdir(parents=True, exist_ok=True)
         with atomic_write(self.path) as temporary:
             temporary.write_text(json.dumps(tables, indent=1, ensure_ascii=False, sort_keys=True), encoding="utf-8")
-        return place
+        return rank
 
     def _read(self) -> dict[str, list[tuple[str, int | float]]]:
         try:
@@ -129,20 +129,20 @@ def opened(path: Path | None = None) -> HighScores:
     try:
         scores._read()
     except ValueError as error:
-        aside = next(
+        renamed = next(
             each for k in count(1) if not (each := path.with_name(f"{path.stem}-damaged-{k}{path.suffix}")).exists()
         )
-        path.replace(aside)
+        path.replace(renamed)
         first = str(error).splitlines()[0]
-        return HighScores(path, f"the high-score file is damaged and was renamed to {aside}: {first}")
+        return HighScores(path, f"the high-score file is damaged and was renamed to {renamed}: {first}")
     return scores
 
 
 def data_folder() -> Path:
     """Return the data folder of the user: `SANDBOX_DATA`, or that of the platform."""
-    stated = os.environ.get(FOLDER)
-    if stated:
-        return Path(stated)
+    configured = os.environ.get(FOLDER)
+    if configured:
+        return Path(configured)
     if os.name == "nt":
         return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "sandbox"
     # Source: XDG Base Directory Specification, 0.8: $XDG_DATA_HOME, else ~/.local/share; a relative path is ignored.

@@ -31,7 +31,8 @@ HOLD_BOUNDS = 0.05, 1.6
 """s, bounds of the time for which it holds a control; log-uniform, drawn for each press. The longest suffice to pull a
 plunger"""
 FULL_PRESS_PROBABILITY = 0.5
-"""probability that an analogue control is pressed fully, as by a key; other presses are uniform from 0 to 1"""
+"""probability that an analogue control is pressed fully, as a key does; the values of other presses are uniform from 0
+to 1"""
 
 
 class NoInput:

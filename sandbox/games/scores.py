@@ -66,13 +66,13 @@ def _edges(scores: FloatArray) -> list[float]:
 
     If all scores are integers, the width is at least 1.
     """
-    least, most = float(scores.min()), float(scores.max())
-    width = 10.0 ** math.floor(math.log10(max(most - least, 1.0) / MAX_BINS))
-    width *= next(times for times in (1.0, 2.0, 5.0, 10.0) if most - least <= width * times * MAX_BINS)
+    low, high = float(scores.min()), float(scores.max())
+    width = 10.0 ** math.floor(math.log10(max(high - low, 1.0) / MAX_BINS))
+    width *= next(factor for factor in (1.0, 2.0, 5.0, 10.0) if high - low <= width * factor * MAX_BINS)
     if (scores == np.round(scores)).all():
         width = max(width, 1.0)
-    first, last = math.floor(least / width), math.floor(most / width) + 1
-    if least < width * first:  # a negative score so small that the quotient is -0
+    first, last = math.floor(low / width), math.floor(high / width) + 1
+    if low < width * first:  # a negative score so small that the quotient is -0
         first -= 1
     parts = round(1.0 / width)  # bins per unit: 3 / 10 is exactly 0.3, 3 × 0.1 is not
     return [k / parts if width < 1.0 else width * k for k in range(first, last + 1)]

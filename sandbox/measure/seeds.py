@@ -23,5 +23,5 @@ def same_random_state(a: Scene, b: Scene) -> bool:
 
 
 def is_random(scene: Scene) -> bool:
-    """Return whether anything in a scene depends on its seed."""
+    """Return whether the bodies of a scene depend on its seed."""
     return not same_random_state(scene, with_seed(scene, scene.world.seed ^ 1))

@@ -46,22 +46,22 @@ WIDTHS = (7.0, 4.4, 2.6, 1.6)
 """Points: the line of each engine is narrower than the one below it, so that all are visible where they agree."""
 LOG_WIDTH = 0.7
 """Ratio of these widths on a logarithmic axis."""
-OPAQUE = 0.9
-PALE = 0.25
-"""Opacity beyond `trusted_until`."""
-DISTRUSTED: dict[str, Any] = {"color": SHADED, "zorder": 0.1, "lw": 0}
+OPACITY = 0.9
+PALE_OPACITY = 0.25
+"""Opacities of curves up to `trusted_until` and beyond it."""
+UNTRUSTED_BACKGROUND: dict[str, Any] = {"color": SHADED, "zorder": 0.1, "lw": 0}
 """Background of the time beyond `trusted_until`."""
-BOUND: dict[str, Any] = {"color": FAINT, "lw": 1.0, "ls": ":"}
+TOLERANCE_LINE: dict[str, Any] = {"color": FAINT, "lw": 1.0, "ls": ":"}
 """Line of the tolerance."""
-NOTE = "css:note"
+NOTE_CLASS = "css:note"
 """Class in pages of a text over curves, which gets an outline in the colour of the background."""
-LEGEND: dict[str, Any] = {"loc": "outside lower center"}
-REACH = 2.0
-"""How far the energy axis follows engines that run away, in ranges of the truth."""
+LEGEND_LAYOUT: dict[str, Any] = {"loc": "outside lower center"}
+MAX_REACH = 2.0
+"""Largest extent of the energy axis beyond the energies of the truth, for diverging engines, in ranges of the truth."""
 
 
 class ChartDetail(NamedTuple):
-    """How finely curves are drawn."""
+    """Detail with which curves are drawn."""
 
     width: float
     """ratio of the line widths to `WIDTHS`"""
@@ -69,7 +69,7 @@ class ChartDetail(NamedTuple):
 
 
 FILE, CHART = ChartDetail(1.0, MAX_POINTS), ChartDetail(0.6, CHART_POINTS)
-"""Of figures in files, and of the smaller charts of pages."""
+"""Detail of figures in files, and of the smaller charts of pages."""
 
 
 def plot_comparison(comparison: Comparison, folder: str | Path) -> tuple[Path, ...]:
@@ -101,7 +101,7 @@ def draw_trajectories(comparison: Comparison) -> Figure:
         run = comparison.trajectories[name]
         for number in numbers:
             draw_path(panel, run, number, axes, COLOURS[index], comparison.trusted_until)
-            for line, opacity in zip(panel.lines[-2:], (OPAQUE, PALE), strict=True):
+            for line, opacity in zip(panel.lines[-2:], (OPACITY, PALE_OPACITY), strict=True):
                 line.set(linewidth=width, alpha=opacity)
     if truth is not None:
         for number in numbers:
@@ -118,9 +118,13 @@ def draw_trajectories(comparison: Comparison) -> Figure:
     if len(numbers) > 1:
         for number in numbers:
             x, y = scene.bodies.position[number].tolist()
-            place = (0.0, (x, y)[axes[0]]) if len(axes) == 1 else (x, y)
+            label_position = (0.0, (x, y)[axes[0]]) if len(axes) == 1 else (x, y)
             text = panel.annotate(
-                shortened(scene.bodies.names[number], 16), place, (4, 4), textcoords="offset points", fontsize=9
+                shortened(scene.bodies.names[number], 16),
+                label_position,
+                (4, 4),
+                textcoords="offset points",
+                fontsize=9,
             )
             literal(text)
     moving = int((~scene.bodies.fixed).sum())
@@ -143,7 +147,7 @@ def draw_error(comparison: Comparison) -> Figure:
     panels[1].set_xlabel("time, s")
     for panel in panels:
         _shade(panel, comparison)
-    extra = [(f"tolerance {comparison.tolerance:.2g} m", Line2D([], [], **BOUND))]
+    extra = [(f"tolerance {comparison.tolerance:.2g} m", Line2D([], [], **TOLERANCE_LINE))]
     _finish(figure, comparison, "error against the truth", "", extra, truth=False)
     return figure
 
@@ -154,8 +158,8 @@ def error_chart(comparison: Comparison) -> Figure:
     curves = {name: (each.time, each.position) for name, each in _errors(comparison).items()}
     _draw_log(panel, comparison, curves, comparison.tolerance, CHART)
     text = f"tolerance {format_number(comparison.tolerance, 2)} m"
-    place: dict[str, Any] = {"xytext": (4, 3), "textcoords": "offset points", "fontsize": 8}
-    panel.annotate(text, (0.0, comparison.tolerance), color=FAINT, gid=NOTE, **place)
+    layout: dict[str, Any] = {"xytext": (4, 3), "textcoords": "offset points", "fontsize": 8}
+    panel.annotate(text, (0.0, comparison.tolerance), color=FAINT, gid=NOTE_CLASS, **layout)
     _shade(panel, comparison)
     _label_trust(panel, comparison)
     finish_chart(panel, "largest position error, m", comparison.scene.world.duration)
@@ -188,10 +192,10 @@ def draw_energy(comparison: Comparison) -> Figure:
     for name, run in comparison.trajectories.items():
         total = energies(run, scene).total
         frames, difference = np.arange(len(total)), total - total[0]
-        own = comparison.truth_of(name)
-        if is_complete and own is not None:
-            frames, own_frames = common_frames(run, own.trajectory)
-            difference = total[frames] - energies(own.trajectory, scene).total[own_frames]
+        row_truth = comparison.truth_of(name)
+        if is_complete and row_truth is not None:
+            frames, own_frames = common_frames(run, row_truth.trajectory)
+            difference = total[frames] - energies(row_truth.trajectory, scene).total[own_frames]
         curves[name] = run.time[frames], np.abs(difference)
     floor = _draw_log(lower, comparison, curves)
     reference = "the truth" if is_complete else "the start"
@@ -218,42 +222,42 @@ def _draw_total_energy(panel: Axes, comparison: Comparison, detail: ChartDetail 
     for (name, index), width in zip(
         _drawn_indices(comparison).items(), _widths(comparison, detail.width), strict=False
     ):
-        run, style = comparison.trajectories[name], {"lw": width, "alpha": OPAQUE, "gid": f"css:line e{index}"}
+        run, style = comparison.trajectories[name], {"lw": width, "alpha": OPACITY, "gid": f"css:line e{index}"}
         draw(panel, run.time, totals[name], COLOURS[index], detail.max_points, **style)
-    right = None
+    true_energy = None
     if truth is not None:
         run = truth.trajectory
-        right, is_trusted = energies(run, scene).total, run.time <= truth.trusted_until
-        draw_closed(panel, run.time, right, is_trusted, detail.max_points)
+        true_energy, is_trusted = energies(run, scene).total, run.time <= truth.trusted_until
+        draw_closed(panel, run.time, true_energy, is_trusted, detail.max_points)
         panel.lines[-1].set_gid("css:line truth")
-        right = right[is_trusted]
-    dress(panel, _energy_limits(totals, right))
+        true_energy = true_energy[is_trusted]
+    dress(panel, _energy_limits(totals, true_energy))
     _shade(panel, comparison)
 
 
-def _energy_limits(totals: Mapping[str, FloatArray], right: FloatArray | None) -> tuple[float, float] | None:
+def _energy_limits(totals: Mapping[str, FloatArray], true_energy: FloatArray | None) -> tuple[float, float] | None:
     """Return the lowest and highest energy to show, J: those of the truth, and of engines as far as `REACH` allows.
 
     Without a truth the energies at the start take its place. None without finite energies.
     """
     finite = [values[np.abs(values) < BEYOND] for values in totals.values()]
     known = [values for values in finite if len(values)]
-    right = None if right is None else right[np.abs(right) < BEYOND]
-    if right is None or not len(right):
-        right = np.asarray([values[0] for values in known])
-    if not len(right):
+    true_energy = None if true_energy is None else true_energy[np.abs(true_energy) < BEYOND]
+    if true_energy is None or not len(true_energy):
+        true_energy = np.asarray([values[0] for values in known])
+    if not len(true_energy):
         return None
-    low, high = float(right.min()), float(right.max())
-    reach = REACH * max(high - low, 0.1 * max(abs(low), abs(high)))
+    low, high = float(true_energy.min()), float(true_energy.max())
+    reach = MAX_REACH * max(high - low, 0.1 * max(abs(low), abs(high)))
     if low == high == 0.0:
-        reach = math.inf  # nothing says which energies are large
+        reach = math.inf  # there is no scale of the energies
     lows = [max(float(values.min()), low - reach) for values in known]
     highs = [min(float(values.max()), high + reach) for values in known]
     return min([low, *lows]), max([high, *highs])
 
 
 def colour_indices(comparison: Comparison) -> dict[str, int]:
-    """Return the index in `COLOURS` of each row, by its name: that of its engine, or of a sweep one of its own."""
+    """Return the index in `COLOURS` of each row, by its name; in a sweep the index of the row, else of its engine."""
     is_swept = any(row.set for row in comparison.rows)
     return {
         row.name: k % len(COLOURS) if is_swept else colour_index(row.engine) for k, row in enumerate(comparison.rows)
@@ -267,7 +271,7 @@ def _drawn_indices(comparison: Comparison) -> dict[str, int]:
 
 
 def _widths(comparison: Comparison, scale: float = 1.0) -> Iterator[float]:
-    """Return a line width for each engine that has a run, scaled; of few engines none is drawn with the widest one."""
+    """Return a line width for each engine that has a run, scaled; with few engines the widest one is not used."""
     unused = max(0, len(WIDTHS) - 1 - len(comparison.trajectories))
     return (scale * width for width in chain(WIDTHS[unused:], repeat(WIDTHS[-1])))
 
@@ -282,27 +286,27 @@ def _draw_log(
     """Draw values ≥ 0 of each engine on a logarithmic axis.
 
     Args:
-        panel: to draw into.
-        comparison: of the engines.
+        panel: panel to draw into.
+        comparison: comparison of the engines.
         curves: times (K,), s, and values (K,) by the name of the row.
-        bound: a dotted line, which the axis includes.
-        detail: of the curves.
+        bound: value of a dotted line, which the axis includes.
+        detail: detail of the curves.
 
     Returns:
         The floor of the axis, at which 0 is drawn: a power of ten below the smallest positive value.
     """
     positive = [values[(values > 0.0) & (values < BEYOND)] for _, values in curves.values()]
-    least = min((float(values.min()) for values in positive if len(values)), default=FLOOR)
-    floor = max(FLOOR, 10.0 ** (math.floor(math.log10(least)) - 1))
+    smallest = min((float(values.min()) for values in positive if len(values)), default=FLOOR)
+    floor = max(FLOOR, 10.0 ** (math.floor(math.log10(smallest)) - 1))
     widths = _widths(comparison, LOG_WIDTH * detail.width)
     for (name, index), width in zip(_drawn_indices(comparison).items(), widths, strict=False):
         if name in curves:
             time, values = curves[name]
             shown = np.where(np.isfinite(values), np.maximum(values, floor), np.nan)
-            style: dict[str, Any] = {"lw": width, "alpha": OPAQUE, "gid": f"css:line e{index}"}
+            style: dict[str, Any] = {"lw": width, "alpha": OPACITY, "gid": f"css:line e{index}"}
             draw(panel, time, shown, COLOURS[index], detail.max_points, **style)
     if bound is not None:
-        panel.axhline(bound, **BOUND)
+        panel.axhline(bound, **TOLERANCE_LINE)
     style_axes(panel)
     panel.set_yscale("log")
     low, high = panel.get_ylim()
@@ -311,35 +315,40 @@ def _draw_log(
 
 
 def _label_trust(panel: Axes, comparison: Comparison) -> None:
-    """Write beside the end of the trusted time what it is."""
+    """Label the end of the trusted time."""
     until, duration = comparison.trusted_until, comparison.scene.world.duration
     if until is None or until >= duration:
         return
-    is_late = until > 0.6 * duration  # then there is more room to its left
-    place: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "fontsize": 8}
-    place |= {"xytext": (-4 if is_late else 4, 4), "ha": "right" if is_late else "left", "color": FAINT, "gid": NOTE}
-    panel.annotate("trusted until here" if is_late else "truth no longer trusted", (until, 0.0), **place)
+    is_late = until > 0.6 * duration  # then there is more space on its left
+    layout: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "fontsize": 8}
+    layout |= {
+        "xytext": (-4 if is_late else 4, 4),
+        "ha": "right" if is_late else "left",
+        "color": FAINT,
+        "gid": NOTE_CLASS,
+    }
+    panel.annotate("trusted until here" if is_late else "truth no longer trusted", (until, 0.0), **layout)
 
 
 def _shade(panel: Axes, comparison: Comparison) -> None:
     """Mark the end of the trusted time, and shade the time beyond it."""
     until = comparison.trusted_until
     if until is not None and until < comparison.scene.world.duration:
-        panel.axvspan(until, comparison.scene.world.duration, **DISTRUSTED)
+        panel.axvspan(until, comparison.scene.world.duration, **UNTRUSTED_BACKGROUND)
         panel.axvline(until, color=INK, lw=1.0)
 
 
 def _finish(
     figure: Figure,
     comparison: Comparison,
-    what: str,
+    subject: str,
     more: str = "",
     extra: list[tuple[str, Line2D]] | None = None,
     truth: bool = True,
 ) -> None:
     """Add legend, title, and the sentence about the truth."""
     entries = [
-        (name, Line2D([], [], color=COLOURS[index], lw=3.4, alpha=OPAQUE))
+        (name, Line2D([], [], color=COLOURS[index], lw=3.4, alpha=OPACITY))
         for name, index in _drawn_indices(comparison).items()
     ]
     best, duration = comparison.best, comparison.scene.world.duration
@@ -348,15 +357,15 @@ def _finish(
     entries += extra or []
     if best is not None and best.trusted_until < duration and "time, s" in (p.get_xlabel() for p in figure.axes):
         entries.append((f"trusted until {best.trusted_until:.3g} s", Line2D([], [], color=INK, lw=1.0)))
-    add_legend(figure, entries, ncols=min(len(entries), 4), **LEGEND)
+    add_legend(figure, entries, ncols=min(len(entries), 4), **LEGEND_LAYOUT)
     figure.align_ylabels()
 
     lines = wrap(comparison.sentence(), 105)[:3]
     if more:
         lines.append(more)
-    tall = figure.get_figheight()
-    place: dict[str, Any] = {"x": 0.1 / figure.get_figwidth(), "va": "top", "color": INK}
-    title = shortened(f"{comparison.scene.title or 'untitled scene'}: {what}", 60)
-    literal(figure.text(y=1 - 0.10 / tall, s=title, fontsize=16, weight="bold", **place))
-    literal(figure.text(y=1 - 0.44 / tall, s="\n".join(lines), fontsize=9.5, linespacing=1.4, **place))
-    figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 1 - (0.5 + 0.19 * len(lines)) / tall))
+    height = figure.get_figheight()
+    layout: dict[str, Any] = {"x": 0.1 / figure.get_figwidth(), "va": "top", "color": INK}
+    title = shortened(f"{comparison.scene.title or 'untitled scene'}: {subject}", 60)
+    literal(figure.text(y=1 - 0.10 / height, s=title, fontsize=16, weight="bold", **layout))
+    literal(figure.text(y=1 - 0.44 / height, s="\n".join(lines), fontsize=9.5, linespacing=1.4, **layout))
+    figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 1 - (0.5 + 0.19 * len(lines)) / height))

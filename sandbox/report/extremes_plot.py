@@ -42,13 +42,13 @@ def draw_axes(result: Extremes) -> Figure:
     left, right = _halved(axes, [len(result.plan.setups(axis)) + 4.2 for axis in axes])
     height = max(_height(result, side) for side in (left, right)) + 0.9
     figure = Figure(figsize=(17.0, height), facecolor="white")
-    figure.suptitle("How far each engine and setting goes", x=0.01, y=1.0 - 0.12 / height, ha="left", va="top", size=14)
+    figure.suptitle("Limits of each engine and setting", x=0.01, y=1.0 - 0.12 / height, ha="left", va="top", size=14)
     for k, side in enumerate((left, right)):
         top = 1.0 - 0.85 / height
         for axis in side:
             rows = len(result.plan.setups(axis))
-            tall = rows * ROW / height
-            panel = figure.add_axes((0.11 + 0.5 * k, top - 0.3 / height - tall, 0.28, tall))
+            panel_height = rows * ROW / height
+            panel = figure.add_axes((0.11 + 0.5 * k, top - 0.3 / height - panel_height, 0.28, panel_height))
             _draw_axis(panel, result, axis)
             top -= (rows * ROW + 1.0) / height
     _legend(figure, 1.0 - 0.42 / height)
@@ -59,23 +59,23 @@ def draw_pairs(result: Extremes) -> Figure:
     """Return a matrix for each pair and setup, a row of matrices for each pair."""
     pairs = [pair for pair in result.plan.pairs if any(cell.axis == pair.name for cell in result.pairs)]
     columns = max(len(result.plan.setups(pair)) for pair in pairs)
-    tall = [len(pair.first.levels) * ROW + 0.95 for pair in pairs]
-    height, width = sum(tall) + 0.9, 1.4 + columns * 2.5
+    heights = [len(pair.first.levels) * ROW + 0.95 for pair in pairs]
+    height, width = sum(heights) + 0.9, 1.4 + columns * 2.5
     figure = Figure(figsize=(width, height), facecolor="white")
     figure.suptitle("Two axes combined", x=0.01, y=1.0 - 0.12 / height, ha="left", va="top", size=14)
     top = height - 0.85
-    for pair, space in zip(pairs, tall, strict=True):
+    for pair, row_height in zip(pairs, heights, strict=True):
         figure.text(0.1 / width, top / height, pair.name, size=10, weight="bold", va="top")
         for k, setup in enumerate(result.plan.setups(pair)):
-            at = 1.3 + k * 2.5, top - 0.45 - len(pair.first.levels) * ROW
+            origin = 1.3 + k * 2.5, top - 0.45 - len(pair.first.levels) * ROW
             size = 2.1, len(pair.first.levels) * ROW
-            panel = figure.add_axes((at[0] / width, at[1] / height, size[0] / width, size[1] / height))
+            panel = figure.add_axes((origin[0] / width, origin[1] / height, size[0] / width, size[1] / height))
             _draw_pair(panel, [c for c in result.pairs if (c.axis, c.setup) == (pair.name, setup.name)], pair)
             panel.set_title(setup.name, size=8, pad=3)
             if k == 0:
                 panel.set_ylabel(pair.first.parameter.replace("_", " "), size=8)
                 panel.set_yticks(range(len(pair.first.levels)), [level_text(x) for x in pair.first.levels], size=7)
-        top -= space
+        top -= row_height
     _legend(figure, 1.0 - 0.42 / height)
     return figure
 
@@ -92,7 +92,7 @@ def _height(result: Extremes, axes: Sequence[Axis]) -> float:
 
 
 def _halved(axes: Sequence[Axis], sizes: Sequence[float]) -> tuple[list[Axis], list[Axis]]:
-    """ErrorBudget axes, in their order, into two columns of similar height."""
+    """Split axes, in their order, into two columns of similar height."""
     total, so_far, left = sum(sizes), 0.0, []
     for axis, size in zip(axes, sizes, strict=True):
         if so_far + 0.5 * size > 0.5 * total:
@@ -104,8 +104,8 @@ def _halved(axes: Sequence[Axis], sizes: Sequence[float]) -> tuple[list[Axis], l
 
 def _draw_axis(panel: Axes, result: Extremes, axis: Axis) -> None:
     levels, setups = result.plan.levels(axis), result.plan.setups(axis)
-    place = {(setup.name, level): (row, k) for row, setup in enumerate(setups) for k, level in enumerate(levels)}
-    cells = {place[c.setup, _single(c)]: c for c in result.cells if c.axis == axis.name}
+    cell_of = {(setup.name, level): (row, k) for row, setup in enumerate(setups) for k, level in enumerate(levels)}
+    cells = {cell_of[c.setup, _single(c)]: c for c in result.cells if c.axis == axis.name}
     _draw_cells(panel, cells, len(setups), len(levels))
     unit = f", {axis.unit}" if axis.unit else ""
     panel.set_title(f"{axis.name.replace('_', ' ')}{unit}", loc="left", size=10, weight="bold", pad=18)
@@ -136,10 +136,10 @@ def _single(cell: Sample) -> float:
 
 
 def _draw_pair(panel: Axes, cells: Sequence[Sample], pair: AxisPair) -> None:
-    place = {
+    cell_of = {
         (a, b): (row, column) for row, a in enumerate(pair.first.levels) for column, b in enumerate(pair.second.levels)
     }
-    known = {place[c.level]: c for c in cells if isinstance(c.level, tuple)}
+    known = {cell_of[c.level]: c for c in cells if isinstance(c.level, tuple)}
     _draw_cells(panel, known, len(pair.first.levels), len(pair.second.levels))
     panel.set_xticks(range(len(pair.second.levels)), [level_text(x) for x in pair.second.levels], size=7)
     panel.set_xlabel(pair.second.parameter.replace("_", " "), size=8, labelpad=1)
@@ -147,7 +147,7 @@ def _draw_pair(panel: Axes, cells: Sequence[Sample], pair: AxisPair) -> None:
 
 
 def _draw_cells(panel: Axes, cells: dict[tuple[int, int], Sample], rows: int, columns: int) -> None:
-    """Colour and mark the cells; one that was not run stays white."""
+    """Colour and mark the cells; cells that were not run are white."""
     numbers = [[0] * columns for _ in range(rows)]
     for (row, column), cell in cells.items():
         numbers[row][column] = 1 + VERDICTS.index(cell.verdict)

@@ -49,8 +49,8 @@ SOLID: dict[str, Any] = {"color": "#9a9a9a", "lw": 1.4, "zorder": 0.6}
 
 def moving_axes(runs: Iterable[Trajectory], numbers: list[int]) -> list[int]:
     """Return the axes, 0 or 1, along which some of the bodies move in some run; both if none moves."""
-    places = [run.position[:, numbers] for run in runs]
-    span = [max((_robust_span(position[..., axis]) for position in places), default=0.0) for axis in (0, 1)]
+    positions = [run.position[:, numbers] for run in runs]
+    span = [max((_robust_span(position[..., axis]) for position in positions), default=0.0) for axis in (0, 1)]
     return [axis for axis in (0, 1) if span[axis] > STILL * max(span)] or [0, 1]
 
 
@@ -67,13 +67,13 @@ def draw_path(panel: Axes, run: Trajectory, number: int, axes: list[int], colour
     """Draw the path of a body in two lines: up to the time until which the truth is trusted, and beyond it."""
     position = np.where((run.time >= run.retired_time[number])[:, None], np.nan, run.position[:, number])
     trusted = run.time <= (math.inf if until is None else until)
-    begun = np.append(~trusted[1:], True)  # the pale line begins where the other ends
-    for kept in (trusted, begun):
-        there = np.where(kept[:, None], position, np.nan)
+    untrusted = np.append(~trusted[1:], True)  # the pale line begins where the other ends
+    for kept in (trusted, untrusted):
+        shown = np.where(kept[:, None], position, np.nan)
         if len(axes) == 1:
-            draw(panel, run.time, there[:, axes[0]], colour)
+            draw(panel, run.time, shown[:, axes[0]], colour)
         else:
-            panel.plot(*_path(there).T, color=colour, solid_joinstyle="round", solid_capstyle="butt")
+            panel.plot(*_path(shown).T, color=colour, solid_joinstyle="round", solid_capstyle="butt")
 
 
 def draw_truth(panel: Axes, run: Trajectory, number: int, axes: list[int], until: float) -> None:
@@ -90,8 +90,8 @@ def _path(position: FloatArray) -> FloatArray:
     """Decimate a path (T, 2); points that cannot be drawn become nan."""
     kept = position[:: max(1, math.ceil(len(position) / MAX_POINTS))]
     kept = np.concatenate((kept, position[-1:]))
-    fine = np.asarray((np.abs(kept) < BEYOND).all(axis=1))
-    return np.where(fine[:, None], kept, np.nan)
+    is_drawable = np.asarray((np.abs(kept) < BEYOND).all(axis=1))
+    return np.where(is_drawable[:, None], kept, np.nan)
 
 
 def draw_fixed(panel: Axes, scene: Scene) -> None:
@@ -133,20 +133,20 @@ def _widened(corners: FloatArray, radius: float) -> FloatArray:
     if radius == 0.0:
         return corners
     if len(corners) == 1:
-        spots = np.linspace(-math.pi, math.pi, 65)[None, :-1]
+        angles = np.linspace(-math.pi, math.pi, 65)[None, :-1]
     else:
-        way = np.roll(corners, -1, axis=0) - corners
-        normal = np.arctan2(-way[:, 0], way[:, 1])
+        edge = np.roll(corners, -1, axis=0) - corners
+        normal = np.arctan2(-edge[:, 0], edge[:, 1])
         before = np.roll(normal, 1)
-        spots = before[:, None] + np.mod(normal - before, 2.0 * math.pi)[:, None] * np.linspace(0.0, 1.0, 25)
-    around = corners[:, None] + radius * np.stack((np.cos(spots), np.sin(spots)), axis=-1)
+        angles = before[:, None] + np.mod(normal - before, 2.0 * math.pi)[:, None] * np.linspace(0.0, 1.0, 25)
+    around = corners[:, None] + radius * np.stack((np.cos(angles), np.sin(angles)), axis=-1)
     return np.asarray(around.reshape(-1, 2))
 
 
 MAX_BODIES = 5
 """Number of bodies drawn if none is named."""
 MAX_CONTACTS = 40
-"""From this number on, marks of contacts would hide the curves and are omitted."""
+"""Number of contacts from which on their marks are omitted, because they would hide the curves."""
 ENERGY = {"kinetic": "#56B4E9", "potential": "#CC79A7", "total": "#444444"}
 
 
@@ -172,16 +172,16 @@ def plot_run(
     Args:
         trajectory: the run.
         scene: its scene.
-        path: of the file, `.png`, `.svg` or `.pdf`.
+        path: path of the file, `.png`, `.svg` or `.pdf`.
         bodies: names to draw; by default the first `MAX_BODIES` that are not fixed.
-        run_bodies: the run's bodies, where some were spawned.
+        run_bodies: bodies of the run, if some were added; default: those of the scene.
 
     Raises:
-        ValueError: the suffix is none of those, or no body has a given name.
+        ValueError: the suffix is not one of these, or no body has a given name.
         OSError: the file cannot be written.
     """
     path = Path(path)
-    format_of(path)  # before the work
+    format_of(path)  # checked before the figure is drawn
     return write_figure(draw_run(trajectory, scene, bodies, run_bodies), path)
 
 
@@ -219,24 +219,24 @@ def draw_run(
     ]
     axes = _moving_axes(curves)
     figure = Figure(figsize=(5.0 + 3.0 * len(axes), 8.0), facecolor="white")
-    rows: Any = [[f"{what} {'xy'[axis]}" for axis in axes] for what in ("position", "velocity")]
+    rows: Any = [[f"{quantity} {'xy'[axis]}" for axis in axes] for quantity in ("position", "velocity")]
     panels = figure.subplot_mosaic([*rows, ["energy"] * len(axes)], sharex=True)
 
     for axis in axes:
-        for what, unit in (("position", "m"), ("velocity", "m/s")):
-            panel = panels[f"{what} {'xy'[axis]}"]
-            panel.set_ylabel(f"{what} {'xy'[axis]}, {unit}")
+        for quantity, unit in (("position", "m"), ("velocity", "m/s")):
+            panel = panels[f"{quantity} {'xy'[axis]}"]
+            panel.set_ylabel(f"{quantity} {'xy'[axis]}, {unit}")
             for curve in curves:
-                draw(panel, trajectory.time, getattr(curve, what)[:, axis], curve.colour)
+                draw(panel, trajectory.time, getattr(curve, quantity)[:, axis], curve.colour)
             for curve in curves:
                 if curve.form is not None:
-                    draw_closed(panel, trajectory.time, getattr(curve.form, what)[:, axis], curve.form.valid)
+                    draw_closed(panel, trajectory.time, getattr(curve.form, quantity)[:, axis], curve.form.valid)
     _draw_energy(panels["energy"], trajectory, scene, run_bodies, dict(zip(numbers, curves, strict=True)))
 
     contacts = _contacts(trajectory, numbers)
     for name, panel in panels.items():
         dress(panel)
-        # The energy panel is wider than the panels above, which therefore need tick labels of their own.
+        # The energy panel is wider than the panels above, which therefore need their own tick labels.
         panel.tick_params(labelbottom=name == "energy" or (len(axes) > 1 and name.startswith("velocity")))
         if not panel.lines:
             panel.text(0.5, 0.5, "no body to draw", transform=panel.transAxes, ha="center", color=FAINT)
@@ -261,18 +261,18 @@ def _chosen(trajectory: Trajectory, bodies: Bodies, names: Sequence[str] | None)
     known = trajectory.names.tolist()
     unknown = [name for name in names if name not in known]
     if unknown:
-        near = get_close_matches(unknown[0], known, n=3) or known[:3]
-        raise ValueError(f"no body named {unknown[0]!r}; there is {', '.join(map(repr, near)) or 'none'}")
+        suggestions = get_close_matches(unknown[0], known, n=3) or known[:3]
+        raise ValueError(f"no body named {unknown[0]!r}; there is {', '.join(map(repr, suggestions)) or 'none'}")
     return [trajectory.number(name) for name in dict.fromkeys(names)]
 
 
 def _curve(trajectory: Trajectory, scene: Scene, number: int, colour: str) -> Curve:
-    gone = (trajectory.time >= trajectory.retired_time[number])[:, None]
+    is_retired = (trajectory.time >= trajectory.retired_time[number])[:, None]
     return Curve(
         name=str(trajectory.names[number]),
         colour=colour,
-        position=np.where(gone, np.nan, trajectory.position[:, number]),
-        velocity=np.where(gone, np.nan, trajectory.velocity[:, number]),
+        position=np.where(is_retired, np.nan, trajectory.position[:, number]),
+        velocity=np.where(is_retired, np.nan, trajectory.velocity[:, number]),
         form=closed_form(trajectory, scene, number),
     )
 
@@ -289,8 +289,8 @@ def _span(values: FloatArray) -> float:
 
 
 def _contacts(trajectory: Trajectory, numbers: list[int]) -> list[float]:
-    own = np.isin(trajectory.contact_pair, numbers).any(axis=1)
-    return trajectory.contact_time[own].tolist() if 0 < own.sum() < MAX_CONTACTS else []
+    is_drawn = np.isin(trajectory.contact_pair, numbers).any(axis=1)
+    return trajectory.contact_time[is_drawn].tolist() if 0 < is_drawn.sum() < MAX_CONTACTS else []
 
 
 def run_energy_chart(trajectory: Trajectory, scene: Scene, duration: float) -> Figure:
@@ -354,22 +354,22 @@ def _title(figure: Figure, trajectory: Trajectory, scene: Scene, curves: list[Cu
     errors = {curve.name: _largest_error(curve) for curve in curves if curve.form is not None}
     if errors:
         worst = max(errors, key=errors.__getitem__)
-        of = f" ({shortened(worst)})" if len(curves) > 1 else ""
-        lines.append(f"largest position error against the closed form: {errors[worst]:.3g} m{of}")
+        body = f" ({shortened(worst)})" if len(curves) > 1 else ""
+        lines.append(f"largest position error against the closed form: {errors[worst]:.3g} m{body}")
     elif curves:
         lines.append("no closed form to compare with")
     if info.get("status", "ok") != "ok":
         lines.append(shortened(f"{info['status']}: {info.get('reason') or 'no reason given'}", 100))
 
-    tall = figure.get_figheight()
-    place: dict[str, Any] = {"x": 0.1 / figure.get_figwidth(), "va": "top", "color": INK}
+    height = figure.get_figheight()
+    layout: dict[str, Any] = {"x": 0.1 / figure.get_figwidth(), "va": "top", "color": INK}
     title = figure.text(
-        y=1 - 0.10 / tall, s=shortened(scene.title or "untitled scene", 60), fontsize=16, weight="bold", **place
+        y=1 - 0.10 / height, s=shortened(scene.title or "untitled scene", 60), fontsize=16, weight="bold", **layout
     )
-    below = figure.text(y=1 - 0.44 / tall, s="\n".join(lines), fontsize=10.5, linespacing=1.4, **place)
+    subtitle = figure.text(y=1 - 0.44 / height, s="\n".join(lines), fontsize=10.5, linespacing=1.4, **layout)
     literal(title)
-    literal(below)
-    figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 1 - (0.5 + 0.21 * len(lines)) / tall))
+    literal(subtitle)
+    figure.set_layout_engine("constrained", rect=(0.0, 0.0, 1.0, 1 - (0.5 + 0.21 * len(lines)) / height))
 
 
 def _largest_error(curve: Curve) -> float:

@@ -24,7 +24,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#E69F00", "#CC79A7", "#56B4E9")
 
 
 def colour_index(engine: str) -> int:
-    """Return the index in `COLOURS` of an engine: its place in the registry, for an unknown engine the last colour."""
+    """Return the index in `COLOURS` of an engine: its index in the registry; the last colour if it is unknown."""
     names = list(ENGINES)
     return names.index(engine) % len(COLOURS) if engine in names else len(COLOURS) - 1
 
@@ -89,15 +89,15 @@ def draw(
     """Draw computed values: a wide, translucent line, so that an analytic solution is visible on top of it.
 
     Args:
-        panel: to draw into.
+        panel: panel to draw into.
         time: (K,), s.
         values: (K,).
-        colour: of the line.
-        max_points: of the line.
-        style: properties of the line, in place of the usual ones.
+        colour: colour of the line.
+        max_points: largest number of points of the line.
+        style: properties of the line, in place of the default ones.
     """
-    usual = {"color": colour, "lw": WIDTH, "alpha": OPACITY, "solid_joinstyle": "round"}
-    panel.plot(*_decimated(time, values, max_points), **{**usual, **style})
+    defaults = {"color": colour, "lw": WIDTH, "alpha": OPACITY, "solid_joinstyle": "round"}
+    panel.plot(*_decimated(time, values, max_points), **{**defaults, **style})
 
 
 def draw_closed(
@@ -136,12 +136,12 @@ def style_axes(panel: Axes) -> None:
 
 
 def dress(panel: Axes, limits: tuple[float, float] | None = None) -> None:
-    """Finish a panel once all is drawn: frame, grid, fonts, and a scale that suits its values.
+    """Finish a panel after all curves are drawn: frame, grid, fonts, and a scale that fits the values.
 
     Args:
-        panel: which; a value far beyond the typical one makes its scale logarithmic on both sides of 0, and rounding
+        panel: the panel. A value far beyond the typical one makes its scale logarithmic on both sides of 0; rounding
             errors are not magnified to full height.
-        limits: lowest and highest value to show on a linear scale, whatever else is drawn.
+        limits: lowest and highest value to show on a linear scale; default: those of the drawn values.
     """
     style_axes(panel)
     if limits is None:
@@ -165,7 +165,7 @@ def dress(panel: Axes, limits: tuple[float, float] | None = None) -> None:
 
 
 def _make_logarithmic(panel: Axes, drawn: FloatArray, linear: int) -> None:
-    """Make a scale logarithmic beyond ±10**linear, with a few ticks that do not crowd around 0."""
+    """Make a scale logarithmic beyond ±10**linear, with a few ticks that do not collide around 0."""
     top = math.ceil(math.log10(np.abs(drawn).max()))
     powers = [10.0**power for power in range(top, linear + 1, -math.ceil((top - linear) / 3))]
     panel.set_yscale("symlog", linthresh=10.0**linear)

@@ -29,7 +29,7 @@ Column = npt.NDArray[Any] | tuple[npt.NDArray[np.int64], list[str]]
 
 
 class MissingExtraError(Exception):
-    """A required library is not installed; `str()` says how to install it."""
+    """A required library is not installed; `str()` has the command that installs it."""
 
 
 def can_write_parquet() -> bool:
@@ -42,7 +42,7 @@ def write_states(trajectory: Trajectory, path: Path) -> int:
 
     Args:
         trajectory: the run.
-        path: ends in `.csv` or `.parquet`.
+        path: path of the file, ending in `.csv` or `.parquet`.
 
     Raises:
         OSError: the file cannot be written.
@@ -57,8 +57,8 @@ def write_contacts(trajectory: Trajectory, fixed_names: Sequence[str], path: Pat
 
     Args:
         trajectory: the run.
-        fixed_names: of the static geometry of its scene.
-        path: ends in `.csv` or `.parquet`.
+        fixed_names: names of the static objects of its scene.
+        path: path of the file, ending in `.csv` or `.parquet`.
 
     Raises:
         OSError: the file cannot be written.
@@ -73,7 +73,7 @@ def write_rows(rows: Sequence[Mapping[str, Any]], path: Path) -> int:
 
     Args:
         rows: values are texts, numbers, booleans or None.
-        path: ends in `.csv` or `.parquet`.
+        path: path of the file, ending in `.csv` or `.parquet`.
 
     Raises:
         OSError: the file cannot be written.
@@ -94,7 +94,7 @@ def write_rows(rows: Sequence[Mapping[str, Any]], path: Path) -> int:
             import pyarrow as pa
             from pyarrow import parquet
 
-            columns = {key: _alike([row[key] for row in rows]) for key in rows[0]}
+            columns = {key: _same_type([row[key] for row in rows]) for key in rows[0]}
             with atomic_write(path) as temporary, temporary.open("xb") as stream:
                 parquet.write_table(pa.table(columns), stream)
         case suffix:
@@ -102,7 +102,7 @@ def write_rows(rows: Sequence[Mapping[str, Any]], path: Path) -> int:
     return len(rows)
 
 
-def _alike(values: list[Any]) -> list[Any]:
+def _same_type(values: list[Any]) -> list[Any]:
     """Return values of one type, as a column of a typed table needs: numbers, booleans, or else texts."""
     kinds = {type(value) for value in values if value is not None}
     if len(kinds) <= 1 or kinds <= {int, float}:
@@ -121,8 +121,8 @@ def _states(run: Trajectory) -> Iterator[list[Column]]:
             time = run.time[rows]
             numbers = np.arange(count)[bodies]
             position, velocity = run.position[rows, bodies], run.velocity[rows, bodies]
-            gone = time[:, None] >= run.retired_time[bodies]  # false where it is nan
-            present = ~gone & ~np.isnan(position).all(axis=2)
+            is_retired = time[:, None] >= run.retired_time[bodies]  # false where it is nan
+            present = ~is_retired & ~np.isnan(position).all(axis=2)
             yield [
                 np.repeat(time, len(numbers)),
                 (np.tile(numbers, len(time)), names),
@@ -195,9 +195,9 @@ def _write_parquet(columns: Sequence[str], chunks: Iterator[list[Column]], path:
     def array(column: Column) -> Any:
         if isinstance(column, tuple):
             numbers, names = column
-            used, places = np.unique(numbers, return_inverse=True)
-            some = [names[number] for number in used.tolist()]
-            return pa.DictionaryArray.from_arrays(pa.array(places.astype(np.int32)), pa.array(some, pa.string()))
+            used, codes = np.unique(numbers, return_inverse=True)
+            texts = [names[number] for number in used.tolist()]
+            return pa.DictionaryArray.from_arrays(pa.array(codes.astype(np.int32)), pa.array(texts, pa.string()))
         return pa.array(np.ascontiguousarray(column))
 
     rows = 0

@@ -16,7 +16,7 @@ from sandbox.measure.tradeoff.objective import pareto
 from sandbox.report.style import FAINT, GRID, INK, add_legend, colour_of, literal, shortened, write_figure
 
 TradeoffMapping = Mapping[str, Any]
-"""What `sandbox tradeoff --json` prints, or a part of it."""
+"""Document that `sandbox tradeoff --json` prints, or a part of it."""
 
 CHOICES = ("integrator", "detection", "response", "joints", "iterations", "broad_phase", "half_kick")
 """Settings by which methods differ; along the curve of a method dt and substeps change."""
@@ -48,7 +48,7 @@ class WorkPoint:
 
     @property
     def status(self) -> str:
-        """`ok`, or how its run failed."""
+        """`ok`, or the kind of failure of its run."""
         return str(self.row["status"])
 
     @property
@@ -183,7 +183,7 @@ FRONT: dict[str, Any] = {"color": INK, "lw": 3.0, "alpha": 0.85, "zorder": 1.5, 
 BOUND: dict[str, Any] = {"color": FAINT, "lw": 1.1, "ls": (0, (1.5, 2.5))}
 FLOOR: dict[str, Any] = {"lw": 1.3, "ls": (0, (6, 4))}
 POINT = "point:"
-"""Begins the gid of a point; its index follows."""
+"""Prefix of the gid of a point; its index follows."""
 
 
 class MinorCosts(LogFormatter):
@@ -199,7 +199,7 @@ def plot_tradeoff(document: TradeoffMapping, path: str | Path) -> Path:
 
     Raises:
         OSError: the file cannot be written.
-        KeyError: the suffix is none of those.
+        KeyError: the suffix is not one of these.
     """
     return write_figure(draw_tradeoff(document), Path(path))
 
@@ -211,7 +211,7 @@ def draw_tradeoff(document: TradeoffMapping, with_title: bool = True) -> Figure:
     Failures are crosses: at the top where only their error is unknown, at the right where their cost is.
 
     Args:
-        document: what `sandbox tradeoff --json` prints.
+        document: document that `sandbox tradeoff --json` prints.
         with_title: with the title of the scene above the diagram.
     """
     points = work_points(document)
@@ -244,21 +244,21 @@ def _draw_methods(panel: Axes, points: Sequence[WorkPoint]) -> list[tuple[str, L
     """Draw each method's points, and a line through the best of them; return the entries of the legend."""
     entries: list[tuple[str, Line2D]] = []
     counts: dict[str, int] = {}
-    for (engine, method), own in methods(points).items():
+    for (engine, method), method_points in methods(points).items():
         marker = MARKERS[counts.setdefault(engine, 0) % len(MARKERS)]
         counts[engine] += 1
         colour = colour_of(engine)
-        best = pareto((point.position for point in own), itemgetter(0), itemgetter(1))
+        best = pareto((point.position for point in method_points), itemgetter(0), itemgetter(1))
         panel.plot(*zip(*best, strict=True), color=colour, lw=0.9, alpha=0.45)
         style: dict[str, Any] = {"color": colour, "lw": 0, "marker": marker, "ms": 6.5, "mec": "white", "mew": 0.6}
-        for point in own:  # each a line of its own, so that a page can refer to it
+        for point in method_points:  # each is a separate line, so that a page can refer to it
             x, y = point.position
             panel.plot([x], [y], **style, zorder=3, gid=f"{POINT}{point.index}")
         label = f"{engine}: {method}" if method else engine
         entries.append((label, Line2D([], [], color=colour, marker=marker, lw=0.9, ms=6.5)))
     if len(entries) <= MAX_METHODS:
         return entries
-    return [  # a legend of all would leave the plot no room
+    return [  # a legend of all methods would take the space of the plot
         (f"{engine}: {count} methods", Line2D([], [], color=colour_of(engine), marker="o", lw=0.9, ms=6.5))
         for engine, count in counts.items()
     ]

@@ -33,8 +33,8 @@ class Fault:
 
     def __str__(self) -> str:
         file, path = shorten(self.file, MAX_NAMED), shorten(self.path, MAX_NAMED)
-        place = file if self.line is None else f"{file}:{self.line}"
-        text = f"{place}: {path}: " if path else f"{place}: "
+        position = file if self.line is None else f"{file}:{self.line}"
+        text = f"{position}: {path}: " if path else f"{position}: "
         return printable(text + shorten(self.message, MAX_MESSAGE))
 
 
@@ -57,14 +57,14 @@ class SceneError(Exception):
 def path_of(location: Location, document: Any) -> str:
     """Return the path of a location, such as `ball.cue.velocity[1]`; named elements appear by name."""
     parts: list[str] = []
-    here = document
+    value = document
     for key in location:
-        here = _child(here, key)
+        value = _child(value, key)
         if isinstance(key, str):
             key = key if key.isprintable() and key else json.dumps(key)
             parts.append(f".{key}" if parts else key)
             continue
-        name = here.get("name") if isinstance(here, dict) else None
+        name = value.get("name") if isinstance(value, dict) else None
         parts.append(f".{quoted(name)}" if isinstance(name, str) and name.isprintable() and name else f"[{key}]")
     return "".join(parts)
 
@@ -84,7 +84,7 @@ def _child(value: Any, key: PathKey) -> Any:
 
 
 class Lines:
-    """Finds the line at which a location of a TOML text begins: a key, a heading, or an element of an array.
+    """Finder of the line at which a location of a TOML text begins: a key, a heading, or an element of an array.
 
     The text is known to be valid, so one linear pass over its tokens suffices. Keys and headings are parsed by tomllib.
     """
@@ -116,41 +116,41 @@ def _lines_of(text: str) -> dict[Location, int]:
     lines: dict[Location, int] = {}
     table: Location = ()  # of the present heading
     counts: dict[Location, int] = {}  # elements so far of each [[table]]
-    within: list[tuple[Location, int]] = []  # open arrays with their next index, inline tables with −1
-    line, start, begun, state = 1, 0, 1, "key"
-    where: Location = ()  # of the present value
+    open_containers: list[tuple[Location, int]] = []  # open arrays with their next index, inline tables with −1
+    line, start, first_line, state = 1, 0, 1, "key"
+    value_location: Location = ()  # of the present value
 
     for token in TOKEN.finditer(text + "\n"):
         sign = token[0]
         if sign == "\n" or sign[0] == "#":
             if state == "heading":
                 table = _enter(_parsed(text[start : token.start()].rstrip()), counts)
-                _note(lines, table, begun)
-            if not within:
+                _note(lines, table, first_line)
+            if not open_containers:
                 state = "key"
         elif state == "key" and sign != "}":
-            start, begun = token.start(), line
+            start, first_line = token.start(), line
             state = "heading" if sign == "[" else "in key"
         elif state == "in key":
             if sign == "=":
                 keys = _parsed(text[start : token.start()] + "=0")[0]
-                where = (within[-1][0] if within else table) + keys
-                _note(lines, where, begun)
+                value_location = (open_containers[-1][0] if open_containers else table) + keys
+                _note(lines, value_location, first_line)
                 state = "value"
         elif state == "value" and sign != "]":
-            if within and within[-1][1] >= 0:
-                array, index = within.pop()
-                within.append((array, index + 1))
-                where = (*array, index)
-                lines[where] = line
+            if open_containers and open_containers[-1][1] >= 0:
+                array, index = open_containers.pop()
+                open_containers.append((array, index + 1))
+                value_location = (*array, index)
+                lines[value_location] = line
             if sign in ("[", "{"):
-                within.append((where, 0 if sign == "[" else -1))
+                open_containers.append((value_location, 0 if sign == "[" else -1))
             state = {"[": "value", "{": "key"}.get(sign, "done")
         elif sign in ("]", "}") and state != "heading":
-            within.pop()
+            open_containers.pop()
             state = "done"
         elif sign == "," and state == "done":
-            state = "value" if within[-1][1] >= 0 else "key"
+            state = "value" if open_containers[-1][1] >= 0 else "key"
         line += sign.count("\n")
     return lines
 
@@ -159,25 +159,25 @@ def _lines_of(text: str) -> dict[Location, int]:
 def _parsed(text: str) -> tuple[tuple[str, ...], bool]:
     """Return the keys of `key = 0`, `[heading]` or `[[heading]]`, and whether it was the last form."""
     keys: list[str] = []
-    here: Any = tomllib.loads(text)
-    while isinstance(here, dict) and here:
-        key, here = next(iter(here.items()))
+    value: Any = tomllib.loads(text)
+    while isinstance(value, dict) and value:
+        key, value = next(iter(value.items()))
         keys.append(key)
-    return tuple(keys), isinstance(here, list)
+    return tuple(keys), isinstance(value, list)
 
 
 def _enter(heading: tuple[tuple[str, ...], bool], counts: dict[Location, int]) -> Location:
     """Return the location of the table that a heading opens."""
-    keys, many = heading
+    keys, is_array = heading
     location: Location = ()
     for key in keys[:-1]:
         location += (key,)
         if location in counts:
             location += (counts[location] - 1,)
     location += (keys[-1],)
-    if many:
+    if is_array:
         counts[location] = counts.get(location, 0) + 1
-    return (*location, counts[location] - 1) if many else location
+    return (*location, counts[location] - 1) if is_array else location
 
 
 def _note(lines: dict[Location, int], location: Location, line: int) -> None:

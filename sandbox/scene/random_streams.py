@@ -2,7 +2,8 @@
 
 A stream is keyed by its number, by the seed and, if there are several of a kind, by an index. numpy's seed sequence
 reads a key as 32-bit words and ignores trailing zeros: [seed, 3] and [seed, 3, 0] are the same stream. So each purpose
-has a number of its own here, and nothing else draws by the seed of a scene, a player or a study. Pictures, sounds and
+has its own number here, and all random numbers that depend on the seed of a scene, a player or a study come from these
+streams. Pictures, sounds and
 the order in which large numbers of bodies are given to an engine do not depend on a seed.
 """
 
@@ -35,7 +36,7 @@ class Stream(Enum):
     STROKE = 0x7374726B
     """errors of a bot's stroke in billiards, by its number in the frame"""
     TRIAL = 0x7472696C
-    """errors by which that bot tries a stroke, by the shots of the match before it"""
+    """errors of the simulated strokes of a bot in billiards, by the number of previous shots of the match"""
     BALL_SEARCH = 0x5EA2C4
     """coils that a pinball table fires when no ball is detected"""
     COIL = 0xC011
@@ -72,7 +73,7 @@ def key_of(stream: Stream, seed: int, *index: int) -> list[int]:
     Args:
         stream: the purpose.
         seed: of the scene, the player or the study, not negative.
-        index: of the generator, body or turn that draws, as `Stream` says; always the same number of them for one
+        index: of the generator, body or turn, as described in `Stream`; always the same number of indices for one
             stream.
     """
     if stream is Stream.AIM:

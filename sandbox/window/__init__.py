@@ -1,5 +1,5 @@
-"""The window: scenes to play with, and stored runs to look at."""
+"""The window: plays scenes interactively, and shows stored runs."""
 
 import os
 
-os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # pygame greets on standard output when it is imported
+os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")  # pygame prints a message on import

@@ -52,23 +52,23 @@ def scenes_beside(path: Path | None) -> tuple[Path, ...]:
     return tuple(found) if path.resolve() in known else (path, *found)
 
 
-def neighbouring_scene(path: Path | None, by: int) -> Path | None:
+def neighbouring_scene(path: Path | None, offset: int) -> Path | None:
     """Return the scene file `by` positions further, cyclically; None if there are no scene files."""
     files = scenes_beside(path)
     if not files:
         return None
     if path is None:
-        return files[0 if by > 0 else -1]
-    here = next((k for k, file in enumerate(files) if file.resolve() == path.resolve()), 0)
-    return files[(here + by) % len(files)]
+        return files[0 if offset > 0 else -1]
+    index = next((k for k, file in enumerate(files) if file.resolve() == path.resolve()), 0)
+    return files[(index + offset) % len(files)]
 
 
 def scenes_to_pick(path: Path | None) -> list[tuple[str, Path]]:
     """Return (name, file) of the scenes in the folder of the open one, then of the shipped scenes."""
-    own = [(scene.name, scene.path) for scene in shipped()]
-    known = {file.resolve() for _, file in own}
+    own_scenes = [(scene.name, scene.path) for scene in shipped()]
+    known = {file.resolve() for _, file in own_scenes}
     others = [file for file in (scenes_beside(path) if path is not None else ()) if file.resolve() not in known]
-    return [*((f"{file.parent.resolve().name}/{file.stem}", file) for file in others), *own]
+    return [*((f"{file.parent.resolve().name}/{file.stem}", file) for file in others), *own_scenes]
 
 
 MESSAGE_DURATION = {"info": 3.0, "warning": 6.0, "error": 10.0}
@@ -232,7 +232,7 @@ class AppState:
         self.messages = Messages()
         self.faults: tuple[str, ...] = ()
         self.on_scene_changed: Callable[[bool], None] | None = None
-        """callback after another view is shown; its argument is whether the view is of the same scene"""
+        """callback after a change of the view; its argument is whether the new view is of the same scene"""
         self._preferences = Preferences(engine, tuple(overrides))
         self._again: Callable[[], LiveView | RecordedView] | None = None
         self._tried: Path | None = None  # faulty file that was tried after the open one
@@ -273,7 +273,7 @@ class AppState:
             path: its scene file.
             file: the scene as read from its file.
             same: whether the view is of the open scene.
-            again: creates the view anew for a restart, where scene and settings do not suffice, as for a recording.
+            again: creates the view again for a restart, if scene and settings do not suffice, as for a recording.
         """
         self._close_controls()
         self.host = host = host_of(view) if isinstance(view, LiveView) else None
@@ -431,8 +431,8 @@ class AppState:
             self._warn_no_session("cannot change its engine; replay it with --engine NAME")
             return
         names = list(ENGINES)
-        here = names.index(self.view.engine)
-        for name in names[here + 1 :] + names[:here]:
+        index = names.index(self.view.engine)
+        for name in names[index + 1 :] + names[:index]:
             if self.switch_engine(name):
                 return
 

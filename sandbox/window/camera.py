@@ -14,7 +14,8 @@ MAX_SCALE, MIN_SCALE = 1e12, 1e-14
 PAN_TIME, ZOOM_OUT_TIME, ZOOM_IN_TIME = 0.15, 0.1, 0.8
 """s: time constants of a camera that follows a body"""
 INNER_FRACTION, OUTER_FRACTION = 0.4, 0.8
-"""of the free area: in the inner part the followed body does not move the camera; it never leaves the outer part"""
+"""fractions of the free area: the camera does not move while the followed body is in the inner one, and keeps it in the
+outer one"""
 
 ViewBox = tuple[tuple[float, float], tuple[float, float]]
 """Lower-left and upper-right corner, m."""
@@ -32,7 +33,7 @@ class Camera:
     scale: float
     """px/m"""
     size: tuple[int, int]
-    """of the picture, px"""
+    """px, of the picture"""
     turned: bool = False
     """whether it is rotated by a quarter turn clockwise"""
 
@@ -50,24 +51,24 @@ class Camera:
         """Return a camera that shows a whole box.
 
         Args:
-            box: m; its sides may be 0.
-            size: of the picture, px.
-            margin: on each side, as a fraction of the picture.
-            inset: px at the right that are covered, as by a panel.
-            foot: px at the bottom that are covered.
-            turned: whether the camera is.
-            head: px at the top that are covered.
+            box: box, m; its sides may be 0.
+            size: size of the picture, px.
+            margin: margin on each side, as a fraction of the picture.
+            inset: covered width at the right, px, for example by a panel.
+            foot: covered height at the bottom, px.
+            turned: whether the camera is rotated.
+            head: covered height at the top, px.
         """
         (left, bottom), (right, top) = box
         free = max(size[0] - inset, size[0] // 3, 1), max(size[1] - head - foot, size[1] // 3, 1)
-        room = 1.0 - 2.0 * margin
+        free_fraction = 1.0 - 2.0 * margin
         width, height = max(right - left, 1e-9), max(top - bottom, 1e-9)
         if turned:
             width, height = height, width
-        scale = min(max(min(free[0] * room / width, free[1] * room / height), MIN_SCALE), MAX_SCALE)
-        whole = cls(((left + right) / 2.0, (bottom + top) / 2.0), scale, size, turned)
+        scale = min(max(min(free[0] * free_fraction / width, free[1] * free_fraction / height), MIN_SCALE), MAX_SCALE)
+        centred = cls(((left + right) / 2.0, (bottom + top) / 2.0), scale, size, turned)
         above = max(min(head, size[1] - free[1]), 0)
-        return whole.panned(((free[0] - size[0]) / 2.0, above + (free[1] - size[1]) / 2.0))
+        return centred.panned(((free[0] - size[0]) / 2.0, above + (free[1] - size[1]) / 2.0))
 
     def to_screen(self, points: FloatArray) -> FloatArray:
         """Return points (…, 2), m, as pixels (…, 2) from the upper left corner."""
@@ -133,14 +134,14 @@ class Camera:
         x, y = (a + (b - a) * move for a, b in zip(self.centre, target.centre, strict=True))
         return replace(self, centre=(x, y), scale=self.scale * factor**part)
 
-    def keeping(self, place: FloatArray, free: tuple[float, float, float, float], elapsed: float) -> Self:
+    def keeping(self, position: FloatArray, free: tuple[float, float, float, float], elapsed: float) -> Self:
         """Return this camera moved so that a position, m, stays near the middle of the free area, px.
 
         It does not move while the position is in the inner part, eases up to the outer part, and jumps beyond it.
         """
         moved = self
         for part, fraction in ((INNER_FRACTION, 1.0 - math.exp(-elapsed / PAN_TIME)), (OUTER_FRACTION, 1.0)):
-            pixel, by = moved.to_screen(place), []
+            pixel, by = moved.to_screen(position), []
             for k in range(2):
                 middle, half = (free[k] + free[k + 2]) / 2.0, part * (free[k + 2] - free[k]) / 2.0
                 by.append(float(min(max(pixel[k], middle - half), middle + half) - pixel[k]) * fraction)

@@ -95,15 +95,15 @@ class WindowContext:
         if scene is None or (self.app_state.view is not None and self.app_state.view.scene is scene):
             return None
         size = self.surface.get_size()
-        made = pygame.Surface(size, 0, self.surface)
+        image = pygame.Surface(size, 0, self.surface)
         free = size[0] - self.gui.panel.width, size[1] - self.gui.bottom_margin
         turned = should_rotate(scene, free)
         camera = Camera.fitting(
             view_bounds(scene), size, inset=self.gui.panel.width, foot=self.gui.bottom_margin, turned=turned
         )
-        Renderer().draw(made, camera, Snapshot(scene, scene.bodies, frame_in_flight(scene)), unit=self.gui.ui_scale)
-        self.gui.panel.draw(made)
-        return made
+        Renderer().draw(image, camera, Snapshot(scene, scene.bodies, frame_in_flight(scene)), unit=self.gui.ui_scale)
+        self.gui.panel.draw(image)
+        return image
 
     def fit_scene(self) -> None:
         """Fit the camera to the whole scene."""
@@ -121,8 +121,8 @@ class WindowContext:
         frame, bodies = show.displayed_frame, show.bodies
         count = min(len(bodies), len(frame.position))
         moving = frame.present[:count] & ~bodies.fixed[:count]
-        seen = moving & self.camera.in_sight(frame.position[:count], bodies.radius[:count])
-        return bool((~bodies.fixed).any()) and not seen.any()
+        visible = moving & self.camera.in_sight(frame.position[:count], bodies.radius[:count])
+        return bool((~bodies.fixed).any()) and not visible.any()
 
     def toggle_follow(self) -> None:
         """Follow the selected body, or all moving bodies, with the camera; or stop following."""
@@ -153,9 +153,9 @@ class WindowContext:
                 closest = MAX_FOLLOW_ZOOM * self._fitted_camera(view_bounds(show.scene, self.app_state.reach)).scale
                 self.camera = self.camera.eased(target.zoomed_to(min(target.scale, closest)), elapsed)
         elif self.following < len(frame.position) and frame.present[self.following]:
-            place = frame.position[self.following]
-            if np.isfinite(place).all():
-                before, self.camera = self.camera, self.camera.keeping(place, self._free_area, elapsed)
+            position = frame.position[self.following]
+            if np.isfinite(position).all():
+                before, self.camera = self.camera, self.camera.keeping(position, self._free_area, elapsed)
                 self.is_fitted &= before == self.camera
 
     @property
@@ -183,10 +183,10 @@ class WindowContext:
         if show is None:
             return
         frame = show.frame
-        there = frame.present & np.isfinite(frame.position).all(axis=1)
-        box = bounding_box(frame.position[there], show.bodies.radius[: len(there)][there])
+        is_valid = frame.present & np.isfinite(frame.position).all(axis=1)
+        box = bounding_box(frame.position[is_valid], show.bodies.radius[: len(is_valid)][is_valid])
         if box is not None:
-            self._fit(_enlarge_box(box, show.bodies.radius[: len(there)][there]))
+            self._fit(_enlarge_box(box, show.bodies.radius[: len(is_valid)][is_valid]))
             self.is_fitted = False
 
     def _fit(self, box: ViewBox) -> None:
@@ -195,28 +195,28 @@ class WindowContext:
 
     def _fitted_camera(self, box: ViewBox) -> Camera:
         """Return a camera that shows a box, m, in the area not covered by panels and timeline."""
-        size, room, show = self.surface.get_size(), self.gui.area, self.app_state.view
+        size, area, show = self.surface.get_size(), self.gui.area, self.app_state.view
         self._covered = head, foot = self.gui.score_margins(self.app_state)
-        lies = show is not None and should_rotate(show.scene, room.size)
+        is_rotated = show is not None and should_rotate(show.scene, area.size)
         if show is not None and has_field(show.scene):  # plates must not cover any part of the field
             (left, bottom), (right, top) = box
             shape = max(right - left, 1e-9), max(top - bottom, 1e-9)
-            room = largest_area(shape[::-1] if lies else shape, room, self.gui.permanent_plates(self.app_state))
-            camera = replace(Camera.fitting(box, room.size, FIELD_MARGIN, turned=lies), size=size)
-            return camera.panned((room.centerx - size[0] / 2.0, room.centery - size[1] / 2.0))
+            area = largest_area(shape[::-1] if is_rotated else shape, area, self.gui.permanent_plates(self.app_state))
+            camera = replace(Camera.fitting(box, area.size, FIELD_MARGIN, turned=is_rotated), size=size)
+            return camera.panned((area.centerx - size[0] / 2.0, area.centery - size[1] / 2.0))
         inset = self.gui.panel.width
-        return Camera.fitting(box, size, inset=inset, foot=foot + self.gui.bottom_margin, turned=lies, head=head)
+        return Camera.fitting(box, size, inset=inset, foot=foot + self.gui.bottom_margin, turned=is_rotated, head=head)
 
     def refit_if_covered(self) -> None:
         """Fit the scene again if a plate has grown over it, for example by a new row or the result of a game."""
         if not self.is_fitted or self.following is not None:
             return
         covered, show = self.gui.score_margins(self.app_state), self.app_state.view
-        grown = any(now > then for now, then in zip(covered, self._covered, strict=True))
+        grown = any(now > before for now, before in zip(covered, self._covered, strict=True))
         if show is not None and has_field(show.scene):
-            taken = self.gui.permanent_plates(self.app_state)
-            if taken != self._plates:
-                grown, self._plates = field_rect(show.scene, self.camera).collidelist(taken) >= 0, taken
+            plates = self.gui.permanent_plates(self.app_state)
+            if plates != self._plates:
+                grown, self._plates = field_rect(show.scene, self.camera).collidelist(plates) >= 0, plates
         if grown:
             self.fit_scene()
 
@@ -238,7 +238,7 @@ def _thrust_body(scene: Scene) -> int | None:
 def _enlarge_box(box: Corners, radius: FloatArray) -> ViewBox:
     """Return a box, m, enlarged to at least `MIN_VIEW_RADII` median radii in width and height."""
     low, high = box
-    least = MIN_VIEW_RADII * float(np.median(radius)) if len(radius) else 1.0
-    grown = np.maximum(least - (high - low), 0.0) / 2.0
+    min_size = MIN_VIEW_RADII * float(np.median(radius)) if len(radius) else 1.0
+    grown = np.maximum(min_size - (high - low), 0.0) / 2.0
     low, high = low - grown, high + grown
     return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))

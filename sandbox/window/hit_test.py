@@ -93,15 +93,15 @@ def rounded_hull(hull: Hull, steps: int = 6) -> FloatArray:
     if radius == 0.0:
         return corners
     if len(corners) == 1:
-        spots = np.linspace(0.0, 2.0 * math.pi, 4 * steps, endpoint=False)
-        return np.asarray(corners + radius * np.column_stack((np.cos(spots), np.sin(spots))))
+        angles = np.linspace(0.0, 2.0 * math.pi, 4 * steps, endpoint=False)
+        return np.asarray(corners + radius * np.column_stack((np.cos(angles), np.sin(angles))))
     edge = np.roll(corners, -1, axis=0) - corners
     sign = 1.0 if _area(corners) >= 0.0 else -1.0
     out = np.arctan2(-edge[:, 0] * sign, edge[:, 1] * sign)  # direction of the outward normal of each side
     before = np.roll(out, 1)
     turn = np.mod((out - before) * sign, 2.0 * math.pi) * sign
-    spots = before[:, None] + turn[:, None] * np.linspace(0.0, 1.0, steps + 1)
-    return np.asarray((corners[:, None] + radius * np.stack((np.cos(spots), np.sin(spots)), axis=-1)).reshape(-1, 2))
+    angles = before[:, None] + turn[:, None] * np.linspace(0.0, 1.0, steps + 1)
+    return np.asarray((corners[:, None] + radius * np.stack((np.cos(angles), np.sin(angles)), axis=-1)).reshape(-1, 2))
 
 
 def hull_area(hull: Hull) -> float:
@@ -130,20 +130,20 @@ def hull_gap(a: Hull, b: Hull, tolerance: float = 0.0) -> tuple[float, FloatArra
         b: another.
         tolerance: the mean is returned of all points whose gap exceeds the smallest one by at most this.
     """
-    gaps, places = [], []
+    gaps, midpoints = [], []
     for one, other in ((a, b), (b, a)):
-        foot = _closest(one.corners, other.corners)
-        away = one.corners - foot
-        length = np.hypot(away[:, 0], away[:, 1])[:, None]
+        nearest = _closest(one.corners, other.corners)
+        offset = one.corners - nearest
+        length = np.hypot(offset[:, 0], offset[:, 1])[:, None]
         # Midpoint of the gap, or of the overlap, between the two surfaces.
-        offset = 0.5 * (length + other.radius - one.radius)
-        places.append(foot + away / np.maximum(length, 1e-300) * offset)
+        shift = 0.5 * (length + other.radius - one.radius)
+        midpoints.append(nearest + offset / np.maximum(length, 1e-300) * shift)
         gaps.append(length[:, 0])
-    gap, place = np.concatenate(gaps), np.concatenate(places)
-    kept = gap <= float(gap.min()) + tolerance
-    apart = _separation(a.corners, b.corners)
-    least = apart if -math.inf < apart <= 0.0 else float(gap.min())
-    return least - a.radius - b.radius, np.asarray(place[kept].mean(axis=0))
+    gap, points = np.concatenate(gaps), np.concatenate(midpoints)
+    is_closest = gap <= float(gap.min()) + tolerance
+    separation = _separation(a.corners, b.corners)
+    smallest = separation if -math.inf < separation <= 0.0 else float(gap.min())
+    return smallest - a.radius - b.radius, np.asarray(points[is_closest].mean(axis=0))
 
 
 def _edges(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -169,15 +169,15 @@ def _separation(a: FloatArray, b: FloatArray) -> float:
     Separating axis theorem. Two single corners have no edges: −inf.
     """
     best = -math.inf
-    for one, other in ((a, b), (b, a)):
-        start, along = _edges(one)
+    for hull, other in ((a, b), (b, a)):
+        start, along = _edges(hull)
         length = np.hypot(along[:, 0], along[:, 1])
         normal = (np.column_stack((along[:, 1], -along[:, 0])) / np.maximum(length, 1e-300)[:, None])[length > 0.0]
         if not len(normal):
             continue
-        if len(one) == 2:
+        if len(hull) == 2:
             normal, start = np.vstack((normal, -normal)), np.vstack((start, start))
-        elif _area(one) < 0.0:
+        elif _area(hull) < 0.0:
             normal = -normal
         best = max(best, float(((other[None] - start[:, None]) * normal[:, None]).sum(-1).min(axis=1).max()))
     return best
@@ -198,55 +198,58 @@ def pick_body(bodies: Bodies, frame: Frame, point: tuple[float, float], reach: f
     with np.errstate(all="ignore"):
         distance = np.hypot(*(frame.position[:count] - np.asarray(point)).T)
         radius = bodies.radius[:count]
-        able = frame.present[:count] & (distance <= radius + reach)
+        is_candidate = frame.present[:count] & (distance <= radius + reach)
         gap = distance - radius
-        for number in np.flatnonzero(able & ~bodies.round[:count]).tolist():
+        for number in np.flatnonzero(is_candidate & ~bodies.round[:count]).tolist():
             gap[number] = signed_distance(hulls_of(bodies, frame, number), *point)
-        able &= gap <= reach
-        if not able.any():
+        is_candidate &= gap <= reach
+        if not is_candidate.any():
             return None
-        score = np.where(able, np.where(gap <= 0.0, distance / radius, 1.0 + gap), np.inf)
+        score = np.where(is_candidate, np.where(gap <= 0.0, distance / radius, 1.0 + gap), np.inf)
     return int(np.argmin(score))
 
 
 def overlapping_bodies(scene: Scene, bodies: Bodies, frame: Frame) -> BoolArray:
     """Return which bodies overlap a plane, wall, post or another body, (N,); touching does not count."""
-    position, there = frame.position, frame.present
+    position, present = frame.position, frame.present
     count = min(len(position), len(bodies))
-    radius, lone = bodies.radius[: len(position)], bodies.round[:count]
+    radius, is_disc = bodies.radius[: len(position)], bodies.round[:count]
     found, layers = np.zeros(len(position), np.bool_), scene.layers
-    lies = bits_of(frame.layer, len(position))
-    sound = there & np.isfinite(position).all(axis=1) & np.isfinite(frame.angle)
-    solids = {number: hulls_of(bodies, frame, number) for number in np.flatnonzero(sound & ~lone).tolist()}
+    layer_bits = bits_of(frame.layer, len(position))
+    is_valid = present & np.isfinite(position).all(axis=1) & np.isfinite(frame.angle)
+    solids = {number: hulls_of(bodies, frame, number) for number in np.flatnonzero(is_valid & ~is_disc).tolist()}
     with np.errstate(all="ignore"):
         for plane in scene.planes:
-            normal, on = np.asarray(plane.normal) / np.hypot(*plane.normal), lies & mask_of(plane.layers, layers) != 0
-            found |= on & lone & ((position - np.asarray(plane.point)) @ normal < radius)
+            normal, on_layer = (
+                np.asarray(plane.normal) / np.hypot(*plane.normal),
+                layer_bits & mask_of(plane.layers, layers) != 0,
+            )
+            found |= on_layer & is_disc & ((position - np.asarray(plane.point)) @ normal < radius)
             for number, hulls in solids.items():
-                deep = any(((h.corners - plane.point) @ normal < h.radius).any() for h in hulls)
-                found[number] |= on[number] and deep
+                overlaps = any(((h.corners - plane.point) @ normal < h.radius).any() for h in hulls)
+                found[number] |= on_layer[number] and overlaps
         for wall in (wall for wall in scene.walls if wall.solid):
-            on = lies & mask_of(wall.layers, layers) != 0
+            on_layer = layer_bits & mask_of(wall.layers, layers) != 0
             points = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points)
             for a, b in pairwise(points):
-                near = on & (segment_distance((a, b))(*position.T) < radius + wall.thickness / 2.0)
-                found |= near & lone
-                _mark_overlaps(found, near, solids, Hull(np.asarray((a, b)), wall.thickness / 2.0))
+                is_near = on_layer & (segment_distance((a, b))(*position.T) < radius + wall.thickness / 2.0)
+                found |= is_near & is_disc
+                _mark_overlaps(found, is_near, solids, Hull(np.asarray((a, b)), wall.thickness / 2.0))
         for post in (post for post in scene.posts if post.solid):
-            near = np.hypot(*(position - np.asarray(post.position)).T) < radius + post.radius
-            near &= lies & mask_of(post.layers, layers) != 0
-            found |= near & lone
-            _mark_overlaps(found, near, solids, Hull(np.asarray((post.position,)), post.radius))
-    able = np.flatnonzero(sound)
-    reach = 2.0 * float(radius[able].max()) if len(able) else 0.0
-    for i, j in near_pairs(position[able], reach):
-        a, b = able[i], able[j]
-        over = (np.hypot(*(position[a] - position[b]).T) < radius[a] + radius[b]) & (lies[a] == lies[b])
-        for k in np.flatnonzero(over & ~(lone[a] & lone[b])).tolist():
-            one, other = (solids.get(n) or hulls_of(bodies, frame, n) for n in (int(a[k]), int(b[k])))
-            over[k] = any(hull_gap(p, q)[0] < 0.0 for p in one for q in other)
-        found[a[over]] = found[b[over]] = True
-    return found & there
+            is_near = np.hypot(*(position - np.asarray(post.position)).T) < radius + post.radius
+            is_near &= layer_bits & mask_of(post.layers, layers) != 0
+            found |= is_near & is_disc
+            _mark_overlaps(found, is_near, solids, Hull(np.asarray((post.position,)), post.radius))
+    valid = np.flatnonzero(is_valid)
+    reach = 2.0 * float(radius[valid].max()) if len(valid) else 0.0
+    for i, j in near_pairs(position[valid], reach):
+        a, b = valid[i], valid[j]
+        overlap = (np.hypot(*(position[a] - position[b]).T) < radius[a] + radius[b]) & (layer_bits[a] == layer_bits[b])
+        for k in np.flatnonzero(overlap & ~(is_disc[a] & is_disc[b])).tolist():
+            hulls_a, hulls_b = (solids.get(n) or hulls_of(bodies, frame, n) for n in (int(a[k]), int(b[k])))
+            overlap[k] = any(hull_gap(p, q)[0] < 0.0 for p in hulls_a for q in hulls_b)
+        found[a[overlap]] = found[b[overlap]] = True
+    return found & present
 
 
 def is_free(scene: Scene, bodies: Bodies, frame: Frame, hulls: list[Hull], layer: str) -> bool:
@@ -275,14 +278,14 @@ def is_free(scene: Scene, bodies: Bodies, frame: Frame, hulls: list[Hull], layer
     count = min(len(bodies), len(frame.position))
     solid = np.asarray([each.collides != "none" for each in bodies.elements], np.bool_)[bodies.element[:count]]
     with np.errstate(all="ignore"):
-        near = np.hypot(*(frame.position[:count] - middle).T) < reach + bodies.radius[:count]
-    near &= frame.present[:count] & solid & (bits_of(frame.layer, count) & bit != 0)
-    others = [hull for number in np.flatnonzero(near).tolist() for hull in hulls_of(bodies, frame, number)]
+        is_near = np.hypot(*(frame.position[:count] - middle).T) < reach + bodies.radius[:count]
+    is_near &= frame.present[:count] & solid & (bits_of(frame.layer, count) & bit != 0)
+    others = [hull for number in np.flatnonzero(is_near).tolist() for hull in hulls_of(bodies, frame, number)]
     return all(hull_gap(hull, other)[0] >= 0.0 for hull in hulls for other in (*fixed, *others))
 
 
-def _mark_overlaps(found: BoolArray, near: BoolArray, solids: dict[int, list[Hull]], fixed: Hull) -> None:
+def _mark_overlaps(found: BoolArray, is_near: BoolArray, solids: dict[int, list[Hull]], fixed: Hull) -> None:
     """Mark the bodies near a static shape that overlap it."""
     for number, hulls in solids.items():
-        if near[number] and not found[number]:
+        if is_near[number] and not found[number]:
             found[number] = any(hull_gap(hull, fixed)[0] < 0.0 for hull in hulls)

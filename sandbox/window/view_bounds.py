@@ -25,13 +25,13 @@ MAX_ROLLING_TIME = 1.2
 SURFACE_MARGIN = 0.12
 """Margin around bodies on a surface, relative to the size of their box."""
 OUTLIER_PERCENT = 0.5
-"""Percentage of positions ignored at each side if there are more than `MANY`."""
-MANY = 1000
-ANCHORED = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.GROOVE, LinkKind.SPRING)
+"""Percentage of positions ignored at each side if there are more than `OUTLIER_COUNT`."""
+OUTLIER_COUNT = 1000
+ANCHORED_KINDS = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.GROOVE, LinkKind.SPRING)
 """Joints with anchor points."""
 MAX_VIEW = 1e15
 """m; larger coordinates are ignored"""
-NEAR = 0.1
+NEAR_DISTANCE = 0.1
 """Largest distance of visible static geometry from the bodies' box, relative to the size of the box."""
 FAR = 20.0
 """Limit of static geometry and flights, as a multiple of the size of the initial box."""
@@ -76,22 +76,28 @@ def view_bounds(scene: Scene, reach: ViewBox | None = None) -> ViewBox:
     if scene.play.area is not None:
         return area_bounds(scene.play.area)
     bodies = scene.bodies
-    things = [corners for corners in _things(scene) if (np.abs(corners) < MAX_VIEW).all()]
+    static_corners = [corners for corners in _wall_and_post_corners(scene) if (np.abs(corners) < MAX_VIEW).all()]
     discs = bodies.round | ~bodies.fixed  # a moving body may rotate within its circle; a static one does not
-    seen = bounding_box(bodies.position[discs], bodies.radius[discs])
-    stands = [(corners.min(axis=0), corners.max(axis=0)) for corners in _solids(bodies)]
-    if seen is None and not stands:
-        stands = [(corners.min(axis=0), corners.max(axis=0)) for corners in things] or [(-UNIT_BOX, UNIT_BOX)]
-    start = _union([*stands, *([] if seen is None else [seen])])
-    start = _union([start, *_swings(scene, bodies, start)])
-    flown = _union([start, *(_orbits(scene, bodies, start) if scene.attractions else _flight(scene, bodies))])
-    met = [(corners.min(axis=0), corners.max(axis=0)) for corners in things]
+    circles = bounding_box(bodies.position[discs], bodies.radius[discs])
+    static_boxes = [(corners.min(axis=0), corners.max(axis=0)) for corners in _static_body_corners(bodies)]
+    if circles is None and not static_boxes:
+        static_boxes = [(corners.min(axis=0), corners.max(axis=0)) for corners in static_corners] or [
+            (-UNIT_BOX, UNIT_BOX)
+        ]
+    start = _union([*static_boxes, *([] if circles is None else [circles])])
+    start = _union([start, *_swing_boxes(scene, bodies, start)])
+    flights = _union(
+        [start, *(_orbit_boxes(scene, bodies, start) if scene.attractions else _flight_boxes(scene, bodies))]
+    )
+    static = [(corners.min(axis=0), corners.max(axis=0)) for corners in static_corners]
     if reach is not None:
         start = _union([start, (np.asarray(reach[0]), np.asarray(reach[1]))])
-        flown = _union([start, flown])
-    near = NEAR * float((flown[1] - flown[0]).max())
-    met = [each for each in met if (each[0] <= flown[1] + near).all() and (each[1] >= flown[0] - near).all()]
-    low, high = _union([start, *met]) if met else flown
+        flights = _union([start, flights])
+    margin = NEAR_DISTANCE * float((flights[1] - flights[0]).max())
+    static = [
+        each for each in static if (each[0] <= flights[1] + margin).all() and (each[1] >= flights[0] - margin).all()
+    ]
+    low, high = _union([start, *static]) if static else flights
     if scene.surface is not None:  # space for rolling
         low, high = low - SURFACE_MARGIN * (high - low).max(), high + SURFACE_MARGIN * (high - low).max()
     if scene.play.arrows is not None:  # space for moving the body
@@ -101,9 +107,9 @@ def view_bounds(scene: Scene, reach: ViewBox | None = None) -> ViewBox:
     for plane in scene.planes:  # the closest point of the plane, if it is not far
         normal = np.asarray(plane.normal) / np.hypot(*plane.normal)
         middle = (low + high) / 2.0
-        foot = middle - ((middle - np.asarray(plane.point)) @ normal) * normal
-        if np.abs(foot - middle).max() <= FAR * float((high - low).max()):
-            low, high = np.minimum(low, foot), np.maximum(high, foot)
+        nearest = middle - ((middle - np.asarray(plane.point)) @ normal) * normal
+        if np.abs(nearest - middle).max() <= FAR * float((high - low).max()):
+            low, high = np.minimum(low, nearest), np.maximum(high, nearest)
     return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
 
 
@@ -123,28 +129,28 @@ def predict_bounds(scene: Scene, engine: str, settings: Settings | None = None) 
         simulation = start(scene, engine, settings)
     except (Refusal, UnknownEngineError):
         return None
-    found = seen = bounding_box(bodies.position[moving], bodies.radius[moving])
+    box = present_box = bounding_box(bodies.position[moving], bodies.radius[moving])
     (left, bottom), (right, top) = view_bounds(scene)
     farthest = FAR * max(right - left, top - bottom)
     try:
         for _ in range(steps):
             simulation.step()
             frame = simulation.frame()
-            there = moving[frame.present[moving]]
-            seen = bounding_box(frame.position[there], bodies.radius[there])
-            if seen is None or found is None:
+            present = moving[frame.present[moving]]
+            present_box = bounding_box(frame.position[present], bodies.radius[present])
+            if present_box is None or box is None:
                 continue
-            union = _union([found, seen])
+            union = _union([box, present_box])
             if not float((union[1] - union[0]).max()) <= farthest:
                 break
-            found = union
+            box = union
     except (Divergence, Exhaustion):
         pass
     finally:
         simulation.close()
-    if found is None:
+    if box is None:
         return None
-    low, high = found
+    low, high = box
     return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
 
 
@@ -166,22 +172,22 @@ def _union(boxes: list[Corners]) -> Corners:
 
 
 def bounding_box(position: FloatArray, radius: FloatArray) -> Corners | None:
-    """Return the box around circles at (M, 2) m, of more than `MANY` without outliers; None without circles."""
-    counts = (np.abs(position) < MAX_VIEW).all(axis=1)
-    position, radius = position[counts], radius[counts]
+    """Return the box around circles at (M, 2) m, of many circles without outliers; None without circles."""
+    is_counted = (np.abs(position) < MAX_VIEW).all(axis=1)
+    position, radius = position[is_counted], radius[is_counted]
     if not len(position):
         return None
-    if len(position) > MANY:
+    if len(position) > OUTLIER_COUNT:
         size = float(np.median(radius))
         low, high = np.percentile(position, (OUTLIER_PERCENT, 100.0 - OUTLIER_PERCENT), axis=0)
         return low - size, high + size
     return (position - radius[:, None]).min(axis=0), (position + radius[:, None]).max(axis=0)
 
 
-def _flight(scene: Scene, bodies: Bodies) -> list[Corners]:
+def _flight_boxes(scene: Scene, bodies: Bodies) -> list[Corners]:
     """Return the box of the bodies' free flights, which end at planes and world bounds."""
     world = scene.world
-    chosen = np.flatnonzero(~_tethered(scene, bodies))
+    chosen = np.flatnonzero(~_is_tethered(scene, bodies))
     chosen = chosen[:: max(1, len(chosen) // 5000)]  # a sample suffices
     duration = world.duration if scene.surface is None else min(world.duration, MAX_ROLLING_TIME)
     time = np.linspace(0.0, duration, FLIGHT_SAMPLES)[:, None, None]
@@ -190,20 +196,20 @@ def _flight(scene: Scene, bodies: Bodies) -> list[Corners]:
         position = start + velocity * time + 0.5 * np.asarray(world.gravity) * time**2
     radius = np.broadcast_to(bodies.radius[chosen], position.shape[:2])
     with np.errstate(all="ignore"):
-        counts = (np.abs(position) < MAX_VIEW).all(axis=2)
+        is_counted = (np.abs(position) < MAX_VIEW).all(axis=2)
         for plane in scene.planes:
             normal = np.asarray(plane.normal) / np.hypot(*plane.normal)
-            counts &= (position - np.asarray(plane.point)) @ normal >= -radius
+            is_counted &= (position - np.asarray(plane.point)) @ normal >= -radius
         if world.bounds is not None:
-            counts &= ((position >= world.bounds[0]) & (position <= world.bounds[1])).all(axis=2)
-        counts &= ~_falls(scene, bodies, position)
+            is_counted &= ((position >= world.bounds[0]) & (position <= world.bounds[1])).all(axis=2)
+        is_counted &= ~_has_fallen(scene, bodies, position)
     # A flight ends where it first leaves the allowed region.
-    counts = np.logical_and.accumulate(counts, axis=0)
-    found = bounding_box(position[counts], radius[counts])
+    is_counted = np.logical_and.accumulate(is_counted, axis=0)
+    found = bounding_box(position[is_counted], radius[is_counted])
     return [] if found is None else [found]
 
 
-def _orbits(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
+def _orbit_boxes(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
     """Return the boxes around attractors out to the apoapsis of each body's two-body orbit."""
     found, size = [], float((start[1] - start[0]).max())
     for each in scene.attractions:
@@ -214,12 +220,12 @@ def _orbits(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
             centre, drift = np.asarray(each.toward), np.zeros(2)
         offset, motion = bodies.position - centre, bodies.velocity - drift
         with np.errstate(all="ignore"):
-            away = np.hypot(*offset.T)
-            size = max(size, float(away.max(initial=0.0)))
-            bound = each.strength / away - 0.5 * (motion * motion).sum(axis=1)  # binding energy, J/kg
+            distance = np.hypot(*offset.T)
+            size = max(size, float(distance.max(initial=0.0)))
+            bound = each.strength / distance - 0.5 * (motion * motion).sum(axis=1)  # binding energy, J/kg
             spin = offset[:, 0] * motion[:, 1] - offset[:, 1] * motion[:, 0]
-            oval = np.maximum(1.0 - 2.0 * bound * (spin / each.strength) ** 2, 0.0)  # squared eccentricity
-            farthest = np.where(bound > 0.0, 0.5 * each.strength / bound * (1.0 + np.sqrt(oval)), np.nan)
+            eccentricity2 = np.maximum(1.0 - 2.0 * bound * (spin / each.strength) ** 2, 0.0)  # squared eccentricity
+            farthest = np.where(bound > 0.0, 0.5 * each.strength / bound * (1.0 + np.sqrt(eccentricity2)), np.nan)
         farthest = farthest[~bodies.fixed & (farthest <= FAR * size)]
         if len(farthest):
             reach = float(farthest.max())
@@ -227,10 +233,10 @@ def _orbits(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
     return found
 
 
-def _falls(scene: Scene, bodies: Bodies, position: FloatArray) -> BoolArray:
+def _has_fallen(scene: Scene, bodies: Bodies, position: FloatArray) -> BoolArray:
     """Return which positions (T, M, 2) are below all static geometry, where the body would have landed, (T, M)."""
     gravity = np.asarray(scene.world.gravity)
-    fixed = [*_things(scene), *_solids(bodies)]
+    fixed = [*_wall_and_post_corners(scene), *_static_body_corners(bodies)]
     if not fixed or not gravity.any():
         return np.zeros(position.shape[:2], np.bool_)
     down = gravity / np.hypot(*gravity)
@@ -240,7 +246,7 @@ def _falls(scene: Scene, bodies: Bodies, position: FloatArray) -> BoolArray:
     return np.asarray((depth > ground) & (depth[0] <= ground))  # a body that starts below never lands
 
 
-def _solids(bodies: Bodies) -> list[FloatArray]:
+def _static_body_corners(bodies: Bodies) -> list[FloatArray]:
     """Return corners (P, 2), m, of each piece of the static bodies other than discs."""
     shapes, found = bodies.shapes, []
     for piece in np.flatnonzero((bodies.fixed & ~bodies.round)[shapes.body]).tolist():
@@ -253,9 +259,9 @@ def _solids(bodies: Bodies) -> list[FloatArray]:
     return found
 
 
-def _tethered(scene: Scene, bodies: Bodies) -> BoolArray:
+def _is_tethered(scene: Scene, bodies: Bodies) -> BoolArray:
     """Return which bodies are static or connected by joints to the world or to a static body, (N,)."""
-    links, found = scene.links.of(*ANCHORED), bodies.fixed.copy()
+    links, found = scene.links.of(*ANCHORED_KINDS), bodies.fixed.copy()
     found[links.b[links.a < 0]] = True
     a, b = links.a[links.a >= 0], links.b[links.a >= 0]
     count = -1
@@ -265,28 +271,28 @@ def _tethered(scene: Scene, bodies: Bodies) -> BoolArray:
     return found
 
 
-def _swings(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
+def _swing_boxes(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
     """Return the box of world anchors, and of the swings of bodies suspended from them by rods and strings."""
     links = scene.links
     if not len(links):
         return []
-    anchored = links.some((links.a < 0) & np.isin(links.kind, ANCHORED))
-    anchor, held = anchored.anchor_a, bodies.position[anchored.b]
+    anchored = links.some((links.a < 0) & np.isin(links.kind, ANCHORED_KINDS))
+    anchor, position = anchored.anchor_a, bodies.position[anchored.b]
     size = float((start[1] - start[0]).max())
-    near = ((anchor >= start[0] - FAR * size) & (anchor <= start[1] + FAR * size)).all(axis=1)
-    places = [anchor[near]]
+    is_near = ((anchor >= start[0] - FAR * size) & (anchor <= start[1] + FAR * size)).all(axis=1)
+    points = [anchor[is_near]]
     if scene.world.gravity[0] == 0.0 and scene.world.gravity[1] < 0.0:
-        swing = near & np.isin(anchored.kind, (LinkKind.ROD, LinkKind.SLIDE)) & ~bodies.fixed[anchored.b]
-        anchor, held, radius = anchor[swing], held[swing], bodies.radius[anchored.b[swing]][:, None]
-        length = np.hypot(*(held - anchor).T)
-        other = np.column_stack((2.0 * anchor[:, 0] - held[:, 0], held[:, 1]))
+        swing = is_near & np.isin(anchored.kind, (LinkKind.ROD, LinkKind.SLIDE)) & ~bodies.fixed[anchored.b]
+        anchor, position, radius = anchor[swing], position[swing], bodies.radius[anchored.b[swing]][:, None]
+        length = np.hypot(*(position - anchor).T)
+        opposite = np.column_stack((2.0 * anchor[:, 0] - position[:, 0], position[:, 1]))
         lowest = anchor - np.column_stack((np.zeros(len(length)), length))
-        places += [each + sign * radius for each in (other, lowest) for sign in (-1.0, 1.0)]
-    found = np.concatenate(places)
+        points += [each + sign * radius for each in (opposite, lowest) for sign in (-1.0, 1.0)]
+    found = np.concatenate(points)
     return [(found.min(axis=0), found.max(axis=0))] if len(found) else []
 
 
-def _things(scene: Scene) -> list[FloatArray]:
+def _wall_and_post_corners(scene: Scene) -> list[FloatArray]:
     """Return the bounding corners (P, 2), m, of each wall and post."""
     found = []
     for wall in scene.walls:
@@ -310,16 +316,16 @@ def crowd_bounds(position: FloatArray, radius: FloatArray, anchors: FloatArray) 
         anchors: (K, 2) m, points of static geometry, included if they are not far.
     """
     lower, upper = np.fmin.reduce(position, axis=0), np.fmax.reduce(position, axis=0)
-    fine = np.isfinite(lower).all(axis=1) & np.isfinite(upper).all(axis=1)
-    lower, upper = lower[fine] - radius[fine, None], upper[fine] + radius[fine, None]
+    is_finite = np.isfinite(lower).all(axis=1) & np.isfinite(upper).all(axis=1)
+    lower, upper = lower[is_finite] - radius[is_finite, None], upper[is_finite] + radius[is_finite, None]
     if not len(lower) and not len(anchors):
         return (-1.0, -1.0), (1.0, 1.0)
     corners = np.concatenate((lower, upper)) if len(lower) else anchors
     middle = np.percentile(corners, (10.0, 90.0), axis=0)
     with np.errstate(over="ignore"):  # in a diverged run
         reach = STRAY_DISTANCE * max(float((middle[1] - middle[0]).max()), 1e-9)
-    both = np.concatenate((corners, anchors))
-    kept = both[((both >= middle[0] - reach) & (both <= middle[1] + reach)).all(axis=1)]
+    points = np.concatenate((corners, anchors))
+    kept = points[((points >= middle[0] - reach) & (points <= middle[1] + reach)).all(axis=1)]
     if not len(kept):
         kept = middle
     (left, bottom), (right, top) = kept.min(axis=0).tolist(), kept.max(axis=0).tolist()
@@ -328,10 +334,10 @@ def crowd_bounds(position: FloatArray, radius: FloatArray, anchors: FloatArray) 
 
 def anchor_points(scene: Scene) -> FloatArray:
     """Return points of static geometry, (K, 2) m: wall ends, boxes of posts, world anchors of joints; no planes."""
-    places = [point for wall in scene.walls for point in wall.points]
+    points = [point for wall in scene.walls for point in wall.points]
     for post in scene.posts:
         (x, y), r = post.position, post.radius
-        places += [(x - r, y - r), (x + r, y + r)]
-    links = scene.links.some((scene.links.a < 0) & np.isin(scene.links.kind, ANCHORED))
-    places += [(x, y) for x, y in links.anchor_a.tolist()]
-    return np.asarray(places, np.float64).reshape(-1, 2)
+        points += [(x - r, y - r), (x + r, y + r)]
+    links = scene.links.some((scene.links.a < 0) & np.isin(scene.links.kind, ANCHORED_KINDS))
+    points += [(x, y) for x, y in links.anchor_a.tolist()]
+    return np.asarray(points, np.float64).reshape(-1, 2)

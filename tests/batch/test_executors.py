@@ -1,4 +1,4 @@
-"""Executors: the same rows from each, an index per job, and workers that die or cannot start."""
+"""Executors: the same rows from each, an index per job, and workers that are killed or cannot start."""
 
 import os
 import pickle
@@ -31,71 +31,71 @@ position = [0, {height}]
 radius = 1
 """
 TIMES = ("seconds", "steps_per_second", "realtime_factor")
-"""of a row, which depend on the machine"""
+"""Keys of a row that depend on the machine."""
 
 LARGE = 50_000_000
-"""bytes of a row, far more than the buffer of a pipe: it is being sent for some 10 ms"""
+"""Bytes of a row, far more than the buffer of a pipe: sending it takes about 10 ms."""
 
 
 def jobs(count: int) -> list[Job]:
     return [Job(f"drop {k}", loads(DROP.format(height=k)), "pymunk") for k in range(count)]
 
 
-def results_of(executor: Executor, some: list[Job]) -> dict[int, Result]:
+def results_of(executor: Executor, submitted: list[Job]) -> dict[int, Result]:
     """Run jobs, check that each is reported once under its index, and return the results by index."""
-    assert [executor.submit(job) for job in some] == list(range(len(some)))
+    assert [executor.submit(job) for job in submitted] == list(range(len(submitted)))
     found: list[Result] = []
     executor.wait(found.append)
-    assert sorted(result.index for result in found) == list(range(len(some)))
+    assert sorted(result.index for result in found) == list(range(len(submitted)))
     return {result.index: result for result in found}
 
 
-def lasting(row: JsonObject) -> JsonObject:
+def without_times(row: JsonObject) -> JsonObject:
     return {key: value for key, value in row.items() if key not in TIMES}
 
 
-def test_every_executor_gives_the_same_rows(tmp_path: Path) -> None:
+def test_all_executors_yield_the_same_rows(tmp_path: Path) -> None:
     with Store(tmp_path / "one") as store:
-        alone = results_of(InProcessExecutor(RunOptions(tmp_path / "one"), store), jobs(4))
-    apart = results_of(ProcessExecutor(RunOptions(tmp_path / "two"), 2), jobs(4))
-    for index, result in alone.items():
+        in_process = results_of(InProcessExecutor(RunOptions(tmp_path / "one"), store), jobs(4))
+    in_workers = results_of(ProcessExecutor(RunOptions(tmp_path / "two"), 2), jobs(4))
+    for index, result in in_process.items():
         assert result.row["scene"] == f"drop {index}"
         assert result.record is not None and result.record.trajectory.status == "ok"
-        assert apart[index].record is None
-        mine, theirs = ({**lasting(each[index].row), "path": None} for each in (alone, apart))
+        assert in_workers[index].record is None
+        mine, theirs = ({**without_times(each[index].row), "path": None} for each in (in_process, in_workers))
         assert mine == theirs
-        assert Path(apart[index].row["path"]).is_file()
+        assert Path(in_workers[index].row["path"]).is_file()
 
 
-def test_jobs_options_and_results_travel_by_value() -> None:
+def test_jobs_options_and_results_can_be_pickled() -> None:
     (job,) = jobs(1)
     result = results_of(InProcessExecutor(RunOptions()), [job])[0]
     for value in (job, RunOptions(), result.row):
         assert pickle.loads(pickle.dumps(value)) == value
 
 
-def test_progress_names_the_job_that_runs() -> None:
-    seen: list[tuple[int, float]] = []
-    results_of(InProcessExecutor(RunOptions(), progress=lambda *where: seen.append(where)), jobs(2))
-    assert (seen[0], seen[-1]) == ((0, 0.0), (1, 1.0))
-    assert seen == sorted(seen)
+def test_progress_has_the_index_of_the_running_job() -> None:
+    states: list[tuple[int, float]] = []
+    results_of(InProcessExecutor(RunOptions(), progress=lambda *state: states.append(state)), jobs(2))
+    assert (states[0], states[-1]) == ((0, 0.0), (1, 1.0))
+    assert states == sorted(states)
 
 
-def test_job_that_cannot_be_stored_ends_the_others_in_every_executor(tmp_path: Path) -> None:
-    some = jobs(2)
+def test_job_that_cannot_be_stored_ends_the_executor(tmp_path: Path) -> None:
+    submitted = jobs(2)
     with Store(tmp_path) as store:
-        path = run_or_fetch(some[0], store).path
+        path = run_or_fetch(submitted[0], store).path
         assert path is not None
         path.unlink()
         path.mkdir()
         for executor in (InProcessExecutor(RunOptions(tmp_path), store), ProcessExecutor(RunOptions(tmp_path), 1)):
-            for job in some:
+            for job in submitted:
                 executor.submit(job)
             with pytest.raises(JobError, match="Is a directory"):
                 executor.wait(lambda _: None)
 
 
-def test_process_that_cannot_be_started_is_an_error_of_the_executor(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_process_that_cannot_be_started_raises_executor_error(monkeypatch: pytest.MonkeyPatch) -> None:
     def start(_: SpawnProcess) -> NoReturn:
         raise OSError(11, "Resource temporarily unavailable")
 
@@ -107,7 +107,7 @@ def test_process_that_cannot_be_started_is_an_error_of_the_executor(monkeypatch:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs /proc/self/task/*/syscall")
-def test_run_of_a_worker_that_is_killed_while_it_sends_the_row_is_made_again(
+def test_run_of_a_worker_killed_while_sending_its_row_is_repeated(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(executors, "serve", partial(serve_large_rows, tmp_path / "killed"))
@@ -117,7 +117,7 @@ def test_run_of_a_worker_that_is_killed_while_it_sends_the_row_is_made_again(
 
 
 def serve_large_rows(mark: Path, pipe: Any, options: RunOptions) -> None:
-    """Serve with rows that take long to send; the first worker to send one kills itself in the middle."""
+    """Serve with rows that take long to send; the first worker that sends one kills itself meanwhile."""
     worker.run_or_fetch = partial(large_record, mark)
     worker.serve(pipe, options)
 
@@ -134,7 +134,7 @@ def large_record(mark: Path, job: Job, *more: Any) -> RunRecord:
 
 
 def kill_in_write(main: int, is_large: Callable[[int], bool] = lambda size: size > LARGE // 100) -> None:
-    """Wait until the main thread is within a large write (system call 1 on x86-64, 64 on ARM), and kill the process."""
+    """Wait until the main thread is in a large write (system call 1 on x86-64, 64 on ARM), then kill the process."""
     number = {"x86_64": "1", "aarch64": "64"}[os.uname().machine]
     while True:
         call = Path(f"/proc/self/task/{main}/syscall").read_text().split()

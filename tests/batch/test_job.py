@@ -1,4 +1,4 @@
-"""Jobs: a run that is made or fetched, and its row."""
+"""Jobs: runs that are computed or loaded from a store, and their rows."""
 
 import json
 from dataclasses import replace
@@ -39,7 +39,7 @@ radius = 1
 JOB = Job("label", SCENE, "pymunk")
 
 
-def test_row_tells_of_the_run() -> None:
+def test_row_has_the_results_of_the_run() -> None:
     record = run_or_fetch(JOB)
     row, run = record.row(), record.trajectory
     assert json.loads(json.dumps(row, allow_nan=False)) == row
@@ -54,18 +54,18 @@ def test_row_tells_of_the_run() -> None:
     assert "final" not in record.row(final=False)
 
 
-def test_run_is_made_once_and_then_read(tmp_path: Path) -> None:
-    told: list[float] = []
+def test_run_is_computed_once_and_then_loaded(tmp_path: Path) -> None:
+    fractions: list[float] = []
     with Store(tmp_path) as store:
-        made = run_or_fetch(JOB, store, progress=told.append)
-        assert told[-1] == 1.0
-        told.clear()
-        found = run_or_fetch(JOB, store, progress=told.append)
-        assert told == []
-    assert (made.repeated, found.repeated, made.id, made.path) == (False, True, found.id, found.path)
-    assert made.path == tmp_path / f"{made.id}.npz"
-    assert np.array_equal(made.trajectory.position, found.trajectory.position)
-    assert {**found.row(), "repeated": False} == made.row()
+        computed = run_or_fetch(JOB, store, progress=fractions.append)
+        assert fractions[-1] == 1.0
+        fractions.clear()
+        loaded = run_or_fetch(JOB, store, progress=fractions.append)
+        assert fractions == []
+    assert (computed.repeated, loaded.repeated, computed.id, computed.path) == (False, True, loaded.id, loaded.path)
+    assert computed.path == tmp_path / f"{computed.id}.npz"
+    assert np.array_equal(computed.trajectory.position, loaded.trajectory.position)
+    assert {**loaded.row(), "repeated": False} == computed.row()
 
 
 def test_id_depends_on_actions_seed_and_resolved_settings() -> None:
@@ -73,17 +73,17 @@ def test_id_depends_on_actions_seed_and_resolved_settings() -> None:
     plain = run_or_fetch(JOB).id
     assert run_or_fetch(replace(JOB, label="other")).id == plain
     assert run_or_fetch(replace(JOB, actions=(action,))).id != plain
-    stated = SCENE.model_copy(update={"solver": SCENE.solver.replace(slop=0.01)})  # what the engine takes anyway
+    stated = SCENE.model_copy(update={"solver": SCENE.solver.replace(slop=0.01)})  # the default of the engine
     assert run_or_fetch(replace(JOB, scene=stated)).id == plain
     other = SCENE.model_copy(update={"solver": SCENE.solver.replace(slop=0.02)})
     assert run_or_fetch(replace(JOB, scene=other)).id != plain
 
 
-def test_what_is_gone_is_told_and_what_is_not_finite_is_null() -> None:
+def test_row_names_retired_bodies_and_is_valid_json_after_divergence() -> None:
     actions = (
         Remove(time=0.05, body="a"),
         Spawn(time=0.05, ball=Ball(name="c", position=(9.0, 9.0), radius=1.0)),
-        Force(time=0.05, body="b", force=(9e13, 0.0)),  # 9e11 m/s a step: beyond all bounds after twelve
+        Force(time=0.05, body="b", force=(9e13, 0.0)),  # 9e11 m/s a step: out of range after twelve
     )
     longer = SCENE.model_copy(update={"world": SCENE.world.model_copy(update={"duration": 1.0})})
     row = run_or_fetch(replace(JOB, scene=longer, actions=actions)).row()
@@ -103,12 +103,12 @@ def test_refused_job_has_no_final_state(tmp_path: Path) -> None:
     assert again.row()["reason"] == row["reason"]
 
 
-def test_unknown_engine_is_an_error() -> None:
+def test_unknown_engine_raises() -> None:
     with pytest.raises(UnknownEngineError, match="unknown engine 'none'"):
         run_or_fetch(replace(JOB, engine="none"))
 
 
-def test_damaged_run_is_made_again_and_replaced(tmp_path: Path) -> None:
+def test_damaged_run_is_repeated_and_replaced(tmp_path: Path) -> None:
     with Store(tmp_path) as store:
         first = run_or_fetch(JOB, store)
         assert first.path is not None
@@ -135,7 +135,7 @@ OTHERS = [
 
 
 @pytest.mark.parametrize(("key", "other"), OTHERS)
-def test_run_under_the_id_of_another_is_made_again(key: str, other: Job, tmp_path: Path) -> None:
+def test_run_stored_under_a_wrong_id_is_repeated(key: str, other: Job, tmp_path: Path) -> None:
     with Store(tmp_path) as store:
         path, theirs = run_or_fetch(JOB, store).path, run_or_fetch(other, store).path
         assert path is not None
@@ -149,7 +149,7 @@ def test_run_under_the_id_of_another_is_made_again(key: str, other: Job, tmp_pat
 
 
 @pytest.mark.parametrize("error", [PermissionError(13, "Permission denied"), OSError(5, "Input/output error")])
-def test_stored_run_that_cannot_be_opened_is_a_fault_of_the_store(
+def test_stored_run_that_cannot_be_opened_raises_store_error(
     error: OSError, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with Store(tmp_path) as store:
@@ -177,7 +177,7 @@ def test_stored_run_that_does_not_fit_into_memory_is_not_replaced(
 
 
 @pytest.mark.parametrize("changes", [{}, {"solver": SCENE.solver.replace(integrator="rk4")}])
-def test_sessions_with_actions_and_refused_runs_are_found_again(changes: dict[str, Any], tmp_path: Path) -> None:
+def test_runs_with_actions_and_refused_runs_are_loaded_again(changes: dict[str, Any], tmp_path: Path) -> None:
     actions = (Remove(time=0.05, body="a"), Remove(time=0.01, body="b"))  # not in order
     job = replace(JOB, scene=SCENE.model_copy(update=changes), actions=actions)
     with Store(tmp_path) as store:
@@ -185,18 +185,18 @@ def test_sessions_with_actions_and_refused_runs_are_found_again(changes: dict[st
     assert (first.trajectory.status, found.repeated) == ("refused" if changes else "ok", True)
 
 
-def test_ledger_made_later_keeps_the_audit_that_was_stored(tmp_path: Path) -> None:
+def test_ledger_computed_later_keeps_the_stored_audit(tmp_path: Path) -> None:
     store = Store(tmp_path)
     run_or_fetch(JOB, store)
     again = run_or_fetch(JOB, store, RunOptions(audit=False, ledger=True))
     assert not again.repeated
-    assert again.trajectory.missed_contacts == 0  # nothing meets; None where it was not looked for
+    assert again.trajectory.missed_contacts == 0  # no contacts; None would mean no audit
     found = run_or_fetch(JOB, store, RunOptions(audit=False, ledger=True))
     assert (found.repeated, found.trajectory.missed_contacts, len(found.trajectory.energy)) == (True, 0, 11)
     store.close()
 
 
-def test_row_tells_what_fell_and_the_spins_of_a_scene_that_has_them() -> None:
+def test_row_has_pocketed_balls_and_spins_of_scenes_with_a_floor() -> None:
     floor = "[world]\nduration = 3\n[surface]\nsliding_friction = 0.2\nrolling_friction = 0.01\n"
     balls = '[[ball]]\nname = "a"\nposition = [0, 0]\nradius = 0.03\nvelocity = [1, 0]\n'
     balls += '[[ball]]\nname = "b"\nposition = [0, 1]\nradius = 0.03\nspin = [0, 0, 9]\n'
@@ -210,7 +210,7 @@ def test_row_tells_what_fell_and_the_spins_of_a_scene_that_has_them() -> None:
         "angular_velocity": 0.0,
         "spin": [0.0, 0.0, 0.0],
     }
-    assert row["final"]["b"]["spin"] == [0.0, 0.0, 9.0]  # nothing stops what only spins
+    assert row["final"]["b"]["spin"] == [0.0, 0.0, 9.0]  # nothing stops a ball that only spins
     zoned = loads(f"{balls.replace('spin = [0, 0, 9]', '')}[[zone]]\nposition = [0.5, 0.0]\nradius = 0.06\n")
     assert run_or_fetch(Job("label", zoned, "pymunk")).row()["pocketed"] == {}
     plain = run_or_fetch(JOB).row()

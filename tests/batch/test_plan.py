@@ -1,4 +1,4 @@
-"""Plans: sweeps and how they multiply."""
+"""Plans of runs: sweeps, their combinations and their limits."""
 
 from pathlib import Path
 
@@ -27,28 +27,28 @@ def scene(tmp_path: Path) -> tuple[str, str]:
     return "label", str(path)
 
 
-def test_runs_that_would_be_too_many_are_counted_without_being_laid_out(scene: tuple[str, str]) -> None:
+def test_excessive_number_of_runs_is_counted_without_creating_jobs(scene: tuple[str, str]) -> None:
     with pytest.raises(AddressError, match=r"multiply to 1,000,000,000 runs"):
         plan([scene], None, sweeps=["world.duration=1:2:1000000", "solver.dt=1:2:1000"])
     with pytest.raises(AddressError, match=r"multiply to 10\^300 runs"):
         plan([scene], None, sweeps=["solver.dt=1:2:1000000"] * 50)
 
 
-def test_scenes_that_would_fill_the_memory_are_refused_at_the_first(scene: tuple[str, str]) -> None:
+def test_scenes_too_large_for_memory_are_rejected_at_the_first(scene: tuple[str, str]) -> None:
     Path(scene[1]).write_text(BALL + SPARKS.replace("3\n", "100000\n"))
     with pytest.raises(SceneError, match="200,000 runs of 100,001 bodies"):
         plan([scene], None, sweeps=["world.duration=1:2:1000"], seeds=200)
     Path(scene[1]).write_text(BALL)
-    assert plan([scene], None, seeds=1_000_000)[0].seeds == 1_000_000  # one run, as nothing is random
+    assert plan([scene], None, seeds=1_000_000)[0].seeds == 1_000_000  # one run, because nothing is random
 
 
-def test_faults_of_many_runs_end_the_check(scene: tuple[str, str]) -> None:
+def test_number_of_reported_faults_is_limited(scene: tuple[str, str]) -> None:
     with pytest.raises(SceneError) as error:
         plan([scene], None, sweeps=["solver.dt=-1:-2:1000000"])
     assert len(error.value.faults) == MAX_FAILED
 
 
-def test_plan_multiplies_in_its_order(scene: tuple[str, str], tmp_path: Path) -> None:
+def test_plan_combines_scenes_sweeps_seeds_and_engines_in_order(scene: tuple[str, str], tmp_path: Path) -> None:
     second = tmp_path / "second.toml"
     second.write_text(BALL.replace("1\n", "2\n") + SPARKS)
     Path(scene[1]).write_text(BALL + SPARKS)
@@ -70,23 +70,23 @@ def test_plan_multiplies_in_its_order(scene: tuple[str, str], tmp_path: Path) ->
     assert {job.scene.balls[0].radius for job in jobs if job.label == "second"} == {2.0}
 
 
-def test_plan_without_anything_is_the_scene_as_it_stands(scene: tuple[str, str]) -> None:
+def test_plan_without_options_is_the_unchanged_scene(scene: tuple[str, str]) -> None:
     (job,) = plan([scene], ["pymunk"])
     assert (job.scene.world.seed, job.scene.solver.dt, job.engine, job.actions) == (0, 0.01, "pymunk", ())
 
 
-def test_sweep_outranks_a_set_value_and_seeds_a_sweep(scene: tuple[str, str]) -> None:
+def test_sweep_overrides_set_values_and_seeds_override_sweeps(scene: tuple[str, str]) -> None:
     jobs = plan([scene], ["pymunk"], ["solver.dt=1.0", "world.seed=9"], ["solver.dt=0.1,0.2", "world.seed=7"], seeds=1)
     assert [(job.scene.solver.dt, job.scene.world.seed) for job in jobs] == [(0.1, 1), (0.2, 1)]
 
 
-def test_every_fault_is_told_once(scene: tuple[str, str], tmp_path: Path) -> None:
+def test_every_fault_is_reported_once(scene: tuple[str, str], tmp_path: Path) -> None:
     bad = tmp_path / "bad.toml"
     bad.write_text(BALL.replace("radius = 1", "radius = -1\nmass = -1"))
     with pytest.raises(SceneError) as caught:
         plan([scene, ("bad", str(bad))], ["pymunk"], sweeps=["solver.dt=-1,0.1,0"], seeds=3)
-    told = [(fault.file, fault.line, fault.path) for fault in caught.value.faults]
-    assert told == [
+    found = [(fault.file, fault.line, fault.path) for fault in caught.value.faults]
+    assert found == [
         (scene[1], None, "solver.dt (set)"),
         (scene[1], None, "solver.dt (set)"),
         (str(bad), 4, "ball.a.radius"),
@@ -97,7 +97,7 @@ def test_every_fault_is_told_once(scene: tuple[str, str], tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("path", ["nothing.at.all", "ball..radius", "ball.none.radius"])
-def test_path_that_leads_nowhere_is_named_by_its_option(scene: tuple[str, str], path: str) -> None:
+def test_fault_of_an_unknown_path_names_its_option(scene: tuple[str, str], path: str) -> None:
     with pytest.raises(SceneError) as caught:
         plan([scene], None, [f"{path}=1"])
     assert {fault.path for fault in caught.value.faults} == {"--set"}
@@ -106,19 +106,19 @@ def test_path_that_leads_nowhere_is_named_by_its_option(scene: tuple[str, str], 
     assert sorted(fault.path for fault in caught.value.faults) == ["--set", "--sweep"]
 
 
-def test_too_many_runs_are_refused_before_any_is_laid_out(scene: tuple[str, str]) -> None:
+def test_too_many_runs_are_rejected_before_creating_jobs(scene: tuple[str, str]) -> None:
     sweeps = ["solver.dt=0.1:1:1001", "ball.a.mass=1:2:1000"]
     with pytest.raises(AddressError, match="multiply to 1,001,000 runs"):
         plan([scene], ["pymunk"], sweeps=sweeps)
 
 
-def test_jobs_tell_the_swept_values() -> None:
+def test_jobs_have_the_swept_values() -> None:
     jobs = plan([("bounce", str(find("bounce")))], ["pymunk"], sweeps=["ball.ball.restitution=0,1"], seeds=2)
     assert [dict(job.point) for job in jobs] == [{"ball.ball.restitution": e, "world.seed": 1} for e in (0, 1)]
     assert [job.seeds for job in jobs] == [2, 2]  # nothing is random
 
 
-def test_seeds_are_one_run_only_where_nothing_is_random(scene: tuple[str, str]) -> None:
+def test_seeds_are_merged_into_one_run_only_if_nothing_is_random(scene: tuple[str, str]) -> None:
     Path(scene[1]).write_text(BALL + SPARKS)
     jobs = plan([scene], ["pymunk"], sweeps=["emitter.0.velocity_max=[1.0,1.0],[-1.0,-1.0]"], seeds=3)
     assert [(job.scene.emitters[0].velocity_max[0], job.scene.world.seed, job.seeds) for job in jobs] == [

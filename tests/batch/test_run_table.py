@@ -1,4 +1,4 @@
-"""Tables of stored runs: a row per run with the values by which the runs differ."""
+"""Tables of stored runs: one row per run, with the values that differ between runs."""
 
 import csv
 from pathlib import Path
@@ -34,7 +34,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "runs"
 
 
-def test_row_holds_what_was_swept_and_what_came_of_it(study: Path) -> None:
+def test_row_has_swept_values_and_results(study: Path) -> None:
     with sandbox.Store(study) as store:
         rows = sandbox.run_table(store)
     assert [list(row) for row in rows] == [[*FIRST, "ball.stone.restitution", "solver.dt", *LAST]] * 4
@@ -67,7 +67,7 @@ def test_table_is_written_as_parquet(study: Path, tmp_path: Path) -> None:
         assert found == sandbox.run_table(store)
 
 
-def test_run_whose_file_is_damaged_keeps_its_row(study: Path, tmp_path: Path) -> None:
+def test_run_with_a_damaged_file_keeps_its_row(study: Path, tmp_path: Path) -> None:
     copy = tmp_path / "copy"
     copy.mkdir()
     for file in study.iterdir():
@@ -83,7 +83,7 @@ def test_run_whose_file_is_damaged_keeps_its_row(study: Path, tmp_path: Path) ->
     assert damaged.name in notices[0]
 
 
-def test_store_without_a_run_makes_no_table(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_empty_store_yields_no_table(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     sandbox.Store(tmp_path / "empty").close()
     assert call(["export", str(tmp_path / "empty"), "--runs", "--to", str(tmp_path / "a.csv")]) == 2
     assert capfd.readouterr().err == f"{tmp_path / 'empty'}: contains no run\n"
@@ -99,7 +99,7 @@ def test_store_without_a_run_makes_no_table(tmp_path: Path, capfd: pytest.Captur
         (None, ("--to", "a.csv", "--contacts"), "--contacts: does not apply to a table of runs"),
     ],
 )
-def test_what_cannot_be_written_is_refused(
+def test_invalid_export_of_runs_is_rejected(
     folder: str | None, options: tuple[str, ...], message: str, study: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     assert call(["export", folder or str(study), "--runs", *options]) == 2

@@ -1,4 +1,4 @@
-"""Faults of a store: a damaged database is refused or mended, a lock is waited for with a word, leftovers go."""
+"""Faults of a store: damaged databases, locks held by other processes, leftover files, full disks."""
 
 import os
 import random
@@ -15,21 +15,21 @@ import pytest
 from sandbox.batch import store as module
 from sandbox.batch.store import DATABASE, TABLE, Store, StoreError
 from sandbox.signals import defer_interrupt
-from tests.batch.test_store import ID, OTHER, a_run, files
+from tests.batch.test_store import ID, OTHER, files, sample_run
 from tests.environment import with_root_on_path
 
 pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 SAVING = f"""
 import sys
-from tests.batch.test_store import Store, Trajectory, a_run
+from tests.batch.test_store import Store, Trajectory, sample_run
 class Slow(Trajectory):
     def save(self, path):
         path.write_bytes(b"half")
         print("ready", flush=True)
         sys.stdin.read()
 with Store(sys.argv[1]) as store:
-    store.add(Slow(**vars(a_run())), "{OTHER}")
+    store.add(Slow(**vars(sample_run())), "{OTHER}")
 """
 
 
@@ -37,7 +37,7 @@ with Store(sys.argv[1]) as store:
 def filled(tmp_path: Path) -> Path:
     """A folder with one run."""
     with Store(tmp_path) as store:
-        store.add(a_run(), ID)
+        store.add(sample_run(), ID)
     return tmp_path
 
 
@@ -49,7 +49,7 @@ def change(folder: Path, *statements: str) -> None:
 
 @contextmanager
 def saving(folder: Path) -> Iterator[subprocess.Popen[str]]:
-    """A process in the middle of saving a run."""
+    """Start a process that blocks while it saves a run."""
     pipe = subprocess.PIPE
     script = [sys.executable, "-c", SAVING, str(folder)]
     with subprocess.Popen(script, env=with_root_on_path(), stdin=pipe, stdout=pipe, text=True) as process:
@@ -60,16 +60,16 @@ def saving(folder: Path) -> Iterator[subprocess.Popen[str]]:
             process.kill()
 
 
-def test_opening_removes_what_a_killed_process_left_and_not_what_a_live_one_writes(filled: Path) -> None:
-    whole = files(filled)
+def test_opening_removes_files_of_killed_processes_and_not_of_live_ones(filled: Path) -> None:
+    complete = files(filled)
     with saving(filled) as process:
-        assert len(files(filled) - whole) == 1
+        assert len(files(filled) - complete) == 1
         Store(filled).close()
-        assert len(files(filled) - whole) == 1
+        assert len(files(filled) - complete) == 1
         process.kill()
         process.wait()
         Store(filled).close()
-    assert files(filled) == whole
+    assert files(filled) == complete
 
 
 DAMAGED = {
@@ -91,7 +91,7 @@ DAMAGED = {
 
 
 @pytest.mark.parametrize("damage", DAMAGED.values(), ids=DAMAGED)
-def test_damaged_row_is_reported_and_not_trusted_and_its_run_can_be_added_again(filled: Path, damage: str) -> None:
+def test_damaged_row_is_reported_and_its_run_can_be_added_again(filled: Path, damage: str) -> None:
     change(filled, f"UPDATE runs SET {damage}")
     notices: list[str] = []
     with Store(filled, notices.append) as store:
@@ -101,16 +101,16 @@ def test_damaged_row_is_reported_and_not_trusted_and_its_run_can_be_added_again(
         assert f"{DATABASE}: a damaged row" in notices[0]
         assert len(notices[0]) < len(str(filled)) + 200
         assert store.rows() == ()
-        added = store.add(a_run(seconds=2.0), ID)
+        added = store.add(sample_run(seconds=2.0), ID)
         assert store.find(ID) == added
         assert store.rows() == (added,)
 
 
-def test_row_without_a_value_is_damaged(filled: Path) -> None:
-    loose = TABLE.replace(" NOT NULL", "")
+def test_row_without_a_required_value_is_damaged(filled: Path) -> None:
+    nullable = TABLE.replace(" NOT NULL", "")
     with closing(sqlite3.connect(filled / DATABASE, isolation_level=None)) as database:
         database.execute("PRAGMA writable_schema = ON")
-        database.execute("UPDATE sqlite_master SET sql = ? WHERE name = 'runs'", (loose.strip(),))
+        database.execute("UPDATE sqlite_master SET sql = ? WHERE name = 'runs'", (nullable.strip(),))
     change(filled, "UPDATE runs SET status = NULL")
     with closing(sqlite3.connect(filled / DATABASE, isolation_level=None)) as database:
         database.execute("PRAGMA writable_schema = ON")
@@ -133,7 +133,7 @@ LAYOUTS = {
 
 
 @pytest.mark.parametrize("statements", LAYOUTS.values(), ids=LAYOUTS)
-def test_database_of_another_layout_is_refused_and_left_alone(filled: Path, statements: list[str]) -> None:
+def test_database_with_a_different_layout_is_rejected_and_unchanged(filled: Path, statements: list[str]) -> None:
     change(filled, *statements)
     before = (filled / DATABASE).read_bytes()
     with pytest.raises(StoreError, match=r"runs\.sqlite: "):
@@ -141,47 +141,47 @@ def test_database_of_another_layout_is_refused_and_left_alone(filled: Path, stat
     assert (filled / DATABASE).read_bytes() == before
 
 
-def test_store_of_the_first_version_is_brought_up_to_date(filled: Path) -> None:
+def test_store_of_the_first_version_is_migrated(filled: Path) -> None:
     change(filled, "ALTER TABLE runs DROP COLUMN score", "PRAGMA user_version = 1")
     with Store(filled) as store:
         assert store.find(ID) is not None
 
 
-def test_damaged_database_is_a_store_error_whatever_the_damage(filled: Path) -> None:
+def test_any_damage_of_the_database_raises_store_error(filled: Path) -> None:
     with Store(filled) as store:
         for k in range(30):
-            store.add(a_run(scene={"title": "μ" * 50}), f"{k:020x}")
-    sound = (filled / DATABASE).read_bytes()
-    chance = random.Random(3)
+            store.add(sample_run(scene={"title": "μ" * 50}), f"{k:020x}")
+    intact = (filled / DATABASE).read_bytes()
+    rng = random.Random(3)
     for k in range(150):
-        damaged = bytearray(sound)
+        damaged = bytearray(intact)
         if k % 3 == 0:
-            damaged = damaged[: chance.randrange(len(damaged))]
+            damaged = damaged[: rng.randrange(len(damaged))]
         else:
-            start = chance.choice([0, 100, chance.randrange(len(damaged))])
-            for at in range(start, min(start + chance.choice([1, 16, 400]), len(damaged))):
-                damaged[at] = chance.randrange(256)
+            start = rng.choice([0, 100, rng.randrange(len(damaged))])
+            for at in range(start, min(start + rng.choice([1, 16, 400]), len(damaged))):
+                damaged[at] = rng.randrange(256)
         (filled / DATABASE).write_bytes(damaged)
         try:
             with Store(filled) as store:
                 store.rows()
                 store.find(ID)
-                store.add(a_run(), ID)
+                store.add(sample_run(), ID)
         except StoreError as error:
             assert DATABASE in str(error)
 
 
 def test_run_is_replaced_with_its_row(filled: Path) -> None:
     with Store(filled) as store:
-        assert store.add(a_run(seconds=9.0), ID).seconds == 0.25
-        assert store.add(a_run(seconds=9.0), ID, replace=True).seconds == 9.0
+        assert store.add(sample_run(seconds=9.0), ID).seconds == 0.25
+        assert store.add(sample_run(seconds=9.0), ID, replace=True).seconds == 9.0
         assert [row.seconds for row in store.rows()] == [9.0]
     assert files(filled) == {DATABASE, f"{ID}.npz"}
 
 
 @pytest.fixture
 def locked(filled: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A store that another connection writes to, and that is waited for shortly."""
+    """A store that a second connection has locked, with short waiting times."""
     monkeypatch.setattr(module, "NOTICE", 0.01)
     monkeypatch.setattr(module, "WAIT", 0.1)
     with closing(sqlite3.connect(filled / DATABASE, isolation_level=None)) as database:
@@ -189,7 +189,7 @@ def locked(filled: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         yield filled
 
 
-def test_locked_store_is_waited_for_with_one_notice_and_then_given_up(locked: Path) -> None:
+def test_locked_store_raises_after_a_wait_with_one_notice(locked: Path) -> None:
     notices: list[str] = []
     with pytest.raises(StoreError, match="another process has locked it"):
         Store(locked, notices.append)
@@ -197,15 +197,13 @@ def test_locked_store_is_waited_for_with_one_notice_and_then_given_up(locked: Pa
     assert "waiting" in notices[0]
 
 
-def test_interrupt_ends_the_wait_for_a_lock_also_where_it_is_held_back(
-    locked: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_interrupt_ends_the_wait_for_a_lock_even_if_deferred(locked: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "WAIT", 600.0)
     with pytest.raises(KeyboardInterrupt), defer_interrupt():
         Store(locked, lambda _: os.kill(os.getpid(), signal.SIGINT))
 
 
-def test_lock_that_is_let_go_in_time_is_taken(filled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_store_opens_if_its_lock_is_released_in_time(filled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "NOTICE", 0.01)
     with closing(sqlite3.connect(filled / DATABASE, isolation_level=None)) as other:
         other.execute("BEGIN EXCLUSIVE")
@@ -213,24 +211,24 @@ def test_lock_that_is_let_go_in_time_is_taken(filled: Path, monkeypatch: pytest.
             assert store.find(ID) is not None
 
 
-def test_folder_that_is_removed_meanwhile_is_told(filled: Path) -> None:
+def test_folder_removed_while_open_raises_store_error(filled: Path) -> None:
     with Store(filled) as store:
         for path in filled.iterdir():
             path.unlink()
         filled.rmdir()
         with pytest.raises(StoreError, match=str(filled)):
-            store.add(a_run(), OTHER)
+            store.add(sample_run(), OTHER)
     filled.mkdir()
 
 
-def test_full_disk_leaves_the_runs_that_are_stored_and_nothing_half_written(filled: Path) -> None:
+def test_full_disk_keeps_stored_runs_and_leaves_no_partial_files(filled: Path) -> None:
     script = f"""
 import resource, sys
-from tests.batch.test_store import Store, StoreError, a_run
+from tests.batch.test_store import Store, StoreError, sample_run
 import numpy as np
 from dataclasses import replace
 store = Store(sys.argv[1])
-long = replace(a_run(), time=np.random.default_rng(0).random(100_000))
+long = replace(sample_run(), time=np.random.default_rng(0).random(100_000))
 for limit in (0, 100, 4096, 100_000):
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
     try:
@@ -238,7 +236,7 @@ for limit in (0, 100, 4096, 100_000):
     except StoreError as error:
         print(error)
 """
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", script, str(filled)],
         env=with_root_on_path(),
         capture_output=True,
@@ -246,10 +244,10 @@ for limit in (0, 100, 4096, 100_000):
         check=True,
         timeout=60,
     )
-    assert done.stderr == ""
-    told = done.stdout.splitlines()
-    assert len(told) == 4
-    assert all(line.endswith("free some disk space, or name another folder") for line in told)
+    assert process.stderr == ""
+    messages = process.stdout.splitlines()
+    assert len(messages) == 4
+    assert all(line.endswith("free some disk space, or name another folder") for line in messages)
     assert files(filled) == {DATABASE, f"{ID}.npz"}
     with Store(filled) as store:
         assert store.find(ID) is not None

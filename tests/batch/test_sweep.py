@@ -1,4 +1,4 @@
-"""The grammar of `--sweep`: keys, lists and ranges, and keys that are given twice."""
+"""The grammar of `--sweep`: keys, lists and ranges, and repeated keys."""
 
 import math
 import tomllib
@@ -40,7 +40,7 @@ def test_sweep_is_a_key_and_values(text: str, key: str, values: list[object]) ->
 
 
 @given(st.integers(1, 60), st.integers(1, 60), st.integers(1, 200))
-def test_whole_values_between_whole_ends_are_integers_and_others_numbers(low: int, width: int, count: int) -> None:
+def test_whole_values_of_a_range_with_integer_ends_are_integers(low: int, width: int, count: int) -> None:
     _, values = parse_sweep(f"x={low}:{low + width}:{count}")
     for k, value in enumerate(values):
         whole = count == 1 or k * width % (count - 1) == 0
@@ -51,12 +51,12 @@ def test_whole_values_between_whole_ends_are_integers_and_others_numbers(low: in
 
 
 @given(st.floats(1e-9, 1e9), st.floats(1.0, 1e9), st.integers(2, 200))
-def test_log_range_has_equal_factors_and_its_very_ends(low: float, factor: float, count: int) -> None:
+def test_log_range_has_equal_factors_and_exact_ends(low: float, factor: float, count: int) -> None:
     high = low * factor
     _, values = parse_sweep(f"x={low!r}:{high!r}:{count}:log")
     assert (len(values), values[0], values[-1]) == (count if low < high else 1, low, high)
     for k, value in enumerate(values):
-        # pow of up to 1e9 rounds its exponent by 1e-16, its result by 20 times that.
+        # pow of up to 1e9 rounds its exponent by 1e-16, and its result by 20 times that.
         assert math.log(value / low) == pytest.approx(math.log(factor) * k / (count - 1), abs=1e-14)
 
 
@@ -85,13 +85,13 @@ def test_log_range_has_equal_factors_and_its_very_ends(low: float, factor: float
         ("solver.dt=1e-300:1e300:3:log", "0 < LOW <= HIGH"),
     ],
 )
-def test_sweep_that_cannot_be_understood_is_refused(text: str, message: str) -> None:
+def test_invalid_sweep_is_rejected(text: str, message: str) -> None:
     with pytest.raises(AddressError, match=message):
         parse_sweep(text)
 
 
 @given(st.text(max_size=20))
-def test_any_text_is_a_sweep_or_refused(text: str) -> None:
+def test_any_text_is_a_sweep_or_rejected(text: str) -> None:
     try:
         key, values = parse_sweep(text)
     except AddressError as error:
@@ -108,25 +108,25 @@ def test_any_text_is_a_sweep_or_refused(text: str) -> None:
         max_size=5,
     )
 )
-def test_listed_values_are_read_as_toml_has_them(values: list[object]) -> None:
+def test_listed_values_are_parsed_as_toml(values: list[object]) -> None:
     texts = [str(v).lower() if isinstance(v, bool) else f'"{v}"' if isinstance(v, str) else str(v) for v in values]
     key, found = parse_sweep(f"x={','.join(texts)}")
-    stated = tomllib.loads(f"x = [{','.join(texts)}]")["x"]
-    assert (key, found) == ("x", [value for k, value in enumerate(stated) if not _is_among(value, stated[:k])])
+    parsed = tomllib.loads(f"x = [{','.join(texts)}]")["x"]
+    assert (key, found) == ("x", [value for k, value in enumerate(parsed) if not _contains_equal(value, parsed[:k])])
 
 
-def _is_among(value: object, others: list[object]) -> bool:
-    """Tell whether one of the others is the same value of the same type: 1, 1.0 and true are three."""
+def _contains_equal(value: object, others: list[object]) -> bool:
+    """Return whether an equal value of the same type is among others: 1, 1.0 and true are different."""
     return any(type(other) is type(value) and repr(other) == repr(value) for other in others)
 
 
 @pytest.mark.parametrize("values", [",".join(["a"] * 10**5), "1:1:1000000", '"' + "," * 10**5, "[" + "," * 10**5])
-def test_equal_values_of_a_sweep_are_one(values: str) -> None:
+def test_equal_values_of_a_sweep_are_merged(values: str) -> None:
     assert len(parse_sweep(f"title={values}")[1]) == 1
 
 
 @pytest.mark.parametrize(
-    ("overrides", "sweeps", "seeds", "told"),
+    ("overrides", "sweeps", "seeds", "repeated"),
     [
         ([], ["world.seed=1,2"], 2, [("--sweep", "world.seed")]),
         (["world.seed=1"], [], 2, [("--set", "world.seed")]),
@@ -136,8 +136,8 @@ def test_equal_values_of_a_sweep_are_one(values: str) -> None:
         (["nonsense"], ["ball..mass=1", "ball..mass=2"], 2, []),
     ],
 )
-def test_keys_that_are_given_twice_are_found(
-    overrides: list[str], sweeps: list[str], seeds: int | None, told: list[tuple[str, str]]
+def test_repeated_keys_are_found(
+    overrides: list[str], sweeps: list[str], seeds: int | None, repeated: list[tuple[str, str]]
 ) -> None:
     faults = repeated_keys(overrides, sweeps, seeds)
-    assert [(fault.file, fault.path) for fault in faults] == told
+    assert [(fault.file, fault.path) for fault in faults] == repeated

@@ -23,20 +23,20 @@ def violations(value: Any, schema: Mapping[str, Any], root: Mapping[str, Any], p
     Args:
         value: the value.
         schema: its schema.
-        root: the whole schema, which has the definitions.
+        root: the root schema, which has the definitions.
         path: path of the value.
     """
     assert set(schema) <= KEYWORDS, f"unknown keywords: {set(schema) - KEYWORDS}"
     if "$ref" in schema:
         yield from violations(value, root["$defs"][schema["$ref"].rpartition("/")[2]], root, path)
     if "enum" in schema and value not in schema["enum"]:
-        yield f"{path}: {value!r} is none of {schema['enum']}"
+        yield f"{path}: {value!r} is not one of {schema['enum']}"
     if "anyOf" in schema and all(any(violations(value, each, root, path)) for each in schema["anyOf"]):
         yield f"{path}: {value!r:.80} matches no alternative"
     if "type" in schema:
         names = schema["type"] if isinstance(schema["type"], list) else [schema["type"]]
         if not any(_has_type(value, name) for name in names):
-            yield f"{path}: {value!r:.80} is no {' or '.join(names)}"
+            yield f"{path}: {value!r:.80} is not {' or '.join(names)}"
             return
     if isinstance(value, dict):
         yield from _object_violations(value, schema, root, path)

@@ -12,13 +12,13 @@ from sandbox.measure.run.runner import run
 from sandbox.scene.compile.demands import JOINTS, Demand
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import load, loads
-from tests.cli.calling import DROP, FAULTY, json_of, lines_of, written
+from tests.cli.calling import DROP, FAULTY, json_of, lines_of, write_scene
 
 pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 
-def test_json_of_a_sound_scene_has_every_key(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path)
+def test_json_of_a_valid_scene_has_every_key(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = write_scene(tmp_path)
     status, document, err = json_of(capfd, "check", scene)
     assert (status, err) == (0, [])
     assert {"scene", "title", "ok", "faults", "demands", "engines", "warnings", "notes"} <= set(document)
@@ -28,29 +28,29 @@ def test_json_of_a_sound_scene_has_every_key(tmp_path: Path, capfd: pytest.Captu
     assert document["engines"] == {name: {"ok": True, "missing": []} for name in ENGINES}
 
 
-def test_json_of_a_faulty_scene_tells_every_fault_with_its_place(
+def test_json_of_a_faulty_scene_has_every_fault_with_line_and_path(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    scene = written(tmp_path, FAULTY)
+    scene = write_scene(tmp_path, FAULTY)
     status, document, err = json_of(capfd, "check", scene)
     assert (status, err) == (2, [])
     assert (document["scene"], document["title"], document["ok"]) == (scene, None, False)
     assert (document["demands"], document["engines"], document["warnings"]) == ([], {}, [])
     assert all(set(fault) == {"file", "line", "path", "message"} for fault in document["faults"])
-    told = [(fault["file"], fault["line"], fault["path"]) for fault in document["faults"]]
-    assert told == [(scene, 3, "ball.a.position"), (scene, 4, "ball.a.radius")]
+    faults = [(fault["file"], fault["line"], fault["path"]) for fault in document["faults"]]
+    assert faults == [(scene, 3, "ball.a.position"), (scene, 4, "ball.a.radius")]
     status, out, lines = lines_of(capfd, "check", scene)
     assert (status, out) == (2, [])
     assert lines == [f"{scene}:{f['line']}: {f['path']}: {f['message']}" for f in document["faults"]]
 
 
-def test_fault_without_a_line_has_null(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_fault_without_a_line_has_null_in_json(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     _, document, _ = json_of(capfd, "check", "nowhere")
     assert (document["faults"][0]["file"], document["faults"][0]["line"]) == ("nowhere", None)
 
 
-def test_several_scenes_are_a_list_and_the_worst_decides(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    good, bad = written(tmp_path), written(tmp_path, FAULTY, "bad.toml")
+def test_status_of_several_scenes_is_that_of_the_worst(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    good, bad = write_scene(tmp_path), write_scene(tmp_path, FAULTY, "bad.toml")
     status, document, _ = json_of(capfd, "check", good, bad, "nowhere")
     assert (status, list(document)) == (2, ["scenes"])
     assert [(each["scene"], each["ok"]) for each in document["scenes"]] == [
@@ -63,7 +63,7 @@ def test_several_scenes_are_a_list_and_the_worst_decides(tmp_path: Path, capfd: 
 
 
 def test_scene_that_no_engine_can_run_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path)
+    scene = write_scene(tmp_path)
     status, document, _ = json_of(capfd, "check", scene, "--set", "solver.detection=penalty_is_none")
     assert (status, document["ok"]) == (2, False)
     status, document, _ = json_of(capfd, "check", scene, "--set", "solver.broad_phase=oriented")
@@ -75,74 +75,76 @@ def test_scene_that_no_engine_can_run_is_refused(tmp_path: Path, capfd: pytest.C
         assert reason.startswith("broad_phase 'oriented' ")
 
 
-def test_warning_carries_kind_message_and_figures(capfd: pytest.CaptureFixture[str]) -> None:
+def test_warning_has_kind_message_and_odds(capfd: pytest.CaptureFixture[str]) -> None:
     _, document, _ = json_of(capfd, "check", "bullet")
     (warning,) = document["warnings"]
     assert warning["kind"] == "tunnelling"
-    assert warning["odds"] == pytest.approx(0.8, abs=1e-12)  # 1 − 0.02/(100·0.001), but for rounding
+    assert warning["odds"] == pytest.approx(0.8, abs=1e-12)  # 1 − 0.02/(100·0.001), to rounding
     assert warning["message"].endswith("odds up to 80 %; dt <= 0.0002 s is safe")
-    assert document["safe_dt"] == pytest.approx(0.0002, rel=1e-12)  # a quotient's rounding
+    assert document["safe_dt"] == pytest.approx(0.0002, rel=1e-12)  # rounding of a quotient
     _, document, _ = json_of(capfd, "check", "bullet", "--set", "solver.dt=0.0002")
     assert document["warnings"] == []
 
 
-def test_scene_where_nothing_can_tunnel_has_no_safe_dt(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_scene_without_possible_tunnelling_has_no_safe_dt(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     _, document, _ = json_of(capfd, "check", "tutorial/fireworks")
     assert document["safe_dt"] is None
-    still = written(tmp_path, DROP.replace("[0.0, -10.0]", "[0.0, 0.0]") + "velocity = [0.0, 1e-320]\n")
-    status, document, err = json_of(capfd, "check", still)  # so slow that quotients overflow
+    slow = write_scene(tmp_path, DROP.replace("[0.0, -10.0]", "[0.0, 0.0]") + "velocity = [0.0, 1e-320]\n")
+    status, document, err = json_of(capfd, "check", slow)  # quotients by this speed overflow
     assert (status, document["safe_dt"], err) == (0, None, [])
 
 
-def test_bill_is_printed_a_line_each(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path)
+def test_demands_and_engines_are_printed_one_per_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = write_scene(tmp_path)
     status, out, err = lines_of(capfd, "check", scene)
     assert (status, out[0], err) == (0, f"{scene}: Drop", [])
-    bill = 1 + len(Demand) - len(JOINTS) + 1  # kinds of joints are one line, as the scene has none
-    marks = {line.split()[1]: line.split()[0] for line in out[1:bill]}
+    engines_begin = 1 + len(Demand) - len(JOINTS) + 1  # all kinds of joints are one line if the scene has none
+    marks = {line.split()[1]: line.split()[0] for line in out[1:engines_begin]}
     assert (marks["gravity"], marks["drag"], marks["rotation"]) == ("on", "off", "off")
-    assert out[bill : bill + len(ENGINES)] == [f"  engine {name}: models everything in the scene" for name in ENGINES]
-    assert len(out) == bill + 1 + len(ENGINES)
+    assert out[engines_begin : engines_begin + len(ENGINES)] == [
+        f"  engine {name}: models everything in the scene" for name in ENGINES
+    ]
+    assert len(out) == engines_begin + 1 + len(ENGINES)
 
 
-def test_quiet_tells_only_what_is_wrong(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    assert lines_of(capfd, "check", written(tmp_path), "--quiet") == (0, [], [])
+def test_quiet_prints_only_warnings_and_faults(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert lines_of(capfd, "check", write_scene(tmp_path), "--quiet") == (0, [], [])
     status, out, err = lines_of(capfd, "check", "bullet", "--quiet")
     assert (status, len(out), err) == (0, 1, [])
     assert out[0].startswith("bullet: warning: 'bullet' can approach 'wall' at up to 100 m/s, 0.1 m per substep")
 
 
-def test_each_of_three_bullets_is_named_with_its_own_speed(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_tunnelling_warnings_name_each_ball_with_its_speed(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     text = '[world]\nduration = 1.0\n[[wall]]\nname = "w"\npoints = [[1, -9], [1, 9]]\nthickness = 0.02\n'
     for k, (name, speed) in enumerate((("slow", 9.0), ("middle", 25.0), ("fast", 60.0))):
         text += f'[[ball]]\nname = "{name}"\nposition = [0, {k}]\nvelocity = [{speed}, 0]\nradius = 0.1\n'
-    _, document, _ = json_of(capfd, "check", written(tmp_path, text), "--no-trial")
+    _, document, _ = json_of(capfd, "check", write_scene(tmp_path, text), "--no-trial")
     found = [(w["ball"], w["speed"]) for w in document["warnings"] if w["thing"] == "w"]
     assert found == [("fast", 60.0), ("middle", 25.0)]
-    _, document, _ = json_of(capfd, "check", written(tmp_path, text))
+    _, document, _ = json_of(capfd, "check", write_scene(tmp_path, text))
     assert document["trial"] == {"engine": "pymunk", "duration": 1.0, "whole": True}
     passed = [(w["ball"], w["thing"]) for w in document["warnings"] if "seen_at" in w]
-    result = run(load(written(tmp_path, text)))
+    result = run(load(write_scene(tmp_path, text)))
     assert passed == [(result.names[a], "w") for a, _ in result.missed_pair.tolist()]
     assert len(passed) > 0
 
 
-def test_fast_ball_is_foretold_to_end_deep_in_the_plane(capfd: pytest.CaptureFixture[str]) -> None:
+def test_fast_ball_has_a_depth_warning_unless_bisected(capfd: pytest.CaptureFixture[str]) -> None:
     _, document, _ = json_of(capfd, "check", "tutorial/fast_ball")
     (warning,) = document["warnings"]
     assert (warning["kind"], warning["ball"], warning["thing"], warning["speed"]) == ("depth", "ball", "ground", 100.0)
-    assert warning["safe_dt"] == pytest.approx(0.005, rel=1e-12)  # a quotient
+    assert warning["safe_dt"] == pytest.approx(0.005, rel=1e-12)  # rounding of a quotient
     bisecting = ("--set", "solver.detection=bisect", "--set", "solver.integrator=velocity_verlet")
     _, document, _ = json_of(capfd, "check", "tutorial/fast_ball", *bisecting)
     assert document["warnings"] == []
 
 
-def test_pixels_are_noted(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_scene_in_pixels_has_a_note(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     pixels = "[world]\ngravity = [0, 981]\n[[ball]]\nposition = [100, 100]\nradius = 20\n"
-    _, document, _ = json_of(capfd, "check", written(tmp_path, pixels))
+    _, document, _ = json_of(capfd, "check", write_scene(tmp_path, pixels))
     assert [note["kind"] for note in document["notes"]] == ["pixels"]
     metres = pixels.replace("981", "-9.81").replace("20", "0.2")
-    _, document, _ = json_of(capfd, "check", written(tmp_path, metres, "metres.toml"))
+    _, document, _ = json_of(capfd, "check", write_scene(tmp_path, metres, "metres.toml"))
     assert document["notes"] == []
 
 
@@ -153,16 +155,16 @@ def test_substeps_of_a_preset_are_shown(capfd: pytest.CaptureFixture[str]) -> No
     assert any("dt is 0.01 s with 10 substeps, so a step takes 0.001 s" in line for line in out)
 
 
-def test_speed_that_nothing_bounds_is_unknown(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_safe_dt_is_unknown_if_the_speed_is_unbounded(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     text = DROP + "[[attraction]]\ntoward = [3, 3]\nstrength = 1.0\n"
-    _, document, _ = json_of(capfd, "check", written(tmp_path, text))
+    _, document, _ = json_of(capfd, "check", write_scene(tmp_path, text))
     assert (document["safe_dt"], document["safe_dt_known"]) == (None, False)
-    _, out, _ = lines_of(capfd, "check", written(tmp_path, text))
+    _, out, _ = lines_of(capfd, "check", write_scene(tmp_path, text))
     assert any("unknown, because attraction without softening" in line for line in out)
 
 
-def test_trial_run_is_on_the_engine_asked_about(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path)
+def test_trial_run_uses_the_chosen_engine(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = write_scene(tmp_path)
     for engine in ("pymunk", "reference"):
         _, document, _ = json_of(capfd, "check", scene, "--engine", engine)
         assert document["trial"]["engine"] == engine
@@ -172,16 +174,16 @@ def test_trial_run_is_on_the_engine_asked_about(tmp_path: Path, capfd: pytest.Ca
     assert (status, len(err)) == (2, 1)
 
 
-def test_failure_in_one_scene_costs_no_other_its_answer(
+def test_failure_in_one_scene_does_not_affect_other_scenes(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    good, bad = written(tmp_path), written(tmp_path, DROP.replace("Drop", "Bad"), "bad.toml")
-    whole = check.bill
+    good, bad = write_scene(tmp_path), write_scene(tmp_path, DROP.replace("Drop", "Bad"), "bad.toml")
+    original = check.bill
 
     def broken(scene: Scene) -> object:
         if scene.title == "Bad":
             raise OverflowError("math range error")
-        return whole(scene)
+        return original(scene)
 
     monkeypatch.setattr(check, "bill", broken)
     status, document, err = json_of(capfd, "check", bad, good)
@@ -190,7 +192,7 @@ def test_failure_in_one_scene_costs_no_other_its_answer(
     assert len(err) == 1
 
 
-def test_failure_of_one_forecast_costs_no_other_its_answer(
+def test_failure_of_one_check_does_not_affect_other_checks(
     capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(situation: object) -> list[Diagnostic]:
@@ -202,20 +204,22 @@ def test_failure_of_one_forecast_costs_no_other_its_answer(
     assert document["warnings"][1]["forecast"] == "springs"
 
 
-def test_note_is_told_of_a_concave_outline(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_concave_outline_has_a_note(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     outline = "[[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]"
-    scene = written(tmp_path, f'[[polygon]]\nname = "L"\nposition = [0, 0]\npoints = {outline}\ncollides = "none"\n')
+    scene = write_scene(
+        tmp_path, f'[[polygon]]\nname = "L"\nposition = [0, 0]\npoints = {outline}\ncollides = "none"\n'
+    )
     status, document, err = json_of(capfd, "check", scene)
     message = "the outline of 'L' is concave and is decomposed into 2 convex pieces"
     assert (status, err) == (0, [])
     assert document["notes"] == [{"kind": "outline", "message": message, "body": "L", "pieces": 2}]
     status, out, _ = lines_of(capfd, "check", scene)
     assert (status, out[-1]) == (0, f"  note: {message}")
-    assert lines_of(capfd, "check", scene, "--quiet") == (0, [], [])  # nothing is wrong
+    assert lines_of(capfd, "check", scene, "--quiet") == (0, [], [])  # a note is no warning
 
 
-def test_expand_prints_the_primitive_scene_and_nothing_else(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    preset = written(tmp_path, '[billiards]\ntable = "pool-9ft"\ngame = "9-ball"\n')
+def test_expand_prints_only_the_expanded_scene(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    preset = write_scene(tmp_path, '[billiards]\ntable = "pool-9ft"\ngame = "9-ball"\n')
     status, out, err = lines_of(capfd, "check", "--expand", preset, "--set", "ball.cue.velocity=[1,0]")
     assert (status, err) == (0, [])
     scene = loads("\n".join(out))
@@ -224,11 +228,11 @@ def test_expand_prints_the_primitive_scene_and_nothing_else(tmp_path: Path, capf
     assert (len(scene.balls), scene.balls[0].velocity) == (10, (1.0, 0.0))
 
 
-def test_expand_is_of_one_sound_scene(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    faulty, sound = written(tmp_path, FAULTY), written(tmp_path, DROP, "sound.toml")
+def test_expand_requires_one_valid_scene(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    faulty, valid = write_scene(tmp_path, FAULTY), write_scene(tmp_path, DROP, "valid.toml")
     status, out, err = lines_of(capfd, "check", "--expand", faulty)
     assert (status, out, len(err)) == (2, [], 2)
-    for arguments in ((faulty, sound), (sound, "--json")):
+    for arguments in ((faulty, valid), (valid, "--json")):
         status, out, err = lines_of(capfd, "check", "--expand", *arguments)
         assert (status, out) == (2, [])
         assert "--expand prints one scene" in "\n".join(err)

@@ -1,4 +1,4 @@
-"""Shell completion: the words offered after a part of a line, in bash, and in zsh and fish where they are installed."""
+"""Shell completion: words offered for a partial command line in bash, and in zsh and fish if installed."""
 
 import os
 import shutil
@@ -28,8 +28,8 @@ radius = 0.1
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in a folder with a scene, a session, a run and a folder, and with `sandbox` among the programs."""
+def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Change to a folder with a scene, a session, a run and a folder, and put `sandbox` on the PATH."""
     for name, text in (("mine.toml", SCENE), ("session.json", "{}"), ("run.npz", ""), (".hidden.toml", SCENE)):
         (tmp_path / name).write_text(text)
     (tmp_path / "folder").mkdir()
@@ -52,23 +52,23 @@ def shell(program: str, script: str) -> list[str]:
 
 
 def in_bash(*lines: str) -> list[list[str]]:
-    """Return what bash offers at the end of each line, whose last word is being typed."""
-    asked = []
+    """Return the words that bash offers for the last, incomplete word of each line."""
+    commands = []
     for line in lines:
         words = line.split(" ")
         array = " ".join(f"'{word}'" for word in words)
-        asked.append(
+        commands.append(
             f"COMPREPLY=(); COMP_WORDS=({array}); COMP_CWORD={len(words) - 1}; _sandbox_completion sandbox; "
             'printf "%s\\n" "${COMPREPLY[@]}" ---'
         )
-    script = 'eval "$(_SANDBOX_COMPLETE=bash_source sandbox)"; ' + "; ".join(asked)
+    script = 'eval "$(_SANDBOX_COMPLETE=bash_source sandbox)"; ' + "; ".join(commands)
     offered: list[list[str]] = [[]]
     for word in shell("bash", script):
         offered = [*offered, []] if word == "---" else [*offered[:-1], [*offered[-1], word]]
     return [[word for word in words if word] for words in offered[:-1]]
 
 
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("workspace")
 def test_bash_offers_commands_options_engines_and_scenes() -> None:
     commands, options, engine, engines, short, folder, session = in_bash(
         "sandbox ",
@@ -90,7 +90,7 @@ def test_bash_offers_commands_options_engines_and_scenes() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("here")
+@pytest.mark.usefixtures("workspace")
 def test_bash_offers_files_and_keys_of_the_scene_on_the_line() -> None:
     files, hidden, runs, tables, names, keys, solver, values = in_bash(
         "sandbox check mi",
@@ -112,17 +112,17 @@ def test_bash_offers_files_and_keys_of_the_scene_on_the_line() -> None:
     assert values == []
 
 
-@pytest.mark.usefixtures("here")
-def test_what_cannot_be_completed_offers_nothing_and_says_nothing() -> None:
+@pytest.mark.usefixtures("workspace")
+def test_line_that_cannot_be_completed_offers_nothing_silently() -> None:
     for line in ("sandbox rum bo", "sandbox run no-such-scene --set ball.", "sandbox run x.toml --set q.w.e."):
         words = line.split()
-        asked = {"_SANDBOX_COMPLETE": "bash_complete", "COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
-        done = subprocess.run(["sandbox"], env=os.environ | asked, capture_output=True, text=True, check=False)
+        environment = {"_SANDBOX_COMPLETE": "bash_complete", "COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
+        done = subprocess.run(["sandbox"], env=os.environ | environment, capture_output=True, text=True, check=False)
         assert (done.stdout.strip(), done.stderr) == ("", "")
 
 
-@pytest.mark.usefixtures("here")
-def test_fish_and_zsh() -> None:
+@pytest.mark.usefixtures("workspace")
+def test_fish_and_zsh_offer_options_and_commands() -> None:
     if shutil.which("fish"):
         script = "_SANDBOX_COMPLETE=fish_source sandbox | source; complete -C 'sandbox check bounce --en'"
         assert [line.partition("\t")[0] for line in shell("fish", script)] == ["--engine"]
@@ -132,18 +132,18 @@ def test_fish_and_zsh() -> None:
             "print ${_comps[sandbox]}"
         )
         assert shell("zsh", script) == ["_sandbox_completion"]
-    asked = {"_SANDBOX_COMPLETE": "zsh_complete", "COMP_WORDS": "sandbox r", "COMP_CWORD": "1"}
-    done = subprocess.run(["sandbox"], env=os.environ | asked, capture_output=True, text=True, check=False)
+    environment = {"_SANDBOX_COMPLETE": "zsh_complete", "COMP_WORDS": "sandbox r", "COMP_CWORD": "1"}
+    done = subprocess.run(["sandbox"], env=os.environ | environment, capture_output=True, text=True, check=False)
     assert done.stdout.splitlines()[:3] == ["plain", "run", COMMANDS["run"][1]]
 
 
-def test_no_command_is_imported_to_complete_the_name_of_one() -> None:
+def test_completing_a_command_name_imports_no_command() -> None:
     script = (
         "import sys\nfrom sandbox.cli.main import call\ncall([])\n"
         "print([name for name in sys.modules if name.startswith('sandbox.') and 'engines' in name], file=sys.stderr)"
     )
-    asked = {"_SANDBOX_COMPLETE": "bash_complete", "COMP_WORDS": "sandbox r", "COMP_CWORD": "1"}
+    environment = {"_SANDBOX_COMPLETE": "bash_complete", "COMP_WORDS": "sandbox r", "COMP_CWORD": "1"}
     done = subprocess.run(
-        [sys.executable, "-c", script], env=os.environ | asked, capture_output=True, text=True, check=False
+        [sys.executable, "-c", script], env=os.environ | environment, capture_output=True, text=True, check=False
     )
     assert (done.stdout.splitlines()[0], done.stderr) == ("plain,run", "[]\n")

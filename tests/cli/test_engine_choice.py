@@ -1,20 +1,20 @@
-"""Engines found where only one has a setting, sweeps of `compare`, and first contacts in the table of `run`."""
+"""Choice of the only engine that has a setting, sweeps of `compare`, first contacts in the table of `run`."""
 
 from pathlib import Path
 
 import pytest
 
-from tests.cli.calling import json_of, lines_of, written
+from tests.cli.calling import json_of, lines_of, write_scene
 
 pytestmark = pytest.mark.full  # child processes and pages
 
 SWEEP = ("--sweep", "solver.integrator=explicit_euler,velocity_verlet,rk4")
 
 
-def test_compare_sweeps_integrators_on_the_engine_that_has_them(
+def test_compare_sweeps_integrators_on_the_only_engine_that_has_them(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    status, document, err = json_of(capfd, "compare", written(tmp_path), *SWEEP)
+    status, document, err = json_of(capfd, "compare", write_scene(tmp_path), *SWEEP)
     assert (status, err) == (
         0,
         ["engine: reference, the only one that has integrator explicit_euler, velocity_verlet, rk4"],
@@ -27,22 +27,22 @@ def test_compare_sweeps_integrators_on_the_engine_that_has_them(
     assert euler > 5.0 * max(verlet, rk4)
 
 
-def test_compare_prints_a_column_of_each_swept_value(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    status, out, _ = lines_of(capfd, "compare", written(tmp_path), "--engine", "reference", *SWEEP)
+def test_compare_prints_a_column_for_each_swept_setting(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = lines_of(capfd, "compare", write_scene(tmp_path), "--engine", "reference", *SWEEP)
     assert status == 0
     assert out[2].split()[:4] == ["engine", "integrator", "dt", "status"]
     assert [line.split()[1] for line in out[3:6]] == ["explicit_euler", "velocity_verlet", "rk4"]
 
 
 def test_compare_refuses_a_value_that_a_named_engine_lacks(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    status, document, err = json_of(capfd, "compare", written(tmp_path), "--engine", "pymunk", *SWEEP)
+    status, document, err = json_of(capfd, "compare", write_scene(tmp_path), "--engine", "pymunk", *SWEEP)
     assert status == 1
     assert [row["status"] for row in document["engines"]] == ["ok", "refused", "refused"]
     assert len(err) == 2
 
 
 @pytest.mark.parametrize(
-    ("more", "where"),
+    ("options", "words"),
     [
         (("--sweep", "solver.dt=1:2"), "--sweep"),
         (("--sweep", "solver.integratr=rk4"), "integratr"),
@@ -50,30 +50,30 @@ def test_compare_refuses_a_value_that_a_named_engine_lacks(tmp_path: Path, capfd
         (("--sweep", "world.duration=0.1,0.2", "--out", "x"), "--out"),
     ],
 )
-def test_compare_tells_faults_of_sweeps(
-    more: tuple[str, ...],
-    where: str,
+def test_compare_reports_faults_of_sweeps(
+    options: tuple[str, ...],
+    words: str,
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    status, out, err = lines_of(capfd, "compare", written(tmp_path), *more)
+    status, out, err = lines_of(capfd, "compare", write_scene(tmp_path), *options)
     assert (status, out, len(err)) == (2, [], 1)
-    assert where in err[0]
+    assert words in err[0]
 
 
-def test_sweep_of_the_solver_is_drawn(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_sweep_of_the_solver_is_in_report_and_plot(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
-    status, _, _ = json_of(capfd, "compare", written(tmp_path), "--engine", "reference", *SWEEP, "--out", str(out))
+    status, _, _ = json_of(capfd, "compare", write_scene(tmp_path), "--engine", "reference", *SWEEP, "--out", str(out))
     assert status == 0
     page = (out / "report.html").read_text(encoding="utf-8")
     assert "reference, integrator velocity_verlet" in page
     assert (out / "error.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_run_takes_the_only_engine_that_has_a_setting(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path)
+def test_run_chooses_the_only_engine_that_has_a_setting(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = write_scene(tmp_path)
     status, document, err = json_of(capfd, "run", scene, "--set", "solver.integrator='rk4'")
     assert (status, err) == (0, ["engine: reference, the only one that has integrator rk4"])
     assert [run["engine"] for run in document["runs"]] == ["reference"]
@@ -81,14 +81,16 @@ def test_run_takes_the_only_engine_that_has_a_setting(tmp_path: Path, capfd: pyt
     assert (status, [run["engine"] for run in document["runs"]]) == (0, ["reference"] * 3)
 
 
-def test_run_refuses_on_a_named_engine(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_run_on_a_named_engine_without_the_setting_is_refused(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     choice = ("--engine", "pymunk", "--set", "solver.integrator='rk4'")
-    status, document, _ = json_of(capfd, "run", written(tmp_path), *choice)
+    status, document, _ = json_of(capfd, "run", write_scene(tmp_path), *choice)
     assert (status, document["runs"][0]["engine"], document["runs"][0]["status"]) == (1, "pymunk", "refused")
 
 
-def test_run_stays_on_pymunk_where_that_has_the_values(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    status, document, err = json_of(capfd, "run", written(tmp_path), "--sweep", "solver.dt=0.01,0.005")
+def test_run_uses_pymunk_if_it_has_the_swept_values(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    status, document, err = json_of(capfd, "run", write_scene(tmp_path), "--sweep", "solver.dt=0.01,0.005")
     assert (status, err, [run["engine"] for run in document["runs"]]) == (0, [], ["pymunk", "pymunk"])
 
 

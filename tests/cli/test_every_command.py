@@ -1,11 +1,11 @@
-"""One example of each command that needs no window: its status and the keys of its JSON document."""
+"""One example of each command that needs no window: exit status and keys of the JSON document."""
 
 from pathlib import Path
 
 import pytest
 
 from sandbox.cli.main import COMMANDS, call
-from tests.cli.calling import DROP, json_of, written
+from tests.cli.calling import DROP, json_of, write_scene
 
 PUTT = """
 [surface]
@@ -61,9 +61,9 @@ EXAMPLES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
         ("players", "frames", "wins"),
     ),
 }
-"""Arguments, and keys that the document has."""
+"""Arguments, and keys of the JSON document, by command."""
 WITH_WINDOW = {"play", "replay"}
-"""Tested with the window."""
+"""Commands that are tested with the window."""
 
 
 def test_every_command_has_an_example() -> None:
@@ -77,7 +77,7 @@ def test_example_of_a_command_succeeds(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     for name, text in (("drop.toml", DROP), ("putt.toml", PUTT), ("shell.toml", SHELL)):
-        written(tmp_path, text, name)
+        write_scene(tmp_path, text, name)
     if command == "export":
         assert call(["run", "drop.toml", "--out", "runs", "--quiet"]) == 0
     arguments, keys = EXAMPLES[command]

@@ -1,4 +1,4 @@
-"""`sandbox export`: tables, pictures and films of stored runs; every fault before the work."""
+"""`sandbox export`: tables, pictures and films of stored runs; faults are reported before any work."""
 
 import json
 import os
@@ -25,7 +25,7 @@ from sandbox.window.camera import Camera
 from sandbox.window.capture import limits
 from sandbox.window.playback.recorded import RecordedRun
 from sandbox.window.render.palette import SKY
-from tests.cli.calling import DROP, json_of, lines_of, process, written
+from tests.cli.calling import DROP, json_of, lines_of, process, write_scene
 from tests.films import gif_frames, mp4_frames
 from tests.interruptible import interrupted
 
@@ -37,9 +37,9 @@ SMALL = ("--size", "160x90")
 
 @pytest.fixture
 def stored(tmp_path: Path) -> Path:
-    """A folder with one run of half a second, as `sandbox run --out` makes it."""
+    """Return a folder with one run of half a second, made by `sandbox run --out`."""
     folder = tmp_path / "runs"
-    assert call(["run", written(tmp_path), "--out", str(folder), "--quiet"]) == 0
+    assert call(["run", write_scene(tmp_path), "--out", str(folder), "--quiet"]) == 0
     return folder
 
 
@@ -53,22 +53,24 @@ def csv_rows(path: Path) -> list[list[str]]:
 
 
 def recorded(**changes: object) -> Recording:
-    parts = {"engine": "pymunk", "settings": Settings(), "actions": (), "duration": 0.3} | changes
-    return Recording(scene=SCENE, **parts)
+    fields = {"engine": "pymunk", "settings": Settings(), "actions": (), "duration": 0.3} | changes
+    return Recording(scene=SCENE, **fields)
 
 
-@pytest.mark.parametrize("way", ["{folder}/{id}.npz", "{folder}/{id}", "{folder}", "{folder}/"])
+@pytest.mark.parametrize("pattern", ["{folder}/{id}.npz", "{folder}/{id}", "{folder}", "{folder}/"])
 def test_run_is_found_by_file_id_or_folder(
-    way: str, stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    pattern: str, stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    name, target = way.format(folder=stored, id=id_in(stored)), tmp_path / "a.csv"
+    name, target = pattern.format(folder=stored, id=id_in(stored)), tmp_path / "a.csv"
     status, document, err = json_of(capfd, "export", name, "--to", str(target))
     assert (status, err) == (0, [])
     assert document == {"run": name, "files": [{"path": str(target), "format": "csv", "rows": 51}]}
     assert len(csv_rows(target)) == 52
 
 
-def test_csv_and_parquet_hold_the_run(stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_csv_and_parquet_contain_the_positions_of_the_run(
+    stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     targets = [tmp_path / "a.csv", tmp_path / "a.parquet"]
     status, out, err = lines_of(capfd, "export", str(stored), *(f"--to={target}" for target in targets))
     assert (status, err) == (0, [])
@@ -79,7 +81,9 @@ def test_csv_and_parquet_hold_the_run(stored: Path, tmp_path: Path, capfd: pytes
     assert parquet.read_table(targets[1])["y"].to_pylist() == trajectory.position[:, 0, 1].tolist()
 
 
-def test_contacts_and_times_narrow_the_tables(stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_contacts_and_time_range_select_rows_of_tables(
+    stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     target = tmp_path / "a.csv"
     status, out, _ = lines_of(capfd, "export", str(stored), "--to", str(target), "--contacts")
     assert (status, out) == (0, [f"written: {target} (1 row)"])
@@ -90,17 +94,17 @@ def test_contacts_and_times_narrow_the_tables(stored: Path, tmp_path: Path, capf
     assert len(csv_rows(target)) == 1
     assert lines_of(capfd, "export", str(stored), "--to", str(target), "--from=0.1", "--until=0.2", "--quiet")[1] == []
     times = [float(row[0]) for row in csv_rows(target)[1:]]
-    assert times == pytest.approx(np.arange(10, 21) * 0.01, rel=1e-12)  # summed in steps
+    assert times == pytest.approx(np.arange(10, 21) * 0.01, rel=1e-12)  # time is a sum of steps
 
 
-def test_gif_shows_the_ball_where_the_run_has_it(
+def test_gif_shows_the_ball_at_its_position_in_the_run(
     stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     target = tmp_path / "a.gif"
     status, document, _ = json_of(capfd, "export", str(stored), "--to", str(target), "--fps", "20", *SMALL)
     assert (status, document["files"]) == (0, [{"path": str(target), "format": "gif", "frames": 10}])
-    frames, shown = gif_frames(target)
-    assert (len(frames), sum(shown)) == (10, 500)
+    frames, durations = gif_frames(target)
+    assert (len(frames), sum(durations)) == (10, 500)
     film = RecordedRun(Trajectory.load(stored / f"{id_in(stored)}.npz"))
     camera = Camera.fitting(film.bounds, (160, 90))
     for k, frame in enumerate(frames):
@@ -119,43 +123,43 @@ def test_gif_shows_the_ball_where_the_run_has_it(
         (("--from", "0.5"), 1, 30),
     ],
 )
-def test_gif_lasts_as_long_as_its_part_of_the_run(
+def test_gif_has_the_duration_of_its_part_of_the_run(
     words: tuple[str, ...], count: int, milliseconds: int, stored: Path, tmp_path: Path
 ) -> None:
     target = tmp_path / "a.gif"
     assert call(["export", str(stored), "--to", str(target), *words, *SMALL, "--quiet"]) == 0
-    frames, shown = gif_frames(target)
+    frames, durations = gif_frames(target)
     assert len(frames) == count
-    assert abs(sum(shown) - milliseconds) <= 10  # ms, the grain of a gif
+    assert abs(sum(durations) - milliseconds) <= 10  # ms, the resolution of gif durations
 
 
-def test_mp4_decodes_to_the_same_pictures(stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_mp4_has_the_same_frames_as_the_gif(stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     targets = [str(tmp_path / "a.mp4"), str(tmp_path / "a.gif")]
     words = ("--to", targets[0], "--to", targets[1], *SMALL)
     status, document, _ = json_of(capfd, "export", str(stored), *words)
     assert (status, [file["frames"] for file in document["files"]]) == (0, [15, 15])
-    films, about = mp4_frames(Path(targets[0]))
+    films, description = mp4_frames(Path(targets[0]))
     gifs, _ = gif_frames(Path(targets[1]))
-    assert "30 fps" in about
+    assert "30 fps" in description
     assert len(films) == 15
     for film, gif in zip(films, gifs, strict=True):
-        assert np.abs(film - gif).mean() < 3  # of 255: one has fewer colours, the other softer edges
+        assert np.abs(film - gif).mean() < 3  # of 255: the gif has fewer colours, the mp4 softer edges
 
 
-def test_png_shows_the_end_or_another_moment(stored: Path, tmp_path: Path) -> None:
+def test_png_shows_the_end_or_the_given_time(stored: Path, tmp_path: Path) -> None:
     film = RecordedRun(Trajectory.load(stored / f"{id_in(stored)}.npz"))
     camera = Camera.fitting(film.bounds, (160, 90))
-    for words, moment in (((), 0.5), (("--at", "0"), 0.0), (("--at", "0.25"), 0.25)):
+    for words, time in (((), 0.5), (("--at", "0"), 0.0), (("--at", "0.25"), 0.25)):
         target = tmp_path / "a.png"
         assert call(["export", str(stored), "--to", str(target), *words, *SMALL, "--quiet"]) == 0
         with Image.open(target) as image:
-            seen = np.asarray(image.convert("RGB")).astype(int)
-        assert seen.shape == (90, 160, 3)
-        x, y = camera.to_screen(film.frame(moment).position[0])
-        assert np.abs(seen[int(y), int(x)] - SKY).max() <= 40  # of 255: a disc may be shaded
+            pixels = np.asarray(image.convert("RGB")).astype(int)
+        assert pixels.shape == (90, 160, 3)
+        x, y = camera.to_screen(film.frame(time).position[0])
+        assert np.abs(pixels[int(y), int(x)] - SKY).max() <= 40  # of 255: a disc may be shaded
 
 
-def test_width_and_overlays_are_honoured(stored: Path, tmp_path: Path) -> None:
+def test_png_has_the_given_width_and_overlays(stored: Path, tmp_path: Path) -> None:
     plain, full = tmp_path / "a.png", tmp_path / "b.png"
     assert call(["export", str(stored), "--to", str(plain), "--quiet"]) == 0
     with Image.open(plain) as image:
@@ -169,7 +173,7 @@ def test_width_and_overlays_are_honoured(stored: Path, tmp_path: Path) -> None:
         assert first.tobytes() != second.tobytes()
 
 
-def test_recording_is_run_first(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_recording_is_run_before_it_is_exported(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     session = recorded(
         actions=(
             Impulse(time=0.0, body="a", impulse=(1.0, 0.0)),
@@ -184,10 +188,10 @@ def test_recording_is_run_first(tmp_path: Path, capfd: pytest.CaptureFixture[str
     assert {row[1] for row in rows} == {"a", "late"}
     last = [row for row in rows if row[1] == "a"][-1]
     assert float(last[0]) == 0.3
-    assert float(last[2]) == pytest.approx(0.3, rel=1e-12)  # 1 m/s for as long, summed in steps
+    assert float(last[2]) == pytest.approx(0.3, rel=1e-12)  # 1 m/s for 0.3 s, a sum of steps
 
 
-def test_recording_that_diverges_is_exported_as_far_as_it_goes_with_status_1(
+def test_diverging_recording_is_exported_until_it_diverges_with_status_1(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     text = DROP.replace("gravity = [0.0, -10.0]", "gravity = [1e9, 0.0]")
@@ -198,7 +202,7 @@ def test_recording_that_diverges_is_exported_as_far_as_it_goes_with_status_1(
     assert err[0].startswith(f"{name}: diverged: at ")
 
 
-def test_recording_that_is_refused_exports_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_refused_recording_exports_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     session = recorded(settings=Settings(broad_phase="oriented"))
     name = str(session.save(tmp_path / "session.json"))
     status, document, err = json_of(capfd, "export", name, "--to", str(tmp_path / "a.csv"))
@@ -210,14 +214,16 @@ def test_recording_that_is_refused_exports_nothing(tmp_path: Path, capfd: pytest
 
 
 def test_folder_of_several_runs_lists_them(stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    call(["run", written(tmp_path), "--sweep", "solver.dt=0.01,0.02", "--out", str(stored), "--quiet"])
+    call(["run", write_scene(tmp_path), "--sweep", "solver.dt=0.01,0.02", "--out", str(stored), "--quiet"])
     ids = sorted(path.stem for path in stored.glob("*.npz"))
     status, out, err = lines_of(capfd, "export", str(stored), "--to", str(tmp_path / "a.csv"))
     assert (status, out) == (2, [])
     assert err == [f"{stored}: contains {len(ids)} runs; name one: {', '.join(f'{stored}/{id}' for id in ids)}"]
 
 
-def test_all_faults_are_told_at_once_and_nothing_is_written(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_all_faults_are_reported_together_and_nothing_is_written(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     words = ("--to", "a.txt", "--to", f"{tmp_path}/nowhere/a.gif", "--fps=60", "--speed=0", "--size=big", "--from=-1")
     status, document, err = json_of(capfd, "export", str(tmp_path / "none"), *words, "--overlay", "glitter")
     assert (status, document["files"]) == (2, [])
@@ -261,7 +267,7 @@ def test_all_faults_are_told_at_once_and_nothing_is_written(tmp_path: Path, capf
         ),
     ],
 )
-def test_fault_is_one_line_that_says_what_is_right(
+def test_faulty_option_is_reported_in_one_line_and_nothing_is_written(
     words: tuple[str, ...],
     message: str,
     stored: Path,
@@ -288,7 +294,7 @@ def test_fault_is_one_line_that_says_what_is_right(
         (b'{"format": 1, "scene": {}}', "cannot be read as a session: "),
     ],
 )
-def test_what_is_no_run_is_told(
+def test_file_that_is_not_a_run_is_a_fault(
     content: bytes | None, message: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "run"
@@ -300,7 +306,7 @@ def test_what_is_no_run_is_told(
     assert message in err[0]
 
 
-def test_empty_folder_and_impossible_names_are_told(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_empty_folder_and_invalid_names_are_faults(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     for name, message in ((str(tmp_path), "contains no run"), ("x" * 5000, "too long"), ("a\0b", "a NUL")):
         status, _, err = lines_of(capfd, "export", name, "--to", str(tmp_path / "a.csv"))
         assert (status, len(err)) == (2, 1)
@@ -319,13 +325,13 @@ def test_empty_folder_and_impossible_names_are_told(tmp_path: Path, capfd: pytes
         ({"contact_pair": np.asarray([[0, -9]])}, "contact_pair: refers to an object that the scene does not have"),
     ],
 )
-def test_run_that_is_inconsistent_is_told(
+def test_inconsistent_run_is_a_fault(
     changes: dict[str, object], message: str, stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     path = stored / f"{id_in(stored)}.npz"
     trajectory = Trajectory.load(path)
-    parts = {name: getattr(trajectory, name) for name in trajectory.__dataclass_fields__}
-    Trajectory(**(parts | changes)).save(path)
+    arrays = {name: getattr(trajectory, name) for name in trajectory.__dataclass_fields__}
+    Trajectory(**(arrays | changes)).save(path)
     status, out, err = lines_of(capfd, "export", str(path), "--contacts", "--to", str(tmp_path / "a.csv"))
     assert (status, out, len(err)) == (2, [], 1)
     assert err[0].startswith(f"{path}: ")
@@ -333,7 +339,7 @@ def test_run_that_is_inconsistent_is_told(
     assert not (tmp_path / "a.csv").exists()
 
 
-def test_missing_extras_are_named_before_the_work(
+def test_missing_extras_are_reported_before_any_file_is_written(
     stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(limits, "can_make_mp4", lambda: False)
@@ -354,13 +360,13 @@ def test_recording_of_an_unknown_engine_is_a_fault(tmp_path: Path, capfd: pytest
     assert "perpetuum" in err[0]
 
 
-def test_disk_that_is_full_is_one_line(
+def test_full_disk_is_reported_in_one_line(
     stored: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def full(*_: object) -> int:
+    def fail_with_full_disk(*_: object) -> int:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(tables, "_write_csv", full)
+    monkeypatch.setattr(tables, "_write_csv", fail_with_full_disk)
     status, document, err = json_of(
         capfd, "export", str(stored), "--to", str(tmp_path / "a.png"), "--to", str(tmp_path / "a.csv")
     )
@@ -368,7 +374,7 @@ def test_disk_that_is_full_is_one_line(
     assert err == [f"--to: {tmp_path / 'a.csv'}: No space left on device"]
 
 
-# As a process: what it loads, what it prints, and that it needs no display.
+# Runs as a child process: modules loaded, output, and no display.
 NO_DISPLAY = """
 import sys
 from sandbox.cli.main import call
@@ -378,7 +384,7 @@ print(status, pygame is not None and pygame.display.get_init(), "SDL_VIDEODRIVER
 """
 
 
-def test_pictures_need_no_display_and_print_nothing_else(stored: Path, tmp_path: Path) -> None:
+def test_pictures_need_no_display_and_print_nothing(stored: Path, tmp_path: Path) -> None:
     env = {key: value for key, value in os.environ.items() if not key.startswith(("SDL_", "DISPLAY", "PYGAME"))}
     done = subprocess.run(
         [sys.executable, "-c", NO_DISPLAY, "export", str(stored), "--to", str(tmp_path / "a.png"), "--quiet"],
@@ -391,13 +397,13 @@ def test_pictures_need_no_display_and_print_nothing_else(stored: Path, tmp_path:
     assert (done.stdout, done.stderr) == ("0 False False\n", "")
 
 
-def test_process_prints_one_document(stored: Path, tmp_path: Path) -> None:
+def test_process_prints_one_json_document(stored: Path, tmp_path: Path) -> None:
     done = process("export", "runs", "--to", "a.png", "--json", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert json.loads(done.stdout) == {"run": "runs", "files": [{"path": "a.png", "format": "png", "frames": 1}]}
 
 
-LOADED = """
+LIST_MODULES = """
 import sys
 from sandbox.cli.main import call
 status = call(sys.argv[1:])
@@ -405,20 +411,20 @@ print(status, *(name for name in ("pygame", "pyarrow", "PIL", "matplotlib", "pym
 """
 
 
-def test_table_loads_nothing_that_draws(stored: Path, tmp_path: Path) -> None:
+def test_table_export_imports_no_graphics_modules(stored: Path, tmp_path: Path) -> None:
     words = ["export", str(stored), "--to", str(tmp_path / "a.csv"), "--quiet"]
     done = subprocess.run(
-        [sys.executable, "-c", LOADED, *words], capture_output=True, text=True, check=True, timeout=120
+        [sys.executable, "-c", LIST_MODULES, *words], capture_output=True, text=True, check=True, timeout=120
     )
     assert (done.stdout, done.stderr) == ("0\n", "")
 
 
-def long(trajectory: Trajectory) -> Trajectory:
-    """The run 20,000 times over: minutes of work for whoever exports it."""
-    times = 20_000
+def repeated(trajectory: Trajectory) -> Trajectory:
+    """Return the run repeated 20,000 times, which takes minutes to export."""
+    repeats = 20_000
     states = {name: getattr(trajectory, name) for name in ("position", "velocity", "angle", "angular_velocity")}
-    count = times * len(trajectory.time)
-    states = {name: np.tile(array, (times, *[1] * (array.ndim - 1))) for name, array in states.items()}
+    count = repeats * len(trajectory.time)
+    states = {name: np.tile(array, (repeats, *[1] * (array.ndim - 1))) for name, array in states.items()}
     scene = {**trajectory.info["scene"], "world": {"duration": count * 1e-3}}
     info = {**trajectory.info, "scene": scene, "steps": count, "state_hash": None}
     return replace(trajectory, time=np.arange(count) * 1e-3, info=info, **states)
@@ -427,8 +433,8 @@ def long(trajectory: Trajectory) -> Trajectory:
 @pytest.mark.parametrize(
     "suffix", [".csv", *(pytest.param(each, marks=pytest.mark.slow) for each in (".gif", ".mp4", ".parquet"))]
 )
-def test_interrupt_keeps_what_is_finished_and_leaves_no_half_file(suffix: str, tmp_path: Path) -> None:
-    long(run(SCENE)).save(tmp_path / "run.npz")
+def test_interrupted_export_keeps_finished_files_and_leaves_no_partial_file(suffix: str, tmp_path: Path) -> None:
+    repeated(run(SCENE)).save(tmp_path / "run.npz")
     out = tmp_path / "out"
     out.mkdir()
     words = ["export", "run.npz", "--to", "out/first.png", "--to", f"out/film{suffix}", "--to", "out/last.png"]

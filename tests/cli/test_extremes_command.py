@@ -1,4 +1,4 @@
-"""`sandbox extremes` on the command line."""
+"""`sandbox extremes`: document, table, faults, interrupt, time limit."""
 
 import json
 import signal
@@ -18,7 +18,7 @@ SMALL = ("extremes", "--axes", "stiffness,restitution", "--engines", "pymunk,exa
 
 @pytest.mark.slow
 def test_document_has_cells_limits_and_predictions(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """The same document twice over, but for times; heat maps and the document are written."""
+    """Two calls give equal documents except for times; heat maps and the document are written."""
     status, document, errors = json_of(capfd, *SMALL, "--out", str(tmp_path))
     assert (status, errors) == (0, [])
     assert {"axis", "level", "engine", "settings", "verdict", "reason"} <= set(document["cells"][0])
@@ -36,29 +36,29 @@ def test_document_has_cells_limits_and_predictions(capfd: pytest.CaptureFixture[
     assert (tmp_path / "extremes.png").stat().st_size > 10_000
     assert json.loads((tmp_path / "extremes.json").read_text(encoding="utf-8")) == document
 
-    # Again, held against boundaries of which one went farther.
+    # Second call, against stored limits of which one is larger.
     stored = tmp_path / "extremes.json"
-    farther = json.loads(json.dumps(document))
-    for limit in farther["limits"]:
+    stored_limits = json.loads(json.dumps(document))
+    for limit in stored_limits["limits"]:
         if (limit["axis"], limit["setup"]) == ("stiffness", "pymunk"):
             limit["limit"] = 3.0
-    stored.write_text(json.dumps(farther), encoding="utf-8")
+    stored.write_text(json.dumps(stored_limits), encoding="utf-8")
     status, again, (line,) = json_of(capfd, *SMALL, "--against", str(stored))
     assert status == 1
     assert line.startswith("stiffness on pymunk: worse: passed up to 3 before, up to 1.99 now: ")
     assert [change["worse"] for change in again["changes"]] == [True]
-    for one, other in zip(document["cells"], again["cells"], strict=True):
-        assert {**one, "seconds": 0.0} == {**other, "seconds": 0.0}
+    for first, second in zip(document["cells"], again["cells"], strict=True):
+        assert {**first, "seconds": 0.0} == {**second, "seconds": 0.0}
 
 
-def test_table_has_a_line_a_setup(capfd: pytest.CaptureFixture[str]) -> None:
+def test_table_has_one_line_per_setup(capfd: pytest.CaptureFixture[str]) -> None:
     status, out, errors = lines_of(capfd, "extremes", "--axes", "speed", "--engines", "exact", "--quick")
     assert (status, errors) == (0, [])
     assert out[0] == "speed  exact  EEE  all levels pass, up to 10"
     assert "single axes: 3 cells: 3 exact" in out
 
 
-def test_faults_are_a_line_each_before_anything_runs(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_faults_are_reported_one_per_line_before_any_run(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.write_text("{}", encoding="utf-8")
     wrong = ("--axes", "speed,nonsense", "--engines", "pymunk,box3d", "--against", str(file), "--out", str(file))
@@ -83,7 +83,9 @@ def test_faults_are_a_line_each_before_anything_runs(capfd: pytest.CaptureFixtur
         ("solver.dt=0.01", "varies; remove it"),
     ],
 )
-def test_override_that_suits_no_scene_is_a_fault(capfd: pytest.CaptureFixture[str], override: str, words: str) -> None:
+def test_override_that_applies_to_no_scene_is_a_fault(
+    capfd: pytest.CaptureFixture[str], override: str, words: str
+) -> None:
     status, out, errors = lines_of(capfd, "extremes", "--axes", "dt", "--quick", "--set", override)
     assert (status, out) == (2, [])
     assert words in errors[0]
@@ -98,12 +100,12 @@ def test_limits_out_of_range_are_faults(capfd: pytest.CaptureFixture[str], wrong
 
 
 @pytest.mark.slow
-def test_interrupted_run_keeps_what_is_finished(tmp_path: Path) -> None:
+def test_interrupted_extremes_keep_finished_cells(tmp_path: Path) -> None:
     words = ["extremes", "--workers", "1", "--json"]  # minutes
     command = subprocess.Popen(interruptible(*words), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
-        time.sleep(8.0)  # enough for some cells, and by far not for all; where none is finished, none is kept
-        for _ in range(2):  # the impatient press it twice
+        time.sleep(8.0)  # long enough for some cells, far too short for all; the test holds with none too
+        for _ in range(2):  # a second Ctrl-C while the first is handled
             command.send_signal(signal.SIGINT)
         out, errors = command.communicate(timeout=60.0)
     finally:
@@ -116,7 +118,7 @@ def test_interrupted_run_keeps_what_is_finished(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_cell_that_takes_too_long_fails_and_the_rest_goes_on(tmp_path: Path) -> None:
+def test_cell_beyond_the_time_limit_fails_and_the_rest_is_run(tmp_path: Path) -> None:
     chosen = ("--axes", "count", "--engines", "exact", "--no-pairs", "--timeout", "0.1", "--json")
     done = process("extremes", *chosen, cwd=tmp_path)
     assert done.returncode == 0
@@ -124,4 +126,4 @@ def test_cell_that_takes_too_long_fails_and_the_rest_goes_on(tmp_path: Path) -> 
     last = document["cells"][-1]
     assert (last["level"], last["reason"]) == (10_000, "took longer than 0.1 s, and was stopped")
     assert len(document["cells"]) == 5
-    assert document["probes"] == []  # where time is up, a boundary would be the machine's
+    assert document["probes"] == []  # a limit set by time would depend on the machine

@@ -1,4 +1,4 @@
-"""A disk that is full in the middle of a file: one line and status 2, no half a file, and what was there stays."""
+"""A full disk in the middle of a write: one line and status 2, no partial file, existing files unchanged."""
 
 import json
 import subprocess
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.calling import DROP, json_of, written
+from tests.cli.calling import DROP, json_of, write_scene
 
 pytestmark = pytest.mark.full  # child processes and command lines that run long
 
@@ -17,7 +17,7 @@ from sandbox.cli.main import call
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), resource.RLIM_INFINITY))
 print(json.dumps([call(words) for words in json.loads(sys.argv[2])]))
 """
-"""A limit on the size of files fails a write as a full disk does; Python ignores its signal."""
+"""A limit on the file size makes a write fail as a full disk does; Python ignores its signal."""
 ENDINGS = ("csv", "parquet", "gif", "png")
 
 
@@ -28,10 +28,10 @@ def files(folder: Path) -> dict[str, bytes]:
 @pytest.mark.parametrize(
     ("limit", "endings"), [(3000, ENDINGS), pytest.param(0, (*ENDINGS, "mp4"), marks=pytest.mark.slow)]
 )
-def test_full_disk_is_a_line_for_each_file_and_leaves_none(
+def test_full_disk_is_reported_once_per_file_and_leaves_no_file(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], limit: int, endings: tuple[str, ...]
 ) -> None:
-    scene, folder = written(tmp_path, DROP.replace("duration = 0.5", "duration = 2.0")), tmp_path / "runs"
+    scene, folder = write_scene(tmp_path, DROP.replace("duration = 0.5", "duration = 2.0")), tmp_path / "runs"
     _, document, _ = json_of(capfd, "run", scene, "--out", str(folder))
     (tmp_path / "out").mkdir()
     calls = [["export", document["runs"][0]["path"], "--to", str(tmp_path / "out" / f"a.{end}")] for end in endings]

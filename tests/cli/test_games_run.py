@@ -1,4 +1,4 @@
-"""`sandbox run`, `check` and `replay` of games: scores, players, sessions that are played again."""
+"""`sandbox run`, `check` and `replay` of games: scores, players, replayed sessions."""
 
 import json
 import sqlite3
@@ -14,7 +14,7 @@ from sandbox.games import registry
 from sandbox.measure.run.sessions import play_out
 from sandbox.scene.files.load import load, loads
 from sandbox.trajectory import Trajectory
-from tests.cli.calling import json_of, lines_of, process, written
+from tests.cli.calling import json_of, lines_of, process, write_scene
 from tests.toy_game import TOY, Toy
 
 pytestmark = pytest.mark.full  # child processes and command lines that run long
@@ -27,10 +27,10 @@ def toy_rules(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def scene(tmp_path: Path) -> str:
-    return written(tmp_path, TOY, "toy.toml")
+    return write_scene(tmp_path, TOY, "toy.toml")
 
 
-def test_row_tells_the_score(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+def test_row_of_a_game_has_score_and_player(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
     status, document, err = json_of(capfd, "run", scene)
     (row,) = document["runs"]
     game = play_out(load(scene))
@@ -43,19 +43,23 @@ def test_row_tells_the_score(scene: str, capfd: pytest.CaptureFixture[str]) -> N
     )
 
 
-def test_table_tells_the_score_only_of_games(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_table_has_a_score_column_only_with_games(
+    scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     _, lines, _ = lines_of(capfd, "run", scene, "--player", "none")
     assert lines[1].split()[-2:] == ["score", "game"]
     assert lines[2].endswith("in progress")
-    plain = written(tmp_path, TOY.replace('game = "landing"', ""), "plain.toml")
+    plain = write_scene(tmp_path, TOY.replace('game = "landing"', ""), "plain.toml")
     _, lines, _ = lines_of(capfd, "run", scene, plain, "--player", "none")
-    assert [line.split()[-2:] for line in lines if "plain" in line] == [["–", "–"]]  # no game, no score
+    assert [line.split()[-2:] for line in lines if "plain" in line] == [
+        ["–", "–"]
+    ]  # a scene without a game has no score
     _, lines, _ = lines_of(capfd, "run", plain)
     assert "score" not in lines[1]
     assert "score" not in json_of(capfd, "run", plain)[1]["runs"][0]
 
 
-def test_seeds_tell_how_scores_are_spread(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+def test_seeds_give_a_distribution_of_scores(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
     _, document, err = json_of(capfd, "run", scene, "--seeds", "8")
     scores = [row["score"] for row in document["runs"]]
     (spread,) = document["scores"]
@@ -64,14 +68,14 @@ def test_seeds_tell_how_scores_are_spread(scene: str, capfd: pytest.CaptureFixtu
     assert (spread["quantiles"]["0"], spread["quantiles"]["1"]) == (min(scores), max(scores))
     assert sum(spread["histogram"]["counts"]) == 8
     _, lines, _ = lines_of(capfd, "run", scene, "--seeds", "8")
-    at = next(k for k, line in enumerate(lines) if line.startswith("scores of"))
-    assert lines[at].endswith("pymunk: 8 games, player random")
-    assert f"mean {spread['mean']:.4g}" in lines[at + 1]
-    assert len(lines) == at + 3 + len(spread["histogram"]["counts"])
+    index = next(k for k, line in enumerate(lines) if line.startswith("scores of"))
+    assert lines[index].endswith("pymunk: 8 games, player random")
+    assert f"mean {spread['mean']:.4g}" in lines[index + 1]
+    assert len(lines) == index + 3 + len(spread["histogram"]["counts"])
     assert max(line.count("█") for line in lines) == 40
 
 
-def test_sweeps_are_spread_apart(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+def test_each_swept_value_has_its_own_score_distribution(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
     arguments = ("run", scene, "--seeds", "3", "--sweep", "world.gravity=[0.0,-9.81],[0.0,-4.0]")
     _, document, _ = json_of(capfd, *arguments)
     assert [(each["set"]["world.gravity"], each["count"]) for each in document["scores"]] == [
@@ -80,7 +84,7 @@ def test_sweeps_are_spread_apart(scene: str, capfd: pytest.CaptureFixture[str]) 
     ]
 
 
-def test_store_keeps_the_score_and_knows_the_player(
+def test_store_has_the_score_and_separates_players(
     scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     out = str(tmp_path / "runs")
@@ -93,9 +97,7 @@ def test_store_keeps_the_score_and_knows_the_player(
         assert [row.score for row in store.rows()] == [first["score"], other["score"]]
 
 
-def test_store_of_the_first_version_is_brought_up_to_date(
-    scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_store_of_version_1_is_migrated(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "runs"
     json_of(capfd, "run", scene, "--out", str(out))
     with closing(sqlite3.connect(out / "runs.sqlite", isolation_level=None)) as old:
@@ -107,37 +109,41 @@ def test_store_of_the_first_version_is_brought_up_to_date(
         assert new.execute("PRAGMA user_version").fetchone()[0] == VERSION == 2
 
 
-def test_script_plays(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    script = written(tmp_path, "0.1, kick, 1\n0.2, kick, 0\n", "script.txt")
+def test_script_is_accepted_as_a_player(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    script = write_scene(tmp_path, "0.1, kick, 1\n0.2, kick, 0\n", "script.txt")
     row = json_of(capfd, "run", scene, "--player", script)[1]["runs"][0]
     assert row["player"] == script
     assert row["score"] % 1.0 == 0.5
-    bad = written(tmp_path, "0.1, jump, 1\n", "bad.txt")
+    bad = write_scene(tmp_path, "0.1, jump, 1\n", "bad.txt")
     status, _, err = json_of(capfd, "run", scene, "--player", bad)
     assert (status, len(err)) == (2, 1)
     assert err[0].startswith(f"{bad}:1: ") and "'jump'" in err[0]
 
 
-def test_player_where_nobody_plays_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    plain = written(tmp_path, TOY.replace('game = "landing"', ""), "plain.toml")
+def test_player_without_a_game_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    plain = write_scene(tmp_path, TOY.replace('game = "landing"', ""), "plain.toml")
     status, _, err = lines_of(capfd, "run", plain, "--player", "none")
     assert (status, err) == (2, ["--player: has no use: none of the scenes has a game with rules"])
 
 
 @pytest.mark.parametrize(("name", "missing"), [("curling", "play.curling.people=0"), ("duel", "would never play")])
-def test_game_that_would_stand_still_is_refused(name: str, missing: str, capfd: pytest.CaptureFixture[str]) -> None:
+def test_player_that_would_leave_the_game_idle_is_refused(
+    name: str, missing: str, capfd: pytest.CaptureFixture[str]
+) -> None:
     status, out, err = lines_of(capfd, "run", name, "--player", "none")
     assert (status, out) == (2, [])
     assert err[0].startswith("--player: player 'none' ")
     assert missing in err[0]
 
 
-def test_game_of_bots_alone_needs_no_player(capfd: pytest.CaptureFixture[str]) -> None:
+def test_game_of_bots_only_needs_no_player(capfd: pytest.CaptureFixture[str]) -> None:
     alone = ("--set", "play.curling.people=0", "--set", "world.duration=1")
     assert lines_of(capfd, "run", "curling", "--player", "none", *alone)[0] == 0
 
 
-def test_session_is_played_again_with_its_score(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_session_is_replayed_with_its_score_and_forgeries_are_detected(
+    scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     game = play_out(load(scene))
     file = game.recording.save(tmp_path / "session.json")
     status, document, err = json_of(capfd, "run", str(file))
@@ -159,9 +165,7 @@ def test_session_is_played_again_with_its_score(scene: str, tmp_path: Path, capf
     assert f"ended in a different game, from {kick['time']:g} s on," in err[0]
 
 
-def test_stored_game_is_played_again_in_the_window(
-    scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_stored_game_is_replayed_for_the_window(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "runs"
     row = json_of(capfd, "run", scene, "--out", str(out))[1]["runs"][0]
     stored = read_run(Path(row["path"]), row["path"])
@@ -175,7 +179,9 @@ def test_stored_game_is_played_again_in_the_window(
     live.close()
 
 
-def test_recording_that_is_damaged_is_one_line(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_damaged_recording_is_reported_in_one_line(
+    scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     file = play_out(loads(TOY)).recording.save(tmp_path / "session.json")
     document = json.loads(file.read_text())
     for presses in ([[0.0, "kick"]], [["x", "kick", 1]], 7, [[-1.0, "kick", 1.0]]):
@@ -186,23 +192,23 @@ def test_recording_that_is_damaged_is_one_line(scene: str, tmp_path: Path, capfd
         assert "presses" in err[0]
 
 
-def test_check_tells_the_game() -> None:
-    told = process("check", "landing").stdout
-    assert "game landing: engine (up), turn left (left), turn right (right)\n" in told
+def test_check_prints_the_game_and_its_controls() -> None:
+    output = process("check", "landing").stdout
+    assert "game landing: engine (up), turn left (left), turn right (right)\n" in output
 
 
 @pytest.mark.slow
-def test_scene_that_its_game_does_not_fit_is_told_with_its_line(tmp_path: Path) -> None:
-    lacking = written(tmp_path, TOY, "lacking.toml")
-    wanted = f"{lacking}:4: play.game: landing needs a body 'ship', a fixed element 'pad', and a thrust"
+def test_scene_without_the_elements_of_its_game_is_a_fault_with_its_line(tmp_path: Path) -> None:
+    scene = write_scene(tmp_path, TOY, "lacking.toml")
+    message = f"{scene}:4: play.game: landing needs a body 'ship', a fixed element 'pad', and a thrust"
     for command in ("run", "check", "play"):
-        done = process(command, lacking)
+        done = process(command, scene)
         assert done.returncode == 2
-        assert done.stderr.startswith(wanted)
+        assert done.stderr.startswith(message)
         assert done.stderr.count("\n") == 1
 
 
-def test_billiards_have_rules_only_with_a_player(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_billiards_are_scored_only_with_a_player(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     run = ("run", "9-ball", "--engine", "exact", "--no-audit")
     assert "score" not in json_of(capfd, *run)[1]["runs"][0]
     by_bot = ("--player", "skilled", "--set", "world.duration=25", "--out", str(tmp_path))

@@ -1,4 +1,4 @@
-"""Ctrl-C in commands that take long: what is finished is printed, and the status is 130."""
+"""Ctrl-C in long commands: finished results are printed, and the exit status is 130."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,26 +9,26 @@ import sandbox.cli.check as checking
 import sandbox.games.artillery.landing_error as missing
 import sandbox.games.billiards.shots.study as studying
 import sandbox.measure.compare.comparison as comparing
-from tests.cli.calling import json_of, lines_of, written
+from tests.cli.calling import json_of, lines_of, write_scene
 
 pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 
 def interrupt_at(monkeypatch: pytest.MonkeyPatch, module: Any, name: str, call: int) -> None:
-    """Let a function of a module be interrupted at its n-th call."""
-    known: Callable[..., Any] = getattr(module, name)
+    """Make a function of a module raise KeyboardInterrupt at its n-th call."""
+    original: Callable[..., Any] = getattr(module, name)
     calls = []
 
-    def interrupted(*given: Any, **named: Any) -> Any:
+    def interrupted(*args: Any, **kwargs: Any) -> Any:
         calls.append(name)
         if len(calls) == call:
             raise KeyboardInterrupt
-        return known(*given, **named)
+        return original(*args, **kwargs)
 
     monkeypatch.setattr(module, name, interrupted)
 
 
-def test_compare_keeps_the_engines_that_are_finished(
+def test_interrupted_compare_keeps_finished_engines(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     interrupt_at(monkeypatch, comparing, "timed_run", 2)
@@ -37,7 +37,7 @@ def test_compare_keeps_the_engines_that_are_finished(
     assert err == ["interrupted: 1 run complete; the results are kept"]
 
 
-def test_compare_that_has_nothing_yet_is_interrupted(
+def test_compare_interrupted_in_its_first_run_prints_nothing(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     interrupt_at(monkeypatch, comparing, "timed_run", 1)
@@ -45,7 +45,7 @@ def test_compare_that_has_nothing_yet_is_interrupted(
     assert (status, out, err[-1]) == (130, [], "interrupted")
 
 
-def test_miss_keeps_the_flights_that_are_finished(
+def test_interrupted_miss_keeps_finished_flights(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     interrupt_at(monkeypatch, missing, "simulated_landing", 3)
@@ -58,17 +58,17 @@ def test_miss_keeps_the_flights_that_are_finished(
     assert "pymunk" in out[-1]
 
 
-def test_check_keeps_the_scenes_that_are_finished(
+def test_interrupted_check_keeps_finished_scenes(
     tmp_path: Any, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    scenes = [written(tmp_path, name=f"{k}.toml") for k in range(3)]
-    interrupt_at(monkeypatch, checking, "_checked", 2)
+    scenes = [write_scene(tmp_path, name=f"{k}.toml") for k in range(3)]
+    interrupt_at(monkeypatch, checking, "_check", 2)
     status, document, err = json_of(capfd, "check", *scenes, "--no-trial")
     assert (status, [each["scene"] for each in document["scenes"]]) == (130, scenes[:1])
     assert err == ["interrupted: 1 of 3 scenes were checked"]
 
 
-def test_shots_keeps_the_odds(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+def test_interrupted_shots_keep_the_odds(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     interrupt_at(monkeypatch, studying, "sensitivity", 1)
     status, document, err = json_of(capfd, "shots", "9-ball", "--count", "3", "--sensitivity")
     assert (status, document["odds"]["count"], document["sensitivity"]) == (130, 3, None)

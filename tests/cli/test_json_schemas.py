@@ -1,4 +1,4 @@
-"""JSON Schemas of the commands' documents: published as they are generated, and satisfied by what commands print."""
+"""JSON Schemas of the commands' documents: the published ones are current, and outputs of commands satisfy them."""
 
 import json
 import math
@@ -13,7 +13,7 @@ import pytest
 from sandbox.cli.json_schemas import DOCUMENTS, document_schema
 from sandbox.cli.main import call
 from sandbox.jsonable import in_json, json_schema, to_json
-from tests.cli.calling import written
+from tests.cli.calling import write_scene
 from tests.cli.json_validation import violations
 from tools.json_schemas import FOLDER, schema_text
 
@@ -84,7 +84,7 @@ def test_value_that_json_cannot_hold_is_refused() -> None:
         to_json([1j])
 
 
-def test_document_satisfies_the_schema_of_its_dataclass_and_damage_does_not() -> None:
+def test_schema_of_a_dataclass_accepts_its_document_and_no_damaged_one() -> None:
     schema, document = json_schema(Sample), to_json(SAMPLE)
     assert list(violations(document, schema, schema)) == []
     for damage in (
@@ -106,7 +106,7 @@ def test_published_schema_is_the_generated_one(command: str) -> None:
     assert stored == schema_text(command), "python -m tools.json_schemas writes it"
 
 
-def check_document(command: str, document: Mapping[str, Any]) -> None:
+def assert_valid_document(command: str, document: Mapping[str, Any]) -> None:
     """Check that a document satisfies the schema of its command."""
     schema = document_schema(command)
     assert list(violations(document, schema, schema)) == []
@@ -116,13 +116,13 @@ def check_document(command: str, document: Mapping[str, Any]) -> None:
 def test_comparison_satisfies_its_schema(
     options: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    call(["compare", written(tmp_path), "--engines", "pymunk,exact", *options, "--json"])
-    check_document("compare", json.loads(capsys.readouterr().out))
+    call(["compare", write_scene(tmp_path), "--engines", "pymunk,exact", *options, "--json"])
+    assert_valid_document("compare", json.loads(capsys.readouterr().out))
 
 
 def test_tradeoff_satisfies_its_schema(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    call(["tradeoff", written(tmp_path), "--engine", "pymunk", "--points", "4", "--budget", "5", "--json"])
-    check_document("tradeoff", json.loads(capsys.readouterr().out))
+    call(["tradeoff", write_scene(tmp_path), "--engine", "pymunk", "--points", "4", "--budget", "5", "--json"])
+    assert_valid_document("tradeoff", json.loads(capsys.readouterr().out))
 
 
 @pytest.mark.slow
@@ -130,10 +130,10 @@ def test_shots_satisfy_their_schema(capsys: pytest.CaptureFixture[str]) -> None:
     call(
         ["shots", "9-ball", "--count", "20", "--sensitivity", "--horizon", "--window", "7:upper left pocket", "--json"]
     )
-    check_document("shots", json.loads(capsys.readouterr().out))
+    assert_valid_document("shots", json.loads(capsys.readouterr().out))
 
 
 @pytest.mark.slow
 def test_extremes_satisfy_their_schema(capsys: pytest.CaptureFixture[str]) -> None:
     call(["extremes", "--quick", "--axes", "speed", "--engines", "pymunk", "--json"])
-    check_document("extremes", json.loads(capsys.readouterr().out))
+    assert_valid_document("extremes", json.loads(capsys.readouterr().out))

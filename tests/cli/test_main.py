@@ -1,4 +1,4 @@
-"""The command line as a whole: help, wrong use, what it loads, and how it ends."""
+"""The command line in general: help, usage errors, imported modules, closed pipes."""
 
 import json
 import os
@@ -11,16 +11,16 @@ import pytest
 from sandbox.cli.main import COMMANDS
 from sandbox.engines.registry import ENGINES
 from sandbox.scene.files.shipped_scenes import shipped
-from tests.cli.calling import json_of, lines_of, process, written
+from tests.cli.calling import json_of, lines_of, process, write_scene
 
 
-def test_commands_are_those_promised() -> None:
-    promised = "run play compare tradeoff shots extremes report check scenes engines schema export replay miss match"
-    assert list(COMMANDS) == promised.split()
+def test_commands_are_the_documented_ones() -> None:
+    expected = "run play compare tradeoff shots extremes report check scenes engines schema export replay miss match"
+    assert list(COMMANDS) == expected.split()
 
 
 @pytest.mark.parametrize("command", [None, *COMMANDS])
-def test_help_of_every_command(command: str | None, capfd: pytest.CaptureFixture[str]) -> None:
+def test_help_of_every_command_fits_into_80_columns(command: str | None, capfd: pytest.CaptureFixture[str]) -> None:
     words = [] if command is None else [command]
     status, out, err = lines_of(capfd, *words, "--help")
     assert (status, err) == (0, [])
@@ -46,7 +46,7 @@ def test_help_and_version_work_as_a_process() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "place", "word"),
+    ("arguments", "prefix", "word"),
     [
         (("nonsense",), "sandbox", "'nonsense'"),
         (("--nonsense",), "sandbox", "--nonsense"),
@@ -60,22 +60,22 @@ def test_help_and_version_work_as_a_process() -> None:
         (("run", "bounce", "--seeds", "0"), "sandbox run", "--seeds"),
     ],
 )
-def test_wrong_use_is_one_line(
-    arguments: tuple[str, ...], place: str, word: str, capfd: pytest.CaptureFixture[str]
+def test_usage_error_is_one_line(
+    arguments: tuple[str, ...], prefix: str, word: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
     status, out, err = lines_of(capfd, *arguments)
     assert (status, out, len(err)) == (2, [], 1)
-    assert err[0].startswith(f"{place}: ")
-    assert word in err[0]  # the rest is click's to word
+    assert err[0].startswith(f"{prefix}: ")
+    assert word in err[0]  # the rest of the wording is click's
 
 
-def test_no_command_greets_with_suggestions_and_is_wrong_use(capfd: pytest.CaptureFixture[str]) -> None:
+def test_call_without_a_command_prints_suggestions_and_is_status_2(capfd: pytest.CaptureFixture[str]) -> None:
     status, out, err = lines_of(capfd)
     assert (status, out) == (2, [])
     assert [line for line in err if line.startswith("  sandbox ")]  # suggestions
 
 
-def test_scenes_are_listed_a_line_each(capfd: pytest.CaptureFixture[str]) -> None:
+def test_scenes_are_listed_one_per_line(capfd: pytest.CaptureFixture[str]) -> None:
     status, out, err = lines_of(capfd, "scenes")
     names = [scene.name for scene in shipped()]
     assert (status, [line.split()[0] for line in out], err) == (0, names, [])
@@ -84,7 +84,7 @@ def test_scenes_are_listed_a_line_each(capfd: pytest.CaptureFixture[str]) -> Non
     assert all(scene["title"] and scene["about"] for scene in document["scenes"])
 
 
-def test_engines_are_listed_a_line_each(capfd: pytest.CaptureFixture[str]) -> None:
+def test_engines_are_listed_one_per_line(capfd: pytest.CaptureFixture[str]) -> None:
     status, out, err = lines_of(capfd, "engines")
     assert (status, [line.split()[0] for line in out], err) == (0, list(ENGINES), [])
     status, document, _ = json_of(capfd, "engines")
@@ -93,14 +93,14 @@ def test_engines_are_listed_a_line_each(capfd: pytest.CaptureFixture[str]) -> No
 
 
 @pytest.mark.parametrize("flags", [(), ("--json",)])
-def test_schema_is_the_one_beside_the_scenes(flags: tuple[str, ...], capfd: pytest.CaptureFixture[str]) -> None:
+def test_printed_schema_is_the_committed_one(flags: tuple[str, ...], capfd: pytest.CaptureFixture[str]) -> None:
     status, out, err = lines_of(capfd, "schema", *flags)
     committed = shipped()[0].path.parents[1] / "scene.schema.json"
     assert (status, err) == (0, [])
     assert json.loads("\n".join(out)) == json.loads(committed.read_text(encoding="utf-8"))
 
 
-LOADED = """
+LIST_MODULES = """
 import sys
 from sandbox.cli.main import call
 status = call(sys.argv[2:])
@@ -121,9 +121,13 @@ print(status, *heavy, file=sys.stderr)
         (("run", "bounce", "--set", "world.duration=0.01", "--json"), "matplotlib,rich,pygame"),
     ],
 )
-def test_command_loads_nothing_that_it_does_not_need(arguments: tuple[str, ...], unneeded: str) -> None:
+def test_command_does_not_import_modules_it_does_not_need(arguments: tuple[str, ...], unneeded: str) -> None:
     done = subprocess.run(
-        [sys.executable, "-c", LOADED, unneeded, *arguments], capture_output=True, text=True, check=True, timeout=120
+        [sys.executable, "-c", LIST_MODULES, unneeded, *arguments],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=120,
     )
     assert done.stderr == "0\n"
 
@@ -131,10 +135,10 @@ def test_command_loads_nothing_that_it_does_not_need(arguments: tuple[str, ...],
 @pytest.mark.parametrize(
     "arguments", [("scenes",), ("schema",), ("check", "pile"), ("run", "drop.toml"), ("run", "drop.toml", "--json")]
 )
-def test_reader_that_has_gone_is_no_fault(arguments: tuple[str, ...], tmp_path: Path) -> None:
-    written(tmp_path)
+def test_closed_pipe_is_not_an_error(arguments: tuple[str, ...], tmp_path: Path) -> None:
+    write_scene(tmp_path)
     reader, writer = os.pipe()
-    os.close(reader)  # whatever is written meets a closed pipe, as behind `| head` that has seen enough
+    os.close(reader)  # every write meets a closed pipe, as after `| head` has ended
     try:
         done = subprocess.run(
             [sys.executable, "-m", "sandbox", *arguments],

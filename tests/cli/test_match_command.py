@@ -1,4 +1,4 @@
-"""`sandbox match`: frames, the score, sessions that replay, what is refused."""
+"""`sandbox match`: frames, score, replayed sessions, faults, interrupt."""
 
 import sys
 from collections.abc import Iterator
@@ -19,20 +19,20 @@ pytestmark = pytest.mark.full  # child processes and command lines that run long
 QUICK = ("match", "straight-rail", "--distance", "2", "--players", "bot:0.9,bot:0.8")
 
 
-def test_frames_are_told_and_counted(capfd: pytest.CaptureFixture[str]) -> None:
+def test_frames_are_printed_and_counted(capfd: pytest.CaptureFixture[str]) -> None:
     status, out, _ = lines_of(capfd, *QUICK, "--frames", "2")
     assert status == 0
     assert [line.partition(":")[0] for line in out] == ["frame 1", "frame 2", "2 frames"]
     assert "(bot:0.9)" in out[-1]
 
 
-def test_document_tells_every_turn_and_session_replays(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_document_has_every_turn_and_saved_sessions_replay(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     status, document, _ = json_of(capfd, *QUICK, "--frames", "2", "--seed", "5", "--out", str(tmp_path / "kept"))
     assert status == 0
     assert document["players"] == ["bot:0.9", "bot:0.8"]
     first, second = document["frames"]
     assert [first["seed"], second["seed"]] == [5, 6]
-    assert [first["seats"], second["seats"]] == [[0, 1], [1, 0]]  # the first shot goes round
+    assert [first["seats"], second["seats"]] == [[0, 1], [1, 0]]  # players take turns at breaking
     assert sum(document["wins"]) == sum(frame["winner"] is not None for frame in document["frames"])
     assert len(first["turns"]) >= first["shots"] == sum(turn.get("plan") is not None for turn in first["turns"])
     status, run, _ = json_of(capfd, "run", str(tmp_path / "kept" / "frame-2.json"), "--no-audit")
@@ -40,11 +40,11 @@ def test_document_tells_every_turn_and_session_replays(capfd: pytest.CaptureFixt
 
 
 def test_same_seed_plays_the_same_frame(capfd: pytest.CaptureFixture[str]) -> None:
-    one, two = (json_of(capfd, *QUICK, "--seed", "3")[1] for _ in range(2))
-    assert one == two
+    first, second = (json_of(capfd, *QUICK, "--seed", "3")[1] for _ in range(2))
+    assert first == second
 
 
-def test_all_that_is_wrong_is_told_at_once(capfd: pytest.CaptureFixture[str]) -> None:
+def test_all_faults_are_reported_together(capfd: pytest.CaptureFixture[str]) -> None:
     status, out, err = lines_of(capfd, "match", "9-ball", "--players", "cat", "--game", "snooker", "--engine", "none")
     assert (status, out) == (2, [])
     assert [line.partition(":")[0] for line in err] == ["--engine", "--players", "9-ball"]
@@ -52,31 +52,35 @@ def test_all_that_is_wrong_is_told_at_once(capfd: pytest.CaptureFixture[str]) ->
     assert (status, "unknown game 'chess'" in err[0]) == (2, True)
 
 
-def test_misses_are_of_snooker(capfd: pytest.CaptureFixture[str]) -> None:
+def test_misses_outside_snooker_are_refused(capfd: pytest.CaptureFixture[str]) -> None:
     status, _, err = lines_of(capfd, "match", "9-ball", "--misses")
     assert (status, err) == (2, ["9-ball: 9-ball takes no misses"])
 
 
-def test_snooker_is_played_with_the_miss(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+def test_misses_option_switches_on_the_miss_rule_of_snooker(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     states = []
 
-    def ended(match: Match, *_: object, **__: object) -> FrameRecord:
+    def record_state(match: Match, *_: object, **__: object) -> FrameRecord:
         states.append(match.state)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sandbox.cli.games.play_frame", ended)
-    for more in ((), ("--misses",)):
-        assert lines_of(capfd, "match", "snooker", *more)[0] == 130
+    monkeypatch.setattr("sandbox.cli.games.play_frame", record_state)
+    for options in ((), ("--misses",)):
+        assert lines_of(capfd, "match", "snooker", *options)[0] == 130
     assert [state.misses for state in states] == [False, True]
 
 
-def test_scene_without_a_floor_is_no_table(capfd: pytest.CaptureFixture[str]) -> None:
+def test_scene_without_a_surface_is_refused(capfd: pytest.CaptureFixture[str]) -> None:
     status, _, err = lines_of(capfd, "match", "bounce")
     assert status == 2
     assert "is not a billiard table" in err[0]
 
 
-def test_frame_without_an_end_is_given_up_and_counted(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_frame_beyond_the_turn_or_time_limit_is_abandoned_and_counted(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     endless = ("match", "three-cushion", "--players", "bot:0,bot:0", "--frames", "3")
     status, document, err = json_of(capfd, *endless, "--turns", "2", "--out", str(tmp_path))
     assert (status, document["unfinished"], document["wins"]) == (1, 3, [0, 0])
@@ -90,7 +94,7 @@ def test_frame_without_an_end_is_given_up_and_counted(tmp_path: Path, capfd: pyt
 
 
 @pytest.mark.parametrize("error", [NoRestError("no rest"), Divergence(1.0, "cue", "flies off"), Exhaustion("too many")])
-def test_shot_without_an_end_gives_the_frame_up(
+def test_failed_shot_abandons_the_frame(
     error: Exception, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     def failing(*_: object) -> None:
@@ -103,9 +107,7 @@ def test_shot_without_an_end_gives_the_frame_up(
     assert str(error) in line
 
 
-def test_reader_that_leaves_is_no_fault_of_out(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_broken_pipe_is_not_an_error(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
     def write(*_: object) -> None:
         raise BrokenPipeError
 
@@ -116,38 +118,38 @@ def test_reader_that_leaves_is_no_fault_of_out(
 
 
 @pytest.mark.parametrize("as_json", [False, True])
-def test_interrupt_keeps_the_frames_that_are_finished(
+def test_interrupted_match_keeps_finished_frames(
     as_json: bool, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     frames = []
 
-    def interrupted(*given: Any, **named: Any) -> FrameRecord:
+    def interrupted(*args: Any, **kwargs: Any) -> FrameRecord:
         if frames:
             raise KeyboardInterrupt
-        frames.append(play_frame(*given, **named))
+        frames.append(play_frame(*args, **kwargs))
         return frames[0]
 
     monkeypatch.setattr("sandbox.cli.games.play_frame", interrupted)
-    called = json_of if as_json else lines_of
-    status, told, err = called(capfd, *QUICK, "--frames", "3")
+    call_command = json_of if as_json else lines_of
+    status, output, err = call_command(capfd, *QUICK, "--frames", "3")
     assert (status, err) == (130, ["interrupted: 1 of 3 frames are complete"])
     if as_json:
-        assert (len(told["frames"]), told["interrupted"]) == (1, True)
+        assert (len(output["frames"]), output["interrupted"]) == (1, True)
     else:
-        assert [line.partition(":")[0] for line in told] == ["frame 1", "1 frames"]
+        assert [line.partition(":")[0] for line in output] == ["frame 1", "1 frames"]
 
 
-def test_progress_is_said_on_a_terminal(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
-    said: list[str] = []
+def test_progress_is_printed_unless_quiet(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+    messages: list[str] = []
 
     @contextmanager
-    def telling(silent: bool) -> Iterator[Any]:
-        yield None if silent else lambda progress: said.append(progress.message)
+    def recording_status_line(silent: bool) -> Iterator[Any]:
+        yield None if silent else lambda progress: messages.append(progress.message)
 
-    monkeypatch.setattr("sandbox.cli.games.status_line", telling)
+    monkeypatch.setattr("sandbox.cli.games.status_line", recording_status_line)
     lines_of(capfd, *QUICK, "--frames", "2")
-    assert said[0].startswith("frame 1 of 2: 1 turn, ")
-    assert said[-1].startswith("frame 2 of 2: ")
-    said.clear()
+    assert messages[0].startswith("frame 1 of 2: 1 turn, ")
+    assert messages[-1].startswith("frame 2 of 2: ")
+    messages.clear()
     lines_of(capfd, *QUICK, "--quiet")
-    assert said == []
+    assert messages == []

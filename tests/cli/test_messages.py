@@ -1,4 +1,4 @@
-"""Messages for common mistakes: one line each, with the place and what would be right, and never a traceback."""
+"""Messages for common mistakes: one line each, with location and correction, and never a traceback."""
 
 import json
 import shlex
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.calling import DROP, json_of, lines_of, written
+from tests.cli.calling import DROP, json_of, lines_of, write_scene
 
 SLINGSHOT = "[pinball]\n[[pinball.slingshot]]\npoints = [[0.0, 0.0], [0.1, 0.0]]\n"
 BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
@@ -63,7 +63,7 @@ BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
         ("run .", 2, "is a folder; it contains no scene (*.toml)"),
     ],
 )
-def test_mistake_is_answered_in_one_line_with_what_would_be_right(
+def test_mistake_is_reported_in_one_line_with_a_correction(
     arguments: str,
     status: int,
     words: str,
@@ -72,13 +72,13 @@ def test_mistake_is_answered_in_one_line_with_what_would_be_right(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    found, _, err = lines_of(capfd, *shlex.split(arguments))
-    assert (found, len(err)) == (status, 1)
+    actual, _, err = lines_of(capfd, *shlex.split(arguments))
+    assert (actual, len(err)) == (status, 1)
     assert words in err[0]
 
 
 @pytest.mark.parametrize(
-    ("text", "place", "words"),
+    ("text", "location", "words"),
     [
         (
             "[[pinball.wall]]\npoints = [[0, 0], [1, 1, 1, 1]]\n",
@@ -91,18 +91,20 @@ def test_mistake_is_answered_in_one_line_with_what_would_be_right(
         ("[world]\nsubsteps = 2\n" + BALL, ":2: world.substeps", "did you mean solver.substeps?"),
     ],
 )
-def test_fault_names_line_path_and_what_would_be_right(
-    text: str, place: str, words: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+def test_fault_has_line_path_and_a_correction(
+    text: str, location: str, words: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    scene = written(tmp_path, text)
+    scene = write_scene(tmp_path, text)
     status, out, (line,) = lines_of(capfd, "check", scene)
     assert (status, out) == (2, [])
-    assert line.startswith(f"{scene}{place}: ")
+    assert line.startswith(f"{scene}{location}: ")
     assert words in line
 
 
 @pytest.mark.parametrize("kind", ["run", "compare"])
-def test_own_results_are_told_from_sessions(kind: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_json_output_of_a_command_is_not_accepted_as_a_session(
+    kind: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     file = tmp_path / "study.json"
     file.write_text(json.dumps({"runs": []} if kind == "run" else {"scene": "x", "engines": []}))
     status, _, (line,) = lines_of(capfd, "run", str(file))
@@ -112,13 +114,13 @@ def test_own_results_are_told_from_sessions(kind: str, tmp_path: Path, capfd: py
     )
 
 
-def test_folder_is_run_scene_by_scene(
+def test_folder_is_run_and_checked_scene_by_scene(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    written(tmp_path, DROP, "b.toml")
-    written(tmp_path, DROP, "a.toml")
-    (tmp_path / "pyproject.toml").write_text("[project]\nname = 'x'\n")  # of other tables: no scene
+    write_scene(tmp_path, DROP, "b.toml")
+    write_scene(tmp_path, DROP, "a.toml")
+    (tmp_path / "pyproject.toml").write_text("[project]\nname = 'x'\n")  # has other tables: not a scene
     (tmp_path / "notes.txt").write_text("no scene")
     for folder in (".", f"{tmp_path}"):
         status, out, err = lines_of(capfd, "run", folder)
@@ -129,36 +131,36 @@ def test_folder_is_run_scene_by_scene(
     assert sum(line.endswith(": Drop") for line in out) == 2
 
 
-def test_fault_in_a_folder_is_of_its_file(
+def test_fault_in_a_folder_names_its_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    written(tmp_path, "x = [", "broken.toml")
+    write_scene(tmp_path, "x = [", "broken.toml")
     status, _, (line,) = lines_of(capfd, "run", ".")
     assert status == 2
     assert line.startswith("broken.toml:1: not TOML")
 
 
-def test_what_was_set_is_in_the_json_of_a_run(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_json_of_a_run_has_its_overrides(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     arguments = ("--set", "ball.a.radius=0.4", "--set", "solver.dt=0.02", "--sweep", "ball.a.mass=1,2")
-    _, document, _ = json_of(capfd, "run", written(tmp_path), *arguments)
+    _, document, _ = json_of(capfd, "run", write_scene(tmp_path), *arguments)
     assert [row["set"] for row in document["runs"]] == [
         {"ball.a.radius": 0.4, "solver.dt": 0.02, "ball.a.mass": mass} for mass in (1, 2)
     ]
 
 
-def test_detections_that_end_alike_differ_in_their_first_contact(capfd: pytest.CaptureFixture[str]) -> None:
-    """The ball meets the plane at 0.045 s, within the first step of 0.1 s."""
+def test_detections_differ_in_their_first_contact(capfd: pytest.CaptureFixture[str]) -> None:
+    """The ball reaches the plane at 0.045 s, within the first step of 0.1 s."""
     arguments = ("fast_ball", "--engine", "reference", "--sweep", "solver.detection=discrete,bisect,swept")
     _, document, _ = json_of(capfd, "run", *arguments)
     times = [row["first_contact"] for row in document["runs"]]
-    assert times == pytest.approx([0.1, 0.045, 0.045], abs=1e-9)  # bisection comes to 1e-9 of the step
+    assert times == pytest.approx([0.1, 0.045, 0.045], abs=1e-9)  # bisection stops at 1e-9 of the step
     _, out, _ = lines_of(capfd, "run", *arguments)
     assert "first contact, s" in out[1]
     assert len({line.split("→")[1] for line in out[2:]}) == 2
 
 
-def test_folder_of_many_runs_names_three_and_where_all_are_listed(
+def test_message_for_a_folder_of_many_runs_names_three_and_the_table(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     for k in range(500):

@@ -1,4 +1,4 @@
-"""`sandbox compare --minimise`: the file, what is said of it, and what is refused before anything is run."""
+"""`sandbox compare --minimise`: the written scene, output, faults before any run, interrupt."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from sandbox.cli.main import call
 from sandbox.measure.compare.reduce import ReducedScene, minimise
 from sandbox.progress import Progress
 from sandbox.scene.files.load import load
-from tests.cli.calling import document_of, json_of, lines_of, written
+from tests.cli.calling import document_of, json_of, lines_of, write_scene
 
 pytestmark = pytest.mark.full  # child processes and command lines that run long
 
@@ -41,35 +41,41 @@ CHOICE = ("--engines", "pymunk,exact", "--minimise")
 
 
 @pytest.fixture(autouse=True)
-def in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def in_temporary_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-def test_the_smallest_scene_is_written_here_and_told(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_minimised_scene_is_written_to_the_working_folder_and_reproduces(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     folder = tmp_path / "scenes"
     folder.mkdir()
-    scene = written(folder, TUNNEL, "tunnel.toml")
+    scene = write_scene(folder, TUNNEL, "tunnel.toml")
     status, out, err = lines_of(capfd, "compare", scene, *CHOICE)
     assert (status, err) == (0, [])
     assert out[-3].startswith("minimised: 4 bodies to 1, 2 fixed objects to 1, in ")
-    parts = 'pymunk and exact differ by more than 0.0001 m from t = 0.01 s on, "bullet" first'
-    assert out[-2:] == [parts, "written: tunnel.min.toml"]
+    difference = 'pymunk and exact differ by more than 0.0001 m from t = 0.01 s on, "bullet" first'
+    assert out[-2:] == [difference, "written: tunnel.min.toml"]
     text = Path("tunnel.min.toml").read_text(encoding="utf-8")
     assert text.splitlines()[:3] == [
-        f"# {parts}.",
+        f"# {difference}.",
         "# Minimised: 4 bodies to 1, 2 fixed objects to 1, from tunnel.toml.",
         "# Reproduce: sandbox compare tunnel.min.toml --engines pymunk,exact --tolerance 0.0001",
     ]
-    least = load("tunnel.min.toml")
-    assert (least.title, least.bodies.names, least.fixed_names) == ("Tunnel, minimised", ("bullet",), ("thin",))
+    minimised = load("tunnel.min.toml")
+    assert (minimised.title, minimised.bodies.names, minimised.fixed_names) == (
+        "Tunnel, minimised",
+        ("bullet",),
+        ("thin",),
+    )
     again = text.splitlines()[2].split("sandbox ")[1].split()
     status, document, _ = json_of(capfd, *again)
     assert status == 0
     assert [row["first_divergence"] for row in document["engines"]] == [0.01, None]
 
 
-def test_json_says_it_in_one_document(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path, TUNNEL, "tunnel.toml")
+def test_json_document_has_the_minimised_scene(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = write_scene(tmp_path, TUNNEL, "tunnel.toml")
     status, document, err = json_of(capfd, "compare", scene, *CHOICE, "small.toml")
     assert (status, err) == (0, [])
     assert document["minimised"] == {
@@ -87,8 +93,10 @@ def test_json_says_it_in_one_document(tmp_path: Path, capfd: pytest.CaptureFixtu
 
 
 @pytest.mark.parametrize("engines", ["pymunk,exact", "exact", "pymunk,reference,exact"])
-def test_where_nobody_disagrees_it_says_so(engines: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path, TUNNEL.replace("[100.0", "[1.0"), "slow.toml")
+def test_engines_that_agree_leave_nothing_to_minimise(
+    engines: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    scene = write_scene(tmp_path, TUNNEL.replace("[100.0", "[1.0"), "slow.toml")
     status, document, err = json_of(capfd, "compare", scene, "--engines", engines, "--minimise")
     assert status == 1
     assert err[-1] == f"{scene}: nothing to minimise: {document['minimised']['error']}"
@@ -96,17 +104,17 @@ def test_where_nobody_disagrees_it_says_so(engines: str, tmp_path: Path, capfd: 
     assert not Path("slow.min.toml").exists()
 
 
-def test_an_engine_that_refuses_disagrees_with_nobody(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_refusing_engine_leaves_nothing_to_minimise(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     box = "[world]\nduration = 0.02\n[[box]]\nposition = [0.0, 9.0]\nsize = [1.0, 1.0]\n"
     box += "[[plane]]\npoint = [0.0, 0.0]\nnormal = [0.0, 1.0]\n"
-    scene = written(tmp_path, box, "box.toml")
+    scene = write_scene(tmp_path, box, "box.toml")
     status, _, err = lines_of(capfd, "compare", scene, *CHOICE)
     assert status == 1
     assert err[-1] == f"{scene}: nothing to minimise: exact cannot run the scene"
 
 
-def test_what_cannot_be_written_is_refused_before_the_runs(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path, TUNNEL, "tunnel.toml")
+def test_unwritable_target_is_refused_before_any_run(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = write_scene(tmp_path, TUNNEL, "tunnel.toml")
     Path("old.toml").write_text("kept", encoding="utf-8")
     for file, reason in (
         ("old.toml", "exists already"),
@@ -123,22 +131,22 @@ def test_what_cannot_be_written_is_refused_before_the_runs(tmp_path: Path, capfd
     assert load("old.toml").bodies.names == ("bullet",)
 
 
-def test_interrupted_it_writes_what_it_has(
+def test_interrupted_minimise_writes_the_smallest_scene_so_far(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupted(*arguments: object, **options: object) -> ReducedScene:
         count = 0
 
-        def told(_: Progress) -> None:
+        def interrupt_at_sixth_call(_: Progress) -> None:
             nonlocal count
             count += 1
             if count == 6:
                 raise KeyboardInterrupt
 
-        return minimise(*arguments, **{**options, "on_progress": told})
+        return minimise(*arguments, **{**options, "on_progress": interrupt_at_sixth_call})
 
     monkeypatch.setattr(minimising, "minimise", interrupted)
-    scene = written(tmp_path, TUNNEL, "tunnel.toml")
+    scene = write_scene(tmp_path, TUNNEL, "tunnel.toml")
     status = call(["compare", scene, *CHOICE, "--json"])
     out, err = capfd.readouterr()
     assert status == 130

@@ -1,4 +1,4 @@
-"""`sandbox miss`: the table, the document, what is refused."""
+"""`sandbox miss`: table, document, faults."""
 
 import math
 from pathlib import Path
@@ -25,7 +25,7 @@ def air(tmp_path: Path) -> str:
     return str(file)
 
 
-def test_document_has_a_row_an_engine_integrator_and_step(capfd: pytest.CaptureFixture[str], air: str) -> None:
+def test_document_has_one_row_per_engine_integrator_and_step(capfd: pytest.CaptureFixture[str], air: str) -> None:
     status, document, _ = json_of(capfd, "miss", air, "--dt", "0.1", "--dt", "0.05", "--set", "world.linear_drag=0.2")
     assert status == 0
     assert {(row["engine"], row["integrator"]) for row in document["rows"]} == {
@@ -39,18 +39,18 @@ def test_document_has_a_row_an_engine_integrator_and_step(capfd: pytest.CaptureF
         assert row["late"] == pytest.approx(row["time"] - document["time"], abs=1e-12)
 
 
-def test_table_tells_the_truth_and_by_how_much_each_misses(capfd: pytest.CaptureFixture[str], air: str) -> None:
+def test_table_has_the_exact_range_and_the_error_of_each_engine(capfd: pytest.CaptureFixture[str], air: str) -> None:
     status, out, _ = lines_of(capfd, "miss", air, "--dt", "0.1", "--angle", "30", "--speed", "40")
     assert status == 0
     assert f"exact range {1600.0 * math.sin(math.radians(60.0)) / 9.81:.4f} m" in out[0]
     exact = next(line for line in out if line.startswith("exact"))
     assert "less than 1 nm" in exact
     euler = next(line for line in out if "explicit_euler" in line)
-    # v_x h is 3.464 m; of the cubic's way within the last step that Euler's velocities bend, a centimetre.
+    # v_x h is 3.464 m; 0.02 m: curvature of the path within the last step, about a centimetre
     assert float(euler.split()[2]) == pytest.approx(40.0 * math.cos(math.radians(30.0)) * 0.1, abs=0.02)
 
 
-def test_what_is_wrong_is_told(capfd: pytest.CaptureFixture[str], air: str) -> None:
+def test_invalid_shot_scene_or_option_is_refused(capfd: pytest.CaptureFixture[str], air: str) -> None:
     status, _, err = lines_of(capfd, "miss", air, "--set", "world.gravity=[0.0, 0.0]")
     assert status == 2
     assert "world.gravity: the shot does not come down" in err[0]

@@ -1,4 +1,4 @@
-"""Standard streams that are full, closed, or of a poor encoding: one line or silence, no traceback."""
+"""Standard streams that are full, closed, or lack characters: one line or silence, no traceback."""
 
 import json
 import os
@@ -11,14 +11,14 @@ import pytest
 from sandbox.batch.store import Store
 from sandbox.cli.main import COMMANDS
 from sandbox.engines.common.compile_clock import ANNOUNCEMENT
-from tests.cli.calling import DROP, document_of, written
+from tests.cli.calling import DROP, document_of, write_scene
 
 pytestmark = pytest.mark.full  # child processes and command lines that run long
 
-DRAWN = DROP.replace('title = "Drop"', 'title = "μ − 🎱 é"').replace("duration = 0.5", "duration = 0.05")
+UNICODE_DROP = DROP.replace('title = "Drop"', 'title = "μ − 🎱 é"').replace("duration = 0.5", "duration = 0.05")
 
 QUICK = ("--help", "engines --json", "run drop.toml")
-"""Invocations that write by every means: click, rich, JSON, and click's own options."""
+"""Commands that cover every way of writing: click, rich, JSON, and click's own options."""
 SLOW = (
     *(f"{command} --help" for command in COMMANDS),
     "--version",
@@ -42,7 +42,7 @@ SLOW = (
 
 
 def shell(command: str, redirection: str, folder: Path, **environment: str) -> tuple[int, str, list[str]]:
-    """Call with streams redirected as a shell writes it; return status, and what was still written where."""
+    """Run a command with a shell redirection; return exit status, captured stdout, and lines of stderr."""
     done = subprocess.run(
         ["sh", "-c", f'"$0" -m sandbox {command} {redirection}', sys.executable],
         cwd=folder,
@@ -56,7 +56,7 @@ def shell(command: str, redirection: str, folder: Path, **environment: str) -> t
 
 
 FULL, CLOSED = (">/dev/full", "No space left"), (">&-", "closed")
-"""A redirection, and a phrase of the error."""
+"""A redirection, and a phrase of the expected error."""
 
 
 def check_failure(command: str, redirection: str, phrase: str, folder: Path) -> None:
@@ -78,10 +78,8 @@ def check_success(command: str, redirection: str, folder: Path) -> None:
 
 
 @pytest.mark.parametrize("command", QUICK)
-def test_output_that_cannot_be_written_is_one_line_and_silence_where_errors_cannot_be(
-    command: str, tmp_path: Path
-) -> None:
-    written(tmp_path, DRAWN)
+def test_unwritable_output_is_reported_in_one_line_or_silently(command: str, tmp_path: Path) -> None:
+    write_scene(tmp_path, UNICODE_DROP)
     check_failure(command, *FULL, tmp_path)
     check_silence(command, ">&- 2>&-", tmp_path)
     check_success(command, "2>/dev/full", tmp_path)
@@ -89,8 +87,8 @@ def test_output_that_cannot_be_written_is_one_line_and_silence_where_errors_cann
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", (*QUICK, *SLOW))
-def test_output_of_no_command_is_a_traceback(command: str, tmp_path: Path) -> None:
-    written(tmp_path, DRAWN)
+def test_no_command_prints_a_traceback_for_unwritable_output(command: str, tmp_path: Path) -> None:
+    write_scene(tmp_path, UNICODE_DROP)
     check_failure(command, *FULL, tmp_path)
     check_failure(command, *CLOSED, tmp_path)
     check_failure(command, f"<&- {CLOSED[0]}", CLOSED[1], tmp_path)
@@ -101,31 +99,31 @@ def test_output_of_no_command_is_a_traceback(command: str, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("command", ["nonsense", "run drop.toml --engine nothing"])
-def test_wrong_input_keeps_its_status_where_errors_cannot_be_written(command: str, tmp_path: Path) -> None:
-    written(tmp_path, DRAWN)
+def test_wrong_input_is_status_2_with_unwritable_stderr(command: str, tmp_path: Path) -> None:
+    write_scene(tmp_path, UNICODE_DROP)
     for redirection in ("2>/dev/full", "2>&-", ">&- 2>&- <&-"):
         assert shell(command, redirection, tmp_path) == (2, "", [])
 
 
-def test_reader_that_leaves_is_no_failure(tmp_path: Path) -> None:
+def test_closed_pipe_is_not_a_failure(tmp_path: Path) -> None:
     status, out, err = shell("scenes", "| head -n 1", tmp_path)
     assert (status, out.count("\n"), err) == (0, 1, [])
 
 
-def test_text_for_closed_streams_goes_into_no_other_file(tmp_path: Path) -> None:
-    written(tmp_path, DRAWN)
+def test_text_for_closed_streams_is_not_written_into_other_files(tmp_path: Path) -> None:
+    write_scene(tmp_path, UNICODE_DROP)
     status, _, _ = shell("run drop.toml --out runs --workers 2 --seeds 2", "<&- >&- 2>&-", tmp_path)
     assert status == 1
     with Store(tmp_path / "runs") as store:
         assert [row.status for row in store.rows()] == ["ok"]
-    assert shell("run drop.toml --out runs --quiet", ">&-", tmp_path) == (0, "", [])  # nothing was to be written
+    assert shell("run drop.toml --out runs --quiet", ">&-", tmp_path) == (0, "", [])  # quiet: no output to write
 
 
 @pytest.mark.parametrize(
     ("command", "encoding"), [("run drop.toml", "latin-1"), ("check drop.toml", "ascii"), ("schema ball", "cp1252")]
 )
-def test_characters_that_an_encoding_lacks_are_no_error(command: str, encoding: str, tmp_path: Path) -> None:
-    written(tmp_path, DRAWN)
+def test_characters_missing_in_the_encoding_are_no_error(command: str, encoding: str, tmp_path: Path) -> None:
+    write_scene(tmp_path, UNICODE_DROP)
     status, out, err = shell(command, "", tmp_path, PYTHONIOENCODING=encoding)
     assert (status, err) == (0, [])
     assert out
@@ -133,7 +131,7 @@ def test_characters_that_an_encoding_lacks_are_no_error(command: str, encoding: 
 
 @pytest.mark.parametrize("environment", [{"PYTHONIOENCODING": "latin-1"}, {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0"}])
 def test_json_is_the_same_in_every_encoding(environment: dict[str, str], tmp_path: Path) -> None:
-    written(tmp_path, DRAWN)
+    write_scene(tmp_path, UNICODE_DROP)
     status, out, _ = shell("run drop.toml --json", "", tmp_path, PYTHONUTF8="0", **environment)
     assert status == 0
     assert document_of(out)["runs"][0]["title"] == "μ − 🎱 é"

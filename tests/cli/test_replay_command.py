@@ -1,4 +1,4 @@
-"""`sandbox replay`: what is put on for a stored run or a session, without a window."""
+"""`sandbox replay`: the view of a stored run or a session, without a window."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from sandbox.window.app_state import AppState
 from sandbox.window.playback import live as live_module
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.session import Session
-from tests.cli.calling import DROP, lines_of, written
+from tests.cli.calling import DROP, lines_of, write_scene
 
 pytestmark = pytest.mark.full  # child processes and command lines that run long
 
@@ -24,15 +24,15 @@ KICK = Impulse(time=0.1, body="a", impulse=(1.0, 0.0))
 
 
 @pytest.fixture(autouse=True)
-def patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No test depends on how fast the machine is."""
+def unlimited_step_budget(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Remove the time limits of stepping, so that no test depends on the speed of the machine."""
     for name in ("MIN_STEP_BUDGET", "MAX_STEP_BUDGET"):
         monkeypatch.setattr(live_module, name, 1e9)
 
 
-def live(show: object) -> LiveView:
-    assert isinstance(show, LiveView)
-    return show
+def live(view: object) -> LiveView:
+    assert isinstance(view, LiveView)
+    return view
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -40,11 +40,11 @@ def test_stored_run_is_computed_again_with_its_own_settings(engine: str) -> None
     source = run(SCENE, "pymunk", dt=0.004, substeps=1, iterations=7, slop=0.02)
     settings = live(_shown(source, engine)).settings
     assert (settings.dt, settings.iterations) == (0.004, 7)
-    if engine != "exact":  # which leaves no overlap
+    if engine != "exact":  # the exact engine leaves no overlap
         assert (settings.slop, settings.integrator) == (0.02, "explicit_euler")
 
 
-def test_stored_run_of_springs_is_computed_again_on_its_own_engine_and_another() -> None:
+def test_stored_penalty_run_is_computed_again_on_its_engine_and_another() -> None:
     source = run(SCENE, "reference", response="penalty", stiffness=1e5, dt=0.001)
     assert source.status == "ok"
     again = live(_shown(source, "reference"))
@@ -53,41 +53,43 @@ def test_stored_run_of_springs_is_computed_again_on_its_own_engine_and_another()
     assert (other.dt, other.stiffness, other.response) == (0.001, None, "impulse")
 
 
-def test_restart_of_a_replay_plays_what_was_recorded_again() -> None:
+def test_restart_replays_the_recorded_actions() -> None:
     session = Session(SCENE, actions=(KICK,))
     session.advance(30, None)
     source = session.recording()
-    stage, first = AppState(source.engine), live(_shown(source, None))
-    stage.show(first, None, first.scene, again=lambda: _shown(source, None))
-    stage.paused = True
+    state, first = AppState(source.engine), live(_shown(source, None))
+    state.show(first, None, first.scene, again=lambda: _shown(source, None))
+    state.paused = True
     for _ in range(2):
-        stage.restart()
-        again = live(stage.view)
-        assert (again.step_number, stage.paused) == (0, True)
+        state.restart()
+        again = live(state.view)
+        assert (again.step_number, state.paused) == (0, True)
         again.session.advance(30, None)
         assert again.session.recording() == source
-    stage.restart()
-    stage.paused = False
+    state.restart()
+    state.paused = False
     for _ in range(60):
-        stage.update(0.02)
-    assert stage.paused  # at the end of what was recorded
-    assert live(stage.view).session.time == pytest.approx(source.duration)
+        state.update(0.02)
+    assert state.paused  # at the end of the recording
+    assert live(state.view).session.time == pytest.approx(source.duration)
 
 
 def test_restart_keeps_the_stored_ghost() -> None:
     source = run(SCENE, "pymunk", actions=(KICK,))
-    stage, first = AppState(), live(_shown(source, "reference"))
-    stage.show(first, None, first.scene, again=lambda: _shown(source, "reference"))
-    stage.restart()
-    again = live(stage.view)
+    state, first = AppState(), live(_shown(source, "reference"))
+    state.show(first, None, first.scene, again=lambda: _shown(source, "reference"))
+    state.restart()
+    again = live(state.view)
     assert again is not first
     assert again.diagnostics.has_ghost
     again.session.advance(20, None)
     assert [action.kind for action in again.session.actions] == ["impulse"]
 
 
-def test_scene_and_session_name_each_others_command(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene, session = written(tmp_path), tmp_path / "s.json"
+def test_message_names_the_right_command_for_a_scene_and_a_session(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    scene, session = write_scene(tmp_path), tmp_path / "s.json"
     Recording(SCENE, "pymunk", SCENE.solver, (), 0.5).save(session)
     status, out, err = lines_of(capfd, "replay", scene)
     assert (status, out, len(err)) == (2, [], 1)
@@ -97,7 +99,7 @@ def test_scene_and_session_name_each_others_command(tmp_path: Path, capfd: pytes
     assert f"`sandbox replay {session}`" in err[0]
 
 
-def test_rerun_and_the_replayed_session_end_alike() -> None:
+def test_rerun_and_replayed_session_have_the_same_hash() -> None:
     session = live(_shown(Recording(SCENE, "pymunk", SCENE.solver, (KICK,), 0.5), None)).session
     session.advance(50, None)
     assert session.recording().state_hash == rerun(session.recording()).info["state_hash"]

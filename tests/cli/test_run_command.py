@@ -1,4 +1,4 @@
-"""`sandbox run`: what it prints, its JSON, its exit status."""
+"""`sandbox run`: output, JSON, exit status."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +11,7 @@ from sandbox.measure.run.sessions import rerun
 from sandbox.recording import Recording
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Trajectory
-from tests.cli.calling import DIVERGING, DROP, FAULTY, SPARKS, json_of, lines_of, process, written
+from tests.cli.calling import DIVERGING, DROP, FAULTY, SPARKS, json_of, lines_of, process, write_scene
 
 PLOT_OF_TWO = "--plot: draws a single run"
 KEYS = {
@@ -31,11 +31,11 @@ KEYS = {
     "missed_contacts": int,
     "final": dict,
 }
-"""of a run that went well and was not stored; `reason` and `path` are null then"""
+"""Types of the keys of a completed run that was not stored; `reason` and `path` are null then."""
 
 
 def test_json_has_every_key_with_its_type(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path)
+    scene = write_scene(tmp_path)
     status, document, err = json_of(capfd, "run", scene)
     assert (status, err, list(document)) == (0, [], ["runs", "interrupted"])
     assert document["interrupted"] is False
@@ -54,15 +54,15 @@ def test_json_has_every_key_with_its_type(tmp_path: Path, capfd: pytest.CaptureF
     assert (final["angle"], final["angular_velocity"]) == (0.0, 0.0)
 
 
-def test_settings_tell_every_choice_as_it_was_made(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    _, document, _ = json_of(capfd, "run", written(tmp_path), "--set", "solver.substeps=3")
+def test_settings_in_json_are_resolved(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    _, document, _ = json_of(capfd, "run", write_scene(tmp_path), "--set", "solver.substeps=3")
     settings = document["runs"][0]["settings"]
     assert (settings["substeps"], settings["iterations"], settings["integrator"]) == (3, 10, "explicit_euler")
     assert settings["slop"] == pytest.approx(0.005)  # a hundredth of the smallest radius
 
 
-def test_without_audit_the_misses_are_unknown(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path)
+def test_missed_contacts_are_unknown_without_audit(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = write_scene(tmp_path)
     _, with_audit, _ = json_of(capfd, "run", scene)
     _, without, _ = json_of(capfd, "run", scene, "--no-audit")
     assert without["runs"][0]["missed_contacts"] is None
@@ -70,7 +70,7 @@ def test_without_audit_the_misses_are_unknown(tmp_path: Path, capfd: pytest.Capt
     assert lines_of(capfd, "run", scene, "--no-audit")[1][2].split()[-1] == "?"
 
 
-def test_bullet_that_tunnels_is_counted(capfd: pytest.CaptureFixture[str]) -> None:
+def test_tunnelling_bullet_is_a_missed_contact(capfd: pytest.CaptureFixture[str]) -> None:
     status, document, _ = json_of(capfd, "run", "bullet")
     assert (status, document["runs"][0]["missed_contacts"]) == (0, 1)
 
@@ -86,14 +86,14 @@ def test_shipped_scene_is_found_from_anywhere(
 
 
 def test_process_in_another_folder_finds_both_kinds_of_scene(tmp_path: Path) -> None:
-    written(tmp_path)
+    write_scene(tmp_path)
     done = process("run", "drop.toml", "bounce", "--set", "world.duration=0.01", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert [line.split()[0] for line in done.stdout.splitlines()] == ["scene", "drop.toml", "bounce"]
 
 
-def test_several_scenes_sweeps_and_seeds_multiply(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    first, second = written(tmp_path, DROP + SPARKS), written(tmp_path, DROP + SPARKS, "other.toml")
+def test_scenes_sweeps_and_seeds_are_combined(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    first, second = write_scene(tmp_path, DROP + SPARKS), write_scene(tmp_path, DROP + SPARKS, "other.toml")
     status, document, _ = json_of(
         capfd,
         "run",
@@ -109,13 +109,13 @@ def test_several_scenes_sweeps_and_seeds_multiply(tmp_path: Path, capfd: pytest.
     rows = [(r["scene"], r["settings"]["dt"], r["settings"]["substeps"], r["seed"]) for r in document["runs"]]
     assert status == 0
     assert rows == [(s, dt, n, seed) for s in (first, second) for dt in (0.01, 0.02) for n in (1, 2) for seed in (1, 2)]
-    assert len({r["id"] for r in document["runs"]}) == 8  # the two files say the same, so they are the same runs
+    assert len({r["id"] for r in document["runs"]}) == 8  # the two files are equal, so their runs are the same
 
 
-def test_seeds_of_a_scene_without_chance_are_told_to_be_one_run(
+def test_seeds_of_a_deterministic_scene_give_one_run_and_a_message(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    scene, folder = written(tmp_path), tmp_path / "runs"
+    scene, folder = write_scene(tmp_path), tmp_path / "runs"
     words = ("run", scene, "--seeds", "3", "--sweep", "solver.dt=0.01,0.02", "--out", str(folder))
     status, document, err = json_of(capfd, *words)
     assert (status, err) == (
@@ -124,20 +124,20 @@ def test_seeds_of_a_scene_without_chance_are_told_to_be_one_run(
     )
     assert [(run["settings"]["dt"], run["seed"]) for run in document["runs"]] == [(0.01, 1), (0.02, 1)]
     assert len(list(folder.glob("*.npz"))) == 2
-    told = f"{scene}: nothing is random, so all seeds give the same run"
-    assert lines_of(capfd, "run", scene, "--sweep", "world.seed=1,2")[2] == [told]
+    message = f"{scene}: nothing is random, so all seeds give the same run"
+    assert lines_of(capfd, "run", scene, "--sweep", "world.seed=1,2")[2] == [message]
     assert lines_of(capfd, "run", scene, "--seeds", "1")[2] == []
-    random = written(tmp_path, DROP + SPARKS, "sparks.toml")
+    random = write_scene(tmp_path, DROP + SPARKS, "sparks.toml")
     assert lines_of(capfd, "run", random, "--seeds", "2")[2] == []
 
 
-def test_engines_may_be_listed_and_count_once(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    status, document, _ = json_of(capfd, "run", written(tmp_path), "--engines", "pymunk, pymunk")
+def test_duplicate_engines_are_run_once(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    status, document, _ = json_of(capfd, "run", write_scene(tmp_path), "--engines", "pymunk, pymunk")
     assert (status, [row["engine"] for row in document["runs"]]) == (0, ["pymunk"])
 
 
-def test_refused_run_is_told_with_its_reason(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path)
+def test_refused_run_is_reported_with_its_reason(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = write_scene(tmp_path)
     status, document, err = json_of(capfd, "run", scene, "--engine", "pymunk", "--set", "solver.integrator=rk4")
     (row,) = document["runs"]
     assert (status, row["status"], row["final"], row["steps"]) == (1, "refused", {}, 0)
@@ -147,15 +147,15 @@ def test_refused_run_is_told_with_its_reason(tmp_path: Path, capfd: pytest.Captu
     assert err == [f"{scene}: refused: {row['reason']}; use --engine reference"]
 
 
-def test_one_refused_of_several_runs_leaves_the_others(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_refused_run_does_not_affect_the_other_runs(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     status, document, _ = json_of(
-        capfd, "run", written(tmp_path), "--engine", "pymunk", "--sweep", "solver.integrator=rk4,explicit_euler"
+        capfd, "run", write_scene(tmp_path), "--engine", "pymunk", "--sweep", "solver.integrator=rk4,explicit_euler"
     )
     assert (status, [row["status"] for row in document["runs"]]) == (1, ["refused", "ok"])
 
 
-def test_diverging_run_keeps_its_data(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path)
+def test_diverged_run_is_stored_up_to_its_divergence(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = write_scene(tmp_path)
     status, document, err = json_of(capfd, "run", scene, *DIVERGING, "--out", str(tmp_path / "runs"))
     (row,) = document["runs"]
     assert (status, row["status"]) == (1, "diverged")
@@ -167,25 +167,27 @@ def test_diverging_run_keeps_its_data(tmp_path: Path, capfd: pytest.CaptureFixtu
     assert row["final"]["a"]["position"] == run.position[-1, 0].tolist()
 
 
-def test_faulty_scenes_are_told_all_at_once(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    bad, worse = written(tmp_path, FAULTY, "bad.toml"), written(tmp_path, FAULTY, "worse.toml")
+def test_faults_of_all_scenes_and_options_are_reported_together(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    bad, worse = write_scene(tmp_path, FAULTY, "bad.toml"), write_scene(tmp_path, FAULTY, "worse.toml")
     arguments = ("run", bad, worse, "nowhere", "--engine", "none", "--sweep", "dt")
     status, document, err = json_of(capfd, *arguments)
     assert (status, document["runs"]) == (2, [])
-    told = [(f["file"], f["line"], f["path"]) for f in document["faults"]]
-    assert told == [
+    locations = [(f["file"], f["line"], f["path"]) for f in document["faults"]]
+    assert locations == [
         ("--engine", None, ""),
         ("nowhere", None, ""),
         ("--sweep", None, ""),
         *((file, line, path) for file in (bad, worse) for line, path in ((3, "ball.a.position"), (4, "ball.a.radius"))),
     ]
-    assert len(err) == len(told)
+    assert len(err) == len(locations)
     assert err[3].startswith(f"{bad}:3: ball.a.position: ")
     assert lines_of(capfd, *arguments) == (2, [], err)
 
 
-def test_fault_of_several_points_of_a_sweep_is_told_once(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path)
+def test_fault_of_several_points_of_a_sweep_is_reported_once(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = write_scene(tmp_path)
     status, out, err = lines_of(capfd, "run", scene, "--sweep", "solver.dt=-1,0.01,0", "--seeds", "3")
     assert (status, out) == (2, [])
     expected = "must be greater than 0 and at most 10, is"
@@ -217,7 +219,7 @@ def test_wrong_option_is_one_line_and_nothing_is_written(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    written(tmp_path)
+    write_scene(tmp_path)
     status, out, err = lines_of(capfd, "run", "drop.toml", *arguments)
     assert (status, out, len(err)) == (2, [], 1)
     assert err[0].startswith(line)
@@ -226,7 +228,7 @@ def test_wrong_option_is_one_line_and_nothing_is_written(
 
 @pytest.mark.parametrize("value", ["solver.dt", "=3", "solver=3", "ball.b.mass=2", "solver.zzz=1"])
 def test_wrong_setting_is_a_fault_of_the_scene(value: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path)
+    scene = write_scene(tmp_path)
     status, document, err = json_of(capfd, "run", scene, "--set", value)
     assert (status, len(document["faults"])) == (2, 1)
     assert document["faults"][0]["file"] == scene
@@ -234,7 +236,7 @@ def test_wrong_setting_is_a_fault_of_the_scene(value: str, tmp_path: Path, capfd
     assert err[0].startswith(f"{scene}: ")
 
 
-def test_run_that_would_not_fit_is_refused_before_any_other_runs(
+def test_run_beyond_the_memory_limit_is_refused_before_any_run(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     sparks = """
@@ -244,7 +246,7 @@ count = 10000
 velocity_min = [0, 0]
 velocity_max = [1, 1]
 """
-    scene = written(tmp_path, sparks)
+    scene = write_scene(tmp_path, sparks)
     arguments = ("run", "bounce", scene, "--set", "solver.dt=1e-9", "--set", "world.duration=1.0")
     status, document, err = json_of(capfd, *arguments, "--out", str(tmp_path / "runs"))
     assert (status, document["runs"]) == (2, [])
@@ -255,12 +257,12 @@ velocity_max = [1, 1]
     assert not (tmp_path / "runs").exists()
 
 
-def test_quiet_says_nothing_where_all_went_well(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    assert lines_of(capfd, "run", written(tmp_path), "--quiet") == (0, [], [])
+def test_quiet_prints_nothing_for_successful_runs(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert lines_of(capfd, "run", write_scene(tmp_path), "--quiet") == (0, [], [])
 
 
-def test_table_has_columns_for_what_differs(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path)
+def test_table_has_columns_for_swept_settings(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = write_scene(tmp_path)
     _, out, _ = lines_of(capfd, "run", scene, "--sweep", "solver.iterations=5,10")
     assert out[0] == scene
     assert out[1].split("  ")[0] == "engine"
@@ -270,7 +272,7 @@ def test_table_has_columns_for_what_differs(tmp_path: Path, capfd: pytest.Captur
     assert [line.split()[2] for line in out[2:]] == ["5", "10"]
 
 
-def test_table_tells_how_many_joints_broke_where_some_did(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_table_has_a_column_of_broken_joints_if_any_broke(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     rope = '[[rope]]\nname = "r"\nstart = [0, 5]\nend = [1, 5]\nlinks = 2\nmass = 1.0\nstrength = {}\n'
     for strength, column in (("1.0", "broken "), ("1e9", "")):
         path = tmp_path / f"{strength}.toml"
@@ -280,7 +282,7 @@ def test_table_tells_how_many_joints_broke_where_some_did(tmp_path: Path, capfd:
 
 
 def test_table_of_several_scenes_names_each(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    paths = [written(tmp_path, name=f"{'long ' * 12}{k}.toml") for k in range(2)]
+    paths = [write_scene(tmp_path, name=f"{'long ' * 12}{k}.toml") for k in range(2)]
     _, out, _ = lines_of(capfd, "run", *paths)
     assert out[0].split()[0] == "scene"
     text = "".join("".join(line.split()) for line in out)  # long names are folded
@@ -288,8 +290,8 @@ def test_table_of_several_scenes_names_each(tmp_path: Path, capfd: pytest.Captur
     assert len([line for line in out if " ok " in line]) == 2
 
 
-def test_plot_is_drawn_and_said(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene, plot = written(tmp_path), tmp_path / "run.svg"
+def test_plot_is_written_and_reported(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene, plot = write_scene(tmp_path), tmp_path / "run.svg"
     status, out, err = lines_of(capfd, "run", scene, "--plot", str(plot), "--body", "a")
     assert (status, out[-1], err) == (0, f"drawn: {plot}", [])
     assert "<svg" in plot.read_text(encoding="utf-8")
@@ -299,44 +301,44 @@ def test_plot_is_drawn_and_said(tmp_path: Path, capfd: pytest.CaptureFixture[str
 
 
 def test_plot_that_cannot_be_written_is_one_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    plot = tmp_path / ("x" * 300 + ".svg")  # longer than any file's name may be
-    status, _, err = lines_of(capfd, "run", written(tmp_path), "--plot", str(plot))
+    plot = tmp_path / ("x" * 300 + ".svg")  # longer than a file name may be
+    status, _, err = lines_of(capfd, "run", write_scene(tmp_path), "--plot", str(plot))
     assert (status, len(err)) == (2, 1)
     assert err[0].startswith(f"--plot: {tmp_path}")
     assert err[0].endswith("x.svg: File name too long")
 
 
-def test_plot_is_refused_where_there_is_a_folder(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_plot_to_a_folder_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     plot = tmp_path / "run.svg"
     plot.mkdir()
-    status, out, err = lines_of(capfd, "run", written(tmp_path), "--plot", str(plot))
+    status, out, err = lines_of(capfd, "run", write_scene(tmp_path), "--plot", str(plot))
     assert (status, out, err) == (2, [], [f"--plot: {plot}: is a folder"])
 
 
-def test_names_in_any_script_come_out_as_they_are(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path, DROP.replace('"a"', '"[b] ✂ a/b"').replace("Drop", "Ünïted [bold]x"))
+def test_names_in_any_script_are_unchanged_in_json(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = write_scene(tmp_path, DROP.replace('"a"', '"[b] ✂ a/b"').replace("Drop", "Ünïted [bold]x"))
     _, document, _ = json_of(capfd, "run", scene)
     assert (document["runs"][0]["title"], list(document["runs"][0]["final"])) == ("Ünïted [bold]x", ["[b] ✂ a/b"])
 
 
 def recorded() -> Recording:
-    """Return a session of the drop with the hash of its end."""
+    """Return a session of the drop with the hash of its final state."""
     scene = loads(DROP)
     kick = Impulse(time=0.1, body="a", impulse=(1.0, 0.0))
     session = Recording(scene, "pymunk", scene.solver, (kick,), 0.4)
     return replace(session, state_hash=rerun(session).info["state_hash"])
 
 
-def test_session_that_ends_in_its_own_state_says_so(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_session_that_ends_in_the_recorded_state_is_replayed(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     session = str(recorded().save(tmp_path / "session.json"))
-    wanted = recorded().state_hash
-    for more in ([], ["--engine", "pymunk"], ["--out", str(tmp_path / "runs")], ["--out", str(tmp_path / "runs")]):
-        status, document, err = json_of(capfd, "run", session, *more)
+    expected = recorded().state_hash
+    for options in ([], ["--engine", "pymunk"], ["--out", str(tmp_path / "runs")], ["--out", str(tmp_path / "runs")]):
+        status, document, err = json_of(capfd, "run", session, *options)
         assert (status, err) == (0, [])
-        assert [(row["state_hash"], row["replayed"]) for row in document["runs"]] == [(wanted, True)]
+        assert [(row["state_hash"], row["replayed"]) for row in document["runs"]] == [(expected, True)]
 
 
-def test_session_that_ends_elsewhere_is_one_line_and_status_1(
+def test_session_that_ends_in_another_state_is_status_1_and_one_line(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     session = str(replace(recorded(), state_hash="00ff").save(tmp_path / "session.json"))
@@ -348,30 +350,28 @@ def test_session_that_ends_elsewhere_is_one_line_and_status_1(
     assert (status, document["runs"][0]["replayed"]) == (1, False)
 
 
-def test_session_with_something_changed_has_nothing_to_compare_with(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_session_with_changed_settings_is_not_compared(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     session = str(replace(recorded(), state_hash="00ff").save(tmp_path / "session.json"))
-    for more in (
+    for options in (
         ["--engine", "reference"],
         ["--set", "solver.dt=0.005"],
         ["--sweep", "solver.dt=0.01"],
         ["--seeds", "1"],
     ):
-        status, document, err = json_of(capfd, "run", session, *more)
+        status, document, err = json_of(capfd, "run", session, *options)
         assert (status, err, document["runs"][0]["replayed"]) == (0, [], None)
     _, document, _ = json_of(capfd, "run", str(replace(recorded(), state_hash=None).save(tmp_path / "none.json")))
     assert document["runs"][0]["replayed"] is None
-    _, document, _ = json_of(capfd, "run", written(tmp_path))
+    _, document, _ = json_of(capfd, "run", write_scene(tmp_path))
     assert "replayed" not in document["runs"][0]
     assert len(document["runs"][0]["state_hash"]) > 0
 
 
 def test_table_shows_substeps_beside_dt(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    _, out, _ = lines_of(capfd, "run", written(tmp_path), "--set", "solver.substeps=4")
+    _, out, _ = lines_of(capfd, "run", write_scene(tmp_path), "--set", "solver.substeps=4")
     assert out[1].split()[:4] == ["engine", "dt", "×", "substeps"]
     assert out[2].split()[1:4] == ["0.01", "×", "4"]
-    _, out, _ = lines_of(capfd, "run", written(tmp_path))
+    _, out, _ = lines_of(capfd, "run", write_scene(tmp_path))
     assert out[1].split()[:3] == ["engine", "dt", "status"]
 
 
@@ -379,14 +379,14 @@ def test_verbose_explains_every_column(tmp_path: Path, capfd: pytest.CaptureFixt
     swept = ("--sweep", "solver.iterations=5,10", "--sweep", "ball.a.restitution=0.1,0.9")
     for words in (("run", *swept), ("compare",), ("tradeoff", "--points", "2", "--tolerance", "1")):
         command, *options = words
-        status, out, err = lines_of(capfd, command, written(tmp_path), *options, "--verbose")
+        status, out, err = lines_of(capfd, command, write_scene(tmp_path), *options, "--verbose")
         assert (status, err) == (0, [])
         row = next(k for k, line in enumerate(out) if line.startswith("engine "))
         explained = {line[2:].partition("  ")[0] for line in out[row + 1 :] if line.startswith("  ")}
-        left = out[row]
-        for head in sorted(explained, key=len, reverse=True):
-            left = left.replace(head, "", 1)
-        assert left.split() == []
+        unexplained = out[row]
+        for column in sorted(explained, key=len, reverse=True):
+            unexplained = unexplained.replace(column, "", 1)
+        assert unexplained.split() == []
 
 
 def test_missed_contact_of_a_single_run_is_named(capfd: pytest.CaptureFixture[str]) -> None:
@@ -398,23 +398,23 @@ def test_missed_contact_of_a_single_run_is_named(capfd: pytest.CaptureFixture[st
     assert document["runs"][0]["missed_contacts"] == 1
 
 
-def test_more_missed_contacts_than_are_named_are_counted(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_missed_contacts_beyond_the_named_ones_are_counted(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     bullets = "[world]\nduration = 0.02\n[solver]\ndt = 0.01\n[[wall]]\npoints = [[1.25, -1], [1.25, 9]]\n"
     bullets += "".join(f"[[ball]]\nposition = [0, {k}]\nvelocity = [100, 0]\nradius = 0.1\n" for k in range(5))
-    _, out, _ = lines_of(capfd, "run", written(tmp_path, bullets))
+    _, out, _ = lines_of(capfd, "run", write_scene(tmp_path, bullets))
     missed = [line for line in out if line.startswith("missed: ")]
     assert (len(missed), missed[-1]) == (4, "missed: and 2 more")
 
 
 @pytest.mark.parametrize("command", ["run", "compare"])
 def test_key_that_is_set_and_swept_is_refused(command: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path)
+    scene = write_scene(tmp_path)
     status, _, err = lines_of(capfd, command, scene, "--set", "solver.dt=0.1", "--sweep", "solver.dt=0.1,0.2")
     assert status == 2
     assert len(err) == 1 and err[0].startswith("--sweep: solver.dt: ")
 
 
-def test_stored_run_is_no_scene(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_stored_run_is_refused_as_a_scene(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "0123456789abcdef0123.npz"
     file.write_bytes(b"PK")
     status, _, (line,) = lines_of(capfd, "run", str(file))

@@ -1,4 +1,4 @@
-"""`sandbox run --out DIR`: what lies in the folder, what is not run again, and what an interruption leaves."""
+"""`sandbox run --out DIR`: contents of the folder, runs that are not repeated, interruption."""
 
 import json
 import shlex
@@ -12,7 +12,7 @@ import pytest
 
 from sandbox.batch.store import Store
 from sandbox.trajectory import Trajectory
-from tests.cli.calling import DROP, SPARKS, document_of, json_of, lines_of, written
+from tests.cli.calling import DROP, SPARKS, document_of, json_of, lines_of, write_scene
 from tests.interruptible import interrupted
 
 pytestmark = pytest.mark.full  # child processes and command lines that run long
@@ -40,7 +40,7 @@ def run_id(capfd: pytest.CaptureFixture[str], folder: Path, *arguments: str) -> 
 
 def test_run_is_stored_as_a_row_and_arrays(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "deep" / "runs"
-    _, document, _ = json_of(capfd, "run", written(tmp_path), "--seeds", "2", "--out", str(folder))
+    _, document, _ = json_of(capfd, "run", write_scene(tmp_path), "--seeds", "2", "--out", str(folder))
     rows, runs = stored(folder), document["runs"]
     assert " ".join(rows[0]) == COLUMNS
     assert [row["id"] for row in rows] == [run["id"] for run in runs]
@@ -48,14 +48,14 @@ def test_run_is_stored_as_a_row_and_arrays(tmp_path: Path, capfd: pytest.Capture
     for row, run in zip(rows, runs, strict=True):
         assert run["path"] == str(folder / row["path"])
         assert json.loads(row["settings"]) == run["settings"]
-        same = ("engine", "seed", "status", "reason", "steps", "seconds", "energy_start", "energy_end", "contacts")
-        assert {key: row[key] for key in same} == {key: run[key] for key in same}
+        common = ("engine", "seed", "status", "reason", "steps", "seconds", "energy_start", "energy_end", "contacts")
+        assert {key: row[key] for key in common} == {key: run[key] for key in common}
         assert (row["missed_contacts"], row["scene_title"]) == (run["missed_contacts"], "Drop")
         assert "pymunk" in json.loads(row["versions"])
 
 
-def test_arrays_bear_the_promised_names_and_shapes(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    _, document, _ = json_of(capfd, "run", written(tmp_path), "--out", str(tmp_path / "runs"))
+def test_arrays_have_the_documented_names_and_shapes(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    _, document, _ = json_of(capfd, "run", write_scene(tmp_path), "--out", str(tmp_path / "runs"))
     with np.load(document["runs"][0]["path"], allow_pickle=False) as arrays:
         shapes = {name: arrays[name].shape for name in arrays.files}
         assert arrays["names"].tolist() == ["a"]
@@ -74,13 +74,13 @@ def test_arrays_bear_the_promised_names_and_shapes(tmp_path: Path, capfd: pytest
 
 
 def test_repeated_command_does_not_run_again(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    arguments = ("run", written(tmp_path), "--out", str(tmp_path / "runs"))
+    arguments = ("run", write_scene(tmp_path), "--out", str(tmp_path / "runs"))
     _, first, _ = json_of(capfd, *arguments)
     before = {path: path.read_bytes() for path in (tmp_path / "runs").glob("*.npz")}
     status, second, err = json_of(capfd, *arguments)
     assert (status, err) == (0, [])
     assert [run["repeated"] for run in (*first["runs"], *second["runs"])] == [False, True]
-    # The seconds are those of the run that was made: it was not made again.
+    # Equal seconds show that the run was not repeated.
     assert {**second["runs"][0], "repeated": False} == first["runs"][0]
     assert {path: path.read_bytes() for path in (tmp_path / "runs").glob("*.npz")} == before
     assert len(stored(tmp_path / "runs")) == 1
@@ -92,9 +92,9 @@ def test_repeated_command_does_not_run_again(tmp_path: Path, capfd: pytest.Captu
 def test_same_settings_by_file_flag_sweep_or_seeds_are_the_same_run(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    folder, plain = tmp_path / "runs", written(tmp_path)
-    solver = written(tmp_path, DROP + "\n[solver]\ndt = 0.02\nsubsteps = 2\n", "solver.toml")
-    seeded = written(tmp_path, DROP.replace("[world]", "[world]\nseed = 1"), "seeded.toml")
+    folder, plain = tmp_path / "runs", write_scene(tmp_path)
+    solver = write_scene(tmp_path, DROP + "\n[solver]\ndt = 0.02\nsubsteps = 2\n", "solver.toml")
+    seeded = write_scene(tmp_path, DROP.replace("[world]", "[world]\nseed = 1"), "seeded.toml")
     by_file = run_id(capfd, folder, solver)
     assert run_id(capfd, folder, plain, "--set", "solver.dt=0.02", "--set", "solver.substeps=2") == by_file
     assert run_id(capfd, folder, plain, "--sweep", "solver.dt=0.02", "--sweep", "solver.substeps=2:2:1") == by_file
@@ -115,28 +115,36 @@ def test_same_settings_by_file_flag_sweep_or_seeds_are_the_same_run(
     ],
 )
 def test_different_setting_is_another_run(change: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    folder, scene = tmp_path / "runs", written(tmp_path)
+    folder, scene = tmp_path / "runs", write_scene(tmp_path)
     assert run_id(capfd, folder, scene) != run_id(capfd, folder, scene, "--set", change)
     assert len(stored(folder)) == 2
 
 
-def test_setting_that_says_what_holds_anyway_is_the_same_run(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    folder, scene = tmp_path / "runs", written(tmp_path)
+def test_setting_equal_to_the_default_is_the_same_run(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    folder, scene = tmp_path / "runs", write_scene(tmp_path)
     assert run_id(capfd, folder, scene) == run_id(capfd, folder, scene, "--set", "solver.integrator=explicit_euler")
 
 
-def test_refused_run_is_kept_too(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_refused_run_is_stored(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "runs"
     status, document, _ = json_of(
-        capfd, "run", written(tmp_path), "--engine", "pymunk", "--set", "solver.integrator=rk4", "--out", str(folder)
+        capfd,
+        "run",
+        write_scene(tmp_path),
+        "--engine",
+        "pymunk",
+        "--set",
+        "solver.integrator=rk4",
+        "--out",
+        str(folder),
     )
     (row,) = stored(folder)
     assert (status, row["status"], row["reason"]) == (1, "refused", document["runs"][0]["reason"])
     assert (row["energy_start"], row["energy_end"], row["missed_contacts"]) == (None, None, None)
 
 
-def test_damaged_run_is_reported_in_one_line_and_made_again(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    arguments = ("run", written(tmp_path), "--out", str(tmp_path / "runs"))
+def test_damaged_run_is_reported_in_one_line_and_repeated(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    arguments = ("run", write_scene(tmp_path), "--out", str(tmp_path / "runs"))
     _, document, _ = json_of(capfd, *arguments)
     path = Path(document["runs"][0]["path"])
     path.write_bytes(b"damaged")
@@ -153,8 +161,8 @@ def test_damaged_run_is_reported_in_one_line_and_made_again(tmp_path: Path, capf
 
 
 @pytest.mark.parametrize("flags", ["--json", "--quiet", ""])
-def test_interrupt_keeps_what_is_finished(flags: str, tmp_path: Path) -> None:
-    scene, folder = written(tmp_path, DROP.replace("duration = 0.5", "duration = 20.0") + SPARKS), tmp_path / "runs"
+def test_interrupted_command_keeps_finished_runs(flags: str, tmp_path: Path) -> None:
+    scene, folder = write_scene(tmp_path, DROP.replace("duration = 0.5", "duration = 20.0") + SPARKS), tmp_path / "runs"
     words = ["run", scene, "--seeds", "500", "--out", str(folder), *shlex.split(flags)]
     status, out, err = interrupted(words, lambda: len(list(folder.glob("*.npz"))) >= 3)
     assert status == 130, err
@@ -176,8 +184,8 @@ def test_interrupt_keeps_what_is_finished(flags: str, tmp_path: Path) -> None:
         assert len([line for line in out.splitlines() if " ok " in line]) == finished
 
 
-def test_interrupted_command_goes_on_where_it_was(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    arguments = ("run", written(tmp_path, DROP + SPARKS), "--out", str(tmp_path / "runs"))
+def test_repeated_command_runs_only_the_missing_seeds(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    arguments = ("run", write_scene(tmp_path, DROP + SPARKS), "--out", str(tmp_path / "runs"))
     json_of(capfd, *arguments, "--seeds", "2")
     _, document, _ = json_of(capfd, *arguments, "--seeds", "4")
     assert [run["repeated"] for run in document["runs"]] == [True, True, False, False]

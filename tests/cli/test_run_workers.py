@@ -1,4 +1,4 @@
-"""`sandbox run --workers N`: the same runs, stored alike; what Ctrl-C and a worker's death leave."""
+"""`sandbox run --workers N`: equal runs and store; interrupts, dying workers, errors in workers."""
 
 import os
 import re
@@ -20,51 +20,58 @@ from sandbox.batch.plan import Job
 from sandbox.batch.store import Store, StoreError
 from sandbox.scene.errors import Fault, SceneError
 from sandbox.trajectory import Trajectory
-from tests.cli.calling import DROP, SPARKS, document_of, json_of, lines_of, written
+from tests.cli.calling import DROP, SPARKS, document_of, json_of, lines_of, write_scene
 from tests.interruptible import interrupted, interruptible
 
 pytestmark = pytest.mark.full  # child processes and command lines that run long
 
-TIMES = ("seconds", "steps_per_second", "realtime_factor")
-"""of a row, which are of the machine"""
+TIMING_KEYS = ("seconds", "steps_per_second", "realtime_factor")
+"""Keys of a row that depend on the machine."""
 
 
-def test_workers_make_the_same_runs(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    words = ("run", written(tmp_path, DROP + SPARKS), "--sweep", "ball.a.position=[0,1],[0,2],[0,3]", "--seeds", "2")
-    alone = json_of(capfd, *words)[1]["runs"]
+def test_runs_with_workers_are_equal_to_runs_without(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    words = (
+        "run",
+        write_scene(tmp_path, DROP + SPARKS),
+        "--sweep",
+        "ball.a.position=[0,1],[0,2],[0,3]",
+        "--seeds",
+        "2",
+    )
+    serial_runs = json_of(capfd, *words)[1]["runs"]
     status, document, _ = json_of(capfd, *words, "--workers", "3", "--out", str(tmp_path / "runs"))
     assert status == 0
-    for one, other in zip(alone, document["runs"], strict=True):
-        assert {key: value for key, value in one.items() if key not in (*TIMES, "path")} == {
-            key: value for key, value in other.items() if key not in (*TIMES, "path")
+    for serial, parallel in zip(serial_runs, document["runs"], strict=True):
+        assert {key: value for key, value in serial.items() if key not in (*TIMING_KEYS, "path")} == {
+            key: value for key, value in parallel.items() if key not in (*TIMING_KEYS, "path")
         }
     with Store(tmp_path / "runs") as store:
         rows = {row.id: row for row in store.rows()}
-        assert set(rows) == {run["id"] for run in alone}
+        assert set(rows) == {run["id"] for run in serial_runs}
         for run in document["runs"]:
             assert Path(run["path"]) == store.file(rows[run["id"]])
             assert Trajectory.load(run["path"]).info["state_hash"] == run["state_hash"]
 
 
-def test_workers_take_from_the_store_what_it_has(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    words = ("run", written(tmp_path, DROP + SPARKS), "--out", str(tmp_path / "runs"), "--workers", "2")
+def test_stored_runs_are_not_repeated_by_workers(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    words = ("run", write_scene(tmp_path, DROP + SPARKS), "--out", str(tmp_path / "runs"), "--workers", "2")
     json_of(capfd, *words, "--seeds", "2")
     _, document, _ = json_of(capfd, *words, "--seeds", "4")
     assert [run["repeated"] for run in document["runs"]] == [True, True, False, False]
 
 
-def test_interrupt_ends_workers_and_keeps_what_is_finished(tmp_path: Path) -> None:
-    scene, folder = written(tmp_path, DROP.replace("duration = 0.5", "duration = 20.0") + SPARKS), tmp_path / "runs"
+def test_interrupt_ends_workers_and_keeps_finished_runs(tmp_path: Path) -> None:
+    scene, folder = write_scene(tmp_path, DROP.replace("duration = 0.5", "duration = 20.0") + SPARKS), tmp_path / "runs"
     words = ["run", scene, "--seeds", "500", "--workers", "2", "--json", "--out", str(folder)]
     status, out, err = interrupted(words, lambda: len(list(folder.glob("*.npz"))) >= 3)
     assert status == 130, err
-    told = re.fullmatch(r"interrupted: (\d+) of 500 runs are complete and kept\n", err)
-    assert told is not None, err  # as of a traceback
+    message = re.fullmatch(r"interrupted: (\d+) of 500 runs are complete and kept\n", err)
+    assert message is not None, err  # no traceback
     runs = document_of(out)["runs"]
-    assert len(runs) == int(told[1]) < 500
+    assert len(runs) == int(message[1]) < 500
     with Store(folder) as store:
         rows = store.rows()
-        assert {run["id"] for run in runs} <= {row.id for row in rows}  # one may be stored and not told of any more
+        assert {run["id"] for run in runs} <= {row.id for row in rows}  # a run may be stored after the last report
         assert all(Trajectory.load(store.file(row)).status == "ok" for row in rows)
     assert {path.name for path in folder.iterdir()} == {"runs.sqlite", *(row.path for row in rows)}
 
@@ -74,41 +81,41 @@ def pid_file(folder: Path) -> Path:
 
 
 def die(job: Job, store: Store | None, *_: object) -> NoReturn:
-    """In place of `run_or_fetch`, die of a signal, and write down that this was tried."""
+    """Replacement of `run_or_fetch`: record the attempt in a file and die by a signal."""
     with pid_file(Path(job.label).parent).open("a") as stream:
         stream.write(f"{os.getpid()}\n")
     os.kill(os.getpid(), signal.SIGSEGV if job.scene.world.seed == 2 else signal.SIGKILL)
     raise AssertionError("still alive")
 
 
-def die_of_one(job: Job, *more: Any) -> RunRecord:
-    """In place of `run_or_fetch`, die of seed 2 alone."""
-    return die(job, *more) if job.scene.world.seed == 2 else run_or_fetch(job, *more)
+def die_for_seed_2(job: Job, *args: Any) -> RunRecord:
+    """Replacement of `run_or_fetch`: die only for seed 2."""
+    return die(job, *args) if job.scene.world.seed == 2 else run_or_fetch(job, *args)
 
 
-def die_once(job: Job, *more: Any) -> RunRecord:
-    """In place of `run_or_fetch`, die at the first attempt alone."""
-    return run_or_fetch(job, *more) if pid_file(Path(job.label).parent).exists() else die(job, *more)
+def die_once(job: Job, *args: Any) -> RunRecord:
+    """Replacement of `run_or_fetch`: die only at the first attempt."""
+    return run_or_fetch(job, *args) if pid_file(Path(job.label).parent).exists() else die(job, *args)
 
 
-def fail_of_one(job: Job, *more: Any) -> RunRecord:
-    """In place of `run_or_fetch`, meet a fault of the program with seed 2."""
+def fail_for_seed_2(job: Job, *args: Any) -> RunRecord:
+    """Replacement of `run_or_fetch`: raise an unexpected error for seed 2."""
     if job.scene.world.seed == 2:
         raise ZeroDivisionError("here")
-    return run_or_fetch(job, *more)
+    return run_or_fetch(job, *args)
 
 
-def run_out_of_memory(job: Job, *more: Any) -> RunRecord:
-    """In place of `run_or_fetch`."""
+def run_out_of_memory(job: Job, *args: Any) -> RunRecord:
+    """Replacement of `run_or_fetch`: raise MemoryError."""
     raise MemoryError
 
 
 @pytest.fixture
-def replaced(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[..., RunRecord]], None]:
-    """Have workers run a function in place of `run_or_fetch`."""
+def replace_run_or_fetch(monkeypatch: pytest.MonkeyPatch) -> Callable[[Callable[..., RunRecord]], None]:
+    """Return a function that replaces `run_or_fetch` in all workers."""
 
     def replace(function: Callable[..., RunRecord]) -> None:
-        # A worker imports what it serves by, from wherever that is: this folder is on its path.
+        # A worker imports the function by its module; this folder is on its path.
         monkeypatch.setattr(executors, "serve", partial(serve_with, function))
 
     return replace
@@ -119,11 +126,11 @@ def serve_with(function: Callable[..., RunRecord], pipe: Any, options: RunOption
     worker.serve(pipe, options)
 
 
-def test_run_whose_worker_is_killed_is_made_again(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], replaced: Callable[[Callable[..., RunRecord]], None]
+def test_run_whose_worker_is_killed_is_repeated(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], replace_run_or_fetch: Callable[[Callable[..., RunRecord]], None]
 ) -> None:
-    replaced(die_once)
-    words = ("run", written(tmp_path, DROP + SPARKS), "--seeds", "4", "--workers", "2")
+    replace_run_or_fetch(die_once)
+    words = ("run", write_scene(tmp_path, DROP + SPARKS), "--seeds", "4", "--workers", "2")
     status, document, err = json_of(capfd, *words)
     assert (status, err) == (0, [])
     assert [run["status"] for run in document["runs"]] == ["ok"] * 4
@@ -132,10 +139,10 @@ def test_run_whose_worker_is_killed_is_made_again(
 
 @pytest.mark.slow
 def test_run_that_kills_every_worker_fails_and_the_others_complete(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], replaced: Callable[[Callable[..., RunRecord]], None]
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], replace_run_or_fetch: Callable[[Callable[..., RunRecord]], None]
 ) -> None:
-    replaced(die_of_one)
-    scene, folder = written(tmp_path, DROP + SPARKS), tmp_path / "runs"
+    replace_run_or_fetch(die_for_seed_2)
+    scene, folder = write_scene(tmp_path, DROP + SPARKS), tmp_path / "runs"
     words = ("run", scene, "--seeds", "4", "--workers", "2", "--out", str(folder))
     status, document, err = json_of(capfd, *words)
     assert status == 1
@@ -145,8 +152,8 @@ def test_run_that_kills_every_worker_fails_and_the_others_complete(
     assert f"{ATTEMPTS} attempts" in err[0]
     with Store(folder) as store:
         assert sorted(row.status for row in store.rows()) == ["failed", "ok", "ok", "ok"]
-    # It is not finished, and is made by the next call.
-    replaced(run_or_fetch)
+    # A failed run counts as not finished: the next call repeats it.
+    replace_run_or_fetch(run_or_fetch)
     status, document, _ = json_of(capfd, *words)
     assert status == 0
     assert [run["repeated"] for run in document["runs"]] == [True, False, True, True]
@@ -155,23 +162,23 @@ def test_run_that_kills_every_worker_fails_and_the_others_complete(
 
 
 @pytest.mark.parametrize(
-    ("function", "phrase"), [(fail_of_one, "ZeroDivisionError"), (run_out_of_memory, "out of memory")]
+    ("function", "phrase"), [(fail_for_seed_2, "ZeroDivisionError"), (run_out_of_memory, "out of memory")]
 )
 def test_internal_error_in_a_worker_names_its_run_and_the_others_complete(
     tmp_path: Path,
     capfd: pytest.CaptureFixture[str],
-    replaced: Callable[[Callable[..., RunRecord]], None],
+    replace_run_or_fetch: Callable[[Callable[..., RunRecord]], None],
     function: Callable[..., RunRecord],
     phrase: str,
 ) -> None:
-    replaced(function)
-    scene = written(tmp_path, DROP + SPARKS)
+    replace_run_or_fetch(function)
+    scene = write_scene(tmp_path, DROP + SPARKS)
     status, document, err = json_of(capfd, "run", scene, "--seeds", "3", "--workers", "2")
     assert status == 1
     assert document["runs"][1]["status"] == "failed"
     assert len(document["runs"]) == 3
-    told = [line for line in err if phrase in line]
-    assert told and all(line.startswith(f"{scene}: failed: ") for line in told)
+    messages = [line for line in err if phrase in line]
+    assert messages and all(line.startswith(f"{scene}: failed: ") for line in messages)
 
 
 @pytest.mark.slow
@@ -179,7 +186,9 @@ def test_workers_that_cannot_start_end_the_command(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(executors, "serve", end_at_once)
-    status, document, err = json_of(capfd, "run", written(tmp_path, DROP + SPARKS), "--seeds", "3", "--workers", "2")
+    status, document, err = json_of(
+        capfd, "run", write_scene(tmp_path, DROP + SPARKS), "--seeds", "3", "--workers", "2"
+    )
     assert (status, document["runs"]) == (1, [])
     assert "no worker process could be started" in err[-1]
     assert "status 3" in err[-1]
@@ -190,7 +199,7 @@ def end_at_once(pipe: object, options: object) -> NoReturn:
 
 
 def children(pid: int) -> list[int]:
-    """Return the processes that a process has started, but for the tracker of multiprocessing."""
+    """Return the worker processes that a process has started, without the resource tracker of multiprocessing."""
     found = []
     for folder in Path("/proc").glob("[0-9]*"):
         try:
@@ -211,18 +220,18 @@ def is_alive(pid: int) -> bool:
 
 
 @contextmanager
-def at_work(tmp_path: Path) -> Iterator[tuple["subprocess.Popen[str]", list[int]]]:
-    """A command whose three workers are in the middle of long runs."""
+def running_workers(tmp_path: Path) -> Iterator[tuple["subprocess.Popen[str]", list[int]]]:
+    """Run a command with three workers in the middle of long runs; yield it and the pids of the workers."""
     long = DROP.replace("duration = 0.5", "duration = 20_000.0") + SPARKS + "[solver]\nrecord_every = 1000\n"
     folder = tmp_path / "runs"
-    words = interruptible("run", written(tmp_path, long), "--seeds", "9", "--workers", "3", "--out", str(folder))
+    words = interruptible("run", write_scene(tmp_path, long), "--seeds", "9", "--workers", "3", "--out", str(folder))
     pipe = subprocess.PIPE
     with subprocess.Popen(words, stdout=pipe, stderr=pipe, text=True) as command:
         pids: list[int] = []
         try:
             wait_until(lambda: len(children(command.pid)) == 3)
             pids = children(command.pid)
-            # A worker is in a session of its own once it serves.
+            # A worker that serves is the leader of its own session.
             wait_until(lambda: all(os.getsid(pid) == pid for pid in pids))
             yield command, pids
         finally:
@@ -232,15 +241,15 @@ def at_work(tmp_path: Path) -> Iterator[tuple["subprocess.Popen[str]", list[int]
 
 
 def wait_until(ready: Callable[[], bool]) -> None:
-    until = monotonic() + 120.0
+    deadline = monotonic() + 120.0
     while not ready():
-        assert monotonic() < until
+        assert monotonic() < deadline
         sleep(0.02)
 
 
 @pytest.mark.slow
 def test_interrupt_ends_workers_that_are_stopped(tmp_path: Path) -> None:
-    with at_work(tmp_path) as (command, pids):
+    with running_workers(tmp_path) as (command, pids):
         for pid in pids:
             os.kill(pid, signal.SIGSTOP)
         command.send_signal(signal.SIGINT)
@@ -262,31 +271,31 @@ def test_handler_of_a_worker_raises_for_the_first_signal_only() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
-def test_workers_end_with_their_parent_in_the_middle_of_a_run(tmp_path: Path, number: signal.Signals) -> None:
-    with at_work(tmp_path) as (command, pids):
-        command.send_signal(number)
+@pytest.mark.parametrize("sent_signal", [signal.SIGTERM, signal.SIGKILL])
+def test_workers_end_with_their_parent_in_the_middle_of_a_run(tmp_path: Path, sent_signal: signal.Signals) -> None:
+    with running_workers(tmp_path) as (command, pids):
+        command.send_signal(sent_signal)
         command.communicate(timeout=120)
         wait_until(lambda: not any(map(is_alive, pids)))
 
 
 @pytest.mark.slow
-def test_damaged_run_is_reported_and_made_again_by_a_worker(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene, folder = written(tmp_path), tmp_path / "runs"
+def test_damaged_run_is_reported_and_repeated_by_a_worker(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene, folder = write_scene(tmp_path), tmp_path / "runs"
     _, document, _ = json_of(capfd, "run", scene, "--out", str(folder))
     path = Path(document["runs"][0]["path"])
     path.write_bytes(b"no arrays")
     words = ("run", scene, "--out", str(folder), "--sweep", "world.seed=0,7", "--workers", "2")
     status, found, err = json_of(capfd, *words)
     assert (status, [row["repeated"] for row in found["runs"]]) == (0, [False, False])
-    (told,) = [line for line in err if "random" not in line]
-    assert told.startswith(f"{path} is not a stored run: ")
+    (message,) = [line for line in err if "random" not in line]
+    assert message.startswith(f"{path} is not a stored run: ")
     status, found, _ = json_of(capfd, *words)
     assert (status, [row["repeated"] for row in found["runs"]]) == (0, [True, True])
 
 
-def test_what_cannot_be_stored_ends_the_command(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene, folder = written(tmp_path), tmp_path / "runs"
+def test_failed_store_ends_the_command_with_status_2(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene, folder = write_scene(tmp_path), tmp_path / "runs"
     _, document, _ = json_of(capfd, "run", scene, "--out", str(folder))
     path = Path(document["runs"][0]["path"])
     path.unlink()
@@ -298,7 +307,7 @@ def test_what_cannot_be_stored_ends_the_command(tmp_path: Path, capfd: pytest.Ca
 
 
 @pytest.mark.parametrize("error", [StoreError("a: b"), SceneError([Fault("a.toml", 3, "ball.a", "is none")])])
-def test_errors_pass_from_process_to_process(error: Exception) -> None:
+def test_errors_are_pickled_with_their_attributes(error: Exception) -> None:
     import pickle
 
     again = pickle.loads(pickle.dumps(error))

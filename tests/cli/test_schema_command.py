@@ -1,4 +1,4 @@
-"""`sandbox schema`: the whole as JSON, one table for people, and what is no table."""
+"""`sandbox schema`: the complete schema as JSON, the listing of one table, unknown tables."""
 
 import json
 
@@ -11,7 +11,7 @@ from tests.cli.calling import json_of, lines_of
 pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 
-def test_without_a_table_it_is_the_schema(capfd: pytest.CaptureFixture[str]) -> None:
+def test_schema_without_a_table_prints_the_json_schema(capfd: pytest.CaptureFixture[str]) -> None:
     assert call(["schema"]) == 0
     assert capfd.readouterr().out == dumps()
 
@@ -19,7 +19,7 @@ def test_without_a_table_it_is_the_schema(capfd: pytest.CaptureFixture[str]) -> 
 @pytest.mark.parametrize(
     "table", ["ball", "[ball]", "solver", "body.box", "play.part", "pinball.bumper", "world", "kick"]
 )
-def test_table_lists_each_of_its_keys_with_what_it_is(table: str, capfd: pytest.CaptureFixture[str]) -> None:
+def test_table_lists_each_key_with_its_description(table: str, capfd: pytest.CaptureFixture[str]) -> None:
     status, out, err = lines_of(capfd, "schema", table)
     assert (status, err) == (0, [])
     _, document, _ = json_of(capfd, "schema", table)
@@ -30,7 +30,7 @@ def test_table_lists_each_of_its_keys_with_what_it_is(table: str, capfd: pytest.
 
 
 @pytest.mark.parametrize(("table", "kind"), [("joint", "rotary_limit"), ("drive", "plunger")])
-def test_table_of_several_kinds_lists_each(table: str, kind: str, capfd: pytest.CaptureFixture[str]) -> None:
+def test_table_of_several_kinds_lists_each_kind(table: str, kind: str, capfd: pytest.CaptureFixture[str]) -> None:
     status, out, _ = lines_of(capfd, "schema", table)
     assert status == 0
     assert any(line.startswith(f"{table}, kind {kind}: ") for line in out)
@@ -38,7 +38,7 @@ def test_table_of_several_kinds_lists_each(table: str, kind: str, capfd: pytest.
     assert kind in json.dumps(document["oneOf"])
 
 
-def test_ranges_leave_out_bounds_that_are_no_choice(capfd: pytest.CaptureFixture[str]) -> None:
+def test_ranges_omit_bounds_of_extreme_size(capfd: pytest.CaptureFixture[str]) -> None:
     _, out, _ = lines_of(capfd, "schema", "ball")
     lines = {line.split()[0]: line for line in out}
     assert "number 0 … 1 " in lines["restitution"]
@@ -56,7 +56,7 @@ def test_ranges_leave_out_bounds_that_are_no_choice(capfd: pytest.CaptureFixture
         ("", "known keys: title,"),
     ],
 )
-def test_what_is_no_table_is_one_line(table: str, words: str, capfd: pytest.CaptureFixture[str]) -> None:
+def test_unknown_table_is_reported_in_one_line(table: str, words: str, capfd: pytest.CaptureFixture[str]) -> None:
     status, out, err = lines_of(capfd, "schema", table)
     assert (status, out, len(err)) == (2, [], 1)
     assert words in err[0]

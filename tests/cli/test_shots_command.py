@@ -1,4 +1,4 @@
-"""`sandbox shots`: what it prints, its JSON, what it writes, its exit status."""
+"""`sandbox shots`: output, JSON, files, exit status."""
 
 import json
 import re
@@ -14,7 +14,7 @@ from sandbox.games.billiards.shots.study import study_shot
 from sandbox.measure.run.runner import run
 from sandbox.scene.files.load import load, loads
 from sandbox.trajectory import Trajectory
-from tests.cli.calling import DROP, document_of, json_of, lines_of, process, written
+from tests.cli.calling import DROP, document_of, json_of, lines_of, process, write_scene
 
 pytestmark = pytest.mark.full  # child processes and command lines that run long
 
@@ -64,12 +64,12 @@ speed = 1.0
 ball = "bystander"
 """
 
-FEW = ("--count", "400", "--threads", "2")
+FEW_SHOTS = ("--count", "400", "--threads", "2")
 
 
 @pytest.fixture(scope="module", autouse=True)
 def compiled() -> None:
-    """Have the kernels compiled before anything is asked: where they are not yet, that is told on standard error."""
+    """Compile the kernels before the tests: the first compilation is announced on standard error."""
     scene = loads(POT)
     study_shot(shot_setup(scene), Spread(), count=1, foretold=True)
     run(scene, "exact")
@@ -77,11 +77,11 @@ def compiled() -> None:
 
 @pytest.fixture
 def scene(tmp_path: Path) -> str:
-    return written(tmp_path, POT, "pot.toml")
+    return write_scene(tmp_path, POT, "pot.toml")
 
 
-def test_json_has_the_shot_its_outcome_and_its_odds(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
-    status, document, err = json_of(capfd, "shots", scene, *FEW, "--aim-error", "0.003", "--speed-error", "0")
+def test_json_has_shot_outcome_and_odds(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+    status, document, err = json_of(capfd, "shots", scene, *FEW_SHOTS, "--aim-error", "0.003", "--speed-error", "0")
     assert (status, err) == (0, [])
     assert (document["scene"], document["title"], document["status"], document["reason"]) == (scene, "Pot", "ok", None)
     assert document["shot"]["name"] == "stun"
@@ -97,19 +97,19 @@ def test_json_has_the_shot_its_outcome_and_its_odds(scene: str, capfd: pytest.Ca
     assert (document["sensitivity"], document["windows"], document["horizon"]) == (None, [], None)
 
 
-def test_answers_are_the_same_on_any_number_of_threads_and_others_with_another_seed(
+def test_results_depend_on_the_seed_and_not_on_the_number_of_threads(
     scene: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    alike = [json_of(capfd, "shots", scene, "--count", "1200", "--threads", n) for n in ("1", "2")]
-    assert alike[0] == alike[1]
+    results = [json_of(capfd, "shots", scene, "--count", "1200", "--threads", n) for n in ("1", "2")]
+    assert results[0] == results[1]
     other = json_of(capfd, "shots", scene, "--count", "1200", "--seed", "6")
     assert other[1]["odds"]["seed"] == 6
-    assert other[1]["odds"]["balls"] != alike[0][1]["odds"]["balls"]
+    assert other[1]["odds"]["balls"] != results[0][1]["odds"]["balls"]
 
 
-def test_all_that_can_be_asked_is_answered(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
-    asked = ("--sensitivity", "--horizon", "--window", "8:ball:far [left]")
-    status, document, err = json_of(capfd, "shots", scene, *FEW, *asked)
+def test_json_has_sensitivity_windows_and_horizon_on_request(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+    options = ("--sensitivity", "--horizon", "--window", "8:ball:far [left]")
+    status, document, err = json_of(capfd, "shots", scene, *FEW_SHOTS, *options)
     assert (status, err) == (0, [])
     assert {row["ball"] for row in document["sensitivity"]} == {"cue", "8:ball", "bystander"}
     assert {row["unit"] for row in document["sensitivity"]} == {"m/rad", "m/m/s", "m/R"}
@@ -120,9 +120,9 @@ def test_all_that_can_be_asked_is_answered(scene: str, capfd: pytest.CaptureFixt
     assert [each["nudge"] for each in document["horizon"]["ladder"]] == [10.0**-k for k in range(2, 13)]
 
 
-def test_table_has_a_line_a_ball_and_sentences_below(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
-    asked = ("--sensitivity", "--horizon", "--nudge", "1e-4", "--window", "8:ball:far [left]")
-    status, out, err = lines_of(capfd, "shots", scene, *FEW, *asked, "--side-error", "0.01")
+def test_table_has_one_line_per_ball_followed_by_sentences(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+    options = ("--sensitivity", "--horizon", "--nudge", "1e-4", "--window", "8:ball:far [left]")
+    status, out, err = lines_of(capfd, "shots", scene, *FEW_SHOTS, *options, "--side-error", "0.01")
     assert (status, err) == (0, [])
     assert out[0] == f"{scene}: Pot"
     assert out[1] == "stun: 'cue' struck at 3 m/s at an aim of 0 rad"
@@ -151,19 +151,19 @@ def test_verbose_explains_every_column(scene: str, capfd: pytest.CaptureFixture[
     assert "same contacts within" in explained
 
 
-def test_another_shot_is_asked_for_by_its_name(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
-    status, document, _ = json_of(capfd, "shots", scene, *FEW, "--shot", "soft")
+def test_shot_is_selected_by_its_name(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+    status, document, _ = json_of(capfd, "shots", scene, *FEW_SHOTS, "--shot", "soft")
     assert (status, document["shot"]["ball"]) == (0, "bystander")
 
 
-def test_values_are_set(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
-    status, document, _ = json_of(capfd, "shots", scene, *FEW, "--set", "shot.stun.aim=1.0")
+def test_set_overrides_values_of_the_shot(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+    status, document, _ = json_of(capfd, "shots", scene, *FEW_SHOTS, "--set", "shot.stun.aim=1.0")
     assert (status, document["shot"]["aim"], document["odds"]["any_pot"]["hits"]) == (0, 1.0, 0)
 
 
 def test_document_and_pictures_are_written(scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "new" / "folder"
-    status, document, err = json_of(capfd, "shots", scene, *FEW, "--out", str(out))
+    status, document, err = json_of(capfd, "shots", scene, *FEW_SHOTS, "--out", str(out))
     assert (status, err) == (0, [])
     assert json.loads((out / "shots.json").read_text(encoding="utf-8")) == document
     assert sorted(path.name for path in out.iterdir()) == ["aims.png", "rests.png", "shots.json"]
@@ -171,11 +171,11 @@ def test_document_and_pictures_are_written(scene: str, tmp_path: Path, capfd: py
 
 
 def test_quiet_prints_nothing(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
-    assert lines_of(capfd, "shots", scene, *FEW, "--quiet") == (0, [], [])
+    assert lines_of(capfd, "shots", scene, *FEW_SHOTS, "--quiet") == (0, [], [])
 
 
-def test_a_window_that_is_not_there_is_status_1(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
-    status, out, err = lines_of(capfd, "shots", scene, *FEW, "--window", "bystander:far [left]")
+def test_missing_window_is_status_1(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, err = lines_of(capfd, "shots", scene, *FEW_SHOTS, "--window", "bystander:far [left]")
     assert (status, err) == (1, [])
     assert out[-1] == "'bystander' into 'far [left]': for no aim within 0.1 rad of 0"
 
@@ -191,7 +191,7 @@ def test_a_window_that_is_not_there_is_status_1(scene: str, capfd: pytest.Captur
         (("--nudge", "nan"), "--nudge: is not a number"),
     ],
 )
-def test_what_is_typed_wrongly_is_a_line_and_status_2(
+def test_wrong_option_is_one_line_and_status_2(
     scene: str, arguments: tuple[str, ...], message: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
     status, document, err = json_of(capfd, "shots", scene, *arguments)
@@ -201,13 +201,13 @@ def test_what_is_typed_wrongly_is_a_line_and_status_2(
     assert len(document["faults"]) == 1
 
 
-def test_a_scene_without_a_shot_is_status_2(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    status, out, err = lines_of(capfd, "shots", written(tmp_path, DROP))
+def test_scene_without_a_shot_is_status_2(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    status, out, err = lines_of(capfd, "shots", write_scene(tmp_path, DROP))
     assert (status, out) == (2, [])
     assert "the scene has no [[shot]]" in err[0]
 
 
-def test_a_scene_that_the_exact_engine_refuses_is_status_1(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
+def test_scene_refused_by_the_exact_engine_is_status_1(scene: str, capfd: pytest.CaptureFixture[str]) -> None:
     status, document, err = json_of(capfd, "shots", scene, "--set", "world.linear_drag=0.1")
     assert (status, document["status"], document["odds"]) == (1, "refused", None)
     assert err == [f"{scene}: refused: {document['reason']}"]
@@ -216,25 +216,25 @@ def test_a_scene_that_the_exact_engine_refuses_is_status_1(scene: str, capfd: py
 def test_too_many_events_are_status_1(
     scene: str, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def gives_up(*_: Any, **__: Any) -> None:
+    def exhaust(*_: Any, **__: Any) -> None:
         raise Exhaustion("at 1 s: too many")
 
-    monkeypatch.setattr(ShotSetup, "simulate", gives_up)
-    status, document, err = json_of(capfd, "shots", scene, *FEW)
+    monkeypatch.setattr(ShotSetup, "simulate", exhaust)
+    status, document, err = json_of(capfd, "shots", scene, *FEW_SHOTS)
     assert (status, document["status"], document["reason"]) == (1, "failed", "at 1 s: too many")
     assert err == [f"{scene}: failed: at 1 s: too many"]
 
 
-def test_an_interrupt_keeps_what_was_played(
+def test_interrupt_keeps_the_shots_played_so_far(
     scene: str, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    fan, calls = ShotSetup.simulate_batch, []
+    simulate_batch, calls = ShotSetup.simulate_batch, []
 
     def interrupted(*arguments: Any) -> Any:
         if calls:
             raise KeyboardInterrupt
         calls.append(arguments)
-        return fan(*arguments)
+        return simulate_batch(*arguments)
 
     monkeypatch.setattr(ShotSetup, "simulate_batch", interrupted)
     status = call(["shots", scene, "--count", "3000", "--threads", "2", "--horizon", "--json"])
@@ -245,7 +245,7 @@ def test_an_interrupt_keeps_what_was_played(
     assert (document["odds"]["count"], document["odds"]["interrupted"], document["horizon"]) == (1024, True, None)
 
 
-def test_a_folder_that_cannot_be_made_is_told_before_anything_is_played(
+def test_unusable_out_folder_is_reported_before_any_shot(
     scene: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     file = tmp_path / "file"
@@ -255,23 +255,25 @@ def test_a_folder_that_cannot_be_made_is_told_before_anything_is_played(
     assert err == [f"--out: {file}: is not a folder"]
 
 
-def test_help_is_a_screen() -> None:
+def test_help_has_less_than_60_lines() -> None:
     done = process("shots", "--help")
     assert done.returncode == 0
     assert len(done.stdout.splitlines()) < 60
     assert "--aim-error RAD" in done.stdout
 
 
-def test_a_sweep_of_the_aim_runs_the_same_fan(scene: str, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_runs_swept_over_the_aim_agree_with_simulated_shots(
+    scene: str, capfd: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     sweep = ("--engine", "exact", "--sweep", "shot.stun.aim=-0.02:0.02:5", "--set", "world.duration=30")
     status, document, err = json_of(capfd, "run", scene, *sweep, "--out", str(tmp_path / "fan"))
     assert (status, err) == (0, [])
-    attempt = shot_setup(load(scene))
+    setup = shot_setup(load(scene))
     for row in document["runs"]:
-        outcome = attempt.simulate(attempt.changed("aim", row["set"]["shot.stun.aim"]))
+        outcome = setup.simulate(setup.changed("aim", row["set"]["shot.stun.aim"]))
         assert row["pocketed"] == outcome.pocketed
-        places = [body["position"] for body in row["final"].values()]
-        assert places == pytest.approx(outcome.position, abs=1e-12)  # m: frames in between change nothing
+        positions = [body["position"] for body in row["final"].values()]
+        assert positions == pytest.approx(outcome.position, abs=1e-12)  # m; recording frames does not change the result
         stored = Trajectory.load(row["path"])
         assert stored.spin.shape == (*stored.position.shape[:2], 3)
         assert stored.spin[-1].tolist() == [body["spin"] for body in row["final"].values()]

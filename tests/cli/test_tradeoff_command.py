@@ -1,4 +1,4 @@
-"""`sandbox tradeoff`: what it prints, its JSON, what it writes, its exit status."""
+"""`sandbox tradeoff`: output, JSON, files, exit status."""
 
 import re
 from dataclasses import replace
@@ -15,12 +15,12 @@ from sandbox.measure.compare.ground_truth import truth_of
 from sandbox.measure.tradeoff.configuration import Evaluation, evaluate
 from sandbox.measure.tradeoff.result import Tradeoff
 from sandbox.scene.files import toml_edit as rewrite
-from tests.cli.calling import DROP, FAULTY, document_of, json_of, lines_of, written
+from tests.cli.calling import DROP, FAULTY, document_of, json_of, lines_of, write_scene
 
 pytestmark = pytest.mark.full  # child processes and command lines that run long
 
-FEW = ("--engine", "pymunk", "--points", "6", "--repeats", "1")
-"""Enough for an answer, and quick."""
+QUICK = ("--engine", "pymunk", "--points", "6", "--repeats", "1")
+"""Options for a quick search that finds a setting."""
 COMMENTED = DROP.replace(
     "[[plane]]", "[solver]  # mine\ndt = 0.02  # coarse\nsubsteps = 1\n\n# below it all\n[[plane]]", 1
 )
@@ -38,12 +38,12 @@ restitution = 1.0
 """
 
 
-def test_json_is_as_promised_to_the_letter(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path)
-    status, document, err = json_of(capfd, "tradeoff", scene, *FEW, "--tolerance", "0.01", "--budget", "4")
+def test_json_has_the_documented_keys(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = write_scene(tmp_path)
+    status, document, err = json_of(capfd, "tradeoff", scene, *QUICK, "--tolerance", "0.01", "--budget", "4")
     assert (status, err) == (0, [])
-    wanted = {"scene", "truth", "metric", "points", "pareto", "within_tolerance", "within_budget"}
-    assert set(document) >= wanted
+    documented = {"scene", "truth", "metric", "points", "pareto", "within_tolerance", "within_budget"}
+    assert set(document) >= documented
     assert (document["scene"], document["truth"], document["metric"]) == (scene, "closed_form", "max_position")
     assert 1 < len(document["points"]) <= 6
     for row in [*document["points"], *document["pareto"], document["within_tolerance"], document["within_budget"]]:
@@ -53,9 +53,11 @@ def test_json_is_as_promised_to_the_letter(tmp_path: Path, capfd: pytest.Capture
     assert document["within_tolerance"]["cost_ms_per_second"] > 0.0
 
 
-def test_table_has_the_front_and_the_answers(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path)
-    status, out, err = lines_of(capfd, "tradeoff", scene, *FEW, "--tolerance", "0.01", "--budget", "4")
+def test_table_has_the_pareto_front_and_the_recommended_settings(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    scene = write_scene(tmp_path)
+    status, out, err = lines_of(capfd, "tradeoff", scene, *QUICK, "--tolerance", "0.01", "--budget", "4")
     assert (status, err) == (0, [])
     assert out[0].startswith(f"{scene} (Drop): error metric: max_position ")
     assert "closed form" in out[0]
@@ -64,19 +66,28 @@ def test_table_has_the_front_and_the_answers(tmp_path: Path, capfd: pytest.Captu
     rows = out[3 : next(k for k, line in enumerate(out) if line.startswith("ms/s: "))]
     assert len([row for row in rows if row.split()[-1] == "scene" or " scene " in row]) == 1
     assert any("cheapest" in row for row in rows)
-    answers = [line for line in out if line.startswith(("cheapest setting", "most accurate setting"))]
-    assert answers[0].startswith("cheapest setting with max_position within 10 mm: pymunk with substeps = ")
-    assert answers[1].startswith("most accurate setting within 4 ms per frame at 60 fps: pymunk")
+    recommendations = [line for line in out if line.startswith(("cheapest setting", "most accurate setting"))]
+    assert recommendations[0].startswith("cheapest setting with max_position within 10 mm: pymunk with substeps = ")
+    assert recommendations[1].startswith("most accurate setting within 4 ms per frame at 60 fps: pymunk")
     assert "    [solver]" in out
     assert any(line.startswith("    space.iterations = ") for line in out)
 
 
-def test_notes_name_what_can_go_wrong_with_a_recommended_setting(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    scene = written(tmp_path, BULLET)
-    own = ("--engine", "pymunk", "--effort", "0.05", "--repeats", "1", "--metric", "missed_contacts", "--budget", "100")
-    status, out, err = lines_of(capfd, "tradeoff", scene, *own)
+def test_notes_warn_of_tunnelling_with_a_recommended_setting(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = write_scene(tmp_path, BULLET)
+    options = (
+        "--engine",
+        "pymunk",
+        "--effort",
+        "0.05",
+        "--repeats",
+        "1",
+        "--metric",
+        "missed_contacts",
+        "--budget",
+        "100",
+    )
+    status, out, err = lines_of(capfd, "tradeoff", scene, *options)
     assert (status, err) == (0, [])
     (k,) = [k for k, line in enumerate(out) if line.startswith("cheapest setting with missed_contacts")]
     assert re.search(r"ms per frame of the budget of 100 ms$", out[k])
@@ -87,40 +98,40 @@ def test_notes_name_what_can_go_wrong_with_a_recommended_setting(
 
 
 def test_rows_whose_step_is_longer_than_a_frame_are_marked(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path, BULLET)
-    own = ("tradeoff", scene, "--engine", "pymunk", "--effort", "0.05", "--repeats", "1", "--tolerance", "100")
-    _, out, _ = lines_of(capfd, *own)
+    scene = write_scene(tmp_path, BULLET)
+    options = ("tradeoff", scene, "--engine", "pymunk", "--effort", "0.05", "--repeats", "1", "--tolerance", "100")
+    _, out, _ = lines_of(capfd, *options)
     rows = [line.split() for line in out if line.startswith("pymunk ")]
-    long = [row for row in rows if float(row[1]) > 1.01 / 60.0]
-    assert long
-    assert [row for row in rows if ">frame" in row] == long
-    assert all("cheapest" not in row for row in long)
+    marked = [row for row in rows if float(row[1]) > 1.01 / 60.0]
+    assert marked
+    assert [row for row in rows if ">frame" in row] == marked
+    assert all("cheapest" not in row for row in marked)
     (legend,) = [line for line in out if line.startswith(">frame: ")]
     assert "longer than a frame at 60 fps" in legend
-    _, out, _ = lines_of(capfd, *own, "--fps", "10")
+    _, out, _ = lines_of(capfd, *options, "--fps", "10")
     assert not [line for line in out if ">frame" in line]
 
 
-def test_error_that_is_split_into_parts_is_named(capfd: pytest.CaptureFixture[str]) -> None:
+def test_position_error_is_labelled_with_its_trusted_time(capfd: pytest.CaptureFixture[str]) -> None:
     scene = sandbox.loads(BULLET)
     truth = truth_of(scene, scene.solver, 1e-4)
     assert truth is not None
-    more: dict[str, Any] = {"metric": "missed_contacts", "most": 2, "repeats": 1}
+    options: dict[str, Any] = {"metric": "missed_contacts", "most": 2, "repeats": 1}
     for until, label in ((0.2, ""), (0.15, ", while the truth is trusted (0.15 s)")):
-        found = sandbox.tradeoff(scene, ("pymunk",), truth=replace(truth, trusted_until=until), **more)
+        found = sandbox.tradeoff(scene, ("pymunk",), truth=replace(truth, trusted_until=until), **options)
         print_tradeoff("bullet", found)
         assert f"position error of pymunk with the settings of the scene{label}: " in capfd.readouterr().out
 
 
 def test_quiet_prints_nothing(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path)
-    assert lines_of(capfd, "tradeoff", scene, *FEW, "--tolerance", "0.1", "--quiet") == (0, [], [])
+    scene = write_scene(tmp_path)
+    assert lines_of(capfd, "tradeoff", scene, *QUICK, "--tolerance", "0.1", "--quiet") == (0, [], [])
 
 
 def test_nothing_within_the_tolerance_is_status_1(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path)
+    scene = write_scene(tmp_path)
     before = Path(scene).read_bytes()
-    status, out, err = lines_of(capfd, "tradeoff", scene, *FEW, "--tolerance", "1e-9", "--write")
+    status, out, err = lines_of(capfd, "tradeoff", scene, *QUICK, "--tolerance", "1e-9", "--write")
     assert (status, err) == (1, [])
     assert any(re.search("none of the . settings tried; the nearest is pymunk with ", line) for line in out)
     assert out[-1].startswith("not written")
@@ -128,7 +139,9 @@ def test_nothing_within_the_tolerance_is_status_1(tmp_path: Path, capfd: pytest.
 
 
 def test_nothing_within_the_budget_is_status_1(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    status, document, _ = json_of(capfd, "tradeoff", written(tmp_path), *FEW, "--tolerance", "1", "--budget", "1e-9")
+    status, document, _ = json_of(
+        capfd, "tradeoff", write_scene(tmp_path), *QUICK, "--tolerance", "1", "--budget", "1e-9"
+    )
     assert status == 1
     assert document["within_budget"] is None
     assert document["nearest_to_budget"]["cost_ms_per_second"] > 0.0
@@ -136,38 +149,38 @@ def test_nothing_within_the_budget_is_status_1(tmp_path: Path, capfd: pytest.Cap
     assert document["nearest_to_tolerance"] is None
 
 
-def test_patience_is_another_name_of_the_time_limit(
+def test_patience_is_an_alias_of_time_limit(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     limits = []
-    real = module.tradeoff
+    original = module.tradeoff
 
-    def noted(*arguments: Any, **more: Any) -> Tradeoff:
-        limits.append(more["time_limit"])
-        return real(*arguments, **more)
+    def record_limit(*args: Any, **kwargs: Any) -> Tradeoff:
+        limits.append(kwargs["time_limit"])
+        return original(*args, **kwargs)
 
-    monkeypatch.setattr(module, "tradeoff", noted)
+    monkeypatch.setattr(module, "tradeoff", record_limit)
     for flag in ((), ("--patience", "50"), ("--time-limit", "50")):
-        lines_of(capfd, "tradeoff", written(tmp_path), *FEW, *flag, "--tolerance", "1")
+        lines_of(capfd, "tradeoff", write_scene(tmp_path), *QUICK, *flag, "--tolerance", "1")
     assert limits == [None, 50.0, 50.0]
 
 
 def test_same_command_tries_the_same_settings_and_gives_the_same_errors(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    scene, found = written(tmp_path), []
+    scene, found = write_scene(tmp_path), []
     for _ in range(2):
         _, document, _ = json_of(capfd, "tradeoff", scene, "--effort", "0.05", "--tolerance", "0.01", "--repeats", "1")
-        kept = ("engine", "settings", "error", "status", "work", "counted_cost_ms_per_second")
-        found.append(([{key: row[key] for key in kept} for row in document["points"]], document["spent"]))
+        keys = ("engine", "settings", "error", "status", "work", "counted_cost_ms_per_second")
+        found.append(([{key: row[key] for key in keys} for row in document["points"]], document["spent"]))
     assert found[0] == found[1]
 
 
-def test_write_keeps_comments_and_the_file_meets_the_tolerance(
+def test_written_file_keeps_comments_and_is_within_the_tolerance(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    scene = written(tmp_path, COMMENTED)
-    status, out, err = lines_of(capfd, "tradeoff", scene, *FEW, "--tolerance", "0.01", "--write")
+    scene = write_scene(tmp_path, COMMENTED)
+    status, out, err = lines_of(capfd, "tradeoff", scene, *QUICK, "--tolerance", "0.01", "--write")
     assert (status, err) == (0, [])
     assert out[-1] == f"written: {scene}"
     text = Path(scene).read_text(encoding="utf-8")
@@ -180,28 +193,28 @@ def test_write_keeps_comments_and_the_file_meets_the_tolerance(
     assert error <= 0.01
 
 
-def test_write_says_which_engine_it_is_for(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    scene = written(tmp_path)
+def test_write_prints_the_engine_to_run_with(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    scene = write_scene(tmp_path)
     _, out, _ = lines_of(capfd, "tradeoff", scene, "--engine", "exact", "--points", "1", "--repeats", "1", "--write")
     assert out[-2:] == [f"{scene}: already has the recommended [solver]", "run it with --engine exact"]
 
 
 def faults_of(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, *arguments: str) -> list[str]:
-    """Call with what is wrong; nothing may be run."""
+    """Call with faulty arguments; return the lines of stderr; no search may start."""
 
-    def nothing(*_: Any, **__: Any) -> None:
+    def refuse_to_run(*_: Any, **__: Any) -> None:
         raise AssertionError("it was run")
 
-    monkeypatch.setattr(module, "tradeoff", nothing)
+    monkeypatch.setattr(module, "tradeoff", refuse_to_run)
     status, out, err = lines_of(capfd, "tradeoff", *arguments)
     assert (status, out) == (2, [])
     return err
 
 
-def test_faults_are_a_line_each_and_all_at_once(
+def test_all_faults_are_reported_together_one_per_line(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scene = written(tmp_path, FAULTY)
+    scene = write_scene(tmp_path, FAULTY)
     err = faults_of(capfd, monkeypatch, scene, "--engine", "pymunk,unity", "--metric", "beauty", "--tolerance", "0")
     assert len(err) == 5
     assert err[0].startswith("--engine: unknown engine 'unity'")
@@ -212,7 +225,7 @@ def test_faults_are_a_line_each_and_all_at_once(
 
 
 @pytest.mark.parametrize(
-    "figure",
+    "option",
     [
         ("--tolerance", "nan"),
         ("--budget", "inf"),
@@ -222,43 +235,43 @@ def test_faults_are_a_line_each_and_all_at_once(
         ("--effort", "inf"),
     ],
 )
-def test_figure_without_end_is_a_fault(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, figure: tuple[str, str]
+def test_infinite_or_nan_option_is_a_fault(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, option: tuple[str, str]
 ) -> None:
-    (line,) = faults_of(capfd, monkeypatch, written(tmp_path), *figure)
-    assert line.startswith(f"{figure[0]}: ")
+    (line,) = faults_of(capfd, monkeypatch, write_scene(tmp_path), *option)
+    assert line.startswith(f"{option[0]}: ")
     assert "positive and finite" in line
 
 
 @pytest.mark.parametrize(
-    "figure", [("--budget", "0"), ("--seeds", "0"), ("--points", "0"), ("--zoom", "-1"), ("--tolerance", "-1")]
+    "option", [("--budget", "0"), ("--seeds", "0"), ("--points", "0"), ("--zoom", "-1"), ("--tolerance", "-1")]
 )
-def test_figure_out_of_range_is_a_fault(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, figure: tuple[str, str]
+def test_option_out_of_range_is_a_fault(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, option: tuple[str, str]
 ) -> None:
-    (line,) = faults_of(capfd, monkeypatch, written(tmp_path), *figure)
-    assert figure[0] in line
+    (line,) = faults_of(capfd, monkeypatch, write_scene(tmp_path), *option)
+    assert option[0] in line
 
 
 def test_write_with_set_is_refused(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (line,) = faults_of(capfd, monkeypatch, written(tmp_path), "--set", "world.duration=0.1", "--write")
+    (line,) = faults_of(capfd, monkeypatch, write_scene(tmp_path), "--set", "world.duration=0.1", "--write")
     assert line.startswith("--write: cannot be combined with --set")
 
 
-def test_write_into_the_installed_package_is_refused_at_once(
+def test_write_into_the_installed_package_is_refused_before_the_search(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "shipped").mkdir()
     monkeypatch.setattr(rewrite, "PACKAGE", tmp_path)
-    scene = written(tmp_path / "shipped")
+    scene = write_scene(tmp_path / "shipped")
     (line,) = faults_of(capfd, monkeypatch, scene, "--write")
     assert "part of the installed package" in line
     assert Path(scene).read_text(encoding="utf-8") == DROP
 
 
-def test_faults_are_json_too(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_faults_are_in_the_json_document(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     status, document, err = json_of(capfd, "tradeoff", str(tmp_path / "none.toml"), "--metric", "beauty")
     assert status == 2
     assert [row["file"] for row in document["faults"]] == ["--metric", str(tmp_path / "none.toml")]
@@ -266,9 +279,9 @@ def test_faults_are_json_too(tmp_path: Path, capfd: pytest.CaptureFixture[str]) 
     assert len(err) == 2
 
 
-def test_folder_gets_the_document(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_out_writes_json_and_report(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "new" / "folder"
-    _, document, err = json_of(capfd, "tradeoff", written(tmp_path), *FEW, "--tolerance", "1", "--out", str(out))
+    _, document, err = json_of(capfd, "tradeoff", write_scene(tmp_path), *QUICK, "--tolerance", "1", "--out", str(out))
     assert err == []
     assert document_of((out / "tradeoff.json").read_text(encoding="utf-8")) == document
     page = (out / "report.html").read_text(encoding="utf-8")
@@ -276,25 +289,25 @@ def test_folder_gets_the_document(tmp_path: Path, capfd: pytest.CaptureFixture[s
     assert "<canvas" in page
 
 
-def interrupted_after(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Interrupt the search when so many settings have been tried."""
+def interrupt_after(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Interrupt the search after this number of evaluated settings."""
     done = 0
 
-    def until_then(*arguments: Any) -> Evaluation:
+    def evaluate_or_interrupt(*arguments: Any) -> Evaluation:
         nonlocal done
         if done == count:
             raise KeyboardInterrupt
         done += 1
         return evaluate(*arguments)
 
-    monkeypatch.setattr("sandbox.measure.tradeoff.search.evaluate", until_then)
+    monkeypatch.setattr("sandbox.measure.tradeoff.search.evaluate", evaluate_or_interrupt)
 
 
-def test_interrupt_keeps_what_was_tried(
+def test_interrupted_search_keeps_the_evaluated_settings(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    interrupted_after(3, monkeypatch)
-    scene = written(tmp_path)
+    interrupt_after(3, monkeypatch)
+    scene = write_scene(tmp_path)
     status, document, err = json_of(capfd, "tradeoff", scene, "--engine", "pymunk", "--tolerance", "1e-3", "--write")
     assert (status, err) == (130, ["interrupted: the 3 settings tried so far are kept"])
     assert document["interrupted"]
@@ -303,36 +316,36 @@ def test_interrupt_keeps_what_was_tried(
     assert Path(scene).read_text(encoding="utf-8") == DROP
 
 
-def test_interrupt_while_it_is_timed_keeps_what_was_tried(
+def test_interrupted_timing_keeps_the_evaluated_settings(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupted(*_: Any) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("sandbox.measure.tradeoff.study.time_in_turns", interrupted)
-    status, document, err = json_of(capfd, "tradeoff", written(tmp_path), *FEW, "--tolerance", "0.01")
+    status, document, err = json_of(capfd, "tradeoff", write_scene(tmp_path), *QUICK, "--tolerance", "0.01")
     assert (status, err) == (130, [f"interrupted: the {len(document['points'])} settings tried so far are kept"])
     assert document["interrupted"]
     assert document["within_tolerance"]["error"] <= 0.01
 
 
-def test_interrupt_before_anything_is_tried_is_told(
+def test_interrupt_before_the_first_setting_is_reported(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    interrupted_after(0, monkeypatch)
-    assert call(["tradeoff", written(tmp_path), "--engine", "pymunk"]) == 130
+    interrupt_after(0, monkeypatch)
+    assert call(["tradeoff", write_scene(tmp_path), "--engine", "pymunk"]) == 130
     out, err = capfd.readouterr()
     assert "none of the 0 settings tried" in out
     assert err.splitlines() == ["interrupted: the 0 settings tried so far are kept"]
 
 
-def test_interrupt_while_the_truth_is_sought_is_one_line(
+def test_interrupt_during_the_ground_truth_is_one_line(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupted(*_: Any) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("sandbox.measure.tradeoff.study.find_truth", interrupted)
-    assert call(["tradeoff", written(tmp_path)]) == 130
+    assert call(["tradeoff", write_scene(tmp_path)]) == 130
     out, err = capfd.readouterr()
     assert (out, err.splitlines()[-1]) == ("", "interrupted")

@@ -1,24 +1,24 @@
-"""Examples in the documentation: the fenced blocks of a Markdown page, and how each is run.
+"""Examples in the documentation: parses the fenced blocks of a Markdown page and runs them.
 
-A page's blocks run in order, in one folder that starts empty:
+The blocks of a page run in order in one initially empty folder:
 
-- `python`: executed, in one namespace per page. A `text` block right after it holds what it prints.
-- `console`: lines that begin with `$ ` are commands, the lines below each are its output. Without such lines it prints
-  nothing.
-- `sh`: commands, a line each. They must succeed; what they print is not compared.
-- `toml`: a scene, or a part of one: no unknown keys.
-- anything else (`text`, `json` …) is not run.
+- `python`: executed in one namespace per page. A `text` block right after it is the expected output.
+- `console`: lines that begin with `$ ` are commands, the lines below each are its output. Without such lines the output
+  must be empty.
+- `sh`: one command per line. They must succeed; their output is not compared.
+- `toml`: a scene or a part of one; it must not have unknown keys.
+- other blocks (`text`, `json` …) are not run.
 
 In outputs `…` or `...` stands for any text, at the end also for none, and white space counts as one space. A command
-that does not succeed says so: `$ sandbox run bad.toml  # exits with 2`. `sandbox play` and `sandbox replay` are parsed,
-not run.
+that fails is marked with its status: `$ sandbox run bad.toml  # exits with 2`. `sandbox play` and `sandbox replay` are
+parsed, not run.
 
-An HTML comment on the line above a block changes how it is treated:
+An HTML comment on the line above a block changes its treatment:
 
 - `<!-- file: game.py -->`: the block is written to this file; a scene in it must load.
-- `<!-- faulty file: bad.toml -->`: the block is written to this file, whose faults are the point.
-- `<!-- slow -->`: the page takes longer than some 20 s, so that its test is marked slow.
-- `<!-- not run: REASON -->`: as with what needs a display, another machine or minutes.
+- `<!-- faulty file: bad.toml -->`: the block is written to this file, which has faults on purpose.
+- `<!-- slow -->`: the page takes longer than about 20 s, so its test is marked slow.
+- `<!-- not run: REASON -->`: the block is not run, for example because it needs a display, another machine or minutes.
 """
 
 import contextlib
@@ -47,7 +47,7 @@ FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 WINDOWS = ("play", "replay")
 EXIT = re.compile(r"\s+# exits with (\d+)$")
 COMPILING = re.compile(r"^compiling .*\n", re.MULTILINE)
-"""said once, where nothing is compiled yet"""
+"""Line that is printed once, at the first compilation of kernels."""
 
 
 @dataclass(frozen=True)
@@ -59,17 +59,17 @@ class Example:
     language: str
     text: str
     file: str | None
-    """name of the file that it is written to"""
+    """name of the file that the block is written to"""
     faulty: bool
-    """that file has faults on purpose"""
+    """whether that file has faults on purpose"""
     slow: bool
     skipped: bool
     output: str | None
-    """what a `python` block prints, where that is stated"""
+    """expected output of a `python` block, if given"""
 
     @property
-    def place(self) -> str:
-        """Page and line."""
+    def location(self) -> str:
+        """Page and line number."""
         page = self.page.relative_to(ROOT) if self.page.is_relative_to(ROOT) else self.page
         return f"{page}:{self.line}"
 
@@ -94,7 +94,7 @@ def examples(page: Path) -> list[Example]:
             before = found.pop()
             found.append(replace(before, output=token.content))
             continue
-        named = re.search(r"<!-- (?:faulty )?file: (\S+) -->", comment)
+        file_comment = re.search(r"<!-- (?:faulty )?file: (\S+) -->", comment)
         line = (token.map or [0])[0] + 1
         found.append(
             Example(
@@ -102,7 +102,7 @@ def examples(page: Path) -> list[Example]:
                 line,
                 language,
                 token.content,
-                named[1] if named else None,
+                file_comment[1] if file_comment else None,
                 "<!-- faulty" in comment,
                 "<!-- slow -->" in comment,
                 "<!-- not run:" in comment,
@@ -114,7 +114,7 @@ def examples(page: Path) -> list[Example]:
 
 
 def processes(page: Path) -> int:
-    """Return the number of commands of a page that run in processes of their own."""
+    """Return the number of commands of a page that run in child processes."""
     lines = [
         line.removeprefix("$ ")
         for example in examples(page)
@@ -131,7 +131,7 @@ def _is_python(token: Any) -> bool:
 
 
 def run_page(page: Path, folder: Path) -> Iterator[str]:
-    """Run the examples of a page in an empty folder; yield what is wrong."""
+    """Run the examples of a page in an empty folder; yield a message for each failure."""
     namespace: dict[str, Any] = {"__name__": "__main__"}
     for example in examples(page):
         if example.skipped:
@@ -156,16 +156,16 @@ def run_page(page: Path, folder: Path) -> Iterator[str]:
 
 
 def _python(example: Example, namespace: dict[str, Any], folder: Path) -> Iterator[str]:
-    """Run a block as a part of one program; it is executed here, as it may pass objects on to the next block."""
+    """Execute a block in this process, since later blocks may use its objects."""
     printed = io.StringIO()
     try:
         with contextlib.chdir(folder), contextlib.redirect_stdout(printed):
             exec(compile("\n" * example.line + example.text, str(example.page), "exec"), namespace)
-    except Exception as error:  # noqa: BLE001, whatever an example raises is what is reported
-        yield f"{example.place}: {type(error).__name__}: {error}"
+    except Exception as error:  # noqa: BLE001, any exception of an example is reported
+        yield f"{example.location}: {type(error).__name__}: {error}"
         return
     if example.output is not None and not _same(example.output, printed.getvalue()):
-        yield f"{example.place}: expected\n{example.output}\nprinted\n{printed.getvalue()}"
+        yield f"{example.location}: expected\n{example.output}\nprinted\n{printed.getvalue()}"
 
 
 def _console(example: Example, folder: Path) -> Iterator[str]:
@@ -183,26 +183,30 @@ def _command(example: Example, line: str, output: str | None, folder: Path) -> I
     """Run a command with `sh`."""
     if not line.strip() or line.lstrip().startswith("#"):
         return
-    stated = EXIT.search(line)
-    status = int(stated[1]) if stated else 0
+    exit_comment = EXIT.search(line)
+    status = int(exit_comment[1]) if exit_comment else 0
     words = shlex.split(line, comments=True)
     if len(words) > 1 and words[0] == "sandbox" and words[1] in WINDOWS:
         yield from _parsed(example, words[1:])
         return
-    here = {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}", "COLUMNS": "120", "SDL_VIDEODRIVER": "dummy"}
+    environment = {
+        "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
+        "COLUMNS": "120",
+        "SDL_VIDEODRIVER": "dummy",
+    }
     done = subprocess.run(
         ["sh", "-ec", line],
         cwd=folder,
-        env={**os.environ, **here},
+        env={**os.environ, **environment},
         capture_output=True,
         text=True,
         check=False,
         timeout=280,
     )
     if done.returncode != status:
-        yield f"{example.place}: {line}\nexited with {done.returncode}, not {status}\n{done.stderr[-2000:]}"
+        yield f"{example.location}: {line}\nexited with {done.returncode}, not {status}\n{done.stderr[-2000:]}"
     elif output is not None and not _same(output, printed := done.stdout + COMPILING.sub("", done.stderr)):
-        yield f"{example.place}: {line}\nexpected\n{output}\nprinted\n{printed}"
+        yield f"{example.location}: {line}\nexpected\n{output}\nprinted\n{printed}"
 
 
 def _parsed(example: Example, words: list[str]) -> Iterator[str]:
@@ -212,19 +216,19 @@ def _parsed(example: Example, words: list[str]) -> Iterator[str]:
     try:
         command.make_context(words[0], words[1:])
     except click.UsageError as error:
-        yield f"{example.place}: {' '.join(words)}: {error.format_message()}"
+        yield f"{example.location}: {' '.join(words)}: {error.format_message()}"
 
 
 def _same(expected: str, printed: str) -> bool:
-    """Compare as doctest does; `…` is `...`, and a line may end with any number of spaces."""
-    wanted = re.sub(r"\s+\.\.\.$", "...", expected.replace("…", "...").strip()) + "\n"  # a last `…` may be nothing
-    return doctest.OutputChecker().check_output(wanted, printed.strip() + "\n", FLAGS)
+    """Compare as doctest does; `…` means `...`, and trailing spaces are ignored."""
+    pattern = re.sub(r"\s+\.\.\.$", "...", expected.replace("…", "...").strip()) + "\n"  # a last `…` may match nothing
+    return doctest.OutputChecker().check_output(pattern, printed.strip() + "\n", FLAGS)
 
 
 def _unknown_keys(example: Example) -> Iterator[str]:
-    """Yield the keys of a scene, or of a part of one, that no scene has."""
+    """Yield the unknown keys of a scene or of a part of one."""
     try:
-        sandbox.loads(example.text, example.place)
+        sandbox.loads(example.text, example.location)
     except sandbox.SceneError as error:
         for fault in error.faults:
             if "unknown key" in fault.message or fault.line is None or example.file is not None:

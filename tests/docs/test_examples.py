@@ -1,4 +1,4 @@
-"""The code, the commands and the scenes of README and documentation run, and print what they show."""
+"""Code, commands and scenes of README and documentation run, and print the outputs shown there."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from tests.docs.examples import PAGES, ROOT, examples, processes, run_page
 pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 MAX_PROCESSES = 1
-"""Commands of a page that the fast tests run; each takes a second or more."""
+"""Largest number of commands of a page in the fast tests; each takes a second or more."""
 
 
 def _parameters() -> list[object]:
@@ -27,13 +27,13 @@ def _is_slow(page: Path) -> bool:
     return processes(page) > MAX_PROCESSES or any(each.slow for each in examples(page))
 
 
-@pytest.mark.timeout(1200)  # of a page with measurements on a busy machine
+@pytest.mark.timeout(1200)  # a page with measurements on a busy machine
 @pytest.mark.parametrize("page", _parameters())
 def test_examples_of_a_page_run(page: Path, tmp_path: Path) -> None:
     assert list(run_page(page, tmp_path)) == []
 
 
-def test_an_example_that_is_wrong_is_found(tmp_path: Path) -> None:
+def test_wrong_examples_are_detected(tmp_path: Path) -> None:
     text = (
         "```python\nprint(1)\n```\n```text\n2\n```\n\n```sh\nsandbox nonsense\n```\n\n"
         "```console\n$ sandbox schema ball | head -1\nbox: …\n```\n\n"

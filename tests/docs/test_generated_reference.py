@@ -1,4 +1,4 @@
-"""Blocks of the reference that are generated from the code: all can be made, and together they are complete."""
+"""Generated blocks of the reference: all can be generated, and together they are complete."""
 
 import re
 from pathlib import Path
@@ -27,7 +27,7 @@ def test_every_block_of_a_page_is_generated(page: Path) -> None:
     assert "{generated}" not in generated.expand(page.read_text(encoding="utf-8"))
 
 
-def test_a_block_of_an_unknown_generator_is_an_error() -> None:
+def test_unknown_generator_raises() -> None:
     with pytest.raises(ValueError, match="no generator 'scenes'"):
         generated.expand("```{generated} scenes\n```")
 
@@ -57,17 +57,17 @@ def test_numbers_with_a_dimension_have_a_unit() -> None:
     assert units["duration"] == "s"
 
 
-def test_every_game_has_keys() -> None:
+def test_every_game_has_a_section_of_keys() -> None:
     page = page_of("window-keys.md")
     for game in RULES:
         assert f"\n### {game.capitalize()}\n" in page
 
 
-def test_every_stored_array_is_described() -> None:
+def test_every_stored_array_has_a_shape() -> None:
     assert set(SHAPES) == set(Trajectory.__dataclass_fields__)
 
 
-def test_keys_that_lessons_and_first_steps_name_are_in_the_table_of_keys() -> None:
+def test_keys_named_in_lessons_and_tutorial_are_in_the_table_of_keys() -> None:
     table = set(re.findall(r"`([^`]+)`", page_of("window-keys.md")))
     texts = {
         page: page.read_text(encoding="utf-8") for page in (*DOCS.glob("lessons/*.md"), *DOCS.glob("tutorial/1*.md"))

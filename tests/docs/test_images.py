@@ -1,4 +1,4 @@
-"""The pictures of README and documentation: each is referenced, made by the tool, small, and can be decoded."""
+"""Pictures of README and documentation: each is referenced, made by the tool, small, and decodable."""
 
 import re
 import subprocess
@@ -44,15 +44,15 @@ def test_every_picture_is_made_by_the_tool() -> None:
     assert {path.relative_to(FOLDER).as_posix() for path in FILES} == known
 
 
-def test_pictures_together_are_small() -> None:
+def test_total_size_of_pictures_is_limited() -> None:
     assert sum(path.stat().st_size for path in FILES) < TOTAL
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(FOLDER).as_posix())
 def test_picture_is_small_and_not_blank(path: Path) -> None:
     is_thumbnail = path.parent.name == "scenes"
-    most = LARGEST_GIF if path.suffix == ".gif" else LARGEST_THUMBNAIL if is_thumbnail else LARGEST_PNG
-    assert path.stat().st_size <= most
+    limit = LARGEST_GIF if path.suffix == ".gif" else LARGEST_THUMBNAIL if is_thumbnail else LARGEST_PNG
+    assert path.stat().st_size <= limit
     with Image.open(path) as image:
         image.load()
         assert image.size == THUMBNAIL if is_thumbnail else 200 <= min(image.size) <= max(image.size) <= 1600

@@ -1,4 +1,4 @@
-"""docs/reference/json.md against what the commands print: no key undocumented, none that is never printed."""
+"""docs/reference/json.md against the output of commands: every printed key is documented, and vice versa."""
 
 import json
 import re
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.full  # child processes and command lines that run long
 
 PAGE = (Path(__file__).parents[2] / "docs/reference/json.md").read_text(encoding="utf-8")
 NO_DOCUMENT = {"play", "replay", "schema"}
-"""commands without a document of their own"""
+"""Commands without a JSON document."""
 
 BAD = "[world]\nduraton = 1\n"
 
@@ -50,7 +50,7 @@ SAMPLES: dict[str, tuple[str, ...]] = {
     "sandbox scenes": ("scenes",),
     "sandbox engines": ("engines",),
 }
-"""By section of the page, the commands that together print all of its keys."""
+"""Commands that together print all keys of a section, by section of the page."""
 
 SLOW = {"sandbox compare", "sandbox tradeoff", "sandbox extremes", "sandbox report", "sandbox shots", "sandbox match"}
 
@@ -70,12 +70,12 @@ restitution = 1.0
 
 @dataclass
 class Key:
-    """A documented key, and those below it."""
+    """A documented key and its child keys."""
 
     free: bool = False
     """whether it may have keys that are not documented"""
     printed: bool = False
-    below: "dict[str, Key]" = field(default_factory=dict)
+    children: "dict[str, Key]" = field(default_factory=dict)
 
 
 def documented(section: str) -> Key:
@@ -89,47 +89,47 @@ def documented(section: str) -> Key:
         for path in re.findall(r"`([^`]+)`", paths):
             key = root
             for name in path.replace("[]", ".[]").split("."):
-                key = key.below.setdefault(name, Key())
+                key = key.children.setdefault(name, Key())
             key.free = bool(re.search(r"\bopen\b|settings|changes|any", kind))
     return root
 
 
-def compared(printed: Any, key: Key, path: str = "") -> Iterator[str]:
-    """Yield what is printed and not documented; mark what is."""
+def undocumented(printed: Any, key: Key, path: str = "") -> Iterator[str]:
+    """Yield the printed keys that are not documented; mark the others as printed."""
     key.printed = True
     if isinstance(printed, dict):
         for name, value in printed.items():
-            below = key.below.get(name) or key.below.get("NAME")
-            if below is not None:
-                yield from compared(value, below, f"{path}.{name}")
+            child = key.children.get(name) or key.children.get("NAME")
+            if child is not None:
+                yield from undocumented(value, child, f"{path}.{name}")
             elif not key.free:
                 yield f"{path}.{name}"
     elif isinstance(printed, list):
-        element = key.below.get("[]")
+        element = key.children.get("[]")
         for value in printed:
             if element is not None:
-                yield from compared(value, element, f"{path}[]")
+                yield from undocumented(value, element, f"{path}[]")
             elif isinstance(value, dict) and not key.free:
                 yield f"{path}[]"
 
 
 def never_printed(key: Key, path: str = "") -> Iterator[str]:
-    """Yield the documented keys that nothing has printed."""
-    for name, below in key.below.items():
-        if not below.printed and (name != "[]" or below.below):  # a list may be empty
+    """Yield the documented keys that were never printed."""
+    for name, child in key.children.items():
+        if not child.printed and (name != "[]" or child.children):  # a list may be empty
             yield f"{path}.{name}"
         else:
-            yield from never_printed(below, f"{path}.{name}")
+            yield from never_printed(child, f"{path}.{name}")
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with the files and the stores that samples name."""
+    """Change to a folder with the files and stores that the samples use."""
     monkeypatch.chdir(tmp_path)
     Path("bad.toml").write_text(BAD)
     Path("tunnel.toml").write_text(TUNNEL)
-    moved = {"axis": "speed", "engine": "pymunk", "setup": "pymunk", "limit": 50.0, "first_failure": 60.0}
-    Path("against.json").write_text(json.dumps({"limits": [moved]}))
+    limit = {"axis": "speed", "engine": "pymunk", "setup": "pymunk", "limit": 50.0, "first_failure": 60.0}
+    Path("against.json").write_text(json.dumps({"limits": [limit]}))
     scene = sandbox.loads(TUNNEL)
     Recording(scene, "pymunk", scene.solver, (), duration=0.1).save("session.json")
     for store in ("store", "damaged"):
@@ -153,7 +153,7 @@ def test_every_printed_key_is_documented_and_every_documented_key_is_printed(
         document = json.loads(capsys.readouterr().out)
         if section == "Faults":
             document = {"faults": document["faults"]}
-        assert list(compared(document, keys)) == [], sample
+        assert list(undocumented(document, keys)) == [], sample
     assert list(never_printed(keys)) == []
 
 

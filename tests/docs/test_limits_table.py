@@ -42,13 +42,13 @@ def _table() -> list[dict[str, str]]:
 STORED_ROWS = list(_stored().items())
 
 
-def test_table_has_a_row_an_axis() -> None:
+def test_table_has_one_row_per_axis() -> None:
     assert len(_table()) == len(STORED_ROWS)
 
 
-@pytest.mark.parametrize("number", range(len(STORED_ROWS)), ids=lambda number: STORED_ROWS[number][0])
-def test_row_of_the_table_agrees_with_the_stored_limits(number: int) -> None:
-    row, (_, limits) = _table()[number], STORED_ROWS[number]
+@pytest.mark.parametrize("index", range(len(STORED_ROWS)), ids=lambda index: STORED_ROWS[index][0])
+def test_row_of_the_table_agrees_with_the_stored_limits(index: int) -> None:
+    row, (_, limits) = _table()[index], STORED_ROWS[index]
     assert set(row) == set(limits)
     for setup, text in row.items():
         cell, limit = CELL.fullmatch(text), limits[setup]

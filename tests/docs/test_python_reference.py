@@ -1,4 +1,4 @@
-"""docs/reference/python.md has every public name, and none that is not there."""
+"""docs/reference/python.md lists every public name, and only names that exist."""
 
 import importlib
 import re

@@ -1,4 +1,4 @@
-"""The window driven for real: an X server of its own, xdotool for hands, screenshots for eyes."""
+"""Fixtures of the end-to-end tests of the window: a private X server, input by xdotool, screenshots."""
 
 import os
 import shutil
@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.driven.driving import Driven, Play, start_server
+from tests.driven.driving import DrivenWindow, OpenWindow, start_server
 from tests.driven.xclient import LIBRARY
 
-# For what tests draw in this process to compare with; the windows that they drive say x11 themselves.
+# For reference pictures drawn in this process; the driven windows set x11 themselves.
 os.environ["SDL_VIDEODRIVER"] = "dummy"
 os.environ["SDL_AUDIODRIVER"] = "dummy"
 os.environ["PYGAME_HIDE_SUPPORT_PROMPT"] = "1"
@@ -18,11 +18,11 @@ os.environ["PYGAME_HIDE_SUPPORT_PROMPT"] = "1"
 
 @pytest.fixture(scope="session")
 def display() -> Iterator[str]:
-    """An X server without a window manager; its display's name."""
+    """Start an X server without a window manager, and return the name of its display."""
     missing = [name for name in ("Xvfb", "xdotool") if shutil.which(name) is None]
     missing += ["libX11"] if LIBRARY is None else []
     if missing:
-        pytest.skip(f"driving a window for real needs {' and '.join(missing)}")
+        pytest.skip(f"driving a real window needs {' and '.join(missing)}")
     server, name = start_server()
     try:
         yield name
@@ -32,16 +32,16 @@ def display() -> Iterator[str]:
 
 
 @pytest.fixture
-def drive(display: str, tmp_path: Path) -> Iterator[Play]:
-    """Open a window by the words of a command line, working in a folder of its own; it is ended afterwards."""
-    driven: list[Driven] = []
+def drive(display: str, tmp_path: Path) -> Iterator[OpenWindow]:
+    """Return a function that opens a window by command-line arguments, in `tmp_path`; all are closed afterwards."""
+    windows: list[DrivenWindow] = []
 
-    def opened(*arguments: str, **changes: str | None) -> Driven:
-        driven.append(Driven(display, tmp_path, arguments, **changes))
-        return driven[-1]
+    def open_window(*arguments: str, **changes: str | None) -> DrivenWindow:
+        windows.append(DrivenWindow(display, tmp_path, arguments, **changes))
+        return windows[-1]
 
     try:
-        yield opened
+        yield open_window
     finally:
-        for each in driven:
-            each.end()
+        for window in windows:
+            window.end()

@@ -1,4 +1,4 @@
-"""Scenes to drive: small, without surprises, and seen where no words cover them."""
+"""Small scenes for driven windows; no text of the window covers their bodies."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ AT_REST = f'title = "Rest"\n[world]\nduration = 5.0\n{_WALLS}{_REST}'
 """A ball at rest, without gravity."""
 
 MOVING = f'title = "Moving"\n[world]\nduration = 1.5\n{_WALLS}{_REST}velocity = [1.0, 0.0]\nrestitution = 1.0\n'
-"""It goes to and fro between two walls, a metre a second, for ever."""
+"""A ball that moves between two walls at 1 m/s without loss."""
 
 FALLING = """
 title = "Falling"
@@ -41,7 +41,7 @@ name = "a"
 position = [-1.0, 5.0]
 radius = 0.5
 """
-"""A step of explicit Euler is late by ½·g·dt² = 5 cm; ½·g·dt·t at time t."""
+"""A falling ball. Explicit Euler lags by ½·g·dt² = 5 cm a step, which is ½·g·dt·t at time t."""
 
 RESTING = """
 title = "Resting"
@@ -60,7 +60,7 @@ position = [-1.0, 0.3]
 velocity = [3.0, 0.0]
 radius = 0.3
 """
-"""A ball that lies on the ground, pressed to it by its weight, and slides along."""
+"""A ball that slides on the ground under its weight."""
 
 LEAVING = """
 title = "Leaving"
@@ -77,11 +77,11 @@ position = [0.0, 1.0]
 velocity = [2e7, 0.0]
 radius = 0.5
 """
-"""After 0.3 s the ball is where pymunk's half-planes have ended."""
+"""After 0.3 s the ball is beyond the end of pymunk's half-planes."""
 
 
-def written(folder: Path, text: str, name: str = "room.toml") -> Path:
-    """Write a scene's file."""
+def write_scene(folder: Path, text: str, name: str = "room.toml") -> Path:
+    """Write a scene file, and return its path."""
     path = folder / name
     path.write_text(text, encoding="utf-8")
     return path

@@ -1,4 +1,4 @@
-"""The driver of the window tests itself: keys reach a window once, however long they are held."""
+"""The driver of the window tests: a key reaches a window once, however long it is held."""
 
 import subprocess
 import sys
@@ -28,15 +28,15 @@ while True:
     if event.type == pygame.KEYUP and event.key == pygame.K_b:
         break
 """
-"""Writes each event of the keyboard, until the key b is released."""
+"""Program that writes each keyboard event until the key b is released."""
 
-HELD = 2.0
-"""s; a server that repeats keys begins after 0.66 s, and goes on at 25 Hz"""
+HOLD_TIME = 2.0
+"""s; a server that repeats keys begins after 0.66 s, and continues at 25 Hz"""
 
 
 @pytest.fixture
 def listener(display: str) -> Iterator[subprocess.Popen[str]]:
-    """A window that writes the events of the keyboard to its standard output."""
+    """Open a window that writes keyboard events to its standard output."""
     env = environment(SDL_VIDEODRIVER="x11", DISPLAY=display)
     process = subprocess.Popen([sys.executable, "-c", LISTENER], env=env, stdout=subprocess.PIPE, text=True)
     try:
@@ -65,6 +65,6 @@ def test_held_key_does_not_repeat_and_its_release_arrives(display: str, listener
     window = xdotool(display, "search", "--sync", "--onlyvisible", "--pid", str(listener.pid)).split()[0]
     xdotool(display, "windowfocus", "--sync", window)
     xdotool(display, "keydown", "a")
-    sleep(HELD)
+    sleep(HOLD_TIME)
     xdotool(display, "keyup", "a", "key", "b")
     assert sorted(lines) == sorted(["KeyDown a", "TextInput a", "KeyUp a", "KeyDown b", "TextInput b", "KeyUp b"])

@@ -1,4 +1,4 @@
-"""How a real window comes and goes, and what it outlives."""
+"""Start, exit and error handling of a real window."""
 
 import signal
 import subprocess
@@ -8,9 +8,9 @@ import pytest
 
 from sandbox.cli.main import call
 from sandbox.window.render.palette import ORANGE, WARNING
-from tests.driven.driving import LIMIT, Play, command, environment
-from tests.driven.looking import MESSAGES, count, differ, laid_out, on_screen
-from tests.driven.rooms import AT_REST, LEAVING, MOVING, written
+from tests.driven.driving import LIMIT, OpenWindow, command, environment
+from tests.driven.looking import MESSAGES, are_different, count_pixels, on_screen, window_layout
+from tests.driven.rooms import AT_REST, LEAVING, MOVING, write_scene
 from tests.driven.xclient import XClient
 
 pytestmark = pytest.mark.full  # a window or a film
@@ -19,33 +19,33 @@ pytestmark = pytest.mark.full  # a window or a film
 @pytest.mark.parametrize(
     ("number", "status"), [(signal.SIGTERM, 0), (signal.SIGINT, 130)], ids=["terminated", "interrupted"]
 )
-def test_signal_closes_the_window_cleanly(drive: Play, tmp_path: Path, number: int, status: int) -> None:
+def test_signal_closes_the_window_cleanly(drive: OpenWindow, tmp_path: Path, number: int, status: int) -> None:
     record = tmp_path / "all.json"
-    window = drive("play", str(written(tmp_path, MOVING)), "--record", str(record))
+    window = drive("play", str(write_scene(tmp_path, MOVING)), "--record", str(record))
     window.process.send_signal(number)
-    assert window.status() == status
-    assert window.said() == [f"session: {record}"]
-    assert window.complained() == ""
+    assert window.exit_status() == status
+    assert window.stdout_lines() == [f"session: {record}"]
+    assert window.stderr_text() == ""
 
 
-def test_escape_and_the_cross_close_the_window(drive: Play, display: str, tmp_path: Path) -> None:
-    path = str(written(tmp_path, MOVING))
+def test_escape_and_the_close_button_close_the_window(drive: OpenWindow, display: str, tmp_path: Path) -> None:
+    path = str(write_scene(tmp_path, MOVING))
     window = drive("play", path)
     window.key("Escape")
-    assert window.status() == 0
+    assert window.exit_status() == 0
     window = drive("play", path)
     with XClient(display) as client:
         client.ask_to_close(window.window)
-    assert window.status() == 0
-    assert window.complained() == ""
+    assert window.exit_status() == 0
+    assert window.stderr_text() == ""
 
 
 @pytest.mark.parametrize("driver", [None, "x11"])
-def test_no_display_is_one_line(tmp_path: Path, driver: str | None) -> None:
+def test_missing_display_is_a_one_line_error(tmp_path: Path, driver: str | None) -> None:
     display = None if driver is None else ":4095"
     hidden: dict[str, str | None] = {"WAYLAND_DISPLAY": None, "XDG_RUNTIME_DIR": None}
     done = subprocess.run(
-        command("play", str(written(tmp_path, AT_REST))),
+        command("play", str(write_scene(tmp_path, AT_REST))),
         env=environment(DISPLAY=display, SDL_VIDEODRIVER=driver, **hidden),
         cwd=tmp_path,
         capture_output=True,
@@ -59,31 +59,33 @@ def test_no_display_is_one_line(tmp_path: Path, driver: str | None) -> None:
     assert line.startswith("cannot open a window: ")
 
 
-def test_no_audio_is_told_and_the_window_stays(drive: Play, tmp_path: Path) -> None:
-    window = drive("play", str(written(tmp_path, MOVING)), SDL_AUDIODRIVER="none-such")
+def test_missing_audio_shows_a_warning_and_the_window_stays_open(drive: OpenWindow, tmp_path: Path) -> None:
+    window = drive("play", str(write_scene(tmp_path, MOVING)), SDL_AUDIODRIVER="none-such")
     window.key("m")
-    told = window.wait_until(lambda shot: count(shot, ORANGE, MESSAGES) > 30, "a warning")
-    window.wait_until(lambda shot: differ(shot, told), "the scene going on")
-    assert window.complained() == ""
+    warned = window.wait_until(lambda shot: count_pixels(shot, ORANGE, MESSAGES) > 30, "a warning")
+    window.wait_until(lambda shot: are_different(shot, warned), "the scene running")
+    assert window.stderr_text() == ""
 
 
-def test_scene_that_diverges_is_told_and_the_window_stays(drive: Play, tmp_path: Path) -> None:
-    window = drive("play", str(written(tmp_path, LEAVING)))
-    window.wait_until(lambda shot: count(shot, WARNING, MESSAGES) > 30, "what happened")
+def test_diverging_scene_shows_an_error_and_the_window_stays_open(drive: OpenWindow, tmp_path: Path) -> None:
+    window = drive("play", str(write_scene(tmp_path, LEAVING)))
+    window.wait_until(lambda shot: count_pixels(shot, WARNING, MESSAGES) > 30, "an error message")
     ended = window.step_number()
     assert ended > 0
     assert window.step_number() == ended
     window.key("comma")
     assert window.step_number() == ended - 1
-    assert window.complained() == ""
+    assert window.stderr_text() == ""
 
 
-def test_what_a_hand_cannot_do_is_told_and_the_window_stays(drive: Play, tmp_path: Path) -> None:
-    path = written(tmp_path, AT_REST)
+def test_unsupported_edit_shows_a_warning_and_the_window_stays_open(drive: OpenWindow, tmp_path: Path) -> None:
+    path = write_scene(tmp_path, AT_REST)
     window = drive("play", str(path), "--paused", "--engine", "exact")
-    window.mouse(on_screen(laid_out(path).camera, (1.0, 0.0)))
+    window.mouse(on_screen(window_layout(path).camera, (1.0, 0.0)))
     window.key("shift+b")
-    window.wait_until(lambda shot: count(shot, ORANGE, MESSAGES) > 30, "that the exact engine has no boxes")
+    window.wait_until(
+        lambda shot: count_pixels(shot, ORANGE, MESSAGES) > 30, "a warning that the exact engine has no boxes"
+    )
     window.key("o")
     assert window.step_number() == 1
     assert window.session().actions == ()
@@ -104,15 +106,15 @@ def test_what_a_hand_cannot_do_is_told_and_the_window_stays(drive: Play, tmp_pat
         (("replay", "."), ".: "),
     ],
 )
-def test_wrong_input_is_a_line_a_fault(
+def test_invalid_input_is_a_one_line_error(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
     arguments: tuple[str, ...],
     line: str,
 ) -> None:
-    written(tmp_path, AT_REST)
-    written(tmp_path, '[[ball]]\nname = "a"\nposition = [0.0]\nradius = 1.0\n', "faulty.toml")
+    write_scene(tmp_path, AT_REST)
+    write_scene(tmp_path, '[[ball]]\nname = "a"\nposition = [0.0]\nradius = 1.0\n', "faulty.toml")
     monkeypatch.chdir(tmp_path)
     assert call(list(arguments)) == 2
     out, err = capfd.readouterr()

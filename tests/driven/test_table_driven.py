@@ -1,4 +1,4 @@
-"""A table in a real window: aimed at, struck, and taken back by real keys and a real mouse."""
+"""A billiards table in a real window: aim, stroke, undo and ball in hand by keys and mouse."""
 
 import math
 from pathlib import Path
@@ -8,9 +8,9 @@ import pytest
 from sandbox.action import Move, Strike
 from sandbox.measure.run.sessions import rerun
 from sandbox.window.camera import Camera
-from tests.driven.driving import Driven, Play
-from tests.driven.looking import differ, laid_out, on_screen
-from tests.driven.rooms import written
+from tests.driven.driving import DrivenWindow, OpenWindow
+from tests.driven.looking import are_different, on_screen, window_layout
+from tests.driven.rooms import write_scene
 
 pytestmark = pytest.mark.slow  # a real window in real time
 
@@ -25,68 +25,68 @@ cue = [0.5, 0.5]
 CUE = (0.5, 0.5)
 
 
-def opened(drive: Play, folder: Path) -> tuple[Driven, Camera]:
-    path = written(folder, TABLE)
-    return drive("play", str(path)), laid_out(path).camera
+def open_table(drive: OpenWindow, folder: Path) -> tuple[DrivenWindow, Camera]:
+    path = write_scene(folder, TABLE)
+    return drive("play", str(path)), window_layout(path).camera
 
 
-def strokes(window: Driven) -> list[Strike]:
+def strokes(window: DrivenWindow) -> list[Strike]:
     return [action for action in window.session().actions if isinstance(action, Strike)]
 
 
-def test_mouse_aims_space_shoots_and_z_takes_it_back(drive: Play, tmp_path: Path) -> None:
-    window, camera = opened(drive, tmp_path)
+def test_mouse_aims_space_shoots_and_z_undoes_the_stroke(drive: OpenWindow, tmp_path: Path) -> None:
+    window, camera = open_table(drive, tmp_path)
     window.mouse(on_screen(camera, (0.8, 0.9)))
-    lying = window.settled()
+    before = window.settled_shot()
     window.key("space")
-    window.wait_until(lambda shot: differ(shot, lying), "the ball rolling")
+    window.wait_until(lambda shot: are_different(shot, before), "the ball rolling")
     (strike,) = strokes(window)
-    # A pixel at half a metre
+    # A pixel and a half at 0.5 m from the ball
     assert strike.aim == pytest.approx(math.atan2(0.4, 0.3), abs=1.5 / (0.5 * camera.scale))
     session = window.session()
     assert rerun(session).info["state_hash"] == session.state_hash
     window.key("z")
-    window.wait_for(lambda: not strokes(window), "the stroke taken back")
+    window.wait_for(lambda: not strokes(window), "the stroke undone")
     assert window.step_number() == 0
 
 
-def test_english_and_power_are_set_by_keys_that_are_held(drive: Play, tmp_path: Path) -> None:
-    window, camera = opened(drive, tmp_path)
+def test_english_and_power_are_set_with_held_keys(drive: OpenWindow, tmp_path: Path) -> None:
+    window, camera = open_table(drive, tmp_path)
     x, y = on_screen(camera, (0.8, 0.9))
     window.mouse((x, y))
-    window.settled()
-    for key, way in (("e", (20, -10)), ("x", (0, 40))):
+    window.settled_shot()
+    for key, offset in (("e", (20, -10)), ("x", (0, 40))):
         window.hold(key)
-        window.settled()
-        x, y = x + way[0], y + way[1]
+        window.settled_shot()
+        x, y = x + offset[0], y + offset[1]
         window.mouse((x, y))
-        window.settled()
-        window.let_go(key)
-        window.settled()
+        window.settled_shot()
+        window.release_key(key)
+        window.settled_shot()
     window.key("space")
     (strike,) = window.wait_for(lambda: strokes(window), "a stroke")
     assert strike.side > 0.1
     assert strike.height > 0.05
     assert 0.05 <= strike.speed < 2.0
-    assert window.session().engine == "exact"  # E was the table's
+    assert window.session().engine == "exact"  # E set the english instead of switching the engine
 
 
-def test_cue_is_drawn_back_by_the_mouse_and_let_go(drive: Play, tmp_path: Path) -> None:
-    window, camera = opened(drive, tmp_path)
+def test_cue_is_drawn_back_and_released_with_the_mouse(drive: OpenWindow, tmp_path: Path) -> None:
+    window, camera = open_table(drive, tmp_path)
     window.drag(on_screen(camera, (0.5, 0.8)), on_screen(camera, (0.5, 0.65)))
     (strike,) = window.wait_for(lambda: strokes(window), "a stroke")
-    # Drawn back by 0.15 of the 0.5 m that make 10 m/s; a pixel is 3 mm.
+    # Drawn back by 0.15 m, where 0.5 m give 10 m/s; a pixel is 3 mm.
     assert strike.speed == pytest.approx(3.0, abs=0.2)
 
 
-def test_ball_in_hand_is_put_where_the_mouse_is_clicked(drive: Play, tmp_path: Path) -> None:
-    window, camera = opened(drive, tmp_path)
-    there = on_screen(camera, (0.3, 0.7))
+def test_ball_in_hand_is_placed_at_the_click(drive: OpenWindow, tmp_path: Path) -> None:
+    window, camera = open_table(drive, tmp_path)
+    target = on_screen(camera, (0.3, 0.7))
     window.key("g")
-    window.settled()
-    window.mouse(there)
-    window.settled()
-    window.click(there)
+    window.settled_shot()
+    window.mouse(target)
+    window.settled_shot()
+    window.click(target)
     moved = window.wait_for(
         lambda: [action for action in window.session().actions if isinstance(action, Move)], "the ball moved"
     )

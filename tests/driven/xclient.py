@@ -1,4 +1,4 @@
-"""What xdotool cannot say to an X server: to close a window politely, and to take the keyboard from all of them."""
+"""X requests that xdotool lacks: asking a window to close, and removing the keyboard focus from all windows."""
 
 import ctypes
 from ctypes.util import find_library
@@ -42,7 +42,7 @@ class XClient:
         self._x.XCloseDisplay(self._display)
 
     def ask_to_close(self, window: int) -> None:
-        """Send what a window manager sends when somebody clicks the cross."""
+        """Send the message that a window manager sends when its close button is clicked."""
         protocols, delete = (
             self._x.XInternAtom(self._display, name, 0) for name in (b"WM_PROTOCOLS", b"WM_DELETE_WINDOW")
         )
@@ -51,5 +51,5 @@ class XClient:
         self._x.XSendEvent(self._display, ctypes.c_ulong(window), 0, ctypes.c_long(0), ctypes.byref(event))
 
     def take_focus_away(self) -> None:
-        """Give the keyboard to no window at all."""
+        """Remove the keyboard focus from all windows."""
         self._x.XSetInputFocus(self._display, ctypes.c_ulong(0), 0, ctypes.c_ulong(0))

@@ -1,19 +1,19 @@
-"""The engines that model drives, for tests that hold for each of them."""
+"""Fixtures for tests that hold for every engine that models drives."""
 
 from functools import partial
 
 import pytest
 
-from sandbox.engines import switching as relay
+from sandbox.engines import switching
 
 
 @pytest.fixture(params=("pymunk", "reference"), scope="module")
 def engine(request):
-    """The name of an engine that models drives."""
+    """Return the name of an engine that models drives."""
     return request.param
 
 
 @pytest.fixture(scope="module")
 def start(engine):
-    """What starts a scene on that engine."""
-    return partial(relay.start, engine=engine)
+    """Return a function that starts a scene on that engine."""
+    return partial(switching.start, engine=engine)

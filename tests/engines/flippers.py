@@ -1,4 +1,4 @@
-"""Flippers: scenes with the bat of a pinball machine, whose figures Visual Pinball gives."""
+"""Flippers: scenes with the flipper of a pinball machine, with parameters from Visual Pinball."""
 
 import math
 from typing import Any
@@ -12,7 +12,7 @@ LENGTH = 0.0702  # m
 MASS = 0.080  # kg
 MOMENT = MASS * LENGTH**2 / 3.0
 REST, END = math.radians(-31.0), math.radians(20.0)
-BALL = 0.01349  # m, its radius
+BALL_RADIUS = 0.01349  # radius, m
 
 TORQUE = {
     "kind": "torque",
@@ -27,8 +27,8 @@ TORQUE = {
 }
 
 
-def bat(**drive: Any) -> dict[str, Any]:
-    """Return the tables of a bat about the origin that lies at rest, and of its drive."""
+def flipper(**drive: Any) -> dict[str, Any]:
+    """Return the tables of a flipper at rest about the origin and of its drive."""
     angle = drive.pop("angle", REST)
     outline = [[-0.0116, 0.0], [0.0, -0.0116], [LENGTH, -0.007], [LENGTH + 0.007, 0.0], [LENGTH, 0.007], [0.0, 0.0116]]
     body = {"name": "bat", "points": outline, "angle": angle, "mass": MASS, "restitution": 0.8, "friction": 0.6}
@@ -36,12 +36,12 @@ def bat(**drive: Any) -> dict[str, Any]:
 
 
 def bar(angle: float = 0.0, **drive: Any) -> dict[str, Any]:
-    """Return the tables of a straight bar, 80 by 20 mm, about its left end, and of its drive."""
-    place = [0.04 * math.cos(angle), 0.04 * math.sin(angle)]
-    body = {"name": "bar", "size": [0.08, 0.02], "position": place, "angle": angle, "mass": MASS, "restitution": 1.0}
-    own = {**TORQUE, "stops": [0.0, 0.5], **drive}
-    del own["moment"]
-    return {"box": [body], "drive": [{"name": "flip", "body": "bar", "pivot": [0.0, 0.0], **own}]}
+    """Return the tables of a straight bar, 80 by 20 mm, that pivots about its left end, and of its drive."""
+    position = [0.04 * math.cos(angle), 0.04 * math.sin(angle)]
+    body = {"name": "bar", "size": [0.08, 0.02], "position": position, "angle": angle, "mass": MASS, "restitution": 1.0}
+    drive_table = {**TORQUE, "stops": [0.0, 0.5], **drive}
+    del drive_table["moment"]
+    return {"box": [body], "drive": [{"name": "flip", "body": "bar", "pivot": [0.0, 0.0], **drive_table}]}
 
 
 BAR_MOMENT = MASS * (0.08**2 + 0.02**2) / 12.0 + MASS * 0.04**2
@@ -49,17 +49,17 @@ BAR_MOMENT = MASS * (0.08**2 + 0.02**2) / 12.0 + MASS * 0.04**2
 
 def ball(x: float, y: float, vx: float = 0.0, vy: float = 0.0, **keys: Any) -> dict[str, Any]:
     """Return the table of a pinball."""
-    return {"name": "ball", "position": [x, y], "velocity": [vx, vy], "radius": BALL, "mass": MASS, **keys}
+    return {"name": "ball", "position": [x, y], "velocity": [vx, vy], "radius": BALL_RADIUS, "mass": MASS, **keys}
 
 
 def scene(*tables: dict[str, Any], gravity: tuple[float, float] = (0.0, 0.0), dt: float = 1e-3, **more: Any) -> Scene:
-    """Return a scene of some tables."""
+    """Return a scene of the given tables."""
     document: dict[str, Any] = {"world": {"gravity": list(gravity), "duration": 1.0}, "solver": {"dt": dt, **more}}
     for each in tables:
         document |= each
     return from_document(document)
 
 
-def press(running: SwitchableSimulation, level: float = 1.0, drive: str = "flip") -> None:
-    """Ask a drive for a level."""
-    running.apply(Drive(time=0.0, drive=drive, level=level))
+def press(simulation: SwitchableSimulation, level: float = 1.0, drive: str = "flip") -> None:
+    """Set the level of a drive."""
+    simulation.apply(Drive(time=0.0, drive=drive, level=level))

@@ -1,4 +1,4 @@
-"""Every pair of materials rebounds and rubs by exactly its own coefficients."""
+"""Every pair of materials uses exactly its own coefficients of restitution and friction."""
 
 import itertools
 
@@ -12,8 +12,8 @@ from sandbox.engines.registry import start
 from sandbox.scene.files.load import from_document
 
 
-def rebounds(document: dict[str, object], balls: int) -> np.ndarray:
-    """Drop balls on as many separate planes' places and return v_after / v_before of each, (N,)."""
+def rebound_ratios(document: dict[str, object], balls: int) -> np.ndarray:
+    """Run a scene of balls that each hit a wall and return −v_after / v_before of each, (N,)."""
     simulation = start(from_document(document))
     before = simulation.frame().velocity[:, 1].copy()
     for _ in range(20):
@@ -21,7 +21,7 @@ def rebounds(document: dict[str, object], balls: int) -> np.ndarray:
     return -simulation.frame().velocity[:, 1] / before
 
 
-def test_stated_on_one_side_both_sides_or_none():
+def test_restitution_set_on_one_side_both_sides_or_neither():
     document = {
         "solver": {"dt": 0.01},
         "material": [{"name": "half", "restitution": 0.5}, {"name": "nothing"}],
@@ -40,16 +40,16 @@ def test_stated_on_one_side_both_sides_or_none():
             {"position": [40, 1], "velocity": [0, -10], "radius": 0.5, "restitution": 0.8},
         ],
     }
-    # One contact each, solved alone: a rounding or two.
-    assert np.allclose(rebounds(document, 5), [0.4, 0.8, 0.5, 0.0, 0.2], rtol=0, atol=1e-15)
+    # One contact each, solved independently: one or two roundings.
+    assert np.allclose(rebound_ratios(document, 5), [0.4, 0.8, 0.5, 0.0, 0.2], rtol=0, atol=1e-15)
 
 
 MATERIALS = ("a", "b", "c")
 
 
 @given(st.lists(st.floats(0, 1), min_size=6, max_size=6))
-def test_any_table_of_pairs_is_realised(values):
-    """Six figures for the pairs of three materials: no three factors could serve them."""
+def test_any_table_of_pair_coefficients_is_realised(values):
+    """Six coefficients for the pairs of three materials cannot be products of three factors."""
     pairs = list(itertools.combinations_with_replacement(MATERIALS, 2))
     document = {
         "solver": {"dt": 0.01},
@@ -61,14 +61,14 @@ def test_any_table_of_pairs_is_realised(values):
     for k, (a, b) in enumerate(pairs):
         document["wall"].append({"points": [[10 * k - 1, 0], [10 * k + 1, 0]], "material": a})
         document["ball"].append({"position": [10 * k, 1], "velocity": [0, -10], "radius": 0.5, "material": b})
-        # Balls of every pair meet too, or pairs of two balls' materials could not.
-    measured = rebounds(document, 6)
-    # The impulse is (1 + e)·10, and is rounded as such: a few ulp of 20, over 10.
+        # Only walls and balls of a pair collide here; pairs of two balls are tested below.
+    measured = rebound_ratios(document, 6)
+    # The impulse (1 + e)·10 is rounded: a few ulps of 20, divided by 10.
     assert np.allclose(measured, values, rtol=0, atol=1e-15)
 
 
 @given(st.floats(0, 1), st.floats(0, 1))
-def test_balls_rebound_by_their_pair(e, between):
+def test_balls_rebound_with_the_restitution_of_their_pair(e, between):
     document = {
         "solver": {"dt": 0.01},
         "material": [{"name": "x", "restitution": 0.3}, {"name": "y"}],
@@ -87,7 +87,7 @@ def test_balls_rebound_by_their_pair(e, between):
     for _ in range(20):
         simulation.step()
     v = simulation.frame().velocity[:, 0]
-    # The iterations converge on the target from one contact at once; sums of speeds of 10 round at 1e-15.
+    # A single contact converges in one iteration; sums of speeds of 10 round at 1e-15.
     assert (v[1] - v[0]) / 20 == pytest.approx(e, abs=1e-14)
     assert (v[3] - v[2]) / 20 == pytest.approx(between, abs=1e-14)
 
@@ -101,26 +101,26 @@ def test_balls_rebound_by_their_pair(e, between):
         )
     )
 )
-def test_factors_leave_only_listed_pairs_wrong(case):
-    values, meets, n = case
-    wanted, touching = np.array(values).reshape(n, n), np.array(meets).reshape(n, n)
-    wanted, touching = np.maximum(wanted, wanted.T), touching | touching.T
-    found = factors(wanted, touching, [None] * n)
-    wrong = set(wrong_pairs(wanted, touching, found))
+def test_factors_are_exact_except_for_the_listed_pairs(case):
+    values, collides, n = case
+    expected, colliding = np.array(values).reshape(n, n), np.array(collides).reshape(n, n)
+    expected, colliding = np.maximum(expected, expected.T), colliding | colliding.T
+    found = factors(expected, colliding, [None] * n)
+    wrong = set(wrong_pairs(expected, colliding, found))
     for a, b in itertools.combinations_with_replacement(range(n), 2):
-        if touching[a, b] and (a, b) not in wrong:
-            assert abs(found[a] * found[b] - wanted[a, b]) <= TOLERANCE * wanted[a, b]
+        if colliding[a, b] and (a, b) not in wrong:
+            assert abs(found[a] * found[b] - expected[a, b]) <= TOLERANCE * expected[a, b]
 
 
-def test_factors_solve_what_can_be_solved():
-    """A table that is a product of factors needs no handler at all: pool's balls and cushions, say."""
-    wanted = np.array([[0.95, 0.85], [0.85, 0.0]])
-    touching = np.array([[True, True], [True, False]])
-    assert not wrong_pairs(wanted, touching, factors(wanted, touching, [None, None]))
+def test_factors_realise_a_factorable_table():
+    """A table that is a product of factors, such as that of pool balls and cushions, needs no collision handler."""
+    expected = np.array([[0.95, 0.85], [0.85, 0.0]])
+    colliding = np.array([[True, True], [True, False]])
+    assert not wrong_pairs(expected, colliding, factors(expected, colliding, [None, None]))
 
 
-def test_friction_of_a_pair_brakes_a_slide():
-    """μ·g for a ball that cannot yet roll: its slip starts at v₀ and shrinks by 3μg a second (disc)."""
+def test_friction_of_a_pair_decelerates_a_sliding_ball():
+    """A ball that still slides decelerates by μ·g: its slip starts at v₀ and shrinks by 3μg a second (disc)."""
     document = {
         "world": {"gravity": [0, -9.81]},
         "solver": {"dt": 0.001, "slop": 0.0},
@@ -142,6 +142,6 @@ def test_friction_of_a_pair_brakes_a_slide():
     for _ in range(500):
         simulation.step()
     v = simulation.frame().velocity[:, 0]
-    # The first contact comes a step late at most: μ·g·h = 1e-3 m/s.
+    # The first contact is at most a step late: μ·g·h = 1e-3 m/s.
     assert v[0] == pytest.approx(5 - 0.1 * 9.81 * 0.5, abs=2e-3)
     assert v[1] == pytest.approx(5 - 0.05 * 9.81 * 0.5, abs=2e-3)

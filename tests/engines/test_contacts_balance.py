@@ -1,7 +1,7 @@
-"""Impulses of contacts and each body's change of momentum: they agree to rounding, whoever parts and meets again.
+"""Contact impulses equal the momentum change of each body to rounding, also if bodies separate and collide again.
 
-Shapes that part are remembered by pymunk for some substeps, and what it tells of them once they meet again counts
-twice what they had then. Piles that settle do so thousands of times.
+pymunk remembers separated shapes for some substeps, and its impulse after a new contact counts the remembered impulse
+twice. In settling piles this happens thousands of times.
 """
 
 import numpy as np
@@ -20,10 +20,10 @@ pytestmark = pytest.mark.full  # long runs and sweeps
 
 GRAVITY = np.array([0.0, -9.81])
 
-ROUNDED = 1e-10
-"""N·s: of some 1e5 additions of parts of 1e-2 N·s to a sum of at most 10, a thousandfold"""
+TOLERANCE = 1e-10
+"""N·s: a thousand times the rounding of about 1e5 additions of terms of 1e-2 N·s to a sum of at most 10."""
 
-FLOORED = """
+FLOOR_SCENE = """
 [world]
 gravity = [0.0, -9.81]
 duration = 3.0
@@ -56,46 +56,46 @@ def pile(persistence: int) -> Scene:
     return load(find("pile"), ["grid.ball.rows=8", "grid.ball.columns=10", f"solver.persistence={persistence}"])
 
 
-def unbalanced(scene: Scene, settle: int, steps: int, actions: dict[int, Action]) -> tuple[float, Contacts]:
-    """Return by how much momentum and impulses differ at most, N·s, of bodies that are there all the time.
+def momentum_error(scene: Scene, settle: int, steps: int, actions: dict[int, Action]) -> tuple[float, Contacts]:
+    """Return the largest difference of momentum change and impulses, N·s, of bodies present all the time, and contacts.
 
     Args:
-        scene: what runs.
-        settle: steps before anybody asks for contacts.
-        steps: after that.
-        actions: what is done before which of these.
+        scene: scene to run.
+        settle: steps before contacts are first queried.
+        steps: steps after that.
+        actions: actions by the step before which they apply.
     """
     simulation = start(scene, "pymunk")
     for _ in range(settle):
         simulation.step()
     simulation.contacts()
-    began = simulation.frame()
-    found = []
+    initial = simulation.frame()
+    batches = []
     for k in range(steps):
         if k in actions:
             simulation.apply(actions[k])
         simulation.step()
         if k % 50 == 0:
-            found.append(simulation.contacts())
-    contacts, ended = Contacts.joined([*found, simulation.contacts()]), simulation.frame()
-    bodies, count = simulation.bodies, len(began.position)
-    momentum = bodies.mass[:, None] * (ended.time - began.time) * GRAVITY
+            batches.append(simulation.contacts())
+    contacts, final = Contacts.joined([*batches, simulation.contacts()]), simulation.frame()
+    bodies, count = simulation.bodies, len(initial.position)
+    momentum = bodies.mass[:, None] * (final.time - initial.time) * GRAVITY
     for (first, second), impulse in zip(contacts.pair.tolist(), contacts.impulse, strict=True):
         momentum[first] -= impulse
         if second >= 0:
             momentum[second] += impulse
-    gained = bodies.mass[:count, None] * (ended.velocity[:count] - began.velocity)
-    there = ended.present[:count] & ~bodies.fixed[:count]
-    return float(np.abs(gained - momentum[:count])[there].max()), contacts
+    gained = bodies.mass[:count, None] * (final.velocity[:count] - initial.velocity)
+    present = final.present[:count] & ~bodies.fixed[:count]
+    return float(np.abs(gained - momentum[:count])[present].max()), contacts
 
 
 @pytest.mark.parametrize("persistence", [1, 3, 10])
 @pytest.mark.parametrize("settle", [0, 150])
 def test_impulses_on_each_ball_of_a_pile_balance_its_momentum(persistence: int, settle: int) -> None:
-    error, contacts = unbalanced(pile(persistence), settle, 360, {})
-    assert error < ROUNDED
-    between = contacts.pair[contacts.pair[:, 1] >= 0]
-    assert len(between) > len(np.unique(between, axis=0)) > 100  # some have met again
+    error, contacts = momentum_error(pile(persistence), settle, 360, {})
+    assert error < TOLERANCE
+    ball_pairs = contacts.pair[contacts.pair[:, 1] >= 0]
+    assert len(ball_pairs) > len(np.unique(ball_pairs, axis=0)) > 100  # some pairs collided again
 
 
 @pytest.mark.parametrize(
@@ -116,8 +116,8 @@ def test_impulses_on_each_ball_of_a_pile_balance_its_momentum(persistence: int, 
     ids=["none", "remove", "move", "ball", "box", "toggle", "reshape", "corner"],
 )
 @pytest.mark.parametrize("persistence", [3, 20])
-def test_impulses_balance_whatever_is_done_meanwhile(actions: dict[int, Action], persistence: int) -> None:
-    scene = loads(FLOORED.replace("dt = 0.005", f"dt = 0.005\npersistence = {persistence}"))
-    error, contacts = unbalanced(scene, 0, 600, actions)
-    assert error < ROUNDED
+def test_impulses_balance_momentum_during_actions(actions: dict[int, Action], persistence: int) -> None:
+    scene = loads(FLOOR_SCENE.replace("dt = 0.005", f"dt = 0.005\npersistence = {persistence}"))
+    error, contacts = momentum_error(scene, 0, 600, actions)
+    assert error < TOLERANCE
     assert len(contacts) > 300

@@ -1,4 +1,4 @@
-"""Drag on pymunk beside other forces: whatever balances in the equations of motion stays where it is, at any step."""
+"""Drag with other forces on pymunk: an equilibrium of the equations of motion is exact at any step."""
 
 import math
 from functools import partial
@@ -16,24 +16,26 @@ from tests import accounts
 
 pytestmark = pytest.mark.full  # long runs and sweeps
 
-# Rounding of a few hundred sums
-kept = partial(accounts.kept, engine="pymunk", closes=1e-11)
+# Rounding of a few hundreds of sums.
+closed_account = partial(accounts.closed_account, engine="pymunk", closes=1e-11)
 
 DT = 0.01
 G = 10.0
 
 LINEAR, STRONG, QUADRATIC, BOTH = (
     {"linear_drag": 5.0},
-    {"linear_drag": 400.0},  # κh = 4: an explicit step of it would be unstable
+    {"linear_drag": 400.0},  # κh = 4: an explicit step would be unstable
     {"quadratic_drag": 0.8},
     {"linear_drag": 2.0, "quadratic_drag": 0.8},
 )
-AIRS = pytest.mark.parametrize("air", [LINEAR, STRONG, QUADRATIC, BOTH], ids=["linear", "strong", "quadratic", "both"])
-WINDS = pytest.mark.parametrize("wind", [(0.0, 0.0), (3.0, -1.0)], ids=["still", "wind"])
+each_drag = pytest.mark.parametrize(
+    "drag", [LINEAR, STRONG, QUADRATIC, BOTH], ids=["linear", "strong", "quadratic", "both"]
+)
+each_wind = pytest.mark.parametrize("wind", [(0.0, 0.0), (3.0, -1.0)], ids=["still", "wind"])
 
 
-def scene_of(air: dict[str, Any], gravity: float = -G, wind: tuple[float, float] = (0.0, 0.0), **more: Any) -> Scene:
-    world = {"gravity": [0.0, gravity], "duration": 60.0, "wind": list(wind), **air}
+def scene_of(drag: dict[str, Any], gravity: float = -G, wind: tuple[float, float] = (0.0, 0.0), **more: Any) -> Scene:
+    world = {"gravity": [0.0, gravity], "duration": 60.0, "wind": list(wind), **drag}
     return from_document({"world": world, "solver": {"dt": DT, **more.pop("solver", {})}, **more})
 
 
@@ -41,81 +43,81 @@ def ball(name: str, x: float, y: float, mass: float = 1.0, **more: Any) -> dict[
     return {"name": name, "position": [x, y], "radius": 0.05, "mass": mass, "collides": "none", **more}
 
 
-def spring(a: str, b: str | None, stiffness: float, rest: float = 0.0, **more: Any) -> dict[str, Any]:
+def spring(a: str, b: str | None, stiffness: float, rest_length: float = 0.0, **more: Any) -> dict[str, Any]:
     between = [a] if b is None else [a, b]
-    return {"kind": "spring", "between": between, "stiffness": stiffness, "rest_length": rest, **more}
+    return {"kind": "spring", "between": between, "stiffness": stiffness, "rest_length": rest_length, **more}
 
 
 def run(scene: Scene, seconds: float, *actions: Action) -> SwitchableSimulation:
-    relay = start(scene)
+    simulation = start(scene)
     for action in actions:
-        relay.apply(action)
+        simulation.apply(action)
     for _ in range(round(seconds / DT)):
-        relay.step()
-    return relay
+        simulation.step()
+    return simulation
 
 
-def rate(air: dict[str, Any], speed: float) -> float:
+def drag_rate(drag: dict[str, Any], speed: float) -> float:
     """Return κ, 1/s."""
-    return float(air.get("linear_drag", 0.0) + air.get("quadratic_drag", 0.0) * speed)
+    return float(drag.get("linear_drag", 0.0) + drag.get("quadratic_drag", 0.0) * speed)
 
 
-def terminal(air: dict[str, Any], push: float) -> float:
+def terminal_speed(drag: dict[str, Any], acceleration: float) -> float:
     """Return the speed, m/s, at which drag balances an acceleration, m/s²."""
-    k, c = air.get("linear_drag", 0.0), air.get("quadratic_drag", 0.0)
-    return 2.0 * push / (k + math.sqrt(k * k + 4.0 * c * push))
+    k, c = drag.get("linear_drag", 0.0), drag.get("quadratic_drag", 0.0)
+    return 2.0 * acceleration / (k + math.sqrt(k * k + 4.0 * c * acceleration))
 
 
-@AIRS
-@WINDS
+@each_drag
+@each_wind
 @pytest.mark.parametrize("substeps", [1, 3])
-def test_mass_on_a_spring_hangs_where_the_forces_balance(air, wind, substeps):
+def test_mass_on_a_spring_stays_at_equilibrium(drag, wind, substeps):
     mass, stiffness = 2.0, 50.0
     held = spring("a", None, stiffness, anchors=[[0.0, 0.0], [0.0, 0.0]], damping=3.0)
-    kappa = rate(air, math.hypot(*wind))
-    wanted = mass / stiffness * (np.array([0.0, -G]) + kappa * np.asarray(wind))
-    scene = scene_of(air, wind=wind, ball=[ball("a", *wanted, mass)], joint=[held], solver={"substeps": substeps})
+    kappa = drag_rate(drag, math.hypot(*wind))
+    expected = mass / stiffness * (np.array([0.0, -G]) + kappa * np.asarray(wind))
+    scene = scene_of(drag, wind=wind, ball=[ball("a", *expected, mass)], joint=[held], solver={"substeps": substeps})
     frame = run(scene, 5.0).frame()
     assert frame.velocity[0] == pytest.approx(np.zeros(2), abs=1e-12)  # rounding of forces of 2,400 N
-    assert frame.position[0] == pytest.approx(wanted, rel=1e-12)  # likewise
+    assert frame.position[0] == pytest.approx(expected, rel=1e-12)  # likewise
 
 
-def test_mass_on_a_spring_comes_to_rest_where_the_forces_balance():
+def test_mass_on_a_spring_comes_to_rest_at_equilibrium():
     held = spring("a", None, 50.0, anchors=[[0.0, 0.0], [0.0, 0.0]])
-    relay = run(scene_of(LINEAR, ball=[ball("a", 0.0, -1.0, 2.0)], joint=[held]), 30.0)
-    assert relay.frame().position[0, 1] == pytest.approx(-2.0 * G / 50.0, rel=1e-12)  # rounding
+    simulation = run(scene_of(LINEAR, ball=[ball("a", 0.0, -1.0, 2.0)], joint=[held]), 30.0)
+    assert simulation.frame().position[0, 1] == pytest.approx(-2.0 * G / 50.0, rel=1e-12)  # rounding
 
 
-def test_column_of_masses_on_springs_hangs_where_the_forces_balance():
+def test_column_of_masses_on_springs_comes_to_rest_at_equilibrium():
     count, mass, stiffness = 10, 0.5, 400.0
     balls = [ball(f"b{k}", 0.0, -0.5 * (k + 1), mass) for k in range(count)]
     first = spring("b0", None, stiffness, 0.4, anchors=[[0.0, 0.0], [0.0, 0.0]])
     others = [spring(f"b{k}", f"b{k + 1}", stiffness, 0.4) for k in range(count - 1)]
-    relay = run(scene_of({"linear_drag": 5.0}, ball=balls, joint=[first, *others]), 40.0)
-    lengths = -np.diff(relay.frame().position[:, 1], prepend=0.0)
+    simulation = run(scene_of({"linear_drag": 5.0}, ball=balls, joint=[first, *others]), 40.0)
+    lengths = -np.diff(simulation.frame().position[:, 1], prepend=0.0)
     below = np.arange(count, 0, -1)  # masses that hang from each spring
     assert lengths == pytest.approx(0.4 + below * mass * G / stiffness, rel=1e-11)  # rounding
 
 
-def test_box_hangs_level_between_springs_at_its_corners():
+def test_box_between_two_springs_comes_to_rest_at_equilibrium():
     box = {"name": "box", "position": [0.0, -1.0], "size": [2.0, 0.2], "mass": 3.0, "collides": "none"}
     held = [
         {**spring("box", None, 60.0, damping=4.0), "anchors": [[x, 0.0], [x, 0.0]]} for x in (-0.7, 1.0)
-    ]  # farther out on one side
-    relay = run(scene_of(LINEAR, box=[box], joint=held), 60.0)
-    # Moments about the middle: each carries what the other's arm says; the box tilts until it does.
-    frame = relay.frame()
+    ]  # asymmetric arms
+    simulation = run(scene_of(LINEAR, box=[box], joint=held), 60.0)
+    # Forces and moments about the centre balance; the box tilts until they do.
+    frame = simulation.frame()
     angle, (x, y) = float(frame.angle[0]), frame.position[0]
     ends = [(x + arm * math.cos(angle), y + arm * math.sin(angle)) for arm in (-0.7, 1.0)]
-    forces = [np.array([60.0 * (at - ex), -60.0 * ey]) for at, (ex, ey) in zip((-0.7, 1.0), ends, strict=True)]
+    forces = [np.array([60.0 * (anchor - ex), -60.0 * ey]) for anchor, (ex, ey) in zip((-0.7, 1.0), ends, strict=True)]
     assert np.sum(forces, axis=0) == pytest.approx([0.0, 3.0 * G], abs=1e-10)  # rounding
     moments = [(ex - x) * f[1] - (ey - y) * f[0] for (ex, ey), f in zip(ends, forces, strict=True)]
     assert sum(moments) == pytest.approx(0.0, abs=1e-9)
 
 
-@AIRS
+@each_drag
 @pytest.mark.parametrize("by", ["thrust", "force", "zone", "gravity"])
-def test_terminal_speed_under_any_force_is_exact(air, by):
+def test_terminal_speed_under_any_force_is_exact(drag, by):
     mass, force = 2.0, 6.0
     more: dict[str, Any] = {}
     actions: list[Action] = []
@@ -125,37 +127,41 @@ def test_terminal_speed_under_any_force_is_exact(air, by):
         actions.append(Force(time=0.0, body="a", force=(force, 0.0)))
     elif by == "zone":
         more["zone"] = [{"position": [0.0, 0.0], "radius": 1e4, "gravity": [force / mass, 0.0]}]
-    one = ball("a", 0.0, 0.0, mass) | {"collides": "fixed"}  # that meets nothing, but zones
-    scene = scene_of(air, 0.0, ball=[one], **more)
+    body = ball("a", 0.0, 0.0, mass) | {"collides": "fixed"}  # collides with nothing but is subject to zones
+    scene = scene_of(drag, 0.0, ball=[body], **more)
     if by == "gravity":
         scene = scene.model_copy(update={"world": scene.world.model_copy(update={"gravity": (force / mass, 0.0)})})
-    relay = run(scene, 10.0, *actions)
-    assert relay.frame().velocity[0, 0] == pytest.approx(terminal(air, force / mass), rel=1e-12)  # rounding
+    simulation = run(scene, 10.0, *actions)
+    assert simulation.frame().velocity[0, 0] == pytest.approx(terminal_speed(drag, force / mass), rel=1e-12)  # rounding
 
 
-@AIRS
-@WINDS
+@each_drag
+@each_wind
 @pytest.mark.parametrize("moving", [True, False], ids=["body", "place"])
-def test_attraction_balances_a_spring(air, wind, moving):
-    """Held on a spring in the pull of a place, or of a heavy body, and in wind."""
+def test_attraction_balances_a_spring(drag, wind, moving):
+    """Equilibrium on a spring under the attraction of a point or of a fixed body, and in wind."""
     mass, stiffness, strength = 1.0, 400.0, 6.0
     sun = {"sun": ball("sun", 4.0, 0.0, 1.0, fixed=True)} if moving else {}
     held = spring("a", None, stiffness, anchors=[[0.0, 0.0], [0.0, 0.0]], damping=2.0)
-    pull = {"toward": "sun" if moving else [4.0, 0.0], "strength": strength}
-    at = np.zeros(2)
-    for _ in range(60):  # a contraction: the pull changes by a hundredth of what the spring does
-        away = np.array([4.0, 0.0]) - at
-        pulled = strength * away / np.hypot(*away) ** 3 + rate(air, math.hypot(*wind)) * np.asarray(wind)
-        at = mass / stiffness * pulled
-    scene = scene_of(air, 0.0, wind, ball=[ball("a", *at, mass), *sun.values()], joint=[held], attraction=[pull])
+    attraction = {"toward": "sun" if moving else [4.0, 0.0], "strength": strength}
+    position = np.zeros(2)
+    for _ in range(60):  # fixed-point iteration: the attraction varies by a hundredth of the spring force
+        offset = np.array([4.0, 0.0]) - position
+        acceleration = strength * offset / np.hypot(*offset) ** 3 + drag_rate(drag, math.hypot(*wind)) * np.asarray(
+            wind
+        )
+        position = mass / stiffness * acceleration
+    scene = scene_of(
+        drag, 0.0, wind, ball=[ball("a", *position, mass), *sun.values()], joint=[held], attraction=[attraction]
+    )
     frame = run(scene, 5.0).frame()
-    assert frame.position[0] == pytest.approx(at, rel=1e-11)  # rounding
+    assert frame.position[0] == pytest.approx(position, rel=1e-11)  # rounding
     assert frame.velocity[0] == pytest.approx(np.zeros(2), abs=1e-12)
 
 
-@pytest.mark.parametrize("air", [LINEAR, QUADRATIC, BOTH], ids=["linear", "quadratic", "both"])
+@pytest.mark.parametrize("drag", [LINEAR, QUADRATIC, BOTH], ids=["linear", "quadratic", "both"])
 @pytest.mark.parametrize("fixed", [True, False])
-def test_account_closes_where_drag_meets_every_other_force(air, fixed):
+def test_ledger_closes_with_drag_and_every_other_force(drag, fixed):
     balls = [
         ball("a", 0.1, 0.0, 1.0, velocity=[1.0, 2.0]),
         ball("b", 1.3, 0.2, 2.0),
@@ -167,25 +173,25 @@ def test_account_closes_where_drag_meets_every_other_force(air, fixed):
         spring("a", "b", 30.0, 0.5),
     ]
     scene = scene_of(
-        air,
+        drag,
         wind=(2.0, 0.5),
         ball=balls,
         joint=joints,
         attraction=[{"toward": "sun", "strength": 6.0}, {"toward": [0.0, 5.0], "strength": 2.0, "softening": 0.5}],
         thrust=[{"body": "b", "force": [1.0, 2.0], "point": [0.01, 0.02]}],
     )
-    account = kept(scene, 100)
+    account = closed_account(scene, 100)
     assert account[Cause.DRAG] != 0.0
 
 
-def test_forces_are_whole_without_drag():
-    """A mass on a spring without drag makes semi-implicit Euler's own steps."""
+def test_forces_are_unscaled_without_drag():
+    """Without drag a mass on a spring follows semi-implicit Euler exactly."""
     held = spring("a", None, 50.0, anchors=[[0.0, 0.0], [0.0, 0.0]])
-    relay = start(scene_of({}, 0.0, ball=[ball("a", 0.3, 0.0)], joint=[held]))
-    relay.apply(Impulse(time=0.0, body="a", impulse=(0.2, 0.0)))
+    simulation = start(scene_of({}, 0.0, ball=[ball("a", 0.3, 0.0)], joint=[held]))
+    simulation.apply(Impulse(time=0.0, body="a", impulse=(0.2, 0.0)))
     x, v = 0.3, 0.2
     for _ in range(200):
-        relay.step()
+        simulation.step()
         x += v * DT
         v -= 50.0 * x * DT
-        assert relay.frame().position[0, 0] == pytest.approx(x, abs=1e-13)  # rounding
+        assert simulation.frame().position[0, 0] == pytest.approx(x, abs=1e-13)  # rounding

@@ -1,4 +1,4 @@
-"""Lives: every engine retires at the first frame at which a life is over, whatever happens on the way."""
+"""Lifetimes: every engine retires a body at the first frame after its lifetime has ended."""
 
 from dataclasses import replace
 
@@ -27,8 +27,8 @@ def scene_of(*emitters: dict[str, object], **tables: object) -> Scene:
     return from_document({"world": world, "solver": solver, "emitter": [{**SPARK, **e} for e in emitters], **tables})
 
 
-def mixed(**tables: object) -> Scene:
-    """Sparks of 0.2 to 0.6 s that touch nothing, of 0.3 s that bounce, and some that stay."""
+def mixed_scene(**tables: object) -> Scene:
+    """Return sparks of 0.2 to 0.6 s that collide with nothing, of 0.3 s that bounce, and some without a lifetime."""
     return scene_of(
         {"name": "free", "count": 300, "lifetime": 0.4, "lifetime_jitter": 0.2},
         {"name": "stay", "count": 3},
@@ -42,7 +42,7 @@ def bodies_of(born: list[float], lifetime: list[float]) -> Bodies:
     return replace(scene_of({"count": len(born)}).bodies, born=np.asarray(born), lifetime=np.asarray(lifetime))
 
 
-def ends(scene: Scene, steps: int, engine: str) -> dict[int, float]:
+def retirement_times(scene: Scene, steps: int, engine: str) -> dict[int, float]:
     simulation = start(scene, engine)
     for _ in range(steps):
         simulation.step()
@@ -50,36 +50,38 @@ def ends(scene: Scene, steps: int, engine: str) -> dict[int, float]:
 
 
 @given(st.lists(st.tuples(st.floats(0, 2), st.floats(1e-9, 3)), min_size=1, max_size=12), st.floats(-1, 1))
-def test_each_is_told_once_at_the_first_frame_after_its_end(lives: list[tuple[float, float]], began: float) -> None:
-    born, lifetime = zip(*lives, strict=True)
-    expiry = Lifetimes(bodies_of(list(born), list(lifetime)), began, 0.1)
-    told: dict[int, float] = {}
+def test_each_body_is_due_once_at_the_first_frame_after_its_end(
+    lifetimes: list[tuple[float, float]], start_time: float
+) -> None:
+    born, lifetime = zip(*lifetimes, strict=True)
+    expiry = Lifetimes(bodies_of(list(born), list(lifetime)), start_time, 0.1)
+    retired: dict[int, float] = {}
     for k in range(1, 70):
-        for number in expiry.due(0.1 * k).tolist():
-            assert number not in told
-            told[number] = 0.1 * k
-    for number, (birth, life) in enumerate(lives):
-        time = told[number]
-        assert time + SLACK * 0.1 >= birth + life - began
-        assert time <= 0.1 or time - 0.1 + SLACK * 0.1 < birth + life - began
+        for index in expiry.due(0.1 * k).tolist():
+            assert index not in retired
+            retired[index] = 0.1 * k
+    for index, (birth, duration) in enumerate(lifetimes):
+        time = retired[index]
+        assert time + SLACK * 0.1 >= birth + duration - start_time
+        assert time <= 0.1 or time - 0.1 + SLACK * 0.1 < birth + duration - start_time
 
 
-def test_nobody_is_due_where_lives_do_not_end() -> None:
+def test_no_body_is_due_with_infinite_lifetimes() -> None:
     expiry = Lifetimes(bodies_of([0.0, 1.0], [np.inf, np.inf]), 0.0, 0.1)
     assert not len(expiry.due(1e12))
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_lives_end_at_the_first_frame_at_which_they_are_over(engine: str) -> None:
-    scene = mixed()
-    retired, lifetime = ends(scene, 60, engine), scene.bodies.lifetime
+def test_bodies_retire_at_the_first_frame_after_their_lifetime(engine: str) -> None:
+    scene = mixed_scene()
+    retired, lifetime = retirement_times(scene, 60, engine), scene.bodies.lifetime
     assert sorted(retired) == np.flatnonzero(np.isfinite(lifetime)).tolist()
-    for number, time in retired.items():
-        assert time == pytest.approx(np.ceil(lifetime[number] / 0.01 - 1e-6) * 0.01, abs=1e-12)  # rounding of k·dt
-    assert {retired[n] for n in range(303, 323)} == {30 * 0.01}  # 0.3 is less than 30·0.01, in binary
+    for index, time in retired.items():
+        assert time == pytest.approx(np.ceil(lifetime[index] / 0.01 - 1e-6) * 0.01, abs=1e-12)  # rounding of k·dt
+    assert {retired[n] for n in range(303, 323)} == {30 * 0.01}  # 0.3 < 30·0.01 in binary
 
 
-def test_engines_and_formulas_retire_the_same_at_the_same_frames() -> None:
+def test_engines_and_closed_forms_retire_the_same_bodies_at_the_same_frames() -> None:
     scene = scene_of(
         {"count": 200, "lifetime": 0.4, "lifetime_jitter": 0.2},
         world={"gravity": [0.0, -9.81], "duration": 0.55, "bounds": [[-0.5, -9.0], [9.0, 9.0]]},
@@ -87,20 +89,20 @@ def test_engines_and_formulas_retire_the_same_at_the_same_frames() -> None:
     truth = solved_run(scene, scene.solver)
     assert truth is not None
     expected = {n: t for n, t in enumerate(truth.retired_time.tolist()) if t == t}
-    aside = [n for n, time in expected.items() if time < scene.bodies.lifetime[n]]
+    out_of_bounds = [n for n, time in expected.items() if time < scene.bodies.lifetime[n]]
     assert 150 < len(expected) < 200
-    assert len(aside) > 20
+    assert len(out_of_bounds) > 20
     for engine in able(scene):
-        found = ends(scene, 55, engine)
-        # Explicit Euler leaves by the top or bottom at another time than the parabola; here all leave by the side.
+        found = retirement_times(scene, 55, engine)
+        # Explicit Euler would cross the top or bottom at another time than the parabola; here all leave by the side.
         assert found.keys() == expected.keys()
         assert [found[n] for n in sorted(found)] == pytest.approx([expected[n] for n in sorted(found)], abs=1e-12)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_lives_change_no_path_before_they_end(engine: str) -> None:
-    mortal, immortal = (
-        mixed(),
+def test_lifetimes_do_not_change_paths_before_they_end(engine: str) -> None:
+    finite, infinite = (
+        mixed_scene(),
         scene_of(
             {"name": "free", "count": 300},
             {"name": "stay", "count": 3},
@@ -108,7 +110,7 @@ def test_lives_change_no_path_before_they_end(engine: str) -> None:
             plane=[FLOOR],
         ),
     )
-    first, second = start(mortal, engine), start(immortal, engine)
+    first, second = start(finite, engine), start(infinite, engine)
     for _ in range(60):
         first.step()
         second.step()
@@ -121,64 +123,66 @@ def test_lives_change_no_path_before_they_end(engine: str) -> None:
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("cut", [0, 7, 29, 30, 31, 45])
-def test_a_leg_that_begins_later_retires_at_the_same_frames(engine: str, cut: int) -> None:
-    scene = mixed()
-    through, other = SwitchableSimulation(scene, engine), SwitchableSimulation(scene, engine)
+def test_resumed_simulation_retires_at_the_same_frames(engine: str, cut: int) -> None:
+    scene = mixed_scene()
+    uninterrupted, other = SwitchableSimulation(scene, engine), SwitchableSimulation(scene, engine)
     for k in range(60):
         if k == cut:
             other.apply(Switch(time=0.0))
             other = SwitchableSimulation.resumed(other.checkpoint())
-        through.step()
+        uninterrupted.step()
         other.step()
-        a, b = through.frame(), other.frame()
+        a, b = uninterrupted.frame(), other.frame()
         assert np.array_equal(a.present, b.present)
-        if engine == "pymunk":  # the reference remembers contacts, exact its events: not bit for bit
+        if engine == "pymunk":  # not bit-identical: the reference remembers contacts, exact its events
             assert np.array_equal(a.position[:303], b.position[:303])
-    assert through.retired.keys() == other.retired.keys()
-    assert list(through.retired.values()) == pytest.approx(list(other.retired.values()), abs=1e-12)  # as of k·dt
+    assert uninterrupted.retired.keys() == other.retired.keys()
+    assert list(uninterrupted.retired.values()) == pytest.approx(
+        list(other.retired.values()), abs=1e-12
+    )  # rounding of k·dt
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_launch_gives_new_lives(engine: str) -> None:
-    relay = SwitchableSimulation(mixed(), engine)
+def test_launch_gives_new_lifetimes(engine: str) -> None:
+    simulation = SwitchableSimulation(mixed_scene(), engine)
     for _ in range(50):
-        relay.step()
-    assert len(relay.retired) > 100
-    relay.apply(Launch(time=0.0, generator="free", seed=8))
-    assert relay.frame().present[:300].all()
-    assert (relay.bodies.born[:300] == relay.time).all()
-    assert (relay.bodies.born[300:] == 0.0).all()
-    lives = relay.bodies.lifetime[:300].copy()
-    assert not np.array_equal(lives, mixed().bodies.lifetime[:300])
-    again = SwitchableSimulation.resumed(relay.checkpoint())
+        simulation.step()
+    assert len(simulation.retired) > 100
+    simulation.apply(Launch(time=0.0, generator="free", seed=8))
+    assert simulation.frame().present[:300].all()
+    assert (simulation.bodies.born[:300] == simulation.time).all()
+    assert (simulation.bodies.born[300:] == 0.0).all()
+    lifetimes = simulation.bodies.lifetime[:300].copy()
+    assert not np.array_equal(lifetimes, mixed_scene().bodies.lifetime[:300])
+    resumed = SwitchableSimulation.resumed(simulation.checkpoint())
     for _ in range(61):
-        relay.step()
-        again.step()
-    for each in (relay, again):
-        ended = np.asarray([each.retired[n] for n in range(300)])
-        late = ended - 0.5 - lives
-        # At the first frame after: less than dt later, and no more than the slack before.
-        assert (late > -SLACK * 0.01 - 1e-12).all()
-        assert (late < 0.01 + 1e-12).all()  # rounding of sums of 1 s
-    assert relay.state_hash() == again.state_hash()
+        simulation.step()
+        resumed.step()
+    for each in (simulation, resumed):
+        end = np.asarray([each.retired[n] for n in range(300)])
+        delay = end - 0.5 - lifetimes
+        # At the first frame after the end: less than dt late, and at most the slack early.
+        assert (delay > -SLACK * 0.01 - 1e-12).all()
+        assert (delay < 0.01 + 1e-12).all()  # rounding of sums of 1 s
+    assert simulation.state_hash() == resumed.state_hash()
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_who_is_gone_already_is_not_retired_again_and_who_joins_stays(engine: str) -> None:
-    relay = SwitchableSimulation(mixed(), engine)
+def test_removed_body_keeps_its_retirement_time_and_spawned_body_stays(engine: str) -> None:
+    simulation = SwitchableSimulation(mixed_scene(), engine)
     for _ in range(10):
-        relay.step()
-    relay.apply(Remove(time=0.0, body="free-1"))
-    relay.apply(Spawn(time=0.0, ball=Ball(name="late", position=(5.0, 5.0), radius=0.1)))
+        simulation.step()
+    simulation.apply(Remove(time=0.0, body="free-1"))
+    simulation.apply(Spawn(time=0.0, ball=Ball(name="late", position=(5.0, 5.0), radius=0.1)))
     for _ in range(60):
-        relay.step()
-    assert relay.retired[0] == 10 * 0.01
-    frame = relay.frame()
+        simulation.step()
+    assert simulation.retired[0] == 10 * 0.01
+    frame = simulation.frame()
     assert np.flatnonzero(frame.present).tolist() == [300, 301, 302, 323]
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_last_part_of_a_step_ends_lives_too(engine: str) -> None:
+def test_partial_last_step_ends_lifetimes(engine: str) -> None:
     simulation = start(scene_of({"count": 2, "lifetime": 0.015}), engine)
     simulation.step()
     simulation.finish(0.4)

@@ -1,4 +1,4 @@
-"""Free flight: closed forms to rounding, and bit for bit what pymunk itself does."""
+"""Free flight: closed forms to rounding, and bit-identical to pymunk."""
 
 import math
 
@@ -31,7 +31,7 @@ speeds = st.floats(-1e4, 1e4)
     st.floats(1e-5, 0.5),
     st.integers(1, 4),
 )
-def test_bodies_that_meet_nothing_fly_bit_for_bit_as_in_pymunk(states, gravity, dt, substeps):
+def test_flight_without_collisions_is_bit_identical_to_pymunk(states, gravity, dt, substeps):
     balls = [
         {"position": [x, y], "velocity": [vx, vy], "angular_velocity": w, "radius": 1.0, "collides": "none"}
         for x, y, vx, vy, w in states
@@ -60,7 +60,7 @@ def test_bodies_that_meet_nothing_fly_bit_for_bit_as_in_pymunk(states, gravity, 
 
 
 @given(st.floats(1e-3, 0.1), st.integers(1, 200), st.floats(-20, 20))
-def test_euler_leads_by_half_g_h_t(dt, steps, speed):
+def test_explicit_euler_is_ahead_by_half_g_h_t(dt, steps, speed):
     simulation = start(
         scene([{"position": [0, 10], "velocity": [0, speed], "radius": 1}], {"gravity": [0, -9.81]}, dt=dt)
     )
@@ -68,7 +68,7 @@ def test_euler_leads_by_half_g_h_t(dt, steps, speed):
         simulation.step()
     time, y = steps * dt, float(simulation.frame().position[0, 1])
     exact = 10 + speed * time - 0.5 * 9.81 * time**2
-    # The scheme's error is +g·h·T/2 exactly; the rest is rounding, of at most a few ulp of the largest term a step.
+    # The error of the scheme is exactly +g·h·T/2; the rest is rounding, at most a few ulps of the largest term a step.
     scale = 10 + abs(speed) * time + 9.81 * time**2
     assert y - exact == pytest.approx(0.5 * 9.81 * dt * time, abs=4 * steps * EPS * scale)
 
@@ -82,14 +82,14 @@ def test_half_kick_is_exact_to_rounding(dt, steps, velocity):
         simulation.frame().velocity[0],
         velocity,
         rtol=0,
-        atol=64 * EPS * (20 + 9.81 * dt),  # g·h/2 is added and taken off again
+        atol=64 * EPS * (20 + 9.81 * dt),  # g·h/2 is added and subtracted again
     )
     for _ in range(steps):
         simulation.step()
     time, frame = steps * dt, simulation.frame()
     g, v = np.asarray(world["gravity"]), np.asarray(velocity)
     scale = 10 + 20 * time + 9.81 * time**2
-    # A rounding or two of the largest term, each step.
+    # One or two roundings of the largest term each step.
     assert np.allclose(frame.position[0], [3, 10] + v * time + 0.5 * g * time**2, rtol=0, atol=4 * steps * EPS * scale)
     assert np.allclose(frame.velocity[0], v + g * time, rtol=0, atol=4 * steps * EPS * (20 + 9.81 * time))
 
@@ -103,7 +103,7 @@ def test_linear_drag_is_exact_in_velocity(k, dt, wind):
     time = 50 * dt
     terminal = np.asarray(wind) + np.array([0, -9.81]) / k
     exact = terminal + (np.array([30, 40]) - terminal) * math.exp(-k * time)
-    # Each of the 50 steps rounds sums of the size of the largest velocity there is.
+    # Each of the 50 steps rounds sums as large as the largest velocity.
     scale = 60 + float(np.abs(terminal).max())
     assert np.allclose(simulation.frame().velocity[0], exact, rtol=0, atol=50 * 8 * EPS * scale)
 
@@ -135,32 +135,32 @@ def test_drag_converges_in_first_order(linear, quadratic):
             simulation.step()
         errors.append(np.hypot(*(simulation.frame().position[0] - oracle)))
     order = np.polyfit(np.log(steps), np.log(errors), 1)[0]
-    assert order == pytest.approx(1.0, abs=0.2)  # the project's band for a fitted order
+    assert order == pytest.approx(1.0, abs=0.2)  # the tolerance of the project for a fitted order
 
 
 @pytest.mark.parametrize("drag", [{"linear_drag": 1e9}, {"quadratic_drag": 1e9}, {"quadratic_drag": 3.0}])
-def test_drag_is_stable_however_strong(drag):
+def test_drag_of_any_strength_is_stable(drag):
     world = {"gravity": [0, -9.81], **drag}
     simulation = start(scene([{"position": [0, 0], "velocity": [1e3, 0], "radius": 1}], world, dt=10.0))
     fastest = 1e3
     for _ in range(100):
         simulation.step()
         speed = float(np.hypot(*simulation.frame().velocity[0]))
-        # Slower and slower, down to the terminal velocity at most.
+        # The speed decreases at most down to the terminal velocity.
         assert speed <= max(fastest, 9.81 / drag.get("linear_drag", 1e-9) + 2 * math.sqrt(9.81 / 1.0))
         fastest = max(speed, 1e-3)
 
 
-def test_the_two_halves_obey_one_rule_with_drag_and_force():
-    """A ball in the space that never touches anything goes bit for bit as one outside of it."""
+def test_particles_and_space_bodies_obey_the_same_law_with_drag_and_force():
+    """A ball in the space that never touches anything moves bit-identically to one outside of it."""
     world = {"gravity": [0.3, -9.81], "linear_drag": 0.7, "quadratic_drag": 0.05, "wind": [3, -1]}
-    alike = {"velocity": [3.0, 12.0], "radius": 0.1, "mass": 0.37}
+    common = {"velocity": [3.0, 12.0], "radius": 0.1, "mass": 0.37}
     document = {
         "world": world,
         "solver": {"dt": 0.01},
         "ball": [
-            {"name": "free", "position": [0, 0], "collides": "none", **alike},
-            {"name": "meeting", "position": [0, 0], **alike},
+            {"name": "free", "position": [0, 0], "collides": "none", **common},
+            {"name": "meeting", "position": [0, 0], **common},
         ],
         "plane": [{"point": [0, -900], "normal": [0, 1]}],
     }
@@ -176,15 +176,15 @@ def test_the_two_halves_obey_one_rule_with_drag_and_force():
 
 
 SPARKS = {"position": [0.3, 0.7], "velocity_min": [-20, 10], "velocity_max": [20, 40], "radius": 0.05}
-AIRS = {
+DRAGS = {
     "still": {},
     "linear": {"linear_drag": 0.3, "wind": [2.0, -1.0]},
     "quadratic": {"linear_drag": 0.1, "quadratic_drag": 0.02, "wind": [2.0, 0.5]},
 }
 
 
-def crowd(count: int, substeps: int, **more):
-    """Return sparks of two masses, some of which spin, with a hole where a heavy one stands on its own."""
+def sparks(count: int, substeps: int, **more):
+    """Return sparks of two masses, some of which spin, with one colliding body between them."""
     world = {"gravity": [0.2, -9.81], "seed": 5, **more}
     emitters = [
         {**SPARKS, "count": count, "mass": 0.37},
@@ -195,91 +195,91 @@ def crowd(count: int, substeps: int, **more):
     return from_document({"world": world, "solver": {"dt": 0.01, "substeps": substeps}, "emitter": emitters})
 
 
-def same(a, b):
+def same_state(a, b):
     return all(
         np.array_equal(getattr(a, each), getattr(b, each))
         for each in ("position", "velocity", "angle", "angular_velocity", "present")
     )
 
 
-@pytest.mark.parametrize("air", AIRS)
+@pytest.mark.parametrize("drag", DRAGS)
 @pytest.mark.parametrize("substeps", [1, 2, 4, 7, 16])
-def test_a_frame_at_once_is_its_substeps_one_after_the_other(air, substeps):
-    """An observer is told of each substep; without one, all of a frame are done while a body is at hand."""
-    which = crowd(300, substeps, **AIRS[air])
-    at_once, apart, told = start(which), start(which), []
-    apart.watch(lambda time, before, after, pairs: told.append(time))
+def test_flight_of_a_whole_frame_equals_its_single_substeps(drag, substeps):
+    """With an observer each substep runs for all bodies; without one all substeps run body by body."""
+    sparks_scene = sparks(300, substeps, **DRAGS[drag])
+    whole_frames, single_substeps, times = start(sparks_scene), start(sparks_scene), []
+    single_substeps.watch(lambda time, before, after, pairs: times.append(time))
     for _ in range(9):
-        at_once.step()
-        apart.step()
-        assert same(at_once.frame(), apart.frame())
-    assert len(told) == 9 * substeps
+        whole_frames.step()
+        single_substeps.step()
+        assert same_state(whole_frames.frame(), single_substeps.frame())
+    assert len(times) == 9 * substeps
 
 
-@pytest.mark.parametrize("air", AIRS)
+@pytest.mark.parametrize("drag", DRAGS)
 @pytest.mark.parametrize("substeps", [1, 4, 6])
 @pytest.mark.parametrize("count", [150, 20_000])
-def test_compiled_and_numpy_flight_are_the_same_bit_for_bit(air, substeps, count, monkeypatch):
-    which = crowd(count, substeps, **AIRS[air])
-    compiled, plain = start(which), start(which)
+def test_compiled_and_numpy_flight_are_bit_identical(drag, substeps, count, monkeypatch):
+    sparks_scene = sparks(count, substeps, **DRAGS[drag])
+    compiled, plain = start(sparks_scene), start(sparks_scene)
     for _ in range(4):
         monkeypatch.setattr(free, "MIN_COMPILED", 200)
         compiled.step()
         monkeypatch.setattr(free, "MIN_COMPILED", 10**9)
         plain.step()
-    assert same(compiled.frame(), plain.frame())
+    assert same_state(compiled.frame(), plain.frame())
 
 
-@pytest.mark.parametrize("air", AIRS)
-@pytest.mark.parametrize("many", [0, 10**9])
-def test_holes_in_a_crowd_change_no_one_else(air, many, monkeypatch):
-    """Those who are left fly as before, in a few runs or scattered; those who are gone stay where they were."""
-    monkeypatch.setattr(free, "MIN_COMPILED", many)
-    which = crowd(150, 3, **AIRS[air])
-    whole, holed = start(which), start(which)
-    gone: list[int] = []
-    for k, more in enumerate(([0, 1, 40], list(range(100, 200)), list(range(201, 300, 2)), [307], [300])):
-        for number in more:
-            holed.apply(Remove(time=0, body=which.bodies.names[number]))
-        gone += more
-        before = holed.frame().position[gone]
+@pytest.mark.parametrize("drag", DRAGS)
+@pytest.mark.parametrize("min_compiled", [0, 10**9])
+def test_removed_particles_do_not_change_the_others(drag, min_compiled, monkeypatch):
+    """Remaining particles fly as before, in contiguous runs or scattered; removed ones keep their position."""
+    monkeypatch.setattr(free, "MIN_COMPILED", min_compiled)
+    sparks_scene = sparks(150, 3, **DRAGS[drag])
+    complete, reduced = start(sparks_scene), start(sparks_scene)
+    removed: list[int] = []
+    for k, indices in enumerate(([0, 1, 40], list(range(100, 200)), list(range(201, 300, 2)), [307], [300])):
+        for index in indices:
+            reduced.apply(Remove(time=0, body=sparks_scene.bodies.names[index]))
+        removed += indices
+        before = reduced.frame().position[removed]
         for _ in range(k + 1):
-            whole.step()
-            holed.step()
-        a, b = whole.frame(), holed.frame()
-        left = b.present
-        assert np.flatnonzero(~left).tolist() == sorted(gone)
-        assert np.array_equal(a.position[left], b.position[left])
-        assert np.array_equal(a.velocity[left], b.velocity[left])
-        assert np.array_equal(a.angle[left], b.angle[left])
-        assert np.array_equal(before, b.position[gone])
-        assert not b.velocity[gone].any()
+            complete.step()
+            reduced.step()
+        a, b = complete.frame(), reduced.frame()
+        remaining = b.present
+        assert np.flatnonzero(~remaining).tolist() == sorted(removed)
+        assert np.array_equal(a.position[remaining], b.position[remaining])
+        assert np.array_equal(a.velocity[remaining], b.velocity[remaining])
+        assert np.array_equal(a.angle[remaining], b.angle[remaining])
+        assert np.array_equal(before, b.position[removed])
+        assert not b.velocity[removed].any()
 
 
-@pytest.mark.parametrize("many", [0, 10**9])
-def test_a_force_on_one_of_a_crowd_moves_that_one_alone(many, monkeypatch):
-    monkeypatch.setattr(free, "MIN_COMPILED", many)
-    which = crowd(150, 4)
-    calm, pushed = start(which), start(which)
-    pushed.apply(Force(time=0, body=which.bodies.names[7], force=(3.7, 0.0), torque=0.01))
+@pytest.mark.parametrize("min_compiled", [0, 10**9])
+def test_force_on_one_particle_moves_only_that_particle(min_compiled, monkeypatch):
+    monkeypatch.setattr(free, "MIN_COMPILED", min_compiled)
+    sparks_scene = sparks(150, 4)
+    free_flight, pushed = start(sparks_scene), start(sparks_scene)
+    pushed.apply(Force(time=0, body=sparks_scene.bodies.names[7], force=(3.7, 0.0), torque=0.01))
     for _ in range(10):
-        calm.step()
+        free_flight.step()
         pushed.step()
-    a, b = calm.frame(), pushed.frame()
+    a, b = free_flight.frame(), pushed.frame()
     assert b.velocity[7, 0] - a.velocity[7, 0] == pytest.approx(1.0, rel=1e-12)  # 3.7 N · 0.1 s / 0.37 kg, rounding
-    moment = float(which.bodies.moment[7])
+    moment = float(sparks_scene.bodies.moment[7])
     assert b.angular_velocity[7] == pytest.approx(0.001 / moment, rel=1e-12)  # rounding of 40 sums
-    rest = np.arange(len(a.position)) != 7
-    assert np.array_equal(a.position[rest], b.position[rest])
-    assert np.array_equal(a.angle[rest], b.angle[rest])
+    others = np.arange(len(a.position)) != 7
+    assert np.array_equal(a.position[others], b.position[others])
+    assert np.array_equal(a.angle[others], b.angle[others])
 
 
-@pytest.mark.parametrize("many", [0, 10**9])
-def test_what_leaves_all_bounds_in_a_crowd_is_named(many, monkeypatch):
-    monkeypatch.setattr(free, "MIN_COMPILED", many)
-    which = crowd(150, 1, linear_drag=1e-9)
-    simulation = start(which)
-    name = which.bodies.names[123]
+@pytest.mark.parametrize("min_compiled", [0, 10**9])
+def test_diverging_particle_is_named(min_compiled, monkeypatch):
+    monkeypatch.setattr(free, "MIN_COMPILED", min_compiled)
+    sparks_scene = sparks(150, 1, linear_drag=1e-9)
+    simulation = start(sparks_scene)
+    name = sparks_scene.bodies.names[123]
     simulation.apply(Force(time=0, body=name, force=(3e13, 0.0)))
     with pytest.raises(Divergence, match=name):
         for _ in range(100):

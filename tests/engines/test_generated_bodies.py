@@ -1,4 +1,4 @@
-"""Stacks, ropes, cloth and ragdolls while they run: what actions find of them, and who meets whom."""
+"""Stacks, ropes, cloth and ragdolls in running simulations: actions on them, and collisions."""
 
 from typing import Any
 
@@ -16,8 +16,8 @@ ENGINES = ("pymunk", "reference")
 every_engine = pytest.mark.parametrize("engine", ENGINES)
 
 
-def mixed(**world: Any) -> Scene:
-    """A ball, a small pyramid on a floor, a rope, and a ragdoll in the air."""
+def mixed_scene(**world: Any) -> Scene:
+    """Return a scene with a ball, a small pyramid on a floor, a rope, and a ragdoll in the air."""
     return from_document(
         {
             "world": {"gravity": [0, -9.81], **world},
@@ -32,22 +32,22 @@ def mixed(**world: Any) -> Scene:
 
 
 @every_engine
-def test_changed_coefficient_reaches_the_bodies_of_its_element_and_spawned_ones_keep_theirs(engine: str) -> None:
-    simulation = start_engine(mixed(), engine, mixed().solver)
+def test_changed_coefficient_applies_to_the_bodies_of_its_element_only(engine: str) -> None:
+    simulation = start_engine(mixed_scene(), engine, mixed_scene().solver)
     simulation.apply(Spawn(time=0.0, ball=Ball(position=(-8.0, 3.0), radius=0.3, restitution=0.9)))
     simulation.apply(SetParameter(time=0.0, path="ragdoll.doll.restitution", value=0.7))
     simulation.apply(SetParameter(time=0.0, path="stack.box.friction", value=0.4))
     bodies = simulation.bodies
     simulation.close()
-    said = [bodies.elements[element] for element in bodies.element.tolist()]
-    assert [each.restitution for each in said[9:24]] == [0.7] * 15
-    assert [each.friction for each in said[1:4]] == [0.4] * 3
-    assert said[-1].restitution == 0.9
+    elements = [bodies.elements[element] for element in bodies.element.tolist()]
+    assert [each.restitution for each in elements[9:24]] == [0.7] * 15
+    assert [each.friction for each in elements[1:4]] == [0.4] * 3
+    assert elements[-1].restitution == 0.9
     assert len(bodies) == 25
 
 
-def test_element_leads_back_to_its_mover() -> None:
-    scene = mixed()
+def test_source_index_maps_an_element_to_its_source() -> None:
+    scene = mixed_scene()
     assert [scene.source_index(k) for k in range(len(scene.elements))] == [0, 1, 2, *[3] * 15]
     assert scene.source_index(len(scene.elements)) == len(scene.body_sources)
     plain = from_document({"ball": [{"position": [k, 0], "radius": 0.1} for k in range(3)]})
@@ -56,33 +56,33 @@ def test_element_leads_back_to_its_mover() -> None:
 
 @every_engine
 @pytest.mark.parametrize("name", ["box", "line", "doll"])
-def test_launch_puts_a_generator_back_whole(engine: str, name: str) -> None:
-    scene = mixed()
-    relay = start(scene, engine)
+def test_launch_restores_a_generator_completely(engine: str, name: str) -> None:
+    scene = mixed_scene()
+    simulation = start(scene, engine)
     for _ in range(30):
-        relay.step()
-    own = np.asarray([body.startswith(f"{name}-") for body in scene.bodies.names])
-    gone = scene.bodies.names[int(np.flatnonzero(own)[1])]
-    relay.apply(Remove(time=relay.time, body=gone))
-    before = relay.frame()
-    relay.apply(Launch(time=relay.time, generator=name, seed=0))
-    after = relay.frame()
+        simulation.step()
+    generated = np.asarray([body.startswith(f"{name}-") for body in scene.bodies.names])
+    removed = scene.bodies.names[int(np.flatnonzero(generated)[1])]
+    simulation.apply(Remove(time=simulation.time, body=removed))
+    before = simulation.frame()
+    simulation.apply(Launch(time=simulation.time, generator=name, seed=0))
+    after = simulation.frame()
     assert after.present.all()
-    assert np.array_equal(after.position[own], scene.bodies.position[own])
-    assert np.array_equal(after.angle[own], scene.bodies.angle[own])
-    assert not after.velocity[own].any()
-    assert np.array_equal(after.position[~own], before.position[~own])
-    relay.close()
+    assert np.array_equal(after.position[generated], scene.bodies.position[generated])
+    assert np.array_equal(after.angle[generated], scene.bodies.angle[generated])
+    assert not after.velocity[generated].any()
+    assert np.array_equal(after.position[~generated], before.position[~generated])
+    simulation.close()
 
 
 @every_engine
-def test_balls_that_a_rod_joins_pass_through_each_other(engine: str) -> None:
+def test_balls_joined_by_a_rod_do_not_collide(engine: str) -> None:
     balls = [{"name": name, "position": [x, 0], "radius": 1.0} for name, x in (("a", 0), ("b", 1), ("c", 1.5))]
     joints = [{"kind": "rod", "between": [a, b]} for a, b in (("a", "b"), ("b", "c"), ("a", "c"))]
-    for joined, touches in ((joints, 0), (joints[:2], 1)):
-        scene = from_document({"ball": balls, "joint": joined})
+    for active_joints, contact_count in ((joints, 0), (joints[:2], 1)):
+        scene = from_document({"ball": balls, "joint": active_joints})
         simulation = start_engine(scene, engine, scene.solver)
         simulation.step()
         contacts = simulation.contacts()
         simulation.close()
-        assert contacts.pair.tolist() == [[0, 2]] * touches
+        assert contacts.pair.tolist() == [[0, 2]] * contact_count

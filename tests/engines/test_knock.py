@@ -1,4 +1,4 @@
-"""Hits of pucks: momentum, angular momentum, the law of restitution, the cone of friction."""
+"""Collisions of pucks: momentum, angular momentum, restitution and the friction cone."""
 
 import math
 
@@ -21,7 +21,7 @@ def energy(motion: Five, mass: float, radius: float) -> float:
     a=MOTION, b=MOTION, masses=st.tuples(SIZE, SIZE), radii=st.tuples(SIZE, SIZE), angle=st.floats(-4, 4),
     restitution=st.floats(0, 1), friction=st.floats(0, 2),
 )  # fmt: skip
-def test_a_hit_keeps_the_laws(
+def test_collision_of_pucks_obeys_the_laws(
     a: Five, b: Five, masses: tuple[float, float], radii: tuple[float, float], angle: float,
     restitution: float, friction: float,
 ) -> None:  # fmt: skip
@@ -30,32 +30,32 @@ def test_a_hit_keeps_the_laws(
     if closing < 0.0:
         a, b, closing = (-a[0], -a[1], *a[2:]), (-b[0], -b[1], *b[2:]), -closing
     c, d = collide_pucks(restitution, friction, a, b, (1 / ma, 1 / mb), radii, *n)
-    rounding = 1e-12 * (ma + mb) * 200  # of sums of momenta and of energies up to 200 times the masses
+    rounding = 1e-12 * (ma + mb) * 200  # rounding of sums of momenta and energies of up to 200 times the masses
     for k in (0, 1):
         assert ma * c[k] + mb * d[k] == approx(ma * a[k] + mb * b[k], abs=rounding)
-    parting = (d[0] - c[0]) * n[0] + (d[1] - c[1]) * n[1]
-    assert parting == approx(restitution * closing, abs=1e-11)  # rounding of speeds of 20 m/s, masses 1000:1
+    separation_speed = (d[0] - c[0]) * n[0] + (d[1] - c[1]) * n[1]
+    assert separation_speed == approx(restitution * closing, abs=1e-11)  # rounding of speeds of 20 m/s, masses 1000:1
     jx, jy = ma * (a[0] - c[0]), ma * (a[1] - c[1])
-    push, rub = jx * n[0] + jy * n[1], jy * n[0] - jx * n[1]
-    assert abs(rub) <= friction * push + rounding
-    # A rub turns both the same way, each by r·J / I = 2·J / (m·r). Known from velocities, to 1e-14 m/s, over a radius.
-    assert c[4] == approx(a[4] - 2.0 * rub / (ma * ra), abs=1e-11)
+    normal_impulse, friction_impulse = jx * n[0] + jy * n[1], jy * n[0] - jx * n[1]
+    assert abs(friction_impulse) <= friction * normal_impulse + rounding
+    # Friction turns both in the same direction, by r·J / I = 2·J / (m·r). Accuracy: 1e-14 m/s over a radius.
+    assert c[4] == approx(a[4] - 2.0 * friction_impulse / (ma * ra), abs=1e-11)
     other = mb * ((d[1] - b[1]) * n[0] - (d[0] - b[0]) * n[1])
     assert d[4] == approx(b[4] - 2.0 * other / (mb * rb), abs=1e-11)
     slip = (a[1] - b[1]) * n[0] - (a[0] - b[0]) * n[1] + ra * a[4] + rb * b[4]
-    left = (c[1] - d[1]) * n[0] - (c[0] - d[0]) * n[1] + ra * c[4] + rb * d[4]
-    assert left * slip >= -1e-9  # it may end, but never turns round
-    assert abs(left) <= abs(slip) + 1e-10  # rounding
+    final_slip = (c[1] - d[1]) * n[0] - (c[0] - d[0]) * n[1] + ra * c[4] + rb * d[4]
+    assert final_slip * slip >= -1e-9  # slip may end but never reverses
+    assert abs(final_slip) <= abs(slip) + 1e-10  # rounding
     assert energy(c, ma, ra) + energy(d, mb, rb) <= energy(a, ma, ra) + energy(b, mb, rb) + rounding * radii[0] ** 2
 
 
-def test_what_never_moves_gives_back_all_that_its_restitution_says() -> None:
+def test_immovable_body_rebounds_a_puck_with_its_restitution() -> None:
     after, wall = collide_pucks(0.5, 0.0, (2.0, 1.0, 0.0, 0.0, 3.0), STILL, (2.0, 0.0), (0.1, 0.0), 1.0, 0.0)
     assert after == (-1.0, 1.0, 0.0, 0.0, 3.0)
     assert wall == STILL
 
 
-def test_a_rough_wall_ends_the_slip_of_a_rim() -> None:
+def test_rough_wall_ends_the_slip_of_a_puck() -> None:
     (_, vy, _, _, spin), _ = collide_pucks(
         0.5, 100.0, (2.0, 1.0, 0.0, 0.0, 0.0), STILL, (2.0, 0.0), (0.1, 0.0), 1.0, 0.0
     )

@@ -1,4 +1,4 @@
-"""Layers: who shares none passes through each other, bit for bit as if the other were not there."""
+"""Layers: bodies without a common layer do not affect each other, bit for bit."""
 
 from typing import Any
 
@@ -19,7 +19,7 @@ from sandbox.trajectory import Trajectory
 
 pytestmark = pytest.mark.full  # property tests with many examples
 
-both = pytest.mark.parametrize("engine", ["pymunk", "reference"])
+every_engine = pytest.mark.parametrize("engine", ["pymunk", "reference"])
 
 LAYERS = ("ground", "one", "two")
 FRAME = {"points": [[-1, -1], [1, -1], [1, 1], [-1, 1]], "closed": True, "restitution": 0.9, "layers": list(LAYERS)}
@@ -33,7 +33,7 @@ def start_on(engine: str, scene: Scene) -> SwitchableSimulation:
     return sandbox.start(scene, engine)
 
 
-def crowd(layer: str, seed: float, count: int = 5) -> dict[str, Any]:
+def scatter(layer: str, seed: float, count: int = 5) -> dict[str, Any]:
     return {
         "name": f"crowd-{layer}",
         "count": count,
@@ -47,44 +47,44 @@ def crowd(layer: str, seed: float, count: int = 5) -> dict[str, Any]:
     }
 
 
-def scene_of(*crowds: dict[str, Any], **more: Any) -> Scene:
-    return from_document({"world": {"duration": 0.6, "gravity": [0.0, -4.0]}, "scatter": list(crowds), **more})
+def scene_of(*scatters: dict[str, Any], **more: Any) -> Scene:
+    return from_document({"world": {"duration": 0.6, "gravity": [0.0, -4.0]}, "scatter": list(scatters), **more})
 
 
-@both
+@every_engine
 @given(seed=st.floats(-1.0, 1.0), jitter=st.integers(0, 1000))
-@example(seed=0.0, jitter=153)  # two of one layer graze by 0.5 % of their distance, and part, between two looks
+@example(seed=0.0, jitter=153)  # two of one layer graze by 0.5 % of their distance and separate between two frames
 @settings(max_examples=15, deadline=None)
-def test_each_layer_runs_as_if_it_were_alone(engine: str, seed: float, jitter: int) -> None:
-    """The generators' chances hang on their place in the file, so those alone come first and are compared there."""
+def test_each_layer_runs_as_if_alone(engine: str, seed: float, jitter: int) -> None:
+    """The random numbers of generators depend on their order in the file, so the compared generator comes first."""
     world = {"duration": 0.6, "gravity": [0.0, -4.0], "seed": jitter}
-    alone = run_on(engine, scene_of(crowd("ground", seed), wall=[FRAME], world=world))
+    alone = run_on(engine, scene_of(scatter("ground", seed), wall=[FRAME], world=world))
     post = {"position": [0.0, 0.0], "radius": 0.3, "layers": ["one", "two"]}
-    others = (crowd("one", -seed), crowd("two", seed / 2.0))
-    full = scene_of(crowd("ground", seed), *others, wall=[FRAME], post=[post], world=world)
+    others = (scatter("one", -seed), scatter("two", seed / 2.0))
+    full = scene_of(scatter("ground", seed), *others, wall=[FRAME], post=[post], world=world)
     mixed = run_on(engine, full)
     count = alone.position.shape[1]
     assert np.array_equal(mixed.position[:, :count], alone.position)
     assert np.array_equal(mixed.velocity[:, :count], alone.velocity)
     layer = full.bodies.layer
-    missed = mixed.missed_pair  # who passes over another misses nothing; at this dt those of one layer may
+    missed = mixed.missed_pair  # bodies of different layers miss no contact; those of one layer may at this dt
     for a, b in (*mixed.contact_pair.tolist(), *missed.tolist()):
         assert layer[a] == layer[b] if b >= 0 else not (layer[a] == 0 and full.fixed_names[-1 - b] == "post-1")
     assert np.array_equal(missed[missed[:, 0] < count], alone.missed_pair)
 
 
-@both
+@every_engine
 @pytest.mark.parametrize("layers", [["ground"], ["ramp"], ["ground", "ramp"]])
 @pytest.mark.parametrize("layer", ["ground", "ramp"])
-def test_wall_stops_who_shares_a_layer(engine: str, layers: list[str], layer: str) -> None:
+def test_wall_stops_bodies_with_a_common_layer(engine: str, layers: list[str], layer: str) -> None:
     ball = {"position": [0.0, 0.0], "velocity": [2.0, 0.0], "radius": 0.1, "restitution": 1.0, "layer": layer}
     wall = {"points": [[0.5, -1], [0.5, 1]], "layers": layers}
     run = run_on(engine, from_document({"world": {"duration": 1.0}, "ball": [ball], "wall": [wall]}))
     assert run.velocity[-1, 0, 0] == pytest.approx(-2.0 if layer in layers else 2.0, rel=1e-12)  # rounding of a solve
 
 
-@both
-def test_planes_are_on_all_layers_but_those_that_say_otherwise(engine: str) -> None:
+@every_engine
+def test_planes_are_on_all_layers_by_default(engine: str) -> None:
     balls = [{"position": [x, 1.0], "radius": 0.1, "layer": name} for x, name in ((0.0, "ground"), (5.0, "up"))]
     world = {"duration": 1.0, "gravity": [0.0, -10.0]}
     for layers, falls in ((None, [False, False]), (["up"], [True, False])):
@@ -94,8 +94,8 @@ def test_planes_are_on_all_layers_but_those_that_say_otherwise(engine: str) -> N
         assert (run.position[-1, :, 1] < -1.0).tolist() == falls
 
 
-@both
-def test_fixed_bodies_are_on_layers_too(engine: str) -> None:
+@every_engine
+def test_fixed_bodies_collide_on_their_layer_only(engine: str) -> None:
     fixed = {"position": [0.5, 0.0], "size": [0.1, 1.0], "fixed": True, "layer": "up"}
     balls = [
         {"position": [0.0, y], "velocity": [1.0, 0.0], "radius": 0.1, "layer": name}
@@ -105,22 +105,22 @@ def test_fixed_bodies_are_on_layers_too(engine: str) -> None:
     assert run.velocity[-1, :2, 0].tolist() == [0.0, 1.0]
 
 
-@both
+@every_engine
 def test_contacts_of_a_layer_end_when_a_body_leaves_it(engine: str) -> None:
-    """A ball lies on a shelf in a zone; rolled into the mouth it is on another layer, and falls through."""
+    """A ball rolls on a shelf into a zone, changes its layer and falls through the shelf."""
     shelf = {"points": [[-1, 0], [1, 0]]}
     ball = {"name": "ball", "position": [-0.5, 0.1], "velocity": [1.0, 0.0], "radius": 0.1}
     mouth = {"position": [0.0, 0.1], "radius": 0.1, "to_layer": "below"}
     world = {"duration": 1.5, "gravity": [0.0, -10.0]}
     run = run_on(engine, from_document({"world": world, "ball": [ball], "wall": [shelf], "zone": [mouth]}))
-    through = float(run.time[np.flatnonzero(run.layer[:, 0])[0]])
-    assert through == pytest.approx(0.4, abs=0.02)
-    fallen = 0.1 - 5.0 * (1.5 - through) ** 2
-    assert run.position[-1, 0, 1] == pytest.approx(fallen, abs=0.1 * 1.1)  # within a frame's way at 11 m/s
+    entry_time = float(run.time[np.flatnonzero(run.layer[:, 0])[0]])
+    assert entry_time == pytest.approx(0.4, abs=0.02)
+    expected = 0.1 - 5.0 * (1.5 - entry_time) ** 2
+    assert run.position[-1, 0, 1] == pytest.approx(expected, abs=0.1 * 1.1)  # within the travel of a frame at 11 m/s
     assert run.missed_contacts == 0
 
 
-def test_meetings_count_every_layer_that_can_be_got_to() -> None:
+def test_contact_matrix_includes_every_reachable_layer() -> None:
     zones = [
         {"position": [0, 0], "radius": 1, "to_layer": "a"},
         {"position": [0, 0], "radius": 1, "layers": ["a"], "to_layer": "b"},
@@ -136,57 +136,59 @@ def test_meetings_count_every_layer_that_can_be_got_to() -> None:
     scene = from_document({"ball": balls, "zone": zones})
     names = scene.layers
     assert names == ("ground", "a", "b", "far", "farther", "none")
-    got = [
+    reachable = [
         {name for k, name in enumerate(names) if bits >> k & 1}
         for bits in reachable_layers(scene, scene.bodies).tolist()
     ]
-    assert got == [{"ground", "a", "b"}, {"b"}, {"far", "farther"}, {"ground"}, {"none"}]
-    meet = contact_matrix(scene)
-    assert meet.touches.tolist() == [True, True, False, False, False]
-    assert meet.can_enter_zone.tolist() == [True, False, True, False, False]
-    assert meet.free.tolist() == [False, False, False, True, True]
+    assert reachable == [{"ground", "a", "b"}, {"b"}, {"far", "farther"}, {"ground"}, {"none"}]
+    contacts = contact_matrix(scene)
+    assert contacts.touches.tolist() == [True, True, False, False, False]
+    assert contacts.can_enter_zone.tolist() == [True, False, True, False, False]
+    assert contacts.free.tolist() == [False, False, False, True, True]
 
 
-@both
+@every_engine
 def test_spawned_body_is_on_its_layer_and_an_unknown_one_is_refused(engine: str) -> None:
     ball = {"position": [0.0, 0.0], "radius": 0.1}
     wall = {"points": [[0.5, -1], [0.5, 1]], "layers": ["up"]}
-    relay = start_on(engine, from_document({"ball": [ball], "wall": [wall]}))
+    simulation = start_on(engine, from_document({"ball": [ball], "wall": [wall]}))
     for name, y in (("up", 0.5), ("ground", -0.5)):
         spawned = Ball(name=name, position=(0.0, y), velocity=(2.0, 0.0), radius=0.1, layer=name)
-        relay.apply(Spawn(time=0, ball=spawned))
+        simulation.apply(Spawn(time=0, ball=spawned))
     with pytest.raises(ActionError, match=r"no layer is named 'attic'.*ground, up"):
-        relay.apply(Spawn(time=0, ball=Ball(position=(0.0, 3.0), radius=0.1, layer="attic")))
+        simulation.apply(Spawn(time=0, ball=Ball(position=(0.0, 3.0), radius=0.1, layer="attic")))
     for _ in range(50):
-        relay.step()
-    relay.apply(Switch(time=0))
+        simulation.step()
+    simulation.apply(Switch(time=0))
     for _ in range(50):
-        relay.step()
-    assert relay.frame().layer.tolist() == [0, 1, 0]
-    assert relay.frame().velocity[:, 0].tolist() == pytest.approx([0.0, 0.0, 2.0], abs=1e-12)  # rounding of a solve
+        simulation.step()
+    assert simulation.frame().layer.tolist() == [0, 1, 0]
+    assert simulation.frame().velocity[:, 0].tolist() == pytest.approx(
+        [0.0, 0.0, 2.0], abs=1e-12
+    )  # rounding of a solve
 
 
-@both
-def test_launched_bodies_are_back_on_their_layer(engine: str) -> None:
+@every_engine
+def test_launched_bodies_return_to_their_initial_layer(engine: str) -> None:
     emitter = {"name": "jet", "position": [0, 0], "count": 3, "velocity_min": [1, 0], "velocity_max": [2, 0]}
     emitter |= {"collides": "fixed", "radius": 0.01}
     zone = {"points": [[0.2, -1], [0.2, 1]], "thickness": 0.1, "to_layer": "up"}
-    relay = start_on(engine, from_document({"emitter": [emitter], "zone": [zone]}))
+    simulation = start_on(engine, from_document({"emitter": [emitter], "zone": [zone]}))
     for _ in range(60):
-        relay.step()
-    assert relay.frame().layer.tolist() == [1, 1, 1]
-    relay.apply(Launch(time=0, generator="jet", seed=3))
-    assert relay.frame().layer.tolist() == [0, 0, 0]
-    assert not relay.frame().visits.any()
+        simulation.step()
+    assert simulation.frame().layer.tolist() == [1, 1, 1]
+    simulation.apply(Launch(time=0, generator="jet", seed=3))
+    assert simulation.frame().layer.tolist() == [0, 0, 0]
+    assert not simulation.frame().visits.any()
 
 
-@both
+@every_engine
 def test_layers_are_stored_with_a_run(engine: str, tmp_path) -> None:
     ball = {"position": [0.0, 0.0], "velocity": [1.0, 0.0], "radius": 0.1}
     zone = {"position": [0.5, 0.0], "radius": 0.2, "to_layer": "up"}
     run = run_on(engine, from_document({"world": {"duration": 1.0}, "ball": [ball], "zone": [zone]}))
-    again = type(run).load(run.save(tmp_path / "run.npz"))
-    assert np.array_equal(again.layer, run.layer)
+    loaded = type(run).load(run.save(tmp_path / "run.npz"))
+    assert np.array_equal(loaded.layer, run.layer)
     assert sorted(np.unique(run.layer).tolist()) == [0, 1]
     plain = run_on(engine, from_document({"world": {"duration": 0.1}, "ball": [ball]}))
     assert plain.layer.size == 0

@@ -1,4 +1,4 @@
-"""Mathavan's cushion: a nose that rubs while it is pressed, against limits, laws and figures of another program."""
+"""Mathavan's cushion model: limits, laws and results of another program."""
 
 import math
 from itertools import pairwise
@@ -12,7 +12,7 @@ from sandbox.engines.tabletop import collisions as module
 from sandbox.engines.tabletop.collisions import MATHAVAN2010, Five, collide_cushion
 
 R = 0.028575
-SCALE = np.asarray([1.0, 1.0, R, R, R])  # spins as speeds of the rim, m/s
+SCALE = np.asarray([1.0, 1.0, R, R, R])  # spins as surface speeds, m/s
 
 POOLTOOL = [
     ((0.41, 0.58, 36.15, 9.86, -48.7), 1.26, (0.215, -0.49256, 20.7996, 6.37061, -32.9517)),
@@ -22,26 +22,26 @@ POOLTOOL = [
     ((-0.54, 2.68, -3.44, 32.79, -56.36), 1.33, (-0.66616, -2.01453, -23.13257, -0.52509, -24.88043)),
     ((1.17, 0.83, 19.26, 51.78, -35.14), 1.31, (0.92495, -0.66744, 10.39523, 38.42011, -9.88426)),
 ]
-"""Velocity and spin before, height of the nose in radii, and after: pooltool 0.6.0, `mathavan_2010.model.solve`,
-e = 0.85, both frictions 0.2, into +y, in steps of 2e-5 N·s at 1 kg."""
+"""Velocity and spin before, height of the nose in radii, velocity and spin after, from pooltool 0.6.0,
+`mathavan_2010.model.solve`: e = 0.85, both frictions 0.2, into +y, in steps of 2e-5 N·s at 1 kg."""
 
 speeds, spins = st.floats(-3.0, 3.0), st.floats(-80.0, 80.0)
 
 
-def hit(a: Five, height: float, e: float = 0.85, friction: float = 0.2, sliding: float = 0.2) -> Five:
+def rebound(a: Five, height: float, e: float = 0.85, friction: float = 0.2, sliding: float = 0.2) -> Five:
     return collide_cushion(MATHAVAN2010, e, friction, sliding, a, R, height, 0.0, 1.0)
 
 
 @pytest.mark.parametrize(("before", "height", "after"), POOLTOOL)
-def test_figures_are_those_of_another_program(before: Five, height: float, after: Five) -> None:
-    off = np.abs((np.asarray(hit(before, height * R)) - np.asarray(after)) * SCALE)
-    assert off.max() < 2e-3  # m/s: its steps of 2e-5 m/s, over some thousand of them, and where slips end
+def test_results_match_pooltool(before: Five, height: float, after: Five) -> None:
+    error = np.abs((np.asarray(rebound(before, height * R)) - np.asarray(after)) * SCALE)
+    assert error.max() < 2e-3  # m/s: some thousand steps of 2e-5 m/s, and the times at which slip ends
 
 
 @pytest.mark.parametrize("height", [0.8 * R, R, 1.28 * R])
 def test_without_friction_only_the_normal_changes(height: float) -> None:
-    after = hit((0.7, 1.3, 5.0, -6.0, 7.0), height, friction=0.0, sliding=0.0)
-    assert after == pytest.approx((0.7, -0.85 * 1.3, 5.0, -6.0, 7.0), rel=1e-6)  # one step of 2,000 is cut
+    after = rebound((0.7, 1.3, 5.0, -6.0, 7.0), height, friction=0.0, sliding=0.0)
+    assert after == pytest.approx((0.7, -0.85 * 1.3, 5.0, -6.0, 7.0), rel=1e-6)  # one step of 2,000 is partial
 
 
 @given(vx=speeds, vy=st.floats(0.05, 4.0), wx=spins, wy=spins, wz=spins, height=st.floats(0.7, 1.6))
@@ -50,27 +50,27 @@ def test_energy_never_rises(vx: float, vy: float, wx: float, wy: float, wz: floa
         return 0.5 * (a[0] ** 2 + a[1] ** 2) + 0.2 * R * R * (a[2] ** 2 + a[3] ** 2 + a[4] ** 2)
 
     before: Five = (vx, vy, wx, wy, wz)
-    after = hit(before, height * R)
+    after = rebound(before, height * R)
     assert after[1] < 0.0
-    # a slip that is over trembles by a step's worth: 1e-3 of the speed into the cushion, squared
+    # a finished slip oscillates by the size of a step: 1e-3 of the speed into the cushion, squared
     assert energy(after) <= energy(before) * (1.0 + 1e-6) + 1e-5 * vy * vy
 
 
-def test_what_is_mirrored_rebounds_mirrored() -> None:
-    a, b = hit((1.2, 1.0, -30.0, 40.0, 20.0), 1.28 * R), hit((-1.2, 1.0, -30.0, -40.0, -20.0), 1.28 * R)
+def test_mirrored_ball_rebounds_mirrored() -> None:
+    a, b = rebound((1.2, 1.0, -30.0, 40.0, 20.0), 1.28 * R), rebound((-1.2, 1.0, -30.0, -40.0, -20.0), 1.28 * R)
     assert a == pytest.approx((-b[0], b[1], b[2], -b[3], -b[4]), rel=1e-12)  # the same sums
 
 
-def test_direction_of_the_cushion_does_not_matter() -> None:
-    turn = 0.7
-    cos, sin = math.cos(turn), math.sin(turn)
+def test_rebound_is_invariant_under_rotation() -> None:
+    rotation = 0.7
+    cos, sin = math.cos(rotation), math.sin(rotation)
 
-    def turned(a: Five) -> Five:
+    def rotated(a: Five) -> Five:
         return cos * a[0] - sin * a[1], sin * a[0] + cos * a[1], cos * a[2] - sin * a[3], sin * a[2] + cos * a[3], a[4]
 
     before: Five = (1.2, 1.0, -30.0, 40.0, 20.0)
-    there = collide_cushion(MATHAVAN2010, 0.85, 0.2, 0.2, turned(before), R, 1.28 * R, -sin, cos)
-    assert there == pytest.approx(turned(hit(before, 1.28 * R)), rel=1e-9)  # rounding of 4,000 steps
+    found = collide_cushion(MATHAVAN2010, 0.85, 0.2, 0.2, rotated(before), R, 1.28 * R, -sin, cos)
+    assert found == pytest.approx(rotated(rebound(before, 1.28 * R)), rel=1e-9)  # rounding of 4,000 steps
 
 
 def test_smaller_steps_converge(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""Pucks: flat discs on a floor, on every engine that has them."""
+"""Pucks: flat discs on a surface, on every engine that models them."""
 
 from typing import Any
 
@@ -39,7 +39,7 @@ def ice(*pucks: Any, curl: float = 0.0, dt: float = 0.005, **more: Any) -> Scene
     return from_document({"world": world, "solver": {"dt": dt}, "surface": surface, "ball": list(pucks), **more})
 
 
-def after(scene: Scene, time: float, engine: str = "pymunk", *actions: Action) -> Simulation:
+def run_for(scene: Scene, time: float, engine: str = "pymunk", *actions: Action) -> Simulation:
     simulation = start(scene, engine)
     for action in actions:
         simulation.apply(action)
@@ -48,62 +48,68 @@ def after(scene: Scene, time: float, engine: str = "pymunk", *actions: Action) -
     return simulation
 
 
-def still(frame: Frame) -> bool:
+def is_at_rest(frame: Frame) -> bool:
     return not (frame.velocity.any() or frame.angular_velocity.any())
 
 
 @every_engine
-def test_a_puck_slides_to_rest_and_turns_to_rest_by_laws_of_their_own(engine: str) -> None:
+def test_sliding_and_spinning_of_a_puck_decelerate_independently(engine: str) -> None:
     scene = ice(puck("a", 0, 0, 1.2, 1.6, 0.25))
-    half = after(scene, 0.4, engine).frame()
-    slowed = 1.0 - MU * G * 0.4 / 2.0
-    assert half.velocity[0] == pytest.approx([1.2 * slowed, 1.6 * slowed], rel=1e-12)  # rounding of 80 steps
-    assert half.angular_velocity[0] == pytest.approx(0.25 - 2.0 * MUS * G / R * 0.4, rel=1e-11)  # likewise
-    end = after(scene, 5.0, engine).frame()
-    assert still(end)
-    assert end.position[0] == pytest.approx(np.asarray([0.6, 0.8]) * 4.0 / (2.0 * MU * G), rel=1e-12)
-    assert end.angle[0] == pytest.approx(0.25**2 / (4.0 * MUS * G / R), rel=1e-11)
+    halfway = run_for(scene, 0.4, engine).frame()
+    remaining = 1.0 - MU * G * 0.4 / 2.0
+    assert halfway.velocity[0] == pytest.approx([1.2 * remaining, 1.6 * remaining], rel=1e-12)  # rounding of 80 steps
+    assert halfway.angular_velocity[0] == pytest.approx(0.25 - 2.0 * MUS * G / R * 0.4, rel=1e-11)  # likewise
+    final = run_for(scene, 5.0, engine).frame()
+    assert is_at_rest(final)
+    assert final.position[0] == pytest.approx(np.asarray([0.6, 0.8]) * 4.0 / (2.0 * MU * G), rel=1e-12)
+    assert final.angle[0] == pytest.approx(0.25**2 / (4.0 * MUS * G / R), rel=1e-11)
 
 
 @every_engine
-def test_a_puck_that_turns_alone_stays_where_it_is(engine: str) -> None:
-    frame = after(ice(puck("a", 1.0, 2.0, spin=-0.2)), 0.2, engine).frame()
+def test_spinning_puck_stays_in_place(engine: str) -> None:
+    frame = run_for(ice(puck("a", 1.0, 2.0, spin=-0.2)), 0.2, engine).frame()
     assert frame.position[0].tolist() == [1.0, 2.0]
     assert frame.angular_velocity[0] == pytest.approx(-0.2 + 2.0 * MUS * G / R * 0.2, rel=1e-12)
 
 
-def test_a_puck_curls_as_the_closed_form_has_it() -> None:
+def test_curling_puck_follows_the_closed_form() -> None:
     scene = ice(puck("a", 0, 0, 0.0, 2.0, 3.0), puck("b", 5, 0, 0.0, 2.0, -3.0), curl=0.4)
-    frame = after(scene, 2.0).frame()
+    frame = run_for(scene, 2.0).frame()
     expected = np.asarray(curled(0.0, 2.0, MU * G, 0.4, 2.0))
     assert frame.position[0] == pytest.approx(expected[:2], abs=1e-12)  # rounding of 400 steps
     assert frame.velocity[0] == pytest.approx(expected[2:], abs=1e-12)
-    assert frame.position[0, 0] < 0.0  # turning anti-clockwise, to its left
+    assert frame.position[0, 0] < 0.0  # counter-clockwise spin curls to the left
     assert frame.position[1] == pytest.approx([5.0 - expected[0], expected[1]], abs=1e-12)
 
 
-def test_a_curling_puck_does_not_depend_on_the_step() -> None:
+def test_curling_puck_does_not_depend_on_the_step() -> None:
     pucks = [puck("a", 0, 0, 2.0, 0.05, 2.0), puck("b", 2.5, 0.1), puck("c", 3.5, 0.5)]
-    coarse, fine = (after(ice(*pucks, curl=0.3, dt=dt), 6.0).frame() for dt in (0.02, 0.0005))
-    assert still(coarse)
-    # hits are taken back to when they were, whatever the step; what is left is rounding, grown by two hits
+    coarse, fine = (run_for(ice(*pucks, curl=0.3, dt=dt), 6.0).frame() for dt in (0.02, 0.0005))
+    assert is_at_rest(coarse)
+    # hits are resolved at their exact time at any step; the rest is rounding, amplified by two hits
     assert coarse.position == pytest.approx(fine.position, abs=1e-8)
 
 
 @settings(max_examples=25)
 @given(
     spins=st.tuples(st.floats(-3, 3), st.floats(-3, 3), st.floats(-3, 3)),
-    off=st.floats(-0.25, 0.25),
+    offset=st.floats(-0.25, 0.25),
     speed=st.floats(0.5, 3.0),
-    wide=st.floats(0.08, 0.2),
+    radius=st.floats(0.08, 0.2),
 )
-def test_engines_agree_on_hits(spins: tuple[float, float, float], off: float, speed: float, wide: float) -> None:
+def test_engines_agree_on_collisions(
+    spins: tuple[float, float, float], offset: float, speed: float, radius: float
+) -> None:
     a, b, c = spins
     wall = {"points": [[3.0, -2.0], [3.0, 2.0]], "restitution": 0.5, "friction": 0.5}
-    pucks = puck("a", 0, 0, speed, 0, a), puck("b", 1.0, off, spin=b), puck("c", 2.0, 3 * off, spin=c, radius=wide)
+    pucks = (
+        puck("a", 0, 0, speed, 0, a),
+        puck("b", 1.0, offset, spin=b),
+        puck("c", 2.0, 3 * offset, spin=c, radius=radius),
+    )
     scene = ice(*pucks, wall=[wall], dt=0.01)
-    one, other = (after(scene, 1.5, engine).frame() for engine in ENGINES)
-    # one step of 10 ms covers 3 cm; the instant of a hit is found to 1e-15, and three hits of round things amplify
+    one, other = (run_for(scene, 1.5, engine).frame() for engine in ENGINES)
+    # a step of 10 ms covers 3 cm; the time of a hit is found to 1e-15, which three collisions of discs amplify
     assert one.position == pytest.approx(other.position, abs=1e-8)
     assert one.velocity == pytest.approx(other.velocity, abs=1e-8)
     assert one.angular_velocity == pytest.approx(other.angular_velocity, abs=1e-7)
@@ -113,37 +119,37 @@ def test_engines_agree_on_hits(spins: tuple[float, float, float], off: float, sp
 @settings(max_examples=15)
 @given(
     spins=st.lists(st.floats(-4, 4), min_size=4, max_size=4),
-    off=st.floats(-0.25, 0.25),
+    offset=st.floats(-0.25, 0.25),
     speed=st.floats(0.5, 3.0),
 )
-def test_energy_never_rises_and_a_mirror_shows_the_same(
-    engine: str, curl: float, spins: list[float], off: float, speed: float
+def test_energy_never_rises_and_mirrored_runs_stay_mirrored(
+    engine: str, curl: float, spins: list[float], offset: float, speed: float
 ) -> None:
     def throw(sign: float) -> Simulation:
-        places = [(0.0, 0.0), (0.8, off), (1.4, -off), (1.9, 2.0 * off)]
+        positions = [(0.0, 0.0), (0.8, offset), (1.4, -offset), (1.9, 2.0 * offset)]
         pucks = [
             puck(str(k), x, sign * y, speed if k == 0 else 0.0, 0.0, sign * spin)
-            for k, ((x, y), spin) in enumerate(zip(places, spins, strict=True))
+            for k, ((x, y), spin) in enumerate(zip(positions, spins, strict=True))
         ]
         wall = {"points": [[2.6, -9.0], [2.6, 9.0]], "restitution": 0.7, "friction": 0.3}
         return start(ice(*pucks, curl=curl, dt=0.02, wall=[wall]), engine)
 
-    run, image = throw(1.0), throw(-1.0)
-    last = total_energy(run)
+    run, mirrored = throw(1.0), throw(-1.0)
+    previous = total_energy(run)
     for _ in range(50):
         run.step()
-        image.step()
+        mirrored.step()
         now = total_energy(run)
-        assert now <= last + 1e-11  # rounding of some 100 J
-        last = now
-    here, there = run.frame(), image.frame()
-    # what mirrors differ by is rounding, grown by up to four hits
-    assert here.position * [1.0, -1.0] == pytest.approx(there.position, abs=1e-8)
-    assert here.angular_velocity == pytest.approx(-there.angular_velocity, abs=1e-7)
+        assert now <= previous + 1e-11  # rounding of some 100 J
+        previous = now
+    frame, mirrored_frame = run.frame(), mirrored.frame()
+    # the mirrored runs differ by rounding, amplified by up to four hits
+    assert frame.position * [1.0, -1.0] == pytest.approx(mirrored_frame.position, abs=1e-8)
+    assert frame.angular_velocity == pytest.approx(-mirrored_frame.angular_velocity, abs=1e-7)
 
 
 @pytest.mark.parametrize(("engine", "curl"), [("pymunk", 0.0), ("pymunk", 0.4), ("exact", 0.0)])
-def test_the_account_of_pucks_adds_up(engine: str, curl: float) -> None:
+def test_ledger_of_pucks_closes(engine: str, curl: float) -> None:
     wall = {"points": [[2.0, -2.0], [2.0, 2.0]], "restitution": 0.5, "friction": 0.5}
     simulation = start(ice(puck("a", 0, 0, 2.0, 0.1, 3.0), puck("b", 1.0, 0.1), wall=[wall], curl=curl), engine)
     simulation.account()
@@ -155,21 +161,21 @@ def test_the_account_of_pucks_adds_up(engine: str, curl: float) -> None:
     assert account[Cause.FRICTION] < -1.0
     assert account[Cause.RESTITUTION] < -0.1
     others = set(account) - {Cause.FRICTION, Cause.RESTITUTION}
-    assert sum(abs(account[cause]) for cause in others) < 1e-6  # hops and mended overlaps
+    assert sum(abs(account[cause]) for cause in others) < 1e-6  # hops and corrected overlaps
 
 
 @every_engine
 def test_pucks_fall_into_pockets(engine: str) -> None:
     hole = {"position": [1.0, 0.0], "radius": 0.05}
-    frame = after(ice(puck("a", 0, 0, 1.5, 0, 1.0), pocket=[hole]), 2.0, engine).frame()
+    frame = run_for(ice(puck("a", 0, 0, 1.5, 0, 1.0), pocket=[hole]), 2.0, engine).frame()
     assert frame.position[0].tolist() == [1.0, 0.0]
-    assert still(frame)
+    assert is_at_rest(frame)
 
 
 @every_engine
-def test_ice_may_be_swept_while_pucks_slide(engine: str) -> None:
+def test_friction_can_change_while_pucks_slide(engine: str) -> None:
     scene = ice(puck("a", 0, 0, 2.0, 0.0))
-    simulation = after(scene, 1.0, engine)
+    simulation = run_for(scene, 1.0, engine)
     simulation.apply(SetParameter(time=1.0, path="surface.sliding_friction", value=0.5 * MU))
     speed = 2.0 - MU * G
     assert simulation.scene.surface is not None
@@ -177,39 +183,39 @@ def test_ice_may_be_swept_while_pucks_slide(engine: str) -> None:
     for _ in range(200):
         simulation.step()
     assert simulation.frame().velocity[0, 0] == pytest.approx(speed - 0.5 * MU * G, rel=1e-12)  # rounding
-    smooth = start(ice_without_rub(), engine)
+    smooth = start(frictionless_ice(), engine)
     with pytest.raises(ActionError, match="floor friction cannot be switched"):
         smooth.apply(SetParameter(time=0.0, path="surface.sliding_friction", value=0.1))
 
 
-def ice_without_rub() -> Scene:
+def frictionless_ice() -> Scene:
     return from_document({"surface": {"bodies": "pucks"}, "ball": [puck("a", 0, 0, 1.0)]})
 
 
-def test_curl_comes_up_where_it_is_modelled() -> None:
+def test_curl_can_be_set_only_where_it_is_modelled() -> None:
     scene = ice(puck("a", 0, 0, 2.0, 0.0, 3.0))
     curl = SetParameter(time=0.0, path="surface.curl", value=0.4)
     expected = curled(2.0, 0.0, MU * G, 0.4, 1.0)
-    assert after(scene, 1.0, "pymunk", curl).frame().position[0] == pytest.approx(expected[:2], abs=1e-12)  # rounding
+    assert run_for(scene, 1.0, "pymunk", curl).frame().position[0] == pytest.approx(expected[:2], abs=1e-12)  # rounding
     with pytest.raises(ActionError, match="curl"):
         start(scene, "exact").apply(curl)
 
 
-def test_what_a_scene_of_pucks_demands() -> None:
-    straight, bent = ice(puck("a", 0, 0)), ice(puck("a", 0, 0), curl=0.1)
-    assert demands(bent) - demands(straight) == {Demand.CURL}
+def test_demands_of_a_scene_of_pucks() -> None:
+    straight, curled_scene = ice(puck("a", 0, 0)), ice(puck("a", 0, 0), curl=0.1)
+    assert demands(curled_scene) - demands(straight) == {Demand.CURL}
     assert {Demand.SURFACE, Demand.PUCKS} <= demands(straight)
-    assert Demand.SPIN not in demands(bent)
+    assert Demand.SPIN not in demands(curled_scene)
     with pytest.raises(Refusal, match="curl"):
-        start(bent, "exact")
+        start(curled_scene, "exact")
     for engine in ("pymunk", "reference"):
-        start(bent, engine).step()
-    assert loads(dumps(bent)) == bent
-    assert straight.bodies.moment[0] == pytest.approx(0.5 * MASS * R**2, rel=1e-15)  # of a disc
+        start(curled_scene, engine).step()
+    assert loads(dumps(curled_scene)) == curled_scene
+    assert straight.bodies.moment[0] == pytest.approx(0.5 * MASS * R**2, rel=1e-15)  # a disc
 
 
-def test_on_a_floor_that_does_not_rub_pucks_are_discs_to_every_engine() -> None:
-    scene = ice_without_rub()
+def test_pucks_on_a_frictionless_surface_are_discs_for_every_engine() -> None:
+    scene = frictionless_ice()
     assert not on_floor(scene)
     for engine in ("pymunk", "exact", "reference"):
         simulation = start(scene, engine)
@@ -217,7 +223,7 @@ def test_on_a_floor_that_does_not_rub_pucks_are_discs_to_every_engine() -> None:
         assert simulation.frame().position[0, 0] == pytest.approx(scene.solver.dt, rel=1e-12)  # rounding
 
 
-def test_a_puck_is_not_struck_but_kicked_and_more_may_come() -> None:
+def test_puck_accepts_impulses_but_no_strike_and_others_can_spawn() -> None:
     simulation = start(ice(puck("a", 0, 0)), "pymunk")
     with pytest.raises(ActionError, match="puck"):
         simulation.apply(Strike(time=0, ball="a", aim=0.0, speed=1.0))
@@ -232,14 +238,14 @@ def test_a_puck_is_not_struck_but_kicked_and_more_may_come() -> None:
         simulation.apply(Spawn(time=0, ball=Ball(position=(9.0, 0.0), radius=0.1, spin=(0.0, 0.0, 1.0))))
 
 
-def test_a_run_goes_on_on_another_engine() -> None:
+def test_run_continues_on_another_engine() -> None:
     scene = ice(puck("a", 0, 0, 2.0, 0.1, 1.0), puck("b", 1.5, 0.0))
     switched = sandbox.run(scene, actions=(Switch(time=0.5, engine="exact"),))
     assert switched.position[-1] == pytest.approx(sandbox.run(scene).position[-1], abs=1e-8)  # as engines agree
 
 
 @pytest.mark.parametrize(
-    ("surface", "more", "path", "words"),
+    ("surface", "more", "path", "expected_text"),
     [
         ({"curl": 0.1, "bodies": "spheres"}, {}, "surface.curl", "pucks"),
         ({"rolling_friction": 0.1}, {}, "surface.rolling_friction", "do not roll"),
@@ -250,9 +256,11 @@ def test_a_run_goes_on_on_another_engine() -> None:
         ({"bodies": "bricks"}, {}, "surface.bodies", "'spheres' or 'pucks'"),
     ],
 )
-def test_what_pucks_have_not_is_told(surface: dict[str, Any], more: dict[str, Any], path: str, words: str) -> None:
+def test_unsupported_settings_of_pucks_are_refused(
+    surface: dict[str, Any], more: dict[str, Any], path: str, expected_text: str
+) -> None:
     document = {"surface": {"bodies": "pucks", **surface}, "ball": [puck("a", 0, 0)], **more}
     with pytest.raises(SceneError) as caught:
         from_document(document)
-    told = {fault.path: fault.message for fault in caught.value.faults}
-    assert any(found.startswith(path) and words in message for found, message in told.items()), told
+    faults = {fault.path: fault.message for fault in caught.value.faults}
+    assert any(found.startswith(path) and expected_text in message for found, message in faults.items()), faults

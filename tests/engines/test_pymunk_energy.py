@@ -1,4 +1,4 @@
-"""The account of pymunk: it closes to rounding, obeys the laws of what it names, and leaves no trace on the run."""
+"""Energy ledger of pymunk: it closes to rounding, its entries obey the laws, and it does not affect the run."""
 
 from functools import partial
 from pathlib import Path
@@ -15,11 +15,11 @@ from sandbox.scene.files.load import from_document
 from tests import accounts
 
 SCENES = Path(__file__).parents[2] / "scenes"
-# Rounding of a few hundred sums, of energies that are up to 1e4 times those in motion
-kept = partial(accounts.kept, engine="pymunk", closes=1e-11)
+# Rounding of a few hundreds of sums of energies up to 1e4 times the kinetic energy.
+closed_account = partial(accounts.closed_account, engine="pymunk", closes=1e-11)
 
 
-def document(gravity: float = -10.0, substeps: int = 1, **more: Any) -> Scene:
+def scene_of(gravity: float = -10.0, substeps: int = 1, **more: Any) -> Scene:
     world = {"gravity": [0, gravity], "duration": 3.0, **more.pop("world", {})}
     solver = {"dt": 0.01, "substeps": substeps, **more.pop("solver", {})}
     return from_document({"world": world, "solver": solver, **more})
@@ -56,8 +56,8 @@ FLOOR = {"point": [0, 0], "normal": [0, 1]}
         ("particles/sparks", 15),
     ],
 )
-def test_account_of_a_shipped_scene_closes(name: str, steps: int) -> None:
-    account = kept(sandbox.load(SCENES / f"{name}.toml"), steps)
+def test_ledger_of_a_shipped_scene_closes(name: str, steps: int) -> None:
+    account = closed_account(sandbox.load(SCENES / f"{name}.toml"), steps)
     assert all(np.isfinite(list(account.values())))
 
 
@@ -84,14 +84,16 @@ def test_account_of_a_shipped_scene_closes(name: str, steps: int) -> None:
     ],
     ids=lambda joints: str(joints[-1]["kind"]),
 )
-def test_account_of_a_joint_in_wind_closes_and_each_cause_has_its_sign(joints: list[dict[str, Any]]) -> None:
+def test_ledger_of_a_joint_in_wind_closes_with_the_expected_signs(joints: list[dict[str, Any]]) -> None:
     box = {"size": [0.6, 0.3], "mass": 2.0, "collides": "none"}
     boxes = [
         {"name": "a", "position": [0, 0], "angular_velocity": 2.0, **box},
         {"name": "b", "position": [1, 0.2], "velocity": [0, 1.0], "angular_velocity": -1.0, **box},
     ]
-    held = [{"between": ["a", "b"], **joint} for joint in joints]
-    account = kept(document(box=boxes, joint=held, substeps=2, world={"linear_drag": 0.1, "wind": [1.0, 0.0]}), 60)
+    joint_tables = [{"between": ["a", "b"], **joint} for joint in joints]
+    account = closed_account(
+        scene_of(box=boxes, joint=joint_tables, substeps=2, world={"linear_drag": 0.1, "wind": [1.0, 0.0]}), 60
+    )
     kind = joints[-1]["kind"]
     assert account[Cause.DRAG] < 0.0
     assert (account[Cause.DAMPING] < 0.0) == kind.endswith("spring")
@@ -100,51 +102,55 @@ def test_account_of_a_joint_in_wind_closes_and_each_cause_has_its_sign(joints: l
 
 
 def test_free_fall_gains_half_m_g_h_squared_in_each_substep() -> None:
-    account = kept(document(ball=[ball("a", 0, 5), ball("b", 1, 5, mass=2.0, collides="none")], plane=[FLOOR]), 50)
-    # Explicit Euler: the fall lags by g h²/2 in each of 50 substeps, for 1 kg in the space and 2 kg beside it.
+    account = closed_account(
+        scene_of(ball=[ball("a", 0, 5), ball("b", 1, 5, mass=2.0, collides="none")], plane=[FLOOR]), 50
+    )
+    # Explicit Euler: the fall lags by g h²/2 in each of 50 substeps, for 1 kg inside and 2 kg outside the space.
     assert account[Cause.INTEGRATOR] == pytest.approx(50 * 0.5 * 3.0 * (10.0 * 0.01) ** 2, rel=1e-12)  # rounding
     assert all(energy == 0.0 for cause, energy in account.items() if cause != Cause.INTEGRATOR)
 
 
-def test_fall_that_starts_half_a_kick_ahead_gains_nothing() -> None:
+def test_free_fall_with_half_kick_gains_no_energy() -> None:
     balls = [ball("a", 0, 5), ball("b", 1, 5, collides="none")]
-    account = kept(document(ball=balls, plane=[FLOOR], solver={"half_kick": True}), 50, part=0.3)
-    # A substep of which only s is made is off by ½ m g² h² s (s − 1), which the interpolation costs.
+    account = closed_account(scene_of(ball=balls, plane=[FLOOR], solver={"half_kick": True}), 50, part=0.3)
+    # Interpolation of a partial substep of fraction s costs ½ m g² h² s (s − 1).
     assert account[Cause.INTEGRATOR] == pytest.approx(2 * 0.5 * 0.1**2 * 0.3 * (0.3 - 1.0), abs=1e-12)  # rounding
 
 
-def test_impact_takes_what_restitution_leaves_over() -> None:
+def test_energy_loss_of_an_impact_follows_restitution() -> None:
     e, m1, m2, v = 0.5, 1.0, 3.0, 4.0
     balls = [ball("a", 0, 0, velocity=[v, 0], mass=m1), ball("b", 1, 0, mass=m2)]
     balls = [{**each, "restitution": np.sqrt(e), "friction": 0.0} for each in balls]
-    account = kept(document(gravity=0.0, ball=balls), 60)
+    account = closed_account(scene_of(gravity=0.0, ball=balls), 60)
     reduced = m1 * m2 / (m1 + m2)
     assert account[Cause.RESTITUTION] == pytest.approx(-0.5 * reduced * (1 - e**2) * v**2, rel=1e-12)  # rounding
     assert account[Cause.FRICTION] == 0.0
 
 
-def test_slide_takes_friction_times_weight_times_way() -> None:
+def test_friction_work_of_a_slide_is_force_times_distance() -> None:
     scene = sandbox.load(SCENES / "benchmark/slide_to_stop.toml")
     time = 120 * scene.solver.dt
-    account = kept(scene, 120)
-    way = 5.0 * time - 0.5 * (0.5 * 9.81) * time**2
+    account = closed_account(scene, 120)
+    distance = 5.0 * time - 0.5 * (0.5 * 9.81) * time**2
     mass = float(scene.bodies.mass[0])
-    # The box tips forward a little at first, into the slop, and its friction is not μ m g meanwhile.
-    assert account[Cause.FRICTION] == pytest.approx(-0.5 * mass * 9.81 * way, rel=5e-3)
+    # At first the box tips forward slightly into the slop, and its friction differs from μ m g.
+    assert account[Cause.FRICTION] == pytest.approx(-0.5 * mass * 9.81 * distance, rel=5e-3)
 
 
 def test_box_at_rest_has_no_entries() -> None:
     box = {"name": "a", "position": [0, 0.1], "size": [1.0, 0.2], "mass": 2.0}
-    scene = document(box=[box], plane=[FLOOR])
-    settled, later = kept(scene, 100), kept(scene, 200)
-    # Each substep's kick, of m g² h²/2 = 0.01 J, is taken back by the contact; 1 J in 1 s would be the integrator's.
-    assert all(later[cause] == pytest.approx(settled[cause], abs=1e-5) for cause in Cause)
+    scene = scene_of(box=[box], plane=[FLOOR])
+    earlier, later = closed_account(scene, 100), closed_account(scene, 200)
+    # The contact cancels the kick of each substep, m g² h²/2 = 0.01 J; uncancelled, it would add 1 J in 1 s.
+    assert all(later[cause] == pytest.approx(earlier[cause], abs=1e-5) for cause in Cause)
 
 
 def test_elastic_gas_has_no_friction() -> None:
-    account = kept(sandbox.load(SCENES / "benchmark/gas.toml"), 100)
+    account = closed_account(sandbox.load(SCENES / "benchmark/gas.toml"), 100)
     assert account[Cause.FRICTION] == 0.0
-    assert account[Cause.RESTITUTION] == pytest.approx(0.0, abs=1e-12 * 78.5)  # rounding, of the gas's energy
+    assert account[Cause.RESTITUTION] == pytest.approx(
+        0.0, abs=1e-12 * 78.5
+    )  # rounding, relative to the energy of the gas
 
 
 ACTIONS: accounts.Timed = [
@@ -158,29 +164,31 @@ ACTIONS: accounts.Timed = [
 ]
 
 
-@pytest.mark.parametrize("part", [None, 0.37])
-def test_account_goes_on_through_actions(part: float | None) -> None:
+@pytest.mark.parametrize("fraction", [None, 0.37])
+def test_ledger_stays_closed_through_actions(fraction: float | None) -> None:
     balls = [ball("a", 0, 0.5), ball("b", 1, 0.3, velocity=[-1, 0]), ball("c", 2, 3, collides="none")]
-    account = kept(document(ball=balls, plane=[FLOOR], substeps=2), 80, ACTIONS, part)
+    account = closed_account(scene_of(ball=balls, plane=[FLOOR], substeps=2), 80, ACTIONS, fraction)
     assert account[Cause.RETIRED] < 0.0
     assert account[Cause.ACTIONS] != 0.0
     assert account[Cause.DRIVES] != 0.0
     assert account[Cause.DRAG] < 0.0
 
 
-def test_steady_force_works_along_the_way() -> None:
-    account = kept(document(gravity=0.0, ball=[ball("a", 0, 0)]), 50, [(0, Force(time=0, body="a", force=(2.0, 0.0)))])
+def test_work_of_a_constant_force_is_booked_as_drives() -> None:
+    account = closed_account(
+        scene_of(gravity=0.0, ball=[ball("a", 0, 0)]), 50, [(0, Force(time=0, body="a", force=(2.0, 0.0)))]
+    )
     assert account[Cause.DRIVES] == pytest.approx(0.5 * 1.0 * (2.0 * 0.5) ** 2, rel=1e-12)  # rounding of 50 sums
 
 
-def test_spring_that_breaks_parts_with_what_it_stored() -> None:
+def test_stored_energy_of_a_broken_spring_is_booked_as_parted() -> None:
     spring = {"kind": "spring", "between": ["a"], "stiffness": 100.0, "rest_length": 0.5, "strength": 12.0}
-    account = kept(document(ball=[ball("a", 0, -0.5)], joint=[spring]), 40)
-    # It breaks in the first substep in which it gives more than 12 N, and so stores more than 12²/2k = 0.72 J.
+    account = closed_account(scene_of(ball=[ball("a", 0, -0.5)], joint=[spring]), 40)
+    # It breaks in the first substep in which its force exceeds 12 N, when it stores more than 12²/2k = 0.72 J.
     assert -0.85 < account[Cause.PARTED] < -0.72
 
 
-def test_contacts_that_part_and_meet_again_are_booked_once() -> None:
+def test_contacts_that_separate_and_return_are_booked_once() -> None:
     boxes = [
         {
             "name": f"b{k}",
@@ -191,5 +199,5 @@ def test_contacts_that_part_and_meet_again_are_booked_once() -> None:
         }
         for k in range(9)
     ]
-    # Munk2D starts a point that it still knows at its old impulse, and reports that once more.
-    kept(document(box=boxes, plane=[FLOOR], solver={"persistence": 8}), 120)
+    # Munk2D starts a contact point that it remembers with its old impulse and reports that again.
+    closed_account(scene_of(box=boxes, plane=[FLOOR], solver={"persistence": 8}), 120)

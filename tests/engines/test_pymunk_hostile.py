@@ -1,4 +1,4 @@
-"""The pymunk engine under any scene, any action and any mixture of materials."""
+"""Pymunk engine with random scenes, actions and mixtures of materials."""
 
 import itertools
 from typing import Any
@@ -20,57 +20,57 @@ pytestmark = pytest.mark.full  # property tests with many examples
 
 
 @st.composite
-def runnable(draw: st.DrawFn) -> Scene:
-    """Sound scenes without the words that only other engines know, and with work for a fraction of a second."""
+def supported_scenes(draw: st.DrawFn) -> Scene:
+    """Draw valid scenes without settings of other engines and with at most a fraction of a second of work."""
     document: Document = draw(documents(most=2))
     solver = document.get("solver", {})
-    for word in ("integrator", "detection", "response", "broad_phase"):
-        solver.pop(word, None)
-    for key, most in (("substeps", 3), ("iterations", 20)):
+    for key in ("integrator", "detection", "response", "broad_phase"):
+        solver.pop(key, None)
+    for key, limit in (("substeps", 3), ("iterations", 20)):
         if key in solver:
-            solver[key] = min(solver[key], most)
+            solver[key] = min(solver[key], limit)
     scene = from_document(document)
-    assume(able(scene))  # but for half a kick in drag
+    assume(able(scene))  # half_kick with drag is refused
     return scene
 
 
 def outcome(simulation: Simulation, steps: int) -> tuple[str | None, str]:
-    """Step; return the divergence, if there is one, and the hash of the state at the end."""
+    """Run some steps; return the message of a divergence, if any, and the final state hash."""
     diverged = None
     try:
         for _ in range(steps):
             simulation.step()
-            assert finite(simulation)
+            assert is_finite(simulation)
     except Divergence as divergence:
         diverged = str(divergence)
     return diverged, simulation.state_hash()
 
 
-def finite(simulation: Simulation) -> bool:
+def is_finite(simulation: Simulation) -> bool:
     frame = simulation.frame()
     state = (frame.position, frame.velocity, frame.angle, frame.angular_velocity)
     return all(bool(np.isfinite(each).all()) for each in state)
 
 
-@given(runnable())
+@given(supported_scenes())
 @settings(max_examples=80)
-def test_any_scene_runs_finite_or_diverges_and_does_so_again(scene: Scene) -> None:
+def test_any_scene_stays_finite_or_diverges_reproducibly(scene: Scene) -> None:
     first, again = start(scene), start(scene)
-    first.contacts()  # recording contacts must not matter
+    first.contacts()  # recording contacts must not change the result
     assert outcome(first, 20) == outcome(again, 20)
     assert np.isfinite(first.contacts().time).all()
 
 
 @st.composite
-def deeds(draw: st.DrawFn, known: tuple[str, ...]) -> Action:
-    """Actions on the bodies of a scene, some of which are not there."""
+def actions_on_bodies(draw: st.DrawFn, known: tuple[str, ...]) -> Action:
+    """Draw an action on a body of a scene or on an unknown body."""
     body = st.sampled_from([*known, "spawned-1", "zzz"])
     amount = numbers(-1e42, 1e42) | numbers(-10, 10)
-    place = numbers(-1e16, 1e16) | numbers(-100, 100)
+    coordinate = numbers(-1e16, 1e16) | numbers(-100, 100)
     speed = numbers(-7e11, 7e11) | numbers(-10, 10)
     ball = st.builds(
         Ball,
-        position=st.tuples(place, place),
+        position=st.tuples(coordinate, coordinate),
         velocity=st.tuples(speed, speed),
         radius=numbers(1e-9, 1e9) | numbers(0.01, 1),
         mass=st.none() | numbers(1e-15, 1e30),
@@ -93,7 +93,7 @@ def deeds(draw: st.DrawFn, known: tuple[str, ...]) -> Action:
             Move,
             time=st.just(0.0),
             body=body,
-            position=st.tuples(place, place),
+            position=st.tuples(coordinate, coordinate),
             velocity=st.none() | st.tuples(speed, speed),
         ),
         st.builds(Spawn, time=st.just(0.0), ball=ball),
@@ -105,28 +105,28 @@ def deeds(draw: st.DrawFn, known: tuple[str, ...]) -> Action:
 
 @given(st.data())
 @settings(max_examples=80)
-def test_any_action_is_done_or_refused_with_nothing_changed(data: st.DataObject) -> None:
-    scene = data.draw(runnable())
-    every = data.draw(st.lists(deeds(scene.bodies.names), min_size=1, max_size=8))
+def test_any_action_is_applied_or_refused_without_change(data: st.DataObject) -> None:
+    scene = data.draw(supported_scenes())
+    actions = data.draw(st.lists(actions_on_bodies(scene.bodies.names), min_size=1, max_size=8))
 
-    def played() -> tuple[str | None, str]:
+    def run_actions() -> tuple[str | None, str]:
         simulation = start(scene)
         simulation.contacts()
         diverged = None
-        for action in every:
+        for action in actions:
             before = simulation.state_hash()
             try:
                 simulation.apply(action)
             except ActionError as error:
                 assert str(error)
                 assert simulation.state_hash() == before
-            assert finite(simulation)
+            assert is_finite(simulation)
             diverged, after = outcome(simulation, 2)
             if diverged is not None:
                 return diverged, after
         return outcome(simulation, 10)
 
-    assert played() == played()
+    assert run_actions() == run_actions()
 
 
 MATERIALS = ("a", "b", "c", "d")
@@ -139,31 +139,31 @@ COEFFICIENTS = st.none() | numbers(0, 1)
     st.lists(st.tuples(st.booleans(), COEFFICIENTS, COEFFICIENTS), min_size=10, max_size=10),
     st.lists(COEFFICIENTS, min_size=8, max_size=8),
 )
-def test_every_mixture_in_one_scene_rebounds_and_rubs_by_its_own_figures(
+def test_every_mixture_of_materials_uses_its_own_coefficients(
     stated: list[tuple[float | None, float | None]],
     paired: list[tuple[bool, float | None, float | None]],
-    own: list[float | None],
+    own_coefficients: list[float | None],
 ) -> None:
-    """Four materials with figures of their own or none, pairs in any number, figures on shapes: no factors serve all.
+    """Materials, pairs and shapes with optional coefficients, which no set of factors can represent.
 
-    A ball of each kind falls on a wall of each kind with slip, once: v' = e·v, and it loses μ·(1 + e)·v along the wall,
-    as long as that does not stop the slip, which starts at 10 v and loses thrice as much.
+    A ball of each kind hits a wall of each kind once with slip: v' = e·v, and it loses μ·(1 + e)·v along the wall. The
+    slip starts at 10 v and loses three times as much, so it does not stop.
     """
 
-    def figures(restitution: float | None, friction: float | None) -> dict[str, float]:
-        both = {"restitution": restitution, "friction": friction}
-        return {key: value for key, value in both.items() if value is not None}
+    def coefficients(restitution: float | None, friction: float | None) -> dict[str, float]:
+        values = {"restitution": restitution, "friction": friction}
+        return {key: value for key, value in values.items() if value is not None}
 
     def kind(material: int, restitution: float | None, friction: float | None) -> dict[str, Any]:
-        return {"material": MATERIALS[material], **figures(restitution, friction)}
+        return {"material": MATERIALS[material], **coefficients(restitution, friction)}
 
-    # Four plain kinds, and four with figures of their own.
+    # Four kinds without and four with their own coefficients.
     kinds = [kind(k, None, None) for k in range(4)]
-    kinds += [kind(k, own[k], own[k + 4]) for k in range(4)]
-    table = {frozenset(two): figures(e, mu) for two, (listed, e, mu) in zip(PAIRS, paired, strict=True) if listed}
+    kinds += [kind(k, own_coefficients[k], own_coefficients[k + 4]) for k in range(4)]
+    table = {frozenset(two): coefficients(e, mu) for two, (listed, e, mu) in zip(PAIRS, paired, strict=True) if listed}
     document: dict[str, Any] = {
         "solver": {"dt": 0.01},
-        "material": [{"name": name, **figures(*each)} for name, each in zip(MATERIALS, stated, strict=True)],
+        "material": [{"name": name, **coefficients(*each)} for name, each in zip(MATERIALS, stated, strict=True)],
         "pair": [{"between": [*two] * (2 if len(two) == 1 else 1), **each} for two, each in table.items()],
         "ball": [],
         "wall": [],
@@ -180,24 +180,24 @@ def test_every_mixture_in_one_scene_rebounds_and_rubs_by_its_own_figures(
         simulation.step()
     velocity = simulation.frame().velocity
 
-    def wanted(figure: str, a: dict[str, Any], b: dict[str, Any]) -> float:
+    def expected(coefficient: str, a: dict[str, Any], b: dict[str, Any]) -> float:
         pair = table.get(frozenset((a["material"], b["material"])), {})
-        if figure in pair:
-            return float(pair[figure])
+        if coefficient in pair:
+            return float(pair[coefficient])
         materials = {material["name"]: material for material in document["material"]}
-        sides = [each.get(figure, materials[each["material"]].get(figure)) for each in (a, b)]
+        sides = [each.get(coefficient, materials[each["material"]].get(coefficient)) for each in (a, b)]
         known = [side for side in sides if side is not None]
         return float(np.prod(known)) if known else 0.0
 
     for n, (row, column) in enumerate(itertools.product(range(8), repeat=2)):
-        e, mu = (wanted(figure, kinds[row], kinds[column]) for figure in ("restitution", "friction"))
-        # A few roundings, of a product of factors, an impulse and a velocity; and of the normal's tilt, times 10 m/s.
+        e, mu = (expected(coefficient, kinds[row], kinds[column]) for coefficient in ("restitution", "friction"))
+        # Rounding of a product of factors, an impulse and a velocity, and the tilt of the normal times 10 m/s.
         assert velocity[n, 1] == pytest.approx(e, rel=1e-12, abs=1e-14)
         assert velocity[n, 0] == pytest.approx(10 - mu * (1 + e), rel=1e-14)  # as above
 
 
-def test_frames_are_values_that_nothing_reaches_through() -> None:
-    """Neither does the engine's going on change a frame, nor can a frame be written to."""
+def test_frames_are_immutable_values() -> None:
+    """Later steps do not change a frame, and a frame cannot be written to."""
     particle = {"position": [9, 9], "radius": 1, "velocity": [1, 2], "angular_velocity": 3}
     for free, spin in itertools.product((True, False), repeat=2):
         collides = "none" if free else "all"
@@ -213,7 +213,7 @@ def test_frames_are_values_that_nothing_reaches_through() -> None:
         simulation.step()
         frame = simulation.frame()
         arrays = (frame.position, frame.velocity, frame.angle, frame.angular_velocity, frame.present)
-        kept = [array.copy() for array in arrays]
+        copies = [array.copy() for array in arrays]
         for array in arrays:
             with pytest.raises(ValueError, match="read-only"):
                 array[0] = 1
@@ -223,12 +223,12 @@ def test_frames_are_values_that_nothing_reaches_through() -> None:
             simulation.step()
         simulation.apply(Remove(time=0, body="ball-1"))
         simulation.step()
-        assert all(np.array_equal(array, copy) for array, copy in zip(arrays, kept, strict=True))
+        assert all(np.array_equal(array, copy) for array, copy in zip(arrays, copies, strict=True))
 
 
 @pytest.mark.parametrize("array", ["position", "velocity", "angle", "angular_velocity", "radius", "mass", "fixed"])
-def test_running_simulation_does_not_see_what_becomes_of_its_description(array: str) -> None:
-    """A scene is a value: two simulations of it, one started after the other ran, are the same."""
+def test_running_simulation_does_not_change_its_scene(array: str) -> None:
+    """A scene is a value: a run must not change the arrays that a later simulation starts from."""
     scene = from_document(
         {
             "world": {"gravity": [0, -9.81]},

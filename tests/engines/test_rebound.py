@@ -1,4 +1,4 @@
-"""How fast things part that hit what falls off with speed, or kicks: one law on every engine."""
+"""Rebound with speed-dependent restitution and kicks: the same law on every engine."""
 
 from itertools import pairwise
 from typing import Any
@@ -28,26 +28,26 @@ SURFACES = {
     "target": (0.35, 0.5, 0.2),
     "post": (0.9, 0.1, 0.3),
 }
-"""Restitution, its falloff in s/m, friction: of a pinball table, as in Visual Pinball's materials."""
+"""Restitution, its falloff in s/m and friction of a pinball table, from Visual Pinball's materials."""
 BUMPER = {"speed": 0.81, "threshold": 0.054}
 SLINGSHOT = {"speed": 2.16, "threshold": 0.054, "profile": "middle", "adds_to": "approach"}
 R, M = 0.01349, 0.08
 BALL = {"name": "ball", "radius": R, "mass": M}
 FLOOR = [[-1.0, 0.0], [1.0, 0.0]]
-LAW = 1e-9
-"""Relative to the speed: a law of one hit, without forces, holds to rounding; the issue asks for this."""
+TOLERANCE = 1e-9
+"""Tolerance relative to the speed: the law of a single impact without forces holds to rounding."""
 
 
-def falling(speed: float, x: float = 0.0, sideways: float = 0.0, **wall: Any) -> Scene:
-    """Return a ball that falls on to a wall along x without gravity, 10 ms from now."""
+def falling_ball(speed: float, x: float = 0.0, sideways: float = 0.0, **wall: Any) -> Scene:
+    """Return a ball that hits a wall along x after 10 ms, without gravity."""
     ball = {**BALL, "position": [x - 0.01 * sideways, R + 0.01 * speed], "velocity": [sideways, -speed]}
     return from_document(
         {"solver": {"dt": 0.001}, "world": {"duration": 0.1}, "ball": [ball], "wall": [{"points": FLOOR, **wall}]}
     )
 
 
-def after(scene: Scene, engine: str, steps: int = 40) -> tuple[SwitchableSimulation, np.ndarray[Any, Any]]:
-    """Return a simulation that has gone on for some steps, with an account, and its ball's velocity, m/s."""
+def run_steps(scene: Scene, engine: str, steps: int = 40) -> tuple[SwitchableSimulation, np.ndarray[Any, Any]]:
+    """Return a simulation with accounting after some steps, and the velocity of its ball, m/s."""
     simulation = start(scene, engine)
     simulation.account()
     for _ in range(steps):
@@ -55,9 +55,9 @@ def after(scene: Scene, engine: str, steps: int = 40) -> tuple[SwitchableSimulat
     return simulation, simulation.frame().velocity[0]
 
 
-def closes(simulation: SwitchableSimulation, before: float) -> None:
-    brought = sum(simulation.account().values())
-    assert total_energy(simulation) - before == pytest.approx(brought, rel=1e-9, abs=1e-13)  # rounding
+def assert_ledger_closes(simulation: SwitchableSimulation, before: float) -> None:
+    booked = sum(simulation.account().values())
+    assert total_energy(simulation) - before == pytest.approx(booked, rel=1e-9, abs=1e-13)  # rounding
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -65,110 +65,112 @@ def closes(simulation: SwitchableSimulation, before: float) -> None:
 @pytest.mark.parametrize("speed", [0.01, 1.0, 7.0])
 def test_restitution_falls_with_speed(engine: str, surface: str, speed: float) -> None:
     e, f, _ = SURFACES[surface]
-    simulation, velocity = after(falling(speed, restitution=e, restitution_falloff=f), engine)
-    assert velocity[1] == pytest.approx(e / (1 + f * speed) * speed, rel=LAW)
-    took = 0.5 * M * (speed**2 - velocity[1] ** 2)
-    assert simulation.account()[Cause.RESTITUTION] == pytest.approx(-took, rel=1e-9)  # rounding
+    simulation, velocity = run_steps(falling_ball(speed, restitution=e, restitution_falloff=f), engine)
+    assert velocity[1] == pytest.approx(e / (1 + f * speed) * speed, rel=TOLERANCE)
+    loss = 0.5 * M * (speed**2 - velocity[1] ** 2)
+    assert simulation.account()[Cause.RESTITUTION] == pytest.approx(-loss, rel=1e-9)  # rounding
     assert simulation.account()[Cause.KICKS] == 0.0
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("speed", [0.06, 0.5, 3.0])
-def test_bumper_adds_its_speed_once_and_books_it(engine: str, speed: float) -> None:
+def test_bumper_adds_its_speed_once_and_its_energy_is_booked(engine: str, speed: float) -> None:
     e, f, _ = SURFACES["rubber"]
     post = {"position": [0.0, -0.0243], "radius": 0.0243, "restitution": e, "restitution_falloff": f, "kick": BUMPER}
     ball = {**BALL, "position": [0.0, R + 0.01 * speed], "velocity": [0.0, -speed]}
     scene = from_document({"solver": {"dt": 0.001}, "ball": [ball], "post": [post]})
     energy = 0.5 * M * speed**2
-    simulation, velocity = after(scene, engine)
-    alone = e / (1 + f * speed) * speed
-    assert velocity[1] == pytest.approx(alone + 0.81, rel=LAW)
-    assert simulation.account()[Cause.KICKS] == pytest.approx(0.5 * M * ((alone + 0.81) ** 2 - alone**2), rel=1e-9)
-    assert simulation.account()[Cause.RESTITUTION] == pytest.approx(0.5 * M * alone**2 - energy, rel=1e-9)
-    closes(simulation, energy)
+    simulation, velocity = run_steps(scene, engine)
+    unkicked = e / (1 + f * speed) * speed
+    assert velocity[1] == pytest.approx(unkicked + 0.81, rel=TOLERANCE)
+    assert simulation.account()[Cause.KICKS] == pytest.approx(
+        0.5 * M * ((unkicked + 0.81) ** 2 - unkicked**2), rel=1e-9
+    )
+    assert simulation.account()[Cause.RESTITUTION] == pytest.approx(0.5 * M * unkicked**2 - energy, rel=1e-9)
+    assert_ledger_closes(simulation, energy)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_nothing_is_kicked_below_the_threshold(engine: str) -> None:
+def test_no_kick_below_the_threshold(engine: str) -> None:
     for speed, kick in ((0.0539, 0.0), (0.0541, 0.81)):
-        _, velocity = after(falling(speed, restitution=0.5, kick=BUMPER), engine)
-        assert velocity[1] == pytest.approx(0.5 * speed + kick, rel=LAW)
+        _, velocity = run_steps(falling_ball(speed, restitution=0.5, kick=BUMPER), engine)
+        assert velocity[1] == pytest.approx(0.5 * speed + kick, rel=TOLERANCE)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("x", [-0.9, -0.5, 0.0, 0.3])
 @pytest.mark.parametrize("speed", [0.06, 0.5, 1.0, 2.0, 7.0])
-def test_slingshot_drives_the_ball_into_its_rubber_and_books_what_that_gains(
-    engine: str, x: float, speed: float
-) -> None:
+def test_slingshot_adds_to_the_approach_speed_and_its_energy_is_booked(engine: str, x: float, speed: float) -> None:
     e, f, _ = SURFACES["rubber"]
-    scene = falling(speed, x, restitution=e, restitution_falloff=f, kick=SLINGSHOT)
-    simulation, velocity = after(scene, engine)
+    scene = falling_ball(speed, x, restitution=e, restitution_falloff=f, kick=SLINGSHOT)
+    simulation, velocity = run_steps(scene, engine)
     s = 0.5 * (x + 1.0)
     driven = speed + 2.16 * 4 * s * (1 - s)
-    alone, out = (e / (1 + f * v) * v for v in (speed, driven))
-    assert velocity[1] == pytest.approx(out, rel=LAW)
-    assert simulation.account()[Cause.KICKS] == pytest.approx(0.5 * M * (out**2 - alone**2), rel=1e-9)  # rounding
-    closes(simulation, 0.5 * M * speed**2)
+    unkicked, rebound_speed = (e / (1 + f * v) * v for v in (speed, driven))
+    assert velocity[1] == pytest.approx(rebound_speed, rel=TOLERANCE)
+    assert simulation.account()[Cause.KICKS] == pytest.approx(
+        0.5 * M * (rebound_speed**2 - unkicked**2), rel=1e-9
+    )  # rounding
+    assert_ledger_closes(simulation, 0.5 * M * speed**2)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize(("speed", "out"), [(0.5, 1.1835), (1.0, 1.2977), (2.0, 1.4804)])
-def test_slingshot_throws_as_hard_as_visual_pinball(engine: str, speed: float, out: float) -> None:
-    # There 80 units at most, halved in the middle: 40 × 0.05397 = 2.16 m/s onto the approach, then 0.8/(1 + 0.3 v).
-    scene = falling(speed, restitution=0.8, restitution_falloff=0.3, kick=SLINGSHOT)
-    _, velocity = after(scene, engine)
-    assert velocity[1] == pytest.approx(out, abs=5e-5)  # the table's digits
+@pytest.mark.parametrize(("speed", "rebound_speed"), [(0.5, 1.1835), (1.0, 1.2977), (2.0, 1.4804)])
+def test_slingshot_matches_visual_pinball(engine: str, speed: float, rebound_speed: float) -> None:
+    # Visual Pinball: at most 80 units, halved in the middle: 40 × 0.05397 = 2.16 m/s of approach, then 0.8/(1 + 0.3 v).
+    scene = falling_ball(speed, restitution=0.8, restitution_falloff=0.3, kick=SLINGSHOT)
+    _, velocity = run_steps(scene, engine)
+    assert velocity[1] == pytest.approx(rebound_speed, abs=5e-5)  # digits of the table
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_kick_onto_the_approach_of_a_surface_without_restitution_gives_nothing(engine: str) -> None:
-    _, velocity = after(falling(2.0, 0.3, kick=SLINGSHOT), engine)
-    assert velocity[1] == pytest.approx(0.0, abs=LAW)
+def test_kick_added_to_the_approach_has_no_effect_without_restitution(engine: str) -> None:
+    _, velocity = run_steps(falling_ball(2.0, 0.3, kick=SLINGSHOT), engine)
+    assert velocity[1] == pytest.approx(0.0, abs=TOLERANCE)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("x", [-0.9, -0.5, 0.0, 0.3])
-def test_kick_onto_the_rebound_is_most_in_the_middle(engine: str, x: float) -> None:
-    share = 0.5 * (x + 1.0)
-    _, velocity = after(falling(2.0, x, restitution=0.8, kick=SLINGSHOT | {"adds_to": "rebound"}), engine)
-    assert velocity[1] == pytest.approx(1.6 + 2.16 * 4 * share * (1 - share), rel=LAW)
-    assert velocity[1] <= (1.6 + 2.16) * (1 + LAW)
+def test_kick_added_to_the_rebound_is_largest_in_the_middle(engine: str, x: float) -> None:
+    fraction = 0.5 * (x + 1.0)
+    _, velocity = run_steps(falling_ball(2.0, x, restitution=0.8, kick=SLINGSHOT | {"adds_to": "rebound"}), engine)
+    assert velocity[1] == pytest.approx(1.6 + 2.16 * 4 * fraction * (1 - fraction), rel=TOLERANCE)
+    assert velocity[1] <= (1.6 + 2.16) * (1 + TOLERANCE)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_share_counts_along_the_whole_polyline(engine: str) -> None:
-    points = [[-1.0, 0.0], [-0.5, 0.0], [1.0, 0.0], [1.0, -2.0]]  # 4 m long; x = 0.25 lies at 1.25 m
-    _, velocity = after(falling(2.0, 0.25, points=points, restitution=0.5, kick=SLINGSHOT), engine)
-    share = 1.25 / 4.0
-    assert velocity[1] == pytest.approx(0.5 * (2.0 + 2.16 * 4 * share * (1 - share)), rel=LAW)
+def test_kick_fraction_is_measured_along_the_whole_polyline(engine: str) -> None:
+    points = [[-1.0, 0.0], [-0.5, 0.0], [1.0, 0.0], [1.0, -2.0]]  # 4 m long; x = 0.25 is at 1.25 m
+    _, velocity = run_steps(falling_ball(2.0, 0.25, points=points, restitution=0.5, kick=SLINGSHOT), engine)
+    fraction = 1.25 / 4.0
+    assert velocity[1] == pytest.approx(0.5 * (2.0 + 2.16 * 4 * fraction * (1 - fraction)), rel=TOLERANCE)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize(("adds_to", "out"), [("rebound", 1.0 + 0.81), ("approach", 0.5 * 2.81)])
-def test_joint_of_two_segments_kicks_once(engine: str, adds_to: str, out: float) -> None:
+@pytest.mark.parametrize(("adds_to", "rebound_speed"), [("rebound", 1.0 + 0.81), ("approach", 0.5 * 2.81)])
+def test_vertex_of_two_segments_kicks_once(engine: str, adds_to: str, rebound_speed: float) -> None:
     points = [[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0]]
     kick = BUMPER | {"adds_to": adds_to}
-    simulation, velocity = after(falling(2.0, 0.0, points=points, restitution=0.5, kick=kick), engine)
-    assert velocity[1] == pytest.approx(out, rel=LAW)
-    closes(simulation, 0.5 * M * 4.0)
+    simulation, velocity = run_steps(falling_ball(2.0, 0.0, points=points, restitution=0.5, kick=kick), engine)
+    assert velocity[1] == pytest.approx(rebound_speed, rel=TOLERANCE)
+    assert_ledger_closes(simulation, 0.5 * M * 4.0)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_friction_of_a_kick_is_that_of_its_impulse(engine: str) -> None:
-    # Grazing: it slips throughout, so that friction takes μ times the whole impulse along the normal, kick included.
-    scene = falling(1.0, 0.0, 8.0, restitution=0.5, friction=0.3, kick=BUMPER)
-    simulation, velocity = after(scene, engine)
-    assert velocity[1] == pytest.approx(1.31, rel=LAW)
-    assert velocity[0] == pytest.approx(8.0 - 0.3 * 2.31, rel=LAW)
+def test_friction_of_a_kick_follows_its_normal_impulse(engine: str) -> None:
+    # Grazing: it slips throughout, so the friction impulse is μ times the whole normal impulse, including the kick.
+    scene = falling_ball(1.0, 0.0, 8.0, restitution=0.5, friction=0.3, kick=BUMPER)
+    simulation, velocity = run_steps(scene, engine)
+    assert velocity[1] == pytest.approx(1.31, rel=TOLERANCE)
+    assert velocity[0] == pytest.approx(8.0 - 0.3 * 2.31, rel=TOLERANCE)
     spin = simulation.frame().angular_velocity[0]
-    assert abs(spin) == pytest.approx(0.3 * 2.31 * M * R / (0.5 * M * R**2), rel=LAW)
-    closes(simulation, 0.5 * M * 65.0)
+    assert abs(spin) == pytest.approx(0.3 * 2.31 * M * R / (0.5 * M * R**2), rel=TOLERANCE)
+    assert_ledger_closes(simulation, 0.5 * M * 65.0)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_ball_that_rests_on_a_wall_that_kicks_stays_there(engine: str) -> None:
-    # The threshold is above what a step of gravity gives, 0.0098 m/s: so much it may fall before it is found to touch.
+def test_ball_at_rest_on_a_kicking_wall_stays_at_rest(engine: str) -> None:
+    # The threshold exceeds the speed from one step of gravity, 0.0098 m/s, which the ball may have at contact.
     wall = {"points": FLOOR, "kick": {"speed": 5.0, "threshold": 0.02}, "restitution": 0.5, "restitution_falloff": 0.3}
     scene = from_document(
         {
@@ -178,30 +180,30 @@ def test_ball_that_rests_on_a_wall_that_kicks_stays_there(engine: str) -> None:
             "wall": [wall],
         }
     )
-    simulation, velocity = after(scene, engine, 500)
-    assert abs(velocity[1]) < 1e-9  # pymunk leaves the rounding of its sums
-    assert simulation.frame().position[0, 1] == pytest.approx(R, abs=1e-5)  # pymunk lets it sink by its slop
+    simulation, velocity = run_steps(scene, engine, 500)
+    assert abs(velocity[1]) < 1e-9  # rounding of sums on pymunk
+    assert simulation.frame().position[0, 1] == pytest.approx(R, abs=1e-5)  # slop of pymunk
     assert simulation.account()[Cause.KICKS] == 0.0
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_two_balls_add_their_falloffs_and_a_pair_outranks_both(engine: str) -> None:
-    def parted(**more: Any) -> float:
+def test_falloffs_of_two_balls_add_and_a_pair_overrides_both(engine: str) -> None:
+    def separation_speed(**more: Any) -> float:
         materials = [{"name": n, "restitution": 0.9, "restitution_falloff": f} for n, f in (("a", 0.2), ("b", 0.3))]
         balls = [
             {"position": [-0.02, 0.0], "velocity": [2.0, 0.0], "radius": R, "mass": M, "material": "a"},
             {"position": [0.02, 0.0], "velocity": [-2.0, 0.0], "radius": R, "mass": M, "material": "b"},
         ]
         scene = from_document({"solver": {"dt": 0.001}, "material": materials, "ball": balls, **more})
-        _, velocity = after(scene, engine, 20)
+        _, velocity = run_steps(scene, engine, 20)
         return float(2.0 * abs(velocity[0]))
 
-    assert parted() == pytest.approx(0.81 * 4.0 / (1 + 0.5 * 4.0), rel=LAW)
+    assert separation_speed() == pytest.approx(0.81 * 4.0 / (1 + 0.5 * 4.0), rel=TOLERANCE)
     pair = {"between": ["a", "b"], "restitution_falloff": 0.05}
-    assert parted(pair=[pair]) == pytest.approx(0.81 * 4.0 / (1 + 0.05 * 4.0), rel=LAW)
+    assert separation_speed(pair=[pair]) == pytest.approx(0.81 * 4.0 / (1 + 0.05 * 4.0), rel=TOLERANCE)
 
 
-def test_box_flat_on_a_wall_that_kicks_goes_up_level() -> None:
+def test_box_landing_flat_on_a_kicking_wall_stays_level() -> None:
     for engine in ("pymunk", "reference"):
         scene = from_document(
             {
@@ -210,24 +212,26 @@ def test_box_flat_on_a_wall_that_kicks_goes_up_level() -> None:
                 "wall": [{"points": FLOOR, "restitution": 0.5, "restitution_falloff": 0.5, "kick": BUMPER}],
             }
         )
-        simulation, velocity = after(scene, engine)
-        assert velocity[1] == pytest.approx(0.5 * 2.0 / (1 + 0.5 * 2.0) + 0.81, rel=1e-6)  # ten passes of the solver
+        simulation, velocity = run_steps(scene, engine)
+        assert velocity[1] == pytest.approx(
+            0.5 * 2.0 / (1 + 0.5 * 2.0) + 0.81, rel=1e-6
+        )  # ten iterations of the solver
         assert simulation.account()[Cause.KICKS] > 0.0
-        closes(simulation, 2.0)
+        assert_ledger_closes(simulation, 2.0)
 
 
 @pytest.mark.parametrize("detection", ["bisect", "swept", "shrink"])
-def test_every_detection_of_the_reference_kicks(detection: str) -> None:
-    scene = falling(3.0, restitution=0.8, restitution_falloff=0.3, kick=BUMPER)
+def test_kicks_work_with_every_detection_of_the_reference(detection: str) -> None:
+    scene = falling_ball(3.0, restitution=0.8, restitution_falloff=0.3, kick=BUMPER)
     simulation = start(scene, "reference", scene.solver.replace(detection=detection, integrator="velocity_verlet"))
     simulation.account()
     for _ in range(40):
         simulation.step()
-    assert simulation.frame().velocity[0, 1] == pytest.approx(0.8 / 1.9 * 3.0 + 0.81, rel=LAW)
-    closes(simulation, 0.5 * M * 9.0)
+    assert simulation.frame().velocity[0, 1] == pytest.approx(0.8 / 1.9 * 3.0 + 0.81, rel=TOLERANCE)
+    assert_ledger_closes(simulation, 0.5 * M * 9.0)
 
 
-def bumpers(dt: float) -> Scene:
+def bumper_scene(dt: float) -> Scene:
     rubber = {"restitution": 0.8, "restitution_falloff": 0.3, "friction": 0.3}
     posts = [{"position": p, "radius": 0.0243, "kick": BUMPER, **rubber} for p in ([0.0, 0.0], [0.13, 0.05])]
     return from_document(
@@ -241,9 +245,9 @@ def bumpers(dt: float) -> Scene:
     )
 
 
-def end_of(engine: str, dt: float) -> np.ndarray[Any, Any]:
-    """Return where the ball is between two bumpers after 0.25 s, and several hits."""
-    simulation = start(bumpers(dt), engine)
+def final_position(engine: str, dt: float) -> np.ndarray[Any, Any]:
+    """Return the position of a ball between two bumpers after 0.25 s and several hits."""
+    simulation = start(bumper_scene(dt), engine)
     hits = 0
     simulation.contacts()
     for _ in range(round(0.25 / dt)):
@@ -253,69 +257,71 @@ def end_of(engine: str, dt: float) -> np.ndarray[Any, Any]:
     return simulation.frame().position[0]
 
 
-def test_engines_agree_on_bumpers_in_the_order_of_their_step() -> None:
-    truth = end_of("exact", 0.25)
+def test_engines_agree_on_bumpers_to_first_order_in_the_step() -> None:
+    truth = final_position("exact", 0.25)
     for engine in ("pymunk", "reference"):
-        coarse, fine = (float(np.hypot(*(end_of(engine, dt) - truth))) for dt in (2e-4, 2.5e-5))
-        # Contacts are found at the end of a step: an error of first order, as large as v·h, that the curved posts
-        # enlarge at each hit.
+        coarse, fine = (float(np.hypot(*(final_position(engine, dt) - truth))) for dt in (2e-4, 2.5e-5))
+        # Contacts are found at the end of a step: a first-order error of up to v·h, which the curved posts amplify at
+        # each hit.
         assert fine < 2e-3
         assert fine < 0.5 * coarse
 
 
 @given(st.floats(0, 1), st.floats(0, 10), st.floats(0, 100))
-def test_rebound_never_exceeds_that_without_falloff_and_grows_with_speed(e: float, f: float, v: float) -> None:
+def test_rebound_is_bounded_by_restitution_and_grows_with_speed(e: float, f: float, v: float) -> None:
     assert 0.0 <= rebound(e, f, v) <= e * v * (1 + 1e-15)
-    assert rebound(e, f, 1.01 * v) >= rebound(e, f, v) * (1 - 1e-14)  # both round
+    assert rebound(e, f, 1.01 * v) >= rebound(e, f, v) * (1 - 1e-14)  # both are rounded
 
 
 @given(st.floats(0, 10), st.floats(0, 1))
-def test_middle_is_where_a_kick_is_most_and_ends_have_none(speed: float, share: float) -> None:
-    assert kicked(speed, 0.1, True, 0.5, 1.0) == kicked(speed, 0.1, False, share, 1.0) == speed
-    assert 0.0 <= kicked(speed, 0.1, True, share, 1.0) <= speed * (1 + 1e-15)
+def test_middle_profile_has_its_largest_kick_in_the_middle_and_none_at_the_ends(speed: float, fraction: float) -> None:
+    assert kicked(speed, 0.1, True, 0.5, 1.0) == kicked(speed, 0.1, False, fraction, 1.0) == speed
+    assert 0.0 <= kicked(speed, 0.1, True, fraction, 1.0) <= speed * (1 + 1e-15)
     assert kicked(speed, 0.1, True, 0.0, 1.0) == kicked(speed, 0.1, True, 1.0, 1.0) == 0.0
-    assert kicked(speed, 0.1, False, share, 0.1) == 0.0
+    assert kicked(speed, 0.1, False, fraction, 0.1) == 0.0
 
 
 @settings(max_examples=30)
 @given(st.lists(st.tuples(st.floats(-5, 5), st.floats(-5, 5)), min_size=3, max_size=6, unique=True), st.booleans())
-def test_stretches_follow_each_other_from_nothing_to_the_whole(points: list[tuple[float, float]], closed: bool) -> None:
+def test_segment_fractions_are_contiguous_from_zero_to_one(points: list[tuple[float, float]], closed: bool) -> None:
     parts = segment_fractions((*points, points[0]) if closed else points)
     assert parts[0][0] == 0.0
-    assert parts[-1][1] == pytest.approx(1.0, rel=1e-14)  # sums round
+    assert parts[-1][1] == pytest.approx(1.0, rel=1e-14)  # rounding of sums
     assert all(a[1] == b[0] for a, b in pairwise(parts))
     assert len(parts) == len(points) - (not closed)
 
 
-def test_share_at_is_held_between_the_ends_of_a_segment() -> None:
+def test_fraction_at_is_clamped_to_the_ends_of_a_segment() -> None:
     assert fraction_at((0.0, 0.0), (2.0, 0.0), (0.5, 0.75), (1.0, 3.0)) == 0.625
     assert fraction_at((0.0, 0.0), (2.0, 0.0), (0.5, 0.75), (-1.0, 3.0)) == 0.5
     assert fraction_at((0.0, 0.0), (2.0, 0.0), (0.5, 0.75), (9.0, 3.0)) == 0.75
 
 
-def test_springs_refuse_what_they_cannot_part_so() -> None:
-    scene = falling(1.0, restitution=0.5, restitution_falloff=0.3, kick=BUMPER)
+def test_penalty_refuses_falloff_and_kicks() -> None:
+    scene = falling_ball(1.0, restitution=0.5, restitution_falloff=0.3, kick=BUMPER)
     with pytest.raises(Refusal, match=r"'penalty' does not model falloff.*'penalty' does not model kicks"):
         start(scene, "reference", scene.solver.replace(response="penalty"))
-    plain = falling(1.0, restitution=0.5)
+    plain = falling_ball(1.0, restitution=0.5)
     simulation = start(plain, "reference", plain.solver.replace(response="penalty"))
     with pytest.raises(ActionError, match="does not support restitution_falloff"):
         simulation.apply(Spawn(time=0.0, ball=Ball(position=(0.5, 0.5), radius=R, restitution_falloff=0.1)))
 
 
-def test_pairs_that_need_nothing_are_told_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pair_callbacks_run_only_where_they_are_needed(monkeypatch: pytest.MonkeyPatch) -> None:
     from sandbox.engines.pymunk_adapter.callbacks import PairCallbacks
 
-    told: list[int] = []
-    tell = PairCallbacks._set_coefficients
-    monkeypatch.setattr(PairCallbacks, "_set_coefficients", lambda self, *rest: (told.append(1), tell(self, *rest))[1])
-    after(falling(2.0, restitution=0.5, friction=0.2), "pymunk")
-    assert not told
-    after(falling(2.0, restitution=0.5, restitution_falloff=0.1), "pymunk")
-    assert told
+    calls: list[int] = []
+    original = PairCallbacks._set_coefficients
+    monkeypatch.setattr(
+        PairCallbacks, "_set_coefficients", lambda self, *rest: (calls.append(1), original(self, *rest))[1]
+    )
+    run_steps(falling_ball(2.0, restitution=0.5, friction=0.2), "pymunk")
+    assert not calls
+    run_steps(falling_ball(2.0, restitution=0.5, restitution_falloff=0.1), "pymunk")
+    assert calls
 
 
-def test_account_books_kicks_as_a_cause_of_their_own() -> None:
+def test_ledger_books_kicks_as_a_separate_cause() -> None:
     account = EnergyLedger()
     account.add(Cause.KICKS, 2.0)
     assert account.entries()[Cause.KICKS] == 2.0
@@ -325,7 +331,7 @@ def test_account_books_kicks_as_a_cause_of_their_own() -> None:
 @pytest.mark.parametrize("engine", ENGINES)
 @settings(max_examples=10, deadline=None)
 @given(x=st.floats(-0.2, 0.2), vx=st.floats(-2, 2), vy=st.floats(-2, 2), g=st.floats(0, 2))
-def test_account_closes_in_a_box_that_kicks(engine: str, x: float, vx: float, vy: float, g: float) -> None:
+def test_ledger_closes_in_a_kicking_box(engine: str, x: float, vx: float, vy: float, g: float) -> None:
     rubber = {"restitution": 0.8, "restitution_falloff": 0.3, "friction": 0.6}
     box = {"points": [[-0.3, 0.0], [0.3, 0.0], [0.3, 0.6], [-0.3, 0.6]], "closed": True, **rubber}
     post = {"position": [0.0, 0.45], "radius": 0.05, **rubber, "kick": BUMPER}
@@ -347,12 +353,12 @@ def test_account_closes_in_a_box_that_kicks(engine: str, x: float, vx: float, vy
     scale = sum(abs(energy) for energy in account.values()) + before + 1e-6
     assert total_energy(simulation) - before == pytest.approx(sum(account.values()), abs=1e-9 * scale)  # rounding
     assert account[Cause.KICKS] >= 0.0 >= account[Cause.RESTITUTION]
-    # What hops on a post gives a little (exact); no law of a rebound gives anything by itself.
+    # Hops on a post add a little energy on exact; the rebound law itself adds none.
     assert account[Cause.PHANTOM] <= 1e-6 * scale
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_floors_refuse_what_kicks_even_where_no_file_was_checked(engine: str) -> None:
+def test_surfaces_refuse_kicks_in_scenes_built_without_a_file(engine: str) -> None:
     post = Post(position=(1.0, 0.0), radius=0.1, kick=Kick(speed=1.0))
     scene = Scene(
         surface=Floor(sliding_friction=0.2), balls=(Ball(position=(0.0, 0.0), radius=0.03, mass=0.2),), posts=(post,)

@@ -1,4 +1,4 @@
-"""Relays: a scene that changes engine, settings and cast on the way is still one scene."""
+"""SwitchableSimulation: changes of engine, settings and bodies keep the continuity of the run."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -24,7 +24,7 @@ from sandbox.action import (
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import ENGINES, able
-from sandbox.engines.registry import start as start_alone
+from sandbox.engines.registry import start as start_plain
 from sandbox.engines.switching import SwitchableSimulation, start
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.discs import Ball
@@ -38,7 +38,7 @@ pytestmark = pytest.mark.full  # property tests with many examples
 SCENES = {each.name: load(each.path) for each in shipped()}
 SHORT = ("tutorial/bounce", "tutorial/fireworks", "benchmark/newtons_cradle", "benchmark/gas", "benchmark/incline")
 RUNS = [(name, engine) for name in SHORT for engine in able(SCENES[name])]
-OTHERS = [(a, b) for a in ENGINES for b in ENGINES if a != b]
+ENGINE_PAIRS = [(a, b) for a in ENGINES for b in ENGINES if a != b]
 
 
 def ball(name: str, x: float, y: float, **more: Any) -> dict[str, Any]:
@@ -51,8 +51,8 @@ def scene_of(*balls: dict[str, Any], **document: Any) -> Scene:
     return from_document({"plane": [floor], "world": world, "solver": {"dt": 0.01}, "ball": list(balls), **document})
 
 
-def three(**document: Any) -> Scene:
-    """Three balls in flight, with spin."""
+def three_balls(**document: Any) -> Scene:
+    """Return three balls in flight, with spin."""
     return scene_of(
         ball("a", -2, 3, velocity=[1, 0], angular_velocity=1.0),
         ball("b", 0, 4, angle=0.5, mass=3),
@@ -61,130 +61,132 @@ def three(**document: Any) -> Scene:
     )
 
 
-def stepped(relay: SwitchableSimulation, steps: int) -> SwitchableSimulation:
+def advance(simulation: SwitchableSimulation, steps: int) -> SwitchableSimulation:
     for _ in range(steps):
-        relay.step()
-    return relay
+        simulation.step()
+    return simulation
 
 
-def same(a: Frame, b: Frame) -> bool:
-    """Tell whether two frames are the same but for the last digits of their times."""
+def same_state(a: Frame, b: Frame) -> bool:
+    """Return whether two frames have the same state, apart from their times."""
     columns = ("position", "velocity", "angle", "angular_velocity", "present")
     return all(np.array_equal(getattr(a, column), getattr(b, column)) for column in columns)
 
 
 @pytest.mark.parametrize(("name", "engine"), RUNS)
-def test_relay_without_switches_is_the_engine_alone_bit_for_bit(name: str, engine: str) -> None:
-    relay, alone = start(SCENES[name], engine), start_alone(SCENES[name], engine)
+def test_simulation_without_switches_is_bit_identical_to_the_plain_engine(name: str, engine: str) -> None:
+    simulation, plain = start(SCENES[name], engine), start_plain(SCENES[name], engine)
     found: list[Contacts] = []
-    for each in (relay, alone):
+    for each in (simulation, plain):
         each.contacts()
     for _ in range(120):
-        for each in (relay, alone):
+        for each in (simulation, plain):
             each.step()
-        assert relay.state_hash() == alone.state_hash()
-    found = [relay.contacts(), alone.contacts()]
+        assert simulation.state_hash() == plain.state_hash()
+    found = [simulation.contacts(), plain.contacts()]
     for column in ("time", "pair", "point", "normal", "impulse"):
         assert np.array_equal(getattr(found[0], column), getattr(found[1], column))
-    assert relay.time == alone.time
-    assert dict(relay.work) == dict(alone.work)
-    assert dict(relay.retired) == dict(alone.retired)
+    assert simulation.time == plain.time
+    assert dict(simulation.work) == dict(plain.work)
+    assert dict(simulation.retired) == dict(plain.retired)
 
 
-@pytest.mark.parametrize(("first", "second"), OTHERS)
-def test_switch_of_engine_keeps_the_state_and_all_that_is_known(first: str, second: str) -> None:
-    relay = stepped(start(three(), first), 20)
-    before, time = relay.frame(), relay.time
-    relay.apply(Switch(time=0.0, engine=second))
-    assert relay.engine == second
-    assert relay.time == time == 20 * 0.01
-    assert relay.state_hash() == before.state_hash()
-    assert relay.bodies.names == ("a", "b", "c")
-    assert relay.setup.bodies.position.tolist() == before.position.tolist()
-    stepped(relay, 20)
-    assert relay.frame().time == 40 * 0.01  # not 20·dt + 20·dt, which rounds otherwise
+@pytest.mark.parametrize(("first", "second"), ENGINE_PAIRS)
+def test_engine_switch_keeps_state_time_and_bodies(first: str, second: str) -> None:
+    simulation = advance(start(three_balls(), first), 20)
+    before, time = simulation.frame(), simulation.time
+    simulation.apply(Switch(time=0.0, engine=second))
+    assert simulation.engine == second
+    assert simulation.time == time == 20 * 0.01
+    assert simulation.state_hash() == before.state_hash()
+    assert simulation.bodies.names == ("a", "b", "c")
+    assert simulation.setup.bodies.position.tolist() == before.position.tolist()
+    advance(simulation, 20)
+    assert simulation.frame().time == 40 * 0.01  # not 20·dt + 20·dt, which rounds differently
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 @given(parts=st.lists(st.tuples(st.integers(1, 12), st.sampled_from([0.01, 0.005, 0.02, 1 / 60])), max_size=5))
 @settings(max_examples=15)
-def test_free_flight_is_closed_form_through_any_change_of_step(engine: str, parts: list[tuple[int, float]]) -> None:
-    relay = start(scene_of(ball("a", 0, 9, velocity=[2, 1], collides="none")), engine)
+def test_free_flight_follows_the_closed_form_through_changes_of_the_step(
+    engine: str, parts: list[tuple[int, float]]
+) -> None:
+    simulation = start(scene_of(ball("a", 0, 9, velocity=[2, 1], collides="none")), engine)
     elapsed, error, h = 0.0, 0.0, 0.01
     for steps, dt in parts:
-        relay.apply(Switch(time=0.0, settings={"dt": dt}))
-        stepped(relay, steps)
+        simulation.apply(Switch(time=0.0, settings={"dt": dt}))
+        advance(simulation, steps)
         elapsed, h = elapsed + steps * dt, max(h, dt)
         error += steps * dt
-    frame = relay.frame()
+    frame = simulation.frame()
     assert frame.time == pytest.approx(elapsed, rel=1e-12)  # a few sums
     assert frame.velocity[0] == pytest.approx([2.0, 1.0 - 9.81 * elapsed], abs=1e-11)  # rounding of up to 60 sums
-    bound = 0.5 * 9.81 * h * error + 1e-11  # explicit Euler's is g·h·T/2; other schemes have less
+    bound = 0.5 * 9.81 * h * error + 1e-11  # the error of explicit Euler is g·h·T/2; other schemes have less
     assert abs(frame.position[0, 1] - (9.0 + elapsed - 0.5 * 9.81 * elapsed**2)) <= bound
     assert frame.position[0, 0] == pytest.approx(2.0 * elapsed, abs=1e-11)  # as above
 
 
-@pytest.mark.parametrize(("first", "second"), OTHERS)
-def test_numbers_names_and_times_are_those_of_the_whole(first: str, second: str) -> None:
-    """A is removed, b flies out of the bounds, d comes, then c: through four legs."""
+@pytest.mark.parametrize(("first", "second"), ENGINE_PAIRS)
+def test_indices_names_and_times_are_those_of_the_whole_run(first: str, second: str) -> None:
+    """Over four segments a is removed, b leaves the bounds and d is spawned."""
     scene = scene_of(
         ball("a", -20, 30, collides="none"),
         ball("b", 49, 30, velocity=[15, 0], collides="none"),
         ball("c", 0, 0.25 + 0.1),
         ball("e", 5, 0.25 + 0.4),
     )
-    relay = start(scene, first)
-    relay.contacts()
-    stepped(relay, 3).apply(Remove(time=0.0, body="a"))
-    relay.apply(Switch(time=0.0, engine=second))
-    assert relay.frame().present.tolist() == [False, True, True, True]
-    stepped(relay, 7)  # b is gone at 0.07 s
-    assert dict(relay.retired) == {0: pytest.approx(0.03), 1: pytest.approx(0.07)}
-    relay.apply(Spawn(time=0.0, ball=Ball(name="d", position=(10.0, 0.35), radius=0.25, restitution=0.5)))
-    relay.apply(Switch(time=0.0, engine=first))
-    relay.apply(Switch(time=0.0, engine=second))
-    assert relay.bodies.names == ("a", "b", "c", "e", "d")
-    before = relay.frame()
+    simulation = start(scene, first)
+    simulation.contacts()
+    advance(simulation, 3).apply(Remove(time=0.0, body="a"))
+    simulation.apply(Switch(time=0.0, engine=second))
+    assert simulation.frame().present.tolist() == [False, True, True, True]
+    advance(simulation, 7)  # b leaves at 0.07 s
+    assert dict(simulation.retired) == {0: pytest.approx(0.03), 1: pytest.approx(0.07)}
+    simulation.apply(Spawn(time=0.0, ball=Ball(name="d", position=(10.0, 0.35), radius=0.25, restitution=0.5)))
+    simulation.apply(Switch(time=0.0, engine=first))
+    simulation.apply(Switch(time=0.0, engine=second))
+    assert simulation.bodies.names == ("a", "b", "c", "e", "d")
+    before = simulation.frame()
     assert before.present.tolist() == [False, False, True, True, True]
-    assert before.position[0].tolist() == pytest.approx([-20.0, 30.0], abs=0.05)  # 0.03 s of falling
+    assert before.position[0].tolist() == pytest.approx([-20.0, 30.0], abs=0.05)  # 0.03 s of free fall
     assert not before.velocity[:2].any()
-    stepped(relay, 50)
-    assert relay.frame().position[:2].tolist() == before.position[:2].tolist()
-    assert dict(relay.retired) == {0: pytest.approx(0.03), 1: pytest.approx(0.07)}
-    contacts = relay.contacts()
+    advance(simulation, 50)
+    assert simulation.frame().position[:2].tolist() == before.position[:2].tolist()
+    assert dict(simulation.retired) == {0: pytest.approx(0.03), 1: pytest.approx(0.07)}
+    contacts = simulation.contacts()
     assert set(map(tuple, contacts.pair.tolist())) == {(2, -1), (3, -1), (4, -1)}
     first_touch = {pair[0]: time for time, pair in zip(contacts.time[::-1], contacts.pair[::-1].tolist(), strict=True)}
-    falls = {2: np.sqrt(2 * 0.1 / 9.81), 3: np.sqrt(2 * 0.4 / 9.81), 4: 0.1 + np.sqrt(2 * 0.1 / 9.81)}
-    for number, time in falls.items():
-        assert first_touch[number] == pytest.approx(time, abs=0.021)  # two steps: the engines' first-order errors
+    contact_times = {2: np.sqrt(2 * 0.1 / 9.81), 3: np.sqrt(2 * 0.4 / 9.81), 4: 0.1 + np.sqrt(2 * 0.1 / 9.81)}
+    for index, time in contact_times.items():
+        assert first_touch[index] == pytest.approx(time, abs=0.021)  # two steps: first-order errors of the engines
     with pytest.raises(ActionError, match="already"):
-        relay.apply(Spawn(time=0.0, ball=Ball(name="a", position=(20.0, 9.0), radius=0.1)))
+        simulation.apply(Spawn(time=0.0, ball=Ball(name="a", position=(20.0, 9.0), radius=0.1)))
 
 
-def test_observer_hears_of_every_leg_by_the_numbers_and_times_of_the_whole() -> None:
-    told: list[tuple[float, int, list[bool], set[tuple[int, ...]]]] = []
+def test_observer_gets_indices_and_times_of_the_whole_run() -> None:
+    observed: list[tuple[float, int, list[bool], set[tuple[int, ...]]]] = []
 
-    def listen(time: float, start: FloatArray, end: FloatArray, touching: IntArray) -> None:
+    def observe(time: float, start: FloatArray, end: FloatArray, touching: IntArray) -> None:
         assert start.shape == end.shape
-        told.append((time, len(end), np.isfinite(end[:, 0]).tolist(), set(map(tuple, touching.tolist()))))
+        observed.append((time, len(end), np.isfinite(end[:, 0]).tolist(), set(map(tuple, touching.tolist()))))
 
-    relay = start(scene_of(ball("a", 0, 9), ball("b", 3, 0.249), ball("c", 6, 9)), "pymunk")
-    relay.watch(listen)
-    stepped(relay, 2).apply(Remove(time=0.0, body="a"))
-    relay.apply(Switch(time=0.0, engine="reference"))
-    relay.step()
-    relay.apply(Spawn(time=0.0, ball=Ball(position=(9.0, 9.0), radius=0.25)))
-    relay.apply(Switch(time=0.0, settings={"substeps": 2}))
-    relay.step()
-    assert [time for time, *_ in told] == pytest.approx([0.0, 0.01, 0.02, 0.03, 0.035], abs=1e-15)  # sums
-    assert [count for _, count, _, _ in told] == [3, 3, 3, 4, 4]
-    there = [finite for _, _, finite, _ in told]
-    assert there == [[True] * 3, [True] * 3, [False, True, True], *[[False, True, True, True]] * 2]
-    assert all((1, -1) in touching for *_, touching in told[:3])  # b lies on the floor from the start
-    assert all(pair[0] in (1, 2) for *_, touching in told for pair in touching)
+    simulation = start(scene_of(ball("a", 0, 9), ball("b", 3, 0.249), ball("c", 6, 9)), "pymunk")
+    simulation.watch(observe)
+    advance(simulation, 2).apply(Remove(time=0.0, body="a"))
+    simulation.apply(Switch(time=0.0, engine="reference"))
+    simulation.step()
+    simulation.apply(Spawn(time=0.0, ball=Ball(position=(9.0, 9.0), radius=0.25)))
+    simulation.apply(Switch(time=0.0, settings={"substeps": 2}))
+    simulation.step()
+    assert [time for time, *_ in observed] == pytest.approx([0.0, 0.01, 0.02, 0.03, 0.035], abs=1e-15)  # sums
+    assert [count for _, count, _, _ in observed] == [3, 3, 3, 4, 4]
+    finite_rows = [finite for _, _, finite, _ in observed]
+    assert finite_rows == [[True] * 3, [True] * 3, [False, True, True], *[[False, True, True, True]] * 2]
+    assert all((1, -1) in touching for *_, touching in observed[:3])  # b rests on the floor from the start
+    assert all(pair[0] in (1, 2) for *_, touching in observed for pair in touching)
 
 
-REFUSED: Mapping[str, Action] = {
+INVALID_ACTIONS: Mapping[str, Action] = {
     "unknown engine": Switch(time=0.0, engine="zzz"),
     "no setting": Switch(time=0.0, settings={"zzz": 1}),
     "dt of zero": Switch(time=0.0, settings={"dt": 0.0}),
@@ -200,160 +202,166 @@ REFUSED: Mapping[str, Action] = {
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("which", REFUSED)
-def test_what_is_refused_says_why_and_changes_nothing(engine: str, which: str) -> None:
-    def between() -> SwitchableSimulation:
+@pytest.mark.parametrize("case", INVALID_ACTIONS)
+def test_invalid_action_is_refused_and_changes_nothing(engine: str, case: str) -> None:
+    def running_simulation() -> SwitchableSimulation:
         scene = scene_of(ball("a", 0, 2), ball("post", 5, 5, fixed=True), ball("gone", 9, 9))
-        relay = stepped(start(scene, engine), 5)
-        relay.apply(Remove(time=0.0, body="gone"))
-        return relay
+        simulation = advance(start(scene, engine), 5)
+        simulation.apply(Remove(time=0.0, body="gone"))
+        return simulation
 
-    relay, untouched = between(), between()
+    simulation, untouched = running_simulation(), running_simulation()
     with pytest.raises(ActionError, match=r"\w"):
-        relay.apply(REFUSED[which])
-    assert (relay.engine, relay.wanted, relay.settings) == (untouched.engine, untouched.wanted, untouched.settings)
-    assert relay.state_hash() == untouched.state_hash()
-    assert stepped(relay, 30).state_hash() == stepped(untouched, 30).state_hash()
+        simulation.apply(INVALID_ACTIONS[case])
+    assert (simulation.engine, simulation.wanted, simulation.settings) == (
+        untouched.engine,
+        untouched.wanted,
+        untouched.settings,
+    )
+    assert simulation.state_hash() == untouched.state_hash()
+    assert advance(simulation, 30).state_hash() == advance(untouched, 30).state_hash()
 
 
-def test_exact_refuses_to_go_on_from_an_overlap() -> None:
-    relay = stepped(start(scene_of(ball("a", 0, 0.2)), "pymunk"), 1)
-    before = relay.state_hash()
+def test_switch_to_exact_is_refused_with_an_overlap() -> None:
+    simulation = advance(start(scene_of(ball("a", 0, 0.2)), "pymunk"), 1)
+    before = simulation.state_hash()
     with pytest.raises(ActionError, match="exact refuses"):
-        relay.apply(Switch(time=0.0, engine="exact"))
-    assert (relay.engine, relay.state_hash()) == ("pymunk", before)
+        simulation.apply(Switch(time=0.0, engine="exact"))
+    assert (simulation.engine, simulation.state_hash()) == ("pymunk", before)
 
 
 @pytest.mark.parametrize(("first", "second"), [("pymunk", "reference"), ("reference", "pymunk")])
-def test_steady_force_goes_on_after_a_switch_and_ends_with_its_body(first: str, second: str) -> None:
+def test_constant_force_continues_after_a_switch_and_ends_with_its_body(first: str, second: str) -> None:
     scene = from_document(
         {
             "world": {"bounds": [[-9, -9], [9, 9]]},
             "ball": [ball("a", 0, 0, mass=2), ball("out", 8.99, 0, velocity=[9, 0], collides="none")],
         }
     )
-    relay = start(scene, first)
-    relay.apply(Force(time=0.0, body="a", force=(4.0, -2.0)))
-    relay.apply(Force(time=0.0, body="out", force=(1.0, 0.0)))
-    stepped(relay, 50).apply(Switch(time=0.0, engine=second))
-    assert relay.frame().present.tolist() == [True, False]
-    stepped(relay, 50)
-    assert relay.frame().velocity[0] == pytest.approx([2.0, -1.0], rel=1e-12)  # a hundred sums
-    point = relay.checkpoint()
+    simulation = start(scene, first)
+    simulation.apply(Force(time=0.0, body="a", force=(4.0, -2.0)))
+    simulation.apply(Force(time=0.0, body="out", force=(1.0, 0.0)))
+    advance(simulation, 50).apply(Switch(time=0.0, engine=second))
+    assert simulation.frame().present.tolist() == [True, False]
+    advance(simulation, 50)
+    assert simulation.frame().velocity[0] == pytest.approx([2.0, -1.0], rel=1e-12)  # a hundred sums
+    point = simulation.checkpoint()
     assert set(point.forces) == {"a"}
-    assert stepped(SwitchableSimulation.resumed(point), 9).state_hash() == stepped(relay, 9).state_hash()
+    assert advance(SwitchableSimulation.resumed(point), 9).state_hash() == advance(simulation, 9).state_hash()
 
 
-def test_pull_goes_on_after_a_switch_and_ends_with_its_body() -> None:
-    relay = start(from_document({"ball": [ball("a", 0, 0), ball("b", 9, 9)]}), "pymunk")
-    relay.apply(Pull(time=0.0, body="a", target=(1.0, 0.0)))
-    stepped(relay, 5).apply(Switch(time=0.0, engine="exact"))
-    stepped(relay, 95)
-    assert relay.frame().position[0] == pytest.approx([1.0, 0.0], abs=1e-9)  # e^{−ωt}·(1 + ωt) after 1 s
-    relay.apply(Remove(time=0.0, body="a"))
-    stepped(relay, 2).apply(Switch(time=0.0, engine="reference"))
-    assert not stepped(relay, 2).frame().present[0]
-    assert not relay.checkpoint().pulls
+def test_pull_continues_after_a_switch_and_ends_with_its_body() -> None:
+    simulation = start(from_document({"ball": [ball("a", 0, 0), ball("b", 9, 9)]}), "pymunk")
+    simulation.apply(Pull(time=0.0, body="a", target=(1.0, 0.0)))
+    advance(simulation, 5).apply(Switch(time=0.0, engine="exact"))
+    advance(simulation, 95)
+    assert simulation.frame().position[0] == pytest.approx([1.0, 0.0], abs=1e-9)  # e^{−ωt}·(1 + ωt) after 1 s
+    simulation.apply(Remove(time=0.0, body="a"))
+    advance(simulation, 2).apply(Switch(time=0.0, engine="reference"))
+    assert not advance(simulation, 2).frame().present[0]
+    assert not simulation.checkpoint().pulls
     with pytest.raises(ActionError, match="a"):
-        relay.apply(Pull(time=0.0, body="a", target=(1.0, 0.0)))
+        simulation.apply(Pull(time=0.0, body="a", target=(1.0, 0.0)))
 
 
-def test_names_of_the_nameless_never_collide() -> None:
-    relay = start(scene_of(ball("spawned-2", 0, 9), ball("a", 2, 9)), "pymunk")
+def test_generated_names_are_unique() -> None:
+    simulation = start(scene_of(ball("spawned-2", 0, 9), ball("a", 2, 9)), "pymunk")
     for k in range(4):
-        relay.apply(Spawn(time=0.0, ball=Ball(position=(4.0 + k, 9.0), radius=0.1)))
-        relay.apply(Switch(time=0.0))
-    relay.apply(Remove(time=0.0, body=relay.bodies.names[-1]))
-    relay.apply(Switch(time=0.0))
-    relay.apply(Spawn(time=0.0, ball=Ball(position=(9.0, 9.0), radius=0.1)))
-    assert len(set(relay.bodies.names)) == 7
-    assert len(relay.frame().position) == 7
+        simulation.apply(Spawn(time=0.0, ball=Ball(position=(4.0 + k, 9.0), radius=0.1)))
+        simulation.apply(Switch(time=0.0))
+    simulation.apply(Remove(time=0.0, body=simulation.bodies.names[-1]))
+    simulation.apply(Switch(time=0.0))
+    simulation.apply(Spawn(time=0.0, ball=Ball(position=(9.0, 9.0), radius=0.1)))
+    assert len(set(simulation.bodies.names)) == 7
+    assert len(simulation.frame().position) == 7
 
 
-def test_coefficients_set_in_a_later_leg_last_and_reach_the_next() -> None:
-    relay = start(scene_of(ball("a", 0, 0.5), ball("b", 3, 9)), "pymunk")
-    relay.apply(Remove(time=0.0, body="b"))
-    relay.apply(Switch(time=0.0, engine="reference"))
-    relay.apply(SetParameter(time=0.0, path="ball.a.restitution", value=0.0))
-    relay.apply(SetParameter(time=0.0, path="plane.floor.restitution", value=0.0))
-    relay.apply(SetParameter(time=0.0, path="world.gravity", value=[0.0, -1.0]))
-    relay.apply(Switch(time=0.0, engine="exact"))
-    assert relay.bodies.elements[0].restitution == 0.0
-    stepped(relay, 200)
-    assert relay.frame().position[0].tolist() == pytest.approx([0.0, 0.25], abs=1e-12)  # it does not bounce
-    assert relay.scene.world.gravity == (0.0, -1.0)
+def test_coefficients_set_after_a_switch_persist_through_the_next() -> None:
+    simulation = start(scene_of(ball("a", 0, 0.5), ball("b", 3, 9)), "pymunk")
+    simulation.apply(Remove(time=0.0, body="b"))
+    simulation.apply(Switch(time=0.0, engine="reference"))
+    simulation.apply(SetParameter(time=0.0, path="ball.a.restitution", value=0.0))
+    simulation.apply(SetParameter(time=0.0, path="plane.floor.restitution", value=0.0))
+    simulation.apply(SetParameter(time=0.0, path="world.gravity", value=[0.0, -1.0]))
+    simulation.apply(Switch(time=0.0, engine="exact"))
+    assert simulation.bodies.elements[0].restitution == 0.0
+    advance(simulation, 200)
+    assert simulation.frame().position[0].tolist() == pytest.approx([0.0, 0.25], abs=1e-12)  # no bounce
+    assert simulation.scene.world.gravity == (0.0, -1.0)
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
-def test_taken_up_in_free_flight_it_goes_on_bit_for_bit(engine: str) -> None:
-    relay = stepped(start(three(solver={"dt": 1 / 60}), engine), 7)
-    relay.apply(Pull(time=0.0, body="b", grip=(0.1, 0.0), target=(1.0, 5.0)))
-    relay.apply(Switch(time=0.0, settings={"dt": 0.003}))
-    stepped(relay, 4)
-    again = SwitchableSimulation.resumed(relay.checkpoint())
+def test_checkpoint_in_free_flight_resumes_bit_identically(engine: str) -> None:
+    simulation = advance(start(three_balls(solver={"dt": 1 / 60}), engine), 7)
+    simulation.apply(Pull(time=0.0, body="b", grip=(0.1, 0.0), target=(1.0, 5.0)))
+    simulation.apply(Switch(time=0.0, settings={"dt": 0.003}))
+    advance(simulation, 4)
+    resumed = SwitchableSimulation.resumed(simulation.checkpoint())
     for _ in range(25):
-        assert again.state_hash() == relay.state_hash()
-        relay.step()
-        again.step()
+        assert resumed.state_hash() == simulation.state_hash()
+        simulation.step()
+        resumed.step()
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
-@pytest.mark.parametrize("speed", [1.0, 3000.0])  # m/s; at 3000 pymunk's half-planes are lengthened on the way
+@pytest.mark.parametrize(
+    "speed", [1.0, 3000.0]
+)  # m/s; at 3000 the adapter lengthens pymunk's half-planes during the run
 @pytest.mark.parametrize("normal", [[0.0, 1.0], [0.1, 1.0]])
 @pytest.mark.parametrize("switched", [False, True])
-def test_taken_up_between_bounces_off_a_plane_it_goes_on_bit_for_bit(
+def test_checkpoint_between_bounces_resumes_bit_identically(
     engine: str, speed: float, normal: list[float], switched: bool
 ) -> None:
     plane = {"point": [0, 0], "normal": normal, "restitution": 1.0}
     velocity = [speed * normal[1], -speed * normal[0]]
     balls = [ball(f"b{k}", 3 * k, 2 + 0.3 * k, velocity=velocity, restitution=1.0) for k in range(2)]
-    relay = start(from_document({"world": {"gravity": [0, -9.81]}, "plane": [plane], "ball": balls}), engine)
-    stepped(relay, 210).contacts()
-    while len(relay.contacts().time):
-        relay.step()
-    again = SwitchableSimulation.resumed(relay.checkpoint())
-    if switched:  # as a recording has it
-        relay.apply(Switch(time=0.0, resumes=True))
+    simulation = start(from_document({"world": {"gravity": [0, -9.81]}, "plane": [plane], "ball": balls}), engine)
+    advance(simulation, 210).contacts()
+    while len(simulation.contacts().time):
+        simulation.step()
+    resumed = SwitchableSimulation.resumed(simulation.checkpoint())
+    if switched:  # as in a recording
+        simulation.apply(Switch(time=0.0, resumes=True))
     for _ in range(400):
-        relay.step()
-        again.step()
-        assert again.state_hash() == relay.state_hash()
-    assert again.plane_reach == relay.plane_reach
+        simulation.step()
+        resumed.step()
+        assert resumed.state_hash() == simulation.state_hash()
+    assert resumed.plane_reach == simulation.plane_reach
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", ["tutorial/bounce", "benchmark/newtons_cradle", "benchmark/gas"])
-def test_switch_of_nothing_and_taking_up_a_checkpoint_are_the_same(name: str, engine: str) -> None:
-    """Whatever there is in contact: a session that went back hands over in this way to be played again."""
-    relay = stepped(start(SCENES[name], engine), 60)
-    again = SwitchableSimulation.resumed(relay.checkpoint())
-    relay.apply(Switch(time=0.0, resumes=True))
+def test_resuming_switch_equals_a_resumed_checkpoint(name: str, engine: str) -> None:
+    """Holds with any contacts: recordings of sessions with undo rely on it."""
+    simulation = advance(start(SCENES[name], engine), 60)
+    resumed = SwitchableSimulation.resumed(simulation.checkpoint())
+    simulation.apply(Switch(time=0.0, resumes=True))
     for _ in range(60):
-        assert again.state_hash() == relay.state_hash()
-        relay.step()
-        again.step()
+        assert resumed.state_hash() == simulation.state_hash()
+        simulation.step()
+        resumed.step()
 
 
-def test_divergence_tells_the_time_of_the_whole() -> None:
+def test_divergence_reports_the_time_of_the_whole_run() -> None:
     scene = from_document({"ball": [ball("a", 9e15, 0, velocity=[1e12, 0])], "solver": {"dt": 1.0}})
-    relay = stepped(start(scene, "pymunk"), 10)
-    relay.apply(Switch(time=0.0, engine="reference", settings={"dt": 10.0}))
+    simulation = advance(start(scene, "pymunk"), 10)
+    simulation.apply(Switch(time=0.0, engine="reference", settings={"dt": 10.0}))
     with pytest.raises(Divergence) as caught:
-        stepped(relay, 10_000)
-    assert caught.value.time == relay.time == relay.frame().time
+        advance(simulation, 10_000)
+    assert caught.value.time == simulation.time == simulation.frame().time
     assert caught.value.time > 100.0
 
 
-def test_patience_goes_on_and_an_exhausted_step_does_not_count() -> None:
-    gas = load(find("gas"), [("grid.atom.velocity_jitter", 100.0)])  # some 200,000 impacts in 10 s
-    relay = stepped(start(gas, "exact"), 3)
-    relay.patience = 0.0
-    relay.apply(Switch(time=0.0, settings={"dt": 10.0}))
-    assert relay.patience == 0.0
-    time = relay.time
+def test_patience_is_kept_and_an_exhausted_step_does_not_advance_time() -> None:
+    gas = load(find("gas"), [("grid.atom.velocity_jitter", 100.0)])  # about 200,000 impacts in 10 s
+    simulation = advance(start(gas, "exact"), 3)
+    simulation.patience = 0.0
+    simulation.apply(Switch(time=0.0, settings={"dt": 10.0}))
+    assert simulation.patience == 0.0
+    time = simulation.time
     with pytest.raises(Exhaustion, match="takes longer"):
-        stepped(relay, 10)
-    assert (relay.time - time) % 10.0 == 0.0
+        advance(simulation, 10)
+    assert (simulation.time - time) % 10.0 == 0.0
 
 
 def test_scene_that_an_engine_cannot_run_is_refused_at_once() -> None:
@@ -361,7 +369,7 @@ def test_scene_that_an_engine_cannot_run_is_refused_at_once() -> None:
         start(scene_of(ball("a", 0, 1)), "exact", Settings(detection="swept"))
 
 
-ACTS: list[Action] = [
+ACTIONS: list[Action] = [
     Impulse(time=0.0, body="a", impulse=(1.0, 2.0), angular=0.1),
     Move(time=0.0, body="b", position=(0.0, 8.0)),
     Remove(time=0.0, body="c"),
@@ -381,27 +389,27 @@ ACTS: list[Action] = [
 ]
 
 
-@given(st.lists(st.tuples(st.integers(0, 12), st.sampled_from(ACTS)), max_size=14), st.sampled_from(list(ENGINES)))
-def test_in_any_order_of_actions_time_goes_on_and_nobody_is_lost(done: list[tuple[int, Action]], engine: str) -> None:
-    relay = start(three(), engine)
-    relay.contacts()
+@given(st.lists(st.tuples(st.integers(0, 12), st.sampled_from(ACTIONS)), max_size=14), st.sampled_from(list(ENGINES)))
+def test_any_sequence_of_actions_keeps_time_and_bodies(script: list[tuple[int, Action]], engine: str) -> None:
+    simulation = start(three_balls(), engine)
+    simulation.contacts()
     time, present, count = 0.0, np.ones(3, np.bool_), 3
-    for steps, action in done:
-        stepped(relay, steps)
-        time += steps * relay.settings.dt
-        before = relay.frame()
+    for steps, action in script:
+        advance(simulation, steps)
+        time += steps * simulation.settings.dt
+        before = simulation.frame()
         try:
-            relay.apply(action)
+            simulation.apply(action)
         except ActionError as error:
             assert str(error)
-            assert same(before, relay.frame())
-        frame = relay.frame()
-        assert frame.time == relay.time == pytest.approx(time, abs=1e-12)  # sums
+            assert same_state(before, simulation.frame())
+        frame = simulation.frame()
+        assert frame.time == simulation.time == pytest.approx(time, abs=1e-12)  # sums
         count += isinstance(action, Spawn) and len(frame.position) > count
-        assert len(frame.position) == len(relay.bodies) == len(set(relay.bodies.names)) == count
-        assert not (frame.present[: len(present)] & ~present).any()  # nobody comes back by himself
-        assert set(relay.retired) == set(np.flatnonzero(~frame.present).tolist())
+        assert len(frame.position) == len(simulation.bodies) == len(set(simulation.bodies.names)) == count
+        assert not (frame.present[: len(present)] & ~present).any()  # no removed body returns
+        assert set(simulation.retired) == set(np.flatnonzero(~frame.present).tolist())
         assert np.isfinite(frame.position).all()
-        pairs = relay.contacts().pair
+        pairs = simulation.contacts().pair
         assert (pairs < count).all()
         present = frame.present

@@ -1,11 +1,11 @@
-"""Setting a value while a scene runs: one part is read again, with the outcome of reading the whole scene."""
+"""SetParameter in a running scene: only one part is re-read, with the same result as re-reading the whole scene."""
 
 from typing import Any
 
 import pytest
 
 from sandbox.action import ActionError, SetParameter, Spawn, Switch
-from sandbox.engines.common import actions as surroundings
+from sandbox.engines.common import actions as actions_module
 from sandbox.engines.contract import Exhaustion, Refusal
 from sandbox.engines.registry import ENGINES
 from sandbox.engines.switching import start
@@ -30,9 +30,9 @@ SCENES = (
     "pinball/classic",
     "tutorial/bounce",
 )
-"""Of every kind: balls, boxes, floors, pucks, nets, zones, drives, drag."""
+"""Scenes of every kind: balls, boxes, surfaces, pucks, nets, zones, drives, drag."""
 
-HEADINGS = (
+TABLES = (
     "material",
     "plane",
     "wall",
@@ -48,8 +48,8 @@ HEADINGS = (
 )
 
 
-def settings_of(scene: Scene) -> list[tuple[str, Any]]:
-    """Return values that can be set in a scene while it runs."""
+def parameters_of(scene: Scene) -> list[tuple[str, Any]]:
+    """Return the parameters that can be set while a scene runs, with new values."""
     found: list[tuple[str, Any]] = [("world.wind", [1.0, 0.5])]
     if scene.surface is None:
         found += [("world.gravity", [0.3, -5.0]), ("world.linear_drag", 0.25), ("world.quadratic_drag", 0.02)]
@@ -58,20 +58,20 @@ def settings_of(scene: Scene) -> list[tuple[str, Any]]:
         if scene.surface.bodies == "pucks":
             found.append(("surface.curl", 0.4))
     document = to_document(scene)
-    for heading in HEADINGS:
-        elements = document.get(heading, [])
+    for table in TABLES:
+        elements = document.get(table, [])
         if elements:
-            found += [(f"{heading}.*.restitution", 0.4), (f"{heading}.{len(elements) - 1}.friction", 0.37)]
+            found += [(f"{table}.*.restitution", 0.4), (f"{table}.{len(elements) - 1}.friction", 0.37)]
             if "name" in elements[0]:
-                found.append((f'{heading}."{elements[0]["name"]}".restitution', 0.23))
+                found.append((f'{table}."{elements[0]["name"]}".restitution', 0.23))
     return found
 
 
-CASES = [(name, path, value) for name in SCENES for path, value in settings_of(load(find(name)))]
+CASES = [(name, path, value) for name in SCENES for path, value in parameters_of(load(find(name)))]
 
 
 @pytest.mark.parametrize(("name", "path", "value"), CASES)
-def test_changed_value_is_what_reading_the_whole_scene_gives(name, path, value):
+def test_changed_value_equals_that_of_a_re_read_scene(name, path, value):
     scene = load(find(name))
     changed = change_value(scene, path, value)
     assert changed == from_document(assign(to_document(scene), path, value)[0])
@@ -79,46 +79,46 @@ def test_changed_value_is_what_reading_the_whole_scene_gives(name, path, value):
     assert changed.elements == from_document(to_document(changed)).elements
 
 
-def ends(name: str, engine: str, path: str, value: Any) -> str:
-    """Return the state after some steps, a change, and some more; or why there is none."""
+def outcome(name: str, engine: str, path: str, value: Any) -> str:
+    """Return the state hash after some steps, a change and more steps, or the message of a refusal."""
     try:
-        relay = start(load(find(name)), engine)
+        simulation = start(load(find(name)), engine)
         for _ in range(10):
-            relay.step()
-        relay.apply(SetParameter(time=0.0, path=path, value=value))
+            simulation.step()
+        simulation.apply(SetParameter(time=0.0, path=path, value=value))
         for _ in range(20):
-            relay.step()
+            simulation.step()
     except (Refusal, ActionError, Exhaustion) as error:
         return str(error)
-    return relay.state_hash()
+    return simulation.state_hash()
 
 
 @pytest.mark.parametrize(("name", "path", "value"), CASES)
 @pytest.mark.parametrize("engine", ENGINES)
-def test_run_goes_on_as_if_the_whole_scene_had_been_read(engine, name, path, value, monkeypatch):
-    quick = ends(name, engine, path, value)
+def test_run_continues_as_if_the_whole_scene_were_re_read(engine, name, path, value, monkeypatch):
+    quick = outcome(name, engine, path, value)
 
     def refuse(*_: Any) -> Scene:
         raise ValueError
 
-    monkeypatch.setattr(surroundings, "change_value", refuse)
-    assert ends(name, engine, path, value) == quick
+    monkeypatch.setattr(actions_module, "change_value", refuse)
+    assert outcome(name, engine, path, value) == quick
 
 
 @pytest.mark.parametrize(("name", "path", "value"), CASES)
-def test_value_that_is_right_is_set_without_reading_the_whole_scene(name, path, value, monkeypatch):
-    """What a change costs is not the size of the scene: no test of time tells that as surely."""
-    relay = start(load(find(name)))
+def test_valid_value_is_set_without_re_reading_the_whole_scene(name, path, value, monkeypatch):
+    """The cost of a change does not depend on the size of the scene; this is a deterministic check of it."""
+    simulation = start(load(find(name)))
 
     def refuse(*_: Any) -> Scene:
         raise AssertionError("the whole scene was read again")
 
-    monkeypatch.setattr(surroundings, "from_session", refuse)
-    relay.apply(SetParameter(time=0.0, path=path, value=value))
-    assert to_document(relay.scene) == assign(to_document(load(find(name))), path, value)[0]
+    monkeypatch.setattr(actions_module, "from_session", refuse)
+    simulation.apply(SetParameter(time=0.0, path=path, value=value))
+    assert to_document(simulation.scene) == assign(to_document(load(find(name))), path, value)[0]
 
 
-WRONG: list[tuple[str, str, Any]] = [
+INVALID_VALUES: list[tuple[str, str, Any]] = [
     ("tutorial/bounce", "world.gravity", "down"),
     ("tutorial/bounce", "world.gravity", [0.0]),
     ("tutorial/bounce", "world.gravity", [0.0, 1e300]),
@@ -150,16 +150,16 @@ WRONG: list[tuple[str, str, Any]] = [
 ]
 
 
-@pytest.mark.parametrize(("name", "path", "value"), WRONG)
-def test_wrong_value_is_refused_with_the_fault_of_the_whole_scene(name, path, value, monkeypatch):
+@pytest.mark.parametrize(("name", "path", "value"), INVALID_VALUES)
+def test_invalid_value_is_refused_with_the_message_of_a_re_read_scene(name, path, value, monkeypatch):
     def refusal() -> str | None:
-        relay = start(load(find(name)))
-        before, scene = relay.state_hash(), relay.scene
+        simulation = start(load(find(name)))
+        before, scene = simulation.state_hash(), simulation.scene
         try:
-            relay.apply(SetParameter(time=0.0, path=path, value=value))
+            simulation.apply(SetParameter(time=0.0, path=path, value=value))
         except ActionError as error:
-            assert relay.scene is scene
-            assert relay.state_hash() == before
+            assert simulation.scene is scene
+            assert simulation.state_hash() == before
             return str(error)
         return None
 
@@ -168,7 +168,7 @@ def test_wrong_value_is_refused_with_the_fault_of_the_whole_scene(name, path, va
     def refuse(*_: Any) -> Scene:
         raise ValueError
 
-    monkeypatch.setattr(surroundings, "change_value", refuse)
+    monkeypatch.setattr(actions_module, "change_value", refuse)
     assert refusal() == quick
     if (name, path) != ("billiards/9-ball", "surface.sliding_friction") or value:
         assert quick is not None
@@ -189,15 +189,15 @@ def test_wrong_value_is_refused_with_the_fault_of_the_whole_scene(name, path, va
         ("tutorial/bounce", "terrain.friction", "ball.ball.friction"),
     ],
 )
-def test_path_of_an_expanded_preset_is_refused_with_the_elements_it_may_mean(name, path, hint):
-    relay = start(load(find(name)))
+def test_path_of_an_expanded_preset_is_refused_with_a_hint(name, path, hint):
+    simulation = start(load(find(name)))
     with pytest.raises(ActionError, match="running scene") as refused:
-        relay.apply(SetParameter(time=0.0, path=path, value=0.5))
+        simulation.apply(SetParameter(time=0.0, path=path, value=0.5))
     assert hint in str(refused.value)
 
 
 @pytest.mark.parametrize(
-    ("path", "value", "said"),
+    ("path", "value", "message"),
     [
         ("ball.late.restitution", 2, "between 0 and 1"),
         ("ball.late.friction", -1.0, "between 0 and 1000"),
@@ -208,18 +208,18 @@ def test_path_of_an_expanded_preset_is_refused_with_the_elements_it_may_mean(nam
         ("ball.later.restitution", 0.5, "ball.late"),
     ],
 )
-def test_wrong_value_of_a_spawned_body_is_refused_in_the_words_of_a_scene(path, value, said):
-    relay = start(load(find("tutorial/bounce")))
-    relay.apply(Spawn(time=0.0, ball=Ball(name="late", position=(50.0, 50.0), radius=0.1)))
+def test_invalid_value_of_a_spawned_body_is_refused_with_the_message_of_a_scene(path, value, message):
+    simulation = start(load(find("tutorial/bounce")))
+    simulation.apply(Spawn(time=0.0, ball=Ball(name="late", position=(50.0, 50.0), radius=0.1)))
     with pytest.raises(ActionError) as refused:
-        relay.apply(SetParameter(time=0.0, path=path, value=value))
+        simulation.apply(SetParameter(time=0.0, path=path, value=value))
     assert str(refused.value).startswith(f"{path}: ")
-    assert said in str(refused.value)
+    assert message in str(refused.value)
     assert len(str(refused.value)) < 200
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "said"),
+    ("key", "value", "message"),
     [
         ("dt", -1.0, "at most 10"),
         ("dt", "fast", "a number"),
@@ -227,16 +227,16 @@ def test_wrong_value_of_a_spawned_body_is_refused_in_the_words_of_a_scene(path, 
         ("steps", 3, "unknown key"),
     ],
 )
-def test_wrong_setting_of_a_switch_is_refused_in_the_words_of_a_scene(key, value, said):
-    relay = start(load(find("tutorial/bounce")))
-    with pytest.raises(ActionError, match=f"^solver.{key}: .*{said}"):
-        relay.apply(Switch(time=0.0, settings={key: value}))
+def test_invalid_setting_of_a_switch_is_refused_with_the_message_of_a_scene(key, value, message):
+    simulation = start(load(find("tutorial/bounce")))
+    with pytest.raises(ActionError, match=f"^solver.{key}: .*{message}"):
+        simulation.apply(Switch(time=0.0, settings={key: value}))
 
 
-def test_session_that_has_only_just_begun_keeps_its_duration():
+def test_new_session_keeps_its_zero_duration():
     scene = load(find("tutorial/bounce"))
-    begun = Recording(scene, "pymunk", Settings(), (), 0.0).whole_scene
-    relay = start(begun)
-    relay.apply(SetParameter(time=0.0, path="world.gravity", value=[0.0, -1.0]))
-    assert relay.scene.world.duration == 0.0
-    assert relay.scene.world.gravity == (0.0, -1.0)
+    new_session = Recording(scene, "pymunk", Settings(), (), 0.0).whole_scene
+    simulation = start(new_session)
+    simulation.apply(SetParameter(time=0.0, path="world.gravity", value=[0.0, -1.0]))
+    assert simulation.scene.world.duration == 0.0
+    assert simulation.scene.world.gravity == (0.0, -1.0)

@@ -1,4 +1,4 @@
-"""Accounts of scenes that change engine on the way: the legs' are added up, and what is done between them is booked."""
+"""Energy ledger across engine switches: segments are summed, and actions between them are booked."""
 
 from typing import Any
 
@@ -22,57 +22,57 @@ def scene_of(**more: Any) -> Scene:
     )
 
 
-def stepped(relay: SwitchableSimulation, steps: int) -> SwitchableSimulation:
+def advance(simulation: SwitchableSimulation, steps: int) -> SwitchableSimulation:
     for _ in range(steps):
-        relay.step()
-    return relay
+        simulation.step()
+    return simulation
 
 
-def test_legs_are_added_up() -> None:
-    relay = start(scene_of(), "reference")
-    begun = total_energy(relay)
-    relay.account()
-    stepped(relay, 60)
-    first = relay.account()
-    relay.apply(Switch(time=0.6, settings={"integrator": "velocity_verlet"}))
-    assert relay.account() == first
-    stepped(relay, 60)
-    entries = relay.account()
+def test_ledgers_of_segments_are_summed() -> None:
+    simulation = start(scene_of(), "reference")
+    initial = total_energy(simulation)
+    simulation.account()
+    advance(simulation, 60)
+    first = simulation.account()
+    simulation.apply(Switch(time=0.6, settings={"integrator": "velocity_verlet"}))
+    assert simulation.account() == first
+    advance(simulation, 60)
+    entries = simulation.account()
     assert entries[Cause.RESTITUTION] < first[Cause.RESTITUTION] < 0.0
-    assert sum(entries.values()) == pytest.approx(total_energy(relay) - begun, abs=1e-12)  # of 20 J: rounding
+    assert sum(entries.values()) == pytest.approx(total_energy(simulation) - initial, abs=1e-12)  # rounding of 20 J
 
 
-def test_hands_are_drives_and_not_actions() -> None:
-    relay = start(scene_of(), "reference")
-    begun = total_energy(relay)
-    relay.account()
-    relay.apply(Pull(time=0.0, body="a", target=(1.0, 4.0)))
-    stepped(relay, 30)
-    entries = relay.account()
+def test_pulls_are_booked_as_drives() -> None:
+    simulation = start(scene_of(), "reference")
+    initial = total_energy(simulation)
+    simulation.account()
+    simulation.apply(Pull(time=0.0, body="a", target=(1.0, 4.0)))
+    advance(simulation, 30)
+    entries = simulation.account()
     assert entries[Cause.ACTIONS] == 0.0
     assert entries[Cause.DRIVES] > 1.0
-    assert sum(entries.values()) == pytest.approx(total_energy(relay) - begun, abs=1e-12)  # as above
+    assert sum(entries.values()) == pytest.approx(total_energy(simulation) - initial, abs=1e-12)  # as above
 
 
-def test_a_launch_is_an_action() -> None:
+def test_launch_is_booked_as_an_action() -> None:
     rain = {"name": "rain", "count": 3, "lower": [-1, 3], "upper": [1, 5], "radius": 0.1, "collides": "none"}
-    relay = start(scene_of(scatter=[rain]), "reference")
-    begun = total_energy(relay)
-    relay.account()
-    stepped(relay, 20)
-    relay.apply(Launch(time=0.2, generator="rain", seed=7))
-    stepped(relay, 20)
-    entries = relay.account()
-    assert entries[Cause.ACTIONS] != 0.0  # another seed, other heights
-    assert sum(entries.values()) == pytest.approx(total_energy(relay) - begun, abs=1e-12)  # as above
+    simulation = start(scene_of(scatter=[rain]), "reference")
+    initial = total_energy(simulation)
+    simulation.account()
+    advance(simulation, 20)
+    simulation.apply(Launch(time=0.2, generator="rain", seed=7))
+    advance(simulation, 20)
+    entries = simulation.account()
+    assert entries[Cause.ACTIONS] != 0.0  # another seed gives other heights
+    assert sum(entries.values()) == pytest.approx(total_energy(simulation) - initial, abs=1e-12)  # as above
 
 
-def test_a_relay_that_is_not_asked_keeps_no_account() -> None:
-    plain, asked = (start(scene_of(), "reference") for _ in range(2))
-    asked.account()
-    for relay in (plain, asked):
-        relay.apply(Pull(time=0.0, body="a", target=(1.0, 4.0)))
-        stepped(relay, 10).apply(Switch(time=0.1, settings={"substeps": 2}))
-        stepped(relay, 40)
-    assert plain.state_hash() == asked.state_hash()
+def test_no_ledger_is_kept_without_accounting() -> None:
+    plain, accounted = (start(scene_of(), "reference") for _ in range(2))
+    accounted.account()
+    for simulation in (plain, accounted):
+        simulation.apply(Pull(time=0.0, body="a", target=(1.0, 4.0)))
+        advance(simulation, 10).apply(Switch(time=0.1, settings={"substeps": 2}))
+        advance(simulation, 40)
+    assert plain.state_hash() == accounted.state_hash()
     assert set(plain.account().values()) == {0.0}

@@ -1,4 +1,4 @@
-"""Thrusts: constant, timed, opened and closed by actions, kept by a running scene that changes its engine."""
+"""Thrust: constant, timed, controlled by throttle actions, and kept through engine switches."""
 
 import math
 
@@ -21,7 +21,7 @@ def ship(*thrusts, collides="none", duration=1.0, **keys):
     return from_document({"world": {"duration": duration}, "box": [body], "thrust": thrusts})
 
 
-def stepped(simulation, count):
+def advance(simulation, count):
     for _ in range(count):
         simulation.step()
     return simulation.frame()
@@ -30,88 +30,88 @@ def stepped(simulation, count):
 @every_engine
 @pytest.mark.parametrize("collides", ["none", "all"])
 def test_thrust_through_the_centre_is_a_constant_acceleration(engine, collides):
-    done = sandbox.run(ship({}, collides=collides), engine, dt=0.01)
-    assert done.velocity[-1, 0] == pytest.approx([2.0, 0.0], abs=1e-14)  # 100 sums of 0.02
-    # Half a step early or late, as the scheme kicks: a·h·T/2.
-    assert done.position[-1, 0, 0] == pytest.approx(1.0, abs=2.0 * 0.01 / 2 + 1e-12)
-    assert not done.angular_velocity.any()
+    trajectory = sandbox.run(ship({}, collides=collides), engine, dt=0.01)
+    assert trajectory.velocity[-1, 0] == pytest.approx([2.0, 0.0], abs=1e-14)  # 100 sums of 0.02
+    # Half a step early or late, depending on the scheme: a·h·T/2.
+    assert trajectory.position[-1, 0, 0] == pytest.approx(1.0, abs=2.0 * 0.01 / 2 + 1e-12)
+    assert not trajectory.angular_velocity.any()
 
 
 @every_engine
-def test_thrust_turns_with_its_body(engine):
-    """Off the centre by 0.5 m: τ = 2 N·m on I = m(w² + h²)/12 = 5/6 kg·m², and the force points where the body does."""
+def test_thrust_rotates_with_its_body(engine):
+    """Off the centre by 0.5 m: τ = 2 N·m on I = m(w² + h²)/12 = 5/6 kg·m²; the force rotates with the body."""
     h = 0.0005
-    done = sandbox.run(ship({"point": [0.0, -0.5]}), engine, dt=h)
+    trajectory = sandbox.run(ship({"point": [0.0, -0.5]}), engine, dt=h)
     alpha = 2.0 / (2.0 * 5.0 / 12.0)
-    t = done.time
-    np.testing.assert_allclose(done.angular_velocity[:, 0], alpha * t, atol=1e-11)  # 2,000 rounded sums
+    t = trajectory.time
+    np.testing.assert_allclose(trajectory.angular_velocity[:, 0], alpha * t, atol=1e-11)  # rounding of 2,000 sums
     phi = 0.5 * alpha * t**2
-    # ∫ a·(cos φ, sin φ) dt by the trapezium rule, whose own error is h²
+    # ∫ a·(cos φ, sin φ) dt by the trapezium rule, with an error of h²
     a = 2.0 * np.column_stack((np.cos(phi), np.sin(phi)))
     velocity = np.concatenate((np.zeros((1, 2)), np.cumsum(0.5 * h * (a[1:] + a[:-1]), axis=0)))
     assert (
-        np.abs(done.velocity[:, 0] - velocity).max() <= 2.0 * h * 2.0
-    )  # a step's force early or late: a·h, and φ with it
+        np.abs(trajectory.velocity[:, 0] - velocity).max() <= 2.0 * h * 2.0
+    )  # force a step early or late: a·h, and the same for φ
 
 
 @every_engine
-def test_timed_thrust_burns_from_begin_to_end(engine):
-    done = sandbox.run(ship({"begin": 0.25, "end": 0.75}), engine, dt=0.01)
-    assert done.velocity[done.time <= 0.25 + 1e-9, 0].max() == 0.0
-    assert done.velocity[-1, 0, 0] == pytest.approx(1.0, abs=1e-12)  # 50 of 100 steps
-    late = done.velocity[done.time >= 0.76, 0, 0]
-    assert np.ptp(late) == 0.0
+def test_timed_thrust_acts_from_begin_to_end(engine):
+    trajectory = sandbox.run(ship({"begin": 0.25, "end": 0.75}), engine, dt=0.01)
+    assert trajectory.velocity[trajectory.time <= 0.25 + 1e-9, 0].max() == 0.0
+    assert trajectory.velocity[-1, 0, 0] == pytest.approx(1.0, abs=1e-12)  # 50 of 100 steps
+    after_end = trajectory.velocity[trajectory.time >= 0.76, 0, 0]
+    assert np.ptp(after_end) == 0.0
 
 
 @every_engine
-def test_thrust_with_a_key_waits_for_a_throttle(engine):
+def test_thrust_with_a_key_is_off_until_a_throttle_action(engine):
     simulation = sandbox.start(ship({"key": "up", "name": "main"}), engine)
-    assert not stepped(simulation, 10).velocity.any()
+    assert not advance(simulation, 10).velocity.any()
     simulation.apply(Throttle(time=0.1, thrust="main", level=0.5))
-    assert stepped(simulation, 50).velocity[0, 0] == pytest.approx(0.5, abs=1e-14)
+    assert advance(simulation, 50).velocity[0, 0] == pytest.approx(0.5, abs=1e-14)
     simulation.apply(Throttle(time=0.6, thrust="main", level=0.0))
-    assert stepped(simulation, 50).velocity[0, 0] == pytest.approx(0.5, abs=1e-14)
+    assert advance(simulation, 50).velocity[0, 0] == pytest.approx(0.5, abs=1e-14)
 
 
 @every_engine
-def test_unknown_thrust_is_refused_with_those_there_are(engine):
+def test_unknown_thrust_is_refused_with_the_known_names(engine):
     simulation = sandbox.start(ship({"name": "main"}, {}), engine)
     with pytest.raises(ActionError, match="no thrust is named 'mian'; known names: main, thrust-2"):
         simulation.apply(Throttle(time=0.0, thrust="mian", level=1.0))
 
 
-def test_throttle_is_kept_where_the_engine_changes_and_where_a_checkpoint_is_taken_up():
+def test_throttle_is_kept_through_engine_switches_and_checkpoints():
     simulation = sandbox.start(ship({"key": "up", "name": "main"}), "pymunk")
     simulation.apply(Throttle(time=0.0, thrust="main", level=1.0))
-    stepped(simulation, 10)
+    advance(simulation, 10)
     simulation.apply(Switch(time=0.1, engine="reference"))
-    assert stepped(simulation, 10).velocity[0, 0] == pytest.approx(0.4, abs=1e-14)
+    assert advance(simulation, 10).velocity[0, 0] == pytest.approx(0.4, abs=1e-14)
     resumed = SwitchableSimulation.resumed(simulation.checkpoint())
-    assert stepped(resumed, 10).state_hash() == stepped(simulation, 10).state_hash()
+    assert advance(resumed, 10).state_hash() == advance(simulation, 10).state_hash()
     assert resumed.frame().velocity[0, 0] == pytest.approx(0.6, abs=1e-14)
 
 
-def test_timed_thrust_keeps_to_the_time_of_the_scene_on_the_next_engine():
+def test_timed_thrust_follows_scene_time_after_an_engine_switch():
     simulation = sandbox.start(ship({"begin": 0.3, "end": 0.5}), "pymunk")
-    stepped(simulation, 10)
+    advance(simulation, 10)
     simulation.apply(Switch(time=0.1, engine="reference"))
-    assert not stepped(simulation, 20).velocity.any()
+    assert not advance(simulation, 20).velocity.any()
     simulation.apply(Switch(time=0.3, engine="pymunk"))
-    assert stepped(simulation, 50).velocity[0, 0] == pytest.approx(0.4, abs=1e-14)  # 0.2 s at 2 m/s²
+    assert advance(simulation, 50).velocity[0, 0] == pytest.approx(0.4, abs=1e-14)  # 0.2 s at 2 m/s²
 
 
 def test_exact_refuses_thrust_and_attraction_by_name():
     with pytest.raises(Refusal, match="does not model thrust"):
         sandbox.start(ship({}), "exact")
     ball = {"position": [1.0, 0.0], "radius": 0.1}
-    pulled = from_document({"ball": [ball], "attraction": [{"toward": [0.0, 0.0], "strength": 1.0}]})
+    attracted = from_document({"ball": [ball], "attraction": [{"toward": [0.0, 0.0], "strength": 1.0}]})
     with pytest.raises(Refusal, match="does not model attraction"):
-        sandbox.start(pulled, "exact")
+        sandbox.start(attracted, "exact")
 
 
 @every_engine
-def test_thrust_presses_what_rests_on_the_ground(engine):
-    """A box pushed down by 10 N bears on the ground with its weight and that."""
+def test_thrust_adds_to_the_load_of_a_resting_box(engine):
+    """A box pushed down by 10 N loads the ground with its weight plus 10 N."""
     scene = from_document(
         {
             "world": {"gravity": [0.0, -9.81], "duration": 2.0},
@@ -120,8 +120,8 @@ def test_thrust_presses_what_rests_on_the_ground(engine):
             "thrust": [{"body": "box", "force": [0.0, -10.0]}],
         }
     )
-    done = sandbox.run(scene, engine, dt=0.01)
-    given = -done.contact_impulse[:, 1].sum()
-    momentum = float(done.velocity[-1, 0, 1])  # what it still has
-    assert given - (9.81 + 10.0) * 2.0 == pytest.approx(momentum, abs=1e-9)  # the balance of momentum, rounded
-    assert math.isclose(done.position[-1, 0, 1], 0.5, abs_tol=0.01)  # the slop
+    trajectory = sandbox.run(scene, engine, dt=0.01)
+    received = -trajectory.contact_impulse[:, 1].sum()
+    momentum = float(trajectory.velocity[-1, 0, 1])  # residual momentum
+    assert received - (9.81 + 10.0) * 2.0 == pytest.approx(momentum, abs=1e-9)  # momentum balance, to rounding
+    assert math.isclose(trajectory.position[-1, 0, 1], 0.5, abs_tol=0.01)  # the slop

@@ -1,4 +1,4 @@
-"""Joints of a wall: where its segments meet there is no edge, and a straight wall in pieces is one straight wall."""
+"""Vertices of a wall: joined segments have no edge, and a straight wall in pieces acts as one straight wall."""
 
 import math
 from typing import Any
@@ -26,16 +26,16 @@ SHAPES: dict[str, dict[str, Any]] = {
 }
 
 FLAT_LOSS = 1e-3
-"""Part of its speed that a frictionless body may lose on a wall whose pieces are out of line by 1e-6 m: they are not
-straight, and each joint that rises takes a little."""
+"""Fraction of its speed that a frictionless body may lose on a wall whose vertices are out of line by 1e-6 m: each
+vertex that rises takes a little."""
 
 
-def sliding(
+def sliding_body(
     kind: str,
     points: list[list[float]],
     speed: float = 3.0,
     size: float = 1.0,
-    above: float = 1.0,
+    side: float = 1.0,
     thickness: float = 0.0,
     dt: float = 0.004,
     duration: float = 2.0,
@@ -43,19 +43,19 @@ def sliding(
     gap: float = 0.0,
     **wall: object,
 ) -> Scene:
-    """A body without friction that slides along a wall on the x axis from x = −4, on either side of it."""
+    """Return a frictionless body that slides from x = −4 along a wall on the x axis, above or below it."""
     half = thickness / 2.0
     shape = {}
     for key, value in SHAPES[kind].items():
         shape[key] = (np.asarray(value) * size).tolist()
-    body = {"name": "body", "position": [-4.0, above * (0.2 * size + half + gap)], "velocity": [speed, 0.0], **shape}
+    body = {"name": "body", "position": [-4.0, side * (0.2 * size + half + gap)], "velocity": [speed, 0.0], **shape}
     body["angular_velocity"] = spin
-    if above < 0:
+    if side < 0:
         body["angle"] = 0.0 if kind == "ball" else math.pi
     return from_document(
         {
             "title": "sliding",
-            "world": {"gravity": [0.0, -9.81 * above], "duration": duration},
+            "world": {"gravity": [0.0, -9.81 * side], "duration": duration},
             "solver": {"dt": dt},
             "wall": [{"name": "floor", "points": points, "thickness": thickness, **wall}],
             kind: [body],
@@ -63,18 +63,18 @@ def sliding(
     )
 
 
-def divided(pieces: int, rise: float = 0.0, backwards: bool = False) -> list[list[float]]:
-    """A wall from x = −5 to 5 in pieces of one length, whose joints lie by up to a rise out of line."""
-    across = np.linspace(-5.0, 5.0, pieces + 1)
-    points = [[float(x), rise * math.sin(1.3 * k)] for k, x in enumerate(across)]
-    return points[::-1] if backwards else points
+def wall_points(pieces: int, rise: float = 0.0, reverse: bool = False) -> list[list[float]]:
+    """Return a wall from x = −5 to 5 in pieces of equal length, whose vertices are out of line by up to `rise`."""
+    xs = np.linspace(-5.0, 5.0, pieces + 1)
+    points = [[float(x), rise * math.sin(1.3 * k)] for k, x in enumerate(xs)]
+    return points[::-1] if reverse else points
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_box_slides_over_the_joints_of_a_straight_wall(engine: str) -> None:
+def test_box_slides_over_the_vertices_of_a_straight_wall(engine: str) -> None:
     points = [[float(x), 0.0] for x in range(-5, 4)] + [[5.0, 0.0]]
-    run = sandbox.run(sliding("box", points), engine=engine)
-    assert run.position[-1, 0, 0] == pytest.approx(2.0, abs=1e-9)  # 500 roundings, and nothing else
+    run = sandbox.run(sliding_body("box", points), engine=engine)
+    assert run.position[-1, 0, 0] == pytest.approx(2.0, abs=1e-9)  # rounding of 500 steps only
     assert run.velocity[-1, 0] == pytest.approx([3.0, 0.0], abs=1e-9)
 
 
@@ -84,26 +84,28 @@ def test_a_box_slides_over_the_joints_of_a_straight_wall(engine: str) -> None:
     pieces=st.integers(2, 60),
     speed=st.floats(0.1, 6.0),
     size=st.floats(0.1, 2.0),
-    above=st.sampled_from([-1.0, 1.0]),
+    side=st.sampled_from([-1.0, 1.0]),
     thickness=st.sampled_from([0.0, 0.01, 0.3]),
-    backwards=st.booleans(),
+    reverse=st.booleans(),
     one_way=st.booleans(),
 )
 @settings(max_examples=6, deadline=None)
-def test_a_straight_wall_in_pieces_is_one_wall_bit_for_bit(
+def test_straight_wall_in_pieces_is_bit_identical_to_one_wall(
     engine: str,
     kind: str,
     pieces: int,
     speed: float,
     size: float,
-    above: float,
+    side: float,
     thickness: float,
-    backwards: bool,
+    reverse: bool,
     one_way: bool,
 ) -> None:
     runs = [
         sandbox.run(
-            sliding(kind, divided(n, 0.0, backwards), speed, size, above, thickness, duration=0.3, one_way=one_way),
+            sliding_body(
+                kind, wall_points(n, 0.0, reverse), speed, size, side, thickness, duration=0.3, one_way=one_way
+            ),
             engine=engine,
         )
         for n in (1, pieces)
@@ -114,23 +116,25 @@ def test_a_straight_wall_in_pieces_is_one_wall_bit_for_bit(
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("kind", SHAPES)
-@pytest.mark.parametrize("above", [1.0, -1.0])
+@pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("pieces", [7, 100])
-def test_joints_that_are_nearly_in_line_catch_nothing(engine: str, kind: str, above: float, pieces: int) -> None:
+def test_vertices_nearly_in_line_do_not_stop_a_body(engine: str, kind: str, side: float, pieces: int) -> None:
     for thickness in (0.0, 0.1):
         run = sandbox.run(
-            sliding(kind, divided(pieces, 1e-6, pieces % 2 == 0), above=above, thickness=thickness, duration=1.0),
+            sliding_body(
+                kind, wall_points(pieces, 1e-6, pieces % 2 == 0), side=side, thickness=thickness, duration=1.0
+            ),
             engine=engine,
         )
         assert run.velocity[-1, 0, 0] == pytest.approx(3.0, rel=FLAT_LOSS)
-        assert run.position[-1, 0, 0] == pytest.approx(-1.0, abs=3.0 * FLAT_LOSS)  # 3 m of way
-        assert above * run.position[:, 0, 1].min() > 0.19 if above > 0 else run.position[:, 0, 1].max() < -0.19
+        assert run.position[-1, 0, 0] == pytest.approx(-1.0, abs=3.0 * FLAT_LOSS)  # over 3 m
+        assert side * run.position[:, 0, 1].min() > 0.19 if side > 0 else run.position[:, 0, 1].max() < -0.19
 
 
 @pytest.mark.parametrize("broad_phase", ["all_pairs", "circles", "sweep", "grid", "oriented"])
 @pytest.mark.parametrize("detection", ["discrete", "bisect", "shrink"])
-def test_joints_are_smooth_however_contacts_are_found(detection: str, broad_phase: str) -> None:
-    scene = sliding("box", divided(33, 1e-6), duration=0.6)
+def test_vertices_are_smooth_with_every_detection_and_broad_phase(detection: str, broad_phase: str) -> None:
+    scene = sliding_body("box", wall_points(33, 1e-6), duration=0.6)
     run = sandbox.run(
         scene, engine="reference", integrator="velocity_verlet", detection=detection, broad_phase=broad_phase
     )
@@ -140,8 +144,8 @@ def test_joints_are_smooth_however_contacts_are_found(detection: str, broad_phas
 @pytest.mark.parametrize("engine", [*ENGINES, "exact"])
 @pytest.mark.parametrize("pieces", [20, 23])
 @pytest.mark.parametrize("rise", [0.0, 1e-12, 1e-9, 1e-7, 1e-5])
-def test_a_ball_rolls_over_joints(engine: str, rise: float, pieces: int) -> None:
-    scene = sliding("ball", divided(pieces, rise), spin=-15.0, gap=2.0 * rise, friction=0.5)
+def test_ball_rolls_over_vertices(engine: str, rise: float, pieces: int) -> None:
+    scene = sliding_body("ball", wall_points(pieces, rise), spin=-15.0, gap=2.0 * rise, friction=0.5)
     run = sandbox.run(scene, engine=engine)
     assert run.velocity[-1, 0, 0] == pytest.approx(3.0, rel=FLAT_LOSS)
     assert np.abs(run.position[:, 0, 1] - 0.2).max() < 0.003  # the default slop of a ball of 0.2 m is 0.002 m
@@ -149,15 +153,15 @@ def test_a_ball_rolls_over_joints(engine: str, rise: float, pieces: int) -> None
 
 @pytest.mark.parametrize("kind", SHAPES)
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_joint_of_a_one_way_wall_lets_nothing_through(engine: str, kind: str) -> None:
-    run = sandbox.run(sliding(kind, divided(20, 1e-4), gap=0.002, one_way=True), engine=engine)
+def test_vertices_of_a_one_way_wall_let_nothing_through(engine: str, kind: str) -> None:
+    run = sandbox.run(sliding_body(kind, wall_points(20, 1e-4), gap=0.002, one_way=True), engine=engine)
     assert run.position[:, 0, 1].min() > 0.19
 
 
 @pytest.mark.parametrize("kind", SHAPES)
 @pytest.mark.parametrize("engine", ENGINES)
 def test_corners_and_ends_of_a_wall_stay_solid(engine: str, kind: str) -> None:
-    """Thrown at a roof's ridge, at an end of a wall, and into a corner, a body comes back."""
+    """A body thrown at a ridge, at the end of a wall or into a corner rebounds."""
     for points, position, velocity in (
         ([[-2.0, -1.0], [0.0, 0.0], [2.0, -1.0]], [0.0, 1.0], [0.0, -2.0]),
         ([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]], [-1.0, 0.001], [2.0, 0.0]),
@@ -172,22 +176,22 @@ def test_corners_and_ends_of_a_wall_stay_solid(engine: str, kind: str) -> None:
             kind: [body],
         }
         run = sandbox.run(from_document(document), engine=engine)
-        turned = run.velocity[-1, 0] @ velocity
-        assert turned < 0.0, (points, run.velocity[-1, 0])
+        rebound = run.velocity[-1, 0] @ velocity
+        assert rebound < 0.0, (points, run.velocity[-1, 0])
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_step_still_stops_what_slides_into_it(engine: str) -> None:
+def test_step_in_a_wall_stops_a_sliding_body(engine: str) -> None:
     points = [[-5.0, 0.0], [-3.0, 0.0], [-1.0, 0.0], [-1.0, 0.5], [5.0, 0.5]]
-    run = sandbox.run(sliding("box", points), engine=engine)
-    assert run.position[:, 0, 0].max() < -1.3 + 0.013  # v·dt, and what a step of rest overlaps
+    run = sandbox.run(sliding_body("box", points), engine=engine)
+    assert run.position[:, 0, 0].max() < -1.3 + 0.013  # v·dt, and the overlap of a step at rest
     assert abs(run.velocity[-1, 0, 0]) < 0.1
 
 
-def test_points_in_line_divide_nothing_and_corners_do() -> None:
+def test_collinear_points_are_merged_and_corners_are_kept() -> None:
     wall = Wall(points=((0, 0), (0.1, 0.1), (0.3, 0.3), (0.7, 0.7), (1, 1), (2, 0), (3, -1 - 1e-9)))
     assert straightened(wall) == ((0, 0), (1, 1), (2, 0), (3, -1 - 1e-9))
-    assert straightened(Wall(points=((0, 0), (2, 0), (1, 0)))) == ((0, 0), (2, 0), (1, 0))  # it turns back
+    assert straightened(Wall(points=((0, 0), (2, 0), (1, 0)))) == ((0, 0), (2, 0), (1, 0))  # reverses direction
     square = wall_segments(Wall(points=((0, 0), (1, 0), (1, 1), (0, 1)), closed=True))
     assert [part.before for part in square] == [(0, 1), (0, 0), (1, 0), (1, 1)]
     assert [part.after for part in square] == [(1, 1), (0, 1), (0, 0), (1, 0)]
@@ -196,7 +200,7 @@ def test_points_in_line_divide_nothing_and_corners_do() -> None:
 @example(angle=0.1, pieces=7, length=3.0)
 @given(angle=st.floats(-math.pi, math.pi), pieces=st.integers(2, 200), length=st.floats(0.1, 1e3))
 @settings(deadline=None)
-def test_a_line_divided_by_rounded_points_is_one_segment(angle: float, pieces: int, length: float) -> None:
+def test_line_with_rounded_intermediate_points_is_one_segment(angle: float, pieces: int, length: float) -> None:
     points = tuple(
         (length * k / pieces * math.cos(angle), length * k / pieces * math.sin(angle)) for k in range(pieces + 1)
     )

@@ -1,4 +1,4 @@
-"""High scores: ten a table, kept through crashes, damage told and put aside."""
+"""High scores: ten per table; a crash does not damage the file; a damaged file is reported and renamed."""
 
 import os
 import subprocess
@@ -18,7 +18,7 @@ def scores(tmp_path: Path) -> HighScores:
     return opened(tmp_path / "new" / FILE)
 
 
-def test_best_come_first_and_ten_stay(scores: HighScores) -> None:
+def test_the_ten_best_scores_are_kept_in_descending_order(scores: HighScores) -> None:
     for k in (5, 3, 8, 1, 9, 2, 7, 4, 6, 10, 12, 11):
         scores.enter("a", f"p{k}", k * 1000)
     assert [each.score for each in scores.of("a")] == [k * 1000 for k in range(12, 2, -1)]
@@ -26,17 +26,17 @@ def test_best_come_first_and_ten_stay(scores: HighScores) -> None:
     assert scores.of("b") == ()
 
 
-def test_rank_is_the_place_that_entering_takes(scores: HighScores) -> None:
+def test_rank_equals_the_rank_at_which_a_score_is_entered(scores: HighScores) -> None:
     for k in range(BEST):
         scores.enter("a", "abc", 100 * (k + 1))
-    for score, place in ((2000, 1), (1000, 2), (150, 10), (100, None), (50, None)):
-        assert scores.rank("a", score) == place
+    for score, rank in ((2000, 1), (1000, 2), (150, 10), (100, None), (50, None)):
+        assert scores.rank("a", score) == rank
     assert scores.enter("a", "low", 50) is None
     assert scores.enter("a", "new", 1000) == 2
-    assert [each.initials for each in scores.of("a")][:2] == ["ABC", "NEW"]  # the earlier of equals is ahead
+    assert [each.initials for each in scores.of("a")][:2] == ["ABC", "NEW"]  # of equal scores the earlier ranks first
 
 
-def test_nothing_is_no_high_score(scores: HighScores) -> None:
+def test_a_score_of_zero_is_not_entered(scores: HighScores) -> None:
     assert scores.rank("a", 0) is None
     assert scores.enter("a", "abc", 0) is None
     assert not scores.path.exists()
@@ -52,7 +52,7 @@ def test_initials_of_any_text_can_be_stored(text: str) -> None:
 def test_file_survives_a_crash_in_the_middle_of_writing(scores: HighScores) -> None:
     scores.enter("a", "abc", 100)
     before = scores.path.read_bytes()
-    # A process that dies as a power cut would have it, with half a file on the disk.
+    # The process dies as in a power cut, with half a file on the disk.
     crash = f"""
 import os, pathlib
 from sandbox.games.high_scores import HighScores
@@ -63,9 +63,9 @@ def half(self, text, **rest):
 pathlib.Path.write_text = half
 HighScores(pathlib.Path({str(scores.path)!r})).enter("a", "new", 500)
 """
-    done = subprocess.run([sys.executable, "-c", crash], check=False)
-    assert done.returncode == 9
-    assert len(list(scores.path.parent.iterdir())) == 2  # half a file did come to be
+    process = subprocess.run([sys.executable, "-c", crash], check=False)
+    assert process.returncode == 9
+    assert len(list(scores.path.parent.iterdir())) == 2  # half a file was written
     assert scores.path.read_bytes() == before
     again = opened(scores.path)
     assert (again.told, again.of("a")[0].score) == (None, 100)
@@ -84,28 +84,28 @@ DAMAGE = {
 }
 
 
-@pytest.mark.parametrize("what", DAMAGE)
-def test_damaged_file_is_told_and_kept_aside(tmp_path: Path, what: str) -> None:
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_damaged_file_is_reported_and_renamed(tmp_path: Path, damage: str) -> None:
     path = tmp_path / FILE
     for k in (1, 2):
-        path.write_bytes(DAMAGE[what])
+        path.write_bytes(DAMAGE[damage])
         scores = opened(path)
-        aside = tmp_path / f"high-scores-damaged-{k}.json"
+        renamed = tmp_path / f"high-scores-damaged-{k}.json"
         assert scores.told is not None
-        assert str(aside) in scores.told
+        assert str(renamed) in scores.told
         assert "\n" not in scores.told
-        assert aside.read_bytes() == DAMAGE[what]
+        assert renamed.read_bytes() == DAMAGE[damage]
         scores.enter("a", "abc", 5)
         assert opened(path).told is None
 
 
-def test_file_that_cannot_be_read_is_not_taken_for_damaged(tmp_path: Path) -> None:
+def test_unreadable_file_is_not_treated_as_damaged(tmp_path: Path) -> None:
     (tmp_path / FILE).mkdir()
     with pytest.raises(OSError, match=FILE):
         opened(tmp_path / FILE)
 
 
-def test_folder_is_the_stated_one_or_the_users(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_data_folder_is_the_configured_one_or_that_of_the_user(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("SANDBOX_DATA", str(tmp_path))
     assert opened().path == tmp_path / FILE
     monkeypatch.delenv("SANDBOX_DATA")
@@ -117,6 +117,6 @@ def test_folder_is_the_stated_one_or_the_users(monkeypatch: pytest.MonkeyPatch, 
     assert data_folder() == tmp_path / ".local" / "share" / "sandbox"
 
 
-def test_each_table_has_scores_of_its_own() -> None:
+def test_table_name_has_the_game_and_the_title() -> None:
     scene = loads('title = "Classic"\n[play]\ngame = "pinball"\n[[ball]]\nposition = [0.0, 0.0]\nradius = 0.1\n')
     assert table_of(scene) == "pinball: Classic"

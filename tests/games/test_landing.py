@@ -1,12 +1,12 @@
-"""Landing: what is a crash, what is none, and what fuel costs, on every engine that can."""
+"""Landing: crashes, landings and the score of fuel, on every engine that can run the scene."""
 
 import math
-from collections.abc import Sequence
 
 import pytest
 
 from sandbox.engines.registry import able
-from sandbox.games.contract import Press, Rules, StepInfo, UnsuitableSceneError
+from sandbox.games.contract import Press, StepInfo, UnsuitableSceneError
+from sandbox.games.landing.bot import LandingBot
 from sandbox.games.landing.rules import (
     DOWN,
     ELSEWHERE,
@@ -34,7 +34,7 @@ game = "landing"
 [world]
 gravity = [0.0, -1.62]
 duration = 30.0
-seed = 246   # of a game that begins at hardly any speed aside: 2 mm/s
+seed = 246   # a start with almost no horizontal speed: 2 mm/s
 [solver]
 dt = 0.01
 [[plane]]
@@ -57,74 +57,54 @@ key = "up"
 """
 
 
-class Autopilot:
-    """Comes down on the pad by what the score panel's figures tell: it knows the rules, and no engine."""
-
-    def decide(self, info: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:
-        assert isinstance(rules, Landing)
-        ship, frame = rules._ship, info.frame
-        x, _ = frame.position[ship].tolist()
-        vx, vy = frame.velocity[ship].tolist()
-        angle, rate = math.remainder(float(frame.angle[ship]), math.tau), float(frame.angular_velocity[ship])
-        to_go, height = rules._place[0] - x, rules._height(frame)
-        near = abs(to_go) < 3.0 and abs(vx) < 0.8
-        wanted = max(min(0.25 * to_go, 5.0), -5.0)
-        lean = max(min(0.35 * (wanted - vx), 0.5), -0.5)  # rad to the right, which pushes there
-        turn = 4.0 * (-lean - angle) - 4.0 * rate
-        sink = -0.8 - 0.12 * height if near else (0.8 * (10.0 - height) if height < 10.0 else -2.0)
-        push = (G + 2.0 * (sink - vy)) / (ENGINE * max(math.cos(angle), 0.5))
-        levels = {"engine": push, "turn left": turn, "turn right": -turn}
-        return [(name, round(min(max(level, 0.0), 1.0), 2)) for name, level in levels.items()]
-
-
 def flat(height: float = 5.0, angle: float = 0.0) -> Scene:
     return loads(FLAT.format(height=height, angle=angle))
 
 
-def assert_freely_fallen(game: PlayedGame, height: float) -> None:
+def assert_free_fall_crash(game: PlayedGame, height: float) -> None:
     speed = math.sqrt(2.0 * G * height)
     assert game.over is not None
-    told = float(game.over.split()[1])
-    assert told == pytest.approx(speed, abs=0.1)  # m/s: told to a tenth, seen a step before the touch
-    assert game.recording.duration == pytest.approx(speed / G, abs=0.03)  # s: touched within two steps
+    reported = float(game.over.split()[1])
+    assert reported == pytest.approx(speed, abs=0.1)  # m/s: rounded to a tenth, measured a step before the contact
+    assert game.recording.duration == pytest.approx(speed / G, abs=0.03)  # s: contact within two steps
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", able(SCENE))
-def test_autopilot_lands_on_every_engine(engine: str) -> None:
-    game = play_out(SCENE, Autopilot(), engine)
+def test_bot_lands_on_every_engine(engine: str) -> None:
+    game = play_out(SCENE, LandingBot(1, 1.0), engine)
     assert game.over == LANDED
     assert FOR_LANDING < game.score < FOR_LANDING + FOR_FUEL
     assert game.trajectory.status == "ok"
 
 
 @pytest.mark.parametrize("seed", range(2, 5))
-def test_autopilot_lands_wherever_a_seed_begins(seed: int) -> None:
+def test_bot_lands_from_the_start_of_any_seed(seed: int) -> None:
     scene = load(find("landing"), [("world.seed", seed)])
-    game = play_out(scene, Autopilot())
+    game = play_out(scene, LandingBot(1, 1.0))
     assert game.over == LANDED
-    begin = game.trajectory.position[1, 0] - SCENE.bodies.position[0]  # after the first step
-    assert abs(begin[0]) <= ELSEWHERE + 0.01 * (5.0 + FASTER)  # and so far it flies in that step
+    displacement = game.trajectory.position[1, 0] - SCENE.bodies.position[0]  # after the first step
+    assert abs(displacement[0]) <= ELSEWHERE + 0.01 * (5.0 + FASTER)  # plus the distance flown in that step
 
 
 @pytest.mark.parametrize("engine", able(flat()))
-def test_who_does_nothing_falls(engine: str) -> None:
-    assert_freely_fallen(play_out(flat(), "none", engine), height=4.0)  # the box is half of 2 m tall
+def test_ship_without_thrust_falls_freely_and_crashes(engine: str) -> None:
+    assert_free_fall_crash(play_out(flat(), "none", engine), height=4.0)  # the box is half of 2 m tall
 
 
-def test_slow_touch_is_a_landing_and_fuel_counts() -> None:
-    """From a height that is fallen at less than `DOWN` it lands by itself, with a full tank."""
+def test_slow_contact_is_a_landing_and_remaining_fuel_scores() -> None:
+    """Dropped from a height that gives less than `DOWN` it lands without thrust, with a full tank."""
     height = 0.9 * DOWN**2 / (2.0 * G)
     game = play_out(flat(1.0 + height), "none")
     assert (game.over, game.score) == (LANDED, FOR_LANDING + FOR_FUEL)
-    burnt = 0.5  # s of an engine at a tenth, which hardly slows it: 5 m/s² · 0.1 · 0.5 s of TANK m/s
-    spent = play_out(flat(1.0 + height), ScriptedInput([Press(0.0, "engine", 0.1), Press(burnt, "engine", 0.0)]))
-    assert spent.over == LANDED
-    # A step more or less: the rules see a throttle at the end of the first step that it acts in.
-    assert spent.score == pytest.approx(FOR_LANDING + FOR_FUEL * (1.0 - 5.0 * 0.1 * burnt / TANK), abs=1.0)
+    burn_time = 0.5  # s of throttle 0.1, which hardly slows the fall: it burns 5 m/s² · 0.1 · 0.5 s of TANK m/s
+    burning = play_out(flat(1.0 + height), ScriptedInput([Press(0.0, "engine", 0.1), Press(burn_time, "engine", 0.0)]))
+    assert burning.over == LANDED
+    # One step of tolerance: the rules read a throttle at the end of the first step in which it acts.
+    assert burning.score == pytest.approx(FOR_LANDING + FOR_FUEL * (1.0 - 5.0 * 0.1 * burn_time / TANK), abs=1.0)
 
 
-def test_tilted_touch_is_a_crash() -> None:
+def test_tilted_contact_is_a_crash() -> None:
     game = play_out(flat(1.7, angle=0.4), "none")
     assert game.over == "crashed: tilted by 23° (limit 15°)"
     assert 0 < game.score <= FOR_A_CRASH
@@ -136,37 +116,37 @@ def test_empty_tank_stops_the_engine() -> None:
     assert stop.kind == "throttle"
     assert stop.level == 0.0
     assert stop.time == pytest.approx(TANK / 5.0, abs=0.011)  # s, at 5 m/s²: within a step
-    # From there on it is thrown up, and gravity alone acts.
+    # From then on gravity alone acts.
     run = game.trajectory
     late = run.time > stop.time + 0.02
     fall = (run.velocity[late, 0, 1][-2] - run.velocity[late, 0, 1][0]) / (run.time[late][-2] - run.time[late][0])
     assert fall == pytest.approx(-G, rel=1e-6)
 
 
-def test_who_flies_away_is_lost() -> None:
+def test_ship_that_flies_away_is_lost() -> None:
     game = play_out(SCENE, ScriptedInput([Press(0.0, "engine", 1.0)]))
     assert game.over == "lost in space"
     assert game.score <= FOR_A_CRASH
 
 
-def test_crash_beside_the_pad_is_none_of_a_landing() -> None:
+def test_contact_beside_the_pad_is_a_crash() -> None:
     game = play_out(SCENE, "none")
     assert game.over == "crashed outside the pad"
     contact = list(game.trajectory.contact_pair[-1])
-    assert contact != [0, -2]  # which is the pad
+    assert contact != [0, -2]  # -2 is the pad
 
 
-@pytest.mark.parametrize("lacks", ['name = "pad"', 'name = "ship"', 'key = "up"'])
-def test_scene_that_lacks_something_is_refused(lacks: str) -> None:
-    text = FLAT.format(height=5.0, angle=0.0).replace(lacks, "").replace('body = "ship"', 'body = "box-1"')
-    if lacks != 'name = "ship"':
+@pytest.mark.parametrize("missing", ['name = "pad"', 'name = "ship"', 'key = "up"'])
+def test_scene_without_pad_ship_or_engine_is_refused(missing: str) -> None:
+    text = FLAT.format(height=5.0, angle=0.0).replace(missing, "").replace('body = "ship"', 'body = "box-1"')
+    if missing != 'name = "ship"':
         text = text.replace('body = "box-1"', 'body = "ship"')
     scene = loads(text)
     with pytest.raises(UnsuitableSceneError, match="landing needs a body 'ship', a fixed element 'pad', and a thrust"):
         Landing(scene, scene.bodies)
 
 
-def test_panel_tells_what_would_be_a_crash() -> None:
+def test_panel_marks_values_that_would_be_a_crash() -> None:
     rules = Landing(SCENE, SCENE.bodies)
     from sandbox.engines.switching import start
 

@@ -59,7 +59,7 @@ TABLED = GameSpec(names=("tabled",), rules="bounce_counter:Count", tables={"tabl
 
 @pytest.fixture
 def scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The file of a scene whose game an installed package registers."""
+    """Scene file whose game is registered by an installed package."""
     (tmp_path / "bounce_counter.py").write_text(RULES_OF_COUNT)
     info = tmp_path / "bounce_counter-1.0.dist-info"
     info.mkdir()
@@ -73,7 +73,7 @@ def scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return file
 
 
-def test_scene_may_name_a_game_of_another_package(scene: Path) -> None:
+def test_scene_can_name_a_game_of_another_package(scene: Path) -> None:
     loaded = load(scene)
     assert loaded.play.game == "count-bounces"
     assert loads(dumps(loaded)) == loaded
@@ -107,7 +107,7 @@ def test_game_with_a_scene_table_is_refused_with_its_line(scene: Path, capfd: py
     assert "[tabled]" in err
 
 
-def test_game_of_this_package_outranks_one_of_the_same_name(scene: Path) -> None:
+def test_builtin_game_has_priority_over_a_registered_game_of_the_same_name(scene: Path) -> None:
     assert type(rules_of(load("landing"))) is Landing
 
 
@@ -119,7 +119,7 @@ def test_unknown_game_is_refused_with_all_names(scene: Path) -> None:
     assert fault.message.endswith("'curling', 'landing', 'broken', 'count-bounces' or 'tabled', is \"count\"")
 
 
-def test_unknown_game_is_refused_without_other_packages() -> None:
+def test_unknown_game_is_refused_with_the_builtin_names() -> None:
     with pytest.raises(SceneError) as caught:
         loads(SCENE.replace("count-bounces", "pinbal"))
     assert caught.value.faults[0].message == (

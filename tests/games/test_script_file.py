@@ -1,4 +1,4 @@
-"""Scripts of who presses what when: every fault of a file is told, with its line."""
+"""Script files of control presses: every fault of a file is reported with its line."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from sandbox.scene.errors import SceneError
 CONTROLS = (Control("left flipper", "", ("z",)), Control("plunger", "", ("enter",), analogue=True))
 
 
-def test_lines_are_presses_in_order_of_time(tmp_path: Path) -> None:
+def test_lines_become_presses_sorted_by_time(tmp_path: Path) -> None:
     file = tmp_path / "s.txt"
     file.write_text("1.5, left flipper, 1\n\n  # all of it\n0, plunger, 0.25 # a quarter\n", encoding="utf-8")
     presses = read_script(file)
@@ -21,7 +21,7 @@ def test_lines_are_presses_in_order_of_time(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("line", "told"),
+    ("line", "message"),
     [
         ("0.5 left 1", "should be `time, control, value`"),
         ("0.5, 1", "should be `time, control, value`"),
@@ -34,16 +34,16 @@ def test_lines_are_presses_in_order_of_time(tmp_path: Path) -> None:
         ("1, left, nan", "a value of nan is out of range"),
     ],
 )
-def test_faults_are_told_with_their_lines(tmp_path: Path, line: str, told: str) -> None:
+def test_faults_are_reported_with_their_lines(tmp_path: Path, line: str, message: str) -> None:
     file = tmp_path / "s.txt"
     file.write_text(f"# first\n{line}\n1, ok, 1\n{line}\n")
     with pytest.raises(SceneError) as error:
         read_script(file)
     assert [(fault.file, fault.line) for fault in error.value.faults] == [(str(file), 2), (str(file), 4)]
-    assert told in error.value.faults[0].message
+    assert message in error.value.faults[0].message
 
 
-def test_what_a_game_does_not_have_is_told() -> None:
+def test_unknown_controls_and_invalid_values_are_reported() -> None:
     presses = (Press(0.0, "tilt", 1.0), Press(1.0, "tilt", 0.0), Press(2.0, "left flipper", 0.5))
     assert [str(fault).split(";")[0] for fault in faults_of(presses, CONTROLS, "s.txt")] == [
         "s.txt: there is no control 'tilt'",
@@ -51,7 +51,7 @@ def test_what_a_game_does_not_have_is_told() -> None:
     ]
 
 
-def test_what_a_game_does_not_have_is_told_where_it_is_first(tmp_path: Path) -> None:
+def test_repeated_fault_is_reported_at_its_first_line(tmp_path: Path) -> None:
     file = tmp_path / "s.txt"
     file.write_text("# first\n3, tilt, 1\n\n1, plunger, 1\n3, tilt, 1\n2, left flipper, 0.5 # half\n")
     faults = faults_of(read_script(file), CONTROLS, str(file))
@@ -61,7 +61,7 @@ def test_what_a_game_does_not_have_is_told_where_it_is_first(tmp_path: Path) -> 
     ]
 
 
-def test_no_file_is_one_line(tmp_path: Path) -> None:
+def test_missing_or_binary_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="No such file"):
         PlayerSpec.parse(str(tmp_path / "none.txt"))
     (tmp_path / "bytes").write_bytes(b"\xff\xfe\x00")
@@ -82,7 +82,7 @@ def test_faults_of_large_scripts_are_few_and_short(text: str, tmp_path: Path) ->
     assert all(len(fault.message) < 200 for fault in error.value.faults)
 
 
-def test_controls_that_there_are_not_are_told_by_the_first(tmp_path: Path) -> None:
+def test_many_unknown_controls_are_reported_by_the_first_twenty(tmp_path: Path) -> None:
     presses = tuple(Press(0.0, f"control {k}" + "x" * 1000, 1.0) for k in range(1000))
     faults = faults_of(presses, CONTROLS, "s.txt")
     assert faults[-1].message == "980 more faults"
@@ -90,7 +90,7 @@ def test_controls_that_there_are_not_are_told_by_the_first(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("name", ["/dev/zero", "x" * 300, "folder", "loop", "a\0b"])
-def test_what_is_no_script_is_one_line(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unreadable_path_gives_a_short_error(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("folder").mkdir()
     Path("loop").symlink_to("loop")

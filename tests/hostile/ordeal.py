@@ -1,4 +1,4 @@
-"""Ordeals: Python code run in a process of its own, so that an abort, a crash or a hang fails one test only."""
+"""Isolated runs: Python code in a child process, so that an abort, a crash or a hang fails one test only."""
 
 import json
 import subprocess
@@ -27,7 +27,7 @@ EXPECTED = (
 )
 
 def outcome(do, *arguments, **named):
-    "Say how a call ended: done, or the name of an exception that belongs to the interface. Any other escapes."
+    "Return how a call ended: done, or the name of an exception of the interface. Any other exception propagates."
     try:
         do(*arguments, **named)
     except EXPECTED as error:
@@ -40,36 +40,39 @@ def steps(simulation, count):
     for _ in range(count):
         simulation.step()
 
-def survey(simulation):
-    "Is every number of the present state finite?"
+def is_finite(simulation):
+    "Return whether every number of the present state is finite."
     frame = simulation.frame()
     state = (frame.position, frame.velocity, frame.angle, frame.angular_velocity)
     return all(bool(np.isfinite(each).all()) for each in state)
 
-def say(value):
+def report(value):
     print(json.dumps(value))
 """
 
-WAYS = pytest.mark.parametrize("flags", [(), pytest.param(("-O",), marks=pytest.mark.slow)], ids=["plain", "optimised"])
-"""`python -O` leaves out every assert, pymunk's own among them. To do all of it twice takes its time."""
+INTERPRETER_FLAGS = pytest.mark.parametrize(
+    "flags", [(), pytest.param(("-O",), marks=pytest.mark.slow)], ids=["plain", "optimised"]
+)
+"""`python -O` removes every assert, including those of pymunk; that variant is slow, as all code runs twice."""
 
 
-def endure(code: str, flags: tuple[str, ...] = (), timeout: float = 60.0) -> Any:
-    """Run code after `PRELUDE` and return what it says.
+def run_isolated(code: str, flags: tuple[str, ...] = (), timeout: float = 60.0) -> Any:
+    """Run code after `PRELUDE` in a child process and return the value that it reports.
 
-    Warnings are errors there too. A timeout is no measurement: what must end in it takes a few seconds.
+    Warnings are errors there too. The timeout only detects hangs: the code normally takes a few seconds.
 
     Raises:
-        AssertionError: the process was killed, complained, or failed.
-        subprocess.TimeoutExpired: it hangs.
+        AssertionError: the process was killed, failed, or wrote to stderr.
+        subprocess.TimeoutExpired: the process hangs.
     """
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-X", "faulthandler", "-W", "error", *flags, "-c", PRELUDE + code],
         capture_output=True,
         text=True,
         timeout=timeout,
         check=False,
     )
-    assert done.returncode == 0, f"status {done.returncode}\n{done.stderr[-4000:]}"
-    assert done.stderr.replace(f"{ANNOUNCEMENT}\n", "") == "", done.stderr  # kernels may be compiled here first
-    return json.loads(done.stdout)
+    assert process.returncode == 0, f"status {process.returncode}\n{process.stderr[-4000:]}"
+    # kernels may be compiled in this process first
+    assert process.stderr.replace(f"{ANNOUNCEMENT}\n", "") == "", process.stderr
+    return json.loads(process.stdout)

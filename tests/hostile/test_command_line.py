@@ -1,4 +1,4 @@
-"""The command line: hostile scenes and words end in a fault or a status, never in a traceback or a signal."""
+"""Command line: hostile scenes and arguments end in a fault or a status, never in a traceback or a signal."""
 
 import subprocess
 import sys
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.hostile.ordeal import WAYS
+from tests.hostile.ordeal import INTERPRETER_FLAGS
 
 pytestmark = pytest.mark.full  # fuzzing and inputs at the ends of their ranges
 
@@ -24,10 +24,10 @@ radius = 1.0
 """
 
 
-def called(flags: tuple[str, ...], folder: Path, *words: str) -> tuple[int, str]:
-    """Run a scene as a process of its own; return its status and what it complained of."""
+def run_command(flags: tuple[str, ...], folder: Path, *words: str) -> tuple[int, str]:
+    """Run a scene in a child process; return its exit status and stderr."""
     (folder / "scene.toml").write_text(SCENE, encoding="utf-8")
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, *flags, "-m", "sandbox", "run", "scene.toml", "--quiet", *words],
         capture_output=True,
         text=True,
@@ -35,11 +35,11 @@ def called(flags: tuple[str, ...], folder: Path, *words: str) -> tuple[int, str]
         timeout=60,
         check=False,
     )
-    assert "Traceback" not in done.stderr
-    return done.returncode, done.stderr
+    assert "Traceback" not in process.stderr
+    return process.returncode, process.stderr
 
 
-@WAYS
+@INTERPRETER_FLAGS
 @pytest.mark.parametrize(
     "word",
     [
@@ -47,13 +47,13 @@ def called(flags: tuple[str, ...], folder: Path, *words: str) -> tuple[int, str]
         "solver.persistence=0", "ball.a.position=[0, -1001]",
     ],
 )  # fmt: skip
-def test_word_that_pymunk_would_abort_on_is_one_line_and_status_2(
+def test_override_on_which_pymunk_would_abort_gives_one_line_and_status_2(
     word: str, flags: tuple[str, ...], tmp_path: Path
 ) -> None:
-    status, complaint = called(flags, tmp_path, "--set", word)
+    status, stderr = run_command(flags, tmp_path, "--set", word)
     assert status == 2
-    assert len(complaint.splitlines()) == 1
-    assert word.partition("=")[0].split(".")[-1] in complaint
+    assert len(stderr.splitlines()) == 1
+    assert word.partition("=")[0].split(".")[-1] in stderr
 
 
 @pytest.mark.parametrize(
@@ -68,7 +68,7 @@ def test_word_that_pymunk_would_abort_on_is_one_line_and_status_2(
         (("--engine", "pymunk", "--set", "solver.detection='swept'"), 1),
     ],
 )
-def test_run_that_cannot_be_or_diverges_has_its_status(words: tuple[str, ...], status: int, tmp_path: Path) -> None:
-    found, complaint = called((), tmp_path, *words)
-    assert found == status
-    assert complaint.strip() or status == 1
+def test_invalid_or_diverging_run_has_its_exit_status(words: tuple[str, ...], status: int, tmp_path: Path) -> None:
+    exit_status, stderr = run_command((), tmp_path, *words)
+    assert exit_status == status
+    assert stderr.strip() or status == 1

@@ -1,87 +1,87 @@
-"""Crowds: what takes pymunk minutes, or for ever, if it is let. Each ends in a reason, or in a few seconds."""
+"""Many bodies: scenes that would take pymunk minutes or hours. Each is refused, or ends in a few seconds."""
 
 import pytest
 
-from tests.hostile.ordeal import WAYS, endure
+from tests.hostile.ordeal import INTERPRETER_FLAGS, run_isolated
 
-pytestmark = pytest.mark.slow  # crowds take their time
+pytestmark = pytest.mark.slow  # many bodies
 
 
-@WAYS
+@INTERPRETER_FLAGS
 @pytest.mark.parametrize("count", [1_000, 1_000_000])
-def test_balls_in_one_spot_are_refused(count: int, flags: tuple[str, ...]) -> None:
+def test_coincident_balls_are_refused(count: int, flags: tuple[str, ...]) -> None:
     code = f"""
 grid = {{"origin": [0, 0], "columns": 1000, "rows": {count} // 1000, "spacing": [0, 0], "radius": 1}}
 emitter = {{"position": [0, 0], "count": {count}, "velocity_min": [0, 0], "velocity_max": [0, 0]}}
-say([
+report([
     outcome(from_document, {{"grid": [grid]}}),
     outcome(from_document, {{"grid": [grid], "ball": [{{"position": [1e9, 0], "radius": 1e8}}]}}),
     outcome(from_document, {{"emitter": [{{**emitter, "collides": "all"}}]}}),
     outcome(lambda: steps(start(from_document({{"emitter": [emitter]}})), 3)),
 ])
 """
-    assert endure(code, flags) == ["SceneError", "SceneError", "SceneError", "done"]
+    assert run_isolated(code, flags) == ["SceneError", "SceneError", "SceneError", "done"]
 
 
-@WAYS
-def test_balls_that_pass_through_each_other_in_one_spot_are_refused_beyond_a_thousand(flags: tuple[str, ...]) -> None:
-    """Pymunk looks at every pair of them: 3,000 take two seconds a step, 30,000 all memory there is."""
+@INTERPRETER_FLAGS
+def test_coincident_balls_without_mutual_collisions_are_refused_beyond_a_thousand(flags: tuple[str, ...]) -> None:
+    """Pymunk tests every pair: 3,000 balls take two seconds a step, 30,000 take all memory."""
     code = """
 def attempt(count):
     plane = {"point": [0, -5], "normal": [0, 1]}
     burst = {"position": [0, 0], "count": count, "velocity_min": [-9, 1], "velocity_max": [9, 9], "collides": "fixed"}
     steps(start(from_document({"plane": [plane], "emitter": [burst]})), 3)
-say([outcome(attempt, count) for count in (1_000, 3_000, 1_000_000)])
+report([outcome(attempt, count) for count in (1_000, 3_000, 1_000_000)])
 """
-    assert endure(code, flags) == ["done", "SceneError", "SceneError"]
+    assert run_isolated(code, flags) == ["done", "SceneError", "SceneError"]
 
 
-@WAYS
-def test_crowd_hidden_behind_a_giant_is_refused(flags: tuple[str, ...]) -> None:
-    """A giant makes all balls its neighbours, of which there are too many to look at every pair."""
+@INTERPRETER_FLAGS
+def test_coincident_balls_beside_a_giant_ball_are_refused(flags: tuple[str, ...]) -> None:
+    """A giant ball makes all balls its neighbours, and there are too many to test every pair."""
     code = """
 spread = {"origin": [0, 0], "columns": 200, "rows": 100, "spacing": [1, 1], "radius": 0.1}
 spot = {"origin": [1000, 0], "columns": 2000, "spacing": [0, 0], "radius": 0.1}
 giant = {"position": [1e6, 0], "radius": 1e4}
-say([outcome(from_document, {"grid": [spread, spot], "ball": [giant]}),
+report([outcome(from_document, {"grid": [spread, spot], "ball": [giant]}),
      outcome(from_document, {"grid": [spread], "ball": [giant]})])
 """
-    assert endure(code, flags) == ["SceneError", "done"]
+    assert run_isolated(code, flags) == ["SceneError", "done"]
 
 
-@WAYS
+@INTERPRETER_FLAGS
 @pytest.mark.parametrize("spread", [0.0, 0.5])
-def test_spawning_hundreds_into_one_spot_is_refused_at_a_hundred(spread: float, flags: tuple[str, ...]) -> None:
+def test_spawning_onto_one_position_is_refused_at_a_hundred_bodies(spread: float, flags: tuple[str, ...]) -> None:
     code = f"""
 simulation = start(from_document({{"ball": [{{"position": [0, 0], "radius": 1}}]}}))
-place = np.random.default_rng(1).uniform(-{spread}, {spread}, (700, 2)).tolist()
-found = [outcome(simulation.apply, Spawn(time=0, ball=Ball(position=tuple(at), radius=1.0))) for at in place]
+positions = np.random.default_rng(1).uniform(-{spread}, {spread}, (700, 2)).tolist()
+found = [outcome(simulation.apply, Spawn(time=0, ball=Ball(position=tuple(at), radius=1.0))) for at in positions]
 bodies = len(simulation.bodies)
 steps(simulation, 3)
 for k in range(2, bodies + 1):
     simulation.apply(Remove(time=0, body=f"spawned-{{k}}"))
 simulation.step()
 left = int(simulation.frame().present.sum())
-say([bodies, found.count("done"), found.count("ActionError"), left, survey(simulation)])
+report([bodies, found.count("done"), found.count("ActionError"), left, is_finite(simulation)])
 """
-    assert endure(code, flags) == [100, 99, 601, 1, True]
+    assert run_isolated(code, flags) == [100, 99, 601, 1, True]
 
 
-@WAYS
-def test_moving_hundreds_onto_one_spot_is_refused_at_a_hundred(flags: tuple[str, ...]) -> None:
+@INTERPRETER_FLAGS
+def test_moving_onto_one_position_is_refused_at_a_hundred_bodies(flags: tuple[str, ...]) -> None:
     code = """
 grid = {"name": "g", "origin": [0, 9], "columns": 300, "spacing": [3, 0], "radius": 1}
 simulation = start(from_document({"grid": [grid]}))
 moves = [Move(time=0, body=f"g-{k + 1}", position=(0.0, 0.0)) for k in range(300)]
 found = [outcome(simulation.apply, move) for move in moves]
 steps(simulation, 3)
-say([found.count("done"), found.count("ActionError"), survey(simulation)])
+report([found.count("done"), found.count("ActionError"), is_finite(simulation)])
 """
-    assert endure(code, flags) == [100, 200, True]
+    assert run_isolated(code, flags) == [100, 200, True]
 
 
-@WAYS
-def test_many_coincident_bodies_are_removed_and_retired_and_freed(flags: tuple[str, ...]) -> None:
+@INTERPRETER_FLAGS
+def test_many_coincident_bodies_can_be_removed_retired_and_freed(flags: tuple[str, ...]) -> None:
     code = """
 def burst(bounds, speed):
     return start(from_document({
@@ -98,40 +98,40 @@ steps(removed, 2)
 retired = burst([[-1, -1], [1, 1]], 1e6)
 steps(retired, 2)
 burst(None, 0.0).step()
-say([len(removed.retired), len(retired.retired)])
+report([len(removed.retired), len(retired.retired)])
 """
-    assert endure(code, flags) == [1_000, 1_000]
+    assert run_isolated(code, flags) == [1_000, 1_000]
 
 
-@WAYS
+@INTERPRETER_FLAGS
 def test_a_hundred_thousand_particles_leave_the_bounds_at_once(flags: tuple[str, ...]) -> None:
     code = """
 burst = {"position": [0, 0], "count": 100_000, "velocity_min": [200, 200], "velocity_max": [300, 300]}
 simulation = start(from_document({"world": {"bounds": [[-1, -1], [1, 1]]}, "emitter": [burst]}))
 steps(simulation, 3)
 frame = simulation.frame()
-say([len(simulation.retired), bool(frame.present.any()), bool(frame.velocity.any()), survey(simulation)])
+report([len(simulation.retired), bool(frame.present.any()), bool(frame.velocity.any()), is_finite(simulation)])
 """
-    assert endure(code, flags) == [100_000, False, False, True]
+    assert run_isolated(code, flags) == [100_000, False, False, True]
 
 
-@WAYS
-def test_forty_thousand_balls_in_a_sorted_line_are_added(flags: tuple[str, ...]) -> None:
-    """In that order pymunk's tree takes half a minute for them; shuffled, a second or two."""
+@INTERPRETER_FLAGS
+def test_forty_thousand_balls_in_a_sorted_line_are_added_quickly(flags: tuple[str, ...]) -> None:
+    """In sorted order pymunk's tree takes half a minute to add them; shuffled, a second or two."""
     code = """
 simulation = start(from_document({
     "grid": [{"origin": [0, 0], "columns": 40_000, "spacing": [3, 0], "radius": 1}],
 }))
 simulation.step()
-say(len(simulation.frame().position))
+report(len(simulation.frame().position))
 """
-    assert endure(code, flags) == 40_000
+    assert run_isolated(code, flags) == 40_000
 
 
-@WAYS
+@INTERPRETER_FLAGS
 @pytest.mark.parametrize("shape", ["line", "spiral"])
-def test_wall_of_a_hundred_thousand_points_is_added(shape: str, flags: tuple[str, ...]) -> None:
-    """As a line it is sorted, which pymunk's tree takes minutes for unless it is shuffled."""
+def test_wall_of_a_hundred_thousand_points_is_added_quickly(shape: str, flags: tuple[str, ...]) -> None:
+    """A line is sorted, which takes pymunk's tree minutes unless the segments are shuffled."""
     code = f"""
 turn = np.arange(100_000) * 1e-3
 points = {{
@@ -144,17 +144,17 @@ simulation = start(from_document({{
 }}))
 simulation.contacts()
 steps(simulation, 10)
-say([survey(simulation), len(simulation.contacts())])
+report([is_finite(simulation), len(simulation.contacts())])
 """
-    finite, contacts = endure(code, flags)
+    finite, contacts = run_isolated(code, flags)
     assert finite
     assert contacts == (1 if shape == "line" else 0)
 
 
-@WAYS
+@INTERPRETER_FLAGS
 @pytest.mark.parametrize("kind", ["plane", "wall", "folded wall", "post", "fixed ball"])
-def test_fixed_things_in_one_place_are_refused(kind: str, flags: tuple[str, ...]) -> None:
-    """In n² steps pymunk's tree adds n equal boxes: minutes for 100,000."""
+def test_coincident_static_elements_are_refused(kind: str, flags: tuple[str, ...]) -> None:
+    """Pymunk's tree adds n equal bounding boxes in O(n²): minutes for 100,000."""
     code = f"""
 things = {{
     "plane": {{"plane": [{{"point": [k, 0], "normal": [0, 1 + k]}} for k in range(6_000)]}},
@@ -163,12 +163,12 @@ things = {{
     "post": {{"post": [{{"position": [0, 0], "radius": 1}} for k in range(6_000)]}},
     "fixed ball": {{"ball": [{{"position": [0, 0], "radius": 1, "fixed": True}} for k in range(6_000)]}},
 }}
-say(outcome(from_document, things[{kind!r}]))
+report(outcome(from_document, things[{kind!r}]))
 """
-    assert endure(code, flags) == "SceneError"
+    assert run_isolated(code, flags) == "SceneError"
 
 
-@WAYS
+@INTERPRETER_FLAGS
 def test_too_many_points_too_many_bodies_and_too_many_surfaces_are_refused(flags: tuple[str, ...]) -> None:
     code = """
 line = [[k * 0.001, 0] for k in range(100_001)]
@@ -182,24 +182,24 @@ spawns = [
 found = [outcome(simulation.apply, spawn) for spawn in spawns]
 simulation.step()
 full = start(from_document({"emitter": [{**emitter, "count": 999_999}], "ball": [ball]}))
-say([
+report([
     outcome(from_document, {"wall": [{"points": line}]}),
     outcome(from_document, {"emitter": [emitter], "ball": [ball]}),
     outcome(from_document, {"ball": [{**ball, "position": [3 * k, 0], "friction": k / 7} for k in range(300)]}),
     outcome(from_document, {"ball": [{**ball, "position": [3 * k, 0], "friction": k / 99} for k in range(20_000)]}),
     outcome(full.apply, Spawn(time=0, ball=Ball(position=(0.0, 0.0), radius=1.0))),
-    found.count("done"), found.count("ActionError"), survey(simulation),
+    found.count("done"), found.count("ActionError"), is_finite(simulation),
 ])
 """
-    *refused, done, errors, finite = endure(code, flags)
+    *refused, done, errors, finite = run_isolated(code, flags)
     assert refused == ["SceneError", "SceneError", "SceneError", "SceneError", "ActionError"]
     assert done == 255  # with the surface of the first ball, 256
     assert errors == 5
     assert finite
 
 
-@WAYS
-def test_table_of_pairs_that_does_not_fit_is_refused_before_it_is_allocated(flags: tuple[str, ...]) -> None:
+@INTERPRETER_FLAGS
+def test_pair_table_too_large_for_memory_is_refused_before_allocation(flags: tuple[str, ...]) -> None:
     code = """
 import os, resource
 resource.setrlimit(resource.RLIMIT_AS, (4 * 2**30, 4 * 2**30))
@@ -211,14 +211,14 @@ def reasons(columns):
 (large,), few = reasons(1_000), reasons(2)
 os.environ["SANDBOX_MAX_MEMORY"] = "100KiB"
 (lowered,) = reasons(2)
-say(["SANDBOX_MAX_MEMORY=75GiB" in large, few, "SANDBOX_MAX_MEMORY=1MiB" in lowered])
+report(["SANDBOX_MAX_MEMORY=75GiB" in large, few, "SANDBOX_MAX_MEMORY=1MiB" in lowered])
 """
-    assert endure(code, flags) == [True, [], True]
+    assert run_isolated(code, flags) == [True, [], True]
 
 
-@WAYS
-def test_particles_beside_a_few_balls_and_columns_of_two_sizes_are_looked_at_quickly(flags: tuple[str, ...]) -> None:
-    """Every pair of what touches nothing, or of what lies above one another, would take minutes."""
+@INTERPRETER_FLAGS
+def test_broad_phase_is_fast_for_particles_and_for_columns_of_two_sizes(flags: tuple[str, ...]) -> None:
+    """Testing every pair of particles without contacts, or of bodies in a column, would take minutes."""
     code = """
 burst = {"position": [0, 0], "count": 200_000, "velocity_min": [-9, -9], "velocity_max": [9, 9]}
 balls = [{"position": [3 * k, 0], "radius": 1, "velocity": [1, 0]} for k in range(5)]
@@ -227,14 +227,16 @@ sizes = [{"position": [9, 0], "radius": 9}, *({"position": [99 * k, 99], "radius
 steps(start(from_document({"emitter": [burst], "ball": sizes}), "reference"), 2)
 column = {"origin": [-99, 0], "rows": 60_000, "columns": 1, "spacing": [1, 3], "radius": 1, "velocity_jitter": 9}
 steps(start(from_document({"grid": [column], "ball": sizes[:1]}), "reference"), 2)
-say("done")
+report("done")
 """
-    assert endure(code, flags) == "done"
+    assert run_isolated(code, flags) == "done"
 
 
-@WAYS
+@INTERPRETER_FLAGS
 @pytest.mark.parametrize("broad_phase", ["all_pairs", "circles", "sweep", "grid"])
-def test_too_many_candidate_pairs_are_refused_with_what_to_set(broad_phase: str, flags: tuple[str, ...]) -> None:
+def test_too_many_candidate_pairs_are_refused_with_the_variable_to_set(
+    broad_phase: str, flags: tuple[str, ...]
+) -> None:
     code = f"""
 import os
 line = {{"name": "g", "origin": [0, 0], "rows": 100, "columns": 1, "spacing": [3, 3], "radius": 1}}
@@ -243,14 +245,14 @@ scene = from_document({{"grid": [line], "ball": balls, "world": {{"duration": 0.
 whole = run(scene, "reference", broad_phase={broad_phase!r})
 os.environ["SANDBOX_MAX_PAIRS"] = "1000"
 cut = run(scene, "reference", broad_phase={broad_phase!r})
-say([whole.status, cut.status, "set SANDBOX_MAX_PAIRS=" in cut.reason])
+report([whole.status, cut.status, "set SANDBOX_MAX_PAIRS=" in cut.reason])
 """
-    assert endure(code, flags) == ["ok", "refused", True]
+    assert run_isolated(code, flags) == ["ok", "refused", True]
 
 
-@WAYS
-def test_step_of_too_many_iterations_is_refused_or_ends_the_run(flags: tuple[str, ...]) -> None:
-    """A move of all bodies onto one spot makes many contacts of few."""
+@INTERPRETER_FLAGS
+def test_step_with_too_many_iterations_is_refused_or_ends_the_run(flags: tuple[str, ...]) -> None:
+    """Moving all bodies onto one position makes many contacts of few bodies."""
     code = """
 import os
 grid = {"name": "g", "origin": [0, 0], "columns": 20, "spacing": [3, 0], "radius": 1}
@@ -259,14 +261,14 @@ refused = [run(scene, name, iterations=10_000, substeps=1_000).info["reason"] fo
 os.environ["SANDBOX_MAX_STEP_WORK"] = "1000"
 actions = [Move(time=0, body=f"g-{k + 1}", position=(0.0, 0.0)) for k in range(20)]
 moved = run(scene, "reference", actions=actions)
-say([*("set SANDBOX_MAX_STEP_WORK=" in each for each in (*refused, moved.reason)), moved.status])
+report([*("set SANDBOX_MAX_STEP_WORK=" in each for each in (*refused, moved.reason)), moved.status])
 """
-    assert endure(code, flags) == [True, True, True, "failed"]
+    assert run_isolated(code, flags) == [True, True, True, "failed"]
 
 
-@WAYS
+@INTERPRETER_FLAGS
 def test_hits_of_many_balls_on_a_floor_end_the_run_at_a_limit(flags: tuple[str, ...]) -> None:
-    """Each hit looks at all pairs in contact and at all balls, and one hit sets off others."""
+    """Each hit tests all pairs in contact and all balls, and one hit causes others."""
     code = """
 import os
 grid = {"name": "g", "origin": [0, 0], "columns": 20, "rows": 20, "spacing": [0.061, 0.061], "radius": 0.03}
@@ -275,12 +277,12 @@ scene = from_document({"grid": [grid], "ball": [cue], "surface": {"sliding_frict
 whole = run(scene, "pymunk")
 os.environ["SANDBOX_MAX_PAIRS"] = "50"
 cut = run(scene, "pymunk")
-say([whole.status, cut.status, "set SANDBOX_MAX_PAIRS=" in cut.reason])
+report([whole.status, cut.status, "set SANDBOX_MAX_PAIRS=" in cut.reason])
 """
-    assert endure(code, flags, timeout=300.0) == ["ok", "failed", True]
+    assert run_isolated(code, flags, timeout=300.0) == ["ok", "failed", True]
 
 
-@WAYS
+@INTERPRETER_FLAGS
 def test_many_attractions_are_refused_and_many_one_way_walls_are_not(flags: tuple[str, ...]) -> None:
     code = """
 grid = {"name": "g", "origin": [0, 9], "columns": 20_000, "spacing": [3, 0], "radius": 1}
@@ -288,20 +290,20 @@ pulls = [{"toward": [k, 0], "strength": 1} for k in range(20_000)]
 scene = from_document({"grid": [grid], "attraction": pulls})
 walls = [{"points": [[3 * k, 0], [3 * k + 1, 0]], "one_way": True} for k in range(20_000)]
 steps(start(from_document({"grid": [grid], "wall": walls}), "reference"), 2)
-say([outcome(start, scene, name) for name in ("pymunk", "reference")])
+report([outcome(start, scene, name) for name in ("pymunk", "reference")])
 """
-    assert endure(code, flags) == ["Refusal", "Refusal"]
+    assert run_isolated(code, flags) == ["Refusal", "Refusal"]
 
 
-@WAYS
+@INTERPRETER_FLAGS
 def test_many_bodies_in_many_zones_are_refused(flags: tuple[str, ...]) -> None:
     code = """
 zones = [{"position": [0, 0], "radius": 1e4} for k in range(1_000)]
 grid = {"origin": [0, 0], "columns": 1_000, "spacing": [3, 3], "radius": 1}
-say([
+report([
     outcome(from_document, {"zone": zones, "grid": [{**grid, "rows": 1_000}]}),
     outcome(from_document, {"zone": zones, "grid": [{**grid, "rows": 2}]}),
     outcome(from_document, {"zone": zones[:10], "grid": [{**grid, "rows": 2}]}),
 ])
 """
-    assert endure(code, flags) == ["SceneError", "SceneError", "done"]
+    assert run_isolated(code, flags) == ["SceneError", "SceneError", "done"]

@@ -1,4 +1,4 @@
-"""Damaged files, bounded: files of every kind through the commands that read them, in isolated processes."""
+"""Damaged files: files of every kind through the commands that read them, in isolated processes."""
 
 import pytest
 
@@ -18,8 +18,8 @@ def test_a_damaged_file_is_determined_by_seed_and_number() -> None:
     assert argument(3, 0) != argument(4, 0)
 
 
-def test_sound_files_are_read_by_every_command() -> None:
-    quick = {"plot", "other", "again", "png", "gif"}  # the others take seconds of compiling and drawing
+def test_undamaged_files_are_read_by_every_command() -> None:
+    quick = {"plot", "other", "again", "png", "gif"}  # the other commands take seconds of compiling and drawing
     cases = [
         Case(
             "tools.fuzzing.damaged_files:read_damaged",
@@ -32,10 +32,10 @@ def test_sound_files_are_read_by_every_command() -> None:
 
 
 @pytest.mark.slow
-def test_damaged_files_are_refused_or_made_again() -> None:
+def test_damaged_files_are_refused_or_recreated() -> None:
     assert failures(list(file_cases(7, 25))) == []
 
 
 @pytest.mark.slow
-def test_many_damaged_files_are_refused_or_made_again() -> None:
+def test_many_damaged_files_are_refused_or_recreated() -> None:
     assert failures(list(file_cases(8, 400)), workers=2) == []

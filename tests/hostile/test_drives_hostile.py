@@ -1,4 +1,4 @@
-"""Drives under attack: bodies of any shape, on any drive, told anything, among others: all stays finite and lawful."""
+"""Random drives and levels on bodies among others: the state stays finite and within its constraints."""
 
 import numpy as np
 import pytest
@@ -13,14 +13,14 @@ from sandbox.scene.description.forces import PlungerDrive
 from sandbox.scene.files.load import from_document
 from tests import strategies
 
-pytestmark = pytest.mark.slow  # some 30 s together
+pytestmark = pytest.mark.slow  # about 30 s together
 
 BODIES = [
     {"name": "a", "position": [0.0, 0.0], "size": [1.0, 0.4], "restitution": 0.5, "friction": 0.5},
     {"name": "b", "position": [1.5, 0.0], "size": [0.3, 2.0], "restitution": 1.0},
 ]
 
-HOW = {
+CONFIGS = {
     "pymunk": ("pymunk", {}),
     "reference": ("reference", {}),
     "verlet": ("reference", {"integrator": "velocity_verlet", "detection": "shrink"}),
@@ -30,10 +30,10 @@ HOW = {
 
 @st.composite
 def sessions(draw):
-    """A scene of two driven boxes among balls over a floor, and what is told to their drives."""
+    """Draw a scene of two driven boxes among balls over a floor, and levels of their drives."""
     first, second = draw(strategies.drives(["a"])), draw(strategies.drives(["b"]))
-    place = st.tuples(strategies.numbers(-2, 3), strategies.numbers(1.2, 4)).map(list)
-    balls = st.fixed_dictionaries({"position": place, "radius": strategies.numbers(0.05, 0.3)})
+    position = st.tuples(strategies.numbers(-2, 3), strategies.numbers(1.2, 4)).map(list)
+    balls = st.fixed_dictionaries({"position": position, "radius": strategies.numbers(0.05, 0.3)})
     document = {
         "world": {"gravity": [0.0, -9.81], "duration": 1.0, "linear_drag": draw(st.sampled_from([0.0, 0.3]))},
         "solver": {"dt": 0.01, "substeps": draw(st.sampled_from([1, 5]))},
@@ -42,36 +42,34 @@ def sessions(draw):
         "ball": draw(st.lists(balls, min_size=1, max_size=3)),
         "drive": [{**first, "name": "first"}, {**second, "name": "second"}],
     }
-    told = st.tuples(st.integers(0, 59), st.sampled_from(["first", "second"]), strategies.numbers(0, 1))
-    return from_document(document), draw(st.lists(told, max_size=6))
+    level = st.tuples(st.integers(0, 59), st.sampled_from(["first", "second"]), strategies.numbers(0, 1))
+    return from_document(document), draw(st.lists(level, max_size=6))
 
 
-def begun(scene, how):
-    """The scene, started in one of the ways."""
-    engine, own = HOW[how]
-    return start(scene, engine, scene.solver.replace(**own))
+def start_with(scene, config):
+    """Start the scene in one of the configurations."""
+    engine, overrides = CONFIGS[config]
+    return start(scene, engine, scene.solver.replace(**overrides))
 
 
-@pytest.mark.parametrize("how", HOW)
+@pytest.mark.parametrize("config", CONFIGS)
 @settings(max_examples=10, deadline=None)
 @given(sessions())
-def test_driven_bodies_stay_where_their_drives_let_them(how, session):
-    scene, told = session
-    running, again = begun(scene, how), begun(scene, how)
+def test_driven_bodies_stay_within_the_limits_of_their_drives(config, session):
+    scene, levels = session
+    running, resumed = start_with(scene, config), start_with(scene, config)
     try:
         for k in range(60):
             if k == 30:
-                again = SwitchableSimulation.resumed(
-                    again.checkpoint()
-                )  # taken up from what can be known: it must go on
-            for each in (running, again):
-                for when, drive, level in told:
+                resumed = SwitchableSimulation.resumed(resumed.checkpoint())  # a checkpoint is enough to continue
+            for each in (running, resumed):
+                for when, drive, level in levels:
                     if when == k:
                         each.apply(Drive(time=0.0, drive=drive, level=level))
                 each.step()
             _check(scene, running.frame())
-            _check(scene, again.frame())
-    except (Divergence, Exhaustion):  # a ball between a kinematic body and the floor has nowhere to go
+            _check(scene, resumed.frame())
+    except (Divergence, Exhaustion):  # a ball is squeezed between a kinematic body and the floor
         return
 
 
@@ -80,38 +78,38 @@ def _check(scene, frame):
     assert all(np.isfinite(array).all() for array in arrays)
     names = scene.bodies.names
     for k, drive in enumerate(scene.drives):
-        number = names.index(drive.body)
+        index = names.index(drive.body)
         if isinstance(drive, PlungerDrive):
-            home, unit = scene.bodies.position[number], np.asarray(drive.direction) / np.hypot(*drive.direction)
-            pull = float((home - frame.position[number]) @ unit)
+            rest, unit = scene.bodies.position[index], np.asarray(drive.direction) / np.hypot(*drive.direction)
+            pull = float((rest - frame.position[index]) @ unit)
             assert -1e-12 <= pull <= drive.travel + 1e-12  # rounding of metres
             assert abs(frame.drives[k, 1] - pull) < 1e-12
             continue
         low, high = sorted(drive.stops)
-        assert low <= frame.angle[number] <= high
-        places = scene.bodies.position[number], frame.position[number]
-        arm, now = (np.hypot(*(place - np.asarray(drive.pivot))) for place in places)
-        assert np.isclose(now, arm, rtol=1e-13, atol=1e-13)
+        assert low <= frame.angle[index] <= high
+        positions = scene.bodies.position[index], frame.position[index]
+        arm, current = (np.hypot(*(position - np.asarray(drive.pivot))) for position in positions)
+        assert np.isclose(current, arm, rtol=1e-13, atol=1e-13)
 
 
-@pytest.mark.parametrize("how", HOW)
+@pytest.mark.parametrize("config", CONFIGS)
 @settings(max_examples=8, deadline=None)
 @given(sessions())
-def test_account_closes_whatever_is_driven(how, session):
-    scene, told = session
-    running = begun(scene, how)
+def test_energy_account_closes_with_any_drives(config, session):
+    scene, levels = session
+    running = start_with(scene, config)
     running.account()
-    begin, most = total_energy(running), 1.0
+    initial, largest = total_energy(running), 1.0
     try:
         for k in range(60):
-            for when, drive, level in told:
+            for when, drive, level in levels:
                 if when == k:
                     running.apply(Drive(time=0.0, drive=drive, level=level))
             running.step()
-            most = max(most, abs(total_energy(running)))
+            largest = max(largest, abs(total_energy(running)))
     except (Divergence, Exhaustion):
         return
     entries = running.account()
-    turned_over = sum(abs(value) for value in entries.values()) + most
-    # Rounding of each substep's sums, of a hundred places from the origin whose heights they hold
-    assert abs(begin + sum(entries.values()) - total_energy(running)) < 1e-10 * turned_over
+    turnover = sum(abs(value) for value in entries.values()) + largest
+    # rounding of the energy sums of each substep, relative to the turnover of energy
+    assert abs(initial + sum(entries.values()) - total_energy(running)) < 1e-10 * turnover

@@ -1,10 +1,10 @@
-"""Figures that no engine may see: each is refused with a reason, by whatever way it comes."""
+"""Invalid numbers: each is refused with a reason, before it reaches an engine, from every input."""
 
 from typing import Any
 
 import pytest
 
-from tests.hostile.ordeal import WAYS, endure
+from tests.hostile.ordeal import INTERPRETER_FLAGS, run_isolated
 
 pytestmark = pytest.mark.full  # fuzzing and inputs at the ends of their ranges
 
@@ -25,13 +25,13 @@ def document():
         ],
     }
 def put(path, value):
-    "A document with a value put in, by keys and places."
+    "Return the document with a value at a path of keys and indices."
     whole = document()
-    *way, last = path.split(".")
-    here = whole
-    for part in way:
-        here = here[int(part) if part.isdecimal() else part]
-    here[int(last) if last.isdecimal() else last] = value
+    *keys, last = path.split(".")
+    node = whole
+    for key in keys:
+        node = node[int(key) if key.isdecimal() else key]
+    node[int(last) if last.isdecimal() else last] = value
     return whole
 VALUES = {
     "-1": -1.0, "-tiny": -5e-324, "0": 0.0, "1e300": 1e300, "nan": math.nan, "inf": math.inf, "-inf": -math.inf,
@@ -39,7 +39,7 @@ VALUES = {
 }
 """
 
-FIGURES = {
+NUMBERS = {
     "ball.0.mass": {},
     "ball.0.radius": {},
     "ball.0.restitution": {"0"},
@@ -48,13 +48,13 @@ FIGURES = {
     "ball.0.velocity.1": {"-1", "-tiny", "0"},
     "ball.0.angle": {"-1", "-tiny", "0"},
     "ball.0.angular_velocity": {"-1", "-tiny", "0"},
-    "ball.1.density": {},  # its mass is stated
+    "ball.1.density": {},  # the mass is stated
     "material.0.restitution": {"0"},
     "material.0.friction": {"0"},
     "pair.0.restitution": {"0"},
     "pair.0.friction": {"0"},
     "plane.0.point.0": {"-1", "-tiny", "0"},
-    "plane.0.normal.1": {"-1"},  # upside down, the balls inside
+    "plane.0.normal.1": {"-1"},  # upside down, with the balls inside
     "wall.0.thickness": {"0"},
     "wall.0.points.0.0": {"-1", "-tiny", "0"},
     "post.0.radius": {},
@@ -71,67 +71,67 @@ FIGURES = {
     "solver.persistence": {},
     "solver.record_every": {},
 }
-"""Where a figure stands, and which of the values are sound there."""
+"""Path of a number, and the names of the values that are valid there."""
 
 
-def expected(sound: Any, failure: str) -> dict[str, str]:
+def expected(valid: Any, failure: str) -> dict[str, str]:
     values = ("-1", "-tiny", "0", "1e300", "nan", "inf", "-inf", "huge", "text", "true")
-    return {value: "done" if value in sound else failure for value in values}
+    return {value: "done" if value in valid else failure for value in values}
 
 
-@WAYS
-def test_wrong_figure_in_a_scene_is_a_fault_and_a_sound_one_runs(flags: tuple[str, ...]) -> None:
+@INTERPRETER_FLAGS
+def test_invalid_number_in_a_scene_is_a_fault_and_a_valid_one_runs(flags: tuple[str, ...]) -> None:
     code = f"""
 def attempt(path, value):
     whole = put(path, value)
     run(from_document(whole))
-say({{path: {{name: outcome(attempt, path, value) for name, value in VALUES.items()}} for path in {list(FIGURES)}}})
+report({{path: {{name: outcome(attempt, path, value) for name, value in VALUES.items()}} for path in {list(NUMBERS)}}})
 """
-    found = endure(SCENE + code, flags)
-    assert found == {path: expected(sound, "SceneError") for path, sound in FIGURES.items()}
+    found = run_isolated(SCENE + code, flags)
+    assert found == {path: expected(valid, "SceneError") for path, valid in NUMBERS.items()}
 
 
-@WAYS
-def test_wrong_figure_by_set_is_a_fault(flags: tuple[str, ...]) -> None:
+@INTERPRETER_FLAGS
+def test_invalid_number_in_an_override_is_a_fault(flags: tuple[str, ...]) -> None:
     paths = ["ball.a.mass", "ball.a.friction", "plane.floor.restitution", "solver.dt", "solver.iterations"]
     code = f"""
 words = ["-1", "-5e-324", "1e300", "nan", "inf", "-inf", "1" * 5000, "text", "true", "[1, 2]", "{{x = 1}}", ""]
-say([
+report([
     [outcome(lambda: run(from_document(document(), overrides=[f"{{path}}={{word}}"]))) for word in words]
     for path in {paths}
 ])
 """
-    assert endure(SCENE + code, flags) == [["SceneError"] * 12] * 5
+    assert run_isolated(SCENE + code, flags) == [["SceneError"] * 12] * 5
 
 
-@WAYS
-def test_wrong_setting_of_a_run_is_a_validation_error(flags: tuple[str, ...]) -> None:
+@INTERPRETER_FLAGS
+def test_invalid_setting_of_a_run_is_a_validation_error(flags: tuple[str, ...]) -> None:
     keys = ["dt", "substeps", "iterations", "slop", "bias", "persistence", "record_every"]
-    sound = {key: FIGURES[f"solver.{key}"] for key in keys}
+    valid = {key: NUMBERS[f"solver.{key}"] for key in keys}
     code = f"""
 scene = from_document(document())
-say({{
+report({{
     key: {{name: outcome(run, scene, **{{key: value}}) for name, value in VALUES.items()}} for key in {keys}
 }})
 """
-    assert endure(SCENE + code, flags) == {key: expected(sound[key], "ValidationError") for key in keys}
+    assert run_isolated(SCENE + code, flags) == {key: expected(valid[key], "ValidationError") for key in keys}
 
 
-@WAYS
-def test_unknown_setting_or_engine_is_named(flags: tuple[str, ...]) -> None:
+@INTERPRETER_FLAGS
+def test_unknown_or_unsupported_setting_or_engine_is_refused(flags: tuple[str, ...]) -> None:
     code = """
 scene = from_document(document())
-say([
+report([
     outcome(run, scene, zzz=1), outcome(run, scene, detection="psychic"), outcome(run, scene, engine="zzz"),
     run(scene, detection="swept").status, run(scene, broad_phase="grid").status, run(scene, response="penalty").status,
 ])
 """
     names = ["ValidationError", "ValidationError", "UnknownEngineError", "refused", "refused", "refused"]
-    assert endure(SCENE + code, flags) == names
+    assert run_isolated(SCENE + code, flags) == names
 
 
-@WAYS
-def test_wrong_figure_set_while_running_is_an_action_error_and_changes_nothing(flags: tuple[str, ...]) -> None:
+@INTERPRETER_FLAGS
+def test_invalid_parameter_of_a_running_simulation_is_refused_and_changes_nothing(flags: tuple[str, ...]) -> None:
     paths = ["material.m.restitution", "material.m.friction", "ball.a.friction", "pair.0.restitution"]
     code = f"""
 simulation = start(from_document(document()))
@@ -159,9 +159,9 @@ places = [
                  ".restitution", "'.restitution", "ball..friction", "ball.a.name.friction")
 ]
 steps(simulation, 20)
-say([found, others, places, survey(simulation)])
+report([found, others, places, is_finite(simulation)])
 """
-    found, others, places, finite = endure(SCENE + code, flags)
+    found, others, places, finite = run_isolated(SCENE + code, flags)
     for path, outcomes in found.items():
         wanted = expected({"0"}, "ActionError")
         assert outcomes == {
@@ -172,9 +172,9 @@ say([found, others, places, survey(simulation)])
     assert finite
 
 
-@WAYS
+@INTERPRETER_FLAGS
 @pytest.mark.parametrize("kind", ["impulse", "force", "move", "spawn"])
-def test_wrong_figure_of_an_action_is_refused_before_there_is_an_action(kind: str, flags: tuple[str, ...]) -> None:
+def test_invalid_number_in_an_action_is_a_validation_error(kind: str, flags: tuple[str, ...]) -> None:
     code = f"""
 wrong = [math.nan, math.inf, -math.inf, 1e300, "1", True]
 def attempt(value):
@@ -188,28 +188,28 @@ def attempt(value):
             simulation.apply(Move(time=0, body="a", position=(0.0, value)))
         case "spawn":
             simulation.apply(Spawn(time=0, ball=Ball(position=(0.0, 9.0), radius=1.0, mass=value)))
-say([outcome(attempt, value) for value in wrong])
+report([outcome(attempt, value) for value in wrong])
 """
-    assert endure(SCENE + code, flags) == ["ValidationError"] * 6
+    assert run_isolated(SCENE + code, flags) == ["ValidationError"] * 6
 
 
-@WAYS
-def test_run_of_more_steps_than_a_run_may_have_is_refused(flags: tuple[str, ...]) -> None:
+@INTERPRETER_FLAGS
+def test_run_of_too_many_steps_is_refused(flags: tuple[str, ...]) -> None:
     code = """
 whole = document()
 whole["world"]["duration"] = 1e9
 whole["solver"]["dt"] = 10
 scene = from_document(whole)
-say([
+report([
     outcome(run, scene, dt=1e-9, record_every=10**9), outcome(run, scene, substeps=1000, record_every=10**9),
     outcome(from_document, whole, overrides=["solver.dt=1e-3"]),
 ])
 """
-    assert endure(SCENE + code, flags) == ["TooLargeError", "TooLargeError", "SceneError"]
+    assert run_isolated(SCENE + code, flags) == ["TooLargeError", "TooLargeError", "SceneError"]
 
 
-@WAYS
-def test_documents_that_are_no_scene_are_faults(flags: tuple[str, ...]) -> None:
+@INTERPRETER_FLAGS
+def test_malformed_documents_are_faults(flags: tuple[str, ...]) -> None:
     code = """
 deep = []
 for _ in range(3000):
@@ -220,6 +220,6 @@ documents = [
     {"ball": [{"position": [0, 0, 0], "radius": 1}]}, {"ball": [{"position": "00", "radius": 1}]},
 ]
 texts = ["", "\\0", "[[ball]]", "x = [", "ball = 1", "[" * 100_000, "x." * 100_000 + "y = 1", "x = " + "9" * 10_000]
-say([outcome(from_document, each) for each in documents] + [outcome(loads, each) for each in texts])
+report([outcome(from_document, each) for each in documents] + [outcome(loads, each) for each in texts])
 """
-    assert endure(code, flags) == ["SceneError"] * 22
+    assert run_isolated(code, flags) == ["SceneError"] * 22

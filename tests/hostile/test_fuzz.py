@@ -1,4 +1,4 @@
-"""Fuzzing, bounded: mutants of the shipped scenes on every engine, in isolated processes."""
+"""Fuzzing with fixed seeds: mutants of the shipped scenes on every engine, in isolated processes."""
 
 from collections.abc import Iterable
 
@@ -10,7 +10,7 @@ from tools.fuzzing.scene_mutants import argument, scene_cases
 pytestmark = pytest.mark.full  # fuzzing and inputs at the ends of their ranges
 
 SEED = 1
-"""The same mutants every time; `python -m tools.fuzzing` draws others by hand."""
+"""The mutants are the same every time; `python -m tools.fuzzing` draws others."""
 
 
 def outcomes(cases: Iterable[Case], limits: Limits | None = None) -> list[Outcome]:
@@ -54,12 +54,12 @@ def test_a_mutant_is_determined_by_seed_and_number() -> None:
         ("allocates", "memory", "MemoryError"),
     ],
 )
-def test_outcome_of_a_case_says_how_it_ended(name: str, kind: str, what: str) -> None:
+def test_outcome_of_a_case_has_its_kind_and_detail(name: str, kind: str, what: str) -> None:
     outcome = outcomes([Case(f"tools.fuzzing.samples:{name}", 1)], Limits(cpu=1.0, memory=2**30))[0]
     assert (outcome.kind, outcome.what) == (kind, what)
 
 
-def test_cases_after_one_that_died_are_run() -> None:
+def test_cases_after_an_aborted_one_are_run() -> None:
     names = ("passes", "aborts", "passes", "raises", "refuses")
     found = outcomes(Case(f"tools.fuzzing.samples:{name}", 1) for name in names)
     assert [outcome.kind for outcome in found] == ["ok", "abort", "ok", "traceback", "refused"]

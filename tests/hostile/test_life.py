@@ -1,8 +1,8 @@
-"""A simulation's life: started, shared, copied, ended, and used after its end."""
+"""Life cycle of a simulation: start, threads, copies, end, and use after its end."""
 
 import pytest
 
-from tests.hostile.ordeal import WAYS, endure
+from tests.hostile.ordeal import INTERPRETER_FLAGS, run_isolated
 
 pytestmark = pytest.mark.full  # fuzzing and inputs at the ends of their ranges
 
@@ -15,7 +15,7 @@ def pile(**world):
                   "friction": 0.5, "restitution": 0.5}],
     }))
 def raised(do, *arguments):
-    "The name of whatever a call raises."
+    "Return the name of the exception that a call raises, or None."
     try:
         do(*arguments)
     except Exception as error:
@@ -24,8 +24,8 @@ def raised(do, *arguments):
 """
 
 
-@WAYS
-def test_ended_simulation_can_be_read_but_not_go_on(flags: tuple[str, ...]) -> None:
+@INTERPRETER_FLAGS
+def test_ended_simulation_can_be_read_but_not_continued(flags: tuple[str, ...]) -> None:
     code = """
 found = []
 for end in (lambda s: s.close(), lambda s: s.finish(0.5)):
@@ -37,63 +37,63 @@ for end in (lambda s: s.close(), lambda s: s.finish(0.5)):
     remove = Remove(time=0, body="g-1")
     found.append([raised(simulation.step), raised(simulation.finish, 0.5), raised(simulation.apply, remove),
                   raised(simulation.close), raised(simulation.close), raised(simulation.frame),
-                  raised(simulation.contacts), simulation.state_hash() == ended, survey(simulation)])
-say(found)
+                  raised(simulation.contacts), simulation.state_hash() == ended, is_finite(simulation)])
+report(found)
 """
     wanted = ["RuntimeError", "RuntimeError", "RuntimeError", None, None, None, None, True, True]
-    assert endure(SETTING + code, flags) == [wanted, wanted]
+    assert run_isolated(SETTING + code, flags) == [wanted, wanted]
 
 
-@WAYS
+@INTERPRETER_FLAGS
 def test_closing_keeps_the_last_state(flags: tuple[str, ...]) -> None:
     code = """
 one, other = pile(), pile()
 steps(one, 20)
 steps(other, 20)
 one.close()
-say(one.state_hash() == other.state_hash())
+report(one.state_hash() == other.state_hash())
 """
-    assert endure(SETTING + code, flags) is True
+    assert run_isolated(SETTING + code, flags) is True
 
 
-@WAYS
-def test_diverged_simulation_can_be_read_but_not_go_on(flags: tuple[str, ...]) -> None:
+@INTERPRETER_FLAGS
+def test_diverged_simulation_can_be_read_but_not_continued(flags: tuple[str, ...]) -> None:
     code = """
 simulation = pile(wind=[1e12, 0], linear_drag=1e9)
 found = [raised(steps, simulation, 20), raised(simulation.step), raised(simulation.finish, 0.5)]
 simulation.frame(), simulation.contacts(), simulation.state_hash(), simulation.close()
-say(found)
+report(found)
 """
-    assert endure(SETTING + code, flags) == ["Divergence", "RuntimeError", "RuntimeError"]
+    assert run_isolated(SETTING + code, flags) == ["Divergence", "RuntimeError", "RuntimeError"]
 
 
-@WAYS
-def test_last_part_that_is_no_part_is_refused_and_one_that_diverges_says_so(flags: tuple[str, ...]) -> None:
+@INTERPRETER_FLAGS
+def test_invalid_partial_step_is_refused_and_a_diverging_one_is_reported(flags: tuple[str, ...]) -> None:
     code = """
 simulation = pile()
 before = simulation.state_hash()
 found = [raised(simulation.finish, part) for part in (0.0, 1.0, -1.0, 2.0, 1e300, math.nan, math.inf, -math.inf)]
 wild = pile(wind=[1e12, 0], linear_drag=1e9)
 wild.step()
-say([found, simulation.state_hash() == before, raised(wild.finish, 0.9), raised(wild.finish, 0.9)])
+report([found, simulation.state_hash() == before, raised(wild.finish, 0.9), raised(wild.finish, 0.9)])
 """
-    assert endure(SETTING + code, flags) == [["ValueError"] * 8, True, "Divergence", "RuntimeError"]
+    assert run_isolated(SETTING + code, flags) == [["ValueError"] * 8, True, "Divergence", "RuntimeError"]
 
 
-@WAYS
-def test_running_simulation_is_not_copied(flags: tuple[str, ...]) -> None:
-    """In contact a copied space goes on differently on the very next step."""
+@INTERPRETER_FLAGS
+def test_running_simulation_cannot_be_copied(flags: tuple[str, ...]) -> None:
+    """A copied space with contacts differs from the original after one step."""
     code = """
 import copy, pickle
 simulation = pile()
 steps(simulation, 20)
-say([raised(copy.copy, simulation), raised(copy.deepcopy, simulation), raised(pickle.dumps, simulation)])
+report([raised(copy.copy, simulation), raised(copy.deepcopy, simulation), raised(pickle.dumps, simulation)])
 """
-    assert endure(SETTING + code, flags) == ["TypeError"] * 3
+    assert run_isolated(SETTING + code, flags) == ["TypeError"] * 3
 
 
-@WAYS
-def test_threads_that_step_one_simulation_are_refused_their_turn(flags: tuple[str, ...]) -> None:
+@INTERPRETER_FLAGS
+def test_concurrent_steps_of_threads_are_refused(flags: tuple[str, ...]) -> None:
     code = """
 import threading
 simulation, done, refused = pile(), [], []
@@ -112,23 +112,23 @@ for thread in threads:
     thread.join()
 alone = pile()
 steps(alone, len(done))
-say([len(done) + len(refused), len(done) > 0, simulation.state_hash() == alone.state_hash()])
+report([len(done) + len(refused), len(done) > 0, simulation.state_hash() == alone.state_hash()])
 """
-    assert endure(SETTING + code, flags) == [1600, True, True]
+    assert run_isolated(SETTING + code, flags) == [1600, True, True]
 
 
-@WAYS
-def test_observer_that_steps_is_refused(flags: tuple[str, ...]) -> None:
+@INTERPRETER_FLAGS
+def test_step_by_an_observer_is_refused(flags: tuple[str, ...]) -> None:
     code = """
 simulation = pile()
 simulation.watch(lambda *_: simulation.step())
-say(raised(simulation.step))
+report(raised(simulation.step))
 """
-    assert endure(SETTING + code, flags) == "RuntimeError"
+    assert run_isolated(SETTING + code, flags) == "RuntimeError"
 
 
-@WAYS
-def test_interleaved_simulations_do_not_know_of_each_other(flags: tuple[str, ...]) -> None:
+@INTERPRETER_FLAGS
+def test_interleaved_simulations_are_independent(flags: tuple[str, ...]) -> None:
     code = """
 alone = pile()
 alone.contacts()
@@ -139,16 +139,16 @@ for simulation in both:
 for k in range(60):
     for simulation in both:
         simulation.step()
-say([each.state_hash() == alone.state_hash() for each in both] + [len(each.contacts()) for each in (alone, *both)])
+report([each.state_hash() == alone.state_hash() for each in both] + [len(each.contacts()) for each in (alone, *both)])
 """
-    same, also, *contacts = endure(SETTING + code, flags)
+    same, also, *contacts = run_isolated(SETTING + code, flags)
     assert same
     assert also
     assert len(set(contacts)) == 1
 
 
-@WAYS
-def test_what_was_read_outlives_its_simulation(flags: tuple[str, ...]) -> None:
+@INTERPRETER_FLAGS
+def test_arrays_that_were_read_outlive_their_simulation(flags: tuple[str, ...]) -> None:
     code = """
 import gc
 simulation = pile()
@@ -163,13 +163,13 @@ del simulation
 gc.collect()
 for _ in range(20):
     steps(pile(), 3)
-say([bool(np.array_equal(array, kept)) for array, kept in zip(arrays, copies)])
+report([bool(np.array_equal(array, kept)) for array, kept in zip(arrays, copies)])
 """
-    assert endure(SETTING + code, flags) == [True] * 6
+    assert run_isolated(SETTING + code, flags) == [True] * 6
 
 
-@WAYS
-def test_every_body_can_go_and_others_come(flags: tuple[str, ...]) -> None:
+@INTERPRETER_FLAGS
+def test_all_bodies_can_be_removed_and_others_spawned(flags: tuple[str, ...]) -> None:
     code = """
 simulation = pile()
 simulation.contacts()
@@ -187,7 +187,7 @@ again = outcome(simulation.apply, Remove(time=0, body="g-1"))
 simulation.apply(Remove(time=0, body="new"))
 steps(simulation, 3)
 frame = simulation.frame()
-say([touching > 0, last > 0, empty, contacts.pair.tolist(), again, bool(frame.present.any()), survey(simulation)])
+report([touching > 0, last > 0, empty, contacts.pair.tolist(), again, bool(frame.present.any()), is_finite(simulation)])
 """
-    found = endure(SETTING + code, flags)
+    found = run_isolated(SETTING + code, flags)
     assert found == [True, True, 0, [[25, -1]], "ActionError", False, True]

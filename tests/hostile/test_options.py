@@ -1,4 +1,4 @@
-"""Hostile values of every option and argument of every command: one bounded line and status 2, never a traceback."""
+"""Hostile values of every option and argument of every command: a short message and status 2, never a traceback."""
 
 import os
 from collections.abc import Iterator
@@ -13,13 +13,13 @@ from sandbox.cli.main import COMMANDS, call, cli
 pytestmark = pytest.mark.full  # fuzzing and inputs at the ends of their ranges
 
 LONG = 10**6
-"""Characters of a long value."""
+"""characters of a long value"""
 MANY = 10**5
-"""Names in a long list."""
-MAX_SAID = 2000
-"""Characters that a command may say of one hostile value."""
+"""names in a long list"""
+MAX_MESSAGE = 2000
+"""maximum characters of the message about one hostile value"""
 MISSING = "no-such-scene"
-"""In place of a scene: the command is refused whatever else it is given, and so never works for long."""
+"""name in place of a scene: the command is refused with any options, so it never runs for long"""
 
 TEXTS = (
     "", " ", "-", "--", "=", ",", ".", "\n", "a\nb", "\x1b[31m", "a\0b", "\udcff", "\u202e", "ü" * LONG, "a" * LONG,
@@ -52,13 +52,13 @@ def values_for(parameter: click.Parameter) -> tuple[str, ...]:
         return NUMBERS
     if isinstance(parameter.type, click.Path) or parameter.name in ("targets", "minimise"):
         return PATHS
-    if parameter.name == "table":  # the schema is made for each, which takes a second
+    if parameter.name == "table":  # each value builds the schema, which takes a second
         return TEXTS[::5]
     return TEXTS + PATHS if isinstance(parameter, click.Argument) else TEXTS
 
 
-def refused_anyway(name: str, command: click.Command) -> list[str]:
-    """Return arguments with which a command is refused, whatever its options are."""
+def refused_arguments(name: str, command: click.Command) -> list[str]:
+    """Return arguments with which a command is refused, with any options."""
     if any(isinstance(parameter, click.Argument) for parameter in command.params) and name != "schema":
         out = ["--out", "page.html"] if name == "report" else []
         return [MISSING, *out]
@@ -73,13 +73,13 @@ def options() -> Iterator[Any]:
                 yield pytest.param(name, command, parameter, id=f"{name} {parameter.name}")
 
 
-def spelled(value: str) -> str:
+def abbreviated(value: str) -> str:
     return f"{value[:20]}, {len(value)} long"
 
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Stand in a folder with all sorts of files."""
+    """Change to a folder with files of several kinds."""
     (tmp_path / "file").write_text("")
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     (tmp_path / "broken").symlink_to(tmp_path / "nothing")
@@ -92,10 +92,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.parametrize(("name", "command", "parameter"), list(options()))
-def test_hostile_value_is_one_bounded_complaint(
+def test_hostile_value_gives_a_short_message_and_status_2(
     name: str, command: click.Command, parameter: click.Parameter, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    base = refused_anyway(name, command)
+    base = refused_arguments(name, command)
     for value in values_for(parameter):
         if isinstance(parameter, click.Argument):
             arguments = [name, *base[1:], "--", value]
@@ -103,26 +103,26 @@ def test_hostile_value_is_one_bounded_complaint(
             arguments = [name, f"{parameter.opts[0]}={value}", *base]
         status = call(arguments)
         err = capfd.readouterr().err
-        assert (status, spelled(value)) == (2, spelled(value))
-        assert err.strip(), spelled(value)
-        assert len(err) <= MAX_SAID, (spelled(value), len(err), err[:500])
+        assert (status, abbreviated(value)) == (2, abbreviated(value))
+        assert err.strip(), abbreviated(value)
+        assert len(err) <= MAX_MESSAGE, (abbreviated(value), len(err), err[:500])
 
 
 @pytest.mark.parametrize("command", list(commands().items()), ids=lambda item: item[0])
 def test_unknown_option_and_value_of_a_flag_are_refused(
     command: tuple[str, click.Command], capfd: pytest.CaptureFixture[str]
 ) -> None:
-    name, this = command
-    flags = [f"{each.opts[0]}={'x' * LONG}" for each in this.params if getattr(each, "is_flag", False)]
+    name, definition = command
+    flags = [f"{each.opts[0]}={'x' * LONG}" for each in definition.params if getattr(each, "is_flag", False)]
     for option in (f"--{'x' * LONG}", f"-{'x' * MANY}", "--\n", *flags):
-        assert call([name, option, *refused_anyway(name, this)]) == 2, option[:20]
-        assert 0 < len(capfd.readouterr().err) <= MAX_SAID
+        assert call([name, option, *refused_arguments(name, definition)]) == 2, option[:20]
+        assert 0 < len(capfd.readouterr().err) <= MAX_MESSAGE
 
 
 @pytest.mark.parametrize("name", TEXTS)
 def test_hostile_command_is_refused(name: str, capfd: pytest.CaptureFixture[str]) -> None:
     assert call([name]) == 2
-    assert 0 < len(capfd.readouterr().err) <= MAX_SAID
+    assert 0 < len(capfd.readouterr().err) <= MAX_MESSAGE
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_path_that_cannot_be_used_is_refused_before_the_work(
     assert call([*command.split(), option, path]) == 2
     err = capfd.readouterr().err
     assert err.startswith(option)
-    assert len(err) <= MAX_SAID
+    assert len(err) <= MAX_MESSAGE
 
 
 @pytest.mark.parametrize(

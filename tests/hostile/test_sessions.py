@@ -1,4 +1,4 @@
-"""Sessions as any program may write them: what is wrong is told with its file and key, and a session may be empty."""
+"""Session files: faults are reported with file and key, and a session may be empty."""
 
 import json
 from collections.abc import Callable
@@ -20,18 +20,18 @@ Document = dict[str, Any]
 
 
 def document() -> Document:
-    """Return a session as its file holds it."""
+    """Return the document of a session file."""
     scene = load(find("bounce"))
     return dict(json.loads(Recording(scene, "pymunk", scene.solver, (), 0.1).to_json()))
 
 
-def switch(**what: Any) -> Callable[[Document], None]:
-    """Return what adds a switch action to a session."""
-    return lambda document: document["actions"].append({"kind": "switch", "time": 0.05, **what})
+def switch(**fields: Any) -> Callable[[Document], None]:
+    """Return a function that adds a switch action to a session."""
+    return lambda document: document["actions"].append({"kind": "switch", "time": 0.05, **fields})
 
 
 def change(key: str, value: Any) -> Callable[[Document], None]:
-    """Return what changes a value of a session."""
+    """Return a function that changes a value of a session."""
     return lambda document: document.__setitem__(key, value)
 
 
@@ -54,10 +54,10 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize(("spoil", "key"), WRONG.values(), ids=WRONG)
+@pytest.mark.parametrize(("mutate", "key"), WRONG.values(), ids=WRONG)
 @pytest.mark.parametrize("command", [("run",), ("export", "--to", "x.csv"), ("replay",)], ids=lambda words: words[0])
-def test_wrong_session_is_told_with_file_and_key(
-    spoil: Callable[[Document], None],
+def test_invalid_session_is_reported_with_file_and_key(
+    mutate: Callable[[Document], None],
     key: str,
     command: tuple[str, ...],
     tmp_path: Path,
@@ -66,7 +66,7 @@ def test_wrong_session_is_told_with_file_and_key(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     wrong = document()
-    spoil(wrong)
+    mutate(wrong)
     Path("s.json").write_text(json.dumps(wrong))
     assert call([*command, "s.json"]) == 2
     out, err = capfd.readouterr()
@@ -77,9 +77,7 @@ def test_wrong_session_is_told_with_file_and_key(
 
 
 @pytest.mark.parametrize("command", ["play", "compare", "check", "tradeoff", "match", "miss", "shots"])
-def test_session_where_a_scene_is_wanted_is_told(
-    command: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_session_instead_of_a_scene_is_refused(command: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "s.json"
     file.write_text(json.dumps(document()))
     assert call([command, str(file)]) == 2
@@ -87,7 +85,7 @@ def test_session_where_a_scene_is_wanted_is_told(
 
 
 @pytest.mark.parametrize("text", ["[" * 10**5, '{"format": 1, "scene": ' + '{"a": ' * 10**5, "1" * 5000, '"\\ud800"'])
-def test_text_that_is_no_session_is_told(text: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_text_that_is_not_a_session_is_refused(text: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "s.json"
     file.write_text(text)
     for command in (["run"], ["export", "--to", "x.csv"], ["replay"]):
@@ -95,19 +93,19 @@ def test_text_that_is_no_session_is_told(text: str, tmp_path: Path, capfd: pytes
         assert len(capfd.readouterr().err) < 1000
 
 
-@pytest.mark.parametrize("stated", [10.0, 0.0])
-def test_session_of_no_step_is_run_stored_and_exported(
-    stated: float, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("duration", [10.0, 0.0])
+def test_session_without_steps_is_run_stored_and_exported(
+    duration: float, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     session = Session(load(find("bounce"))).recording()
     assert session.duration == 0.0
     file = tmp_path / "s.json"
     session.save(file)
     written = json.loads(file.read_text())
-    written["scene"].setdefault("world", {})["duration"] = stated
+    written["scene"].setdefault("world", {})["duration"] = duration
     file.write_text(json.dumps(written))
     assert rerun(Recording.load(file)).info["state_hash"] == session.state_hash
-    for _ in range(2):  # made, and found again
+    for _ in range(2):  # computed, then loaded from the stored file
         assert call(["run", str(file), "--out", str(tmp_path / "runs"), "--json"]) == 0
         (row,) = json.loads(capfd.readouterr().out)["runs"]
         assert (row["status"], row["steps"], row["replayed"]) == ("ok", 0, True)

@@ -1,4 +1,4 @@
-"""Tables under attack: gates, kicks, holes, slopes, layers and drives all at once, and walls that come, go and bend."""
+"""Random pinball tables: gates, kicks, holes, slopes, layers and drives together, with walls that change."""
 
 import copy
 import random
@@ -22,13 +22,13 @@ pytestmark = pytest.mark.full  # fuzzing and inputs at the ends of their ranges
 
 STEPS = 40
 LAYERS = (["ground"], ["ramp"], ["ground", "ramp"])
-Timed = list[tuple[int, Action]]
+TimedActions = list[tuple[int, Action]]
 
 
 def table(r: random.Random) -> dict[str, Any]:
-    """Return a scene of all that a pinball table is made of, anywhere, and on top of each other."""
+    """Return a scene with every kind of element of a pinball table, at random positions, with overlaps."""
 
-    def place(low: float = -1.5) -> list[float]:
+    def point(low: float = -1.5) -> list[float]:
         return [r.uniform(-1.5, 1.5), r.uniform(low, 1.5)]
 
     def surface(profile: str = "even") -> dict[str, Any]:
@@ -42,19 +42,19 @@ def table(r: random.Random) -> dict[str, Any]:
         | surface(r.choice(["even", "middle"]))
         for k in range(3)
     ]
-    zones = [{"position": place(), "radius": r.uniform(0.2, 1.0), "layers": r.choice(LAYERS)} for _ in range(3)]
+    zones = [{"position": point(), "radius": r.uniform(0.2, 1.0), "layers": r.choice(LAYERS)} for _ in range(3)]
     zones[0]["holds"], zones[1]["gravity"], zones[2]["to_layer"] = True, [r.uniform(-5.0, 5.0), 2.0], "ramp"
-    hinge, home = place(), place()
+    hinge, home = point(), point()
     air = r.choice([{}, {"linear_drag": 0.5}, {"quadratic_drag": 0.3}])
     return {
         "world": {"gravity": [0.0, -4.0], "duration": 1.0, **air},
         "solver": {"dt": 0.01, "substeps": r.choice([1, 4])},
         "plane": [{"point": [0.0, -1.6], "normal": [0.0, 1.0], "restitution": 0.5}],
         "wall": walls,
-        "post": [{"name": "post", "position": place(), "radius": 0.1, **surface()}],
+        "post": [{"name": "post", "position": point(), "radius": 0.1, **surface()}],
         "zone": zones,
         "ball": [
-            {"name": f"ball {k}", "position": place(), "velocity": place(), "radius": 0.1, "friction": 0.5}
+            {"name": f"ball {k}", "position": point(), "velocity": point(), "radius": 0.1, "friction": 0.5}
             for k in range(4)
         ],
         "box": [
@@ -76,8 +76,8 @@ def course(r: random.Random) -> list[list[float]]:
     return [[x + 0.1 * k, r.uniform(-1.5, 1.5)] for k, x in enumerate(xs)]
 
 
-def driven(r: random.Random) -> Timed:
-    """Return what a mirrored table can be told alike."""
+def drive_actions(r: random.Random) -> TimedActions:
+    """Return actions that apply equally to a mirrored table."""
     return [
         (r.randrange(STEPS), Drive(time=0.0, drive=r.choice(["flip", "shoot"]), level=float(r.randrange(2))))
         if r.random() < 0.7
@@ -86,8 +86,8 @@ def driven(r: random.Random) -> Timed:
     ]
 
 
-def interfering(r: random.Random) -> Timed:
-    """Return what else can be done to it."""
+def table_actions(r: random.Random) -> TimedActions:
+    """Return these actions and others, that do not apply to a mirrored table."""
     points = tuple((x, y) for x, y in course(r))
     ball = Ball(name="late", position=(r.uniform(-1.0, 1.0), r.uniform(-1.0, 1.0)), radius=0.1)
     each: list[Action] = [
@@ -97,16 +97,16 @@ def interfering(r: random.Random) -> Timed:
         Impulse(time=0.0, body="ball 1", impulse=(r.uniform(-0.1, 0.1), 0.1)),
         Switch(time=0.0, settings={"substeps": 2}),
     ]
-    return [*driven(r), *((r.randrange(STEPS), action) for action in r.sample(each, 3))]
+    return [*drive_actions(r), *((r.randrange(STEPS), action) for action in r.sample(each, 3))]
 
 
-def play(running: SwitchableSimulation | Session, told: Timed, steps: int = STEPS) -> None:
+def play(running: SwitchableSimulation | Session, actions: TimedActions, steps: int = STEPS) -> None:
     for k in range(steps):
-        for when, action in told:
+        for when, action in actions:
             if when == k:
                 try:
                     running.apply(action)
-                except ActionError:  # of who is gone
+                except ActionError:  # the body has been removed
                     continue
         running.advance() if isinstance(running, Session) else running.step()
 
@@ -116,25 +116,25 @@ tables = st.integers(0, 2**32).map(random.Random)
 
 @settings(max_examples=5, deadline=None)
 @given(tables)
-def test_account_closes_whatever_comes_together(r: random.Random) -> None:
-    scene, told = from_document(table(r)), interfering(r)
+def test_energy_account_closes_with_any_elements_and_actions(r: random.Random) -> None:
+    scene, actions = from_document(table(r)), table_actions(r)
     running = start(scene)
     running.account()
-    begin = total_energy(running)
+    initial = total_energy(running)
     try:
-        play(running, told)
+        play(running, actions)
         running.finish(0.6)
-    except Divergence:  # a ball between a kinematic body and the floor has nowhere to go
+    except Divergence:  # a ball is squeezed between a kinematic body and the floor
         return
-    booked = running.account()
-    turned_over = max(1.0, *(abs(energy) for energy in booked.values()))
-    assert abs(total_energy(running) - begin - sum(booked.values())) < 1e-10 * turned_over  # sums of rounding
-    assert booked["kicks"] >= 0.0
+    account = running.account()
+    turnover = max(1.0, *(abs(energy) for energy in account.values()))
+    assert abs(total_energy(running) - initial - sum(account.values())) < 1e-10 * turnover  # sums of rounding
+    assert account["kicks"] >= 0.0
 
 
 def mirrored(document: dict[str, Any]) -> dict[str, Any]:
     other = copy.deepcopy(document)
-    for wall in other["wall"]:  # turned round, so that its left is where it was
+    for wall in other["wall"]:  # reversed, so that the left side of a wall stays its left side
         wall["points"] = [[-x, y] for x, y in reversed(wall["points"])]
     for kind in ("post", "zone", "ball", "box"):
         for each in other[kind]:
@@ -148,27 +148,27 @@ def mirrored(document: dict[str, Any]) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_mirrored_table_is_played_mirrored(seed: int) -> None:
+def test_mirrored_table_gives_the_mirrored_motion(seed: int) -> None:
     r = random.Random(seed)
-    document, told = table(r), driven(r)
+    document, actions = table(r), drive_actions(r)
     one, other = start(from_document(document)), start(from_document(mirrored(document)))
     for running in (one, other):
-        play(running, told)
-    here, there = one.frame(), other.frame()
-    np.testing.assert_allclose(here.position * [-1.0, 1.0], there.position, rtol=0.0, atol=1e-9)  # rounding that grew
-    np.testing.assert_allclose(-here.angle, there.angle, rtol=0.0, atol=1e-8)  # on discs of 0.1 m
-    assert (here.visits == there.visits).all()
-    assert (here.layer == there.layer).all()
+        play(running, actions)
+    frame, mirror = one.frame(), other.frame()
+    np.testing.assert_allclose(frame.position * [-1.0, 1.0], mirror.position, rtol=0.0, atol=1e-9)  # amplified rounding
+    np.testing.assert_allclose(-frame.angle, mirror.angle, rtol=0.0, atol=1e-8)  # 1e-9 m on discs of 0.1 m
+    assert (frame.visits == mirror.visits).all()
+    assert (frame.layer == mirror.layer).all()
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_table_is_seen_again_as_it_was(seed: int) -> None:
+def test_table_replays_to_the_same_state(seed: int) -> None:
     r = random.Random(seed)
     session = Session(from_document(table(r)))
-    play(session, interfering(r))
-    there = session.simulation.state_hash()
+    play(session, table_actions(r))
+    state_hash = session.simulation.state_hash()
     for step in (10, 25, STEPS):
-        assert all(0.0 < share <= 1.0 for share in session.seek(step))
-    assert session.simulation.state_hash() == there
+        assert all(0.0 < fraction <= 1.0 for fraction in session.seek(step))
+    assert session.simulation.state_hash() == state_hash
     recording = session.recording()
-    assert rerun(recording, audit=False).info["state_hash"] == recording.state_hash == there
+    assert rerun(recording, audit=False).info["state_hash"] == recording.state_hash == state_hash

@@ -1,4 +1,4 @@
-"""Every kind of table that a scene can hold, each by the least document that has one, for bodies named `a` and `b`."""
+"""Minimal documents of every kind of table of a scene, for bodies named `a` and `b`."""
 
 import copy
 from typing import Any
@@ -23,7 +23,7 @@ BODIES: dict[str, Document] = {
     "two": {"ball": [_ball("a", 0.0), _ball("b", 2.0)]},
     "alone": {"ball": [_ball("a", 0.0, collides="none"), _ball("b", 2.0, collides="none")]},
 }
-"""The bodies that a feature may speak of, or may have to do without."""
+"""Bodies that a feature refers to; some may be missing."""
 
 _HINGE: Document = {"name": "d", "body": "a", "pivot": [0.2, 3.0], "stops": [0.0, 1.0]}
 _PLUNGER: Document = {"name": "d", "kind": "plunger", "body": "a", "direction": [0, 1], "travel": 1.0, "speed": 1.0}
@@ -31,7 +31,7 @@ _ROPE: Document = {"name": "g", "start": [0.0, 6.0], "end": [2.0, 6.0]}
 _EMITTER: Document = {"name": "g", "position": [0, 5], "count": 3, "velocity_min": [-1, -1], "velocity_max": [1, 1]}
 _WALL: Document = {"name": "w", "points": [[-5.0, 2.4], [5.0, 2.4]]}
 _FLOOR: Document = {"sliding_friction": 0.2, "rolling_friction": 0.01}
-_STILL: Document = {"world": {"gravity": [0.0, 0.0]}}
+_NO_GRAVITY: Document = {"world": {"gravity": [0.0, 0.0]}}
 
 JOINTS: dict[str, Document] = {
     "rod": {"length": 2.0},
@@ -47,8 +47,8 @@ JOINTS: dict[str, Document] = {
 
 
 def _joint(kind: str, *between: str) -> Document:
-    apart = {"anchors": [[0.0, 0.0], [0.0, 1.0]]} if kind in ("rod", "slide", "spring") else {}
-    return {"name": "j", "kind": kind, "between": [*between], **apart, **JOINTS[kind]}
+    anchored = {"anchors": [[0.0, 0.0], [0.0, 1.0]]} if kind in ("rod", "slide", "spring") else {}
+    return {"name": "j", "kind": kind, "between": [*between], **anchored, **JOINTS[kind]}
 
 
 FEATURES: dict[str, Document] = {
@@ -82,10 +82,10 @@ FEATURES: dict[str, Document] = {
         "pair": [{"between": ["m", "n"], "friction": 0.5}],
         "plane": [{"point": [0, 0], "normal": [0, 1], "material": "m"}],
     },
-    "floor": {**_STILL, "surface": _FLOOR, "wall": [{**_WALL, "height": 0.6}]},
-    "shot": {**_STILL, "surface": _FLOOR, "shot": [{"ball": "a", "speed": 1.0, "aim": [1.0, 0.0]}]},
-    "pockets": {**_STILL, "surface": _FLOOR, "pocket": [{"position": [0.1, 3.0], "radius": 0.9}]},
-    "pucks": {**_STILL, "surface": {"sliding_friction": 0.2, "bodies": "pucks", "curl": 0.5}},
+    "floor": {**_NO_GRAVITY, "surface": _FLOOR, "wall": [{**_WALL, "height": 0.6}]},
+    "shot": {**_NO_GRAVITY, "surface": _FLOOR, "shot": [{"ball": "a", "speed": 1.0, "aim": [1.0, 0.0]}]},
+    "pockets": {**_NO_GRAVITY, "surface": _FLOOR, "pocket": [{"position": [0.1, 3.0], "radius": 0.9}]},
+    "pucks": {**_NO_GRAVITY, "surface": {"sliding_friction": 0.2, "bodies": "pucks", "curl": 0.5}},
     "grid": {"grid": [{"name": "g", "origin": [-3, 5], "columns": 2, "spacing": [1, 1], "radius": 0.2}]},
     "scatter": {"scatter": [{"name": "g", "lower": [-3, 5], "upper": [0, 8], "count": 2, "radius": 0.2}]},
     "emitter": {"emitter": [{**_EMITTER, "lifetime": 0.03}]},
@@ -132,14 +132,14 @@ FEATURES: dict[str, Document] = {
 
 def document(bodies: str, feature: str) -> Document:
     """Return a scene with some bodies, by their name in `BODIES`, and a feature."""
-    whole: Document = {"title": "t", "world": {"gravity": [0.0, -9.81]}, "solver": {"dt": 0.01}}
+    scene: Document = {"title": "t", "world": {"gravity": [0.0, -9.81]}, "solver": {"dt": 0.01}}
     for part in (BODIES[bodies], FEATURES[feature]):
         for key, value in copy.deepcopy(part).items():
-            whole[key] = (
-                {**whole[key], **value}
+            scene[key] = (
+                {**scene[key], **value}
                 if key == "world"
-                else [*whole.get(key, []), *value]
+                else [*scene.get(key, []), *value]
                 if isinstance(value, list)
                 else value
             )
-    return whole
+    return scene

@@ -1,4 +1,4 @@
-"""One law on every engine: balls on a surface move as on `exact`, until chaos, with every collision model."""
+"""Balls on a surface move on every engine as on `exact`, before chaos, with every collision model."""
 
 import math
 from typing import Any
@@ -21,7 +21,7 @@ offsets = st.floats(-0.3, 0.3)
 
 
 def shot(ball_ball: str, cushion: str, aim: float, **more: Any) -> Scene:
-    """A cue ball in a box, struck so that it cuts a ball 0.3 m away."""
+    """Return a scene of a cue ball in a box, struck so that it hits a ball 0.3 m away off centre."""
     ball = {"radius": R, "mass": 0.17, "restitution": 0.95**0.5}
     target = [0.5 + 0.3 * math.cos(aim + 0.05), 0.5 + 0.3 * math.sin(aim + 0.05)]
     document = {
@@ -41,12 +41,14 @@ def shot(ball_ball: str, cushion: str, aim: float, **more: Any) -> Scene:
 @pytest.mark.parametrize("ball_ball", ["elastic", "frictional"])
 @settings(max_examples=6, deadline=None)
 @given(aim=st.floats(0.0, 6.28), speed=st.floats(0.5, 1.5), side=offsets, height=offsets)
-def test_engines_agree_over_the_first_hits(engine: str, ball_ball: str, cushion: str, aim: float, **how: float) -> None:
-    scene = shot(ball_ball, cushion, aim, **how)
+def test_engines_agree_over_the_first_hits(
+    engine: str, ball_ball: str, cushion: str, aim: float, **stroke: float
+) -> None:
+    scene = shot(ball_ball, cushion, aim, **stroke)
     exact, native = run(scene, "exact", account=True), run(scene, engine, account=True)
-    # m: both take each hit at its own time, so that only rounding is left, which a hit of balls grows tenfold
+    # m: both resolve each hit at its exact time, so only rounding is left, which a hit of balls amplifies tenfold
     assert np.abs(exact.position - native.position).max() < 1e-8
     for trajectory in (exact, native):
         energy = trajectory.energy
-        assert np.diff(energy).max() <= 5e-8  # J: a hop
+        assert np.diff(energy).max() <= 5e-8  # J: energy of a hop
         assert np.abs(energy - energy[0] - trajectory.account.sum(axis=1)).max() <= 1e-12 * energy[0]  # rounding

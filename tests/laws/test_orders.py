@@ -1,4 +1,4 @@
-"""Convergence: by halving the step, the order that a scheme claims, in whole scenes."""
+"""Order of convergence of each scheme, by halving the step in whole scenes."""
 
 import numpy as np
 import pytest
@@ -8,22 +8,22 @@ from sandbox.engines.reference.integrators import INTEGRATORS as TABLE
 from sandbox.measure.analytic import bounces
 from sandbox.measure.analytic.trajectory import solved_run
 from sandbox.scene.files.load import from_document
-from tests.laws.ways import INTEGRATORS, Way, drop
+from tests.laws.ways import INTEGRATORS, EngineConfig, drop
 
 STEPS = np.array([0.04, 0.02, 0.01, 0.005])
 
 
-def fitted(errors) -> float:
+def fitted_order(errors) -> float:
     return float(np.polyfit(np.log(STEPS), np.log(errors), 1)[0])
 
 
-def thrown():
+def projectile_with_drag():
     world = {"gravity": [0.0, -9.81], "linear_drag": 0.3, "quadratic_drag": 0.05, "wind": [2.0, 0.5], "duration": 2.0}
     return from_document({"world": world, "ball": [{"position": [0, 0], "velocity": [15, 20], "radius": 0.1}]})
 
 
-def landing():
-    """DOP853 at its tightest: an oracle nobody here wrote."""
+def final_state():
+    """Return the final state by DOP853 at its smallest tolerances, an independent reference."""
 
     def flight(_, s):
         wind = s[2:] - [2.0, 0.5]
@@ -32,47 +32,50 @@ def landing():
     return solve_ivp(flight, (0, 2), [0, 0, 15, 20], method="DOP853", rtol=1e-13, atol=1e-13).y[:, -1]
 
 
-@pytest.mark.parametrize("way", [*(Way("reference", {"integrator": word}) for word in INTEGRATORS), Way("pymunk", {})])
-def test_flight_through_air_converges_at_the_order_of_its_scheme(way):
-    order = 1 if way.engine == "pymunk" else TABLE[way.settings["integrator"]].order
-    expected, scene = landing(), thrown()
+@pytest.mark.parametrize(
+    "config", [*(EngineConfig("reference", {"integrator": word}) for word in INTEGRATORS), EngineConfig("pymunk", {})]
+)
+def test_flight_through_air_converges_at_the_order_of_its_scheme(config):
+    order = 1 if config.engine == "pymunk" else TABLE[config.settings["integrator"]].order
+    expected, scene = final_state(), projectile_with_drag()
     errors = []
     for dt in STEPS:
-        done = way.run(scene, dt=float(dt))
-        errors.append(np.abs(np.concatenate((done.position[-1, 0], done.velocity[-1, 0])) - expected).max())
-    assert fitted(errors) == pytest.approx(order, abs=0.2)  # a fit over three halvings
+        result = config.run(scene, dt=float(dt))
+        errors.append(np.abs(np.concatenate((result.position[-1, 0], result.velocity[-1, 0])) - expected).max())
+    assert fitted_order(errors) == pytest.approx(order, abs=0.2)  # a fit over three halvings
 
 
 @pytest.mark.parametrize(
     ("settings", "order"),
     [({"detection": "swept"}, 2), ({"detection": "discrete"}, 1)],
 )
-def test_a_bounce_converges_at_the_order_of_its_detection(settings, order):
-    """The worst over many phases of the impact within the step: a single one would err by chance."""
+def test_bounce_converges_at_the_order_of_its_detection(settings, order):
+    """The largest error over many phases of the impact within the step, as that of a single phase is random."""
     errors = np.zeros(len(STEPS))
     for height in np.linspace(1.0, 1.2, 25):
         scene = drop(0.8, float(height), 0.8)
         exact = bounces(np.array([0.8]), float(height), 0.0, 9.81, 0.8)[0][0]
         for k, dt in enumerate(STEPS):
-            done = Way("reference", {"integrator": "velocity_verlet", **settings}).run(scene, dt=float(dt))
-            errors[k] = max(errors[k], abs(done.position[-1, 0, 1] - 0.5 - exact))
-    assert fitted(errors) == pytest.approx(order, abs=0.3)  # the worst of 25 phases is not quite the worst of all
+            result = EngineConfig("reference", {"integrator": "velocity_verlet", **settings}).run(scene, dt=float(dt))
+            errors[k] = max(errors[k], abs(result.position[-1, 0, 1] - 0.5 - exact))
+    # the maximum over 25 phases is slightly below that over all
+    assert fitted_order(errors) == pytest.approx(order, abs=0.3)
 
 
 @pytest.mark.parametrize("detection", ["bisect", "swept"])
 @pytest.mark.parametrize(("e", "h"), [(0.8, 0.007), (0.8, 0.0035), (0.9, 0.007)])
 def test_explicit_euler_with_exact_impacts_never_stops_bouncing(detection, e, h):
-    """Each flight gains g·h, so rebounds tend to v = e·(v + g·h): a scheme's flaw, as it is documented."""
-    done = Way("reference", {"detection": detection}).run(drop(e, 1.0, 15.0), dt=h)
-    rebound = -e / (1 + e) * done.contact_impulse[-4:, 1]
+    """Each flight gains g·h, so rebounds tend to v = e·(v + g·h): a documented flaw of the scheme."""
+    result = EngineConfig("reference", {"detection": detection}).run(drop(e, 1.0, 15.0), dt=h)
+    rebound = -e / (1 + e) * result.contact_impulse[-4:, 1]
     np.testing.assert_allclose(rebound, e * 9.81 * h / (1 - e), rtol=0.05)  # the gain varies with the phase in a step
 
 
-def test_bisection_and_an_exact_flight_leave_only_its_epsilon():
+def test_bisection_with_an_exact_flight_has_only_the_error_of_its_epsilon():
     scene = drop(0.8, 1.0, 0.8)
     exact = bounces(np.array([0.8]), 1.0, 0.0, 9.81, 0.8)[0][0]
-    done = Way("reference", {"integrator": "velocity_verlet", "detection": "bisect"}).run(scene)
-    assert done.position[-1, 0, 1] - 0.5 == pytest.approx(exact, abs=1e-9)  # 1e-9 of 0.01 s at 4.4 m/s, 1.8-fold
+    result = EngineConfig("reference", {"integrator": "velocity_verlet", "detection": "bisect"}).run(scene)
+    assert result.position[-1, 0, 1] - 0.5 == pytest.approx(exact, abs=1e-9)  # 1e-9 of 0.01 s at 4.4 m/s, 1.8-fold
 
 
 SPRING = {
@@ -93,29 +96,29 @@ PENDULUM = {
 RATTLE = {"joints": "rattle"}
 SMOOTH = [
     *(
-        (document, Way("reference", {"integrator": word}), TABLE[word].order)
+        (document, EngineConfig("reference", {"integrator": word}), TABLE[word].order)
         for document in (SPRING, ORBIT)
         for word in INTEGRATORS
     ),
     *(
-        (PENDULUM, Way("reference", {"integrator": word} | RATTLE), 2)
+        (PENDULUM, EngineConfig("reference", {"integrator": word} | RATTLE), 2)
         for word in ("velocity_verlet", "leapfrog", "rk4")
     ),
-    (PENDULUM, Way("reference", {"integrator": "semi_implicit_euler"}), 1),
-    *((document, Way("pymunk", {}), 1) for document in (SPRING, ORBIT, PENDULUM)),
+    (PENDULUM, EngineConfig("reference", {"integrator": "semi_implicit_euler"}), 1),
+    *((document, EngineConfig("pymunk", {}), 1) for document in (SPRING, ORBIT, PENDULUM)),
 ]
 
 
 @pytest.mark.parametrize(
-    ("document", "way", "order"),
+    ("document", "config", "order"),
     SMOOTH,
     ids=["-".join((*sorted({"joint", "attraction"} & set(d)), w.engine, *w.settings.values())) for d, w, _ in SMOOTH],
 )
-def test_springs_orbits_and_pendulums_converge_to_their_closed_forms(document, way, order):
-    """The largest error of any frame: at a single one, errors of different sign may cancel."""
+def test_springs_orbits_and_pendulums_converge_to_their_closed_forms(document, config, order):
+    """The error is the maximum over all frames: in a single frame errors of different sign may cancel."""
     scene, errors = from_document(document), []
     for dt in STEPS / 2.0:
-        truth = solved_run(scene, scene.solver.replace(dt=float(dt)))
-        done = way.run(scene, dt=float(dt))
-        errors.append(np.hypot(*(done.position - truth.position)[:, 0].T).max())
-    assert fitted(errors) == pytest.approx(order, abs=0.2)  # a fit over three halvings
+        exact = solved_run(scene, scene.solver.replace(dt=float(dt)))
+        result = config.run(scene, dt=float(dt))
+        errors.append(np.hypot(*(result.position - exact.position)[:, 0].T).max())
+    assert fitted_order(errors) == pytest.approx(order, abs=0.2)  # a fit over three halvings

@@ -1,4 +1,4 @@
-"""Prefix: a shorter run is the beginning of a longer one, bit for bit, and a session replays to its own state."""
+"""A shorter run is bit for bit the prefix of a longer one, and a session replays to its own state."""
 
 from pathlib import Path
 
@@ -20,15 +20,15 @@ from sandbox.window.playback.session import Session
 pytestmark = pytest.mark.full  # long runs and sweeps
 
 LONG = 1000.0
-"""s; far longer than any scene runs by itself"""
+"""s; far longer than the duration of any scene"""
 
 STEPS = 40
-"""So many suffice for the bodies that lie on something from the start; more are made of the scenes that fall first."""
+"""enough for scenes whose bodies are in contact from the start; scenes with a fall first have more"""
 
 FALLING_FIRST = {"benchmark/pile": 120, "joints/ragdoll_stairs": 240}
 
 MANY_EVENTS = {("benchmark/pile", "exact")}
-"""Which engine takes seconds over which scene, and then gives up."""
+"""scene and engine of runs that take seconds and end in `Exhaustion`"""
 
 CASES = [
     pytest.param(scene.name, engine, marks=pytest.mark.slow if (scene.name, engine) in MANY_EVENTS else ())
@@ -37,14 +37,14 @@ CASES = [
 ]
 
 
-def lasting(scene: Scene, duration: float) -> Scene:
+def with_duration(scene: Scene, duration: float) -> Scene:
     return scene.model_copy(update={"world": scene.world.model_copy(update={"duration": duration})})
 
 
 def states(scene: Scene, engine: str, steps: int) -> list[str]:
-    """Return the hash of each state, and how the run ended if it did."""
+    """Return the hash of each state, followed by the name of the exception if the run ended early."""
     relay, found = start(scene, engine), []
-    relay.contacts()  # as a run and a session ask for them
+    relay.contacts()  # as a run and a session do
     for _ in range(steps):
         try:
             relay.step()
@@ -55,14 +55,14 @@ def states(scene: Scene, engine: str, steps: int) -> list[str]:
 
 
 @pytest.mark.parametrize(("name", "engine"), CASES)
-def test_states_are_the_same_however_long_a_scene_runs(name, engine):
+def test_states_do_not_depend_on_the_duration_of_the_scene(name, engine):
     scene = load(find(name))
     steps = FALLING_FIRST.get(name, STEPS)
     try:
-        short = states(lasting(scene, steps * scene.solver.dt), engine, steps)
+        short = states(with_duration(scene, steps * scene.solver.dt), engine, steps)
     except Refusal:
-        return  # what an engine refuses it does not run at all
-    assert states(lasting(scene, LONG), engine, steps) == short
+        return  # a refused scene has no states
+    assert states(with_duration(scene, LONG), engine, steps) == short
 
 
 FLAT = """
@@ -74,11 +74,11 @@ dt = 0.01
 point = [0.0, 0.0]
 normal = [0.0, 1.0]
 """
-"""An inclined floor with nothing on it."""
+"""A floor without bodies."""
 
 
 def replayed(session: Session, path: Path) -> str:
-    """Save a session, read it again, run it anew, and return the hash of the state that it ends in."""
+    """Save a session, load it, rerun it, and return the hash of its final state."""
     recording = session.recording()
     assert recording.state_hash == session.frame.state_hash()
     result = rerun(Recording.load(recording.save(path)))
@@ -100,15 +100,16 @@ def test_session_of_spawned_balls_and_boxes_replays_to_its_own_state(engine, tmp
 
 
 @pytest.mark.parametrize("name", ["benchmark/incline", "benchmark/pyramid", "joints/ragdoll_stairs"])
-def test_session_that_outlasts_its_scene_replays_to_its_own_state(name, tmp_path):
-    scene = lasting(load(find(name)), 0.1)
-    session = Session(scene, settings=scene.solver.replace(dt=0.05, substeps=1))  # coarse, so that 40 s are few steps
+def test_session_longer_than_its_scene_replays_to_its_own_state(name, tmp_path):
+    scene = with_duration(load(find(name)), 0.1)
+    # a coarse step, so that 40 s have few steps
+    session = Session(scene, settings=scene.solver.replace(dt=0.05, substeps=1))
     session.advance(800)
     assert session.time > 39.0
     assert replayed(session, tmp_path / "session.json") == session.frame.state_hash()
 
 
-STRAYING = """
+DISTANT = """
 [world]
 duration = 1.0
 [solver]
@@ -127,25 +128,25 @@ position = [0.0, 0.5]
 radius = 0.5
 collides = "fixed"
 """
-"""A ball that leaves the middle by 20 m a step, and one that stays there."""
+"""A ball that moves away from the origin by 20 m a step, and one that stays there."""
 
 
 def height(relay: SwitchableSimulation, name: str) -> float:
     return float(relay.frame().position[relay.bodies.names.index(name), 1])
 
 
-def test_plane_goes_on_under_a_body_that_strays():
-    relay = start(loads(STRAYING))
+def test_plane_extends_under_a_body_that_moves_far_away():
+    relay = start(loads(DISTANT))
     for _ in range(3000):
         relay.step()
-    assert relay.frame().position[0, 0] > 50e3  # ten times as far as the planes reach at first
+    assert relay.frame().position[0, 0] > 50e3  # ten times the initial extent of the planes
     # Twice the slop of 1 % of a radius; without a plane it would be 4 km deep.
     assert height(relay, "rolls") == pytest.approx(0.5, abs=0.01)
     assert height(relay, "rests") == pytest.approx(0.5, abs=0.01)
 
 
-def test_body_can_be_put_where_planes_did_not_reach():
-    relay = start(loads(STRAYING))
+def test_body_can_be_spawned_beyond_the_initial_extent_of_planes():
+    relay = start(loads(DISTANT))
     relay.step()
     relay.apply(Spawn(time=0.0, ball=Ball(name="far", position=(4e6, 0.5), radius=0.5)))
     for _ in range(200):
@@ -153,8 +154,8 @@ def test_body_can_be_put_where_planes_did_not_reach():
     assert height(relay, "far") == pytest.approx(0.5, abs=0.01)
 
 
-def test_body_that_nothing_can_reach_ends_the_run():
-    relay = start(loads(STRAYING))
+def test_body_beyond_the_range_of_half_planes_ends_the_run():
+    relay = start(loads(DISTANT))
     relay.step()
     relay.apply(Impulse(time=0.0, body="rolls", impulse=(1e9, 0.0)))
     with pytest.raises(Divergence, match="half-planes"):

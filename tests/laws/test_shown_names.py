@@ -1,4 +1,4 @@
-"""Every name that a message, table or result shows of an element leads to it by a path of `--set`."""
+"""Names of elements in messages, tables and results can be used as paths of `--set`."""
 
 import re
 
@@ -96,8 +96,8 @@ def scene() -> Scene:
     return loads(UNNAMED)
 
 
-def resolved(scene: Scene, name: str) -> list[str]:
-    """The tables in which a name leads to an element, or to the generator that it is a part of."""
+def tables_of(scene: Scene, name: str) -> list[str]:
+    """Return the tables in which a name resolves to an element, or to the generator of the element."""
     found = []
     for kind, elements in to_document(scene).items():
         if isinstance(elements, list):
@@ -112,28 +112,28 @@ def resolved(scene: Scene, name: str) -> list[str]:
     return found
 
 
-def test_names_of_bodies_fixed_things_joints_drives_and_thrusts_are_paths(scene: Scene) -> None:
+def test_names_of_bodies_static_elements_joints_drives_and_thrusts_are_paths(scene: Scene) -> None:
     shown = [*scene.bodies.names, *scene.fixed_names, *scene.links.names, "drive-1", "thrust-1"]
     assert len(shown) == len(set(shown))
     for name in shown:
-        assert resolved(scene, name) == [name.partition("-")[0]]
+        assert tables_of(scene, name) == [name.partition("-")[0]]
 
 
-def test_each_path_leads_to_the_element_that_is_called_so(scene: Scene) -> None:
+def test_default_name_resolves_to_its_element(scene: Scene) -> None:
     for kind, elements in to_document(scene).items():
         for k in range(len(elements) if isinstance(elements, list) else 0):
             assert assign(to_document(scene), f"{kind}.{kind}-{k + 1}.x", 1)[1] == (kind, k, "x")
 
 
 def test_names_in_warnings_and_notes_are_paths(scene: Scene) -> None:
-    told = [each.message for each in (*warnings(scene), *notes(scene))]
-    names = {name for message in told for name in re.findall(r"'([^']+)'", message)}
-    assert {"joint-1", "joint-3", "ball-1"} <= names  # the scene is made for them
+    messages = [each.message for each in (*warnings(scene), *notes(scene))]
+    names = {name for message in messages for name in re.findall(r"'([^']+)'", message)}
+    assert {"joint-1", "joint-3", "ball-1"} <= names  # the scene is designed to cause these
     for name in names:
-        assert resolved(scene, name), name
+        assert tables_of(scene, name), name
 
 
-def test_name_that_was_stated_outranks_one_that_would_be_made() -> None:
+def test_stated_name_has_priority_over_a_default_name() -> None:
     document = {"ball": [{}, {"name": "ball-1"}]}
     assert assign(document, "ball.ball-1.mass", 1)[1] == ("ball", 1, "mass")
 
@@ -147,14 +147,14 @@ def test_name_that_was_stated_outranks_one_that_would_be_made() -> None:
         ("grid-1-2.radius=2", "that is part of an element: grid.grid-1.radius"),
     ],
 )
-def test_name_without_its_table_is_answered_with_the_path(scene: Scene, path: str, words: str) -> None:
+def test_name_without_its_table_is_refused_with_the_full_path(scene: Scene, path: str, words: str) -> None:
     key, _, value = path.partition("=")
     with pytest.raises(AddressError, match=re.escape(words)):
         assign(to_document(scene), key, value)
 
 
 @pytest.mark.parametrize("name", ["a", "two words", "a.b", "a[0]", 'say "a"', "it's", "a=b", "8"])
-def test_path_of_a_fault_can_be_set_as_it_is_shown(name: str) -> None:
+def test_path_of_a_fault_can_be_used_in_an_override(name: str) -> None:
     document = {"ball": [{"name": "other"}, {"name": name, "radius": -1.0, "position": [0.0, 0.0]}]}
     shown = path_of(("ball", 1, "radius"), document)
     key, value = parse_assignment(f"{shown}=2")

@@ -1,4 +1,4 @@
-"""Sparse scenes: without bodies, with one, or with nothing that can move, and later without those it speaks of."""
+"""Sparse scenes: no bodies, one body, only static bodies, or removed bodies that other elements refer to."""
 
 from typing import Any
 
@@ -26,7 +26,7 @@ from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import dumps, from_document, loads
 from tests.laws.features import BODIES, FEATURES, JOINTS, document
 
-pytestmark = pytest.mark.slow  # some 45 s together
+pytestmark = pytest.mark.slow  # about 45 s together
 
 CHOICES: list[dict[str, Any]] = [
     {},
@@ -60,7 +60,7 @@ LATER = (
 
 
 def _scene(bodies: str, feature: str) -> Scene | None:
-    """Return a scene; None where it has faults, such as a feature of a body that is not there."""
+    """Return a scene; None if it has faults, such as a reference to a missing body."""
     try:
         return from_document(document(bodies, feature))
     except SceneError:
@@ -68,17 +68,17 @@ def _scene(bodies: str, feature: str) -> Scene | None:
 
 
 def _step(simulation: Simulation) -> bool:
-    """Advance, and ask for all that can be known; tell whether it can go on."""
+    """Advance by a step and read everything; return whether the simulation can continue."""
     try:
         simulation.step()
-    except (Divergence, Exhaustion):  # such as next to what attracts
+    except (Divergence, Exhaustion):  # e.g. close to an attracting body
         return False
     _read(simulation)
     return True
 
 
 def _read(simulation: Simulation) -> None:
-    """Ask for all that can be known; it is finite."""
+    """Read everything, and check that the state is finite."""
     frame = simulation.frame()
     assert np.isfinite(frame.position).all() and np.isfinite(frame.velocity).all()
     simulation.contacts(), simulation.account(), simulation.state_hash()
@@ -86,7 +86,7 @@ def _read(simulation: Simulation) -> None:
 
 
 def _apply(simulation: Simulation, action: Any) -> bool:
-    """Do what an action says; tell whether it can be done."""
+    """Apply an action; return whether it was accepted."""
     try:
         simulation.apply(action)
     except ActionError:
@@ -95,8 +95,8 @@ def _apply(simulation: Simulation, action: Any) -> bool:
 
 
 @pytest.mark.parametrize("feature", FEATURES)
-def test_each_feature_runs_whatever_moves(feature: str) -> None:
-    """A scene that loads is run, or refused."""
+def test_each_feature_runs_with_any_set_of_bodies(feature: str) -> None:
+    """Every scene that loads runs or is refused."""
     for bodies in BODIES:
         scene = _scene(bodies, feature)
         for engine in ENGINES if scene is not None else ():
@@ -111,103 +111,105 @@ def test_each_feature_runs_whatever_moves(feature: str) -> None:
                     _step(simulation)
 
 
-@pytest.mark.parametrize("gone", ["a", "all"])
+@pytest.mark.parametrize("removed", ["a", "all"])
 @pytest.mark.parametrize("feature", FEATURES)
-def test_engines_take_over_a_scene_that_speaks_of_bodies_that_are_gone(feature: str, gone: str) -> None:
-    """By removal; after it the scene goes on, with launches and other actions, and there and back."""
+def test_engine_switch_keeps_elements_that_refer_to_removed_bodies(feature: str, removed: str) -> None:
+    """After the removal the scene continues, with launches and other actions, and through a switch back."""
     for bodies in ("one of two fixed", "two"):
         scene = _scene(bodies, feature)
         for engine in ENGINES if scene is not None else ():
             assert scene is not None
             try:
-                first = SwitchableSimulation(scene, engine)
+                original = SwitchableSimulation(scene, engine)
             except Refusal:
                 continue
-            if not _step(first):
+            if not _step(original):
                 continue
             for action in ACTIONS:
-                _apply(first, action)
-            for name in first.bodies.names if gone == "all" else ("a",):
-                _apply(first, Remove(time=0.0, body=name))
-            if not _step(first):
+                _apply(original, action)
+            for name in original.bodies.names if removed == "all" else ("a",):
+                _apply(original, Remove(time=0.0, body=name))
+            if not _step(original):
                 continue
-            point = first.checkpoint()
+            point = original.checkpoint()
             for other in ENGINES:
-                relay = SwitchableSimulation.resumed(point)
-                if not _apply(relay, Switch(time=0.0, engine=other)) or not _step(relay):
+                switched = SwitchableSimulation.resumed(point)
+                if not _apply(switched, Switch(time=0.0, engine=other)) or not _step(switched):
                     continue
                 for action in LATER:
-                    _apply(relay, action)
-                if _step(relay) and _apply(relay, Switch(time=0.0, engine=engine)) and _step(relay):
-                    _read(SwitchableSimulation.resumed(relay.checkpoint()))
+                    _apply(switched, action)
+                if _step(switched) and _apply(switched, Switch(time=0.0, engine=engine)) and _step(switched):
+                    _read(SwitchableSimulation.resumed(switched.checkpoint()))
 
 
 @pytest.mark.parametrize("feature", ["attraction to a body", "attractions", "thrusts", "emitter", "bounds", "pockets"])
-def test_engines_take_over_whoever_left_by_itself(feature: str) -> None:
-    """Out of world.bounds, at the end of its life, or into a pocket."""
-    found = document("two", feature)
-    found["world"].setdefault("bounds", [[-50.0, -50.0], [50.0, 50.0]])
-    scene = from_document(found)
+def test_engine_switch_keeps_bodies_that_were_removed(feature: str) -> None:
+    """Removed outside of world.bounds, at the end of its lifetime, or in a pocket."""
+    whole = document("two", feature)
+    whole["world"].setdefault("bounds", [[-50.0, -50.0], [50.0, 50.0]])
+    scene = from_document(whole)
     for engine in ENGINES:
         try:
-            first = SwitchableSimulation(scene, engine)
+            original = SwitchableSimulation(scene, engine)
         except Refusal:
             continue
-        _apply(first, Move(time=0.0, body="a", position=(1e3, 3.0)))
+        _apply(original, Move(time=0.0, body="a", position=(1e3, 3.0)))
         for _ in range(5):
-            first.step()
+            original.step()
+        removed = ~original.frame().present
         for other in ENGINES:
-            relay = SwitchableSimulation.resumed(first.checkpoint())
-            if _apply(relay, Switch(time=0.0, engine=other)):
-                _step(relay)
+            switched = SwitchableSimulation.resumed(original.checkpoint())
+            if _apply(switched, Switch(time=0.0, engine=other)):
+                _step(switched)
+                assert not switched.frame().present[removed].any()
 
 
-def test_who_left_attracts_no_more_and_thrusts_keep_their_throttles() -> None:
-    """The engines agree on what goes on after a body has left, as does one that did not change."""
-    found = document("two", "thrusts")
-    found["attraction"] = [{"toward": "a", "strength": 1e3}, {"toward": [0.0, 50.0], "strength": 1.0}]
-    found["world"]["gravity"] = [0.0, 0.0]
-    scene = from_document(found)
-    ends = []
+def test_removed_body_attracts_no_more_and_thrusts_keep_their_throttles() -> None:
+    """The engines agree after a body is removed, with and without a switch."""
+    whole = document("two", "thrusts")
+    whole["attraction"] = [{"toward": "a", "strength": 1e3}, {"toward": [0.0, 50.0], "strength": 1.0}]
+    whole["world"]["gravity"] = [0.0, 0.0]
+    scene = from_document(whole)
+    velocities = []
     for engine, other in (
         ("pymunk", "pymunk"),
         ("pymunk", "reference"),
         ("reference", "pymunk"),
         ("reference", "reference"),
     ):
-        relay = SwitchableSimulation(scene, engine)
-        relay.apply(Throttle(time=0.0, thrust="u", level=0.5))
-        relay.apply(Remove(time=0.0, body="a"))
-        relay.apply(Switch(time=0.0, engine=other, settings={"dt": 0.001}))
+        switched = SwitchableSimulation(scene, engine)
+        switched.apply(Throttle(time=0.0, thrust="u", level=0.5))
+        switched.apply(Remove(time=0.0, body="a"))
+        switched.apply(Switch(time=0.0, engine=other, settings={"dt": 0.001}))
         for _ in range(100):
-            relay.step()
-        ends.append(relay.frame().velocity[1])
-    assert ends[0][0] > 0.0
-    np.testing.assert_allclose(ends, [ends[0]] * 4, rtol=1e-2, atol=1e-6)
+            switched.step()
+        velocities.append(switched.frame().velocity[1])
+    assert velocities[0][0] > 0.0
+    np.testing.assert_allclose(velocities, [velocities[0]] * 4, rtol=1e-2, atol=1e-6)
 
 
 @pytest.mark.parametrize("kind", JOINTS)
 @pytest.mark.parametrize("others", [(), ("fixed",), ("stroke",), ("plunger",)])
-def test_joint_between_what_no_joint_can_move_is_refused_by_name(kind: str, others: tuple[str, ...]) -> None:
-    found = document("two", f"{kind} between two" if others else f"{kind} to the world")
+def test_joint_between_immovable_bodies_is_refused_by_name(kind: str, others: tuple[str, ...]) -> None:
+    whole = document("two", f"{kind} between two" if others else f"{kind} to the world")
     drive = {"kind": "stroke", "stops": [0, 1], "rate": 1.0}
-    found["drive"] = [{**drive, "body": "a", "pivot": [0.0, 3.0]}]
+    whole["drive"] = [{**drive, "body": "a", "pivot": [0.0, 3.0]}]
     if others == ("fixed",):
-        found["ball"][1]["fixed"] = True
+        whole["ball"][1]["fixed"] = True
     elif others == ("stroke",):
-        found["drive"].append({**drive, "body": "b", "pivot": [2.0, 3.0]})
+        whole["drive"].append({**drive, "body": "b", "pivot": [2.0, 3.0]})
     elif others == ("plunger",):
-        found["drive"].append({"kind": "plunger", "body": "b", "direction": [0, 1], "travel": 1.0, "speed": 1.0})
+        whole["drive"].append({"kind": "plunger", "body": "b", "direction": [0, 1], "travel": 1.0, "speed": 1.0})
     with pytest.raises(SceneError, match="'a'") as raised:
-        from_document(found)
+        from_document(whole)
     assert [fault.path for fault in raised.value.faults] == ["joint.j.between"]
 
 
 @pytest.mark.parametrize("kind", JOINTS)
-def test_joint_between_a_led_body_and_one_that_moves_holds(kind: str) -> None:
-    found = document("two", f"{kind} between two")
-    found["drive"] = [{"kind": "stroke", "body": "a", "pivot": [0.0, 3.0], "stops": [0, 1], "rate": 1.0}]
-    simulation = start(from_document(found), "pymunk")
+def test_joint_between_a_driven_and_a_free_body_holds(kind: str) -> None:
+    whole = document("two", f"{kind} between two")
+    whole["drive"] = [{"kind": "stroke", "body": "a", "pivot": [0.0, 3.0], "stops": [0, 1], "rate": 1.0}]
+    simulation = start(from_document(whole), "pymunk")
     for _ in range(10):
         simulation.step()
     _read(simulation)

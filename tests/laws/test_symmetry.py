@@ -1,18 +1,18 @@
-"""Physics knows no left and right, no first and second, no fast and slow observer."""
+"""Symmetries: mirror images, order of bodies, moving frames, translation, repetition."""
 
 import numpy as np
 import pytest
 
 from sandbox.scene.files.load import from_document
-from tests.laws.ways import HARD, SOFT, named
+from tests.laws.ways import IMPULSE_CONFIGS, PENALTY, each_config
 
-SHIFT = 1e-12  # m and m/s: roundings of 1e-16 that one impact in four balls amplifies by less than 1e3
+TOLERANCE = 1e-12  # m and m/s: rounding of 1e-16, amplified by less than 1e3 in the impacts
 
 PAIRS = [{"between": [a, b], "restitution": 0.7, "friction": 0.4} for a, b in ("xx", "xy", "yy")]
 
 
-def four(order=(0, 1, 2, 3), mirror=1.0, drift=(0.0, 0.0), gravity=0.0):
-    """Four unlike balls that meet pairwise, once."""
+def four_balls(order=(0, 1, 2, 3), mirror=1.0, drift=(0.0, 0.0), gravity=0.0):
+    """Return four different balls that collide once in pairs."""
     balls = [
         {"name": "a", "position": [-1.5, 0.1], "velocity": [2.0, 0.0], "radius": 0.5, "mass": 1.0, "material": "x"},
         {"name": "b", "position": [0.0, 0.0], "velocity": [0.0, 0.3], "radius": 0.4, "mass": 3.0, "material": "y"},
@@ -33,62 +33,63 @@ def four(order=(0, 1, 2, 3), mirror=1.0, drift=(0.0, 0.0), gravity=0.0):
     )
 
 
-def state(done, order=(0, 1, 2, 3)):
-    back = np.argsort(order)
-    return done.position[-1][back], done.velocity[-1][back], done.angular_velocity[-1][back]
+def state(result, order=(0, 1, 2, 3)):
+    by_name = np.argsort(order)
+    return result.position[-1][by_name], result.velocity[-1][by_name], result.angular_velocity[-1][by_name]
 
 
-@named([*HARD, SOFT])
-def test_the_order_in_the_file_does_not_matter(way):
-    expected = way.run(four())
+@each_config([*IMPULSE_CONFIGS, PENALTY])
+def test_result_does_not_depend_on_the_order_of_bodies_in_the_file(config):
+    expected = config.run(four_balls())
     assert len(expected.contact_time) == 2
     for order in ((1, 0, 3, 2), (3, 2, 1, 0), (2, 0, 3, 1)):
-        for ours, theirs in zip(state(way.run(four(order)), order), state(expected), strict=True):
-            np.testing.assert_allclose(ours, theirs, atol=SHIFT, rtol=0)
+        for actual, wanted in zip(state(config.run(four_balls(order)), order), state(expected), strict=True):
+            np.testing.assert_allclose(actual, wanted, atol=TOLERANCE, rtol=0)
 
 
-@named([*HARD, SOFT])
-def test_a_mirror_image_stays_one(way):
-    position, velocity, spin = state(way.run(four(gravity=-9.81)))
-    there_position, there_velocity, there_spin = state(way.run(four(mirror=-1.0, gravity=-9.81)))
-    np.testing.assert_allclose(there_position, position * [-1, 1], atol=SHIFT, rtol=0)
-    np.testing.assert_allclose(there_velocity, velocity * [-1, 1], atol=SHIFT, rtol=0)
-    np.testing.assert_allclose(there_spin, -spin, atol=SHIFT, rtol=0)
+@each_config([*IMPULSE_CONFIGS, PENALTY])
+def test_mirror_image_stays_a_mirror_image(config):
+    position, velocity, spin = state(config.run(four_balls(gravity=-9.81)))
+    mirrored_position, mirrored_velocity, mirrored_spin = state(config.run(four_balls(mirror=-1.0, gravity=-9.81)))
+    np.testing.assert_allclose(mirrored_position, position * [-1, 1], atol=TOLERANCE, rtol=0)
+    np.testing.assert_allclose(mirrored_velocity, velocity * [-1, 1], atol=TOLERANCE, rtol=0)
+    np.testing.assert_allclose(mirrored_spin, -spin, atol=TOLERANCE, rtol=0)
 
 
-@named(HARD)
-def test_a_moving_observer_sees_the_same(way):
-    """Galilei: with a common drift, chosen exact in binary so that no step changes by rounding alone."""
+@each_config(IMPULSE_CONFIGS)
+def test_motion_is_the_same_in_a_moving_frame(config):
+    """Galilean invariance, with a drift that is exact in binary, so that it causes no rounding by itself."""
     drift = np.array([0.5, -0.25])
-    position, velocity, spin = state(way.run(four()))
-    there_position, there_velocity, there_spin = state(way.run(four(drift=tuple(drift))))
-    np.testing.assert_allclose(there_position, position + drift, atol=1e-10, rtol=0)  # times of impact by roots
-    np.testing.assert_allclose(there_velocity, velocity + drift, atol=1e-10, rtol=0)
-    np.testing.assert_allclose(there_spin, spin, atol=1e-10, rtol=0)
+    position, velocity, spin = state(config.run(four_balls()))
+    drifting_position, drifting_velocity, drifting_spin = state(config.run(four_balls(drift=tuple(drift))))
+    # accuracy of the roots for times of impact
+    np.testing.assert_allclose(drifting_position, position + drift, atol=1e-10, rtol=0)
+    np.testing.assert_allclose(drifting_velocity, velocity + drift, atol=1e-10, rtol=0)
+    np.testing.assert_allclose(drifting_spin, spin, atol=1e-10, rtol=0)
 
 
-@named([*HARD, SOFT])
-def test_a_run_repeats_bit_for_bit(way):
-    one, two = way.run(four()), way.run(four())
+@each_config([*IMPULSE_CONFIGS, PENALTY])
+def test_run_repeats_bit_for_bit(config):
+    one, two = config.run(four_balls()), config.run(four_balls())
     assert np.array_equal(one.position, two.position)
     assert np.array_equal(one.contact_impulse, two.contact_impulse)
 
 
-@named(HARD)
-@pytest.mark.parametrize("place", [1e3, 1e6])
-def test_a_place_far_out_is_as_good_up_to_rounding(way, place):
-    near, far = way.run(four()), None
-    scene = four()
+@each_config(IMPULSE_CONFIGS)
+@pytest.mark.parametrize("origin", [1e3, 1e6])
+def test_motion_far_from_the_origin_is_the_same_up_to_rounding(config, origin):
+    near, far = config.run(four_balls()), None
+    scene = four_balls()
     document = {
         "world": {"duration": 1.0},
         "material": [{"name": "x"}, {"name": "y"}],
         "pair": PAIRS,
         "ball": [
-            {**ball.model_dump(exclude_none=True), "position": [ball.position[0] + place, ball.position[1]]}
+            {**ball.model_dump(exclude_none=True), "position": [ball.position[0] + origin, ball.position[1]]}
             for ball in scene.balls
         ],
     }
-    far = way.run(from_document(document))
-    # A coordinate is rounded to place·1e-16, a normal by that over the contact distance; ten of those.
-    tolerance = 1e-14 * place
-    np.testing.assert_allclose(far.position[-1] - [place, 0.0], near.position[-1], atol=tolerance, rtol=0)
+    far = config.run(from_document(document))
+    # A coordinate is rounded to origin·1e-16, a normal to that over the contact distance; ten such errors.
+    tolerance = 1e-14 * origin
+    np.testing.assert_allclose(far.position[-1] - [origin, 0.0], near.position[-1], atol=tolerance, rtol=0)

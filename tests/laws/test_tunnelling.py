@@ -1,4 +1,4 @@
-"""Case 19: bullets that get past a thin wall, in the share that is forecast of them."""
+"""Case 19: the fraction of bullets that tunnel through a thin wall is the predicted one."""
 
 import numpy as np
 import pytest
@@ -13,8 +13,8 @@ RADIUS, THICK, SPEED = 0.01, 0.02, 100.0
 WALL = 1.0
 
 
-def salvo(ratio: float) -> Scene:
-    """Bullets that start anywhere within one step's way, and cover `ratio` times what the wall can stop in each."""
+def scene_of_bullets(ratio: float) -> Scene:
+    """Return bullets that start within one step of travel, which is `ratio` times the distance that the wall stops."""
     step = ratio * (RADIUS + THICK / 2.0)
     return loads(
         f"[world]\nduration = {(WALL + 4.0 * step) / SPEED!r}\nseed = 7\n[solver]\ndt = {step / SPEED!r}\n"
@@ -26,14 +26,14 @@ def salvo(ratio: float) -> Scene:
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
 @pytest.mark.parametrize("ratio", [0.9, 1.1, 1.5, 3.0, 10.0])
-def test_share_that_passes_is_what_is_forecast(ratio: float, engine: str) -> None:
-    scene = salvo(ratio)
+def test_fraction_of_tunnelling_bullets_is_the_predicted_one(ratio: float, engine: str) -> None:
+    scene = scene_of_bullets(ratio)
     (forecast,) = tunnelling_risks(scene)
-    done = run(scene, engine, audit=False)
-    assert done.status == "ok"
-    passed = float(np.mean(done.position[-1, :, 0] > WALL))
+    result = run(scene, engine, audit=False)
+    assert result.status == "ok"
+    passed = float(np.mean(result.position[-1, :, 0] > WALL))
     odds = forecast.odds(scene.solver.dt)
     assert odds == pytest.approx(max(0.0, 1.0 - 1.0 / ratio), abs=1e-12)  # rounding
-    # As a share within 3 %: of 2,500 bullets three standard deviations, where the odds are even.
+    # 3 %: three standard deviations of 2,500 bullets at even odds.
     assert passed == pytest.approx(odds, abs=0.03)
     assert (passed > 0.0) == (ratio > 1.0)

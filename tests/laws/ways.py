@@ -1,4 +1,4 @@
-"""Every way to compute a scene that the laws are held against: each engine as it is, and the reference's choices."""
+"""Configurations in which the laws are tested: each engine with its defaults, and the choices of the reference."""
 
 from typing import Any, NamedTuple
 
@@ -12,56 +12,61 @@ from sandbox.scene.files.load import from_document
 from sandbox.trajectory import Trajectory
 
 
-class Way(NamedTuple):
+class EngineConfig(NamedTuple):
     """An engine with settings."""
 
     engine: str
     settings: dict[str, Any]
 
     def run(self, scene: Scene, **more: Any) -> Trajectory:
-        """Run a scene this way; it must come through."""
+        """Run a scene; the run must end with status "ok"."""
         settings = {"dt": 0.01, **self.settings, **more}
-        done = run(scene, self.engine, audit=False, **settings)
-        assert done.status == "ok", done.reason
-        return done
+        result = run(scene, self.engine, audit=False, **settings)
+        assert result.status == "ok", result.reason
+        return result
 
     def start(self, scene: Scene) -> Any:
-        """Start a scene this way."""
+        """Start a scene."""
         return start(scene, self.engine, scene.solver.replace(**self.settings))
 
 
 INTEGRATORS = ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "leapfrog", "rk4")
 
-SOFT = Way("reference", {"response": "penalty", "integrator": "velocity_verlet", "substeps": 50, "stiffness": 2e4})
-"""Springs: the laws hold for them to the accuracy of the step, here a hundredth of a contact of 1 kg."""
+PENALTY = EngineConfig(
+    "reference", {"response": "penalty", "integrator": "velocity_verlet", "substeps": 50, "stiffness": 2e4}
+)
+"""Penalty springs: laws hold to the accuracy of the step, here a hundredth of the duration of a contact of 1 kg."""
 
-HARD = [
-    *(Way(engine, {}) for engine in ENGINES),
-    *(Way("reference", {"integrator": word}) for word in INTEGRATORS[1:]),
-    *(Way("reference", {"integrator": "velocity_verlet", "detection": word}) for word in ("bisect", "swept", "shrink")),
+IMPULSE_CONFIGS = [
+    *(EngineConfig(engine, {}) for engine in ENGINES),
+    *(EngineConfig("reference", {"integrator": word}) for word in INTEGRATORS[1:]),
+    *(
+        EngineConfig("reference", {"integrator": "velocity_verlet", "detection": word})
+        for word in ("bisect", "swept", "shrink")
+    ),
 ]
-"""Impulses: what the laws say of an impact holds to rounding."""
+"""Impulses: laws of an impact hold to rounding."""
 
 
-def named(ways: list[Way]) -> Any:
-    """Return a parametrization over ways, each by its name."""
+def each_config(configs: list[EngineConfig]) -> Any:
+    """Return a parametrization over configurations, with ids of their engines and settings."""
     return pytest.mark.parametrize(
-        "way",
+        "config",
         [
             pytest.param(w, id="-".join((w.engine, *(v for v in w.settings.values() if isinstance(v, str)))))
-            for w in ways
+            for w in configs
         ],
     )
 
 
 def pair(e: float, mass: tuple[float, float], offset: float, speed: float, **keys: Any) -> Scene:
-    """Return a ball that hits one at rest, off its middle by a part of the contact distance 1, after some 0.5 s."""
+    """Return a ball that hits one at rest after about 0.5 s, with an offset in units of the contact distance 1 m."""
     between = {"between": ["a", "a"], "restitution": e, "friction": keys.pop("friction", 0.0)}
-    still = {"name": "two", "position": [0.0, 0.0], "radius": 0.5, "mass": mass[1], "material": "a"}
+    resting = {"name": "two", "position": [0.0, 0.0], "radius": 0.5, "mass": mass[1], "material": "a"}
     x = -float(np.sqrt(1 - offset**2)) - 0.503 * speed
-    moving = {**still, "name": "one", "position": [x, offset], "velocity": [speed, 0.0], "mass": mass[0]}
+    moving = {**resting, "name": "one", "position": [x, offset], "velocity": [speed, 0.0], "mass": mass[0]}
     return from_document(
-        {"world": {"duration": 1.0}, "material": [{"name": "a"}], "pair": [between], "ball": [moving, still]} | keys
+        {"world": {"duration": 1.0}, "material": [{"name": "a"}], "pair": [between], "ball": [moving, resting]} | keys
     )
 
 

@@ -1,4 +1,4 @@
-"""Seeds: the same scene with other chances."""
+"""Seeds: the same scene with different random values."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import loads
 
 PLAIN = "[world]\nseed = 3\n[[ball]]\nname = 'a'\nposition = [0, 0]\nradius = 1\n"
-HEADS = {
+RANDOM_PARTS = {
     "velocity": "[[grid]]\norigin = [0, 0]\ncolumns = 2\nrows = 2\nspacing = [1, 1]\nradius = 0.1\n"
     "velocity_jitter = 1.0\n",
     "place": "[[scatter]]\nlower = [0, 0]\nupper = [9, 9]\ncount = 3\nradius = 0.1\n",
@@ -17,15 +17,15 @@ HEADS = {
 }
 
 
-def test_scene_without_chances_is_none() -> None:
+def test_scene_without_random_parts_is_not_random() -> None:
     assert not is_random(loads(PLAIN))
-    calm = HEADS["velocity"].replace("velocity_jitter = 1.0\n", "")
-    assert not is_random(loads(calm))
+    without_jitter = RANDOM_PARTS["velocity"].replace("velocity_jitter = 1.0\n", "")
+    assert not is_random(loads(without_jitter))
 
 
-@pytest.mark.parametrize("kind", HEADS)
-def test_scene_with_chances_is_random_and_its_seeds_differ(kind: str) -> None:
-    scene = loads(HEADS[kind])
+@pytest.mark.parametrize("kind", RANDOM_PARTS)
+def test_scene_with_random_parts_depends_on_its_seed(kind: str) -> None:
+    scene = loads(RANDOM_PARTS[kind])
     other = with_seed(scene, 7)
     assert is_random(scene)
     assert other.world.seed == 7
@@ -34,17 +34,17 @@ def test_scene_with_chances_is_random_and_its_seeds_differ(kind: str) -> None:
     assert np.array_equal(scene.bodies.mass, other.bodies.mass)
 
 
-def test_only_the_seed_is_another() -> None:
-    scene = loads("[world]\nduration = 2.0\n" + HEADS["place"])
+def test_with_seed_changes_only_the_seed() -> None:
+    scene = loads("[world]\nduration = 2.0\n" + RANDOM_PARTS["place"])
     mine, its = to_document(scene), to_document(with_seed(scene, 5))
     assert its.pop("world") == {**mine.pop("world"), "seed": 5}
     assert mine == its
 
 
-def test_seed_at_the_end_of_its_range_is_no_trap() -> None:
-    assert is_random(loads(HEADS["place"] + f"[world]\nseed = {2**63 - 1}\n"))
+def test_largest_seed_is_accepted() -> None:
+    assert is_random(loads(RANDOM_PARTS["place"] + f"[world]\nseed = {2**63 - 1}\n"))
 
 
-def test_seed_out_of_range_is_a_fault() -> None:
+def test_seed_out_of_range_raises_scene_error() -> None:
     with pytest.raises(SceneError, match="seed"):
         with_seed(loads(PLAIN), -1)

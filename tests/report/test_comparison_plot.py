@@ -1,4 +1,4 @@
-"""Plots of comparisons: what is in the figures, and what is on the disk."""
+"""Plots of comparisons: contents of the figures, and written files."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -23,7 +23,7 @@ from sandbox.scene.files.load import load, loads
 from sandbox.scene.files.shipped_scenes import find
 
 DROP = compare(load(find("bounce"), ["world.duration=1.5", "solver.dt=0.01"]), ["pymunk"])
-THROWN = compare(
+PROJECTILES = compare(
     loads(
         'title = "Thrown"\n[world]\ngravity = [0, -10]\nduration = 1.0\n'
         '[[ball]]\nname = "$x_1$"\nposition = [0, 0]\nvelocity = [3, 5]\nradius = 0.1\ncollides = "none"\n'
@@ -35,7 +35,7 @@ THROWN = compare(
 )
 
 
-def distrusted(comparison: Comparison, until: float) -> Comparison:
+def trusted_until(comparison: Comparison, until: float) -> Comparison:
     """Return a comparison whose truth ends early."""
     best = comparison.best
     assert best is not None
@@ -47,11 +47,11 @@ def legend_of(figure: Figure) -> list[str]:
     return [text.get_text() for legend in figure.legends for text in legend.get_texts()]
 
 
-def drawn(panel: Axes, number: int) -> tuple[np.ndarray, np.ndarray]:
-    line = panel.lines[number]
+def line_data(panel: Axes, index: int) -> tuple[np.ndarray, np.ndarray]:
+    line = panel.lines[index]
     x, y = (np.asarray(values, dtype=np.float64) for values in (line.get_xdata(), line.get_ydata()))
-    kept = np.isfinite(y)
-    return x[kept], y[kept]
+    finite = np.isfinite(y)
+    return x[finite], y[finite]
 
 
 def test_motion_along_one_axis_is_drawn_against_time_with_the_truth() -> None:
@@ -60,29 +60,31 @@ def test_motion_along_one_axis_is_drawn_against_time_with_the_truth() -> None:
     assert (panel.get_xlabel(), panel.get_ylabel()) == ("time, s", "position y, m")
     run, truth = DROP.trajectories["pymunk"], DROP.best
     assert truth is not None
-    assert drawn(panel, 0)[1].tolist() == run.position[:, 0, 1].tolist()
-    assert drawn(panel, 2)[1].tolist() == truth.trajectory.position[:, 0, 1].tolist()
+    assert line_data(panel, 0)[1].tolist() == run.position[:, 0, 1].tolist()
+    assert line_data(panel, 2)[1].tolist() == truth.trajectory.position[:, 0, 1].tolist()
     assert legend_of(figure) == ["pymunk", "truth: closed form"]
 
 
-def test_motion_in_the_plane_is_drawn_as_a_path_among_the_fixed_things() -> None:
-    figure = draw_trajectories(THROWN)
+def test_planar_motion_is_drawn_as_a_path_with_fixed_shapes() -> None:
+    figure = draw_trajectories(PROJECTILES)
     (panel,) = figure.axes
     assert (panel.get_xlabel(), panel.get_ylabel()) == ("position x, m", "position y, m")
     assert panel.get_aspect() == 1.0
     assert [text.get_text() for text in panel.texts] == ["$x_1$", "_b"]
-    x, y = drawn(panel, 0)
-    run = THROWN.trajectories["pymunk"]
+    x, y = line_data(panel, 0)
+    run = PROJECTILES.trajectories["pymunk"]
     assert x[:101].tolist() == run.position[:, 0, 0].tolist()
     assert y[:101].tolist() == run.position[:, 0, 1].tolist()
-    assert len(panel.artists) + len(panel.patches) + len(panel.lines) >= 6 + 3  # two lines a body, the truth, the fixed
+    assert (
+        len(panel.artists) + len(panel.patches) + len(panel.lines) >= 6 + 3
+    )  # two lines per body, the truth, the fixed shapes
 
 
-def test_error_is_drawn_on_a_log_axis_with_a_floor_that_is_told() -> None:
+def test_error_is_drawn_on_a_log_axis_with_a_labelled_floor() -> None:
     figure = draw_error(DROP)
     upper, lower = figure.axes
     assert upper.get_yscale() == lower.get_yscale() == "log"
-    time, error = drawn(upper, 0)
+    time, error = line_data(upper, 0)
     inside = (time > 0.0) & (time < 1.0)
     assert error[inside] == pytest.approx(9.81 * 0.01 * time[inside] / 2.0, rel=1e-9)  # g·h·T/2, of numbers near 5
     floor = float(upper.get_ylabel().rsplit(" ", 1)[1].rstrip(")"))
@@ -96,56 +98,56 @@ def test_energy_shows_each_engine_and_the_truth() -> None:
     upper, lower = figure.axes
     assert upper.get_ylabel().startswith("total energy, J")
     assert lower.get_ylabel().startswith("energy, difference from the truth, J")
-    assert drawn(upper, 0)[1][0] == pytest.approx(9.81 * 5.5)  # m·g·y at the start
-    assert drawn(upper, 1)[1][-1] == pytest.approx(9.81 * (0.5 + 3.2))  # e² of 5 m is left
+    assert line_data(upper, 0)[1][0] == pytest.approx(9.81 * 5.5)  # m·g·y at the start
+    assert line_data(upper, 1)[1][-1] == pytest.approx(9.81 * (0.5 + 3.2))  # e² of 5 m remain
     assert legend_of(figure) == ["pymunk", "truth: closed form"]
 
 
-def test_time_beyond_the_trust_is_marked() -> None:
+def test_time_after_the_trusted_time_is_marked() -> None:
     assert DROP.best is not None
     until = float(DROP.best.trajectory.time[70])
-    comparison = distrusted(DROP, until)
+    comparison = trusted_until(DROP, until)
     for figure in (draw_trajectories(comparison), draw_error(comparison), draw_energy(comparison)):
         assert "trusted until 0.7 s" in legend_of(figure)
         for panel in figure.axes:
             assert any(np.all(np.asarray(line.get_xdata()) == until) for line in panel.lines)
     (panel,) = draw_trajectories(comparison).axes
-    assert drawn(panel, 0)[0].max() == until
-    assert drawn(panel, 1)[0].min() == until  # pale, from there on
-    assert drawn(panel, 2)[0].max() == until  # the truth ends
+    assert line_data(panel, 0)[0].max() == until
+    assert line_data(panel, 1)[0].min() == until  # pale from there on
+    assert line_data(panel, 2)[0].max() == until  # the truth ends
     assert "from the start" in draw_energy(comparison).axes[1].get_ylabel()
 
 
-def test_heading_says_what_the_truth_is() -> None:
+def test_heading_names_the_truth() -> None:
     text = "\n".join(text.get_text() for text in draw_error(DROP).texts)
     assert "Bounce: error against the truth" in text
     assert "truth: closed form" in text
 
 
-def test_files_are_written_whole_and_the_same_again(tmp_path: Path) -> None:
-    paths = plot_comparison(THROWN, tmp_path)
+def test_files_are_written_completely_and_reproducibly(tmp_path: Path) -> None:
+    paths = plot_comparison(PROJECTILES, tmp_path)
     assert [path.name for path in paths] == ["trajectories.png", "error.png", "energy.png"]
     assert sorted(tmp_path.iterdir()) == sorted(paths)
     before = [path.read_bytes() for path in paths]
-    plot_comparison(THROWN, tmp_path)
+    plot_comparison(PROJECTILES, tmp_path)
     assert [path.read_bytes() for path in paths] == before
 
 
-def test_comparison_without_a_run_is_drawn_too(tmp_path: Path) -> None:
+def test_comparison_without_a_run_can_be_drawn(tmp_path: Path) -> None:
     refused = compare(DROP.scene, ["pymunk"], integrator="rk4")
     assert refused.trajectories == {}
     assert all(path.stat().st_size > 0 for path in plot_comparison(refused, tmp_path))
 
 
-def test_empty_scene_is_drawn_too(tmp_path: Path) -> None:
+def test_empty_scene_can_be_drawn(tmp_path: Path) -> None:
     empty = compare(loads("[world]\nduration = 0.1\n"), ["pymunk"])
     assert all(path.stat().st_size > 0 for path in plot_comparison(empty, tmp_path))
 
 
-def test_charts_of_a_page_draw_what_the_files_draw() -> None:
+def test_charts_of_a_page_have_the_data_of_the_files() -> None:
     error, energy = error_chart(DROP), energy_chart(DROP)
     for chart, figure in ((error, draw_error(DROP)), (energy, draw_energy(DROP))):
-        assert drawn(chart.axes[0], 0)[1].tolist() == drawn(figure.axes[0], 0)[1].tolist()
+        assert line_data(chart.axes[0], 0)[1].tolist() == line_data(figure.axes[0], 0)[1].tolist()
         assert chart.axes[0].get_xlim() == (0.0, DROP.scene.world.duration)
         assert not chart.legends
     assert [text.get_text() for text in error.axes[0].texts] == ["tolerance 0.005 m"]
@@ -153,24 +155,24 @@ def test_charts_of_a_page_draw_what_the_files_draw() -> None:
 
 def test_trusted_time_is_labelled_in_charts_of_a_page() -> None:
     for until, label in ((0.3, "truth no longer trusted"), (1.2, "trusted until here")):
-        texts = [text.get_text() for text in energy_chart(distrusted(DROP, until)).axes[0].texts]
+        texts = [text.get_text() for text in energy_chart(trusted_until(DROP, until)).axes[0].texts]
         assert texts == [label]
 
 
-def test_energy_axis_holds_the_truth_and_not_an_engine_that_runs_away() -> None:
+def test_energy_axis_fits_the_truth_and_not_a_diverging_engine() -> None:
     run = DROP.trajectories["pymunk"]
     growing = replace(run, velocity=run.velocity * 10.0 ** (4.0 * run.time)[:, None, None])
-    wild = Comparison(DROP.scene, DROP.best, DROP.tolerance, DROP.rows, {"pymunk": growing})
+    diverging = Comparison(DROP.scene, DROP.best, DROP.tolerance, DROP.rows, {"pymunk": growing})
     assert DROP.best is not None
-    right = energies(DROP.best.trajectory, DROP.scene).total
-    span = float(np.ptp(right))
-    for figure in (energy_chart(wild), draw_energy(wild)):
+    expected = energies(DROP.best.trajectory, DROP.scene).total
+    span = float(np.ptp(expected))
+    for figure in (energy_chart(diverging), draw_energy(diverging)):
         low, high = figure.axes[0].get_ylim()
-        assert low < right.min() < right.max() < high
-        assert high < right.max() + 2.5 * span  # two ranges, and a margin of 5 %
+        assert low < expected.min() < expected.max() < high
+        assert high < expected.max() + 2.5 * span  # two ranges, and a margin of 5 %
 
 
-def test_empty_scene_has_charts_too() -> None:
+def test_empty_scene_has_charts() -> None:
     empty = compare(loads("[world]\nduration = 0.1\n"), ["pymunk"])
     assert energy_chart(empty).axes[0].get_xlim() == error_chart(empty).axes[0].get_xlim() == (0.0, 0.1)
 

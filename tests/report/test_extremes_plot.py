@@ -1,4 +1,4 @@
-"""Heat maps: every cell has its field, its colour and its mark."""
+"""Heat maps of extremes: every sample has its cell, colour and mark."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from sandbox.measure.extremes.scenarios import AXES, PAIRS
 from sandbox.report.extremes_plot import COLOURS, MARKS, draw_axes, draw_pairs, level_text, plot_extremes
 
 
-def made_up() -> Extremes:
+def synthetic_extremes() -> Extremes:
     axis, pair = AXES["restitution"], PAIRS[0]
     plan = ExtremesPlan((axis,), (pair,), ("pymunk", "exact"))
     cells = tuple(
@@ -28,8 +28,8 @@ def made_up() -> Extremes:
     return Extremes(plan, cells, (), limits, both, 1.0)
 
 
-def test_axes_have_a_mark_a_field_and_the_boundary_beside() -> None:
-    result = made_up()
+def test_axes_have_a_mark_per_cell_and_the_boundary_beside() -> None:
+    result = synthetic_extremes()
     (panel,) = draw_axes(result).axes
     texts = [text.get_text() for text in panel.texts]
     assert [texts.count(MARKS[word]) for word in VERDICTS] == [
@@ -39,14 +39,14 @@ def test_axes_have_a_mark_a_field_and_the_boundary_beside() -> None:
     assert [label.get_text() for label in panel.get_yticklabels()] == ["pymunk", "pymunk, 4 substeps", "exact"]
 
 
-def test_pairs_have_a_matrix_a_setup() -> None:
-    figure = draw_pairs(made_up())
+def test_pairs_have_a_matrix_per_setup() -> None:
+    figure = draw_pairs(synthetic_extremes())
     assert len(figure.axes) == 3
     assert [axes.get_title() for axes in figure.axes] == ["pymunk", "pymunk, 4 substeps", "exact"]
 
 
 def test_pictures_are_written(tmp_path: Path) -> None:
-    names = [path.name for path in plot_extremes(made_up(), tmp_path)]
+    names = [path.name for path in plot_extremes(synthetic_extremes(), tmp_path)]
     assert names == ["extremes.png", "pairs.png"]
     assert all((tmp_path / name).stat().st_size > 5_000 for name in names)
 

@@ -1,4 +1,4 @@
-"""Plots: what is in the figure, and what is on the disk."""
+"""Plots of runs: contents of the figure, and written files."""
 
 from pathlib import Path
 
@@ -26,11 +26,11 @@ def ball(name: str, x: float = 0.0, vx: float = 0.0) -> str:
 
 
 def euler(scene: Scene, frames: int = 21, contacts: int = 0, **changes: object) -> Trajectory:
-    """Explicit Euler in free flight: g·h·T/2 above the parabola."""
+    """Return free flight by explicit Euler, g·h·T/2 above the parabola."""
     bodies, h = scene.bodies, scene.solver.dt
     time = np.arange(frames) * h
-    pull = np.where(bodies.fixed[:, None], 0.0, scene.world.gravity)
-    velocity = bodies.velocity + time[:, None, None] * pull
+    gravity = np.where(bodies.fixed[:, None], 0.0, scene.world.gravity)
+    velocity = bodies.velocity + time[:, None, None] * gravity
     position = bodies.position + np.cumsum(velocity, axis=0) * h - velocity * h
     info = {"engine": "toy", "settings": scene.solver.model_dump(), "status": "ok", "reason": None, "audited": False}
     info |= changes.pop("info", {})
@@ -64,7 +64,7 @@ def heading(figure: Figure) -> str:
     return "\n".join(text.get_text() for text in figure.texts)
 
 
-def test_a_projectile_shows_position_velocity_and_energy_with_the_closed_form() -> None:
+def test_projectile_shows_position_velocity_energy_and_the_closed_form() -> None:
     scene = loads(HEAD + ball("shell", vx=3.0))
     run = euler(scene)
     figure = draw_run(run, scene)
@@ -77,13 +77,13 @@ def test_a_projectile_shows_position_velocity_and_energy_with_the_closed_form() 
     ):
         drawn, closed = (line.get_ydata() for line in panel(figure, label).lines)
         assert np.array_equal(drawn, values)
-        assert closed == pytest.approx(exact, rel=1e-14)  # the formula, rounded a few times
+        assert closed == pytest.approx(exact, rel=1e-14)  # a few roundings of the formula
     energy = [line.get_ydata() for line in panel(figure, "energy").lines]
     assert len(energy) == 6
-    assert energy[5] == pytest.approx(np.full(21, 504.5), rel=1e-14)  # the closed form keeps m g y + ½ m v²
+    assert energy[5] == pytest.approx(np.full(21, 504.5), rel=1e-14)  # m g y + ½ m v² is constant in the closed form
 
 
-def test_the_heading_says_what_was_run_and_how_wrong_it_is() -> None:
+def test_heading_names_the_run_and_its_largest_error() -> None:
     scene = loads(HEAD + ball("a") + ball("b", x=5.0))
     run = euler(scene)
     run.position[7, 1] += (0.0, 8.0)
@@ -97,7 +97,7 @@ def test_the_heading_says_what_was_run_and_how_wrong_it_is() -> None:
     assert lines[3] == "diverged: at 1 s: $x$ left"
 
 
-def test_without_a_closed_form_none_is_drawn_or_claimed() -> None:
+def test_no_closed_form_is_drawn_or_mentioned_if_there_is_none() -> None:
     scene = loads(HEAD.replace("[solver]", "quadratic_drag = 0.1\n[solver]") + ball("a"))
     figure = draw_run(euler(scene), scene)
     assert legend_of(figure) == ["a"]
@@ -106,17 +106,17 @@ def test_without_a_closed_form_none_is_drawn_or_claimed() -> None:
 
 
 def test_the_closed_form_ends_at_the_first_contact() -> None:
-    bounded = HEAD.replace("[solver]", "bounds = [[-99, -99], [99, 99]]\n[solver]")  # no formula for both together
+    bounded = HEAD.replace("[solver]", "bounds = [[-99, -99], [99, 99]]\n[solver]")  # no closed form of both balls
     scene = loads(bounded + ball("a", vx=1.0) + ball("b", x=9.0))
     run = euler(scene, contact_time=np.array([1.05]), contact_pair=np.array([[0, 1]]))
     figure = draw_run(run, scene, ["a"])
     closed = panel(figure, "position y").lines[1].get_ydata()
     assert np.array_equal(np.isnan(closed), run.time >= 1.05)
-    # The energy of the scene is b's too, and b is not drawn.
+    # The energy of the scene includes that of b, which is not drawn.
     assert len([line for line in panel(figure, "energy").lines if line.get_linestyle() == "--"]) == 0
 
 
-def test_an_axis_along_which_nothing_moves_is_left_out() -> None:
+def test_axis_without_motion_is_left_out() -> None:
     scene = loads(HEAD + ball("a", x=3.0))
     run = euler(scene)
     run.position[:, 0, 0] += np.random.default_rng(1).normal(scale=1e-12, size=21)
@@ -137,7 +137,7 @@ def test_at_most_five_bodies_are_drawn_unless_named() -> None:
     assert panel(figure, "position y").lines[6].get_color() == COLOURS[0]
 
 
-def test_an_unknown_body_is_refused_with_those_it_could_be() -> None:
+def test_unknown_body_is_rejected_with_a_suggestion() -> None:
     scene = loads(HEAD + ball("cue") + ball("eight"))
     with pytest.raises(ValueError, match="no body named 'cux'; there is 'cue'"):
         draw_run(euler(scene), scene, ["cux"])
@@ -146,7 +146,7 @@ def test_an_unknown_body_is_refused_with_those_it_could_be() -> None:
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
 def test_odd_names_are_written_literally(tmp_path: Path, suffix: str) -> None:
     scene = loads((HEAD + "".join(map(ball, ODD_NAMES))).replace("Trial", "$\\\\alpha$ & <i>"))
-    # Warnings are errors here: neither missing glyphs nor mathematics may raise any.
+    # Warnings are errors: neither missing glyphs nor mathematical text may raise one.
     path = plot_run(euler(scene), scene, tmp_path / f"plot{suffix}", ODD_NAMES)
     figure = draw_run(euler(scene), scene, ODD_NAMES)
     assert legend_of(figure)[:6] == ODD_NAMES
@@ -157,14 +157,14 @@ def test_odd_names_are_written_literally(tmp_path: Path, suffix: str) -> None:
     assert [p.name for p in tmp_path.iterdir()] == [f"plot{suffix}"]
 
 
-def test_the_same_run_makes_the_same_picture(tmp_path: Path) -> None:
+def test_same_run_yields_the_same_picture(tmp_path: Path) -> None:
     scene = loads(HEAD + ball("a", vx=1.0))
     for suffix in (".png", ".pdf"):
         one, two = (plot_run(euler(scene), scene, tmp_path / f"{n}{suffix}") for n in "12")
         assert one.read_bytes() == two.read_bytes()
 
 
-def test_a_scene_of_nothing_can_be_drawn(tmp_path: Path) -> None:
+def test_empty_scene_and_empty_runs_can_be_drawn(tmp_path: Path) -> None:
     scene = loads(HEAD + GROUND)
     plot_run(euler(scene), scene, tmp_path / "plot.png")
     figure = draw_run(euler(scene), scene)
@@ -190,14 +190,14 @@ def test_a_diverged_run_can_be_drawn(tmp_path: Path) -> None:
     assert high >= np.nanmax(run.position[:19])
 
 
-def test_a_retired_body_is_drawn_no_further() -> None:
+def test_retired_body_is_drawn_until_its_retirement() -> None:
     scene = loads(HEAD + ball("a", vx=1.0))
     figure = draw_run(euler(scene, retired_time=np.array([1.05])), scene)
     for axes in figure.axes[:4]:
         assert np.isfinite(axes.lines[0].get_ydata()).sum() == 11
 
 
-def test_a_spawned_body_is_drawn_from_when_it_is_there() -> None:
+def test_spawned_body_is_drawn_from_its_first_frame() -> None:
     scene = loads(HEAD + ball("a"))
     joined = scene.bodies.joined_by(Ball(name="new", position=(1.0, 1.0), radius=0.1), "new")
     more = loads(HEAD + ball("a") + ball("new", x=1.0))
@@ -209,7 +209,7 @@ def test_a_spawned_body_is_drawn_from_when_it_is_there() -> None:
 
 
 @pytest.mark.parametrize(("contacts", "ticks"), [(0, 0), (3, 3), (39, 39), (40, 0)])
-def test_contacts_are_marked_where_they_are_few(contacts: int, ticks: int) -> None:
+def test_contacts_are_marked_if_they_are_few(contacts: int, ticks: int) -> None:
     scene = loads(HEAD + GROUND + ball("a", vx=1.0))
     figure = draw_run(euler(scene, contacts=contacts), scene)
     for axes in figure.axes:
@@ -218,7 +218,7 @@ def test_contacts_are_marked_where_they_are_few(contacts: int, ticks: int) -> No
     assert ("contact" in legend_of(figure)) == (ticks > 0)
 
 
-def test_a_long_run_keeps_its_extremes() -> None:
+def test_thinned_curve_of_a_long_run_keeps_its_extremes() -> None:
     scene = loads(HEAD.replace("0.1", "0.0001") + ball("a"))
     run = euler(scene, frames=20_001)
     run.position[12_345, 0, 1], run.position[54, 0, 1] = 900.0, -900.0
@@ -230,18 +230,18 @@ def test_a_long_run_keeps_its_extremes() -> None:
 
 
 @pytest.mark.parametrize("name", ["plot.jpg", "plot", "plot.png.gz", ".png"])
-def test_an_unknown_suffix_is_refused_with_those_that_are_known(tmp_path: Path, name: str) -> None:
+def test_unknown_suffix_is_rejected_with_the_known_ones(tmp_path: Path, name: str) -> None:
     scene = loads(HEAD + ball("a"))
     with pytest.raises(ValueError, match=r"\.png, \.svg, \.pdf"):
         plot_run(euler(scene), scene, tmp_path / name)
     assert not list(tmp_path.iterdir())
 
 
-def test_a_suffix_may_be_in_capitals() -> None:
+def test_suffix_may_be_in_capitals() -> None:
     assert format_of("Plot.PNG") == "png"
 
 
-def test_a_failed_write_leaves_what_was_there(tmp_path: Path) -> None:
+def test_failed_write_leaves_existing_files(tmp_path: Path) -> None:
     scene = loads(HEAD + ball("a"))
     target = tmp_path / "plot.png"
     target.mkdir()

@@ -1,4 +1,4 @@
-"""Tables of runs: every number as it was, bit for bit, and a whole file or none."""
+"""Tables of runs: every number bit for bit, and complete files or none."""
 
 import csv
 import tracemalloc
@@ -50,8 +50,8 @@ ACTIONS = (
 )
 
 
-def made() -> Trajectory:
-    """A run with three kinds of contact, a body that comes and one that goes."""
+def recorded_run() -> Trajectory:
+    """Return a run with three kinds of contact, an added and a removed body."""
     trajectory = run(SCENE, actions=ACTIONS)
     assert {tuple(pair) for pair in trajectory.contact_pair.tolist()} >= {(0, 2), (0, -1), (1, -2)}
     return trajectory
@@ -63,13 +63,13 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 
 
 def bits(values: object) -> list[int]:
-    """Floats by their bits; a nan is a nan, whatever its sign."""
+    """Return floats as their bits; all NaNs are equal, regardless of their sign."""
     array = np.asarray(values, np.float64)
     return np.where(np.isnan(array), np.float64("nan"), array).view(np.int64).tolist()
 
 
 def test_states_as_csv_have_the_bits_of_the_run(tmp_path: Path) -> None:
-    trajectory, path = made(), tmp_path / "states.csv"
+    trajectory, path = recorded_run(), tmp_path / "states.csv"
     count = write_states(trajectory, path)
     rows = rows_of(path)
     frames, bodies = trajectory.angle.shape
@@ -88,8 +88,8 @@ def test_states_as_csv_have_the_bits_of_the_run(tmp_path: Path) -> None:
         assert bits([float(row[name]) for row in rows]) == bits(values.ravel())
 
 
-def test_presence_says_who_is_there(tmp_path: Path) -> None:
-    trajectory, path = made(), tmp_path / "states.csv"
+def test_present_column_is_true_only_while_a_body_exists(tmp_path: Path) -> None:
+    trajectory, path = recorded_run(), tmp_path / "states.csv"
     write_states(trajectory, path)
     present = {name: [] for name in trajectory.names.tolist()}
     for row in rows_of(path):
@@ -105,13 +105,13 @@ def test_presence_says_who_is_there(tmp_path: Path) -> None:
 
 
 def test_contacts_as_csv_have_names_and_bits(tmp_path: Path) -> None:
-    trajectory, path = made(), tmp_path / "contacts.csv"
+    trajectory, path = recorded_run(), tmp_path / "contacts.csv"
     count = write_contacts(trajectory, SCENE.fixed_names, path)
     rows = rows_of(path)
     assert (len(rows), tuple(rows[0])) == (count, CONTACTS) == (len(trajectory.contact_time), CONTACTS)
     fixed = {-1: "ground, the", -2: 'a "peg"'}
     for row, pair in zip(rows, trajectory.contact_pair.tolist(), strict=True):
-        names = [fixed[number] if number < 0 else str(trajectory.names[number]) for number in pair]
+        names = [fixed[index] if index < 0 else str(trajectory.names[index]) for index in pair]
         assert [row["a"], row["b"]] == names
     for column, values in (("point", trajectory.contact_point), ("impulse", trajectory.contact_impulse)):
         for k, axis in enumerate("xy"):
@@ -122,8 +122,8 @@ def test_contacts_as_csv_have_names_and_bits(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("chunk", [3, 7, 1 << 16])
 def test_parquet_is_equal_to_csv(chunk: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tables, "CHUNK", chunk)  # 3 cuts a frame of 4 bodies in two
-    trajectory = made()
+    monkeypatch.setattr(tables, "CHUNK", chunk)  # a chunk of 3 splits a frame of 4 bodies
+    trajectory = recorded_run()
     for suffix in (".csv", ".parquet"):
         write_states(trajectory, tmp_path / f"states{suffix}")
         write_contacts(trajectory, SCENE.fixed_names, tmp_path / f"contacts{suffix}")
@@ -142,7 +142,7 @@ def test_parquet_is_equal_to_csv(chunk: int, tmp_path: Path, monkeypatch: pytest
 
 
 @pytest.mark.parametrize("value", [0.1 + 0.2, 5e-324, -0.0, 1.7976931348623157e308, np.pi, np.inf])
-def test_every_double_survives(value: float, tmp_path: Path) -> None:
+def test_every_double_is_preserved(value: float, tmp_path: Path) -> None:
     trajectory = run(loads("[world]\nduration = 0.01\n[[ball]]\nposition = [0, 0]\nradius = 1"))
     trajectory.angle[:] = value
     write_states(trajectory, tmp_path / "a.csv")
@@ -152,7 +152,7 @@ def test_every_double_survives(value: float, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
-def test_run_without_contacts_gives_a_table_of_no_rows(suffix: str, tmp_path: Path) -> None:
+def test_run_without_contacts_yields_a_table_without_rows(suffix: str, tmp_path: Path) -> None:
     trajectory = run(loads("[world]\nduration = 0.01\n[[ball]]\nposition = [0, 0]\nradius = 1"))
     path = tmp_path / f"contacts{suffix}"
     assert write_contacts(trajectory, (), path) == 0
@@ -161,19 +161,21 @@ def test_run_without_contacts_gives_a_table_of_no_rows(suffix: str, tmp_path: Pa
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
-def test_table_is_whole_or_not_there(suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_interrupted_table_leaves_the_previous_file(
+    suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / f"states{suffix}"
     path.write_bytes(b"old")
     monkeypatch.setattr(tables, "CHUNK", 8)
-    real, calls = np.repeat, []
+    original, calls = np.repeat, []
 
     def interrupted(*args: object) -> object:
         calls.append(args)
         if len(calls) == 3:
             raise KeyboardInterrupt
-        return real(*args)
+        return original(*args)
 
-    trajectory = made()
+    trajectory = recorded_run()
     monkeypatch.setattr(tables.np, "repeat", interrupted)
     with pytest.raises(KeyboardInterrupt):
         write_states(trajectory, path)
@@ -181,17 +183,21 @@ def test_table_is_whole_or_not_there(suffix: str, tmp_path: Path, monkeypatch: p
     assert path.read_bytes() == b"old"
 
 
-def test_parquet_without_its_extra_names_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_parquet_without_its_extra_names_the_command_to_install_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(tables, "can_write_parquet", lambda: False)
     with pytest.raises(MissingExtraError, match=r'pip install -e "\.\[parquet\]"'):
-        write_states(made(), tmp_path / "states.parquet")
+        write_states(recorded_run(), tmp_path / "states.parquet")
     with pytest.raises(ValueError, match=r"ends in \.csv or \.parquet, not '\.txt'"):
-        write_states(made(), tmp_path / "states.txt")
+        write_states(recorded_run(), tmp_path / "states.txt")
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
-def test_run_needs_little_memory_beside_itself(suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_writing_a_table_takes_little_additional_memory(
+    suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(tables, "CHUNK", 1024)
     count, frames = 2000, 60
     trajectory = run(loads("[world]\nduration = 0.01\n[[ball]]\nposition = [0, 0]\nradius = 1"))
@@ -208,11 +214,11 @@ def test_run_needs_little_memory_beside_itself(suffix: str, tmp_path: Path, monk
             "retired_time": np.full(count, np.nan),
         }
     )
-    write_states(trajectory, tmp_path / f"first{suffix}")  # imports are not what is measured
+    write_states(trajectory, tmp_path / f"first{suffix}")  # so that imports are not measured
     tracemalloc.start()
     try:
         assert write_states(large, tmp_path / f"states{suffix}") == count * frames
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
-    assert peak < states.nbytes / 2  # of 5.8 MB; it grows with the chunk and the names, not with the frames
+    assert peak < states.nbytes / 2  # of 5.8 MB; it depends on the chunk and the names, not on the frames

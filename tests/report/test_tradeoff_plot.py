@@ -1,4 +1,4 @@
-"""The picture of a trade-off: a line a method, the front, floors and bounds, failures beyond all."""
+"""The plot of a trade-off: a line per method, the front, floors and limits, and failures above all points."""
 
 from pathlib import Path
 from typing import Any
@@ -23,9 +23,9 @@ def point(engine: str, dt: float, error: float | None, cost: float | None, statu
 def document() -> dict[str, Any]:
     points = [point("pymunk", 0.01, 0.1, 2.0), point("pymunk", 0.001, 0.01, 20.0), point("exact", 0.01, 0.0, 30.0)]
     failed = point("pymunk", 0.1, None, 0.5, "diverged")
-    asked = {"metric": "max_position", "unit": "m", "tolerance": 0.02, "budget": 0.5, "fps": 60.0}
+    request = {"metric": "max_position", "unit": "m", "tolerance": 0.02, "budget": 0.5, "fps": 60.0}
     lines = {"floors": {"pymunk": 0.005}, "pareto": points}
-    return {"title": "$x$ <b>", "points": [*points, failed], **lines, **asked}
+    return {"title": "$x$ <b>", "points": [*points, failed], **lines, **request}
 
 
 def test_lines_are_methods_front_and_bounds(document: dict[str, Any]) -> None:
@@ -33,14 +33,14 @@ def test_lines_are_methods_front_and_bounds(document: dict[str, Any]) -> None:
     assert (panel.get_xscale(), panel.get_yscale()) == ("log", "log")
     fronts = [line for line in panel.lines if line.get_linewidth() == 3.0]
     assert [list(map(float, front.get_xdata())) for front in fronts] == [[2.0, 20.0, 30.0]]
-    assert list(map(float, fronts[0].get_ydata())) == [0.1, 0.01, 1e-16]  # 0 is drawn at the least
-    level = [float(line.get_ydata()[0]) for line in panel.lines if list(line.get_xdata()) == [0, 1]]
-    assert level == [0.005, 0.02]
-    upright = [float(line.get_xdata()[0]) for line in panel.lines if list(line.get_ydata()) == [0, 1]]
-    assert upright == [30.0]  # 0.5 ms a frame, 60 frames a second
+    assert list(map(float, fronts[0].get_ydata())) == [0.1, 0.01, 1e-16]  # 0 is drawn at the smallest error
+    horizontal = [float(line.get_ydata()[0]) for line in panel.lines if list(line.get_xdata()) == [0, 1]]
+    assert horizontal == [0.005, 0.02]
+    vertical = [float(line.get_xdata()[0]) for line in panel.lines if list(line.get_ydata()) == [0, 1]]
+    assert vertical == [30.0]  # 0.5 ms per frame at 60 frames per second
 
 
-def test_failure_is_a_cross_above_all_at_its_cost(document: dict[str, Any]) -> None:
+def test_failure_is_a_cross_above_all_points_at_its_cost(document: dict[str, Any]) -> None:
     (panel,) = draw_tradeoff(document).axes
     ((x, y),) = [line.get_xydata()[0] for line in panel.lines if line.get_marker() == "x"]
     assert x == 0.5

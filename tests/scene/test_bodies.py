@@ -1,4 +1,4 @@
-"""Bodies: numbering and starting state."""
+"""Bodies: numbering and initial state."""
 
 import math
 from dataclasses import replace
@@ -49,7 +49,7 @@ radius = 1
 """
 
 
-def test_bodies_are_numbered_balls_grids_scatters_emitters() -> None:
+def test_bodies_are_numbered_as_balls_grids_scatters_emitters() -> None:
     bodies = loads(SCENE).bodies
     assert bodies.names == ("ball-1", "rock", "row-1", "row-2", "scatter-1-1", "emitter-1-1", "emitter-1-2")
     assert bodies.position.tolist() == [[1, 2], [50, 0], [0, 20], [7, 20], [-9, -9], [9, 9], [9, 9]]
@@ -64,11 +64,11 @@ def test_bodies_are_numbered_balls_grids_scatters_emitters() -> None:
     assert len(bodies) == 7
 
 
-def test_mass_is_stated_or_from_the_density_or_one() -> None:
-    at = {"position": (0.0, 0.0), "radius": 3.0}
-    assert geometry_of(Ball(**at, mass=2.5)).mass == 2.5
-    assert geometry_of(Ball(**at, density=2.0)).mass == 2.0 * math.pi * 9.0
-    assert geometry_of(Ball(**at)).mass == 1.0
+def test_mass_is_given_or_from_the_density_or_1_kg() -> None:
+    disc = {"position": (0.0, 0.0), "radius": 3.0}
+    assert geometry_of(Ball(**disc, mass=2.5)).mass == 2.5
+    assert geometry_of(Ball(**disc, density=2.0)).mass == 2.0 * math.pi * 9.0
+    assert geometry_of(Ball(**disc)).mass == 1.0
 
 
 def test_moment_is_that_of_a_disc() -> None:
@@ -76,7 +76,7 @@ def test_moment_is_that_of_a_disc() -> None:
     assert np.array_equal(bodies.moment, bodies.mass * bodies.radius**2 / 2)
 
 
-def test_joined_body_gets_the_next_number_and_leaves_the_others() -> None:
+def test_added_body_gets_the_next_number_and_keeps_the_others() -> None:
     bodies = loads(SCENE).bodies
     more = bodies.joined_by(Ball(position=(1.0, 1.0), velocity=(2.0, 3.0), radius=0.5, mass=4.0, angle=1.0), "new")
     assert more.names == (*bodies.names, "new")
@@ -89,15 +89,15 @@ def test_joined_body_gets_the_next_number_and_leaves_the_others() -> None:
     assert len(bodies) == 7
 
 
-def test_joined_fixed_body_has_no_velocity() -> None:
+def test_added_fixed_body_has_no_velocity() -> None:
     more = loads(SCENE).bodies.joined_by(Ball(position=(0.0, 0.0), velocity=(2.0, 3.0), radius=1.0, fixed=True), "new")
     assert more.fixed[-1]
     assert more.velocity[-1].tolist() == [0, 0]
 
 
-def test_fixed_ball_has_no_motion_however_it_came_about() -> None:
+def test_fixed_ball_built_in_python_has_no_velocity() -> None:
     ball = Ball(position=(0.0, 0.0), velocity=(2.0, 3.0), angular_velocity=4.0, radius=1.0, fixed=True)
-    bodies = Scene(balls=(ball,)).bodies  # no file would be let through with it
+    bodies = Scene(balls=(ball,)).bodies  # a scene file with it is refused
     assert not bodies.velocity.any()
     assert not bodies.angular_velocity.any()
 
@@ -110,7 +110,7 @@ def test_scene_without_bodies_has_empty_arrays() -> None:
     assert Scene().fixed_names == ()
 
 
-def test_fixed_things_are_numbered_planes_walls_posts() -> None:
+def test_fixed_elements_are_numbered_as_planes_walls_posts() -> None:
     text = """
     [[post]]
     position = [0, 0]
@@ -131,7 +131,7 @@ def test_fixed_things_are_numbered_planes_walls_posts() -> None:
 
 @settings(max_examples=25)
 @given(strategies.scenes())
-def test_arrays_of_any_scene_agree_in_shape_and_are_finite(scene: Scene) -> None:
+def test_arrays_of_bodies_have_equal_lengths_and_are_finite(scene: Scene) -> None:
     bodies = scene.bodies
     n = len(scene.balls) + sum(map(size, (*scene.grids, *scene.scatters, *scene.emitters)))
     assert len(bodies) == len(set(bodies.names)) == n
@@ -147,15 +147,15 @@ def test_arrays_of_any_scene_agree_in_shape_and_are_finite(scene: Scene) -> None
     assert not set(scene.fixed_names) & set(bodies.names)
 
 
-def test_changed_copy_of_a_scene_has_bodies_of_its_own_fields():
+def test_changed_copy_of_a_scene_has_its_own_bodies():
     scene = loads(
         '[world]\ngravity = [0, -9.81]\n[[ball]]\nname = "a"\nradius = 0.1\nposition = [0, 1]\n'
         '[[ball]]\nname = "b"\nradius = 0.1\nposition = [1, 1]\n[[joint]]\nkind = "rod"\nbetween = ["a", "b"]\n'
     )
     assert scene.bodies.names == ("a", "b") and len(scene.links) == 1
-    moved = scene.model_copy(update={"balls": scene.balls[:1], "joints": ()})
-    assert moved.bodies.names == ("a",)
-    assert len(moved.links) == 0
+    changed = scene.model_copy(update={"balls": scene.balls[:1], "joints": ()})
+    assert changed.bodies.names == ("a",)
+    assert len(changed.links) == 0
     assert scene.bodies.names == ("a", "b")
 
 

@@ -1,4 +1,4 @@
-"""Every bound of a scene file: the last value that is taken, and the first beyond it that is not."""
+"""Bounds of the numbers in a scene file: the last accepted value, and the first refused value beyond it."""
 
 import math
 from typing import Any
@@ -97,8 +97,8 @@ BOUNDS: list[tuple[str, str, float, float]] = [
 ]
 
 
-def sound(kind: str) -> dict[str, Any]:
-    """Return a small sound document with one element of each kind."""
+def valid_document(kind: str) -> dict[str, Any]:
+    """Return a small valid document with one element of each kind."""
     document: dict[str, Any] = {
         "world": {"gravity": [0.0, 0.0], "wind": [0.0, 0.0], "duration": 1.0},
         "solver": {},
@@ -113,7 +113,7 @@ def sound(kind: str) -> dict[str, Any]:
     }
     if kind == "plane":
         document["plane"] = [{"point": [0.0, 0.0], "normal": [0.0, 1.0]}]
-    if kind in ("grid", "scatter", "emitter"):  # alone, so that a million bodies are not one too many
+    if kind in ("grid", "scatter", "emitter"):  # alone: a million bodies and one more would exceed the limit of bodies
         document = {
             key: value for key, value in document.items() if key not in ("ball", "grid", "scatter", "emitter")
         } | {kind: document[kind]}
@@ -123,13 +123,13 @@ def sound(kind: str) -> dict[str, Any]:
 
 def put(document: dict[str, Any], kind: str, path: str, value: Any) -> dict[str, Any]:
     """Return the document with a value set in the first element of a kind."""
-    here: Any = document[kind][0] if isinstance(document[kind], list) else document[kind]
-    *way, last = (int(key) if key.isdecimal() else key for key in path.split("."))
-    for key in way:
-        here = here[key]
-    here[last] = value
+    node: Any = document[kind][0] if isinstance(document[kind], list) else document[kind]
+    *keys, last = (int(key) if key.isdecimal() else key for key in path.split("."))
+    for key in keys:
+        node = node[key]
+    node[last] = value
     if (kind, path) == ("world", "duration"):
-        document["solver"]["dt"] = 10.0  # so that the steps stay below their own bound
+        document["solver"]["dt"] = 10.0  # keeps the number of steps below its limit
     return document
 
 
@@ -141,44 +141,46 @@ def beyond(value: float, direction: float) -> float:
 
 
 @pytest.mark.parametrize(("kind", "path", "value", "direction"), BOUNDS)
-def test_bound_is_taken_at_the_edge_and_refused_beyond(kind: str, path: str, value: float, direction: float) -> None:
-    from_document(put(sound(kind), kind, path, value))
+def test_value_at_a_bound_is_accepted_and_the_next_refused(
+    kind: str, path: str, value: float, direction: float
+) -> None:
+    from_document(put(valid_document(kind), kind, path, value))
     with pytest.raises(SceneError) as caught:
-        from_document(put(sound(kind), kind, path, beyond(value, direction)))
-    place = caught.value.faults[0].path
+        from_document(put(valid_document(kind), kind, path, beyond(value, direction)))
+    fault_path = caught.value.faults[0].path
     leaf = path.split(".")[0]
-    assert place.startswith(kind)
-    assert f".{leaf}" in place
+    assert fault_path.startswith(kind)
+    assert f".{leaf}" in fault_path
 
 
-def test_every_number_of_a_ball_is_bounded_both_ways() -> None:
+def test_every_number_of_a_ball_has_two_bounds() -> None:
     for key in ("radius", "mass", "density", "angle", "angular_velocity", "restitution", "friction"):
         for value in (1e300, -1e300):
             with pytest.raises(SceneError):
                 from_document({"ball": [{**BALL, key: value}]})
 
 
-def test_density_is_bounded_where_the_mass_would_do() -> None:
+def test_density_beyond_its_bounds_is_refused_though_the_mass_is_valid() -> None:
     for density, direction, radius in ((1e30, UP, 0.1), (1e-30, DOWN, 1e9)):
         from_document({"ball": [{**BALL, "radius": radius, "density": density}]})
         with pytest.raises(SceneError, match="density"):
             from_document({"ball": [{**BALL, "radius": radius, "density": beyond(density, direction)}]})
 
 
-def test_duration_zero_is_refused_and_the_least_taken() -> None:
+def test_duration_of_zero_is_refused_and_the_smallest_float_accepted() -> None:
     with pytest.raises(SceneError):
         from_document({"world": {"duration": 0.0}, "ball": [BALL]})
     from_document({"world": {"duration": 5e-324}, "ball": [BALL]})
 
 
 @pytest.mark.parametrize("kind", ["ball", "grid", "scatter"])
-def test_speed_is_bounded_as_a_length_not_by_component(kind: str) -> None:
-    from_document(put(sound(kind), kind, "velocity", [6e11, 8e11]))  # a 3-4-5 triangle
+def test_bound_of_velocity_is_on_the_speed_not_the_components(kind: str) -> None:
+    from_document(put(valid_document(kind), kind, "velocity", [6e11, 8e11]))  # a 3-4-5 triangle
     with pytest.raises(SceneError, match="speed"):
-        from_document(put(sound(kind), kind, "velocity", [8e11, 8e11]))
+        from_document(put(valid_document(kind), kind, "velocity", [8e11, 8e11]))
 
 
-def test_mass_from_density_is_bounded_like_a_stated_one() -> None:
+def test_mass_from_density_has_the_bounds_of_a_given_mass() -> None:
     disc = {"position": [0.0, 0.0], "radius": 1e9}
     most = 1e30 / (math.pi * 1e18)
     from_document({"ball": [{**disc, "density": most * (1 - 1e-15)}]})
@@ -189,7 +191,7 @@ def test_mass_from_density_is_bounded_like_a_stated_one() -> None:
         from_document({"ball": [{"position": [0.0, 0.0], "radius": 1e-9, "density": 1.0}]})
 
 
-def test_steps_at_the_edge_are_taken_and_more_refused() -> None:
+def test_number_of_steps_at_the_limit_is_accepted_and_more_refused() -> None:
     from_document({"world": {"duration": 1e7}, "solver": {"dt": 0.01}, "ball": [BALL]})
     with pytest.raises(SceneError, match="steps per run") as caught:
         from_document({"world": {"duration": 1e7 + 1.0}, "solver": {"dt": 0.01}, "ball": [BALL]})
@@ -199,7 +201,7 @@ def test_steps_at_the_edge_are_taken_and_more_refused() -> None:
 
 
 @pytest.mark.parametrize("length", [1, 200])
-def test_name_of_allowed_length_is_taken(length: int) -> None:
+def test_name_of_allowed_length_is_accepted(length: int) -> None:
     scene = from_document({"ball": [{**BALL, "name": "é" * length}]})
     assert scene.bodies.names == ("é" * length,)
 
@@ -207,7 +209,7 @@ def test_name_of_allowed_length_is_taken(length: int) -> None:
 @pytest.mark.parametrize(
     "name", ["", "x" * 201, "a\x00b", "a\tb", "a\nb", "line\n", "\x1b[31m", "a\x7f", "a\x85", "a\u2028", "a\u2029b"]
 )
-def test_name_empty_too_long_or_with_control_characters_is_refused(name: str) -> None:
+def test_name_that_is_empty_too_long_or_has_control_characters_is_refused(name: str) -> None:
     for document in (
         {"ball": [{**BALL, "name": name}]},
         {"ball": [BALL], "material": [{"name": name}]},
@@ -221,25 +223,25 @@ def test_name_empty_too_long_or_with_control_characters_is_refused(name: str) ->
 
 
 @pytest.mark.parametrize("name", ["../../etc/passwd", "con", " ", "🎱", 'a"b', "a\\b", "a.b", "-", "é", "…", "x" * 200])
-def test_name_of_any_other_text_is_taken(name: str) -> None:
+def test_name_of_any_other_text_is_accepted(name: str) -> None:
     assert from_document({"ball": [{**BALL, "name": name}]}).bodies.names == (name,)
 
 
-def test_wall_takes_two_points_and_not_one() -> None:
+def test_wall_of_two_points_is_accepted_and_of_one_refused() -> None:
     from_document({"wall": [{"points": [[0, 0], [1, 0]]}]})
     with pytest.raises(SceneError, match="2 or more") as caught:
         from_document({"wall": [{"points": [[0, 0]]}]})
     assert caught.value.faults[0].path == "wall[0].points"
 
 
-def test_colour_takes_six_digits_only() -> None:
+def test_colour_is_six_hexadecimal_digits() -> None:
     assert from_document({"ball": [{**BALL, "colour": "#09aFcC"}]}).balls[0].colour == "#09aFcC"
     for colour in ("#09af", "09afcc", "red", "#09afcg", "#09afcc ", "#09afcc\n"):
         with pytest.raises(SceneError, match="#rrggbb"):
             from_document({"ball": [{**BALL, "colour": colour}]})
 
 
-def test_title_and_about_are_bounded() -> None:
+def test_lengths_of_title_and_about_are_limited() -> None:
     from_document({"title": "x" * 200, "about": "y" * 2000})
     with pytest.raises(SceneError) as caught:
         from_document({"title": "x" * 201, "about": "y" * 2001})

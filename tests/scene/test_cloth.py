@@ -1,4 +1,4 @@
-"""Cloth: nodes in columns and rows on springs or rods."""
+"""Cloth: a grid of nodes joined by springs or rods."""
 
 import math
 from typing import Any
@@ -22,7 +22,7 @@ def scene_of(**cloth: Any) -> Scene:
     return from_document({"cloth": [{key: value for key, value in {**CLOTH, **cloth}.items() if value is not None}]})
 
 
-def test_nodes_are_counted_along_rows_from_the_upper_left() -> None:
+def test_nodes_are_numbered_along_rows_from_the_upper_left() -> None:
     bodies = scene_of(name="flag").bodies
     assert bodies.names == tuple(f"flag-{n}" for n in range(1, 13))
     assert bodies.position[[0, 3, 4, 11]].tolist() == [[1.0, 2.0], [2.5, 2.0], [1.0, 1.75], [2.5, 1.5]]
@@ -30,7 +30,7 @@ def test_nodes_are_counted_along_rows_from_the_upper_left() -> None:
     assert bodies.mass.tolist() == [1.0] * 12
 
 
-def test_springs_join_neighbours_at_rest() -> None:
+def test_springs_join_neighbours_at_their_rest_length() -> None:
     scene = scene_of(pins=[])
     bodies, links = scene.bodies, scene.links
     assert links.kind.tolist() == [LinkKind.SPRING] * 17
@@ -49,16 +49,23 @@ def test_springs_join_neighbours_at_rest() -> None:
     bend=st.sampled_from([None, 5.0]), kind=st.sampled_from(["springs", "rods"]),
     pins=st.sampled_from(["top", "left", "corners", []]), width=st.floats(0.01, 10.0), height=st.floats(0.01, 10.0),
 )  # fmt: skip
-def test_every_link_is_at_rest_and_counted(
+def test_every_link_starts_at_rest_length_and_their_number_is_right(
     columns: int, rows: int, shear: float | None, bend: float | None, kind: str, pins: Any, width: float, height: float
 ) -> None:
-    figures = {"stiffness": 100.0, "damping": 0.1} if kind == "springs" else {"stiffness": None, "damping": None}
+    coefficients = {"stiffness": 100.0, "damping": 0.1} if kind == "springs" else {"stiffness": None, "damping": None}
     scene = scene_of(
-        columns=columns, rows=rows, shear=shear, bend=bend, kind=kind, pins=pins, spacing=[width, height], **figures
+        columns=columns,
+        rows=rows,
+        shear=shear,
+        bend=bend,
+        kind=kind,
+        pins=pins,
+        spacing=[width, height],
+        **coefficients,
     )
     bodies, links = scene.bodies, scene.links
     length = np.hypot(*(bodies.position[links.a] - bodies.position[links.b]).T)
-    assert links.figures[:, 0] == pytest.approx(length, rel=1e-12)  # rounding of places up to 100 links from the corner
+    assert links.figures[:, 0] == pytest.approx(length, rel=1e-12)  # rounding of positions, 100 links from the corner
     assert not (bodies.fixed[links.a] & bodies.fixed[links.b]).any()
     pinned = {"top": columns, "left": rows, "corners": min(columns, 2)}[pins] if pins else 0
     assert bodies.fixed.sum() == pinned
@@ -71,7 +78,7 @@ def test_every_link_is_at_rest_and_counted(
     assert loads(dumps(scene)) == scene
 
 
-def test_shear_and_bend_have_their_own_stiffness() -> None:
+def test_shear_and_bend_springs_have_their_own_stiffness() -> None:
     links = scene_of(pins=[], kind="rods", stiffness=None, shear=3.0, bend=5.0).links
     assert np.unique(links.figures[links.kind == LinkKind.ROD, 1]).tolist() == [0.0]
     springs = links.figures[links.kind == LinkKind.SPRING]
@@ -85,7 +92,7 @@ def test_shear_and_bend_have_their_own_stiffness() -> None:
     ("pins", "fixed"),
     [("top", [0, 1, 2, 3]), ("left", [0, 4, 8]), ("corners", [0, 3]), ([[1, 2], [3, 0]], [3, 9]), ([], [])],
 )
-def test_pinned_nodes_never_move_and_their_links_to_each_other_are_left_out(pins: Any, fixed: list[int]) -> None:
+def test_pinned_nodes_are_fixed_and_have_no_links_to_each_other(pins: Any, fixed: list[int]) -> None:
     scene = scene_of(pins=pins, velocity=[1.0, 2.0])
     assert np.flatnonzero(scene.bodies.fixed).tolist() == fixed
     assert {tuple(v) for v in scene.bodies.velocity[fixed].tolist()} <= {(0.0, 0.0)}
@@ -110,7 +117,7 @@ def test_pinned_nodes_never_move_and_their_links_to_each_other_are_left_out(pins
         ({"spacing": [0.0, 1.0]}, "spacing[0]", "must be greater than 0"),
     ],
 )
-def test_wrong_figure_is_a_fault_that_says_what_would_be_right(cloth: dict[str, Any], key: str, message: str) -> None:
+def test_wrong_value_is_a_fault_with_a_hint(cloth: dict[str, Any], key: str, message: str) -> None:
     with pytest.raises(SceneError) as caught:
         scene_of(**cloth)
     (fault,) = caught.value.faults
@@ -118,26 +125,27 @@ def test_wrong_figure_is_a_fault_that_says_what_would_be_right(cloth: dict[str, 
     assert message in fault.message
 
 
-def test_large_cloth_is_arrays_throughout() -> None:
+def test_large_cloth_is_one_element_with_arrays_of_nodes_and_links() -> None:
     scene = scene_of(columns=64, rows=64, shear=10.0, bend=1.0)
     assert len(scene.bodies) == 4096
     assert len(scene.bodies.elements) == 1
-    # 64·63 twice along rows and columns, 63² twice along diagonals, 64·62 twice past a neighbour, less the pinned row's
+    # 64·63 twice along rows and columns, 63² twice along diagonals, 64·62 twice between next neighbours, minus those
+    # within the pinned row
     assert len(scene.links) == 2 * 64 * 63 + 2 * 63 * 63 + 2 * 64 * 62 - 63 - 62
     assert len(set(scene.links.names)) == len(scene.links)
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
-def test_cloth_leans_with_the_wind_as_its_scene_tells(engine: str) -> None:
+def test_cloth_in_wind_hangs_along_the_sum_of_drag_and_weight(engine: str) -> None:
     scene = load(
         find("cloth"), ["cloth.sheet.columns=3", "cloth.sheet.rows=8", "world.linear_drag=4.0", "world.wind=[1.0,0.0]"]
     )
     simulation = start(scene, engine, scene.solver)
     for _ in range(round(8.0 / scene.solver.dt)):
         simulation.step()
-    place = simulation.frame().position.reshape(8, 3, 2)
+    position = simulation.frame().position.reshape(8, 3, 2)
     simulation.close()
-    lean = place[-1] - place[0]
+    offset = position[-1] - position[0]
     assert scene.world.wind[0] * scene.world.linear_drag == 4.0
-    # each column hangs by itself along the sum of drag and weight; 8 s of drag leave e^−16 of the swing
-    assert lean[:, 0] / -lean[:, 1] == pytest.approx(4.0 / 9.81, rel=0.01)
+    # each column hangs along the sum of drag and weight; after 8 s of drag the swing has decayed to e^−16
+    assert offset[:, 0] / -offset[:, 1] == pytest.approx(4.0 / 9.81, rel=0.01)

@@ -1,4 +1,4 @@
-"""Convex parts: they are convex, counter-clockwise, inside the outline, apart from each other, and cover it."""
+"""Convex decomposition: parts are convex, counter-clockwise, inside the outline, disjoint, and cover it."""
 
 import math
 from collections.abc import Sequence
@@ -28,7 +28,7 @@ T = ((0.0, 2.0), (1.0, 2.0), (1.0, 0.0), (2.0, 0.0), (2.0, 2.0), (3.0, 2.0), (3.
 
 
 # A simple outline on which convex_decomposition of pymunk 7.3.1 recurses until the stack is full, at any tolerance.
-DEADLY = ((4.0, 5.0), (3.0, 3.0), (2.0, 5.0), (2.0, 3.0), (3.0, 0.0), (4.0, 4.0), (3.0, 2.0))
+RECURSING = ((4.0, 5.0), (3.0, 3.0), (2.0, 5.0), (2.0, 3.0), (3.0, 0.0), (4.0, 4.0), (3.0, 2.0))
 
 
 def moved(points: Sequence[Point], angle: float, by: Point = (0.0, 0.0)) -> tuple[Point, ...]:
@@ -53,18 +53,18 @@ def star(tips: int) -> tuple[Point, ...]:
 
 def gear(teeth: int) -> tuple[Point, ...]:
     profile = ((0.0, 0.8), (0.25, 0.8), (0.35, 1.0), (0.75, 1.0), (0.85, 0.8))
-    polar = [(2 * math.pi * (i + share) / teeth, r) for i in range(teeth) for share, r in profile]
+    polar = [(2 * math.pi * (i + fraction) / teeth, r) for i in range(teeth) for fraction, r in profile]
     return tuple((r * math.cos(t), r * math.sin(t)) for t, r in polar)
 
 
 def spiral(n: int, turns: float = 3.0) -> tuple[Point, ...]:
-    way = [2 * math.pi * turns * i / (n - 1) for i in range(n)]
-    outer, inner = ([((r + t) * math.cos(t), (r + t) * math.sin(t)) for t in way] for r in (3, 1))
+    angles = [2 * math.pi * turns * i / (n - 1) for i in range(n)]
+    outer, inner = ([((r + t) * math.cos(t), (r + t) * math.sin(t)) for t in angles] for r in (3, 1))
     return anticlockwise(outer + inner[::-1])
 
 
 def assert_parts(points: tuple[Point, ...]) -> tuple[tuple[Point, ...], ...]:
-    """Cut an outline, and hold the parts against shapely."""
+    """Decompose an outline, check the parts against shapely, and return them."""
     assert outline_fault(points) is None
     parts = convex_parts(points)
     whole = Polygon(points)
@@ -73,30 +73,30 @@ def assert_parts(points: tuple[Point, ...]) -> tuple[tuple[Point, ...], ...]:
         assert is_convex(part, straightness_tolerance(points))
         assert set(part) <= set(points)
     area = signed_area(points)
-    assert math.fsum(map(signed_area, parts)) == pytest.approx(area, rel=1e-9)  # what convex_parts promises
+    assert math.fsum(map(signed_area, parts)) == pytest.approx(area, rel=1e-9)  # documented for convex_parts
     cut = [Polygon(part) for part in parts]
     for part in cut:
-        assert part.difference(whole).area < 1e-9 * area  # shapely rounds the corners of what it cuts
-    for one, other in combinations(cut[:12], 2):
-        assert one.intersection(other).area < 1e-9 * area  # so too
-    hollow = sum(
+        assert part.difference(whole).area < 1e-9 * area  # shapely rounds the corners of intersections
+    for first, second in combinations(cut[:12], 2):
+        assert first.intersection(second).area < 1e-9 * area  # same reason
+    reflex_corners = sum(
         orient2d(*corner) < 0 for corner in zip((*points[-1:], *points), points, (*points[1:], points[0]), strict=False)
     )
-    assert len(parts) <= 2 * hollow + 1  # Hertel and Mehlhorn's bound
+    assert len(parts) <= 2 * reflex_corners + 1  # Hertel and Mehlhorn's bound
     return parts
 
 
-def test_outline_that_kills_pymunk_is_covered() -> None:
-    assert len(assert_parts(anticlockwise(DEADLY))) <= 4
+def test_outline_on_which_pymunk_recurses_endlessly_is_covered() -> None:
+    assert len(assert_parts(anticlockwise(RECURSING))) <= 4
 
 
-def test_convex_outline_is_returned_as_it_is() -> None:
+def test_convex_outline_is_returned_unchanged() -> None:
     square = ((0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
     assert convex_parts(square) == (square,)
 
 
 @pytest.mark.parametrize(("points", "count"), [(L, 2), (U, 3), (T, 2)])
-def test_letters_are_cut_into_as_few_parts_as_can_be(points: tuple[Point, ...], count: int) -> None:
+def test_letters_are_cut_into_the_fewest_parts(points: tuple[Point, ...], count: int) -> None:
     assert len(assert_parts(points)) == count
 
 
@@ -125,7 +125,7 @@ def test_corners_on_straight_edges_of_a_concave_outline_are_left_out() -> None:
 
 
 @pytest.mark.parametrize("scale", [1e-6, 1e9])
-def test_scale_does_not_matter(scale: float) -> None:
+def test_parts_do_not_depend_on_scale(scale: float) -> None:
     parts = convex_parts(tuple((scale * x, scale * y) for x, y in gear(7)))
     assert [len(part) for part in parts] == [len(part) for part in convex_parts(gear(7))]
 
@@ -142,10 +142,10 @@ def test_random_stars_are_covered(radii: list[float]) -> None:
 
 
 @given(st.sets(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=3), st.sampled_from([0.0, 0.4, 1.1]))
-def test_random_figures_on_a_grid_are_covered(cells: set[tuple[int, int]], angle: float) -> None:
+def test_random_polyominoes_are_covered(cells: set[tuple[int, int]], angle: float) -> None:
     union = unary_union([box(x, y, x + 1, y + 1) for x, y in cells])
     pieces = [union] if isinstance(union, Polygon) else list(union.geoms)
-    for piece in pieces:  # the outlines of holes are left aside; where an outline touches itself, it is a fault
+    for piece in pieces:  # holes are ignored; an outline that touches itself is a fault
         points = anticlockwise([(x, y) for x, y in piece.exterior.coords[:-1]])
         if outline_fault(points) is None:
             assert_parts(moved(points, angle))
@@ -163,7 +163,7 @@ def test_random_simple_outlines_are_covered(points: list[Point]) -> None:
 
 
 def untangled(points: list[Point]) -> tuple[Point, ...] | None:
-    """Uncross edges until none do; every time, the way around becomes shorter, so it ends."""
+    """Uncross edges until none cross; each swap shortens the perimeter, so the loop ends."""
     points = list(points)
     for _ in range(400):
         n = len(points)
@@ -177,7 +177,7 @@ def untangled(points: list[Point]) -> tuple[Point, ...] | None:
     return None
 
 
-def test_outline_with_a_waist_of_no_width_is_refused() -> None:
+def test_outline_with_a_waist_narrower_than_the_tolerance_is_refused() -> None:
     hourglass = ((0.0, 0.0), (2.0, 0.0), (1.0 + 1e-10, 1.0), (2.0, 2.0), (0.0, 2.0), (1.0 - 1e-10, 1.0))
     assert outline_fault(hourglass) is None
     with pytest.raises(OutlineError, match=r"too narrow .* split it by hand"):

@@ -1,4 +1,4 @@
-"""Demands: what physics a scene needs, and why."""
+"""Demands: the physical features that a scene needs, and why."""
 
 from typing import Any
 
@@ -158,7 +158,7 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
 
 
 @pytest.mark.parametrize(("demand", "on", "document", "why"), CASES)
-def test_demand_is_made_or_not_for_a_reason(demand: Demand, on: bool, document: dict[str, Any], why: str) -> None:
+def test_demand_is_on_or_off_with_a_reason(demand: Demand, on: bool, document: dict[str, Any], why: str) -> None:
     scene = from_document(document)
     item = next(item for item in bill(scene) if item.demand is demand)
     assert item.on is on
@@ -166,7 +166,7 @@ def test_demand_is_made_or_not_for_a_reason(demand: Demand, on: bool, document: 
     assert (demand in demands(scene)) is on
 
 
-def test_cases_show_every_demand_on_and_off() -> None:
+def test_cases_cover_every_demand_on_and_off() -> None:
     assert {(demand, on) for demand, on, _, _ in CASES} == {(demand, on) for demand in Demand for on in (True, False)}
 
 
@@ -179,16 +179,16 @@ def test_bill_lists_every_demand_once_with_a_reason(scene: Scene) -> None:
     assert demands(scene) == {item.demand for item in items if item.on}
 
 
-def test_fireworks_demand_nothing_but_flight() -> None:
+def test_emitter_without_collisions_demands_translation_and_gravity_only() -> None:
     emitter = {"position": [0, 0], "count": 100, "velocity_min": [-1, 8], "velocity_max": [1, 12]}
     scene = from_document({"world": {"gravity": [0, -9.81]}, "emitter": [emitter]})
     assert demands(scene) == {Demand.TRANSLATION, Demand.GRAVITY}
 
 
-def test_unmodelled_is_one_reason_that_lists_all() -> None:
-    falls = from_document({"world": {"gravity": [0, -9.81], "linear_drag": 0.1}, "ball": [BALL]})
-    wanted = demands(falls)
-    assert unmodelled(falls, wanted) == []
-    assert unmodelled(falls, wanted - {Demand.DRAG}) == ["it does not model drag"]
-    three = wanted - {Demand.DRAG, Demand.GRAVITY, Demand.TRANSLATION}
-    assert unmodelled(falls, three) == ["it does not model drag, gravity or translation"]
+def test_unmodelled_demands_are_listed_in_one_reason() -> None:
+    scene = from_document({"world": {"gravity": [0, -9.81], "linear_drag": 0.1}, "ball": [BALL]})
+    needed = demands(scene)
+    assert unmodelled(scene, needed) == []
+    assert unmodelled(scene, needed - {Demand.DRAG}) == ["it does not model drag"]
+    modelled = needed - {Demand.DRAG, Demand.GRAVITY, Demand.TRANSLATION}
+    assert unmodelled(scene, modelled) == ["it does not model drag, gravity or translation"]

@@ -1,4 +1,4 @@
-"""Drives as a scene file describes them: what they stand for, and what is wrong with them."""
+"""Drives in a scene file: faults, round trip, and moment about the hinge."""
 
 from typing import Any
 
@@ -22,7 +22,7 @@ def faults(document: dict[str, Any]) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("box", "drive", "told"),
+    ("box", "drive", "message"),
     [
         ({}, {**TORQUE, "body": "car"}, "drive[0].body: no body is named 'car'"),
         ({"fixed": True}, TORQUE, "drive[0].body: 'bar' is fixed"),
@@ -34,12 +34,12 @@ def faults(document: dict[str, Any]) -> list[str]:
         ({}, {**TORQUE, "moment": 0.9}, "drive[0].moment: must be greater than 1 kg·m²"),
     ],
 )
-def test_fault_of_a_drive_is_told(box: dict[str, Any], drive: dict[str, Any], told: str) -> None:
+def test_faulty_drive_is_refused_with_a_message(box: dict[str, Any], drive: dict[str, Any], message: str) -> None:
     (found,) = faults({"box": [{**BOX, **box}], "drive": [drive]})
-    assert found.startswith(told)
+    assert found.startswith(message)
 
 
-def test_body_has_one_drive_and_no_thrust() -> None:
+def test_body_with_two_drives_or_a_thrust_is_refused() -> None:
     thrust = {"body": "bar", "force": [1, 0]}
     found = faults({"box": [BOX], "drive": [{**TORQUE, "name": "a"}, {**STROKE, "name": "a"}], "thrust": [thrust]})
     assert any(each.startswith("drive.a.name: another drive is also named 'a'") for each in found)
@@ -47,13 +47,13 @@ def test_body_has_one_drive_and_no_thrust() -> None:
     assert sum("has a thrust" in each for each in found) == 2
 
 
-def test_one_of_many_bodies_has_no_drive() -> None:
+def test_drive_of_a_generated_body_is_refused() -> None:
     grid = {"name": "g", "origin": [0, 0], "spacing": [3, 3], "columns": 2, "rows": 1, "radius": 1}
     (found,) = faults({"grid": [grid], "drive": [{**PLUNGER, "body": "g-1"}]})
     assert found.startswith("drive[0].body: 'g-1' is made by a generator")
 
 
-def test_fault_in_a_figure_names_line_and_range() -> None:
+def test_fault_in_a_number_names_its_line_and_range() -> None:
     with pytest.raises(SceneError) as caught:
         loads(BAR + '[[drive]]\nkind = "stroke"\nbody = "bar"\npivot = [0, 0]\nstops = [0, 1]\nrate = 0\n')
     (fault,) = caught.value.faults
@@ -61,7 +61,7 @@ def test_fault_in_a_figure_names_line_and_range() -> None:
     assert fault.message == "must be greater than 0, is 0"
 
 
-def test_kind_that_no_drive_is_and_key_that_it_lacks() -> None:
+def test_unknown_kind_and_unknown_key_of_a_drive_are_refused() -> None:
     assert faults({"box": [BOX], "drive": [{**STROKE, "kind": "strike"}]}) == [
         'drive[0].kind: is "strike"; kinds of drive: torque, stroke, plunger'
     ]
@@ -71,13 +71,13 @@ def test_kind_that_no_drive_is_and_key_that_it_lacks() -> None:
 
 
 @pytest.mark.parametrize("drive", [TORQUE, STROKE, PLUNGER], ids=lambda drive: drive["kind"])
-def test_drive_is_read_as_it_was_written(drive: dict[str, Any]) -> None:
+def test_drive_round_trips_through_toml(drive: dict[str, Any]) -> None:
     scene = from_document({"box": [BOX], "drive": [{**drive, "name": "d", "key": "left shift"}]})
     assert loads(dumps(scene)) == scene
 
 
-def test_moment_about_the_hinge_is_that_which_is_stated() -> None:
-    """I = 2 kg·m² about the hinge, 1 m from the middle of 1 kg, leaves 1 kg·m² about that."""
+def test_moment_about_the_hinge_is_the_given_one() -> None:
+    """I = 2 kg·m² about the hinge, 1 m from the centre of 1 kg, leaves 1 kg·m² about the centre."""
     scene = from_document({"box": [BOX], "drive": [{**TORQUE, "moment": 2}]})
     assert scene.bodies.moment[0] == pytest.approx(1.0, rel=1e-15)
     assert mounts(scene)["bar"].hinge == (-1.0, 0.0)

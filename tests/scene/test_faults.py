@@ -1,4 +1,4 @@
-"""Faults and the lines they stand on."""
+"""Faults: their lines, paths and messages."""
 
 import random
 from typing import Any
@@ -13,18 +13,18 @@ from tests import strategies
 
 
 @given(strategies.rendered())
-def test_line_found_is_the_line_where_the_key_is(said: tuple[strategies.Document, strategies.Rendered]) -> None:
-    rendered = said[1]
+def test_line_of_a_location_is_the_line_of_its_key(drawn: tuple[strategies.Document, strategies.Rendered]) -> None:
+    rendered = drawn[1]
     lines = Lines(rendered.text)
     assert {location: lines.find(location) for location in rendered.lines} == rendered.lines
 
 
 @settings(max_examples=25)
 @given(strategies.rendered(), st.integers(), st.text(min_size=1))
-def test_line_of_what_is_not_there_is_the_line_of_the_table_around_it(
-    said: tuple[strategies.Document, strategies.Rendered], index: int, key: str
+def test_line_of_a_missing_key_is_the_line_of_its_table(
+    drawn: tuple[strategies.Document, strategies.Rendered], index: int, key: str
 ) -> None:
-    rendered = said[1]
+    rendered = drawn[1]
     lines = Lines(rendered.text)
     for location, line in rendered.lines.items():
         assert lines.find((*location, index % 1000 + 1000)) == line
@@ -32,32 +32,32 @@ def test_line_of_what_is_not_there_is_the_line_of_the_table_around_it(
     assert lines.find((f"no {key}",)) is None
 
 
-def spoilt(document: strategies.Document, chance: random.Random) -> tuple[strategies.Document, tuple[Any, ...]]:
-    """Put one value of the wrong kind, or one unknown key, into a document; return it and where."""
-    here: Any = document
+def with_fault(document: strategies.Document, chance: random.Random) -> tuple[strategies.Document, tuple[Any, ...]]:
+    """Put one value of a wrong type, or one unknown key, into a document; return it and the location."""
+    node: Any = document
     location: tuple[Any, ...] = ()
-    while isinstance(here, dict | list) and here:
-        key = chance.choice(list(here) if isinstance(here, dict) else range(len(here)))
+    while isinstance(node, dict | list) and node:
+        key = chance.choice(list(node) if isinstance(node, dict) else range(len(node)))
         location += (key,)
-        holder, here = here, here[key]
-        if isinstance(here, dict) and chance.random() < 0.5:
-            here["zzz"] = 1
+        holder, node = node, node[key]
+        if isinstance(node, dict) and chance.random() < 0.5:
+            node["zzz"] = 1
             return document, (*location, "zzz")
-    if isinstance(here, bool):
+    if isinstance(node, bool):
         holder[key] = 0
     else:
-        holder[key] = True if isinstance(here, str | list) else "0.1"
+        holder[key] = True if isinstance(node, str | list) else "0.1"
     return document, location
 
 
 @given(
-    st.tuples(strategies.documents(), st.randoms(use_true_random=False)).map(lambda both: spoilt(*both)),
+    st.tuples(strategies.documents(), st.randoms(use_true_random=False)).map(lambda pair: with_fault(*pair)),
     st.randoms(use_true_random=False),
 )
 def test_every_fault_has_file_line_path_and_message(
-    both: tuple[strategies.Document, tuple[Any, ...]], chance: random.Random
+    faulty: tuple[strategies.Document, tuple[Any, ...]], chance: random.Random
 ) -> None:
-    document, location = both
+    document, location = faulty
     rendered = strategies.Rendered(document, chance)
     with pytest.raises(SceneError) as caught:
         loads(rendered.text, "a scene.toml")
@@ -74,7 +74,7 @@ def line(text: str, *location: str | int) -> int | None:
     return Lines(text).find(location)
 
 
-def test_line_in_dotted_keys_and_inline_tables() -> None:
+def test_line_of_keys_in_dotted_keys_and_inline_tables() -> None:
     text = "world.seed = 1\nworld . 'wind' = [0,\n 1]\nsolver = {dt = 0.1, x = [\n[1], {y = 2}]}\n"
     assert line(text, "world") == 1
     assert line(text, "world", "seed") == 1
@@ -86,7 +86,7 @@ def test_line_in_dotted_keys_and_inline_tables() -> None:
     assert line(text, "solver", "x", 1, "y") == 5
 
 
-def test_line_in_tables_of_tables() -> None:
+def test_line_of_keys_in_nested_tables() -> None:
     text = "[[a]]\nb.c = 1\n[[a.d]]\nx = 1\n[[a.d]]\nx = 2\n[a.e]\nx = 3\n[[a]]\n[[a.d]]\n\nx = 4\n[f.g.h]\ni = 1"
     assert line(text, "a") == 1
     assert line(text, "a", 0, "b", "c") == 2
@@ -108,7 +108,7 @@ def test_line_in_tables_of_tables() -> None:
         "[ 's]' ]", '[[ s . "]]" ]]', "s.t . 'u=' = 1", "\t", "s = +1e+5", "s=''''''",
     ],
 )  # fmt: skip
-def test_line_after_what_looks_like_something_else(trap: str) -> None:
+def test_line_after_text_that_looks_like_a_heading_or_string(trap: str) -> None:
     text = f"{trap}\n[end]\n  z = [1,\n2]"
     base = trap.count("\n") + 1
     assert line(text, "end") == base + 1
@@ -117,12 +117,12 @@ def test_line_after_what_looks_like_something_else(trap: str) -> None:
     assert line(text.replace("\n", "\r\n"), "end", "z") == base + 2
 
 
-def test_line_of_anything_in_no_text_is_none() -> None:
+def test_line_in_an_empty_text_or_of_an_empty_location_is_none() -> None:
     assert line("", "a") is None
     assert line("a = 1") is None
 
 
-def test_path_calls_elements_by_name_where_they_have_a_printable_one() -> None:
+def test_path_names_elements_with_a_printable_name() -> None:
     document = {"ball": [{"name": "cue"}, {}, {"name": "a\x1bb"}, {"name": 3}], "x\ny": 1}
     assert path_of(("ball", 0, "velocity", 1), document) == "ball.cue.velocity[1]"
     assert path_of(("ball", 1, "mass"), document) == "ball[1].mass"
@@ -133,7 +133,7 @@ def test_path_calls_elements_by_name_where_they_have_a_printable_one() -> None:
     assert path_of((), document) == ""
 
 
-def test_fault_is_one_line_whatever_it_speaks_of() -> None:
+def test_fault_is_one_printable_line() -> None:
     assert str(Fault("s.toml", 3, "ball.cue", "is wrong")) == "s.toml:3: ball.cue: is wrong"
     assert str(Fault("s.toml", None, "", "is wrong")) == "s.toml: is wrong"
     assert str(Fault("a\nb", 1, "é", "\x1b[31m \u2028 \x85 \ud800")) == "a\\nb:1: é: \\x1b[31m \\u2028 \\x85 \\ud800"
@@ -143,11 +143,11 @@ FLIPPER = "[pinball]\n[[pinball.flipper]]\npivot = [0.1, 0.1]\nstops = [{}, 0.35
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("[pinball]\nslope = 6.5\n", "must be between 0 and 1.5, is 6.5; angles are in radians, 6.5° is 0.1134"),
         (FLIPPER.format(-31), "must be between -10 and 10, is -31; angles are in radians, -31° is -0.5411"),
-        (FLIPPER.format(-3100), "must be between -10 and 10, is -3100"),  # no angle in degrees either
+        (FLIPPER.format(-3100), "must be between -10 and 10, is -3100"),  # out of range in degrees too
         ("[[shot]]\naim = 1e9\nspeed = 1.0\n", "must be between -1e+06 and 1e+06, is 1000000000"),
         (
             "[[ball]]\nposition = [0, 0]\nradius = 0.1\nangular_velocity = 1e99\n",
@@ -155,7 +155,7 @@ FLIPPER = "[pinball]\n[[pinball.flipper]]\npivot = [0.1, 0.1]\nstops = [{}, 0.35
         ),  # rad/s
     ],
 )
-def test_angle_in_degrees_is_told_in_radians(text: str, told: str) -> None:
+def test_message_of_an_angle_out_of_range_gives_it_in_radians(text: str, message: str) -> None:
     with pytest.raises(SceneError) as error:
         loads(text)
-    assert error.value.faults[0].message == told
+    assert error.value.faults[0].message == message

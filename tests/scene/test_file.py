@@ -1,4 +1,4 @@
-"""Reading and writing scene files: whatever comes in, a Scene or a SceneError comes out."""
+"""Reading and writing scene files: every input gives a Scene or a SceneError."""
 
 import random
 import sys
@@ -27,7 +27,7 @@ KEYS = sorted(
 
 
 def check_faults(error: SceneError, file: str, lines: int) -> None:
-    """Check what every fault promises."""
+    """Check the invariants of every fault."""
     assert error.faults
     assert str(error) == "\n".join(map(str, error.faults))
     for fault in error.faults:
@@ -37,7 +37,7 @@ def check_faults(error: SceneError, file: str, lines: int) -> None:
         assert len(str(fault).splitlines()) == 1
 
 
-def only_scene_error(text: str) -> None:
+def assert_scene_or_scene_error(text: str) -> None:
     try:
         assert isinstance(loads(text, "f.toml"), Scene)
     except SceneError as error:
@@ -61,7 +61,7 @@ def only_scene_error(text: str) -> None:
 @example("[[ball]]\n[ball.position]\nx = 1")
 @example("[[world.bounds]]\n")
 def test_any_text_gives_a_scene_or_a_scene_error(text: str) -> None:
-    only_scene_error(text)
+    assert_scene_or_scene_error(text)
 
 
 @given(
@@ -99,7 +99,7 @@ def test_any_text_gives_a_scene_or_a_scene_error(text: str) -> None:
     )
 )
 def test_any_mixture_of_lines_gives_a_scene_or_a_scene_error(lines: list[str]) -> None:
-    only_scene_error("".join(lines))
+    assert_scene_or_scene_error("".join(lines))
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -132,13 +132,13 @@ def test_any_document_gives_a_scene_or_a_scene_error(document: dict[str, Any]) -
 
 @given(strategies.documents(), strategies.junk(), st.randoms(use_true_random=False))
 def test_any_value_anywhere_gives_a_scene_or_a_scene_error(document: Any, value: Any, chance: random.Random) -> None:
-    here: Any = document
+    node: Any = document
     while True:
-        key = chance.choice(list(here) if isinstance(here, dict) else range(len(here)))
-        if not isinstance(here[key], dict | list) or not here[key] or chance.random() < 0.2:
+        key = chance.choice(list(node) if isinstance(node, dict) else range(len(node)))
+        if not isinstance(node[key], dict | list) or not node[key] or chance.random() < 0.2:
             break
-        here = here[key]
-    here[key] = value
+        node = node[key]
+    node[key] = value
     try:
         assert isinstance(from_document(document, "f"), Scene)
     except SceneError as error:
@@ -146,7 +146,7 @@ def test_any_value_anywhere_gives_a_scene_or_a_scene_error(document: Any, value:
 
 
 @given(strategies.scenes())
-def test_scene_written_and_read_again_is_equal(scene: Scene) -> None:
+def test_scene_round_trips_through_toml(scene: Scene) -> None:
     text = dumps(scene)
     again = loads(text)
     assert again == scene
@@ -155,23 +155,25 @@ def test_scene_written_and_read_again_is_equal(scene: Scene) -> None:
 
 
 @given(strategies.rendered())
-def test_scene_means_the_same_however_it_is_written(said: tuple[strategies.Document, strategies.Rendered]) -> None:
-    document, rendered = said
+def test_scene_does_not_depend_on_the_layout_of_the_text(
+    drawn: tuple[strategies.Document, strategies.Rendered],
+) -> None:
+    document, rendered = drawn
     assert tomllib.loads(rendered.text.replace("\r\n", "\n")) == document
     assert loads(rendered.text) == from_document(document)
 
 
 @given(st.text(max_size=200), st.text(max_size=200))
-def test_title_and_about_of_any_text_are_written_and_read_again(title: str, about: str) -> None:
+def test_title_and_about_of_any_text_round_trip(title: str, about: str) -> None:
     scene = from_document({"title": title, "about": about})
     assert loads(dumps(scene)) == scene
 
 
-def test_scene_at_its_defaults_is_written_as_no_empty_file() -> None:
+def test_scene_with_default_values_round_trips() -> None:
     assert loads(dumps(Scene())) == Scene()
 
 
-def test_scene_is_read_from_a_file_with_bom_and_dos_line_ends(tmp_path: Path) -> None:
+def test_scene_is_read_from_a_file_with_bom_and_crlf(tmp_path: Path) -> None:
     path = tmp_path / "a name with spaces.toml"
     path.write_bytes(b"\xef\xbb\xbf" + f'about = """a\nb"""\n{BALL}'.replace("\n", "\r\n").encode())
     scene = load(path)
@@ -190,7 +192,7 @@ def test_file_without_content_is_a_fault(text: str) -> None:
     assert [(fault.file, fault.line) for fault in caught.value.faults] == [("e.toml", 1)]
 
 
-def test_fault_beyond_megabytes_of_comments_has_its_line() -> None:
+def test_fault_after_megabytes_of_comments_has_its_line() -> None:
     with pytest.raises(SceneError) as caught:
         loads("# a comment\n" * 420_000 + BALL + "x = 1")
     assert [(fault.line, fault.path) for fault in caught.value.faults] == [(420_004, "ball[0].x")]
@@ -199,7 +201,7 @@ def test_fault_beyond_megabytes_of_comments_has_its_line() -> None:
 @pytest.mark.parametrize(
     ("text", "line"), [("a = ", 1), ("\n\n[[ball]\n", 3), ("a = 1\na = 2", 2), ("a = 'x\n", 1), ("x", 1), ("\n= 1", 2)]
 )
-def test_text_that_is_no_toml_is_one_fault_with_its_line(text: str, line: int) -> None:
+def test_text_that_is_not_toml_is_one_fault_with_its_line(text: str, line: int) -> None:
     with pytest.raises(SceneError, match="not TOML") as caught:
         loads(text)
     assert [fault.line for fault in caught.value.faults] == [line]
@@ -213,7 +215,7 @@ def test_missing_file_directory_and_impossible_path_are_faults(tmp_path: Path) -
         assert caught.value.faults[0].file == str(path)
 
 
-def test_file_of_other_text_encodings_is_a_fault(tmp_path: Path) -> None:
+def test_file_in_another_encoding_is_a_fault(tmp_path: Path) -> None:
     path = tmp_path / "f.toml"
     for content in (BALL.encode("utf-16"), b"title = '\xe9'", bytes(range(256)) * 100):
         path.write_bytes(content)
@@ -221,10 +223,10 @@ def test_file_of_other_text_encodings_is_a_fault(tmp_path: Path) -> None:
             load(path)
 
 
-def test_file_beyond_the_limit_is_refused_unread(tmp_path: Path) -> None:
+def test_file_beyond_the_size_limit_is_refused_unread(tmp_path: Path) -> None:
     path = tmp_path / "huge.toml"
     with path.open("wb") as stream:
-        stream.truncate(2**40)  # sparse: takes no room
+        stream.truncate(2**40)  # sparse: takes no disk space
     with pytest.raises(SceneError, match="SANDBOX_MAX_FILE_SIZE=1024GiB to allow it"):
         load(path)
 
@@ -233,13 +235,13 @@ def test_many_faults_are_all_reported_with_their_lines() -> None:
     block = "[[ball]]\nposition = [0, 0]\nraduis = 1\n"
     with pytest.raises(SceneError) as caught:
         loads(block * 2000)
-    places = {(fault.line, fault.path) for fault in caught.value.faults}
-    assert places == {(3 * k + 3, f"ball[{k}].raduis") for k in range(2000)} | {
+    reported = {(fault.line, fault.path) for fault in caught.value.faults}
+    assert reported == {(3 * k + 3, f"ball[{k}].raduis") for k in range(2000)} | {
         (3 * k + 1, f"ball[{k}].radius") for k in range(2000)
     }
 
 
-def test_faults_come_in_the_order_of_their_lines() -> None:
+def test_faults_are_sorted_by_line() -> None:
     text = f"{BALL}raduis = 1\n[world]\nseed = -1\n[[plane]]\npoint = [0, 0]\nnormal = [0, 0]\n[solver]\ndt = 0\n"
     with pytest.raises(SceneError) as caught:
         loads(text)
@@ -252,11 +254,11 @@ def test_override_changes_the_scene() -> None:
     assert (scene.solver.dt, scene.world.seed) == (0.5, 7)
 
 
-def test_later_override_outranks_an_earlier_one() -> None:
+def test_later_override_replaces_an_earlier_one() -> None:
     assert loads(BALL, overrides=["solver.dt=0.5", "solver.dt=0.25"]).solver.dt == 0.25
 
 
-def test_fault_of_an_override_says_so_and_has_no_line() -> None:
+def test_fault_of_an_override_is_marked_and_has_no_line() -> None:
     with pytest.raises(SceneError) as caught:
         loads(f"{BALL}[solver]\ndt = 0.1\n", "s.toml", ["solver.dt=20", "ball.0.mass=-1"])
     assert [(fault.line, fault.path) for fault in caught.value.faults] == [
@@ -265,7 +267,7 @@ def test_fault_of_an_override_says_so_and_has_no_line() -> None:
     ]
 
 
-def test_override_can_mend_a_fault_of_the_file() -> None:
+def test_override_can_correct_a_fault_of_the_file() -> None:
     assert loads(f"{BALL}mass = -1\n", overrides=["ball.0.mass=2"]).balls[0].mass == 2.0
 
 
@@ -273,12 +275,12 @@ def test_override_can_mend_a_fault_of_the_file() -> None:
     "override",
     ["solver.dt", "=1", "nowhere.x.y=1", "ball.none.mass=1", "ball.9.mass=1", "solver.dt.x=1", "title.x=1", ""],
 )
-def test_override_that_leads_nowhere_is_a_fault(override: str) -> None:
+def test_override_with_an_unknown_path_is_a_fault(override: str) -> None:
     with pytest.raises(SceneError, match="--set"):
         loads(f"title = 't'\n{BALL}[solver]\ndt = 0.1", overrides=[override])
 
 
-def test_overrides_that_lead_nowhere_are_all_reported() -> None:
+def test_all_faulty_overrides_are_reported() -> None:
     with pytest.raises(SceneError) as caught:
         loads(BALL, overrides=["x", "ball.none.mass=1", "ball.0.mass=2"])
     assert len(caught.value.faults) == 2
@@ -301,13 +303,13 @@ def test_loading_a_small_scene_calls_few_modules() -> None:
     package = str(Path(sandbox.__file__).parent)
     called: set[str] = set()
 
-    def note(frame: FrameType, event: str, _: object) -> None:
+    def record_call(frame: FrameType, event: str, _: object) -> None:
         if event == "call" and frame.f_code.co_filename.startswith(package):
             called.add(frame.f_code.co_filename)
 
     load("bounce")  # imports modules, and builds the validator
     before = sys.getprofile()
-    sys.setprofile(note)
+    sys.setprofile(record_call)
     try:
         load("bounce")
     finally:

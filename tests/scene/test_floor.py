@@ -1,4 +1,4 @@
-"""Floors: `[surface]`, spins, noses, pockets and shots of a scene file."""
+"""Surfaces: `[surface]`, spin, cushion heights, pockets and shots of a scene file."""
 
 import math
 from typing import Any
@@ -16,21 +16,21 @@ CUSHION = {"points": [[1, -1], [1, 1]], "height": 0.037}
 TABLE: dict[str, Any] = {"surface": {"sliding_friction": 0.2}, "ball": [BALL], "wall": [CUSHION]}
 
 
-def test_balls_on_a_floor_are_spheres() -> None:
-    on, off = (from_document({**more, "ball": [BALL]}) for more in ({"surface": {}}, {}))
-    # ⅖ m r² against ½ m r²; the last digit may be rounded otherwise
-    assert on.bodies.moment[0] == pytest.approx(0.4 * MASS * RADIUS**2, rel=1e-15)
-    assert off.bodies.moment[0] == pytest.approx(0.5 * MASS * RADIUS**2, rel=1e-15)
+def test_balls_on_a_surface_have_the_moment_of_a_sphere() -> None:
+    with_surface, without = (from_document({**more, "ball": [BALL]}) for more in ({"surface": {}}, {}))
+    # ⅖ m r² against ½ m r²; 1e-15: the last digit may be rounded differently
+    assert with_surface.bodies.moment[0] == pytest.approx(0.4 * MASS * RADIUS**2, rel=1e-15)
+    assert without.bodies.moment[0] == pytest.approx(0.5 * MASS * RADIUS**2, rel=1e-15)
 
 
-def test_spin_is_kept_in_the_bodies_and_in_the_file() -> None:
+def test_spin_is_read_into_the_bodies_and_round_trips() -> None:
     scene = from_document({**TABLE, "ball": [{**BALL, "spin": [1.0, 2.0, 3.0]}]})
     assert scene.bodies.roll.tolist() == [[1.0, 2.0]]
     assert scene.bodies.angular_velocity.tolist() == [3.0]
     assert loads(dumps(scene)) == scene
 
 
-def test_pockets_are_numbered_after_everything_solid() -> None:
+def test_pockets_are_numbered_after_the_fixed_elements() -> None:
     pocket = {"position": [1, 1], "radius": 0.1}
     scene = from_document({**TABLE, "pocket": [pocket, {**pocket, "name": "left"}], "post": [pocket]})
     assert scene.fixed_names == ("wall-1", "post-1", "pocket-1", "left")
@@ -59,13 +59,13 @@ def test_pockets_are_numbered_after_everything_solid() -> None:
         ({**TABLE, "pocket": [{"name": "cue", "position": [9, 9], "radius": 1}]}, "pocket", "unique"),
     ],
 )
-def test_what_only_a_floor_has_is_checked(document: dict[str, Any], path: str, words: str) -> None:
+def test_faults_of_keys_that_need_a_surface_are_reported(document: dict[str, Any], path: str, words: str) -> None:
     with pytest.raises(SceneError) as caught:
         from_document(document)
     assert any(path in fault.path and words in fault.message for fault in caught.value.faults), str(caught.value)
 
 
-def test_shot_starts_the_ball_that_it_names() -> None:
+def test_shot_gives_the_ball_velocity_and_spin() -> None:
     scene = from_document({**TABLE, "shot": [{"aim": 0.5 * math.pi, "speed": 2.0, "height": 0.3}]})
     velocity, spin = scene.bodies.velocity[0], scene.bodies.roll[0]
     assert velocity[1] > 0.0
@@ -75,20 +75,21 @@ def test_shot_starts_the_ball_that_it_names() -> None:
 
 @pytest.mark.parametrize("side", [-0.4, 0.0, 0.25])
 @pytest.mark.parametrize("height", [-0.3, 0.0, 0.28])
-def test_stroke_keeps_energy_and_momentum_of_ball_and_cue(side: float, height: float) -> None:
-    """The tip is elastic and sticks: cue and ball together lose neither, but for the squirt that is added to it."""
-    cue, speed = 0.55, 3.0
-    velocity, spin = struck(Stroke(aim=0.3, speed=speed, side=side, height=height, cue_mass=cue), MASS, RADIUS)
-    ball = math.hypot(*velocity)
-    after = speed - MASS * ball / cue
-    moving = 0.5 * MASS * ball**2 + 0.2 * MASS * RADIUS**2 * float(np.dot(spin, spin))
-    assert moving + 0.5 * cue * after**2 == pytest.approx(0.5 * cue * speed**2, rel=1e-12)  # rounding
+def test_stroke_conserves_energy_and_momentum_of_ball_and_cue(side: float, height: float) -> None:
+    """The tip is elastic and does not slip: cue and ball conserve both, except for the added squirt."""
+    cue_mass, speed = 0.55, 3.0
+    velocity, spin = struck(Stroke(aim=0.3, speed=speed, side=side, height=height, cue_mass=cue_mass), MASS, RADIUS)
+    ball_speed = math.hypot(*velocity)
+    cue_speed = speed - MASS * ball_speed / cue_mass
+    ball_energy = 0.5 * MASS * ball_speed**2 + 0.2 * MASS * RADIUS**2 * float(np.dot(spin, spin))
+    total_energy = ball_energy + 0.5 * cue_mass * cue_speed**2
+    assert total_energy == pytest.approx(0.5 * cue_mass * speed**2, rel=1e-12)  # rounding
 
 
-def test_side_sends_the_ball_off_and_spins_it() -> None:
+def test_side_makes_the_ball_squirt_and_spin() -> None:
     right, left = (struck(Stroke(aim=0.0, speed=1.0, side=a), MASS, RADIUS) for a in (0.3, -0.3))
-    assert right[0][1] > 0.0 > left[0][1]  # struck on its right it squirts to the left
-    assert right[1][2] > 0.0 > left[1][2]  # and turns anti-clockwise
+    assert right[0][1] > 0.0 > left[0][1]  # struck on its right side, the ball squirts to the left
+    assert right[1][2] > 0.0 > left[1][2]  # and turns counter-clockwise
     assert right[0] == pytest.approx((left[0][0], -left[0][1]))
 
 
@@ -101,7 +102,7 @@ def test_shot_at_a_ball_in_a_pocket_is_a_fault() -> None:
         loads(text)
 
 
-def test_pocket_that_is_wrong_swallows_no_ball_meanwhile() -> None:
+def test_faulty_pocket_causes_no_fault_of_a_shot() -> None:
     document = {**TABLE, "pocket": [{"position": [0, 0], "radius": -1}], "shot": [{"aim": 0, "speed": 1}]}
     with pytest.raises(SceneError) as caught:
         from_document(document)

@@ -1,4 +1,4 @@
-"""Tables of games in a scene: imported when they occur, and values as all others are."""
+"""Tables of games in a scene: lazy import, values, round trip and faults."""
 
 import copy
 import pickle
@@ -19,7 +19,7 @@ from sandbox.scene.files.document import to_document
 from sandbox.scene.files.load import dumps, from_document, load, loads
 from sandbox.scene.files.presets import Preset
 
-LOADED = """
+LIST_GAME_MODULES = """
 import sys
 from sandbox.scene.files.load import load
 scene = load(sys.argv[1])
@@ -41,17 +41,19 @@ print(*sorted(name for name in sys.modules if name.startswith("sandbox.games."))
 )
 def test_scene_imports_only_the_games_of_its_tables(scene: str, folders: set[str]) -> None:
     done = subprocess.run(
-        [sys.executable, "-c", LOADED, scene], capture_output=True, text=True, check=True, timeout=120
+        [sys.executable, "-c", LIST_GAME_MODULES, scene], capture_output=True, text=True, check=True, timeout=120
     )
     modules = set(done.stdout.split()) - {"sandbox.game_names"}
-    assert {module.split(".")[2] for module in modules if module.count(".") > 2} == folders  # of the others, the spec
+    assert {
+        module.split(".")[2] for module in modules if module.count(".") > 2
+    } == folders  # of other games only the spec is imported
     assert not [module for module in modules if module.endswith(("rules", "bot", "hand", "registry"))]
 
 
 @pytest.mark.parametrize("heading", GAME_TABLES)
-def test_every_table_is_a_field_and_leads_to_its_model(heading: str) -> None:
-    within, _, key = heading.rpartition(".")
-    table, field = game_table(heading), (Play if within else Scene).model_fields[key]
+def test_every_table_is_a_lazy_field_with_its_model(heading: str) -> None:
+    parent, _, key = heading.rpartition(".")
+    table, field = game_table(heading), (Play if parent else Scene).model_fields[key]
     lazy = lazy_table(field)
     assert lazy is not None
     assert lazy.model is table.model
@@ -59,7 +61,7 @@ def test_every_table_is_a_field_and_leads_to_its_model(heading: str) -> None:
     assert table.about
 
 
-def test_table_is_found_by_its_model() -> None:
+def test_table_of_finds_a_table_by_its_model() -> None:
     scene = load("artillery/duel")
     artillery, terrain = table_of(scene, Artillery), table_of(scene, Terrain)
     assert artillery is not None
@@ -71,7 +73,7 @@ def test_table_is_found_by_its_model() -> None:
 
 
 @pytest.mark.parametrize("name", ["artillery/duel", "games/curling"])
-def test_scene_with_tables_is_a_value(name: str) -> None:
+def test_scene_with_tables_is_copied_pickled_and_hashed_by_value(name: str) -> None:
     scene = load(name)
     for copied in (pickle.loads(pickle.dumps(scene)), copy.deepcopy(scene), scene.model_copy(deep=True)):
         assert copied == scene
@@ -80,13 +82,13 @@ def test_scene_with_tables_is_a_value(name: str) -> None:
     assert from_document(to_document(scene)) == scene
 
 
-def test_keys_of_tables_keep_their_order_in_files() -> None:
+def test_tables_have_a_fixed_order_in_files() -> None:
     document = to_document(load("artillery/duel"))
     kept = [key for key in document if key in ("play", "terrain", "artillery", "wall", "box")]
     assert kept == ["play", "terrain", "artillery", "wall", "box"]
 
 
-def test_scene_in_code_takes_tables_as_models_and_as_dicts() -> None:
+def test_scene_accepts_tables_as_models_and_as_dicts() -> None:
     scene = Scene(billiards={"table": "pool-9ft"})
     assert table_of(scene, Billiards) == Billiards(table="pool-9ft")
     assert scene == Scene(billiards=Billiards(table="pool-9ft")) != Scene()

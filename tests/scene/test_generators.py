@@ -1,4 +1,4 @@
-"""Grids, scatters and emitters: what they expand to."""
+"""Grids, scatters and emitters: the positions, velocities and lifetimes that they expand to."""
 
 import math
 
@@ -16,15 +16,15 @@ from sandbox.scene.validate.scene import crosscheck
 GRID = Grid(origin=(1.0, 2.0), columns=3, rows=2, spacing=(0.5, -4.0), radius=0.1)
 SCATTER = Scatter(count=200, lower=(-5.0, 0.0), upper=(5.0, 20.0), radius=0.1)
 EMITTER = Emitter(position=(3.0, 4.0), count=200, velocity_min=(-1.0, 8.0), velocity_max=(1.0, 12.0))
-LOOSE = {
+RANDOM = {
     "grid": Grid(origin=(0.0, 0.0), columns=20, spacing=(1.0, 1.0), radius=0.1, jitter=0.1, velocity_jitter=1.0),
     "scatter": Scatter(count=20, lower=(0.0, 0.0), upper=(9.0, 9.0), radius=0.1, velocity_jitter=1.0),
     "emitter": Emitter(position=(0.0, 0.0), count=20, velocity_min=(0.0, 0.0), velocity_max=(1.0, 1.0)),
 }
 
 
-def uniform_mean(values: np.ndarray, low: float, high: float) -> None:
-    """Check that values are uniform in [low, high) as far as range, mean and variance tell."""
+def assert_uniform(values: np.ndarray, low: float, high: float) -> None:
+    """Check that values are uniform in [low, high) by their range, mean and variance."""
     n, width = len(values), high - low
     assert low <= values.min()
     assert values.max() <= high
@@ -32,7 +32,7 @@ def uniform_mean(values: np.ndarray, low: float, high: float) -> None:
     assert abs(values.var() - width**2 / 12) < 5 * width**2 / math.sqrt(180 * n)  # 5 σ of the variance of n
 
 
-def test_grid_counts_along_rows_from_the_origin() -> None:
+def test_grid_is_numbered_along_rows_from_the_origin() -> None:
     position, velocity = expand(GRID, 0, 0)
     assert position.tolist() == [[1.0, 2.0], [1.5, 2.0], [2.0, 2.0], [1.0, -2.0], [1.5, -2.0], [2.0, -2.0]]
     assert velocity.tolist() == [[0.0, 0.0]] * 6
@@ -45,34 +45,34 @@ def test_grid_without_jitter_does_not_depend_on_the_seed() -> None:
 def test_grid_jitter_moves_each_coordinate_by_up_to_its_amount() -> None:
     grid = Grid(origin=(0.0, 0.0), columns=50, rows=50, spacing=(1.0, 1.0), radius=0.1, jitter=0.2, velocity=(3.0, 0.0),
                 velocity_jitter=0.5)  # fmt: skip
-    still = Grid(origin=(0.0, 0.0), columns=50, rows=50, spacing=(1.0, 1.0), radius=0.1)
+    regular = Grid(origin=(0.0, 0.0), columns=50, rows=50, spacing=(1.0, 1.0), radius=0.1)
     position, velocity = expand(grid, 7, 0)
-    moved = position - expand(still, 7, 0)[0]
+    offset = position - expand(regular, 7, 0)[0]
     for axis in (0, 1):
-        uniform_mean(moved[:, axis], -0.2 - 1e-14, 0.2 + 1e-14)  # rounding of the difference of numbers up to 50
-    uniform_mean(velocity[:, 0], 2.5, 3.5)
-    uniform_mean(velocity[:, 1], -0.5, 0.5)
+        assert_uniform(offset[:, axis], -0.2 - 1e-14, 0.2 + 1e-14)  # rounding of the difference of numbers up to 50
+    assert_uniform(velocity[:, 0], 2.5, 3.5)
+    assert_uniform(velocity[:, 1], -0.5, 0.5)
 
 
-def test_scatter_stays_in_its_box_without_overlap() -> None:
+def test_scatter_is_uniform_in_its_box_without_overlap() -> None:
     position, velocity = expand(SCATTER, 3, 0)
-    uniform_mean(position[:, 0], -5.0, 5.0)
-    uniform_mean(position[:, 1], 0.0, 20.0)
+    assert_uniform(position[:, 0], -5.0, 5.0)
+    assert_uniform(position[:, 1], 0.0, 20.0)
     assert not velocity.any()
-    apart = np.hypot(*(position[:, None] - position[None]).transpose(2, 0, 1))
-    assert apart[np.triu_indices(200, 1)].min() >= 0.2
+    distance = np.hypot(*(position[:, None] - position[None]).transpose(2, 0, 1))
+    assert distance[np.triu_indices(200, 1)].min() >= 0.2
 
 
-def test_scatter_draws_the_later_ball_of_an_overlap_again() -> None:
+def test_scatter_redraws_the_later_ball_of_an_overlap() -> None:
     scatter = SCATTER.model_copy(update={"radius": 0.3})
     first = np.random.Generator(np.random.PCG64([3, 1, 0])).random((200, 2)) * [10.0, 20.0] + [-5.0, 0.0]
     position, _ = expand(scatter, 3, 0)
     kept = (position == first).all(axis=1)
     assert kept[0]
     assert 20 < kept.sum() < 200
-    apart = np.hypot(*(first[:, None] - first[None]).transpose(2, 0, 1))
-    crowded = np.triu(apart < 0.6, 1).any(axis=0)  # overlaps an earlier one
-    assert np.array_equal(kept & crowded, np.zeros(200, dtype=bool))
+    distance = np.hypot(*(first[:, None] - first[None]).transpose(2, 0, 1))
+    overlapping = np.triu(distance < 0.6, 1).any(axis=0)  # overlaps an earlier ball
+    assert np.array_equal(kept & overlapping, np.zeros(200, dtype=bool))
 
 
 @given(
@@ -82,101 +82,103 @@ def test_scatter_draws_the_later_ball_of_an_overlap_again() -> None:
     st.floats(0.1, 0.3),
     st.floats(0.2, 5.0),
 )
-def test_scatter_never_overlaps(seed: int, count: int, radius: float, cover: float, shape: float) -> None:
-    side = math.sqrt(count * math.pi * radius**2 / cover)
-    scatter = Scatter(count=count, lower=(0.0, 0.0), upper=(side * shape, side / shape), radius=radius)
+def test_scatter_never_overlaps(seed: int, count: int, radius: float, coverage: float, stretch: float) -> None:
+    side = math.sqrt(count * math.pi * radius**2 / coverage)
+    scatter = Scatter(count=count, lower=(0.0, 0.0), upper=(side * stretch, side / stretch), radius=radius)
     position, _ = expand(scatter, seed, 0)
     assert position.shape == (count, 2)
     assert (position >= 0).all()
-    assert (position <= [side * shape, side / shape]).all()
-    apart = np.hypot(*(position[:, None] - position[None]).transpose(2, 0, 1)) + 1e9 * np.eye(count)
-    assert apart.min() >= 2 * radius
+    assert (position <= [side * stretch, side / stretch]).all()
+    distance = np.hypot(*(position[:, None] - position[None]).transpose(2, 0, 1)) + 1e9 * np.eye(count)
+    assert distance.min() >= 2 * radius
 
 
 @pytest.mark.parametrize("collides", ["none", "fixed"])
-def test_scatter_that_passes_through_itself_may_overlap(collides: str) -> None:
+def test_scatter_without_mutual_collisions_may_overlap(collides: str) -> None:
     scatter = SCATTER.model_copy(update={"radius": 100.0, "collides": collides})
     assert expand(scatter, 0, 0)[0].shape == (200, 2)
 
 
 @pytest.mark.parametrize("radius", [0.9, 0.6])
-def test_scatter_that_does_not_fit_says_so(radius: float) -> None:
+def test_scatter_that_does_not_fit_raises(radius: float) -> None:
     with pytest.raises(GeneratorError, match=r"do not fit.*use\s+fewer") as caught:
         expand(SCATTER.model_copy(update={"radius": radius}), 0, 4)
     assert caught.value.location == ("scatter", 4, "count")
 
 
-def test_emitter_draws_velocities_between_its_two() -> None:
+def test_emitter_draws_velocities_between_its_bounds() -> None:
     emitter = EMITTER.model_copy(update={"count": 5000})
     position, velocity = expand(emitter, 1, 0)
     assert (position == [3.0, 4.0]).all()
-    uniform_mean(velocity[:, 0], -1.0, 1.0)
-    uniform_mean(velocity[:, 1], 8.0, 12.0)
+    assert_uniform(velocity[:, 0], -1.0, 1.0)
+    assert_uniform(velocity[:, 1], 8.0, 12.0)
     assert abs(np.corrcoef(velocity.T)[0, 1]) < 5 / math.sqrt(5000)  # 5 σ of a correlation of 5,000 independent pairs
 
 
-def test_emitter_of_one_velocity_has_no_spread() -> None:
+def test_emitter_with_equal_bounds_has_one_velocity() -> None:
     emitter = EMITTER.model_copy(update={"velocity_min": (1.0, 2.0), "velocity_max": (1.0, 2.0)})
     assert (expand(emitter, 1, 0)[1] == [1.0, 2.0]).all()
 
 
-@pytest.mark.parametrize("kind", LOOSE)
-def test_same_seed_same_balls_and_another_seed_others(kind: str) -> None:
-    first, again, other, elsewhere = (expand(LOOSE[kind], seed, k) for seed, k in ((5, 0), (5, 0), (6, 0), (5, 1)))
+@pytest.mark.parametrize("kind", RANDOM)
+def test_draws_depend_on_the_seed_and_the_index_only(kind: str) -> None:
+    first, again, other_seed, other_index = (
+        expand(RANDOM[kind], seed, k) for seed, k in ((5, 0), (5, 0), (6, 0), (5, 1))
+    )
     assert np.array_equal(first, again)
-    assert not np.array_equal(first, other)
-    assert not np.array_equal(first, elsewhere)
+    assert not np.array_equal(first, other_seed)
+    assert not np.array_equal(first, other_index)
 
 
-def test_kinds_of_generators_draw_from_streams_of_their_own() -> None:
+def test_grid_and_emitter_draw_from_different_streams() -> None:
     grid = Grid(origin=(0.0, 0.0), columns=20, spacing=(0.0, 0.0), radius=0.1, velocity_jitter=0.5)
     emitter = Emitter(position=(0.0, 0.0), count=20, velocity_min=(-0.5, -0.5), velocity_max=(0.5, 0.5))
     assert not np.isclose(expand(grid, 0, 0)[1], expand(emitter, 0, 0)[1]).any()
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2**32, 2**63 - 1])
-def test_every_seed_serves(seed: int) -> None:
-    assert np.isfinite(expand(LOOSE["scatter"], seed, 0)).all()
+def test_every_seed_is_usable(seed: int) -> None:
+    assert np.isfinite(expand(RANDOM["scatter"], seed, 0)).all()
 
 
-@pytest.mark.parametrize("kind", LOOSE)
-def test_adding_generators_changes_none_before(kind: str) -> None:
+@pytest.mark.parametrize("kind", RANDOM)
+def test_added_generators_do_not_change_earlier_ones(kind: str) -> None:
     field = f"{kind}s"
-    alone = Scene(world=World(seed=4), **{field: (LOOSE[kind],)}).bodies
-    several = {f"{other}s": (generator,) for other, generator in LOOSE.items()}
-    several[field] = (LOOSE[kind], LOOSE[kind].model_copy(update={"name": "more"}))
-    more = Scene(world=World(seed=4), **several).bodies
-    mine = [name in alone.names for name in more.names]
-    assert sum(mine) == 20
-    assert np.array_equal(more.position[mine], alone.position)
-    assert np.array_equal(more.velocity[mine], alone.velocity)
+    alone = Scene(world=World(seed=4), **{field: (RANDOM[kind],)}).bodies
+    several = {f"{other}s": (generator,) for other, generator in RANDOM.items()}
+    several[field] = (RANDOM[kind], RANDOM[kind].model_copy(update={"name": "more"}))
+    extended = Scene(world=World(seed=4), **several).bodies
+    earlier = [name in alone.names for name in extended.names]
+    assert sum(earlier) == 20
+    assert np.array_equal(extended.position[earlier], alone.position)
+    assert np.array_equal(extended.velocity[earlier], alone.velocity)
 
 
-def test_changing_a_count_keeps_the_first_of_an_emitter() -> None:
+def test_larger_count_keeps_the_first_particles_of_an_emitter() -> None:
     more = EMITTER.model_copy(update={"count": 300})
     assert np.array_equal(expand(more, 0, 0)[1][:200], expand(EMITTER, 0, 0)[1])
 
 
-def test_draws_are_those_of_the_first_release() -> None:
-    # PCG64 keyed by [seed, kind, index]: numpy promises the stream of `random()` for good
+def test_draws_of_an_emitter_are_unchanged_between_releases() -> None:
+    # PCG64 keyed by [seed, kind, index]: numpy guarantees that the stream of `random()` does not change
     expected = np.random.Generator(np.random.PCG64([1, 2, 0])).random((200, 2)) * [2.0, 4.0] + [-1.0, 8.0]
     assert np.array_equal(expand(EMITTER, 1, 0)[1], expected)
 
 
-def test_size_counts_balls() -> None:
+def test_size_is_the_number_of_balls() -> None:
     assert [size(generator) for generator in (GRID, SCATTER, EMITTER)] == [6, 200, 200]
 
 
-def test_lives_are_uniform_about_the_stated_one_shortest_first() -> None:
+def test_lifetimes_are_uniform_about_the_given_one_and_sorted() -> None:
     emitter = EMITTER.model_copy(update={"count": 5000, "lifetime": 3.0, "lifetime_jitter": 0.5})
-    lives = lifetimes(emitter, 1, 0)
-    uniform_mean(lives, 2.5, 3.5)
-    assert (np.diff(lives) >= 0).all()
+    drawn = lifetimes(emitter, 1, 0)
+    assert_uniform(drawn, 2.5, 3.5)
+    assert (np.diff(drawn) >= 0).all()
     velocity = expand(emitter, 1, 0)[1]
-    assert abs(np.corrcoef(lives, velocity[:, 0])[0, 1]) < 5 / math.sqrt(5000)  # 5 σ, of 5,000 independent pairs
+    assert abs(np.corrcoef(drawn, velocity[:, 0])[0, 1]) < 5 / math.sqrt(5000)  # 5 σ of 5,000 independent pairs
 
 
-def test_lives_are_drawn_after_the_velocities() -> None:
+def test_lifetimes_are_drawn_after_the_velocities() -> None:
     emitter = EMITTER.model_copy(update={"lifetime": 3.0, "lifetime_jitter": 0.5})
     random = np.random.Generator(np.random.PCG64([7, 2, 4]))
     velocity = random.random((200, 2)) * [2.0, 4.0] + [-1.0, 8.0]
@@ -184,19 +186,19 @@ def test_lives_are_drawn_after_the_velocities() -> None:
     assert np.array_equal(lifetimes(emitter, 7, 4), np.sort(3.0 + (random.random(200) * 2.0 - 1.0) * 0.5))
 
 
-def test_without_a_lifetime_particles_stay_for_ever() -> None:
+def test_particles_without_a_lifetime_have_an_infinite_one() -> None:
     assert (lifetimes(EMITTER, 1, 0) == np.inf).all()
 
 
-def test_bodies_know_how_long_they_live() -> None:
-    mortal = EMITTER.model_copy(update={"lifetime": 3.0})
-    bodies = Scene(emitters=(EMITTER, mortal), grids=(GRID,)).bodies
+def test_bodies_have_the_lifetime_of_their_emitter() -> None:
+    limited = EMITTER.model_copy(update={"lifetime": 3.0})
+    bodies = Scene(emitters=(EMITTER, limited), grids=(GRID,)).bodies
     assert bodies.lifetime.tolist() == [np.inf] * 206 + [3.0] * 200
     assert not bodies.born.any()
 
 
 @pytest.mark.parametrize(
-    ("stated", "key", "told"),
+    ("update", "key", "words"),
     [
         ({"lifetime_jitter": 0.5}, "lifetime_jitter", "needs a `lifetime`"),
         ({"lifetime": 1.0, "lifetime_jitter": 1.0}, "lifetime_jitter", "less than `lifetime`"),
@@ -208,8 +210,8 @@ def test_bodies_know_how_long_they_live() -> None:
         ),
     ],
 )
-def test_what_is_said_of_lives_must_agree(stated: dict[str, object], key: str, told: str) -> None:
-    faults = crosscheck(Scene(emitters=(EMITTER, EMITTER.model_copy(update=stated))))
+def test_inconsistent_lifetime_keys_are_faults(update: dict[str, object], key: str, words: str) -> None:
+    faults = crosscheck(Scene(emitters=(EMITTER, EMITTER.model_copy(update=update))))
     ((location, message),) = faults
     assert location == ("emitter", 1, key)
-    assert told in message
+    assert words in message

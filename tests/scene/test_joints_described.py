@@ -1,4 +1,4 @@
-"""Joints, attractions and thrusts in scene files: which there are, and what is wrong with one."""
+"""Joints, attractions and thrusts in scene files: kinds and faults."""
 
 import pytest
 
@@ -33,7 +33,7 @@ def test_joint_of_every_kind_is_read() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "messages"),
     [
         ('between=["a","b"]', [f"s.toml:9: joint[0].kind: is missing; kinds of joint: {KINDS}"]),
         ('kind="spirng"\nbetween=["a","b"]', ['s.toml:10: joint[0].kind: is "spirng"; kinds of joint']),
@@ -92,15 +92,15 @@ def test_joint_of_every_kind_is_read() -> None:
         ),
     ],
 )
-def test_fault_of_a_joint_is_told_with_line_and_path(text: str, told: list[str]) -> None:
+def test_faulty_joint_is_refused_with_line_and_path(text: str, messages: list[str]) -> None:
     found = faults(f"{TWO}[[joint]]\n{text}\n")
-    assert len(found) == len(told), found
-    for message, start in zip(found, told, strict=True):
+    assert len(found) == len(messages), found
+    for message, start in zip(found, messages, strict=True):
         assert message.startswith(start)
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "messages"),
     [
         ("[[attraction]]\nstrength=1", ["s.toml:9: attraction[0].toward: is missing"]),
         (
@@ -129,15 +129,15 @@ def test_fault_of_a_joint_is_told_with_line_and_path(text: str, told: list[str])
         ),
     ],
 )
-def test_fault_of_a_force_is_told_with_line_and_path(text: str, told: list[str]) -> None:
+def test_faulty_force_is_refused_with_line_and_path(text: str, messages: list[str]) -> None:
     found = faults(f"{TWO}{text}\n")
-    assert len(found) == len(told), found
-    for message, start in zip(found, told, strict=True):
+    assert len(found) == len(messages), found
+    for message, start in zip(found, messages, strict=True):
         assert message.startswith(start)
 
 
 @pytest.mark.parametrize("joint", ["joint=5\n", "joint=[5]\n", "attraction={}\n"])
-def test_tables_that_are_none_are_told(joint: str) -> None:
+def test_joint_that_is_not_an_array_of_tables_is_refused(joint: str) -> None:
     (found,) = faults(joint + TWO)
     assert found.startswith("s.toml:1: ")
     assert "a table" in found or "tables, each under a heading" in found
@@ -156,6 +156,6 @@ def test_joint_between_fixed_bodies_is_refused() -> None:
 
 
 @pytest.mark.parametrize("strength", ["0", "-1.0", "inf", "true"])
-def test_strength_is_a_force_above_none(strength: str) -> None:
+def test_strength_that_is_not_a_positive_force_is_refused(strength: str) -> None:
     (found,) = faults(f'{TWO}[[joint]]\nkind="rod"\nstrength={strength}\nbetween=["a"]\n')
     assert found.startswith("s.toml:11: joint[0].strength: ")

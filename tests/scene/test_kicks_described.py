@@ -1,4 +1,4 @@
-"""What a scene file may say of kicks, falloffs, gates and openings, and what is told of what it may not."""
+"""Kicks, restitution falloffs, one-way and passable walls in scene files: faults, surfaces, warnings."""
 
 from typing import Any
 
@@ -16,7 +16,7 @@ NONE = {"restitution_falloff": 0}
 
 
 @pytest.mark.parametrize(
-    ("document", "where", "what"),
+    ("document", "path", "words"),
     [
         (
             {"post": [{**POST, "kick": {"speed": 1, "profile": "middle"}}]},
@@ -51,12 +51,12 @@ NONE = {"restitution_falloff": 0}
         ),
     ],
 )
-def test_fault_is_told_where_it_is(document: dict[str, Any], where: str, what: str) -> None:
+def test_fault_has_its_path_and_message(document: dict[str, Any], path: str, words: str) -> None:
     with pytest.raises(SceneError) as caught:
         from_document(document)
     (fault,) = caught.value.faults
-    assert fault.path == where
-    assert what in fault.message
+    assert fault.path == path
+    assert words in fault.message
 
 
 def test_fault_names_file_and_line() -> None:
@@ -65,7 +65,7 @@ def test_fault_names_file_and_line() -> None:
         loads(text, "bumpers.toml")
 
 
-def test_materials_state_falloff_and_a_shape_outranks_its_own() -> None:
+def test_falloff_of_a_material_is_overridden_by_the_shape() -> None:
     balls = [{**BALL, "material": "rubber"}, {"position": [9, 9], "radius": 0.1, "material": "rubber", **NONE}]
     rubber = {"name": "rubber", "restitution": 0.8, "restitution_falloff": 0.3}
     scene = from_document({"material": [rubber], "ball": balls, "post": [{**POST, "restitution_falloff": 0.1}]})
@@ -77,7 +77,7 @@ def test_materials_state_falloff_and_a_shape_outranks_its_own() -> None:
     assert not surfaces.fixed_coefficients[first, second]
 
 
-def test_parts_of_a_body_take_over_its_falloff() -> None:
+def test_parts_of_a_body_inherit_its_falloff() -> None:
     part = {"position": [0, 0], "radius": 0.1}
     parts = [part, {**part, "position": [0.5, 0], "restitution_falloff": 0.5}]
     scene = from_document({"body": [{"position": [5, 5], "restitution_falloff": 0.2, "ball": parts}]})
@@ -85,24 +85,24 @@ def test_parts_of_a_body_take_over_its_falloff() -> None:
     assert [surfaces.surfaces[k].falloff for k in surfaces.of_shape.tolist()] == [0.2, 0.5]
 
 
-def test_scene_without_any_of_it_has_the_surfaces_it_had() -> None:
+def test_scene_without_kicks_and_falloffs_has_one_plain_surface() -> None:
     surfaces = contact_matrix(from_document({"ball": [BALL], "post": [POST], "wall": [WALL]})).surfaces
     assert len(surfaces.surfaces) == 1
     assert surfaces.fixed_coefficients.all()
     assert not surfaces.kicks.any() | surfaces.one_way.any()
 
 
-def test_warning_where_gravity_alone_makes_a_hit() -> None:
+def test_warning_when_a_step_of_gravity_exceeds_the_kick_threshold() -> None:
     kicks = {"position": [0, 0], "radius": 0.5, "name": "bumper", "kick": {"speed": 1, "threshold": 0.054}}
     document = {"world": {"gravity": [0, -9.81], "duration": 0.1}, "ball": [BALL], "post": [kicks]}
-    slow, quick = ({**document, "solver": {"dt": dt}} for dt in (0.01, 0.005))
-    (warning,) = (each for each in warnings(from_document(slow)) if each.kind == "kick_threshold")
+    coarse, fine = ({**document, "solver": {"dt": dt}} for dt in (0.01, 0.005))
+    (warning,) = (each for each in warnings(from_document(coarse)) if each.kind == "kick_threshold")
     assert "'bumper' kicks bodies that approach at 0.054 m/s" in warning.message
     assert "dt < 0.0055 s" in warning.message  # 0.054/9.81 s
-    assert not [each for each in warnings(from_document(quick)) if each.kind == "kick_threshold"]
+    assert not [each for each in warnings(from_document(fine)) if each.kind == "kick_threshold"]
 
 
-def test_forecast_of_speed_counts_kicks_in() -> None:
+def test_top_speed_includes_kicks() -> None:
     from sandbox.measure.preflight import top_speeds
 
     def fastest(**wall: Any) -> float:
@@ -116,7 +116,7 @@ def test_forecast_of_speed_counts_kicks_in() -> None:
     assert fastest(restitution=1.0, kick={"speed": 2.0}) == 2.0
 
 
-def test_no_closed_form_is_claimed_where_restitution_falls_off() -> None:
+def test_scene_with_restitution_falloff_has_no_closed_form() -> None:
     from sandbox.measure.analytic import solution
 
     plane = {"point": [0, 0], "normal": [0, 1], "restitution": 0.5}
@@ -128,7 +128,7 @@ def test_no_closed_form_is_claimed_where_restitution_falls_off() -> None:
     assert solution(from_document({"ball": [{**each, "restitution_falloff": 0.1} for each in row]})) is None
 
 
-def test_energy_is_not_kept_where_restitution_falls_off_or_something_kicks() -> None:
+def test_energy_is_not_conserved_with_falloff_or_kicks() -> None:
     from sandbox.measure.tradeoff.objective import conserves_energy
 
     elastic = {**BALL, "restitution": 1}

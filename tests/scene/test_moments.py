@@ -15,7 +15,7 @@ from sandbox.scene.geometry.polygon import Moments, capsule_moments, disc_moment
 EXACT = 1e-12  # a handful of roundings of 1e-16 each, over sums of up to a few hundred terms
 
 
-def turned(points: Sequence[Point], angle: float, by: Point = (0.0, 0.0)) -> tuple[Point, ...]:
+def rotated(points: Sequence[Point], angle: float, by: Point = (0.0, 0.0)) -> tuple[Point, ...]:
     c, s = math.cos(angle), math.sin(angle)
     return tuple((by[0] + c * x - s * y, by[1] + s * x + c * y) for x, y in points)
 
@@ -25,7 +25,7 @@ def regular(n: int, radius: float) -> tuple[Point, ...]:
 
 
 def radial(radii: Sequence[float]) -> tuple[Point, ...]:
-    """A star-shaped outline about the origin, of any wildness."""
+    """A star-shaped outline about the origin with these radii."""
     step = 2 * math.pi / len(radii)
     return tuple((r * math.cos(step * i), r * math.sin(step * i)) for i, r in enumerate(radii))
 
@@ -34,14 +34,14 @@ stars = st.lists(st.floats(0.1, 1.0), min_size=3, max_size=40).map(radial)
 angles = st.floats(-10.0, 10.0)
 
 
-def assert_same(got: Moments, expected: Moments, rel: float = EXACT) -> None:
+def assert_moments(got: Moments, expected: Moments, rel: float = EXACT) -> None:
     assert got.area == pytest.approx(expected.area, rel=rel)
     assert got.second == pytest.approx(expected.second, rel=rel)
     assert math.dist(got.centroid, expected.centroid) <= rel * math.sqrt(expected.area)
 
 
 def test_disc_moments_are_the_closed_form() -> None:
-    assert_same(disc_moments((3.0, -4.0), 2.0), Moments(4 * math.pi, (3.0, -4.0), 8 * math.pi))
+    assert_moments(disc_moments((3.0, -4.0), 2.0), Moments(4 * math.pi, (3.0, -4.0), 8 * math.pi))
 
 
 @given(st.floats(0.01, 100), st.floats(0.01, 100))
@@ -55,14 +55,14 @@ def test_rectangle_moments_are_the_closed_form(w: float, h: float) -> None:
 
 def test_right_triangle_moments_are_the_closed_form() -> None:
     # b·h³/36 about x and h·b³/36 about y, through the centroid
-    assert_same(polygon_moments(((0.0, 0.0), (3.0, 0.0), (0.0, 5.0))), Moments(7.5, (1.0, 5 / 3), 15 * 34 / 36))
+    assert_moments(polygon_moments(((0.0, 0.0), (3.0, 0.0), (0.0, 5.0))), Moments(7.5, (1.0, 5 / 3), 15 * 34 / 36))
 
 
 @pytest.mark.parametrize("n", [3, 4, 5, 6, 17, 1000])
 def test_regular_polygon_moments_are_the_closed_form(n: int) -> None:
     area = n / 2 * 4.0 * math.sin(2 * math.pi / n)
     second = area * 4.0 / 6 * (2 + math.cos(2 * math.pi / n))
-    assert_same(polygon_moments(regular(n, 2.0)), Moments(area, (0.0, 0.0), second))
+    assert_moments(polygon_moments(regular(n, 2.0)), Moments(area, (0.0, 0.0), second))
 
 
 def test_annulus_sector_moments_approach_the_closed_form() -> None:
@@ -73,32 +73,32 @@ def test_annulus_sector_moments_approach_the_closed_form() -> None:
     area = half * (outer**2 - inner**2)
     x = 2 * math.sin(half) * (outer**3 - inner**3) / (3 * area)
     second = half * (outer**4 - inner**4) / 2 - area * x * x
-    # chords of angle h leave out h²/6 of a sector's area and h²/3 of its moment, of which some share is subtracted
-    assert_same(polygon_moments(corners), Moments(area, (x, 0.0), second), rel=4 * (2 * half / n) ** 2)
+    # chords of angle h omit h²/6 of a sector's area and h²/3 of its moment; the factor 4 allows for the subtraction
+    assert_moments(polygon_moments(corners), Moments(area, (x, 0.0), second), rel=4 * (2 * half / n) ** 2)
 
 
-def test_capsule_without_length_is_a_disc() -> None:
-    assert_same(capsule_moments((1.0, 2.0), (1.0, 2.0), 0.3), disc_moments((1.0, 2.0), 0.3))
+def test_capsule_without_length_has_moments_of_a_disc() -> None:
+    assert_moments(capsule_moments((1.0, 2.0), (1.0, 2.0), 0.3), disc_moments((1.0, 2.0), 0.3))
 
 
-def test_capsule_without_width_is_a_rod() -> None:
+def test_thin_capsule_has_moments_of_a_rod() -> None:
     length, radius = 3.0, 1e-9
     got = capsule_moments((0.0, 1.0), (length, 1.0), radius)
-    # the ends add πr/2L to the area, 5e-10, and thrice that to the moment
+    # the caps add πr/2L to the area, 5e-10, and three times that to the moment
     assert got.second / got.area == pytest.approx(length**2 / 12, rel=4e-9)
     assert got.area == pytest.approx(2 * radius * length, rel=1e-9)
 
 
 @given(st.floats(0.0, 10.0), st.floats(0.01, 10.0), angles)
-def test_capsule_moments_are_those_of_quadrature(length: float, radius: float, angle: float) -> None:
-    a, b = turned(((0.0, 0.0), (length, 0.0)), angle, by=(2.0, -1.0))
+def test_capsule_moments_agree_with_quadrature(length: float, radius: float, angle: float) -> None:
+    a, b = rotated(((0.0, 0.0), (length, 0.0)), angle, by=(2.0, -1.0))
 
     def height(x: float) -> float:
         past = max(abs(x) - length / 2, 0.0)
         return math.sqrt(max(radius**2 - past**2, 0.0))
 
     def over_cap(power: int) -> float:
-        # with x = L/2 + r·sin t, so that the integrand is smooth to its very end
+        # with x = L/2 + r·sin t, so that the integrand is smooth up to the end of the cap
         def slice_at(t: float) -> float:
             x, dx = length / 2 + radius * math.sin(t), radius * math.cos(t)
             y = height(x)
@@ -110,28 +110,28 @@ def test_capsule_moments_are_those_of_quadrature(length: float, radius: float, a
     second = 2 * radius * length**3 / 12 + 2 * radius**3 / 3 * length + 2 * over_cap(2)
     middle = (a[0] + b[0]) / 2, (a[1] + b[1]) / 2
     expected = Moments(area, middle, second)
-    # height() cancels digits at the very end of a cap, and `middle` those of a place 2 m off, 1 cm wide
-    assert_same(capsule_moments(a, b, radius), expected, rel=1e-9)
+    # height() cancels digits at the end of a cap, and `middle` those of a position 2 m off, 1 cm wide
+    assert_moments(capsule_moments(a, b, radius), expected, rel=1e-9)
 
 
-def test_capsule_moments_are_those_of_its_outline() -> None:
+def test_capsule_moments_agree_with_a_polygon_outline() -> None:
     n, half, radius = 20_000, 1.5, 0.7
     right = [-math.pi / 2 + math.pi * i / n for i in range(n + 1)]
     corners = [(half + radius * math.cos(t), radius * math.sin(t)) for t in right]
     corners += [(-half - radius * math.cos(t), -radius * math.sin(t)) for t in right]
-    # chords of angle h leave out h²/6 of the caps' area and h²/3 of their moment
-    assert_same(polygon_moments(corners), capsule_moments((-half, 0.0), (half, 0.0), radius), rel=(math.pi / n) ** 2)
+    # chords of angle h omit h²/6 of the caps' area and h²/3 of their moment
+    assert_moments(polygon_moments(corners), capsule_moments((-half, 0.0), (half, 0.0), radius), rel=(math.pi / n) ** 2)
 
 
 @given(stars)
-def test_area_and_centroid_are_those_of_shapely(points: tuple[Point, ...]) -> None:
+def test_area_and_centroid_agree_with_shapely(points: tuple[Point, ...]) -> None:
     got, oracle = polygon_moments(points), Polygon(points)
     assert got.area == pytest.approx(oracle.area, rel=1e-11)  # shapely sums without compensation
     assert math.dist(got.centroid, (oracle.centroid.x, oracle.centroid.y)) < 1e-11  # of an extent of 2
 
 
 @given(stars)
-def test_second_moment_is_that_of_greens_theorem(points: tuple[Point, ...]) -> None:
+def test_second_moment_agrees_with_greens_theorem(points: tuple[Point, ...]) -> None:
     got = polygon_moments(points)
     cx, cy = got.centroid
     edges = list(zip(points, points[1:] + points[:1], strict=True))
@@ -141,24 +141,24 @@ def test_second_moment_is_that_of_greens_theorem(points: tuple[Point, ...]) -> N
         mx, my = (ax + bx) / 2 - cx, (ay + by) / 2 - cy
         cubes = [((ax - cx) ** 3, (ay - cy) ** 3, 1), (mx**3, my**3, 4), ((bx - cx) ** 3, (by - cy) ** 3, 1)]
         total += sum(weight * (x * (by - ay) - y * (bx - ax)) for x, y, weight in cubes) / 18
-    assert got.second == pytest.approx(total, rel=1e-11)  # the oracle cancels some digits
+    assert got.second == pytest.approx(total, rel=1e-11)  # cancellation in the oracle
 
 
 @given(stars)
-def test_slices_weigh_together_what_the_whole_does(points: tuple[Point, ...]) -> None:
-    shares = [polygon_moments(((0.0, 0.0), b, c)) for b, c in zip(points, points[1:] + points[:1], strict=True)]
+def test_moments_of_triangles_add_up_to_the_polygon(points: tuple[Point, ...]) -> None:
+    triangles = [polygon_moments(((0.0, 0.0), b, c)) for b, c in zip(points, points[1:] + points[:1], strict=True)]
     whole = polygon_moments(points)
-    second = sum(s.second + s.area * math.dist(s.centroid, whole.centroid) ** 2 for s in shares)  # parallel axes
-    assert whole.area == pytest.approx(sum(s.area for s in shares), rel=1e-11)
+    second = sum(s.second + s.area * math.dist(s.centroid, whole.centroid) ** 2 for s in triangles)  # parallel axes
+    assert whole.area == pytest.approx(sum(s.area for s in triangles), rel=1e-11)
     assert whole.second == pytest.approx(second, rel=1e-11)
 
 
 @given(stars, angles)
-def test_moments_do_not_change_when_turned(points: tuple[Point, ...], angle: float) -> None:
-    before, after = polygon_moments(points), polygon_moments(turned(points, angle))
-    assert after.area == pytest.approx(before.area, rel=1e-11)  # turning rounds every corner by 1e-16
+def test_moments_do_not_change_under_rotation(points: tuple[Point, ...], angle: float) -> None:
+    before, after = polygon_moments(points), polygon_moments(rotated(points, angle))
+    assert after.area == pytest.approx(before.area, rel=1e-11)  # rotation rounds every corner by 1e-16
     assert after.second == pytest.approx(before.second, rel=1e-11)
-    assert math.dist(after.centroid, turned([before.centroid], angle)[0]) < 1e-11
+    assert math.dist(after.centroid, rotated([before.centroid], angle)[0]) < 1e-11
 
 
 def test_moments_far_from_the_origin_keep_their_digits() -> None:

@@ -1,4 +1,4 @@
-"""Nesting: documents of any depth are refused before anything recursive reads them, however full the stack is."""
+"""Nesting: deep documents are refused before a recursive reader sees them, even on a nearly full stack."""
 
 import json
 from collections.abc import Callable
@@ -43,7 +43,7 @@ DEPTHS = (MAX_DEPTH, 100, 1_000, 100_000, 1_000_000)
 
 
 def _deep(call: Callable[[], Any], frames: int) -> Any:
-    """Call something from so many frames further down."""
+    """Call a function from this many stack frames further down."""
     return call() if frames == 0 else _deep(call, frames - 1)
 
 
@@ -58,20 +58,20 @@ def test_deep_toml_is_refused_at_any_depth(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", TOML)
-def test_shallow_toml_is_reported_as_any_other(kind: str) -> None:
+def test_shallow_toml_has_no_nesting_fault(kind: str) -> None:
     with pytest.raises(SceneError) as raised:
         _deep(lambda: loads(TOML[kind](8), "a.toml"), 600)
     assert "nested" not in str(raised.value)
 
 
-def test_depth_that_adds_up_over_keys_and_tables_is_refused() -> None:
+def test_depth_is_summed_over_keys_and_tables() -> None:
     key = ".".join("a" * 20)
     for text in (f"[{key}]\n{key} = 1", f"{key} = {{ {key} = 1 }}", f"{key} = {'[' * 20}{']' * 20}"):
         with pytest.raises(SceneError, match="nested too deeply"):
             loads(text)
 
 
-def test_line_is_told() -> None:
+def test_nesting_fault_has_its_line() -> None:
     with pytest.raises(SceneError) as raised:
         loads("title = 'a'\n\n[world]\ngravity = " + "[" * 99)
     assert raised.value.faults[0].line == 4
@@ -98,7 +98,7 @@ def test_any_text_is_checked_in_linear_time(text: str) -> None:
     check_text(text)
 
 
-def test_values_that_hold_themselves_or_each_other_are_checked() -> None:
+def test_cyclic_and_shared_values_are_checked() -> None:
     cyclic: list[Any] = []
     cyclic.append(cyclic)
     with pytest.raises(NestingError):
@@ -149,12 +149,12 @@ def test_deep_json_is_refused(depth: int, brackets: tuple[str, str], tmp_path: P
         HighScores(path).rank("a", 1)
 
 
-def test_folder_with_a_deep_file_is_listed(tmp_path: Path) -> None:
+def test_folder_with_a_deeply_nested_file_is_listed(tmp_path: Path) -> None:
     (tmp_path / "deep.toml").write_text(f"a = {'[' * 100_000}")
     assert len(scenes_in(str(tmp_path))) == 1
 
 
 def _flatten(nested: Any) -> None:
-    """Take a deep list apart: to let go of it as it is would recurse."""
+    """Take a deep list apart: freeing it as a whole would recurse."""
     while nested:
         nested = nested.pop()

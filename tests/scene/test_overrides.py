@@ -1,4 +1,4 @@
-"""Addresses: `--set` and sweeps reach every value of a scene."""
+"""Override paths: `--set` and sweeps address every value of a scene."""
 
 import copy
 import datetime
@@ -36,7 +36,7 @@ DOCUMENT: dict[str, Any] = {
         ("True", "True"), ("9" * 5000, "9" * 5000), ("[" * 10_000, "[" * 10_000), ("1_000", 1000), (".5", ".5"),
     ],
 )  # fmt: skip
-def test_value_is_toml_and_any_other_word_a_string(text: str, value: object) -> None:
+def test_value_is_parsed_as_toml_or_else_as_a_string(text: str, value: object) -> None:
     parsed = parse_value(text)
     assert parsed == value
     assert type(parsed) is type(value)
@@ -61,7 +61,7 @@ def test_path_is_split_at_dots_outside_quotes(path: str, parts: tuple[str, ...])
 @pytest.mark.parametrize(
     "path", ["", ".", "a.", ".a", "a..b", '"a', "'a.b", '"a"b', 'a."".b', "''", "a.'b'c", "[0]", "a.[0].b"]
 )
-def test_path_malformed_is_refused(path: str) -> None:
+def test_malformed_path_is_refused(path: str) -> None:
     with pytest.raises(AddressError):
         parse_path(path)
 
@@ -95,16 +95,16 @@ def test_assignment_without_key_or_equals_is_refused(text: str) -> None:
         ("ball.1", ("ball", 1)), ("wall", ("wall",)), ("wall.0", ("wall", 0)),
     ],
 )  # fmt: skip
-def test_value_is_set_where_the_path_leads_and_nowhere_else(path: str, location: tuple[str | int, ...]) -> None:
+def test_assign_sets_only_the_value_at_the_path(path: str, location: tuple[str | int, ...]) -> None:
     before = copy.deepcopy(DOCUMENT)
     changed, where = assign(DOCUMENT, path, 42)
     assert where == location
     assert before == DOCUMENT
     expected: Any = copy.deepcopy(DOCUMENT)
-    here = expected
+    node = expected
     for key in location[:-1]:
-        here = here.setdefault(key, {}) if isinstance(here, dict) else here[key]
-    here[location[-1]] = 42
+        node = node.setdefault(key, {}) if isinstance(node, dict) else node[key]
+    node[location[-1]] = 42
     assert changed == expected
 
 
@@ -120,7 +120,7 @@ def test_value_is_set_where_the_path_leads_and_nowhere_else(path: str, location:
         ("ball.\u00b2.mass", "no element"), ("ball.1e0.mass", "no element"),
     ],
 )  # fmt: skip
-def test_path_that_leads_nowhere_is_refused_with_what_there_is(path: str, words: str) -> None:
+def test_unknown_path_is_refused_with_the_available_names(path: str, words: str) -> None:
     with pytest.raises(AddressError, match=words):
         assign(DOCUMENT, path, 1)
 
@@ -134,26 +134,26 @@ def test_path_into_an_empty_list_is_refused() -> None:
     "location",
     [("ball", 0, "mass"), ("ball", 2, "mass"), ("wall", 0, "points", 1, 0), ("world", "gravity", 1), ("ball", 1)],
 )
-def test_path_that_a_fault_writes_leads_to_what_it_is_about(location: tuple[str | int, ...]) -> None:
+def test_path_of_a_fault_can_be_assigned_to(location: tuple[str | int, ...]) -> None:
     assert assign(DOCUMENT, path_of(location, DOCUMENT), 7)[1] == location
 
 
 @given(st.text(max_size=40), st.integers())
 @example("world." + "a." * 5000 + "b", 1)
-def test_any_path_is_followed_or_refused(path: str, value: int) -> None:
+def test_any_path_is_assigned_or_refused(path: str, value: int) -> None:
     try:
         changed, location = assign(DOCUMENT, path, value)
     except AddressError as error:
         assert str(error)
     else:
-        here: Any = changed
+        node: Any = changed
         for key in location:
-            here = here[key]
-        assert here == value
+            node = node[key]
+        assert node == value
 
 
 @given(st.text(min_size=1).filter(lambda name: '"' not in name or "'" not in name))
-def test_element_of_any_name_is_reached_in_quotes(name: str) -> None:
+def test_element_of_any_name_is_addressed_in_quotes(name: str) -> None:
     quote = "'" if '"' in name else '"'
     key, value = parse_assignment(f"ball.{quote}{name}{quote}.mass=2")
     assert assign({"ball": [{"name": "other"}, {"name": name}]}, key, value)[1] == (
@@ -163,7 +163,7 @@ def test_element_of_any_name_is_reached_in_quotes(name: str) -> None:
     )
 
 
-def test_star_sets_every_element_of_a_list_and_is_the_list() -> None:
+def test_star_sets_every_element_and_returns_the_location_of_the_list() -> None:
     before = copy.deepcopy(DOCUMENT)
     changed, where = assign(DOCUMENT, "ball.*.restitution", 0.5)
     assert where == ("ball",)
@@ -171,13 +171,13 @@ def test_star_sets_every_element_of_a_list_and_is_the_list() -> None:
     assert changed == {**DOCUMENT, "ball": [{**each, "restitution": 0.5} for each in DOCUMENT["ball"]]}
 
 
-def test_star_reaches_into_values() -> None:
+def test_star_sets_items_within_values() -> None:
     document = {"ball": [{"position": [0.0, 1.0]}, {"position": [2.0, 3.0]}]}
     assert assign(document, "ball.*.position.1", 9)[0] == {"ball": [{"position": [0.0, 9]}, {"position": [2.0, 9]}]}
     assert assign(document, 'ball."*".mass', 9)[0]["ball"][1] == {"position": [2.0, 3.0], "mass": 9}
 
 
-def test_star_stands_for_every_element_of_a_list_anywhere() -> None:
+def test_star_works_in_nested_lists() -> None:
     document = {"pinball": {"bumper": [{"name": "a"}, {}], "wall": [{"points": [[0, 0], [1, 2]]}]}}
     changed, where = assign(document, "pinball.bumper.*.speed", 2)
     assert where == ("pinball", "bumper")
@@ -185,7 +185,7 @@ def test_star_stands_for_every_element_of_a_list_anywhere() -> None:
     assert assign(document, "pinball.wall.*.points.*[1]", 7)[0]["pinball"]["wall"] == [{"points": [[0, 7], [1, 7]]}]
 
 
-def test_element_called_star_is_the_one_that_is_meant() -> None:
+def test_element_named_star_takes_precedence() -> None:
     document = {"ball": [{"name": "a"}, {"name": "*"}]}
     changed, where = assign(document, "ball.*.mass", 2)
     assert where == ("ball", 1, "mass")
@@ -207,7 +207,7 @@ def test_element_called_star_is_the_one_that_is_meant() -> None:
         ({"ball": [{}]}, "ball.b.shapes.*.x", "no element 'b'"),
     ],
 )  # fmt: skip
-def test_star_that_leads_nowhere_is_refused(document: dict[str, Any], path: str, words: str) -> None:
+def test_star_with_an_unknown_path_is_refused(document: dict[str, Any], path: str, words: str) -> None:
     before = copy.deepcopy(document)
     with pytest.raises(AddressError, match=words):
         assign(document, path, 1)

@@ -1,4 +1,4 @@
-"""`[play]`: what it names is there, and no run depends on it."""
+"""`[play]`: its references are checked, and it does not affect the bodies."""
 
 import re
 from typing import Any
@@ -28,7 +28,7 @@ PARTS: dict[str, Any] = {
         {"show": "overlap"}, {"arrows": "a.b", "arrow_step": 0.1, "relaunch": "s", "show": "overlap"},
     ],
 )  # fmt: skip
-def test_what_is_there_can_be_claimed(play: dict[str, Any]) -> None:
+def test_play_may_refer_to_existing_bodies_and_generators(play: dict[str, Any]) -> None:
     scene = from_document({**PARTS, "play": play})
     assert scene.play.model_dump(exclude_unset=True) == play
     assert scene.bodies.position.tolist() == from_document(PARTS).bodies.position.tolist()
@@ -58,7 +58,7 @@ def test_what_is_there_can_be_claimed(play: dict[str, Any]) -> None:
         ({"ground": "sand"}, "play.ground", "'playfield'"),
     ],
 )
-def test_what_is_not_there_is_a_fault_where_it_stands(play: dict[str, Any], path: str, words: str) -> None:
+def test_unknown_reference_or_invalid_value_in_play_is_a_fault(play: dict[str, Any], path: str, words: str) -> None:
     with pytest.raises(SceneError) as caught:
         from_document({**PARTS, "play": play})
     (fault,) = caught.value.faults
@@ -66,7 +66,7 @@ def test_what_is_not_there_is_a_fault_where_it_stands(play: dict[str, Any], path
     assert re.search(words, fault.message)
 
 
-def test_both_faults_are_told_at_once_with_their_lines() -> None:
+def test_all_faults_in_play_are_reported_with_their_lines() -> None:
     text = 'title = "t"\n\n[play]\narrows = "a"\nrelaunch = "b"\n'
     with pytest.raises(SceneError) as caught:
         loads(text, "t.toml")

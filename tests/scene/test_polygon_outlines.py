@@ -1,4 +1,4 @@
-"""Orientation, convexity and faults of outlines, against closed forms, fractions and shapely."""
+"""Orientation, convexity and faults of outlines, compared with closed forms, exact fractions and shapely."""
 
 import math
 from collections.abc import Sequence
@@ -25,31 +25,31 @@ def moved(points: Sequence[Point], angle: float = 0.0, by: Point = (0.0, 0.0)) -
     return tuple((by[0] + c * x - s * y, by[1] + s * x + c * y) for x, y in points)
 
 
-def test_area_of_an_outline_has_the_sign_of_its_sense() -> None:
+def test_area_of_an_outline_has_the_sign_of_its_orientation() -> None:
     assert signed_area(L) == 3.0
     assert signed_area(L[::-1]) == -3.0
 
 
-def test_area_far_from_the_origin_is_the_same_to_the_last_digit() -> None:
+def test_area_far_from_the_origin_is_exact() -> None:
     assert signed_area(moved(L, by=(1e6, -1e6))) == 3.0
     assert signed_area(moved(L, by=(1e15, 1e15))) == 3.0
 
 
-def test_anticlockwise_turns_an_outline_round_and_keeps_its_first_corner() -> None:
+def test_anticlockwise_reverses_an_outline_and_keeps_its_first_corner() -> None:
     clockwise = (L[0], *L[:0:-1])
     assert anticlockwise(L) == L
     assert anticlockwise(clockwise) == L
 
 
 @given(st.tuples(close, close), st.sampled_from([(12.0, 12.0), (24.0, 24.0), (0.5, 0.5)]))
-def test_turn_has_the_exact_sign_where_rounding_would_choose_another(a: Point, b: Point) -> None:
+def test_orientation_has_the_exact_sign_despite_rounding(a: Point, b: Point) -> None:
     c = (24.0, 24.0)
     ax, ay, bx, by = map(Fraction, (*a, *b))
     exact = (ax - 24) * (by - 24) - (ay - 24) * (bx - 24)
     assert (orient2d(a, b, c) > 0, orient2d(a, b, c) < 0) == (exact > 0, exact < 0)
 
 
-def test_turn_has_a_sign_where_its_products_underflow() -> None:
+def test_orientation_has_a_sign_when_its_products_underflow() -> None:
     assert orient2d((0.0, 0.0), (1e-200, 0.0), (0.0, 1e-200)) > 0.0
     assert orient2d((0.0, 0.0), (0.0, 1e-200), (1e-200, 0.0)) < 0.0
 
@@ -63,7 +63,7 @@ def test_regular_polygon_is_convex(n: int) -> None:
     assert is_convex(tuple((math.cos(2 * math.pi * i / n), math.sin(2 * math.pi * i / n)) for i in range(n)))
 
 
-def test_outline_with_a_hollow_corner_is_not_convex() -> None:
+def test_outline_with_a_reflex_corner_is_not_convex() -> None:
     assert not is_convex(L)
     assert not is_convex(((0.0, 0.0), (1.0, 1e-6), (2.0, 0.0), (1.0, 1.0)))
 
@@ -77,11 +77,11 @@ def test_corners_on_straight_edges_stay_straight_when_moved(angle: float, by: Po
 
 
 @pytest.mark.parametrize("points", [SQUARE, L, L[::-1], moved(L, 0.3), moved(L, 0.3, (1e6, 1e6))])
-def test_sound_outline_has_no_fault(points: tuple[Point, ...]) -> None:
+def test_valid_outline_has_no_fault(points: tuple[Point, ...]) -> None:
     assert outline_fault(points) is None
 
 
-def test_corner_on_its_neighbour_is_a_fault() -> None:
+def test_corner_too_close_to_its_neighbour_is_a_fault() -> None:
     fault = outline_fault(((0.0, 0.0), (1.0, 0.0), (1.0, 1e-10), (0.0, 1.0)))
     assert fault is not None
     assert fault[0] == 2
@@ -116,7 +116,7 @@ def test_corner_that_touches_an_edge_is_a_fault(lift: float) -> None:
     assert outline_fault(((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (1.0, lift), (0.0, 2.0))) is not None
 
 
-def test_corner_that_just_misses_an_edge_is_none() -> None:
+def test_corner_one_ulp_off_an_edge_is_no_fault() -> None:
     assert outline_fault(((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (1.0, 2.0**-52), (0.0, 2.0))) is None
 
 
@@ -141,14 +141,14 @@ def test_outline_without_width_is_a_fault_of_no_corner() -> None:
 
 
 @given(grid_points)
-def test_fault_is_found_exactly_where_shapely_finds_one(points: tuple[Point, ...]) -> None:
+def test_outline_has_a_fault_exactly_if_shapely_finds_it_invalid(points: tuple[Point, ...]) -> None:
     repeats = any(a == b for a, b in zip(points, points[1:] + points[:1], strict=True))
     valid = not repeats and bool(Polygon(points).is_valid)
     assert (outline_fault(points) is None) == valid
 
 
 @given(grid_points, st.integers(0, 8), st.booleans())
-def test_fault_does_not_depend_on_where_or_which_way_an_outline_starts(
+def test_fault_does_not_depend_on_first_corner_or_orientation(
     points: tuple[Point, ...], start: int, backwards: bool
 ) -> None:
     start %= len(points)
@@ -158,7 +158,7 @@ def test_fault_does_not_depend_on_where_or_which_way_an_outline_starts(
 
 
 @given(st.lists(st.floats(0.1, 1.0), min_size=3, max_size=40), st.integers(0, 39), st.integers(0, 39))
-def test_swapped_corners_of_a_star_are_judged_as_shapely_does(radii: list[float], i: int, j: int) -> None:
+def test_swapped_corners_of_a_star_are_a_fault_if_shapely_finds_one(radii: list[float], i: int, j: int) -> None:
     n = len(radii)
     i, j = i % n, j % n
     assume(i != j)

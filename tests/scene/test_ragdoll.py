@@ -1,4 +1,4 @@
-"""Ragdolls: people's shares of mass and length, joints within their bounds, limbs that pass each other."""
+"""Ragdolls: human mass and length fractions, joint limits, limbs of one ragdoll that do not collide."""
 
 import math
 from typing import Any
@@ -21,28 +21,28 @@ MASSES = {
     "head": 6.9, "pelvis": 21.75, "chest": 21.75, "upper-arm": 2.7, "forearm": 1.6, "hand": 0.6, "thigh": 14.2,
     "shank": 4.3, "foot": 1.4,
 }  # fmt: skip
-"""%, of which the trunk has 43.5 in two"""
+"""% of the total mass; the trunk has 43.5 % in two segments."""
 
 
 def scene_of(**ragdoll: Any) -> Scene:
     return from_document({"ragdoll": [{"position": [0.0, 0.0], **ragdoll}]})
 
 
-def parted(scene: Scene, position: FloatArray, angle: FloatArray) -> float:
-    """Return how far the two sides of a pivot are apart at most, m."""
+def joint_separation(scene: Scene, position: FloatArray, angle: FloatArray) -> float:
+    """Return the largest distance between the two anchors of a pivot, m."""
     pivots = scene.links.of(LinkKind.PIVOT)
     first, second = pivots.ends(position, angle)
     return float(np.hypot(*(second - first).T).max())
 
 
-def within(scene: Scene, angle: FloatArray) -> float:
-    """Return how far the angle of a joint is within its bounds at least, rad."""
+def limit_margin(scene: Scene, angle: FloatArray) -> float:
+    """Return the smallest distance of a joint angle from its limits, rad; negative beyond a limit."""
     bounds = scene.links.of(LinkKind.ROTARY_LIMIT)
     turn = angle[bounds.b] - angle[bounds.a]
     return float(np.minimum(turn - bounds.figures[:, 0], bounds.figures[:, 1] - turn).min())
 
 
-def test_segments_share_the_mass_as_people_do() -> None:
+def test_segments_have_human_mass_fractions() -> None:
     bodies = scene_of(name="doll", mass=80.0).bodies
     assert len(bodies) == 15
     assert math.fsum(bodies.mass) == pytest.approx(80.0, rel=1e-15)
@@ -52,16 +52,16 @@ def test_segments_share_the_mass_as_people_do() -> None:
     assert math.fsum(scene_of().bodies.mass) == pytest.approx(75.0, rel=1e-15)
 
 
-def test_names_tell_the_segments() -> None:
+def test_bodies_are_named_after_their_segments() -> None:
     names = scene_of(name="doll").bodies.names
     trunk = {"doll-pelvis", "doll-chest", "doll-head"}
     sides = {f"doll-{side}-{limb}" for side in ("left", "right") for limb in MASSES if f"doll-{limb}" not in trunk}
     assert set(names) == trunk | sides
     assert scene_of().bodies.names[0] == "ragdoll-1-left-upper-arm"
-    assert scene_of(facing="left").bodies.names[0] == "ragdoll-1-right-upper-arm"  # what is behind comes first
+    assert scene_of(facing="left").bodies.names[0] == "ragdoll-1-right-upper-arm"  # the limbs at the back come first
 
 
-def test_straight_figure_is_as_tall_as_its_height_and_joined_where_its_segments_meet() -> None:
+def test_straight_figure_has_unit_height_and_joints_at_segment_ends() -> None:
     parts = segments(scene_of().ragdolls[0])
     assert max(part.ends[0][1] + part.radius for part in parts.values()) == 1.0
     assert min(part.ends[-1][1] - part.radius for name, part in parts.items() if name.endswith("foot")) == 0.0
@@ -82,17 +82,17 @@ figures = {
 
 
 @given(st.fixed_dictionaries({}, optional=figures))
-def test_ragdoll_starts_whole_within_its_bounds(ragdoll: dict[str, Any]) -> None:
+def test_ragdoll_starts_joined_and_within_its_joint_limits(ragdoll: dict[str, Any]) -> None:
     scene = scene_of(**ragdoll)
     bodies, height = scene.bodies, ragdoll.get("height", 1.75)
-    assert parted(scene, bodies.position, bodies.angle) < 1e-14 * (height + 20.0)  # rounding of places
-    assert within(scene, bodies.angle) >= math.radians(4.9)  # the stiffest bend of the stride is 5° from its bound
+    assert joint_separation(scene, bodies.position, bodies.angle) < 1e-14 * (height + 20.0)  # rounding of positions
+    assert limit_margin(scene, bodies.angle) >= math.radians(4.9)  # the smallest margin of the initial pose is 5°
     assert len(scene.links) == 28
     assert loads(dumps(scene)) == scene
 
 
 @pytest.mark.parametrize("facing", ["left", "right"])
-def test_ragdoll_stands_on_its_position(facing: str) -> None:
+def test_position_of_a_ragdoll_is_below_its_feet(facing: str) -> None:
     bodies = scene_of(position=[3.0, 1.0], height=2.0, facing=facing).bodies
     shapes = bodies.shapes
     cos, sin = np.cos(bodies.angle), np.sin(bodies.angle)
@@ -100,7 +100,7 @@ def test_ragdoll_stands_on_its_position(facing: str) -> None:
     y = bodies.position[body, 1] + sin[body] * shapes.corner[:, 0] + cos[body] * shapes.corner[:, 1]
     lowest = y - np.repeat(shapes.radius, shapes.corners)
     assert lowest.min() == pytest.approx(1.0, abs=1e-15)  # rounding
-    assert (y + np.repeat(shapes.radius, shapes.corners)).max() == pytest.approx(3.0, abs=0.02)  # legs are spread
+    assert (y + np.repeat(shapes.radius, shapes.corners)).max() == pytest.approx(3.0, abs=0.02)  # the legs are spread
     toe = bodies.position[bodies.names.index("ragdoll-1-right-foot"), 0]
     assert (toe > 3.0) == (facing == "right")
 
@@ -113,18 +113,18 @@ def test_facing_left_is_the_mirror_image() -> None:
     assert left.position[order] * [-1.0, 1.0] == pytest.approx(right.position, abs=1e-15)  # rounding
 
 
-def test_angle_and_spin_turn_all_of_it_about_its_position() -> None:
-    upright, lying = scene_of(position=[1.0, 2.0]).bodies, scene_of(position=[1.0, 2.0], angle=math.pi / 2).bodies
+def test_angle_and_angular_velocity_apply_about_the_position() -> None:
+    upright, tilted = scene_of(position=[1.0, 2.0]).bodies, scene_of(position=[1.0, 2.0], angle=math.pi / 2).bodies
     offset = upright.position - [1.0, 2.0]
-    across = np.column_stack((-offset[:, 1], offset[:, 0]))
-    assert lying.position == pytest.approx(np.add(across, [1.0, 2.0]), abs=1e-15)
-    assert lying.angle == pytest.approx(upright.angle + math.pi / 2, abs=1e-15)  # rounding, as above
+    rotated = np.column_stack((-offset[:, 1], offset[:, 0]))
+    assert tilted.position == pytest.approx(np.add(rotated, [1.0, 2.0]), abs=1e-15)
+    assert tilted.angle == pytest.approx(upright.angle + math.pi / 2, abs=1e-15)  # rounding, as above
     spun = scene_of(position=[1.0, 2.0], velocity=[1.0, 0.0], angular_velocity=3.0).bodies
     assert spun.angular_velocity.tolist() == [3.0] * 15
-    assert spun.velocity == pytest.approx(np.add(3.0 * across, [1.0, 0.0]), abs=1e-14)
+    assert spun.velocity == pytest.approx(np.add(3.0 * rotated, [1.0, 0.0]), abs=1e-14)
 
 
-def test_limbs_of_one_pass_through_each_other_not_through_another() -> None:
+def test_limbs_of_each_ragdoll_have_their_own_collision_group() -> None:
     scene = from_document({
         "ball": [{"position": [9.0, 9.0], "radius": 1.0}],
         "ragdoll": [{"position": [0.0, 0.0]}, {"position": [2.0, 0.0]}],
@@ -135,7 +135,7 @@ def test_limbs_of_one_pass_through_each_other_not_through_another() -> None:
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
-def test_only_limbs_of_one_ragdoll_overlap_without_a_contact(engine: str) -> None:
+def test_limbs_collide_only_with_other_ragdolls(engine: str) -> None:
     doll = {"position": [0.0, 0.0], "restitution": 0.0}
     for dolls, touches in (([doll], False), ([doll, {**doll, "position": [0.1, 0.0]}], True)):
         scene = from_document({"solver": {"dt": 0.001}, "ragdoll": dolls})
@@ -156,7 +156,7 @@ def test_only_limbs_of_one_ragdoll_overlap_without_a_contact(engine: str) -> Non
         ({"mass": 0.0}, "mass", "must be greater than 0"),
     ],
 )
-def test_wrong_figure_is_a_fault_that_says_what_would_be_right(ragdoll: dict[str, Any], key: str, message: str) -> None:
+def test_wrong_value_is_a_fault_with_a_hint(ragdoll: dict[str, Any], key: str, message: str) -> None:
     with pytest.raises(SceneError) as caught:
         scene_of(**ragdoll)
     (fault,) = caught.value.faults
@@ -164,7 +164,7 @@ def test_wrong_figure_is_a_fault_that_says_what_would_be_right(ragdoll: dict[str
     assert message in fault.message
 
 
-def test_material_and_colour_are_those_of_the_table() -> None:
+def test_segments_have_the_material_and_colour_of_the_ragdoll() -> None:
     scene = from_document({
         "material": [{"name": "felt", "friction": 0.5}],
         "ragdoll": [{"position": [0.0, 0.0], "material": "felt", "restitution": 0.1, "colour": "#123456"}],
@@ -176,17 +176,17 @@ def test_material_and_colour_are_those_of_the_table() -> None:
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
-def test_ragdoll_holds_together_down_the_stairs(engine: str) -> None:
+def test_ragdoll_stays_joined_when_falling_down_stairs(engine: str) -> None:
     scene = load(find("ragdoll_stairs"))
     simulation = start(scene, engine, scene.solver)
-    apart, beyond = 0.0, 0.0
+    separation, excess = 0.0, 0.0
     for _ in range(round(5.0 / scene.solver.dt)):
         simulation.step()
         frame = simulation.frame()
-        apart = max(apart, parted(scene, frame.position, frame.angle))
-        beyond = max(beyond, -within(scene, frame.angle))
+        separation = max(separation, joint_separation(scene, frame.position, frame.angle))
+        excess = max(excess, -limit_margin(scene, frame.angle))
     simulation.close()
-    assert frame.position[scene.bodies.names.index("doll-head"), 1] < 1.5  # it has come down from 3.6 m
-    # joints are held by velocities: a blow at some 5 m/s moves what it stops by v·h = 5 mm before it is put right
-    assert apart < 0.02
-    assert beyond < math.radians(8.0)  # likewise, of a hand's 8 cm
+    assert frame.position[scene.bodies.names.index("doll-head"), 1] < 1.5  # fell from 3.6 m
+    # joints are velocity constraints: an impact at about 5 m/s separates an anchor by v·h = 5 mm before the correction
+    assert separation < 0.02
+    assert excess < math.radians(8.0)  # the same 5 mm, relative to the 8 cm of a hand

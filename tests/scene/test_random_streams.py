@@ -1,4 +1,4 @@
-"""Streams: no two purposes draw the same numbers, for any seed and any number of elements."""
+"""Random streams: streams of one seed have distinct keys and draws, for any seed and any number of elements."""
 
 from collections.abc import Iterator
 
@@ -17,17 +17,17 @@ WITHOUT_INDEX = {
     Stream.LANDING,
     Stream.KEYS,
 }
-"""Of which a seed has one; of all others there are several."""
+"""Streams of which a seed has only one; all others have an index."""
 
 MANY = 10_000
-"""Elements of a kind, turns or strokes."""
+"""Number of indices: elements of a kind, turns or strokes."""
 
 SEEDS = (0, 1, 2, 3, 4, 7, 11, 12, 12345, 2**32 - 1, 2**32, 3 * 2**32 + 1, 2**63 - 1, *(s.value for s in Stream))
-"""Some that look like the numbers of streams, and some of two words."""
+"""Seeds; some equal the number of a stream, some take two 32-bit words."""
 
 
 def words(key: list[int]) -> tuple[int, ...]:
-    """Return what numpy's seed sequence makes of a key: words of 32 bits, without trailing zeros."""
+    """Return the 32-bit words that numpy's SeedSequence makes of a key, without trailing zeros."""
     found: list[int] = []
     for each in key:
         found.append(each & 0xFFFFFFFF)
@@ -47,15 +47,15 @@ def keys(seed: int, many: int) -> Iterator[list[int]]:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_every_stream_of_a_seed_has_a_key_of_its_own(seed):
-    every = [words(key) for key in keys(seed, MANY)]
-    assert len(set(every)) == len(every)
+def test_streams_of_a_seed_have_distinct_keys(seed):
+    all_words = [words(key) for key in keys(seed, MANY)]
+    assert len(set(all_words)) == len(all_words)
 
 
 @pytest.mark.parametrize(
     "stream", [Stream.COIL, Stream.CURLER, Stream.FLIPPERS, Stream.LANDING, Stream.KEYS, Stream.AIM]
 )
-def test_seed_that_is_the_number_of_a_stream_has_keys_of_its_own(stream):
+def test_seed_equal_to_a_stream_number_has_distinct_keys(stream):
     index = () if stream in WITHOUT_INDEX else (0,)
     others = {words(key_of(stream, seed, *index)) for seed in range(1000)}
     for generator in (Stream.GRID, Stream.SCATTER, Stream.EMITTER, Stream.STACK):
@@ -63,10 +63,10 @@ def test_seed_that_is_the_number_of_a_stream_has_keys_of_its_own(stream):
             assert words(key_of(generator, stream.value, k)) not in others
 
 
-def test_words_are_what_numpy_makes_of_a_key():
-    """The rules by which keys are told apart here are numpy's own."""
-    alike = [[5, 3], [5, 3, 0], [5, 3, 0, 0]], [[5, 2**32 + 3], [5, 3, 1]]
-    for group in alike:
+def test_keys_with_equal_words_have_equal_draws_in_numpy():
+    """`words` compares keys as numpy does."""
+    equal_groups = [[5, 3], [5, 3, 0], [5, 3, 0, 0]], [[5, 2**32 + 3], [5, 3, 1]]
+    for group in equal_groups:
         assert len({words(key) for key in group}) == 1
         assert len({int(np.random.PCG64(key).random_raw()) for key in group}) == 1
     assert words([5, 0, 3]) != words([5, 3])
@@ -74,17 +74,17 @@ def test_words_are_what_numpy_makes_of_a_key():
 
 
 @pytest.mark.parametrize("seed", [0, 1, 3, 2**40])
-def test_every_stream_of_a_seed_begins_with_other_draws(seed):
-    begins = [draws(s, seed, *(() if s in WITHOUT_INDEX else (k,))).random() for s in Stream for k in range(50)]
-    assert len(set(begins)) == len(begins) - 49 * len(WITHOUT_INDEX)
+def test_streams_of_a_seed_have_distinct_first_draws(seed):
+    first_draws = [draws(s, seed, *(() if s in WITHOUT_INDEX else (k,))).random() for s in Stream for k in range(50)]
+    assert len(set(first_draws)) == len(first_draws) - 49 * len(WITHOUT_INDEX)
 
 
-def test_rack_and_first_stack_draw_apart():
+def test_rack_and_first_stack_have_distinct_draws():
     assert draws(Stream.RACK, 7).random() != draws(Stream.STACK, 7, 0).random()
 
 
-def test_jitter_of_a_stack_follows_the_seed():
+def test_jitter_of_a_stack_depends_on_the_seed():
     stack = {"name": "s", "base": [0, 0], "size": [1, 1], "columns": 1, "rows": 4, "jitter": 0.1}
-    places = [from_document({"world": {"seed": seed}, "stack": [stack]}).bodies.position[:, 0] for seed in (1, 1, 2)]
-    assert (places[0] == places[1]).all()
-    assert (places[0] != places[2]).all()
+    positions = [from_document({"world": {"seed": seed}, "stack": [stack]}).bodies.position[:, 0] for seed in (1, 1, 2)]
+    assert (positions[0] == positions[1]).all()
+    assert (positions[0] != positions[2]).all()

@@ -1,4 +1,4 @@
-"""Ropes: of rods, of springs, of planks."""
+"""Ropes made of rods, springs or planks."""
 
 import math
 from typing import Any
@@ -36,12 +36,12 @@ def faults_of(more: dict[str, Any] | None = None, **rope: Any) -> list[tuple[str
 
 
 def gaps(scene: Scene) -> FloatArray:
-    """Return the vectors between the two ends of each link as the scene starts."""
+    """Return the vector between the two ends of each link in the initial state, (L, 2) m."""
     first, second = scene.links.ends(scene.bodies.position, scene.bodies.angle)
     return second - first
 
 
-def test_rope_as_long_as_its_way_is_straight_and_even() -> None:
+def test_rope_without_slack_is_straight_with_equal_links() -> None:
     scene = scene_of(name="line")
     assert scene.bodies.names == tuple(f"line-{n}" for n in range(1, 7))
     assert scene.links.names == tuple(f"line-joint-{n}" for n in range(1, 6))
@@ -53,7 +53,7 @@ def test_rope_as_long_as_its_way_is_straight_and_even() -> None:
     assert not scene.links.collide.any()
 
 
-def test_mass_is_of_each_node_and_nodes_are_balls_that_meet_nothing() -> None:
+def test_nodes_have_the_given_mass_and_do_not_collide() -> None:
     bodies = scene_of(mass=0.25, radius=0.1, colour="#ff0000").bodies
     assert bodies.mass.tolist() == [0.25] * 6
     assert bodies.round.all()
@@ -68,8 +68,10 @@ def test_mass_is_of_each_node_and_nodes_are_balls_that_meet_nothing() -> None:
     links=st.integers(2, 60), slack=st.floats(0.0, 20.0), x=st.floats(-3.0, 3.0), y=st.floats(-3.0, 3.0),
     gravity=st.sampled_from([[0.0, 0.0], [0.0, -9.81], [3.0, 1.0]]), kind=st.sampled_from(["rods", "planks"]),
 )  # fmt: skip
-@example(links=7, slack=0.5, x=2e-313, y=2e-313, gravity=[0.0, -9.81], kind="rods")  # too few digits for a direction
-def test_slack_rope_keeps_the_lengths_of_its_links_and_its_ends(
+@example(
+    links=7, slack=0.5, x=2e-313, y=2e-313, gravity=[0.0, -9.81], kind="rods"
+)  # subnormal: too few digits for a direction
+def test_slack_rope_has_the_given_link_length_and_ends(
     links: int, slack: float, x: float, y: float, gravity: list[float], kind: str
 ) -> None:
     length = max(math.hypot(x, y), 0.1) * (1.0 + slack)
@@ -82,36 +84,36 @@ def test_slack_rope_keeps_the_lengths_of_its_links_and_its_ends(
         radius=0.001 * length / links,
     )
     bodies, pitch = scene.bodies, length / links
-    rounding = 1e-13 * length  # of sums of up to 60 links
+    rounding = 1e-13 * length  # rounding of sums of up to 60 links
     if kind == "rods":
         assert np.hypot(*gaps(scene).T) == pytest.approx(pitch, abs=rounding)
-        place = bodies.position
+        nodes = bodies.position
     else:
         assert np.hypot(*gaps(scene).T) == pytest.approx(0.0, abs=rounding)
         turn = np.column_stack((np.cos(bodies.angle), np.sin(bodies.angle)))
-        place = np.vstack((bodies.position - 0.5 * pitch * turn, bodies.position[-1:] + 0.5 * pitch * turn[-1:]))
-    assert place[0] == pytest.approx(np.zeros(2), abs=rounding)
-    assert place[-1] == pytest.approx(np.array([x, y]), abs=rounding)
-    middle = place.mean(axis=0) - 0.5 * np.array([x, y])
+        nodes = np.vstack((bodies.position - 0.5 * pitch * turn, bodies.position[-1:] + 0.5 * pitch * turn[-1:]))
+    assert nodes[0] == pytest.approx(np.zeros(2), abs=rounding)
+    assert nodes[-1] == pytest.approx(np.array([x, y]), abs=rounding)
+    middle = nodes.mean(axis=0) - 0.5 * np.array([x, y])
     down = np.array(gravity) if any(gravity) else np.array([0.0, -1.0])
-    assert middle @ down >= -rounding * math.hypot(*down)  # it hangs that way
+    assert middle @ down >= -rounding * math.hypot(*down)  # it hangs in the direction of gravity
     assert loads(dumps(scene)) == scene
 
 
-def test_rope_back_to_its_start_is_a_regular_polygon() -> None:
-    place = scene_of(end=[0.0, 0.0], links=6, length=6.0).bodies.position
-    assert place[3] == pytest.approx(np.array([0.0, -2.0]), abs=1e-14)  # rounding
-    assert place[[0, 6]] == pytest.approx(np.zeros((2, 2)), abs=1e-14)  # rounding
+def test_rope_with_equal_ends_is_a_regular_polygon() -> None:
+    position = scene_of(end=[0.0, 0.0], links=6, length=6.0).bodies.position
+    assert position[3] == pytest.approx(np.array([0.0, -2.0]), abs=1e-14)  # rounding
+    assert position[[0, 6]] == pytest.approx(np.zeros((2, 2)), abs=1e-14)  # rounding
 
 
-def test_springs_take_their_rest_from_the_length_and_may_start_stretched() -> None:
+def test_springs_have_rest_lengths_of_the_rope_length_and_may_start_stretched() -> None:
     scene = scene_of(length=2.5, damping=0.3, **SPRINGS)
     assert scene.links.kind.tolist() == [LinkKind.SPRING] * 5
     assert scene.links.figures.tolist() == [[0.5, 200.0, 0.3]] * 5
     assert np.hypot(*gaps(scene).T) == pytest.approx(1.0, abs=1e-15)  # rounding
 
 
-def test_planks_lie_end_to_end_and_hang_on_the_world() -> None:
+def test_planks_are_joined_end_to_end_and_to_the_world() -> None:
     scene = scene_of(mass=2.0, **PLANKS)
     bodies, links = scene.bodies, scene.links
     assert len(bodies) == 5
@@ -127,26 +129,26 @@ def test_planks_lie_end_to_end_and_hang_on_the_world() -> None:
 
 
 @pytest.mark.parametrize(("fix", "fixed"), [([], []), (["start"], [0]), (["end"], [5]), (["end", "start"], [0, 5])])
-def test_only_the_ends_that_are_fixed_are_fixed(fix: list[str], fixed: list[int]) -> None:
+def test_fix_selects_the_fixed_ends(fix: list[str], fixed: list[int]) -> None:
     assert np.flatnonzero(scene_of(fix=fix).bodies.fixed).tolist() == fixed
     assert len(scene_of(fix=fix, **PLANKS).links) == 4 + len(fixed)
 
 
 @pytest.mark.parametrize("kind", [{}, SPRINGS, PLANKS], ids=["rods", "springs", "planks"])
-def test_tied_rope_holds_bodies_where_its_ends_start(kind: dict[str, Any]) -> None:
+def test_tied_rope_is_anchored_to_bodies_at_its_ends(kind: dict[str, Any]) -> None:
     scene = scene_of({"ball": BALLS}, tie={"start": "a", "end": "b"}, **kind)
     bodies, links = scene.bodies, scene.links
     assert not bodies.fixed.any()
     assert len(bodies) == 2 + (5 if kind is PLANKS else 4)
     first, second = links.ends(bodies.position, bodies.angle)
-    ends = {number: place for pair, places in ((links.a, first), (links.b, second))
-            for number, place in zip(pair.tolist(), places.tolist(), strict=True) if number < 2}  # fmt: skip
+    ends = {body: anchor for bodies_of, anchors in ((links.a, first), (links.b, second))
+            for body, anchor in zip(bodies_of.tolist(), anchors.tolist(), strict=True) if body < 2}  # fmt: skip
     assert ends[0] == pytest.approx([0.0, 0.0], abs=1e-15)  # rounding
     assert ends[1] == pytest.approx([3.0, 4.0], abs=1e-15)  # rounding
     assert np.hypot(*gaps(scene).T) == pytest.approx(0.0 if kind is PLANKS else 1.0, abs=1e-14)  # rounding
 
 
-def test_one_link_between_two_bodies_has_no_node_of_its_own() -> None:
+def test_single_link_between_two_bodies_has_no_nodes() -> None:
     scene = scene_of({"ball": BALLS}, links=1, tie={"start": "a", "end": "b"})
     assert scene.bodies.names == ("a", "b")
     assert scene.links.a.tolist() == [0]
@@ -160,7 +162,7 @@ def test_links_between_fixed_bodies_are_left_out() -> None:
     assert len(scene_of({"ball": fixed}, links=1, tie={"start": "a"}).links) == 0
 
 
-def test_joints_of_the_file_come_first() -> None:
+def test_joints_of_the_file_precede_those_of_ropes() -> None:
     joint = {"kind": "rod", "between": ["a", "rope-1-2"], "name": "mine"}
     scene = scene_of({"ball": BALLS, "joint": [joint]})
     assert scene.links.names == ("mine", *(f"rope-1-joint-{n}" for n in range(1, 6)))
@@ -189,24 +191,24 @@ def test_joints_of_the_file_come_first() -> None:
         ({"fix": ["middle"]}, "fix[0]", "'start' or 'end'"),
     ],
 )
-def test_wrong_figure_is_a_fault_that_says_what_would_be_right(rope: dict[str, Any], key: str, message: str) -> None:
-    ((path, said),) = faults_of({"ball": BALLS}, **rope)
+def test_wrong_value_is_a_fault_with_a_hint(rope: dict[str, Any], key: str, message: str) -> None:
+    ((path, fault_message),) = faults_of({"ball": BALLS}, **rope)
     assert path == f"rope[0].{key}"
-    assert message in said
+    assert message in fault_message
 
 
-def test_fault_stands_in_its_line() -> None:
+def test_fault_of_a_rope_has_its_line() -> None:
     text = "[[rope]]\nstart = [0, 0]\nend = [1, 0]\nlinks = 3\nlength = 0.5\n"
     with pytest.raises(SceneError) as caught:
         loads(text)
     assert [fault.line for fault in caught.value.faults] == [5]
 
 
-def test_chain_comes_to_rest_with_the_sag_that_its_scene_tells() -> None:
+def test_chain_comes_to_rest_with_the_sag_stated_in_its_scene() -> None:
     scene = load(find("hanging_chain"), ["solver.substeps=2", "solver.dt=0.01", "world.linear_drag=4.0"])
     simulation = start(scene, "pymunk", scene.solver)
     for _ in range(400):
         simulation.step()
     frame = simulation.frame()
     simulation.close()
-    assert -frame.position[:, 1].min() == pytest.approx(0.43854, abs=2e-4)  # it still swings by that much after 4 s
+    assert -frame.position[:, 1].min() == pytest.approx(0.43854, abs=2e-4)  # amplitude of the swing left after 4 s

@@ -1,4 +1,4 @@
-"""Round corners: arcs that touch their edges, chords that keep to their tolerance, lines beside lines."""
+"""Rounded polylines: tangent arcs, chords within the tolerance, offset lines and parts."""
 
 import math
 from itertools import pairwise
@@ -11,38 +11,36 @@ from shapely import LineString
 
 from sandbox.scene.geometry.polyline import RoundingError, arc_at, beside, length_of, part_of, rounded
 
-SMALL = 1e-12  # m: rounding of lengths about 1 m, with room
+SMALL = 1e-12  # m: rounding of lengths of about 1 m, with a margin
 
 angles = st.floats(-2.8, 2.8).filter(lambda turn: abs(turn) > 0.05)
 radii = st.floats(0.005, 0.1)
 
 
 def bent(turn: float, radius: float) -> list[tuple[float, ...]]:
-    """Return a line along x that bends once, its edges long enough for the arc."""
+    """Return a polyline along x with one rounded corner and edges long enough for its arc."""
     edge = radius * math.tan(abs(turn) / 2.0) + 0.1
     return [(-edge, 0.0), (0.0, 0.0, radius), (edge * math.cos(turn), edge * math.sin(turn))]
 
 
 @given(angles, radii)
-def test_arc_touches_both_edges_and_goes_over_into_them_without_a_kink(turn: float, radius: float) -> None:
+def test_arc_is_tangent_to_both_edges(turn: float, radius: float) -> None:
     arc = arc_at(bent(turn, radius), 1)
     assert arc is not None
     assert arc.turn == pytest.approx(turn, abs=SMALL)
     (bx, by), (ex, ey), (cx, cy) = arc.at(0.0), arc.at(1.0), arc.centre
-    assert by == pytest.approx(0.0, abs=SMALL)  # it begins on the first edge
+    assert by == pytest.approx(0.0, abs=SMALL)  # begins on the first edge
     assert bx == pytest.approx(-arc.tangent_length, abs=SMALL)
-    way = math.cos(turn), math.sin(turn)
-    assert ex * way[1] - ey * way[0] == pytest.approx(0.0, abs=SMALL)  # and ends on the second
-    assert ex * way[0] + ey * way[1] == pytest.approx(arc.tangent_length, abs=SMALL)
-    # there its radius stands square to the edge
+    direction = math.cos(turn), math.sin(turn)
+    assert ex * direction[1] - ey * direction[0] == pytest.approx(0.0, abs=SMALL)  # ends on the second edge
+    assert ex * direction[0] + ey * direction[1] == pytest.approx(arc.tangent_length, abs=SMALL)
+    # the radius is perpendicular to each edge there
     assert bx - cx == pytest.approx(0.0, abs=SMALL)
-    assert (ex - cx) * way[0] + (ey - cy) * way[1] == pytest.approx(0.0, abs=SMALL)
+    assert (ex - cx) * direction[0] + (ey - cy) * direction[1] == pytest.approx(0.0, abs=SMALL)
 
 
 @given(angles, radii, st.floats(1e-5, 1e-3))
-def test_no_chord_lies_farther_than_the_tolerance_from_its_arc_and_none_could_be_spared(
-    turn: float, radius: float, tolerance: float
-) -> None:
+def test_arc_has_the_fewest_chords_within_the_tolerance(turn: float, radius: float, tolerance: float) -> None:
     corners = bent(turn, radius)
     arc = arc_at(corners, 1)
     assert arc is not None
@@ -57,11 +55,11 @@ def test_no_chord_lies_farther_than_the_tolerance_from_its_arc_and_none_could_be
 
 
 @given(angles, radii)
-def test_length_is_that_of_the_edges_and_the_arc(turn: float, radius: float) -> None:
+def test_length_of_a_rounded_line_is_that_of_edges_and_arc(turn: float, radius: float) -> None:
     corners, tolerance = bent(turn, radius), 1e-6
     straight = sum(math.dist(a[:2], b[:2]) for a, b in pairwise(corners))
     exact = straight - 2.0 * radius * math.tan(abs(turn) / 2.0) + radius * abs(turn)
-    # a chord is short of its arc by about 8/3 of its sagitta squared over its length, at most the sagitta each
+    # a chord is shorter than its arc by about 8/3 of its sagitta squared over its length, at most its sagitta
     assert length_of(rounded(corners, tolerance=tolerance)) == pytest.approx(exact, rel=1e-3)
     assert length_of(rounded(corners, tolerance=tolerance)) <= exact + SMALL
 
@@ -73,7 +71,7 @@ def test_rectangle_rounded_by_half_its_width_has_a_semicircular_arch() -> None:
     assert points[:, 1].max() == pytest.approx(1.0, abs=2e-5)  # the tolerance
 
 
-def test_corner_without_a_radius_stays_and_ends_are_not_rounded() -> None:
+def test_corners_without_a_radius_and_ends_are_not_rounded() -> None:
     assert rounded([(0.0, 0.0, 0.3), (1.0, 0.0), (1.0, 1.0, 0.3)]) == ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))
 
 
@@ -92,16 +90,14 @@ def test_closed_line_is_rounded_at_every_corner() -> None:
         ([(0.0, 0.0), (0.0, 0.0, 0.1), (1.0, 0.0)], 1, "is at the same place as the next corner"),
     ],
 )
-def test_what_cannot_be_rounded_is_told_by_its_corner(
-    corners: list[tuple[float, ...]], corner: int, words: str
-) -> None:
+def test_impossible_rounding_raises_with_its_corner(corners: list[tuple[float, ...]], corner: int, words: str) -> None:
     with pytest.raises(RoundingError, match=words) as caught:
         rounded(corners)
     assert caught.value.corner == corner
 
 
 @given(angles, st.floats(0.03, 0.1), st.floats(-0.02, 0.02))
-def test_line_beside_another_keeps_its_distance(turn: float, radius: float, distance: float) -> None:
+def test_offset_line_keeps_its_distance(turn: float, radius: float, distance: float) -> None:
     assume(abs(distance) > 1e-4)
     line = rounded(bent(turn, radius))
     other = LineString(beside(line, distance))

@@ -13,13 +13,13 @@ from sandbox.scene.files.shipped_scenes import SCHEMA, folder
 
 
 @cache
-def whole() -> dict[str, Any]:
-    """The schema, made once."""
+def cached_schema() -> dict[str, Any]:
+    """Return the schema, built once."""
     return schema()
 
 
 def objects(value: Any) -> Iterator[dict[str, Any]]:
-    """Every JSON object within a value."""
+    """Yield every JSON object within a value."""
     if isinstance(value, dict):
         yield value
     for inner in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
@@ -27,7 +27,7 @@ def objects(value: Any) -> Iterator[dict[str, Any]]:
 
 
 def parts(model: type[Part]) -> Iterator[type[Part]]:
-    """A model and all that its fields are made of."""
+    """Yield a model and the models of its fields, recursively."""
     yield model
     for field in model.model_fields.values():
         table = lazy_table(field)
@@ -42,43 +42,43 @@ def test_committed_schema_is_current() -> None:
     assert (root / SCHEMA).read_text(encoding="utf-8") == dumps()
 
 
-def test_schema_is_its_text() -> None:
-    assert json.loads(dumps()) == whole()
+def test_dumped_schema_is_valid_json_with_its_dialect() -> None:
+    assert json.loads(dumps()) == cached_schema()
     assert dumps().endswith("}\n")
-    assert whole()["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    assert cached_schema()["$schema"] == "https://json-schema.org/draft/2020-12/schema"
 
 
 @pytest.mark.parametrize("part", list(parts(Scene)), ids=lambda part: part.__name__)
-def test_table_knows_exactly_the_keys_of_its_part(part: type[Part]) -> None:
-    table = whole() if part is Scene else whole()["$defs"][part.__name__]
+def test_table_has_exactly_the_keys_of_its_model(part: type[Part]) -> None:
+    table = cached_schema() if part is Scene else cached_schema()["$defs"][part.__name__]
     fields = {field.alias or name: field for name, field in part.model_fields.items()}
     assert set(table["properties"]) == set(fields)
     assert set(table.get("required", ())) == {key for key, field in fields.items() if field.is_required()}
     assert table["additionalProperties"] is False
 
 
-def test_nothing_may_be_null_for_toml_has_none() -> None:
-    for each in objects(whole()):
+def test_schema_allows_no_null() -> None:
+    for each in objects(cached_schema()):
         assert each.get("type") != "null"
         assert None not in each.values()
 
 
 def test_docstrings_below_fields_become_descriptions() -> None:
-    document = whole()
+    document = cached_schema()
     ball = document["$defs"]["Ball"]["properties"]
     assert ball["fixed"]["description"] == "Never moves, as if infinitely heavy."
     assert (
         ball["mass"]["description"] == "mass, kg; default 1 if neither mass nor density is given"
-    )  # written in a class that Ball extends
+    )  # inherited from a base class of Ball
     assert document["properties"]["about"]["description"] == "What to observe."
     assert document["properties"]["ball"]["description"] == "One ball; on a `[surface]` a sphere, I = ⅖ m r²."
 
 
 def test_every_key_has_a_description() -> None:
-    tables = {"scene": whole(), **whole()["$defs"]}
-    without = [f"{name}.{key}" for name, table in tables.items() for key in table.get("properties", ())
+    tables = {"scene": cached_schema(), **cached_schema()["$defs"]}
+    undocumented = [f"{name}.{key}" for name, table in tables.items() for key in table.get("properties", ())
                if not table["properties"][key].get("description")]  # fmt: skip
-    assert without == []
+    assert undocumented == []
 
 
 @pytest.mark.parametrize(
@@ -91,12 +91,14 @@ def test_every_key_has_a_description() -> None:
     ],
 )  # fmt: skip
 def test_descriptions_of_quantities_name_their_units(table: str, key: str, unit: str) -> None:
-    words = whole()["$defs"][table]["properties"][key]["description"].replace(",", " ").replace(";", " ").split()
+    words = (
+        cached_schema()["$defs"][table]["properties"][key]["description"].replace(",", " ").replace(";", " ").split()
+    )
     assert unit in [word.rstrip(".:") for word in words]
 
 
-def test_ranges_and_defaults_are_those_of_the_model() -> None:
-    tables = whole()["$defs"]
+def test_schema_has_the_ranges_and_defaults_of_the_model() -> None:
+    tables = cached_schema()["$defs"]
     assert tables["Ball"]["properties"]["radius"] == {
         "description": "radius of the disc, m",
         "type": "number",

@@ -1,4 +1,4 @@
-"""Settings as a value."""
+"""Settings: replacement, validation and defaults of engines."""
 
 import pytest
 from pydantic import ValidationError
@@ -8,11 +8,11 @@ from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import from_document
 
 
-def test_substep_is_the_frame_step_divided() -> None:
+def test_substep_length_is_dt_over_substeps() -> None:
     assert Settings(dt=0.01, substeps=4).h == 0.01 / 4
 
 
-def test_replace_changes_what_it_names_and_nothing_else() -> None:
+def test_replace_changes_only_the_given_settings() -> None:
     before = Settings(dt=0.5, slop=0.1, integrator="rk4")
     after = before.replace(dt=0.25, bias=None)
     assert after == Settings(dt=0.25, slop=0.1, integrator="rk4")
@@ -22,19 +22,19 @@ def test_replace_changes_what_it_names_and_nothing_else() -> None:
 @pytest.mark.parametrize(
     "changes", [{"dt": 0.0}, {"dt": "0.1"}, {"dt": True}, {"step": 1}, {"substeps": 1.0}, {"dt": float("nan")}]
 )
-def test_replace_is_as_strict_as_a_file(changes: dict[str, object]) -> None:
+def test_replace_validates_as_strictly_as_a_file(changes: dict[str, object]) -> None:
     with pytest.raises(ValidationError):
         Settings().replace(**changes)
 
 
-def test_choices_left_to_the_engine_are_none() -> None:
-    left = {key for key, value in Settings().model_dump().items() if value is None}
-    words = {"integrator", "detection", "response", "impact", "broad_phase", "joints"}
-    assert left == words | {"slop", "bias", "persistence", "stiffness", "damping", "stretch"}
+def test_settings_left_to_the_engine_are_none() -> None:
+    unset = {key for key, value in Settings().model_dump().items() if value is None}
+    choices = {"integrator", "detection", "response", "impact", "broad_phase", "joints"}
+    assert unset == choices | {"slop", "bias", "persistence", "stiffness", "damping", "stretch"}
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
-def test_choices_of_an_engine_are_settings_at_the_ends_of_size_and_mass(engine: str) -> None:
+def test_resolved_settings_of_extreme_sizes_and_masses_are_within_bounds(engine: str) -> None:
     corners = [[-1e15, -1e15], [1e15, -1e15], [1e15, 1e15], [-1e15, 1e15]]
     giant = {"position": [0, 0], "points": corners, "mass": 1e30}
     plane = {"point": [0, -2e15], "normal": [0, 1]}

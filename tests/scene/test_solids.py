@@ -1,4 +1,4 @@
-"""Solids in scene files: their faults, what they weigh, and that they are written as they were read."""
+"""Solids in scene files: faults, mass and moment, round trip."""
 
 import math
 from typing import Any
@@ -25,14 +25,14 @@ def faults(text: str) -> list[str]:
 
 @settings(max_examples=40)
 @given(strategies.solid_scenes())
-def test_scene_of_solids_and_joints_is_read_back_as_it_was_written(scene: Scene) -> None:
+def test_scene_of_solids_and_joints_round_trips(scene: Scene) -> None:
     again = loads(dumps(scene))
     assert again == scene
     assert to_document(again) == to_document(scene)
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "messages"),
     [
         ("[[box]]\nposition=[0,0]\n", ["s.toml:1: box[0].size: is missing"]),
         ("[[box]]\nposition=[0,0]\nsize=[1]\n", ["s.toml:3: box[0].size: must be an array of 2, has 1"]),
@@ -116,14 +116,14 @@ def test_scene_of_solids_and_joints_is_read_back_as_it_was_written(scene: Scene)
         ),
     ],
 )
-def test_fault_of_a_solid_is_told_with_line_and_path(text: str, told: list[str]) -> None:
+def test_faulty_solid_is_refused_with_line_and_path(text: str, messages: list[str]) -> None:
     found = faults(text)
-    assert len(found) == len(told), found
-    for message, start in zip(found, told, strict=True):
+    assert len(found) == len(messages), found
+    for message, start in zip(found, messages, strict=True):
         assert start in message
 
 
-def test_all_faults_of_solids_are_told_at_once() -> None:
+def test_all_faults_of_solids_are_reported_together() -> None:
     found = faults(
         '[[body]]\nname="h"\nposition=[0,0]\n[[body.box]]\nsize=[1,-1]\n[[body.polygon]]\npoints=[[0,0],[1,0]]\n'
         '[[joint]]\nkind="pivot"\nat=[0,0]\nbetween=["q"]\n[[box]]\nsize=[1,1]\nposition=[5,5]\nmaterial="x"\n'
@@ -139,19 +139,19 @@ def test_fault_of_an_outline_hides_no_unknown_names() -> None:
     assert "thrust[0].body: no body is named 'zz'" in found[1]
 
 
-def crowd(count: int, **one: Any) -> dict[str, Any]:
+def concave_polygons(count: int, **keys: Any) -> dict[str, Any]:
     shape = [[0, 0], [3, 0], [3, 1], [1, 1], [1, 2], [3, 2], [3, 3], [0, 3]]
-    return {"polygon": [{"points": shape, **one} for _ in range(count)]}
+    return {"polygon": [{"points": shape, **keys} for _ in range(count)]}
 
 
-def test_crowd_of_bodies_hollow_at_their_centres_is_refused() -> None:
-    assert isinstance(from_document(crowd(50)), Scene)
+def test_too_many_overlapping_concave_polygons_are_refused() -> None:
+    assert isinstance(from_document(concave_polygons(50)), Scene)
     with pytest.raises(SceneError, match="pairs of pieces so close"):
-        from_document(crowd(900))
-    assert isinstance(from_document(crowd(900, collides="none")), Scene)
+        from_document(concave_polygons(900))
+    assert isinstance(from_document(concave_polygons(900, collides="none")), Scene)
 
 
-def test_fixed_body_of_too_many_parts_in_one_place_is_refused() -> None:
+def test_fixed_body_with_too_many_identical_parts_is_refused() -> None:
     part = {"size": [1, 1]}
     bodies = [{"position": [0, 0], "fixed": True, "box": [part] * 1000} for _ in range(6)]
     with pytest.raises(SceneError, match="more than 5,000 identical objects") as caught:
@@ -173,7 +173,7 @@ def test_values_of_solids_and_joints_are_set_by_name() -> None:
     assert paths == {(None, "joint.x.length (set)"), (None, "box.a.size (set)")}
 
 
-def test_density_of_parts_is_scaled_to_a_stated_mass() -> None:
+def test_density_of_parts_is_scaled_to_a_given_mass() -> None:
     parts = [{"size": [1, 1], "position": [-1, 0]}, {"size": [1, 1], "position": [1, 0], "density": 3}]
     bodies = from_document({"body": [{"position": [0, 0], "mass": 8, "box": parts}]}).bodies
     assert bodies.mass[0] == pytest.approx(8, rel=1e-15)  # one division

@@ -28,10 +28,10 @@ def faults_of(**stack: Any) -> list[str]:
     return [str(fault) for fault in caught.value.faults]
 
 
-def test_pyramid_has_a_box_fewer_in_each_row_named_from_the_lower_left() -> None:
+def test_pyramid_has_one_box_fewer_in_each_row_numbered_from_the_lower_left() -> None:
     bodies = scene_of(name="stone").bodies
     assert bodies.names == tuple(f"stone-{n}" for n in range(1, 11))
-    # each coordinate is a sum or two of figures about 1: rounding
+    # 1e-15: each coordinate is one or two sums of numbers of about 1
     expected = [[0.4, 2.1], [0.8, 2.1], [1.2, 2.1], [1.6, 2.1], [0.6, 2.3], [1.0, 2.3], [1.4, 2.3]]
     assert bodies.position[:7] == pytest.approx(np.array(expected), abs=1e-15)
     assert bodies.position[9] == pytest.approx(np.array([1.0, 2.7]), abs=1e-15)
@@ -42,7 +42,7 @@ def test_pyramid_is_symmetric_about_its_base() -> None:
     assert sorted(x.tolist()) == sorted((-x).tolist())
 
 
-def test_wall_touches_without_a_gap_and_parts_by_it() -> None:
+def test_boxes_of_a_wall_are_the_gap_apart() -> None:
     size = {"columns": 3, "rows": 5, "fewer": 0}
     for gap in (0.0, 0.05):
         position = scene_of(gap=gap, **size).bodies.position.reshape(5, 3, 2)
@@ -60,7 +60,7 @@ def test_boxes_have_the_mass_and_moment_of_rectangles() -> None:
     assert scene_of().bodies.mass.tolist() == [1.0] * 10
 
 
-def test_angle_tilts_the_whole_stack_about_its_base() -> None:
+def test_angle_rotates_the_stack_about_its_base() -> None:
     straight, tilted = scene_of().bodies, scene_of(angle=0.5).bodies
     assert tilted.angle.tolist() == [0.5] * 10
     cos, sin = math.cos(0.5), math.sin(0.5)
@@ -68,18 +68,18 @@ def test_angle_tilts_the_whole_stack_about_its_base() -> None:
     assert tilted.position == pytest.approx(np.add(offset, [1.0, 2.0]), abs=1e-15)  # rounding
 
 
-def test_jitter_moves_boxes_along_their_rows_by_the_seed() -> None:
-    still = scene_of(columns=30, rows=30).bodies.position
-    one, again, other = (scene_of(seed, columns=30, rows=30, jitter=0.1).bodies.position for seed in (1, 1, 2))
-    assert np.array_equal(one, again)
-    assert not np.array_equal(one, other)
-    moved = one - still
-    assert np.array_equal(moved[:, 1], np.zeros(len(moved)))
-    assert np.abs(moved[:, 0]).max() <= 0.1 + 1e-14  # rounding of the difference
-    assert np.abs(moved[:, 0].mean()) < 5 * 0.1 / math.sqrt(3 * len(moved))  # 5 σ of a mean of uniform figures
+def test_jitter_offsets_boxes_along_their_rows_depending_on_the_seed() -> None:
+    regular = scene_of(columns=30, rows=30).bodies.position
+    first, again, other = (scene_of(seed, columns=30, rows=30, jitter=0.1).bodies.position for seed in (1, 1, 2))
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
+    offset = first - regular
+    assert np.array_equal(offset[:, 1], np.zeros(len(offset)))
+    assert np.abs(offset[:, 0]).max() <= 0.1 + 1e-14  # rounding of the difference
+    assert np.abs(offset[:, 0].mean()) < 5 * 0.1 / math.sqrt(3 * len(offset))  # 5 σ of a mean of uniform numbers
 
 
-def test_a_second_stack_leaves_the_first_as_it_is() -> None:
+def test_second_stack_does_not_change_the_first() -> None:
     one = from_document({"stack": [{**PYRAMID, "jitter": 0.1}]}).bodies
     two = from_document({"stack": [{**PYRAMID, "jitter": 0.1}, {**PYRAMID, "jitter": 0.1, "base": [50, 0]}]}).bodies
     assert np.array_equal(one.position, two.position[:10])
@@ -90,24 +90,24 @@ def test_a_second_stack_leaves_the_first_as_it_is() -> None:
     columns=st.integers(1, 12), rows=st.integers(1, 12), fewer=st.integers(0, 3), gap=st.floats(0.0, 1.0),
     width=st.floats(0.01, 10.0), height=st.floats(0.01, 10.0),
 )  # fmt: skip
-def test_stack_has_its_count_in_rows_about_its_base(
+def test_stack_has_the_given_rows_centred_on_its_base(
     columns: int, rows: int, fewer: int, gap: float, width: float, height: float
 ) -> None:
-    figures = {"columns": columns, "rows": rows, "fewer": fewer, "gap": gap, "size": [width, height], "base": [0, 0]}
+    keys = {"columns": columns, "rows": rows, "fewer": fewer, "gap": gap, "size": [width, height], "base": [0, 0]}
     if fewer * (rows - 1) >= columns:
-        assert any("is empty" in fault for fault in faults_of(**figures))
+        assert any("is empty" in fault for fault in faults_of(**keys))
         return
-    scene = scene_of(**figures)
+    scene = scene_of(**keys)
     bodies = scene.bodies
     assert len(bodies) == sum(columns - fewer * row for row in range(rows))
     scale = columns * (width + gap)
     assert bodies.position[:, 0].mean() == pytest.approx(0.0, abs=1e-14 * scale)  # rounding of sums
-    bottom = rows * height + (rows - 1) * gap - 0.5 * height
-    assert bodies.position[-1, 1] == pytest.approx(bottom, rel=1e-14)  # a few roundings
+    top_centre = rows * height + (rows - 1) * gap - 0.5 * height
+    assert bodies.position[-1, 1] == pytest.approx(top_centre, rel=1e-14)  # a few roundings
     assert loads(dumps(scene)) == scene
 
 
-def test_row_that_would_hold_no_box_is_a_fault_with_its_line() -> None:
+def test_empty_row_is_a_fault_with_its_line() -> None:
     text = "[[stack]]\nbase = [0, 0]\nsize = [1, 1]\ncolumns = 5\nrows = 4\nfewer = 2\n"
     with pytest.raises(SceneError) as caught:
         loads(text)
@@ -120,11 +120,11 @@ def test_too_many_boxes_are_a_fault() -> None:
     assert any("the limit is 1,000,000" in fault for fault in faults_of(columns=1001, rows=1000, fewer=0))
 
 
-def test_boxes_of_a_stack_can_meet_each_other() -> None:
-    meet = contact_matrix(scene_of())
-    assert meet.mutual
-    assert meet.solids
-    assert not meet.ball_ball
+def test_boxes_of_a_stack_can_collide() -> None:
+    matrix = contact_matrix(scene_of())
+    assert matrix.mutual
+    assert matrix.solids
+    assert not matrix.ball_ball
 
 
 def test_tower_of_twenty_stands_for_ten_seconds_on_pymunk() -> None:
@@ -137,6 +137,6 @@ def test_tower_of_twenty_stands_for_ten_seconds_on_pymunk() -> None:
     simulation.close()
     assert len(scene.bodies) == 20
     assert scene.world.duration == 10.0
-    # pymunk's tower leans and settles by 9 mm within ten seconds, of 0.8 m at which the top would be off its base
+    # pymunk's tower leans and settles by 9 mm within ten seconds; it would fall at 0.8 m
     assert np.abs(end.position - begin.position).max() < 0.05
-    assert np.abs(end.angle).max() < 0.02  # likewise: 3 mrad
+    assert np.abs(end.angle).max() < 0.02  # measured: 3 mrad

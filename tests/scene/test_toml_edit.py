@@ -1,4 +1,4 @@
-"""Settings written into scene files: the values change, and not a character beside them."""
+"""Settings written into scene files: only the values in `[solver]` change, everything else is kept byte for byte."""
 
 import os
 import re
@@ -36,37 +36,37 @@ some_settings = st.fixed_dictionaries(
 
 
 def without_solver(text: str) -> str:
-    """Return a text without what says its `[solver]`: heading, lines, inline table, each to its line's end."""
-    heading, kept, at = None, "", 0
+    """Return a text without its `[solver]`: heading, lines or inline table, each up to the end of its line."""
+    heading, kept, end = None, "", 0
     for each in statements(text):
         heading = each.keys if each.heading else heading
-        mine = heading == ("solver",) or (heading is None and each.keys[0] == "solver")
-        kept += text[at : each.begin] + ("" if mine else text[each.begin : each.end])
-        at = each.end
-    return kept + text[at:]
+        is_solver = heading == ("solver",) or (heading is None and each.keys[0] == "solver")
+        kept += text[end : each.begin] + ("" if is_solver else text[each.begin : each.end])
+        end = each.end
+    return kept + text[end:]
 
 
 @settings(max_examples=60, deadline=None)
 @given(rendered(documents()), some_settings, st.sampled_from(["", "\ufeff"]))
-def test_settings_put_into_any_layout_change_nothing_else(
+def test_settings_written_into_any_layout_change_nothing_else(
     case: tuple[dict[str, object], Rendered], changes: dict[str, object], mark: str
 ) -> None:
     document, text = case
     result = with_solver(mark + text.text, changes)
     solver = {**document.get("solver", {}), **changes}
-    wanted = {**document, "solver": {key: value for key, value in solver.items() if value is not None}}
-    assert {"solver": {}, **tomllib.loads(result.removeprefix("\ufeff"))} == wanted
+    expected = {**document, "solver": {key: value for key, value in solver.items() if value is not None}}
+    assert {"solver": {}, **tomllib.loads(result.removeprefix("\ufeff"))} == expected
     assert result.startswith("\ufeff") == bool(mark)
     before, after = (without_solver(each.removeprefix("\ufeff")) for each in (text.text, result))
     if "solver" in document:
-        assert before.rstrip("\r\n") == after.rstrip("\r\n")  # a last line is ended where another follows
-    else:  # blank lines are added around a table that is new, nothing else
+        assert before.rstrip("\r\n") == after.rstrip("\r\n")  # a newline may be added to the last line
+    else:  # only blank lines are added around a new table
         assert re.sub(r"\s+", " ", before).strip() == re.sub(r"\s+", " ", after).strip()
     assert with_solver(result, changes) == result
 
 
 @pytest.mark.parametrize("scene", shipped(), ids=lambda scene: scene.name)
-def test_shipped_scenes_keep_every_byte_outside_of_solver(scene: object) -> None:
+def test_shipped_scenes_keep_every_byte_outside_solver(scene: object) -> None:
     text = scene.path.read_bytes().decode()
     result = with_solver(text, CHANGES)
     begin = text.index("[solver]\n")
@@ -102,7 +102,7 @@ def test_shipped_scenes_keep_every_byte_outside_of_solver(scene: object) -> None
         (BALL + "[world]\nseed = 1", BALL + "[world]\nseed = 1\n\n[solver]\ndt = 0.002\nsubsteps = 4\n"),
     ],
 )
-def test_each_layout_is_kept(before: str, after: str) -> None:
+def test_layout_of_solver_is_kept(before: str, after: str) -> None:
     assert with_solver(before, {"dt": 0.002, "substeps": 4}) == after
     crlf = before.replace("\n", "\r\n")
     if "\n" in before:
@@ -120,21 +120,21 @@ def test_each_layout_is_kept(before: str, after: str) -> None:
         (BALL, BALL),
     ],
 )
-def test_a_setting_of_none_is_taken_out(before: str, after: str) -> None:
+def test_setting_of_none_is_removed(before: str, after: str) -> None:
     assert with_solver(before, {"dt": None}) == after
 
 
-def test_numbers_are_written_the_short_way() -> None:
-    figures = [0.001, 1e-3, 1e-6, 2.5e-7, 1.0, 10.0, 1e22, 4, True]
-    assert list(map(written, figures)) == ["0.001", "0.001", "1e-6", "2.5e-7", "1.0", "10.0", "1e22", "4", "true"]
+def test_numbers_are_written_in_short_form() -> None:
+    numbers = [0.001, 1e-3, 1e-6, 2.5e-7, 1.0, 10.0, 1e22, 4, True]
+    assert list(map(written, numbers)) == ["0.001", "0.001", "1e-6", "2.5e-7", "1.0", "10.0", "1e22", "4", "true"]
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False))
-def test_a_number_written_is_read_the_same(figure: float) -> None:
-    assert tomllib.loads(f"x = {written(figure)}")["x"] == figure
+def test_written_number_round_trips(number: float) -> None:
+    assert tomllib.loads(f"x = {written(number)}")["x"] == number
 
 
-def test_what_cannot_be_is_refused() -> None:
+def test_invalid_setting_or_text_is_refused() -> None:
     with pytest.raises(SceneError, match=r"f\.toml:2: solver\.dt: "):
         with_solver("[solver]\ndt = 0.01\n" + BALL, {"dt": -1.0}, "f.toml")
     with pytest.raises(SceneError, match=r"solver\.speed"):
@@ -143,7 +143,7 @@ def test_what_cannot_be_is_refused() -> None:
         with_solver("[solver\n", {"dt": 1.0})
 
 
-def test_a_file_is_written_with_its_permissions_and_through_a_link(tmp_path: Path) -> None:
+def test_write_keeps_permissions_and_follows_a_link(tmp_path: Path) -> None:
     path, link = tmp_path / "a.toml", tmp_path / "link.toml"
     path.write_bytes(b"\xef\xbb\xbf" + BALL.replace("\n", "\r\n").encode())
     path.chmod(0o640)
@@ -157,7 +157,7 @@ def test_a_file_is_written_with_its_permissions_and_through_a_link(tmp_path: Pat
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.toml", "link.toml"]
 
 
-def test_what_is_no_scene_file_is_refused_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_file_that_is_not_a_writable_scene_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     session, latin, missing = tmp_path / "s.json", tmp_path / "l.toml", tmp_path / "m.toml"
     session.write_text("{}")
     latin.write_bytes(BALL.encode() + b"# \xe9\n")
@@ -178,7 +178,7 @@ def test_what_is_no_scene_file_is_refused_by_name(tmp_path: Path, monkeypatch: p
     assert inside.read_text() == BALL
 
 
-def test_a_file_that_cannot_be_written_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failed_write_leaves_the_file_unchanged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.toml"
     path.write_text(BALL)
     with monkeypatch.context() as patch:
@@ -186,10 +186,10 @@ def test_a_file_that_cannot_be_written_stays(tmp_path: Path, monkeypatch: pytest
         with pytest.raises(SceneError, match="read-only"):
             write_solver(path, {"dt": 0.004})
 
-    def full(*_: object) -> None:
+    def fail_with_full_disk(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(Path, "write_bytes", full)
+    monkeypatch.setattr(Path, "write_bytes", fail_with_full_disk)
     with pytest.raises(SceneError, match="cannot be written: No space left"):
         write_solver(path, {"dt": 0.004})
     assert path.read_text() == BALL

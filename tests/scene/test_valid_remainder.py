@@ -1,4 +1,4 @@
-"""Faults of both sorts, in single values and between the parts, are reported at once."""
+"""Faults in single values and faults between elements are reported together."""
 
 from collections.abc import Iterable
 
@@ -8,17 +8,17 @@ from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import loads
 
 BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
-LOST = f"{BALL}material = 'lost'\n"
+UNDECLARED = f"{BALL}material = 'lost'\n"
 
 
-def paths(text: str) -> list[str]:
+def fault_paths(text: str) -> list[str]:
     with pytest.raises(SceneError) as caught:
         loads(text)
     return [fault.path for fault in caught.value.faults]
 
 
-def expect(text: str, wanted: Iterable[str]) -> None:
-    assert sorted(paths(text)) == sorted(wanted)
+def assert_fault_paths(text: str, expected: Iterable[str]) -> None:
+    assert sorted(fault_paths(text)) == sorted(expected)
 
 
 @pytest.mark.parametrize(
@@ -47,22 +47,23 @@ def expect(text: str, wanted: Iterable[str]) -> None:
     ],
 )
 def test_faulty_value_does_not_hide_a_fault_elsewhere(broken: str, path: str) -> None:
-    expect(LOST + broken, ["ball[0].material", path])
+    assert_fault_paths(UNDECLARED + broken, ["ball[0].material", path])
 
 
-def test_faulty_value_before_any_table_does_not_hide_a_fault_elsewhere() -> None:
-    expect(f"title = 3\nzzz = 1\n{LOST}", ["title", "zzz", "ball[0].material"])
+def test_faulty_top_level_value_does_not_hide_a_fault_elsewhere() -> None:
+    assert_fault_paths(f"title = 3\nzzz = 1\n{UNDECLARED}", ["title", "zzz", "ball[0].material"])
 
 
 def test_several_faulty_values_of_one_element_are_all_reported() -> None:
     text = "[[ball]]\nposition = 'x'\nradius = -1\nmass = -1\nname = ''\nzzz = 1\n"
-    expect(
-        LOST + text, ["ball[0].material", *(f"ball[1].{key}" for key in ("position", "radius", "mass", "name", "zzz"))]
+    assert_fault_paths(
+        UNDECLARED + text,
+        ["ball[0].material", *(f"ball[1].{key}" for key in ("position", "radius", "mass", "name", "zzz"))],
     )
 
 
-def test_element_with_a_faulty_value_is_not_accused_of_what_follows_from_it() -> None:
-    expect(f"{BALL}material = 3\nmass = 1\ndensity = 'x'\nfixed = true\nvelocity = 'x'\n", [
+def test_faulty_value_causes_no_other_fault_of_its_element() -> None:
+    assert_fault_paths(f"{BALL}material = 3\nmass = 1\ndensity = 'x'\nfixed = true\nvelocity = 'x'\n", [
         "ball[0].material", "ball[0].density", "ball[0].velocity",
     ])  # fmt: skip
 
@@ -76,8 +77,8 @@ def test_element_with_a_faulty_value_is_not_accused_of_what_follows_from_it() ->
         "[material]\nname='x'",
     ],
 )
-def test_material_that_is_only_misspelt_is_not_called_missing_too(broken: str) -> None:
-    assert "ball[0].material" not in paths(LOST + broken)
+def test_misspelt_material_table_is_not_also_reported_as_missing(broken: str) -> None:
+    assert "ball[0].material" not in fault_paths(UNDECLARED + broken)
 
 
 @pytest.mark.parametrize(
@@ -98,19 +99,21 @@ def test_material_that_is_only_misspelt_is_not_called_missing_too(broken: str) -
         ("[[grid]]\norigin = [0, 0]\ncolumns = 999\nspacing = 0\nradius = 99\n", "grid[0].spacing"),
     ],
 )
-def test_stand_in_for_a_faulty_value_makes_nothing_else_look_wrong(text: str, path: str) -> None:
-    expect(text, [path])
+def test_default_for_a_faulty_value_causes_no_other_fault(text: str, path: str) -> None:
+    assert_fault_paths(text, [path])
 
 
 def test_faulty_world_does_not_hide_too_many_steps() -> None:
-    expect(f"{BALL}[world]\nseed = -1\nduration = 1e9\n[solver]\ndt = 0.01\n", ["world.seed", "solver.dt"])
+    assert_fault_paths(f"{BALL}[world]\nseed = -1\nduration = 1e9\n[solver]\ndt = 0.01\n", ["world.seed", "solver.dt"])
 
 
-def test_stand_ins_in_one_spot_are_no_crowd() -> None:
+def test_default_positions_of_faulty_balls_are_not_overlaps() -> None:
     grid = "[[grid]]\norigin = [0, 0]\ncolumns = 400\nspacing = [3, 0]\nradius = 1\n"
-    expect(grid + "[[ball]]\nposition = 'x'\nradius = 1\n" * 400, [f"ball[{k}].position" for k in range(400)])
+    assert_fault_paths(
+        grid + "[[ball]]\nposition = 'x'\nradius = 1\n" * 400, [f"ball[{k}].position" for k in range(400)]
+    )
 
 
-def test_table_of_the_wrong_kind_is_reported_alone() -> None:
-    expect(f"world = 3\n{BALL}", ["world"])
-    expect("[ball]\nposition = [0, 0]\nradius = 1\nmaterial = 'lost'\n", ["ball"])
+def test_table_of_a_wrong_type_is_reported_alone() -> None:
+    assert_fault_paths(f"world = 3\n{BALL}", ["world"])
+    assert_fault_paths("[ball]\nposition = [0, 0]\nradius = 1\nmaterial = 'lost'\n", ["ball"])

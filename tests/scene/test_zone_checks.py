@@ -1,4 +1,4 @@
-"""Zones and layers of a scene file: what is wrong with them, where they lie, and that they are kept."""
+"""Zones and layers of a scene file: faults, geometry and round trip."""
 
 import math
 from typing import Any
@@ -15,7 +15,7 @@ from sandbox.scene.geometry.shapes import contains, middle_of, width_of
 BALL: dict[str, Any] = {"position": [0, 0], "radius": 0.1}
 CIRCLE: dict[str, Any] = {"position": [1, 1], "radius": 0.5}
 HOOK = [[0, 0], [3, 0], [3, 1], [1, 1], [1, 3], [0, 3]]
-"""an L whose centroid, (1.1, 1.1) m, is outside of it: areas 3 and 2 m², about (1.5, 0.5) and (0.5, 2)"""
+"""An L whose centroid, (1.1, 1.1) m, is outside: areas of 3 and 2 m² with centroids (1.5, 0.5) and (0.5, 2) m."""
 
 
 @pytest.mark.parametrize(
@@ -40,13 +40,13 @@ HOOK = [[0, 0], [3, 0], [3, 1], [1, 1], [1, 3], [0, 3]]
         ({"wall": [{"points": [[0, 0], [1, 0]], "layers": []}]}, "wall[0].layers", "an array of 1"),
     ],
 )
-def test_fault_names_its_place_and_what_would_be_right(document: dict[str, Any], path: str, words: str) -> None:
+def test_fault_of_a_zone_or_layer_has_its_path_and_a_hint(document: dict[str, Any], path: str, words: str) -> None:
     with pytest.raises(SceneError) as caught:
         from_document(document)
     assert any(fault.path.startswith(path) and words in fault.message for fault in caught.value.faults), caught.value
 
 
-def test_zones_and_layers_are_kept_by_a_file() -> None:
+def test_zones_and_layers_round_trip() -> None:
     zones = [
         {**CIRCLE, "name": "hole", "holds": True, "colour": "#ff0000"},
         {"points": [[0, 0], [1, 0]], "thickness": 0.2, "gravity": [0, 1], "layers": ["up", "ground"]},
@@ -60,29 +60,29 @@ def test_zones_and_layers_are_kept_by_a_file() -> None:
     assert scene.layers == ("ground", "up")
 
 
-def test_ten_layers_are_a_scene() -> None:
+def test_ten_layers_are_accepted() -> None:
     balls = [{**BALL, "layer": f"{k}", "position": [k, 0]} for k in range(9)]
     assert len(from_document({"ball": balls}).layers) == 10
 
 
-def test_middle_of_a_zone() -> None:
+def test_middle_of_a_zone_is_its_centroid() -> None:
     assert middle_of(Zone(position=(1.0, 2.0), radius=1.0)) == (1.0, 2.0)
     strip = Zone(points=((0.0, 0.0), (1.0, 0.0), (1.0, 3.0)), thickness=0.1)
-    assert middle_of(strip) == pytest.approx((1.0, 1.0))  # 2 of 4 m on
+    assert middle_of(strip) == pytest.approx((1.0, 1.0))  # after 2 of 4 m
     assert middle_of(Zone(points=tuple((float(x), float(y)) for x, y in HOOK))) == pytest.approx((1.1, 1.1))
     clockwise = tuple((float(x), float(y)) for x, y in reversed(HOOK))
     assert middle_of(Zone(points=clockwise)) == pytest.approx((1.1, 1.1))
 
 
 @given(x=st.floats(-1.0, 4.0), y=st.floats(-1.0, 4.0))
-def test_concave_outline_contains_what_its_two_boxes_do(x: float, y: float) -> None:
+def test_concave_outline_contains_the_points_of_its_two_boxes(x: float, y: float) -> None:
     hook = Zone(points=tuple((float(a), float(b)) for a, b in HOOK))
     inside = (0.0 < x < 3.0 and 0.0 < y < 1.0) or (0.0 < x < 1.0 and 0.0 < y < 3.0)
     edge = min(abs(x), abs(x - 1.0), abs(x - 3.0), abs(y), abs(y - 1.0), abs(y - 3.0)) < 1e-12
     assert edge or contains(hook, (x, y)) == inside
 
 
-def test_width_is_that_of_the_narrowest_piece() -> None:
+def test_width_of_a_zone_is_its_smallest_extent() -> None:
     assert width_of(Zone(position=(0.0, 0.0), radius=0.5)) == 1.0
     assert width_of(Zone(points=((0.0, 0.0), (9.0, 0.0)), thickness=0.2)) == 0.2
     slanted = Zone(points=((0.0, 0.0), (1.0, 1.0), (0.0, 2.0), (-1.0, 1.0)))

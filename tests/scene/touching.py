@@ -1,6 +1,6 @@
-"""Small scenes of things that may touch, and what they have in common, worked out thing by thing.
+"""Small scenes of elements that may touch, and a brute-force oracle of their possible contacts.
 
-An oracle for surfaces, meetings and demands: written from what the scene file means, one pair at a time.
+The oracle is for surfaces, contact matrices and demands. It follows the definition of the scene file, pair by pair.
 """
 
 from typing import Any
@@ -12,39 +12,41 @@ from sandbox.scene.description.base import HasMaterial
 from sandbox.scene.description.discs import Ball, Disc
 from sandbox.scene.files.load import from_document
 
-FIGURES = [0.0, 0.25, 0.5, 1.0]
+COEFFICIENTS = [0.0, 0.25, 0.5, 1.0]
 
 
 @st.composite
 def touching_scenes(draw: st.DrawFn) -> Scene:
-    """Scenes whose things differ in material, figures, what they collide with, and whether they move."""
-    figures = {key: st.sampled_from(FIGURES) for key in ("restitution", "friction")}
+    """Scenes whose elements differ in material, coefficients, `collides` and `fixed`."""
+    coefficients = {key: st.sampled_from(COEFFICIENTS) for key in ("restitution", "friction")}
     names = ["a", "b", "c"][: draw(st.integers(0, 3))]
-    materials = [{"name": name, **draw(st.fixed_dictionaries({}, optional=figures))} for name in names]
+    materials = [{"name": name, **draw(st.fixed_dictionaries({}, optional=coefficients))} for name in names]
     pairs = []
     for k, first in enumerate(names):
         for second in names[k:]:
             if draw(st.booleans()):
                 between = draw(st.permutations([first, second]))
-                pairs.append({"between": list(between), **draw(st.fixed_dictionaries({}, optional=figures))})
+                pairs.append({"between": list(between), **draw(st.fixed_dictionaries({}, optional=coefficients))})
 
-    surface = figures | ({"material": st.sampled_from(names)} if names else {})
+    surface = coefficients | ({"material": st.sampled_from(names)} if names else {})
     collides = {"collides": st.sampled_from(["all", "fixed", "none"])}
 
-    def some(required: dict[str, Any], optional: dict[str, Any], most: int) -> list[dict[str, Any]]:
+    def elements_of(required: dict[str, Any], optional: dict[str, Any], most: int) -> list[dict[str, Any]]:
         fixed = {key: st.just(value) for key, value in required.items()}
         return draw(st.lists(st.fixed_dictionaries(fixed, optional={**surface, **optional}), max_size=most))
 
-    at = {"position": [0.0, 0.0], "radius": 1.0}
+    disc = {"position": [0.0, 0.0], "radius": 1.0}
     return from_document(
         {
             "material": materials,
             "pair": pairs,
-            "plane": some({"point": [0.0, 0.0], "normal": [0.0, 1.0]}, {}, 1),
-            "wall": some({"points": [[0.0, 0.0], [1.0, 0.0]]}, {}, 1),
-            "post": some(at, {}, 1),
-            "ball": some(at, {**collides, "fixed": st.booleans()}, 5),
-            "grid": some({"origin": [0.0, 0.0], "columns": 2, "spacing": [0.0, 0.0], "radius": 1.0}, collides, 1),
+            "plane": elements_of({"point": [0.0, 0.0], "normal": [0.0, 1.0]}, {}, 1),
+            "wall": elements_of({"points": [[0.0, 0.0], [1.0, 0.0]]}, {}, 1),
+            "post": elements_of(disc, {}, 1),
+            "ball": elements_of(disc, {**collides, "fixed": st.booleans()}, 5),
+            "grid": elements_of(
+                {"origin": [0.0, 0.0], "columns": 2, "spacing": [0.0, 0.0], "radius": 1.0}, collides, 1
+            ),
         }
     )
 
@@ -58,33 +60,34 @@ def is_fixed(disc: Disc) -> bool:
     return isinstance(disc, Ball) and disc.fixed
 
 
-def balls_meet(a: Disc, b: Disc) -> bool:
-    """Tell whether two balls can touch: one of them moves, and each lets the other."""
+def balls_can_collide(a: Disc, b: Disc) -> bool:
+    """Return whether two balls can collide: one of them moves, and `collides` of each allows the other."""
     if is_fixed(a) and is_fixed(b):
         return False
     return all(
-        one.collides == "all" or (one.collides == "fixed" and is_fixed(other)) for one, other in ((a, b), (b, a))
+        first.collides == "all" or (first.collides == "fixed" and is_fixed(second))
+        for first, second in ((a, b), (b, a))
     )
 
 
-def meets_fixed_things(disc: Disc) -> bool:
+def collides_with_fixed(disc: Disc) -> bool:
     return not is_fixed(disc) and disc.collides != "none"
 
 
 def coefficient(scene: Scene, a: HasMaterial, b: HasMaterial, key: str) -> float:
-    """Return restitution or friction of a contact."""
+    """Return the restitution or friction of a contact: that of the pair, else the product of the two sides."""
     for pair in scene.pairs:
-        stated = getattr(pair, key)
-        if sorted(pair.between) == sorted((str(a.material), str(b.material))) and stated is not None:
-            return float(stated)
-    sides = []
-    for thing in (a, b):
-        figure = getattr(thing, key)
+        of_pair = getattr(pair, key)
+        if sorted(pair.between) == sorted((str(a.material), str(b.material))) and of_pair is not None:
+            return float(of_pair)
+    values = []
+    for element in (a, b):
+        value = getattr(element, key)
         for material in scene.materials:
-            if figure is None and material.name == thing.material:
-                figure = getattr(material, key)
-        if figure is not None:
-            sides.append(figure)
-    if not sides:
+            if value is None and material.name == element.material:
+                value = getattr(material, key)
+        if value is not None:
+            values.append(value)
+    if not values:
         return 0.0
-    return float(sides[0] if len(sides) == 1 else sides[0] * sides[1])
+    return float(values[0] if len(values) == 1 else values[0] * values[1])

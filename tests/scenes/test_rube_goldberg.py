@@ -1,4 +1,4 @@
-"""The Rube Goldberg machine: each thing is moved by the one before, up to the bell, whatever the step."""
+"""The Rube Goldberg machine: each stage triggers the next, up to the bell, for several step lengths."""
 
 from itertools import pairwise
 
@@ -16,16 +16,16 @@ STAGES = [
     ("third", "paddle wheel"), ("arm", "fourth"), ("fourth", "tray"), ("tray", "second beam"), ("leaper", "flag"),
     ("flag", "bell"),
 ]  # fmt: skip
-"""Who touches whom, in order."""
+"""Pairs of bodies that touch, in order."""
 
 UNTIL = "world.duration=15.0"
 
 
-def played(*changes: str) -> tuple[list[float], sandbox.Trajectory]:
-    """Return when each stage happens, s, and the run."""
+def run_machine(*changes: str) -> tuple[list[float], sandbox.Trajectory]:
+    """Return the time of each stage, s, and the run."""
     scene = load(find("rube_goldberg"), [UNTIL, *changes])
     run = sandbox.run(scene, audit=False)
-    names = [*scene.bodies.names, *reversed(scene.fixed_names)]  # −1 is the first of those that are fixed
+    names = [*scene.bodies.names, *reversed(scene.fixed_names)]  # index −1 is the first fixed element
     first: dict[frozenset[str], float] = {}
     for time, (a, b) in zip(run.contact_time.tolist(), run.contact_pair.tolist(), strict=True):
         first.setdefault(frozenset((names[a], names[b])), time)
@@ -34,26 +34,26 @@ def played(*changes: str) -> tuple[list[float], sandbox.Trajectory]:
 
 @pytest.fixture(scope="module")
 def machine() -> tuple[list[float], sandbox.Trajectory]:
-    return played()
+    return run_machine()
 
 
-def test_each_thing_is_moved_by_the_one_before(machine: tuple[list[float], sandbox.Trajectory]) -> None:
+def test_stages_happen_in_order(machine: tuple[list[float], sandbox.Trajectory]) -> None:
     times, _ = machine
     assert all(before < after for before, after in pairwise(times)), dict(zip(STAGES, times, strict=True))
-    assert times[0] > 1.0  # nothing goes off by itself
+    assert times[0] > 1.0  # no stage starts at the beginning
     assert times[-1] < 15.0
 
 
-def test_the_threads_tear_as_the_ball_lands_and_the_flag_stands(
+def test_threads_tear_when_the_ball_lands_and_the_flag_rises(
     machine: tuple[list[float], sandbox.Trajectory],
 ) -> None:
     times, run = machine
     landed = times[STAGES.index(("fourth", "tray"))]
-    torn = sorted(time for time in run.broken_time.tolist() if time == time)  # others are nan
+    torn = sorted(time for time in run.broken_time.tolist() if time == time)  # nan for joints that hold
     assert len(torn) == 2
-    assert torn == pytest.approx([landed, landed], abs=0.05)  # within a few steps
+    assert torn == pytest.approx([landed, landed], abs=0.05)  # a few steps
     flag = list(run.names).index("flag")
-    assert run.angle[-1, flag] < -0.6  # rad: it leans on the bell, 0.7 from where it lay
+    assert run.angle[-1, flag] < -0.6  # rad: it leans on the bell, 0.7 from its initial angle
 
 
 @pytest.mark.parametrize(
@@ -65,10 +65,10 @@ def test_the_threads_tear_as_the_ball_lands_and_the_flag_stands(
         ["solver.substeps=2"],
     ],
 )
-def test_the_machine_hangs_on_no_rounding_error(
+def test_stage_times_depend_little_on_the_step(
     machine: tuple[list[float], sandbox.Trajectory], changes: list[str]
 ) -> None:
-    times, _ = played(*changes)
+    times, _ = run_machine(*changes)
     assert all(before < after for before, after in pairwise(times))
-    # each stage begins anew from rest, so what a step does to when a hit is found does not add up to more
+    # each stage starts from rest, so the errors of detection times do not accumulate
     assert times == pytest.approx(machine[0], abs=0.1)

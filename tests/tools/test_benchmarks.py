@@ -1,4 +1,4 @@
-"""Benchmarks: both sides of a row compute the same, and what is printed of a row."""
+"""Benchmarks: both sides of a row compute the same; sides take turns; result of a row."""
 
 import itertools
 
@@ -9,7 +9,7 @@ from tools.benchmarks.row import Bench
 from tools.benchmarks.suite import BENCHES
 
 CHECKED = {bench.same: bench for bench in BENCHES if bench.same is not None}
-"""One row a check: rows that differ by their size alone share it."""
+"""One row per check function: rows that differ only in size have the same one."""
 
 
 @pytest.mark.full
@@ -27,7 +27,7 @@ def test_sides_take_turns_and_the_first_alternates() -> None:
     order: list[str] = []
 
     def side(name: str, *seconds: float):
-        values = itertools.chain((9.0,), seconds)  # the first is the warm-up's
+        values = itertools.chain((9.0,), seconds)  # the first value is for the warm-up
 
         def work() -> float:
             order.append(name)

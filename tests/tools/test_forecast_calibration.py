@@ -1,4 +1,4 @@
-"""Calibration of forecasts: the random scenes are sound and repeatable, and warnings on the held-out half are right."""
+"""Calibration of forecasts: random scenes are valid and reproducible; precision and recall on the held-out half."""
 
 from collections import Counter
 
@@ -18,7 +18,7 @@ def row(foretold: bool, happened: bool, formulas: bool = False) -> Observation:
     )  # fmt: skip
 
 
-def test_there_are_enough_kinds_and_the_halves_share_neither_kinds_nor_seeds() -> None:
+def test_halves_have_disjoint_kinds_and_seeds() -> None:
     assert len(KINDS) >= 36
     (fit, even), (held_out, odd) = halves()["fit"], halves()["held-out"]
     assert sorted(fit + held_out) == sorted(KINDS)
@@ -26,13 +26,13 @@ def test_there_are_enough_kinds_and_the_halves_share_neither_kinds_nor_seeds() -
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
-def test_every_kind_makes_sound_scenes_that_can_be_repeated(kind: str) -> None:
+def test_every_kind_makes_valid_and_reproducible_scenes(kind: str) -> None:
     for seed in range(4):
         assert len(from_document(document(kind, seed)).bodies) > 0
     assert document(kind, 1) == document(kind, 1) != document(kind, 2)
 
 
-def test_shares_are_of_warnings_and_of_what_happened() -> None:
+def test_precision_and_recall_are_computed_from_the_confusion_counts() -> None:
     rows = [row(True, True)] * 6 + [row(True, False)] * 2 + [row(False, True)] + [row(False, False)] * 9
     assert confusion(rows) == Counter({(True, True): 6, (True, False): 2, (False, True): 1, (False, False): 9})
     found = summary(rows)["foretold"]["all"]
@@ -41,27 +41,27 @@ def test_shares_are_of_warnings_and_of_what_happened() -> None:
     assert shares(Counter())["recall"] is None
 
 
-def test_what_happened_is_judged_apart_from_what_was_foretold() -> None:
-    """Seeds of bullets, slow to fast: the audit and geometry of the run agree on which pass."""
+def test_observed_and_forecast_tunnelling_of_bullets_agree() -> None:
+    """Bullets from slow to fast by seed: the forecast agrees with the tunnelling observed in the run."""
     for seed in range(4):
         (found,) = (each for each in observe("bullets", seed, ["pymunk"]) if each.trouble == "tunnelling")
         assert found.foretold == found.happened
         assert found.covered
-        assert found.formulas or not found.happened  # a bound warns of more, never of less
+        assert found.formulas or not found.happened  # a bound may warn too often, never too rarely
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(1200)  # 84 scenes, each run five to seven times
-def test_warnings_on_the_held_out_half_are_right() -> None:
+def test_precision_and_recall_on_the_held_out_half() -> None:
     kinds, parity = halves()["held-out"]
     rows = [
         each for kind in kinds for seed in (parity, parity + 2) for each in observe(kind, seed, ["pymunk", "reference"])
     ]
     found = summary(rows)
-    # README has the figures of eight seeds.
+    # The README has the results of eight seeds.
     assert found["foretold"]["all"]["precision"] >= 0.95
     assert found["foretold"]["all"]["recall"] >= 0.95
-    # Of these some forty troubles each one weighs 2 to 6 %: the two below may lose one or two more than in README.
+    # With about forty events, each counts 2 to 6 %: the bounds below allow one or two more misses than the README.
     assert found["trial run on another engine"]["all"]["precision"] >= 0.85
     assert found["trial run on another engine"]["all"]["recall"] >= 0.85
     assert found["trial run of half"]["all"]["recall"] >= 0.85

@@ -1,4 +1,4 @@
-"""The window without a display: SDL's dummy drivers, chosen before pygame is imported."""
+"""Select SDL's dummy drivers before pygame is imported, so that tests of the window need no display."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""Events as SDL would send them."""
+"""Keyboard, mouse and focus events as SDL sends them."""
 
 import pygame
 

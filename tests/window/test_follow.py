@@ -1,4 +1,4 @@
-"""A camera that follows: what is followed stays in the picture, whichever way it goes."""
+"""Following camera: the followed bodies stay in the picture, in whichever direction they move."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +12,7 @@ from sandbox.window.app import App
 from sandbox.window.app_state import AppState
 from sandbox.window.camera import Camera
 from tests.window.pressing import key, key_up, press, release
-from tests.window.windowed import turned, window_on
+from tests.window.windowed import open_window, run_frame
 
 pytestmark = pytest.mark.full  # every shipped scene
 
@@ -41,63 +41,63 @@ F, HOME = pygame.K_f, pygame.K_HOME
 
 @pytest.fixture
 def window(tmp_path: Path) -> Iterator[App]:
-    with window_on(LEAVING, tmp_path) as opened:
-        pygame.event.clear()  # those of its opening
-        yield opened
+    with open_window(LEAVING, tmp_path) as window:
+        pygame.event.clear()  # events of opening the window
+        yield window
 
 
-def seen(window: App) -> list[bool]:
-    """Return which bodies are in the part of the picture that nothing covers."""
+def visible(window: App) -> list[bool]:
+    """Return which bodies are in the uncovered part of the picture."""
     assert window.app_state.view is not None
     free = window.context.gui.area
     return [
-        free.collidepoint(place)
-        for place in window.context.camera.to_screen(window.app_state.view.displayed_frame.position).tolist()
+        free.collidepoint(point)
+        for point in window.context.camera.to_screen(window.app_state.view.displayed_frame.position).tolist()
     ]
 
 
-def strike(window: App, code: int) -> None:
-    turned(window, key(code), key_up(code), elapsed=0.0)
+def tap(window: App, code: int) -> None:
+    run_frame(window, key(code), key_up(code), elapsed=0.0)
 
 
 @pytest.mark.parametrize("elapsed", [0.01, 0.1])
-def test_all_that_moves_stays_in_the_picture(window: App, elapsed: float) -> None:
-    strike(window, F)
-    for _ in range(round(4.0 / elapsed)):  # they are 40 m apart then, and have fallen 80 m
-        turned(window, elapsed=elapsed)
-        assert all(seen(window))
+def test_all_moving_bodies_stay_in_the_picture(window: App, elapsed: float) -> None:
+    tap(window, F)
+    for _ in range(round(4.0 / elapsed)):  # the bodies are 40 m apart at the end, and have fallen 80 m
+        run_frame(window, elapsed=elapsed)
+        assert all(visible(window))
 
 
 def test_picked_body_stays_in_the_picture_at_the_same_scale(window: App) -> None:
     x, y = window.context.camera.to_screen(np.zeros(2)).tolist()
-    turned(window, press(x, y), release(x, y), elapsed=0.0)
-    strike(window, F)
+    run_frame(window, press(x, y), release(x, y), elapsed=0.0)
+    tap(window, F)
     scale = window.context.camera.scale
     for _ in range(40):
-        turned(window, elapsed=0.1)
-        assert seen(window)[0]
+        run_frame(window, elapsed=0.1)
+        assert visible(window)[0]
     assert window.context.camera.scale == scale
-    assert not seen(window)[1]
-    strike(window, HOME)
+    assert not visible(window)[1]
+    tap(window, HOME)
     assert window.context.following is None
     assert window.context.is_fitted
 
 
-def test_that_nothing_is_in_sight_is_said_until_something_is(window: App) -> None:
+def test_message_is_shown_while_no_body_is_in_view(window: App) -> None:
     home = window.context.camera
     for _ in range(40):
-        turned(window, elapsed=0.1)
+        run_frame(window, elapsed=0.1)
     assert window.context.camera == home
     assert window.context.is_out_of_view
     text = window.context.gui.describe_out_of_view(window.app_state)
     assert text is not None
     assert "Home" in text
-    strike(window, HOME)
+    tap(window, HOME)
     assert not window.context.is_out_of_view
     assert window.context.gui.describe_out_of_view(window.app_state) is None
 
 
-def test_spent_fireworks_say_that_space_launches_them(tmp_path: Path) -> None:
+def test_out_of_view_message_of_fireworks_names_the_relaunch_key(tmp_path: Path) -> None:
     window = App(AppState(), size=(640, 480), folder=tmp_path, say=lambda _: None)
     try:
         assert window.app_state.open(find("fireworks"))
@@ -109,7 +109,7 @@ def test_spent_fireworks_say_that_space_launches_them(tmp_path: Path) -> None:
         window.close()
 
 
-def test_ship_that_a_key_drives_is_followed_from_the_start(tmp_path: Path) -> None:
+def test_body_driven_by_keys_is_followed_from_the_start(tmp_path: Path) -> None:
     window = App(AppState(), size=(640, 480), folder=tmp_path, say=lambda _: None)
     try:
         assert window.app_state.open(find("spaceship"))
@@ -118,20 +118,20 @@ def test_ship_that_a_key_drives_is_followed_from_the_start(tmp_path: Path) -> No
         assert scene is not None
         ship = scene.bodies.names.index(scene.thrusts[0].body)
         assert window.context.following == ship
-        turned(window, key(pygame.K_UP), elapsed=0.0)
+        run_frame(window, key(pygame.K_UP), elapsed=0.0)
         for _ in range(60):
-            turned(window, elapsed=0.1)
-            assert seen(window)[ship]
+            run_frame(window, elapsed=0.1)
+            assert visible(window)[ship]
     finally:
         window.close()
 
 
-def test_full_screen_and_back(window: App) -> None:
-    turned(window, elapsed=0.0)
+def test_f11_toggles_full_screen_and_restores_the_size(window: App) -> None:
+    run_frame(window, elapsed=0.0)
     size = window.context.surface.get_size()
-    strike(window, pygame.K_F11)
+    tap(window, pygame.K_F11)
     assert window.context.surface.get_flags() & pygame.FULLSCREEN
-    strike(window, pygame.K_F11)
+    tap(window, pygame.K_F11)
     assert not window.context.surface.get_flags() & pygame.FULLSCREEN
     assert window.context.surface.get_size() == size
     assert window.context.camera.size == size

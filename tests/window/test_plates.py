@@ -1,4 +1,4 @@
-"""Plates: no two lie over each other in any shipped scene at any size, and the scene has most of the window."""
+"""Plates (text boxes) of the window: none overlap in any shipped scene at any size, and most of the window is free."""
 
 import math
 from itertools import combinations
@@ -21,24 +21,24 @@ from sandbox.window.view_bounds import field_rect, view_bounds
 pytestmark = pytest.mark.full  # every shipped scene
 
 SIZES = [(400, 300, 1.0), (800, 600, 1.0), (1024, 700, 1.0), (1280, 720, 1.0), (1920, 1080, 1.0), (1280, 720, 2.0)]
-"""Width and height, px, and by how much letters and widgets are larger."""
+"""Width and height, px, and the scale of text and widgets."""
 SHIPPED = [each.name for each in shipped()]
 FIELD_SCENES = [
     each.name
     for each in shipped()
     if (play := load(each.path).play).view is not None or play.area is not None or play.game is not None
 ]
-"""Tables and games: their files state the view, or what plays there."""
+"""Tables and games: their files state the view, the area or the game."""
 
 
 def overlaps(window: App) -> list[str]:
-    """Return the pairs of plates that lie over each other."""
+    """Return the pairs of plates that overlap."""
     plates = window.context.gui.plates.items()
     return [f"{a}{p} {b}{q}" for (a, p), (b, q) in combinations(plates, 2) if p.colliderect(q)]
 
 
-def opened(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> App:
-    # What is laid out does not depend on what flies where: the look ahead is left out.
+def open_scene(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> App:
+    # The layout does not depend on the trajectories, so predicting them is skipped.
     monkeypatch.setattr("sandbox.window.app_state.predict_bounds", lambda *_: None)
     window = App(AppState(), size=(1280, 720), folder=folder, say=lambda _: None)
     assert window.app_state.open(find(name))
@@ -57,10 +57,10 @@ def resize(window: App, width: int, height: int, unit: float) -> None:
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_no_two_plates_overlap(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    window = opened(name, tmp_path, monkeypatch)
+    window = open_scene(name, tmp_path, monkeypatch)
     try:
         window.run_frame(0.0)
-        window.app_state.paused = True  # from here on all that can be told at once
+        window.app_state.paused = True  # show every plate at once from here on
         window.context.gui.overlays = set(OVERLAYS)
         window.app_state.body_tools.picked = 0
         window.app_state.messages.add("a message that is long enough to need more than one line of a small window")
@@ -76,7 +76,7 @@ def test_no_two_plates_overlap(name: str, tmp_path: Path, monkeypatch: pytest.Mo
 
 @pytest.mark.parametrize("name", [name for name in FIELD_SCENES if name.startswith("pinball")])
 def test_messages_leave_the_field_free_beside_it(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    window = opened(name, tmp_path, monkeypatch)
+    window = open_scene(name, tmp_path, monkeypatch)
     try:
         resize(window, 900, 600, 1.0)
         window.app_state.messages.add("a message that is long enough to need more than one line beside the table")
@@ -93,12 +93,12 @@ def test_messages_leave_the_field_free_beside_it(name: str, tmp_path: Path, monk
 
 @pytest.mark.parametrize("name", FIELD_SCENES)
 def test_plates_leave_the_field_free(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of tables and games: what their files state as the view, which is all that counts there."""
-    window = opened(name, tmp_path, monkeypatch)
+    """The field of tables and games is the view that their files state."""
+    window = open_scene(name, tmp_path, monkeypatch)
     try:
         scene = window.app_state.view.scene if window.app_state.view is not None else None
         assert scene is not None
-        for width, height, unit in SIZES[1:]:  # at 400 × 300 there is room for either alone
+        for width, height, unit in SIZES[1:]:  # 400 × 300 is too small for both
             resize(window, width, height, unit)
             corners = window.context.camera.to_screen(np.asarray(view_bounds(scene)))
             (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
@@ -107,31 +107,31 @@ def test_plates_leave_the_field_free(name: str, tmp_path: Path, monkeypatch: pyt
                 k: r for k, r in window.context.gui.plates.items() if not k.startswith(("message", "rate", "inset"))
             }
             assert [k for k, rect in covering.items() if rect.colliderect(field)] == [], (width, height, unit)
-            assert field.width * field.height > 0.08 * width * height  # it is not driven into a corner either
+            assert field.width * field.height > 0.08 * width * height  # the field is not reduced to a corner either
     finally:
         window.close()
 
 
-def test_last_shot_is_told_whole_beside_four_tanks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    window = opened("four", tmp_path, monkeypatch)
-    told = "at 172.07 m, exactly 171.94 m: off by 148 mm"
+def test_last_shot_is_shown_in_full_beside_four_tanks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    window = open_scene("four", tmp_path, monkeypatch)
+    message = "at 172.07 m, exactly 171.94 m: off by 148 mm"
     lines = ArtilleryRules.display_lines
-    monkeypatch.setattr(ArtilleryRules, "display_lines", lambda self: [*lines(self), ("last shot", told)])
+    monkeypatch.setattr(ArtilleryRules, "display_lines", lambda self: [*lines(self), ("last shot", message)])
     try:
         resize(window, 1024, 700, 1.0)
         assert window.app_state.host is not None
         assert window.app_state.view is not None
-        laid = score_panel.layout_score(window.app_state.host.shown().board, window.context.gui.area, 300, 1.0)
-        texts = [text for cells, _ in laid.rows for _, text in cells]
-        assert told in texts
-        assert len(laid.rows) <= 4
+        panel = score_panel.layout_score(window.app_state.host.shown().board, window.context.gui.area, 300, 1.0)
+        texts = [text for cells, _ in panel.rows for _, text in cells]
+        assert message in texts
+        assert len(panel.rows) <= 4
     finally:
         window.close()
 
 
-def test_largest_room_lies_beside_what_is_taken() -> None:
+def test_largest_area_avoids_the_occupied_rectangles() -> None:
     free = pygame.Rect(0, 0, 100, 80)
     assert largest_area((1, 1), free, []) == free
     assert largest_area((1, 1), free, [pygame.Rect(0, 0, 30, 20)]) == pygame.Rect(30, 0, 70, 80)
     assert largest_area((2, 1), free, [pygame.Rect(0, 0, 30, 20)]) == pygame.Rect(0, 20, 100, 60)
-    assert largest_area((1, 1), free, [free]) == free  # nothing is left: it is not minded
+    assert largest_area((1, 1), free, [free]) == free  # nothing is left: the occupied rectangles are ignored

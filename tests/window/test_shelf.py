@@ -1,4 +1,4 @@
-"""The shelf, messages, and the facts that are told."""
+"""Neighbouring scenes, scenes of the picker, messages, and facts of a body."""
 
 from pathlib import Path
 
@@ -21,18 +21,18 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_walk_goes_round_the_files_beside_the_one_that_is_open(folder: Path) -> None:
-    here, seen = folder / "b.toml", []
+def test_neighbouring_scenes_cycle_through_the_folder(folder: Path) -> None:
+    current, names = folder / "b.toml", []
     for _ in range(4):
-        next_one = neighbouring_scene(here, 1)
+        next_one = neighbouring_scene(current, 1)
         assert next_one is not None
-        here = next_one
-        seen.append(here.name)
-    assert seen == ["c.toml", "a.toml", "b.toml", "c.toml"]
+        current = next_one
+        names.append(current.name)
+    assert names == ["c.toml", "a.toml", "b.toml", "c.toml"]
     assert neighbouring_scene(folder / "a.toml", -1) == folder / "c.toml"
 
 
-def test_walk_knows_a_file_by_any_of_its_paths(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_neighbouring_scene_accepts_relative_paths_and_links(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     found = neighbouring_scene(Path("a.toml"), 1)
     assert found is not None
@@ -41,30 +41,30 @@ def test_walk_knows_a_file_by_any_of_its_paths(folder: Path, monkeypatch: pytest
     assert neighbouring_scene(folder / "link.toml", 1) is not None
 
 
-def test_file_of_another_kind_or_that_is_gone_is_walked_from(folder: Path) -> None:
-    for here in (folder / "notes.txt", folder / "gone.toml"):
-        assert scenes_beside(here)[0] == here
-        assert neighbouring_scene(here, 1) == folder / "a.toml"
-        assert neighbouring_scene(here, -1) == folder / "c.toml"
+def test_neighbouring_scene_starts_from_other_and_missing_files(folder: Path) -> None:
+    for current in (folder / "notes.txt", folder / "gone.toml"):
+        assert scenes_beside(current)[0] == current
+        assert neighbouring_scene(current, 1) == folder / "a.toml"
+        assert neighbouring_scene(current, -1) == folder / "c.toml"
     lonely = folder / "no such folder" / "x.toml"
     assert neighbouring_scene(lonely, 1) == lonely
 
 
-def test_without_a_file_the_shipped_scenes_are_walked() -> None:
+def test_neighbouring_scenes_without_a_file_are_the_shipped_scenes() -> None:
     files = [each.path for each in shipped()]
     assert list(scenes_beside(None)) == files
     assert neighbouring_scene(None, 1) == files[0]
     assert neighbouring_scene(None, -1) == files[-1]
 
 
-def test_picker_offers_what_is_beside_and_what_ships_each_once(folder: Path) -> None:
+def test_picker_offers_neighbouring_and_shipped_scenes_without_duplicates(folder: Path) -> None:
     offered = scenes_to_pick(folder / "a.toml")
     assert [name for name, _ in offered[:3]] == [f"{folder.name}/{stem}" for stem in "abc"]
     assert offered[3:] == scenes_to_pick(None) == [(each.name, each.path) for each in shipped()]
     assert scenes_to_pick(shipped()[0].path) == scenes_to_pick(None)
 
 
-def test_messages_last_their_time_and_are_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_messages_expire_and_repeated_messages_are_merged(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [100.0]
     monkeypatch.setattr(module, "perf_counter", lambda: now[0])
     messages = Messages()
@@ -84,7 +84,7 @@ def test_messages_last_their_time_and_are_told_once(monkeypatch: pytest.MonkeyPa
     assert [text for _, text in messages.visible()] == ["4", "5", "6", "7", "8"][-MAX_MESSAGES:]
 
 
-def test_facts_of_a_body_are_its_figures() -> None:
+def test_body_facts_list_speed_energy_and_contacts() -> None:
     scene = from_document(
         {
             "ball": [
@@ -104,12 +104,12 @@ def test_facts_of_a_body_are_its_figures() -> None:
     assert any(line.startswith("E kin 25") for line in lines)
     assert lines[-1] == "2 contacts"
     assert "fixed" in body_facts(bodies, frame, Contacts.none(), 1)
-    gone = Frame(0.0, *(array.copy() for array in state), np.zeros(2, np.bool_))
-    assert body_facts(bodies, gone, contacts, 0) == ("cue", "removed")
+    absent = Frame(0.0, *(array.copy() for array in state), np.zeros(2, np.bool_))
+    assert body_facts(bodies, absent, contacts, 0) == ("cue", "removed")
     assert body_facts(bodies, frame, contacts, 2) == ()
 
 
-def test_settings_are_told_in_a_few_words() -> None:
+def test_settings_text_lists_only_relevant_settings() -> None:
     assert settings_text(Settings(dt=0.01)) == "dt 10.0 ms"
     words = settings_text(Settings(dt=0.01, substeps=2, integrator="rk4", detection="swept", response="penalty"))
     assert words == "dt 10.0 ms · 2 × 10 · rk4 · swept · penalty"

@@ -1,4 +1,4 @@
-"""Collision sounds: their pitch and shape, which contacts are heard, and silence where there is no device."""
+"""Collision sounds: pitch and envelope, selection of contacts, and silence without an audio device."""
 
 import os
 import subprocess
@@ -33,7 +33,7 @@ PITCHES = [float(LOWEST * (HIGHEST / LOWEST) ** (k / (STEPS - 1))) for k in rang
 
 
 def bodies(radii: list[float], fixed: bool = False) -> Bodies:
-    """Balls of 1 kg in a row; the last one may be fixed."""
+    """Return balls of 1 kg in a row; the last one may be fixed."""
     text = "".join(
         f"[[ball]]\nposition = [{10 * k}, 0]\nradius = {radius}\nfixed = {str(fixed and k == len(radii) - 1).lower()}\n"
         for k, radius in enumerate(radii)
@@ -42,7 +42,7 @@ def bodies(radii: list[float], fixed: bool = False) -> Bodies:
 
 
 def touching(*rows: tuple[float, tuple[int, int], float]) -> Contacts:
-    """Contacts by time, pair, and the impulse's size."""
+    """Return contacts given by time, pair and magnitude of the impulse, N·s."""
     count = len(rows)
     impulse = np.zeros((count, 2))
     impulse[:, 1] = [row[2] for row in rows]
@@ -57,10 +57,10 @@ def touching(*rows: tuple[float, tuple[int, int], float]) -> Contacts:
 
 @pytest.fixture
 def sounds() -> Iterator[Sounds]:
-    made = Sounds()
-    assert made.enable()
-    yield made
-    made.disable()
+    sounds = Sounds()
+    assert sounds.enable()
+    yield sounds
+    sounds.disable()
     assert pygame.mixer.get_init() is None
 
 
@@ -73,36 +73,36 @@ def test_spectrum_peaks_at_the_pitch(pitch: float) -> None:
 
 
 @pytest.mark.parametrize("pitch", PITCHES[::9])
-def test_samples_use_the_scale_and_stay_within(pitch: float) -> None:
+def test_samples_peak_at_six_tenths_of_full_scale(pitch: float) -> None:
     samples = impact_sound(pitch)
     assert samples.dtype == np.int16
     assert len(samples) == int(SECONDS * RATE)
     assert int(np.abs(samples.astype(int)).max()) == round(0.6 * 32767)
-    assert samples[0] == samples[-1] == 0  # no step that clicks
+    assert samples[0] == samples[-1] == 0  # no discontinuity, which would click
 
 
 @pytest.mark.parametrize("pitch", PITCHES)
 def test_envelope_decays(pitch: float) -> None:
     parts = np.abs(impact_sound(pitch).astype(float)).reshape(10, -1).max(axis=1)
-    audible = parts[parts > 30]  # of 32,767: below, rounding to integers is what is seen
+    audible = parts[parts > 30]  # of 32,767: below, rounding to integers dominates
     assert (np.diff(audible) < 0).all()
     assert parts[-1] < 0.01 * parts[0]  # 40 dB
 
 
-def test_larger_bodies_sound_lower_and_all_can_be_heard() -> None:
+def test_pitch_falls_with_the_radius_and_stays_in_the_audible_range() -> None:
     pitches = [impact_pitch(radius) for radius in (1e-9, 0.01, 0.028575, 0.1, 0.5, 2.0, 1e9)]
     assert pitches == sorted(pitches, reverse=True)
     assert all(higher > lower for higher, lower in pairwise(pitches[1:6]))
     assert (pitches[0], pitches[-1]) == (pytest.approx(HIGHEST), pytest.approx(LOWEST))
-    assert impact_pitch(0.5) == pytest.approx(220.0, rel=0.06)  # half a whole tone, to which pitches are rounded
+    assert impact_pitch(0.5) == pytest.approx(220.0, rel=0.06)  # half of a whole tone, to which pitches are rounded
     assert len({impact_pitch(radius) for radius in np.geomspace(1e-9, 1e9, 4000)}) == STEPS
 
 
-def test_same_pitch_is_the_same_sound() -> None:
+def test_impact_sound_is_deterministic() -> None:
     assert np.array_equal(impact_sound(440.0), impact_sound(440.0))
 
 
-def test_loudness_is_of_the_lighter_body_that_moves() -> None:
+def test_loudness_uses_the_lighter_moving_body() -> None:
     balls = bodies([0.5, 0.2, 0.1], fixed=True)
     balls.mass[1] = 0.25
     contacts = touching((0.0, (0, 1), 1.0), (0.0, (1, 2), 1.0), (0.0, (0, -1), 1.0), (0.0, (0, -3), 2.0))
@@ -112,7 +112,7 @@ def test_loudness_is_of_the_lighter_body_that_moves() -> None:
     assert strength == pytest.approx(np.array([1.0, 1.0, 1.0, 2.0]) / falls, rel=1e-14)  # a few roundings
 
 
-def test_body_that_falls_its_radius_is_heard_and_one_at_rest_is_not() -> None:
+def test_fall_by_one_radius_is_audible_and_resting_contact_is_silent() -> None:
     fall, rest = 1.0 * (2 * 9.81 * 0.5) ** 0.5, 1.0 * 9.81 / 60
     strength, _ = loudness(touching((0.0, (0, -1), fall), (0.0, (0, -1), rest)), bodies([0.5]))
     assert strength[0] == pytest.approx(1.0, rel=1e-15)
@@ -121,12 +121,12 @@ def test_body_that_falls_its_radius_is_heard_and_one_at_rest_is_not() -> None:
     assert 0.0 < volume(0.2) < volume(1.0) < 1.0
 
 
-def test_impulse_that_is_no_number_is_silent() -> None:
+def test_impulse_that_is_not_finite_is_silent() -> None:
     strength, _ = loudness(touching((0.0, (0, -1), np.nan), (0.0, (0, -1), np.inf)), bodies([0.5]))
     assert strength.tolist() == [0.0, 0.0]
 
 
-def test_contact_is_heard_once_as_long_as_it_lasts(sounds: Sounds) -> None:
+def test_lasting_contact_is_played_once(sounds: Sounds) -> None:
     balls = bodies([0.5, 0.1])
     first = (0.1, (0, -1), 5.0)
     assert sounds.hits(touching(first), balls) == 1
@@ -134,19 +134,19 @@ def test_contact_is_heard_once_as_long_as_it_lasts(sounds: Sounds) -> None:
     assert sounds.hits(touching(first, (0.2, (1, -1), 5.0)), balls) == 1
     assert sounds.hits(Contacts.none(), balls) == 0
     assert sounds.hits(touching((0.4, (0, -1), 5.0)), balls) == 1
-    assert sounds.hits(touching((0.4, (0, -2), 5.0)), balls) == 1  # at the same time, another thing
+    assert sounds.hits(touching((0.4, (0, -2), 5.0)), balls) == 1  # at the same time, another partner
 
 
-def test_sounds_of_a_moment_are_few_different_and_the_loudest(sounds: Sounds) -> None:
+def test_simultaneous_sounds_are_limited_and_distinct_in_pitch(sounds: Sounds) -> None:
     radii = [float(r) for r in np.geomspace(0.01, 10.0, 12)]
     balls = bodies([*radii, 0.01])
     crowd = [(0.1, (k, -1), 40.0 * float(np.sqrt(radius))) for k, radius in enumerate(radii)]
     assert sounds.hits(touching(*crowd), balls) == A_CALL
-    assert sounds.hits(touching((0.2, (0, -1), 5.0), (0.2, (12, -1), 5.0)), balls) == 1  # of one radius, one sound
+    assert sounds.hits(touching((0.2, (0, -1), 5.0), (0.2, (12, -1), 5.0)), balls) == 1  # equal radii share one sound
     assert len(sounds._sounds) <= A_CALL + 1
 
 
-def test_no_more_voices_than_there_are(sounds: Sounds, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_sounds_are_limited_by_the_channels_of_the_mixer(sounds: Sounds, monkeypatch: pytest.MonkeyPatch) -> None:
     pygame.mixer.set_num_channels(3)
     balls = bodies([float(r) for r in np.geomspace(0.01, 10.0, 8)])
     crowd = touching(*((0.1, (k, -1), 1e3) for k in range(8)))
@@ -154,15 +154,15 @@ def test_no_more_voices_than_there_are(sounds: Sounds, monkeypatch: pytest.Monke
     assert sounds.hits(touching((0.2, (0, -1), 1e3)), balls) == 0
 
 
-def test_sounds_are_off_until_asked_for() -> None:
-    made = Sounds()
-    assert not made.enabled
-    assert made.hits(touching((0.1, (0, -1), 5.0)), bodies([0.5])) == 0
+def test_sounds_are_off_by_default() -> None:
+    sounds = Sounds()
+    assert not sounds.enabled
+    assert sounds.hits(touching((0.1, (0, -1), 5.0)), bodies([0.5])) == 0
     assert pygame.mixer.get_init() is None
-    made.disable()
+    sounds.disable()
 
 
-def test_disabling_falls_silent_and_enabling_plays_again(sounds: Sounds) -> None:
+def test_disabling_silences_and_enabling_plays_again(sounds: Sounds) -> None:
     hit = touching((0.1, (0, -1), 5.0))
     assert sounds.hits(hit, bodies([0.5])) == 1
     sounds.disable()
@@ -172,30 +172,30 @@ def test_disabling_falls_silent_and_enabling_plays_again(sounds: Sounds) -> None
     assert sounds.hits(hit, bodies([0.5])) == 1
 
 
-def test_mixer_that_somebody_else_opened_stays_open() -> None:
+def test_mixer_opened_elsewhere_stays_open() -> None:
     pygame.mixer.init(22_050, -16, 1, 512, allowedchanges=0)
     try:
-        made = Sounds()
-        assert made.enable()
-        assert made.hits(touching((0.1, (0, -1), 5.0)), bodies([0.5])) == 1
-        (played,) = made._sounds.values()
+        sounds = Sounds()
+        assert sounds.enable()
+        assert sounds.hits(touching((0.1, (0, -1), 5.0)), bodies([0.5])) == 1
+        (played,) = sounds._sounds.values()
         assert played.get_length() == pytest.approx(SECONDS, abs=1e-3)  # s, a few samples
-        made.disable()
+        sounds.disable()
         assert pygame.mixer.get_init() == (22_050, -16, 1)
     finally:
         pygame.mixer.quit()
 
 
-def test_mixer_that_is_missing_is_no_exception(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_mixer_raises_no_exception(monkeypatch: pytest.MonkeyPatch) -> None:
     class Missing:
         def __getattr__(self, name: str) -> None:
             raise NotImplementedError("mixer module not available")
 
     monkeypatch.setattr(sound.pygame, "mixer", Missing())
-    made = Sounds()
-    assert not made.enable()
-    assert (made.available, made.why) == (False, "no sound: mixer module not available")
-    assert made.hits(touching((0.1, (0, -1), 5.0)), bodies([0.5])) == 0
+    sounds = Sounds()
+    assert not sounds.enable()
+    assert (sounds.available, sounds.why) == (False, "no sound: mixer module not available")
+    assert sounds.hits(touching((0.1, (0, -1), 5.0)), bodies([0.5])) == 0
 
 
 NO_DEVICE = """
@@ -210,7 +210,7 @@ sounds.disable()
 """
 
 
-def test_no_audio_device_is_no_exception() -> None:
+def test_missing_audio_device_raises_no_exception() -> None:
     done = subprocess.run(
         [sys.executable, "-W", "error", "-c", NO_DEVICE],
         capture_output=True,

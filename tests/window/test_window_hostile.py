@@ -1,4 +1,4 @@
-"""Input to the window that nobody means: it is used as far as it makes sense, or told in the window."""
+"""Malformed and extreme input to the window: it is used as far as possible, or reported in the window."""
 
 import json
 from collections.abc import Iterator
@@ -28,24 +28,34 @@ name = {name}
 position = [-1.0, 0.0]
 radius = 0.4
 """
-ODD = ["\0", "\x1b[31mred", "a\nb", "\u202eright to left", "👩‍👩‍👧" * 30, "\U0010ffff", "../../x", "/", "x" * 200]
+HOSTILE_TEXTS = [
+    "\0",
+    "\x1b[31mred",
+    "a\nb",
+    "\u202eright to left",
+    "👩‍👩‍👧" * 30,
+    "\U0010ffff",
+    "../../x",
+    "/",
+    "x" * 200,
+]
 
 
 @pytest.fixture
 def window(tmp_path: Path) -> Iterator[App]:
-    """A window that writes into a folder of its own; what it prints is in `window.said`."""
+    """Return a window that writes into the folder `out`; its printed lines are in `window.printed`."""
     (tmp_path / "out").mkdir()
-    said: list[str] = []
-    window = App(AppState(), size=(900, 600), folder=tmp_path / "out", say=said.append)
-    window.said = said
+    printed: list[str] = []
+    window = App(AppState(), size=(900, 600), folder=tmp_path / "out", say=printed.append)
+    window.printed = printed
     yield window
     window.close()
 
 
-def room(folder: Path, title: str = "Room", name: str = "a") -> Path:
+def write_room(folder: Path, title: str = "Room", name: str = "a") -> Path:
     path = folder / "room.toml"
-    written = ('"' + "".join(f"\\U{ord(letter):08x}" for letter in text) + '"' for text in (title, name))
-    path.write_text(ROOM.format(**dict(zip(("title", "name"), written, strict=True))), encoding="utf-8")
+    literals = ('"' + "".join(f"\\U{ord(letter):08x}" for letter in text) + '"' for text in (title, name))
+    path.write_text(ROOM.format(**dict(zip(("title", "name"), literals, strict=True))), encoding="utf-8")
     return path
 
 
@@ -55,26 +65,26 @@ def post(window: App, *events: pygame.event.Event) -> None:
     window.run_frame(0.02)
 
 
-def control(window: App, code: int) -> None:
+def press_with_ctrl(window: App, code: int) -> None:
     post(window, key(code, mod=pygame.KMOD_CTRL), pygame.event.Event(pygame.KEYUP, key=code, mod=0, unicode=""))
 
 
-@pytest.mark.parametrize("text", ODD)
+@pytest.mark.parametrize("text", HOSTILE_TEXTS)
 def test_any_title_and_name_are_shown_and_saved_under_a_plain_name(window: App, tmp_path: Path, text: str) -> None:
     name = text if text.isprintable() else "a"
-    assert window.app_state.open(room(tmp_path, text, name))
+    assert window.app_state.open(write_room(tmp_path, text, name))
     window.context.gui.overlays |= {"names"}
-    control(window, pygame.K_p)
-    control(window, pygame.K_s)
+    press_with_ctrl(window, pygame.K_p)
+    press_with_ctrl(window, pygame.K_s)
     written = sorted(path.name for path in (tmp_path / "out").iterdir())
     assert written == ["sandbox-room-1.json", "sandbox-room-1.png"]
     assert pygame.display.get_caption()[0].isprintable()
 
 
 @pytest.mark.parametrize("typed", ["x" * 500, "\0\x1b\ud800\u200b", "👩\U0010ffff\u202e", "../../etc", "%s{}\\"])
-def test_any_letters_can_be_typed_for_a_scene(window: App, tmp_path: Path, typed: str) -> None:
-    window.app_state.open(room(tmp_path))
-    control(window, pygame.K_o)
+def test_any_text_can_be_typed_into_the_picker(window: App, tmp_path: Path, typed: str) -> None:
+    window.app_state.open(write_room(tmp_path))
+    press_with_ctrl(window, pygame.K_o)
     for letter in typed:
         post(window, pygame.event.Event(pygame.KEYDOWN, key=pygame.K_a, mod=0, unicode=letter))
     assert window.context.gui.scene_browser is not None
@@ -83,38 +93,38 @@ def test_any_letters_can_be_typed_for_a_scene(window: App, tmp_path: Path, typed
 
 
 @pytest.mark.parametrize("is_file", [False, True], ids=["gone", "a file"])
-def test_folder_that_cannot_be_written_is_told(window: App, tmp_path: Path, is_file: bool) -> None:
-    window.app_state.open(room(tmp_path))
+def test_unwritable_folder_is_reported(window: App, tmp_path: Path, is_file: bool) -> None:
+    window.app_state.open(write_room(tmp_path))
     (tmp_path / "out").rmdir()
     if is_file:
         (tmp_path / "out").write_text("", encoding="utf-8")
     for code in (pygame.K_p, pygame.K_s, pygame.K_r):
-        control(window, code)
-        assert "out: cannot be written: " in window.said[-1]
-        assert ".tmp" not in window.said[-1]
+        press_with_ctrl(window, code)
+        assert "out: cannot be written: " in window.printed[-1]
+        assert ".tmp" not in window.printed[-1]
 
 
 @pytest.mark.parametrize("notches", [1e9, -1e9, 10_000, -10_000])
-def test_wheel_that_spins_wildly_only_zooms(window: App, tmp_path: Path, notches: float) -> None:
-    window.app_state.open(room(tmp_path))
-    turned = {"x": 0, "y": int(notches), "precise_y": float(notches), "flipped": False}
-    post(window, pygame.event.Event(pygame.MOUSEWHEEL, **turned))
-    post(window, pygame.event.Event(pygame.MOUSEWHEEL, **turned))
+def test_extreme_wheel_events_keep_the_scale_finite(window: App, tmp_path: Path, notches: float) -> None:
+    window.app_state.open(write_room(tmp_path))
+    wheel = {"x": 0, "y": int(notches), "precise_y": float(notches), "flipped": False}
+    post(window, pygame.event.Event(pygame.MOUSEWHEEL, **wheel))
+    post(window, pygame.event.Event(pygame.MOUSEWHEEL, **wheel))
     assert 0.0 < window.context.camera.scale < float("inf")
 
 
-@pytest.mark.parametrize("what", [pygame.DROPFILE, pygame.DROPTEXT])
+@pytest.mark.parametrize("event_type", [pygame.DROPFILE, pygame.DROPTEXT])
 @pytest.mark.parametrize("dropped", ["/", "../x", "\0", "x" * 10_000])
-def test_what_is_dropped_on_the_window_does_nothing(window: App, tmp_path: Path, what: int, dropped: str) -> None:
-    window.app_state.open(room(tmp_path))
-    show = window.app_state.view
-    post(window, pygame.event.Event(what, file=dropped, text=dropped))
-    assert window.app_state.view is show
+def test_dropped_files_and_text_are_ignored(window: App, tmp_path: Path, event_type: int, dropped: str) -> None:
+    window.app_state.open(write_room(tmp_path))
+    view = window.app_state.view
+    post(window, pygame.event.Event(event_type, file=dropped, text=dropped))
+    assert window.app_state.view is view
     assert window.context.exit_status is None
 
 
 @pytest.mark.parametrize("score", [10**16, -(10**16), 10**4000, 1e300])
-def test_high_scores_that_no_game_gives_are_damage(tmp_path: Path, score: float) -> None:
+def test_high_scores_outside_the_valid_range_are_reported_as_damage(tmp_path: Path, score: float) -> None:
     path = tmp_path / "scores.json"
     path.write_text(json.dumps({"t": [["ABC", score]]}), encoding="utf-8")
     scores = opened(path)
@@ -122,14 +132,14 @@ def test_high_scores_that_no_game_gives_are_damage(tmp_path: Path, score: float)
     assert scores.of("t") == ()
 
 
-def test_high_scores_list_ten_however_many_a_file_has(tmp_path: Path) -> None:
+def test_high_scores_list_at_most_ten_entries(tmp_path: Path) -> None:
     path = tmp_path / "scores.json"
     path.write_text(json.dumps({"t": [["ABC", 1000 - k] for k in range(500)]}), encoding="utf-8")
     assert len(HighScores(path).of("t")) == 10
 
 
 @pytest.mark.parametrize("typed", ["é\0../👩", "\ud800\n", "xyzzy" * 100])
-def test_initials_are_three_plain_letters_whatever_is_typed(tmp_path: Path, typed: str) -> None:
+def test_initials_are_at_most_three_ascii_letters(tmp_path: Path, typed: str) -> None:
     entry = HighScoreEntry(HighScores(tmp_path / "scores.json"), "t", 12, 1)
     for letter in ("a", *typed):
         entry.type(letter)

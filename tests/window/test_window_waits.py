@@ -1,4 +1,4 @@
-"""When time stands still though nobody paused: help, the picker, another window, a game before its start, compiling."""
+"""Time stops without a pause: behind help and picker, without focus, before the start of a game, while compiling."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -13,7 +13,7 @@ from sandbox.window.app import App
 from sandbox.window.app_state import AppState
 from sandbox.window.worker import Worker
 from tests.window.pressing import FOCUS_LOST, key, key_up, press
-from tests.window.windowed import turned, window_on
+from tests.window.windowed import open_window, run_frame
 
 pytestmark = pytest.mark.full  # a window or a film
 
@@ -32,35 +32,35 @@ FOCUS_GAINED = pygame.event.Event(pygame.WINDOWFOCUSGAINED)
 
 @pytest.fixture
 def window(tmp_path: Path) -> Iterator[App]:
-    with window_on(MOVING, tmp_path) as opened:
-        pygame.event.clear()  # those of its opening
-        yield opened
+    with open_window(MOVING, tmp_path) as window:
+        pygame.event.clear()  # events of opening the window
+        yield window
 
 
 @pytest.fixture
 def game(tmp_path: Path) -> Iterator[Callable[[str], App]]:
-    """Opens a shipped scene."""
-    opened: list[App] = []
+    """Return a function that opens a shipped scene."""
+    windows: list[App] = []
 
     def play(name: str) -> App:
-        stage = AppState()
-        window = App(stage, size=(640, 480), folder=tmp_path, say=lambda _: None)
-        opened.append(window)
-        assert stage.open(find(name))
+        state = AppState()
+        window = App(state, size=(640, 480), folder=tmp_path, say=lambda _: None)
+        windows.append(window)
+        assert state.open(find(name))
         pygame.event.clear()
         return window
 
     yield play
-    for each in opened:
-        each.close()
+    for window in windows:
+        window.close()
 
 
 def steps(window: App) -> int:
-    """Let the window make three turns; return how many steps were made."""
+    """Run three frames, and return the number of steps that they made."""
     assert window.app_state.view is not None
     before = window.app_state.view.step_number
     for _ in range(3):
-        turned(window)
+        run_frame(window)
     return window.app_state.view.step_number - before
 
 
@@ -74,14 +74,14 @@ def steps(window: App) -> int:
     ],
     ids=["help", "picker", "focus"],
 )
-def test_time_stands_still_behind_what_hides_the_scene(
+def test_time_stops_while_help_picker_or_focus_loss_hides_the_scene(
     window: App, hides: pygame.event.Event, shows: pygame.event.Event, paused: bool
 ) -> None:
     window.app_state.paused = paused
     assert (steps(window) > 0) is not paused
-    turned(window, hides)
+    run_frame(window, hides)
     assert steps(window) == 0
-    turned(window, shows)
+    run_frame(window, shows)
     assert (steps(window) > 0) is not paused
     assert window.context.exit_status is None
 
@@ -90,44 +90,44 @@ def test_time_stands_still_behind_what_hides_the_scene(
 def test_real_time_game_waits_for_space(game: Callable[[str], App], name: str) -> None:
     window = game(name)
     assert steps(window) == 0
-    turned(window, key(pygame.K_UP), key(pygame.K_LSHIFT), key_up(pygame.K_UP), key_up(pygame.K_LSHIFT))
-    live = turned(window, key(pygame.K_SPACE), key_up(pygame.K_SPACE))
+    run_frame(window, key(pygame.K_UP), key(pygame.K_LSHIFT), key_up(pygame.K_UP), key_up(pygame.K_LSHIFT))
+    live = run_frame(window, key(pygame.K_SPACE), key_up(pygame.K_SPACE))
     assert steps(window) > 0
     assert live.session.game is not None
-    assert live.session.game.presses == ()  # neither those before the start, nor the one that starts
-    turned(window, key(pygame.K_r), key_up(pygame.K_r))
-    assert steps(window) > 0  # who asks for another game is ready
+    assert live.session.game.presses == ()  # neither presses before the start, nor the one that starts
+    run_frame(window, key(pygame.K_r), key_up(pygame.K_r))
+    assert steps(window) > 0  # a restarted game does not wait
 
 
 @pytest.mark.parametrize("name", ["duel", "bounce"])
-def test_other_scenes_run_at_once(game: Callable[[str], App], name: str) -> None:
+def test_other_scenes_start_at_once(game: Callable[[str], App], name: str) -> None:
     assert steps(game(name)) > 0
 
 
-def test_step_begins_a_game_paused(game: Callable[[str], App]) -> None:
+def test_single_step_starts_a_game_paused(game: Callable[[str], App]) -> None:
     window = game("landing")
-    live = turned(window, key(pygame.K_o), key_up(pygame.K_o))
+    live = run_frame(window, key(pygame.K_o), key_up(pygame.K_o))
     assert live.step_number == 1
     assert window.app_state.paused
     assert not window.app_state.waits_for_start
 
 
-def compile_for(window: App, *meanwhile: pygame.event.Event) -> None:
-    """Let the next job of the stage compile until so many events have been taken out of the queue."""
+def compile_for(window: App, *events: pygame.event.Event) -> None:
+    """Run a job that compiles until these events have been taken out of the queue."""
 
     def job() -> None:
         COMPILE_CLOCK.begin("sandbox.test")
-        for event in meanwhile:
+        for event in events:
             pygame.event.post(event)
-        while pygame.event.peek([event.type for event in meanwhile]) and window.context.exit_status is None:
+        while pygame.event.peek([event.type for event in events]) and window.context.exit_status is None:
             threading.Event().wait(0.01)
         COMPILE_CLOCK.end()
 
     window.app_state.compute(job)
 
 
-def test_presses_while_compiling_are_dropped_and_releases_are_not(window: App) -> None:
-    turned(window)
+def test_presses_while_compiling_are_dropped_and_releases_are_kept(window: App) -> None:
+    run_frame(window)
     compile_for(window, key(pygame.K_p), press(100, 100), key_up(pygame.K_q))
     kept = {event.type for event in pygame.event.get()}
     assert pygame.KEYUP in kept
@@ -137,43 +137,43 @@ def test_presses_while_compiling_are_dropped_and_releases_are_not(window: App) -
 
 
 @pytest.mark.parametrize("event", [key(pygame.K_ESCAPE), pygame.event.Event(pygame.QUIT)], ids=["escape", "cross"])
-def test_window_closes_while_something_compiles(window: App, event: pygame.event.Event) -> None:
-    turned(window)
+def test_window_can_be_closed_while_compiling(window: App, event: pygame.event.Event) -> None:
+    run_frame(window)
     compile_for(window, event)
     assert window.context.exit_status == 0
 
 
-def test_scene_is_seen_while_its_session_is_being_started(window: App, tmp_path: Path) -> None:
-    seen: list[int] = []
-    drawn = window.context.gui.draw_wait
+def test_scene_is_drawn_while_its_session_starts(window: App, tmp_path: Path) -> None:
+    colour_counts: list[int] = []
+    draw_wait = window.context.gui.draw_wait
 
-    def look(surface: pygame.Surface, what: str) -> None:
-        seen.append(len({surface.get_at((x, 240))[:3] for x in range(0, 360, 4)}))
-        drawn(surface, what)
+    def count_colours(surface: pygame.Surface, what: str) -> None:
+        colour_counts.append(len({surface.get_at((x, 240))[:3] for x in range(0, 360, 4)}))
+        draw_wait(surface, what)
 
-    window.context.gui.draw_wait = look  # type: ignore[method-assign]
+    window.context.gui.draw_wait = count_colours  # type: ignore[method-assign]
     other = tmp_path / "other.toml"
     other.write_text(MOVING.replace("Moving", "Other"), encoding="utf-8")
-    begin = window.app_state.compute
+    compute_in_worker = window.app_state.compute
 
     def compute(job: Callable[[], object]) -> object:
         def slow() -> object:
             COMPILE_CLOCK.begin("sandbox.test")
-            while not seen:
+            while not colour_counts:
                 threading.Event().wait(0.01)
             COMPILE_CLOCK.end()
             return job()
 
-        return begin(slow)
+        return compute_in_worker(slow)
 
     window.app_state.compute = compute  # type: ignore[assignment]
     window.app_state.open_other(other)
-    assert seen[0] > 2  # a ball over the ground, not one colour
+    assert colour_counts[0] > 2  # the ball on the background, not a single colour
     assert window.app_state.view is not None
     assert window.app_state.view.scene.title == "Other"
 
 
-def test_worker_raises_what_its_job_raises_and_goes_on() -> None:
+def test_worker_reraises_exceptions_of_a_job_and_stays_usable() -> None:
     worker = Worker(lambda done: None)
 
     def fail() -> None:

@@ -1,4 +1,4 @@
-"""A window without a display, on a scene given as text."""
+"""A window without a display that shows a scene given as text."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -12,21 +12,21 @@ from sandbox.window.playback.live import LiveView
 
 
 @contextmanager
-def window_on(text: str, folder: Path, size: tuple[int, int] = (640, 480)) -> Iterator[App]:
-    """Open a window on a scene, and close it in the end."""
+def open_window(text: str, folder: Path, size: tuple[int, int] = (640, 480)) -> Iterator[App]:
+    """Open a window on a scene, and close it at the end."""
     file = folder / "scene.toml"
     file.write_text(text, encoding="utf-8")
-    stage = AppState()
-    stage.open_other(file)
-    opened = App(stage, size=size, folder=folder, say=lambda _: None)
+    state = AppState()
+    state.open_other(file)
+    window = App(state, size=size, folder=folder, say=lambda _: None)
     try:
-        yield opened
+        yield window
     finally:
-        opened.close()
+        window.close()
 
 
-def turned(window: App, *events: pygame.event.Event, elapsed: float = 0.05) -> LiveView:
-    """Post events, let the window make one turn, and return what is live in it."""
+def run_frame(window: App, *events: pygame.event.Event, elapsed: float = 0.05) -> LiveView:
+    """Post events, run one frame of the window, and return its live view."""
     for event in events:
         pygame.event.post(event)
     window.run_frame(elapsed)

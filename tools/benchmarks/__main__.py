@@ -1,10 +1,10 @@
-"""Benchmarks: what this project claims about speed, as ratios against a peer in the same run.
+"""Benchmarks: the speed claims of this project, as ratios against a peer in the same run.
 
     python tools/bench.py [NAME…] [--json] [--repeats N]
 
-Each row first checks that both sides compute the same, where they should. After a warm-up they then take turns, so that
-a noisy machine affects both; the ratio is that of the medians.
-The rows are those of suite.py and games.py. Times are seconds unless the unit says otherwise.
+Each row first checks that both sides compute the same, if they should. After a warm-up the sides take turns, so that
+a noisy machine affects both; the ratio is that of the medians. The rows are in suite.py and games.py. Times are
+in seconds unless the unit says otherwise.
 """
 
 import argparse
@@ -23,7 +23,7 @@ from tools.benchmarks.workloads import Timed
 def measure(bench: Bench, repeats: int) -> dict[str, object]:
     """Check that both sides compute the same, time them in turns and return the row.
 
-    The side that goes first alternates, and the garbage collector runs between the timings, not in them.
+    The first side alternates, and the garbage collector runs between the timings, not during them.
 
     Raises:
         AssertionError: the sides do not compute the same.
@@ -33,35 +33,35 @@ def measure(bench: Bench, repeats: int) -> dict[str, object]:
     ours, peer = bench.ours(), bench.peer()
     ours(), peer()
     best = max if bench.rate else min
-    mine: list[float] = []
-    theirs: list[float] = []
+    our_values: list[float] = []
+    peer_values: list[float] = []
     for k in range(repeats):
-        turns = [(ours, mine), (peer, theirs)]
-        for work, figures in turns if k % 2 == 0 else reversed(turns):
-            figures.append(_without_collection(work))
-    own, other = statistics.median(mine), statistics.median(theirs)
-    claimed = own - other if bench.above else own / other
-    met = None if bench.target is None else own >= bench.target if bench.rate else claimed <= bench.target
+        turns = [(ours, our_values), (peer, peer_values)]
+        for work, values in turns if k % 2 == 0 else reversed(turns):
+            values.append(_without_collection(work))
+    our_median, peer_median = statistics.median(our_values), statistics.median(peer_values)
+    compared = our_median - peer_median if bench.above else our_median / peer_median
+    met = None if bench.target is None else our_median >= bench.target if bench.rate else compared <= bench.target
     return {
         "name": bench.name,
         "about": bench.about,
-        "ours": own - other if bench.above else own,
-        "peer": other,
+        "ours": our_median - peer_median if bench.above else our_median,
+        "peer": peer_median,
         "unit": f"{bench.unit} above" if bench.above else bench.unit,
-        "ratio": (own - other) / other if bench.above else own / other,
+        "ratio": (our_median - peer_median) / peer_median if bench.above else our_median / peer_median,
         "target": bench.target,
         "met": met,
         "repeats": repeats,
-        "ours_best": min(mine) - min(theirs) if bench.above else best(mine),
-        "peer_best": best(theirs),
-        "spread": max(theirs) / min(theirs) - 1.0,
-        "ours_spread": max(mine) / min(mine) - 1.0,
+        "ours_best": min(our_values) - min(peer_values) if bench.above else best(our_values),
+        "peer_best": best(peer_values),
+        "spread": max(peer_values) / min(peer_values) - 1.0,
+        "ours_spread": max(our_values) / min(our_values) - 1.0,
         "same": "checked" if bench.same is not None else None,
     }
 
 
 def _without_collection(work: Timed) -> float:
-    """Return what a piece of work measures, with the garbage collector off."""
+    """Return the value that a workload measures, with the garbage collector off."""
     gc.collect()
     gc.disable()
     try:
@@ -71,7 +71,7 @@ def _without_collection(work: Timed) -> float:
 
 
 def main() -> int:
-    """Run the benches named, or all."""
+    """Run the named benches, or all."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(bench.name for bench in BENCHES))
     parser.add_argument("--json", action="store_true", help="one JSON document on standard output")
@@ -95,25 +95,25 @@ def main() -> int:
         row = measure(bench, arguments.repeats)
         rows.append(row)
         if not arguments.json:
-            print(told(row), flush=True)
+            print(format_row(row), flush=True)
     if arguments.json:
         date = f"{datetime.now(UTC):%Y-%m-%d}"
-        told_of = {"machine": {**machine(), "date": date}, "versions": versions(), "rows": rows}
-        print(json.dumps({**told_of, "skipped": skipped} if skipped else told_of))
+        document = {"machine": {**machine(), "date": date}, "versions": versions(), "rows": rows}
+        print(json.dumps({**document, "skipped": skipped} if skipped else document))
     return 0
 
 
-def told(row: dict[str, object]) -> str:
-    """Return a row as two lines."""
+def format_row(row: dict[str, object]) -> str:
+    """Return a row as two lines of text."""
     verdict = {None: "", True: ", met", False: ", MISSED"}[row["met"]]
     rate = str(row["unit"]).endswith("/s")
-    goal = "" if row["target"] is None else f"   target {'>=' if rate else '<='} {row['target']:.3g}{verdict}"
-    figure = f"{row['ours']:.3f} s above" if row["unit"] == "s above" else f"{row['ratio']:.3g} ×"
+    target = "" if row["target"] is None else f"   target {'>=' if rate else '<='} {row['target']:.3g}{verdict}"
+    result = f"{row['ours']:.3f} s above" if row["unit"] == "s above" else f"{row['ratio']:.3g} ×"
     if rate:
-        figure = f"{row['ours']:.3g} /s"
+        result = f"{row['ours']:.3g} /s"
     unit = str(row["unit"]).split()[0]
     return (
-        f"{row['name']:<24}{figure:>14}{goal}   (median {row['ours']:.4g} / {row['peer']:.4g} {unit}, "
+        f"{row['name']:<24}{result:>14}{target}   (median {row['ours']:.4g} / {row['peer']:.4g} {unit}, "
         f"best {row['ours_best']:.4g} / {row['peer_best']:.4g}, {row['repeats']} repeats, "
         f"spread {row['ours_spread']:.0%} / {row['spread']:.0%})\n"
         f"{'':<24}{row['about']}"

@@ -1,4 +1,4 @@
-"""Connected and stacked bodies: the cloth and the tower that the benches step, and a cloth of bare pymunk springs."""
+"""Workloads of connected and stacked bodies: cloth, tower, heap of planks, and a cloth of bare pymunk springs."""
 
 import time
 from collections.abc import Callable
@@ -31,38 +31,38 @@ stiffness = 100.0
 damping = 0.02
 pins = "top"
 """
-"""64 × 64 nodes on 8,001 springs, its uppermost row pinned"""
+"""64 × 64 nodes on 8,001 springs, with the uppermost row pinned."""
 
 
 def cloth(engine: str, steps: int, **settings: str) -> Timed:
-    """Return the work of stepping the cloth; it tells steps a second."""
+    """Return a workload that steps the cloth; it returns steps per second."""
     scene = loads(CLOTH)
 
     def work() -> float:
         simulation = start(scene, engine, scene.solver.replace(**settings))
         simulation.step()
-        began = time.perf_counter()
+        start_time = time.perf_counter()
         for _ in range(steps):
             simulation.step()
-        took = time.perf_counter() - began
+        seconds = time.perf_counter() - start_time
         simulation.close()
-        return steps / took
+        return steps / seconds
 
     return work
 
 
 def springs(steps: int) -> Timed:
-    """Return the same of the same cloth, written by hand with pymunk's springs; it tells steps a second."""
+    """Return a workload that steps the same cloth of hand-written pymunk springs; it returns steps per second."""
     scene = loads(CLOTH)
 
     def work() -> float:
         space = cloth_space(scene)
         h = scene.solver.h
         space.step(h)
-        began = time.perf_counter()
+        start_time = time.perf_counter()
         for _ in range(steps):
             space.step(h)
-        return steps / (time.perf_counter() - began)
+        return steps / (time.perf_counter() - start_time)
 
     return work
 
@@ -72,11 +72,11 @@ def cloth_space(scene: Scene) -> pymunk.Space:
     space = pymunk.Space()
     space.gravity = scene.world.gravity
     bodies = []
-    for place, mass, fixed in zip(
+    for position, mass, fixed in zip(
         scene.bodies.position.tolist(), scene.bodies.mass.tolist(), scene.bodies.fixed.tolist(), strict=True
     ):
         body = pymunk.Body(mass, float("inf"), body_type=pymunk.Body.STATIC if fixed else pymunk.Body.DYNAMIC)
-        body.position = place
+        body.position = position
         space.add(body)
         bodies.append(body)
     links = scene.links
@@ -88,22 +88,22 @@ def cloth_space(scene: Scene) -> pymunk.Space:
     return space
 
 
-def standing(scene: Scene, engine: str, most_drift: float, **settings: int) -> Timed:
-    """Return the work of a run of a tower on an engine, at settings that keep it from drifting; it tells seconds.
+def standing(scene: Scene, engine: str, max_drift: float, **settings: int) -> Timed:
+    """Return a workload that runs a tower on an engine with settings that limit its drift; it returns seconds.
 
     Raises:
-        AssertionError: a box came to lie farther aside than `most_drift`, m: the settings are not those claimed.
+        AssertionError: a box drifted sideways by more than `max_drift`, m.
     """
-    whole = scene.solver.replace(record_every=10_000, **settings)
-    scene = scene.model_copy(update={"solver": whole})
+    solver = scene.solver.replace(record_every=10_000, **settings)
+    scene = scene.model_copy(update={"solver": solver})
 
     def work() -> float:
-        began = time.perf_counter()
+        start_time = time.perf_counter()
         done = run(scene, engine, audit=False)
-        took = time.perf_counter() - began
-        aside = float(abs(done.position[-1, :, 0] - done.position[0, :, 0]).max())
-        assert aside <= most_drift, f"{engine}: {aside:g} m aside"
-        return took
+        seconds = time.perf_counter() - start_time
+        drift = float(abs(done.position[-1, :, 0] - done.position[0, :, 0]).max())
+        assert drift <= max_drift, f"{engine}: drift of {drift:g} m"
+        return seconds
 
     return work
 
@@ -122,15 +122,15 @@ def heap() -> Scene:
 
 
 def planks(broad_phase: str) -> Timed:
-    """Return the work of a second of a heap of planks on the reference; it returns seconds."""
+    """Return a workload that simulates a second of a heap of planks on the reference; it returns seconds."""
     scene = heap()
 
     def work() -> float:
         simulation = start(scene, "reference", scene.solver.replace(broad_phase=broad_phase))
         simulation.step()
-        began = time.perf_counter()
+        start_time = time.perf_counter()
         for _ in range(200):
             simulation.step()
-        return time.perf_counter() - began
+        return time.perf_counter() - start_time
 
     return work

@@ -1,4 +1,4 @@
-"""The rows of the benchmarks that are games: shots at billiards against pooltool, and pinball in play."""
+"""Rows of games: billiard shots against pooltool, pinball, changes of parameters, and shots on threads."""
 
 from sandbox.scene.files.load import load
 from tools.benchmarks import agreement, drawing, pooltool_shots
@@ -55,7 +55,7 @@ GAMES = (
     ),
     Bench(
         "pinball-frames",
-        "pictures a second of pinball/full in play / of the same with nothing kept from one to the next",
+        "pictures a second of pinball/full in play / of the same without cached static elements",
         lambda: drawing.played(scene("pinball/full", "world.duration=8.0"), kept=True),
         lambda: drawing.played(scene("pinball/full", "world.duration=8.0"), kept=False),
         unit="frames/s",
@@ -63,7 +63,7 @@ GAMES = (
     ),
     Bench(
         "shots-threads",
-        "9-ball breaks a second, a fan of them on two threads / on one",
+        "9-ball breaks a second, in a fan on two threads / on one",
         lambda: fanning(load(pooltool_shots.path("nine_ball_break")), 2000, 2),
         lambda: fanning(load(pooltool_shots.path("nine_ball_break")), 2000, 1),
         unit="shots/s",

@@ -1,4 +1,4 @@
-"""Peers: what the benchmarks compare with, written as directly as it can be done."""
+"""Peers of the benchmarks, written as directly as possible."""
 
 import math
 import time
@@ -30,15 +30,15 @@ TOUCH = (
 
 
 def pile_loop(scene: Scene) -> Callable[[], float]:
-    """Time a pile as one would write it for pymunk alone, recording what a `Trajectory` holds.
+    """Return a workload that runs a pile with a minimal pymunk loop, which records the arrays of a `Trajectory`.
 
-    No guard, no audit, no checks, no choice of engine; contacts are rows of a pair while it lasts.
+    No guard, no audit, no checks, no choice of engine; a contact that lasts is one row.
     """
 
     def work() -> float:
-        began = time.perf_counter()
+        start_time = time.perf_counter()
         pile_arrays(scene)
-        return time.perf_counter() - began
+        return time.perf_counter() - start_time
 
     return work
 
@@ -46,12 +46,13 @@ def pile_loop(scene: Scene) -> Callable[[], float]:
 def pile_arrays(scene: Scene) -> tuple[FloatArray, FloatArray]:
     """Run a pile of equal balls and return its frames (T, N, 6) and its contacts (C, 9).
 
-    A frame has position, angle, velocity and angular velocity of each ball; a contact has time, numbers, normal, point
-    and impulse.
+    A frame has position, angle, velocity and angular velocity of each ball; a contact has time, two indices, normal,
+    point and impulse.
     """
     radius, mass = float(scene.bodies.radius[0]), float(scene.bodies.mass[0])
     (pair,) = scene.pairs
-    friction, restitution = pair.friction**0.5, pair.restitution**0.5  # pymunk multiplies those of two shapes
+    # pymunk multiplies the coefficients of two shapes
+    friction, restitution = pair.friction**0.5, pair.restitution**0.5
     dt, steps = scene.solver.dt, round(scene.world.duration / scene.solver.dt)
     space = pymunk.Space()
     space.gravity = scene.world.gravity
@@ -101,11 +102,11 @@ def pile_arrays(scene: Scene) -> tuple[FloatArray, FloatArray]:
         row = row_of[a, b]
         new = np.flatnonzero((row < 0) | (last[row] < k - 1))
         row[new] = rows + np.arange(len(new))
-        opened = slice(rows, rows + len(new))
-        contacts[opened, 0] = k * dt
-        contacts[opened, 1], contacts[opened, 2] = a[new], b[new]
-        contacts[opened, 3:5] = table[new, 2:4]
-        contacts[opened, 5:7] = (table[new, 4:6] + table[new, 6:8]) / 2
+        new_rows = slice(rows, rows + len(new))
+        contacts[new_rows, 0] = k * dt
+        contacts[new_rows, 1], contacts[new_rows, 2] = a[new], b[new]
+        contacts[new_rows, 3:5] = table[new, 2:4]
+        contacts[new_rows, 5:7] = (table[new, 4:6] + table[new, 6:8]) / 2
         rows += len(new)
         row_of[a, b] = row
         last[row] = k
@@ -114,7 +115,7 @@ def pile_arrays(scene: Scene) -> tuple[FloatArray, FloatArray]:
 
 
 def bodies_without_shapes(count: int, steps: int) -> Callable[[], float]:
-    """Time pymunk bodies in free flight, stepped and read in one batch each frame."""
+    """Return a workload of pymunk bodies in free flight, stepped and read in one batch per frame."""
 
     def work() -> float:
         space = pymunk.Space()
@@ -125,32 +126,32 @@ def bodies_without_shapes(count: int, steps: int) -> Callable[[], float]:
             space.add(body)
         states = Buffer()
         space.step(0.01)
-        began = time.perf_counter()
+        start_time = time.perf_counter()
         for _ in range(steps):
             space.step(0.01)
             states.clear()
             get_space_bodies(space, STATE, states)
             np.frombuffer(states.float_buf()).reshape(-1, 6).copy()
-        return time.perf_counter() - began
+        return time.perf_counter() - start_time
 
     return work
 
 
 def copying(size: int, times: int) -> Callable[[], float]:
-    """Time copying so many bytes so often: each is read once and written once."""
+    """Return a workload that copies `size` bytes `times` times; each is read once and written once."""
     source, target = np.ones(size // 8), np.ones(size // 8)
 
     def work() -> float:
-        began = time.perf_counter()
+        start_time = time.perf_counter()
         for _ in range(times):
             np.copyto(target, source)
-        return time.perf_counter() - began
+        return time.perf_counter() - start_time
 
     return work
 
 
 def fly(position: FloatArray, velocity: FloatArray, h: float, steps: int) -> None:
-    """Advance particles in free flight, in place, as one would write it in numpy."""
+    """Advance particles in free flight in place, in straightforward numpy."""
     gravity = np.array([0.0, -9.81])
     for _ in range(steps):
         position += velocity * h
@@ -158,37 +159,38 @@ def fly(position: FloatArray, velocity: FloatArray, h: float, steps: int) -> Non
 
 
 def naive_flight(count: int) -> Callable[[], float]:
-    """Return the particle-steps a second of numpy's two lines for free flight."""
+    """Return a workload of `fly`; it returns particle-steps per second."""
     position, velocity = np.zeros((count, 2)), np.ones((count, 2))
     steps = max(5, 5_000_000 // count)
 
     def work() -> float:
-        began = time.perf_counter()
+        start_time = time.perf_counter()
         fly(position, velocity, 0.01, steps)
-        return count * steps / (time.perf_counter() - began)
+        return count * steps / (time.perf_counter() - start_time)
 
     return work
 
 
 def copied(count: int) -> Callable[[], float]:
-    """Return of how many particles positions and velocities are copied in a second: as a step reads and writes them."""
+    """Return a workload that copies positions and velocities, as a step reads and writes them; particles per second."""
     times = max(10, 20_000_000 // count)
     copy = copying(count * 4 * 8, times)
     return lambda: count * times / copy()
 
 
 def give_moments(simulation: Simulation, scene: Scene) -> None:
-    """Give every body of a pymunk simulation the moment that the engine left out as nothing can turn it."""
+    """Give every body of a pymunk simulation its moment, which the engine omits for bodies that cannot be turned."""
     space_bodies = simulation._population.space_bodies  # type: ignore[attr-defined]
     for number, moment in enumerate(scene.bodies.moment.tolist()):
         space_bodies.give_moment(number, moment)
 
 
 def gas(count: int, speed: float, **more: object) -> Scene:
-    """Return an elastic gas of 16, 100 or 1,000 balls in a box, as dilute as the shipped one, with more if stated.
+    """Return an elastic gas of 16, 100 or 1,000 balls in a box, as dilute as the shipped one, with `more` keys.
 
-    The same gas at any speed, m/s, but for the clock. Exact is asked for a fast one, so that many events lie between
-    two frames; pymunk is slow at high speeds, as its tree widens boxes by a tenth of a second's way.
+    Except for the time scale the gas is the same at any speed, m/s. A fast gas is for `exact`, so that many events lie
+    between two frames; pymunk is slow at high speeds, because its tree extends boxes by the motion of a tenth of a
+    second.
     """
     columns, rows = {16: (4, 4), 100: (10, 10), 1000: (40, 25)}[count]
     sides = [([0, 0], [1, 0]), ([0, 0], [0, 1]), ([columns, rows], [-1, 0]), ([columns, rows], [0, -1])]
@@ -215,16 +217,16 @@ def gas(count: int, speed: float, **more: object) -> Scene:
     )
 
 
-def contacts_a_second(count: int) -> Callable[[], float]:
-    """Return the contacts a second that pymunk gets through in the same gas, 1/50 of a radius a step."""
+def contacts_per_second(count: int) -> Callable[[], float]:
+    """Return a workload of the same gas on pymunk, 1/50 of a radius per step; it returns contacts per second."""
 
     def work() -> float:
         simulation = start(gas(count, 1.0), "pymunk")
         simulation.contacts()
-        began = time.perf_counter()
+        start_time = time.perf_counter()
         for _ in range(2000 if count < 1000 else 400):
             simulation.step()
-        seconds = time.perf_counter() - began
+        seconds = time.perf_counter() - start_time
         return len(simulation.contacts()) / seconds
 
     return work
@@ -238,27 +240,27 @@ def bounce_truth(scene: Scene) -> FloatArray:
 
 
 def bounce_to(scene: Scene, tolerance: float) -> Callable[[], float]:
-    """Time a bounce in pymunk alone, at the largest dt = scene's / 2ⁿ whose frames are right to a tolerance, m.
+    """Return a workload of a bounce in bare pymunk with the largest dt = scene's / 2ⁿ within a tolerance, m.
 
-    The dt is sought first, against the closed form; velocities start half a kick ahead, so that flight is exact, and
-    what is left is the time of impact.
+    The dt is found first, by comparison with the closed form. Velocities start half a kick ahead, so that flight is
+    exact and the only error is that of the time of impact.
     """
     frames, height = round(scene.world.duration / scene.solver.dt), 0.05
     truth = bounce_truth(scene)
-    each = 1
+    substeps = 1
     while True:
-        found, seconds = _bounced(scene, frames, each, height)
-        if np.abs(found - truth).max() <= tolerance:
+        heights, seconds = _bounced(scene, frames, substeps, height)
+        if np.abs(heights - truth).max() <= tolerance:
             break
         if seconds > 60.0:
             raise RuntimeError(f"pymunk does not get within {tolerance:g} m in a minute")
-        each *= 2
-    return lambda: _bounced(scene, frames, each, height)[1]
+        substeps *= 2
+    return lambda: _bounced(scene, frames, substeps, height)[1]
 
 
-def _bounced(scene: Scene, frames: int, each: int, height: float) -> tuple[FloatArray, float]:
-    """Return the ball's heights at the frames, with so many steps each, and the seconds that took."""
-    dt = scene.solver.dt / each
+def _bounced(scene: Scene, frames: int, substeps: int, height: float) -> tuple[FloatArray, float]:
+    """Return the heights of the ball at the frames, m, with `substeps` steps per frame, and the seconds it took."""
+    dt = scene.solver.dt / substeps
     space = pymunk.Space()
     space.gravity, space.collision_slop = (0.0, -9.81), 1e-9
     body, ground = pymunk.Body(1.0, math.inf), pymunk.Body(body_type=pymunk.Body.STATIC)
@@ -266,10 +268,10 @@ def _bounced(scene: Scene, frames: int, each: int, height: float) -> tuple[Float
     ball, floor = pymunk.Circle(body, 0.5), pymunk.Segment(ground, (-1e4, -1e3), (1e4, -1e3), 1e3)
     ball.elasticity, floor.elasticity = 0.8, 1.0
     space.add(body, ball, ground, floor)
-    found = np.empty(frames)
-    began = time.perf_counter()
+    heights = np.empty(frames)
+    start_time = time.perf_counter()
     for frame in range(frames):
-        for _ in range(each):
+        for _ in range(substeps):
             space.step(dt)
-        found[frame] = body.position.y - 0.5
-    return found, time.perf_counter() - began
+        heights[frame] = body.position.y - 0.5
+    return heights, time.perf_counter() - start_time

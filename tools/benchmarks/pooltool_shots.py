@@ -1,11 +1,11 @@
-"""A peer for billiards: full shots, from the strike to rest, played and timed by pooltool.
+"""A peer for billiards: full shots from the strike to rest, simulated and timed by pooltool.
 
     python -m tools.benchmarks.pooltool_shots [NAME…] [--corrected] [--repeats N] [--json]
 
-The scenes lie in tools/benchmarks/shots. They hold tables, cushions, jaws, pockets, models and balls of pooltool, so
-that another engine can play the same shot. Pooltool runs in a process and with a home folder of its own, under the
-Python that `POOLTOOL_PYTHON` names, or this one. Its handling of touching balls and degenerate quartics is unchanged
-unless `corrected`; the law of friction between balls is always ours.
+The scenes in tools/benchmarks/shots have the tables, cushions, jaws, pockets, models and balls of pooltool, so that
+another engine can simulate the same shot. Pooltool runs in a child process with its own home folder, under the Python
+that `POOLTOOL_PYTHON` names, or this one. Its handling of touching balls and degenerate quartics is unchanged unless
+`corrected`; the law of friction between balls is always ours.
 """
 
 import argparse
@@ -28,23 +28,23 @@ from typing import Any, NamedTuple
 SHOTS = Path(__file__).resolve().parent / "shots"
 NAMES = ("nine_ball_break", "eight_ball_break", "snooker_break", "three_cushions")
 SPACER = 1e-9
-"""m, by which bodies that met are parted where pooltool is corrected."""
+"""m, by which bodies are separated after a collision if pooltool is corrected."""
 
 
 class Played(NamedTuple):
-    """A shot that was played."""
+    """Result of a simulated shot."""
 
     seconds: float
     events: int
-    """Collisions and transitions."""
-    meetings: int
-    """Of them those of two balls."""
+    """number of collisions and transitions"""
+    ball_collisions: int
+    """number of events that are collisions of two balls"""
     rest: float
-    """s, when all lay still"""
+    """time at which all balls are at rest, s"""
 
 
 class MissingError(RuntimeError):
-    """Pooltool is not to be had."""
+    """Pooltool is not available."""
 
 
 def path(name: str) -> Path:
@@ -53,17 +53,17 @@ def path(name: str) -> Path:
 
 
 def missing() -> str | None:
-    """Return why pooltool cannot be asked, if so."""
+    """Return the reason why pooltool is not available, or None."""
     if "POOLTOOL_PYTHON" in os.environ or importlib.util.find_spec("pooltool"):
         return None
     return "pooltool-billiards is not installed here; POOLTOOL_PYTHON can name a Python that has it"
 
 
 def peer(name: str, corrected: bool = False) -> Callable[[], float]:
-    """Time a shot of pooltool's, from the strike to rest, its table and balls set up before.
+    """Return a workload that simulates a shot with pooltool, from the strike to rest; setting up is not timed.
 
     Raises:
-        MissingError: there is no pooltool.
+        MissingError: pooltool is not available.
     """
     player = playing(corrected)
     return lambda: player(name).seconds
@@ -71,24 +71,24 @@ def peer(name: str, corrected: bool = False) -> Callable[[], float]:
 
 @functools.cache
 def playing(corrected: bool = False) -> "Player":
-    """Start pooltool once, as it is or corrected, and return what has it play.
+    """Start pooltool once, unchanged or corrected, and return its `Player`.
 
     Raises:
-        MissingError: there is no pooltool.
+        MissingError: pooltool is not available.
     """
     return Player(corrected)
 
 
 class Player:
-    """Pooltool in a process of its own, which plays shots by name."""
+    """Pooltool in a child process, which simulates shots by name."""
 
     def __init__(self, corrected: bool) -> None:
         if reason := missing():
             raise MissingError(reason)
         self.folder = tempfile.TemporaryDirectory(prefix="pooltool-")
-        surroundings = {**os.environ, "HOME": self.folder.name}
-        if corrected:  # compiled code that is patched is not to be mixed with pooltool's own
-            surroundings["NUMBA_CACHE_DIR"] = self.folder.name
+        environment = {**os.environ, "HOME": self.folder.name}
+        if corrected:  # keep compiled patched code apart from pooltool's own cache
+            environment["NUMBA_CACHE_DIR"] = self.folder.name
         self.process = subprocess.Popen(
             [
                 os.environ.get("POOLTOOL_PYTHON", sys.executable),
@@ -99,18 +99,18 @@ class Player:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
-            env=surroundings,
+            env=environment,
         )
         atexit.register(self.close)
 
     def __call__(self, name: str) -> Played:
-        """Play a shot.
+        """Simulate a shot.
 
         Raises:
-            MissingError: pooltool has ended; it said why on standard error.
+            MissingError: pooltool has ended; the reason is on standard error.
         """
         assert self.process.stdin is not None and self.process.stdout is not None
-        with contextlib.suppress(BrokenPipeError):  # no answer tells as much
+        with contextlib.suppress(BrokenPipeError):  # reported below, as there is no answer
             self.process.stdin.write(f"{path(name)}\n")
             self.process.stdin.flush()
         answer = self.process.stdout.readline()
@@ -119,14 +119,14 @@ class Player:
         return Played(*json.loads(answer))
 
     def close(self) -> None:
-        """End the process, and remove its folder."""
+        """End the process and remove its folder."""
         self.process.communicate()
         self.folder.cleanup()
 
 
 def serve(corrected: bool) -> None:
-    """Play the scene files named on standard input, and answer each with a line."""
-    answers, sys.stdout = sys.stdout, sys.stderr  # whatever pooltool prints is not an answer
+    """Simulate the scene files named on standard input; answer each with a line."""
+    answers, sys.stdout = sys.stdout, sys.stderr  # keeps prints of pooltool apart from the answers
     import pooltool as pt
 
     from tools.oracles import pooltool_world as world
@@ -136,9 +136,9 @@ def serve(corrected: bool) -> None:
     for line in sys.stdin:
         document = tomllib.loads(Path(line.strip()).read_text())
         system, engine = world.system(document), world.engine(document)
-        began = time.perf_counter()
+        start_time = time.perf_counter()
         pt.simulate(system, engine=engine, inplace=True)
-        seconds = time.perf_counter() - began
+        seconds = time.perf_counter() - start_time
         kinds = [str(event.event_type) for event in system.events]
         events = len(kinds) - kinds.count("none")
         answers.write(json.dumps([seconds, events, kinds.count("ball_ball"), float(system.t)]) + "\n")
@@ -146,7 +146,7 @@ def serve(corrected: bool) -> None:
 
 
 def measured(name: str, repeats: int, corrected: bool) -> dict[str, Any]:
-    """Return the median and least time of a shot, after one that warms up, and what happened in it."""
+    """Return median and minimum time of a shot after a warm-up, and its numbers of events."""
     play = playing(corrected)
     first = play(name)
     times = [play(name).seconds for _ in range(repeats)]
@@ -157,16 +157,16 @@ def measured(name: str, repeats: int, corrected: bool) -> dict[str, Any]:
         "unit": "s",
         "repeats": repeats,
         "events": first.events,
-        "ball_ball": first.meetings,
+        "ball_ball": first.ball_collisions,
         "rest": first.rest,
     }
 
 
 def main() -> int:
-    """Time the shots that are named, or all."""
+    """Time the named shots, or all."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(NAMES))
-    parser.add_argument("--corrected", action="store_true", help="without the faults that are known of it")
+    parser.add_argument("--corrected", action="store_true", help="correct the known faults of pooltool")
     parser.add_argument("--repeats", type=int, default=7, metavar="N")
     parser.add_argument("--json", action="store_true", help="one JSON document on standard output")
     parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
@@ -185,8 +185,8 @@ def main() -> int:
                     "{name:18} median {median:.4g} s, best {best:.4g} s of {repeats}; "
                     "{events} events, {ball_ball} of two balls, at rest after {rest:.2f} s".format(**rows[-1])
                 )
-    except MissingError as told:
-        print(told, file=sys.stderr)
+    except MissingError as error:
+        print(error, file=sys.stderr)
         return 1
     if arguments.json:
         print(json.dumps({"rows": rows}))

@@ -1,4 +1,4 @@
-"""A row of the benchmarks: the work timed, its peer, and the claim."""
+"""A row of the benchmarks: the timed workload, its peer, and the claim."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -7,21 +7,21 @@ from tools.benchmarks.workloads import Timed
 
 
 class Bench(NamedTuple):
-    """A row: ours, the peer, and what is claimed."""
+    """A row: our workload, the peer, and the claimed target."""
 
     name: str
     about: str
     ours: Callable[[], Timed]
     peer: Callable[[], Timed]
     target: float | None = None
-    """the ratio, or for `above` the seconds, that may not be exceeded; for a rate, what ours must reach"""
+    """largest ratio, or for `above` largest difference in seconds; for a rate, the smallest value of ours"""
     unit: str = "s"
     above: bool = False
-    """Ours is what exceeds the peer, not its whole."""
+    """whether the result is the difference of ours and the peer, not their ratio"""
     rate: bool = False
-    """Ours and the peer return how much they did in a second; the target is what ours must reach."""
+    """whether both sides return amounts per second"""
     missing: Callable[[], str | None] | None = None
-    """Returns the reason why an optional peer is not installed, or None; the row is then left out, with that reason."""
+    """returns the reason why an optional peer is not installed, or None; with a reason the row is skipped"""
     same: Callable[[], None] | None = None
-    """Asserts that both sides compute the same. None where they differ by design: another method, less physics, or a
-    process that is only started."""
+    """asserts that both sides compute the same; None if they differ by design: another method, less physics, or a
+    process that is only started"""

@@ -1,4 +1,4 @@
-"""The rows of the benchmarks: engines, pictures and commands; those of games come last."""
+"""The rows of the benchmarks: engines, pictures and commands, followed by those of games."""
 
 from tools.benchmarks import agreement, connected, drawing, peers
 from tools.benchmarks.games import GAMES
@@ -32,7 +32,7 @@ BENCHES = (
     *(
         Bench(
             f"flight-{name}",
-            f"particle-steps a second of {count:,} particles, stepped and not read / of numpy as one would write it",
+            f"particle-steps a second of {count:,} particles, stepped and not read / of straightforward numpy",
             lambda count=count: flying(count),
             lambda count=count: peers.naive_flight(count),
             5e8 if count == 100_000 else None,
@@ -44,7 +44,7 @@ BENCHES = (
     ),
     Bench(
         "flight-substeps",
-        "substeps a second of 100,000 particles, 16 to a frame / of numpy as one would write it",
+        "substeps a second of 100,000 particles, 16 per frame / of straightforward numpy",
         lambda: flying(100_000, substeps=16),
         lambda: peers.naive_flight(100_000),
         unit="steps/s",
@@ -53,7 +53,7 @@ BENCHES = (
     ),
     Bench(
         "flight-drag",
-        "the same of particles that air slows and wind carries / of numpy as one would write it, without",
+        "the same with drag and wind / of straightforward numpy without",
         lambda: flying(100_000, substeps=16, drag=0.3),
         lambda: peers.naive_flight(100_000),
         unit="steps/s",
@@ -76,32 +76,32 @@ BENCHES = (
     ),
     Bench(
         "particles-copy",
-        "a step of those, not read / copying the bytes that it reads and writes",
+        "a step of the same particles, not read / copying the bytes that it reads and writes",
         lambda: stepping(scene("particles/fireworks_100k", *SPARKS), 100, record=False, contacts=False),
         lambda: peers.copying(100_000 * 4 * 8, 100),
     ),
     Bench(
         "omit-space",
-        "1,000 balls that meet nothing, outside of the space / the same, made to meet each other, in it",
+        "1,000 balls that cannot collide, outside of the space / the same with collisions, in the space",
         lambda: stepping(scene("benchmark/pile", "grid.ball.collides=none"), 120, contacts=False),
         lambda: stepping(scene("benchmark/pile"), 120, contacts=False),
     ),
     Bench(
         "omit-ball-ball",
-        "225 balls of a gas that meet only the box / that meet each other too",
+        "225 balls of a gas that collide only with the box / also with each other",
         lambda: stepping(scene("benchmark/gas", "grid.0.collides=fixed"), 400, contacts=False),
         lambda: stepping(scene("benchmark/gas"), 400, contacts=False),
     ),
     Bench(
         "omit-contacts",
-        "the pile, contacts not asked for / recorded",
+        "the pile, contacts not recorded / recorded",
         lambda: stepping(SETTLED, 120, contacts=False),
         lambda: stepping(SETTLED, 120),
         same=lambda: agreement.without_contacts(SETTLED),
     ),
     Bench(
         "omit-rotation",
-        "225 frictionless balls, which nothing can turn, without a moment / with one",
+        "225 frictionless balls, which cannot be turned, without a moment / with one",
         lambda: stepping(scene("benchmark/gas"), 400, contacts=False),
         lambda: stepping(scene("benchmark/gas"), 400, contacts=False, turning=True),
         same=lambda: agreement.without_rotation(scene("benchmark/gas")),
@@ -119,7 +119,7 @@ BENCHES = (
             f"exact-{count}",
             f"events a second of exact in an elastic gas of {count:,} balls / contacts a second of pymunk in it",
             lambda count=count: events(count),
-            lambda count=count: peers.contacts_a_second(count),
+            lambda count=count: peers.contacts_per_second(count),
             target,
             "events/s",
             rate=True,
@@ -194,14 +194,14 @@ BENCHES = (
     ),
     Bench(
         "oriented",
-        "a second of a heap of 60 long planks on the reference, looked at by oriented boxes / by discs around them",
+        "a second of a heap of 60 long planks on the reference, broad phase of oriented boxes / of circles",
         lambda: connected.planks("oriented"),
         lambda: connected.planks("circles"),
         same=agreement.planks,
     ),
     Bench(
         "turn",
-        "a turn of the window in which a body is dragged, and seen where the hand is at its end / one with no event",
+        "a frame of the window in which a body is dragged to the pointer / a frame without events",
         lambda: turns("gas", hand=True),
         lambda: turns("gas", hand=False),
     ),
@@ -246,7 +246,7 @@ BENCHES = (
     ),
     Bench(
         "draw-particles",
-        "pictures a second of 100,000 particles of 1 px that fade / in one colour by surfarray, as one would write it",
+        "pictures a second of 100,000 particles of 1 px that fade / in one colour by surfarray, straightforward",
         lambda: drawing.particles(scene("particles/fireworks_100k", *SPARKS), 150),
         lambda: drawing.particles_by_array(scene("particles/fireworks_100k", *SPARKS), 150),
         300.0,

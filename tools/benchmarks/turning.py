@@ -1,4 +1,4 @@
-"""Turning: turns of the window's loop, without a display; what a hand does is to be seen at the end of its own turn."""
+"""Workload of the window's loop without a display; a drag must be visible at the end of the same frame."""
 
 import os
 import statistics
@@ -16,23 +16,23 @@ from sandbox.window.app_state import AppState
 from tools.benchmarks.workloads import timed
 
 TURNS = 30
-"""Timed at once."""
+"""Number of frames in one timing."""
 FRAME = 1.0 / 60.0
 """s"""
 
 
 def turns(scene: str, hand: bool) -> Callable[[], float]:
-    """Time a turn of a paused scene: with a body dragged to another place in it, or with nothing done.
+    """Return a workload of frames of a paused scene, with a body dragged in each or without input; median seconds.
 
     Raises:
-        AssertionError: the picture at the end of the turn does not show the body where the hand is.
+        AssertionError: at the end of the frame the body is not at the pointer.
     """
 
     def work() -> float:
-        stage = AppState()
-        window = App(stage)
-        stage.open(find(scene))
-        stage.paused = True
+        state = AppState()
+        window = App(state)
+        state.open(find(scene))
+        state.paused = True
         window.run_frame(FRAME)
         found = [turn(window, k) if hand else timed(lambda: window.run_frame(FRAME)) for k in range(TURNS)]
         window.close()
@@ -42,14 +42,14 @@ def turns(scene: str, hand: bool) -> Callable[[], float]:
         live = window.app_state.live
         assert live is not None
         x, y = window.context.camera.to_screen(live.frame.position[0]).round().tolist()
-        there = (int(x) + (7 if k % 2 else -7), int(y))
-        for kind, at in ((pygame.MOUSEBUTTONDOWN, (int(x), int(y))), (pygame.MOUSEMOTION, there)):
-            about = {"rel": (0, 0), "buttons": (1, 0, 0)} if kind == pygame.MOUSEMOTION else {"button": 1}
-            pygame.event.post(pygame.event.Event(kind, pos=at, **about))
-        pygame.event.post(pygame.event.Event(pygame.MOUSEBUTTONUP, pos=there, button=1))
+        target = (int(x) + (7 if k % 2 else -7), int(y))
+        for kind, position in ((pygame.MOUSEBUTTONDOWN, (int(x), int(y))), (pygame.MOUSEMOTION, target)):
+            attributes = {"rel": (0, 0), "buttons": (1, 0, 0)} if kind == pygame.MOUSEMOTION else {"button": 1}
+            pygame.event.post(pygame.event.Event(kind, pos=position, **attributes))
+        pygame.event.post(pygame.event.Event(pygame.MOUSEBUTTONUP, pos=target, button=1))
         seconds = timed(lambda: window.run_frame(FRAME))
         now = window.context.camera.to_screen(live.frame.position[0])
-        assert np.abs(now - there).max() <= 1.0, "the body is not where the hand is"
+        assert np.abs(now - target).max() <= 1.0, "the body is not at the pointer"
         return seconds
 
     return work

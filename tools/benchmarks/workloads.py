@@ -1,4 +1,4 @@
-"""Workloads: what the benches time of ours, each set up first and then returned as a piece of work to be timed."""
+"""Workloads of the benches: each function sets one up and returns a function that does it and returns its measure."""
 
 import subprocess
 import sys
@@ -22,14 +22,14 @@ from sandbox.scene.files.shipped_scenes import find
 from tools.benchmarks import peers
 
 Timed = Callable[[], float]
-"""Does the work once and returns what it took."""
+"""Does the work once and returns its measure: seconds, or an amount per second."""
 
 
 def timed(work: Callable[[], object]) -> float:
-    """Return the seconds that a piece of work takes."""
-    began = time.perf_counter()
+    """Return the seconds that a call takes."""
+    start_time = time.perf_counter()
     work()
-    return time.perf_counter() - began
+    return time.perf_counter() - start_time
 
 
 def scene(name: str, *overrides: str) -> Scene:
@@ -38,23 +38,23 @@ def scene(name: str, *overrides: str) -> Scene:
 
 
 def running(which: Scene, audit: bool = True) -> Timed:
-    """Time a whole recorded run."""
+    """Return a workload of a complete recorded run; seconds."""
     return lambda: timed(lambda: run(which, audit=audit))
 
 
 def shooting(which: Scene, shots: int = 20) -> Timed:
-    """Time a whole shot to rest, its events kept, through the public interface; the mean of some."""
+    """Return a workload of a complete shot to rest with its events, through the public interface; mean seconds."""
     table = sandbox.Table(which)
 
-    def go() -> None:
+    def run_all() -> None:
         for _ in range(shots):
             table.shoot()
 
-    return lambda: timed(go) / shots
+    return lambda: timed(run_all) / shots
 
 
 def fanning(which: Scene, shots: int, threads: int) -> Timed:
-    """Return how many shots a second a fan plays: each a little stronger than the one before."""
+    """Return a workload of a fan of shots of increasing strength; shots per second."""
     table = sandbox.Table(which)
     cue = which.bodies.names.index("cue")
     motion = (*which.bodies.velocity[cue], *which.bodies.roll[cue], which.bodies.angular_velocity[cue])
@@ -70,7 +70,7 @@ def stepping(
     turning: bool = False,
     engine: str = "pymunk",
 ) -> Timed:
-    """Time some steps, from the start, of a simulation that is set up before."""
+    """Return a workload of the first steps of a simulation that is set up before; seconds."""
 
     def work() -> float:
         simulation = start(which, engine)
@@ -79,19 +79,19 @@ def stepping(
         if turning:
             peers.give_moments(simulation, which)
 
-        def go() -> None:
+        def run_all() -> None:
             for _ in range(steps):
                 simulation.step()
                 if record:
                     simulation.frame()
 
-        return timed(go)
+        return timed(run_all)
 
     return work
 
 
 def setting(which: Scene, steps: int, path: str, values: tuple[Any, Any]) -> Timed:
-    """Time some changes of a value, one to the other and back, of a scene that has run for as many steps."""
+    """Return a workload of changes of a parameter between two values, after as many steps; seconds."""
 
     def work() -> float:
         simulation = start(which)
@@ -99,17 +99,17 @@ def setting(which: Scene, steps: int, path: str, values: tuple[Any, Any]) -> Tim
         for _ in range(steps):
             simulation.step()
 
-        def go() -> None:
+        def run_all() -> None:
             for k in range(steps):
                 simulation.apply(SetParameter(time=0.0, path=path, value=values[k % 2]))
 
-        return timed(go)
+        return timed(run_all)
 
     return work
 
 
 def flying(count: int, substeps: int = 1, drag: float = 0.0) -> Callable[[], float]:
-    """Return the particle-steps a second of particles that touch nothing, each of a frame's substeps counted."""
+    """Return a workload of particles without contacts; particle-steps per second, with every substep counted."""
     which = particles_in_flight(count, substeps, drag)
 
     def work() -> float:
@@ -123,7 +123,7 @@ def flying(count: int, substeps: int = 1, drag: float = 0.0) -> Callable[[], flo
 
 
 def particles_in_flight(count: int, substeps: int = 1, drag: float = 0.0) -> Scene:
-    """Return particles that touch nothing, at 100 frames a second."""
+    """Return a scene of particles without contacts, at 100 frames per second."""
     return from_document(
         {
             "world": {"gravity": [0.0, -9.81], "linear_drag": drag, "wind": [1.0, 0.0], "duration": 1e4},
@@ -136,46 +136,46 @@ def particles_in_flight(count: int, substeps: int = 1, drag: float = 0.0) -> Sce
 
 
 def playing(which: Scene) -> Timed:
-    """Return how many seconds of a game are played in one: rules, a random player, contacts; not audited."""
+    """Return a workload of a game with a random player and contacts, without audit; simulated seconds per second."""
 
     def work() -> float:
-        begun = time.perf_counter()
-        played = sandbox.play_out(which, "random", audit=False)
-        return float(played.trajectory.time[-1]) / (time.perf_counter() - begun)
+        start_time = time.perf_counter()
+        game = sandbox.play_out(which, "random", audit=False)
+        return float(game.trajectory.time[-1]) / (time.perf_counter() - start_time)
 
     return work
 
 
 def simulated(which: Scene, seconds: float) -> Timed:
-    """Return how many seconds are simulated in one where nobody looks: neither contacts nor frames, no rules."""
+    """Return a workload of bare steps without contacts, frames and rules; simulated seconds per second."""
     steps = round(seconds / which.solver.dt)
     bare = stepping(which, steps, record=False, contacts=False)
     return lambda: seconds / bare()
 
 
 def command(*arguments: str) -> Timed:
-    """Time a Python process from start to end."""
+    """Return a workload of a Python process from start to end; seconds."""
     line = [sys.executable, *arguments]
     return lambda: timed(lambda: subprocess.run(line, check=True, capture_output=True))
 
 
 def events(count: int) -> Timed:
-    """Return the events a second of `exact` in an elastic gas of so many balls, in steps of many thousand events."""
+    """Return a workload of `exact` in an elastic gas, with thousands of events per step; events per second."""
 
     def work() -> float:
         gas = peers.gas(count, 100.0)
         simulation = start(gas, "exact", gas.solver.replace(dt=160.0 / count))
         simulation.step()
-        began, before = time.perf_counter(), simulation.work["events"]
+        start_time, before = time.perf_counter(), simulation.work["events"]
         while simulation.work["events"] < before + 100_000:
             simulation.step()
-        return (simulation.work["events"] - before) / (time.perf_counter() - began)
+        return (simulation.work["events"] - before) / (time.perf_counter() - start_time)
 
     return work
 
 
 def rolling(count: int, floor: bool) -> Callable[[], float]:
-    """Return the steps a second of a gas of so many balls on pymunk, on a floor with three spins, or as discs."""
+    """Return a workload of a gas on pymunk, on a surface with three spins or as discs; steps per second."""
     surface = {"sliding_friction": 0.2, "rolling_friction": 0.01, "spinning_friction": 0.01}
     more = {"surface": surface, "contact_models": {"ball_ball": "frictional"}} if floor else {}
 
@@ -189,7 +189,7 @@ def rolling(count: int, floor: bool) -> Callable[[], float]:
 
 
 def staged(which: Scene, name: str, steps: int = 2000) -> Timed:
-    """Time one stage of a reference step with one ball: "move", "look", "resolve", or "step" for the whole."""
+    """Return a workload of one stage of a reference step of one ball, "move", "look", "resolve" or "step"; seconds."""
 
     def work() -> float:
         simulation = ReferenceEngine().start(which)

@@ -1,9 +1,9 @@
-"""Boundaries: how far each engine and setup goes, measured and held against the stored ones of the last release.
+"""Boundaries: limits of each engine and setup, measured and compared with the stored ones of the last release.
 
     python -m tools.calibration.boundaries [--store] [--axes NAME,…] [--workers N] [--timeout S]
 
-Without `--store` it tells what has moved, and exits with 1 where something got worse. With it, what was measured is
-written to boundaries.json beside this file, in place of the stored boundaries of the same axes and setups.
+Without `--store` it prints the changes and exits with 1 if a limit got worse. With it, the measured limits are written
+to boundaries.json beside this file and replace the stored ones of the same axes and setups.
 """
 
 import argparse
@@ -22,7 +22,7 @@ STORED = Path(__file__).resolve().parent / "boundaries.json"
 
 
 def main() -> int:
-    """Measure, and store or compare."""
+    """Measure the limits; store them or compare them with the stored ones."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--store", action="store_true", help=f"write {STORED.name}")
     parser.add_argument("--axes", metavar="NAME[,NAME]", default=",".join(AXES), help="which; by default all")
@@ -36,7 +36,7 @@ def main() -> int:
     plan = ExtremesPlan(
         tuple(AXES[name] for name in names), pairs=(), seconds=arguments.timeout, workers=arguments.workers
     )
-    result = extremes(plan, _told)
+    result = extremes(plan, _print_progress)
     if result.interrupted:
         print("interrupted: nothing is stored or compared", file=sys.stderr)
         return 130
@@ -52,7 +52,7 @@ def main() -> int:
     return int(any(change.worse for change in found))
 
 
-def _told(progress: Progress) -> None:
+def _print_progress(progress: Progress) -> None:
     if sys.stderr.isatty():
         print(f"\r\033[K{progress.fraction or 0.0:.0%} {progress.message}", end="", file=sys.stderr, flush=True)
 

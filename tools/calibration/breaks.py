@@ -1,10 +1,10 @@
-"""Breaks: until when a break of 16 balls on a floor can be trusted, played by pymunk in fixed steps.
+"""Breaks: the time until which a break of 16 balls on a surface, simulated by pymunk in fixed steps, can be trusted.
 
     python -m tools.calibration.breaks [--seeds N] [--against ENGINE]
 
-Each break is played at some dt, and either at 1/16 of it or by another engine. Printed is when a ball is first more
-than 1 mm from where it is there, s after the first hit, up to 2 s: the least and the median over seeds, which move the
-cue ball aside by up to 1 mm, for racks that touch and racks with gaps.
+Each break is simulated with some dt, and again with 1/16 of it or on another engine. The result is the time after the
+first hit, up to 2 s, at which a ball first differs by more than 1 mm: minimum and median over seeds, which shift the
+cue ball by up to 1 mm, for racks of touching balls and racks with gaps.
 """
 
 import argparse
@@ -23,17 +23,17 @@ from sandbox.scene.files.load import from_document
 
 RADIUS, MASS = 0.028575, 0.170097
 WIDTH, LENGTH = 1.27, 2.54
-TOO_FAR = 1e-3
-"""m"""
-FINER = 16
-FIRST = 0.2
-"""s, when the cue ball arrives, near enough"""
-LOOK = 1 / 60
-"""s between looks"""
+MAX_DISTANCE = 1e-3
+"""m; two simulations agree up to this distance"""
+REFINEMENT = 16
+FIRST_HIT = 0.2
+"""s, approximate time of the first hit"""
+FRAME = 1 / 60
+"""s between compared frames"""
 LAST = 2.0
-"""s, from the first hit on"""
+"""s after the first hit, end of the comparison"""
 SPEED = 6.0
-"""m/s, of the cue ball"""
+"""m/s, speed of the cue ball"""
 GAPS = (0.0, 1e-8, 1e-6, 1e-4, 1e-3, 1e-2)
 """m"""
 RATES = (60, 120, 240, 480, 960)
@@ -41,21 +41,21 @@ RATES = (60, 120, 240, 480, 960)
 
 
 def rack(seed: int, gap: float, rate: int) -> Scene:
-    """Return a break: 15 balls, and the cue ball that is about to hit them."""
+    """Return a break: a rack of 15 balls, and a cue ball that moves towards it."""
     off = np.random.default_rng(seed).uniform(-1e-3, 1e-3)
     pitch = 2 * RADIUS + gap
-    places = [(0.5 * WIDTH + off, 0.25 * LENGTH)]
-    places += [
+    positions = [(0.5 * WIDTH + off, 0.25 * LENGTH)]
+    positions += [
         (0.5 * WIDTH + (k - row / 2) * pitch, 0.75 * LENGTH + row * pitch * math.sqrt(0.75))
         for row in range(5)
         for k in range(row + 1)
     ]
-    balls = [{"position": place, "radius": RADIUS, "mass": MASS, "material": "resin"} for place in places]
+    balls = [{"position": position, "radius": RADIUS, "mass": MASS, "material": "resin"} for position in positions]
     rail = [[0, 0], [WIDTH, 0], [WIDTH, LENGTH], [0, LENGTH]]
     return from_document(
         {
             "world": {"duration": 10.0},
-            "solver": {"dt": LOOK, "substeps": round(LOOK * rate)},
+            "solver": {"dt": FRAME, "substeps": round(FRAME * rate)},
             "surface": {"sliding_friction": 0.2, "rolling_friction": 0.01, "spinning_friction": 0.0127},
             "contact_models": {"ball_ball": "frictional", "cushion": "han2005"},
             "material": [{"name": "resin"}],
@@ -67,19 +67,19 @@ def rack(seed: int, gap: float, rate: int) -> Scene:
 
 
 def path(scene: Scene, engine: str = "pymunk") -> FloatArray:
-    """Return where all balls are at each look, (T, N, 2) m."""
-    simulation, places = start(scene, engine), []
-    for _ in range(round((FIRST + LAST) / LOOK)):
+    """Return the positions of all balls in each frame, (T, N, 2) m."""
+    simulation, positions = start(scene, engine), []
+    for _ in range(round((FIRST_HIT + LAST) / FRAME)):
         simulation.step()
-        places.append(simulation.frame().position)
+        positions.append(simulation.frame().position)
     simulation.close()
-    return np.asarray(places)
+    return np.asarray(positions)
 
 
-def parted(one: FloatArray, other: FloatArray) -> float:
-    """Return when two paths are first too far apart, s; inf where they never are."""
-    far = (np.hypot(*np.moveaxis(one - other, 2, 0)) > TOO_FAR).any(axis=1)
-    return LOOK * (int(far.argmax()) + 1) - FIRST if far.any() else math.inf
+def divergence_time(first: FloatArray, second: FloatArray) -> float:
+    """Return the time at which two paths first differ too much, s; inf if they never do."""
+    far = (np.hypot(*np.moveaxis(first - second, 2, 0)) > MAX_DISTANCE).any(axis=1)
+    return FRAME * (int(far.argmax()) + 1) - FIRST_HIT if far.any() else math.inf
 
 
 def main() -> int:
@@ -93,8 +93,8 @@ def main() -> int:
         for rate in RATES:
             times = []
             for seed in range(arguments.seeds):
-                other = rack(seed, gap, rate if arguments.against else rate * FINER)
-                times.append(parted(path(rack(seed, gap, rate)), path(other, arguments.against or "pymunk")))
+                other = rack(seed, gap, rate if arguments.against else rate * REFINEMENT)
+                times.append(divergence_time(path(rack(seed, gap, rate)), path(other, arguments.against or "pymunk")))
             least, median = min(times), statistics.median(times)
             print(f"gap {gap:5g} m, {rate:3} Hz: {least:.2f} s at least, {median:.2f} s in the median", flush=True)
     return 0

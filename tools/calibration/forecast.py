@@ -1,13 +1,13 @@
-"""Calibration of forecasts: warnings of `sandbox check` against what then happened, on random scenes.
+"""Calibration of forecasts: warnings of `sandbox check` compared with the events of the run, on random scenes.
 
     python -m tools.calibration.forecast [--half fit|held-out] [--kinds NAME,…] [--seeds N] [--from SEED]
                                          [--engines A,B] [--json]
 
 Every scene of `random_scenes.py` is forecast first, by the formulas alone and with a trial run, and then run in full on
-each engine. Rules of this file, which know nothing of the forecasts, decide what went wrong. Precision is the share of
-warnings after which it happened, recall the share of what happened that was warned of; both count (scene, engine,
-trouble). The forecasts were fitted on one half, every second kind with even seeds; `held-out` is the other kinds with
-odd seeds. Everything is reproducible: nothing depends on the clock.
+each engine. Rules of this file, independent of the forecasts, decide which troubles occurred. Precision is the fraction
+of warnings that came true, recall the fraction of troubles that were forecast; both count (scene, engine, trouble). The
+forecasts were fitted on one half, every second kind with even seeds; `held-out` is the other kinds with odd seeds. The
+results are reproducible: nothing depends on the clock.
 """
 
 import argparse
@@ -45,10 +45,10 @@ TROUBLES = {
     "orbit": "energy",
     "event_rate": "events",
 }
-"""What each kind of warning foretells; warnings of other kinds foretell none of what is judged here."""
+"""Trouble that each kind of warning forecasts; warnings of other kinds forecast none of these."""
 
 JOINT_OFF, MOVED, ENERGY_GAIN = 0.1, 0.5, 0.1
-"""Shares of a joint's length, of a stacked body's width, of the energy at stake, beyond which something went wrong."""
+"""Thresholds of trouble, as fractions of a joint's length, of a stacked body's width, and of the energy at stake."""
 
 Key = tuple[str, int, str, str]
 """kind of scene, seed, engine, trouble"""
@@ -63,45 +63,54 @@ class Observation:
     engine: str
     trouble: str
     formulas: bool
-    """foretold by the formulas alone"""
+    """whether the formulas alone forecast it"""
     foretold: bool
-    """by the formulas and the trial run"""
+    """whether the formulas and the trial run forecast it"""
     happened: bool
     half_foretold: bool
-    """by the formulas and a trial run of half the scene at most"""
+    """whether the formulas and a trial run of at most half the scene forecast it"""
     elsewhere: bool | None
-    """on the reference, by the formulas and a trial run on pymunk, as without `--engine`; None where there was none"""
+    """on the reference: whether formulas and a trial run on pymunk, as without `--engine`, forecast it; else None"""
     covered: bool
-    """The trial run covered the whole scene."""
+    """whether the trial run covered the whole scene"""
 
 
 def halves() -> dict[str, tuple[tuple[str, ...], int]]:
-    """Return the kinds, and the parity of the seeds, of either half."""
+    """Return the kinds and the parity of the seeds of each half."""
     names = sorted(KINDS)
     return {"fit": (tuple(names[::2]), 0), "held-out": (tuple(names[1::2]), 1)}
 
 
 def observe(kind: str, seed: int, engines: Iterable[str]) -> Iterator[Observation]:
-    """Forecast a scene, run it, and yield what was foretold and what happened on each engine that models it."""
+    """Forecast a scene, run it, and yield forecasts and occurrences on each engine that models it."""
     scene = from_document(document(kind, seed))
-    usual = run_preflight(scene)
-    usually = troubles(scene, (each.kind for each in usual.warnings))
+    default_preflight = run_preflight(scene)
+    default_troubles = troubles(scene, (each.kind for each in default_preflight.warnings))
     for engine in engines:
         if ENGINES[engine].missing(scene, scene.solver):
             continue
-        answer = run_preflight(scene, engine=engine)
+        preflight = run_preflight(scene, engine=engine)
         by_formulas = troubles(scene, (each.kind for each in warnings(scene, engine=engine)))
-        told = troubles(scene, (each.kind for each in answer.warnings))
+        forecast = troubles(scene, (each.kind for each in preflight.warnings))
         half = troubles(scene, (each.kind for each in run_preflight(scene, engine=engine, cover=0.5).warnings))
-        came = judge(scene, run(scene, engine), engine)
-        for trouble in sorted(came):
-            elsewhere = trouble in usually if engine == "reference" and usual.tried is not None else None
-            row = trouble in by_formulas, trouble in told, came[trouble], trouble in half, elsewhere, answer.covered
+        occurred = judge(scene, run(scene, engine), engine)
+        for trouble in sorted(occurred):
+            elsewhere = (
+                trouble in default_troubles if engine == "reference" and default_preflight.tried is not None else None
+            )
+            row = (
+                trouble in by_formulas,
+                trouble in forecast,
+                occurred[trouble],
+                trouble in half,
+                elsewhere,
+                preflight.covered,
+            )
             yield Observation(kind, seed, engine, trouble, *row)
 
 
 def troubles(scene: Scene, kinds: Iterable[str]) -> set[str]:
-    """Return what warnings of some kinds foretell of a scene."""
+    """Return the troubles that warnings of these kinds forecast for a scene."""
     found = {TROUBLES[kind] for kind in kinds if kind in TROUBLES}
     if "joint or stack" in found:
         found = found - {"joint or stack"} | {"joint" if len(scene.links) else "stack"}
@@ -109,44 +118,43 @@ def troubles(scene: Scene, kinds: Iterable[str]) -> set[str]:
 
 
 def judge(scene: Scene, done: Trajectory, engine: str) -> dict[str, bool]:
-    """Return which kinds of trouble a run could have had, and whether it had them."""
+    """Return for each trouble that is possible in a run whether it occurred."""
     if engine == "exact":
         return {"events": done.status == "failed"}
-    ended = done.status == "ok" and bool(np.isfinite(done.position).all())
-    found = {"energy": not ended or gained(scene, done) > ENERGY_GAIN}
+    completed = done.status == "ok" and bool(np.isfinite(done.position).all())
+    found = {"energy": not completed or energy_gain(scene, done) > ENERGY_GAIN}
     if contact_matrix(scene).touches.any():
         found["tunnelling"] = len(done.missed_time) > 0
-    if scene.planes and ended:
-        found["depth"] = sunk(scene, done)
+    if scene.planes and completed:
+        found["depth"] = is_behind_plane(scene, done)
     if done.info["joint_error"] is not None:
         found["joint"] = not done.info["joint_error"] <= JOINT_OFF
-    still = not scene.bodies.velocity.any() and not scene.bodies.fixed.any()
-    if (scene.stacks or len(scene.boxes) > 1) and still and not (scene.balls or scene.thrusts or scene.joints):
-        away = np.hypot(*np.moveaxis(done.position - done.position[0], 2, 0)).max(axis=0)
-        found["stack"] = not ended or bool((away > MOVED * 2.0 * scene.bodies.thin).any())
+    starts_at_rest = not scene.bodies.velocity.any() and not scene.bodies.fixed.any()
+    if (scene.stacks or len(scene.boxes) > 1) and starts_at_rest and not (scene.balls or scene.thrusts or scene.joints):
+        displacement = np.hypot(*np.moveaxis(done.position - done.position[0], 2, 0)).max(axis=0)
+        found["stack"] = not completed or bool((displacement > MOVED * 2.0 * scene.bodies.thin).any())
     if found.get("joint") or found.get("stack"):
-        del found["energy"]  # what is torn or falls gains energy too: one trouble, counted once
+        del found["energy"]  # broken joints and falling stacks gain energy too: one trouble, counted once
     return found
 
 
-def gained(scene: Scene, done: Trajectory) -> float:
-    """Return by how much energy grew, as a share of the kinetic energy of the start and of all potential energy turned.
+def energy_gain(scene: Scene, done: Trajectory) -> float:
+    """Return the gain of energy, as a fraction of the initial kinetic energy and the range of the potential energy.
 
-    At least of what lifts every body by its own width: a body that lies still has next to no energy otherwise.
-
-    0 where thrusts, motors or wind do work.
+    The reference is at least the energy that lifts every body by its own width, for bodies at rest. The result is 0 if
+    thrusts, motors or wind do work.
     """
     if scene.thrusts or any(scene.world.wind) or len(scene.links.of(LinkKind.MOTOR)):
         return 0.0
     kinetic, potential, total = energies(done, scene)
     bodies = scene.bodies
-    own_width = float(np.hypot(*scene.world.gravity)) * float((bodies.mass * 2.0 * bodies.thin)[~bodies.fixed].sum())
-    stake = max(float(kinetic[0]) + float(np.ptp(potential)), own_width)
+    lift_energy = float(np.hypot(*scene.world.gravity)) * float((bodies.mass * 2.0 * bodies.thin)[~bodies.fixed].sum())
+    stake = max(float(kinetic[0]) + float(np.ptp(potential)), lift_energy)
     return float(total.max() - total[0]) / stake if stake > 0.0 else 0.0
 
 
-def sunk(scene: Scene, done: Trajectory) -> bool:
-    """Return whether a centre that began in front of a plane came to lie behind it."""
+def is_behind_plane(scene: Scene, done: Trajectory) -> bool:
+    """Return whether a centre that started in front of a plane was behind it later."""
     for plane in scene.fixed:
         if isinstance(plane, Plane):
             normal = np.asarray(plane.normal) / np.hypot(*plane.normal)
@@ -162,7 +170,7 @@ def confusion(rows: Iterable[Observation], of: str = "foretold") -> Counter[tupl
 
 
 def shares(count: Counter[tuple[bool, bool]]) -> dict[str, Any]:
-    """Return a confusion table with its precision and recall, None where there is nothing to count."""
+    """Return a confusion table with precision and recall; None for a ratio without cases."""
     hits, alarms, missed = count[True, True], count[True, False], count[False, True]
     return {
         "true_positives": hits,
@@ -176,18 +184,18 @@ def shares(count: Counter[tuple[bool, bool]]) -> dict[str, Any]:
 
 def summary(rows: list[Observation]) -> dict[str, Any]:
     """Return all confusion tables: over all, and by trouble, kind of scene and engine."""
-    part = {
+    subsets = {
         "all": rows,
         "trial run covers all": [row for row in rows if row.covered],
         "trial run covers a part": [row for row in rows if not row.covered],
     }
     return {
-        "foretold": {name: shares(confusion(some)) for name, some in part.items()},
+        "foretold": {name: shares(confusion(subset)) for name, subset in subsets.items()},
         "trial run on another engine": {
             "all": shares(confusion((row for row in rows if row.elsewhere is not None), "elsewhere"))
         },
-        "trial run of half": {name: shares(confusion(some, "half_foretold")) for name, some in part.items()},
-        "by formulas alone": {name: shares(confusion(some, "formulas")) for name, some in part.items()},
+        "trial run of half": {name: shares(confusion(subset, "half_foretold")) for name, subset in subsets.items()},
+        "by formulas alone": {name: shares(confusion(subset, "formulas")) for name, subset in subsets.items()},
         **{
             f"by {key}": {
                 name: shares(confusion(row for row in rows if getattr(row, key) == name))
@@ -236,8 +244,8 @@ def main() -> int:
                 f"{name:<28}{counts[0]:>6}{counts[1]:>9}{counts[2]:>12}{counts[3]:>8}" + "{:>11}{:>8}".format(*ratios)
             )
     for row in wrong:
-        what = "unforeseen" if row.happened else "false alarm"
-        print(f"{what}: {row.trouble} in {row.kind}, seed {row.seed}, on {row.engine}", file=sys.stderr)
+        label = "unforeseen" if row.happened else "false alarm"
+        print(f"{label}: {row.trouble} in {row.kind}, seed {row.seed}, on {row.engine}", file=sys.stderr)
     return 0
 
 

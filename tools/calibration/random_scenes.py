@@ -1,7 +1,7 @@
-"""Random scenes of 43 kinds, for the calibration of forecasts: everyday set-ups with sizes and speeds drawn at random.
+"""Random scenes of 43 kinds for the calibration of forecasts: common set-ups with random sizes and speeds.
 
-A kind is a function of a random generator that returns a scene document. The scenes have nothing to do with the matrix
-of `sandbox extremes`. Some run for longer than a trial run of `sandbox check` covers.
+A kind is a function of a random generator that returns a scene document; its name seeds the generator. The scenes are
+independent of the matrix of `sandbox extremes`. Some are longer than a trial run of `sandbox check`.
 """
 
 import math
@@ -19,18 +19,18 @@ KINDS: dict[str, Callable[[Random], Document]] = {}
 
 
 def kind(build: Callable[[Random], Document]) -> Callable[[Random], Document]:
-    """Add a kind of scene under the name of its function."""
+    """Register a kind of scene under the name of its function."""
     KINDS[build.__name__] = build
     return build
 
 
 def document(name: str, seed: int) -> Document:
-    """Return the scene of a kind and a seed; the same for ever."""
+    """Return the scene document of a kind and a seed, which never changes."""
     random = np.random.default_rng([seed, zlib.crc32(name.encode())])
-    made = KINDS[name](random)
-    made.setdefault("world", {})["seed"] = seed
-    made.setdefault("solver", {}).setdefault("dt", steps(random))
-    return made
+    scene = KINDS[name](random)
+    scene.setdefault("world", {})["seed"] = seed
+    scene.setdefault("solver", {}).setdefault("dt", steps(random))
+    return scene
 
 
 def log(random: Random, low: float, high: float) -> float:
@@ -39,7 +39,7 @@ def log(random: Random, low: float, high: float) -> float:
 
 
 def steps(random: Random) -> float:
-    """Draw a step as games and studies have them, s."""
+    """Draw a step that is common in games and studies, s."""
     return float(random.choice([1 / 30, 1 / 60, 1 / 60, 1 / 100, 1 / 120, 1 / 240, 1 / 500]))
 
 
@@ -91,8 +91,8 @@ def fall_onto_box(random: Random) -> Document:
 def long_fall(random: Random) -> Document:
     floor = {"name": "floor", "points": [[-9.0, 0.0], [9.0, 0.0]], "thickness": 0.1}
     height = log(random, 100, 700)
-    made = {"world": world(14.0), "wall": [floor], "ball": [ball(0, height, log(random, 0.05, 0.6), restitution=0.5)]}
-    return {**made, "solver": {"dt": 1 / 500}}
+    scene = {"world": world(14.0), "wall": [floor], "ball": [ball(0, height, log(random, 0.05, 0.6), restitution=0.5)]}
+    return {**scene, "solver": {"dt": 1 / 500}}
 
 
 @kind
@@ -114,27 +114,30 @@ def shower(random: Random) -> Document:
 
 @kind
 def ball_and_ball(random: Random) -> Document:
-    one, two = log(random, 0.05, 0.5), log(random, 0.05, 0.5)
+    first_radius, second_radius = log(random, 0.05, 0.5), log(random, 0.05, 0.5)
     speed = log(random, 2, 80)
-    first = ball(-1.5, 0, one, velocity=[speed, 0], mass=log(random, 0.1, 10), restitution=0.8)
-    return {"world": {"duration": 1.0}, "ball": [first, ball(1.5, 0, two, mass=log(random, 0.1, 10), restitution=0.8)]}
+    first = ball(-1.5, 0, first_radius, velocity=[speed, 0], mass=log(random, 0.1, 10), restitution=0.8)
+    return {
+        "world": {"duration": 1.0},
+        "ball": [first, ball(1.5, 0, second_radius, mass=log(random, 0.1, 10), restitution=0.8)],
+    }
 
 
 @kind
 def ball_beside_ball(random: Random) -> Document:
     radius, speed = log(random, 0.05, 0.4), log(random, 2, 60)
-    off = float(random.uniform(-1.8, 1.8)) * radius
-    first = ball(-2, off, radius, velocity=[speed, 0], restitution=0.9)
+    offset = float(random.uniform(-1.8, 1.8)) * radius
+    first = ball(-2, offset, radius, velocity=[speed, 0], restitution=0.9)
     return {"world": {"duration": 1.0}, "ball": [first, ball(0.7, 0, radius, velocity=[-speed, 0], restitution=0.9)]}
 
 
 @kind
 def bullets(random: Random) -> Document:
-    some = [
+    balls = [
         ball(-1 - random.uniform(0, 1), y, 0.05, velocity=[log(random, 3, 120), 0], name=f"bullet {y}")
         for y in (-1, 0, 1)
     ]
-    return {"world": {"duration": 1.0}, "wall": [upright(0.6, log(random, 0.005, 0.2))], "ball": some}
+    return {"world": {"duration": 1.0}, "wall": [upright(0.6, log(random, 0.005, 0.2))], "ball": balls}
 
 
 @kind
@@ -149,18 +152,18 @@ def struck_into_wall(random: Random) -> Document:
 @kind
 def fast_ball_into_plane(random: Random) -> Document:
     radius, speed = log(random, 0.05, 0.6), log(random, 5, 150)
-    one = ball(random.uniform(-1, 1), 6, radius, velocity=[1.0, -speed], restitution=0.9)
-    return {"world": {"duration": 0.6}, "plane": [ground()], "ball": [one]}
+    fast = ball(random.uniform(-1, 1), 6, radius, velocity=[1.0, -speed], restitution=0.9)
+    return {"world": {"duration": 0.6}, "plane": [ground()], "ball": [fast]}
 
 
 @kind
 def thrown_boxes(random: Random) -> Document:
-    some = [
+    boxes = [
         {"position": [-3 + 1.2 * k, 2 + k], "size": [log(random, 0.1, 0.8), log(random, 0.1, 0.8)], **bodies(random),
          "velocity": [log(random, 1, 12), random.uniform(-6, 3)], "angular_velocity": random.uniform(-9, 9)}
         for k in range(3)
     ]  # fmt: skip
-    return {"world": world(2.0), "plane": [ground()], "box": some}
+    return {"world": world(2.0), "plane": [ground()], "box": boxes}
 
 
 @kind
@@ -173,10 +176,14 @@ def rods_at_pegs(random: Random) -> Document:
 
 @kind
 def late_bullet(random: Random) -> Document:
-    speed, far = log(random, 5, 60), 30.0
-    some = [ball(-far, 0, log(random, 0.04, 0.2), velocity=[speed, 0])]
-    made = {"world": {"duration": far / speed + 1.0}, "wall": [upright(0.3, log(random, 0.01, 0.1))], "ball": some}
-    return {**made, "solver": {"dt": float(random.choice([1 / 240, 1 / 500, 1 / 1000]))}}
+    speed, distance = log(random, 5, 60), 30.0
+    balls = [ball(-distance, 0, log(random, 0.04, 0.2), velocity=[speed, 0])]
+    scene = {
+        "world": {"duration": distance / speed + 1.0},
+        "wall": [upright(0.3, log(random, 0.01, 0.1))],
+        "ball": balls,
+    }
+    return {**scene, "solver": {"dt": float(random.choice([1 / 240, 1 / 500, 1 / 1000]))}}
 
 
 # Crowds
@@ -185,11 +192,11 @@ def late_bullet(random: Random) -> Document:
 @kind
 def bouncy_balls(random: Random) -> Document:
     count = int(random.integers(3, 8))
-    some = [
+    balls = [
         ball(0.35 * k - 1, 1 + 0.4 * (k % 3), 0.15, restitution=float(random.uniform(0.5, 0.95))) for k in range(count)
     ]
     walls = [{"point": [side, 0], "normal": [-side, 0]} for side in (-1.4, 1.8)]
-    return {"world": world(3.0), "plane": [ground(), *walls], "ball": some}
+    return {"world": world(3.0), "plane": [ground(), *walls], "ball": balls}
 
 
 @kind
@@ -197,8 +204,8 @@ def column_of_balls(random: Random) -> Document:
     radius, count = log(random, 0.05, 0.3), int(random.integers(2, 6))
     walls = [{"point": [side * radius * 1.05, 0], "normal": [-side, 0]} for side in (-1, 1)]
     friction, e = float(random.choice([0.0, 0.4])), float(random.uniform(0, 0.7))
-    some = [ball(0.0, radius * (1.02 + 2.05 * k), radius, restitution=e, friction=friction) for k in range(count)]
-    return {"world": world(2.0), "plane": [ground(), *walls], "ball": some}
+    balls = [ball(0.0, radius * (1.02 + 2.05 * k), radius, restitution=e, friction=friction) for k in range(count)]
+    return {"world": world(2.0), "plane": [ground(), *walls], "ball": balls}
 
 
 @kind
@@ -206,7 +213,7 @@ def heap(random: Random) -> Document:
     count, radius = int(random.integers(4, 14)), 0.1
     walls = [{"point": [side, 0], "normal": [-side, 0]} for side in (-0.5, 0.5)]
     friction, e = float(random.choice([0.0, 0.3])), float(random.uniform(0, 0.6))
-    some = [
+    balls = [
         ball(
             -0.3 + 0.22 * (k % 3) + 0.03 * (k // 3 % 2),
             0.12 + 0.25 * (k // 3),
@@ -216,14 +223,14 @@ def heap(random: Random) -> Document:
         )
         for k in range(count)
     ]
-    return {"world": world(2.5), "plane": [ground(), *walls], "ball": some}
+    return {"world": world(2.5), "plane": [ground(), *walls], "ball": balls}
 
 
 @kind
 def gas_in_thin_box(random: Random) -> Document:
     box = {"name": "box", "points": [[-2, -2], [2, -2], [2, 2], [-2, 2]], "closed": True, "restitution": 1.0}
-    some = {"count": 15, "lower": [-1.5, -1.5], "upper": [1.5, 1.5], "radius": log(random, 0.04, 0.15)}
-    gas = {"name": "atom", **some, "velocity_jitter": log(random, 1, 20), "restitution": 1.0}
+    atoms = {"count": 15, "lower": [-1.5, -1.5], "upper": [1.5, 1.5], "radius": log(random, 0.04, 0.15)}
+    gas = {"name": "atom", **atoms, "velocity_jitter": log(random, 1, 20), "restitution": 1.0}
     return {"world": {"duration": 2.0}, "wall": [{**box, "thickness": log(random, 0.01, 0.2)}], "scatter": [gas]}
 
 
@@ -242,22 +249,22 @@ def rack_break(random: Random) -> Document:
 @kind
 def cradle(random: Random) -> Document:
     count, radius, length = int(random.integers(3, 6)), 0.1, 1.0
-    some, rods = [], []
+    balls, rods = [], []
     for k in range(count):
         angle = -log(random, 0.2, 1.2) if k == 0 else 0.0
         top = [0.2005 * k, 0.0]
-        some.append(
+        balls.append(
             ball(top[0] + length * math.sin(angle), -length * math.cos(angle), radius, name=f"b{k}", restitution=1.0)
         )
         rods.append({"kind": "rod", "between": [f"b{k}"], "anchors": [[0, 0], top]})
-    return {"world": world(3.0), "ball": some, "joint": rods}
+    return {"world": world(3.0), "ball": balls, "joint": rods}
 
 
 @kind
 def pegs(random: Random) -> Document:
     posts = [{"position": [0.5 * (k % 4) + 0.25 * (k // 4 % 2), -0.45 * (k // 4)], "radius": 0.05} for k in range(16)]
-    some = [ball(0.3 + 0.4 * k, 1 + log(random, 0.2, 5), 0.06, **bodies(random)) for k in range(3)]
-    return {"world": world(2.5), "post": posts, "plane": [{"point": [0, -2.5], "normal": [0, 1]}], "ball": some}
+    balls = [ball(0.3 + 0.4 * k, 1 + log(random, 0.2, 5), 0.06, **bodies(random)) for k in range(3)]
+    return {"world": world(2.5), "post": posts, "plane": [{"point": [0, -2.5], "normal": [0, 1]}], "ball": balls}
 
 
 # Stacks
@@ -267,12 +274,12 @@ def pegs(random: Random) -> Document:
 def heavy_on_light(random: Random) -> Document:
     light, heavy = log(random, 0.2, 1), log(random, 0.3, 1)
     ratio = log(random, 3, 1000)
-    low = {"name": "light", "position": [0, light / 2], "size": [light] * 2, "mass": 1.0, "friction": 0.5}
-    high = {"name": "heavy", "position": [0, light + heavy / 2], "size": [heavy] * 2, "mass": ratio, "friction": 0.5}
+    lower = {"name": "light", "position": [0, light / 2], "size": [light] * 2, "mass": 1.0, "friction": 0.5}
+    upper = {"name": "heavy", "position": [0, light + heavy / 2], "size": [heavy] * 2, "mass": ratio, "friction": 0.5}
     return {
         "world": world(3.0),
         "plane": [ground()],
-        "box": [low, high],
+        "box": [lower, upper],
         "solver": {"dt": steps(random), "iterations": int(random.choice([5, 10, 20]))},
     }
 
@@ -380,9 +387,9 @@ def thrust_into_wall(random: Random) -> Document:
 
 @kind
 def wind(random: Random) -> Document:
-    blown = [ball(-3, k, log(random, 0.05, 0.2)) for k in range(3)]
+    balls = [ball(-3, k, log(random, 0.05, 0.2)) for k in range(3)]
     air = {"duration": 2.0, "linear_drag": log(random, 0.3, 10), "wind": [log(random, 2, 60), 0]}
-    return {"world": air, "wall": [upright(1.0, log(random, 0.01, 0.1))], "ball": blown}
+    return {"world": air, "wall": [upright(1.0, log(random, 0.01, 0.1))], "ball": balls}
 
 
 @kind
@@ -439,15 +446,15 @@ def pendulum(random: Random) -> Document:
 
 @kind
 def double_pendulum(random: Random) -> Document:
-    one, two = (float(each) for each in random.uniform(-3, 3, 2))
-    first = [math.sin(one), -math.cos(one)]
-    second = [first[0] + math.sin(two), first[1] - math.cos(two)]
-    some = [
+    first_angle, second_angle = (float(each) for each in random.uniform(-3, 3, 2))
+    first = [math.sin(first_angle), -math.cos(first_angle)]
+    second = [first[0] + math.sin(second_angle), first[1] - math.cos(second_angle)]
+    balls = [
         ball(*first, 0.1, name="a", collides="none"),
         ball(*second, 0.1, name="b", mass=log(random, 0.1, 50), collides="none"),
     ]
     rods = [{"kind": "rod", "between": ["a"], "anchors": [[0, 0], [0, 0]]}, {"kind": "rod", "between": ["a", "b"]}]
-    return {"world": world(3.0), "ball": some, "joint": rods}
+    return {"world": world(3.0), "ball": balls, "joint": rods}
 
 
 @kind
@@ -461,7 +468,7 @@ def loaded_chain(random: Random) -> Document:
 
 
 def _chain(random: Random, count: int, load: float) -> Document:
-    some = [
+    balls = [
         ball(0, -0.2 * (k + 1), 0.05, name=f"n{k}", collides="none", mass=load if k == count - 1 else 1.0)
         for k in range(count)
     ]
@@ -469,7 +476,7 @@ def _chain(random: Random, count: int, load: float) -> Document:
     rods[0]["anchors"] = [[0, 0], [0, 0]]
     return {
         "world": world(2.0),
-        "ball": some,
+        "ball": balls,
         "joint": rods,
         "solver": {"dt": steps(random), "iterations": int(random.choice([2, 5, 10, 30]))},
     }
@@ -529,6 +536,6 @@ def box_on_ramp(random: Random) -> Document:
         "normal": [math.sin(tilt), math.cos(tilt)],
         "friction": float(random.uniform(0, 1)),
     }
-    at = [math.sin(tilt) * size / 2, math.cos(tilt) * size / 2]
-    crate = {"position": at, "size": [size, size], "angle": -tilt, "friction": 1.0}
+    position = [math.sin(tilt) * size / 2, math.cos(tilt) * size / 2]
+    crate = {"position": position, "size": [size, size], "angle": -tilt, "friction": 1.0}
     return {"world": world(2.5), "plane": [slope], "box": [crate]}

@@ -1,10 +1,10 @@
-"""Fuzz the program: generated inputs, run in isolated processes with limits of time and memory.
+"""Fuzz the program: generated inputs, run in isolated processes with limits on time and memory.
 
     python -m tools.fuzzing scenes --count 20000 --seed 1 --workers 2 --keep found
     python -m tools.fuzzing files --count 2000 --seed 1 --workers 2 --keep found
     python -m tools.fuzzing case found/*.json
 
-Exit status: 0 nothing failed; 1 something failed; 2 wrong options; 130 interrupted.
+Exit status: 0 no case failed; 1 a case failed; 2 wrong options; 130 interrupted.
 """
 
 import argparse
@@ -20,7 +20,7 @@ from tools.fuzzing.damaged_files import file_cases
 from tools.fuzzing.isolated import Case, Failure, Limits, Outcome, run_cases
 from tools.fuzzing.scene_mutants import scene_cases
 
-SLOW = 5.0  # s of CPU time from which on a case is reported, though it is within its limit
+SLOW = 5.0  # s of CPU time; slower cases are reported even within their limit
 
 
 def main() -> int:
@@ -30,8 +30,8 @@ def main() -> int:
     if options.command == "case":
         cases: Iterator[Case] = map(Case.load, options.files)
     else:
-        made = {"scenes": scene_cases, "files": file_cases}[options.command]
-        cases = made(options.seed, options.count, options.first)
+        make_cases = {"scenes": scene_cases, "files": file_cases}[options.command]
+        cases = make_cases(options.seed, options.count, options.first)
     summary = Summary()
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
@@ -47,13 +47,13 @@ def main() -> int:
 
 
 class Summary:
-    """Counts of outcomes, and the failures by place."""
+    """Counts of outcomes, and failures grouped by location."""
 
     def __init__(self) -> None:
         self.count = 0
         self.failures: dict[str, Failure] = {}
         self._kinds: Counter[str] = Counter()
-        self._cpu, self._began = 0.0, perf_counter()
+        self._cpu, self._start_time = 0.0, perf_counter()
         self._slow: list[tuple[float, Case]] = []
 
     def add(self, case: Case, outcome: Outcome) -> None:
@@ -74,8 +74,8 @@ class Summary:
     def line(self) -> str:
         """Return the counts as one line."""
         kinds = ", ".join(f"{count} {kind}" for kind, count in sorted(self._kinds.items()))
-        each = self._cpu / max(self.count, 1)
-        return f"{self.count} cases in {perf_counter() - self._began:.0f} s, {each:.3f} s CPU each: {kinds}"
+        mean = self._cpu / max(self.count, 1)
+        return f"{self.count} cases in {perf_counter() - self._start_time:.0f} s, {mean:.3f} s CPU each: {kinds}"
 
     def report(self, keep: Path | None) -> None:
         """Print the failures, most frequent first, and write the smallest case of each."""
@@ -97,9 +97,9 @@ def _parser() -> argparse.ArgumentParser:
     scenes = commands.add_parser("scenes", help="mutants of the shipped scenes, with actions, on every engine")
     files = commands.add_parser("files", help="damaged files of every kind, through the commands that read them")
     for each in (scenes, files):
-        each.add_argument("--count", type=int, default=1000, help="how many mutants, or damaged files")
+        each.add_argument("--count", type=int, default=1000, help="number of mutants or damaged files")
         each.add_argument("--seed", type=int, default=1)
-        each.add_argument("--first", type=int, default=0, metavar="K", help="number of the first")
+        each.add_argument("--first", type=int, default=0, metavar="K", help="index of the first")
     case = commands.add_parser("case", help="case files, one after the other")
     case.add_argument("files", type=Path, nargs="+", metavar="FILE")
     for each in (scenes, files, case):
@@ -113,7 +113,7 @@ def _parser() -> argparse.ArgumentParser:
 def _bytes(text: str) -> int:
     found = re.fullmatch(r"(\d+(?:\.\d+)?)\s*(KiB|MiB|GiB|B|)", text)
     if found is None:
-        raise argparse.ArgumentTypeError(f"{text!r} is no size; such as 4GiB")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a size such as 4GiB")
     return int(float(found[1]) * {"KiB": 2**10, "MiB": 2**20, "GiB": 2**30, "B": 1, "": 1}[found[2]])
 
 

@@ -1,7 +1,7 @@
-"""Damaged files: every kind of file that the program reads, damaged, through every command that reads it.
+"""Damaged files of every kind that the program reads, passed to every command that reads them.
 
-A case passes where each command ends with status 0, 1 or 2, without a traceback, and with a message of bounded length
-on standard error unless the status is 0; and where `run --out`, which makes a damaged run again, leaves a sound store.
+A case passes if each command ends with status 0, 1 or 2, without a traceback, and with a message of bounded length on
+standard error unless the status is 0, and if `run --out`, which repeats a damaged run, leaves a valid store.
 """
 
 import atexit
@@ -44,7 +44,7 @@ from tools.fuzzing.file_damage import (
 from tools.fuzzing.isolated import Case, Violation
 
 MAX_ERROR = 20_000  # characters on standard error
-MAX_LINE = 2_000  # characters of one line of it
+MAX_LINE = 2_000  # characters of one line on standard error
 
 SCENE = """
 title = "Drop"
@@ -112,9 +112,9 @@ class Kind:
     """A kind of file."""
 
     path: str
-    """in the folder of a case; of a stored run, whose name is its id, a pattern"""
+    """path in the folder of a case; a pattern for a stored run, whose name is its id"""
     commands: tuple[str, ...]
-    """those of `COMMANDS` that read it"""
+    """keys of `COMMANDS` of the commands that read it"""
     draw: Callable[[Path, random.Random], Damage]
 
 
@@ -163,8 +163,8 @@ WEIGHTS = {"run": 8, "game": 4, "store": 3, "session": 3, "game session": 2, "sc
 def file_cases(seed: int, count: int, first: int = 0) -> Iterator[Case]:
     """Yield the cases of the damaged files `first` to `first + count − 1` of a seed."""
     for index in range(first, first + count):
-        made = argument(seed, index)
-        yield Case("tools.fuzzing.damaged_files:read_damaged", made, f"damaged {made['file']} {index} of seed {seed}")
+        drawn = argument(seed, index)
+        yield Case("tools.fuzzing.damaged_files:read_damaged", drawn, f"damaged {drawn['file']} {index} of seed {seed}")
 
 
 def argument(seed: int, index: int) -> dict[str, Any]:
@@ -188,14 +188,14 @@ def read_damaged(argument: Mapping[str, Any]) -> str | None:
     """Damage a file and run commands that read it.
 
     Args:
-        argument: `file`, a key of `KINDS`; `damage`, a list of what `apply_damage` takes; `commands`, keys of its
-            kind's commands.
+        argument: `file`, a key of `KINDS`; `damage`, a list of damages for `apply_damage`; `commands`, keys of
+            `COMMANDS`.
 
     Returns:
-        None where all commands ended with status 0, else `status 2` and the like.
+        None if all commands ended with status 0, else the worst status, such as `status 2`.
 
     Raises:
-        Violation: a command did not answer as it should.
+        Violation: a command violated a check.
     """
     kind = KINDS[argument["file"]]
     statuses = []
@@ -211,7 +211,7 @@ def read_damaged(argument: Mapping[str, Any]) -> str | None:
     return f"status {worst}" if worst else None
 
 
-def _called(*arguments: str) -> tuple[int, str]:
+def _call(*arguments: str) -> tuple[int, str]:
     """Call a command; return its status and standard output.
 
     Raises:
@@ -220,37 +220,37 @@ def _called(*arguments: str) -> tuple[int, str]:
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         status = call(list(arguments))
-    told, words = err.getvalue(), " ".join(arguments)
+    errors, words = err.getvalue(), " ".join(arguments)
     if status not in (0, 1, 2):
         raise Violation("status", f"{status} of `sandbox {words}`")
-    if status and not told.strip():
+    if status and not errors.strip():
         raise Violation("silence", f"status {status} of `sandbox {words}`, and no message")
-    if "Traceback" in told:
-        raise Violation("traceback on standard error", told[-2000:])
-    if len(told) > MAX_ERROR or max(map(len, told.splitlines()), default=0) > MAX_LINE:
-        raise Violation("length", f"{len(told):,} characters of `sandbox {words}`: {told[:1000]}")
-    out.getvalue().encode("utf-8")  # as a terminal would have it
-    told.encode("utf-8")
+    if "Traceback" in errors:
+        raise Violation("traceback on standard error", errors[-2000:])
+    if len(errors) > MAX_ERROR or max(map(len, errors.splitlines()), default=0) > MAX_LINE:
+        raise Violation("length", f"{len(errors):,} characters of `sandbox {words}`: {errors[:1000]}")
+    out.getvalue().encode("utf-8")  # raises for lone surrogates
+    errors.encode("utf-8")
     return status, out.getvalue()
 
 
 def _run(file: str, path: str, *more: str) -> int:
-    """Run what the file belongs to. Where that stored runs, they must be sound, and found by the next call."""
+    """Run the command of the file; check that stored runs are valid and are found by the next call."""
     if file in ("session", "game session"):
-        return _called("run", path, "--json")[0]
+        return _call("run", path, "--json")[0]
     if file == "script":
-        return _called("run", "game.toml", "--player", path, "--json")[0]
+        return _call("run", "game.toml", "--player", path, "--json")[0]
     if file == "scene":
-        return _called("run", path, "--json", "--no-audit")[0]
+        return _call("run", path, "--json", "--no-audit")[0]
     words = ["run", *(("game.toml", "--player", "random") if file == "game" else ("drop.toml", "--ledger"))]
     words += ["--out", str(Path(path).parent), "--json", *more]
-    status, out = _called(*words)
+    status, out = _call(*words)
     if status == 2:
         return status
     (row,) = json.loads(out)["runs"]
     if Trajectory.load(row["path"]).info.get("state_hash") != row["state_hash"]:
         raise Violation("store", "the stored run is another than the one that was made")
-    again, out = _called(*words)
+    again, out = _call(*words)
     (found,) = json.loads(out)["runs"]
     if again != status or not found["repeated"]:
         raise Violation("store", "the run that was made again is not found")
@@ -262,18 +262,18 @@ def _plot(file: str, path: str) -> int:
 
 
 def _other_run(_: str, path: str) -> int:
-    """Run what is not in the store yet."""
-    return _called("run", "drop.toml", "--set", "world.seed=5", "--out", str(Path(path).parent), "--json")[0]
+    """Run a run that is not in the store yet."""
+    return _call("run", "drop.toml", "--set", "world.seed=5", "--out", str(Path(path).parent), "--json")[0]
 
 
 def _export(*words: str) -> Callable[[str, str], int]:
-    return lambda _, path: _called("export", path, *words)[0]
+    return lambda _, path: _call("export", path, *words)[0]
 
 
-def _shown(*words: str) -> Callable[[str, str], int]:
-    """Return a command that opens a window without a display, and closes it after a few frames."""
+def _windowed(*words: str) -> Callable[[str, str], int]:
+    """Return a command that opens a window without a display and closes it after a few frames."""
 
-    def show(_: str, path: str) -> int:
+    def run(_: str, path: str) -> int:
         from sandbox.window.app import App
 
         def few_frames(window: App) -> int:
@@ -282,16 +282,16 @@ def _shown(*words: str) -> Callable[[str, str], int]:
             return window.context.exit_status or 0
 
         with mock.patch.object(App, "run", few_frames), mock.patch.dict(os.environ, DUMMY):
-            return _called(words[0], path, *words[1:])[0]
+            return _call(words[0], path, *words[1:])[0]
 
-    return show
+    return run
 
 
 DUMMY = {"SDL_VIDEODRIVER": "dummy", "SDL_AUDIODRIVER": "dummy", "PYGAME_HIDE_SUPPORT_PROMPT": "1"}
 
 
 def _changes(_: str, path: str) -> int:
-    """Compare stored boundaries with others, without measuring any."""
+    """Compare stored boundaries with given ones, without measuring."""
     try:
         before = read(path)
     except StoredError as error:
@@ -309,16 +309,16 @@ def _changes(_: str, path: str) -> int:
 
 
 def _against(_: str, path: str) -> int:
-    """Hold no boundaries against stored ones: the axis that is named is none, which is reported too."""
-    return _called("extremes", "--axes", "none", "--against", path)[0]
+    """Call `extremes --against` with an unknown axis, so that nothing is measured and both faults are reported."""
+    return _call("extremes", "--axes", "none", "--against", path)[0]
 
 
 def _scores(_: str, path: str) -> int:
-    """Read high scores, and enter one."""
+    """Read high scores and enter one."""
     try:
         scores = opened(Path(path).absolute())
     except OSError:
-        return 2  # a folder; the window reports it
+        return 2  # the path is a folder, which the window reports
     scores.enter("landing: Pad", "abc", 10)
     if scores.told is not None and len(scores.told) > MAX_LINE:
         raise Violation("length", scores.told[:1000])
@@ -335,12 +335,12 @@ COMMANDS: dict[str, Callable[[str, str], int]] = {
     "contacts": _export("--contacts", "--to", "a.csv"),
     "png": _export("--to", "a.png", "--width", "320", "--overlay", "contacts"),
     "gif": _export("--to", "a.gif", "--width", "160", "--fps", "5"),
-    "replay": _shown("replay"),
-    "again": _shown("replay", "--engine", "pymunk"),
-    "other": _shown("replay", "--engine", "reference"),
-    "play": _shown("play"),
-    "scene replay": _shown("replay"),
-    "check": lambda _, path: _called("check", path)[0],
+    "replay": _windowed("replay"),
+    "again": _windowed("replay", "--engine", "pymunk"),
+    "other": _windowed("replay", "--engine", "reference"),
+    "play": _windowed("play"),
+    "scene replay": _windowed("replay"),
+    "check": lambda _, path: _call("check", path)[0],
     "changes": _changes,
     "against": _against,
     "scores": _scores,
@@ -349,8 +349,8 @@ COMMANDS: dict[str, Callable[[str, str], int]] = {
 
 @cache
 def _base() -> Path:
-    """Make a folder with one sound file of each kind, for this process; it is copied for each case."""
-    folder = Path(tempfile.mkdtemp(prefix="sound-"))
+    """Make a folder with one valid file of each kind for this process; it is copied for each case."""
+    folder = Path(tempfile.mkdtemp(prefix="valid-"))
     owner = os.getpid()
     atexit.register(lambda: os.getpid() == owner and shutil.rmtree(folder, ignore_errors=True))
     (folder / "drop.toml").write_text(SCENE, encoding="utf-8")
@@ -360,14 +360,16 @@ def _base() -> Path:
     opened(folder / "high-scores.json").enter("landing: Pad", "abc", 7)
     scene = loads(SCENE)
     ball = Ball(name="c", position=(9.0, 9.0), radius=1.0)
-    acts = (Spawn(time=0.1, ball=ball), Impulse(time=0.2, body="c", impulse=(1.0, 0.0)))
-    session = Recording(scene, "pymunk", scene.solver, acts, 0.3)
-    Recording(scene, "pymunk", scene.solver, acts, 0.3, rerun(session).info["state_hash"]).save(folder / "session.json")
+    actions = (Spawn(time=0.1, ball=ball), Impulse(time=0.2, body="c", impulse=(1.0, 0.0)))
+    session = Recording(scene, "pymunk", scene.solver, actions, 0.3)
+    Recording(scene, "pymunk", scene.solver, actions, 0.3, rerun(session).info["state_hash"]).save(
+        folder / "session.json"
+    )
     play_out(loads(GAME), "random").recording.save(folder / "game.json")
     with contextlib.chdir(folder):
         for words in (
             ("drop.toml", "--ledger", "--out", "runs"),
             ("game.toml", "--player", "random", "--out", "games"),
         ):
-            _called("run", *words, "--json")
+            _call("run", *words, "--json")
     return folder

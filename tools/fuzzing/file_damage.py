@@ -1,7 +1,7 @@
-"""Damage to files: each kind is a function of a file and the keys of a JSON object, so that a case file can state it.
+"""Damage to files: each kind is a function of a file and a JSON object, so that a case file can contain it.
 
-A damage is `{"op": "flip", "at": [0.2, 0.7]}`. Places are fractions of a file's length, so that a case still means
-something when the file that it damages has changed a little. A raw value of JSON is `{"raw": "NaN"}` or
+A damage is `{"op": "flip", "at": [0.2, 0.7]}`. Positions are fractions of the length of a file, so that a case stays
+meaningful if the damaged file changes slightly. A raw JSON value is `{"raw": "NaN"}` or
 `{"before": "[", "after": "]", "times": 10000}`.
 """
 
@@ -27,29 +27,29 @@ PLACEHOLDER = "\x01raw value\x01"
 # --- bytes ----------------------------------------------------------------------------------------------------------
 
 
-def _place(content: bytes | bytearray, at: float) -> int:
+def _index(content: bytes | bytearray, at: float) -> int:
     return min(int(at * len(content)), max(len(content) - 1, 0))
 
 
 def flip(content: bytearray, damage: Damage) -> bytes:
-    """Flip a bit at each of some places."""
+    """Flip a bit at each of several positions."""
     for at in damage["at"] if content else ():
-        place = at * len(content) * 8
-        content[int(place) // 8] ^= 1 << int(place) % 8
+        bit = at * len(content) * 8
+        content[int(bit) // 8] ^= 1 << int(bit) % 8
     return content
 
 
 def zero(content: bytearray, damage: Damage) -> bytes:
-    """Put zeros in place of a block."""
-    start = _place(content, damage["at"])
+    """Overwrite a block with zeros."""
+    start = _index(content, damage["at"])
     block = content[start : start + damage["length"]]
     content[start : start + len(block)] = bytes(len(block))
     return content
 
 
 def overwrite(content: bytearray, damage: Damage) -> bytes:
-    """Put other bytes in place of a block."""
-    start, block = _place(content, damage["at"]), bytes.fromhex(damage["hex"])
+    """Overwrite a block with other bytes."""
+    start, block = _index(content, damage["at"]), bytes.fromhex(damage["hex"])
     content[start : start + len(block)] = block
     return content
 
@@ -63,26 +63,26 @@ def insert(content: bytearray, damage: Damage) -> bytes:
 
 def cut(content: bytearray, damage: Damage) -> bytes:
     """Cut a block out; the length may reach beyond the end, which truncates the file."""
-    start = _place(content, damage["at"])
+    start = _index(content, damage["at"])
     del content[start : start + damage["length"]]
     return content
 
 
 def double(content: bytearray, damage: Damage) -> bytes:
-    """Repeat a block where it stands."""
-    start = _place(content, damage["at"])
+    """Repeat a block in place."""
+    start = _index(content, damage["at"])
     block = content[start : start + damage["length"]]
     content[start:start] = block
     return content
 
 
 def crlf(content: bytearray, _: Damage) -> bytes:
-    """End lines as Windows does."""
+    """Replace line ends by CRLF."""
     return bytes(content).replace(b"\n", b"\r\n")
 
 
 def recode(content: bytearray, damage: Damage) -> bytes:
-    """Encode a text otherwise, such as `utf-16` or `utf-8-sig`."""
+    """Encode a text differently, such as in `utf-16` or `utf-8-sig`."""
     return bytes(content).decode("utf-8", "replace").encode(damage["to"])
 
 
@@ -102,7 +102,7 @@ def raw_json(damage: Damage) -> str:
 def damage_json(text: str, damage: Damage) -> str:
     """Set, delete or duplicate the value at a path of a document.
 
-    A path is of keys and indices; one that is not there any more leads to where it ends.
+    A path consists of keys and indices; a path that does not exist is followed as far as possible.
     """
     document = [json.loads(text)]
     holder: Any = document
@@ -142,7 +142,7 @@ def _array(content: bytes) -> Any:
 
 
 def header(content: bytes, damage: Damage) -> bytes:
-    """State another shape or type for the same data."""
+    """Write a header with another shape or type for the same data."""
     found = _array(content)
     shape, descr = damage.get("shape", str(found.shape)), damage.get("descr", repr(found.dtype.str))
     text = f"{{'descr': {descr}, 'fortran_order': {damage.get('fortran', False)}, 'shape': {shape}, }}\n".encode()
@@ -166,30 +166,30 @@ def resize(content: bytes, damage: Damage) -> bytes:
 
 
 def reshape(content: bytes, damage: Damage) -> bytes:
-    """Store zeros of another shape, which may be large: they compress well."""
+    """Store zeros of another shape, which may be large because zeros compress well."""
     return _npy(np.zeros(damage["shape"], _array(content).dtype))
 
 
 def put(content: bytes, damage: Damage) -> bytes:
-    """Put a value in place of one."""
+    """Replace one value."""
     found = _array(content).copy()
     if found.size:
         with np.errstate(all="ignore"):
             value = np.asarray(damage["value"])
             flat = found.reshape(-1)
-            flat[_place(bytes(len(flat)), damage["at"])] = value.astype(found.dtype)
+            flat[_index(bytes(len(flat)), damage["at"])] = value.astype(found.dtype)
     return _npy(found)
 
 
 def shuffle(content: bytes, damage: Damage) -> bytes:
-    """Put the rows in another order."""
+    """Permute the rows."""
     found = _array(content)
     order = np.random.default_rng(damage["seed"]).permutation(len(found)) if found.ndim else ()
     return _npy(found[order])
 
 
 def fortran(content: bytes, _: Damage) -> bytes:
-    """Store the values column by column."""
+    """Store the values in Fortran order."""
     return _npy(np.asfortranarray(_array(content)))
 
 
@@ -204,12 +204,12 @@ def text(_: bytes, damage: Damage) -> bytes:
 
 
 def code_points(content: bytes, damage: Damage) -> bytes:
-    """Store numbers that are no characters in place of some of a text."""
+    """Replace characters of a text by invalid code points."""
     found = _array(content)
     if found.dtype.kind != "U" or not found.size:
         return content
     codes = np.frombuffer(found.tobytes(), "<u4").copy()
-    codes[_place(bytes(len(codes)), damage["at"])] = damage["code"]
+    codes[_index(bytes(len(codes)), damage["at"])] = damage["code"]
     return header(_npy(codes), {"descr": repr(found.dtype.str), "shape": str(found.shape)})
 
 
@@ -225,7 +225,7 @@ MEMBER: dict[str, Callable[[bytes, Damage], bytes]] = {
 
 
 def damage_archive(path: Path, damage: Damage) -> None:
-    """Write an archive again with other members."""
+    """Rewrite an archive with changed members."""
     with zipfile.ZipFile(path) as archive:
         members = [(name, archive.read(name)) for name in archive.namelist()]
     op, name = damage["op"], f"{damage.get('member', 'time')}.npy"
@@ -247,7 +247,7 @@ def damage_archive(path: Path, damage: Damage) -> None:
     with zipfile.ZipFile(path, "w", method) as archive:
         for each, content in members:
             archive.filelist = [entry for entry in archive.filelist if op == "repeat" or entry.filename != each]
-            archive.NameToInfo.pop(each, None)  # else a repeated name is warned of
+            archive.NameToInfo.pop(each, None)  # avoids the warning about a duplicate name
             archive.writestr(each, content)
 
 
@@ -257,7 +257,7 @@ ARCHIVE = (*MEMBER, "remove", "repeat", "rename", "swap", "method")
 
 
 def damage_database(path: Path, damage: Damage) -> None:
-    """Change a database by a statement; `hex` is the value of its parameter, as bytes or text."""
+    """Execute an SQL statement on a database; `hex` or `value` is its parameter."""
     value: Any = damage.get("value")
     if "hex" in damage:
         value = bytes.fromhex(damage["hex"])
@@ -267,14 +267,14 @@ def damage_database(path: Path, damage: Damage) -> None:
             connection.execute(damage["sql"], (value,) if "?" in damage["sql"] else ())
             connection.commit()
         except sqlite3.DatabaseError:
-            return  # as it is damaged already
+            return  # the database is damaged already
 
 
 # --- files ----------------------------------------------------------------------------------------------------------
 
 
 def apply_damage(path: Path, damages: Iterable[Damage]) -> None:
-    """Damage a file in place; what cannot be done to a file that is damaged already is left out."""
+    """Damage a file in place; damages that cannot be applied to an already damaged file are skipped."""
     for damage in damages:
         op = damage["op"]
         if op == "folder":
@@ -313,7 +313,7 @@ RAW: tuple[Mapping[str, Any], ...] = tuple(
     + [{"before": '{"a":', "raw": "1", "after": "}", "times": times} for times in (40, 10_000)]
     + [{"raw": '"', "after": "x", "times": 100_000}, {"raw": '"x"', "before": " ", "times": 100_000}]
 )  # fmt: skip
-"""Values that a key may have instead of its own."""
+"""Raw values that replace the value of a key."""
 
 SHAPES = (
     "()", "(0,)", "(1,)", "(-1,)", "(3, -2)", "(1000000000000000,)", "(1000000000000000, 2, 2)",
@@ -361,7 +361,7 @@ def draw_bytes(draw: random.Random) -> Damage:
 
 
 def draw_text(draw: random.Random) -> Damage:
-    """Draw damage to a file of text."""
+    """Draw damage to a text file."""
     if draw.random() < 0.6:
         return draw_bytes(draw)
     strange = draw.choice(("\ufeff", "\x00", "\x1b[2J", "\r", "\u2028", "\U0001f3b1", "\x80", "é", "{", "[", '"', "'"))
@@ -387,7 +387,7 @@ def paths_of(document: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]
 
 
 def draw_json(document: Any, draw: random.Random, op: str = "json") -> Damage:
-    """Draw damage to a JSON document; values near its root are as likely as all others together."""
+    """Draw damage to a JSON document; half of the paths are at or just below its root."""
     paths = paths_of(document)
     shallow = [path for path in paths if len(path) <= 1]
     path = list(draw.choice(draw.choice((paths, shallow))))
@@ -396,7 +396,7 @@ def draw_json(document: Any, draw: random.Random, op: str = "json") -> Damage:
 
 
 def draw_archive(shapes: Mapping[str, tuple[int, ...]], document: Any, draw: random.Random) -> Damage:
-    """Draw damage to an archive of arrays of some shapes, whose `info` is a document."""
+    """Draw damage to an archive of arrays with these shapes, whose `info` is a JSON document."""
     names = sorted(shapes)
     member, other = draw.choice(names), draw.choice(names)
     rows = draw.choice((0, 1, 2, 3, shapes[member][0] + 1 if shapes[member] else 1, 100_000))

@@ -1,7 +1,7 @@
-"""Isolated cases: worker processes that run one case after the other under limits of CPU time and memory.
+"""Isolated cases: worker processes that run one case after the other with limits on CPU time and memory.
 
-A worker is a Python process in which warnings are errors. The parent waits for the answer to each case, and starts
-another worker where one died or exceeded a limit. Limits are those of POSIX (`resource`); elsewhere only the wall
+A worker is a Python process in which warnings are errors. The parent waits for the answer to each case and starts
+another worker if one died or exceeded a limit. Limits are those of POSIX (`resource`); on other systems only the wall
 clock limits a case.
 """
 
@@ -36,10 +36,10 @@ MAX_DETAIL = 8000  # characters of a traceback that are kept
 Kind = Literal["ok", "refused", "traceback", "violation", "abort", "hang", "memory"]
 FAILURES: frozenset[Kind] = frozenset({"traceback", "violation", "abort", "hang", "memory"})
 UNCERTAIN: frozenset[Kind] = frozenset({"hang", "memory"})
-"""They may come of compiling, or of the memory of earlier cases: they count where a fresh worker confirms them."""
+"""Possible effects of compiling or of the memory of earlier cases; they count only if a fresh worker confirms them."""
 
 
-class Violation(AssertionError):  # noqa: N818, a finding, not an error of the program that reports it
+class Violation(AssertionError):  # noqa: N818, a finding, not an error of the reporting program
     """A check of a result failed. `check` names the check; failures are grouped by it."""
 
     def __init__(self, check: str, detail: str) -> None:
@@ -49,22 +49,22 @@ class Violation(AssertionError):  # noqa: N818, a finding, not an error of the p
 
 @dataclass(frozen=True)
 class Limits:
-    """What one case may use."""
+    """Limits on the resources of one case."""
 
     cpu: float = 20.0
-    """s of CPU time of one stage: loading, the run of one engine, a check"""
+    """CPU time of one stage (loading, the run of one engine, a check), s"""
     memory: int = 4 * 2**30
-    """bytes of address space of the worker"""
+    """address space of the worker, bytes"""
 
     @property
     def wall(self) -> float:
-        """Seconds by the clock; several times the CPU time, as machines are shared."""
+        """Wall-clock time of one case, s; several times the CPU time, because machines are shared."""
         return 12.0 * self.cpu + 30.0
 
 
 @dataclass(frozen=True)
 class Case:
-    """A function and the JSON value that it is called with."""
+    """A function and its argument, a JSON value."""
 
     function: str
     """`module:name`; tools/ is on the path"""
@@ -84,36 +84,36 @@ class Case:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a case ended."""
+    """Result of a case."""
 
     kind: Kind
     what: str = ""
     """type of the error, name of the check, or signal"""
-    place: str = ""
+    location: str = ""
     """innermost frame in the package, `file:line in function`"""
     detail: str = ""
     """traceback, or the last lines of standard error"""
     cpu: float = 0.0
-    """s of CPU time, where the worker survived"""
+    """CPU time if the worker survived, s"""
 
     @property
     def failed(self) -> bool:
-        """Whether the case broke something."""
+        """Whether the case failed."""
         return self.kind in FAILURES
 
     @property
     def group(self) -> str:
-        """By what failures are grouped."""
-        return " ".join(part for part in (self.kind, self.what, self.place) if part)
+        """Key by which failures are grouped."""
+        return " ".join(part for part in (self.kind, self.what, self.location) if part)
 
 
 # --- the worker -----------------------------------------------------------------------------------------------------
 
 
 def serve(limits: Limits) -> None:
-    """Run the cases that arrive on standard input, one JSON line each; answer with one JSON line each."""
+    """Run the cases on standard input, one JSON line each; answer each with a JSON line."""
     replies = os.fdopen(os.dup(1), "w", encoding="utf-8")
-    os.dup2(2, 1)  # what a case prints is no answer
+    os.dup2(2, 1)  # keeps the prints of a case apart from the answers
     faulthandler.enable()
     if resource is not None:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
@@ -128,27 +128,27 @@ def serve(limits: Limits) -> None:
         module, _, name = case["function"].partition(":")
         function = getattr(importlib.import_module(module), name)
         unraisable.clear()
-        began = time.process_time()
+        start_time = time.process_time()
         begin_stage()
         outcome = _outcome(function, case["argument"], unraisable)
-        outcome["cpu"] = time.process_time() - began
+        outcome["cpu"] = time.process_time() - start_time
         replies.write(json.dumps(outcome) + "\n")
         replies.flush()
 
 
 _stage_limit: float | None = None
-"""s of CPU time of one stage of a case, where this process is a worker"""
+"""CPU time limit of one stage, s, if this process is a worker."""
 
 
 def begin_stage() -> None:
-    """Begin another stage of the present case: the limit of CPU time is of each stage."""
+    """Begin another stage of the current case: the limit of CPU time applies to each stage."""
     if resource is not None and _stage_limit is not None:
         soft = math.ceil(time.process_time() + _stage_limit)
         resource.setrlimit(resource.RLIMIT_CPU, (soft, resource.getrlimit(resource.RLIMIT_CPU)[1]))
 
 
 def extend_cpu_limit(seconds: int) -> None:
-    """Let the present case use more CPU time, as for compiling, which is done once."""
+    """Raise the CPU time limit of the current case, for example for compiling, which is done once."""
     if resource is not None:
         soft, hard = resource.getrlimit(resource.RLIMIT_CPU)
         if soft != resource.RLIM_INFINITY:
@@ -161,21 +161,21 @@ def _outcome(function: Any, argument: Any, unraisable: list[BaseException]) -> d
         if unraisable:
             raise unraisable[0]
     except MemoryError as error:
-        return {"kind": "memory", **_told(error)}
+        return {"kind": "memory", **_description(error)}
     except Violation as violation:
-        return {"kind": "violation", **_told(violation), "what": violation.check, "place": ""}
-    except BaseException as error:  # noqa: BLE001, whatever leaves a case is its outcome
-        return {"kind": "traceback", **_told(error)}
+        return {"kind": "violation", **_description(violation), "what": violation.check, "location": ""}
+    except BaseException as error:  # noqa: BLE001, any exception is the outcome of the case
+        return {"kind": "traceback", **_description(error)}
     finally:
         gc.collect(1)
     return {"kind": "refused", "what": refused} if refused else {"kind": "ok"}
 
 
-def _told(error: BaseException) -> dict[str, str]:
+def _description(error: BaseException) -> dict[str, str]:
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if _is_ours(frame.filename)]
-    place = f"{_short(frames[-1].filename)}:{frames[-1].lineno} in {frames[-1].name}" if frames else ""
+    location = f"{_short(frames[-1].filename)}:{frames[-1].lineno} in {frames[-1].name}" if frames else ""
     detail = "".join(traceback.format_exception(error, limit=-12))
-    return {"what": type(error).__name__, "place": place, "detail": detail[-MAX_DETAIL:]}
+    return {"what": type(error).__name__, "location": location, "detail": detail[-MAX_DETAIL:]}
 
 
 def _is_ours(file: str) -> bool:
@@ -190,15 +190,15 @@ def _short(file: str) -> str:
 
 
 class Worker:
-    """A worker process, restarted where it dies."""
+    """A worker process, restarted if it dies."""
 
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
         self._process: subprocess.Popen[str] | None = None
-        self._complaints = tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace")  # noqa: SIM115, closed in stop
+        self._stderr = tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace")  # noqa: SIM115, closed in stop
 
     def run(self, case: Case) -> Outcome:
-        """Run one case; a hang and a lack of memory are confirmed in a fresh worker."""
+        """Run one case; a hang or a lack of memory is confirmed in a fresh worker."""
         outcome = self._attempt(case)
         if outcome.kind in UNCERTAIN:
             self._end()
@@ -208,12 +208,12 @@ class Worker:
         return outcome
 
     def stop(self) -> None:
-        """End the process, whatever it does."""
+        """Kill the process."""
         self._end()
-        self._complaints.close()
+        self._stderr.close()
 
     def interrupt(self) -> None:
-        """End the process from another thread; the case that it runs fails."""
+        """Kill the process from another thread; its current case fails."""
         process = self._process
         if process is not None:
             process.kill()
@@ -222,13 +222,13 @@ class Worker:
         process = self._process or self._begin()
         assert process.stdin is not None
         assert process.stdout is not None
-        late = threading.Event()
+        timed_out = threading.Event()
 
-        def end_late() -> None:
-            late.set()
+        def abort_late() -> None:
+            timed_out.set()
             process.send_signal(signal.SIGABRT)  # faulthandler writes the stack
 
-        timer = threading.Timer(self._limits.wall, end_late)
+        timer = threading.Timer(self._limits.wall, abort_late)
         timer.start()
         try:
             process.stdin.write(json.dumps({"function": case.function, "argument": case.argument}) + "\n")
@@ -240,11 +240,11 @@ class Worker:
             timer.cancel()
         if line:
             return Outcome(**json.loads(line))
-        return self._post_mortem(late.is_set())
+        return self._post_mortem(timed_out.is_set())
 
     def _begin(self) -> subprocess.Popen[str]:
-        self._complaints.seek(0)
-        self._complaints.truncate()
+        self._stderr.seek(0)
+        self._stderr.truncate()
         code = (
             "from tools.fuzzing.isolated import Limits, serve; "
             f"serve(Limits({self._limits.cpu!r}, {self._limits.memory!r}))"
@@ -254,16 +254,16 @@ class Worker:
             [sys.executable, "-W", "error", "-c", code],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=self._complaints,
+            stderr=self._stderr,
             text=True,
             encoding="utf-8",
             env={**os.environ, "PYTHONPATH": path, "OPENBLAS_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"},
-            start_new_session=True,  # Ctrl-C is the parent's
+            start_new_session=True,  # only the parent handles Ctrl-C
         )
         return self._process
 
-    def _post_mortem(self, late: bool) -> Outcome:
-        """Say what a process died of."""
+    def _post_mortem(self, timed_out: bool) -> Outcome:
+        """Return the outcome of a process that died."""
         process = self._process
         assert process is not None
         try:
@@ -271,15 +271,15 @@ class Worker:
         except subprocess.TimeoutExpired:
             status = 0
         self._end()
-        self._complaints.seek(0)
-        text = self._complaints.read()
+        self._stderr.seek(0)
+        text = self._stderr.read()
         found = re.search(r'File "([^"]*/sandbox/(?!.*site-packages)[^"]*)", line (\d+) in (\S+)', text)
-        place = f"{_short(found[1])}:{found[2]} in {found[3]}" if found else ""
-        if late or (hasattr(signal, "SIGXCPU") and status == -signal.SIGXCPU):
-            return Outcome("hang", "", place, text[-MAX_DETAIL:])
+        location = f"{_short(found[1])}:{found[2]} in {found[3]}" if found else ""
+        if timed_out or (hasattr(signal, "SIGXCPU") and status == -signal.SIGXCPU):
+            return Outcome("hang", "", location, text[-MAX_DETAIL:])
         name = signal.Signals(-status).name if status < 0 else f"exit {status}"
         short_of_memory = "MemoryError" in text or "bad_alloc" in text
-        return Outcome("memory" if short_of_memory else "abort", name, place, text[-MAX_DETAIL:])
+        return Outcome("memory" if short_of_memory else "abort", name, location, text[-MAX_DETAIL:])
 
     def _end(self) -> None:
         process, self._process = self._process, None
@@ -290,15 +290,15 @@ class Worker:
                 if stream is not None:
                     try:
                         stream.close()
-                    except BrokenPipeError:  # a request that nobody will read
+                    except BrokenPipeError:  # the worker died with an unread request
                         continue
 
 
 def run_cases(cases: Iterable[Case], limits: Limits, workers: int = 2) -> Iterator[tuple[Case, Outcome]]:
-    """Yield each case with its outcome, in the order in which they end. Closing the iterator ends the workers."""
+    """Yield each case with its outcome, in the order of completion. Closing the iterator ends the workers."""
     source, lock, stop = iter(cases), threading.Lock(), threading.Event()
-    ended: queue.Queue[tuple[Case, Outcome] | BaseException | None] = queue.Queue(maxsize=4 * workers)
-    crew = [Worker(limits) for _ in range(workers)]
+    results: queue.Queue[tuple[Case, Outcome] | BaseException | None] = queue.Queue(maxsize=4 * workers)
+    pool = [Worker(limits) for _ in range(workers)]
 
     def work(worker: Worker) -> None:
         try:
@@ -309,48 +309,48 @@ def run_cases(cases: Iterable[Case], limits: Limits, workers: int = 2) -> Iterat
                     break
                 outcome = worker.run(case)
                 if not stop.is_set():
-                    ended.put((case, outcome))
+                    results.put((case, outcome))
         except BaseException as error:  # noqa: BLE001, raised again by the iterator
-            ended.put(error)
+            results.put(error)
         finally:
             worker.stop()
-            ended.put(None)
+            results.put(None)
 
-    threads = [threading.Thread(target=work, args=(worker,), daemon=True) for worker in crew]
+    threads = [threading.Thread(target=work, args=(worker,), daemon=True) for worker in pool]
     for thread in threads:
         thread.start()
     try:
-        left = workers
-        while left:
-            item = ended.get()
+        running = workers
+        while running:
+            item = results.get()
             if item is None:
-                left -= 1
+                running -= 1
             elif isinstance(item, BaseException):
                 raise item
             else:
                 yield item
     finally:
         stop.set()
-        for worker in crew:
+        for worker in pool:
             worker.interrupt()
         while any(thread.is_alive() for thread in threads):
             try:
-                ended.get(timeout=0.05)
+                results.get(timeout=0.05)
             except queue.Empty:
                 continue
 
 
 @dataclass(frozen=True)
 class Failure:
-    """Cases that failed at the same place."""
+    """Cases that failed at the same location."""
 
     count: int
     case: Case
-    """the smallest of them"""
+    """the smallest case"""
     outcome: Outcome
 
     def joined_by(self, case: Case, outcome: Outcome) -> "Failure":
-        """Return these and one more."""
+        """Return this failure with one more case."""
         if len(case.to_json()) < len(self.case.to_json()):
             return Failure(self.count + 1, case, outcome)
         return replace(self, count=self.count + 1)

@@ -1,4 +1,4 @@
-"""Random actions against the names of a scene document."""
+"""Random actions that refer to names of a scene document."""
 
 import copy
 import random
@@ -22,19 +22,19 @@ from tools.fuzzing.schema_values import (
 )
 
 FREQUENT = ("remove", "remove", "switch", "switch", "launch", "spawn", "strike", "strike", "throttle", "drive", "drive")
-"""Actions that are drawn more often: those that start an engine anew, and those that few scenes have a subject for."""
+"""Actions that are drawn more often: those that restart an engine, and those that apply to few scenes."""
 
 
 def actions(document: Document, draw: random.Random) -> list[Any]:
-    """Draw up to six actions against the names of a document, at increasing times."""
+    """Draw up to six actions that refer to names of a document, at increasing times."""
     dt = document.get("solver", {})
     dt = dt.get("dt", 0.01) if isinstance(dt, dict) else 0.01
     dt = dt if isinstance(dt, float) and 1e-9 <= dt <= 10 else 0.01
-    made, step = [], 0
+    drawn, step = [], 0
     for _ in range(draw.choice((1, 2, 3, 4, 6))):
         step += draw.choice((0, 0, 1, 2, 4))
-        made.append(_action(document, step * dt * draw.choice((1.0, 1.0, 1.5)), draw))
-    return made
+        drawn.append(_action(document, step * dt * draw.choice((1.0, 1.0, 1.5)), draw))
+    return drawn
 
 
 def _action(document: Document, time: float, draw: random.Random) -> Any:
@@ -43,27 +43,27 @@ def _action(document: Document, time: float, draw: random.Random) -> Any:
     usable = [kind for kind in [*kinds, *FREQUENT] if _has_subject(kind, document)]
     kind = draw.choice(usable if draw.random() < 0.95 else kinds)
     node = resolved({"$ref": root["discriminator"]["mapping"][kind]}, None, root)
-    made: Document = table_of(node, document, draw, root) | {"kind": kind, "time": time}
+    action: Document = table_of(node, document, draw, root) | {"kind": kind, "time": time}
     match kind:
         case "remove" if draw.random() < 0.5:
-            made["body"] = draw.choice(_referenced(document) or bodies_of(document) or ["missing"])
+            action["body"] = draw.choice(_referenced(document) or bodies_of(document) or ["missing"])
         case "spawn":
-            made = {"kind": kind, "time": time, **_spawned(document, draw)}
+            action = {"kind": kind, "time": time, **_spawned(document, draw)}
         case "set":
-            made |= _setting(document, draw)
+            action |= _setting(document, draw)
         case "switch":
-            made["engine"] = draw.choice(list(ENGINES))
-            made["settings"] = _changed_settings(document, draw) if draw.random() < 0.3 else {}
+            action["engine"] = draw.choice(list(ENGINES))
+            action["settings"] = _changed_settings(document, draw) if draw.random() < 0.3 else {}
         case "move" if draw.random() < 0.5:
-            made["position"] = [draw.uniform(-3.0, 3.0), draw.uniform(-1.0, 5.0)]
+            action["position"] = [draw.uniform(-3.0, 3.0), draw.uniform(-1.0, 5.0)]
     if draw.random() < 0.05:
-        key = draw.choice(sorted(made))
-        made[key] = copy.deepcopy(draw.choice((*NUMBERS[:-4], *OTHERS, *TEXTS)))
-    return made
+        key = draw.choice(sorted(action))
+        action[key] = copy.deepcopy(draw.choice((*NUMBERS[:-4], *OTHERS, *TEXTS)))
+    return action
 
 
 def _referenced(document: Document) -> list[str]:
-    """Return the names of bodies that joints, attractions, thrusts and drives of a document name."""
+    """Return the bodies that joints, attractions, thrusts and drives of a document refer to."""
     found: list[str] = []
     for kind in ("joint", "attraction", "thrust", "drive"):
         for _, each in tables(document, kind):
@@ -81,21 +81,21 @@ def _has_subject(kind: str, document: Document) -> bool:
 
 
 def _spawned(document: Document, draw: random.Random) -> Document:
-    """Draw a shape; often a copy of one that the scene has, elsewhere."""
+    """Draw a shape; often a shifted copy of one in the scene."""
     root = scene_schema()
-    theirs = [(kind, each) for kind in SPAWNED for _, each in tables(document, kind)]
-    if theirs and draw.random() < 0.6:
-        kind, single = copy.deepcopy(draw.choice(theirs))
-        single["name"] = f"spawned-{draw.randrange(100)}"
+    existing = [(kind, each) for kind in SPAWNED for _, each in tables(document, kind)]
+    if existing and draw.random() < 0.6:
+        kind, shape = copy.deepcopy(draw.choice(existing))
+        shape["name"] = f"spawned-{draw.randrange(100)}"
         if draw.random() < 0.8:
-            shift(single, draw.uniform(-5.0, 5.0))
-        return {kind: single}
+            shift(shape, draw.uniform(-5.0, 5.0))
+        return {kind: shape}
     kind = draw.choice(SPAWNED)
     return {kind: value_of(root["properties"][kind]["items"], kind, document, draw, root)}
 
 
 def _setting(document: Document, draw: random.Random) -> Document:
-    """Draw a value that a running scene may change, and its path."""
+    """Draw a path that may be set in a running scene, and a value."""
     if draw.random() < 0.6:
         path = draw.choice(("world.gravity", "world.wind", "world.linear_drag", "world.quadratic_drag",
                             "surface.sliding_friction", "surface.curl"))  # fmt: skip

@@ -1,4 +1,4 @@
-"""Sample cases: one for every kind of outcome, by which the isolation is tested."""
+"""Sample cases, one for every kind of outcome, for the tests of the isolation."""
 
 import os
 import time
@@ -18,17 +18,17 @@ def refuses(_: Any) -> str:
 
 
 def raises(argument: int) -> float:
-    """Let an exception escape."""
+    """Raise an unexpected exception."""
     return argument / 0
 
 
 def violates(_: Any) -> None:
-    """Find a check violated."""
+    """Raise a violation of a check."""
     raise Violation("sum", "1 + 1 is 3")
 
 
 def warns(_: Any) -> None:
-    """Warn."""
+    """Issue a warning."""
     warnings.warn("a warning is an error", stacklevel=1)
 
 
@@ -44,10 +44,10 @@ def loops(_: Any) -> None:
 
 
 def waits(_: Any) -> None:
-    """Use no CPU time, for long."""
+    """Sleep for a long time."""
     time.sleep(600.0)
 
 
 def allocates(_: Any) -> int:
-    """Ask for more memory than there may be."""
+    """Allocate more memory than the limit."""
     return len(bytearray(2**40))

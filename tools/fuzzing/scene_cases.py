@@ -1,7 +1,7 @@
-"""Scene cases: one scene file loaded, run on every engine with actions, and what comes out checked.
+"""Scene cases: a scene file is loaded and run on every engine with actions, and the results are checked.
 
-An error of the interface, with a message of bounded length, is a proper answer. Everything else that is raised leaves
-the case, and is a failure.
+An error of the interface with a message of bounded length is a valid result. Any other exception leaves the case and is
+a failure.
 """
 
 import json
@@ -41,8 +41,8 @@ from sandbox.window.playback.session import Session
 from tools.fuzzing.isolated import Violation, begin_stage, extend_cpu_limit
 
 MAX_MESSAGE = 4000  # characters of one fault or error
-BUDGET = 0.5  # s of CPU time after which the steps of one run are ended
-COMPILE_TIME = 30  # s of CPU time that compiling one kernel may take beside
+BUDGET = 0.5  # s of CPU time after which a run is stopped
+COMPILE_TIME = 30  # s of additional CPU time for compiling one kernel
 COMPILE_CLOCK.on_begin = lambda _: extend_cpu_limit(COMPILE_TIME)
 EXPECTED = (
     SceneError, ValidationError, ActionError, Refusal, Divergence, Exhaustion, TooLargeError, UnknownEngineError,
@@ -51,19 +51,19 @@ EXPECTED = (
 """The errors of the interface."""
 
 
-class _BudgetSpent(Exception):  # noqa: N818, ends a run that has been tried for long enough
+class _BudgetSpent(Exception):  # noqa: N818, stops a run after its budget
     pass
 
 
 MAX_BODIES = 20_000
-"""Beyond, a scene is only loaded and run: a session starts an engine several times, of which each takes seconds."""
+"""Larger scenes are only loaded and run: a session starts an engine several times, which takes seconds each time."""
 
 
 def run_scene(argument: Mapping[str, Any]) -> str | None:
-    """Load a scene and run it as a case says (keys: see the package).
+    """Load a scene and run it as described by the argument (keys: see the package).
 
     Returns:
-        The name of the error that refused the scene, None where it loaded.
+        The name of the error that refused the scene, None if it loaded.
 
     Raises:
         Violation: a check failed.
@@ -75,18 +75,18 @@ def run_scene(argument: Mapping[str, Any]) -> str | None:
         return "SceneError"
     if loads(dumps(scene)) != scene:
         raise Violation("round trip", "the scene that was written and read is another")
-    acts = read_actions(argument.get("actions", []))
+    actions = read_actions(argument.get("actions", []))
     for each in argument.get("runs") or [{"engine": engine, "steps": 10} for engine in ENGINES]:
         begin_stage()
-        (run_publicly if each.get("public") else run_stepwise)(scene, acts, each)
+        (run_publicly if each.get("public") else run_stepwise)(scene, actions, each)
     for extra in argument.get("also", []) if len(scene.bodies) <= MAX_BODIES else []:
         begin_stage()
-        EXTRAS[extra](scene, acts)
+        EXTRAS[extra](scene, actions)
     return None
 
 
 def expanded(argument: Mapping[str, Any]) -> str:
-    """Return the text of a case: `text` is a text, or its parts, of which part k is repeated `times[k]` times."""
+    """Return the text of a case: `text` itself, or its joined parts, with part k repeated `times[k]` times."""
     text = argument["text"]
     if isinstance(text, str):
         return text
@@ -95,7 +95,7 @@ def expanded(argument: Mapping[str, Any]) -> str:
 
 
 def read_actions(values: list[Any]) -> tuple[Action, ...]:
-    """Return the actions that are valid, in order; of the others only the errors are checked."""
+    """Return the valid actions in order; of invalid ones only the errors are checked."""
     found: list[Action] = []
     for value in values:
         try:
@@ -106,10 +106,10 @@ def read_actions(values: list[Any]) -> tuple[Action, ...]:
 
 
 def check_error(error: Exception) -> None:
-    """Check that an error has a message, not too long.
+    """Check that an error has a message of limited length.
 
     Raises:
-        Violation: it has not.
+        Violation: the message is empty or too long.
     """
     text = str(error)
     kind = type(error).__name__
@@ -126,10 +126,10 @@ def _check_faults(error: SceneError) -> None:
             raise Violation("empty message", f"fault at {fault.path!r}") from error
 
 
-def _attempt(do: Callable[[], Any]) -> Any:
-    """Return what a call returns, None where an error of the interface ends it."""
+def _attempt(call: Callable[[], Any]) -> Any:
+    """Return the result of a call, None if an error of the interface ends it."""
     try:
-        return do()
+        return call()
     except _BudgetSpent:
         return None
     except EXPECTED as error:
@@ -140,16 +140,16 @@ def _attempt(do: Callable[[], Any]) -> Any:
 # --- runs -----------------------------------------------------------------------------------------------------------
 
 
-def run_publicly(scene: Scene, acts: tuple[Action, ...], how: Mapping[str, Any]) -> None:
-    """Run a scene by `sandbox.run`, and check what it returns."""
-    began = time.process_time()
+def run_publicly(scene: Scene, actions: tuple[Action, ...], options: Mapping[str, Any]) -> None:
+    """Run a scene with `sandbox.run` and check the result."""
+    start_time = time.process_time()
 
     def watch(*_: Any) -> None:
-        if time.process_time() - began > BUDGET:
+        if time.process_time() - start_time > BUDGET:
             raise _BudgetSpent
 
-    flags = {key: how[key] for key in ("audit", "account") if key in how}
-    found = _attempt(lambda: run(scene, how["engine"], actions=acts, on_work=watch, **flags))
+    flags = {key: options[key] for key in ("audit", "account") if key in options}
+    found = _attempt(lambda: run(scene, options["engine"], actions=actions, on_work=watch, **flags))
     if found is not None:
         check_run(found, scene)
         if flags.get("account") and found.info["status"] != "refused":
@@ -157,10 +157,10 @@ def run_publicly(scene: Scene, acts: tuple[Action, ...], how: Mapping[str, Any])
 
 
 def check_run(found: Trajectory, scene: Scene) -> None:
-    """Check that a run ended with a status and a reason, and in finite numbers unless it diverged.
+    """Check that a run has a valid status and reason, and a finite final state if its status is ok.
 
     Raises:
-        Violation: it did not.
+        Violation: a check failed.
     """
     status, reason = found.info["status"], found.info["reason"]
     if status not in ("ok", "diverged", "failed", "refused"):
@@ -178,51 +178,51 @@ def check_run(found: Trajectory, scene: Scene) -> None:
                 raise Violation("finite state", f"{name} of an ok run on {found.info['engine']}")
 
 
-def run_stepwise(scene: Scene, acts: tuple[Action, ...], how: Mapping[str, Any]) -> None:
-    """Step a scene on an engine, and try actions, of which those that cannot be done change nothing."""
-    simulation = _attempt(lambda: SwitchableSimulation(scene, how["engine"]))
+def run_stepwise(scene: Scene, actions: tuple[Action, ...], options: Mapping[str, Any]) -> None:
+    """Step a scene on an engine and apply actions; check that refused actions change nothing."""
+    simulation = _attempt(lambda: SwitchableSimulation(scene, options["engine"]))
     if simulation is None:
         return
     try:
-        _attempt(lambda: step_through(simulation, acts, how))
+        _attempt(lambda: step_through(simulation, actions, options))
         simulation.state_hash()
-        simulation.bodies.names  # noqa: B018, may be laid out at first use
+        simulation.bodies.names  # noqa: B018, computed at first use
     finally:
         simulation.close()
 
 
-def step_through(simulation: SwitchableSimulation, acts: tuple[Action, ...], how: Mapping[str, Any]) -> None:
-    """Make the steps of a run, with its actions, and read all that can be read of it.
+def step_through(simulation: SwitchableSimulation, actions: tuple[Action, ...], options: Mapping[str, Any]) -> None:
+    """Make the steps of a run with its actions, and read frames, contacts and account.
 
     Raises:
-        Divergence, Exhaustion: the physics cannot go on.
+        Divergence, Exhaustion: the simulation cannot continue.
         Violation: a state is not finite.
     """
-    began, due = time.process_time(), list(acts)
+    start_time, due = time.process_time(), list(actions)
     simulation.contacts()
-    if how.get("account"):
+    if options.get("account"):
         simulation.account()
-    if how.get("audit"):
+    if options.get("audit"):
         simulation.watch(lambda *_: None)
-    for step in range(how.get("steps", 10)):
+    for step in range(options.get("steps", 10)):
         while due and due[0].time <= simulation.time + 1e-12:
-            _act(simulation, due.pop(0))
+            _apply(simulation, due.pop(0))
         simulation.step()
         if step % 5 == 0:
             _check_frame(simulation.frame(), simulation.bodies)
             simulation.contacts()
-        if time.process_time() - began > BUDGET:
+        if time.process_time() - start_time > BUDGET:
             return
-    for action in due[:2]:  # those of later times, at the end
-        _act(simulation, action)
+    for action in due[:2]:  # actions of later times, at the end
+        _apply(simulation, action)
     simulation.finish(0.5)
     _check_frame(simulation.frame(), simulation.bodies)
     simulation.contacts()
-    if how.get("account"):
+    if options.get("account"):
         simulation.account()
 
 
-def _act(simulation: SwitchableSimulation, action: Action) -> None:
+def _apply(simulation: SwitchableSimulation, action: Action) -> None:
     before = simulation.state_hash()
     try:
         simulation.apply(action)
@@ -252,12 +252,12 @@ def _is_small(scene: Scene) -> bool:
 
 
 def _check(scene: Scene, _: tuple[Action, ...]) -> None:
-    """Do what `sandbox check` does; a forecast that fails inside is a failure too."""
+    """Do the same as `sandbox check`; a forecast that fails internally is a failure too."""
     bill(scene)
     largest_safe_dt(scene)
     notes(scene)
-    answer = run_preflight(scene, cover=1.0 if _is_small(scene) else 0.0)
-    for warning in answer.warnings:
+    preflight = run_preflight(scene, cover=1.0 if _is_small(scene) else 0.0)
+    for warning in preflight.warnings:
         if warning.kind == FAILED:
             raise Violation("failed forecast", f"{warning.details['forecast']}: {warning.message[:2000]}")
         if not 0 < len(warning.message) <= MAX_MESSAGE:
@@ -267,47 +267,47 @@ def _check(scene: Scene, _: tuple[Action, ...]) -> None:
 
 def _compare(scene: Scene, _: tuple[Action, ...]) -> None:
     steps = scene.world.duration / scene.solver.h
-    if len(scene.bodies) <= 30 and steps <= 300:  # it makes dozens of runs, for the truth of which dt is divided
+    if len(scene.bodies) <= 30 and steps <= 300:  # compare makes dozens of runs, with smaller dt for the ground truth
         _attempt(lambda: compare(scene))
 
 
-def _record(scene: Scene, acts: tuple[Action, ...]) -> None:
-    """Play, record, write, read and replay; it ends in the same state."""
-    session = _played(scene, acts, 12)
+def _record(scene: Scene, actions: tuple[Action, ...]) -> None:
+    """Play, record, write, read and replay a session; check that the replay ends in the same state."""
+    session = _played(scene, actions, 12)
     if session is None or session.ended is not None:
         return
     recording = session.recording()
     text = recording.to_json()
-    back = Recording.from_json(text)
-    if back != recording:
+    loaded = Recording.from_json(text)
+    if loaded != recording:
         raise Violation("recording", "what was written and read is another")
     if recording.duration == 0.0:
         return
-    found = rerun(back, audit=False)
+    found = rerun(loaded, audit=False)
     if found.info["state_hash"] != recording.state_hash and found.info["status"] != "failed":
         raise Violation("replay", f"another state on {recording.engine}; status {found.info['status']}")
 
 
-def _play(scene: Scene, acts: tuple[Action, ...]) -> None:
-    """Play a session on each engine that can."""
+def _play(scene: Scene, actions: tuple[Action, ...]) -> None:
+    """Play a session on each engine that models the scene."""
     for engine in able(scene):
-        _played(scene, acts, 6, engine)
+        _played(scene, actions, 6, engine)
 
 
-def _played(scene: Scene, acts: tuple[Action, ...], steps: int, engine: str | None = None) -> Session | None:
-    """Return a session after some steps, with actions and presses of its game."""
+def _played(scene: Scene, actions: tuple[Action, ...], steps: int, engine: str | None = None) -> Session | None:
+    """Return a session after a number of steps, with actions and inputs of its game."""
     engine = engine or _engine_for(scene)
     if engine is None:
         return None
     begin_stage()
-    return _attempt(lambda: _session(scene, acts, steps, engine))  # type: ignore[no-any-return]
+    return _attempt(lambda: _session(scene, actions, steps, engine))  # type: ignore[no-any-return]
 
 
-def _session(scene: Scene, acts: tuple[Action, ...], steps: int, engine: str) -> Session:
+def _session(scene: Scene, actions: tuple[Action, ...], steps: int, engine: str) -> Session:
     rules = rules_of(scene)
     session = Session(scene, engine, game=None if rules is None else GameSession(rules))
     session.simulation.patience = 2.0
-    due, began = list(acts), time.process_time()
+    due, start_time = list(actions), time.process_time()
     controls = () if rules is None else rules.controls
     for step in range(steps):
         if due and session.ended is None:
@@ -317,14 +317,14 @@ def _session(scene: Scene, acts: tuple[Action, ...], steps: int, engine: str) ->
                 check_error(error)
         if session.game is not None and controls and session.ended is None:
             _attempt(partial(session.press, controls[step % len(controls)].name, float(step % 3 != 0)))
-        if session.ended is not None or session.advance() == 0 or time.process_time() - began > BUDGET:
+        if session.ended is not None or session.advance() == 0 or time.process_time() - start_time > BUDGET:
             break
     return session
 
 
-def _rewind(scene: Scene, acts: tuple[Action, ...]) -> None:
-    """Go back in a session, forth again, and take an action back."""
-    session = _played(scene, acts, 10)
+def _rewind(scene: Scene, actions: tuple[Action, ...]) -> None:
+    """Seek backwards and forwards in a session, and retract an action."""
+    session = _played(scene, actions, 10)
     if session is None or session.ended is not None:
         return
     last, state = session.step_number, session.frame.state_hash()
@@ -340,44 +340,44 @@ def _rewind(scene: Scene, acts: tuple[Action, ...]) -> None:
     Recording.from_json(session.recording().to_json())
 
 
-def _resume(scene: Scene, acts: tuple[Action, ...]) -> None:
-    """Go on from a checkpoint on each engine, whichever it was made on."""
+def _resume(scene: Scene, actions: tuple[Action, ...]) -> None:
+    """Resume from a checkpoint on each engine."""
     engine = _engine_for(scene)
     simulation = None if engine is None else _attempt(lambda: SwitchableSimulation(scene, engine))
     if simulation is None:
         return
     try:
-        _attempt(lambda: step_through(simulation, acts, {"steps": 4}))
+        _attempt(lambda: step_through(simulation, actions, {"steps": 4}))
     finally:
         simulation.close()
-    point = simulation.checkpoint()
+    checkpoint = simulation.checkpoint()
     for each in ENGINES:
-        again = _attempt(partial(SwitchableSimulation.resumed, replace(point, engine=each)))
-        if again is not None:
-            _attempt(again.step)
-            again.close()
+        resumed = _attempt(partial(SwitchableSimulation.resumed, replace(checkpoint, engine=each)))
+        if resumed is not None:
+            _attempt(resumed.step)
+            resumed.close()
 
 
-def _store(scene: Scene, acts: tuple[Action, ...]) -> None:
-    """Run on each engine, write the run to a file and read it; refused and failed runs too."""
+def _store(scene: Scene, actions: tuple[Action, ...]) -> None:
+    """Run on each engine, write the run to a file and read it, including refused and failed runs."""
     if not _is_small(scene):
         return
     for engine in ENGINES:
-        found = _attempt(partial(run, scene, engine, actions=acts, audit=False))
+        found = _attempt(partial(run, scene, engine, actions=actions, audit=False))
         if found is None:
             continue
         with tempfile.TemporaryDirectory() as folder:
             file = found.save(Path(folder) / "run.npz")
             try:
-                back = Trajectory.load(file)
+                loaded = Trajectory.load(file)
             except ValueError as error:
                 raise Violation("stored run", f"{found.status} on {engine}: {error}") from error
-        if json.dumps(back.info) != json.dumps(found.info) or not np.array_equal(back.time, found.time):
+        if json.dumps(loaded.info) != json.dumps(found.info) or not np.array_equal(loaded.time, found.time):
             raise Violation("stored run", f"what was written and read is another, on {engine}")
 
 
 def _play_game(scene: Scene, _: tuple[Action, ...]) -> None:
-    """Let a random player play the game of a scene that has one."""
+    """Play the game of a scene, if any, with a random player."""
     if _is_small(scene) and scene.play.game is not None:
         engine = _engine_for(scene)
         if engine is not None:
@@ -394,4 +394,4 @@ EXTRAS: dict[str, Callable[[Scene, tuple[Action, ...]], None]] = {
     "store": _store,
     "game": _play_game,
 }
-"""What is done beside running."""
+"""Additional checks of a scene, by name."""

@@ -1,4 +1,4 @@
-"""Changes of a scene document: those that keep to the schema, and those that break types, ranges or references."""
+"""Changes of a scene document: valid ones, and ones that break types, ranges or references."""
 
 import copy
 import math
@@ -16,16 +16,16 @@ from tools.fuzzing.schema_values import (
     Path,
     bodies_of,
     bounds_of,
-    can_be_stated,
+    can_be_added,
+    locations,
     names_for,
-    places,
     scene_schema,
     tables,
     value_of,
 )
 
 HEAVY = frozenset({"fireworks_100k", "pile"})
-"""Shipped scenes of so many bodies that one run takes seconds; few mutants are made of them."""
+"""Shipped scenes with so many bodies that one run takes seconds; few mutants are made of them."""
 COUNTS = ("count", "columns", "rows", "links")
 TEXTS = ("", " ", "ball", "é", "𝔘nicode", "名前", "a.b", 'a"b', "a'b", "*", "-1", "0", "\u0000", "\u001b[31m", "\u2028",
          "\u202e", "x" * 200, "x" * 201, "x" * 100_000, "\n", "[0]", "fixed", "world", "=", "#", "\ufffe")  # fmt: skip
@@ -52,24 +52,24 @@ def base_scene(draw: random.Random) -> Document:
 
 
 def put(document: Document, path: Path, value: Any) -> None:
-    """Set a value at a path that exists but for its last key."""
-    here: Any = document
+    """Set a value at a path that exists except for its last key."""
+    node: Any = document
     for key in path[:-1]:
-        here = here[key]
-    here[path[-1]] = value
+        node = node[key]
+    node[path[-1]] = value
 
 
-def _pick(document: Document, draw: random.Random, wanted: Callable[[Path, Any, Document], bool]) -> Any:
-    fitting = [each for each in places(document) if wanted(*each)]
-    if not fitting:
+def _pick(document: Document, draw: random.Random, is_candidate: Callable[[Path, Any, Document], bool]) -> Any:
+    candidates = [each for each in locations(document) if is_candidate(*each)]
+    if not candidates:
         return None
-    kinds = sorted({str(path[0]) for path, _, _ in fitting})  # tables of many elements are not drawn more often
+    kinds = sorted({str(path[0]) for path, _, _ in candidates})  # tables with many elements are not more likely
     kind = draw.choice(kinds)
-    return draw.choice([each for each in fitting if str(each[0][0]) == kind])
+    return draw.choice([each for each in candidates if str(each[0][0]) == kind])
 
 
 def redraw(document: Document, draw: random.Random) -> None:
-    """Draw another value for a place, from its whole range."""
+    """Draw another value at a location, from its whole range."""
     found = _pick(document, draw, lambda _, value, __: not isinstance(value, (dict, list)))
     if found is not None:
         path, _, node = found
@@ -87,17 +87,17 @@ def scale(document: Document, draw: random.Random) -> None:
 
 
 def add_key(document: Document, draw: random.Random) -> None:
-    """State an optional value of a table."""
+    """Add an optional key to a table."""
     found = _pick(document, draw, lambda _, value, node: isinstance(value, dict) and "properties" in node)
     table, node = (document, scene_schema()) if found is None or draw.random() < 0.1 else found[1:]
-    absent = [key for key in node["properties"] if key not in table and can_be_stated(key, document)]
+    absent = [key for key in node["properties"] if key not in table and can_be_added(key, document)]
     if absent:
         key = draw.choice(absent)
         table[key] = value_of(node["properties"][key], key, document, draw, scene_schema())
 
 
 def drop_key(document: Document, draw: random.Random) -> None:
-    """Leave out an optional value of a table."""
+    """Remove an optional key of a table."""
     found = _pick(document, draw, lambda _, value, node: bool(_optional(value, node)))
     if found is not None:
         _, table, node = found
@@ -131,41 +131,45 @@ def set_world(document: Document, draw: random.Random) -> None:
 
 
 def duplicate(document: Document, draw: random.Random) -> None:
-    """Add a copy of an element, under another name, here or beside."""
-    kinds = sorted(kind for kind, held in document.items() if isinstance(held, list) and held)
+    """Add a copy of an element under another name, in place or shifted."""
+    kinds = sorted(kind for kind, elements in document.items() if isinstance(elements, list) and elements)
     if kinds:
-        held = document[draw.choice(kinds)]
-        twin = copy.deepcopy(draw.choice(held))
-        if isinstance(twin, dict):
-            if "name" in twin:
-                twin["name"] = f"{twin['name']}-twin"
+        elements = document[draw.choice(kinds)]
+        copied = copy.deepcopy(draw.choice(elements))
+        if isinstance(copied, dict):
+            if "name" in copied:
+                copied["name"] = f"{copied['name']}-twin"
             if draw.random() < 0.6:
-                shift(twin, draw.choice((0.01, 1.0, 3.0, 1e3)))
-        held.append(twin)
+                shift(copied, draw.choice((0.01, 1.0, 3.0, 1e3)))
+        elements.append(copied)
 
 
 def shift(table: Document, by: float) -> None:
     """Move an element by a distance along both axes, in place."""
     for key in ("position", "origin", "point", "at", "base", "center", "lower", "corner"):
-        place = table.get(key)
-        if isinstance(place, list) and len(place) == 2 and all(isinstance(each, (int, float)) for each in place):
-            table[key] = [place[0] + by, place[1] + by]
+        position = table.get(key)
+        if (
+            isinstance(position, list)
+            and len(position) == 2
+            and all(isinstance(each, (int, float)) for each in position)
+        ):
+            table[key] = [position[0] + by, position[1] + by]
 
 
 def add_element(document: Document, draw: random.Random) -> None:
     """Add an element drawn from the schema."""
     root = scene_schema()
     lists = [
-        key for key, node in root["properties"].items() if node.get("type") == "array" and can_be_stated(key, document)
+        key for key, node in root["properties"].items() if node.get("type") == "array" and can_be_added(key, document)
     ]
     kind = draw.choice(lists)
-    made = value_of(root["properties"][kind]["items"], kind, document, draw, root)
+    element = value_of(root["properties"][kind]["items"], kind, document, draw, root)
     if isinstance(document.setdefault(kind, []), list):
-        document[kind].append(made)
+        document[kind].append(element)
 
 
 def add_joint(document: Document, draw: random.Random) -> None:
-    """Add a joint, spring, limit or motor between two bodies of the scene, or one and the world."""
+    """Add a joint between two bodies of the scene, or one body and the world."""
     root = scene_schema()
     bodies = bodies_of(document)
     joint = value_of(root["properties"]["joint"]["items"], "joint", document, draw, root)
@@ -178,40 +182,40 @@ def add_joint(document: Document, draw: random.Random) -> None:
 
 
 def transplant(document: Document, draw: random.Random) -> None:
-    """Take over a table of another scene, often with its references led to bodies of this one."""
+    """Copy a table of another scene, often with its references changed to bodies of this one."""
     other = base_scene(draw)
     kind = draw.choice(sorted(other))
-    held = copy.deepcopy(other[kind])
-    if isinstance(held, list):
-        held = held[:20]
+    value = copy.deepcopy(other[kind])
+    if isinstance(value, list):
+        value = value[:20]
         if draw.random() < 0.7:
-            _relink(held, document, draw)
+            _relink(value, document, draw)
         if draw.random() < 0.8 and isinstance(document.get(kind), list):
-            held = [*document[kind], *held]
-    document[kind] = held
+            value = [*document[kind], *value]
+    document[kind] = value
 
 
 def _relink(value: Any, document: Document, draw: random.Random) -> None:
-    """Lead the references in a value to names of a document."""
+    """Replace the references in a value by names of a document."""
     if isinstance(value, list):
         for each in value:
             _relink(each, document, draw)
     elif isinstance(value, dict):
-        for key, held in value.items():
+        for key, inner in value.items():
             names = names_for(key, document)
-            if names and isinstance(held, str):
+            if names and isinstance(inner, str):
                 value[key] = draw.choice(names)
-            elif names and isinstance(held, list) and held and all(isinstance(each, str) for each in held):
-                value[key] = draw.sample(names, min(len(held), len(names)))
+            elif names and isinstance(inner, list) and inner and all(isinstance(each, str) for each in inner):
+                value[key] = draw.sample(names, min(len(inner), len(names)))
             else:
-                _relink(held, document, draw)
+                _relink(inner, document, draw)
 
 
 def fix(document: Document, draw: random.Random) -> None:
-    """Fix one body, or all of them; or free them."""
-    those = [each for kind in SINGLES for _, each in tables(document, kind)]
+    """Fix one body or all bodies, or make them movable."""
+    bodies = [each for kind in SINGLES for _, each in tables(document, kind)]
     value = draw.random() < 0.8
-    for each in those if draw.random() < 0.4 else those and [draw.choice(those)]:
+    for each in bodies if draw.random() < 0.4 else bodies and [draw.choice(bodies)]:
         each["fixed"] = value
         if value:
             for key in ("velocity", "angular_velocity", "spin"):
@@ -219,21 +223,21 @@ def fix(document: Document, draw: random.Random) -> None:
 
 
 def put_together(document: Document, draw: random.Random) -> None:
-    """Put one body where another one is."""
-    those = [each for kind in SINGLES for _, each in tables(document, kind) if "position" in each]
-    if len(those) > 1:
-        one, other = draw.sample(those, 2)
-        one["position"] = copy.deepcopy(other["position"])
+    """Move one body to the position of another."""
+    bodies = [each for kind in SINGLES for _, each in tables(document, kind) if "position" in each]
+    if len(bodies) > 1:
+        first, second = draw.sample(bodies, 2)
+        first["position"] = copy.deepcopy(second["position"])
 
 
 def set_count(document: Document, draw: random.Random) -> None:
-    """Change how many of something there are."""
+    """Change a count."""
     found = _pick(document, draw, lambda path, _, __: path[-1] in COUNTS)
     if found is None:
         _add_generator(document, draw)
         return
-    few = (1, 2, 3, 7, 30) if draw.random() < 0.8 else (100, 300, 1000, 100_000, 1_000_000)
-    put(document, found[0], draw.choice(few))
+    counts = (1, 2, 3, 7, 30) if draw.random() < 0.8 else (100, 300, 1000, 100_000, 1_000_000)
+    put(document, found[0], draw.choice(counts))
 
 
 def _add_generator(document: Document, draw: random.Random) -> None:
@@ -244,19 +248,19 @@ def _add_generator(document: Document, draw: random.Random) -> None:
 
 
 def drop_element(document: Document, draw: random.Random) -> None:
-    """Leave out an element, or all of a kind."""
+    """Remove an element, or all elements of a kind."""
     kind = draw.choice(sorted(document)) if document else None
     if kind is None:
         return
-    held = document[kind]
-    if isinstance(held, list) and len(held) > 1 and draw.random() < 0.7:
-        del held[draw.randrange(len(held))]
+    elements = document[kind]
+    if isinstance(elements, list) and len(elements) > 1 and draw.random() < 0.7:
+        del elements[draw.randrange(len(elements))]
     elif len(document) > 1:
         del document[kind]
 
 
 def refer(document: Document, draw: random.Random) -> None:
-    """Lead a reference to another name of the scene."""
+    """Replace a reference by another name of the scene."""
     found = _pick(
         document, draw, lambda path, value, _: isinstance(value, str) and bool(names_for(_key(path), document))
     )
@@ -269,7 +273,7 @@ def _key(path: Path) -> str:
 
 
 def break_value(document: Document, draw: random.Random) -> None:
-    """Put a value of another type, or a number of any size, at a place."""
+    """Put a value of another type, or a number of any size, at a location."""
     found = _pick(document, draw, lambda *_: True)
     if found is not None:
         put(document, found[0], copy.deepcopy(draw.choice(NUMBERS if draw.random() < 0.6 else OTHERS)))
@@ -286,7 +290,7 @@ def break_bound(document: Document, draw: random.Random) -> None:
 
 
 def break_key(document: Document, draw: random.Random) -> None:
-    """Misspell a key, add one that is unknown, or drop one that is required."""
+    """Misspell a key, add an unknown one, or remove one."""
     found = _pick(document, draw, lambda _, value, __: isinstance(value, dict) and bool(value))
     table = document if found is None else found[1]
     key = draw.choice(sorted(table))
@@ -300,7 +304,7 @@ def break_key(document: Document, draw: random.Random) -> None:
 
 
 def break_text(document: Document, draw: random.Random) -> None:
-    """Put an unusual text, or a name that is missing, at a place of a text."""
+    """Replace a text by an unusual one."""
     found = _pick(document, draw, lambda _, value, __: isinstance(value, str))
     if found is not None:
         put(document, found[0], draw.choice(TEXTS))
@@ -317,7 +321,7 @@ def break_list(document: Document, draw: random.Random) -> None:
 
 
 def nest(document: Document, draw: random.Random) -> None:
-    """Put a deeply nested value at a place."""
+    """Put a deeply nested value at a location."""
     found = _pick(document, draw, lambda *_: True)
     if found is not None:
         value: Any = 1

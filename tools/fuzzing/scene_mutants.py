@@ -1,7 +1,7 @@
 """Scene mutants: generated scene files with actions; mutant k of a seed is the same on every machine.
 
-A mutant is a shipped scene with one to three changes, cut to a few steps. Most changes keep to the schema, so that
-most mutants load and run; the rest break types, ranges, references or the syntax of TOML.
+A mutant is a shipped scene with one to three changes, shortened to a few steps. Most changes are valid, so that most
+mutants load and run; the others break types, ranges, references or the TOML syntax.
 """
 
 import copy
@@ -18,14 +18,14 @@ from tools.fuzzing.scene_changes import INVALID_CHANGES, VALID_CHANGES, base_sce
 from tools.fuzzing.schema_values import Document
 
 VALID = 0.94
-"""Fraction of the changes that keep to the schema."""
+"""Fraction of the changes that are valid."""
 TEXTUAL = 0.05
 """Fraction of the mutants whose text is damaged."""
 ALSO = {
     "check": 0.3, "compare": 0.02, "session": 0.06, "recording": 0.08, "resume": 0.06, "rewind": 0.05, "store": 0.05,
     "game": 0.2,
 }  # fmt: skip
-"""What is done beside running (`scene_cases.EXTRAS`), and how often."""
+"""Probabilities of additional checks (`scene_cases.EXTRAS`)."""
 
 
 def scene_cases(seed: int, count: int, first: int = 0) -> Iterator[Case]:
@@ -43,14 +43,14 @@ def argument(seed: int, index: int) -> Document:
         change = draw.choice(VALID_CHANGES if draw.random() < VALID else INVALID_CHANGES)
         change(document, draw)
     text = to_toml(document)
-    made: Document = {"text": text}
+    case: Document = {"text": text}
     if draw.random() < TEXTUAL:
-        made = damaged(text, draw)
+        case = damaged(text, draw)
     if draw.random() < 0.7:
-        made["actions"] = actions(document, draw)
-    made["runs"] = [_run(engine, draw) for engine in ENGINES]
-    made["also"] = [each for each, odds in ALSO.items() if draw.random() < odds]
-    return made
+        case["actions"] = actions(document, draw)
+    case["runs"] = [_run(engine, draw) for engine in ENGINES]
+    case["also"] = [each for each, odds in ALSO.items() if draw.random() < odds]
+    return case
 
 
 def _run(engine: str, draw: random.Random) -> Document:
@@ -64,14 +64,14 @@ def _run(engine: str, draw: random.Random) -> Document:
 
 
 def shorten(document: Document, draw: random.Random) -> None:
-    """Cut a scene's duration to a few steps."""
+    """Shorten the duration of a scene to a few steps."""
     dt = document.get("solver", {}).get("dt", 0.01)
     if draw.random() < 0.97:
         document.setdefault("world", {})["duration"] = dt * draw.choice((1, 3, 8, 15, 15.5, 25))
 
 
 def to_toml(document: Document) -> str:
-    """Return a document as TOML, of any keys and values that TOML has; None becomes an empty text."""
+    """Return a document with any keys and values as TOML; None becomes an empty text."""
     plain, tables = [], []
     for key, value in document.items():
         heading = _toml_key(key)
@@ -102,7 +102,7 @@ def _toml_value(value: Any) -> str:
         case bool():
             return "true" if value else "false"
         case dict():
-            return "{" + ", ".join(f"{_toml_key(key)} = {_toml_value(held)}" for key, held in value.items()) + "}"
+            return "{" + ", ".join(f"{_toml_key(key)} = {_toml_value(inner)}" for key, inner in value.items()) + "}"
         case list():
             return "[" + ", ".join(map(_toml_value, value)) + "]"
         case str():
@@ -115,7 +115,7 @@ def _toml_value(value: Any) -> str:
 
 
 def damaged(text: str, draw: random.Random) -> Document:
-    """Return a case argument with a damaged text: `text`, and `times` where a part of it is repeated."""
+    """Return a case argument with a damaged text: `text`, and `times` if a part of it is repeated."""
     position = draw.randrange(len(text) + 1)
     before, after = text[:position], text[position:]
     match draw.randrange(9):
@@ -156,4 +156,4 @@ _NESTED = (
     ('"""', "", ""), ("a = [1, ", "", "]"), ("[a.", "a", "]\n"), ('"', "", ""), ("# ", "", "\n"),
     ("x" * 100, " = 1", ""),
 )  # fmt: skip
-"""What is repeated before, between and after, on a line of its own or anywhere."""
+"""Repeated opening text, text in the middle, and repeated closing text, inserted on a separate line or anywhere."""

@@ -1,4 +1,4 @@
-"""Values drawn from the JSON Schema of scenes and actions, and the names that a document can refer to."""
+"""Random values from the JSON Schema of scenes and actions, and the names that a document can refer to."""
 
 import random
 from collections.abc import Iterator
@@ -33,15 +33,15 @@ def action_schema() -> Document:
 
 
 def resolved(node: Document, value: Any, root: Document) -> Document:
-    """Follow references and, by a value's discriminator or type, alternatives."""
+    """Follow references, and choose alternatives by the discriminator or the type of a value."""
     while True:
         if "$ref" in node:
             node = root["$defs"][node["$ref"].rpartition("/")[2]]
         elif "discriminator" in node:
-            which = node["discriminator"]
-            kind = value.get(which["propertyName"]) if isinstance(value, dict) else None
-            options = sorted(which["mapping"].items())
-            node = {"$ref": which["mapping"].get(kind if isinstance(kind, str) else None, options[0][1])}
+            discriminator = node["discriminator"]
+            kind = value.get(discriminator["propertyName"]) if isinstance(value, dict) else None
+            options = sorted(discriminator["mapping"].items())
+            node = {"$ref": discriminator["mapping"].get(kind if isinstance(kind, str) else None, options[0][1])}
         elif "anyOf" in node:
             fitting = [each for each in node["anyOf"] if _fits(each, value, root)]
             node = (fitting or node["anyOf"])[0]
@@ -57,8 +57,8 @@ def _fits(node: Document, value: Any, root: Document) -> bool:
     return isinstance(value, kinds.get(resolved(node, value, root).get("type"), (object,)))
 
 
-def places(document: Document) -> list[tuple[Path, Any, Document]]:
-    """Return every place of a document that the schema knows: its path, its value, its schema."""
+def locations(document: Document) -> list[tuple[Path, Any, Document]]:
+    """Return every location in a document that is in the schema: its path, value and schema."""
     root = scene_schema()
     found: list[tuple[Path, Any, Document]] = []
 
@@ -81,11 +81,11 @@ def places(document: Document) -> list[tuple[Path, Any, Document]]:
 
 
 def value_of(node: Document, key: str, document: Document, draw: random.Random, root: Document) -> Any:
-    """Draw a value that the schema of a place allows."""
+    """Draw a value that a schema node allows."""
     if "discriminator" in node:
         kind, reference = draw.choice(sorted(node["discriminator"]["mapping"].items()))
-        made = value_of({"$ref": reference}, key, document, draw, root)
-        return {**made, node["discriminator"]["propertyName"]: kind}
+        table = value_of({"$ref": reference}, key, document, draw, root)
+        return {**table, node["discriminator"]["propertyName"]: kind}
     if "anyOf" in node:
         options = [each for each in node["anyOf"] if each.get("type") != "null"]
         return value_of(draw.choice(options), key, document, draw, root)
@@ -111,7 +111,7 @@ def value_of(node: Document, key: str, document: Document, draw: random.Random, 
 
 
 def bounds_of(node: Document) -> tuple[float, float]:
-    """Return the least and greatest value that a number's schema allows."""
+    """Return the smallest and largest value that the schema of a number allows."""
     low, high = node.get("minimum", -1e12), node.get("maximum", 1e12)
     if "exclusiveMinimum" in node:
         low = node["exclusiveMinimum"] + (1 if node.get("type") == "integer" else 1e-6)
@@ -134,10 +134,10 @@ def _number(node: Document, draw: random.Random) -> float:
 
 def _whole(node: Document, draw: random.Random) -> int:
     low, high = (int(each) for each in bounds_of(node))
-    wanted = draw.choice((0, 1, 2, 3, 5, 8, 10, 20))
+    value = draw.choice((0, 1, 2, 3, 5, 8, 10, 20))
     if draw.random() < 0.04:
-        wanted = draw.choice((1000, 100_000, 1_000_000, high, low))
-    return min(max(wanted, low), high)
+        value = draw.choice((1000, 100_000, 1_000_000, high, low))
+    return min(max(value, low), high)
 
 
 def _text(node: Document, key: str, document: Document, draw: random.Random) -> str:
@@ -162,47 +162,47 @@ def _array(node: Document, key: str, document: Document, draw: random.Random, ro
 
 def table_of(node: Document, document: Document, draw: random.Random, root: Document) -> Document:
     """Draw a table: all required keys and a few optional ones."""
-    made: Document = {}
+    table: Document = {}
     properties = node.get("properties", {})
-    optional = [key for key in properties if key not in node.get("required", []) and can_be_stated(key, document)]
-    few = set(draw.sample(optional, min(len(optional), draw.choice((0, 1, 1, 2, 3)))))
+    optional = [key for key in properties if key not in node.get("required", []) and can_be_added(key, document)]
+    chosen = set(draw.sample(optional, min(len(optional), draw.choice((0, 1, 1, 2, 3)))))
     for key, inner in properties.items():
         if key == "name":
             if draw.random() < 0.5:
-                made[key] = f"new-{draw.randrange(1000)}"
-        elif key in node.get("required", []) or key in few:
-            made[key] = value_of(inner, key, document, draw, root)
-    return made
+                table[key] = f"new-{draw.randrange(1000)}"
+        elif key in node.get("required", []) or key in chosen:
+            table[key] = value_of(inner, key, document, draw, root)
+    return table
 
 
-def can_be_stated(key: str, document: Document) -> bool:
-    """Whether a document has something for a key to name."""
+def can_be_added(key: str, document: Document) -> bool:
+    """Return whether a document has names that a key can refer to."""
     return key not in ("material", "pair") or bool(names_of(document, "material"))
 
 
 def bodies_of(document: Document) -> list[str]:
-    """Return the names of a document's bodies, of generators the first few."""
-    made = []
+    """Return the names of the bodies of a document, for generators only the first few."""
+    names = []
     for kind in SINGLES:
-        made += [each.get("name", f"{kind}-{k + 1}") for k, each in tables(document, kind)]
+        names += [each.get("name", f"{kind}-{k + 1}") for k, each in tables(document, kind)]
     for kind in GENERATORS:
         stems = [each.get("name", f"{kind}-{k + 1}") for k, each in tables(document, kind)]
-        made += [f"{stem}-{n}" for stem in stems for n in (1, 2, 3)]
+        names += [f"{stem}-{n}" for stem in stems for n in (1, 2, 3)]
     if "pinball" in document:
-        made += ["ball", "ball-1"]
+        names += ["ball", "ball-1"]
     if "billiards" in document:
-        made += ["cue", "1", "9", "object"]
-    return [name for name in made if isinstance(name, str)]
+        names += ["cue", "1", "9", "object"]
+    return [name for name in names if isinstance(name, str)]
 
 
 def names_of(document: Document, *kinds: str) -> list[str]:
-    """Return the names of a document's elements of some kinds."""
-    made = [each.get("name", f"{kind}-{k + 1}") for kind in kinds for k, each in tables(document, kind)]
-    return [name for name in made if isinstance(name, str)]
+    """Return the names of the elements of these kinds in a document."""
+    names = [each.get("name", f"{kind}-{k + 1}") for kind in kinds for k, each in tables(document, kind)]
+    return [name for name in names if isinstance(name, str)]
 
 
 def names_for(key: str, document: Document) -> list[str]:
-    """Return the names that may stand at a key."""
+    """Return the names that are valid values of a key."""
     if key in BODY_KEYS:
         return bodies_of(document)
     if key == "material":
@@ -222,6 +222,6 @@ def names_for(key: str, document: Document) -> list[str]:
 
 def tables(document: Document, kind: str) -> Iterator[tuple[int, Document]]:
     """Yield the elements of one kind that are tables, with their indices."""
-    held = document.get(kind)
-    if isinstance(held, list):
-        yield from ((k, each) for k, each in enumerate(held) if isinstance(each, dict))
+    elements = document.get(kind)
+    if isinstance(elements, list):
+        yield from ((k, each) for k, each in enumerate(elements) if isinstance(each, dict))

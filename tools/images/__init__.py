@@ -1,1 +1,1 @@
-"""Pictures of README and documentation, by the part of the program that draws them."""
+"""Pictures of README and documentation, in modules by the part of the program that draws them."""

@@ -3,8 +3,8 @@
     python -m tools.images [NAME…]
     python -m tools.images --list
 
-A name is the path of a file in `docs/images/`, or its beginning: `hero`, `scenes/pinball`. Without a name all are made,
-which takes some minutes.
+A name is the path of a file in `docs/images/`, or its beginning: `hero`, `scenes/pinball`. Without a name all pictures
+are made, which takes some minutes.
 """
 
 import argparse
@@ -23,10 +23,10 @@ from tools.images.files import FOLDER
 
 
 class Picture(NamedTuple):
-    """One picture."""
+    """A picture and the function that makes it."""
 
     name: str
-    """its path in `docs/images/`"""
+    """path in `docs/images/`"""
     about: str
     make: Callable[[Path], object]
 
@@ -68,16 +68,16 @@ PICTURES = (
 
 
 def main() -> None:
-    """Make the pictures that the command line names."""
+    """Make the pictures named on the command line."""
     parser = argparse.ArgumentParser(description="Make the pictures of README and documentation.")
     parser.add_argument("names", nargs="*", metavar="NAME", help="pictures, or the beginning of their paths")
     parser.add_argument("--list", action="store_true", help="list the pictures")
     options = parser.parse_args()
-    wanted = [each for each in PICTURES if not options.names or any(map(each.name.startswith, options.names))]
+    selected = [each for each in PICTURES if not options.names or any(map(each.name.startswith, options.names))]
     unknown = [name for name in options.names if not any(each.name.startswith(name) for each in PICTURES)]
     if unknown:
         parser.error(f"no picture begins with {', '.join(unknown)}; --list lists them")
-    for picture in wanted:
+    for picture in selected:
         if options.list:
             print(f"{picture.name:40} {picture.about}")
             continue

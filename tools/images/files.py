@@ -1,4 +1,4 @@
-"""Image files: PNGs with a palette, gifs that share one palette over all frames."""
+"""Image files: PNGs with a palette, gifs with one palette for all frames."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,7 +9,7 @@ from PIL import Image
 
 FOLDER = Path(__file__).resolve().parents[2] / "docs" / "images"
 SAMPLES = 24
-"""frames of a film from which its palette is chosen"""
+"""Number of frames of a film from which its palette is chosen."""
 
 
 def image_of(surface: pygame.Surface) -> Image.Image:
@@ -18,10 +18,10 @@ def image_of(surface: pygame.Surface) -> Image.Image:
 
 
 def reduce_colours(image: Image.Image, colours: int) -> Image.Image:
-    """Return an image with a palette of so many colours, without dithering.
+    """Return an image with a palette of `colours` colours, without dithering.
 
-    The commonest are kept as they are; of the rest half are those of which there is most, and half are spread, so that
-    small bright things keep theirs.
+    The most common colours are kept. Of the rest one half is chosen by frequency and one half by coverage of the colour
+    space, so that small bright objects keep their colours.
     """
     image = image.convert("RGB")
     found = image.getcolors(colours)
@@ -30,8 +30,8 @@ def reduce_colours(image: Image.Image, colours: int) -> Image.Image:
     commonest = sorted(image.getcolors(image.width * image.height), reverse=True)[: colours // 8]
     kept = [part for _, colour in commonest for part in colour]
     rest = (colours - len(commonest)) // 2
-    for how in (Image.Quantize.MEDIANCUT, Image.Quantize.MAXCOVERAGE):
-        kept += (image.quantize(rest, how).getpalette() or [])[: 3 * rest]
+    for method in (Image.Quantize.MEDIANCUT, Image.Quantize.MAXCOVERAGE):
+        kept += (image.quantize(rest, method).getpalette() or [])[: 3 * rest]
     palette = Image.new("P", (1, 1))
     palette.putpalette(kept)
     return image.quantize(palette=palette, dither=Image.Dither.NONE)
@@ -47,16 +47,16 @@ def save_gif(frames: Sequence[Image.Image], path: Path, fps: float, colours: int
     """Write frames as a gif that loops.
 
     Args:
-        frames: of one size.
-        path: of the file.
-        fps: frames a second; a gif counts hundredths of a second.
-        colours: of the palette that all frames share.
-        hold: s for which the last frame is shown in addition.
+        frames: frames of equal size.
+        path: path of the file.
+        fps: frames per second; a gif has durations in hundredths of a second.
+        colours: number of colours of the common palette.
+        hold: additional duration of the last frame, s.
     """
     chosen = np.unique(np.linspace(0, len(frames) - 1, SAMPLES).round().astype(int))
     montage = np.concatenate([np.asarray(frames[k].convert("RGB")) for k in chosen.tolist()])
     palette = reduce_colours(Image.fromarray(montage), colours)
     reduced = [frame.convert("RGB").quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
-    shown = [round(1000.0 / fps)] * len(frames)
-    shown[-1] += round(1000.0 * hold)
-    reduced[0].save(path, save_all=True, append_images=reduced[1:], duration=shown, loop=0, optimize=True)
+    durations = [round(1000.0 / fps)] * len(frames)
+    durations[-1] += round(1000.0 * hold)
+    reduced[0].save(path, save_all=True, append_images=reduced[1:], duration=durations, loop=0, optimize=True)

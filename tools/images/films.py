@@ -13,32 +13,32 @@ from sandbox.window.playback.recorded import RecordedRun
 
 from .files import image_of, save_gif
 
-SHARP = 2
-"""Pictures are drawn so many times larger, and averaged."""
+SUPERSAMPLING = 2
+"""Pictures are drawn larger by this factor, and averaged."""
 
 
 def film(
     scene: str, size: tuple[int, int], until: float, *, engine: str = "pymunk", fps: float = 20.0, colours: int = 64
 ) -> Callable[[Path], None]:
-    """Return what films a scene.
+    """Return a function that films a scene.
 
     Args:
-        scene: its name.
-        size: of the film, px.
-        until: s of the run.
-        engine: its name.
-        fps: frames a second.
-        colours: of the palette.
+        scene: name of the scene.
+        size: size of the film, px.
+        until: duration of the run, s.
+        engine: name of the engine.
+        fps: frames per second.
+        colours: number of colours of the palette.
     """
 
     def make(path: Path) -> None:
         recorded = RecordedRun(run(sandbox.load(find(scene), [f"world.duration={until}"]), engine, audit=False), scene)
         renderer = RunRenderer(recorded)
-        large = size[0] * SHARP, size[1] * SHARP
+        large = size[0] * SUPERSAMPLING, size[1] * SUPERSAMPLING
         surface, camera, frames = offscreen(large), Camera.fitting(recorded.bounds, large), []
         for k in range(round(until * fps) + 1):
             renderer.draw(surface, camera, k / fps, caption=size[0] >= MIN_CAPTION_WIDTH)
-            frames.append(image_of(surface).reduce(SHARP))
+            frames.append(image_of(surface).reduce(SUPERSAMPLING))
         save_gif(frames, path, fps, colours, 0.8)
 
     return make

@@ -1,4 +1,4 @@
-"""Figures of the lessons: each is plotted from runs of the scene that the lesson is about."""
+"""Figures of the lessons, plotted from runs of the scene of each lesson."""
 
 from collections.abc import Callable
 from io import BytesIO
@@ -30,7 +30,7 @@ def _legend_outside(axes: Axes) -> None:
 
 
 def ball(axes: Axes) -> None:
-    """Draw a fall by two first-order integrators beside the closed form."""
+    """Draw a fall by two first-order integrators and the closed form."""
     scene = sandbox.load("ball")
     time = np.linspace(0, 1, 200)
     axes.plot(time, 10 - 9.81 / 2 * time**2, "k", label="closed form")
@@ -58,7 +58,7 @@ def order(axes: Axes) -> None:
 
 
 def fireworks(axes: Axes) -> None:
-    """Draw sparks at four times, and the rectangles that hold them."""
+    """Draw sparks at four times, and the rectangles that bound them."""
     run = sandbox.run(sandbox.load("fireworks"))
     for frame, colour in zip((50, 100, 150, 200), COLOURS, strict=False):
         t = run.time[frame]
@@ -97,7 +97,7 @@ def bisection(axes: Axes) -> None:
 
 
 def bounce(axes: Axes) -> None:
-    """Draw bounces on the exact engine and on one of fixed steps."""
+    """Draw bounces on the exact engine and with fixed steps."""
     scene = sandbox.load("bounce")
     for engine, dt, colour in (("exact", 0.005, "k"), ("pymunk", 0.05, BLUE)):
         run = sandbox.run(scene, engine, dt=dt)
@@ -108,7 +108,7 @@ def bounce(axes: Axes) -> None:
 
 
 def kepler(axes: Axes) -> None:
-    """Draw five turns by two integrators."""
+    """Draw five orbits by two integrators."""
     scene = sandbox.load("kepler")
     for integrator, colour in (("explicit_euler", ORANGE), ("velocity_verlet", BLUE)):
         run = sandbox.run(scene, "reference", integrator=integrator, audit=False)
@@ -123,22 +123,24 @@ def cradle(axes: Axes) -> None:
     scene = sandbox.load("newtons_cradle")
     for engine, dt, style in (("exact", 1e-4, "k"), ("pymunk", 1e-3, "o-"), ("pymunk", 1e-4, "-")):
         run = sandbox.run(scene, engine, dt=dt, audit=False)
-        seen = (run.time > 0.1985) & (run.time < 0.208)
+        visible = (run.time > 0.1985) & (run.time < 0.208)
         color = {"k": "k", "o-": BLUE, "-": ORANGE}[style]
         label = engine if engine == "exact" else f"{engine}, dt = {dt:g} s"
         line = style.replace("k", "-")
-        axes.plot(1e3 * run.time[seen], 1e3 * run.position[seen, 4, 0], line, color=color, markersize=4, label=label)
+        axes.plot(
+            1e3 * run.time[visible], 1e3 * run.position[visible, 4, 0], line, color=color, markersize=4, label=label
+        )
     axes.set(xlabel="time, ms", ylabel="x of the last ball, mm")
     axes.legend()
 
 
 def gas(axes: Axes) -> None:
-    """Draw how a perturbation grows, and how two engines part."""
+    """Draw the growth of a perturbation, and the divergence of two engines."""
     scene = sandbox.load("gas")
     run = sandbox.run(scene, "exact", audit=False)
-    nudge = sandbox.Impulse(time=0.0, body="atom-1", impulse=(1e-12, 0.0))
+    perturbation = sandbox.Impulse(time=0.0, body="atom-1", impulse=(1e-12, 0.0))
     others = {
-        "exact, one velocity changed by 1e-12 m/s": sandbox.run(scene, "exact", actions=[nudge], audit=False),
+        "exact, one velocity changed by 1e-12 m/s": sandbox.run(scene, "exact", actions=[perturbation], audit=False),
         "pymunk, dt = 0.005 s": sandbox.run(scene, "pymunk", audit=False),
     }
     for (label, other), colour in zip(others.items(), (BLUE, ORANGE), strict=True):
@@ -167,7 +169,7 @@ def stacks(axes: Axes) -> None:
 
 
 def tunnelling(axes: Axes) -> None:
-    """Draw the measured odds of a miss, and the formula."""
+    """Draw the measured probability of a miss, and the formula."""
     text = sandbox.dumps(sandbox.load("bullet"))
     steps = np.array([1e-4, 1.5e-4, 2e-4, 2.5e-4, 3e-4, 4e-4, 5e-4, 7e-4, 1e-3])
     odds = []
@@ -190,8 +192,8 @@ def billiards(axes: Axes) -> None:
     run = sandbox.run(sandbox.load("half_ball"), "exact", dt=0.005)
     for number, colour in ((0, BLUE), (1, ORANGE)):
         x, y = run.position[:, number].T
-        seen = (y < 1.4) & (np.abs(x) < 0.8)
-        axes.plot(x[seen], y[seen], color=colour, label=run.names[number])
+        visible = (y < 1.4) & (np.abs(x) < 0.8)
+        axes.plot(x[visible], y[visible], color=colour, label=run.names[number])
     hit = int(np.searchsorted(run.time, run.contact_time[0]))
     for number, colour in ((0, BLUE), (1, ORANGE)):
         axes.add_patch(Circle(tuple(run.position[hit, number]), 0.028575, fill=False, edgecolor=colour))
@@ -200,7 +202,7 @@ def billiards(axes: Axes) -> None:
 
 
 def springs(axes: Axes) -> None:
-    """Draw the growth of a spring's amplitude in a step."""
+    """Draw the growth of the amplitude of a spring per step."""
     z = np.linspace(0.02, 3.0, 600)
     semi = np.where(z <= 2, 1.0, np.abs(1 - z * z / 2 - np.sqrt(np.maximum(0, z**4 / 4 - z * z))))
     axes.plot(z, np.sqrt(1 + z * z), color=ORANGE, label="explicit Euler")
@@ -212,16 +214,16 @@ def springs(axes: Axes) -> None:
 
 
 def figure(draw: Callable[[Axes], None]) -> Callable[[Path], None]:
-    """Return what makes a picture of a figure."""
+    """Return a function that writes the picture of a figure."""
 
     def make(path: Path) -> None:
-        drawn, axes = plt.subplots(figsize=(6.4, 4.0), layout="constrained")
+        chart, axes = plt.subplots(figsize=(6.4, 4.0), layout="constrained")
         draw(axes)
         axes.spines[["top", "right"]].set_visible(False)
         buffer = BytesIO()
-        drawn.savefig(buffer, dpi=110)
+        chart.savefig(buffer, dpi=110)
         save_png(Image.open(buffer), path, COLOURS_OF_FILE)
-        plt.close(drawn)
+        plt.close(chart)
 
     return make
 

@@ -1,4 +1,4 @@
-"""Plots, by the commands that readers are shown."""
+"""Plots made by commands of the documentation."""
 
 import sys
 from collections.abc import Callable
@@ -17,7 +17,7 @@ WIDTH = 960
 
 
 def plot(*arguments: str) -> Callable[[Path], None]:
-    """Return what makes a plot by a command, to which `--plot FILE` is added."""
+    """Return a function that makes a plot by a command with `--plot FILE`."""
 
     def make(path: Path) -> None:
         with TemporaryDirectory() as folder:
@@ -30,7 +30,7 @@ def plot(*arguments: str) -> Callable[[Path], None]:
 
 
 def save_narrowed(drawn: Path, path: Path) -> None:
-    """Save a plot in a page's width."""
+    """Save a plot scaled to the page width."""
     image = Image.open(drawn).convert("RGB")
     height = round(image.height * WIDTH / image.width)
     save_png(image.resize((WIDTH, height), Image.Resampling.LANCZOS), path, COLOURS)

@@ -1,4 +1,4 @@
-"""Thumbnails of the gallery: each shipped scene at a telling moment of a run on the engine that it is played on."""
+"""Thumbnails of the gallery: each shipped scene at a characteristic time of a run on its default engine."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -21,27 +21,27 @@ from sandbox.window.view_bounds import should_rotate
 from .files import image_of, save_png
 
 SIZE = (360, 225)
-SHARP = 2
-"""The picture is drawn so many times larger, and averaged."""
+SUPERSAMPLING = 2
+"""The picture is drawn larger by this factor, and averaged."""
 LINES = 1.8
-"""unit of lines: they are wider than in the window, as the picture is small"""
+"""Unit of line widths; lines are wider than in the window, because the picture is small."""
 FAINT = 0.35
-"""of the colours of earlier moments"""
+"""Opacity of earlier times."""
 
 
 class Moment(NamedTuple):
-    """What a thumbnail shows."""
+    """Time, trails and view of a thumbnail."""
 
     time: float
-    """s of the run"""
+    """time of the picture, s"""
     strobe: int = 0
-    """how many earlier moments are seen faintly, equally spaced from the start"""
+    """number of earlier times that are drawn faintly, equally spaced from the start"""
     trail: float = 0.0
-    """s, for how long back trails go"""
+    """duration of trails, s"""
     box: ViewBox | None = None
-    """part of the world, m; None: where the run goes"""
+    """visible part of the world, m; None: bounds of the run"""
     player: str | None = None
-    """of a game with rules; None: it is left to itself"""
+    """player of a game with rules; None: no inputs"""
 
 
 MOMENTS = {
@@ -104,18 +104,18 @@ MOMENTS = {
     "tutorial/overpass": Moment(2.4, trail=2.4),
     "tutorial/spaceship": Moment(4.8, trail=4.8),
 }
-"""Of each scene that a run can show; those of artillery are seen in the window."""
+"""By scene; the thumbnails of artillery are made from the window."""
 LARGEST = 9_000
-"""bytes of a thumbnail"""
+"""Largest size of a thumbnail, bytes."""
 
 
 def make(name: str, path: Path) -> None:
-    """Make the thumbnail of a scene, such as `tutorial/bounce`, with as many colours as the file has room for."""
+    """Make the thumbnail of a scene, such as `tutorial/bounce`, with as many colours as fit into `LARGEST` bytes."""
     save(thumbnail(name, MOMENTS[name]), path)
 
 
 def save(image: Image.Image, path: Path) -> None:
-    """Write a thumbnail with as many colours as the file has room for."""
+    """Write a thumbnail with as many colours as fit into `LARGEST` bytes."""
     for colours in (256, 128, 64, 32, 16, 8):
         save_png(image, path, colours)
         if path.stat().st_size <= LARGEST:
@@ -123,21 +123,21 @@ def save(image: Image.Image, path: Path) -> None:
 
 
 def thumbnail(name: str, moment: Moment) -> Image.Image:
-    """Return the picture of a moment of a run."""
+    """Return the picture of a run at a moment."""
     scene = sandbox.load(find(name), [f"world.duration={moment.time}"])
     film = RecordedRun(_run(scene, moment), name)
-    size = SIZE[0] * SHARP, SIZE[1] * SHARP
+    size = SIZE[0] * SUPERSAMPLING, SIZE[1] * SUPERSAMPLING
     camera = Camera.fitting(moment.box or film.bounds, size, turned=should_rotate(scene, size))
     overlays = frozenset({"shapes", *(("trails",) if moment.trail else ())})
-    picture, surface, shown = Renderer(), offscreen(size), None
+    renderer, surface, combined = Renderer(), offscreen(size), None
     for k in range(moment.strobe + 1):
         time = film.duration * (1.0 - k / max(moment.strobe, 1))
-        picture.draw(surface, camera, film.snapshot(time, overlays, moment.trail or 1.0), unit=LINES, scale=False)
+        renderer.draw(surface, camera, film.snapshot(time, overlays, moment.trail or 1.0), unit=LINES, scale=False)
         image = image_of(surface)
         faint = Image.blend(Image.new("RGB", size, BACKGROUND), image, FAINT)
-        shown = image if shown is None else ImageChops.lighter(shown, faint)
-    assert shown is not None
-    return shown.reduce(SHARP)
+        combined = image if combined is None else ImageChops.lighter(combined, faint)
+    assert combined is not None
+    return combined.reduce(SUPERSAMPLING)
 
 
 def _run(scene: sandbox.Scene, moment: Moment) -> sandbox.Trajectory:

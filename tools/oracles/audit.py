@@ -1,7 +1,7 @@
-"""A second opinion on the oracle: its runs against formulas of our own, and against its own sensitivity.
+"""Audit of the oracle: its runs are compared with independent formulas.
 
-Between two events every ball is moved on by the closed forms of sliding, rolling and spinning; each impact is worked
-out again from the states before it; and in between nothing may overlap. All of it from the scene alone.
+Between two events every ball is advanced by the closed forms of sliding, rolling and spinning; each impact is computed
+from the states before it; and between events no bodies may overlap. Everything is derived from the scene alone.
 """
 
 import itertools
@@ -14,11 +14,11 @@ Document = dict[str, Any]
 Array = np.ndarray
 
 RESTING = 1e-9
-"""m/s: less than that is no slip and no motion."""
+"""m/s; smaller speeds count as no slip and no motion."""
 
 
 class Event(NamedTuple):
-    """An event: when, of what kind, of whom, and the states (N, 3, 3) of all balls before and after it."""
+    """An event: time, kind, names of the bodies, and the states (N, 3, 3) of all balls before and after it."""
 
     time: float
     kind: str
@@ -28,7 +28,7 @@ class Event(NamedTuple):
 
 
 class Rules:
-    """The physics of a scene, worked out again."""
+    """An independent implementation of the physics of a scene."""
 
     def __init__(self, document: Document) -> None:
         self.floor, self.models = document["surface"], document["contact_models"]
@@ -41,76 +41,76 @@ class Rules:
         self.pockets = {pocket["name"]: pocket for pocket in document.get("pocket", [])}
 
     def slip(self, state: Array) -> Array:
-        """Return the velocity (2,) of a ball's lowest point."""
+        """Return the velocity (2,) of the lowest point of a ball, m/s."""
         _, v, w = state
         return np.array([v[0] - self.radius * w[1], v[1] + self.radius * w[0]])
 
-    def moved(self, state: Array, t: float) -> Array:
-        """Return a ball's state (position, velocity, spin) a time later, through as many of its motions as it takes."""
+    def advanced(self, state: Array, t: float) -> Array:
+        """Return the state (position, velocity, spin) of a ball after a time t, s, of sliding, rolling and rest."""
         x, v, w = state[0, :2].copy(), state[1, :2].copy(), state[2].copy()
         g, r = self.floor["gravity"], self.radius
-        fall = 5.0 * self.floor["spinning_friction"] * g / (2.0 * r) * t
-        about_z = math.copysign(max(abs(w[2]) - fall, 0.0), w[2])
+        spin_loss = 5.0 * self.floor["spinning_friction"] * g / (2.0 * r) * t
+        about_z = math.copysign(max(abs(w[2]) - spin_loss, 0.0), w[2])
         u = self.slip(state)
         size = math.hypot(*u)
         if size > RESTING:
-            grip = self.floor["sliding_friction"] * g
-            lasts = min(t, 2.0 * size / (7.0 * grip))
-            a = -grip * u / size
-            x, v = x + v * lasts + a * lasts**2 / 2.0, v + a * lasts
+            deceleration = self.floor["sliding_friction"] * g
+            duration = min(t, 2.0 * size / (7.0 * deceleration))
+            a = -deceleration * u / size
+            x, v = x + v * duration + a * duration**2 / 2.0, v + a * duration
             # ω̇ = (5/2R²)·(r × a) with r = −R·ẑ from the centre to the cloth
-            w[:2] += 2.5 / r * np.array([a[1], -a[0]]) * lasts
-            t -= lasts
+            w[:2] += 2.5 / r * np.array([a[1], -a[0]]) * duration
+            t -= duration
         speed = math.hypot(*v)
         if t > 0.0 and speed > RESTING:
             drag = self.floor["rolling_friction"] * g
-            lasts = min(t, speed / drag)
+            duration = min(t, speed / drag)
             a = -drag * v / speed
-            x, v = x + v * lasts + a * lasts**2 / 2.0, v + a * lasts
+            x, v = x + v * duration + a * duration**2 / 2.0, v + a * duration
             w[:2] = -v[1] / r, v[0] / r
-        made = np.zeros((3, 3))
-        made[0, :2], made[1, :2], made[2] = x, v, [w[0], w[1], about_z]
-        return made
+        result = np.zeros((3, 3))
+        result[0, :2], result[1, :2], result[2] = x, v, [w[0], w[1], about_z]
+        return result
 
-    def struck(self, event: Event) -> dict[str, Array]:
-        """Return the states that an impact leaves, by name.
+    def after_impact(self, event: Event) -> dict[str, Array]:
+        """Return the states after an impact, by name.
 
-        Where it happens is taken as it is after it: bodies are first parted by a tiny distance, which turns normals.
+        Positions are those after the event: pooltool first separates the bodies slightly, which turns normals.
         """
         states = event.before.copy()
         states[:, 0] = event.after[:, 0]
         if event.kind == "ball_ball":
             a, b = (states[self.balls.index(name)] for name in event.names)
-            return dict(zip(event.names, self._met(a, b), strict=True))
+            return dict(zip(event.names, self._after_ball_collision(a, b), strict=True))
         if event.kind == "cushion":
-            name, what = event.names
-            return {name: self._rebounded(states[self.balls.index(name)], what)}
+            name, cushion = event.names
+            return {name: self._after_cushion(states[self.balls.index(name)], cushion)}
         return {}
 
-    def _met(self, a: Array, b: Array) -> tuple[Array, Array]:
+    def _after_ball_collision(self, a: Array, b: Array) -> tuple[Array, Array]:
         a, b = a.copy(), b.copy()
         n = (b[0] - a[0]) / np.linalg.norm(b[0] - a[0])
         approach = float((a[1] - b[1]) @ n)
-        assert approach > 0.0, f"two balls part at {approach:g} m/s and yet collide"
-        push = (1.0 + self.restitution) / 2.0 * approach
-        rub = np.zeros(3)
+        assert approach > 0.0, f"two balls separate at {approach:g} m/s and yet collide"
+        normal_impulse = (1.0 + self.restitution) / 2.0 * approach
+        friction_impulse = np.zeros(3)
         if self.models["ball_ball"] == "frictional":
-            along = a[1] - b[1] - approach * n
-            u = along + self.radius * np.cross(a[2] + b[2], n)
+            tangential = a[1] - b[1] - approach * n
+            u = tangential + self.radius * np.cross(a[2] + b[2], n)
             size = float(np.linalg.norm(u))
             mu = 0.009951 + 0.108 * math.exp(-1.088 * size)
             if size > 0.0:
-                rub = -u / size * min(mu * push, size / 7.0)
+                friction_impulse = -u / size * min(mu * normal_impulse, size / 7.0)
         for state, sign in ((a, 1.0), (b, -1.0)):
-            state[1] += sign * (rub - push * n)
+            state[1] += sign * (friction_impulse - normal_impulse * n)
             state[1, 2] = 0.0
-            state[2] += 2.5 / self.radius * np.cross(n, rub)
+            state[2] += 2.5 / self.radius * np.cross(n, friction_impulse)
         return a, b
 
-    def _rebounded(self, state: Array, what: str) -> Array:
-        """Return a ball after a cushion, in the frame of the normal into it and the left of that."""
+    def _after_cushion(self, state: Array, cushion: str) -> Array:
+        """Return the state of a ball after a cushion, computed in the frame of the normal into it and the tangent."""
         state = state.copy()
-        fixed = self.walls.get(what) or self.posts[what]
+        fixed = self.walls.get(cushion) or self.posts[cushion]
         n = self.nearest(fixed, state[0, :2]) - state[0, :2]
         n /= math.hypot(*n)
         left = np.array([-n[1], n[0]])
@@ -134,17 +134,17 @@ class Rules:
         state[1, :2], state[2, :2], state[2, 2] = vx * n + vy * left, wx * n + wy * left, wz
         return state
 
-    def nearest(self, fixed: Document, at: Array) -> Array:
-        """Return the point of a wall, or the centre of a post, that is nearest to a place."""
+    def nearest(self, fixed: Document, point: Array) -> Array:
+        """Return the nearest point of a wall, or the centre of a post."""
         if "position" in fixed:
             return np.array(fixed["position"])
         a, b = np.array(fixed["points"])
-        share = np.clip(((at - a) @ (b - a)) / ((b - a) @ (b - a)), 0.0, 1.0)
-        return a + share * (b - a)
+        fraction = np.clip(((point - a) @ (b - a)) / ((b - a) @ (b - a)), 0.0, 1.0)
+        return a + fraction * (b - a)
 
 
 class Verdict(NamedTuple):
-    """By how much a run is off our formulas, at worst; spins count times the radius."""
+    """Largest deviations of a run from our formulas; spins are multiplied by the radius."""
 
     position: float
     """m"""
@@ -152,53 +152,55 @@ class Verdict(NamedTuple):
     """m/s"""
     overlap: float
     """m"""
-    parted: float
-    """m, by which bodies that met were moved apart"""
+    separation: float
+    """m, by which colliding bodies were moved apart"""
 
 
-def audit(document: Document, events: list[Event], looks: int = 40) -> Verdict:
-    """Return by how much a run is off; `looks` is how often overlaps are sought between two events.
+def audit(document: Document, events: list[Event], samples: int = 40) -> Verdict:
+    """Return the deviations of a run; overlaps are checked at `samples` times between two events.
 
     Raises:
-        AssertionError: bodies collide that part, or a captured ball has moved.
+        AssertionError: separating bodies collide, or a captured ball has moved.
     """
     rules = Rules(document)
-    place = velocity = overlap = parted = 0.0
-    caught: dict[str, str] = {}
+    position = velocity = overlap = separation = 0.0
+    captured: dict[str, str] = {}
     for last, event in itertools.pairwise(events):
         span = event.time - last.time
-        for number in range(len(rules.balls)):
-            expected = rules.moved(last.after[number], span)
-            off = np.abs(expected - event.before[number])
-            place = max(place, float(off[0, :2].max()))
-            velocity = max(velocity, float(off[1].max()), float(off[2].max()) * rules.radius)
-        for share in np.linspace(0.0, 1.0, looks + 1)[1:-1] if span > 1e-9 else ():
-            overlap = max(overlap, _overlap(rules, last.after, float(share) * span, caught))
-        for name, expected in rules.struck(event).items():
-            off = np.abs(expected - event.after[rules.balls.index(name)])
-            velocity = max(velocity, float(off[1].max()), float(off[2].max()) * rules.radius)
-            parted = max(parted, math.dist(expected[0], event.before[rules.balls.index(name), 0]))
+        for index in range(len(rules.balls)):
+            expected = rules.advanced(last.after[index], span)
+            deviation = np.abs(expected - event.before[index])
+            position = max(position, float(deviation[0, :2].max()))
+            velocity = max(velocity, float(deviation[1].max()), float(deviation[2].max()) * rules.radius)
+        for fraction in np.linspace(0.0, 1.0, samples + 1)[1:-1] if span > 1e-9 else ():
+            overlap = max(overlap, _overlap(rules, last.after, float(fraction) * span, captured))
+        for name, expected in rules.after_impact(event).items():
+            deviation = np.abs(expected - event.after[rules.balls.index(name)])
+            velocity = max(velocity, float(deviation[1].max()), float(deviation[2].max()) * rules.radius)
+            separation = max(separation, math.dist(expected[0], event.before[rules.balls.index(name), 0]))
         if event.kind == "pocket":
             name, pocket = event.names
-            caught[name] = pocket
-            rests = event.after[rules.balls.index(name)]
-            assert not rests[1:].any() and rests[0, :2].tolist() == rules.pockets[pocket]["position"]
-    return Verdict(place, velocity, overlap, parted)
+            captured[name] = pocket
+            rest_state = event.after[rules.balls.index(name)]
+            assert not rest_state[1:].any() and rest_state[0, :2].tolist() == rules.pockets[pocket]["position"]
+    return Verdict(position, velocity, overlap, separation)
 
 
-def _overlap(rules: Rules, states: Array, t: float, caught: dict[str, str]) -> float:
-    """Return the deepest overlap, m, of balls on the table with each other, walls, posts, or a pocket's circle."""
-    at = [rules.moved(state, t)[0, :2] for name, state in zip(rules.balls, states, strict=True) if name not in caught]
-    moving = [
-        math.hypot(*state[1, :2]) > 0.0 for name, state in zip(rules.balls, states, strict=True) if name not in caught
+def _overlap(rules: Rules, states: Array, t: float, captured: dict[str, str]) -> float:
+    """Return the deepest overlap, m, of balls on the table with each other, walls, posts or pockets."""
+    positions = [
+        rules.advanced(state, t)[0, :2] for name, state in zip(rules.balls, states, strict=True) if name not in captured
     ]
-    deep = 0.0
-    for i, a in enumerate(at):
-        for b in at[i + 1 :]:
-            deep = max(deep, 2.0 * rules.radius - math.dist(a, b))
+    moving = [
+        math.hypot(*state[1, :2]) > 0.0 for name, state in zip(rules.balls, states, strict=True) if name not in captured
+    ]
+    depth = 0.0
+    for i, a in enumerate(positions):
+        for b in positions[i + 1 :]:
+            depth = max(depth, 2.0 * rules.radius - math.dist(a, b))
         if moving[i]:
             for fixed in (*rules.walls.values(), *rules.posts.values()):
-                deep = max(deep, rules.radius + fixed.get("radius", 0.0) - math.dist(a, rules.nearest(fixed, a)))
+                depth = max(depth, rules.radius + fixed.get("radius", 0.0) - math.dist(a, rules.nearest(fixed, a)))
             for pocket in rules.pockets.values():
-                deep = max(deep, pocket["radius"] - math.dist(a, pocket["position"]))
-    return deep
+                depth = max(depth, pocket["radius"] - math.dist(a, pocket["position"]))
+    return depth

@@ -1,4 +1,4 @@
-"""Shots at billiards, as scenes: balls right after the strike, their cloth, and what they meet."""
+"""Billiard shots as scenes: balls right after the strike, cloth, cushions and tables."""
 
 import math
 from collections.abc import Callable
@@ -7,9 +7,9 @@ from tools.oracles.shot_parts import CAROM, POOL, SNOOKER, Pair, Shot, Triple, b
 
 
 def on_cloth() -> list[Shot]:
-    """Return balls alone."""
+    """Return shots of single balls without collisions."""
     slow, oblique = heading(1.0, 53.0), heading(1.5, 30.0)
-    alone: list[tuple[str, str, str, Pair, Triple, float, int]] = [
+    singles: list[tuple[str, str, str, Pair, Triple, float, int]] = [
         (
             "roll",
             "Straight roll",
@@ -34,7 +34,7 @@ def on_cloth() -> list[Shot]:
     ]
     shots = [
         Shot(name, scene(title, about, [ball(POOL, "cue", (0.0, 0.0), velocity, spin)], dt, frames))
-        for name, title, about, velocity, spin, dt, frames in alone
+        for name, title, about, velocity, spin, dt, frames in singles
     ]
     side = [
         ball(POOL, "rolling", (0.0, 0.0), (0.4, 0.3), turning(POOL, (0.4, 0.3), 1.0, 60.0)),
@@ -45,7 +45,7 @@ def on_cloth() -> list[Shot]:
 
 
 def of_two() -> list[Shot]:
-    """Return one ball hitting another."""
+    """Return collisions of two balls."""
     start, r = (0.0, -0.2), POOL.radius
     half = (r, r * 2.0 * math.sqrt(0.75))
     straight = (0.0, 2.0)
@@ -86,7 +86,7 @@ def of_two() -> list[Shot]:
 
 
 def at_cushions() -> list[Shot]:
-    """Return a ball at one cushion."""
+    """Return shots of one ball at one cushion."""
     shots = []
     for model in ("simple", "han2005"):
         for degrees in (45, 20):
@@ -94,8 +94,8 @@ def at_cushions() -> list[Shot]:
                 velocity = heading(1.6, 90.0 - degrees)  # the angle is that between path and cushion
                 spin = turning(POOL, velocity, 1.0, side)
                 start = (0.5 - velocity[0] * 0.3, -velocity[1] * 0.3)
-                told = f", {abs(side):g} rad/s of side" if side else ""
-                about = f"Rolling into a cushion at {degrees}°{told}: {model}."
+                side_text = f", {abs(side):g} rad/s of side" if side else ""
+                about = f"Rolling into a cushion at {degrees}°{side_text}: {model}."
                 name = f"cushion_{degrees}_{model}{'_side' if side else ''}"
                 wall = rail((0.5, -4.0), (0.5, 16.0))
                 balls = [ball(POOL, "cue", start, velocity, spin)]
@@ -110,7 +110,7 @@ def at_cushions() -> list[Shot]:
 
 
 def on_tables() -> list[Shot]:
-    """Return shots that need a table."""
+    """Return shots on tables and of several balls."""
     corner = (0.9906, 1.9812)
     straight = heading(1.5, 45.0)
     potted = [
@@ -193,7 +193,7 @@ def snooker(dt: float, frames: int) -> Shot:
 
 
 def three_cushions(dt: float, frames: int) -> Shot:
-    """Return a shot on the carom table, by four cushions onto the second ball."""
+    """Return a shot on the carom table, over four cushions to the second ball."""
     velocity = heading(4.0, 58.0)
     balls = [
         ball(CAROM, "white", (0.9, 0.3), velocity, turning(CAROM, velocity, 0.6, 30.0)),
@@ -205,9 +205,9 @@ def three_cushions(dt: float, frames: int) -> Shot:
 
 
 TO_COMPARE: tuple[Callable[[], list[Shot]], ...] = (on_cloth, of_two, at_cushions, on_tables)
-"""What is held against the oracle."""
+"""Functions that return the shots that are compared with the oracle."""
 
 
 def full() -> list[Shot]:
-    """Return what is timed, from the strike to rest."""
+    """Return the shots that are timed from the strike to rest."""
     return [nine_ball(0.02, 2000), eight_ball(0.02, 2000), snooker(0.02, 2000), three_cushions(0.02, 2000)]

@@ -1,7 +1,7 @@
-"""Pooltool's world from a scene of ours, so that both play the same shot on the same table with the same models.
+"""Conversion of scenes to pooltool, so that both engines simulate the same shot, table and models.
 
-Needs `pooltool-billiards`, which writes into the home folder: set `HOME` and `NUMBA_CACHE_DIR` before this is imported.
-Nothing of that package is changed on the disk; `correct` exchanges what is at fault while it runs.
+Requires `pooltool-billiards`, which writes into the home folder: set `HOME` and `NUMBA_CACHE_DIR` before the import.
+No file of that package is changed; `correct` replaces its faulty functions at run time.
 """
 
 import math
@@ -32,7 +32,7 @@ from pooltool.ptmath.roots import quartic
 Document = dict[str, Any]
 
 NEGLIGIBLE = 1e-24
-"""m²/s⁴, the square of an acceleration between two balls that moves them by 1e-10 m in ten seconds."""
+"""m²/s⁴; square of a relative acceleration of two balls that moves them by 1e-10 m in ten seconds."""
 
 PATCHES = (
     "no relative acceleration: the quadratic is solved where the quartic's leading coefficient vanishes",
@@ -45,13 +45,13 @@ _plain_quartic = quartic.solve
 
 @numba.njit(cache=False)
 def _roots(a: float, b: float, c: float, d: float, e: float) -> np.ndarray:
-    """Return the four roots; of a quadratic its two, and −1, which counts as past, in place of the others."""
+    """Return the four roots; for a quadratic its two roots, and −1, which counts as past, for the others."""
     if abs(a) > NEGLIGIBLE:
         return _plain_quartic(a, b, c, d, e)
     found = np.full(4, complex(-1.0, 0.0))
-    inside = d * d - 4.0 * c * e
-    if c > 0.0 and inside >= 0.0:
-        q = -0.5 * (d + math.copysign(math.sqrt(inside), d))
+    discriminant = d * d - 4.0 * c * e
+    if c > 0.0 and discriminant >= 0.0:
+        q = -0.5 * (d + math.copysign(math.sqrt(discriminant), d))
         found[0] = complex(q / c, 0.0)
         if q != 0.0:
             found[1] = complex(e / q, 0.0)
@@ -59,14 +59,14 @@ def _roots(a: float, b: float, c: float, d: float, e: float) -> np.ndarray:
 
 
 def correct(spacer: float) -> None:
-    """Put right what is at fault, before the first shot of the process; `spacer` is what parts bodies that met, m."""
+    """Correct known faults, before the first shot of the process; `spacer` separates bodies after a collision, m."""
     quartic.solve = _roots
     constants.MIN_DIST = spacer
     CoreBallBallCollision.resolve_continually_touching = lambda self, ball1, ball2: (ball1, ball2)  # noqa: ARG005
 
 
 class Coulomb(AlciatoreBallBallFriction):
-    """A coefficient that makes of pooltool's impulse μ·e·v_n Coulomb's μ(1 + e)/2·v_n, its slip condition with it."""
+    """Coefficient that turns pooltool's impulse μ·e·v_n into Coulomb's μ(1 + e)/2·v_n, with its slip condition."""
 
     def calculate_friction(self, ball1: pt.Ball, ball2: pt.Ball) -> float:
         """Return μ(1 + e)/(2e)."""
@@ -74,8 +74,8 @@ class Coulomb(AlciatoreBallBallFriction):
         return super().calculate_friction(ball1, ball2) * (1.0 + e) / (2.0 * e)
 
 
-class Smooth(AlciatoreBallBallFriction):
-    """Balls that do not rub."""
+class Frictionless(AlciatoreBallBallFriction):
+    """Balls without friction."""
 
     def calculate_friction(self, ball1: pt.Ball, ball2: pt.Ball) -> float:  # noqa: ARG002
         """Return 0."""
@@ -83,24 +83,24 @@ class Smooth(AlciatoreBallBallFriction):
 
 
 def engine(document: Document, coulomb: bool = True) -> PhysicsEngine:
-    """Return pooltool's physics with the models that a scene names; `coulomb` off leaves its own law of friction."""
+    """Return pooltool's physics with the models of a scene; without `coulomb` it keeps its own law of friction."""
     models = document["contact_models"]
     if models["ball_ball"] == "frictional":
-        between = FrictionalInelastic(friction=Coulomb() if coulomb else AlciatoreBallBallFriction())
+        ball_ball = FrictionalInelastic(friction=Coulomb() if coulomb else AlciatoreBallBallFriction())
     elif _restitution(document) == 1.0:
-        between = FrictionlessElastic()
+        ball_ball = FrictionlessElastic()
     else:
-        between = FrictionalInelastic(friction=Smooth())
+        ball_ball = FrictionalInelastic(friction=Frictionless())
     if models["cushion"] == "han2005":
-        straight, round_ = Han2005Linear(), Han2005Circular()
+        linear, circular = Han2005Linear(), Han2005Circular()
     else:
-        straight = UnrealisticLinear(restitution=True)
-        round_ = UnrealisticCircular(restitution=True)
+        linear = UnrealisticLinear(restitution=True)
+        circular = UnrealisticCircular(restitution=True)
     return PhysicsEngine(
         resolver=Resolver(
-            ball_ball=between,
-            ball_linear_cushion=straight,
-            ball_circular_cushion=round_,
+            ball_ball=ball_ball,
+            ball_linear_cushion=linear,
+            ball_circular_cushion=circular,
             ball_pocket=CanonicalBallPocket(),
             stick_ball=InstantaneousPoint(),
             transition=CanonicalTransition(),
@@ -109,19 +109,19 @@ def engine(document: Document, coulomb: bool = True) -> PhysicsEngine:
 
 
 def _restitution(document: Document) -> float:
-    """Return that of two balls, which all share."""
+    """Return the restitution of two balls, which is the same for all pairs."""
     (pair,) = document["pair"]
     return float(pair["restitution"])
 
 
 def system(document: Document) -> pt.System:
-    """Return pooltool's balls and table as a scene's are right after the strike."""
+    """Return pooltool's balls and table of a scene right after the strike."""
     floor = document["surface"]
     rail = next((m for m in document["material"] if m["name"] == "rail"), {"restitution": 0.85, "friction": 0.2})
     balls = {}
     for ball in document["ball"]:
         radius = ball["radius"]
-        made = pt.Ball.create(
+        converted = pt.Ball.create(
             ball["name"],
             xy=ball["position"],
             m=ball["mass"],
@@ -135,14 +135,14 @@ def system(document: Document) -> pt.System:
             g=floor["gravity"],
         )
         velocity, spin = ball.get("velocity", [0.0, 0.0]), ball.get("spin", [0.0, 0.0, 0.0])
-        made.state.rvw[1, :2], made.state.rvw[2] = velocity, spin
-        made.state.s = motion(velocity, spin, radius)
-        balls[ball["name"]] = made
+        converted.state.rvw[1, :2], converted.state.rvw[2] = velocity, spin
+        converted.state.s = motion(velocity, spin, radius)
+        balls[ball["name"]] = converted
     return pt.System(cue=pt.Cue(cue_ball_id=document["ball"][0]["name"]), table=_table(document), balls=balls)
 
 
 def motion(velocity: list[float], spin: list[float], radius: float) -> int:
-    """Return pooltool's number of the state that follows from a ball's figures."""
+    """Return pooltool's number of the motion state of a ball."""
     slip = math.hypot(velocity[0] - radius * spin[1], velocity[1] + radius * spin[0])
     if slip > 1e-9:
         return constants.sliding
@@ -154,8 +154,8 @@ def motion(velocity: list[float], spin: list[float], radius: float) -> int:
 def _table(document: Document) -> pt.Table:
     """Return the table of walls with two points, posts and pockets.
 
-    Walls are met from one side alone, as in pooltool's own tables, or it would be slower: from that of the table's
-    middle, or of the pocket where one is near.
+    Walls are one-sided, as in pooltool's own tables, because this is faster. The side is that of the middle of the
+    table, or of a nearby pocket.
     """
     walls = document.get("wall", [])
     ends = np.array([wall["points"] for wall in walls]).reshape(-1, 2)
@@ -163,19 +163,19 @@ def _table(document: Document) -> pt.Table:
     linear = {}
     for wall in walls:
         (ax, ay), (bx, by) = wall["points"]
-        made = LinearCushionSegment(
+        segment = LinearCushionSegment(
             wall["name"], p1=np.array([ax, ay, wall["height"]]), p2=np.array([bx, by, wall["height"]])
         )
-        centre = (made.p1 + made.p2)[:2] / 2.0
+        centre = (segment.p1 + segment.p2)[:2] / 2.0
         near = [
             p["position"] for p in document.get("pocket", []) if math.dist(p["position"], centre) < 2.0 * p["radius"]
         ]
         x, y = near[0] if near else middle
-        side = made.lx * x + made.ly * y + made.l0
+        side = segment.lx * x + segment.ly * y + segment.l0
         facing = CushionDirection.BOTH
-        if abs(side) > 1e-9:  # else it is the only wall, met from where the ball comes
+        if abs(side) > 1e-9:  # otherwise it is the only wall, and both sides are needed
             facing = CushionDirection.SIDE1 if side < 0.0 else CushionDirection.SIDE2
-        linear[wall["name"]] = LinearCushionSegment(wall["name"], p1=made.p1, p2=made.p2, direction=facing)
+        linear[wall["name"]] = LinearCushionSegment(wall["name"], p1=segment.p1, p2=segment.p2, direction=facing)
     circular = {
         post["name"]: CircularCushionSegment(
             post["name"], center=np.array([*post["position"], post["height"]]), radius=post["radius"]
@@ -193,7 +193,7 @@ def _table(document: Document) -> pt.Table:
 
 
 def furniture(name: str) -> Document:
-    """Return the walls, posts and pockets of one of pooltool's own tables as a scene has them."""
+    """Return the walls, posts and pockets of one of pooltool's tables as tables of a scene."""
     table = pt.Table.prebuilt(pt.objects.TableName[name])
     cushions = table.cushion_segments
     return {

@@ -1,11 +1,11 @@
-"""A scene as TOML text, with every digit of its figures."""
+"""A scene as TOML text, with every digit of its numbers."""
 
 import json
 from typing import Any
 
 
 def text(document: dict[str, Any]) -> str:
-    """Return a scene's text: plain keys, then tables, then lists of tables, in their order."""
+    """Return the text of a scene: plain keys first, then tables and arrays of tables in their order."""
     plain, tables = [], []
     for key, value in document.items():
         if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""Parts of shots at billiards: balls and cloth by game, spins, racks, cushions, and the scene of all that."""
+"""Parts of billiard shots: balls and cloth by game, spins, racks, cushions, and complete scenes."""
 
 import math
 import random
@@ -11,7 +11,7 @@ Triple = tuple[float, float, float]
 
 
 class Kit(NamedTuple):
-    """Balls and cloth of a game: SI units, the coefficients without."""
+    """Balls and cloth of a game, in SI units; coefficients are dimensionless."""
 
     radius: float
     mass: float
@@ -27,32 +27,32 @@ CAROM = Kit(0.03075, 0.210, 0.2, 0.15)
 
 
 class Shot(NamedTuple):
-    """A shot: its scene but for the table, and which table."""
+    """A shot: its scene without the table, and the name of the table."""
 
     name: str
     document: Document
     furniture: str | None = None
-    """The table of pooltool's whose cushions, jaws and pockets it has."""
+    """name of the table of pooltool whose cushions, jaws and pockets are used"""
 
 
-def ball(kit: Kit, name: str, at: Pair, velocity: Pair = (0.0, 0.0), spin: Triple = (0.0, 0.0, 0.0)) -> Document:
-    """Return a ball; what does not move states neither velocity nor spin."""
-    made: Document = {"name": name, "position": [*at]}
+def ball(kit: Kit, name: str, position: Pair, velocity: Pair = (0.0, 0.0), spin: Triple = (0.0, 0.0, 0.0)) -> Document:
+    """Return a ball; velocity and spin are omitted if zero."""
+    table: Document = {"name": name, "position": [*position]}
     if any(velocity):
-        made["velocity"] = [*velocity]
+        table["velocity"] = [*velocity]
     if any(spin):
-        made["spin"] = [*spin]
-    return {**made, "radius": kit.radius, "mass": kit.mass, "material": "phenolic"}
+        table["spin"] = [*spin]
+    return {**table, "radius": kit.radius, "mass": kit.mass, "material": "phenolic"}
 
 
 def heading(speed: float, degrees: float) -> Pair:
-    """Return a velocity from its size and its angle from the x axis."""
+    """Return a velocity from its magnitude and its angle from the x axis, degrees."""
     return speed * math.cos(math.radians(degrees)), speed * math.sin(math.radians(degrees))
 
 
-def turning(kit: Kit, velocity: Pair, share: float, side: float = 0.0) -> Triple:
-    """Return the spin that is a share of natural roll (1 rolls, 0 is stun, −1 draws), and `side` rad/s about z."""
-    return -share * velocity[1] / kit.radius, share * velocity[0] / kit.radius, side
+def turning(kit: Kit, velocity: Pair, fraction: float, side: float = 0.0) -> Triple:
+    """Return a spin of `fraction` of natural roll (1 rolls, 0 is stun, −1 draws), and `side` rad/s about z."""
+    return -fraction * velocity[1] / kit.radius, fraction * velocity[0] / kit.radius, side
 
 
 def scene(
@@ -67,7 +67,7 @@ def scene(
     restitution: float | None = None,
     **furniture: list[Document],
 ) -> Document:
-    """Return a scene of a shot that is looked at for so many frames of dt, s."""
+    """Return a scene of a shot with a duration of `frames` steps of dt, s."""
     return {
         "title": title,
         "about": about,
@@ -96,20 +96,20 @@ def scene(
 
 
 def rail(a: Pair, b: Pair, height: float = 0.036576) -> list[Document]:
-    """Return a lone cushion."""
+    """Return a single cushion."""
     return [{"name": "cushion", "points": [[*a], [*b]], "height": height, "material": "rail"}]
 
 
 def rack(
     kit: Kit, rows: Iterable[int], apex: Pair, names: Iterable[str], seed: int, gap: float = 1e-3
 ) -> list[Document]:
-    """Return balls in rows along y; each has `gap` radii about it, within which it is off its place."""
-    chance, left, made = random.Random(seed), iter(names), []
+    """Return balls in rows along y, each randomly off its position by up to `gap` radii."""
+    generator, remaining_names, balls = random.Random(seed), iter(names), []
     pitch = 2.0 * kit.radius * (1.0 + gap)
     for row, count in enumerate(rows):
         for column in range(count):
-            angle, off = chance.uniform(0.0, 2.0 * math.pi), chance.uniform(0.0, gap * kit.radius)
-            x = apex[0] + (column - (count - 1) / 2.0) * pitch + off * math.cos(angle)
-            y = apex[1] + row * pitch * math.sqrt(0.75) + off * math.sin(angle)
-            made.append(ball(kit, next(left), (x, y)))
-    return made
+            angle, offset = generator.uniform(0.0, 2.0 * math.pi), generator.uniform(0.0, gap * kit.radius)
+            x = apex[0] + (column - (count - 1) / 2.0) * pitch + offset * math.cos(angle)
+            y = apex[1] + row * pitch * math.sqrt(0.75) + offset * math.sin(angle)
+            balls.append(ball(kit, next(remaining_names), (x, y)))
+    return balls

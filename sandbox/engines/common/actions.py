@@ -163,10 +163,10 @@ def set_parameter(action: SetParameter, target: ActionTarget) -> None:
         return
     try:
         scene = change_value(target.scene, action.path, action.value)
-        wrong = action.path.startswith("surface.") and any(check_surface(scene, target.setup.bodies))
+        is_invalid = action.path.startswith("surface.") and any(check_surface(scene, target.setup.bodies))
     except ValueError:
-        wrong = True
-    if wrong:  # validate the whole scene again, to report every fault as for a file
+        is_invalid = True
+    if is_invalid:  # validate the whole scene again, to report every fault as for a file
         try:
             scene = _validated_again(action, target.scene)
         except AddressError as error:
@@ -194,10 +194,10 @@ def _validated_again(action: SetParameter, scene: Scene) -> Scene:
 def _with_coefficient(
     action: SetParameter, parts: tuple[str, ...], target: ActionTarget
 ) -> tuple[BodySource, ...] | None:
-    """Return the spawned elements, one of them with another restitution or friction; None if none of them is meant.
+    """Return the spawned elements, one of them with another restitution or friction; None for any other path.
 
-    Spawned elements are addressed by name, `ball.spawned-1.restitution`. `*` and indices mean the elements of the file,
-    so that the meaning of an action does not depend on which bodies were spawned before.
+    Spawned elements are addressed by name, `ball.spawned-1.restitution`. `*` and indices select elements of the file
+    only, so that the effect of an action does not depend on which bodies were spawned before.
 
     Raises:
         ActionError: the value is out of range.
@@ -205,22 +205,22 @@ def _with_coefficient(
     first = len(target.scene.elements)
     if len(parts) != 3 or parts[1] not in target.bodies.names:
         return None
-    place = int(target.bodies.element[target.bodies.names.index(parts[1])]) - first
-    if place < 0:
+    index = int(target.bodies.element[target.bodies.names.index(parts[1])]) - first
+    if index < 0:
         return None
     spawned = list(target.bodies.elements[first:])
-    element = spawned[place]
+    element = spawned[index]
     heading = heading_of(element)
     if parts[0] != heading:
-        meant = ".".join((heading, quoted(parts[1]), parts[2]))
-        raise ActionError(f"{action.path}: {parts[1]!r} is a {heading}; did you mean {meant}?")
+        suggestion = ".".join((heading, quoted(parts[1]), parts[2]))
+        raise ActionError(f"{action.path}: {parts[1]!r} is a {heading}; did you mean {suggestion}?")
     try:
         stated = element.model_dump(by_alias=True, exclude_unset=True)
-        spawned[place] = type(element).model_validate({**stated, parts[2]: action.value})
+        spawned[index] = type(element).model_validate({**stated, parts[2]: action.value})
     except ValidationError as error:
         from sandbox.scene.files.diagnosis import explained  # only faults need it
 
-        messages = (message for _, message in explained(error, (heading, place)))
+        messages = (message for _, message in explained(error, (heading, index)))
         raise ActionError(f"{action.path}: {'; '.join(messages)}") from None
     return tuple(spawned)
 
@@ -228,14 +228,14 @@ def _with_coefficient(
 def _spawned_hint(parts: tuple[str, ...], target: ActionTarget) -> str:
     """Return a hint how spawned bodies are addressed, for a path into the list of their kind."""
     first = len(target.scene.elements)
-    of_element = dict(zip(target.bodies.element.tolist(), target.bodies.names, strict=True))
-    joined = [
-        f"{parts[0]}.{quoted(of_element[first + k])}"
+    name_of_element = dict(zip(target.bodies.element.tolist(), target.bodies.names, strict=True))
+    paths = [
+        f"{parts[0]}.{quoted(name_of_element[first + k])}"
         for k, element in enumerate(target.bodies.elements[first:])
-        if heading_of(element) == parts[0] and first + k in of_element
+        if heading_of(element) == parts[0] and first + k in name_of_element
     ]
-    some = ", ".join(joined[:5])
-    return f"; bodies added during the run are addressed by name: {some}" if joined else ""
+    listed = ", ".join(paths[:5])
+    return f"; bodies added during the run are addressed by name: {listed}" if paths else ""
 
 
 def toggle(action: Toggle, target: ActionTarget) -> None:
@@ -272,7 +272,7 @@ def reshape(action: Reshape, target: ActionTarget) -> None:
         raise ActionError(f"{action.thing!r} is a cushion; walls on a [surface] cannot be reshaped")
     index = names.index(action.thing)
     wall = scene.walls[index].model_copy(update={"points": action.points})
-    faults = [f"{'.'.join(map(str, where))} {message}" for where, message in check_wall_points(wall)]
+    faults = [f"{'.'.join(map(str, location))} {message}" for location, message in check_wall_points(wall)]
     if faults:
         raise ActionError(f"the wall {action.thing!r}: {'; '.join(faults)}")
     walls = (*scene.walls[:index], wall, *scene.walls[index + 1 :])
@@ -377,9 +377,9 @@ def _movable_body_index(name: str, target: ActionTarget) -> int:
 
 
 def _refuse_driven(name: str, scene: Scene) -> None:
-    for drive, own in zip(scene.drives, names_of(scene), strict=True):
+    for drive, drive_name in zip(scene.drives, names_of(scene), strict=True):
         if drive.body == name:
-            raise ActionError(f"{name!r} is held by its drive; move it by a `drive` action on {own!r}")
+            raise ActionError(f"{name!r} is held by its drive; move it by a `drive` action on {drive_name!r}")
 
 
 def _apply_impulse(action: Impulse, target: ActionTarget) -> None:
@@ -438,19 +438,19 @@ def _spawn(action: Spawn, target: ActionTarget) -> None:
         raise ActionError(f"no layer is named {single.layer!r}; layers: {', '.join(scene.layers)}")
     if len(target.bodies) >= MAX_BODIES:
         raise ActionError(f"the scene already has {MAX_BODIES:,} bodies, which is the limit")
-    alone = scene_of_one_body(scene, single)
-    faults = crosscheck(alone)
+    alone_scene = scene_of_one_body(scene, single)
+    faults = crosscheck(alone_scene)
     if faults:
         raise ActionError("; ".join(message for _, message in faults))
-    x, y = alone.bodies.position[0].tolist()  # of the centre of mass, which may be far from `position`
-    _check_place((x, y), float(alone.bodies.radius[0]), single.collides, target)
+    x, y = alone_scene.bodies.position[0].tolist()  # of the centre of mass, which may be far from `position`
+    _check_place((x, y), float(alone_scene.bodies.radius[0]), single.collides, target)
     if isinstance(single, Ball) and not single.fixed and single.collides != "none":
         _check_cushion_heights(single.radius, scene)
     target.add(single, name)
 
 
 def _check_cushion_heights(radius: float, scene: Scene) -> None:
-    """Refuse a ball of a radius, m, that a cushion's nose would pass over. Balls of a file are checked alike."""
+    """Refuse a ball of a radius, m, if the nose of a cushion passes over it. Balls of a file have the same check."""
     for collider, name in zip(scene.fixed, scene.fixed_names, strict=False):  # pockets come last among the names
         height = collider.height if isinstance(collider, Wall | Post) else None
         if height is not None and height >= 2.0 * radius:
@@ -461,5 +461,5 @@ def scene_of_one_body(scene: Scene, single: BodySpec) -> Scene:
     """Return a scene with one body and the world, surface and materials of another scene."""
     kinds = {Ball: "balls", Box: "boxes", Capsule: "capsules", Polygon: "polygons", Compound: "compounds"}
     keys = ("world", "surface", "contact_models", "materials", "pairs")
-    surroundings = {key: getattr(scene, key) for key in keys}
-    return Scene.model_validate(surroundings).model_copy(update={kinds[type(single)]: (single,)})
+    environment = {key: getattr(scene, key) for key in keys}
+    return Scene.model_validate(environment).model_copy(update={kinds[type(single)]: (single,)})

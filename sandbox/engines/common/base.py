@@ -109,7 +109,7 @@ class BaseSimulation(ABC):
         return self.frame().state_hash()
 
     def close(self) -> None:
-        """End the simulation and release what it holds."""
+        """End the simulation and release its resources."""
         self._ended = True
 
     def _check_running(self) -> None:
@@ -120,6 +120,47 @@ class BaseSimulation(ABC):
     def _check_part(part: float) -> None:
         if not 0.0 < part < 1.0:
             raise ValueError(f"a last part of {part} steps; it must be greater than 0 and less than 1")
+
+
+class SteppedSimulation(BaseSimulation):
+    """Simulation whose shortened last step differs from the others only in its length."""
+
+    def step(self) -> None:
+        """Advance by one dt.
+
+        Raises:
+            Divergence: the state of a body is not finite, or exceeds the bounds. It can still be read.
+            Exhaustion: the step exceeds a resource limit.
+        """
+        with self._lock, np.errstate(all="ignore"):  # `_finish_step` reports a state that is not finite
+            self._check_running()
+            self._advance(1.0)
+            self._steps += 1
+            self._finish_step()
+
+    def finish(self, part: float) -> None:
+        """Advance by a last fraction of dt, 0 < part < 1. No step can follow.
+
+        Raises:
+            Divergence: as `step`.
+            Exhaustion: as `step`.
+            ValueError: `part` is out of range.
+        """
+        self._check_part(part)
+        with self._lock, np.errstate(all="ignore"):
+            self._check_running()
+            self._advance(part)
+            self._part = part
+            self._finish_step()
+            self._ended = True
+
+    @abstractmethod
+    def _advance(self, part: float) -> None:
+        """Advance the bodies by a fraction of dt, 0 < part <= 1."""
+
+    @abstractmethod
+    def _finish_step(self) -> None:
+        """Check that the state is finite and bounded, and remove expired bodies."""
 
 
 FARTHEST = 1e17
@@ -145,6 +186,6 @@ def slop_of(start: Scene | Setup) -> float:
     It follows from the thinnest body that can collide.
     """
     bodies = Setup.of(start).bodies
-    touching = np.asarray([e.collides != "none" for e in bodies.elements], dtype=bool)[bodies.element]
-    thinnest = float(bodies.thin[touching].min()) if touching.any() else 1.0
-    return min(SLOP_PER_RADIUS * thinnest, MAX_SLOP)
+    can_collide = np.asarray([e.collides != "none" for e in bodies.elements], dtype=bool)[bodies.element]
+    min_thickness = float(bodies.thin[can_collide].min()) if can_collide.any() else 1.0
+    return min(SLOP_PER_RADIUS * min_thickness, MAX_SLOP)

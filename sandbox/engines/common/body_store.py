@@ -80,14 +80,14 @@ class BodyStore:
         self.restitution: FloatArray = surfaces.restitution
         self.friction: FloatArray = surfaces.friction
         self.falloff: FloatArray = surfaces.falloff
-        kinds = np.asarray([COLLISION_MASKS[element.collides] for element in bodies.elements], dtype=np.int64)
-        self.collision_mask: IntArray = np.where(self.present, kinds[bodies.element], NOTHING)
+        masks = np.asarray([COLLISION_MASKS[element.collides] for element in bodies.elements], dtype=np.int64)
+        self.collision_mask: IntArray = np.where(self.present, masks[bodies.element], NOTHING)
         """(N,) `NOTHING`, `FIXED` (planes, walls, posts, fixed bodies) or `ALL`"""
-        moves = self.moving
-        self.inverse_mass: FloatArray = np.where(moves, 1.0 / bodies.mass, 0.0)
+        is_moving = self.moving
+        self.inverse_mass: FloatArray = np.where(is_moving, 1.0 / bodies.mass, 0.0)
         # A body that nothing can turn gets no inverse moment: its spin stays the same, bit for bit.
-        turns = moves & (matrix.turnable | self._has_torque)
-        self.inverse_moment: FloatArray = np.where(turns, 1.0 / bodies.moment, 0.0)
+        can_turn = is_moving & (matrix.turnable | self._has_torque)
+        self.inverse_moment: FloatArray = np.where(can_turn, 1.0 / bodies.moment, 0.0)
         self.mounts: dict[int, Mount] = {}
         """how drives hold the present bodies, by body index"""
         if self._all_mounts:
@@ -104,8 +104,8 @@ class BodyStore:
         """(N,) moves along its path whatever it collides with (kinematic)"""
         for n, mount in self.mounts.items():
             self.hinge[n], self.kinematic[n] = mount.hinge, not isinstance(mount.drive, TorqueDrive)
-            about = about_hinge(mount, float(bodies.mass[n]), float(bodies.moment[n]))
-            self.inverse_mass[n], self.inverse_moment[n] = 0.0, 0.0 if self.kinematic[n] else 1.0 / about
+            moment_about_hinge = about_hinge(mount, float(bodies.mass[n]), float(bodies.moment[n]))
+            self.inverse_mass[n], self.inverse_moment[n] = 0.0, 0.0 if self.kinematic[n] else 1.0 / moment_about_hinge
 
     @property
     def links(self) -> JointArrays:
@@ -242,8 +242,8 @@ class BodyStore:
 
     def beyond(self) -> int | None:
         """Return the index of a body that is not finite or out of bounds; None if there is none."""
-        worst = first_beyond(self.position, self.velocity, self.angle, self.angular_velocity)
-        return None if worst < 0 else worst
+        index = first_beyond(self.position, self.velocity, self.angle, self.angular_velocity)
+        return None if index < 0 else index
 
 
 @kernel
@@ -251,8 +251,8 @@ def first_beyond(position: FloatArray, velocity: FloatArray, angle: FloatArray, 
     """Return the index of the first of N bodies that is not finite or out of bounds; −1 if there is none."""
     for i in range(len(position)):
         # Comparisons with nan are false, so a nan anywhere makes `good` false.
-        good = position[i, 0] ** 2 + position[i, 1] ** 2 <= FARTHEST * FARTHEST
-        good = good and velocity[i, 0] ** 2 + velocity[i, 1] ** 2 <= FASTEST * FASTEST
-        if not (good and abs(spin[i]) < math.inf and abs(angle[i]) < math.inf):
+        is_valid = position[i, 0] ** 2 + position[i, 1] ** 2 <= FARTHEST * FARTHEST
+        is_valid = is_valid and velocity[i, 0] ** 2 + velocity[i, 1] ** 2 <= FASTEST * FASTEST
+        if not (is_valid and abs(spin[i]) < math.inf and abs(angle[i]) < math.inf):
             return i
     return -1

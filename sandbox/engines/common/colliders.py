@@ -1,9 +1,8 @@
 """Static colliders: the planes, walls and posts of a scene as arrays, for the hand-written engines.
 
-Where two segments of a wall join, their ends are no edges of the wall: a body that slides or rolls from one to the
-other must not collide with a corner there. So points in line with their neighbours are removed, and each segment knows
-how the wall continues at its ends (ghost vertices, as in Box2D's chain shapes). The ends of an open wall, and corners,
-are solid.
+Where two segments of a wall join, their ends are internal: a body that slides or rolls from one to the other must not
+collide with a corner there. So points in line with their neighbours are removed, and each segment stores the far ends
+of its neighbours (ghost vertices, as in Box2D's chain shapes). The ends of an open wall, and corners, are solid.
 """
 
 import math
@@ -21,7 +20,7 @@ IN_LINE = 4 * 2.0**-52
 line: two roundings of each coordinate."""
 
 LEAN = 1e-9
-"""Sine of the angle up to which a contact normal does not lean over a joint of a wall; below it is rounding."""
+"""Sine of the angle up to which a contact normal does not lean over a joint of a wall: smaller angles are rounding."""
 
 SIDEWAYS = 0.1
 """A normal whose angle to a segment's direction has a smaller sine does not show on which side of the segment a body
@@ -62,14 +61,14 @@ class WallSegment(NamedTuple):
 
 def wall_segments(wall: Wall) -> list[WallSegment]:
     """Return the straight parts of a wall in order. Points in line with their neighbours do not divide it."""
-    line = straightened(wall)
-    looped = line[0] == line[-1] and len(line) > 3
-    found = []
-    for k in range(len(line) - 1):
-        before = line[k - 1] if k > 0 else line[-2] if looped else None
-        after = line[k + 2] if k + 2 < len(line) else line[1] if looped else None
-        found.append(WallSegment(line[k], line[k + 1], before, after))
-    return found
+    points = straightened(wall)
+    is_closed = points[0] == points[-1] and len(points) > 3
+    segments = []
+    for k in range(len(points) - 1):
+        before = points[k - 1] if k > 0 else points[-2] if is_closed else None
+        after = points[k + 2] if k + 2 < len(points) else points[1] if is_closed else None
+        segments.append(WallSegment(points[k], points[k + 1], before, after))
+    return segments
 
 
 def straightened(wall: Wall) -> tuple[Point, ...]:
@@ -90,8 +89,8 @@ def _in_line(a: Point, b: Point, c: Point) -> bool:
     ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - b[0], c[1] - b[1]
     if ux * vx + uy * vy <= 0.0:
         return False
-    off = abs(ux * vy - uy * vx) / math.hypot(c[0] - a[0], c[1] - a[1])
-    return off <= IN_LINE * max(map(abs, (*a, *b, *c)))
+    distance = abs(ux * vy - uy * vx) / math.hypot(c[0] - a[0], c[1] - a[1])
+    return distance <= IN_LINE * max(map(abs, (*a, *b, *c)))
 
 
 def static_colliders(scene: Scene, everything: bool = False) -> StaticColliders:
@@ -113,12 +112,12 @@ def static_colliders(scene: Scene, everything: bool = False) -> StaticColliders:
         else:
             segments.append((k, *collider.position, *collider.position, collider.radius))
             joints.append((0.0, 0.0, 0.0, 0.0))
-    flat = np.asarray(planes, dtype=np.float64).reshape(-1, 5)
-    thin = np.asarray(segments, dtype=np.float64).reshape(-1, 6)
+    plane_rows = np.asarray(planes, dtype=np.float64).reshape(-1, 5)
+    segment_rows = np.asarray(segments, dtype=np.float64).reshape(-1, 6)
     return StaticColliders(
-        flat[:, 1:].copy(),
-        flat[:, 0].astype(np.int64),
-        thin[:, 1:].copy(),
-        thin[:, 0].astype(np.int64),
+        plane_rows[:, 1:].copy(),
+        plane_rows[:, 0].astype(np.int64),
+        segment_rows[:, 1:].copy(),
+        segment_rows[:, 0].astype(np.int64),
         np.asarray(joints, dtype=np.float64).reshape(-1, 4),
     )

@@ -69,11 +69,11 @@ class PairIndex:
         highest = max(int(first.max()), int(second.max()))
         if highest >= LARGEST_SQUARE:
             return False
-        old = len(self._table)
-        if highest >= old:
-            size = min(max(2 * old, highest + 1), LARGEST_SQUARE)
+        old_size = len(self._table)
+        if highest >= old_size:
+            size = min(max(2 * old_size, highest + 1), LARGEST_SQUARE)
             table = np.zeros((size, size), np.int32)
-            table[:old, :old] = self._table
+            table[:old_size, :old_size] = self._table
             self._table = table
         return True
 
@@ -93,9 +93,9 @@ class ContactBatch(NamedTuple):
     """(K,) contact point, m, midway in the overlap"""
 
 
-def join_batches(some: ContactBatch, more: ContactBatch) -> ContactBatch:
+def join_batches(first: ContactBatch, second: ContactBatch) -> ContactBatch:
     """Return the contacts of two batches as one."""
-    return ContactBatch(*(np.concatenate(both) for both in zip(some, more, strict=True)))
+    return ContactBatch(*(np.concatenate(arrays) for arrays in zip(first, second, strict=True)))
 
 
 NO_CONTACTS = ContactBatch(
@@ -130,66 +130,66 @@ class ContactLog:
         """Each present contact has a row of its own. While the same contacts last, `add_impulses` may be called. If two
         share a row, the order of summation affects the last digit, so they cannot be summed beside the rows."""
 
-    def record(self, time: float, now: ContactBatch) -> None:
+    def record(self, time: float, batch: ContactBatch) -> None:
         """Add the contacts at a time, s."""
         self._flush()
         self._order, self.steady = None, True
-        if self.can_repeat_pairs and len(now.a) > 1:
-            self._order = _order(now)
+        if self.can_repeat_pairs and len(batch.a) > 1:
+            self._order = _order(batch)
             k = self._order
-            now = ContactBatch(now.a[k], now.b[k], now.impulse[k], now.normal[k], now.point[k])
-        if not len(now.a) and not len(self._row):
+            batch = ContactBatch(batch.a[k], batch.b[k], batch.impulse[k], batch.normal[k], batch.point[k])
+        if not len(batch.a) and not len(self._row):
             return
-        swapped = (now.a < 0) | ((now.b >= 0) & (now.b < now.a))
-        first, second = np.where(swapped, now.b, now.a), np.where(swapped, now.a, now.b)
+        swapped = (batch.a < 0) | ((batch.b >= 0) & (batch.b < batch.a))
+        first, second = np.where(swapped, batch.b, batch.a), np.where(swapped, batch.a, batch.b)
         # Static colliders, −1 − k, become 0 … F − 1, and bodies follow them: small integers for the table.
         row, new = self._rows.find(first + self._collider_count, second + self._collider_count)
         sign = swapped * 2.0 - 1.0
-        given = now.impulse * sign  # impulse of the first on the second
+        signed_impulse = batch.impulse * sign  # impulse of the first on the second
         if len(new):
             # An engine may list contacts by memory address: unsorted, two runs would differ.
             new = new[np.argsort(self._rows.key[new], kind="stable")]
             leader, group = new, np.arange(len(new))
             if self.can_repeat_pairs:
-                _, at, group = np.unique(self._rows.key[new], return_index=True, return_inverse=True)
-                leader, group = new[at], group.reshape(-1)
+                _, first_index, group = np.unique(self._rows.key[new], return_index=True, return_inverse=True)
+                leader, group = new[first_index], group.reshape(-1)
             row[new] = self._count + group
             rows = self._new_rows(len(leader))
             self._time[rows] = time
             self._pair[rows, 0], self._pair[rows, 1] = first[leader], second[leader]
-            self._geometry[rows, 0], self._geometry[rows, 1] = now.point[leader], -sign[leader] * now.normal[leader]
+            self._geometry[rows, 0], self._geometry[rows, 1] = batch.point[leader], -sign[leader] * batch.normal[leader]
         self._rows.keep(row)
         self._row, self._sign = row, sign
         self.steady = not self.can_repeat_pairs or len(row) < 2 or len(np.unique(row)) == len(row)
-        self._enter(given)
+        self._enter(signed_impulse)
 
     def add_impulses(self, impulse: ComplexArray) -> None:
         """Add impulses (K,), N·s, of the same contacts as in the last `record`, in the same order."""
         if not len(impulse):
             return
-        given = (impulse if self._order is None else impulse[self._order]) * self._sign
+        signed_impulse = (impulse if self._order is None else impulse[self._order]) * self._sign
         if not self.steady:
             self._flush()
-            self._enter(given)
+            self._enter(signed_impulse)
         elif self._unflushed is None:  # from now on summed beside the rows, so that the rows are looked up only once
-            self._unflushed = self._impulse[self._row] + given
+            self._unflushed = self._impulse[self._row] + signed_impulse
         else:
-            self._unflushed += given
+            self._unflushed += signed_impulse
 
     def _flush(self) -> None:
         """Write impulses summed beside the rows into the rows."""
         if self._unflushed is not None:
             self._impulse[self._row], self._unflushed = self._unflushed, None
 
-    def _enter(self, given: ComplexArray) -> None:
+    def _enter(self, impulse: ComplexArray) -> None:
         if self.can_repeat_pairs and not self.steady:
-            np.add.at(self._impulse, self._row, given)
+            np.add.at(self._impulse, self._row, impulse)
         else:
-            self._impulse[self._row] += given
+            self._impulse[self._row] += impulse
 
-    def _new_rows(self, more: int) -> slice:
+    def _new_rows(self, count: int) -> slice:
         """Return a number of new rows with impulse 0."""
-        end = self._count + more
+        end = self._count + count
         if end > self._max_rows:
             raise Exhaustion(too_many_contacts(end))
         if end > len(self._time):
@@ -213,12 +213,12 @@ class ContactLog:
             return Contacts.none()
         vectors = (self._geometry[:n, 0], self._geometry[:n, 1], self._impulse[:n])
         taken = Contacts(self._time[:n].copy(), self._pair[:n].copy(), *(_to_rows(vector) for vector in vectors))
-        lasting = self._row if len(self._row) < 2 else np.unique(self._row)
-        self._row = np.searchsorted(lasting, self._row)
+        open_rows = self._row if len(self._row) < 2 else np.unique(self._row)
+        self._row = np.searchsorted(open_rows, self._row)
         self._rows.keep(self._row)
-        self._count = count = len(lasting)
-        self._time[:count], self._pair[:count] = taken.time[lasting], taken.pair[lasting]
-        self._geometry[:count] = self._geometry[lasting]
+        self._count = count = len(open_rows)
+        self._time[:count], self._pair[:count] = taken.time[open_rows], taken.pair[open_rows]
+        self._geometry[:count] = self._geometry[open_rows]
         self._impulse[:count] = 0.0
         return taken
 
@@ -228,9 +228,9 @@ def too_many_contacts(rows: int) -> str:
     return f"a run with {rows:,} contacts is too long to record; {CONTACTS.remedy(2 * rows)}"
 
 
-def _order(now: ContactBatch) -> IntArray:
+def _order(batch: ContactBatch) -> IntArray:
     """Return the order of contacts by pair, then by point. It decides which contact opens a row, deterministically."""
-    return np.lexsort((now.point.imag, now.point.real, now.b, now.a))
+    return np.lexsort((batch.point.imag, batch.point.real, batch.b, batch.a))
 
 
 def _to_rows(vector: ComplexArray) -> FloatArray:

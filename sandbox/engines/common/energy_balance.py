@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,9 +15,6 @@ from sandbox.scene.compile.potential import Potential
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.trajectory import Frame
-
-if TYPE_CHECKING:
-    from sandbox.engines.contract import Simulation
 
 
 def energy_of(
@@ -34,21 +30,21 @@ def energy_of(
         frame: the state.
         bodies: at least those of the frame, with the same indices.
         gravity: m/s².
-        start: adds the energy of the springs and attractions of this scene or setup; None: none.
+        start: scene or setup whose springs and attractions are included; None: none are.
         breaks: (J,) s, time at which each joint of the scene broke; inf if it did not. None: no joint broke.
     """
     count = len(frame.position)
-    counts = frame.present & ~bodies.fixed[:count]
-    mass, moment = bodies.mass[:count][counts], bodies.moment[:count][counts]
+    included = frame.present & ~bodies.fixed[:count]
+    mass, moment = bodies.mass[:count][included], bodies.moment[:count][included]
     with np.errstate(over="ignore", invalid="ignore"):  # a diverged state squares to infinity
-        squared = np.einsum("nk,nk->n", frame.velocity[counts], frame.velocity[counts])
-        kinetic = 0.5 * float(mass @ squared + moment @ np.square(frame.angular_velocity[counts]))
+        speed_squared = np.einsum("nk,nk->n", frame.velocity[included], frame.velocity[included])
+        kinetic = 0.5 * float(mass @ speed_squared + moment @ np.square(frame.angular_velocity[included]))
         if frame.roll is not None:
-            kinetic += 0.5 * float(moment @ np.square(frame.roll[counts]).sum(axis=1))
-        potential = -float(mass @ (frame.position[counts] @ np.asarray(gravity)))
+            kinetic += 0.5 * float(moment @ np.square(frame.roll[included]).sum(axis=1))
+        potential = -float(mass @ (frame.position[included] @ np.asarray(gravity)))
         if start is not None:
-            known = bodies if count == len(bodies) else bodies.some(np.arange(count))
-            stored = Potential(start, known, breaks=breaks)
+            frame_bodies = bodies if count == len(bodies) else bodies.some(np.arange(count))
+            stored = Potential(start, frame_bodies, breaks=breaks)
             if stored:
                 state = frame.position[None], frame.angle[None], frame.present[None]
                 potential += float(stored.at(np.asarray([frame.time]), *state)[0])
@@ -88,8 +84,8 @@ class LedgerHandover:
         """Return the energy change by each cause since the first call, J, including the present simulation's ledger."""
         if self._past is None:
             self._past = EnergyLedger()
-        own = present.account()
-        return {cause: energy + own[cause] for cause, energy in self._past.entries().items()}
+        present_entries = present.account()
+        return {cause: energy + present_entries[cause] for cause, energy in self._past.entries().items()}
 
     @contextmanager
     def replacing(self, session: Simulation, successor: Simulation) -> Iterator[None]:

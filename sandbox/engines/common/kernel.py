@@ -64,8 +64,8 @@ def _compiled(function: Callable[P, R], options: dict[str, bool]) -> Callable[P,
     try:
         compiled: Any = numba.njit(error_model="numpy")(function)
         if folder is not None:
-            kept: Any = _KernelCache
-            compiled._cache = kept(function)  # as `cache=True` does, with numba's class
+            cache_class: Any = _KernelCache
+            compiled._cache = cache_class(function)  # as `cache=True` does, with numba's class
     finally:
         config.CACHE_DIR = numba_folder
     compiled.targetoptions.update(options)  # takes effect, because compiling waits for the first call
@@ -78,26 +78,26 @@ def cache_folder() -> Path | None:
 
     Folders of earlier states of the sources are deleted after an hour: until then another process may use them.
     """
-    here = Path(__file__).resolve().parents[1]  # the engines
+    engines = Path(__file__).resolve().parents[1]
     # Installations may share the user's folder, and Python versions the sources: each has its own folders.
-    installation = blake2b(f"{here} {sys.version} {numba.__version__}".encode(), digest_size=4).hexdigest()
+    installation = blake2b(f"{engines} {sys.version} {numba.__version__}".encode(), digest_size=4).hexdigest()
     stamp = blake2b(digest_size=8)
-    shared = here.parent / "scene" / "geometry"  # kernels compile functions of it
-    for file in sorted((*_sources(here), *_sources(shared))):
+    geometry = engines.parent / "scene" / "geometry"  # kernels compile functions of it
+    for file in sorted((*_sources(engines), *_sources(geometry))):
         status = file.stat()
         stamp.update(f"{file.name} {status.st_mtime_ns} {status.st_size}".encode())
     user = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    for home in (here / "__pycache__", user / "sandbox2d"):
-        folder = home / f"kernels-{installation}-{stamp.hexdigest()}"
+    for parent in (engines / "__pycache__", user / "sandbox2d"):
+        folder = parent / f"kernels-{installation}-{stamp.hexdigest()}"
         try:
             folder.mkdir(parents=True, exist_ok=True)
             if not os.access(folder, os.W_OK):
                 continue
         except OSError:
             continue
-        for old in home.glob(f"kernels-{installation}-*"):
-            if old != folder and _is_unused(old):
-                shutil.rmtree(old, ignore_errors=True)  # another process may be removing it too
+        for other in parent.glob(f"kernels-{installation}-*"):
+            if other != folder and _is_unused(other):
+                shutil.rmtree(other, ignore_errors=True)  # another process may be removing it too
         return folder
     return None
 

@@ -23,7 +23,7 @@ NO_BODIES: IntArray = np.empty(0, np.int64)
 
 
 class Lifetimes:
-    """Ends of lifetimes in ascending order. A frame at which no lifetime ends costs one comparison.
+    """Queue of lifetimes by their ends. A frame at which no lifetime ends costs one comparison.
 
     Args:
         bodies: bodies of a running scene; bodies added later have no lifetime.
@@ -33,8 +33,8 @@ class Lifetimes:
 
     def __init__(self, bodies: Bodies, began: float, dt: float) -> None:
         end = bodies.born + bodies.lifetime - began
-        mortal = np.flatnonzero(np.isfinite(end))
-        self._indices: IntArray = mortal[np.argsort(end[mortal], kind="stable")]
+        limited = np.flatnonzero(np.isfinite(end))
+        self._indices: IntArray = limited[np.argsort(end[limited], kind="stable")]
         self._ends = end[self._indices]
         self._slack = SLACK * dt
         self._ended = 0
@@ -43,9 +43,7 @@ class Lifetimes:
     def due(self, time: float) -> IntArray:
         """Return the indices, ascending, of the bodies whose lifetime has ended by a time of the run, s.
 
-        Each is returned once.
-
-        Some may have been removed already for another reason.
+        Each is returned once. Some may have been removed already for another reason.
         """
         latest = time + self._slack
         if latest < self._next:
@@ -74,9 +72,9 @@ class Lifetimes:
         due = self.due(time)
         if bounds is None:
             return due[present[due]] if len(due) else due
-        out: BoolArray = np.asarray(((position < bounds[0]) | (position > bounds[1])).any(axis=1))
-        out[due] = True
-        return np.flatnonzero(out & present & ~fixed)
+        is_expired: BoolArray = np.asarray(((position < bounds[0]) | (position > bounds[1])).any(axis=1))
+        is_expired[due] = True
+        return np.flatnonzero(is_expired & present & ~fixed)
 
     def _first_end(self) -> float:
         return float(self._ends[self._ended]) if self._ended < len(self._ends) else math.inf

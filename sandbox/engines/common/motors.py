@@ -1,12 +1,12 @@
 """Motion of driven bodies: hinges with torque and stops, hinges at a constant rate, and plungers.
 
 `HingeDrive` turns a body by a torque, without contacts. The law is that of Visual Pinball's flippers: the current of
-the coil ramps towards a wanted torque at `torque / ramp` per second. Within `hold_within` of the end the wanted torque
+the coil ramps towards a target torque at `torque / ramp` per second. Within `hold_within` of the end the target torque
 is that of the weaker hold coil: it is multiplied by b + hold_ratio·(1 − b), b = (d / hold_within)⁴, d the angle left,
 on the way up and on the way back (`FlipperMoverObject::UpdateVelocities`, src/physics/hitflipper.cpp).
 
 In a substep the torque ramps, and the body moves between its stops under the mean of that torque; the times at which it
-reaches a stop are exact. Where the wanted torque depends on the angle, the substep is divided into pieces that each
+reaches a stop are exact. Where the target torque depends on the angle, the substep is divided into pieces that each
 cross a part of that range.
 
 `advance_between_stops` moves a body of one degree of freedom between two stops under a constant acceleration. Its path
@@ -24,7 +24,7 @@ MAX_BOUNCES = 16
 
 
 def advance_between_stops(
-    position: float, speed: float, h: float, rate: float, end: float, bounce: float
+    position: float, speed: float, h: float, acceleration: float, end: float, bounce: float
 ) -> tuple[float, float, int]:
     """Return the position and speed after h, s, and the stop that the body is pressed against: −1, 1, or 0 for none.
 
@@ -32,54 +32,54 @@ def advance_between_stops(
         position: position from the first stop, 0 to `end`.
         speed: per second.
         h: duration, s.
-        rate: acceleration.
+        acceleration: constant, per second².
         end: position of the last stop.
         bounce: restitution of a stop. A bounce that would return within half of h is suppressed.
     """
-    position, left = min(max(position, 0.0), end), h
+    position, remaining = min(max(position, 0.0), end), h
     for _ in range(MAX_BOUNCES):
-        time, border = _first_border(position, speed, rate, end)
-        if time >= left:
+        time, limit = _first_limit(position, speed, acceleration, end)
+        if time >= remaining:
             break
-        position, speed, left = border, speed + rate * time, left - time
-        stop = 1 if border == end else -1
+        position, speed, remaining = limit, speed + acceleration * time, remaining - time
+        stop = 1 if limit == end else -1
         if stop * speed < 0.0:
             continue
         speed *= -bounce
-        if stop * rate < 0.0:
+        if stop * acceleration < 0.0:
             continue
-        if 4.0 * abs(speed) <= stop * rate * h:
-            return border, 0.0, stop
+        if 4.0 * abs(speed) <= stop * acceleration * h:
+            return limit, 0.0, stop
     else:
         return position, speed, 0
-    position += left * (speed + 0.5 * rate * left)
-    return min(max(position, 0.0), end), speed + rate * left, 0
+    position += remaining * (speed + 0.5 * acceleration * remaining)
+    return min(max(position, 0.0), end), speed + acceleration * remaining, 0
 
 
-def _first_border(position: float, speed: float, rate: float, end: float) -> tuple[float, float]:
-    """Return the time, s, at which a parabola first leaves the range from 0 to `end`, inf if never, and the border."""
-    up, down = _time_to_reach(end - position, speed, rate), _time_to_reach(position, -speed, -rate)
+def _first_limit(position: float, speed: float, acceleration: float, end: float) -> tuple[float, float]:
+    """Return the time, s, at which a parabola first leaves the range from 0 to `end`, inf if never, and that limit."""
+    up, down = _time_to_reach(end - position, speed, acceleration), _time_to_reach(position, -speed, -acceleration)
     return (up, end) if up <= down else (down, 0.0)
 
 
-def _time_to_reach(distance: float, speed: float, rate: float) -> float:
+def _time_to_reach(distance: float, speed: float, acceleration: float) -> float:
     """Return the first time, s, at which a displacement of 0 or more is reached and still grows; inf if never."""
-    square = speed * speed + 2.0 * rate * distance
+    square = speed * speed + 2.0 * acceleration * distance
     if square < 0.0:
         return math.inf
     root = math.sqrt(square)
     if speed >= 0.0:
         if speed + root > 0.0:
             return 2.0 * distance / (speed + root)
-        return 0.0 if rate > 0.0 else math.inf  # at rest exactly on the border
-    return (root - speed) / rate if rate > 0.0 else math.inf
+        return 0.0 if acceleration > 0.0 else math.inf  # at rest exactly at the limit
+    return (root - speed) / acceleration if acceleration > 0.0 else math.inf
 
 
 PIECES_OF_RANGE = 8
 """Pieces in which a body crosses the range of the hold coil; the error of the speed at the stop is then below 0.1 %."""
 
 MAX_PIECES = 32
-"""of one substep; a range so small that it would need more has no effect on the speed"""
+"""Largest number of pieces of a substep. A range so small that it would need more has no effect on the speed."""
 
 
 class HingeState(NamedTuple):
@@ -96,7 +96,7 @@ class HingeState(NamedTuple):
     torque: float
     """N·m, of the drive at the end of the substep, positive in its direction"""
     steady: bool
-    """whether the torque was the wanted one throughout the substep"""
+    """whether the torque was at its target throughout the substep"""
 
 
 class HingeDrive:
@@ -109,7 +109,7 @@ class HingeDrive:
         self.sense = math.copysign(1.0, end - self.rest)
         """1 if the drive turns the body counterclockwise, else −1"""
         self._end = abs(end - self.rest)
-        self._edge = self._end - drive.hold_within if drive.hold_ratio < 1.0 else self._end
+        self._hold_begin = self._end - drive.hold_within if drive.hold_ratio < 1.0 else self._end
 
     def turn(
         self, angle: float, spin: float, torque: float, level: float, weight_torque: float, h: float
@@ -120,55 +120,62 @@ class HingeDrive:
             angle: rad.
             spin: rad/s.
             torque: of the drive, N·m, positive in its direction.
-            level: wanted level.
+            level: of the drive.
             weight_torque: torque of the body's weight about the hinge, N·m.
             h: substep, s.
         """
         sense, end = self.sense, self._end
-        position, speed, own = sense * (angle - self.rest), sense * spin, sense * weight_torque
-        count = self._pieces(position, speed, own, h)
+        position, speed, signed_weight_torque = sense * (angle - self.rest), sense * spin, sense * weight_torque
+        count = self._pieces(position, speed, signed_weight_torque, h)
         piece, steady = h / count, True
         for _ in range(count):
             if not self.drive.ramp:
-                torque = self._wanted(level, position)
-            ahead = position + piece * (speed + 0.5 * piece * (torque + own) / self.moment)
-            wanted = self._wanted(level, min(max(ahead, 0.0), end))
-            steady = steady and torque == wanted
-            torque, mean = self._ramp(torque, wanted, piece)
+                torque = self._target_torque(level, position)
+            predicted = position + piece * (speed + 0.5 * piece * (torque + signed_weight_torque) / self.moment)
+            target = self._target_torque(level, min(max(predicted, 0.0), end))
+            steady = steady and torque == target
+            torque, mean_torque = self._ramp(torque, target, piece)
             position, speed, stop = advance_between_stops(
-                position, speed, piece, (mean + own) / self.moment, end, self.drive.bounce
+                position, speed, piece, (mean_torque + signed_weight_torque) / self.moment, end, self.drive.bounce
             )
-        new = self.drive.stops[1] if stop > 0 else self.rest + sense * position  # the stop's exact angle
-        return HingeState(new, sense * speed, stop, sense * (mean + own) if stop else 0.0, torque, steady)
+        new_angle = self.drive.stops[1] if stop > 0 else self.rest + sense * position  # the stop's exact angle
+        return HingeState(
+            new_angle,
+            sense * speed,
+            stop,
+            sense * (mean_torque + signed_weight_torque) if stop else 0.0,
+            torque,
+            steady,
+        )
 
-    def _pieces(self, position: float, speed: float, own: float, h: float) -> int:
+    def _pieces(self, position: float, speed: float, weight_torque: float, h: float) -> int:
         """Return the number of pieces that a substep is divided into."""
-        max_displacement = h * (abs(speed) + 0.5 * h * (self.drive.torque + abs(own)) / self.moment)
-        if self._edge == self._end or position + max_displacement <= self._edge:
+        max_displacement = h * (abs(speed) + 0.5 * h * (self.drive.torque + abs(weight_torque)) / self.moment)
+        if self._hold_begin == self._end or position + max_displacement <= self._hold_begin:
             return 1
         pieces = PIECES_OF_RANGE * max_displacement / self.drive.hold_within
         return max(math.ceil(pieces), 1) if pieces < MAX_PIECES else MAX_PIECES  # also for nan, after divergence
 
-    def _wanted(self, level: float, position: float) -> float:
-        """Return the torque that a level asks for at an angle from the rest, rad; N·m, positive in its direction."""
+    def _target_torque(self, level: float, position: float) -> float:
+        """Return the target torque of a level at an angle from the rest, rad; N·m, positive in its direction."""
         drive = self.drive
-        wanted = level * drive.torque if level > 0.0 else -drive.return_ratio * drive.torque
-        if position > self._edge:
+        target = level * drive.torque if level > 0.0 else -drive.return_ratio * drive.torque
+        if position > self._hold_begin:
             fade = ((self._end - position) / drive.hold_within) ** 4
-            wanted *= fade + drive.hold_ratio * (1.0 - fade)
-        return wanted
+            target *= fade + drive.hold_ratio * (1.0 - fade)
+        return target
 
-    def _ramp(self, torque: float, wanted: float, h: float) -> tuple[float, float]:
-        """Return the torque after ramping towards the wanted one for h, s, and its mean over h, N·m."""
-        gap = wanted - torque
-        if gap == 0.0 or not self.drive.ramp:
-            return wanted, 0.5 * (torque + wanted)
-        step = self.drive.torque * h / self.drive.ramp
-        if abs(gap) > step:
-            new = torque + math.copysign(step, gap)
-            return new, 0.5 * (torque + new)
-        fraction = abs(gap) / step  # fraction of h in which the torque still changes
-        return wanted, wanted - 0.5 * gap * fraction
+    def _ramp(self, torque: float, target: float, h: float) -> tuple[float, float]:
+        """Return the torque after ramping towards a target for h, s, and its mean over h, N·m."""
+        difference = target - torque
+        if difference == 0.0 or not self.drive.ramp:
+            return target, 0.5 * (torque + target)
+        max_change = self.drive.torque * h / self.drive.ramp
+        if abs(difference) > max_change:
+            new_torque = torque + math.copysign(max_change, difference)
+            return new_torque, 0.5 * (torque + new_torque)
+        fraction = abs(difference) / max_change  # fraction of h in which the torque still changes
+        return target, target - 0.5 * difference * fraction
 
 
 def hinge_to_centre(hinge: Point, angle: float) -> Point:
@@ -216,35 +223,35 @@ class PlungerState(NamedTuple):
     """whether it stands still from the end of the substep on"""
 
 
-def rate_after_level_change(before: float, level: float, rate: float) -> float:
+def rate_after_level_change(old_level: float, level: float, rate: float) -> float:
     """Return the rate, m/s, of a plunger after a change of its level. A released plunger starts at rest."""
-    return 0.0 if not level > 0.0 and before > 0.0 else rate
+    return 0.0 if not level > 0.0 and old_level > 0.0 else rate
 
 
 def advance_plunger(drive: PlungerDrive, level: float, pull: float, rate: float, h: float) -> PlungerState:
     """Advance a plunger from a pull, m, and its rate, m/s, by h, s: drawn by hand, or moved forward by its spring."""
-    wanted = level * drive.travel
-    if pull == wanted:  # a spring reaches this only if it was stopped there
+    target = level * drive.travel
+    if pull == target:  # a spring reaches this only if it was stopped there
         return PlungerState(pull, 0.0, False)
-    return _draw_back(drive, wanted, pull, h) if wanted > 0.0 else _spring_forward(drive, pull, rate, h)
+    return _draw_back(drive, target, pull, h) if target > 0.0 else _spring_forward(drive, pull, rate, h)
 
 
-def _draw_back(drive: PlungerDrive, wanted: float, pull: float, h: float) -> PlungerState:
-    """Move towards the wanted pull, m, at the speed of the hand."""
+def _draw_back(drive: PlungerDrive, target: float, pull: float, h: float) -> PlungerState:
+    """Move towards the target pull, m, at the speed of the hand."""
     rate = drive.travel / drive.draw_time
-    arrives = abs(wanted - pull) <= rate * h
-    rate = math.copysign(rate, wanted - pull)
-    return PlungerState(wanted if arrives else pull + rate * h, rate, arrives)
+    arrives = abs(target - pull) <= rate * h
+    rate = math.copysign(rate, target - pull)
+    return PlungerState(target if arrives else pull + rate * h, rate, arrives)
 
 
 def _spring_forward(drive: PlungerDrive, pull: float, rate: float, h: float) -> PlungerState:
     """Move forward by the spring for a substep, or up to the stop, with the speed at that moment."""
     omega = drive.speed / drive.travel
     cos, sin = math.cos(omega * h), math.sin(omega * h)
-    new_pull, pace = pull * cos + rate / omega * sin, rate * cos - pull * omega * sin
+    new_pull, new_rate = pull * cos + rate / omega * sin, rate * cos - pull * omega * sin
     if new_pull <= 0.0:
         return PlungerState(0.0, -math.hypot(pull * omega, rate), True)
-    return PlungerState(new_pull, pace, False)
+    return PlungerState(new_pull, new_rate, False)
 
 
 def stroke_direction(drive: PlungerDrive) -> Point:
@@ -280,12 +287,12 @@ class RateHingeState(NamedTuple):
 
 def turn_at_rate(drive: StrokeDrive, level: float, angle: float, h: float) -> RateHingeState:
     """Turn a body on a constant-rate hinge from an angle, rad, for h, s."""
-    pressed = level > 0.0
-    stop = drive.stops[pressed]
-    left = stop - angle
-    rate = drive.rate if pressed or drive.return_rate is None else drive.return_rate
-    arrives = abs(left) <= rate * h
-    if not left or not rate:
+    is_on = level > 0.0
+    stop = drive.stops[is_on]
+    remaining = stop - angle
+    rate = drive.rate if is_on or drive.return_rate is None else drive.return_rate
+    arrives = abs(remaining) <= rate * h
+    if not remaining or not rate:
         return RateHingeState(angle, 0.0, arrives)
-    spin = math.copysign(rate, left)
+    spin = math.copysign(rate, remaining)
     return RateHingeState(stop if arrives else angle + spin * h, spin, arrives)

@@ -53,8 +53,8 @@ def kick_gain(restitution: float, falloff: float, kick: float, to_approach: bool
     """
     if not to_approach or kick == 0.0:
         return kick
-    driven = closing + kick
-    return restitution / (1.0 + falloff * driven) * driven - restitution / (1.0 + falloff * closing) * closing
+    increased = closing + kick
+    return restitution / (1.0 + falloff * increased) * increased - restitution / (1.0 + falloff * closing) * closing
 
 
 compiled_rebound, compiled_kicked, compiled_kick_gain = kernel(rebound), kernel(kicked), kernel(kick_gain)
@@ -64,12 +64,12 @@ compiled_rebound, compiled_kicked, compiled_kick_gain = kernel(rebound), kernel(
 def segment_fractions(points: Sequence[Point]) -> list[tuple[float, float]]:
     """Return the fractions of a polyline's length at which each segment begins and ends."""
     lengths = [math.dist(a, b) for a, b in pairwise(points)]
-    whole, begin = math.fsum(lengths), 0.0
-    found = []
+    total, begin = math.fsum(lengths), 0.0
+    fractions = []
     for length in lengths:
-        found.append((begin / whole, (begin + length) / whole))
+        fractions.append((begin / total, (begin + length) / total))
         begin += length
-    return found
+    return fractions
 
 
 def fraction_at(a: Point, b: Point, fractions: tuple[float, float], point: Point) -> float:
@@ -81,5 +81,5 @@ def fraction_at(a: Point, b: Point, fractions: tuple[float, float], point: Point
         fractions: fractions at which the segment begins and ends, as from `segment_fractions`.
         point: m.
     """
-    along = nearest_fraction(a[0], a[1], b[0], b[1], point[0], point[1])
-    return fractions[0] + (fractions[1] - fractions[0]) * along
+    fraction = nearest_fraction(a[0], a[1], b[0], b[1], point[0], point[1])
+    return fractions[0] + (fractions[1] - fractions[0]) * fraction

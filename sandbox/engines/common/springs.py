@@ -33,11 +33,11 @@ def anchors_in_world(
         angle: (N,) rad.
     """
     arm, point = np.zeros_like(anchor), position[index]
-    rotated, world = anchor.any(axis=1) & (index >= 0), index < 0
-    if rotated.any():  # most anchors are at the centre
-        at = index[rotated]
-        x, y = anchor[rotated].T
-        arm[rotated] = np.column_stack(rotate(x, y, np.cos(angle[at]), np.sin(angle[at])))
-        point[rotated] += arm[rotated]
-    point[world] = anchor[world]
+    has_arm, is_world = anchor.any(axis=1) & (index >= 0), index < 0
+    if has_arm.any():  # most anchors are at the centre
+        body = index[has_arm]
+        x, y = anchor[has_arm].T
+        arm[has_arm] = np.column_stack(rotate(x, y, np.cos(angle[body]), np.sin(angle[body])))
+        point[has_arm] += arm[has_arm]
+    point[is_world] = anchor[is_world]
     return arm, point

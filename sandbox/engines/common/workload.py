@@ -18,22 +18,22 @@ def overload(start: Scene | Setup, settings: Settings) -> list[str]:
     """Return why a step would take too long: because of its iterations, or of its attractions."""
     setup = Setup.of(start)
     scene, bodies = setup.scene, setup.bodies
-    touching = np.asarray([element.collides != "none" for element in bodies.elements], np.bool_)[bodies.element]
-    moving = touching & ~bodies.fixed
-    moving_count = int(moving.sum())
+    can_collide = np.asarray([element.collides != "none" for element in bodies.elements], np.bool_)[bodies.element]
+    is_moving = can_collide & ~bodies.fixed
+    moving_count = int(is_moving.sum())
     iterations = (settings.iterations + DETECTION_COST) * settings.substeps
     max_overlaps = MAX_OVERLAPS + MAX_OVERLAPS_EACH * moving_count  # validation refuses a scene that starts with more
     overlaps = 0
     if max_overlaps * iterations > STEP_WORK.value:  # rare; other scenes need no search for overlaps
-        overlaps = count_overlaps(bodies.position[moving], bodies.core[moving], max_overlaps)
+        overlaps = count_overlaps(bodies.position[is_moving], bodies.core[is_moving], max_overlaps)
     rows = max(CONTACTS_PER_BODY * moving_count, overlaps) + len(setup.links)
-    solved = STEP_WORK.refusal(
+    solver_refusal = STEP_WORK.refusal(
         f"a step of up to {rows:,} contacts and joints × ({settings.iterations:,} iterations + {DETECTION_COST} for "
         f"detection) × {settings.substeps:,} substeps takes work of",
         rows * iterations,
     )
-    pulls = PAIRS.refusal(
+    attraction_refusal = PAIRS.refusal(
         f"{len(scene.attractions):,} attractions of {len(bodies):,} bodies need this many pairs per step:",
         len(scene.attractions) * len(bodies) * settings.substeps,
     )
-    return [reason for reason in (solved, pulls) if reason is not None]
+    return [reason for reason in (solver_refusal, attraction_refusal) if reason is not None]

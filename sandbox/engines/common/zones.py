@@ -56,9 +56,11 @@ class ZoneTracker:
     def __init__(self, scene: Scene, host: ZoneHost) -> None:
         self._zones, self._host = scene.zones, host
         self._masks = [mask_of(zone.layers, scene.layers) for zone in scene.zones]
-        self._to = [None if zone.to_layer is None else scene.layers.index(zone.to_layer) for zone in scene.zones]
-        self._first = len(scene.fixed) + len(scene.pockets)
-        self._rows: list[tuple[int, int, complex, complex]] = []
+        self._target_layers = [
+            None if zone.to_layer is None else scene.layers.index(zone.to_layer) for zone in scene.zones
+        ]
+        self._collider_count = len(scene.fixed) + len(scene.pockets)
+        self._entries: list[tuple[int, int, complex, complex]] = []
 
     def rebuild_arrays(
         self, position: FloatArray, velocity: FloatArray, spin: FloatArray, layer: IntArray, visits: IntArray
@@ -100,20 +102,20 @@ class ZoneTracker:
 
     def release_body(self, index: int) -> None:
         """Release a body if it is held."""
-        where = self.visits[index] == HELD
-        if where.any():
-            self.visits[index, where] = RELEASED
+        is_held = self.visits[index] == HELD
+        if is_held.any():
+            self.visits[index, is_held] = RELEASED
             self._host.release(index)
 
     def forget(self, indices: IntArray) -> None:
-        """Forget the zones of bodies that have left the scene."""
+        """Reset the zone states of bodies that have left the scene."""
         self.visits[indices] = AWAY
 
     def apply_effects(self, ahead: FloatArray) -> None:
         """Apply the effects of zones that bodies entered during the last substep.
 
         Args:
-            ahead: (2,) m/s by which the velocities are ahead of time (half a kick).
+            ahead: (2,) m/s, by which the stored velocities are ahead of time (half a kick).
         """
         host = self._host
         pending, host.pending = sorted(host.pending), set()
@@ -130,24 +132,24 @@ class ZoneTracker:
     def _enter(self, index: int, inside: list[int], ahead: FloatArray) -> None:
         """Apply the zones that a body is inside of. Each acts once, until the body has left it."""
         self._leave(index, inside)
-        waiting = [zone for zone in inside if self.visits[index, zone] == AWAY]
-        while (zone := next((z for z in waiting if self._masks[z] >> self.layer[index] & 1), None)) is not None:
-            waiting.remove(zone)
+        candidates = [zone for zone in inside if self.visits[index, zone] == AWAY]
+        while (zone := next((z for z in candidates if self._masks[z] >> self.layer[index] & 1), None)) is not None:
+            candidates.remove(zone)
             self.visits[index, zone] = INSIDE
             self._record(index, zone, self._velocity[index] - ahead)
-            to = self._to[zone]
-            if to is not None and to != self.layer[index]:
-                self.layer[index] = to
+            layer = self._target_layers[zone]
+            if layer is not None and layer != self.layer[index]:
+                self.layer[index] = layer
                 self._host.set_layer(index)
             if self._zones[zone].holds and self._can_hold(index, zone):
                 self._hold(index, zone)
                 return
 
     def _record(self, index: int, zone: int, velocity: FloatArray) -> None:
-        motion, position = complex(*velocity), complex(*self._position[index])
-        size = abs(motion)
-        direction = motion / size if 0.0 < size < math.inf else 1j
-        self._rows.append((index, -1 - self._first - zone, direction, position))
+        velocity_vector, position = complex(*velocity), complex(*self._position[index])
+        speed = abs(velocity_vector)
+        direction = velocity_vector / speed if 0.0 < speed < math.inf else 1j
+        self._entries.append((index, -1 - self._collider_count - zone, direction, position))
 
     def _can_hold(self, index: int, zone: int) -> bool:
         """Return whether a zone can hold a body: one body at a time, and none that is attached to a joint."""
@@ -173,14 +175,14 @@ class ZoneTracker:
                 gravity = self._zones[zone].gravity
         self._host.set_gravity(index, gravity)
 
-    def drain_entries(self, again: bool = False) -> ContactBatch | None:
-        """Return the zone entries since the last call as contacts, or None; `again` makes the next call repeat them."""
-        if not self._rows:
+    def drain_entries(self, repeat: bool = False) -> ContactBatch | None:
+        """Return the zone entries since the last call as contacts, or None; `repeat` keeps them for the next call."""
+        if not self._entries:
             return None
-        indices, zones, direction, position = zip(*self._rows, strict=True)
-        if not again:
-            self._rows = []
-        nothing = np.zeros(len(indices), np.complex128)
+        indices, zones, direction, position = zip(*self._entries, strict=True)
+        if not repeat:
+            self._entries = []
+        no_impulse = np.zeros(len(indices), np.complex128)
         return ContactBatch(
-            np.asarray(indices), np.asarray(zones), nothing, np.asarray(direction), np.asarray(position)
+            np.asarray(indices), np.asarray(zones), no_impulse, np.asarray(direction), np.asarray(position)
         )

@@ -1,1 +1,1 @@
-"""exact: event-driven, hand-written. Closed-form motion between events, roots for the next event."""
+"""exact: the event-driven engine. Motion between events is in closed form; next events are roots of polynomials."""

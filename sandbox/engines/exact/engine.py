@@ -1,4 +1,4 @@
-"""ExactEngine: what the event-driven engine supports, and its start. Imports no kernels until a scene is started."""
+"""ExactEngine: the demands that the event-driven engine supports, and its start. Only `start` imports kernels."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -29,11 +29,11 @@ class ExactEngine:
     capabilities: frozenset[Demand] = CAPABILITIES
 
     def missing(self, start: Scene | Setup, settings: Settings) -> tuple[str, ...]:
-        """Return what scene and settings require and this engine does not support."""
+        """Return each demand and setting that this engine does not support."""
         return unsupported(Setup.of(start), settings)
 
     def resolve(self, start: Scene | Setup, settings: Settings) -> Settings:  # noqa: ARG002, part of the protocol
-        """Return the settings unchanged: this engine has no choices to fill in."""
+        """Return the settings unchanged: this engine has no defaults to fill in."""
         return settings
 
     def start(self, start: Scene | Setup, settings: Settings | None = None) -> "ExactSimulation | TabletopSimulation":

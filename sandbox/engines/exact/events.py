@@ -93,11 +93,11 @@ def earliest_event(moving_balls: IntArray, times: FloatArray) -> int:
     ball = -1
     if len(moving_balls) > 0:
         ball = moving_balls[0]
-        best = times[ball]
+        earliest = times[ball]
         for k in range(1, len(moving_balls)):
-            if times[moving_balls[k]] < best:
+            if times[moving_balls[k]] < earliest:
                 ball = moving_balls[k]
-                best = times[ball]
+                earliest = times[ball]
     return ball
 
 
@@ -177,9 +177,9 @@ def advance(data: EventState, until: float) -> int:
             continue
         world[c.NOW], world[c.NOW_RESIDUAL] = t, residual
         counts[c.EVENT_BODY], counts[c.EVENT_KIND], counts[c.EVENT_PARTNER] = i, kind, partner
-        bound = check_limits(counts, world, len(moving_balls), t)
-        if bound != c.DONE:
-            return bound
+        status = check_limits(counts, world, len(moving_balls), t)
+        if status != c.DONE:
+            return status
         process_event(data, i, kind, partner, t, residual)
     return c.PAUSED
 

@@ -83,20 +83,20 @@ def collide_fixed(
         The impulse on the ball, N·s.
     """
     state, r = data.state, data.state[i, c.RADIUS]
-    im, ii = data.state[i, c.INVERSE_MASS], data.state[i, c.INVERSE_INERTIA]
+    inverse_mass, inverse_inertia = data.state[i, c.INVERSE_MASS], data.state[i, c.INVERSE_INERTIA]
     closing = -(state[i, c.VX] * nx + state[i, c.VY] * ny)
-    normal = max((closing + separation + kick) / im, 0.0)
+    normal = max((closing + separation + kick) / inverse_mass, 0.0)
     across = 0.0
     if friction > 0.0:
         slip = -state[i, c.VX] * ny + state[i, c.VY] * nx - state[i, c.SPIN] * r
-        across = friction_impulse(slip, im + r * r * ii, friction, normal)
+        across = friction_impulse(slip, inverse_mass + r * r * inverse_inertia, friction, normal)
     jx, jy = normal * nx - across * ny, normal * ny + across * nx
-    state[i, c.VX] += jx * im
-    state[i, c.VY] += jy * im
-    state[i, c.SPIN] -= r * across * ii
+    state[i, c.VX] += jx * inverse_mass
+    state[i, c.VY] += jy * inverse_mass
+    state[i, c.SPIN] -= r * across * inverse_inertia
     if data.counts[c.ACCOUNTING] != 0:
         # The kick takes the speed from `separation` to `separation + kick`: work is impulse times their mean.
-        account_fixed_hit(data, i, nx, ny, normal, across, kick / im * (separation + 0.5 * kick))
+        account_fixed_hit(data, i, nx, ny, normal, across, kick / inverse_mass * (separation + 0.5 * kick))
     return jx, jy
 
 
@@ -127,12 +127,15 @@ def hit_vertex(data: EventState, i: int, k: int) -> None:
     closing = state[i, c.VX] * nx + state[i, c.VY] * ny
     across = -state[i, c.VX] * ny + state[i, c.VY] * nx
     press = state[i, c.AX] * nx + state[i, c.AY] * ny - across * across / distance
-    mine, its = data.tags[i, c.SURFACE], data.vertex_tags[k, c.COLLIDER_SURFACE]
-    restitution, falloff = data.surfaces[c.RESTITUTION, mine, its], data.surfaces[c.FALLOFF, mine, its]
+    surface, other_surface = data.tags[i, c.SURFACE], data.vertex_tags[k, c.COLLIDER_SURFACE]
+    restitution, falloff = (
+        data.surfaces[c.RESTITUTION, surface, other_surface],
+        data.surfaces[c.FALLOFF, surface, other_surface],
+    )
     separation = separation_speed(data.world[c.MICRO_BOUNCE], closing, restitution, falloff, press)
     kick = compiled_kicked(data.vertices[k, c.VERTEX_KICK], data.vertices[k, c.VERTEX_THRESHOLD], False, 0.5, closing)
     kick = compiled_kick_gain(restitution, falloff, kick, data.vertices[k, c.VERTEX_TO_APPROACH] != 0.0, closing)
-    jx, jy = collide_fixed(data, i, -nx, -ny, separation, kick, data.surfaces[c.FRICTION, mine, its])
+    jx, jy = collide_fixed(data, i, -nx, -ny, separation, kick, data.surfaces[c.FRICTION, surface, other_surface])
     r = data.state[i, c.RADIUS]
     row = add_row(data, i, -1 - data.vertex_tags[k, c.COLLIDER], state[i, c.X] + r * nx, state[i, c.Y] + r * ny, nx, ny)
     add_impulse(data, row, -jx, -jy)
@@ -163,30 +166,44 @@ def hit_ball(
     nx, ny = dx / distance, dy / distance
     vx, vy = state[j, c.VX] - state[i, c.VX], state[j, c.VY] - state[i, c.VY]
     closing, across = -(vx * nx + vy * ny), -vx * ny + vy * nx
-    pull = (state[j, c.AX] - state[i, c.AX]) * nx + (state[j, c.AY] - state[i, c.AY]) * ny
-    press = -pull - across * across / distance
-    if abs(pull) <= NOISE * (abs(state[i, c.AX]) + abs(state[i, c.AY]) + abs(state[j, c.AX]) + abs(state[j, c.AY])):
+    relative_acceleration = (state[j, c.AX] - state[i, c.AX]) * nx + (state[j, c.AY] - state[i, c.AY]) * ny
+    press = -relative_acceleration - across * across / distance
+    if abs(relative_acceleration) <= NOISE * (
+        abs(state[i, c.AX]) + abs(state[i, c.AY]) + abs(state[j, c.AX]) + abs(state[j, c.AY])
+    ):
         press = 0.0  # equal accelerations do not press them together
-    mine, its = tags[i, c.SURFACE], tags[j, c.SURFACE]
+    surface, other_surface = tags[i, c.SURFACE], tags[j, c.SURFACE]
     separation = separation_speed(
-        micro_bounce, closing, surfaces[c.RESTITUTION, mine, its], surfaces[c.FALLOFF, mine, its], press
+        micro_bounce,
+        closing,
+        surfaces[c.RESTITUTION, surface, other_surface],
+        surfaces[c.FALLOFF, surface, other_surface],
+        press,
     )
-    ri, rj = state[i, c.RADIUS], state[j, c.RADIUS]
-    mi, mj = state[i, c.INVERSE_MASS], state[j, c.INVERSE_MASS]
-    ii, ij = state[i, c.INVERSE_INERTIA], state[j, c.INVERSE_INERTIA]
-    normal = max((closing + separation) / (mi + mj), 0.0)
+    radius_i, radius_j = state[i, c.RADIUS], state[j, c.RADIUS]
+    inverse_mass_i, inverse_mass_j = state[i, c.INVERSE_MASS], state[j, c.INVERSE_MASS]
+    inverse_inertia_i, inverse_inertia_j = state[i, c.INVERSE_INERTIA], state[j, c.INVERSE_INERTIA]
+    normal = max((closing + separation) / (inverse_mass_i + inverse_mass_j), 0.0)
     tangential = 0.0
-    friction = surfaces[c.FRICTION, mine, its]
+    friction = surfaces[c.FRICTION, surface, other_surface]
     if friction > 0.0:
-        slip = across - (state[i, c.SPIN] * ri + state[j, c.SPIN] * rj)
-        tangential = friction_impulse(slip, mi + mj + ri * ri * ii + rj * rj * ij, friction, normal)
+        slip = across - (state[i, c.SPIN] * radius_i + state[j, c.SPIN] * radius_j)
+        tangential = friction_impulse(
+            slip,
+            inverse_mass_i
+            + inverse_mass_j
+            + radius_i * radius_i * inverse_inertia_i
+            + radius_j * radius_j * inverse_inertia_j,
+            friction,
+            normal,
+        )
     jx, jy = normal * nx - tangential * ny, normal * ny + tangential * nx  # of i on j
-    state[i, c.VX] -= jx * mi
-    state[i, c.VY] -= jy * mi
-    state[j, c.VX] += jx * mj
-    state[j, c.VY] += jy * mj
-    state[i, c.SPIN] -= ri * tangential * ii
-    state[j, c.SPIN] -= rj * tangential * ij
+    state[i, c.VX] -= jx * inverse_mass_i
+    state[i, c.VY] -= jy * inverse_mass_i
+    state[j, c.VX] += jx * inverse_mass_j
+    state[j, c.VY] += jy * inverse_mass_j
+    state[i, c.SPIN] -= radius_i * tangential * inverse_inertia_i
+    state[j, c.SPIN] -= radius_j * tangential * inverse_inertia_j
     record_partner(state, tags, i, c.BALL, j)
     record_partner(state, tags, j, c.BALL, i)
     return jx, jy, nx, ny

@@ -23,9 +23,9 @@ def nearest_vertex(
     now: float,
     residual: float,
     best: float,
-    met: int,
-    skip: int,
-    other: int,
+    just_hit: int,
+    end_a: int,
+    end_b: int,
 ) -> tuple[int, float]:
     """Return the vertex that a ball hits first and the time until then, s, if less than `best`; else −1.
 
@@ -36,21 +36,25 @@ def nearest_vertex(
         now: s.
         residual: s, part of the time that rounding has cut off `now`.
         best: s.
-        met: vertex of the collision that the ball has just had, or −1.
-        skip: vertex at an end of the supporting line, to which the path of the ball is tangent; or −1.
-        other: likewise.
+        just_hit: vertex of the collision that the ball has just had, or −1.
+        end_a: vertex at an end of the supporting line, to which the path of the ball is tangent; or −1.
+        end_b: likewise.
     """
     x, y, vx, vy = position_at(state, i, now, residual)
     ax, ay, radius = state[i, c.AX], state[i, c.AY], state[i, c.RADIUS]
     straight, speed, partner = ax == 0.0 and ay == 0.0, abs(vx) + abs(vy), -1
     for k in range(len(vertices)):
-        if k in (skip, other) or (straight and k == met) or vertices[k, c.SOLID] == 0.0:
+        if k in (end_a, end_b) or (straight and k == just_hit) or vertices[k, c.SOLID] == 0.0:
             continue
-        dx, dy, reach = vertices[k, c.CENTRE_X] - x, vertices[k, c.CENTRE_Y] - y, vertices[k, c.CIRCLE_RADIUS] + radius
+        dx, dy, radius_sum = (
+            vertices[k, c.CENTRE_X] - x,
+            vertices[k, c.CENTRE_Y] - y,
+            vertices[k, c.CIRCLE_RADIUS] + radius,
+        )
         if straight:
-            tau = pair_entry(dx, dy, -vx, -vy, reach, speed)
+            tau = pair_entry(dx, dy, -vx, -vy, radius_sum, speed)
         else:
-            tau = curved_entry(dx, dy, -vx, -vy, -ax, -ay, reach, k == met, best)
+            tau = curved_entry(dx, dy, -vx, -vy, -ax, -ay, radius_sum, k == just_hit, best)
         if tau < best:
             best, partner = tau, k
     return partner, best
@@ -62,7 +66,7 @@ def nearest_ball(
 ) -> tuple[int, float]:
     """Return the ball that a ball hits first and the time until then, s, if less than `best`; else −1."""
     x, y, vx, vy = position_at(state, i, now, residual)
-    ax, ay, size = state[i, c.AX], state[i, c.AY], state[i, c.RADIUS]
+    ax, ay, radius = state[i, c.AX], state[i, c.AY], state[i, c.RADIUS]
     hits_all = tags[i, c.COLLISION_MASK] == ALL
     just_hit = state[i, c.LAST_TIME] == now and tags[i, c.LAST_KIND] == c.BALL
     last, partner, speed = tags[i, c.LAST_PARTNER], -1, abs(vx) + abs(vy)
@@ -71,7 +75,7 @@ def nearest_ball(
         if j == i or not (hits_all or state[j, c.INVERSE_MASS] == 0.0):
             continue
         tau = (now - state[j, c.T]) + (residual - state[j, c.TIME_RESIDUAL])
-        bx, by, reach = state[j, c.AX] - ax, state[j, c.AY] - ay, size + state[j, c.RADIUS]
+        bx, by, radius_sum = state[j, c.AX] - ax, state[j, c.AY] - ay, radius + state[j, c.RADIUS]
         straight = bx == 0.0 and by == 0.0
         wx, wy = state[j, c.VX] + state[j, c.AX] * tau, state[j, c.VY] + state[j, c.AY] * tau
         ux, uy = wx - vx, wy - vy
@@ -79,21 +83,27 @@ def nearest_ball(
         dy = state[j, c.Y] + 0.5 * (state[j, c.VY] + wy) * tau - y
         # Most balls recede, or cannot arrive before `best`. The tests are combined with |, because separate branches
         # would be mispredicted. The slack exceeds rounding.
-        ahead = best * 1.000001
-        far = (dx * ux + dy * uy >= 0.0) | (abs(dx) > reach + abs(ux) * ahead) | (abs(dy) > reach + abs(uy) * ahead)
-        if straight & far:
+        horizon = best * 1.000001
+        cannot_hit = (
+            (dx * ux + dy * uy >= 0.0)
+            | (abs(dx) > radius_sum + abs(ux) * horizon)
+            | (abs(dy) > radius_sum + abs(uy) * horizon)
+        )
+        if straight & cannot_hit:
             continue
-        met = just_hit and last == j
-        if met and state[j, c.INVERSE_MASS] > 0.0:
-            met = state[j, c.LAST_TIME] == now and tags[j, c.LAST_KIND] == c.BALL and tags[j, c.LAST_PARTNER] == i
+        has_just_hit = just_hit and last == j
+        if has_just_hit and state[j, c.INVERSE_MASS] > 0.0:
+            has_just_hit = (
+                state[j, c.LAST_TIME] == now and tags[j, c.LAST_KIND] == c.BALL and tags[j, c.LAST_PARTNER] == i
+            )
         if not straight:
-            after = curved_entry(dx, dy, ux, uy, bx, by, reach, met, best)
-        elif met:
+            tau_hit = curved_entry(dx, dy, ux, uy, bx, by, radius_sum, has_just_hit, best)
+        elif has_just_hit:
             continue
         else:
-            after = pair_entry(dx, dy, ux, uy, reach, speed + abs(wx) + abs(wy))
-        if after < best:
-            best, partner = after, j
+            tau_hit = pair_entry(dx, dy, ux, uy, radius_sum, speed + abs(wx) + abs(wy))
+        if tau_hit < best:
+            best, partner = tau_hit, j
     return partner, best
 
 
@@ -121,7 +131,7 @@ def line_time(
     ax: float,
     ay: float,
     radius: float,
-    met: bool,
+    has_just_hit: bool,
 ) -> float:
     """Return the time until a ball hits a line, s, or infinity.
 
@@ -135,11 +145,11 @@ def line_time(
         ax: its acceleration, m/s².
         ay: likewise.
         radius: m.
-        met: whether they have just collided; a speed of approach is rounding error then.
+        has_just_hit: whether they have just collided; a speed of approach is rounding error then.
     """
     nx, ny, length = lines[f, c.NX], lines[f, c.NY], lines[f, c.LENGTH]
     b, a = vx * nx + vy * ny, ax * nx + ay * ny
-    if abs(b) <= NOISE * (abs(vx) + abs(vy)) or (met and b < 0.0):
+    if abs(b) <= NOISE * (abs(vx) + abs(vy)) or (has_just_hit and b < 0.0):
         b = 0.0
     if abs(a) <= NOISE * (abs(ax) + abs(ay)):
         a = 0.0
@@ -213,34 +223,34 @@ def find_next_event(
     best, kind, partner = math.inf, c.NONE, -1
     just_hit = state[i, c.LAST_TIME] == now
     last_kind, last_partner = tags[i, c.LAST_KIND], tags[i, c.LAST_PARTNER]
-    s1, s2 = tags[i, c.SUPPORT], tags[i, c.SUPPORT + 1]
+    support, second_support = tags[i, c.SUPPORT], tags[i, c.SUPPORT + 1]
     if state[i, c.SLIP_END_TIME] < math.inf:
         best, kind = max((state[i, c.SLIP_END_TIME] - now) - residual, 0.0), c.SLIP_END
-    if s1 >= 0 and s2 < 0:
-        tau = line_end_time(lines, s1, x, y, vx, vy, ax, ay)
+    if support >= 0 and second_support < 0:
+        tau = line_end_time(lines, support, x, y, vx, vy, ax, ay)
         if tau < best:
-            best, kind, partner = tau, c.LINE_END, s1
+            best, kind, partner = tau, c.LINE_END, support
 
     for f in range(len(lines)):
-        if s1 >= 0 and (f in (s1, s2) or are_parallel(lines, f, s1)):
+        if support >= 0 and (f in (support, second_support) or are_parallel(lines, f, support)):
             continue
         if vx * lines[f, c.NX] + vy * lines[f, c.NY] >= 0.0 and ax * lines[f, c.NX] + ay * lines[f, c.NY] >= 0.0:
             continue
         if just_hit and last_kind == c.LINE_END and last_partner == f:
             continue  # it has just left this line over its end
-        met = just_hit and last_kind == c.LINE and last_partner == f
-        tau = line_time(lines, f, x, y, vx, vy, ax, ay, radius, met)
+        has_just_hit = just_hit and last_kind == c.LINE and last_partner == f
+        tau = line_time(lines, f, x, y, vx, vy, ax, ay, radius, has_just_hit)
         if tau < best:
             best, kind, partner = tau, c.LINE, f
 
-    met_vertex, skip, other = -1, -1, -1
+    hit_vertex, end_a, end_b = -1, -1, -1
     if just_hit and last_kind == c.VERTEX:
-        met_vertex = last_partner
-    if s1 >= 0:
-        skip, other = line_tags[s1, c.ENDS], line_tags[s1, c.ENDS + 1]
+        hit_vertex = last_partner
+    if support >= 0:
+        end_a, end_b = line_tags[support, c.ENDS], line_tags[support, c.ENDS + 1]
     k, tau = -1, math.inf
     if len(vertices) > 0:
-        k, tau = nearest_vertex(vertices, state, i, now, residual, best, met_vertex, skip, other)
+        k, tau = nearest_vertex(vertices, state, i, now, residual, best, hit_vertex, end_a, end_b)
     if k >= 0:
         best, kind, partner = tau, c.VERTEX, k
     j, tau = nearest_ball(state, tags, targets, i, now, residual, best)

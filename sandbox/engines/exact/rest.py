@@ -1,4 +1,4 @@
-"""Resting contact: a ball that stands, slides or rolls on a line, or stands in a corner of two lines.
+"""Resting contact: a ball that rests, slides or rolls on a line, or rests in a corner of two lines.
 
 Motion on a line is in closed form. The slip of the contact point is u = v·t − ω R, where t is the normal rotated left
 by 90°. While u ≠ 0, friction μ N acts against it, u changes at a constant rate and its zero is an event. Afterwards the
@@ -24,9 +24,9 @@ of them had happened."""
 
 
 @kernel
-def release_support(data: EventState, i: int, which: int) -> None:
-    """Remove a support; the second of two becomes the first."""
-    if which == 0:
+def release_support(data: EventState, i: int, slot: int) -> None:
+    """Remove the support in a slot, 0 or 1; the second of two moves to slot 0."""
+    if slot == 0:
         data.tags[i, c.SUPPORT], data.tags[i, c.LOG_ROW] = data.tags[i, c.SUPPORT + 1], data.tags[i, c.LOG_ROW + 1]
     data.tags[i, c.SUPPORT + 1], data.tags[i, c.LOG_ROW + 1] = -1, -1
     data.state[i, c.SUPPORT_FORCE + 2], data.state[i, c.SUPPORT_FORCE + 3] = 0.0, 0.0
@@ -34,33 +34,38 @@ def release_support(data: EventState, i: int, which: int) -> None:
 
 @kernel
 def release_supports(data: EventState, i: int) -> None:
-    """Remove all supports of a ball, whose impulses have been logged."""
+    """Remove all supports of a ball. Their impulses must have been logged."""
     release_support(data, i, 0)
     release_support(data, i, 0)
 
 
 @kernel
-def set_supported_velocity(data: EventState, i: int, which: int, vx: float, vy: float) -> None:
-    """Set the velocity of a supported ball, m/s, and log and account the small change as the support's."""
-    state, im = data.state, data.state[i, c.INVERSE_MASS]
-    add_impulse(data, data.tags[i, c.LOG_ROW + which], (state[i, c.VX] - vx) / im, (state[i, c.VY] - vy) / im)
+def set_supported_velocity(data: EventState, i: int, slot: int, vx: float, vy: float) -> None:
+    """Set the velocity of a supported ball, m/s; log and account the small change as that of the support in a slot."""
+    state, inverse_mass = data.state, data.state[i, c.INVERSE_MASS]
+    add_impulse(
+        data,
+        data.tags[i, c.LOG_ROW + slot],
+        (state[i, c.VX] - vx) / inverse_mass,
+        (state[i, c.VY] - vy) / inverse_mass,
+    )
     account_velocity(data, i, vx, vy)
     state[i, c.VX], state[i, c.VY] = vx, vy
 
 
 @kernel
-def corner_forces(data: EventState, i: int, turning: float) -> tuple[float, float, float, float]:
+def corner_forces(data: EventState, i: int, spin_sign: float) -> tuple[float, float, float, float]:
     """Return the forces on a ball in a corner: normal force and friction of each support, per mass, m/s².
 
     Args:
         data: state arrays.
         i: ball.
-        turning: sign of the spin; 0 omits friction, which a ball without spin does not need.
+        spin_sign: sign of the spin; 0 omits friction, which a ball without spin does not need.
     """
     f, g = data.tags[i, c.SUPPORT], data.tags[i, c.SUPPORT + 1]
-    mine = data.tags[i, c.SURFACE]
-    mu = turning * data.surfaces[c.FRICTION, mine, data.line_tags[f, c.COLLIDER_SURFACE]]
-    nu = turning * data.surfaces[c.FRICTION, mine, data.line_tags[g, c.COLLIDER_SURFACE]]
+    surface = data.tags[i, c.SURFACE]
+    mu = spin_sign * data.surfaces[c.FRICTION, surface, data.line_tags[f, c.COLLIDER_SURFACE]]
+    nu = spin_sign * data.surfaces[c.FRICTION, surface, data.line_tags[g, c.COLLIDER_SURFACE]]
     lines = data.lines
     # Spin > 0 makes the contact point slip along −t, so friction acts along +t.
     ax, ay = lines[f, c.NX] - mu * lines[f, c.NY], lines[f, c.NY] + mu * lines[f, c.NX]
@@ -77,37 +82,40 @@ def corner_forces(data: EventState, i: int, turning: float) -> tuple[float, floa
 def rest_in_corner(data: EventState, i: int) -> None:
     """Hold a ball in a corner while friction decelerates its spin; release a support that does not press."""
     state, r = data.state, data.state[i, c.RADIUS]
-    im, ii = data.state[i, c.INVERSE_MASS], data.state[i, c.INVERSE_INERTIA]
-    if abs(state[i, c.SPIN]) * r <= REST_TIME * (abs(data.world[c.GX]) + abs(data.world[c.GY])) and ii > 0.0:
+    inverse_mass, inverse_inertia = data.state[i, c.INVERSE_MASS], data.state[i, c.INVERSE_INERTIA]
+    if (
+        abs(state[i, c.SPIN]) * r <= REST_TIME * (abs(data.world[c.GX]) + abs(data.world[c.GY]))
+        and inverse_inertia > 0.0
+    ):
         account_spin(data, i, 0.0)
         state[i, c.SPIN] = 0.0
-    turning = 0.0
-    if state[i, c.SPIN] != 0.0 and ii > 0.0:
-        turning = 1.0 if state[i, c.SPIN] > 0.0 else -1.0
-    first, second, mu, nu = corner_forces(data, i, turning)
+    spin_sign = 0.0
+    if state[i, c.SPIN] != 0.0 and inverse_inertia > 0.0:
+        spin_sign = 1.0 if state[i, c.SPIN] > 0.0 else -1.0
+    first, second, first_friction, second_friction = corner_forces(data, i, spin_sign)
     if first < 0.0 or second < 0.0:
-        calm, other, _, _ = corner_forces(data, i, 0.0)
-        if turning == 0.0 or calm < 0.0 or other < 0.0 or (first < 0.0) != (second < 0.0):
+        first_frictionless, second_frictionless, _, _ = corner_forces(data, i, 0.0)
+        if spin_sign == 0.0 or first_frictionless < 0.0 or second_frictionless < 0.0 or (first < 0.0) != (second < 0.0):
             release_support(data, i, 0 if first < 0.0 else 1)
             return
         account_spin(data, i, 0.0)
-        state[i, c.SPIN], turning = 0.0, 0.0  # jammed: no pair of forces within the friction cones lets it rotate
-        first, second, mu, nu = calm, other, 0.0, 0.0
+        state[i, c.SPIN], spin_sign = 0.0, 0.0  # jammed: no pair of forces within the friction cones lets it rotate
+        first, second, first_friction, second_friction = first_frictionless, second_frictionless, 0.0, 0.0
     set_supported_velocity(data, i, 1, 0.0, 0.0)
     state[i, c.AX], state[i, c.AY] = 0.0, 0.0
-    state[i, c.ALPHA] = -r * (mu + nu) * ii / im
+    state[i, c.ALPHA] = -r * (first_friction + second_friction) * inverse_inertia / inverse_mass
     state[i, c.SLIP_END_TIME] = math.inf
     if state[i, c.ALPHA] != 0.0:
         state[i, c.SLIP_END_TIME] = state[i, c.T] + (state[i, c.TIME_RESIDUAL] - state[i, c.SPIN] / state[i, c.ALPHA])
-    for which in range(2):
-        f = data.tags[i, c.SUPPORT + which]
-        normal_force, friction_force = (first, mu) if which == 0 else (second, nu)
-        data.state[i, c.SUPPORT_FORCE + 2 * which] = (
+    for slot in range(2):
+        f = data.tags[i, c.SUPPORT + slot]
+        normal_force, friction_force = (first, first_friction) if slot == 0 else (second, second_friction)
+        data.state[i, c.SUPPORT_FORCE + 2 * slot] = (
             normal_force * data.lines[f, c.NX] - friction_force * data.lines[f, c.NY]
-        ) / im
-        data.state[i, c.SUPPORT_FORCE + 2 * which + 1] = (
+        ) / inverse_mass
+        data.state[i, c.SUPPORT_FORCE + 2 * slot + 1] = (
             normal_force * data.lines[f, c.NY] + friction_force * data.lines[f, c.NX]
-        ) / im
+        ) / inverse_mass
 
 
 REST_FRACTION = 8.0 * 2.0**-52
@@ -125,28 +133,33 @@ def hit_line(data: EventState, i: int, f: int) -> None:
     """Collide a ball with a line: it bounces, or is supported from now on."""
     state = data.state
     nx, ny = data.lines[f, c.NX], data.lines[f, c.NY]
-    mine, its = data.tags[i, c.SURFACE], data.line_tags[f, c.COLLIDER_SURFACE]
-    restitution, friction = data.surfaces[c.RESTITUTION, mine, its], data.surfaces[c.FRICTION, mine, its]
+    surface, other_surface = data.tags[i, c.SURFACE], data.line_tags[f, c.COLLIDER_SURFACE]
+    restitution, friction = (
+        data.surfaces[c.RESTITUTION, surface, other_surface],
+        data.surfaces[c.FRICTION, surface, other_surface],
+    )
     closing = max(-(state[i, c.VX] * nx + state[i, c.VY] * ny), 0.0)
     press = -(state[i, c.AX] * nx + state[i, c.AY] * ny)
-    falloff = data.surfaces[c.FALLOFF, mine, its]
+    falloff = data.surfaces[c.FALLOFF, surface, other_surface]
     separation = compiled_rebound(restitution, falloff, closing)
     kick = 0.0
     if data.lines[f, c.KICK_SPEED] > 0.0:
         kick = line_kick(data.lines, f, state[i, c.X], state[i, c.Y], closing)
         kick = compiled_kick_gain(restitution, falloff, kick, data.lines[f, c.KICK_TO_APPROACH] != 0.0, closing)
-    rests = False
+    comes_to_rest = False
     if press > 0.0 and kick == 0.0:
         flight_time = 2.0 * separation / press
-        rests = flight_time <= REST_FRACTION * abs(state[i, c.T]) or flight_time <= REST_TIME * (1.0 - restitution)
-    jx, jy = collide_fixed(data, i, nx, ny, 0.0 if rests else separation, kick, friction)
+        comes_to_rest = flight_time <= REST_FRACTION * abs(state[i, c.T]) or flight_time <= REST_TIME * (
+            1.0 - restitution
+        )
+    jx, jy = collide_fixed(data, i, nx, ny, 0.0 if comes_to_rest else separation, kick, friction)
     record_partner(state, data.tags, i, c.LINE, f)
     recheck_supports(data, i)
-    if rests and not is_in_corner(data.tags, i):
-        which = 1 if is_supported(data.tags, i) else 0
-        data.tags[i, c.SUPPORT + which] = f
-        open_support_row(data, i, which)
-        add_impulse(data, data.tags[i, c.LOG_ROW + which], -jx, -jy)
+    if comes_to_rest and not is_in_corner(data.tags, i):
+        slot = 1 if is_supported(data.tags, i) else 0
+        data.tags[i, c.SUPPORT + slot] = f
+        open_support_row(data, i, slot)
+        add_impulse(data, data.tags[i, c.LOG_ROW + slot], -jx, -jy)
     else:
         r = data.state[i, c.RADIUS]
         collider = -1 - data.line_tags[f, c.COLLIDER]
@@ -170,23 +183,23 @@ def line_kick(lines: FloatArray, f: int, x: float, y: float, closing: float) -> 
 def recheck_supports(data: EventState, i: int) -> None:
     """Decide which supports a ball keeps after its velocity or its supports have changed."""
     state = data.state
-    for which in (1, 0):
-        f = data.tags[i, c.SUPPORT + which]
+    for slot in (1, 0):
+        f = data.tags[i, c.SUPPORT + slot]
         if f < 0:
             continue
         if not is_solid(data.lines, f):
-            release_support(data, i, which)
+            release_support(data, i, slot)
             continue
         nx, ny = data.lines[f, c.NX], data.lines[f, c.NY]
         press = -(data.world[c.GX] * nx + data.world[c.GY] * ny)
         tolerance = REST_TIME * abs(press) + NOISE * (abs(state[i, c.VX]) + abs(state[i, c.VY]))
-        out = state[i, c.VX] * nx + state[i, c.VY] * ny
-        if out > tolerance or out < -max(ABSORBED_SPEED, tolerance):
-            release_support(data, i, which)
-        elif out < -tolerance:
+        normal_velocity = state[i, c.VX] * nx + state[i, c.VY] * ny
+        if normal_velocity > tolerance or normal_velocity < -max(ABSORBED_SPEED, tolerance):
+            release_support(data, i, slot)
+        elif normal_velocity < -tolerance:
             friction = data.surfaces[c.FRICTION, data.tags[i, c.SURFACE], data.line_tags[f, c.COLLIDER_SURFACE]]
             jx, jy = collide_fixed(data, i, nx, ny, 0.0, 0.0, friction)
-            add_impulse(data, data.tags[i, c.LOG_ROW + which], -jx, -jy)
+            add_impulse(data, data.tags[i, c.LOG_ROW + slot], -jx, -jy)
 
 
 @kernel
@@ -217,40 +230,41 @@ def set_free_fall(state: FloatArray, world: FloatArray, i: int) -> None:
 
 @kernel
 def move_on_one_line(data: EventState, i: int, f: int, press: float) -> None:
-    """Let a ball slide, roll or stand on one line; `press` is gravity's normal component, m/s²."""
+    """Set the motion of a ball that slides, rolls or rests on one line; `press` is gravity's normal component, m/s²."""
     state, r = data.state, data.state[i, c.RADIUS]
-    im, ii = data.state[i, c.INVERSE_MASS], data.state[i, c.INVERSE_INERTIA]
+    inverse_mass, inverse_inertia = data.state[i, c.INVERSE_MASS], data.state[i, c.INVERSE_INERTIA]
     nx, ny = data.lines[f, c.NX], data.lines[f, c.NY]
     tx, ty = -ny, nx
-    pull = data.world[c.GX] * tx + data.world[c.GY] * ty
-    if abs(pull) <= NOISE * press:
-        pull = 0.0
+    tangential_gravity = data.world[c.GX] * tx + data.world[c.GY] * ty
+    if abs(tangential_gravity) <= NOISE * press:
+        tangential_gravity = 0.0
     v = state[i, c.VX] * tx + state[i, c.VY] * ty
     friction = data.surfaces[c.FRICTION, data.tags[i, c.SURFACE], data.line_tags[f, c.COLLIDER_SURFACE]]
-    contact_gain = 1.0 + r * r * ii / im  # acceleration of the contact point relative to that of the centre
+    # acceleration of the contact point relative to that of the centre
+    contact_gain = 1.0 + r * r * inverse_inertia / inverse_mass
     slip = v - state[i, c.SPIN] * r
-    slides, max_friction = math.inf, friction * press
-    drive = 0.0  # friction per mass, m/s²
+    slip_end, max_friction = math.inf, friction * press
+    friction_acceleration = 0.0  # friction per mass, m/s²
     if abs(slip) <= NOISE * (abs(v) + abs(state[i, c.SPIN] * r)) + REST_TIME * max_friction * contact_gain:
         slip = 0.0
-    if slip == 0.0 and abs(pull) <= max_friction * contact_gain:
-        drive = -pull / contact_gain
-        if ii > 0.0 and friction > 0.0:
+    if slip == 0.0 and abs(tangential_gravity) <= max_friction * contact_gain:
+        friction_acceleration = -tangential_gravity / contact_gain
+        if inverse_inertia > 0.0 and friction > 0.0:
             account_spin(data, i, v / r)
             state[i, c.SPIN] = v / r
     else:
-        downhill = slip if slip != 0.0 else pull
-        drive = -max_friction if downhill > 0.0 else max_friction
-        rate = pull + drive * contact_gain
+        slip_direction = slip if slip != 0.0 else tangential_gravity
+        friction_acceleration = -max_friction if slip_direction > 0.0 else max_friction
+        rate = tangential_gravity + friction_acceleration * contact_gain
         if slip * rate < 0.0:
-            slides = state[i, c.T] + (state[i, c.TIME_RESIDUAL] - slip / rate)
-    a = pull + drive
+            slip_end = state[i, c.T] + (state[i, c.TIME_RESIDUAL] - slip / rate)
+    a = tangential_gravity + friction_acceleration
     set_supported_velocity(data, i, 0, v * tx, v * ty)
     state[i, c.AX], state[i, c.AY] = a * tx, a * ty
-    state[i, c.ALPHA] = -r * drive * ii / im
-    state[i, c.SLIP_END_TIME] = slides
-    data.state[i, c.SUPPORT_FORCE] = (state[i, c.AX] - data.world[c.GX]) / im
-    data.state[i, c.SUPPORT_FORCE + 1] = (state[i, c.AY] - data.world[c.GY]) / im
+    state[i, c.ALPHA] = -r * friction_acceleration * inverse_inertia / inverse_mass
+    state[i, c.SLIP_END_TIME] = slip_end
+    data.state[i, c.SUPPORT_FORCE] = (state[i, c.AX] - data.world[c.GX]) / inverse_mass
+    data.state[i, c.SUPPORT_FORCE + 1] = (state[i, c.AY] - data.world[c.GY]) / inverse_mass
 
 
 @kernel
@@ -274,7 +288,7 @@ def pass_line_end(data: EventState, i: int) -> None:
     """Move a ball at the end of its line to the next parallel line, or release it."""
     state, lines, f = data.state, data.lines, data.tags[i, c.SUPPORT]
     # At a convex joint the centre reaches the end of one line before it is above the next.
-    beside = TOUCH_GAP + PARALLEL_ANGLE * state[i, c.RADIUS]
+    tolerance = TOUCH_GAP + PARALLEL_ANGLE * state[i, c.RADIUS]
     for g in range(len(lines)):
         if g == f or not are_parallel(lines, f, g):
             continue
@@ -287,8 +301,8 @@ def pass_line_end(data: EventState, i: int) -> None:
         )
         if v == 0.0:
             v = state[i, c.AX] * lines[g, c.UX] + state[i, c.AY] * lines[g, c.UY]
-        if (v > 0.0 and -beside <= foot < lines[g, c.LENGTH] - beside) or (
-            v < 0.0 and beside < foot <= lines[g, c.LENGTH] + beside
+        if (v > 0.0 and -tolerance <= foot < lines[g, c.LENGTH] - tolerance) or (
+            v < 0.0 and tolerance < foot <= lines[g, c.LENGTH] + tolerance
         ):
             data.tags[i, c.SUPPORT] = g
             if data.line_tags[g, c.COLLIDER] != data.line_tags[f, c.COLLIDER]:

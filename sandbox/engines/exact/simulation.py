@@ -69,8 +69,8 @@ class ExactSimulation(EventDrivenSimulation[EventState]):
                 self._data = data = with_log_rows(data, max(FIRST_LOG_ROWS, 4 * len(data.state)))
                 data.counts[c.RECORDING], data.world[c.NOW] = 1, now
                 data.state[:, c.LOGGED_UNTIL] = now
-                for i, which in np.argwhere(data.tags[:, c.SUPPORT : c.SUPPORT + 2] >= 0).tolist():
-                    open_support_row(data, i, which)
+                for i, slot in np.argwhere(data.tags[:, c.SUPPORT : c.SUPPORT + 2] >= 0).tolist():
+                    open_support_row(data, i, slot)
             log_supports(data, now)
         return drain_log(data)
 
@@ -82,16 +82,16 @@ class ExactSimulation(EventDrivenSimulation[EventState]):
         counts, limit = self._data.counts, int(self._data.counts[c.MAX_EVENTS])
         if status == TOO_FAST:
             count, span = 2 * limit // BATCHES_PER_BUDGET, 2.0 / (MAX_BATCH_RATE * BATCHES_PER_BUDGET)
-            many = f"{count:,} events within {span:.3g} s where the limit is {limit:,} per second"
+            excess = f"{count:,} events within {span:.3g} s where the limit is {limit:,} per second"
         elif status == TOO_DENSE:
-            many = f"more than {int(counts[c.IN_INSTANT]) - 1:,} events within an instant"
+            excess = f"more than {int(counts[c.IN_INSTANT]) - 1:,} events within an instant"
         else:
-            many = f"more than {int(counts[c.IN_SECOND]) - 1:,} events within one second"
+            excess = f"more than {int(counts[c.IN_SECOND]) - 1:,} events within one second"
         kinds = c.LINE, c.VERTEX, c.BALL
-        last = last_event_bodies(self._data, self.bodies.names, self.scene.fixed_names, kinds)
+        last_bodies = last_event_bodies(self._data, self.bodies.names, self.scene.fixed_names, kinds)
         return (
-            f"at {float(self._data.world[c.NOW]):.9g} s: {many}, last of {last}; engines with time steps can continue: "
-            "pymunk, reference"
+            f"at {float(self._data.world[c.NOW]):.9g} s: {excess}, last of {last_bodies}; engines with time steps can "
+            "continue: pymunk, reference"
         )
 
     def _double_log(self) -> None:
@@ -112,8 +112,8 @@ class ExactSimulation(EventDrivenSimulation[EventState]):
     def _rebuild(self) -> None:
         """Copy the changes of an action from the body store into the state arrays, and predict again."""
         store, now = self._store, self.time
-        touched = sorted(store.velocity_set | store.position_set)
-        for i in touched:
+        changed = sorted(store.velocity_set | store.position_set)
+        for i in changed:
             advance_to(self._data, i, now, 0.0)
             self._data.state[i, c.X : c.Y + 1], self._data.state[i, c.VX : c.VY + 1] = (
                 store.position[i],
@@ -136,13 +136,13 @@ class ExactSimulation(EventDrivenSimulation[EventState]):
             rebuild_from(data, now)
             return
         data.world[c.NOW], data.world[c.NOW_RESIDUAL] = now, 0.0
-        for i in touched:
+        for i in changed:
             if data.state[i, c.INVERSE_MASS] > 0.0:
                 recheck_supports(data, i)
                 rebuild_ball(data, i)
-        if any(self.bodies.fixed[i] for i in touched):
+        if any(self.bodies.fixed[i] for i in changed):
             predict_all(data)  # a fixed body that has moved may now be in the path of any ball
-        for i in touched:
+        for i in changed:
             if data.state[i, c.INVERSE_MASS] > 0.0:
                 predict_next_event(data, i, now, 0.0)
 

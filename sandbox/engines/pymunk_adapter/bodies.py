@@ -12,6 +12,7 @@ import numpy as np
 from sandbox.action import ActionError
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.actions import derive_contacts, has_same_bodies
+from sandbox.engines.common.lifetimes import NO_BODIES
 from sandbox.engines.common.zones import ZoneTracker
 from sandbox.engines.pymunk_adapter.particles import Particles
 from sandbox.engines.pymunk_adapter.space import SpaceBodies
@@ -80,18 +81,15 @@ class PymunkZoneHost:
 
     def set_gravity(self, index: int, gravity: Point | None) -> None:
         """Replace the world's gravity on a body by another, m/s², by a force that makes up the difference."""
-        more = None if gravity is None else (np.asarray(gravity) - self._gravity) * self._bodies.mass[index]
-        self._space_bodies.constant_forces.set_zone_force(index, more)
+        force = None if gravity is None else (np.asarray(gravity) - self._gravity) * self._bodies.mass[index]
+        self._space_bodies.constant_forces.set_zone_force(index, force)
 
 
 UNCORRECTED = 1e9
 """m of overlap that pymunk leaves uncorrected on a surface, where the tabletop stepper corrects it."""
 
-NO_BODIES: IntArray = np.empty(0, np.int64)
-
-
 MAX_OVERLAPS = 100
-"""Bodies that a new body may overlap: pymunk takes minutes to separate a thousand at one point."""
+"""Number of bodies that a new body may overlap: pymunk takes minutes to separate a thousand at one point."""
 
 MAX_CANDIDATES = 1000
 """The same for bodies that pass through each other: pymunk still tests every pair."""
@@ -113,8 +111,8 @@ def check_overlaps(
     Raises:
         ActionError: it would overlap too many.
     """
-    near = np.hypot(*(position - centre).T) < bodies.radius + radius
-    overlapping = bodies.element[near & present]
+    is_near = np.hypot(*(position - centre).T) < bodies.radius + radius
+    overlapping = bodies.element[is_near & present]
     kinds = [bodies.elements[element].collides for element in overlapping.tolist()]
     if collides == "all" and kinds.count("all") >= MAX_OVERLAPS:
         raise ActionError(f"it would overlap {kinds.count('all')} bodies; pymunk can separate at most {MAX_OVERLAPS}")
@@ -140,8 +138,8 @@ class PymunkBodies:
         self.layer, self.visits = self.bodies.layer.copy(), self.bodies.visits.copy()
         self.tabletop = TabletopStepper(scene, settings) if on_floor(setup) else None
         """stepper of balls on a surface; None without a surface"""
-        floored = settings.replace(slop=UNCORRECTED), SKIN
-        self.space_bodies = SpaceBodies(setup, *(floored if self.tabletop is not None else (settings,)))
+        tabletop_arguments = settings.replace(slop=UNCORRECTED), SKIN
+        self.space_bodies = SpaceBodies(setup, *(tabletop_arguments if self.tabletop is not None else (settings,)))
         self.particles = Particles(scene.world, settings.h, self.space_bodies.field)
         self._zone_host = PymunkZoneHost(self.space_bodies)
         self.zone_tracker = ZoneTracker(scene, self._zone_host) if scene.zones else None
@@ -161,14 +159,14 @@ class PymunkBodies:
         """The scene, with all changes that actions have made."""
         return self.setup.scene
 
-    def _rebuild(self, scene: Scene, matrix: ContactMatrix, same: bool = False) -> None:
-        """Rebuild what depends on a scene and its contact matrix. With `same`, only the world has changed."""
+    def _rebuild(self, scene: Scene, matrix: ContactMatrix, same_bodies: bool = False) -> None:
+        """Update after a change of the scene or contact matrix. With `same_bodies`, only the world has changed."""
         self._contact_matrix = matrix
         if self.tabletop is not None:  # the tabletop stepper resolves collisions, not pymunk
             self.tabletop.rebuild(scene, matrix)
-            nothing = np.zeros_like(matrix.surfaces.restitution)
-            matrix = replace(matrix, surfaces=replace(matrix.surfaces, restitution=nothing, friction=nothing))
-        if same:
+            zero = np.zeros_like(matrix.surfaces.restitution)
+            matrix = replace(matrix, surfaces=replace(matrix.surfaces, restitution=zero, friction=zero))
+        if same_bodies:
             self.space_bodies.rebuild_world(scene)
         else:
             self.space_bodies.rebuild(scene, matrix)
@@ -188,11 +186,11 @@ class PymunkBodies:
             self.tabletop.rebuild_arrays(state, self.bodies, self.present)
 
     def capture(self) -> bool:
-        """Let balls fall into pockets. Return whether some did."""
-        fell = self.tabletop.capture() if self.tabletop is not None else NO_BODIES
-        if len(fell):
-            self.space_bodies.leave(fell)
-        return len(fell) > 0
+        """Capture balls in pockets. Return whether there were any."""
+        captured = self.tabletop.capture() if self.tabletop is not None else NO_BODIES
+        if len(captured):
+            self.space_bodies.leave(captured)
+        return len(captured) > 0
 
     @property
     def has_pending_zones(self) -> bool:
@@ -251,15 +249,15 @@ class PymunkBodies:
     def distribute(self, indices: IntArray) -> None:
         """Add each of some bodies to the space or to the particles."""
         matrix, bodies = self._contact_matrix, self.bodies
-        flying = matrix.free[indices] & ~self._driven[indices]
+        is_particle = matrix.free[indices] & ~self._driven[indices]
         state = self.position, self.velocity, self.angle, self.angular_velocity
         self.particles.rebuild_arrays(*state, bodies)
-        self.particles.join(indices[flying & ~bodies.fixed[indices]])
+        self.particles.join(indices[is_particle & ~bodies.fixed[indices]])
         # In the space, a body that nothing can turn gets no moment. A particle keeps it, for torques of actions.
-        turned = np.where(matrix.turnable, bodies.moment, math.inf)
-        chosen = indices[~flying]
-        position, velocity, angle, spin = (array[chosen] for array in state)
-        self.space_bodies.join(chosen, bodies, position, velocity, angle, spin, turned[chosen])
+        moment = np.where(matrix.turnable, bodies.moment, math.inf)
+        in_space = indices[~is_particle]
+        position, velocity, angle, spin = (array[in_space] for array in state)
+        self.space_bodies.join(in_space, bodies, position, velocity, angle, spin, moment[in_space])
         self.space_bodies.link(self.setup.links)
 
     @property
@@ -283,11 +281,11 @@ class PymunkBodies:
         if self._half_kick and (scene.world.linear_drag or scene.world.quadratic_drag):
             raise ActionError("drag cannot be switched on in a run with half_kick, which does not support it")
         bodies, matrix = self.bodies, self._contact_matrix
-        same = spawned is None and has_same_bodies(scene, self.scene)
-        checked = same and scene.world is self.scene.world
-        if self.tabletop is not None and not checked and (reason := next(unsupported_by_steppers(setup), None)):
+        same_bodies = spawned is None and has_same_bodies(scene, self.scene)
+        is_checked = same_bodies and scene.world is self.scene.world
+        if self.tabletop is not None and not is_checked and (reason := next(unsupported_by_steppers(setup), None)):
             raise ActionError(reason)
-        if not same:
+        if not same_bodies:
             spawned = bodies.elements[len(self.scene.elements) :] if spawned is None else spawned
             bodies = replace(bodies, elements=(*scene.elements, *spawned))
             matrix = derive_contacts(setup, bodies)
@@ -300,7 +298,7 @@ class PymunkBodies:
                 self.space_bodies.set_velocity(index, self.velocity[index])
         self.particles.world = scene.world
         self.particles.rebuild()
-        self._rebuild(scene, matrix, same)
+        self._rebuild(scene, matrix, same_bodies)
         self._set_arrays()
 
     def is_in_pocket(self, index: int) -> bool:
@@ -334,22 +332,22 @@ class PymunkBodies:
         self._rebuild(scene, matrix)
         self._set_arrays()
         self.space_bodies.add_missing_shapes(bodies)
-        out = [n for n in np.flatnonzero(self.present & ~matrix.free).tolist() if not self.space_bodies.holds(n)]
-        self._promote(np.asarray([n for n in out if n != index and not self.is_in_pocket(n)], np.int64))
+        outside = [n for n in np.flatnonzero(self.present & ~matrix.free).tolist() if not self.space_bodies.holds(n)]
+        self._move_to_space(np.asarray([n for n in outside if n != index and not self.is_in_pocket(n)], np.int64))
         self.distribute(np.asarray([index]))
         if self.zone_tracker is not None:
             self.zone_tracker.update_position(index)
         return index
 
-    def _promote(self, indices: IntArray) -> None:
+    def _move_to_space(self, indices: IntArray) -> None:
         """Move particles that can now touch something to the space."""
         if not len(indices):
             return
-        flying = indices[np.isin(indices, self.particles.indices)]
-        steady = {n: self.particles.constant_force(n) for n in flying.tolist()}
+        particles = indices[np.isin(indices, self.particles.indices)]
+        forces = {n: self.particles.constant_force(n) for n in particles.tolist()}
         self.particles.leave(indices)
         self.distribute(indices)
-        for index, (force, torque) in steady.items():
+        for index, (force, torque) in forces.items():
             if torque:
                 self.space_bodies.give_moment(index, float(self.bodies.moment[index]))
             if force.any() or torque:
@@ -430,10 +428,10 @@ class PymunkBodies:
         self._is_in_play(index)
         if force.any() or torque:
             self._release(index)
-        part = self._owner(index)
-        if torque and part is self.space_bodies and not math.isfinite(part.moment(index)):
-            part.give_moment(index, float(self.bodies.moment[index]))
-        part.set_constant_force(index, force, torque)
+        owner = self._owner(index)
+        if torque and owner is self.space_bodies and not math.isfinite(owner.moment(index)):
+            owner.give_moment(index, float(self.bodies.moment[index]))
+        owner.set_constant_force(index, force, torque)
 
     def move_body(self, index: int, position: FloatArray) -> None:
         """Set the position of a body, m."""
@@ -444,9 +442,9 @@ class PymunkBodies:
             self.distribute(np.asarray([index]))
             return
         self._release(index)
-        part = self._part_of(index)
-        if part is not None:
-            part.set_position(index, position)
+        owner = self._holder(index)
+        if owner is not None:
+            owner.set_position(index, position)
         if self.zone_tracker is not None:
             self.zone_tracker.update_position(index)
 
@@ -454,7 +452,7 @@ class PymunkBodies:
         """Return the part that holds a body; the space for a fixed body that nothing can touch."""
         return self.particles if self.particles.holds(index) else self.space_bodies
 
-    def _part_of(self, index: int) -> Particles | SpaceBodies | None:
+    def _holder(self, index: int) -> Particles | SpaceBodies | None:
         """Return the part that holds a body; None for a fixed body that nothing can touch."""
         if self.particles.holds(index):
             return self.particles

@@ -6,15 +6,15 @@ equivalent restitution is set in `pre_solve`, which is called after the forces. 
 other; they get no kick and no other restitution.
 
 `SpaceOneWayWalls` lets bodies that come from the right of a one-way wall pass, for as long as the two overlap. The
-pairs that are passing are part of a state: where a space continues from one, a body that lies on a wall begins a new
-contact at a speed of rounding, so that it could not be distinguished from one that leaves the wall.
+passing pairs are part of the state from which a run can continue: in the new space, a body that rests on a wall begins
+a new contact at a speed that is rounding error, and could not be distinguished from a body that leaves the wall.
 
 Munk2D keeps the decision of `begin` on a contact until the contact ends; `pre_solve` is called nevertheless.
 `separate`, which would report the end, cannot be used: it is called for present contacts when a space is freed, and
 pymunk has released its objects by then.
 
-Internal edges: `correct_normal` corrects contacts of polygons at the joints of a wall, whose segments have no edges
-there. `Segment.set_neighbors` makes Munk2D reject contacts with an end of a segment if the normal points over it
+Internal edges: `correct_normal` corrects contacts of polygons at the joints of a wall, where its segments have no
+edges. `Segment.set_neighbors` makes Munk2D reject contacts with an end of a segment if the normal points over it
 towards the neighbour. For discs that is exact. For other shapes Munk2D compares the nearest point with the end bit by
 bit, which fails by rounding once the two overlap: then the end of the next segment stops a sliding box. A normal that
 leans over an end, towards the continuation of the wall, is turned to the nearest normal of the whole wall.
@@ -41,12 +41,12 @@ def closing_speed(arbiter: pymunk.Arbiter) -> float:
     a, b = arbiter.shapes
     first, second, n = a.body, b.body, arbiter.normal
     assert first is not None and second is not None
-    along = (first.velocity - second.velocity).dot(n)
+    linear = (first.velocity - second.velocity).dot(n)
     if not (_turns(a) or _turns(b)):
-        return float(along)
+        return float(linear)
     return float(
         max(
-            along + _turning(first, point.point_a, n) - _turning(second, point.point_b, n)
+            linear + _turning(first, point.point_a, n) - _turning(second, point.point_b, n)
             for point in arbiter.contact_point_set.points
         )
     )
@@ -70,40 +70,40 @@ def _turning(body: pymunk.Body, point: pymunk.Vec2d, normal: pymunk.Vec2d) -> fl
 def correct_normal(arbiter: pymunk.Arbiter, joints: Mapping[pymunk.Shape, WallSegment]) -> None:
     """Correct the normal of a contact if it leans over a joint of a wall."""
     first, second = arbiter.shapes
-    part = joints.get(second) or joints.get(first)
-    other = first if second in joints else second
-    if part is None or isinstance(other, pymunk.Circle):
+    segment = joints.get(second) or joints.get(first)
+    shape = first if second in joints else second
+    if segment is None or isinstance(shape, pymunk.Circle):
         return
-    normal = arbiter.normal if part is joints.get(first) else -arbiter.normal  # from the wall to the body
-    turned = _corrected_normal(normal, part, other)
+    normal = arbiter.normal if segment is joints.get(first) else -arbiter.normal  # from the wall to the body
+    turned = _corrected_normal(normal, segment, shape)
     if turned is None:
         return
     points = lib.cpArbiterGetContactPointSet(arbiter._arbiter)
-    sign = 1.0 if part is joints.get(first) else -1.0
+    sign = 1.0 if segment is joints.get(first) else -1.0
     points.normal = (sign * turned.x, sign * turned.y)  # pymunk's setter would merge its two points
     lib.cpArbiterSetContactPointSet(arbiter._arbiter, ffi.addressof(points))
 
 
-def _corrected_normal(normal: pymunk.Vec2d, part: WallSegment, other: pymunk.Shape) -> pymunk.Vec2d | None:
+def _corrected_normal(normal: pymunk.Vec2d, segment: WallSegment, shape: pymunk.Shape) -> pymunk.Vec2d | None:
     """Return the normal of the wall nearest to one that leans over a joint; None if it does not lean."""
-    a, b = pymunk.Vec2d(*part.a), pymunk.Vec2d(*part.b)
+    a, b = pymunk.Vec2d(*segment.a), pymunk.Vec2d(*segment.b)
     along = (b - a).normalized()
     lean = normal.dot(along)
     if abs(lean) <= LEAN:
         return None
-    end, sign = (part.after, 1.0) if lean > 0.0 else (part.before, -1.0)
-    if end is None:
+    neighbour_end, sign = (segment.after, 1.0) if lean > 0.0 else (segment.before, -1.0)
+    if neighbour_end is None:
         return None
-    onward = (pymunk.Vec2d(*end) - (b if lean > 0.0 else a)).normalized()
-    if normal.dot(onward) <= LEAN:
+    next_direction = (pymunk.Vec2d(*neighbour_end) - (b if lean > 0.0 else a)).normalized()
+    if normal.dot(next_direction) <= LEAN:
         return None
     left = along.perpendicular()
     side = normal.dot(left)
     if abs(side) < SIDEWAYS:
-        side = (other.bb.center() - a).dot(left)
+        side = (shape.bb.center() - a).dot(left)
     side = 1.0 if side >= 0.0 else -1.0
-    own, its = side * left, side * sign * onward.perpendicular()
-    return own if normal.dot(own) >= normal.dot(its) else its
+    own_normal, next_normal = side * left, side * sign * next_direction.perpendicular()
+    return own_normal if normal.dot(own_normal) >= normal.dot(next_normal) else next_normal
 
 
 BodyWallPair: TypeAlias = tuple[int, int]
@@ -121,7 +121,7 @@ class SpaceOneWayWalls:
         """segments of all walls that continue at one of their ends"""
         self.tick = 0
         """number of substeps"""
-        self._handled: set[tuple[int, int]] = set()
+        self._pairs_with_callback: set[tuple[int, int]] = set()
         self._passing: dict[BodyWallPair, dict[tuple[pymunk.Shape, pymunk.Shape] | None, int]] = {}
         self._last = -1  # the last substep in which a body was passing
         self._stopped: dict[BodyWallPair, int] = {}  # the substep in which a wall last stopped a body
@@ -130,8 +130,8 @@ class SpaceOneWayWalls:
     def rebuild(self, surfaces: PairTable, touching: BoolArray) -> None:
         """Add callbacks for the pairs (S, S) of surfaces of which one may be a one-way wall's."""
         for a, b in np.argwhere(np.triu(touching & (surfaces.one_way | surfaces.one_way[:, None]))).tolist():
-            if (a, b) not in self._handled:
-                self._handled.add((a, b))
+            if (a, b) not in self._pairs_with_callback:
+                self._pairs_with_callback.add((a, b))
                 self._space.on_collision(a + 1, b + 1, begin=self._begin)
 
     def resume(self, passing: Iterable[BodyWallPair]) -> None:
@@ -154,11 +154,11 @@ class SpaceOneWayWalls:
             return
         # At a joint of two segments of a wall both are in contact: the second follows the decision of the first.
         passing = self._passing.setdefault(_body_wall_pair(shape, wall), {})
-        through = any(last >= self.tick - 1 and pair != (shape, wall) for pair, last in passing.items())
-        held = self._stopped.get(_body_wall_pair(shape, wall), -2) >= self.tick - 1
-        arbiter.process_collision = held or (not through and self._blocks(arbiter, wall, shape))
+        is_passing = any(last >= self.tick - 1 and pair != (shape, wall) for pair, last in passing.items())
+        was_stopped = self._stopped.get(_body_wall_pair(shape, wall), -2) >= self.tick - 1
+        arbiter.process_collision = was_stopped or (not is_passing and self._blocks(arbiter, wall, shape))
 
-    def note(self, arbiter: pymunk.Arbiter) -> None:
+    def record_decision(self, arbiter: pymunk.Arbiter) -> None:
         """Record whether a contact is ignored, as decided when it began."""
         wall, shape = self._wall_and_other(arbiter)
         if wall is None:
@@ -184,8 +184,8 @@ class SpaceOneWayWalls:
         side = shape.bb.center() - shape.body.velocity * self._h - wall.a
         if (wall.b - wall.a).cross(side) < 0.0:
             return False
-        touched = self._is_resumed and self.tick == 1  # in contact before the space was created, and not passing
-        return touched or closing_speed(arbiter) >= 0.0
+        was_touching = self._is_resumed and self.tick == 1  # in contact before the space was created, and not passing
+        return was_touching or closing_speed(arbiter) >= 0.0
 
 
 def _body_wall_pair(shape: pymunk.Shape, wall: pymunk.Shape) -> BodyWallPair:
@@ -226,8 +226,8 @@ class KickedContact(NamedTuple):
     @property
     def work_per_impulse(self) -> float:
         """Work of the kick, J, for each N·s of the contact's normal impulse."""
-        whole = self.without_kick + self.kick
-        return self.kick / (self.closing + whole) * 0.5 * (self.without_kick + whole)
+        with_kick = self.without_kick + self.kick
+        return self.kick / (self.closing + with_kick) * 0.5 * (self.without_kick + with_kick)
 
 
 @dataclass
@@ -241,17 +241,17 @@ class PairCallbacks:
     """contacts that were kicked in the last substep, by the address of the arbiter; filled if it is a dict"""
     _known: dict[tuple[int, int], list[PairCoefficients]] = field(default_factory=dict)
 
-    def rebuild(self, surfaces: PairTable, wrong: set[tuple[int, int]], jointed: set[tuple[int, int]]) -> None:
-        """Set the pairs (a ≤ b) whose coefficients are set at each contact; all others no longer are.
+    def rebuild(self, surfaces: PairTable, unfactored: set[tuple[int, int]], jointed: set[tuple[int, int]]) -> None:
+        """Set the pairs (a ≤ b) whose coefficients are set at each contact, in place of the previous ones.
 
         Args:
             surfaces: all.
-            wrong: pairs that factors cannot represent.
+            unfactored: pairs whose coefficients are no products of factors.
             jointed: pairs of polygons and walls of several segments, whose normals are corrected.
         """
         for known in self._known.values():
             known.clear()
-        for a, b in sorted(wrong | jointed):
+        for a, b in sorted(unfactored | jointed):
             kick = surfaces.surfaces[a].kick or surfaces.surfaces[b].kick
             restitution, friction = float(surfaces.restitution[a, b]), float(surfaces.friction[a, b])
             known = self._known.setdefault((a, b), [])
@@ -267,7 +267,7 @@ class PairCallbacks:
         if not known:
             return
         if self.one_way_walls.walls:
-            self.one_way_walls.note(arbiter)
+            self.one_way_walls.record_decision(arbiter)
             if not arbiter.process_collision:
                 return
         if self.one_way_walls.joints:
@@ -292,18 +292,18 @@ class PairCallbacks:
         """Return the speed of the kick on a contact, m/s."""
         if closing <= kick.threshold:
             return 0.0
-        fraction, middle = 0.5, kick.profile == "middle"
-        if middle:
+        fraction, is_middle = 0.5, kick.profile == "middle"
+        if is_middle:
             segment = next(shape for shape in arbiter.shapes if shape in self.segment_fractions)
             assert isinstance(segment, pymunk.Segment)
             points = arbiter.contact_point_set.points
             x = sum(point.point_a.x + point.point_b.x for point in points) / (2 * len(points))
             y = sum(point.point_a.y + point.point_b.y for point in points) / (2 * len(points))
             fraction = fraction_at(segment.a, segment.b, self.segment_fractions[segment], (x, y))
-        return kicked(kick.speed, kick.threshold, middle, fraction, closing)
+        return kicked(kick.speed, kick.threshold, is_middle, fraction, closing)
 
 
-def kick_works(kicks: dict[int, KickedContact], where: list[int], counts: list[int]) -> FloatArray:
+def kick_works(kicks: dict[int, KickedContact], addresses: list[int], counts: list[int]) -> FloatArray:
     """Return the work of a kick, J, for each N·s along the normal of each contact point; 0 without a kick."""
-    each = [kicks[place].work_per_impulse if place in kicks else 0.0 for place in where]
-    return np.repeat(np.asarray(each, dtype=np.float64), counts)
+    works = [kicks[address].work_per_impulse if address in kicks else 0.0 for address in addresses]
+    return np.repeat(np.asarray(works, dtype=np.float64), counts)

@@ -32,65 +32,65 @@ TOLERANCE = 2.0**-51
 """Relative; two roundings, of a square root or quotient and of the product."""
 
 
-def factors(wanted: FloatArray, touching: BoolArray, stated: list[float | None]) -> list[float]:
-    """Return a factor for each of S surfaces whose products best match the wanted coefficients.
+def factors(target: FloatArray, touching: BoolArray, stated: list[float | None]) -> list[float]:
+    """Return a factor for each of S surfaces whose products best match the target coefficients.
 
     The stated values are tried first, with 1 where none is stated. If a product is wrong then, the factors are solved
     for: square roots on the diagonal, quotients along each further pair.
 
     Args:
-        wanted: (S, S) coefficients, symmetric.
+        target: (S, S) coefficients, symmetric.
         touching: (S, S) pairs that can touch; the others do not matter.
         stated: value that each surface states itself.
     """
-    plain = [1.0 if value is None else value for value in stated]
-    if not wrong_pairs(wanted, touching, plain):
-        return plain
-    solved = _solve_factors(wanted, touching)
-    return min(plain, solved, key=lambda f: len(wrong_pairs(wanted, touching, f)))
+    stated_factors = [1.0 if value is None else value for value in stated]
+    if not wrong_pairs(target, touching, stated_factors):
+        return stated_factors
+    solved = _solve_factors(target, touching)
+    return min(stated_factors, solved, key=lambda f: len(wrong_pairs(target, touching, f)))
 
 
-def wrong_pairs(wanted: FloatArray, touching: BoolArray, factor: list[float]) -> list[tuple[int, int]]:
-    """Return the pairs that can touch and whose product of factors is not the wanted coefficient."""
-    with np.errstate(over="ignore"):  # a quotient by a tiny factor may overflow; such a pair is wrong
-        off = np.abs(np.outer(factor, factor) - wanted) > TOLERANCE * wanted
-    rows, columns = np.nonzero(np.triu(off & touching))
+def wrong_pairs(target: FloatArray, touching: BoolArray, factor: list[float]) -> list[tuple[int, int]]:
+    """Return the pairs that can touch and whose product of factors is not the target coefficient."""
+    with np.errstate(over="ignore"):  # a quotient by a tiny factor may overflow; then the pair is wrong
+        is_wrong = np.abs(np.outer(factor, factor) - target) > TOLERANCE * target
+    rows, columns = np.nonzero(np.triu(is_wrong & touching))
     return list(zip(rows.tolist(), columns.tolist(), strict=True))
 
 
-def _solve_factors(wanted: FloatArray, touching: BoolArray) -> list[float]:
-    """Solve f_a·f_b = wanted over the pairs that can touch, as far as possible.
+def _solve_factors(target: FloatArray, touching: BoolArray) -> list[float]:
+    """Solve f_a·f_b = target over the pairs that can touch, as far as possible.
 
-    Factors of surfaces that touch their own kind are fixed; from these, values spread along the pairs.
+    Factors of surfaces that can touch themselves are roots; from these, other factors follow pair by pair.
     """
-    size = len(wanted)
+    size = len(target)
     factor: list[float | None] = [None] * size
-    own = [a for a in range(size) if touching[a, a]]
-    for seed in (*own, *range(size)):
+    self_touching = [a for a in range(size) if touching[a, a]]
+    for seed in (*self_touching, *range(size)):
         if factor[seed] is not None:
             continue
-        factor[seed] = math.sqrt(wanted[seed, seed]) if touching[seed, seed] else _free_factor(wanted, touching, seed)
+        factor[seed] = math.sqrt(target[seed, seed]) if touching[seed, seed] else _free_factor(target, touching, seed)
         queue = [seed]
         while queue:
             a = queue.pop()
             base = factor[a]
             for b in range(size):
                 if factor[b] is None and touching[a, b] and not touching[b, b] and base:
-                    quotient = float(wanted[a, b]) / base
+                    quotient = float(target[a, b]) / base
                     if math.isfinite(quotient):
                         factor[b] = quotient
                         queue.append(b)
     return [0.0 if value is None else value for value in factor]
 
 
-def _free_factor(wanted: FloatArray, touching: BoolArray, surface: int) -> float:
+def _free_factor(target: FloatArray, touching: BoolArray, surface: int) -> float:
     """Return 1, or 0 for a surface whose pairs all have the coefficient 0."""
-    return 1.0 if (wanted[surface][touching[surface]] > 0).any() else 0.0
+    return 1.0 if (target[surface][touching[surface]] > 0).any() else 0.0
 
 
 STATIC, COLLIDES_ALL, COLLIDES_FIXED = 0b001, 0b010, 0b100
-"""Collision categories: static and fixed bodies, bodies that collide with everything, and bodies that collide with the
-former only."""
+"""Collision categories: static and fixed bodies; bodies that collide with everything; bodies that collide with the
+first category only."""
 
 CATEGORIES_PER_LAYER = 3
 """number of categories on each layer: those of layer k are shifted by 3·k bits"""
@@ -103,7 +103,7 @@ thousand times as much at 5e6"""
 def new_space(scene: Scene, settings: Settings) -> pymunk.Space:
     """Return an empty space with every parameter set. `settings` must be resolved."""
     assert settings.slop is not None and settings.bias is not None and settings.persistence is not None
-    space = pymunk.Space(threaded=False)  # two threads are not repeatable
+    space = pymunk.Space(threaded=False)  # with two threads, runs are not repeatable
     space.gravity = gravity_of(scene)
     space.damping = 1.0  # drag is in `forces.py`: pymunk's damping would slow spins too, and has no wind
     space.iterations = settings.iterations
@@ -121,16 +121,16 @@ def gravity_of(scene: Scene) -> tuple[float, float]:
 
 
 @cache
-def category(fixed: bool, collides: Collides, group: int = 0, layers: int = 1) -> pymunk.ShapeFilter:
+def collision_filter(fixed: bool, collides: Collides, group: int = 0, layers: int = 1) -> pymunk.ShapeFilter:
     """Return the filter of shapes on some layers, given as bits. Shapes of one group other than 0 do not collide."""
     if fixed:
-        own, others = STATIC, COLLIDES_ALL | COLLIDES_FIXED if collides == "all" else 0
+        categories, mask = STATIC, COLLIDES_ALL | COLLIDES_FIXED if collides == "all" else 0
     elif collides == "all":
-        own, others = COLLIDES_ALL, STATIC | COLLIDES_ALL
+        categories, mask = COLLIDES_ALL, STATIC | COLLIDES_ALL
     else:
-        own, others = COLLIDES_FIXED, STATIC
-    each = sum(1 << CATEGORIES_PER_LAYER * k for k in range(layers.bit_length()) if layers >> k & 1)
-    return pymunk.ShapeFilter(group, categories=own * each, mask=others * each)
+        categories, mask = COLLIDES_FIXED, STATIC
+    layer_bits = sum(1 << CATEGORIES_PER_LAYER * k for k in range(layers.bit_length()) if layers >> k & 1)
+    return pymunk.ShapeFilter(group, categories=categories * layer_bits, mask=mask * layer_bits)
 
 
 def reach_of(starts: FloatArray) -> tuple[FloatArray, float]:
@@ -221,14 +221,14 @@ class SurfaceSetter:
         stated = [(s.restitution, s.friction) for s in surfaces.surfaces]
         self._elasticity = factors(surfaces.restitution, touching, [e for e, _ in stated])
         self._friction = factors(surfaces.friction, touching, [mu for _, mu in stated])
-        wrong = {
+        unfactored = {
             *wrong_pairs(surfaces.restitution, touching, self._elasticity),
             *wrong_pairs(surfaces.friction, touching, self._friction),
             *_pairs(touching & ~(surfaces.fixed_coefficients & ~(surfaces.one_way | surfaces.one_way[:, None]))),
         }
         solid = matrix.solid
         corrected = {(a, b) for a, b in _pairs(touching) if (a in jointed and solid[b]) or (b in jointed and solid[a])}
-        self.pair_callbacks.rebuild(surfaces, wrong, corrected)
+        self.pair_callbacks.rebuild(surfaces, unfactored, corrected)
         if surfaces.one_way.any():
             self.one_way_walls.rebuild(surfaces, touching)
 
@@ -239,9 +239,9 @@ class SurfaceSetter:
         shape.collision_type = surface + 1  # 0 is pymunk's default for shapes without a type
 
 
-def _pairs(which: BoolArray) -> list[tuple[int, int]]:
-    """Return the pairs a ≤ b for which a symmetric (S, S) is true."""
-    return [(a, b) for a, b in np.argwhere(np.triu(which)).tolist()]
+def _pairs(matrix: BoolArray) -> list[tuple[int, int]]:
+    """Return the pairs a ≤ b for which a symmetric matrix (S, S) is true."""
+    return [(a, b) for a, b in np.argwhere(np.triu(matrix)).tolist()]
 
 
 SHUFFLED_FROM = 5_000
@@ -271,7 +271,7 @@ class StaticShapes:
             centre, reach = np.asarray(plane_reach[:2]), plane_reach[2]
         if scene.planes:
             self._middle[0:2], self.reach, self._planes = centre, reach, scene.planes
-        every: list[pymunk.Shape] = []
+        all_shapes: list[pymunk.Shape] = []
         for collider, index in zip(scene.fixed, surface.tolist(), strict=True):
             body = pymunk.Body(body_type=pymunk.Body.STATIC)
             shapes = self._shapes(collider, body, centre, reach)
@@ -280,9 +280,9 @@ class StaticShapes:
                 self._setter.set_surface(shape, index)
             self._space.add(body)
             self._colliders.append((body, shapes))
-            every += shapes
-        for k in shuffled(len(every)):
-            self._space.add(every[k])
+            all_shapes += shapes
+        for k in shuffled(len(all_shapes)):
+            self._space.add(all_shapes[k])
         self._bound()
 
     @property
@@ -295,8 +295,8 @@ class StaticShapes:
 
     def _bound(self) -> None:
         """Set the limits of `within` from the present reach."""
-        where = min(self.reach, FARTHEST)
-        self._limit = np.array([where, where, math.inf, FASTEST, FASTEST, math.inf])
+        max_distance = min(self.reach, FARTHEST)
+        self._limit = np.array([max_distance, max_distance, math.inf, FASTEST, FASTEST, math.inf])
 
     def extend(self, position: FloatArray) -> None:
         """Extend the half-planes to positions (M, 2), m, at most to `LONGEST_REACH`.
@@ -305,11 +305,11 @@ class StaticShapes:
         ends. A body that moves farther than the reach within one step can be beyond the ends, at twice the reach,
         before that.
         """
-        far = np.abs(position - self._middle[0:2])
-        far = far[far <= LONGEST_REACH]  # no half-plane can reach positions beyond, or nan
-        if not len(far) or far.max() <= self.reach:
+        distance = np.abs(position - self._middle[0:2])
+        distance = distance[distance <= LONGEST_REACH]  # no half-plane can reach positions beyond, or nan
+        if not len(distance) or distance.max() <= self.reach:
             return
-        while self.reach < far.max():
+        while self.reach < distance.max():
             self.reach = min(2.0 * self.reach, LONGEST_REACH)
         for plane, (_, shapes) in zip(self._planes, self._colliders, strict=False):  # planes come first
             for shape in shapes:
@@ -358,11 +358,11 @@ class StaticShapes:
     def rebuild(self, scene: Scene, surface: IntArray) -> None:
         """Update the surfaces (F,) and filters of the static colliders."""
         for (_, shapes), collider, index in zip(self._colliders, scene.fixed, surface.tolist(), strict=False):
-            passes = _filter(collider, scene)
+            shape_filter = _filter(collider, scene)
             for shape in shapes:
                 self._setter.set_surface(shape, index)
-                if shape.filter != passes:
-                    shape.filter = passes
+                if shape.filter != shape_filter:
+                    shape.filter = shape_filter
 
     @property
     def ids(self) -> dict[int, int]:
@@ -392,7 +392,7 @@ def jointed_surfaces(scene: Scene, surface: IntArray) -> set[int]:
 def _filter(collider: Plane | Wall | Post, scene: Scene) -> pymunk.ShapeFilter:
     """Return the collision filter of a static collider."""
     solid = isinstance(collider, Plane) or collider.solid
-    return category(True, "all" if solid else "none", layers=mask_of(collider.layers, scene.layers))
+    return collision_filter(True, "all" if solid else "none", layers=mask_of(collider.layers, scene.layers))
 
 
 def shuffled(count: int) -> list[int]:

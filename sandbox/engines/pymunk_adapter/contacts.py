@@ -11,8 +11,8 @@ separates while another stays.
 
 `CachedContactCorrection` computes the same correction from the lists of contacts, without callbacks. It needs pairs
 with at most one contact point. The impulse with which such a pair begins again is its last one, in the frame of the
-normal: with complex numbers c = J/n, and then c·n' about the new normal. A callback at each beginning takes as long as
-a sixth of the step of a pile.
+normal: with complex numbers c = J/n, and then c·n' about the new normal. A callback at each beginning would
+take a sixth of the step of a pile.
 """
 
 from typing import Any, NamedTuple, Self
@@ -44,8 +44,8 @@ class WarmStartCorrection:
         if not (x or y):
             return
         if self.points is not None:
-            where, impulses = impulses_of(arbiter)
-            self.points[where] = impulses
+            address, impulses = impulses_of(arbiter)
+            self.points[address] = impulses
         if self.pairs:
             a, b = arbiter.shapes
             if a.body is not None and b.body is not None:
@@ -54,7 +54,7 @@ class WarmStartCorrection:
 
     @property
     def found(self) -> bool:
-        """Whether there are some."""
+        """Whether impulses have been collected."""
         return bool(self._ids)
 
     def take(self) -> tuple[IntArray, FloatArray]:
@@ -74,18 +74,18 @@ def subtract_impulses(touching: ContactBatch, pair: IntArray, impulse: FloatArra
     """
     if not len(pair) or not len(touching.a):
         return touching
-    low = int(min(touching.a.min(), touching.b.min(), pair.min()))
-    span = int(max(touching.a.max(), touching.b.max(), pair.max())) - low + 1
-    key = (touching.a - low) * span + touching.b - low
+    lowest = int(min(touching.a.min(), touching.b.min(), pair.min()))
+    span = int(max(touching.a.max(), touching.b.max(), pair.max())) - lowest + 1
+    key = (touching.a - lowest) * span + touching.b - lowest
     order = np.argsort(key, kind="stable")
     corrected = touching.impulse.copy()
-    given = impulse[:, 0] + 1j * impulse[:, 1]
+    impulse_vector = impulse[:, 0] + 1j * impulse[:, 1]
     for first, second, sign in ((0, 1, 1.0), (1, 0, -1.0)):
-        wanted = (pair[:, first] - low) * span + pair[:, second] - low
-        row = order[np.minimum(np.searchsorted(key, wanted, sorter=order), len(key) - 1)]
-        found = key[row] == wanted
-        np.subtract.at(corrected, row[found], sign * given[found])
-        pair, given = pair[~found], given[~found]  # some may be listed in the other order
+        pair_key = (pair[:, first] - lowest) * span + pair[:, second] - lowest
+        row = order[np.minimum(np.searchsorted(key, pair_key, sorter=order), len(key) - 1)]
+        found = key[row] == pair_key
+        np.subtract.at(corrected, row[found], sign * impulse_vector[found])
+        pair, impulse_vector = pair[~found], impulse_vector[~found]  # some may be listed in the other order
     return touching._replace(impulse=corrected)
 
 
@@ -128,9 +128,9 @@ class ContactPoints(NamedTuple):
         """Return the work, J, of impulses along normals, along surfaces and by kicks, at mean velocities."""
         x, y = self.joint_impulses.separating_velocity(velocity, spin).T
         nx, ny = self.normal.T
-        out, left = nx * x + ny * y, nx * y - ny * x
-        kicks = float(self.along @ self.kick)
-        return float(self.along @ out) - kicks, float(self.across @ left), kicks
+        normal_velocity, tangential_velocity = nx * x + ny * y, nx * y - ny * x
+        kick_work = float(self.along @ self.kick)
+        return float(self.along @ normal_velocity) - kick_work, float(self.across @ tangential_velocity), kick_work
 
 
 class ContactPointReader:
@@ -146,7 +146,7 @@ class ContactPointReader:
         Args:
             index: body index of each `cpBody` that moves; all others are static.
         """
-        begun = self._warm_start.points
+        warm_start = self._warm_start.points
         first: list[int] = []
         second: list[int] = []
         normal: list[tuple[float, float]] = []
@@ -157,10 +157,10 @@ class ContactPointReader:
             if arbiter.state >= NOT_TOUCHING:
                 continue
             record = points_of(arbiter)
-            if begun:
-                old = begun.get(address_of(arbiter))
-                if old is not None:
-                    record[:, IMPULSES] -= old  # applied before they separated
+            if warm_start:
+                applied_before = warm_start.get(address_of(arbiter))
+                if applied_before is not None:
+                    record[:, IMPULSES] -= applied_before  # applied before they separated
             records.append(record)
             if kicks:
                 addresses.append(address_of(arbiter))
@@ -170,8 +170,8 @@ class ContactPointReader:
                 first.append(a)
                 second.append(b)
                 normal.append(n)
-        if begun:
-            begun.clear()
+        if warm_start:
+            warm_start.clear()
         kick = np.zeros(len(first))
         if kicks:
             kick = kick_works(kicks, addresses, [len(record) for record in records])
@@ -191,7 +191,7 @@ class CachedContactCorrection:
     """Pairs that have separated and that pymunk still caches."""
 
     def __init__(self, reader: SpaceReader, collider_count: int) -> None:
-        """Start after a first reading in which no pair is cached.
+        """Start after a first reading without cached pairs.
 
         Args:
             reader: of the space; from now on it keeps each listing for one more reading.
@@ -204,38 +204,39 @@ class CachedContactCorrection:
         """pair → last impulse, N·s, in the frame of its normal"""
         reader.keep_last = True
 
-    def correct(self, found: ContactBatch) -> ContactBatch:
+    def correct(self, contacts: ContactBatch) -> ContactBatch:
         """Return contacts that differ from the last ones, without impulses that are counted twice."""
         last = self._last
-        lower, higher = np.minimum(found.a, found.b), np.maximum(found.a, found.b)  # pymunk lists either first
+        # pymunk lists either body first.
+        lower, higher = np.minimum(contacts.a, contacts.b), np.maximum(contacts.a, contacts.b)
         row, new = self._rows.find(lower + self._collider_count, higher + self._collider_count)
-        self._rows.keep(np.arange(len(found.a)))
-        self._last = found
+        self._rows.keep(np.arange(len(contacts.a)))
+        self._last = contacts
         ended = np.ones(len(last.a), np.bool_)
-        lasting = np.ones(len(found.a), np.bool_)
+        lasting = np.ones(len(contacts.a), np.bool_)
         lasting[new] = False
         ended[row[lasting]] = False
-        gone = np.flatnonzero(ended)
-        if len(gone):
-            impulse, normal = self._reader.last_vectors(gone)
-            for pair, last_impulse in zip(_pairs(last, gone), (impulse / normal).tolist(), strict=True):
+        ended_rows = np.flatnonzero(ended)
+        if len(ended_rows):
+            impulse, normal = self._reader.last_vectors(ended_rows)
+            for pair, last_impulse in zip(_pairs(last, ended_rows), (impulse / normal).tolist(), strict=True):
                 self._separated[pair] = last_impulse
         if not self._separated:
-            return found
-        again = [
+            return contacts
+        reopened = [
             (k, self._separated.pop(pair))
-            for k, pair in zip(new.tolist(), _pairs(found, new), strict=True)
+            for k, pair in zip(new.tolist(), _pairs(contacts, new), strict=True)
             if pair in self._separated
         ]
         if self._separated:  # a pair that pymunk no longer caches begins at 0
             cached = set(map(_pair, *self._reader.cached().T.tolist()))
             self._separated = {pair: last_impulse for pair, last_impulse in self._separated.items() if pair in cached}
-        if not again:
-            return found
-        impulse = found.impulse.copy()
-        for k, last_impulse in again:
-            impulse[k] -= last_impulse * found.normal[k]
-        return found._replace(impulse=impulse)
+        if not reopened:
+            return contacts
+        impulse = contacts.impulse.copy()
+        for k, last_impulse in reopened:
+            impulse[k] -= last_impulse * contacts.normal[k]
+        return contacts._replace(impulse=impulse)
 
 
 def _pairs(touching: ContactBatch, rows: IntArray) -> list[ColliderPair]:
@@ -262,17 +263,17 @@ class ContactReader:
         self._cached_correction: CachedContactCorrection | None = None
         self._points: ContactPointReader | None = None
 
-    def touching(self, polygons: bool, single: bool, steady: bool) -> ContactBatch | ComplexArray:
+    def touching(self, polygons: bool, single: bool, impulses_suffice: bool) -> ContactBatch | ComplexArray:
         """Return the present contacts; from the first call on, their impulses are corrected.
 
         Args:
             polygons: whether there are polygons, which may touch in two points.
             single: whether two bodies have at most one contact.
-            steady: whether impulses alone suffice if the contacts are the same as at the last call, in the same order.
+            impulses_suffice: whether impulses alone suffice if the contacts are those of the last call, in that order.
         """
         same = self._reader.read_contacts(polygons)
         if single and self._are_listings_enough():
-            if same and steady and self._cached_correction is not None:
+            if same and impulses_suffice and self._cached_correction is not None:
                 return self._reader.impulses()
             found = self._reader.touching()
             if self._cached_correction is None:
@@ -281,7 +282,7 @@ class ContactReader:
                 return found
             return self._cached_correction.correct(found)
         warm_start = self._warm_start or self._start_warm_start_correction()
-        if same and steady and warm_start.pairs and not warm_start.found:
+        if same and impulses_suffice and warm_start.pairs and not warm_start.found:
             return self._reader.impulses()
         warm_start.pairs = True
         found = self._reader.touching()

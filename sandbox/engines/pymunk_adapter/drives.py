@@ -84,7 +84,7 @@ class DrivenBodyStart(NamedTuple):
 
 
 class SpaceDrivenBody:
-    """Driven body: its index, and its state where the space does not have it."""
+    """Driven body: its index, and the part of its state that the space does not hold."""
 
     def __init__(self, start: DrivenBodyStart) -> None:
         self.index, self.mount, self.body, self._h = start.body_index, start.mount, start.body, start.h
@@ -119,7 +119,7 @@ class SpaceDrivenBody:
         """Return position, m, and velocity, m/s, of the centre of mass at an angle, rad, and a spin, rad/s."""
         return centre_about_pivot(self.mount.hinge, self._pivot, angle, spin)
 
-    def _aim(self, angle: float, spin: float) -> None:
+    def _set_angle_before_step(self, angle: float, spin: float) -> None:
         """Set the angle so that the next step turns the body to `angle` with its spin."""
         lib.cpBodySetAngle(self._record, angle - spin * self._h)
 
@@ -156,14 +156,14 @@ class SpaceHingeMotor(SpaceDrivenBody):
         self._gravity = (0.0, 0.0)
         self._weight: Any = (0.0, 0.0)
         self._is_resting = False  # at rest at a stop, with the same torque as in the last substep
-        self.kick = self.weight_torque = 0.0
+        self.total_torque = self.weight_torque = 0.0
         """N·m, total torque without contacts and the limit, and the part of its weight"""
         lib.cpBodySetAngularVelocity(self._record, self.spin)
 
-    def set_gravity(self, gravity: tuple[float, float], ground: tuple[float, float]) -> None:
+    def set_gravity(self, gravity: tuple[float, float], space_gravity: tuple[float, float]) -> None:
         """Set the gravity, m/s², and the gravity that the space itself applies to all bodies."""
-        balance = -ground[0] * self.body.mass, -ground[1] * self.body.mass
-        self._gravity, self._weight = gravity, ffi.new("cpVect *", balance)[0]  # once: a tuple takes 0.15 µs more
+        counterforce = -space_gravity[0] * self.body.mass, -space_gravity[1] * self.body.mass
+        self._gravity, self._weight = gravity, ffi.new("cpVect *", counterforce)[0]  # once: a tuple takes 0.15 µs more
         self._is_resting = False
 
     def set(self, level: float) -> None:
@@ -175,7 +175,7 @@ class SpaceHingeMotor(SpaceDrivenBody):
         lib.cpBodySetForce(self._record, self._weight)
         if self.spin or not self._is_resting:
             self._move()
-        lib.cpBodySetTorque(self._record, self.kick)
+        lib.cpBodySetTorque(self._record, self.total_torque)
         self._can_leave_stop = self._had_contact = False
 
     def _move(self) -> None:
@@ -184,10 +184,10 @@ class SpaceHingeMotor(SpaceDrivenBody):
         angle, spin, self.stop, press, self.torque, steady = hinge_drive.turn(
             self.angle, self.spin, self.torque, self.level, self.weight_torque, h
         )
-        self._aim(angle, self.spin)
-        self.kick = self.moment * (spin - self.spin) / h
+        self._set_angle_before_step(angle, self.spin)
+        self.total_torque = self.moment * (spin - self.spin) / h
         if self.stop:
-            self.kick += press
+            self.total_torque += press
         self._is_resting = self.stop != 0 and steady and not self.spin and angle == self.angle
         self._set_limit(self.stop)
         self.angle = angle
@@ -204,24 +204,24 @@ class SpaceHingeMotor(SpaceDrivenBody):
             high - 2.0 * UNLIMITED * (direction > 0),
         )
 
-    def on_contact(self, arbiter: pymunk.Arbiter, first: bool) -> None:
-        """Handle a contact before it is solved; `first` if the body is the first of the two."""
+    def on_contact(self, arbiter: pymunk.Arbiter, is_first: bool) -> None:
+        """Handle a contact before it is solved; `is_first`: whether the body is the first of the two."""
         self._had_contact = True
         if not self.stop:
             return
         nx, ny = arbiter.normal
-        direction = self.stop * self._sense * (-1.0 if first else 1.0)
+        direction = self.stop * self._sense * (-1.0 if is_first else 1.0)
         x, y = self._pivot
-        onto = all(
+        presses_onto_stop = all(
             direction * ((p.point_a[0] - x) * ny - (p.point_a[1] - y) * nx) >= 0.0
             for p in arbiter.contact_point_set.points
         )
-        if onto and not (self._can_leave_stop or self._is_locked):
+        if presses_onto_stop and not (self._can_leave_stop or self._is_locked):
             self._is_locked = True
             lib.cpBodySetAngularVelocity(self._record, 0.0)
             lib.cpBodySetMoment(self._record, math.inf)
             self._set_limit(0)  # a limit between two immovable bodies would give nan
-        elif not onto:
+        elif not presses_onto_stop:
             self._can_leave_stop = True
             self._unlock()
 
@@ -255,8 +255,8 @@ class SpaceHingeMotor(SpaceDrivenBody):
     @property
     def drive_impulse(self) -> float:
         """Angular impulse of drive and stops in the last substep, N·m·s; undefined while the body is immovable."""
-        held = -self.stop * self._sense * abs(self.limit.impulse)
-        return (self.kick - self.weight_torque) * self._h + held
+        limit_impulse = -self.stop * self._sense * abs(self.limit.impulse)
+        return (self.total_torque - self.weight_torque) * self._h + limit_impulse
 
 
 class SpaceKinematicHinge(SpaceDrivenBody):
@@ -280,7 +280,7 @@ class SpaceKinematicHinge(SpaceDrivenBody):
             self.spin = spin
             lib.cpBodySetAngularVelocity(self._record, spin)
         self.angle = angle
-        self._aim(self.angle, spin)
+        self._set_angle_before_step(self.angle, spin)
 
     def after(self) -> None:
         """Stop the body once it has reached a stop."""
@@ -300,7 +300,7 @@ class SpacePlunger(SpaceDrivenBody):
         super().__init__(start)
         assert isinstance(start.mount.drive, PlungerDrive)
         self._drive, self._arrives = start.mount.drive, False
-        self._along = stroke_direction(self._drive)
+        self._direction = stroke_direction(self._drive)
         _, self.pull, self.rate = start.state
         """m, distance by which it is drawn back, and the rate at which that grows, m/s"""
         lib.cpBodySetVelocity(self._record, self.velocity)
@@ -316,7 +316,7 @@ class SpacePlunger(SpaceDrivenBody):
             return
         h = self._h
         self.pull, self.rate, self._arrives = advance_plunger(self._drive, self.level, self.pull, self.rate, h)
-        self.position, self.velocity = plunger_state(self.mount.home, self._along, self.pull, self.rate)
+        self.position, self.velocity = plunger_state(self.mount.home, self._direction, self.pull, self.rate)
         (x, y), (vx, vy) = self.position, self.velocity
         lib.cpBodySetPosition(self._record, (x - vx * h, y - vy * h))
         lib.cpBodySetVelocity(self._record, (vx, vy))
@@ -374,10 +374,10 @@ class SpaceDrives:
     def join(self, name: str, index: int, body: pymunk.Body, state: list[float]) -> None:
         """Drive a body that is in the space; its state is x, y, angle, vx, vy, spin, mass."""
         mount = self._mounts[name]
-        level, effort, pace = self.state[mount.number].tolist()
+        level, torque_or_pull, rate = self.state[mount.number].tolist()
         x, y, angle, vx, vy, spin, mass, *_ = state
-        own = level, effort, pace
-        start = DrivenBodyStart(index, mount, body, mass, (x, y), (vx, vy), angle, spin, own, self._h)
+        drive_state = level, torque_or_pull, rate
+        start = DrivenBodyStart(index, mount, body, mass, (x, y), (vx, vy), angle, spin, drive_state, self._h)
         if isinstance(mount.drive, TorqueDrive):
             hinge = SpaceHingeMotor(start, self._space.static_body)
             hinge.set_gravity(*self._gravity)
@@ -401,26 +401,26 @@ class SpaceDrives:
                     self._space.remove(driven_body.limit)
         self.driven_bodies = list(self._by_drive.values())
 
-    def add_callbacks(self, kind: Callable[[int], set[int]]) -> None:
-        """Add callbacks for contacts of hinged bodies; `kind` returns the collision types of a body by its index."""
+    def add_callbacks(self, collision_types: Callable[[int], set[int]]) -> None:
+        """Add callbacks for contacts of hinged bodies; `collision_types` returns those of a body by its index."""
         for hinge in self._hinges.values():
-            for each in kind(hinge.index) - self._with_callback:
-                self._with_callback.add(each)
-                self._space.on_collision(each, None, pre_solve=self._contact_callback)
+            for collision_type in collision_types(hinge.index) - self._with_callback:
+                self._with_callback.add(collision_type)
+                self._space.on_collision(collision_type, None, pre_solve=self._contact_callback)
 
     def _contact_callback(self, arbiter: pymunk.Arbiter, _: pymunk.Space, __: object) -> None:
         if not arbiter.process_collision:  # it passes a one-way wall
             return
-        for shape, first in zip(arbiter.shapes, (True, False), strict=True):
+        for shape, is_first in zip(arbiter.shapes, (True, False), strict=True):
             hinge = self._hinges.get(shape.body.id) if shape.body is not None else None
             if hinge is not None:
-                hinge.on_contact(arbiter, first)
+                hinge.on_contact(arbiter, is_first)
 
-    def set_gravity(self, gravity: tuple[float, float], ground: tuple[float, float]) -> None:
+    def set_gravity(self, gravity: tuple[float, float], space_gravity: tuple[float, float]) -> None:
         """Set the gravity, m/s², and the gravity that the space itself applies to all bodies."""
-        self._gravity = gravity, ground
+        self._gravity = gravity, space_gravity
         for hinge in self._hinges.values():
-            hinge.set_gravity(gravity, ground)
+            hinge.set_gravity(gravity, space_gravity)
 
     def set(self, index: int, level: float) -> None:
         """Set the level of a drive from now on."""
@@ -464,7 +464,7 @@ class SpaceDrives:
         return [driven_body.index for driven_body in self.driven_bodies]
 
     def end(self, before: FloatArray, fraction: float) -> None:
-        """Fix the state (D, 3) for good, interpolated by a fraction of the last substep from `before`."""
+        """Set the final state (D, 3), interpolated by a fraction of the last substep from `before`."""
         self._last = before + (self.current_state() - before) * fraction
 
     def current_state(self) -> FloatArray:

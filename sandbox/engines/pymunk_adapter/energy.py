@@ -28,43 +28,43 @@ class AppliedImpulses(NamedTuple):
     """(N, 2) by gravity and attraction"""
     driven: FloatArray
     """(N, 2) by constant forces and thrusts"""
-    twisted: FloatArray
+    angular: FloatArray
     """(N,) by constant torques and thrusts, N·m·s"""
     drag: FloatArray
     """(N, 2) by drag, including its reduction of other forces"""
 
 
 def applied_impulses(
-    population: PymunkBodies, before: FloatArray, counts: BoolArray, springs: FloatArray | None, h: float
+    population: PymunkBodies, before: FloatArray, included: BoolArray, springs: FloatArray | None, h: float
 ) -> AppliedImpulses:
     """Return the impulses applied in the last substep.
 
     Args:
         population: as it is after the substep.
         before: velocities at its start, (N, 2) m/s.
-        counts: (N,) bodies to include; others get 0.
+        included: (N,) bodies to include; others get 0.
         springs: (N, 2) N, forces of springs, which drag reduces; None: none.
-        h: duration that counts, s.
+        h: duration of the accounted part of the substep, s.
     """
     bodies, world = population.bodies, population.scene.world
-    mass = np.where(counts, bodies.mass, 0.0)[:, None]
+    mass = np.where(included, bodies.mass, 0.0)[:, None]
     constant, torque = _constant_forces(population)
-    pull, thrust, thrust_torque = _field(population)
+    attraction, thrust, thrust_torque = _field(population)
     drag = np.zeros_like(before)
     if has_drag(world):
-        applied = (constant + thrust + (0.0 if springs is None else springs)) / bodies.mass[:, None] + pull
-        given = acceleration(world, before, applied, population.h) - np.asarray(world.gravity) - applied
-        drag = mass * given * h
-    driven = np.where(counts[:, None], constant + thrust, 0.0)
-    twisted = np.where(counts, torque + thrust_torque, 0.0)
-    return AppliedImpulses(mass * (np.asarray(world.gravity) + pull) * h, driven * h, twisted * h, drag)
+        applied = (constant + thrust + (0.0 if springs is None else springs)) / bodies.mass[:, None] + attraction
+        drag_acceleration = acceleration(world, before, applied, population.h) - np.asarray(world.gravity) - applied
+        drag = mass * drag_acceleration * h
+    driven = np.where(included[:, None], constant + thrust, 0.0)
+    angular = np.where(included, torque + thrust_torque, 0.0)
+    return AppliedImpulses(mass * (np.asarray(world.gravity) + attraction) * h, driven * h, angular * h, drag)
 
 
 def _constant_forces(population: PymunkBodies) -> tuple[FloatArray, FloatArray]:
     """Return the constant forces (N, 2), N, and torques (N,), N·m."""
     force, torque = np.zeros_like(population.position), np.zeros(len(population.position))
-    for steady in (population.particles.forces, population.space_bodies.constant_forces):
-        for index, constant in steady.items():
+    for forces in (population.particles.forces, population.space_bodies.constant_forces):
+        for index, constant in forces.items():
             force[index], torque[index] = constant
     return force, torque
 
@@ -72,16 +72,16 @@ def _constant_forces(population: PymunkBodies) -> tuple[FloatArray, FloatArray]:
 def _field(population: PymunkBodies) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the attraction (N, 2), m/s², on all bodies, and the thrusts, (N, 2) N and (N,) N·m."""
     field, particles, names = population.space_bodies.field, population.particles.indices, population.bodies.names
-    pull, thrust = np.zeros_like(population.position), np.zeros_like(population.position)
-    thrust_torque = np.zeros(len(pull))
+    attraction, thrust = np.zeros_like(population.position), np.zeros_like(population.position)
+    thrust_torque = np.zeros(len(attraction))
     if field.attracts:
-        pull[particles] = field.at(population.position[particles])
+        attraction[particles] = field.at(population.position[particles])
     if field.applied:
         index = {name: k for k, name in enumerate(names)}
         rows = [index[name] for name in field.applied]
         applied = np.asarray(list(field.applied.values()))
-        pull[rows], thrust[rows], thrust_torque[rows] = applied[:, 0:2], applied[:, 2:4], applied[:, 4]
-    return pull, thrust, thrust_torque
+        attraction[rows], thrust[rows], thrust_torque[rows] = applied[:, 0:2], applied[:, 2:4], applied[:, 4]
+    return attraction, thrust, thrust_torque
 
 
 class EnergyState(NamedTuple):
@@ -150,32 +150,32 @@ def drive_work(
     """
     before, now = states
     velocity, spin = means
-    met = ImpulseSums(np.zeros_like(velocity), np.zeros_like(spin), np.empty(0, np.int64))
-    met.subtract(points.joint_impulses)  # the negative of the impulses by contacts
+    contact_impulses = ImpulseSums(np.zeros_like(velocity), np.zeros_like(spin), np.empty(0, np.int64))
+    contact_impulses.subtract(points.joint_impulses)  # the negative of the impulses by contacts
     driven = weight = potential_change = 0.0
     for driven_body in driven_bodies:
         n = driven_body.index
         mass = float(bodies.mass[n])
-        shift = now.position[n] - before.position[n]
-        rise = -mass * float(shift @ np.asarray(gravity))
+        displacement = now.position[n] - before.position[n]
+        height_energy = -mass * float(displacement @ np.asarray(gravity))
         if isinstance(driven_body, SpaceHingeMotor):
-            potential_change += rise
+            potential_change += height_energy
         else:
-            driven += rise  # a kinematic body's drive carries its weight
+            driven += height_energy  # a kinematic body's drive carries its weight
         if isinstance(driven_body, SpacePlunger):
-            given = mass * (now.velocity[n] - before.velocity[n]) + met.linear[n]
-            driven += float(given @ velocity[n])
+            impulse = mass * (now.velocity[n] - before.velocity[n]) + contact_impulses.linear[n]
+            driven += float(impulse @ velocity[n])
             continue
         x, y = driven_body.mount.hinge
         moment = float(bodies.moment[n]) + mass * (x * x + y * y)
         if isinstance(driven_body, SpaceHingeMotor):
             weight += driven_body.weight_torque * h * fraction * float(spin[n])
         if isinstance(driven_body, SpaceHingeMotor) and not driven_body.was_locked:
-            given = driven_body.drive_impulse * fraction
+            impulse = driven_body.drive_impulse * fraction
         else:
-            given = moment * float(now.spin[n] - before.spin[n]) + float(met.angular[n])
-            given -= driven_body.weight_torque * h * fraction if isinstance(driven_body, SpaceHingeMotor) else 0.0
-        driven += given * float(spin[n])
+            impulse = moment * float(now.spin[n] - before.spin[n]) + float(contact_impulses.angular[n])
+            impulse -= driven_body.weight_torque * h * fraction if isinstance(driven_body, SpaceHingeMotor) else 0.0
+        driven += impulse * float(spin[n])
     return DriveWorkSums(driven, weight, potential_change)
 
 
@@ -220,54 +220,54 @@ class PymunkEnergyLedger:
 
     @np.errstate(over="ignore", invalid="ignore")  # in a diverged state, which the simulation detects next
     def substep(self, before: EnergyState | None, fraction: float = 1.0) -> None:
-        """Enter the last substep or, if it is cut off, its first fraction."""
+        """Account the last substep or, if it is cut off, its first fraction."""
         p, account = self._population, self.account
         if p.particles.has_only_gravity:
             account.add(Cause.INTEGRATOR, self._free_fall_error(fraction))
         if before is None:
             return
-        counts = p.free_to_move
+        included = p.free_to_move
         if p.particles.has_only_gravity:
-            counts[p.particles.indices] = False
+            included[p.particles.indices] = False
         driven_bodies = p.space_bodies.drives.driven_bodies
-        counts[p.space_bodies.drives.indices] = False  # entered separately below
-        whole = self._state()
-        now = before.interpolated(whole, fraction)
-        if now is not whole:
+        included[p.space_bodies.drives.indices] = False  # accounted separately below
+        end = self._state()
+        now = before.interpolated(end, fraction)
+        if now is not end:
             p.space_bodies.drives.place_on_hinges(now.position, now.velocity, now.angle, now.spin)
-        velocity, spin = self._mean(before, now, counts)
+        velocity, spin = self._mean(before, now, included)
         set_mean_driven_velocity(driven_bodies, before, now, velocity, spin)
-        held = p.space_bodies.joints.by_kind
-        drawn = spring_forces(held.springs, whole.position, whole.angle) if len(held.springs) else None
-        kicks = applied_impulses(p, before.velocity, counts, drawn, p.h * fraction)
-        kicks.twisted[~self._can_turn()] = 0.0
-        joint_impulses = springs(p.space_bodies.joints, whole.position, whole.angle, p.h) if held else ((), ())
-        stiff, damped = (tuple(each.scaled(fraction) for each in some) for some in joint_impulses)
+        joints = p.space_bodies.joints.by_kind
+        spring_force = spring_forces(joints.springs, end.position, end.angle) if len(joints.springs) else None
+        applied = applied_impulses(p, before.velocity, included, spring_force, p.h * fraction)
+        applied.angular[~self._can_turn()] = 0.0
+        joint_impulses = springs(p.space_bodies.joints, end.position, end.angle, p.h) if joints else ((), ())
+        by_stiffness, by_damping = (tuple(each.scaled(fraction) for each in impulses) for impulses in joint_impulses)
         points = p.space_bodies.contact_reader.points().scaled(fraction)
 
-        self._move(before, now, counts, fraction, kicks, (velocity, spin))
-        for each in stiff:
+        self._move(before, now, included, fraction, applied, (velocity, spin))
+        for each in by_stiffness:
             account.add_unchecked(Cause.INTEGRATOR, each.work(velocity, spin))
-        account.add(Cause.DRAG, float(np.sum(kicks.drag * velocity[:-1])))
-        account.add(Cause.DRIVES, float(np.sum(kicks.driven * velocity[:-1]) + kicks.twisted @ spin[:-1]))
-        account.add(Cause.DAMPING, sum(each.work(velocity, spin) for each in damped))
-        along, across, by_kicks = points.work(velocity, spin)
-        account.add_contacts(along, across)
-        account.add(Cause.KICKS, by_kicks)
+        account.add(Cause.DRAG, float(np.sum(applied.drag * velocity[:-1])))
+        account.add(Cause.DRIVES, float(np.sum(applied.driven * velocity[:-1]) + applied.angular @ spin[:-1]))
+        account.add(Cause.DAMPING, sum(each.work(velocity, spin) for each in by_damping))
+        normal_work, tangential_work, kick_work = points.work(velocity, spin)
+        account.add_contacts(normal_work, tangential_work)
+        account.add(Cause.KICKS, kick_work)
         if driven_bodies:
             gravity = p.scene.world.gravity
             work = drive_work(driven_bodies, (before, now), (velocity, spin), points, p.bodies, gravity, p.h, fraction)
             account.add(Cause.DRIVES, work.driven)
             account.add(Cause.INTEGRATOR, work.weight + work.potential_change)
 
-        if len(held.rigid):
-            given = self._unexplained_impulses(before, now, counts, kicks)
-            for impulses in (*stiff, *damped, points.joint_impulses):
-                given.subtract(impulses)
-            self._joints(given, whole, fraction, velocity, spin)
+        if len(joints.rigid):
+            joint_sums = self._unexplained_impulses(before, now, included, applied)
+            for impulses in (*by_stiffness, *by_damping, points.joint_impulses):
+                joint_sums.subtract(impulses)
+            self._joints(joint_sums, end, fraction, velocity, spin)
 
     def joints_broken(self, indices: IntArray) -> None:
-        """Enter the stored energy of joints, by their indices, that have broken."""
+        """Account the stored energy of joints, by their indices, that have broken."""
         now = self._state()
         before = self._stored_energy(now)
         self._breaks[indices], self._potential = -np.inf, None
@@ -281,37 +281,37 @@ class PymunkEnergyLedger:
         mass = float(p.bodies.mass[p.particles.indices].sum())
         return 0.5 * mass * float(kick @ kick) * fraction * (fraction - ahead)
 
-    def _mean(self, before: EnergyState, now: EnergyState, counts: BoolArray) -> tuple[FloatArray, FloatArray]:
+    def _mean(self, before: EnergyState, now: EnergyState, included: BoolArray) -> tuple[FloatArray, FloatArray]:
         """Return mean reported velocities (N + 1, 2) and spins (N + 1,); 0 for other bodies and the world."""
         velocity = 0.5 * (before.velocity + now.velocity) - self._population.ahead
         spin = 0.5 * (before.spin + now.spin)
-        velocity[~counts], spin[~counts] = 0.0, 0.0
+        velocity[~included], spin[~included] = 0.0, 0.0
         return np.vstack((velocity, np.zeros((1, 2)))), np.append(spin, 0.0)
 
     def _move(
         self,
         before: EnergyState,
         now: EnergyState,
-        counts: BoolArray,
+        included: BoolArray,
         fraction: float,
-        kicks: AppliedImpulses,
+        applied: AppliedImpulses,
         mean: tuple[FloatArray, FloatArray],
     ) -> None:
-        """Enter the difference between gravity's work and the loss of height by the drift, and position corrections.
+        """Account the difference between gravity's work and the loss of height by the drift, and position corrections.
 
         The drift is the displacement by the old velocities; displacements beyond it are corrections of overlaps.
         """
         p = self._population
         h = p.h * fraction
-        drift = np.where(counts[:, None], before.position + before.velocity * h, now.position)
-        turned = np.where(counts, before.angle + before.spin * h, now.angle)
-        heavy = np.where(counts, p.bodies.mass, 0.0)[:, None] * np.asarray(p.scene.world.gravity)
-        fallen = float(np.sum(heavy * np.where(counts[:, None], drift - before.position, 0.0)))
-        shifted = float(np.sum(heavy * (now.position - drift)))
-        start, middle, end = self._stored_energy(before, EnergyState(drift, turned, *now[2:]), now).tolist()
-        worked = float(np.sum(kicks.weight * mean[0][:-1]))
-        self.account.add(Cause.INTEGRATOR, worked - fallen + (middle - start))
-        self.account.add(Cause.CORRECTION, (end - middle) - shifted)
+        drift = np.where(included[:, None], before.position + before.velocity * h, now.position)
+        drift_angle = np.where(included, before.angle + before.spin * h, now.angle)
+        weight = np.where(included, p.bodies.mass, 0.0)[:, None] * np.asarray(p.scene.world.gravity)
+        drift_work = float(np.sum(weight * np.where(included[:, None], drift - before.position, 0.0)))
+        correction_work = float(np.sum(weight * (now.position - drift)))
+        start, middle, end = self._stored_energy(before, EnergyState(drift, drift_angle, *now[2:]), now).tolist()
+        impulse_work = float(np.sum(applied.weight * mean[0][:-1]))
+        self.account.add(Cause.INTEGRATOR, impulse_work - drift_work + (middle - start))
+        self.account.add(Cause.CORRECTION, (end - middle) - correction_work)
 
     def _stored_energy(self, *states: EnergyState) -> FloatArray:
         """Return the energy stored in springs and attraction in some states, (S,) J."""
@@ -322,9 +322,9 @@ class PymunkEnergyLedger:
         potential = self._potential[1]
         if not potential:
             return np.zeros(len(states))
-        there = np.broadcast_to(p.present, (len(states), len(p.present)))
-        places, angles = np.stack([s.position for s in states]), np.stack([s.angle for s in states])
-        return potential.at(np.zeros(len(states)), places, angles, there)
+        present = np.broadcast_to(p.present, (len(states), len(p.present)))
+        positions, angles = np.stack([s.position for s in states]), np.stack([s.angle for s in states])
+        return potential.at(np.zeros(len(states)), positions, angles, present)
 
     def _can_turn(self) -> BoolArray:
         """Return which bodies a torque turns, (N,): in the space, those with a finite moment."""
@@ -335,23 +335,23 @@ class PymunkEnergyLedger:
         return turnable
 
     def _unexplained_impulses(
-        self, before: EnergyState, now: EnergyState, counts: BoolArray, kicks: AppliedImpulses
+        self, before: EnergyState, now: EnergyState, included: BoolArray, applied: AppliedImpulses
     ) -> ImpulseSums:
-        """Return the impulses on bodies, without those of `kicks`."""
+        """Return the impulses on bodies, without those of `applied`."""
         p = self._population
-        mass, moment = np.where(counts, p.bodies.mass, 0.0), np.where(counts, p.bodies.moment, 0.0)
-        gained = mass[:, None] * (now.velocity - before.velocity) - kicks.weight - kicks.driven - kicks.drag
-        twisted = moment * (now.spin - before.spin) - kicks.twisted
+        mass, moment = np.where(included, p.bodies.mass, 0.0), np.where(included, p.bodies.moment, 0.0)
+        linear = mass[:, None] * (now.velocity - before.velocity) - applied.weight - applied.driven - applied.drag
+        angular = moment * (now.spin - before.spin) - applied.angular
         rigid = p.space_bodies.joints.by_kind.rigid
-        return ImpulseSums(np.vstack((gained, np.zeros((1, 2)))), np.append(twisted, 0.0), np.union1d(rigid.a, rigid.b))
+        return ImpulseSums(np.vstack((linear, np.zeros((1, 2)))), np.append(angular, 0.0), np.union1d(rigid.a, rigid.b))
 
     def _joints(
-        self, given: ImpulseSums, whole: EnergyState, fraction: float, velocity: FloatArray, spin: FloatArray
+        self, joint_sums: ImpulseSums, end: EnergyState, fraction: float, velocity: FloatArray, spin: FloatArray
     ) -> None:
-        """Enter the work of joints, with motors as drives."""
-        driven: JointImpulses = motors(self._population.space_bodies.joints, whole.position, whole.angle, given).scaled(
-            fraction
-        )
-        given.subtract(driven)
-        self.account.add(Cause.DRIVES, driven.work(velocity, spin))
-        self.account.add(Cause.JOINTS, given.work(velocity, spin))
+        """Account the work of joints, with motors as drives."""
+        by_motors: JointImpulses = motors(
+            self._population.space_bodies.joints, end.position, end.angle, joint_sums
+        ).scaled(fraction)
+        joint_sums.subtract(by_motors)
+        self.account.add(Cause.DRIVES, by_motors.work(velocity, spin))
+        self.account.add(Cause.JOINTS, joint_sums.work(velocity, spin))

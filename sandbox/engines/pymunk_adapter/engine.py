@@ -1,4 +1,4 @@
-"""PymunkEngine: what pymunk can model, and its defaults of the settings. pymunk is imported by `start` only."""
+"""PymunkEngine: the demands that pymunk supports, and its defaults of settings. Only `start` imports pymunk."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -74,10 +74,15 @@ class PymunkEngine:
     def resolve(self, start: Scene | Setup, settings: Settings) -> Settings:
         """Return the settings with defaults for slop, bias, persistence and the values that describe pymunk."""
         setup = Setup.of(start)
-        own: dict[str, object] = {"slop": slop_of(setup), "bias": BIAS, "persistence": PERSISTENCE, **FIXED_METHODS}
+        defaults: dict[str, object] = {
+            "slop": slop_of(setup),
+            "bias": BIAS,
+            "persistence": PERSISTENCE,
+            **FIXED_METHODS,
+        }
         if len(setup.links):
-            own["joints"] = "impulses"
-        return settings.replace(**{k: v for k, v in own.items() if getattr(settings, k) is None})
+            defaults["joints"] = "impulses"
+        return settings.replace(**{k: v for k, v in defaults.items() if getattr(settings, k) is None})
 
     def start(self, start: Scene | Setup, settings: Settings | None = None) -> "PymunkSimulation":
         """Create a pymunk space with the bodies of a scene.

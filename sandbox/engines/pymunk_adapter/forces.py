@@ -74,22 +74,24 @@ class SpaceForceField:
         """Return the acceleration (N, 2), m/s², towards the attracting points, at positions (N, 2), m."""
         total = np.zeros_like(position)
         for attraction in self._attracting_points:
-            away = position - np.asarray(attraction.toward, dtype=np.float64)
-            square = (away * away).sum(axis=1)
-            below = (square + attraction.softening**2) * np.sqrt(square)
+            offset = position - np.asarray(attraction.toward, dtype=np.float64)
+            square = (offset * offset).sum(axis=1)
+            denominator = (square + attraction.softening**2) * np.sqrt(square)
             with np.errstate(over="ignore"):  # next to the point; such a body leaves the bounds
-                rate = np.divide(attraction.strength, below, out=np.zeros_like(below), where=below > 0)
-                total -= away * rate[:, None]
+                rate = np.divide(
+                    attraction.strength, denominator, out=np.zeros_like(denominator), where=denominator > 0
+                )
+                total -= offset * rate[:, None]
         return total
 
-    def apply_to(self, name: str, body: pymunk.Body, members: dict[str, pymunk.Body]) -> None:
-        """Apply the field to a body from now on; `members` are the bodies in the space by name, at each time."""
+    def apply_to(self, name: str, body: pymunk.Body, bodies: dict[str, pymunk.Body]) -> None:
+        """Apply the field to a body from now on; `bodies`: those in the space by name, kept up to date."""
         thrusts = self._thrusts.get(name, [])
 
-        def kick(body: pymunk.Body, gravity: tuple[float, float], damping: float, dt: float) -> None:
+        def update_velocity(body: pymunk.Body, gravity: tuple[float, float], damping: float, dt: float) -> None:
             x, y = body.position
-            ax, ay = self._attraction(name, x, y, body.mass, members) if self.attracts else (0.0, 0.0)
-            pull, thrust, torque = (ax, ay), (0.0, 0.0), 0.0
+            ax, ay = self._attraction(name, x, y, body.mass, bodies) if self.attracts else (0.0, 0.0)
+            attraction, thrust, torque = (ax, ay), (0.0, 0.0), 0.0
             if thrusts:
                 cos, sin = body.rotation_vector  # math.cos would raise if the angle is not finite
                 fx, fy, torque = self._thrust(thrusts)
@@ -98,13 +100,13 @@ class SpaceForceField:
                 ay += thrust[1] / body.mass
                 body.torque += torque
             if self.applied is not None:
-                self.applied[name] = (*pull, *thrust, torque)
+                self.applied[name] = (*attraction, *thrust, torque)
             if self.fractions:
                 fraction = self.fractions[name]
                 ax, ay = ax * fraction, ay * fraction
             pymunk.Body.update_velocity(body, (gravity[0] + ax, gravity[1] + ay), damping, dt)
 
-        body.velocity_func = kick
+        body.velocity_func = update_velocity
 
     def _thrust(self, thrusts: list[tuple[int, Thrust, Point]]) -> tuple[float, float, float]:
         """Return the force and torque of thrusts in the body's frame, N and N·m."""
@@ -116,7 +118,7 @@ class SpaceForceField:
                 x, y, torque = x + fx, y + fy, torque + arm[0] * fy - arm[1] * fx
         return x, y, torque
 
-    def _attraction(self, name: str, x: float, y: float, mass: float, members: dict[str, pymunk.Body]) -> Point:
+    def _attraction(self, name: str, x: float, y: float, mass: float, bodies: dict[str, pymunk.Body]) -> Point:
         ax, ay = 0.0, 0.0
         for attraction in self._attracting_points:
             assert not isinstance(attraction.toward, str)
@@ -125,14 +127,14 @@ class SpaceForceField:
             ax, ay = ax + rate * dx, ay + rate * dy
         for attraction in self._attracting_bodies:
             toward = str(attraction.toward)
-            if toward not in members:
+            if toward not in bodies:
                 continue
             if toward != name:
-                px, py = members[toward].position
+                px, py = bodies[toward].position
                 rate = _rate(attraction, px - x, py - y)
                 ax, ay = ax + rate * (px - x), ay + rate * (py - y)
                 continue
-            for other, body in members.items():  # reaction: the attracting body is attracted with the same force
+            for other, body in bodies.items():  # reaction: the attracting body is attracted with the same force
                 if other != name and body.body_type == pymunk.Body.DYNAMIC:
                     px, py = body.position
                     rate = _rate(attraction, px - x, py - y) * body.mass / mass
@@ -146,8 +148,8 @@ def _rate(attraction: Attraction, dx: float, dy: float) -> float:
     It never raises: pymunk would only print an exception of a callback and continue.
     """
     square = dx * dx + dy * dy
-    below = (square + attraction.softening**2) * math.sqrt(square)
-    return attraction.strength / below if below > 0.0 else 0.0
+    denominator = (square + attraction.softening**2) * math.sqrt(square)
+    return attraction.strength / denominator if denominator > 0.0 else 0.0
 
 
 def acceleration(world: World, velocity: FloatArray, applied: FloatArray | None, h: float) -> FloatArray:

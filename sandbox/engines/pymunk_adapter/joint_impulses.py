@@ -37,14 +37,14 @@ class JointImpulses(NamedTuple):
             velocity: (N + 1, 2) m/s, of all bodies and of the world, which is the last.
             spin: (N + 1,) rad/s.
         """
-        where = (self.a, self.arm_a), (self.b, self.arm_b)
-        first, second = (velocity[n] + spin[n, None] * _left(arm) for n, arm in where)
+        anchors = (self.a, self.arm_a), (self.b, self.arm_b)
+        first, second = (velocity[n] + spin[n, None] * _left(arm) for n, arm in anchors)
         return np.asarray(second - first)
 
     def work(self, velocity: FloatArray, spin: FloatArray) -> float:
         """Return their work, J, at mean velocities."""
-        turning = self.angular_impulse @ (spin[self.b] - spin[self.a])
-        return float(np.sum(self.impulse * self.separating_velocity(velocity, spin)) + turning)
+        angular_work = self.angular_impulse @ (spin[self.b] - spin[self.a])
+        return float(np.sum(self.impulse * self.separating_velocity(velocity, spin)) + angular_work)
 
 
 JointPair: TypeAlias = tuple[JointImpulses, JointImpulses]
@@ -91,23 +91,29 @@ def springs(joints: SpaceJoints, position: FloatArray, angle: FloatArray, h: flo
     arm_b, point_b = anchors_in_world(links.b, links.anchor_b, position, angle)
     displacement = point_b - point_a
     length = np.hypot(displacement[:, 0], displacement[:, 1])
-    along = displacement / np.where(length > 0.0, length, 1.0)[:, None]
-    stiff = elastic_force(links, length) * h
-    damped = joints.impulses(links) - stiff
-    nothing = np.zeros(len(links))
-    ends = links.a, links.b, arm_a, arm_b
+    direction = displacement / np.where(length > 0.0, length, 1.0)[:, None]
+    elastic = elastic_force(links, length) * h
+    damper = joints.impulses(links) - elastic
+    no_torque = np.zeros(len(links))
+    spring_ends = links.a, links.b, arm_a, arm_b
 
     rotary = joints.by_kind.rotary
-    wound = elastic_force(rotary, relative(rotary, angle)) * h
-    slowed = joints.impulses(rotary) - wound
-    still = np.zeros((len(rotary), 2))
-    rotary_ends = rotary.a, rotary.b, still, still, still
-    stiffness = JointImpulses(*ends, along * stiff[:, None], nothing), JointImpulses(*rotary_ends, wound)
-    dampers = JointImpulses(*ends, along * damped[:, None], nothing), JointImpulses(*rotary_ends, slowed)
+    rotary_elastic = elastic_force(rotary, relative(rotary, angle)) * h
+    rotary_damper = joints.impulses(rotary) - rotary_elastic
+    no_force = np.zeros((len(rotary), 2))
+    rotary_ends = rotary.a, rotary.b, no_force, no_force, no_force
+    stiffness = (
+        JointImpulses(*spring_ends, direction * elastic[:, None], no_torque),
+        JointImpulses(*rotary_ends, rotary_elastic),
+    )
+    dampers = (
+        JointImpulses(*spring_ends, direction * damper[:, None], no_torque),
+        JointImpulses(*rotary_ends, rotary_damper),
+    )
     return stiffness, dampers
 
 
-def motors(joints: SpaceJoints, position: FloatArray, angle: FloatArray, given: ImpulseSums) -> JointImpulses:
+def motors(joints: SpaceJoints, position: FloatArray, angle: FloatArray, joint_sums: ImpulseSums) -> JointImpulses:
     """Return the impulses of motors.
 
     pymunk reports their magnitudes. Their signs follow from the sum of the impulses of all joints, by least squares.
@@ -116,16 +122,18 @@ def motors(joints: SpaceJoints, position: FloatArray, angle: FloatArray, given: 
         joints: the joints of the space.
         position: (N, 2) m.
         angle: (N,) rad.
-        given: sum of the impulses of all joints but springs.
+        joint_sums: sum of the impulses of all joints but springs.
     """
-    rigid, chosen = joints.by_kind.rigid, joints.by_kind.motors
-    still = np.zeros((len(chosen), 2))
-    if not len(chosen):
-        return JointImpulses(chosen.a, chosen.b, still, still, still, np.zeros(0))
-    unknown = np.linalg.lstsq(_unit_responses(rigid, position, angle), _stacked(given), rcond=None)[0]
+    rigid, motor_links = joints.by_kind.rigid, joints.by_kind.motors
+    no_force = np.zeros((len(motor_links), 2))
+    if not len(motor_links):
+        return JointImpulses(motor_links.a, motor_links.b, no_force, no_force, no_force, np.zeros(0))
+    unknown = np.linalg.lstsq(_unit_responses(rigid, position, angle), _stacked(joint_sums), rcond=None)[0]
     first = np.cumsum(_component_counts(rigid)) - _component_counts(rigid)
     signs = np.sign(unknown[first[rigid.kind == LinkKind.MOTOR]])
-    return JointImpulses(chosen.a, chosen.b, still, still, still, signs * np.abs(joints.impulses(chosen)))
+    return JointImpulses(
+        motor_links.a, motor_links.b, no_force, no_force, no_force, signs * np.abs(joints.impulses(motor_links))
+    )
 
 
 def _component_counts(links: JointArrays) -> IntArray:
@@ -133,8 +141,8 @@ def _component_counts(links: JointArrays) -> IntArray:
     return np.where(np.isin(links.kind, (LinkKind.PIVOT, LinkKind.GROOVE)), 2, 1)
 
 
-def _stacked(given: ImpulseSums) -> FloatArray:
-    return np.column_stack((given.linear, given.angular))[:-1].reshape(-1)
+def _stacked(joint_sums: ImpulseSums) -> FloatArray:
+    return np.column_stack((joint_sums.linear, joint_sums.angular))[:-1].reshape(-1)
 
 
 def _unit_responses(links: JointArrays, position: FloatArray, angle: FloatArray) -> FloatArray:
@@ -145,18 +153,18 @@ def _unit_responses(links: JointArrays, position: FloatArray, angle: FloatArray)
     arm_a, point_a = anchors_in_world(links.a, links.anchor_a, position, angle)
     arm_b, point_b = anchors_in_world(links.b, links.anchor_b, position, angle)
     for k, kind in enumerate(links.kind.tolist()):
-        a, b, at = int(links.a[k]), int(links.b[k]), int(column[k])
+        a, b, first_column = int(links.a[k]), int(links.b[k]), int(column[k])
         if kind in (LinkKind.MOTOR, LinkKind.ROTARY_LIMIT, LinkKind.GEAR):
-            table[b, 2, at] += 1.0
-            table[a, 2, at] -= 1.0 / links.figures[k, 1] if kind == LinkKind.GEAR else 1.0
+            table[b, 2, first_column] += 1.0
+            table[a, 2, first_column] -= 1.0 / links.figures[k, 1] if kind == LinkKind.GEAR else 1.0
             continue
         middle = position[a] if a >= 0 else np.zeros(2)
-        own = point_b[k] - middle if kind == LinkKind.GROOVE else arm_a[k]
+        first_arm = point_b[k] - middle if kind == LinkKind.GROOVE else arm_a[k]
         directions = np.eye(2) if count[k] == 2 else (point_b - point_a)[k : k + 1]
-        for extra, direction in enumerate(directions):
-            for body, arm, sign in ((a, own, -1.0), (b, arm_b[k], 1.0)):
-                table[body, :2, at + extra] += sign * direction
-                table[body, 2, at + extra] += sign * float(cross(arm, direction))
+        for component, direction in enumerate(directions):
+            for body, arm, sign in ((a, first_arm, -1.0), (b, arm_b[k], 1.0)):
+                table[body, :2, first_column + component] += sign * direction
+                table[body, 2, first_column + component] += sign * float(cross(arm, direction))
     return table[:-1].reshape(-1, table.shape[2])
 
 

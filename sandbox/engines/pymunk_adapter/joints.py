@@ -32,18 +32,18 @@ def constraint_of(links: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body, bi
 
 def _new_constraint(links: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body) -> pymunk.Constraint:
     x, y, z = links.figures[k].tolist()
-    at, on = tuple(links.anchor_a[k].tolist()), tuple(links.anchor_b[k].tolist())
+    anchor_a, anchor_b = tuple(links.anchor_a[k].tolist()), tuple(links.anchor_b[k].tolist())
     match LinkKind(int(links.kind[k])):
         case LinkKind.ROD:
-            rod = pymunk.PinJoint(a, b, at, on)
+            rod = pymunk.PinJoint(a, b, anchor_a, anchor_b)
             rod.distance = x
             return rod
         case LinkKind.PIVOT:
-            return pymunk.PivotJoint(a, b, at, on)
+            return pymunk.PivotJoint(a, b, anchor_a, anchor_b)
         case LinkKind.SLIDE:
-            return pymunk.SlideJoint(a, b, at, on, x, y)
+            return pymunk.SlideJoint(a, b, anchor_a, anchor_b, x, y)
         case LinkKind.GROOVE:
-            return pymunk.GrooveJoint(a, b, at, (x, y), on)
+            return pymunk.GrooveJoint(a, b, anchor_a, (x, y), anchor_b)
         case LinkKind.ROTARY_LIMIT:
             return pymunk.RotaryLimitJoint(a, b, x, y)
         case LinkKind.MOTOR:
@@ -51,7 +51,7 @@ def _new_constraint(links: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body) 
         case LinkKind.GEAR:
             return pymunk.GearJoint(a, b, x, y)
         case LinkKind.SPRING:
-            return pymunk.DampedSpring(a, b, at, on, x, y, z)
+            return pymunk.DampedSpring(a, b, anchor_a, anchor_b, x, y, z)
         case LinkKind.ROTARY_SPRING:
             return pymunk.DampedRotarySpring(a, b, -x, y, z)  # pymunk: angle of the first body relative to the second
 
@@ -173,8 +173,8 @@ class SpaceJoints:
         """Remove the joints of a body that leaves."""
         if self._links is None:
             return
-        those = np.flatnonzero((self._links.a == index) | (self._links.b == index))
-        self._remove([k for k in those.tolist() if k in self._constraints])
+        attached = np.flatnonzero((self._links.a == index) | (self._links.b == index))
+        self._remove([k for k in attached.tolist() if k in self._constraints])
 
     def break_overloaded(
         self, position: FloatArray, velocity: FloatArray, angle: FloatArray, spin: FloatArray, h: float

@@ -47,15 +47,15 @@ def fall(position: FloatArray, velocity: FloatArray, runs: IntArray, h: float, k
             x, v = position[first : min(first + TILE, end)], velocity[first : min(first + TILE, end)]
             for _ in range(substeps // 4):
                 for i in range(len(x)):
-                    coordinate, speed, more = x[i], v[i], kick[i]
+                    coordinate, speed, kick_value = x[i], v[i], kick[i]
                     coordinate += speed * h
-                    speed += more
+                    speed += kick_value
                     coordinate += speed * h
-                    speed += more
+                    speed += kick_value
                     coordinate += speed * h
-                    speed += more
+                    speed += kick_value
                     x[i] = coordinate + speed * h
-                    v[i] = speed + more
+                    v[i] = speed + kick_value
             for _ in range(substeps % 4):
                 for i in range(len(x)):
                     speed = v[i]
@@ -117,12 +117,12 @@ def turn(angle: FloatArray, spin: FloatArray, runs: IntArray, h: float, substeps
 @bare_kernel
 def all_within(values: FloatArray, runs: IntArray, limit: float) -> bool:
     """Return whether the coordinates (2N,) of all particles are within ± a limit, and not nan."""
-    wild = 0
+    out_of_range = 0
     for k in range(len(runs)):
-        some = values[2 * runs[k, 0] : 2 * runs[k, 1]]
-        for i in range(len(some)):
-            wild += 0 if abs(some[i]) <= limit else 1  # no early exit, so that the loop is vectorised
-    return wild == 0
+        coordinates = values[2 * runs[k, 0] : 2 * runs[k, 1]]
+        for i in range(len(coordinates)):
+            out_of_range += 0 if abs(coordinates[i]) <= limit else 1  # no early exit, so that the loop is vectorised
+    return out_of_range == 0
 
 
 def runs_of(indices: IntArray) -> IntArray:
@@ -182,14 +182,14 @@ class Particles:
         """Remove bodies; indices of other bodies are ignored."""
         for index in self._forces.keys() & set(indices.tolist()) if self._forces else ():
             del self._forces[index]
-        gone = np.zeros(len(self._mass), np.bool_)
-        gone[indices] = True
-        self._set_indices(self.indices[~gone[self.indices]])
+        is_removed = np.zeros(len(self._mass), np.bool_)
+        is_removed[indices] = True
+        self._set_indices(self.indices[~is_removed[self.indices]])
 
     def holds(self, index: int) -> bool:
         """Return whether a body is a particle."""
-        at = int(np.searchsorted(self.indices, index))
-        return at < len(self.indices) and int(self.indices[at]) == index
+        row = int(np.searchsorted(self.indices, index))
+        return row < len(self.indices) and int(self.indices[row]) == index
 
     def _set_indices(self, indices: IntArray) -> None:
         self.indices, self._runs = indices, runs_of(indices)
@@ -254,8 +254,8 @@ class Particles:
             if all_within(position, self._runs, 0.5 * FARTHEST) and all_within(speed, self._runs, 0.5 * FASTEST):
                 return None
         position, speed = (np.hypot(*array[self.indices].T) for array in (self._position, self._velocity))
-        good = (position <= FARTHEST) & (speed <= FASTEST) & np.isfinite(self._spin[self.indices])
-        return None if good.all() else (int(self.indices[np.argmin(good)]), BEYOND)
+        is_valid = (position <= FARTHEST) & (speed <= FASTEST) & np.isfinite(self._spin[self.indices])
+        return None if is_valid.all() else (int(self.indices[np.argmin(is_valid)]), BEYOND)
 
     @property
     def _compiled(self) -> bool:
@@ -266,14 +266,14 @@ class Particles:
         if not len(self.indices):
             return
         world, compiled = self.world, self._compiled
-        forced = self._has_force or self._field is not None or world.quadratic_drag > 0
-        if compiled and not forced and not self._has_drag:
+        has_forces = self._has_force or self._field is not None or world.quadratic_drag > 0
+        if compiled and not has_forces and not self._has_drag:
             fall(*self._flat, self._runs, self._h, self._kick, substeps)
-        elif compiled and not forced:
+        elif compiled and not has_forces:
             mass, gravity, wind = self._air
             drift(*self._flat, self._runs, self._h, mass, gravity, wind, *self._drag, substeps)
         else:
-            self._fly_by_numpy(substeps, forced or self._has_drag)
+            self._step_with_numpy(substeps, has_forces or self._has_drag)
         if self._has_torque:
             for _ in range(substeps):
                 self._turn_with_torques()
@@ -284,23 +284,23 @@ class Particles:
                 for _ in range(substeps):
                     self._angle[piece] += self._spin[piece] * self._h
 
-    def _fly_by_numpy(self, substeps: int, forced: bool) -> None:
-        even = self._kick[:2]
+    def _step_with_numpy(self, substeps: int, has_forces: bool) -> None:
+        uniform_kick = self._kick[:2]
         forces = self._force_array() if self._has_force else None
         for piece in self._pieces():
             position, velocity = self._position[piece], self._velocity[piece]
-            moved = np.empty_like(velocity)
+            displacement = np.empty_like(velocity)
             mass = self._mass[piece][:, None]
             force = None if forces is None else forces[piece]
             for _ in range(substeps):
-                np.multiply(velocity, self._h, out=moved)
-                position += moved
-                velocity += self._forced_kick(position, velocity, mass, force) if forced else even
+                np.multiply(velocity, self._h, out=displacement)
+                position += displacement
+                velocity += self._forced_kick(position, velocity, mass, force) if has_forces else uniform_kick
             if not isinstance(piece, slice):
                 self._position[piece], self._velocity[piece] = position, velocity
 
     def _pieces(self) -> Iterator[slice | IntArray]:
-        """Yield the rows to advance together. Only slices are views that can be written to in place."""
+        """Yield the rows to advance together. Only slices give views that can be written in place."""
         if len(self._runs) >= SCATTERED:
             for first in range(0, len(self.indices), BLOCK):
                 yield self.indices[first : first + BLOCK]
@@ -335,5 +335,5 @@ class Particles:
                 kick += self._field.at(position) * mean_fraction(rates(self.world, velocity), self._h)[:, None]
             return kick * self._h
         gravity = np.asarray(self.world.gravity)
-        pull = gravity if self._field is None else gravity + self._field.at(position)
-        return (pull + (np.zeros(2) if force is None else force * inverse)) * self._h
+        acceleration_sum = gravity if self._field is None else gravity + self._field.at(position)
+        return (acceleration_sum + (np.zeros(2) if force is None else force * inverse)) * self._h

@@ -91,10 +91,10 @@ class SpaceReader:
         self._last: tuple[Buffer, Any, IntArray] | None = None  # previous listing: buffer, listing, rows
         self._index_of = IdTable({})
         self._moving: IntArray = np.empty(0, np.int64)
-        self._words, self._width = b"", 4  # ids of the last reading, and number of vectors of a contact
-        self._live: IntArray = np.empty(0, np.int64)
-        self._firsts = self._live  # first vector of each
-        self._moved, self._first, self._all = True, True, 0
+        self._id_words, self._width = b"", 4  # ids of the last reading, and number of vectors of a contact
+        self._touching_rows: IntArray = np.empty(0, np.int64)
+        self._first_vectors = self._touching_rows  # first vector of each
+        self._is_order_stale, self._moving_come_first, self._body_count = True, True, 0
         self._rows: IntArray = np.empty(0, np.int64)
         self._indices: IntArray = np.empty(0, np.int64)
         self.records: dict[Any, int] = {}
@@ -102,23 +102,23 @@ class SpaceReader:
         self.slots: slice | IntArray = self._indices
         """positions of the rows of `state` in scene order; a slice where possible, which is faster"""
 
-    def assign(self, moving: dict[int, int], still: dict[int, int]) -> None:
+    def assign(self, moving: dict[int, int], static: dict[int, int]) -> None:
         """Set the body index of each id: of moving bodies, and of static ones."""
-        self._index_of = IdTable(moving | still)
+        self._index_of = IdTable(moving | static)
         self._moving = np.array(sorted(moving), dtype=np.int64)
-        self._moved = True
+        self._is_order_stale = True
 
     def state(self) -> tuple[IntArray, FloatArray]:
         """Return the indices (R,) of the moving bodies, and their states (R, 6): x, y, angle, vx, vy, ω.
 
         Both are valid until the next call.
         """
-        if self._moved:
+        if self._is_order_stale:
             self._read_order()
         self._bodies.clear()
         get_space_bodies(self._space, STATE, self._bodies)
         table = np.frombuffer(self._bodies.float_buf()).reshape(-1, STATE_WIDTH)
-        return self._indices, table[: len(self._rows)] if self._first else table[self._rows]
+        return self._indices, table[: len(self._rows)] if self._moving_come_first else table[self._rows]
 
     def indices(self, ids: IntArray) -> IntArray:
         """Return the body indices of ids."""
@@ -126,7 +126,7 @@ class SpaceReader:
 
     def invalidate_order(self) -> None:
         """Record that bodies were added or removed, which changes the order of rows."""
-        self._moved = True
+        self._is_order_stale = True
 
     def _read_order(self) -> None:
         """Read the order of the rows by their ids. It holds until bodies are added or removed."""
@@ -135,25 +135,25 @@ class SpaceReader:
         ids = np.frombuffer(self._bodies.int_buf(), np.int64)
         self._rows = np.flatnonzero(np.isin(ids, self._moving))
         self._indices = self._index_of.indices(ids[self._rows])
-        self._first = np.array_equal(self._rows, np.arange(len(self._rows)))  # static bodies come last
-        self._all = len(ids)
+        self._moving_come_first = np.array_equal(self._rows, np.arange(len(self._rows)))  # static bodies come last
+        self._body_count = len(ids)
         first = int(self._indices[0]) if len(self._indices) else 0
         consecutive = np.array_equal(self._indices, np.arange(first, first + len(self._indices)))
         self.slots = slice(first, first + len(self._indices)) if consecutive else self._indices
-        self._moved = False
+        self._is_order_stale = False
 
     def set_forces(self, force: FloatArray) -> None:
         """Set the force, N, on each body of the last `state`, in its order, for the next step only."""
-        self._outgoing = np.zeros((self._all, 2))  # kept alive: pymunk holds a bare pointer into it
+        self._outgoing = np.zeros((self._body_count, 2))  # kept alive: pymunk holds a bare pointer into it
         self._outgoing[self._rows] = force
         self._forces.set_float_buf(self._outgoing.reshape(-1))
         set_space_bodies(self._space, BodyFields.FORCE, self._forces)
 
     def set_velocities(self, velocity: FloatArray) -> None:
         """Set the velocities of all moving bodies to those of (N, 2), m/s, in scene order."""
-        if self._moved:
+        if self._is_order_stale:
             self._read_order()
-        self._outgoing = np.zeros((self._all, 2))  # kept alive, as in `set_forces`; static bodies do not move
+        self._outgoing = np.zeros((self._body_count, 2))  # kept alive, as in `set_forces`; static bodies do not move
         self._outgoing[self._rows] = velocity[self._indices]
         self._forces.set_float_buf(self._outgoing.reshape(-1))
         set_space_bodies(self._space, BodyFields.VELOCITY, self._forces)
@@ -165,8 +165,8 @@ class SpaceReader:
         words = np.frombuffer(self._arbiters.int_buf(), np.int64).reshape(-1, 3)
         if not len(words):
             return np.empty((0, 2), np.int64)
-        live = words[words[:, 2] > 0]
-        return np.column_stack([self._index_of.indices(live[:, k]) for k in (0, 1)])
+        touching = words[words[:, 2] > 0]
+        return np.column_stack([self._index_of.indices(touching[:, k]) for k in (0, 1)])
 
     def read_contacts(self, polygons: bool = False) -> bool:
         """Read the present contacts, with `polygons` up to two points each. Return whether they are the previous ones.
@@ -180,21 +180,21 @@ class SpaceReader:
         self._listing.fields = SECOND_FLAGS if polygons else TOUCH_FLAGS
         lib.cpSpaceEachCachedArbiter(self._space._space, LIST, self._listing)
         self._width = 6 if polygons else 4
-        found = self._arbiters._int_arr  # the memory behind `int_buf`
-        words = ffi.buffer(found.arr, found.num * WORD)[:] if found.num else b""
-        same = words == self._words
+        int_array = self._arbiters._int_arr  # the memory behind `int_buf`
+        words = ffi.buffer(int_array.arr, int_array.num * WORD)[:] if int_array.num else b""
+        same = words == self._id_words
         if not same:
-            self._words = words
+            self._id_words = words
             # An ended contact stays cached for a while, with no points.
-            self._live = np.flatnonzero(np.frombuffer(words, np.int64)[2::3])
-            self._firsts = self._live * self._width
+            self._touching_rows = np.flatnonzero(np.frombuffer(words, np.int64)[2::3])
+            self._first_vectors = self._touching_rows * self._width
         return same
 
     def _swap_buffers(self) -> None:
         """Keep the present listing as the previous one, and reuse the buffers of the one before it."""
         spare = Buffer() if self._last is None else self._last[0]
         listing = _listing(spare) if self._last is None else self._last[1]
-        self._last = self._arbiters, self._listing, self._firsts
+        self._last = self._arbiters, self._listing, self._first_vectors
         self._arbiters, self._listing = spare, listing
 
     def last_vectors(self, rows: IntArray) -> tuple[ComplexArray, ComplexArray]:
@@ -206,28 +206,28 @@ class SpaceReader:
 
     def cached(self) -> IntArray:
         """Return the body indices (C, 2) of contacts that have ended and that Munk2D still caches."""
-        words = np.frombuffer(self._words, np.int64).reshape(-1, 3)
-        gone = words[words[:, 2] == 0]
-        return np.column_stack([self._index_of.indices(gone[:, k]) for k in (0, 1)])
+        words = np.frombuffer(self._id_words, np.int64).reshape(-1, 3)
+        ended = words[words[:, 2] == 0]
+        return np.column_stack([self._index_of.indices(ended[:, k]) for k in (0, 1)])
 
     def impulses(self) -> ComplexArray:
         """Return the impulses (K,), N·s, of the present contacts, on the first body of each."""
-        if not len(self._live):
+        if not len(self._touching_rows):
             return NO_CONTACTS.impulse
         vectors = np.frombuffer(self._arbiters.float_buf(), np.complex128)
-        return vectors.take(self._firsts)
+        return vectors.take(self._first_vectors)
 
     def touching(self) -> ContactBatch:
         """Return the present contacts as new arrays."""
-        live = self._live
-        if not len(live):
+        rows = self._touching_rows
+        if not len(rows):
             return NO_CONTACTS
-        words = np.frombuffer(self._words, np.int64).reshape(-1, 3)
-        a, b = (self._index_of.indices(words[:, k].take(live)) for k in (0, 1))
-        vectors = np.frombuffer(self._arbiters.float_buf(), np.complex128).reshape(-1, self._width).take(live, axis=0)
+        words = np.frombuffer(self._id_words, np.int64).reshape(-1, 3)
+        a, b = (self._index_of.indices(words[:, k].take(rows)) for k in (0, 1))
+        vectors = np.frombuffer(self._arbiters.float_buf(), np.complex128).reshape(-1, self._width).take(rows, axis=0)
         point = (vectors[:, 2] + vectors[:, 3]) * 0.5
         if self._width > 4:
-            twice = words[:, 2].take(live) > 1
+            twice = words[:, 2].take(rows) > 1
             point = np.where(twice, 0.5 * (point + (vectors[:, 4] + vectors[:, 5]) * 0.5), point)
         return ContactBatch(a, b, vectors[:, 0], vectors[:, 1], point)
 

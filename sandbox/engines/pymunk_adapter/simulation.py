@@ -35,19 +35,21 @@ class EventRecorder:
         self.record(time, opening=True)
 
     def record(self, time: float, opening: bool = False) -> None:
-        """Record contacts and zone entries at a time, s; entries at the opening are recorded again at the next call."""
+        """Record contacts and zone entries at a time, s; at the opening, zone entries stay for the next call."""
         tabletop, zone_tracker, log = self._population.tabletop, self._population.zone_tracker, self._log
-        entries = None if zone_tracker is None else zone_tracker.drain_entries(again=opening)
-        steady = log.steady and entries is None
-        now = self._population.space_bodies.touching(steady) if tabletop is None else tabletop.drain_contacts()
-        if isinstance(now, ContactBatch):
-            log.record(time, now if entries is None else join_batches(now, entries))
-            self.contacts += len(now.a)
+        entries = None if zone_tracker is None else zone_tracker.drain_entries(repeat=opening)
+        impulses_suffice = log.steady and entries is None
+        contacts = (
+            self._population.space_bodies.touching(impulses_suffice) if tabletop is None else tabletop.drain_contacts()
+        )
+        if isinstance(contacts, ContactBatch):
+            log.record(time, contacts if entries is None else join_batches(contacts, entries))
+            self.contacts += len(contacts.a)
         else:
-            log.add_impulses(now)
-            self.contacts += len(now)
+            log.add_impulses(contacts)
+            self.contacts += len(contacts)
         if entries is not None:
-            log.steady = False  # a zone entry is no lasting contact: the next contacts are different ones
+            log.steady = False  # a zone entry does not last: the next contacts are different ones
 
     def rebuild(self) -> None:
         """Update after an action: a spawned body may have several shapes."""
@@ -165,25 +167,25 @@ class PymunkSimulation(BaseSimulation):
         self._check_part(part)
         with self._lock:
             self._check_running()
-            whole, rest = divmod(part * self._settings.substeps, 1.0)
-            self._advance(int(whole))
+            substeps, fraction = divmod(part * self._settings.substeps, 1.0)
+            self._advance(int(substeps))
             population, start = self._population, None
             if population.tabletop is None:
                 start = [array.copy() for array in self._state()], population.space_bodies.drives.current_state()
-                self._integrate(int(whole), self.time, fraction=rest)  # its contacts lie beyond the end
-            elif rest:  # the tabletop stepper supports a shorter substep, with its contacts
-                self._substep(int(whole), self.time, fraction=rest)
+                self._integrate(int(substeps), self.time, fraction=fraction)  # its contacts would be after the end
+            elif fraction:  # the tabletop stepper supports a shorter substep, with its contacts
+                self._substep(int(substeps), self.time, fraction=fraction)
             self._part = part
             self._check_state()
             if start is not None:
-                self._interpolate(*start, rest)
+                self._interpolate(*start, fraction)
             self._retire()
             population.end()
 
     def _interpolate(self, start: list[FloatArray], drives: FloatArray, fraction: float) -> None:
         """Set the state to a fraction of the last substep, from its start: four arrays, and drives (D, 3)."""
-        for now, old in zip(self._state(), start, strict=True):
-            now[...] = old + (now - old) * fraction
+        for array, old in zip(self._state(), start, strict=True):
+            array[...] = old + (array - old) * fraction
         self._population.space_bodies.drives.place_on_hinges(*self._state())
         self._population.space_bodies.drives.end(drives, fraction)
 
@@ -268,13 +270,13 @@ class PymunkSimulation(BaseSimulation):
     def _advance(self, substeps: int) -> None:
         """Advance by some substeps from the start of a step. Particles and the space are independent of each other."""
         # An observer gets all bodies after each substep, and the ledger needs them all too.
-        together = self._observer is not None or self._ledger is not None
-        if not together:
+        with_particles = self._observer is not None or self._ledger is not None
+        if not with_particles:
             self._population.particles.step(substeps)
-        if together or self._recorder is not None or len(self._population.space_bodies):
+        if with_particles or self._recorder is not None or len(self._population.space_bodies):
             time = self.time
             for k in range(substeps):
-                self._substep(k, time, with_particles=together)
+                self._substep(k, time, with_particles=with_particles)
 
     def _substep(self, k: int, time: float, with_particles: bool = True, fraction: float = 1.0) -> None:
         """Advance by one substep as `_integrate`, and process its events: broken joints, zone entries, contacts."""
@@ -302,7 +304,7 @@ class PymunkSimulation(BaseSimulation):
         """
         population, ledger = self._population, self._ledger
         space_bodies, tabletop, start = population.space_bodies, population.tabletop, time + k * self._h
-        opening = ledger.opening() if ledger is not None else None
+        opening_state = ledger.opening() if ledger is not None else None
         if with_particles:
             population.particles.step()
         if tabletop is None:
@@ -320,7 +322,7 @@ class PymunkSimulation(BaseSimulation):
             self._joint_iterations += space_bodies.solved_joint_count * self._settings.iterations
         population.invalidate()
         if ledger is not None:
-            ledger.substep(opening, fraction)
+            ledger.substep(opening_state, fraction)
 
     def _update_zones(self) -> None:
         """Apply the effects of zones that bodies have entered."""
@@ -352,15 +354,15 @@ class PymunkSimulation(BaseSimulation):
     def _check_state(self) -> None:
         """Check the state, and end the simulation if a body is not finite, out of bounds, or beyond the half-planes."""
         population = self._population
-        for part in (
+        for owner in (
             population.particles,
             population.space_bodies,
             *(() if population.tabletop is None else (population.tabletop,)),
         ):
-            beyond = part.beyond()
-            if beyond is not None:
+            diverged = owner.beyond()
+            if diverged is not None:
                 self._population.end()
-                index, description = beyond
+                index, description = diverged
                 raise Divergence(self.time, self.bodies.names[index], description)
 
     def _retire(self) -> None:

@@ -15,7 +15,7 @@ from sandbox.engines.pymunk_adapter.colliders import (
     StaticShapes,
     SurfaceSetter,
     body_shapes,
-    category,
+    collision_filter,
     gravity_of,
     jointed_surfaces,
     new_space,
@@ -110,7 +110,7 @@ class SpaceBodyTable:
         body = self._members[index].body
         body.body_type = pymunk.Body.DYNAMIC
         body.mass, body.moment = self._resting.pop(index)
-        body.force, body.torque = (0.0, 0.0), 0.0  # thrusts have accumulated meanwhile
+        body.force, body.torque = (0.0, 0.0), 0.0  # thrusts have accumulated while it was held
         self._state = None
 
 
@@ -121,7 +121,7 @@ class ConstantForces:
         self._action_forces: dict[int, tuple[FloatArray, float]] = {}
         self._zone_forces: dict[int, FloatArray] = {}
         self._total: dict[int, tuple[FloatArray, float]] = {}  # sums of both
-        self._ready: list[tuple[Any, Any, float]] | None = None  # `cpBody`, force and torque of each
+        self._prepared: list[tuple[Any, Any, float]] | None = None  # `cpBody`, force and torque of each
 
     @property
     def with_zone_force(self) -> list[int]:
@@ -154,7 +154,7 @@ class ConstantForces:
         self._sum(index)
 
     def _sum(self, index: int) -> None:
-        self._ready = None
+        self._prepared = None
         action, zone_force = self._action_forces.get(index), self._zone_forces.get(index)
         if action is not None:
             self._total[index] = action if zone_force is None else (action[0] + zone_force, action[1])
@@ -167,16 +167,16 @@ class ConstantForces:
         """Remove all forces on a body."""
         for each in (self._action_forces, self._zone_forces, self._total):
             each.pop(index, None)
-        self._ready = None
+        self._prepared = None
 
     def apply(self, members: Mapping[int, SpaceBody]) -> None:
         """Set forces and torques for the next step, in a scene without drag."""
-        if self._ready is None:
-            self._ready = [
+        if self._prepared is None:
+            self._prepared = [
                 (members[index].body._body, ffi.new("cpVect *", force.tolist())[0], torque)
                 for index, (force, torque) in self._total.items()
             ]
-        for record, force, torque in self._ready:  # pymunk's setters take five times as long
+        for record, force, torque in self._prepared:  # pymunk's setters take five times as long
             lib.cpBodySetForce(record, force)
             if torque:  # pymunk resets it to 0 after each step
                 lib.cpBodySetTorque(record, torque)
@@ -210,8 +210,10 @@ class ConstantForces:
         if springs is None:
             reader.set_forces(mass * acceleration(world, values[:, 3:5], applied, h))
         else:
-            pull = np.divide(springs, mass, out=np.zeros_like(springs), where=mass > 0.0)
-            reader.set_forces(mass * (acceleration(world, values[:, 3:5], applied + pull, h) - pull))
+            spring_acceleration = np.divide(springs, mass, out=np.zeros_like(springs), where=mass > 0.0)
+            reader.set_forces(
+                mass * (acceleration(world, values[:, 3:5], applied + spring_acceleration, h) - spring_acceleration)
+            )
         self._set_torques(members)
 
     def _set_torques(self, members: Mapping[int, SpaceBody]) -> None:
@@ -246,7 +248,7 @@ class SpaceBodies(SpaceBodyTable):
         self.zone_sensors = ZoneSensors(self._space, scene.zones)
         self.joints = SpaceJoints(self._space)
         self._polygons = False
-        self._has_single_contacts = False  # whether two bodies have at most one contact, and no sensors are listed
+        self._has_single_contacts = False  # two bodies have at most one contact, and no sensors are listed
         self._by_name: dict[str, pymunk.Body] = {}
         self._name_of: dict[int, str] = {}
         self.contact_reader = ContactReader(
@@ -328,7 +330,7 @@ class SpaceBodies(SpaceBodyTable):
         self._space.add(body)
         self._members[index] = SpaceBody(body, ())
         if self._can_touch[index] or fixed:
-            self._give_shapes(index, bodies)
+            self._add_shapes(index, bodies)
         if self._sensed[index]:
             self.zone_sensors.add(index, body)
         self._by_name[name], self._name_of[index] = body, name
@@ -337,7 +339,7 @@ class SpaceBodies(SpaceBodyTable):
         elif not fixed and (self.field.attracts or self.field.has_thrust(name)):
             self.field.apply_to(name, body, self._by_name)
 
-    def _give_shapes(self, index: int, bodies: Bodies) -> None:
+    def _add_shapes(self, index: int, bodies: Bodies) -> None:
         """Add the shapes of a body in the space."""
         body = self._members[index].body
         shapes = tuple(body_shapes(body, bodies, index, self._skin))
@@ -351,7 +353,7 @@ class SpaceBodies(SpaceBodyTable):
     def _filter(self, index: int, bodies: Bodies) -> pymunk.ShapeFilter:
         collides = bodies.elements[bodies.element[index]].collides
         layers = 1 << int(self.layer[index])
-        return category(bool(bodies.fixed[index]), collides, int(bodies.group[index]), layers)
+        return collision_filter(bool(bodies.fixed[index]), collides, int(bodies.group[index]), layers)
 
     def set_layer(self, index: int, bodies: Bodies) -> None:
         """Apply a body's changed collision layer from now on. Its contacts on the old layer end."""
@@ -367,13 +369,13 @@ class SpaceBodies(SpaceBodyTable):
         """Add shapes to bodies that so far were only joined or driven, and can now touch something."""
         for index, member in self._members.items():
             if not member.shapes and self._can_touch[index]:
-                self._give_shapes(index, bodies)
+                self._add_shapes(index, bodies)
 
     def _register(self) -> None:
         moving = {m.body.id: index for index, m in self._members.items() if m.moves}
         self._reader.records = {self._members[index].body._body: index for index in moving.values()}
-        still = {m.body.id: index for index, m in self._members.items() if not m.moves}
-        self._reader.assign(moving, still | self._static_shapes.ids)
+        static = {m.body.id: index for index, m in self._members.items() if not m.moves}
+        self._reader.assign(moving, static | self._static_shapes.ids)
         self._state = None
 
     def leave(self, indices: IntArray) -> None:
@@ -419,11 +421,11 @@ class SpaceBodies(SpaceBodyTable):
         self._surface_of, self._surface_of_fixed = matrix.surfaces.of_shape, matrix.surfaces.of_fixed
         self._can_touch, self._sensed = matrix.touches, matrix.can_enter_zone
         self._surface_setter.rebuild(matrix, jointed_surfaces(scene, self._surface_of_fixed))
-        for index, (_, own) in self._members.items():
-            for piece, shape in own:
+        for index, (_, shapes) in self._members.items():
+            for piece, shape in shapes:
                 self._surface_setter.set_surface(shape, int(self._surface_of[piece]))
-            heavy = matrix.turnable[index] and math.isinf(self.moment(index))
-            if heavy and index not in self.drives.indices:
+            needs_moment = matrix.turnable[index] and math.isinf(self.moment(index))
+            if needs_moment and index not in self.drives.indices:
                 self.give_moment(index, float(self._moments[index]))
         if self.drives.driven_bodies:
             self.drives.add_callbacks(self._collision_types)
@@ -504,17 +506,17 @@ class SpaceBodies(SpaceBodyTable):
         if not self._moving:
             return
         _, state = self._read()
-        at = self._reader.slots
-        position[at], velocity[at] = state[:, 0:2], state[:, 3:5]
-        angle[at], angular_velocity[at] = state[:, 2], state[:, 5]
+        rows = self._reader.slots
+        position[rows], velocity[rows] = state[:, 0:2], state[:, 3:5]
+        angle[rows], angular_velocity[rows] = state[:, 2], state[:, 5]
         if self.drives.driven_bodies:
             self.drives.write(position, velocity, angle, angular_velocity)
 
-    def touching(self, steady: bool = False) -> ContactBatch | ComplexArray:
+    def touching(self, impulses_suffice: bool = False) -> ContactBatch | ComplexArray:
         """Return the present contacts, as `ContactReader.touching` does."""
         if not self._moving:
             return NO_CONTACTS
-        return self.contact_reader.touching(self._polygons, self._has_single_contacts, steady)
+        return self.contact_reader.touching(self._polygons, self._has_single_contacts, impulses_suffice)
 
     def beyond(self) -> tuple[int, str] | None:
         """Return a body that is not finite or out of bounds, and a description; else None.
@@ -531,11 +533,11 @@ class SpaceBodies(SpaceBodyTable):
         within = self._static_shapes.within(state)
         if within.all():
             return None
-        worst = int(np.argmin(np.all(within, axis=1)))
-        if not np.isfinite(state[worst]).all() or self._static_shapes.reach > FARTHEST:
-            return int(indices[worst]), BEYOND
+        row = int(np.argmin(np.all(within, axis=1)))
+        if not np.isfinite(state[row]).all() or self._static_shapes.reach > FARTHEST:
+            return int(indices[row]), BEYOND
         return int(
-            indices[worst]
+            indices[row]
         ), f"is more than {self._static_shapes.reach:g} m out, beyond the range of pymunk's half-planes"
 
     @property

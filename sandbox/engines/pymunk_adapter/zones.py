@@ -74,11 +74,11 @@ class ZoneSensors:
     def _on_separate(self, arbiter: pymunk.Arbiter, _: pymunk.Space, __: Any) -> None:
         self._count(arbiter, -1)
 
-    def _count(self, arbiter: pymunk.Arbiter, by: int) -> None:
+    def _count(self, arbiter: pymunk.Arbiter, change: int) -> None:
         probe, zone = arbiter.shapes
         index = self._index_of.get(probe)
         if index is not None:  # None while it is being removed
-            self._within[index][self._zone_of[zone]] += by
+            self._within[index][self._zone_of[zone]] += change
             self.pending.add(index)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from sandbox.action import Action, ActionError, Impulse, Spawn
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.actions import apply_action
-from sandbox.engines.common.base import BEYOND, BaseSimulation
+from sandbox.engines.common.base import BEYOND, SteppedSimulation
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, ContactLog, join_batches
 from sandbox.engines.common.kernel import warn_if_uncompiled
@@ -33,7 +33,7 @@ ROUNDING = 1e-12
 """Overlap as a fraction of the contact distance, and change of velocity as a fraction of the speed, that is rounding"""
 
 
-class ReferenceSimulation(BaseSimulation):
+class ReferenceSimulation(SteppedSimulation):
     """A running scene. A substep applies forces, advances bodies, detects and resolves contacts; see `step.step`.
 
     Zones detect centres at the end of a substep, so that the delay of their effects depends only on the substep.
@@ -90,43 +90,16 @@ class ReferenceSimulation(BaseSimulation):
         """Work counters since the start: all those of the contract but events and predictions."""
         return {"substeps": self.substeps, **self._world.work}
 
-    def step(self) -> None:
-        """Advance by one dt.
-
-        Raises:
-            Divergence: the state of a body is not finite, or exceeds the bounds. It can still be read.
-            Exhaustion: a substep would be divided into too many pieces, or contacts exceed a resource limit.
-        """
-        with self._lock, np.errstate(all="ignore"):
-            self._check_running()
-            self._advance(self._settings.substeps)
-            self._steps += 1
-            self._finish_step()
-
-    def finish(self, part: float) -> None:
-        """Advance by a last fraction of dt, 0 < part < 1: whole substeps, then a shorter one.
-
-        Raises:
-            Divergence: as `step`.
-            ValueError: `part` is out of range.
-        """
-        self._check_part(part)
-        with self._lock, np.errstate(all="ignore"):
-            self._check_running()
-            whole, rest = divmod(part * self._settings.substeps, 1.0)
-            self._advance(int(whole), rest, (self._steps + part) * self._settings.dt)
-            self._part = part
-            self._finish_step()
-            self._ended = True
-
-    def _advance(self, whole: int, rest: float = 0.0, end: float = 0.0) -> None:
-        """Advance by whole substeps, then by a fraction `rest` of one, which ends at `end`, s; 0 for none."""
+    def _advance(self, part: float) -> None:
+        """Advance by the whole substeps in a fraction of dt, then by a shorter one."""
+        whole, rest = divmod(part * self._settings.substeps, 1.0)
         begin, h = self._steps * self._settings.dt, self._h
-        for k in range(whole):
+        for k in range(int(whole)):
             start = begin + k * h
             self._substep(start, h)
             self._end_substep(h, self._after(k + 1), start + h)
         if rest > 0.0:
+            end = (self._steps + part) * self._settings.dt
             self._substep(begin + whole * h, rest * h)
             self._end_substep(rest * h, end, end)
 

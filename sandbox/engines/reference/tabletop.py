@@ -12,7 +12,7 @@ import numpy as np
 from sandbox.action import Action, ActionError
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.actions import apply_action
-from sandbox.engines.common.base import BaseSimulation
+from sandbox.engines.common.base import SteppedSimulation
 from sandbox.engines.common.body_store import NOTHING, BodyStore
 from sandbox.engines.common.contact_log import ContactLog
 from sandbox.engines.common.energy_balance import record_energy_change
@@ -155,7 +155,7 @@ class CirclePairFinder:
         """Set the position of a ball: it is in the arrays of the store already."""
 
 
-class ReferenceTabletopSimulation(BaseSimulation):
+class ReferenceTabletopSimulation(SteppedSimulation):
     """A running scene of balls or pucks on a surface."""
 
     def __init__(self, setup: Setup, settings: Settings) -> None:
@@ -194,40 +194,11 @@ class ReferenceTabletopSimulation(BaseSimulation):
         """Work counters since the start. Collisions are resolved one by one, without iterations."""
         return {"substeps": self.substeps, **self._finder.pipeline.work}
 
-    def step(self) -> None:
-        """Advance by one dt.
-
-        Raises:
-            Divergence: a body is not finite, or out of bounds. The state can still be read.
-            Exhaustion: so many balls touch at once that resolving their collisions would take too long.
-        """
-        with self._lock, np.errstate(all="ignore"):
-            self._check_running()
-            self._advance(self._settings.substeps)
-            self._steps += 1
-            self._finish_step()
-
-    def finish(self, part: float) -> None:
-        """Advance by a last fraction of dt, 0 < part < 1: whole substeps, then a shorter one.
-
-        Raises:
-            Divergence: as `step`.
-            Exhaustion: as `step`.
-            ValueError: `part` is out of range.
-        """
-        self._check_part(part)
-        with self._lock, np.errstate(all="ignore"):
-            self._check_running()
-            whole, rest = divmod(part * self._settings.substeps, 1.0)
-            self._advance(int(whole), rest)
-            self._part = part
-            self._finish_step()
-            self._ended = True
-
-    def _advance(self, whole: int, rest: float = 0.0) -> None:
-        """Advance by whole substeps, then by a fraction `rest` of one; 0 for none."""
+    def _advance(self, part: float) -> None:
+        """Advance by the whole substeps in a fraction of dt, then by a shorter one."""
+        whole, rest = divmod(part * self._settings.substeps, 1.0)
         begin = self._steps * self._settings.dt
-        for k in range(whole):
+        for k in range(int(whole)):
             self._substep(begin + k * self._h, 1.0)
         if rest > 0.0:
             self._substep(begin + whole * self._h, rest)

@@ -1,9 +1,9 @@
 """Collisions on a surface: ball with ball, ball with cushion (Mathavan et al. 2010), puck with puck.
 
-One function for each model. Velocities along z are ignored: the surface stops them, and nothing jumps. n points from
-the first to the second.
+One function for each model. Velocities along z are ignored: no ball leaves the surface. n points from the first to the
+second.
 
-`mathavan2010`: the nose of a cushion rubs a ball while it is pressed against it, and the surface rubs it from below.
+`mathavan2010`: while a ball is pressed against a cushion, friction acts on it at the nose and at the surface below.
 Source: Mathavan, Jackson & Parkin 2010, "A theoretical analysis of billiard ball dynamics under cushion impacts". The
 impulse grows in small steps, because the directions of slip at the nose and at the surface change meanwhile, for which
 there is no closed form. The collision ends when the cushion has returned e² of the work of compression.
@@ -54,39 +54,45 @@ def mathavan2010(
         return a
     step = (1.0 + restitution) * y / (STEPS * cos)
     max_friction = 1.0 / (3.5 * step)
-    work, wanted, pressed = 0.0, math.inf, 0.0
+    work, target_work, compression_work = 0.0, math.inf, 0.0
     for _ in range(100 * STEPS):
         along, up = x + q * sin - r * cos, p - y * sin
         slip = math.sqrt(along * along + up * up)
         ca, cu = (along / slip, up / slip) if slip > NO_SLIP else (0.0, 0.0)
         effective_friction = min(friction, max_friction * slip)  # a step can end slip, but not reverse it
-        under_x, under_y = x - q, y + p
-        under = math.sqrt(under_x * under_x + under_y * under_y)
-        fx, fy = (under_x / under, under_y / under) if under > NO_SLIP else (0.0, 0.0)
-        weight = sin + effective_friction * cu * cos  # part of the impulse that presses the ball onto the surface
-        grip = min(sliding * max(weight, 0.0), max_friction * under)
+        floor_slip_x, floor_slip_y = x - q, y + p
+        floor_slip = math.sqrt(floor_slip_x * floor_slip_x + floor_slip_y * floor_slip_y)
+        fx, fy = (floor_slip_x / floor_slip, floor_slip_y / floor_slip) if floor_slip > NO_SLIP else (0.0, 0.0)
+        pressing = sin + effective_friction * cu * cos  # part of the impulse that presses the ball onto the surface
+        grip = min(sliding * max(pressing, 0.0), max_friction * floor_slip)
         dx = -effective_friction * ca - grip * fx
         dy = -cos + effective_friction * sin * cu - grip * fy
         dp = -2.5 * (effective_friction * cu + grip * fy)
         dq = -2.5 * (effective_friction * ca * sin - grip * fx)
         dr = 2.5 * effective_friction * ca * cos
         # The last steps of compression and of restitution are shortened to end exactly.
-        part = step
+        actual_step = step
         ends = False
-        if wanted == math.inf:
+        if target_work == math.inf:
             if y + dy * step <= 0.0:
-                part, ends = y / -dy, True
+                actual_step, ends = y / -dy, True
         else:
-            more = -cos * (y + 0.5 * dy * step) * step
-            if work + more >= wanted:
-                part, ends = step * (wanted - work) / more, True
+            step_work = -cos * (y + 0.5 * dy * step) * step
+            if work + step_work >= target_work:
+                actual_step, ends = step * (target_work - work) / step_work, True
         before = y
-        x, y, p, q, r = x + dx * part, y + dy * part, p + dp * part, q + dq * part, r + dr * part
-        work += cos * part * 0.5 * abs(before + y)
-        if ends and wanted == math.inf:
-            y, pressed = 0.0, work
-            work, wanted = 0.0, restitution * restitution * pressed
-            if wanted == 0.0:
+        x, y, p, q, r = (
+            x + dx * actual_step,
+            y + dy * actual_step,
+            p + dp * actual_step,
+            q + dq * actual_step,
+            r + dr * actual_step,
+        )
+        work += cos * actual_step * 0.5 * abs(before + y)
+        if ends and target_work == math.inf:
+            y, compression_work = 0.0, work
+            work, target_work = 0.0, restitution * restitution * compression_work
+            if target_work == 0.0:
                 break
         elif ends:
             break
@@ -137,9 +143,9 @@ def collide_balls(
     """
     avx, avy, awx, awy, awz = a
     bvx, bvy, bwx, bwy, bwz = b
-    la, lb = inverse_mass
+    inverse_a, inverse_b = inverse_mass
     closing = (avx - bvx) * nx + (avy - bvy) * ny
-    impulse = (1.0 + restitution) * closing / (la + lb)
+    impulse = (1.0 + restitution) * closing / (inverse_a + inverse_b)
     if model == FRICTIONAL:
         # Slip of the first over the second at the point of contact: along t = (−n_y, n_x), and along z.
         along = (avy - bvy) * nx - (avx - bvx) * ny + radius * (awz + bwz)
@@ -147,15 +153,23 @@ def collide_balls(
         slip = math.sqrt(along * along + up * up)
         if slip > 0.0:
             # Coulomb's law, up to the impulse that ends the slip: the effective inverse mass is 7/2 of the sum.
-            friction_per_slip = min(ball_friction(slip) * impulse, slip / (3.5 * (la + lb))) / slip
+            friction_per_slip = min(ball_friction(slip) * impulse, slip / (3.5 * (inverse_a + inverse_b))) / slip
             dt, dz = -friction_per_slip * along, -friction_per_slip * up
             turn = 2.5 / radius
-            avx, avy = avx - la * dt * ny, avy + la * dt * nx
-            bvx, bvy = bvx + lb * dt * ny, bvy - lb * dt * nx
-            awx, awy, awz = awx + turn * la * dz * ny, awy - turn * la * dz * nx, awz + turn * la * dt
-            bwx, bwy, bwz = bwx + turn * lb * dz * ny, bwy - turn * lb * dz * nx, bwz + turn * lb * dt
-    avx, avy = avx - la * impulse * nx, avy - la * impulse * ny
-    bvx, bvy = bvx + lb * impulse * nx, bvy + lb * impulse * ny
+            avx, avy = avx - inverse_a * dt * ny, avy + inverse_a * dt * nx
+            bvx, bvy = bvx + inverse_b * dt * ny, bvy - inverse_b * dt * nx
+            awx, awy, awz = (
+                awx + turn * inverse_a * dz * ny,
+                awy - turn * inverse_a * dz * nx,
+                awz + turn * inverse_a * dt,
+            )
+            bwx, bwy, bwz = (
+                bwx + turn * inverse_b * dz * ny,
+                bwy - turn * inverse_b * dz * nx,
+                bwz + turn * inverse_b * dt,
+            )
+    avx, avy = avx - inverse_a * impulse * nx, avy - inverse_a * impulse * ny
+    bvx, bvy = bvx + inverse_b * impulse * nx, bvy + inverse_b * impulse * ny
     return (avx, avy, awx, awy, awz), (bvx, bvy, bwx, bwy, bwz)
 
 
@@ -192,8 +206,8 @@ def collide_cushion(
         vx, vy, wx, wy, wz = a
         normal_impulse = (1.0 + restitution) * (vx * nx + vy * ny)
         return vx - normal_impulse * nx, vy - normal_impulse * ny, wx, wy, wz
-    still = max(vx * nx + vy * ny, 0.0)  # a nose far above the centre does not stop it completely
-    return vx - still * nx, vy - still * ny, wx, wy, wz
+    remaining = max(vx * nx + vy * ny, 0.0)  # a nose far above the centre does not stop it completely
+    return vx - remaining * nx, vy - remaining * ny, wx, wy, wz
 
 
 @kernel
@@ -244,14 +258,14 @@ def collide_pucks(
     """
     avx, avy, _, _, aw = a
     bvx, bvy, _, _, bw = b
-    (la, lb), (ra, rb) = inverse_mass, radii
-    normal_impulse = (1.0 + restitution) * ((avx - bvx) * nx + (avy - bvy) * ny) / (la + lb)
+    (inverse_a, inverse_b), (ra, rb) = inverse_mass, radii
+    normal_impulse = (1.0 + restitution) * ((avx - bvx) * nx + (avy - bvy) * ny) / (inverse_a + inverse_b)
     # Slip of the first over the second, along t = (−n_y, n_x), the direction in which spin moves each rim.
     slip = (avy - bvy) * nx - (avx - bvx) * ny + ra * aw + rb * bw
-    friction_impulse = math.copysign(min(friction * normal_impulse, abs(slip) / (3.0 * (la + lb))), slip)
+    friction_impulse = math.copysign(min(friction * normal_impulse, abs(slip) / (3.0 * (inverse_a + inverse_b))), slip)
     jx, jy = normal_impulse * nx - friction_impulse * ny, normal_impulse * ny + friction_impulse * nx
-    if la > 0.0:
-        avx, avy, aw = avx - la * jx, avy - la * jy, aw - 2.0 * la * friction_impulse / ra
-    if lb > 0.0:
-        bvx, bvy, bw = bvx + lb * jx, bvy + lb * jy, bw - 2.0 * lb * friction_impulse / rb
+    if inverse_a > 0.0:
+        avx, avy, aw = avx - inverse_a * jx, avy - inverse_a * jy, aw - 2.0 * inverse_a * friction_impulse / ra
+    if inverse_b > 0.0:
+        bvx, bvy, bw = bvx + inverse_b * jx, bvy + inverse_b * jy, bw - 2.0 * inverse_b * friction_impulse / rb
     return (avx, avy, 0.0, 0.0, aw), (bvx, bvy, 0.0, 0.0, bw)

@@ -104,13 +104,13 @@ def approach(
     balls: TabletopBalls, cushions: Cushions, i: int, other: int, time_before_end: float
 ) -> tuple[float, float, float, float]:
     """Return a pair's gap at a time, m, the normal from the first to the second, and the closing speed, m/s."""
-    x, y, _, mine = state_at(balls, i, time_before_end)
+    x, y, _, motion = state_at(balls, i, time_before_end)
     if other < 0:
-        gap, nx, ny = distance_to_collider(cushions, -1 - other, x, y, mine[0], mine[1])
-        return gap - balls.radius[i], nx, ny, mine[0] * nx + mine[1] * ny
-    px, py, _, theirs = state_at(balls, other, time_before_end)
+        gap, nx, ny = distance_to_collider(cushions, -1 - other, x, y, motion[0], motion[1])
+        return gap - balls.radius[i], nx, ny, motion[0] * nx + motion[1] * ny
+    px, py, _, other_motion = state_at(balls, other, time_before_end)
     dx, dy = px - x, py - y
-    ux, uy = mine[0] - theirs[0], mine[1] - theirs[1]
+    ux, uy = motion[0] - other_motion[0], motion[1] - other_motion[1]
     distance = math.sqrt(dx * dx + dy * dy)
     if distance > 0.0:
         nx, ny = dx / distance, dy / distance
@@ -139,33 +139,39 @@ def time_of_nearest(balls: TabletopBalls, cushions: Cushions, i: int, other: int
 
 @kernel
 def time_of_impact(balls: TabletopBalls, cushions: Cushions, i: int, other: int) -> float:
-    """Return the time before the end at which a pair that overlaps, or did, collided, s; below 0 if it did not."""
-    latest, (near, _, _, closing) = 0.0, approach(balls, cushions, i, other, 0.0)
+    """Return the time before the end at which a pair that overlaps, or has overlapped, collided, s; below 0 if none."""
+    latest, (end_gap, _, _, closing) = 0.0, approach(balls, cushions, i, other, 0.0)
     max_time = balls.age[i] if other < 0 or not balls.in_play[other] else min(balls.age[i], balls.age[other])
-    if not near < 0.0:
+    if not end_gap < 0.0:
         latest = time_of_nearest(balls, cushions, i, other, max_time) if closing < 0.0 else 0.0
-        near = approach(balls, cushions, i, other, latest)[0]
-        if not near < 0.0:
+        end_gap = approach(balls, cushions, i, other, latest)[0]
+        if not end_gap < 0.0:
             return -1.0
-    far, _, _, began = approach(balls, cushions, i, other, max_time)
-    if far <= 0.0:  # in contact all the time
-        return max_time if began > RESTING_SPEED and far > near else 0.0 if closing > RESTING_SPEED else -1.0
+    start_gap, _, _, earlier_closing = approach(balls, cushions, i, other, max_time)
+    if start_gap <= 0.0:  # in contact all the time
+        return (
+            max_time
+            if earlier_closing > RESTING_SPEED and start_gap > end_gap
+            else 0.0
+            if closing > RESTING_SPEED
+            else -1.0
+        )
     # Between a time of overlap and one before it: false position, by the Illinois rule.
-    low, high, below, above, side = latest, max_time, near, far, 0
+    low, high, low_gap, high_gap, last_side = latest, max_time, end_gap, start_gap, 0
     for _ in range(MAX_ITERATIONS):
-        middle = (low * above - high * below) / (above - below)
-        gap, _, _, began = approach(balls, cushions, i, other, middle)
+        middle = (low * high_gap - high * low_gap) / (high_gap - low_gap)
+        gap, _, _, earlier_closing = approach(balls, cushions, i, other, middle)
         if abs(gap) <= ROUNDING_TOLERANCE * balls.radius[i] or high - low <= ROUNDING_TOLERANCE * max_time:
             break
         if gap < 0.0:
-            low, below = middle, gap
-            above = 0.5 * above if side < 0 else above
-            side = -1
+            low, low_gap = middle, gap
+            high_gap = 0.5 * high_gap if last_side < 0 else high_gap
+            last_side = -1
         else:
-            high, above = middle, gap
-            below = 0.5 * below if side > 0 else below
-            side = 1
-    return middle if began > RESTING_SPEED else -1.0
+            high, high_gap = middle, gap
+            low_gap = 0.5 * low_gap if last_side > 0 else low_gap
+            last_side = 1
+    return middle if earlier_closing > RESTING_SPEED else -1.0
 
 
 @kernel
@@ -173,13 +179,13 @@ def separate(balls: TabletopBalls, cushions: Cushions, i: int, other: int, depth
     """Move two bodies apart by a depth, m, in proportion to their inverse masses."""
     _, nx, ny, _ = approach(balls, cushions, i, other, 0.0)
     own_inverse_mass, other_inverse_mass = balls.inverse_mass[i], 0.0 if other < 0 else balls.inverse_mass[other]
-    fraction = depth * own_inverse_mass / (own_inverse_mass + other_inverse_mass)
-    balls.position[i, 0] -= fraction * nx
-    balls.position[i, 1] -= fraction * ny
+    own_depth = depth * own_inverse_mass / (own_inverse_mass + other_inverse_mass)
+    balls.position[i, 0] -= own_depth * nx
+    balls.position[i, 1] -= own_depth * ny
     balls.moved[i] = True
     if other_inverse_mass > 0.0:
-        balls.position[other, 0] += (depth - fraction) * nx
-        balls.position[other, 1] += (depth - fraction) * ny
+        balls.position[other, 0] += (depth - own_depth) * nx
+        balls.position[other, 1] += (depth - own_depth) * ny
         balls.moved[other] = True
 
 
@@ -203,7 +209,7 @@ def append_new_pairs(
         if count == len(pairs):
             return count
         if k < 0:
-            near = approach(balls, cushions, i, k, 0.0)[0] < SKIN * balls.radius[i]
+            is_near = approach(balls, cushions, i, k, 0.0)[0] < SKIN * balls.radius[i]
         else:
             can_collide = (
                 k != i
@@ -212,8 +218,8 @@ def append_new_pairs(
             )
             dx, dy = balls.position[k, 0] - x, balls.position[k, 1] - y
             contact_distance = (1.0 + SKIN) * (balls.radius[i] + balls.radius[k])
-            near = can_collide and dx * dx + dy * dy < contact_distance * contact_distance
-        if near and not is_listed(pairs, count, i, k):
+            is_near = can_collide and dx * dx + dy * dy < contact_distance * contact_distance
+        if is_near and not is_listed(pairs, count, i, k):
             pairs[count, 0], pairs[count, 1] = i, k
             rows[count, DUE] = -1.0
             write_geometry(balls, cushions, i, k, rows[count])
@@ -302,9 +308,9 @@ def resolve_hit(
     _, nx, ny, closing = approach(balls, cushions, i, other, time_before_end)
     radius, inverse_mass, floor = balls.radius[i], balls.inverse_mass[i], balls.floor
     inertia = floor.inertia
-    undone = kinetic_energy(motion_of(balls, i), inverse_mass, radius, inertia)
-    mine = restore_state(balls, i, time_before_end)
-    began = kinetic_energy(mine, inverse_mass, radius, inertia)
+    energy_without_hit = kinetic_energy(motion_of(balls, i), inverse_mass, radius, inertia)
+    motion = restore_state(balls, i, time_before_end)
+    energy_before = kinetic_energy(motion, inverse_mass, radius, inertia)
     if other < 0:
         k = -1 - other
         height = cushions.height[k] if cushions.height[k] > 0.0 else radius
@@ -313,58 +319,70 @@ def resolve_hit(
         )
         friction = parameters.friction[balls.surface[i], cushions.surface[k]]
         if floor.pucks:
-            alone = (inverse_mass, 0.0), (radius, 0.0)
-            after, _ = collide_pucks(restitution, 0.0, mine, STILL, *alone, nx, ny)
-            smooth = kinetic_energy(after, inverse_mass, radius, inertia)
-            after, _ = collide_pucks(restitution, friction, mine, STILL, *alone, nx, ny)
+            inverse_masses_and_radii = (inverse_mass, 0.0), (radius, 0.0)
+            after, _ = collide_pucks(restitution, 0.0, motion, STILL, *inverse_masses_and_radii, nx, ny)
+            energy_frictionless = kinetic_energy(after, inverse_mass, radius, inertia)
+            after, _ = collide_pucks(restitution, friction, motion, STILL, *inverse_masses_and_radii, nx, ny)
         else:
-            after = collide_cushion(parameters.cushion, restitution, 0.0, 0.0, mine, radius, height, nx, ny)
-            smooth = kinetic_energy(after, inverse_mass, radius, inertia)
+            after = collide_cushion(parameters.cushion, restitution, 0.0, 0.0, motion, radius, height, nx, ny)
+            energy_frictionless = kinetic_energy(after, inverse_mass, radius, inertia)
             after = collide_cushion(
-                parameters.cushion, restitution, friction, parameters.grip, mine, radius, height, nx, ny
+                parameters.cushion, restitution, friction, parameters.grip, motion, radius, height, nx, ny
             )
-        ended = kinetic_energy(after, inverse_mass, radius, inertia)
-        redone = 0.0
+        energy_after = kinetic_energy(after, inverse_mass, radius, inertia)
+        other_energy_end = 0.0
     else:
-        gone = motion_of(balls, other)
-        theirs = restore_state(balls, other, time_before_end) if balls.in_play[other] else gone
+        other_without_hit = motion_of(balls, other)
+        other_motion = restore_state(balls, other, time_before_end) if balls.in_play[other] else other_without_hit
         other_inverse_mass, other_radius = balls.inverse_mass[other], balls.radius[other]
-        undone += kinetic_energy(gone, other_inverse_mass, other_radius, inertia)
-        began += kinetic_energy(theirs, other_inverse_mass, other_radius, inertia)
+        energy_without_hit += kinetic_energy(other_without_hit, other_inverse_mass, other_radius, inertia)
+        energy_before += kinetic_energy(other_motion, other_inverse_mass, other_radius, inertia)
         restitution = (
             parameters.restitution[balls.surface[i], balls.surface[other]] if closing > MIN_BOUNCE_SPEED else 0.0
         )
-        both, radii = (inverse_mass, other_inverse_mass), (radius, other_radius)
+        inverse_masses, radii = (inverse_mass, other_inverse_mass), (radius, other_radius)
         friction = parameters.friction[balls.surface[i], balls.surface[other]]
         if floor.pucks:
-            after, more = collide_pucks(restitution, 0.0, mine, theirs, both, radii, nx, ny)
+            after, other_after = collide_pucks(restitution, 0.0, motion, other_motion, inverse_masses, radii, nx, ny)
         else:
-            after, more = collide_balls(ELASTIC, restitution, mine, theirs, both, radius, nx, ny)
-        smooth = kinetic_energy(after, inverse_mass, radius, inertia) + kinetic_energy(
-            more, other_inverse_mass, other_radius, inertia
+            after, other_after = collide_balls(
+                ELASTIC, restitution, motion, other_motion, inverse_masses, radius, nx, ny
+            )
+        energy_frictionless = kinetic_energy(after, inverse_mass, radius, inertia) + kinetic_energy(
+            other_after, other_inverse_mass, other_radius, inertia
         )
         if floor.pucks:
-            after, more = collide_pucks(restitution, friction, mine, theirs, both, radii, nx, ny)
+            after, other_after = collide_pucks(
+                restitution, friction, motion, other_motion, inverse_masses, radii, nx, ny
+            )
         else:
-            after, more = collide_balls(parameters.ball_ball, restitution, mine, theirs, both, radius, nx, ny)
-        ended = kinetic_energy(after, inverse_mass, radius, inertia) + kinetic_energy(
-            more, other_inverse_mass, other_radius, inertia
+            after, other_after = collide_balls(
+                parameters.ball_ball, restitution, motion, other_motion, inverse_masses, radius, nx, ny
+            )
+        energy_after = kinetic_energy(after, inverse_mass, radius, inertia) + kinetic_energy(
+            other_after, other_inverse_mass, other_radius, inertia
         )
         if balls.in_play[other]:
-            set_motion(balls, other, more)
+            set_motion(balls, other, other_after)
             advance_ball(balls, other, time_before_end)
-            more = motion_of(balls, other)
-        redone = kinetic_energy(more, other_inverse_mass, other_radius, inertia)
+            other_after = motion_of(balls, other)
+        other_energy_end = kinetic_energy(other_after, other_inverse_mass, other_radius, inertia)
     if row[IMPULSE_X] == 0.0 and row[IMPULSE_Y] == 0.0:
         row[NORMAL_X], row[NORMAL_Y] = nx, ny
         row[POINT_X], row[POINT_Y] = balls.position[i, 0] + radius * nx, balls.position[i, 1] + radius * ny
-    row[IMPULSE_X] += (mine[0] - after[0]) / inverse_mass
-    row[IMPULSE_Y] += (mine[1] - after[1]) / inverse_mass
-    work[0] += smooth - began
-    work[1] += ended - smooth
+    row[IMPULSE_X] += (motion[0] - after[0]) / inverse_mass
+    row[IMPULSE_Y] += (motion[1] - after[1]) / inverse_mass
+    work[0] += energy_frictionless - energy_before
+    work[1] += energy_after - energy_frictionless
     set_motion(balls, i, after)
     advance_ball(balls, i, time_before_end)
-    work[2] += began - undone + redone + kinetic_energy(motion_of(balls, i), inverse_mass, radius, inertia) - ended
+    work[2] += (
+        energy_before
+        - energy_without_hit
+        + other_energy_end
+        + kinetic_energy(motion_of(balls, i), inverse_mass, radius, inertia)
+        - energy_after
+    )
 
 
 @kernel
@@ -393,12 +411,12 @@ def resolve(
         count: number of pairs in contact.
         max_tests: limit of the tests of pairs and balls; −1 is returned if there would be more.
     """
-    done, looked = 0, 0
+    hits, tests = 0, 0
     for k in range(count):
         i, other = pairs[k, 0], pairs[k, 1]
         write_geometry(balls, cushions, i, other, rows[k])
         rows[k, DUE] = time_of_impact(balls, cushions, i, other)
-    while done < MAX_HITS_PER_CONTACT * count:
+    while hits < MAX_HITS_PER_CONTACT * count:
         first, time_before_end = -1, -1.0
         for k in range(count):
             if rows[k, DUE] > time_before_end:
@@ -407,9 +425,9 @@ def resolve(
             break
         i, other = pairs[first, 0], pairs[first, 1]
         resolve_hit(balls, cushions, parameters, i, other, time_before_end, rows[first], work)
-        done += 1
-        looked += 2 * (count + len(balls.in_play))
-        if looked > max_tests:
+        hits += 1
+        tests += 2 * (count + len(balls.in_play))
+        if tests > max_tests:
             return -1
         count = append_new_pairs(balls, cushions, i, pairs, rows, count)
         if other >= 0 and balls.in_play[other]:
@@ -421,8 +439,8 @@ def resolve(
     for k in range(count):
         i, other = pairs[k, 0], pairs[k, 1]
         depth = -approach(balls, cushions, i, other, 0.0)[0]
-        lies = rows[k, IMPULSE_X] != 0.0 or rows[k, IMPULSE_Y] != 0.0
-        if lies and 0.0 < depth <= parameters.slop:
+        was_hit = rows[k, IMPULSE_X] != 0.0 or rows[k, IMPULSE_Y] != 0.0
+        if was_hit and 0.0 < depth <= parameters.slop:
             separate(balls, cushions, i, other, depth)
         elif depth > parameters.slop:
             separate(balls, cushions, i, other, parameters.correction * (depth - parameters.slop))

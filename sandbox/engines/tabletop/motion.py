@@ -119,7 +119,7 @@ def rates(
 
 
 @kernel
-def fallen(wz: float, drop: float) -> float:
+def decayed_spin(wz: float, drop: float) -> float:
     """Return a spin about z, rad/s, moved towards 0 by a drop, rad/s."""
     if wz > drop:
         return wz - drop
@@ -147,8 +147,8 @@ def curled(vx: float, vy: float, slowing: float, curl: float, time: float) -> tu
     lost = slowing * time / speed
     if lost >= 1.0:
         along, left = _curl_term(-1.0, 0.0, curl)
-        far = speed / slowing
-        return far * (along * vx - left * vy), far * (along * vy + left * vx), 0.0, 0.0
+        scale = speed / slowing
+        return scale * (along * vx - left * vy), scale * (along * vy + left * vx), 0.0, 0.0
     if lost < SHORT:
         along, left = 1.0 - 0.5 * lost, 0.5 * lost * curl
         x, y = time * (along * vx - left * vy), time * (along * vy + left * vx)
@@ -156,12 +156,12 @@ def curled(vx: float, vy: float, slowing: float, curl: float, time: float) -> tu
         rate = math.log1p(-lost)
         sine, half = math.sin(-curl * rate), math.sin(-0.5 * curl * rate)
         # s^(2−iκ) − 1, computed without cancellation where s is near 1
-        real = math.expm1(2.0 * rate) * (1.0 - 2.0 * half * half) - 2.0 * half * half
-        along, left = _curl_term(real, math.exp(2.0 * rate) * sine, curl)
-        far = time / lost
-        x, y = far * (along * vx - left * vy), far * (along * vy + left * vx)
-    turn = -curl * math.log1p(-lost)
-    cos, sin, fraction = math.cos(turn), math.sin(turn), 1.0 - lost
+        real_part = math.expm1(2.0 * rate) * (1.0 - 2.0 * half * half) - 2.0 * half * half
+        along, left = _curl_term(real_part, math.exp(2.0 * rate) * sine, curl)
+        scale = time / lost
+        x, y = scale * (along * vx - left * vy), scale * (along * vy + left * vx)
+    angle = -curl * math.log1p(-lost)
+    cos, sin, fraction = math.cos(angle), math.sin(angle), 1.0 - lost
     vx, vy = rotate(vx, vy, cos, sin)
     return x, y, fraction * vx, fraction * vy
 
@@ -238,27 +238,27 @@ def rolled(motion: Five, radius: float, floor: SurfaceFriction, time: float) -> 
     """
     vx, vy, wx, wy, wz = motion
     x = y = 0.0
-    left = time
-    fall = floor.spinning / radius
-    turning = min(time, abs(wz) / fall) if fall > 0.0 else time
+    remaining = time
+    spin_decay = floor.spinning / radius
+    spin_time = min(time, abs(wz) / spin_decay) if spin_decay > 0.0 else time
     if floor.curl != 0.0 and wz != 0.0 and floor.sliding > 0.0 and (vx != 0.0 or vy != 0.0):
-        x, y, vx, vy = curled(vx, vy, floor.sliding, math.copysign(floor.curl, floor.curl * wz), turning)
-        left -= turning
+        x, y, vx, vy = curled(vx, vy, floor.sliding, math.copysign(floor.curl, floor.curl * wz), spin_time)
+        remaining -= spin_time
     for _ in range(MAX_PHASES):
         phase = phase_of(vx, vy, wx, wy, wz, radius, floor.pucks)
-        if phase in (RESTING, SPINNING) or left <= 0.0:
+        if phase in (RESTING, SPINNING) or remaining <= 0.0:
             break
-        ax, ay, bx, by, lasts = rates(phase, vx, vy, wx, wy, wz, radius, floor)
-        t = min(left, lasts)
-        x, y = x + (vx + 0.5 * ax * t) * t, y + (vy + 0.5 * ay * t) * t
-        vx, vy, wx, wy = vx + ax * t, vy + ay * t, wx + bx * t, wy + by * t
-        if phase in (ROLLING, GLIDING) and lasts <= left:
+        ax, ay, bx, by, duration = rates(phase, vx, vy, wx, wy, wz, radius, floor)
+        dt = min(remaining, duration)
+        x, y = x + (vx + 0.5 * ax * dt) * dt, y + (vy + 0.5 * ay * dt) * dt
+        vx, vy, wx, wy = vx + ax * dt, vy + ay * dt, wx + bx * dt, wy + by * dt
+        if phase in (ROLLING, GLIDING) and duration <= remaining:
             vx = vy = 0.0
-        if phase == ROLLING or (phase == SLIDING and lasts <= left):
+        if phase == ROLLING or (phase == SLIDING and duration <= remaining):
             wx, wy = 0.0 - vy / radius, vx / radius  # no −0.0 at rest
-        left -= t
-    angle = (wz - math.copysign(0.5 * fall * turning, wz)) * turning
-    return x, y, angle, (vx, vy, wx, wy, fallen(wz, fall * time))
+        remaining -= dt
+    angle = (wz - math.copysign(0.5 * spin_decay * spin_time, wz)) * spin_time
+    return x, y, angle, (vx, vy, wx, wy, decayed_spin(wz, spin_decay * time))
 
 
 @kernel
@@ -266,19 +266,19 @@ def state_at(balls: TabletopBalls, i: int, time_before_end: float) -> tuple[floa
     """Return a ball's position at a time, m, its angle, and its velocity and spin; at most back to its anchor."""
     if time_before_end == 0.0 or not balls.in_play[i]:
         return balls.position[i, 0], balls.position[i, 1], balls.angle[i], motion_of(balls, i)
-    old = balls.anchor[i]
-    began = old[3], old[4], old[5], old[6], old[7]
-    x, y, angle, motion = rolled(began, balls.radius[i], balls.floor, balls.age[i] - time_before_end)
-    return old[0] + x, old[1] + y, old[2] + angle, motion
+    anchor = balls.anchor[i]
+    start = anchor[3], anchor[4], anchor[5], anchor[6], anchor[7]
+    x, y, angle, motion = rolled(start, balls.radius[i], balls.floor, balls.age[i] - time_before_end)
+    return anchor[0] + x, anchor[1] + y, anchor[2] + angle, motion
 
 
 @kernel
 def advance_ball(balls: TabletopBalls, i: int, time: float) -> None:
     """Set a ball's anchor, and advance it by a time, s, as if without contacts."""
-    old, motion = balls.anchor[i], motion_of(balls, i)
-    old[0], old[1], old[2] = balls.position[i, 0], balls.position[i, 1], balls.angle[i]
+    anchor, motion = balls.anchor[i], motion_of(balls, i)
+    anchor[0], anchor[1], anchor[2] = balls.position[i, 0], balls.position[i, 1], balls.angle[i]
     for k in range(5):
-        old[3 + k] = motion[k]
+        anchor[3 + k] = motion[k]
     balls.age[i] = time
     x, y, angle, motion = rolled(motion, balls.radius[i], balls.floor, time)
     balls.position[i, 0] += x
@@ -306,23 +306,23 @@ def advance_all(balls: TabletopBalls, time: float, displacement: FloatArray) -> 
 
 
 @kernel
-def find_in_pockets(balls: TabletopBalls, pockets: FloatArray, which: IntArray) -> int:
+def find_in_pockets(balls: TabletopBalls, pockets: FloatArray, pocket_index: IntArray) -> int:
     """Find the balls in play whose centres are within a pocket; return their number.
 
     Args:
         balls: all.
         pockets: (P, 3) centre and radius, m.
-        which: (N,) index of the pocket of each, −1 for none; written to.
+        pocket_index: (N,) index of the pocket of each, −1 for none; written to.
     """
-    found = 0
-    for i in range(len(which)):
-        which[i] = -1
+    count = 0
+    for i in range(len(pocket_index)):
+        pocket_index[i] = -1
         for k in range(len(pockets)):
             dx, dy = balls.position[i, 0] - pockets[k, 0], balls.position[i, 1] - pockets[k, 1]
-            if balls.in_play[i] and which[i] < 0 and dx * dx + dy * dy < pockets[k, 2] * pockets[k, 2]:
-                which[i] = k
-                found += 1
-    return found
+            if balls.in_play[i] and pocket_index[i] < 0 and dx * dx + dy * dy < pockets[k, 2] * pockets[k, 2]:
+                pocket_index[i] = k
+                count += 1
+    return count
 
 
 @kernel
@@ -332,7 +332,7 @@ def first_beyond(balls: TabletopBalls, farthest: float, fastest: float) -> int:
         x, y = balls.position[i, 0], balls.position[i, 1]
         vx, vy, wx, wy, wz = motion_of(balls, i)
         # Comparisons with nan are false, so a nan anywhere makes `good` false.
-        good = x * x + y * y <= farthest * farthest and vx * vx + vy * vy <= fastest * fastest
-        if not (good and abs(wx) + abs(wy) + abs(wz) + abs(balls.angle[i]) < math.inf):
+        is_valid = x * x + y * y <= farthest * farthest and vx * vx + vy * vy <= fastest * fastest
+        if not (is_valid and abs(wx) + abs(wy) + abs(wz) + abs(balls.angle[i]) < math.inf):
             return i
     return -1

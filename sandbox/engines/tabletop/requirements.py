@@ -1,4 +1,4 @@
-"""Requirements of scenes with a surface: what engines do not support there, and the pockets that contain points."""
+"""Restrictions of scenes with a surface, and the pockets at given positions."""
 
 from collections.abc import Iterator
 
@@ -13,16 +13,16 @@ from sandbox.scene.compile.setup import Setup
 
 
 def unsupported_on_surface(start: Scene | Setup, bodies: Bodies | None = None) -> Iterator[str]:
-    """Yield what is not supported on a surface by any engine, with the scene's bodies and those spawned since.
+    """Yield the features that no engine supports on a surface, with the scene's bodies or with given ones.
 
-    Sides of pucks are upright, so that pucks of different radii collide horizontally; balls of different radii do not.
+    Pucks have upright sides, so that pucks of different radii collide horizontally. Balls of different radii do not.
     """
     setup = Setup.of(start)
     scene, bodies = setup.scene, setup.bodies if bodies is None else bodies
     if scene.world.gravity != (0.0, 0.0):
         yield "it does not model world.gravity in the plane of a floor"
-    if does := demands(setup) & SURFACES:
-        yield f"it does not model {', '.join(sorted(does))} on a floor"
+    if unmodelled := demands(setup) & SURFACES:
+        yield f"it does not model {', '.join(sorted(unmodelled))} on a floor"
     collides = np.asarray([element.collides == "all" for element in bodies.elements], np.bool_)[bodies.element]
     if scene.surface is not None and bodies.spheres and len(np.unique(bodies.radius[collides & bodies.round])) > 1:
         yield "it does not model collisions of balls with different radii on a floor"
@@ -33,11 +33,11 @@ def pockets_at(scene: Scene, position: FloatArray) -> IntArray:
 
     Where pockets overlap it is the first of them.
     """
-    found = np.full(len(position), -1, dtype=np.int64)
+    index = np.full(len(position), -1, dtype=np.int64)
     for k, pocket in enumerate(scene.pockets):
-        apart = position - np.asarray(pocket.position)
-        found[(found < 0) & (np.einsum("nk,nk->n", apart, apart) < pocket.radius**2)] = k
-    return found
+        offset = position - np.asarray(pocket.position)
+        index[(index < 0) & (np.einsum("nk,nk->n", offset, offset) < pocket.radius**2)] = k
+    return index
 
 
 def on_floor(start: Scene | Setup) -> bool:
@@ -47,7 +47,7 @@ def on_floor(start: Scene | Setup) -> bool:
 
 
 def unsupported_by_steppers(start: Scene | Setup, bodies: Bodies | None = None) -> Iterator[str]:
-    """Yield what is not supported on a surface by time-step solvers, with the scene's bodies or with given ones."""
+    """Yield the features that no time-step solver supports on a surface, with the scene's bodies or with given ones."""
     setup = Setup.of(start)
     scene, bodies = setup.scene, setup.bodies if bodies is None else bodies
     world = scene.world

@@ -2,7 +2,7 @@
 
 A substep: spheres slide, roll and spin in closed form; a collision detector moves their discs by the mean velocity of
 the substep and returns the pairs in contact (`PairFinder`); `contacts.resolve` takes each pair back to its time of
-impact and applies the models of `collisions`; balls in a pocket leave the table.
+impact and applies the models of `collisions`; balls in a pocket are captured.
 
 Energy accounting: friction of the cloth, of balls against each other and against cushions is FRICTION; RESTITUTION is
 the loss of the same impacts without friction; the energy of a pocketed ball is RETIRED. Paths are exact, so the
@@ -41,7 +41,7 @@ from sandbox.scene.description.world import Settings
 
 EXTRA_PAIRS = 100
 """Number of pairs beyond twice the initial ones that collisions may bring into contact within a substep; further pairs
-wait."""
+are found in the next substep."""
 
 
 TESTS_PER_PAIR = 10
@@ -113,19 +113,19 @@ class TabletopStepper:
 
     def rebuild_arrays(self, state: BallArrays, bodies: Bodies, present: BoolArray) -> None:
         """Use these arrays from now on. Pockets of bodies that were there before are kept."""
-        index = len(bodies)
-        pocket = np.full(index, -1, np.int64)
+        count = len(bodies)
+        pocket = np.full(count, -1, np.int64)
         pocket[: len(self.pocket)] = self.pocket
         self.pocket = pocket
         self._masks = np.asarray([COLLISION_MASKS[each.collides] for each in bodies.elements], np.int64)[bodies.element]
         self._moment = np.where(bodies.fixed, 0.0, bodies.moment)
         self._mass = np.where(bodies.fixed, 0.0, bodies.mass)
-        self._displacement, self._which = np.zeros((index, 2)), np.zeros(index, np.int64)
+        self._displacement, self._pocket_index = np.zeros((count, 2)), np.zeros(count, np.int64)
         self._balls = TabletopBalls(
             *state,
-            anchor=np.zeros((index, 8)),
-            age=np.zeros(index),
-            moved=np.zeros(index, np.bool_),
+            anchor=np.zeros((count, 8)),
+            age=np.zeros(count),
+            moved=np.zeros(count, np.bool_),
             in_play=present & ~bodies.fixed & (pocket < 0),
             collision_mask=np.where(present & (pocket < 0), self._masks, NOTHING),
             radius=bodies.radius,
@@ -176,13 +176,13 @@ class TabletopStepper:
         pairs, count = _distinct_pairs(finder.find_pairs(self._displacement / self._h), balls.in_play)
         rows, work = np.zeros((len(pairs), WIDTH)), np.zeros(3)
         if count:
-            found = count
+            initial_count = count
             count = resolve(
                 balls, self._cushions, self._parameters, pairs, rows, work, count, TESTS_PER_PAIR * PAIRS.value
             )
             if count < 0:
                 remedy = PAIRS.remedy(10 * PAIRS.value)
-                raise Exhaustion(f"a substep with {found:,} pairs of balls in contact takes too long; {remedy}")
+                raise Exhaustion(f"a substep with {initial_count:,} pairs of balls in contact takes too long; {remedy}")
             for index in np.flatnonzero(balls.moved).tolist():
                 finder.set_position(index, balls.position[index])
             if self.account is not None:
@@ -192,12 +192,12 @@ class TabletopStepper:
 
     def _apply_forces(self, forces: Iterable[tuple[int, tuple[FloatArray, float]]], h: float) -> None:
         """Apply constant forces and torques for a time, s, as one impulse."""
-        steady = list(forces)
-        before = self._energy() if steady else 0.0
-        for index, (force, torque) in steady:
+        items = list(forces)
+        before = self._energy() if items else 0.0
+        for index, (force, torque) in items:
             self.balls.velocity[index] += force * (h / self._mass[index])
             self.balls.spin[index] += torque * (h / self._moment[index])
-        if steady:
+        if items:
             self._attribute(Cause.DRIVES, before)
 
     def capture(self) -> IntArray:
@@ -205,18 +205,20 @@ class TabletopStepper:
         balls = self.balls
         if not len(self._pockets):
             return np.empty(0, np.int64)
-        if not find_in_pockets(balls, self._pockets, self._which):
+        if not find_in_pockets(balls, self._pockets, self._pocket_index):
             return np.empty(0, np.int64)
-        indices = np.flatnonzero(self._which >= 0)
-        which = self._which[indices]
+        indices = np.flatnonzero(self._pocket_index >= 0)
+        pocket = self._pocket_index[indices]
         before = self._energy()
-        centre, reach = self._pockets[which, :2], self._pockets[which, 2]
-        place = balls.position[indices]
-        given = balls.velocity[indices] * self._mass[indices, None]
-        normal = (centre - place) / reach[:, None]
-        captures = ContactBatch(indices, -1 - self._collider_count - which, *map(_complex, (-given, normal, place)))
+        centre, radius = self._pockets[pocket, :2], self._pockets[pocket, 2]
+        position = balls.position[indices]
+        momentum = balls.velocity[indices] * self._mass[indices, None]
+        normal = (centre - position) / radius[:, None]
+        captures = ContactBatch(
+            indices, -1 - self._collider_count - pocket, *map(_complex, (-momentum, normal, position))
+        )
         self._captures = join_batches(self._captures, captures)
-        self.pocket[indices] = which
+        self.pocket[indices] = pocket
         balls.in_play[indices] = False
         balls.collision_mask[indices] = NOTHING
         balls.position[indices] = centre
@@ -242,8 +244,8 @@ class TabletopStepper:
         if self.account is None:
             return 0.0
         balls = self.balls
-        turning = np.square(balls.roll).sum(axis=1) + np.square(balls.spin)
-        return 0.5 * float(self._mass @ np.square(balls.velocity).sum(axis=1) + self._moment @ turning)
+        squared_spin = np.square(balls.roll).sum(axis=1) + np.square(balls.spin)
+        return 0.5 * float(self._mass @ np.square(balls.velocity).sum(axis=1) + self._moment @ squared_spin)
 
     def _attribute(self, cause: Cause, before: float) -> None:
         if self.account is not None:
@@ -260,19 +262,19 @@ def _distinct_pairs(pairs: IntArray, in_play: BoolArray) -> tuple[IntArray, int]
     first, second = pairs.max(axis=1), pairs.min(axis=1)
     swapped = (second >= 0) & in_play[np.maximum(second, 0)]
     first, second = np.where(swapped, second, first), np.where(swapped, first, second)
-    once = np.unique(np.column_stack((first, second))[in_play[first]], axis=0)
-    return np.concatenate((once, np.zeros((EXTRA_PAIRS + len(once), 2), np.int64))), len(once)
+    distinct = np.unique(np.column_stack((first, second))[in_play[first]], axis=0)
+    return np.concatenate((distinct, np.zeros((EXTRA_PAIRS + len(distinct), 2), np.int64))), len(distinct)
 
 
 def _touching(pairs: IntArray, rows: FloatArray) -> ContactBatch:
     """Return contacts as a batch, from their rows (K, WIDTH)."""
-    met = (rows[:, GAP] < 0.0) | rows[:, IMPULSE_X : IMPULSE_X + 2].any(axis=1)  # other pairs were only near
-    pairs, rows = pairs[met], rows[met]
+    is_touching = (rows[:, GAP] < 0.0) | rows[:, IMPULSE_X : IMPULSE_X + 2].any(axis=1)  # other pairs were only close
+    pairs, rows = pairs[is_touching], rows[is_touching]
     if not len(pairs):
         return NO_CONTACTS
     vectors = (_complex(rows[:, k : k + 2]) for k in (IMPULSE_X, NORMAL_X, POINT_X))
-    given, normal, point = vectors
-    return ContactBatch(pairs[:, 0].copy(), pairs[:, 1].copy(), -given, normal, point)
+    impulse, normal, point = vectors
+    return ContactBatch(pairs[:, 0].copy(), pairs[:, 1].copy(), -impulse, normal, point)
 
 
 def _complex(vectors: FloatArray) -> ComplexArray:

@@ -41,16 +41,16 @@ def bracketed_root(f: Callable[[float], float], low: float, high: float, width: 
     for count in range(MAX_ITERATIONS):
         if abs(high - low) <= width:
             break
-        here = (low * weight_high - high * weight_low) / (weight_high - weight_low)
-        if count % 3 == 2 or not min(low, high) < here < max(low, high):
-            here = 0.5 * (low + high)
-        there = f(here)
-        if there == 0.0:
-            return here
-        if (there > 0.0) == (at_low > 0.0):
-            low, weight_low, weight_high = here, there, 0.5 * weight_high
+        x = (low * weight_high - high * weight_low) / (weight_high - weight_low)
+        if count % 3 == 2 or not min(low, high) < x < max(low, high):
+            x = 0.5 * (low + high)
+        value = f(x)
+        if value == 0.0:
+            return x
+        if (value > 0.0) == (at_low > 0.0):
+            low, weight_low, weight_high = x, value, 0.5 * weight_high
         else:
-            high, weight_high, weight_low = here, there, 0.5 * weight_low
+            high, weight_high, weight_low = x, value, 0.5 * weight_low
     return 0.5 * (low + high)
 
 
@@ -82,11 +82,11 @@ def rk4(world: World, knot: Knot, h: float) -> Knot:
     x, y, vx, vy = knot
     sum_x = sum_y = sum_vx = sum_vy = ax = ay = 0.0
     for weight, fraction in ((1.0, 0.0), (2.0, 0.5), (2.0, 0.5), (1.0, 1.0)):
-        here_x, here_y = vx + fraction * h * ax, vy + fraction * h * ay
-        aside, up = here_x - wind_x, here_y - wind_y
-        drag = linear + quadratic * math.sqrt(aside * aside + up * up)
-        ax, ay = gx - drag * aside, gy - drag * up
-        sum_x, sum_y = sum_x + weight * here_x, sum_y + weight * here_y
+        stage_vx, stage_vy = vx + fraction * h * ax, vy + fraction * h * ay
+        air_vx, air_vy = stage_vx - wind_x, stage_vy - wind_y
+        drag = linear + quadratic * math.sqrt(air_vx * air_vx + air_vy * air_vy)
+        ax, ay = gx - drag * air_vx, gy - drag * air_vy
+        sum_x, sum_y = sum_x + weight * stage_vx, sum_y + weight * stage_vy
         sum_vx, sum_vy = sum_vx + weight * ax, sum_vy + weight * ay
     sixth = h / 6.0
     return x + sixth * sum_x, y + sixth * sum_y, vx + sixth * sum_vx, vy + sixth * sum_vy
@@ -115,7 +115,7 @@ class Flight:
             knot = rk4(self._world, knot, rest)
         return np.array(knot[:2]), np.array(knot[2:])
 
-    def places(self, first: int, count: int) -> FloatArray:
+    def positions(self, first: int, count: int) -> FloatArray:
         """Return the positions (count, 2), m, at the times k·`INTEGRATION_STEP` from k = `first` on."""
         if not self._world.quadratic_drag:
             times = np.arange(first, first + count, dtype=np.float64) * INTEGRATION_STEP
@@ -158,7 +158,7 @@ def landing(
     began, place, speed = 0.0, position, velocity
     while began < MAX_FLIGHT:
         flight = Flight(world, place, speed)
-        crossed = _first(flight, ground, edges, discs, MAX_FLIGHT - began)
+        crossed = _first_event(flight, ground, edges, discs, MAX_FLIGHT - began)
         if crossed is None:
             return None
         time, side = crossed
@@ -180,26 +180,28 @@ def state_past_edge(
     return np.array([2.0 * wall - place[0], place[1]]), np.array([-velocity[0], velocity[1]])
 
 
-def _first(flight: Flight, ground: Ground, edges: Edges, discs: FloatArray, longest: float) -> tuple[float, int] | None:
+def _first_event(
+    flight: Flight, ground: Ground, edges: Edges, discs: FloatArray, max_time: float
+) -> tuple[float, int] | None:
     """Return time, s, and kind of the first event: impact (0), left end (−1) or right end (1); None without one."""
     count, top = 64, max(float(ground.heights.max()), float((discs[:, 1] + discs[:, 2]).max(initial=0.0)))
-    for first in range(0, int(longest / INTEGRATION_STEP), count):
-        places = flight.places(first, count + 1)
-        low = np.minimum(places[:-1, 1], places[1:, 1]) <= top
-        beside = (places[1:, 0] < 0.0) | (places[1:, 0] > ground.width)
+    for first in range(0, int(max_time / INTEGRATION_STEP), count):
+        positions = flight.positions(first, count + 1)
+        low = np.minimum(positions[:-1, 1], positions[1:, 1]) <= top
+        beside = (positions[1:, 0] < 0.0) | (positions[1:, 0] > ground.width)
         for k in np.flatnonzero(low | beside).tolist():  # other steps are above all obstacles
-            a, b = places[k], places[k + 1]
+            a, b = positions[k], positions[k + 1]
             begin, end = (first + k) * INTEGRATION_STEP, (first + k + 1) * INTEGRATION_STEP
             side = 0 if edges == "open" else int(b[0] > ground.width) - int(b[0] < 0.0)
             if side:
-                end = _side(flight, side, ground.width, begin)
+                end = _edge_crossing_time(flight, side, ground.width, begin)
                 b = flight.at(end)[0]
             if min(a[1], b[1]) <= top:
                 found, struck = crossing(ground, a, b), first_strike(discs, a, b)
                 if struck is not None and (found is None or struck[0] < found.here):
-                    return _struck(flight, discs[struck[1]], begin, end, struck[0]), 0
+                    return _disc_impact_time(flight, discs[struck[1]], begin, end, struck[0]), 0
                 if found is not None:
-                    return _landed(flight, ground, begin, end, found), 0
+                    return _ground_impact_time(flight, ground, begin, end, found), 0
                 if b[1] < 0.0 and not 0.0 <= b[0] <= ground.width:
                     return None  # beside the terrain and below its base
             if side:
@@ -207,7 +209,7 @@ def _first(flight: Flight, ground: Ground, edges: Edges, discs: FloatArray, long
     return None
 
 
-def _side(flight: Flight, side: int, width: float, begin: float) -> float:
+def _edge_crossing_time(flight: Flight, side: int, width: float, begin: float) -> float:
     """Return the time, s, at which a shell passes an end, within the step that begins at `begin`, s."""
     wall = width if side > 0 else 0.0
 
@@ -234,24 +236,24 @@ def crossing(ground: Ground, a: FloatArray, b: FloatArray) -> Crossing | None:
     """Return where the segment from a to b, (2,) m each, enters the terrain; None if it does not."""
     low, high = min(a[0], b[0]), max(a[0], b[0])
     kinks = ground.kinks[np.searchsorted(ground.kinks, low, "right") : np.searchsorted(ground.kinks, high, "left")]
-    shares = np.array([0.0, 1.0])
+    fractions = np.array([0.0, 1.0])
     if len(kinks):
-        shares = np.sort(np.concatenate((shares, (kinks - a[0]) / (b[0] - a[0]))))
-    x, y = a[0] + shares * (b[0] - a[0]), a[1] + shares * (b[1] - a[1])
+        fractions = np.sort(np.concatenate((fractions, (kinks - a[0]) / (b[0] - a[0]))))
+    x, y = a[0] + fractions * (b[0] - a[0]), a[1] + fractions * (b[1] - a[1])
     gap = y - ground.surface(x)
-    below = np.flatnonzero((gap < 0.0) | ((gap == 0.0) & (shares > 0.0)))  # a shell may start on the surface
+    below = np.flatnonzero((gap < 0.0) | ((gap == 0.0) & (fractions > 0.0)))  # a shell may start on the surface
     if not len(below):
         return None
     k = int(below[0])
     if k == 0:
         return Crossing(0.0, 0.0, 0.0)
-    before, after = float(shares[k - 1]), float(shares[k])
+    before, after = float(fractions[k - 1]), float(fractions[k])
     if math.isinf(gap[k - 1]):  # through a side of the terrain
         return Crossing(after, after, after)
     return Crossing(before, before + (after - before) * float(gap[k - 1] / (gap[k - 1] - gap[k])), after)
 
 
-def _landed(flight: Flight, ground: Ground, begin: float, end: float, found: Crossing) -> float:
+def _ground_impact_time(flight: Flight, ground: Ground, begin: float, end: float, found: Crossing) -> float:
     """Return the time, s, at which a trajectory enters the terrain, given the crossing of the chord of the step."""
 
     def gap(time: float) -> float:
@@ -272,26 +274,26 @@ def first_strike(discs: FloatArray, a: FloatArray, b: FloatArray) -> tuple[float
     """
     if not len(discs):
         return None
-    way, offset = b - a, a - discs[:, :2]
-    along, square = offset @ way, float(way @ way)
+    segment, offset = b - a, a - discs[:, :2]
+    along, square = offset @ segment, float(segment @ segment)
     outside = (offset**2).sum(axis=1) - discs[:, 2] ** 2
     root = along**2 - square * outside
-    able = np.flatnonzero((root > 0.0) & (along < 0.0) & (outside > 0.0) & (square > 0.0))
-    if not len(able):
+    entering = np.flatnonzero((root > 0.0) & (along < 0.0) & (outside > 0.0) & (square > 0.0))
+    if not len(entering):
         return None
-    fraction = (-along[able] - np.sqrt(root[able])) / square
+    fraction = (-along[entering] - np.sqrt(root[entering])) / square
     k = int(np.argmin(fraction))
-    return (float(fraction[k]), int(able[k])) if fraction[k] <= 1.0 else None
+    return (float(fraction[k]), int(entering[k])) if fraction[k] <= 1.0 else None
 
 
-def _struck(flight: Flight, disc: FloatArray, begin: float, end: float, fraction: float) -> float:
+def _disc_impact_time(flight: Flight, disc: FloatArray, begin: float, end: float, fraction: float) -> float:
     """Return the time, s, at which a trajectory enters a disc, given the fraction at which the chord does."""
 
-    def apart(time: float) -> float:
+    def distance_to_disc(time: float) -> float:
         return math.dist(flight.at(time)[0], disc[:2]) - float(disc[2])
 
     here = begin + fraction * (end - begin)
     inside = min(here + 0.1 * float(disc[2]) / max(float(np.hypot(*flight.at(here)[1])), 1e-9), end)
-    if apart(begin) > 0.0 >= apart(inside):
-        return bracketed_root(apart, begin, inside, IMPACT_TIME_TOLERANCE)
+    if distance_to_disc(begin) > 0.0 >= distance_to_disc(inside):
+        return bracketed_root(distance_to_disc, begin, inside, IMPACT_TIME_TOLERANCE)
     return here

@@ -57,16 +57,16 @@ SPREAD = 3.0
 """m/s, difference of the horizontal velocities of neighbouring fragments"""
 
 
-WHOLE = 100.0
+FULL_HEALTH = 100.0
 """initial health of a tank"""
 PER_KILL = 100
 """points for destroying a tank, in addition to one for each point of health"""
-PER_POINT = 5
+MONEY_PER_HEALTH = 5
 """money for each point of health taken"""
 BARREL = 0.75
 """distance from centre to muzzle, in widths of a tank"""
-SAFE_FALL, PER_METRE = 1.0, 3.0
-"""m that a tank falls without damage, and health lost per metre beyond that"""
+SAFE_FALL, FALL_DAMAGE = 1.0, 3.0
+"""m that a tank may fall without damage, and health lost per metre beyond that"""
 
 
 class Muzzle(NamedTuple):
@@ -95,7 +95,7 @@ class Tank:
     power: float = 0.6
     """fraction of full speed"""
     weapon: int = 0
-    health: float = WHOLE
+    health: float = FULL_HEALTH
     points: int = 0
     place: Point = (0.0, 0.0)
     """m, of its centre"""
@@ -140,7 +140,7 @@ class Tanks:
         """(M, 3) m, centres and radii of the tanks that are alive."""
         return np.array([(*tank.place, self.radius) for tank in self.alive]).reshape(-1, 3)
 
-    def see(self, frame: Frame) -> None:
+    def update(self, frame: Frame) -> None:
         """Update the positions of the tanks."""
         for tank in self.every:
             if frame.present[tank.number]:
@@ -149,8 +149,8 @@ class Tanks:
 
     def at_rest(self, frame: Frame, speed: float) -> bool:
         """Return whether no tank that is alive moves faster than a speed, m/s."""
-        those = [tank.number for tank in self.alive]
-        return bool((np.hypot(*frame.velocity[those].T) <= speed).all())
+        indices = [tank.number for tank in self.alive]
+        return bool((np.hypot(*frame.velocity[indices].T) <= speed).all())
 
     def muzzle(self, tank: Tank) -> Muzzle:
         """Return the muzzle of a tank."""
@@ -160,8 +160,8 @@ class Tanks:
         """Damage the tanks near an explosion, and reward the shooter; return the damaged tanks."""
         hurt = []
         for tank in self.alive:
-            far = max(math.dist(tank.place, place) - self.radius, 0.0)
-            fraction = 1.0 - far / (2.0 * weapon.radius)
+            distance = max(math.dist(tank.place, place) - self.radius, 0.0)
+            fraction = 1.0 - distance / (2.0 * weapon.radius)
             if fraction > 0.0 and weapon.damage > 0.0:
                 self.hurt(tank, weapon.damage * fraction, shooter)
                 hurt.append(tank)
@@ -173,7 +173,7 @@ class Tanks:
         tank.health -= taken
         points = round(taken) + (0 if tank.alive else PER_KILL)
         shooter.points += points if tank is not shooter else -points
-        shooter.money += PER_POINT * round(taken) if tank is not shooter else 0
+        shooter.money += MONEY_PER_HEALTH * round(taken) if tank is not shooter else 0
 
 
 REST_SPEED = 0.1
@@ -224,7 +224,7 @@ class Battlefield:
         self.pull = math.hypot(*scene.world.gravity)
         """m/s², acceleration of falling dirt"""
         self._since = 0.0
-        self._stood: dict[str, float] = {}  # height of each tank at the start of settling, m
+        self._heights_before: dict[str, float] = {}  # height of each tank at the start of settling, m
 
     def blast(self, time: float, shooter: Tank, place: Point, weapon: Weapon) -> list[Action]:
         """Apply an explosion: carve or add terrain, and damage tanks in range; destroyed tanks explode in turn."""
@@ -232,26 +232,26 @@ class Battlefield:
         change = (self.ground.with_heap if dirt else self.ground.without)(place, weapon.radius)
         self.cues.append("dirt" if dirt else "blast")
         self.blasts.append(Explosion(time, place, weapon.radius, dirt))
-        actions = self._changed(time, change)
+        actions = self._replace_terrain(time, change)
         hurt = self.tanks.blast(shooter, place, weapon)
-        return actions + self._out(time, [tank for tank in hurt if not tank.alive])
+        return actions + self._remove_destroyed(time, [tank for tank in hurt if not tank.alive])
 
-    def _out(self, time: float, dead: Sequence[Tank]) -> list[Action]:
+    def _remove_destroyed(self, time: float, destroyed: Sequence[Tank]) -> list[Action]:
         """Remove destroyed tanks; each explodes, which may destroy others."""
         actions: list[Action] = []
-        for tank in dead:
+        for tank in destroyed:
             actions.append(Remove(time=time, body=tank.name))
             actions += self.blast(time, tank, tank.place, WRECK)
         return actions
 
-    def _changed(self, time: float, change: Crater) -> list[Action]:
+    def _replace_terrain(self, time: float, change: Crater) -> list[Action]:
         """Replace the terrain, and lift buried tanks."""
         self.ground = change.ground
         if change.loose:
             self.falling.append((time, change.loose))
-        return [Reshape(time=time, thing=GROUND, points=self.ground.points), *self._lifted(time)]
+        return [Reshape(time=time, thing=GROUND, points=self.ground.points), *self._lift_buried(time)]
 
-    def _lifted(self, time: float) -> list[Action]:
+    def _lift_buried(self, time: float) -> list[Action]:
         """Place buried tanks on the terrain."""
         actions: list[Action] = []
         for tank in self.tanks.alive:
@@ -262,35 +262,35 @@ class Battlefield:
                 actions.append(Move(time=time, body=tank.name, position=tank.place, velocity=(0.0, 0.0)))
         return actions
 
-    def begin_to_settle(self, time: float) -> None:
+    def start_settling(self, time: float) -> None:
         """Start settling: record the heights from which tanks may fall."""
         self._since = time
-        self._stood = {tank.name: tank.place[1] for tank in self.tanks.alive}
+        self._heights_before = {tank.name: tank.place[1] for tank in self.tanks.alive}
 
-    def settle(self, seen: StepInfo, shooter: Tank) -> tuple[bool, list[Action]]:
+    def settle(self, info: StepInfo, shooter: Tank) -> tuple[bool, list[Action]]:
         """Wait until dirt and tanks are at rest, then apply falls; return whether settling is done, and the actions.
 
         Args:
-            seen: input of the step.
+            info: input of the step.
             shooter: tank whose shot caused the falls.
         """
-        actions = self._lifted(seen.time)
-        waited = seen.time - self._since
-        still = self._fallen(seen.time) and self.tanks.at_rest(seen.frame, REST_SPEED)
+        actions = self._lift_buried(info.time)
+        waited = info.time - self._since
+        still = self._has_dirt_landed(info.time) and self.tanks.at_rest(info.frame, REST_SPEED)
         if waited < PAUSE or (waited < SETTLE_TIMEOUT and not still):
             return False, actions
         self.falling.clear()
-        dead = []
+        destroyed = []
         for tank in self.tanks.alive:
-            fall = self._stood.get(tank.name, tank.place[1]) - tank.place[1]
+            fall = self._heights_before.get(tank.name, tank.place[1]) - tank.place[1]
             beside = not 0.0 <= tank.place[0] <= self.ground.width
             if beside or fall > SAFE_FALL:
-                self.tanks.hurt(tank, math.inf if beside else PER_METRE * (fall - SAFE_FALL), shooter)
-                dead += [] if tank.alive else [tank]
-        self.begin_to_settle(seen.time)
-        return not dead, actions + self._out(seen.time, dead)
+                self.tanks.hurt(tank, math.inf if beside else FALL_DAMAGE * (fall - SAFE_FALL), shooter)
+                destroyed += [] if tank.alive else [tank]
+        self.start_settling(info.time)
+        return not destroyed, actions + self._remove_destroyed(info.time, destroyed)
 
-    def _fallen(self, time: float) -> bool:
+    def _has_dirt_landed(self, time: float) -> bool:
         """Return whether all falling dirt has landed."""
         drops = [(since, each.drop) for since, loose in self.falling for each in loose]
         return not self.pull or all(0.5 * self.pull * (time - since) ** 2 >= drop for since, drop in drops)

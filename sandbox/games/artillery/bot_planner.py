@@ -15,9 +15,9 @@ from sandbox.scene.random_streams import Stream, draws
 
 ANGLE_ERROR, SPEED_ERROR = math.radians(6.0), 0.08
 """rad, and relative: standard deviations of the errors of angle and speed at skill 0"""
-NEAR = 0.2
+EQUAL_MISS_FRACTION = 0.2
 """fraction of the crater radius: shots that land nearer to the target than this are equally good"""
-BIG = 0.5
+BIG_WEAPON_PROBABILITY = 0.5
 """probability of a weapon that costs money, if the tank can pay for it"""
 WORK = 6_000
 """work of the search per step, as counted by `AimSolver.go_on`: 1 to 4 ms, so that the window remains responsive; a
@@ -33,9 +33,9 @@ def choose_shot(tanks: Tanks, shooter: Tank, random: np.random.Generator) -> tup
     """Return the target, the weakest tank or among equals the nearest, and the index of the weapon."""
     others = [tank for tank in tanks.alive if tank is not shooter]
     target = min(others, key=lambda tank: (tank.health, math.dist(tank.place, shooter.place)))
-    able = [k for k, weapon in enumerate(WEAPONS) if weapon.kind == "shell" and 0 < weapon.cost <= shooter.money]
-    big = bool(random.uniform() < BIG)
-    return target, able[-1] if able and big and target.health > WEAPONS[0].damage else 0
+    affordable = [k for k, weapon in enumerate(WEAPONS) if weapon.kind == "shell" and 0 < weapon.cost <= shooter.money]
+    big = bool(random.uniform() < BIG_WEAPON_PROBABILITY)
+    return target, affordable[-1] if affordable and big and target.health > WEAPONS[0].damage else 0
 
 
 class BotPlanner:
@@ -54,8 +54,8 @@ class BotPlanner:
             skill: 0 to 1; default: that of the shooter.
         """
         target, self.weapon = choose_shot(field.tanks, shooter, random)
-        self._full = field.artillery.speed
-        self._lack = 1.0 - ((shooter.player.bot or 0.0) if skill is None else skill)
+        self._full_speed = field.artillery.speed
+        self._error_scale = 1.0 - ((shooter.player.bot or 0.0) if skill is None else skill)
         self._errors = random.standard_normal(2).tolist()
         self._search = AimSolver(
             TargetingProblem(
@@ -63,9 +63,9 @@ class BotPlanner:
                 muzzle=field.tanks.muzzle(shooter),
                 ground=field.ground,
                 edges=field.artillery.edges,
-                full=self._full,
+                full_speed=self._full_speed,
                 at=target.place[0],
-                near=NEAR * WEAPONS[self.weapon].radius,
+                tolerance=EQUAL_MISS_FRACTION * WEAPONS[self.weapon].radius,
             )
         )
 
@@ -74,7 +74,7 @@ class BotPlanner:
         aim = self._search.go_on(work)
         if aim is None:
             return None
-        turned, faster = self._errors
-        angle = min(max(aim.angle + self._lack * ANGLE_ERROR * turned, 0.0), math.pi)
-        speed = min(max(aim.speed * (1.0 + self._lack * SPEED_ERROR * faster), 0.0), self._full)
+        angle_error, speed_error = self._errors
+        angle = min(max(aim.angle + self._error_scale * ANGLE_ERROR * angle_error, 0.0), math.pi)
+        speed = min(max(aim.speed * (1.0 + self._error_scale * SPEED_ERROR * speed_error), 0.0), self._full_speed)
         return aim._replace(angle=angle, speed=speed)

@@ -27,9 +27,9 @@ from sandbox.trajectory import Frame
 
 STEPS = 1 / 15, 1 / 60, 1 / 240
 """s, time steps of the table"""
-LATER = 2.0
+MAX_TIME_FACTOR = 2.0
 """limit of the simulated time of flight, as a multiple of `MAX_FLIGHT`"""
-FAR = 1e6
+MAX_RANGE = 1e6
 """m, limit of the range"""
 
 
@@ -84,31 +84,31 @@ def landing_error_table(
     """
     velocity = speed * np.array([math.cos(angle), math.sin(angle)])
     world = World(**{key: getattr(world, key) for key in ("gravity", "linear_drag", "quadratic_drag", "wind")})
-    true = exact_landing(world, velocity)
+    exact = exact_landing(world, velocity)
     rows: list[LandingError] = []
     refused: dict[tuple[str, str | None], str] = {}
     interrupted = False
-    for (engine, integrator), dt in product(_ways(), dict.fromkeys(dts)):
+    for (engine, integrator), dt in product(_engine_integrators(), dict.fromkeys(dts)):
         if (engine, integrator) in refused:
             continue
         if on_progress is not None:
             on_progress(Progress(f"{engine}{f', {integrator}' if integrator else ''}, dt {dt:g} s"))
         settings = Settings().replace(dt=dt, integrator=integrator)
         try:
-            down = simulated_landing(world, velocity, engine, settings)
+            impact = simulated_landing(world, velocity, engine, settings)
         except Refusal as refusal:
             refused[engine, integrator] = "; ".join(refusal.reasons)
             continue
         except KeyboardInterrupt:
             interrupted = True
             break
-        x, time = down.place[0], down.time
-        rows.append(LandingError(engine, integrator, dt, x, time, x - true.place[0], time - true.time))
+        x, time = impact.place[0], impact.time
+        rows.append(LandingError(engine, integrator, dt, x, time, x - exact.place[0], time - exact.time))
     reasons = dict.fromkeys((engine, reason) for (engine, _), reason in refused.items())
-    return LandingErrorTable(true.place[0], true.time, tuple(rows), tuple(reasons), interrupted)
+    return LandingErrorTable(exact.place[0], exact.time, tuple(rows), tuple(reasons), interrupted)
 
 
-def _ways() -> Iterator[tuple[str, str | None]]:
+def _engine_integrators() -> Iterator[tuple[str, str | None]]:
     for engine in ENGINES:
         for integrator in INTEGRATORS if engine == "reference" else (None,):
             yield engine, integrator
@@ -120,20 +120,22 @@ def exact_landing(world: World, velocity: FloatArray) -> ShellImpact:
     Raises:
         ValueError: the shot does not land within the limits of time and range.
     """
-    near = _from(FAR, world, velocity)
-    return _from(1.0 + 2.0 * abs(near.place[0]), world, velocity)  # a smaller offset has smaller rounding errors
+    approximate = _landing_on_level_ground(MAX_RANGE, world, velocity)
+    return _landing_on_level_ground(
+        1.0 + 2.0 * abs(approximate.place[0]), world, velocity
+    )  # a smaller offset has smaller rounding errors
 
 
-def _from(half: float, world: World, velocity: FloatArray) -> ShellImpact:
+def _landing_on_level_ground(half_width: float, world: World, velocity: FloatArray) -> ShellImpact:
     """Return the impact relative to the start, on ground that extends by `half`, m, to either side of it.
 
     Raises:
         ValueError: the shot does not land within the limits of time and range.
     """
-    down = landing(world, np.array([half, 0.0]), velocity, Ground(np.zeros(2), 2.0 * half))
-    if down is None:
-        raise ValueError(f"the shot does not come down within {MAX_FLIGHT:g} s and {FAR:g} m")
-    return down._replace(place=(down.place[0] - half, down.place[1]))
+    impact = landing(world, np.array([half_width, 0.0]), velocity, Ground(np.zeros(2), 2.0 * half_width))
+    if impact is None:
+        raise ValueError(f"the shot does not come down within {MAX_FLIGHT:g} s and {MAX_RANGE:g} m")
+    return impact._replace(place=(impact.place[0] - half_width, impact.place[1]))
 
 
 @reraise_interrupt()
@@ -149,22 +151,24 @@ def simulated_landing(world: World, velocity: FloatArray, engine: str, settings:
     scene = Scene(world=world, solver=settings, balls=(ball,))
     simulation = start(scene, engine, settings)
     before, now = simulation.frame(), simulation.frame()
-    for _ in range(math.ceil(LATER * MAX_FLIGHT / settings.dt)):
+    for _ in range(math.ceil(MAX_TIME_FACTOR * MAX_FLIGHT / settings.dt)):
         before = now
         simulation.step()
         now = simulation.frame()
         if now.position[0, 1] <= 0.0:
             break
     else:
-        raise ValueError(f"on {engine} the shot does not come down within {LATER * MAX_FLIGHT:g} s")
+        raise ValueError(f"on {engine} the shot does not come down within {MAX_TIME_FACTOR * MAX_FLIGHT:g} s")
     simulation.close()
-    half = 1.0 + 2.0 * abs(float(now.position[0, 0]))
-    step = FlightSegment(_state(before, half), _state(now, half), now.time - before.time)
-    found = step.meets(Ground(np.zeros(2), 2.0 * half), NO_DISCS, 1.0)
+    half_width = 1.0 + 2.0 * abs(float(now.position[0, 0]))
+    step = FlightSegment(_state(before, half_width), _state(now, half_width), now.time - before.time)
+    found = step.meets(Ground(np.zeros(2), 2.0 * half_width), NO_DISCS, 1.0)
     fraction = 1.0 if found is None else found[0]
-    return ShellImpact(before.time + fraction * (now.time - before.time), (float(step.at(fraction)[0]) - half, 0.0))
+    return ShellImpact(
+        before.time + fraction * (now.time - before.time), (float(step.at(fraction)[0]) - half_width, 0.0)
+    )
 
 
-def _state(frame: Frame, aside: float) -> tuple[FloatArray, FloatArray]:
+def _state(frame: Frame, offset: float) -> tuple[FloatArray, FloatArray]:
     """Return position and velocity of the only body, shifted to the right by `aside`, m."""
-    return frame.position[0] + np.array([aside, 0.0]), frame.velocity[0]
+    return frame.position[0] + np.array([offset, 0.0]), frame.velocity[0]

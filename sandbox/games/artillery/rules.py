@@ -1,7 +1,7 @@
 """Rules of artillery: players take turns to aim and fire, until one tank is left.
 
 A turn has the phases of `TurnPhase`: aiming, flight of the shells, and settling of terrain and tanks. A key tap
-changes the gun by one small step; a held key moves it continuously, and faster after `LATER`. A bot plans its shot
+changes the gun by one small step; a held key moves it continuously, and faster after `FAST_DELAY`. A bot plans its shot
 during the aiming phase, moves the gun to it at a fixed rate, and fires.
 
 Angles are in rad, anticlockwise from the right; power is a fraction of full speed.
@@ -16,7 +16,7 @@ import numpy as np
 from sandbox.action import Action, SetParameter
 from sandbox.arrays import FloatArray
 from sandbox.games.artillery.ballistics import Flight, landing
-from sandbox.games.artillery.battlefield import PAUSE, WEAPONS, WHOLE, Battlefield, Tank
+from sandbox.games.artillery.battlefield import FULL_HEALTH, PAUSE, WEAPONS, Battlefield, Tank
 from sandbox.games.artillery.bot_planner import BotPlanner, turn_generator
 from sandbox.games.artillery.shells import ArtilleryShot, Projectiles
 from sandbox.games.artillery.targeting import FiringSolution
@@ -40,15 +40,15 @@ CONTROLS = (
     Control("fire", "fire", ("space",), pad="a"),
 )
 
-TURN, POWER = math.radians(0.1), 0.001
+TAP_ANGLE, TAP_POWER = math.radians(0.1), 0.001
 """rad, and fraction of full speed, of one tap"""
-SLOW, FAST = 1.0, 8.0
-"""rates of a held key as multiples of `PER_SECOND`, before and after `LATER`"""
-LATER = 0.6
+SLOW_FACTOR, FAST_FACTOR = 1.0, 8.0
+"""rates of a held key as multiples of `HOLD_RATES`, before and after `FAST_DELAY`"""
+FAST_DELAY = 0.6
 """s, time after which a held key moves the gun faster"""
-PER_SECOND = math.radians(5.0), 0.05
+HOLD_RATES = math.radians(5.0), 0.05
 """rad/s, and fraction of full speed per second, by a held key"""
-BRING = math.radians(90.0), 1.0
+BOT_GUN_RATES = math.radians(90.0), 1.0
 """rad/s, and fraction of full speed per second, at which a bot sets its gun"""
 MIN_POWER = 0.02
 """fraction of full speed, lower bound of the power"""
@@ -67,13 +67,13 @@ class GunControls:
         else:
             self._held.pop(name, None)
 
-    def touch(self, name: str, tank: Tank) -> None:
+    def tap(self, name: str, tank: Tank) -> None:
         """Apply one tap of a key."""
         match name:
             case "left" | "right":
-                set_gun(tank, TURN if name == "left" else -TURN, 0.0)
+                set_gun(tank, TAP_ANGLE if name == "left" else -TAP_ANGLE, 0.0)
             case "up" | "down":
-                set_gun(tank, 0.0, POWER if name == "up" else -POWER)
+                set_gun(tank, 0.0, TAP_POWER if name == "up" else -TAP_POWER)
             case "weapon":
                 count = len(WEAPONS)
                 nexts = ((tank.weapon + k) % count for k in range(1, count + 1))
@@ -83,27 +83,27 @@ class GunControls:
         """Move the gun by the held keys, for a time, s."""
         for name in self._held:
             self._held[name] += time
-        turn, power = (self._way(more, less) for more, less in (("left", "right"), ("up", "down")))
-        set_gun(tank, turn * PER_SECOND[0] * time, power * PER_SECOND[1] * time)
+        turn, power = (self._hold_direction(more, less) for more, less in (("left", "right"), ("up", "down")))
+        set_gun(tank, turn * HOLD_RATES[0] * time, power * HOLD_RATES[1] * time)
 
-    def _way(self, more: str, less: str) -> float:
+    def _hold_direction(self, more: str, less: str) -> float:
         return sum(
-            sign * (SLOW if self._held[name] < LATER else FAST)
+            sign * (SLOW_FACTOR if self._held[name] < FAST_DELAY else FAST_FACTOR)
             for name, sign in ((more, 1.0), (less, -1.0))
             if name in self._held
         )
 
     @staticmethod
-    def bring(tank: Tank, angle: float, power: float, time: float) -> bool:
+    def move_towards(tank: Tank, angle: float, power: float, time: float) -> bool:
         """Move a gun towards a setting, for a time, s; return whether it has reached it."""
         turn, more = angle - tank.angle, power - tank.power
-        there = abs(turn) <= BRING[0] * time and abs(more) <= BRING[1] * time
-        if there:
+        reached = abs(turn) <= BOT_GUN_RATES[0] * time and abs(more) <= BOT_GUN_RATES[1] * time
+        if reached:
             tank.angle, tank.power = angle, power
         else:
-            tank.angle += math.copysign(min(abs(turn), BRING[0] * time), turn)
-            tank.power += math.copysign(min(abs(more), BRING[1] * time), more)
-        return there
+            tank.angle += math.copysign(min(abs(turn), BOT_GUN_RATES[0] * time), turn)
+            tank.power += math.copysign(min(abs(more), BOT_GUN_RATES[1] * time), more)
+        return reached
 
 
 def set_gun(tank: Tank, turn: float, more: float) -> None:
@@ -115,8 +115,8 @@ def set_gun(tank: Tank, turn: float, more: float) -> None:
 HEIGHTS = 33
 """number of terrain heights in an observation, evenly spaced from side to side"""
 
-AIR = frozenset({"gravity", "wind", "linear_drag", "quadratic_drag"})
-"""Parameters of the world on which the flight of shells depends."""
+AIR_PARAMETERS = frozenset({"gravity", "wind", "linear_drag", "quadratic_drag"})
+"""parameters of the world that affect the flight of shells"""
 
 TRACER_STEP = 0.03
 """s between two points of the tracer"""
@@ -147,8 +147,8 @@ class ArtilleryRules:
         """number of the turn, from 1, counted over all players"""
         self.phase: TurnPhase = "begin"
         self._gunner = GunControls()
-        self._time, self._previous_time, self._since, self._number = 0.0, 0.0, 0.0, 0
-        self._thought: BotPlanner | None = None  # of a bot whose turn it is
+        self._time, self._previous_time, self._since, self._shooter_index = 0.0, 0.0, 0.0, 0
+        self._planner: BotPlanner | None = None  # of a bot whose turn it is
         self._aim: FiringSolution | None = None
         self._over: str | None = None
 
@@ -161,8 +161,8 @@ class ArtilleryRules:
     def score(self) -> int:
         """Points of the first player without a bot; if all have bots, the highest points."""
         tanks = self.field.tanks.every
-        persons = [tank.points for tank in tanks if tank.player.bot is None]
-        return persons[0] if persons else max(tank.points for tank in tanks)
+        humans = [tank.points for tank in tanks if tank.player.bot is None]
+        return humans[0] if humans else max(tank.points for tank in tanks)
 
     @property
     def game_over(self) -> str | None:
@@ -172,12 +172,12 @@ class ArtilleryRules:
     @property
     def shooter(self) -> Tank:
         """Tank whose turn it is."""
-        return self.field.tanks.every[self._number]
+        return self.field.tanks.every[self._shooter_index]
 
     @property
     def thinking(self) -> bool:
         """Whether a bot is searching for its shot."""
-        return self._thought is not None and self._aim is None
+        return self._planner is not None and self._aim is None
 
     @property
     def shots(self) -> list[ArtilleryShot]:
@@ -200,7 +200,7 @@ class ArtilleryRules:
             return ()
         if control == "fire":
             return self._fire()
-        self._gunner.touch(control, self.shooter)
+        self._gunner.tap(control, self.shooter)
         if control == "weapon":
             self.field.cues.append("click")
         return ()
@@ -209,9 +209,9 @@ class ArtilleryRules:
         """Advance the turn: move the gun by held keys, track shells, or wait until everything is at rest."""
         passed = info.time - self._time
         self._previous_time, self._time = self._time, info.time
-        self._breathe(info.actions)
-        self.barrage.know(info)
-        self.field.tanks.see(info.frame)
+        self._update_air(info.actions)
+        self.barrage.find_bodies(info)
+        self.field.tanks.update(info.frame)
         match self.phase:
             case "begin":
                 return self._begin_turn()
@@ -221,7 +221,7 @@ class ArtilleryRules:
                 actions = self.barrage.follow(info, passed)
                 if not self.barrage.shells:
                     self.phase = "settle"
-                    self.field.begin_to_settle(info.time)
+                    self.field.start_settling(info.time)
                 return actions
             case "settle":
                 done, actions = self.field.settle(info, self.shooter)
@@ -252,7 +252,7 @@ class ArtilleryRules:
         """Return turn, wind, state of every tank and its gun, last impact, and terrain heights."""
         field, last = self.field, next((shot.place for shot in reversed(self.shots) if shot.place is not None), None)
         person = self.phase == "aim" and self.shooter.player.bot is None
-        found = [("turn", float(self.turn)), ("shooter", self._number), ("may fire", person)]
+        found = [("turn", float(self.turn)), ("shooter", self._shooter_index), ("may fire", person)]
         found += [("wind", self.world.wind[0]), ("shells", len(self.barrage.shells))]
         for tank in field.tanks.every:
             own = {"health": tank.health, "money": tank.money, "points": tank.points}
@@ -277,7 +277,7 @@ class ArtilleryRules:
                     name=tank.name,
                     angle=tank.angle,
                     power=tank.power,
-                    health=tank.health / WHOLE,
+                    health=tank.health / FULL_HEALTH,
                     aiming=aiming and tank is self.shooter,
                 )
                 for tank in tanks.alive
@@ -323,11 +323,11 @@ class ArtilleryRules:
         cues, self.field.cues = self.field.cues, []
         return cues
 
-    def _breathe(self, actions: Sequence[Action]) -> None:
+    def _update_air(self, actions: Sequence[Action]) -> None:
         """Apply changes of air and gravity; shells in flight then have no exact solution."""
         for action in actions:
             key = action.path.removeprefix("world.") if isinstance(action, SetParameter) else ""
-            if not isinstance(action, SetParameter) or key not in AIR:
+            if not isinstance(action, SetParameter) or key not in AIR_PARAMETERS:
                 continue
             value = tuple(action.value) if isinstance(action.value, list) else action.value
             self.world = self.world.model_copy(update={key: value})
@@ -342,24 +342,24 @@ class ArtilleryRules:
         if self.turn >= self.artillery.rounds * len(tanks):
             best = max(tanks, key=lambda tank: (tank.points, tank.health))
             return self._end(f"out of shells; {best.name} wins on points")
-        first = self._number + 1 if self.turn else 0
+        first = self._shooter_index + 1 if self.turn else 0
         order = (k % len(tanks) for k in range(first, first + len(tanks)))
-        self._number = next(k for k in order if tanks[k].alive)
+        self._shooter_index = next(k for k in order if tanks[k].alive)
         self.turn += 1
         self.phase, self._since = "aim", self._time
-        self._thought, self._aim = None, None
+        self._planner, self._aim = None, None
         if WEAPONS[self.shooter.weapon].cost > self.shooter.money:
             self.shooter.weapon = 0
         self.field.cues.append("turn")
-        most = self.artillery.wind
-        if not most:
+        max_wind = self.artillery.wind
+        if not max_wind:
             return []
-        wind = (float(turn_generator(self.world.seed, 2 * self.turn).uniform(-most, most)), 0.0)
+        wind = (float(turn_generator(self.world.seed, 2 * self.turn).uniform(-max_wind, max_wind)), 0.0)
         self.world = self.world.model_copy(update={"wind": wind})
         return [SetParameter(time=self._time, path="world.wind", value=list(wind))]
 
-    def _end(self, why: str) -> list[Action]:
-        self._over = why
+    def _end(self, reason: str) -> list[Action]:
+        self._over = reason
         self.field.cues.append("win")
         return []
 
@@ -369,15 +369,15 @@ class ArtilleryRules:
         if tank.player.bot is None:
             self._gunner.hold(tank, passed)
             return []
-        if self._thought is None:
-            self._thought = BotPlanner(self.world, self.field, tank, turn_generator(self.world.seed, 2 * self.turn + 1))
-            tank.weapon = self._thought.weapon
+        if self._planner is None:
+            self._planner = BotPlanner(self.world, self.field, tank, turn_generator(self.world.seed, 2 * self.turn + 1))
+            tank.weapon = self._planner.weapon
         if self._aim is None:
-            self._aim = self._thought.go_on()
+            self._aim = self._planner.go_on()
         if self._aim is None:
             return []
-        there = self._gunner.bring(tank, self._aim.angle, self._aim.speed / self.artillery.speed, passed)
-        return self._fire() if there and self._time - self._since >= PAUSE else []
+        reached = self._gunner.move_towards(tank, self._aim.angle, self._aim.speed / self.artillery.speed, passed)
+        return self._fire() if reached and self._time - self._since >= PAUSE else []
 
     def _fire(self) -> list[Action]:
         tank = self.shooter

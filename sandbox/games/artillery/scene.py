@@ -79,8 +79,8 @@ class Artillery(Part):
     players: Annotated[tuple[Player, ...], Field(min_length=2, max_length=10, alias="player")]
     """players in the order of their turns"""
     edges: Edges = "open"
-    """behaviour of a shell at the left and right end of the ground: it flies on, reappears at the other end, or hits
-    a wall"""
+    """behaviour of a shell at the left and right end of the ground: `open`, it flies on; `rubber`, it rebounds; `wrap`,
+    it reappears at the other end"""
     wind: Annotated[float, Field(ge=0, le=100)] = 0.0
     """largest wind, m/s: each turn has a new random wind between −wind and wind; 0 keeps the wind of [world]"""
     speed: Annotated[float, Field(gt=0, le=1e4)] = 60.0
@@ -104,7 +104,7 @@ QUANTUM = 2.0**-20
 precision."""
 
 
-EVEN = 1e-9
+COLUMN_TOLERANCE = 1e-9
 """tolerance of the position of a column, as a fraction of the width of the terrain: rounding"""
 
 
@@ -130,8 +130,8 @@ def columns_of(points: Sequence[Point]) -> tuple[tuple[float, ...], float] | Non
     width, heights = points[-1][0], tuple(y for _, y in points[1:-1])
     if width <= 0.0 or points[0][1] != heights[0] or points[-1][1] != heights[-1] or min(heights) < 0.0:
         return None
-    for (x, _), (there, _) in zip(points, course_of(heights, width), strict=True):
-        if abs(x - there) > EVEN * width:
+    for (x, _), (even_x, _) in zip(points, course_of(heights, width), strict=True):
+        if abs(x - even_x) > COLUMN_TOLERANCE * width:
             return None
     return heights, width
 
@@ -163,8 +163,8 @@ def displaced(count: int, shrink: float, seed: int) -> np.ndarray[tuple[int], np
         finer[::2] = line
         finer[1::2] = 0.5 * (line[1:] + line[:-1]) + spread * random.standard_normal(len(line) - 1)
         line = finer
-    places = np.linspace(0.0, len(line) - 1.0, count)
-    return np.interp(places, np.arange(len(line)), line)
+    indices = np.linspace(0.0, len(line) - 1.0, count)
+    return np.interp(indices, np.arange(len(line)), line)
 
 
 def levelled(heights: tuple[float, ...], width: float, at: float, half: float) -> tuple[float, ...]:
@@ -180,7 +180,7 @@ GROUND = "terrain"
 FRICTION = 0.8
 """default friction of the wall"""
 
-DEEP, HIGH = 0.08, 0.5
+VIEW_BELOW, VIEW_ABOVE = 0.08, 0.5
 """extent of the view below and above the lowest column, as fractions of the width of the terrain"""
 
 MARGIN = 1.0
@@ -241,7 +241,7 @@ def expanded(scene: Scene) -> Scene:
     if terrain is None and artillery is None:
         return scene
     if terrain is not None and terrain.laid is not None:
-        scene = _laid_anew(scene, terrain, terrain.laid)
+        scene = _regenerated(scene, terrain, terrain.laid)
     changes: dict[str, Any] = {"terrain": None}
     walls = scene.walls
     if terrain is not None:
@@ -272,8 +272,8 @@ def _wall(terrain: Terrain, artillery: Artillery | None, seed: int) -> Wall:
     return Wall(name=GROUND, points=course_of(heights, terrain.width), **own)
 
 
-def _laid_anew(scene: Scene, terrain: Terrain, laid: int) -> Scene:
-    """Return a scene with its terrain, generated from the seed `laid`, generated anew if the scene has another seed.
+def _regenerated(scene: Scene, terrain: Terrain, laid: int) -> Scene:
+    """Return a scene whose terrain, from the seed `laid`, is generated again if the seed of the scene has changed.
 
     A wall whose points have been changed since is kept, and so are the positions of tanks that have been moved.
     """
@@ -289,12 +289,12 @@ def _laid_anew(scene: Scene, terrain: Terrain, laid: int) -> Scene:
     }
     if artillery is not None:
         count = range(len(artillery.players))
-        stood, stand = (
+        old_tanks, new_tanks = (
             {tank.name: tank for tank in (_tank(artillery, k, ground) for k in count)} for ground in (before, after)
         )
         changes["boxes"] = tuple(
-            box.model_copy(update={"position": stand[box.name].position})
-            if box.name in stood and box.position == stood[box.name].position
+            box.model_copy(update={"position": new_tanks[box.name].position})
+            if box.name in old_tanks and box.position == old_tanks[box.name].position
             else box
             for box in scene.boxes
         )
@@ -306,7 +306,7 @@ def _laid_anew(scene: Scene, terrain: Terrain, laid: int) -> Scene:
 def _view(ground: Wall) -> tuple[Point, Point]:
     """Return the corners of the view, m: the width of the terrain, and space for the flight of shells above it."""
     width, low = ground.points[-1][0], min(y for _, y in ground.points)
-    return (0.0, low - DEEP * width), (width, low + HIGH * width)
+    return (0.0, low - VIEW_BELOW * width), (width, low + VIEW_ABOVE * width)
 
 
 def _pads(artillery: Artillery | None, each: float) -> Iterator[tuple[float, float]]:

@@ -59,12 +59,12 @@ class Shell:
     """impact of the exact trajectory; None without one"""
     disturbed: bool = False
     """whether air or gravity changed during the flight"""
-    whole: bool = True
+    is_whole: bool = True
     """whether it is the shell that was fired; False for a fragment"""
     rolling: float | None = None
     """s, time at which it began to roll; None in flight"""
     slow: float | None = None
-    """s, time since which it has been slower than `HARDLY`; None if it is not"""
+    """s, time since which it has been slower than `REST_LIMIT`; None if it is not"""
 
 
 class FlightSegment:
@@ -107,16 +107,16 @@ class FlightSegment:
         return self._root(gap, found.before * until, found.here * until, found.after * until), None
 
     @staticmethod
-    def _root(f: Callable[[float], float], low: float, here: float, high: float | None = None) -> float:
-        """Return a root near `here` if one is bracketed; else `here`, the fraction on the chord."""
-        high = here if high is None else high
+    def _root(f: Callable[[float], float], low: float, chord: float, high: float | None = None) -> float:
+        """Return a root near `chord`, the fraction on the chord, if one is bracketed; else `chord`."""
+        high = chord if high is None else high
         for until in (high, min(high + 0.05, 1.0)):
             if low < until and f(low) > 0.0 >= f(until):
                 return bracketed_root(f, low, until, 1e-12)
-        return here
+        return chord
 
 
-def returned(
+def past_edge(
     place: FloatArray, velocity: FloatArray, ground: Ground, edges: Edges
 ) -> tuple[FloatArray, FloatArray] | None:
     """Return position and velocity of a shell after it has passed an end; None if it is inside, or may leave."""
@@ -163,22 +163,22 @@ class ArtilleryShot(NamedTuple):
         if self.place is None:
             return exact
         across, up = (format_deviation(abs(a - b)) for a, b in zip(self.place, self.exact, strict=True))
-        return f"{exact} (Δx {across}" + (")" if up == NOTHING else f", Δy {up})")
+        return f"{exact} (Δx {across}" + (")" if up == BELOW_RESOLUTION else f", Δy {up})")
 
 
-NOTHING = "less than 1 nm"
+BELOW_RESOLUTION = "less than 1 nm"
 
 
 def format_deviation(metres: float) -> str:
     """Return a deviation from the exact solution, m, as text; rounding errors below 1 nm have one text."""
-    return NOTHING if metres < 1e-9 else format_si(metres, "m")
+    return BELOW_RESOLUTION if metres < 1e-9 else format_si(metres, "m")
 
 
-ROLLER = 0.5
+ROLLER_RADIUS = 0.5
 """m, radius of a roller"""
-HARDLY = 0.5
-"""m/s and s: a roller that is slower than 0.5 m/s for 0.5 s explodes"""
-ROLLS = 8.0
+REST_LIMIT = 0.5
+"""m/s, and s: a roller that is slower than 0.5 m/s for 0.5 s explodes"""
+MAX_ROLL_TIME = 8.0
 """s, longest duration of rolling"""
 
 
@@ -210,20 +210,20 @@ class Projectiles:
         field.cues.append("fire")
         field.blasts.clear()
         self.ways.clear()
-        action = self._shell(time, tank, weapon, place, velocity)
+        action = self._spawn_shell(time, tank, weapon, place, velocity)
         exact = landing(world, place, velocity, field.ground, self._edges, field.tanks.discs)
         self.shells[-1].exact = exact
         return [action]
 
-    def know(self, seen: StepInfo) -> None:
+    def find_bodies(self, info: StepInfo) -> None:
         """Find the body indices of spawned shells: new bodies are the last ones, in the order of the actions."""
         new = [shell for shell in self.shells if shell.number is None]
         if not new:
             return
         own = {shell.name for shell in new}
-        spawned = [action.single.name for action in seen.actions if isinstance(action, Spawn)]
+        spawned = [action.single.name for action in info.actions if isinstance(action, Spawn)]
         others = sum(name not in own for name in spawned)
-        first = len(seen.frame.position) - len(new) - others
+        first = len(info.frame.position) - len(new) - others
         for k, shell in enumerate(new):  # the rules spawn before the player does
             shell.number = first + k
 
@@ -232,22 +232,22 @@ class Projectiles:
         for shell in self.shells:
             shell.exact, shell.disturbed = None, True
 
-    def follow(self, seen: StepInfo, passed: float) -> list[Action]:
+    def follow(self, info: StepInfo, passed: float) -> list[Action]:
         """Update all shells, and return the actions of their impacts; the last step took `passed`, s."""
         actions: list[Action] = []
         for shell in [*self.shells]:
             number = shell.number
             if number is None:
                 continue
-            if not seen.frame.present[number]:  # bodies beyond the bounds of the world are removed
-                self._gone(shell, seen.time)
+            if not info.frame.present[number]:  # bodies beyond the bounds of the world are removed
+                self._lose(shell, info.time)
                 continue
             before = shell.place, shell.velocity
-            shell.place, shell.velocity = seen.frame.position[number].copy(), seen.frame.velocity[number].copy()
+            shell.place, shell.velocity = info.frame.position[number].copy(), info.frame.velocity[number].copy()
             if shell.rolling is not None:
-                actions += self._roll(shell, seen.time)
+                actions += self._roll(shell, info.time)
             else:
-                actions += self._fly(shell, before, seen.time, passed)
+                actions += self._fly(shell, before, info.time, passed)
             x, y = shell.place.tolist()
             self.ways[shell.name].append((x, y))
         return actions
@@ -256,70 +256,70 @@ class Projectiles:
         """Update a shell in flight: detect impacts, split clusters, and apply the ends of the terrain."""
         field, place = self._field, shell.place
         step = FlightSegment(before, (place, shell.velocity), passed)
-        beyond = returned(place, shell.velocity, field.ground, self._edges)
+        beyond = past_edge(place, shell.velocity, field.ground, self._edges)
         until = 1.0
         if beyond is not None:
             wall = field.ground.width if place[0] > 0.0 else 0.0
             until = min(max(float((wall - before[0][0]) / (place[0] - before[0][0])), 0.0), 1.0)
         found = step.meets(field.ground, field.tanks.discs, until)
         if found is not None:
-            return self._come_down(shell, step, *found, time, passed)
-        if shell.weapon.kind == "cluster" and shell.whole and before[1][1] > 0.0 >= shell.velocity[1]:
+            return self._land(shell, step, *found, time, passed)
+        if shell.weapon.kind == "cluster" and shell.is_whole and before[1][1] > 0.0 >= shell.velocity[1]:
             return self._split(shell, time)
         if beyond is not None:
             shell.place, shell.velocity = beyond
             (x, y), (vx, vy) = (each.tolist() for each in beyond)
             return [Move(time=time, body=shell.name, position=(x, y), velocity=(vx, vy))]
         if place[1] < -1.0 and not 0.0 <= place[0] <= field.ground.width:
-            return self._left(shell, time)
+            return self._remove_lost(shell, time)
         return []
 
-    def _come_down(
+    def _land(
         self, shell: Shell, step: FlightSegment, fraction: float, struck: int | None, time: float, passed: float
     ) -> list[Action]:
         """Explode a shell at its impact, at a fraction of the last step, or let a roller start there."""
         x, y = step.at(fraction).tolist()
         shell.place = np.array([x, y])
-        self._tell(shell, (x, y), time - (1.0 - fraction) * passed)
+        self._record_result(shell, (x, y), time - (1.0 - fraction) * passed)
         if shell.weapon.kind != "roller" or struck is not None:
-            return self._go_off(shell, (x, y), time)
+            return self._explode(shell, (x, y), time)
         ground = self._field.ground
         low, high = max(x - 0.5, 0.0), min(x + 0.5, ground.width)
         along = np.array([high - low, float(ground.surface(high) - ground.surface(low))])
         along /= np.hypot(*along)
-        place = np.array([x, y]) + (ROLLER + LIFT) * np.array([-along[1], along[0]])
+        place = np.array([x, y]) + (ROLLER_RADIUS + LIFT) * np.array([-along[1], along[0]])
         velocity = float(step.velocity(fraction) @ along) * along
         self.shells.remove(shell)
-        rolling = self._shell(time, shell.shooter, shell.weapon, place, velocity, rolls=True)
+        rolling = self._spawn_shell(time, shell.shooter, shell.weapon, place, velocity, rolls=True)
         return [Remove(time=time, body=shell.name), rolling]
 
     def _roll(self, shell: Shell, time: float) -> list[Action]:
-        """Explode a roller that touches a tank, comes to rest, or has rolled for `ROLLS`."""
+        """Explode a roller that touches a tank, comes to rest, or has rolled for `MAX_ROLL_TIME`."""
         assert shell.rolling is not None
         discs = self._field.tanks.discs
-        near = np.hypot(*(discs[:, :2] - shell.place).T) <= discs[:, 2] + ROLLER
-        if float(np.hypot(*shell.velocity)) > HARDLY:
+        is_near = np.hypot(*(discs[:, :2] - shell.place).T) <= discs[:, 2] + ROLLER_RADIUS
+        if float(np.hypot(*shell.velocity)) > REST_LIMIT:
             shell.slow = None
         elif shell.slow is None:
             shell.slow = time
-        still = shell.slow is not None and time - shell.slow >= HARDLY
-        if near.any() or still or time - shell.rolling > ROLLS:
+        still = shell.slow is not None and time - shell.slow >= REST_LIMIT
+        if is_near.any() or still or time - shell.rolling > MAX_ROLL_TIME:
             x, y = shell.place.tolist()
-            return self._go_off(shell, (x, y - ROLLER), time)
+            return self._explode(shell, (x, y - ROLLER_RADIUS), time)
         if 0.0 <= shell.place[0] <= self._field.ground.width:
             return []
-        return self._left(shell, time) if self._edges == "open" else self._roll_past(shell, time)
+        return self._remove_lost(shell, time) if self._edges == "open" else self._roll_past(shell, time)
 
     def _roll_past(self, shell: Shell, time: float) -> list[Action]:
         """Move a roller that has passed an end of the terrain back inside; it explodes if it is then underground."""
         ground = self._field.ground
-        beyond = returned(shell.place, shell.velocity, ground, self._edges)
+        beyond = past_edge(shell.place, shell.velocity, ground, self._edges)
         assert beyond is not None
         (x, y), (vx, vy) = (each.tolist() for each in beyond)
         surface = float(ground.surface(x))
         if y < surface:
-            return self._go_off(shell, (x, y), time)
-        place = x, max(y, surface + ROLLER)
+            return self._explode(shell, (x, y), time)
+        place = x, max(y, surface + ROLLER_RADIUS)
         shell.place, shell.velocity = np.array(place), beyond[1]
         return [Move(time=time, body=shell.name, position=place, velocity=(vx, vy))]
 
@@ -328,37 +328,37 @@ class Projectiles:
         self.shells.remove(shell)
         actions: list[Action] = [Remove(time=time, body=shell.name)]
         for k in range(FRAGMENTS):
-            aside = np.array([SPREAD * (k - 0.5 * (FRAGMENTS - 1)), 0.0])
-            actions.append(self._shell(time, shell.shooter, shell.weapon, shell.place, shell.velocity + aside))
-            self.shells[-1].whole = False
+            offset = np.array([SPREAD * (k - 0.5 * (FRAGMENTS - 1)), 0.0])
+            actions.append(self._spawn_shell(time, shell.shooter, shell.weapon, shell.place, shell.velocity + offset))
+            self.shells[-1].is_whole = False
         self._field.cues.append("split")
         return actions
 
-    def _go_off(self, shell: Shell, place: tuple[float, float], time: float) -> list[Action]:
+    def _explode(self, shell: Shell, place: tuple[float, float], time: float) -> list[Action]:
         self.shells.remove(shell)
         return [
             Remove(time=time, body=shell.name),
             *self._field.blast(time, shell.shooter, place, shell.weapon),
         ]
 
-    def _left(self, shell: Shell, time: float) -> list[Action]:
-        self._gone(shell, time)
+    def _remove_lost(self, shell: Shell, time: float) -> list[Action]:
+        self._lose(shell, time)
         return [Remove(time=time, body=shell.name)]
 
-    def _gone(self, shell: Shell, time: float) -> None:
+    def _lose(self, shell: Shell, time: float) -> None:
         self.shells.remove(shell)
-        self._tell(shell, None, time)
+        self._record_result(shell, None, time)
 
-    def _tell(self, shell: Shell, place: tuple[float, float] | None, time: float) -> None:
+    def _record_result(self, shell: Shell, place: tuple[float, float] | None, time: float) -> None:
         """Record the result of a shot; fragments, and explosions of rollers, are not recorded."""
-        if shell.whole and shell.rolling is None:
+        if shell.is_whole and shell.rolling is None:
             exact = None if shell.exact is None else shell.exact.place
             flown = time - shell.fired
             self.shots.append(
                 ArtilleryShot(shell.shooter.name, shell.weapon.name, place, exact, flown, time, shell.disturbed)
             )
 
-    def _shell(
+    def _spawn_shell(
         self, time: float, tank: Tank, weapon: Weapon, place: FloatArray, velocity: FloatArray, rolls: bool = False
     ) -> Spawn:
         self._fired += 1
@@ -371,7 +371,7 @@ class Projectiles:
             name=shell.name,
             position=(x, y),
             velocity=(vx, vy),
-            radius=ROLLER if rolls else SHELL_RADIUS,
+            radius=ROLLER_RADIUS if rolls else SHELL_RADIUS,
             mass=SHELL_MASS,
             collides="fixed" if rolls else "none",
             friction=0.3,

@@ -56,51 +56,51 @@ class TrialShots:
         self.when = np.full(len(position), np.nan)
         """(K,) s, time of each impact; nan without one"""
         self._k, self._steps = 0, int(MAX_TRIAL_TIME / h)
-        self._number = np.arange(len(position))  # indices of the shells in flight
+        self._indices = np.arange(len(position))  # indices of the shells in flight
         self._state = np.stack((position, velocity))
         self._gap = self._state[0, :, 1] - ground.surface(self._state[0, :, 0])
         below = self._gap < 0.0
         self.place[below], self.when[below] = position[below, 0], 0.0
-        self._keep(~below)
+        self._keep_flying(~below)
 
     @property
     def done(self) -> bool:
         """Whether no shell is in flight any more, or the limit of time has been reached."""
-        return not len(self._number) or self._k >= self._steps
+        return not len(self._indices) or self._k >= self._steps
 
     def fly(self, work: int) -> int:
         """Advance by an amount of work, in shells × steps, and at least one step; return the work done."""
-        did = 0
-        while not self.done and did < work:
-            did += STEP_WORK + len(self._number)
+        work_done = 0
+        while not self.done and work_done < work:
+            work_done += STEP_WORK + len(self._indices)
             self._step()
-        return did
+        return work_done
 
     def _step(self) -> None:
-        step, inputs, ground = INTEGRATORS["rk4"].step, inputs_of(self._world, len(self._number)), self._ground
+        step, inputs, ground = INTEGRATORS["rk4"].step, inputs_of(self._world, len(self._indices)), self._ground
         before, gap = self._state, self._gap
         self._state = state = step(transition, 0.0, before, inputs, self._h)
-        x, was = state[0, :, 0], before[0, :, 0]
-        open_ = self._edges == "open"
-        self._gap = now = state[0, :, 1] - ground.surface(x if open_ else np.clip(x, 0.0, ground.width))
-        down = (now <= 0.0) & np.isfinite(now)
-        fraction = gap[down] / (gap[down] - now[down])
+        x, x_before = state[0, :, 0], before[0, :, 0]
+        is_open = self._edges == "open"
+        self._gap = now = state[0, :, 1] - ground.surface(x if is_open else np.clip(x, 0.0, ground.width))
+        landed = (now <= 0.0) & np.isfinite(now)
+        fraction = gap[landed] / (gap[landed] - now[landed])
         fraction[~np.isfinite(fraction)] = 1.0  # through a side of the terrain
-        self.place[self._number[down]] = was[down] + fraction * (x[down] - was[down])
-        self.when[self._number[down]] = (self._k + fraction) * self._h
+        self.place[self._indices[landed]] = x_before[landed] + fraction * (x[landed] - x_before[landed])
+        self.when[self._indices[landed]] = (self._k + fraction) * self._h
         self._k += 1
-        if open_:
-            self._keep(~(down | ((state[0, :, 1] < 0.0) & ((x < 0.0) | (x > ground.width)))))
+        if is_open:
+            self._keep_flying(~(landed | ((state[0, :, 1] < 0.0) & ((x < 0.0) | (x > ground.width)))))
         else:
-            self._keep(~down)
-            self._return()
+            self._keep_flying(~landed)
+            self._apply_edges()
 
-    def _keep(self, flying: BoolArray) -> None:
+    def _keep_flying(self, flying: BoolArray) -> None:
         """Restrict the arrays to the shells in flight."""
         if not flying.all():
-            self._number, self._state, self._gap = self._number[flying], self._state[:, flying], self._gap[flying]
+            self._indices, self._state, self._gap = self._indices[flying], self._state[:, flying], self._gap[flying]
 
-    def _return(self) -> None:
+    def _apply_edges(self) -> None:
         """Move shells that have passed an end of the terrain back inside."""
         state, ground = self._state, self._ground
         for side, wall in ((-1.0, 0.0), (1.0, ground.width)):
@@ -115,27 +115,27 @@ class TrialShots:
             self._gap[out] = state[0, out, 1] - ground.surface(state[0, out, 0])
 
 
-COARSE, CLOSE = 0.08, 0.04
+COARSE_STEP, FINE_STEP = 0.08, 0.04
 """s, steps of the coarse grid and of the subdivisions: 4.8 m and 2.4 m at 60 m/s"""
 ANGLES = np.radians(np.arange(3.0, 178.0, 1.5))
 """rad, angles of the coarse grid"""
-SHARES = np.linspace(0.3, 1.0, 8)
+SPEED_FRACTIONS = np.linspace(0.3, 1.0, 8)
 """speeds of the coarse grid, as fractions of full speed"""
-TRIED, PARTS = 16, 16
+MAX_BRACKETS, BRACKET_PARTS = 16, 16
 """number of brackets that are subdivided, and of parts of each"""
-FINER = 2
+SUBDIVISIONS = 2
 """number of subdivisions"""
-SHAKE, STEADY = math.radians(0.1), 2.0
-"""rad, and multiple of the tolerance: a shot is insensitive if it lands within STEADY × tolerance of the target with
-its angle changed by ±SHAKE."""
-CHECKED = 6
+ANGLE_PERTURBATION, INSENSITIVE_FACTOR = math.radians(0.1), 2.0
+"""rad, and multiple of the tolerance: a shot is insensitive if it lands within INSENSITIVE_FACTOR × tolerance of the
+target with its angle changed by ±ANGLE_PERTURBATION."""
+MAX_CHECKS = 6
 """number of candidates that are checked on the exact trajectory"""
 CHECK_WORK = 10_000
 """work of one check, in the unit of `TrialShots.fly`"""
 
 Stage = Literal["fan", "finer", "shaken", "checked"]
-"""Stages of the search: coarse grid; subdivision of brackets; candidates and their perturbations by ±SHAKE; checks of
-the best candidates."""
+"""Stages of the search: coarse grid; subdivision of brackets; candidates and their perturbations; checks of the best
+candidates."""
 
 
 class FiringSolution(NamedTuple):
@@ -159,24 +159,24 @@ class TargetingProblem(NamedTuple):
     """terrain"""
     edges: Edges
     """behaviour of a shell at the left and right end of the terrain"""
-    full: float
+    full_speed: float
     """m/s, full speed"""
     at: float
     """m, x of the target"""
-    near: float
+    tolerance: float
     """m, tolerance: shots that land within this distance of the target are hits"""
 
-    def volley(self, angle: FloatArray, speed: FloatArray, h: float) -> TrialShots:
+    def trial_shots(self, angle: FloatArray, speed: FloatArray, h: float) -> TrialShots:
         """Start trial shots at angles, rad, and speeds, m/s, (K,) each, with a step h, s."""
         velocity = speed[:, None] * np.column_stack((np.cos(angle), np.sin(angle)))
         return TrialShots(self.world, self.muzzle.at(angle), velocity, self.ground, self.edges, h)
 
-    def checked(self, aim: FiringSolution) -> FiringSolution:
+    def with_exact_miss(self, aim: FiringSolution) -> FiringSolution:
         """Return a shot with the miss distance of its exact trajectory; inf without an impact."""
         muzzle = self.muzzle.at(np.array([aim.angle]))[0]
         velocity = aim.speed * np.array([math.cos(aim.angle), math.sin(aim.angle)])
-        down = landing(self.world, muzzle, velocity, self.ground, self.edges)
-        return aim._replace(miss=math.inf if down is None else down.place[0] - self.at)
+        landed = landing(self.world, muzzle, velocity, self.ground, self.edges)
+        return aim._replace(miss=math.inf if landed is None else landed.place[0] - self.at)
 
 
 class AimSolver:
@@ -187,12 +187,12 @@ class AimSolver:
         """the shot; None until the search is complete"""
         self._range = range_
         self._stage: Stage = "fan"
-        angle, fraction = (each.reshape(-1) for each in np.meshgrid(ANGLES, SHARES))
-        self._angle, self._speed = angle, range_.full * fraction  # of the trial shots
-        self._volley = range_.volley(self._angle, self._speed, COARSE)
+        angle, fraction = (each.reshape(-1) for each in np.meshgrid(ANGLES, SPEED_FRACTIONS))
+        self._angle, self._speed = angle, range_.full_speed * fraction  # of the trial shots
+        self._trials = range_.trial_shots(self._angle, self._speed, COARSE_STEP)
         self._brackets = np.empty((0, 3))  # two angles, between which the miss changes sign, and the speed
-        self._closer = 0
-        self._left: list[FiringSolution] = []  # candidates to check
+        self._subdivisions = 0
+        self._candidates: list[FiringSolution] = []  # candidates to check
         self._best: FiringSolution | None = None  # best checked candidate
 
     def go_on(self, work: int) -> FiringSolution | None:
@@ -204,15 +204,15 @@ class AimSolver:
         while self.found is None and work > 0:
             if self._stage == "checked":
                 work -= CHECK_WORK
-                self._check()
-            elif not self._volley.done:
-                work -= self._volley.fly(work)
+                self._check_next()
+            elif not self._trials.done:
+                work -= self._trials.fly(work)
             elif self._stage == "fan":
-                self._bracket()
+                self._choose_brackets()
             elif self._stage == "finer":
-                self._close_in()
+                self._refine_brackets()
             else:
-                self._order()
+                self._order_candidates()
         return self.found
 
     def all(self) -> FiringSolution:
@@ -221,70 +221,72 @@ class AimSolver:
             self.go_on(CHECK_WORK)
         return self.found
 
-    def _bracket(self) -> None:
+    def _choose_brackets(self) -> None:
         """Choose brackets from the coarse grid: those with the closest impacts and the shortest flights first."""
-        volley, angle, speed = self._volley, self._angle, self._speed
-        miss = volley.place - self._range.at
+        trial_shots, angle, speed = self._trials, self._angle, self._speed
+        miss = trial_shots.place - self._range.at
         at = np.flatnonzero((miss[1:] * miss[:-1] <= 0.0) & (speed[1:] == speed[:-1]))
         jump = np.abs(miss[at + 1] - miss[at])
-        at = at[np.argsort(jump + 0.5 * volley.when[at], kind="stable")][:TRIED]
+        at = at[np.argsort(jump + 0.5 * trial_shots.when[at], kind="stable")][:MAX_BRACKETS]
         k = int(np.argmin(np.where(np.isnan(miss), np.inf, np.abs(miss))))
         self._best = FiringSolution(float(angle[k]), float(speed[k]), math.inf)
-        self._left = [self._best]  # fallback if no bracket leads to a hit
+        self._candidates = [self._best]  # fallback if no bracket leads to a hit
         self._brackets = np.column_stack((angle[at], angle[at + 1], speed[at]))
-        self._fan()
+        self._subdivide()
 
-    def _fan(self) -> None:
+    def _subdivide(self) -> None:
         """Subdivide each bracket by trial shots; without brackets, check the best shot of the grid."""
         if not len(self._brackets):
             self._stage = "checked"
             return
         low, high, speed = self._brackets.T
-        fan = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, PARTS + 1)
-        self._angle, self._speed, self._stage = fan.reshape(-1), np.repeat(speed, PARTS + 1), "finer"
-        self._volley = self._range.volley(self._angle, self._speed, CLOSE)
+        fan = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, BRACKET_PARTS + 1)
+        self._angle, self._speed, self._stage = fan.reshape(-1), np.repeat(speed, BRACKET_PARTS + 1), "finer"
+        self._trials = self._range.trial_shots(self._angle, self._speed, FINE_STEP)
 
-    def _close_in(self) -> None:
+    def _refine_brackets(self) -> None:
         """Replace each bracket by its part with the change of sign; after the last subdivision, do the secant step."""
         row = np.arange(len(self._brackets))
         fan = self._angle.reshape(len(row), -1)
-        miss = (self._volley.place - self._range.at).reshape(fan.shape)
+        miss = (self._trials.place - self._range.at).reshape(fan.shape)
         jump = np.abs(miss[:, 1:] - miss[:, :-1])
         jump[~(miss[:, 1:] * miss[:, :-1] <= 0.0)] = np.inf
         k = np.argmin(jump, axis=1)
         self._brackets = np.column_stack((fan[row, k], fan[row, k + 1], self._brackets[:, 2]))
-        self._closer += 1
-        if self._closer < FINER:
-            self._fan()
+        self._subdivisions += 1
+        if self._subdivisions < SUBDIVISIONS:
+            self._subdivide()
             return
-        short, far = miss[row, k], miss[row, k + 1]
-        between = short - far
+        short, long = miss[row, k], miss[row, k + 1]
+        between = short - long
         fraction = np.where(
             np.isfinite(between) & (between != 0.0), short / np.where(between == 0.0, 1.0, between), 0.0
         )
         low, high, speed = self._brackets.T
         angle = low + np.clip(fraction, 0.0, 1.0) * (high - low)
-        self._angle = (angle + np.array([[0.0], [-SHAKE], [SHAKE]])).reshape(-1)
+        self._angle = (angle + np.array([[0.0], [-ANGLE_PERTURBATION], [ANGLE_PERTURBATION]])).reshape(-1)
         self._speed, self._stage = np.tile(speed, 3), "shaken"
-        self._volley = self._range.volley(self._angle, self._speed, CLOSE)
+        self._trials = self._range.trial_shots(self._angle, self._speed, FINE_STEP)
 
-    def _order(self) -> None:
+    def _order_candidates(self) -> None:
         """Order the candidates for the checks."""
-        volley, near, count = self._volley, self._range.near, len(self._brackets)
-        shaken = (volley.place - self._range.at).reshape(3, -1)
-        miss, when, speed = shaken[0], volley.when[:count], self._speed[:count]
-        unsure = ~(np.abs(shaken).max(axis=0, initial=0.0) <= STEADY * near)  # also true for nan
-        order = np.lexsort((when, speed, unsure, ~(np.abs(miss) <= near)))
+        trial_shots, tolerance, count = self._trials, self._range.tolerance, len(self._brackets)
+        perturbed = (trial_shots.place - self._range.at).reshape(3, -1)
+        miss, when, speed = perturbed[0], trial_shots.when[:count], self._speed[:count]
+        is_sensitive = ~(
+            np.abs(perturbed).max(axis=0, initial=0.0) <= INSENSITIVE_FACTOR * tolerance
+        )  # also true for nan
+        order = np.lexsort((when, speed, is_sensitive, ~(np.abs(miss) <= tolerance)))
         shots = [
-            FiringSolution(float(self._angle[k]), float(speed[k]), float(miss[k])) for k in order[:CHECKED].tolist()
+            FiringSolution(float(self._angle[k]), float(speed[k]), float(miss[k])) for k in order[:MAX_CHECKS].tolist()
         ]
-        self._left, self._stage = [*shots, *self._left], "checked"
+        self._candidates, self._stage = [*shots, *self._candidates], "checked"
 
-    def _check(self) -> None:
+    def _check_next(self) -> None:
         """Check the next candidate; take the first within the tolerance, else the nearest of all."""
         assert self._best is not None
-        aim = self._range.checked(self._left.pop(0))
+        aim = self._range.with_exact_miss(self._candidates.pop(0))
         if abs(aim.miss) < abs(self._best.miss):
             self._best = aim
-        if abs(aim.miss) <= self._range.near or not self._left:
+        if abs(aim.miss) <= self._range.tolerance or not self._candidates:
             self.found = self._best

@@ -70,7 +70,7 @@ MIN_TANK_SIZE = 20.0
 """px, smallest drawn width of a tank; smaller tanks are enlarged"""
 HULL = ((-0.50, -0.02), (-0.42, 0.18), (-0.20, 0.24), (0.20, 0.24), (0.42, 0.18), (0.50, -0.02))
 """Corners, in widths and heights of a tank from its centre."""
-AIM_REACH = 26.0
+AIM_LENGTH = 26.0
 """m, length of the row of dots that shows the power, from the muzzle"""
 
 
@@ -88,8 +88,8 @@ def draw_tanks(view: DrawContext, gunnery: ArtilleryViewState, tints: dict[int, 
         lift = 0.5 * (height - gunnery.size[1] * view.camera.scale)  # enlarged tanks keep their bottom edge
         _Tank(view, (x, y - lift), (width, height), -float(frame.angle[gun.number]), tints[gun.number]).draw(gun)
         if gun.aiming:
-            _setting(view, gunnery, gun, (x, y - lift), width)
-        _label(view, gun, (x, y - lift - 1.1 * width), tints[gun.number])
+            _draw_gun_setting(view, gunnery, gun, (x, y - lift), width)
+        _draw_label(view, gun, (x, y - lift - 1.1 * width), tints[gun.number])
 
 
 class _Tank:
@@ -99,7 +99,7 @@ class _Tank:
         self._view, self._at, self._size, self._tint = view, at, size, tint
         self._cos, self._sin = math.cos(turn), math.sin(turn)
 
-    def _place(self, x: float, y: float) -> Pixel:
+    def _pixel(self, x: float, y: float) -> Pixel:
         """Return the pixel of a point of the tank, in widths to the right of its centre and heights above it."""
         right, down = x * self._size[0], -y * self._size[1]
         return (
@@ -111,67 +111,70 @@ class _Tank:
         """Draw barrel, turret, hull, track and wheels, from the back to the front."""
         view, tint, width = self._view, self._tint, self._size[0]
         dark, light = mix_colours(tint, BACKGROUND, 0.55), mix_colours(tint, INK, 0.35)
-        turret = self._place(0.0, 0.28)
-        way = math.cos(gun.angle), -math.sin(gun.angle)
-        muzzle = turret[0] + BARREL_LENGTH * width * way[0], turret[1] + BARREL_LENGTH * width * way[1]
-        thick = max(0.10 * width, 2.0)
+        turret = self._pixel(0.0, 0.28)
+        direction = math.cos(gun.angle), -math.sin(gun.angle)
+        muzzle = turret[0] + BARREL_LENGTH * width * direction[0], turret[1] + BARREL_LENGTH * width * direction[1]
+        thickness = max(0.10 * width, 2.0)
         draw_line(
             view.surface,
             turret,
             muzzle,
             mix_colours(dark, BACKGROUND, 0.4),
-            thick + 2.0 * view.ui_scale,
+            thickness + 2.0 * view.ui_scale,
             view.antialias,
         )
-        draw_line(view.surface, turret, muzzle, mix_colours(tint, (90, 94, 104), 0.5), thick, view.antialias)
-        brake = turret[0] + 0.86 * BARREL_LENGTH * width * way[0], turret[1] + 0.86 * BARREL_LENGTH * width * way[1]
-        draw_line(view.surface, brake, muzzle, light, thick + 1.0, view.antialias)
+        draw_line(view.surface, turret, muzzle, mix_colours(tint, (90, 94, 104), 0.5), thickness, view.antialias)
+        brake = (
+            turret[0] + 0.86 * BARREL_LENGTH * width * direction[0],
+            turret[1] + 0.86 * BARREL_LENGTH * width * direction[1],
+        )
+        draw_line(view.surface, brake, muzzle, light, thickness + 1.0, view.antialias)
         dome = [
-            self._place(0.21 * math.cos(a), 0.22 + 0.40 * math.sin(a)) for a in np.linspace(0.0, math.pi, 14).tolist()
+            self._pixel(0.21 * math.cos(a), 0.22 + 0.40 * math.sin(a)) for a in np.linspace(0.0, math.pi, 14).tolist()
         ]
         fill_polygon(view.surface, dome, mix_colours(tint, INK, 0.12), view.antialias)
-        fill_polygon(view.surface, [self._place(x, y) for x, y in HULL], tint, view.antialias)
+        fill_polygon(view.surface, [self._pixel(x, y) for x, y in HULL], tint, view.antialias)
         draw_line(
-            view.surface, self._place(-0.40, 0.16), self._place(0.40, 0.16), light, 1.2 * view.ui_scale, view.antialias
+            view.surface, self._pixel(-0.40, 0.16), self._pixel(0.40, 0.16), light, 1.2 * view.ui_scale, view.antialias
         )
         track = [
-            self._place(x + 0.16 * math.cos(a), -0.24 + 0.26 * math.sin(a))
+            self._pixel(x + 0.16 * math.cos(a), -0.24 + 0.26 * math.sin(a))
             for x, begin in ((0.34, -0.5), (-0.34, 0.5))
             for a in np.linspace(begin * math.pi, (begin + 1.0) * math.pi, 8).tolist()
         ]
         fill_polygon(view.surface, track, (32, 32, 38), view.antialias)
         for x in (-0.32, -0.11, 0.11, 0.32):
-            draw_dot(view.surface, self._place(x, -0.24), 0.075 * width, mix_colours(dark, INK, 0.25))
+            draw_dot(view.surface, self._pixel(x, -0.24), 0.075 * width, mix_colours(dark, INK, 0.25))
 
 
-def _setting(view: DrawContext, gunnery: ArtilleryViewState, gun: GunView, at: Pixel, width: float) -> None:
+def _draw_gun_setting(view: DrawContext, gunnery: ArtilleryViewState, gun: GunView, at: Pixel, width: float) -> None:
     """Draw the setting of a gun: dots along its direction, and a power bar and text below the tank."""
     turret = at[0], at[1] - 0.28 * width * gunnery.size[1] / gunnery.size[0]
-    way = math.cos(gun.angle), -math.sin(gun.angle)
-    reach = max(AIM_REACH * view.camera.scale, 90.0 * view.ui_scale)
+    direction = math.cos(gun.angle), -math.sin(gun.angle)
+    reach = max(AIM_LENGTH * view.camera.scale, 90.0 * view.ui_scale)
     first, count = BARREL_LENGTH * width + 6.0 * view.ui_scale, 14
     for k in range(count):
         fraction = (k + 1) / count
         lit = fraction <= gun.power + 0.5 / count
-        far = first + fraction * reach
+        distance = first + fraction * reach
         colour = mix_colours(YELLOW, ORANGE, fraction) if lit else (150, 150, 164)
         size = (2.6 if lit else 1.4) * view.ui_scale
-        draw_dot(view.surface, (turret[0] + far * way[0], turret[1] + far * way[1]), size, colour)
-    wide, high = 64.0 * view.ui_scale, 7.0 * view.ui_scale
-    box = pygame.Rect(round(at[0] - 0.5 * wide), round(at[1] + 0.42 * width), round(wide), round(high))
-    pygame.draw.rect(view.surface, BACKGROUND, box.inflate(4, 4), border_radius=round(high))
+        draw_dot(view.surface, (turret[0] + distance * direction[0], turret[1] + distance * direction[1]), size, colour)
+    bar_width, bar_height = 64.0 * view.ui_scale, 7.0 * view.ui_scale
+    box = pygame.Rect(round(at[0] - 0.5 * bar_width), round(at[1] + 0.42 * width), round(bar_width), round(bar_height))
+    pygame.draw.rect(view.surface, BACKGROUND, box.inflate(4, 4), border_radius=round(bar_height))
     full = pygame.Rect(box.left, box.top, round(box.width * gun.power), box.height)
-    pygame.draw.rect(view.surface, mix_colours(YELLOW, ORANGE, gun.power), full, border_radius=round(0.5 * high))
-    told = f"{math.degrees(gun.angle):.1f}°   {100.0 * gun.power:.1f} %"
+    pygame.draw.rect(view.surface, mix_colours(YELLOW, ORANGE, gun.power), full, border_radius=round(0.5 * bar_height))
+    label = f"{math.degrees(gun.angle):.1f}°   {100.0 * gun.power:.1f} %"
     draw_text(
-        view.surface, told, (box.centerx, box.bottom + 4 * view.ui_scale), 12 * view.ui_scale, INK, "midtop", bold=True
+        view.surface, label, (box.centerx, box.bottom + 4 * view.ui_scale), 12 * view.ui_scale, INK, "midtop", bold=True
     )
 
 
-def _label(view: DrawContext, gun: GunView, at: Pixel, tint: RgbColour) -> None:
+def _draw_label(view: DrawContext, gun: GunView, at: Pixel, tint: RgbColour) -> None:
     """Draw the name of a player, and a health bar below it."""
-    wide, high = 44.0 * view.ui_scale, 4.0 * view.ui_scale
-    box = pygame.Rect(round(at[0] - 0.5 * wide), round(at[1] - high), round(wide), round(high))
+    bar_width, bar_height = 44.0 * view.ui_scale, 4.0 * view.ui_scale
+    box = pygame.Rect(round(at[0] - 0.5 * bar_width), round(at[1] - bar_height), round(bar_width), round(bar_height))
     if gun.health is not None:
         pygame.draw.rect(view.surface, BACKGROUND, box.inflate(3, 3), border_radius=3)
         colour = mix_colours(WARNING, GREEN, gun.health)
@@ -209,18 +212,18 @@ def sky_image(size: tuple[int, int]) -> pygame.Surface:
     strip = pygame.Surface((1, height))
     for y in range(height):
         strip.set_at((0, y), sky_tone(y / height))
-    whole = pygame.transform.scale(strip, (width, height))
+    sky = pygame.transform.scale(strip, (width, height))
     random = np.random.Generator(np.random.PCG64(7))
     for x, y, bright in random.uniform(size=(STARS, 3)).tolist():
         down = 0.6 * y * y
         colour = mix_colours(sky_tone(down), (240, 240, 255), 0.25 + 0.55 * bright * (1.0 - y))
-        whole.set_at((int(x * (width - 1)), int(down * height)), colour)
+        sky.set_at((int(x * (width - 1)), int(down * height)), colour)
     for k, (level, reach, colour) in enumerate(RIDGES):
         line = displaced(96, 0.5, k + 3)
         line = (line - line.mean()) / max(float(np.abs(line - line.mean()).max()), 1e-9)
         tops = np.interp(np.linspace(0.0, 95.0, width), np.arange(96), (level - 0.5 * reach * line) * height)
-        _ridge(whole, tops, colour)
-    return whole
+        _draw_ridge(sky, tops, colour)
+    return sky
 
 
 def sky_tone(fraction: float) -> RgbColour:
@@ -231,7 +234,7 @@ def sky_tone(fraction: float) -> RgbColour:
     return SKY_TONES[-1][1]
 
 
-def _ridge(surface: pygame.Surface, tops: FloatArray, colour: RgbColour) -> None:
+def _draw_ridge(surface: pygame.Surface, tops: FloatArray, colour: RgbColour) -> None:
     """Draw a ridge that fades into mist downwards, by pixel columns with tops in px."""
     height = surface.get_height()
     strip = pygame.Surface((1, height), 0, surface)
@@ -244,9 +247,9 @@ def _ridge(surface: pygame.Surface, tops: FloatArray, colour: RgbColour) -> None
 SOIL: RgbColour = (122, 92, 62)
 GRASS: RgbColour = (150, 190, 96)
 DEEP: RgbColour = (24, 21, 27)
-DARKENS = 16.0
+HALF_DEPTH = 16.0
 """m, depth at which the colour is halfway from `SOIL` to `DEEP`"""
-BAND = 3.2
+BAND_THICKNESS = 3.2
 """m, thickness of the alternating layers"""
 
 
@@ -262,26 +265,28 @@ def draw_land(surface: pygame.Surface, camera: Camera, scene: Scene, unit: float
     others = tuple(wall for wall in scene.walls if wall.name != GROUND)
     for wall in scene.walls:
         if wall.name == GROUND:
-            _ground(surface, camera, wall, soil_of(scene), unit, antialias)
-            _sides(surface, camera, scene, wall, unit, antialias)
+            _draw_ground(surface, camera, wall, soil_of(scene), unit, antialias)
+            _draw_sides(surface, camera, scene, wall, unit, antialias)
     draw_static_bodies(surface, camera, scene.model_copy(update={"walls": others}), unit, antialias)
 
 
-def _ground(surface: pygame.Surface, camera: Camera, wall: Wall, soil: RgbColour, unit: float, antialias: bool) -> None:
+def _draw_ground(
+    surface: pygame.Surface, camera: Camera, wall: Wall, soil: RgbColour, unit: float, antialias: bool
+) -> None:
     """Fill the area below a wall by pixel columns, each copied from one strip, and draw its edge."""
-    places = camera.to_screen(np.asarray(wall.points))
+    pixels = camera.to_screen(np.asarray(wall.points))
     width, height = surface.get_size()
-    left, right = max(int(np.ceil(places[0, 0])), 0), min(int(np.ceil(places[-1, 0])), width)
+    left, right = max(int(np.ceil(pixels[0, 0])), 0), min(int(np.ceil(pixels[-1, 0])), width)
     if left >= right:
         return
-    tops = np.interp(np.arange(left, right) + 0.5, places[:, 0], places[:, 1])
+    tops = np.interp(np.arange(left, right) + 0.5, pixels[:, 0], pixels[:, 1])
     strip = terrain_strip(soil, camera.scale, height, surface)
     first = np.clip(np.floor(tops), -height, height).astype(np.int64).tolist()
     surface.blits([(strip, (x, top)) for x, top in zip(range(left, right), first, strict=True)], doreturn=False)
     edge = mix_colours(GRASS, soil, 0.35)
-    near = np.flatnonzero((places[:, 0] >= -50.0) & (places[:, 0] <= width + 50.0))
-    if len(near) > 1:
-        shown = places[max(int(near[0]) - 1, 0) : int(near[-1]) + 2]
+    visible = np.flatnonzero((pixels[:, 0] >= -50.0) & (pixels[:, 0] <= width + 50.0))
+    if len(visible) > 1:
+        shown = pixels[max(int(visible[0]) - 1, 0) : int(visible[-1]) + 2]
         shown = np.column_stack((np.clip(shown[:, 0], -1e4, 1e4), np.clip(shown[:, 1], -1e4, 1e4)))
         corners = shown.tolist()
         for shift, colour in ((1.5 * unit, mix_colours(edge, soil, 0.5)), (0.0, edge)):
@@ -300,13 +305,15 @@ def terrain_strip(soil: RgbColour, scale: float, height: int, like: pygame.Surfa
     strip = pygame.Surface((1, max(2 * height, 1)), 0, like)
     for y in range(strip.get_height()):
         depth = y / scale
-        tint = mix_colours(DEEP, soil, 0.5 ** (depth / DARKENS))
-        layer = 0.10 if int(depth / BAND) % 2 else 0.0
+        tint = mix_colours(DEEP, soil, 0.5 ** (depth / HALF_DEPTH))
+        layer = 0.10 if int(depth / BAND_THICKNESS) % 2 else 0.0
         strip.set_at((0, y), mix_colours(mix_colours(tint, (0, 0, 0), layer), GRASS, 0.35 * 0.5 ** (depth / 0.7)))
     return strip
 
 
-def _sides(surface: pygame.Surface, camera: Camera, scene: Scene, wall: Wall, unit: float, antialias: bool) -> None:
+def _draw_sides(
+    surface: pygame.Surface, camera: Camera, scene: Scene, wall: Wall, unit: float, antialias: bool
+) -> None:
     """Draw the ends of the terrain: solid lines if shells rebound, dashed ones if they reappear at the other end."""
     artillery = table_of(scene, Artillery)
     if artillery is None or artillery.edges == "open":
@@ -333,9 +340,9 @@ MAX_TRAIL_POINTS = 400
 def draw_below(view: DrawContext, gunnery: ArtilleryViewState) -> None:
     """Draw the layer behind the tanks: falling dirt, paths of shells, and the tracer."""
     for clod in gunnery.clods:
-        _clod(view, clod)
-    for way in gunnery.ways:
-        _way(view, way, bool(gunnery.flying))
+        _draw_falling_dirt(view, clod)
+    for path in gunnery.ways:
+        _draw_path(view, path, bool(gunnery.flying))
     if gunnery.tracer is not None:
         for x, y in view.camera.to_screen(gunnery.tracer[::4]).tolist():
             draw_dot(view.surface, (x, y), 1.3 * view.ui_scale, mix_colours(SKY, INK, 0.4))
@@ -350,33 +357,33 @@ def draw_above(view: DrawContext, gunnery: ArtilleryViewState) -> None:
             draw_glow(view.surface, (x, y), 7.0 * view.ui_scale, (255, 190, 90), 90)
             draw_dot(view.surface, (x, y), max(2.6 * view.ui_scale, 2.0), (255, 246, 214))
     for burst in gunnery.bursts:
-        _burst(view, burst)
+        _draw_explosion(view, burst)
     if gunnery.landed is not None and not gunnery.flying:
-        _landed(view, gunnery.landed)
+        _draw_impact(view, gunnery.landed)
 
 
-def _way(view: DrawContext, way: FloatArray, flying: bool) -> None:
+def _draw_path(view: DrawContext, path: FloatArray, flying: bool) -> None:
     """Draw the path of a shell: fading with age during the flight, thin and dashed afterwards."""
-    points = way[:: max(len(way) // MAX_TRAIL_POINTS, 1)]
-    places = view.camera.to_screen(np.vstack((points, way[-1:]))).tolist()
-    for k in range(len(places) - 1):
-        age = 1.0 - k / len(places)
+    points = path[:: max(len(path) // MAX_TRAIL_POINTS, 1)]
+    pixels = view.camera.to_screen(np.vstack((points, path[-1:]))).tolist()
+    for k in range(len(pixels) - 1):
+        age = 1.0 - k / len(pixels)
         fraction = max(0.75 - age, 0.16) if flying else 0.22
         if not flying and k % 3 == 2:
             continue  # dashed after the flight
         colour = mix_colours((70, 72, 104), SMOKE, fraction)
-        (ax, ay), (bx, by) = places[k], places[k + 1]
+        (ax, ay), (bx, by) = pixels[k], pixels[k + 1]
         draw_line(view.surface, (ax, ay), (bx, by), colour, (1.0 + 1.4 * fraction) * view.ui_scale, view.antialias)
 
 
-def _clod(view: DrawContext, clod: FallingDirt) -> None:
+def _draw_falling_dirt(view: DrawContext, clod: FallingDirt) -> None:
     """Draw a column of falling dirt, and the sky where it will come to rest."""
     surface = view.surface
     ends = np.array([(clod.left, clod.top), (clod.right, clod.bottom), (clod.right, clod.floor)])
-    places = np.clip(view.camera.to_screen(ends), -OFF_SCREEN_MARGIN, OFF_SCREEN_MARGIN)
-    (left, top), (right, bottom), (_, floor) = places.tolist()
-    lies = floor - (bottom - top)
-    air = pygame.Rect(math.floor(left), math.floor(lies) - 4, math.ceil(right) - math.floor(left) + 1, 1)
+    pixels = np.clip(view.camera.to_screen(ends), -OFF_SCREEN_MARGIN, OFF_SCREEN_MARGIN)
+    (left, top), (right, bottom), (_, floor) = pixels.tolist()
+    rest_top = floor - (bottom - top)
+    air = pygame.Rect(math.floor(left), math.floor(rest_top) - 4, math.ceil(right) - math.floor(left) + 1, 1)
     air.height = max(math.ceil(floor) - air.top, 1)
     air = air.clip(surface.get_rect())
     if air.width and air.height:
@@ -389,21 +396,21 @@ def _clod(view: DrawContext, clod: FallingDirt) -> None:
         surface.fill(mix_colours(GRASS, soil, 0.4), pygame.Rect(dirt.left, dirt.top, dirt.width, min(2, dirt.height)))
 
 
-def _burst(view: DrawContext, burst: ExplosionView) -> None:
+def _draw_explosion(view: DrawContext, burst: ExplosionView) -> None:
     """Draw an explosion: a disc that grows, changes colour, and fades."""
     fraction = min(burst.age / EXPLOSION_DURATION, 1.0)
     x, y = view.camera.to_screen(np.asarray(burst.place)).tolist()
     radius = burst.radius * view.camera.scale * (0.35 + 0.75 * fraction**0.4)
     tones = ((150, 118, 84), (120, 94, 70), (96, 78, 62), (80, 70, 62)) if burst.dirt else FLAME
-    place = fraction * (len(tones) - 1)
-    k = min(int(place), len(tones) - 2)
-    colour = mix_colours(tones[k], tones[k + 1], place - k)
+    tone_position = fraction * (len(tones) - 1)
+    k = min(int(tone_position), len(tones) - 2)
+    colour = mix_colours(tones[k], tones[k + 1], tone_position - k)
     for part, opacity in ((1.0, 0.45), (0.72, 0.6), (0.4, 0.8)):
-        hidden = round(255 * opacity * (1.0 - fraction))
-        draw_glow(view.surface, (x, y), radius * part, mix_colours(colour, tones[0], 1.0 - part), hidden)
+        alpha = round(255 * opacity * (1.0 - fraction))
+        draw_glow(view.surface, (x, y), radius * part, mix_colours(colour, tones[0], 1.0 - part), alpha)
 
 
-def _landed(view: DrawContext, landed: tuple[tuple[float, float], tuple[float, float]]) -> None:
+def _draw_impact(view: DrawContext, landed: tuple[tuple[float, float], tuple[float, float]]) -> None:
     """Mark the impact of the last shot by a cross, and that of its exact trajectory by a ring."""
     (x, y), (ex, ey) = view.camera.to_screen(np.asarray(landed)).tolist()
     if all(abs(each) < 1e4 for each in (x, y, ex, ey)):
@@ -413,7 +420,7 @@ def _landed(view: DrawContext, landed: tuple[tuple[float, float], tuple[float, f
         draw_dot(view.surface, (ex, ey), 7.0 * view.ui_scale, YELLOW, 1.4 * view.ui_scale)
 
 
-def _back(view: DrawContext, middle: tuple[float, float], size: tuple[float, float]) -> None:
+def _draw_text_background(view: DrawContext, middle: tuple[float, float], size: tuple[float, float]) -> None:
     """Darken the background of a text."""
     box = pygame.Rect(0, 0, round(size[0]), round(size[1]))
     shade = pygame.Surface(box.size, pygame.SRCALPHA)
@@ -422,15 +429,15 @@ def _back(view: DrawContext, middle: tuple[float, float], size: tuple[float, flo
     view.surface.blit(shade, box)
 
 
-def _wind(view: DrawContext, wind: float) -> None:
+def _draw_wind(view: DrawContext, wind: float) -> None:
     """Draw direction and speed of the wind, at the left below the text of the run."""
     size = 13.0 * view.ui_scale
     middle, top = 96.0 * view.ui_scale, max(view.snapshot.below, 24.0 * view.ui_scale) + 20.0 * view.ui_scale
     half = min(max(7.0 * abs(wind), 8.0), 84.0) * view.ui_scale
-    told = f"wind {abs(wind):.1f} m/s" if wind else "no wind"
-    _back(view, (middle, top + 7.0 * view.ui_scale), (172.0 * view.ui_scale, 44.0 * view.ui_scale))
-    draw_text(view.surface, told, (middle + 1, top + 9 * view.ui_scale + 1), size, BACKGROUND, "midtop", bold=True)
-    draw_text(view.surface, told, (middle, top + 9 * view.ui_scale), size, INK, "midtop", bold=True)
+    label = f"wind {abs(wind):.1f} m/s" if wind else "no wind"
+    _draw_text_background(view, (middle, top + 7.0 * view.ui_scale), (172.0 * view.ui_scale, 44.0 * view.ui_scale))
+    draw_text(view.surface, label, (middle + 1, top + 9 * view.ui_scale + 1), size, BACKGROUND, "midtop", bold=True)
+    draw_text(view.surface, label, (middle, top + 9 * view.ui_scale), size, INK, "midtop", bold=True)
     if wind:
         ends = (middle - half, top), (middle + half, top)
         begin, end = ends if wind > 0 else ends[::-1]
@@ -469,7 +476,7 @@ class ArtilleryView:
     def hud(self, ctx: DrawContext) -> None:
         """Draw the wind."""
         if isinstance(ctx.snapshot.game, ArtilleryViewState) and ctx.snapshot.game.wind is not None:
-            _wind(ctx, ctx.snapshot.game.wind)
+            _draw_wind(ctx, ctx.snapshot.game.wind)
 
 
 def _rgb(colour: ColourArray) -> RgbColour:

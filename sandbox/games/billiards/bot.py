@@ -73,16 +73,16 @@ class BilliardsBot:
 
     def decide(self, match: Match) -> Decision:
         """Return the decision after which the next shot is best for this player, by `ease`."""
-        me, best, top = match.turn, match.choices.decisions[0], -math.inf
+        player, best, best_value = match.turn, match.choices.decisions[0], -math.inf
         for decision in match.choices.decisions:
             if decision == "claim":
                 return decision
             after = match.decide(decision)
-            good = 1.0 if after.over else ease(after, self.sigma) * (1.0 if after.turn == me else -1.0)
+            good = 1.0 if after.over else ease(after, self.sigma) * (1.0 if after.turn == player else -1.0)
             if decision.startswith("rerack"):
-                good = 0.3 if after.turn == me else -0.3
-            if good > top:
-                best, top = decision, good
+                good = 0.3 if after.turn == player else -0.3
+            if good > best_value:
+                best, best_value = decision, good
         return best
 
     def plan(self, match: Match) -> FramePlan:
@@ -94,57 +94,61 @@ class BilliardsBot:
         """Return the intended shot, without error."""
         table, place = self._table(match), None
         if match.state.in_hand is not None:
-            place = self._best_place(match)
+            place = self._best_position(match)
             match = match.place(place)
         table = table.with_balls(dict(zip(match.layout.names, match.position, strict=True)))
-        trial = ShotEvaluator(match, table, self.sigma)
-        strokes = self._strokes(trial)
-        ranked = self._ranked(trial, strokes)
+        evaluator = ShotEvaluator(match, table, self.sigma)
+        strokes = self._strokes(evaluator)
+        ranked = self._ranked(evaluator, strokes)
         if match.layout.pockets and not match.state.opening and (not ranked or ranked[0][0] < GOOD_VALUE):
-            ranked += self._ranked(trial, list(directions_all_around(trial, 60, (1.5, 3.0))))
+            ranked += self._ranked(evaluator, list(directions_all_around(evaluator, 60, (1.5, 3.0))))
         ranked.sort(key=lambda each: -each[0])
-        best = self._steadiest(trial, ranked[:FINALISTS])
+        best = self._most_robust(evaluator, ranked[:FINALISTS])
         return FramePlan(best[0], best[1], place)
 
     def with_error(self, stroke: Stroke, number: int) -> Stroke:
         """Return a stroke with the random error of the shot `number` of a frame."""
         random = draws(Stream.STROKE, self.seed, number)
-        aside, faster = random.standard_normal(2).tolist()
-        return _with_error(stroke, aside * self.sigma, faster * self.speed_error)
+        angle_error, relative_error = random.standard_normal(2).tolist()
+        return _with_error(stroke, angle_error * self.sigma, relative_error * self.speed_error)
 
-    def _strokes(self, trial: ShotEvaluator) -> list[Stroke]:
-        match = trial.match
+    def _strokes(self, evaluator: ShotEvaluator) -> list[Stroke]:
+        match = evaluator.match
         if not match.layout.pockets:
             rail = match.rules.name == "straight-rail"
             speeds, sides = ((0.8, 1.5, 2.5), (0.0,)) if rail else ((3.0, 4.5, 6.0), (-0.35, 0.0, 0.35))
-            return list(directions_all_around(trial, 72, speeds, sides))
+            return list(directions_all_around(evaluator, 72, speeds, sides))
         if match.state.opening:
             if match.rules.name == "snooker":
-                return list(directions_all_around(trial, 12, (2.0, 2.8), (-0.3, 0.3)))
-            return list(break_candidates(trial))
-        return pot_candidates(trial)
+                return list(directions_all_around(evaluator, 12, (2.0, 2.8), (-0.3, 0.3)))
+            return list(break_candidates(evaluator))
+        return pot_candidates(evaluator)
 
-    def _ranked(self, trial: ShotEvaluator, strokes: list[Stroke]) -> list[tuple[float, Stroke, ShotCall]]:
+    def _ranked(self, evaluator: ShotEvaluator, strokes: list[Stroke]) -> list[tuple[float, Stroke, ShotCall]]:
         """Return the strokes with their values without error and their calls, best first."""
         found = []
         for stroke in strokes:
-            made = trial.outcome(stroke)
-            found.append((trial.value_of(made), stroke, ShotCall() if made is None else made[1]))
+            made = evaluator.outcome(stroke)
+            found.append((evaluator.value_of(made), stroke, ShotCall() if made is None else made[1]))
         return sorted(found, key=lambda each: -each[0])
 
-    def _steadiest(self, trial: ShotEvaluator, ranked: list[tuple[float, Stroke, ShotCall]]) -> tuple[Stroke, ShotCall]:
+    def _most_robust(
+        self, evaluator: ShotEvaluator, ranked: list[tuple[float, Stroke, ShotCall]]
+    ) -> tuple[Stroke, ShotCall]:
         """Return the stroke and call with the highest mean value over random errors of this player."""
-        random = draws(Stream.TRIAL, self.seed, trial.match.shots)
+        random = draws(Stream.TRIAL, self.seed, evaluator.match.shots)
         errors = random.standard_normal((ERROR_SAMPLES, 2)) * (self.sigma, self.speed_error)
-        best, top = ranked[0], -math.inf
+        best, best_value = ranked[0], -math.inf
         for good, stroke, call in ranked:
-            tried = [trial.value_of(trial.outcome(_with_error(stroke, *error), call)) for error in errors.tolist()]
-            mean = (good + sum(tried)) / (1 + ERROR_SAMPLES)
-            if mean > top:
-                best, top = (good, stroke, call), mean
+            values = [
+                evaluator.value_of(evaluator.outcome(_with_error(stroke, *error), call)) for error in errors.tolist()
+            ]
+            mean = (good + sum(values)) / (1 + ERROR_SAMPLES)
+            if mean > best_value:
+                best, best_value = (good, stroke, call), mean
         return best[1], best[2]
 
-    def _best_place(self, match: Match) -> Point:
+    def _best_position(self, match: Match) -> Point:
         """Return the place of a cue ball in hand with the highest probability of a straight pot, m."""
         at = match.position[match.layout.number[match.cue]]
         place = match.state.in_hand
@@ -152,11 +156,11 @@ class BilliardsBot:
             return at
         radius = match.layout.radius[match.layout.number[match.cue]]
         others = [disc for name, disc in match.on_table.items() if name != match.cue]
-        best, top = at, straight(match, self.sigma).chance.max(initial=0.0)
+        best, best_value = at, straight(match, self.sigma).chance.max(initial=0.0)
         for point in spread(match.layout, place, radius, others)[::2]:
             chance = straight(match.place(point), self.sigma).chance.max(initial=0.0)
-            if chance > top + 1e-9:
-                best, top = point, chance
+            if chance > best_value + 1e-9:
+                best, best_value = point, chance
         return best
 
     def _table(self, match: Match) -> Table:
@@ -168,10 +172,10 @@ class BilliardsBot:
         return self._tables[key][1]
 
 
-def _with_error(stroke: Stroke, aside: float, faster: float) -> Stroke:
+def _with_error(stroke: Stroke, angle_error: float, relative_error: float) -> Stroke:
     """Return a stroke with an error of the aim, rad, and a relative error of the speed."""
-    speed = min(max(stroke.speed * (1.0 + faster), 1e-3), 100.0)
-    return stroke.model_copy(update={"aim": stroke.aim + aside, "speed": speed})
+    speed = min(max(stroke.speed * (1.0 + relative_error), 1e-3), 100.0)
+    return stroke.model_copy(update={"aim": stroke.aim + angle_error, "speed": speed})
 
 
 DEFAULT_SKILL = 0.7

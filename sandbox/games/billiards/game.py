@@ -109,11 +109,11 @@ class BilliardsRules:
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Return a copy that shares the immutable matches and contacts."""
-        twin = copy.copy(self)
+        duplicate = copy.copy(self)
         for name in ("log", "_contacts", "_english", "_place", "_sounds"):
-            setattr(twin, name, copy.copy(getattr(self, name)))
-        memo[id(self)] = twin
-        return twin
+            setattr(duplicate, name, copy.copy(getattr(self, name)))
+        memo[id(self)] = duplicate
+        return duplicate
 
     @property
     def score(self) -> int:

@@ -167,11 +167,11 @@ def play_frame(
     table = FrameTable(match, engine)
     first, turns = match, list[FrameTurn]()
     unfinished: str | None = None
-    began_at = perf_counter()
+    start_time = perf_counter()
     while not table.match.over:
         if len(turns) >= most:
             unfinished = f"not finished after {len(turns):,} turns"
-        elif time_limit is not None and perf_counter() - began_at > time_limit:
+        elif time_limit is not None and perf_counter() - start_time > time_limit:
             unfinished = f"not finished after {time_limit:g} s and {len(turns):,} turns"
         if unfinished is not None:
             break
@@ -209,7 +209,9 @@ class FrameTable:
         self._rules = BilliardsRules(match)
         self._game = GameSession(self._rules)
         self._actions: list[Action] = []
-        self._pending = list(self._look(Contacts.none()))  # actions of the rules that are applied with the next shot
+        self._pending = list(
+            self._run_rules(Contacts.none())
+        )  # actions of the rules that are applied with the next shot
 
     @property
     def match(self) -> Match:
@@ -252,7 +254,7 @@ class FrameTable:
         limit = time + MAX_SHOT_TIME
         while True:
             self._simulation.step()
-            self._pending = list(self._look(self._simulation.contacts()))
+            self._pending = list(self._run_rules(self._simulation.contacts()))
             if self._rules.waiting or self.match.over:
                 break
             if self._simulation.time > limit:
@@ -286,7 +288,7 @@ class FrameTable:
     def _press(self, control: tuple[str, float]) -> None:
         self._pending += self._game.press(self._simulation.time, *control)
 
-    def _look(self, contacts: Contacts) -> Sequence[Action]:
+    def _run_rules(self, contacts: Contacts) -> Sequence[Action]:
         return self._game.on_step(self._simulation.time, self._simulation.frame(), contacts)
 
 

@@ -54,7 +54,7 @@ def require_suitable_table(layout: TableGeometry, rules: Ruleset[Any], state: Ru
     wanted = {*state.table, *(rules.cue_balls if rules.name != "free" else (rules.cue_ball(state),))}
     missing, idle = sorted(wanted - set(layout.names)), sorted(set(layout.names) - wanted)
     spots = [name for name in SPOTS.get(rules.rack, COLOURS) if name not in layout.spots and rules.name != "free"]
-    wrong = [
+    faults = [
         *([f"no ball {', '.join(missing)}"] if missing else []),
         *([f"the game does not use {', '.join(idle)}"] if idle else []),
         *([f"no spot {', '.join(spots)}; state a [[play.spot]]"] if spots else []),
@@ -62,8 +62,8 @@ def require_suitable_table(layout: TableGeometry, rules: Ruleset[Any], state: Ru
         *(["no pockets"] if not layout.pockets and rules.name in ("8-ball", "9-ball", "snooker") else []),
         *(["carom has no pockets"] if layout.pockets and rules.rack == "carom" else []),
     ]
-    if wrong:
-        raise GameError(f"{rules.name} cannot be played on this table: {'; '.join(wrong)}")
+    if faults:
+        raise GameError(f"{rules.name} cannot be played on this table: {'; '.join(faults)}")
 
 
 @dataclass(frozen=True)
@@ -147,9 +147,11 @@ class Match:
     @property
     def on_table(self) -> dict[str, PlacedDisc]:
         """The balls that are not pocketed, with the cue ball."""
-        here = {*self.state.table, self.cue}
+        on_table_names = {*self.state.table, self.cue}
         return {
-            name: (*self.position[k], self.layout.radius[k]) for name, k in self.layout.number.items() if name in here
+            name: (*self.position[k], self.layout.radius[k])
+            for name, k in self.layout.number.items()
+            if name in on_table_names
         }
 
     def refusal(self, at: Point) -> str | None:
@@ -177,9 +179,9 @@ class Match:
         Raises:
             GameError: the place is not allowed; the message has the reason.
         """
-        why = self.refusal(at)
-        if why is not None:
-            raise GameError(why)
+        reason = self.refusal(at)
+        if reason is not None:
+            raise GameError(reason)
         return replace(self, position=self._with({self.cue: at}), verdict=None)
 
     def decide(self, decision: Decision) -> Self:
@@ -302,10 +304,10 @@ class Match:
                 return False
         return first is not None
 
-    def _with(self, places: dict[str, Point]) -> tuple[Point, ...]:
+    def _with(self, positions: dict[str, Point]) -> tuple[Point, ...]:
         """Return the positions with some balls at other places."""
         position = list(self.position)
-        for name, at in places.items():
+        for name, at in positions.items():
             position[self.layout.number[name]] = at
         return tuple(position)
 
@@ -318,8 +320,8 @@ class Match:
             position = self.before
         after = replace(self, state=verdict.state, position=position)
         if verdict.respot:
-            here = [after.layout.number[name] for name in after.on_table]
-            after = replace(after, position=respot_moves(after.layout, verdict.respot, position, here))
+            on_table_names = [after.layout.number[name] for name in after.on_table]
+            after = replace(after, position=respot_moves(after.layout, verdict.respot, position, on_table_names))
         after = after._in_hand()
         if after.over:
             return replace(after, verdict=verdict)

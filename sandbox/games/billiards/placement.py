@@ -13,7 +13,7 @@ from sandbox.scene.description.base import Point
 ROUNDING = 1e-9
 """m by which a place may exceed a bound: tolerance for rounding errors"""
 
-AROUND = 72
+CIRCLE_POINTS = 72
 """number of candidate places around each ball"""
 
 
@@ -38,7 +38,7 @@ def placement_refusal(
         return "the ball would be outside the cushions"
     if not _within(layout, place, point)[0]:
         return f"the ball must be placed {place}"
-    if _apart(point, radius, others)[0] < -ROUNDING:
+    if _gap(point, radius, others)[0] < -ROUNDING:
         return "another ball is there"
     return None
 
@@ -47,7 +47,7 @@ def allowed(
     layout: TableGeometry, place: PlacementRegion, points: FloatArray, radius: float, others: Sequence[PlacedDisc]
 ) -> BoolArray:
     """Return whether a ball may be placed at (M, 2) points, m, as (M,) booleans."""
-    free = (layout.room(points) >= radius - ROUNDING) & (_apart(points, radius, others) >= -ROUNDING)
+    free = (layout.room(points) >= radius - ROUNDING) & (_gap(points, radius, others) >= -ROUNDING)
     return np.asarray(free & _within(layout, place, points))
 
 
@@ -60,20 +60,23 @@ def nearest(
     """
     if placement_refusal(layout, place, at, radius, others) is None:
         return at
-    wanted = np.array([at])
-    found = [_into(layout, place, wanted, radius), np.array(spread(layout, place, radius, others)).reshape(-1, 2)]
-    near = np.array(others, dtype=float).reshape(-1, 3)
-    for x, y, r in near.tolist():
-        away, reach = math.atan2(at[1] - y, at[0] - x), radius + r + HAIR
-        turns = away + np.linspace(-math.pi, math.pi, AROUND + 1)  # includes the nearest point of the circle
-        ring = np.array([x, y]) + reach * np.column_stack((np.cos(turns), np.sin(turns)))
-        found += [ring, _into(layout, place, ring, radius)]
-    found.append(_between(near, radius))
-    points = np.concatenate(found)
+    target = np.array([at])
+    candidates = [
+        _clamped(layout, place, target, radius),
+        np.array(spread(layout, place, radius, others)).reshape(-1, 2),
+    ]
+    discs = np.array(others, dtype=float).reshape(-1, 3)
+    for x, y, r in discs.tolist():
+        bearing, centre_distance = math.atan2(at[1] - y, at[0] - x), radius + r + HAIR
+        angles = bearing + np.linspace(-math.pi, math.pi, CIRCLE_POINTS + 1)  # includes the nearest point of the circle
+        ring = np.array([x, y]) + centre_distance * np.column_stack((np.cos(angles), np.sin(angles)))
+        candidates += [ring, _clamped(layout, place, ring, radius)]
+    candidates.append(_touching_two(discs, radius))
+    points = np.concatenate(candidates)
     points = points[allowed(layout, place, points, radius, others)]
     if not len(points):
         return None
-    best = points[np.argmin(np.hypot(*(points - wanted).T))]
+    best = points[np.argmin(np.hypot(*(points - target).T))]
     return float(best[0]), float(best[1])
 
 
@@ -81,10 +84,10 @@ def spread(layout: TableGeometry, place: PlacementRegion, radius: float, others:
     """Return allowed places of a ball in hand, m, spread over the allowed area."""
     points = layout.places.get((place, radius))
     if points is None:
-        points = _bounds(layout, place, radius)
+        points = _grid_points(layout, place, radius)
         points = points[allowed(layout, place, points, radius, ())]
         layout.places[place, radius] = points
-    free = points[_apart(points, radius, others) >= -ROUNDING]
+    free = points[_gap(points, radius, others) >= -ROUNDING]
     return [(x, y) for x, y in free.tolist()]
 
 
@@ -93,13 +96,13 @@ def _within(layout: TableGeometry, place: PlacementRegion, points: FloatArray) -
     if place == "anywhere":
         return np.ones(len(points), dtype=bool)
     home, along = np.array(layout.home), np.array(layout.along)
-    behind = (points - home) @ along <= ROUNDING
+    is_behind = (points - home) @ along <= ROUNDING
     if place == "in the D" and layout.d_radius:
-        behind &= np.hypot(*(points - home).T) <= layout.d_radius + ROUNDING
-    return np.asarray(behind)
+        is_behind &= np.hypot(*(points - home).T) <= layout.d_radius + ROUNDING
+    return np.asarray(is_behind)
 
 
-def _into(layout: TableGeometry, place: PlacementRegion, points: FloatArray, radius: float) -> FloatArray:
+def _clamped(layout: TableGeometry, place: PlacementRegion, points: FloatArray, radius: float) -> FloatArray:
     """Return (M, 2) points clamped to the playing area and to the area that the rules allow."""
     (x0, y0), (x1, y1) = layout.area
     inside = np.clip(points, (x0 + radius, y0 + radius), (x1 - radius, y1 - radius))
@@ -108,13 +111,13 @@ def _into(layout: TableGeometry, place: PlacementRegion, points: FloatArray, rad
     home, along = np.array(layout.home), np.array(layout.along)
     inside = inside - np.maximum((inside - home) @ along, 0.0)[:, None] * along
     if place == "in the D" and layout.d_radius:
-        apart = inside - home
-        far = np.hypot(*apart.T)[:, None]
-        inside = home + apart * np.minimum(1.0, layout.d_radius / np.maximum(far, 1e-300))
+        offset = inside - home
+        distance = np.hypot(*offset.T)[:, None]
+        inside = home + offset * np.minimum(1.0, layout.d_radius / np.maximum(distance, 1e-300))
     return np.asarray(inside)
 
 
-def _bounds(layout: TableGeometry, place: PlacementRegion, radius: float) -> FloatArray:
+def _grid_points(layout: TableGeometry, place: PlacementRegion, radius: float) -> FloatArray:
     """Return a grid of points over the area that the rules allow, (M, 2) m."""
     (x0, y0), (x1, y1) = layout.area
     if place == "in the D" and layout.d_radius:
@@ -122,27 +125,29 @@ def _bounds(layout: TableGeometry, place: PlacementRegion, radius: float) -> Flo
         x0, y0, x1, y1 = max(x0, x - reach), max(y0, y - reach), min(x1, x + reach), min(y1, y + reach)
     columns, rows = np.linspace(x0 + radius, x1 - radius, GRID), np.linspace(y0 + radius, y1 - radius, GRID)
     grid = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
-    return _into(layout, place, grid, radius)
+    return _clamped(layout, place, grid, radius)
 
 
-def _apart(points: FloatArray, radius: float, others: Sequence[PlacedDisc]) -> FloatArray:
+def _gap(points: FloatArray, radius: float, others: Sequence[PlacedDisc]) -> FloatArray:
     """Return the gap between a ball at (M, 2) points and the nearest other ball, (M,) m; negative for overlap."""
-    least = np.full(len(points), np.inf)
+    gap = np.full(len(points), np.inf)
     for x, y, r in others:
-        least = np.minimum(least, np.hypot(points[:, 0] - x, points[:, 1] - y) - radius - r)
-    return least
+        gap = np.minimum(gap, np.hypot(points[:, 0] - x, points[:, 1] - y) - radius - r)
+    return gap
 
 
-def _between(others: FloatArray, radius: float) -> FloatArray:
+def _touching_two(others: FloatArray, radius: float) -> FloatArray:
     """Return the centres of a ball that touches two others, with a gap of `HAIR`, (M, 2) m."""
-    found = []
+    candidates = []
     for i, (ax, ay, ar) in enumerate(others.tolist()):
         for bx, by, br in others[i + 1 :].tolist():
             a, b, d = ar + radius + HAIR, br + radius + HAIR, math.hypot(bx - ax, by - ay)
             if not 0.0 < d < a + b:
                 continue
             forward = 0.5 * (a * a - b * b + d * d) / d
-            aside = math.sqrt(max(a * a - forward * forward, 0.0))
+            sideways = math.sqrt(max(a * a - forward * forward, 0.0))
             ux, uy = (bx - ax) / d, (by - ay) / d
-            found += [(ax + ux * forward - s * uy * aside, ay + uy * forward + s * ux * aside) for s in (1.0, -1.0)]
-    return np.array(found).reshape(-1, 2)
+            candidates += [
+                (ax + ux * forward - s * uy * sideways, ay + uy * forward + s * ux * sideways) for s in (1.0, -1.0)
+            ]
+    return np.array(candidates).reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""Translation between the engine's view of a table, contacts and positions, and that of the rules, events and spots.
+"""Conversion between contacts and positions of the engine, and events and spots of the rules.
 
 `shot_events` converts the contacts of a shot to events by name. `situation_of` returns the balls that touch the cue
 ball, and whether it is snookered. `respot_moves` and `rerack_moves` return the positions of respotted and reracked
@@ -27,7 +27,7 @@ def situation_of(
     """Return the situation of the player to shoot.
 
     Args:
-        cues: the cue ball; for a ball in hand, the cue ball at each allowed place.
+        cues: the cue ball; for a ball in hand, the cue ball at each allowed position.
         others: the object balls on the table.
         targets: names of the balls on.
         placed: whether the cue ball is in hand, so that it touches no ball.
@@ -38,35 +38,35 @@ def situation_of(
     free = {name: disc for name, disc in others.items() if name not in targets}
     against: tuple[str, ...] = ()
     by: tuple[str, ...] = ()
-    looks = 0
+    count = 0
     for cue in cues:
-        looks += 1
+        count += 1
         against = () if placed else touching_balls(cue, others)
-        found = [_hidden(cue, others[name], free) for name in others if name in targets]
-        if not found or any(way is None for way in found) or not targets.isdisjoint(against):
+        blockers = [_blocking_ball(cue, others[name], free) for name in others if name in targets]
+        if not blockers or any(name is None for name in blockers) or not targets.isdisjoint(against):
             return Situation(against)
-        names = {way for way in found if way is not None}
+        names = {name for name in blockers if name is not None}
         by = tuple(names) if len(names) == 1 else ()
-    return Situation(against, looks > 0, by if looks == 1 else ())
+    return Situation(against, count > 0, by if count == 1 else ())
 
 
-def _hidden(cue: PlacedDisc, target: PlacedDisc, others: dict[str, PlacedDisc]) -> str | None:
+def _blocking_ball(cue: PlacedDisc, target: PlacedDisc, others: dict[str, PlacedDisc]) -> str | None:
     """Return the nearest ball that blocks the path to an edge of a target; None if both edges can be hit."""
-    in_way = {}
+    distances = {}
     for edge in _edges(cue, target):
         for name, disc in others.items():
-            if _beside((cue[0], cue[1]), edge, (disc[0], disc[1])) < cue[2] + disc[2]:
-                in_way[name] = math.hypot(disc[0] - cue[0], disc[1] - cue[1])
-    return min(in_way, key=lambda name: in_way[name]) if in_way else None
+            if _segment_distance((cue[0], cue[1]), edge, (disc[0], disc[1])) < cue[2] + disc[2]:
+                distances[name] = math.hypot(disc[0] - cue[0], disc[1] - cue[1])
+    return min(distances, key=lambda name: distances[name]) if distances else None
 
 
 def _edges(cue: PlacedDisc, target: PlacedDisc) -> tuple[Point, Point]:
     """Return the centres of the cue ball as it just touches each edge of a target, m."""
-    dx, dy, reach = target[0] - cue[0], target[1] - cue[1], cue[2] + target[2]
-    far = math.hypot(dx, dy)
-    reach = min(reach, far)
-    forward = math.sqrt(far * far - reach * reach)
-    turn, heading = math.asin(reach / far) if far else 0.0, math.atan2(dy, dx)
+    dx, dy, contact_distance = target[0] - cue[0], target[1] - cue[1], cue[2] + target[2]
+    distance = math.hypot(dx, dy)
+    contact_distance = min(contact_distance, distance)
+    forward = math.sqrt(distance * distance - contact_distance * contact_distance)
+    turn, heading = math.asin(contact_distance / distance) if distance else 0.0, math.atan2(dy, dx)
     left, right = heading + turn, heading - turn
     return (
         (cue[0] + forward * math.cos(left), cue[1] + forward * math.sin(left)),
@@ -74,7 +74,7 @@ def _edges(cue: PlacedDisc, target: PlacedDisc) -> tuple[Point, Point]:
     )
 
 
-def _beside(begin: Point, end: Point, point: Point) -> float:
+def _segment_distance(begin: Point, end: Point, point: Point) -> float:
     """Return the distance of a point from a line segment, m."""
     dx, dy = end[0] - begin[0], end[1] - begin[1]
     px, py = point[0] - begin[0], point[1] - begin[1]
@@ -105,30 +105,30 @@ def respotted_position(layout: TableGeometry, respot: Respot, radius: float, oth
         if all(math.hypot(spot[0] - x, spot[1] - y) >= radius + r for x, y, r in others):
             return spot
     (x, y), (ux, uy) = spots[0], layout.along
-    for way in (1.0, -1.0):
-        far = _distance_to_room(spots[0], (way * ux, way * uy), radius, others)
-        place = (x + way * ux * far, y + way * uy * far)
+    for sign in (1.0, -1.0):
+        distance = _distance_to_room(spots[0], (sign * ux, sign * uy), radius, others)
+        position = (x + sign * ux * distance, y + sign * uy * distance)
         (x0, y0), (x1, y1) = layout.area
-        if x0 + radius <= place[0] <= x1 - radius and y0 + radius <= place[1] <= y1 - radius:
-            return place
+        if x0 + radius <= position[0] <= x1 - radius and y0 + radius <= position[1] <= y1 - radius:
+            return position
     raise GameError(f"there is no room to spot the {respot.ball}")
 
 
-def _distance_to_room(spot: Point, way: Point, radius: float, others: Sequence[PlacedDisc]) -> float:
+def _distance_to_room(spot: Point, direction: Point, radius: float, others: Sequence[PlacedDisc]) -> float:
     """Return the distance from a spot to the first free point in a direction, m."""
-    taken = []
+    blocked = []
     for x, y, r in others:
-        forward = (x - spot[0]) * way[0] + (y - spot[1]) * way[1]
-        aside = (x - spot[0]) * way[1] - (y - spot[1]) * way[0]
-        reach = radius + r + HAIR
-        if abs(aside) < reach:
-            half = math.sqrt(reach * reach - aside * aside)
-            taken.append((forward - half, forward + half))
-    far = 0.0
-    for low, high in sorted(taken):
-        if low < far < high:
-            far = high
-    return far
+        forward = (x - spot[0]) * direction[0] + (y - spot[1]) * direction[1]
+        sideways = (x - spot[0]) * direction[1] - (y - spot[1]) * direction[0]
+        contact_distance = radius + r + HAIR
+        if abs(sideways) < contact_distance:
+            half = math.sqrt(contact_distance * contact_distance - sideways * sideways)
+            blocked.append((forward - half, forward + half))
+    distance = 0.0
+    for low, high in sorted(blocked):
+        if low < distance < high:
+            distance = high
+    return distance
 
 
 SIMULTANEOUS = 5e-3
@@ -151,21 +151,23 @@ def shot_events(
         against: pairs that touch before the shot, from `touching_pairs`; they count only after a separation (WPA 8.4).
         cue: name of the ball that was struck.
     """
-    names, fixed, solid = layout.names, layout.scene.fixed_names, len(layout.scene.fixed)
+    names, fixed, static_count = layout.names, layout.scene.fixed_names, len(layout.scene.fixed)
     frozen = any(b < 0 for _, b in against)
-    moved = _set_in_motion(contacts, began, against, None if cue is None else layout.number[cue]) if frozen else {}
-    found = []
+    motion_times = (
+        _set_in_motion(contacts, began, against, None if cue is None else layout.number[cue]) if frozen else {}
+    )
+    events = []
     for time, (a, b) in zip(contacts.time.tolist(), contacts.pair.tolist(), strict=True):
         since = time - began
         if since < 0.0:
             continue
-        if (a, b) in against and since <= SIMULTANEOUS + (0.0 if b >= 0 else moved.get(a, math.inf)):
+        if (a, b) in against and since <= SIMULTANEOUS + (0.0 if b >= 0 else motion_times.get(a, math.inf)):
             continue
         if b >= 0:
-            found.append(BallEvent(since, names[a], "ball", names[b]))
+            events.append(BallEvent(since, names[a], "ball", names[b]))
         else:
-            found.append(BallEvent(since, names[a], "cushion" if -1 - b < solid else "pocket", fixed[-1 - b]))
-    return tuple(found)
+            events.append(BallEvent(since, names[a], "cushion" if -1 - b < static_count else "pocket", fixed[-1 - b]))
+    return tuple(events)
 
 
 def _set_in_motion(
@@ -177,12 +179,12 @@ def _set_in_motion(
         if b >= 0:
             joined = group.get(a, {a}) | group.get(b, {b})
             group.update(dict.fromkeys(joined, joined))
-    moved = {} if cue is None else dict.fromkeys(group.get(cue, {cue}), 0.0)
+    motion_times = {} if cue is None else dict.fromkeys(group.get(cue, {cue}), 0.0)
     for time, (a, b) in zip(contacts.time.tolist(), contacts.pair.tolist(), strict=True):
         if b >= 0 and time >= began and (a, b) not in against:
             for ball in group.get(a, {a}) | group.get(b, {b}):
-                moved[ball] = min(moved.get(ball, math.inf), time - began)
-    return moved
+                motion_times[ball] = min(motion_times.get(ball, math.inf), time - began)
+    return motion_times
 
 
 def touching_pairs(layout: TableGeometry, position: tuple[Point, ...]) -> frozenset[tuple[int, int]]:
@@ -201,8 +203,8 @@ def touching_pairs(layout: TableGeometry, position: tuple[Point, ...]) -> frozen
     return frozenset(found)
 
 
-ASIDE = 1.0
-"""m from the corner of the playing area to the first place where balls are parked during a move"""
+PARK_DISTANCE = 1.0
+"""m from the corner of the playing area to the first position where balls are parked during a move"""
 
 
 def rerack_moves(layout: TableGeometry, rules: Ruleset[Any], state: RulesState) -> tuple[Point, ...]:
@@ -219,7 +221,7 @@ def rerack_moves(layout: TableGeometry, rules: Ruleset[Any], state: RulesState) 
 
 
 def respot_moves(
-    layout: TableGeometry, respots: Sequence[Respot], position: tuple[Point, ...], here: Iterable[int]
+    layout: TableGeometry, respots: Sequence[Respot], position: tuple[Point, ...], on_table: Iterable[int]
 ) -> tuple[Point, ...]:
     """Return the positions after some balls are respotted, one after the other, m.
 
@@ -227,19 +229,19 @@ def respot_moves(
         layout: geometry of the table.
         respots: the balls and their spots, in order.
         position: positions before, m.
-        here: indices of the balls on the table, which block spots unless they are in a pocket.
+        on_table: indices of the balls on the table, which block spots unless they are in a pocket.
 
     Raises:
         GameError: there is no room.
     """
-    places, lifted = list(position), {layout.number[each.ball] for each in respots}
-    lying = {k for k in here if k not in lifted and layout.pocket_at(places[k]) is None}
+    positions, respotted = list(position), {layout.number[each.ball] for each in respots}
+    blocking = {k for k in on_table if k not in respotted and layout.pocket_at(positions[k]) is None}
     for each in respots:
-        number = layout.number[each.ball]
-        others = [(*places[k], layout.radius[k]) for k in sorted(lying)]
-        places[number] = respotted_position(layout, each, layout.radius[number], others)
-        lying.add(number)
-    return tuple(places)
+        ball = layout.number[each.ball]
+        others = [(*positions[k], layout.radius[k]) for k in sorted(blocking)]
+        positions[ball] = respotted_position(layout, each, layout.radius[ball], others)
+        blocking.add(ball)
+    return tuple(positions)
 
 
 def collision_free_moves(layout: TableGeometry, now: Sequence[Point], then: Sequence[Point]) -> list[tuple[int, Point]]:
@@ -247,31 +249,31 @@ def collision_free_moves(layout: TableGeometry, now: Sequence[Point], then: Sequ
 
     No ball is moved onto another. If balls block each other in a cycle, one of them is parked beside the table.
     """
-    at, left, found = list(now), [k for k in range(len(now)) if now[k] != then[k]], list[tuple[int, Point]]()
+    at, remaining, moves = list(now), [k for k in range(len(now)) if now[k] != then[k]], list[tuple[int, Point]]()
     (x0, y0), _ = layout.area
-    while left:
+    while remaining:
         # Only balls that are still to be moved can block; the final positions are free by assumption.
-        ready = next((k for k in left if _are_places_free(layout, k, then[k], at, left)), None)
-        number = left[0] if ready is None else ready
-        far = 4.0 * layout.radius[number] * (number + 1) + ASIDE
-        place = (x0 - far, y0 - far) if ready is None else then[number]
-        at[number] = place
-        found.append((number, place))
-        left.remove(number)
+        ready = next((k for k in remaining if _is_position_free(layout, k, then[k], at, remaining)), None)
+        ball = remaining[0] if ready is None else ready
+        offset = 4.0 * layout.radius[ball] * (ball + 1) + PARK_DISTANCE
+        destination = (x0 - offset, y0 - offset) if ready is None else then[ball]
+        at[ball] = destination
+        moves.append((ball, destination))
+        remaining.remove(ball)
         if ready is None:
-            left.append(number)
-    return found
+            remaining.append(ball)
+    return moves
 
 
-def _are_places_free(
-    layout: TableGeometry, number: int, place: Point, at: Sequence[Point], others: Sequence[int]
+def _is_position_free(
+    layout: TableGeometry, ball: int, position: Point, at: Sequence[Point], others: Sequence[int]
 ) -> bool:
-    """Return whether a ball can be moved to a place without overlap; balls in pockets do not overlap."""
-    if layout.pocket_at(place) is not None:
+    """Return whether a ball can be moved to a position without overlap; balls in pockets do not overlap."""
+    if layout.pocket_at(position) is not None:
         return True
     radius = layout.radius
     return all(
-        math.dist(place, at[k]) >= radius[number] + radius[k] or layout.pocket_at(at[k]) is not None
+        math.dist(position, at[k]) >= radius[ball] + radius[k] or layout.pocket_at(at[k]) is not None
         for k in others
-        if k != number
+        if k != ball
     )

@@ -57,16 +57,19 @@ def faults_of(scene: Scene) -> Iterator[tuple[Location, str]]:
     if missing and billiards.table is None:
         yield (
             ("billiards", key),
-            f"{rack} needs spots to place its balls; add a `table`, or a [[play.spot]] for {_and(missing)}",
+            f"{rack} needs spots to place its balls; add a `table`, or a [[play.spot]] for {_quoted_list(missing)}",
         )
     elif missing:
-        yield ("billiards", key), f"{rack} cannot be racked on {billiards.table}, which has no spots {_and(missing)}"
+        yield (
+            ("billiards", key),
+            f"{rack} cannot be racked on {billiards.table}, which has no spots {_quoted_list(missing)}",
+        )
     elif rack in ("8-ball", "9-ball", "carom") and math.dist(spots["head"], spots["foot"]) < 1e-9:
         yield ("billiards", key), "the spots 'head' and 'foot' are at the same point; the rack needs a direction"
-    known = _set(billiards).colours
+    known = _ball_set(billiards).colours
     for name in billiards.place:
         if name not in known:
-            yield ("billiards", "place", name), f"is not a ball of the set; balls: {_and(list(known))}"
+            yield ("billiards", "place", name), f"is not a ball of the set; balls: {_quoted_list(list(known))}"
 
 
 def expanded(scene: Scene) -> Scene:
@@ -77,7 +80,7 @@ def expanded(scene: Scene) -> Scene:
     billiards = table_of(scene, Billiards)
     if billiards is None:
         return scene
-    balls, rack, spots = _set(billiards), _rack(billiards), _spots(scene, billiards)
+    balls, rack, spots = _ball_set(billiards), _rack(billiards), _spots(scene, billiards)
     radius = balls.radius if billiards.ball_radius is None else billiards.ball_radius
     floor = {
         "sliding_friction": balls.sliding,
@@ -114,12 +117,12 @@ def _balls(
     """Return the balls on the table, in the order of their set."""
     from sandbox.games.billiards.tables import rack_positions  # imports numpy, which the JSON schema must not
 
-    places = {**rack_positions(rack, spots, radius, billiards.gap, seed), **billiards.place}
+    positions = {**rack_positions(rack, spots, radius, billiards.gap, seed), **billiards.place}
     mass = balls.mass if billiards.ball_mass is None else billiards.ball_mass
     return [
-        Ball(name=name, position=places[name], radius=radius, mass=mass, material=BALL, colour=colour)
+        Ball(name=name, position=positions[name], radius=radius, mass=mass, material=BALL, colour=colour)
         for name, colour in balls.colours.items()
-        if name in places
+        if name in positions
     ]
 
 
@@ -127,7 +130,7 @@ def _rack(billiards: Billiards) -> RackName:
     return RACKS[billiards.game] if billiards.rack is None else billiards.rack
 
 
-def _set(billiards: Billiards) -> BallSet:
+def _ball_set(billiards: Billiards) -> BallSet:
     """Return the ball set of the rack, else of the table, else of pool."""
     name = RACK_BALLS.get(_rack(billiards))
     if name is None:
@@ -137,9 +140,9 @@ def _set(billiards: Billiards) -> BallSet:
 
 def _spots(scene: Scene, billiards: Billiards) -> dict[str, Point]:
     """Return the spots of the scene and of its table, by name; those of the scene take precedence."""
-    own = {spot.name: spot.position for spot in scene.play.spots}
-    more = {} if billiards.table is None else TABLES[billiards.table].spots
-    return own | {name: at for name, at in more.items() if name not in own}
+    scene_spots = {spot.name: spot.position for spot in scene.play.spots}
+    table_spots = {} if billiards.table is None else TABLES[billiards.table].spots
+    return scene_spots | {name: at for name, at in table_spots.items() if name not in scene_spots}
 
 
 def _pairs(billiards: Billiards) -> tuple[Pair, ...]:
@@ -149,7 +152,7 @@ def _pairs(billiards: Billiards) -> tuple[Pair, ...]:
     )
 
 
-def _and(names: list[str]) -> str:
+def _quoted_list(names: list[str]) -> str:
     return ", ".join(map(repr, names))
 
 

@@ -24,10 +24,10 @@ from sandbox.games.billiards.rules.base import BallEvent, ShotCall, balls_touche
 from sandbox.games.billiards.table_geometry import TableGeometry
 from sandbox.scene.description.surface import Stroke
 
-THINNEST = 0.2
+MIN_CUT_COSINE = 0.2
 """cosine of the thinnest candidate cut, 78°"""
 
-GRAZE = 0.98
+BLOCKING_FRACTION = 0.98
 """fraction of two radii: a ball that is closer to a path blocks it. Less than 1, because the estimate neglects jaws and
 throw and should not rule out a shot for a grazing contact"""
 
@@ -46,13 +46,13 @@ class PotOptions:
 
 def mouths(layout: TableGeometry, radius: float) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return aiming points in the mouths of P pockets, (P, 2) m, unit vectors into them, (P, 2), and radii, (P,) m."""
-    holes = np.array(list(layout.pockets.values()), dtype=float).reshape(-1, 3)
+    pockets = np.array(list(layout.pockets.values()), dtype=float).reshape(-1, 3)
     (x0, y0), (x1, y1) = layout.area
     inset = 0.7 * radius
-    points = np.clip(holes[:, :2], (x0 + inset, y0 + inset), (x1 - inset, y1 - inset))
-    inward = holes[:, :2] - points
+    points = np.clip(pockets[:, :2], (x0 + inset, y0 + inset), (x1 - inset, y1 - inset))
+    inward = pockets[:, :2] - points
     size = np.hypot(*inward.T)[:, None]
-    return points, inward / np.maximum(size, 1e-12), holes[:, 2]
+    return points, inward / np.maximum(size, 1e-12), pockets[:, 2]
 
 
 def pot_options(
@@ -70,35 +70,35 @@ def pot_options(
     """
     points, inward, width = mouths(layout, radius)
     to_mouth = points[None] - targets[:, None]
-    far = np.maximum(np.hypot(to_mouth[..., 0], to_mouth[..., 1]), 1e-9)
-    heading = to_mouth / far[..., None]
+    mouth_distance = np.maximum(np.hypot(to_mouth[..., 0], to_mouth[..., 1]), 1e-9)
+    heading = to_mouth / mouth_distance[..., None]
     ghost = targets[:, None] - 2.0 * radius * heading
     to_ghost = ghost - cue
     distance = np.maximum(np.hypot(to_ghost[..., 0], to_ghost[..., 1]), 1e-9)
     cut = np.einsum("tpc,tpc->tp", to_ghost / distance[..., None], heading)
     enters = np.einsum("tpc,pc->tp", heading, inward)
     opening = np.maximum(width * np.maximum(enters, 0.0) - radius, 0.0)
-    margin = opening / far * 2.0 * radius * np.maximum(cut, 0.0) / distance
+    margin = opening / mouth_distance * 2.0 * radius * np.maximum(cut, 0.0) / distance
     chance = _erf(margin / (math.sqrt(2.0) * sigma))
     (x0, y0), (x1, y1) = layout.area
     inside = (ghost[..., 0] > x0 + 0.9 * radius) & (ghost[..., 0] < x1 - 0.9 * radius)
     inside &= (ghost[..., 1] > y0 + 0.9 * radius) & (ghost[..., 1] < y1 - 0.9 * radius)
-    open_ = inside & (cut > THINNEST) & (opening > 0.0)
-    for t, p in np.argwhere(open_):
+    is_open = inside & (cut > MIN_CUT_COSINE) & (opening > 0.0)
+    for t, p in np.argwhere(is_open):
         itself = np.hypot(*(others - targets[t]).T) < 1e-9
         rest = others[~itself]
         if _blocked(cue, ghost[t, p], rest, radius) or _blocked(targets[t], points[p], rest, radius):
-            open_[t, p] = False
-    return PotOptions(ghost, np.where(open_, chance, 0.0), distance)
+            is_open[t, p] = False
+    return PotOptions(ghost, np.where(is_open, chance, 0.0), distance)
 
 
 def _blocked(begin: FloatArray, end: FloatArray, others: FloatArray, radius: float) -> bool:
     """Return whether a ball blocks the straight path of another, from `begin` to `end`."""
-    path, apart = end - begin, others - begin
-    fraction = np.clip(apart @ path / max(float(path @ path), 1e-18), 0.0, 1.0)
-    away = apart - fraction[:, None] * path
-    near: BoolArray = np.einsum("kc,kc->k", away, away) < (2.0 * GRAZE * radius) ** 2
-    return bool(near.any())
+    path, offset = end - begin, others - begin
+    fraction = np.clip(offset @ path / max(float(path @ path), 1e-18), 0.0, 1.0)
+    normal_offset = offset - fraction[:, None] * path
+    is_near: BoolArray = np.einsum("kc,kc->k", normal_offset, normal_offset) < (2.0 * BLOCKING_FRACTION * radius) ** 2
+    return bool(is_near.any())
 
 
 def _erf(x: FloatArray) -> FloatArray:
@@ -106,7 +106,7 @@ def _erf(x: FloatArray) -> FloatArray:
     return np.asarray(1.0 - (1.0 + 0.278393 * x + 0.230389 * x**2 + 0.000972 * x**3 + 0.078108 * x**4) ** -4)
 
 
-IN_HAND = 0.9
+IN_HAND_CHANCE = 0.9
 """assumed probability of a pot with the ball in hand"""
 
 
@@ -147,32 +147,32 @@ class ShotEvaluator:
             call = fitting_call(match, match.events(contacts))
         return match.played(contacts, outcome.position, call), call
 
-    def value_of(self, made: tuple[Match, ShotCall] | None) -> float:
+    def value_of(self, outcome: tuple[Match, ShotCall] | None) -> float:
         """Return the value of an outcome for the player: ±1.5 for a won or lost frame, −1 if it could not be computed.
 
         Other outcomes have a value of −0.7 to 0.8 by the ease of the next shot, plus the value of the points, `UNIT`.
         """
-        if made is None:
+        if outcome is None:
             return -1.0
-        me, after = self.match.turn, made[0]
+        player, after = self.match.turn, outcome[0]
         if after.over:
-            return 0.0 if after.state.winner is None else (1.5 if after.state.winner == me else -1.5)
+            return 0.0 if after.state.winner is None else (1.5 if after.state.winner == player else -1.5)
         gained = 0.0
         if after.verdict is not None and after.verdict.points:
-            gained = sum(p if each == me else -p for each, p in enumerate(after.verdict.points))
-        points = UNIT.get(after.rules.name, 0.0) * gained
-        again = after.turn == me
-        return points + (0.3 + 0.5 * ease(after, self.sigma) if again else -0.1 - 0.6 * ease(after, self.sigma))
+            gained = sum(p if each == player else -p for each, p in enumerate(after.verdict.points))
+        points = POINT_VALUES.get(after.rules.name, 0.0) * gained
+        keeps_turn = after.turn == player
+        return points + (0.3 + 0.5 * ease(after, self.sigma) if keeps_turn else -0.1 - 0.6 * ease(after, self.sigma))
 
 
-UNIT = {"snooker": 0.04, "three-cushion": 0.5, "straight-rail": 0.4, "free": 0.1}
+POINT_VALUES = {"snooker": 0.04, "three-cushion": 0.5, "straight-rail": 0.4, "free": 0.1}
 """value of a point, by game; points of other games are ignored"""
 
 
 def ease(match: Match, sigma: float) -> float:
     """Return the probability of the player's best straight shot, 0 to 1; in carom an estimate by distances."""
     if match.state.in_hand is not None:
-        return IN_HAND
+        return IN_HAND_CHANCE
     cue, targets, others = standing(match)
     if not len(targets):
         return 0.0
@@ -223,50 +223,50 @@ SPEEDS = (1.2, 2.0, 3.2)
 HEIGHTS = (-0.3, 0.0, 0.3)
 """offset of the tip above the centre, in radii, of candidate pots: draw, stun, follow"""
 
-THROWS = 7
+THROW_AIMS = 7
 """number of candidate aims on either side of the ghost ball; throw and spin turn the path of the object ball"""
 
-ASIDE = 0.12
+THROW_RANGE = 0.12
 """rad: range of these aims on either side, as a change of the direction of the object ball"""
 
 COMBINATIONS = 5
 """number of pairs of a ball and a pocket that are simulated"""
 
 
-def pot_candidates(trial: ShotEvaluator, most: int = COMBINATIONS) -> list[Stroke]:
+def pot_candidates(evaluator: ShotEvaluator, max_pairs: int = COMBINATIONS) -> list[Stroke]:
     """Return strokes that pot a ball on: for each speed and height, the middle of the aims that succeed.
 
     A fan of aims is simulated for each of the `most` likeliest pairs of a ball and a pocket by geometry.
     """
-    match, shots = trial.match, straight(trial.match, trial.sigma)
-    order = np.argsort(-shots.chance, axis=None, kind="stable")[:most]
+    match, shots = evaluator.match, straight(evaluator.match, evaluator.sigma)
+    order = np.argsort(-shots.chance, axis=None, kind="stable")[:max_pairs]
     on = [ball for ball in match.state.table if ball in match.targets and ball != match.cue]
-    holes, found = list(match.layout.pockets), []
+    pocket_names, found = list(match.layout.pockets), []
     speeds_and_heights = list(product(SPEEDS, HEIGHTS))
     for t, p in zip(*np.unravel_index(order, shots.chance.shape), strict=True):
         if shots.chance[t, p] <= 0.0:
             continue
-        to_ghost = shots.ghost[t, p] - trial.place
-        ahead = math.atan2(to_ghost[1], to_ghost[0])
-        reach = ASIDE * 2.0 * trial.radius / float(shots.distance[t, p])
-        turns = (ahead + np.linspace(-reach, reach, 2 * THROWS + 1)).tolist()
+        to_ghost = shots.ghost[t, p] - evaluator.place
+        bearing = math.atan2(to_ghost[1], to_ghost[0])
+        reach = THROW_RANGE * 2.0 * evaluator.radius / float(shots.distance[t, p])
+        turns = (bearing + np.linspace(-reach, reach, 2 * THROW_AIMS + 1)).tolist()
         strokes = [Stroke(aim=aim, speed=speed, height=height) for speed, height in speeds_and_heights for aim in turns]
-        fan = trial.table.fan(strokes, match.cue)
+        fan = evaluator.table.fan(strokes, match.cue)
         ball, cue = match.layout.number[on[t]], match.layout.number[match.cue]
-        hole = list(match.layout.pockets).index(holes[p])
-        made = (fan.pocket[:, ball] == hole) & (fan.pocket[:, cue] < 0)
+        hole = list(match.layout.pockets).index(pocket_names[p])
+        potted = (fan.pocket[:, ball] == hole) & (fan.pocket[:, cue] < 0)
         for k in range(len(speeds_and_heights)):
-            row = made[k * len(turns) : (k + 1) * len(turns)].tolist()
-            middle = _middle(row)
+            successes = potted[k * len(turns) : (k + 1) * len(turns)].tolist()
+            middle = _middle(successes)
             if middle is not None:
                 found.append(strokes[k * len(turns) + middle])
     return found
 
 
-def _middle(row: Sequence[bool]) -> int | None:
+def _middle(successes: Sequence[bool]) -> int | None:
     """Return the middle index of the longest run of true values."""
     best, begin, length = None, 0, 0
-    for k, each in enumerate([*row, False]):
+    for k, each in enumerate([*successes, False]):
         if each:
             continue
         if k - begin > length:
@@ -276,25 +276,25 @@ def _middle(row: Sequence[bool]) -> int | None:
 
 
 def directions_all_around(
-    trial: ShotEvaluator, count: int, speeds: Sequence[float], sides: Sequence[float] = (0.0,)
+    evaluator: ShotEvaluator, count: int, speeds: Sequence[float], sides: Sequence[float] = (0.0,)
 ) -> Iterator[Stroke]:
     """Yield strokes in all directions, most densely towards the nearest balls: kicks, banks, caroms, safeties."""
-    cue, targets, others = standing(trial.match)
+    cue, targets, others = standing(evaluator.match)
     aims = list(np.linspace(-math.pi, math.pi, count, endpoint=False))
-    balls = targets if trial.match.layout.pockets else others
+    balls = targets if evaluator.match.layout.pockets else others
     if len(balls):
-        near = balls[np.argsort(np.hypot(*(balls - cue).T), kind="stable")][:6]
-        for x, y in near - cue:
-            half = math.asin(min(1.0, 2.0 * trial.radius / math.hypot(x, y)))
+        nearest = balls[np.argsort(np.hypot(*(balls - cue).T), kind="stable")][:6]
+        for x, y in nearest - cue:
+            half = math.asin(min(1.0, 2.0 * evaluator.radius / math.hypot(x, y)))
             aims += list(math.atan2(y, x) + 0.97 * half * np.linspace(-1.0, 1.0, max(count // 6, 5)))
     for speed, side, aim in product(speeds, sides, aims):
         yield Stroke(aim=float(aim), speed=speed, side=side)
 
 
-def break_candidates(trial: ShotEvaluator) -> Iterator[Stroke]:
+def break_candidates(evaluator: ShotEvaluator) -> Iterator[Stroke]:
     """Yield opening strokes of pool: hard, at or near the centre of the nearest ball."""
-    cue, targets, _ = standing(trial.match)
+    cue, targets, _ = standing(evaluator.match)
     x, y = targets[np.argmin(np.hypot(*(targets - cue).T))] - cue
-    half = 2.0 * trial.radius / math.hypot(x, y)
+    half = 2.0 * evaluator.radius / math.hypot(x, y)
     for speed, part in product((7.5, 9.0), (-0.6, -0.3, -0.1, -0.03, 0.0, 0.03, 0.1, 0.3, 0.6)):
         yield Stroke(aim=math.atan2(y, x) + part * half, speed=speed, height=0.05)

@@ -122,13 +122,13 @@ class TableGeometry:
         """Return the distance of (M, 2) points from the nearest fixed object, (M,) m; negative outside the area."""
         (x0, y0), (x1, y1) = self.area
         x, y = points[:, 0], points[:, 1]
-        least = np.minimum(np.minimum(x - x0, x1 - x), np.minimum(y - y0, y1 - y))
-        for apart in (self.from_planes(points), self.from_segments(points)):
-            if apart.shape[1]:
-                least = np.minimum(least, apart.min(axis=1))
+        clearance = np.minimum(np.minimum(x - x0, x1 - x), np.minimum(y - y0, y1 - y))
+        for distance in (self.from_planes(points), self.from_segments(points)):
+            if distance.shape[1]:
+                clearance = np.minimum(clearance, distance.min(axis=1))
         for px, py, radius in (*self.pockets.values(), *((*post.position, post.radius) for post in self.scene.posts)):
-            least = np.minimum(least, np.hypot(x - px, y - py) - radius)
-        return least
+            clearance = np.minimum(clearance, np.hypot(x - px, y - py) - radius)
+        return clearance
 
     @cached_property
     def segments(self) -> tuple[FloatArray, FloatArray, list[int]]:
@@ -149,8 +149,8 @@ class TableGeometry:
         fraction = np.einsum("mkc,kc->mk", from_a, segment) / np.maximum(
             np.einsum("kc,kc->k", segment, segment), 1e-300
         )
-        apart = from_a - np.clip(fraction, 0.0, 1.0)[..., None] * segment
-        return np.asarray(np.hypot(apart[..., 0], apart[..., 1]) - half)
+        distance = from_a - np.clip(fraction, 0.0, 1.0)[..., None] * segment
+        return np.asarray(np.hypot(distance[..., 0], distance[..., 1]) - half)
 
     def from_planes(self, points: FloatArray) -> FloatArray:
         """Return the distance of (M, 2) points from each plane, (M, K) m."""
@@ -167,11 +167,11 @@ class TableGeometry:
         found += _touching(self.from_segments(points) - radius, self.segments[2])
         begin = len(self.scene.planes) + len(self.scene.walls)
         for k, post in enumerate(self.scene.posts, begin):
-            apart = np.hypot(*(points - post.position).T) - post.radius
-            found += _touching(apart[:, None] - radius, [-1 - k])
+            distance = np.hypot(*(points - post.position).T) - post.radius
+            found += _touching(distance[:, None] - radius, [-1 - k])
         return found
 
 
-def _touching(apart: FloatArray, owner: list[int]) -> list[tuple[int, int]]:
+def _touching(distance: FloatArray, owner: list[int]) -> list[tuple[int, int]]:
     """Return the pairs that touch, from (M, K) distances between bodies and fixed objects."""
-    return [(i, owner[k]) for i, k in np.argwhere(apart <= TOUCH).tolist()]
+    return [(i, owner[k]) for i, k in np.argwhere(distance <= TOUCH).tolist()]

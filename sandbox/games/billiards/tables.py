@@ -152,8 +152,8 @@ def _carom() -> TableSpec:
     """UMB 11: 2.84 × 1.42 m. UMB 13: spots on the long axis, and two spots 182.5 mm to either side of the head spot."""
     width, length = 1.42, 2.84
     spots = _strings(width, length)
-    (x, y), aside = spots["head"], 0.1825
-    return TableSpec(width, length, "carom", {**spots, "head-left": (x - aside, y), "head-right": (x + aside, y)})
+    (x, y), sideways = spots["head"], 0.1825
+    return TableSpec(width, length, "carom", {**spots, "head-left": (x - sideways, y), "head-right": (x + sideways, y)})
 
 
 TABLES: dict[TableName, TableSpec] = {
@@ -313,8 +313,8 @@ def static_colliders(table: TableSpec, nose: float) -> TableColliders:
         return TableColliders(_rectangle(table, nose), (), ())
     walls: list[Wall] = []
     for k, name in enumerate(CUSHIONS):
-        here, there = holes[k], holes[(k + 1) % len(holes)]
-        walls.append(_wall(name, (_nose_end(here, here.lips[1]), _nose_end(there, there.lips[0])), nose))
+        hole, next_hole = holes[k], holes[(k + 1) % len(holes)]
+        walls.append(_wall(name, (_nose_end(hole, hole.lips[1]), _nose_end(next_hole, next_hole.lips[0])), nose))
     posts: list[Post] = []
     for hole in holes:
         for number, lip in enumerate(hole.lips, 1):
@@ -390,10 +390,10 @@ def _facing(hole: PocketHole, lip: PocketLip) -> tuple[Point, Point] | None:
     direction = (ax * cos + ox * sin, ay * cos + oy * sin)
     (x, y), (px, py) = _lip(hole, lip), _centre(hole)
     toward = (px - x) * direction[0] + (py - y) * direction[1]
-    aside = (px - x) * direction[1] - (py - y) * direction[0]
-    length = toward - math.sqrt(hole.opening.radius**2 - aside**2)
-    begins = _rounded(hole.opening)
-    return (_displaced((x, y), direction, begins), _displaced((x, y), direction, length)) if length > begins else None
+    sideways = (px - x) * direction[1] - (py - y) * direction[0]
+    length = toward - math.sqrt(hole.opening.radius**2 - sideways**2)
+    start = _rounded(hole.opening)
+    return (_displaced((x, y), direction, start), _displaced((x, y), direction, length)) if length > start else None
 
 
 def _displaced(point: Point, direction: Vector, distance: float) -> Point:
@@ -403,10 +403,10 @@ def _displaced(point: Point, direction: Vector, distance: float) -> Point:
 HAIR = 1e-10
 """m: gap between racked balls that touch; small enough to count as touching, larger than rounding errors"""
 
-ASIDE = 0.1825
+CUE_BALL_OFFSET = 0.1825
 """m: distance from the head spot to the cue ball at the start of a carom game (UMB 13)"""
 
-BREAK = 0.5
+BREAK_FRACTION = 0.5
 """position of the cue ball for the break-off, as a fraction of the line from brown to yellow"""
 
 
@@ -431,8 +431,8 @@ def rack_positions(rack: RackName, spots: dict[str, Point], radius: float, gap: 
         case "snooker":
             return _snooker_rack(spots, radius, gap, random)
         case "carom":
-            (x, y), along = spots["head"], _way(spots["head"], spots["foot"])
-            white = (x + along[1] * ASIDE, y - along[0] * ASIDE)
+            (x, y), along = spots["head"], _unit_vector(spots["head"], spots["foot"])
+            white = (x + along[1] * CUE_BALL_OFFSET, y - along[0] * CUE_BALL_OFFSET)
             return {"white": white, "yellow": spots["head"], "red": spots["foot"]}
         case "none":
             return {}
@@ -455,37 +455,37 @@ def _nine_ball(random: np.random.Generator) -> list[list[str]]:
 
 def _snooker_rack(spots: dict[str, Point], radius: float, gap: float, random: np.random.Generator) -> dict[str, Point]:
     """WPBSA, position of balls: colours on their spots, reds in a triangle behind the pink, near but not touching."""
-    along = _way(spots["blue"], spots["pink"])
+    along = _unit_vector(spots["blue"], spots["pink"])
     begin = _shifted(spots["pink"], along, 2.0 * radius + max(gap, 1e-3))
     reds = _rows(range(1, 16), (1, 2, 3, 4, 5))
-    places = _lattice([[f"red-{number}" for number in row] for row in reds], begin, along, radius, gap, random)
+    positions = _lattice([[f"red-{number}" for number in row] for row in reds], begin, along, radius, gap, random)
     (bx, by), (yx, yy) = spots["brown"], spots["yellow"]
-    cue = (bx + BREAK * (yx - bx), by + BREAK * (yy - by))
-    return {"cue": cue, **places, **{name: spots[name] for name in RACK_SPOTS["snooker"]}}
+    cue = (bx + BREAK_FRACTION * (yx - bx), by + BREAK_FRACTION * (yy - by))
+    return {"cue": cue, **positions, **{name: spots[name] for name in RACK_SPOTS["snooker"]}}
 
 
 def _pyramid(
     rows: list[list[str]], spots: dict[str, Point], radius: float, gap: float, random: np.random.Generator
 ) -> dict[str, Point]:
-    return _lattice(rows, spots["foot"], _way(spots["head"], spots["foot"]), radius, gap, random)
+    return _lattice(rows, spots["foot"], _unit_vector(spots["head"], spots["foot"]), radius, gap, random)
 
 
 def _lattice(
     rows: list[list[str]], begin: Point, along: Vector, radius: float, gap: float, random: np.random.Generator
 ) -> dict[str, Point]:
     """Return the positions of rows of balls, the first row at `begin`, the others behind it along `along`, m."""
-    pitch, loose = 2.0 * radius + max(0.5 * gap, HAIR), 0.25 * gap
-    places: dict[str, Point] = {}
+    pitch, max_shift = 2.0 * radius + max(0.5 * gap, HAIR), 0.25 * gap
+    positions: dict[str, Point] = {}
     for k, row in enumerate(rows):
         for n, name in enumerate(row):
-            forward, aside = k * pitch * math.sqrt(0.75), (n - 0.5 * (len(row) - 1)) * pitch
-            far, turn = loose * math.sqrt(random.random()), 2.0 * math.pi * random.random()
-            forward, aside = forward + far * math.cos(turn), aside + far * math.sin(turn)
-            places[name] = (
-                begin[0] + along[0] * forward - along[1] * aside,
-                begin[1] + along[1] * forward + along[0] * aside,
+            forward, sideways = k * pitch * math.sqrt(0.75), (n - 0.5 * (len(row) - 1)) * pitch
+            shift, turn = max_shift * math.sqrt(random.random()), 2.0 * math.pi * random.random()
+            forward, sideways = forward + shift * math.cos(turn), sideways + shift * math.sin(turn)
+            positions[name] = (
+                begin[0] + along[0] * forward - along[1] * sideways,
+                begin[1] + along[1] * forward + along[0] * sideways,
             )
-    return places
+    return positions
 
 
 def _rows(order: list[int] | range, sizes: tuple[int, ...]) -> list[list[str]]:
@@ -498,7 +498,7 @@ def _shuffled(numbers: range | tuple[int, ...], random: np.random.Generator) -> 
     return [number for _, number in sorted((float(random.random()), number) for number in numbers)]
 
 
-def _way(begin: Point, end: Point) -> Vector:
+def _unit_vector(begin: Point, end: Point) -> Vector:
     size = math.dist(begin, end)
     return (end[0] - begin[0]) / size, (end[1] - begin[1]) / size
 

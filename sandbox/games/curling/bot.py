@@ -65,27 +65,27 @@ class CurlingBot:
 
     def _take_out(self, stones: Stones) -> Delivery | None:
         """Return a delivery that takes out the opponent's best stone with a free path to it; None without one."""
-        theirs = [place for team, place in stones if team != self._team and in_house(place)]
-        for target in sorted(theirs, key=lambda place: math.hypot(*place)):
+        theirs = [position for team, position in stones if team != self._team and in_house(position)]
+        for target in sorted(theirs, key=lambda position: math.hypot(*position)):
             speed = self._ice.speed_for(math.dist(target, (RELEASE, 0.0)) + TAKE_OUT_DISTANCE)
             for turn in (1, -1):
-                way = self._ice.through(target, turn, speed)
-                if self._clearance(way, stones, target) > MIN_CLEARANCE:
-                    return way
+                delivery = self._ice.through(target, turn, speed)
+                if self._clearance(delivery, stones, target) > MIN_CLEARANCE:
+                    return delivery
         return None
 
     def _draw_to(self, target: Point, stones: Stones) -> Delivery:
         """Return the delivery to a target with the larger clearance."""
-        ways = [self._ice.to_rest(target, turn) for turn in (1, -1)]
-        return max(ways, key=lambda way: min(self._clearance(way, stones, None), MIN_CLEARANCE))
+        deliveries = [self._ice.to_rest(target, turn) for turn in (1, -1)]
+        return max(deliveries, key=lambda delivery: min(self._clearance(delivery, stones, None), MIN_CLEARANCE))
 
-    def _clearance(self, way: Delivery, stones: Stones, target: Point | None) -> float:
+    def _clearance(self, delivery: Delivery, stones: Stones, target: Point | None) -> float:
         """Return the clearance, m, between the path of a stone and the other stones; with a target, only up to it."""
-        others = np.asarray([complex(*place) for _, place in stones if place != target])
+        others = np.asarray([complex(*position) for _, position in stones if position != target])
         if not len(others):
             return math.inf
-        shares = np.linspace(1.0, 0.0, PATH_POINTS)
-        places = np.asarray([RELEASE + self._ice.way(way, fraction) for fraction in shares.tolist()])
+        fractions = np.linspace(1.0, 0.0, PATH_POINTS)
+        path = np.asarray([RELEASE + self._ice.way(delivery, fraction) for fraction in fractions.tolist()])
         if target is not None:
-            places = places[places.real < target[0] - 2.0 * STONE]
-        return float(np.abs(places[:, None] - others).min(initial=math.inf)) - 2.0 * STONE
+            path = path[path.real < target[0] - 2.0 * STONE]
+        return float(np.abs(path[:, None] - others).min(initial=math.inf)) - 2.0 * STONE

@@ -70,28 +70,28 @@ class Ice(NamedTuple):
 
     def to_rest(self, target: Point, turn: int) -> Delivery:
         """Return the delivery of a stone that comes to rest at a position, m."""
-        far = complex(target[0] - RELEASE, target[1])
-        speed = self.speed_for(abs(far))
-        return self._turned(Delivery(speed, 0.0, turn), far, 0.0)
+        target_offset = complex(target[0] - RELEASE, target[1])
+        speed = self.speed_for(abs(target_offset))
+        return self._with_heading(Delivery(speed, 0.0, turn), target_offset, 0.0)
 
     def through(self, target: Point, turn: int, speed: float) -> Delivery:
         """Return the delivery with a speed, m/s, that passes a position, m; if it is too slow, as `to_rest`."""
-        far = complex(target[0] - RELEASE, target[1])
+        target_offset = complex(target[0] - RELEASE, target[1])
         straight = Delivery(speed, 0.0, turn)
-        if abs(self.way(straight, 0.0)) <= abs(far):
+        if abs(self.way(straight, 0.0)) <= abs(target_offset):
             return self.to_rest(target, turn)
         low, high = 0.0, 1.0  # the distance increases as the fraction decreases
         while high - low > FRACTION_TOLERANCE:
             middle = 0.5 * (low + high)
-            if abs(self.way(straight, middle)) > abs(far):
+            if abs(self.way(straight, middle)) > abs(target_offset):
                 low = middle
             else:
                 high = middle
-        return self._turned(straight, far, high)
+        return self._with_heading(straight, target_offset, high)
 
-    def _turned(self, delivery: Delivery, far: complex, fraction: float) -> Delivery:
-        """Return a delivery with the heading that leads in the direction of `far`, at a fraction of the speed."""
-        way = self.way(delivery, fraction)
+    def _with_heading(self, delivery: Delivery, target_offset: complex, fraction: float) -> Delivery:
+        """Return a delivery with the heading that leads in the direction of a target, at a fraction of the speed."""
+        displacement = self.way(delivery, fraction)
         # not `cmath.phase`, which raises where an angle is too small for a float
-        heading = math.atan2(far.imag, far.real) - math.atan2(way.imag, way.real)
+        heading = math.atan2(target_offset.imag, target_offset.real) - math.atan2(displacement.imag, displacement.real)
         return delivery._replace(heading=heading)

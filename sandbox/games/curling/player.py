@@ -8,11 +8,11 @@ from sandbox.games.curling.rules import HARDER, SIDEWAYS, Curling, CurlingAim, b
 from sandbox.games.curling.sheet import RELEASE, TEAMS
 
 MAX_ERROR = 5.0
-"""error of the deliveries without any skill, in units of `CurlingBot`"""
+"""error of the deliveries at skill 0, in units of `CurlingBot`"""
 
 
 class CurlingPlayer:
-    """Policy that delivers the stones of all persons."""
+    """Policy that delivers the stones of all teams that a person plays."""
 
     def __init__(self, seed: int, skill: float = 0.8) -> None:
         """Create a policy.
@@ -27,7 +27,7 @@ class CurlingPlayer:
         self._seed, self._error = seed, MAX_ERROR * (1.0 - checked_skill(skill))
         self._bots: list[CurlingBot] = []
         self._target: CurlingAim | None = None
-        self._held: set[str] = set()
+        self._held_controls: set[str] = set()
         self._time = 0.0
 
     def decide(self, info: StepInfo, rules: Rules) -> Sequence[tuple[str, float]]:
@@ -45,9 +45,9 @@ class CurlingPlayer:
         else:
             self._target = self._target or self._choose(rules)
             wanted = self._wanted(rules.aim, self._target, step)
-        changes = [(name, 0.0) for name in sorted(self._held - wanted)]
-        changes += [(name, 1.0) for name in sorted(wanted - self._held)]
-        self._held = wanted
+        changes = [(name, 0.0) for name in sorted(self._held_controls - wanted)]
+        changes += [(name, 1.0) for name in sorted(wanted - self._held_controls)]
+        self._held_controls = wanted
         return changes
 
     def _choose(self, rules: Curling) -> CurlingAim:
@@ -66,10 +66,10 @@ class CurlingPlayer:
             (target.broom - aim.broom, SIDEWAYS, "left", "right"),
             (target.weight - aim.weight, HARDER, "harder", "softer"),
         ):
-            if abs(offset) > 0.5 * rate * step:  # nearer than by another step
+            if abs(offset) > 0.5 * rate * step:  # one more step reduces the offset
                 wanted.add(more if offset > 0.0 else less)
         if aim.turn != target.turn:
-            wanted |= {"turn"} - self._held
+            wanted |= {"turn"} - self._held_controls
         elif not wanted:
-            wanted |= {"throw"} - self._held
+            wanted |= {"throw"} - self._held_controls
         return wanted

@@ -154,11 +154,11 @@ class Curling:
                 'curling needs a [surface] with bodies = "pucks" and a sliding_friction, the bodies red-1 … red-8 and '
                 f"yellow-1 … yellow-8, and a {BROOM!r}" + (f"; missing: {', '.join(lacking)}" if lacking else "")
             )
-        self._numbers = [bodies.names.index(name) for name in self._names]
-        self._moment = [float(bodies.moment[number]) for number in self._numbers]
+        self._body_indices = [bodies.names.index(name) for name in self._names]
+        self._moment = [float(bodies.moment[number]) for number in self._body_indices]
         self._floor, self._ice = floor, Ice.of(floor)
         self._teams = [CurlingBot(team, self._ice, match.error, scene.world.seed) for team in (0, 1)]
-        self._people = match.people
+        self._human_teams = match.people
         self._score = CurlingScore(match.ends)
         self._places: dict[int, Point] = {}  # positions of stones in play, by index in `_names`
         self._before: dict[int, Point] = {}  # positions before the last delivery
@@ -166,8 +166,8 @@ class Curling:
         self._counted_as_guards: set[int] = set()  # stones short of the hog line that count as in the free guard zone
         self._running, self._ready = False, False
         self._broom, self._weight, self._turn = 0.0, 0.0, 1
-        self._meant: Delivery | None = None
-        self._held: set[str] = set()
+        self._bot_delivery: Delivery | None = None
+        self._held_controls: set[str] = set()
         self._time, self._since = 0.0, -PAUSE
         self._frame: Frame | None = None
         self._message = ""
@@ -175,9 +175,9 @@ class Curling:
 
     @property
     def score(self) -> int:
-        """Points of the red team in a match of one person, otherwise of the leading team."""
+        """Points of the red team if only that team is played by a person, otherwise of the leading team."""
         red, yellow = self._score.points
-        return red if self._people == 1 else max(red, yellow)
+        return red if self._human_teams == 1 else max(red, yellow)
 
     @property
     def game_over(self) -> str | None:
@@ -191,7 +191,7 @@ class Curling:
 
     @property
     def _is_bot_turn(self) -> bool:
-        return self._score.team >= self._people
+        return self._score.team >= self._human_teams
 
     @property
     def present_score(self) -> CurlingScore:
@@ -206,7 +206,7 @@ class Curling:
     @property
     def stones(self) -> Stones:
         """Team, and position, m, of each stone in play."""
-        return [(k // STONES, place) for k, place in self._places.items()]
+        return [(k // STONES, position) for k, position in self._places.items()]
 
     @property
     def has_last_stone(self) -> bool:
@@ -215,14 +215,14 @@ class Curling:
 
     @property
     def aim(self) -> CurlingAim | None:
-        """Present aim of a person who may deliver now; None while stones run and in a turn of a bot."""
+        """Present aim in the turn of a person; None while stones move, and in a turn of a bot."""
         if not self._ready or self._is_bot_turn:
             return None
         return CurlingAim(self._broom, self._weight, self._turn)
 
     def on_input(self, control: str, value: float) -> Sequence[Action]:
         """Return the actions of an input; it has no effect in a turn of a bot."""
-        (self._held.add if value > 0.0 else self._held.discard)(control)
+        (self._held_controls.add if value > 0.0 else self._held_controls.discard)(control)
         if control == "sweep":
             return self._sweep(value > 0.0) if self._running and not self._is_bot_turn else ()
         if value <= 0.0 or not self._ready or self._is_bot_turn:
@@ -239,74 +239,76 @@ class Curling:
         """Track the stones, remove those out of play, score ends, and place the next stone."""
         elapsed, self._time, self._frame = info.time - self._time, info.time, info.frame
         if self._running:
-            return self._follow(info, elapsed)
+            return self._track_stones(info, elapsed)
         if not self._ready:
-            return self._next(info) if info.time - self._since >= PAUSE else ()
+            return self._place_next_stone(info) if info.time - self._since >= PAUSE else ()
         if not self._is_bot_turn:
-            return self._aim(elapsed)
-        if self._meant is None:
+            return self._update_aim(elapsed)
+        if self._bot_delivery is None:
             return self._choose()
-        return self._deliver(self._meant) if info.time - self._since >= BOT_PAUSE else ()
+        return self._deliver(self._bot_delivery) if info.time - self._since >= BOT_PAUSE else ()
 
-    def _next(self, info: StepInfo) -> Sequence[Action]:
+    def _place_next_stone(self, info: StepInfo) -> Sequence[Action]:
         """Place the next stone at its release point; at the start of an end, park all others."""
         moves: list[Action] = []
         if self._score.thrown == 0:
             self._places, self._counted_as_guards = {}, set()
-            moves = [self._put(k, parked_position(*divmod(k, STONES))) for k in range(2 * STONES)]
-        moves.append(self._put(self._current, (RELEASE, 0.0)))
-        self._ready, self._meant, self._since, self._weight = True, None, info.time, 0.0
+            moves = [self._place_stone(k, parked_position(*divmod(k, STONES))) for k in range(2 * STONES)]
+        moves.append(self._place_stone(self._current, (RELEASE, 0.0)))
+        self._ready, self._bot_delivery, self._since, self._weight = True, None, info.time, 0.0
         self._cues.append("next")
-        return (*moves, self._hold(0.0))
+        return (*moves, self._move_broom(0.0))
 
-    def _aim(self, elapsed: float) -> Sequence[Action]:
+    def _update_aim(self, elapsed: float) -> Sequence[Action]:
         """Move broom and weight while their keys are held."""
-        held = self._held
+        held = self._held_controls
         self._weight += HARDER * elapsed * (("harder" in held) - ("softer" in held))
         self._weight = min(max(self._weight, WEIGHTS[0]), WEIGHTS[1])
         aside = ("left" in held) - ("right" in held)
-        return (self._hold(self._broom + SIDEWAYS * elapsed * aside),) if aside else ()
+        return (self._move_broom(self._broom + SIDEWAYS * elapsed * aside),) if aside else ()
 
     def _choose(self) -> Sequence[Action]:
         """Choose the delivery of a bot, and place its broom."""
-        self._meant = self._teams[self._score.team].delivery(self.stones, self._score.thrown, self.has_last_stone)
-        self._turn = self._meant.turn
-        self._weight = self._ice.distance_for(self._meant.speed) + RELEASE
-        return (self._hold(broom_offset(self._meant.heading)),)
+        self._bot_delivery = self._teams[self._score.team].delivery(
+            self.stones, self._score.thrown, self.has_last_stone
+        )
+        self._turn = self._bot_delivery.turn
+        self._weight = self._ice.distance_for(self._bot_delivery.speed) + RELEASE
+        return (self._move_broom(broom_offset(self._bot_delivery.heading)),)
 
     def _deliver(self, delivery: Delivery) -> Sequence[Action]:
         assert self._frame is not None
         name, moment = self._names[self._current], self._moment[self._current]
-        spin = delivery.spin - float(self._frame.angular_velocity[self._numbers[self._current]])
+        spin = delivery.spin - float(self._frame.angular_velocity[self._body_indices[self._current]])
         self._before = dict(self._places)
         self._places[self._current] = (RELEASE, 0.0)
         self._running, self._ready, self._message = True, False, ""
         self._hits.clear()
         self._cues.append("throw")
-        sweeps = self._sweep(True) if "sweep" in self._held and not self._is_bot_turn else ()
+        sweeps = self._sweep(True) if "sweep" in self._held_controls and not self._is_bot_turn else ()
         return (
             Move(time=0.0, body=name, position=(RELEASE, 0.0), velocity=delivery.velocity),
             Impulse(time=0.0, body=name, impulse=(0.0, 0.0), angular=moment * spin),
             *sweeps,
         )
 
-    def _follow(self, info: StepInfo, elapsed: float) -> Sequence[Action]:
+    def _track_stones(self, info: StepInfo, elapsed: float) -> Sequence[Action]:
         """Update the positions, remove stones that leave play, and judge the shot once all stones are at rest."""
         frame, moves = info.frame, list[Action]()
         self._record_hits(info, elapsed)
         for k in tuple(self._places):
-            x, y = frame.position[self._numbers[k]].tolist()
+            x, y = frame.position[self._body_indices[k]].tolist()
             self._places[k] = (x, y)
             if is_out_of_play((x, y)):
                 del self._places[k]
-                moves.append(self._put(k, removed_position(*divmod(k, STONES))))
+                moves.append(self._place_stone(k, removed_position(*divmod(k, STONES))))
                 self._cues.append("gone")
-        moving = [k for k in self._places if frame.velocity[self._numbers[k]].any()]
+        moving = [k for k in self._places if frame.velocity[self._body_indices[k]].any()]
         return moves if moving else [*moves, *self._judge(info)]
 
     def _record_hits(self, info: StepInfo, elapsed: float) -> None:
         """Record collisions between stones."""
-        stones = {number: k for k, number in enumerate(self._numbers)}
+        stones = {number: k for k, number in enumerate(self._body_indices)}
         pairs = info.contacts.pair[info.contacts.time > self._time - elapsed].tolist()  # older contacts persist
         new = {(stones[a], stones[b]) for a, b in pairs if a in stones and b in stones}
         if new:
@@ -316,36 +318,40 @@ class Curling:
     def _judge(self, info: StepInfo) -> Sequence[Action]:
         """Apply hog line and free guard zone to a shot at rest; score the end after its last stone."""
         moves: list[Action] = []
-        current, places = self._current, self._places
-        if current in places and is_hogged(places[current]) and not self._hits:
-            del places[current]
-            moves.append(self._put(current, removed_position(*divmod(current, STONES))))
+        current, positions = self._current, self._places
+        if current in positions and is_hogged(positions[current]) and not self._hits:
+            del positions[current]
+            moves.append(self._place_stone(current, removed_position(*divmod(current, STONES))))
             self._message = "stone removed: short of the hog line"
-        zone = {k for k, place in self._before.items() if in_free_guard_zone(place)} | self._counted_as_guards
-        theirs = [k for k in zone if k // STONES != self._score.team]
-        if self._score.thrown < PROTECTED and any(k not in places for k in theirs):
-            moves += [self._put(k, place) for k, place in self._before.items()]
-            moves.append(self._put(current, removed_position(*divmod(current, STONES))))
+        zone = {k for k, position in self._before.items() if in_free_guard_zone(position)} | self._counted_as_guards
+        opponents = [k for k in zone if k // STONES != self._score.team]
+        if self._score.thrown < PROTECTED and any(k not in positions for k in opponents):
+            moves += [self._place_stone(k, position) for k, position in self._before.items()]
+            moves.append(self._place_stone(current, removed_position(*divmod(current, STONES))))
             self._places = dict(self._before)
             self._message = "free guard zone: stones replaced"
         else:
-            met = {k for pair in self._hits if not zone.isdisjoint(pair) for k in pair}
-            self._counted_as_guards = {k for k in met | self._counted_as_guards if k in places and is_hogged(places[k])}
-        if "sweep" in self._held:
+            hit_guards = {k for pair in self._hits if not zone.isdisjoint(pair) for k in pair}
+            self._counted_as_guards = {
+                k for k in hit_guards | self._counted_as_guards if k in positions and is_hogged(positions[k])
+            }
+        if "sweep" in self._held_controls:
             moves += self._sweep(False)
         self._running, self._since = False, info.time
         self._score = self._score.after_stone()
         if self._score.full:
-            self._count()
+            self._score_end()
         return moves
 
-    def _count(self) -> None:
-        team, points = end_score([(k // STONES, place) for k, place in self._places.items()])
+    def _score_end(self) -> None:
+        team, points = end_score([(k // STONES, position) for k, position in self._places.items()])
         self._score = self._score.after_end(team, points)
         self._message = "blank end" if team is None else f"{TEAMS[team]} scores {points}"
         self._cues.append("score" if points else "blank")
         if self._score.game_over is not None:
-            self._cues.append("win" if self._people != 1 or self._score.points[0] > self._score.points[1] else "lose")
+            self._cues.append(
+                "win" if self._human_teams != 1 or self._score.points[0] > self._score.points[1] else "lose"
+            )
 
     def _sweep(self, on: bool) -> Sequence[Action]:
         """Return the actions that set friction and curl of swept ice, or reset them."""
@@ -358,10 +364,10 @@ class Curling:
             del values["curl"]
         return [SetParameter(time=0.0, path=f"surface.{key}", value=value) for key, value in values.items()]
 
-    def _put(self, k: int, place: Point) -> Move:
-        return Move(time=0.0, body=self._names[k], position=place, velocity=(0.0, 0.0))
+    def _place_stone(self, k: int, position: Point) -> Move:
+        return Move(time=0.0, body=self._names[k], position=position, velocity=(0.0, 0.0))
 
-    def _hold(self, aside: float) -> Move:
+    def _move_broom(self, aside: float) -> Move:
         """Place the broom on the tee line, m to the left of the centre line."""
         self._broom = min(max(aside, -MAX_BROOM_OFFSET), MAX_BROOM_OFFSET)
         return Move(time=0.0, body=BROOM, position=(0.0, self._broom))

@@ -53,29 +53,29 @@ PROTECTED = 5
 """number of the first deliveries of an end that must not remove guards of the other team from play"""
 
 
-def is_out_of_play(place: Point) -> bool:
+def is_out_of_play(position: Point) -> bool:
     """Return whether a stone is out of play: it touches a side line, or is completely past the back line.
 
     Args:
-        place: position of its centre, m.
+        position: position of its centre, m.
     """
-    x, y = place
+    x, y = position
     return abs(y) + STONE >= 0.5 * WIDTH or x - STONE > BACK
 
 
-def is_hogged(place: Point) -> bool:
+def is_hogged(position: Point) -> bool:
     """Return whether a stone at rest is not completely past the hog line."""
-    return place[0] - STONE <= -HOG
+    return position[0] - STONE <= -HOG
 
 
-def in_house(place: Point) -> bool:
+def in_house(position: Point) -> bool:
     """Return whether a stone touches the house."""
-    return math.hypot(*place) - STONE <= RINGS[0]
+    return math.hypot(*position) - STONE <= RINGS[0]
 
 
-def in_free_guard_zone(place: Point) -> bool:
+def in_free_guard_zone(position: Point) -> bool:
     """Return whether a stone at rest is in the free guard zone: before the tee line, and not in the house."""
-    return not is_hogged(place) and place[0] + STONE < 0.0 and not in_house(place)
+    return not is_hogged(position) and position[0] + STONE < 0.0 and not in_house(position)
 
 
 def end_score(stones: Sequence[tuple[int, Point]]) -> tuple[int | None, int]:
@@ -88,10 +88,10 @@ def end_score(stones: Sequence[tuple[int, Point]]) -> tuple[int | None, int]:
     Args:
         stones: team and centre, m, of each stone in play.
     """
-    near = sorted((math.hypot(*place), team) for team, place in stones if in_house(place))
-    if not near:
+    distances = sorted((math.hypot(*position), team) for team, position in stones if in_house(position))
+    if not distances:
         return None, 0
-    best = near[0][1]
-    other = next((distance for distance, team in near if team != best), math.inf)
-    points = sum(team == best and distance < other for distance, team in near)
+    best = distances[0][1]
+    other = next((distance for distance, team in distances if team != best), math.inf)
+    points = sum(team == best and distance < other for distance, team in distances)
     return (best, points) if points else (None, 0)

@@ -16,30 +16,30 @@ from sandbox.scene.random_streams import Stream, draws
 
 SPRING, DAMPER = 0.0625, 0.4
 """1/s² and 1/s: horizontal acceleration per distance from the pad, and per velocity; nearly critically damped"""
-MAX_ASIDE = 0.25
+MAX_SIDEWAYS_FRACTION = 0.25
 """largest horizontal acceleration, as a fraction of that of the engines"""
 STIFFNESS, DAMPING = 1.6, 1.8
 """1/s² and 1/s: angular acceleration per angle and per angular velocity"""
-CONE = 2.0, 1.0
+DESCENT_CONE = 2.0, 1.0
 """m, and m per m of height: horizontal distance from the pad up to which the ship descends"""
-LOW = 2.0
+STEADY_HEIGHT = 2.0
 """m, height below which the ship descends only while it is steady"""
 STEADY = 0.4, 0.1
 """m/s and rad: limits of horizontal speed and tilt of a steady ship"""
-TOUCHDOWN = 0.5
+TOUCHDOWN_SPEED = 0.5
 """m/s, rate of descent at the pad"""
-BRAKING = 0.15
-"""deceleration of the descent, as a fraction of what the engines can do against gravity"""
-THROTTLE = 2.0
+BRAKING_FRACTION = 0.15
+"""deceleration of the descent, as a fraction of the largest upward acceleration against gravity"""
+DESCENT_GAIN = 2.0
 """1/s, vertical acceleration per difference from the rate of descent"""
 LEVELS = 100
 """number of throttle levels: coarser throttles keep the recording of a game short"""
 MAX_ERROR = 0.5
-"""largest relative misjudgement of height and velocities, without any skill"""
+"""largest relative error of the estimated height and velocities at skill 0"""
 
 
 class _Engine(NamedTuple):
-    """What a thrust does at full throttle."""
+    """Accelerations of the ship by a thrust at full throttle."""
 
     name: str
     lift: float
@@ -55,8 +55,8 @@ class LandingBot:
         """Create a policy.
 
         Args:
-            seed: random seed of the misjudgements.
-            skill: 0 to 1; without skill, height and velocities are misjudged by up to `MAX_ERROR`, with 1 not at all.
+            seed: random seed of the errors.
+            skill: 0 to 1; the largest error of height and velocities decreases from `MAX_ERROR` to none.
 
         Raises:
             ValueError: the skill is not from 0 to 1.
@@ -83,17 +83,17 @@ class LandingBot:
 
         engines = _engines(rules)
         available = math.fsum(each.lift for each in engines if not each.turn)
-        aside = _clamp(SPRING * distance - DAMPER * vx, MAX_ASIDE * available)
+        sideways = _clamp(SPRING * distance - DAMPER * vx, MAX_SIDEWAYS_FRACTION * available)
         descent = 0.0
-        settled = height > LOW or (abs(vx) < STEADY[0] and abs(tilt) < STEADY[1])
-        if abs(distance) < CONE[0] + CONE[1] * height and settled:
-            braking = BRAKING * max(available - rules.gravity, 0.0)
-            descent = TOUCHDOWN + math.sqrt(2.0 * braking * max(height, 0.0))
-        up = rules.gravity - THROTTLE * (descent + vy)
-        turn = STIFFNESS * (math.atan2(-aside, max(up, 0.2 * available)) - tilt) - DAMPING * rate
-        return self._changes(engines, up / max(math.cos(tilt), 0.5), turn)
+        settled = height > STEADY_HEIGHT or (abs(vx) < STEADY[0] and abs(tilt) < STEADY[1])
+        if abs(distance) < DESCENT_CONE[0] + DESCENT_CONE[1] * height and settled:
+            braking = BRAKING_FRACTION * max(available - rules.gravity, 0.0)
+            descent = TOUCHDOWN_SPEED + math.sqrt(2.0 * braking * max(height, 0.0))
+        up = rules.gravity - DESCENT_GAIN * (descent + vy)
+        turn = STIFFNESS * (math.atan2(-sideways, max(up, 0.2 * available)) - tilt) - DAMPING * rate
+        return self._throttle_changes(engines, up / max(math.cos(tilt), 0.5), turn)
 
-    def _changes(self, engines: Sequence[_Engine], lift: float, turn: float) -> list[tuple[str, float]]:
+    def _throttle_changes(self, engines: Sequence[_Engine], lift: float, turn: float) -> list[tuple[str, float]]:
         """Return the throttles that change for accelerations of the ship, m/s² and rad/s²."""
         total_lift = math.fsum(each.lift for each in engines if not each.turn)
         total_turn = math.fsum(abs(each.turn) for each in engines if each.turn * turn > 0.0)

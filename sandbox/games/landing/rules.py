@@ -34,17 +34,17 @@ TANK = 45.0
 """N·s per kg of the ship, capacity of the tank: the change of velocity, m/s, in free space"""
 DOWN, ASIDE, TILT = 2.0, 1.0, math.radians(15.0)
 """m/s, m/s and rad: limits of vertical speed, horizontal speed and tilt at the first touch"""
-STILL, STANDING = 0.05, 1.0
+REST_SPEED, REST_TIME = 0.05, 1.0
 """m/s and s: the ship has landed when it has been slower than this for this duration"""
-FALLEN = math.radians(45.0)
+TIPPED_OVER_ANGLE = math.radians(45.0)
 """rad, tilt on the pad beyond which the ship has tipped over"""
 FOR_LANDING, FOR_FUEL = 100, 900
 """points for a landing, and for a full tank"""
-FOR_A_CRASH, FAR, FAST = 50, 50.0, 15.0
+FOR_A_CRASH, CRASH_DISTANCE, CRASH_SPEED = 50, 50.0, 15.0
 """points for a crash; they decrease linearly to 0 at a distance from the pad, m, and at a speed, m/s"""
 ELSEWHERE, FASTER = 18.0, 3.0
 """m and m/s, bounds of the random change of the initial horizontal position and velocity"""
-PADS = {"up": "a rt up", "left": "left -leftx", "right": "right +leftx"}
+GAMEPAD_INPUTS = {"up": "a rt up", "left": "left -leftx", "right": "right +leftx"}
 """gamepad inputs by the key of a thrust"""
 
 
@@ -78,15 +78,15 @@ class Landing:
         """m/s², downwards"""
         self.pad = _pad_position(scene)
         """m, centre of the top of the pad"""
-        self._pad_number, self._solid = -1 - scene.fixed_names.index(PAD), len(scene.fixed)
+        self._pad_index, self._static_count = -1 - scene.fixed_names.index(PAD), len(scene.fixed)
         form = geometry_of(bodies.elements[int(bodies.element[self.ship])])
         self._corners = [(x, y, piece.radius) for piece in form.pieces for x, y in piece.corners]
         self._tank = self._full = TANK * self.mass
         self._levels = dict.fromkeys(self.thrusts, 0.0)
         self._start = _start(scene, bodies, self.ship)
-        self._time, self._still = 0.0, 0.0
-        self._before: Frame | None = None
-        self._now: Frame | None = None
+        self._time, self._rest_time = 0.0, 0.0
+        self._previous_frame: Frame | None = None
+        self._frame: Frame | None = None
         self._cues: list[str] = []
         self._touched = False
 
@@ -96,15 +96,15 @@ class Landing:
 
     def on_step(self, info: StepInfo) -> Sequence[Action]:
         """Update fuel and score, and determine whether the game is over."""
-        if self._now is None:
-            self._now = info.frame
+        if self._frame is None:
+            self._frame = info.frame
             return (self._start,)
-        self._before, self._now = self._now, info.frame
+        self._previous_frame, self._frame = self._frame, info.frame
         elapsed, self._time = info.time - self._time, info.time
         stopped = self._burn(info, elapsed)
-        self.game_over = self._ended(info, elapsed)
+        self.game_over = self._end_reason(info, elapsed)
         if self.game_over is not None:
-            self.score = self.score or self._consolation()
+            self.score = self.score or self._crash_points()
             self._cues.append("win" if self.game_over == LANDED else "lose")
             return tuple(Throttle(time=0.0, thrust=name, level=0.0) for name, level in self._levels.items() if level)
         return stopped
@@ -115,59 +115,62 @@ class Landing:
             if isinstance(action, Throttle) and action.thrust in self._levels:
                 self._levels[action.thrust] = action.level
         burnt = math.fsum(level * math.hypot(*self.thrusts[name].force) for name, level in self._levels.items())
-        had, self._tank = self._tank, max(self._tank - burnt * elapsed, 0.0)
-        if self._tank > 0.0 or had == 0.0:
+        tank_before, self._tank = self._tank, max(self._tank - burnt * elapsed, 0.0)
+        if self._tank > 0.0 or tank_before == 0.0:
             return ()
         self._cues.append("empty")
-        opened = [name for name, level in self._levels.items() if level > 0.0]
+        open_thrusts = [name for name, level in self._levels.items() if level > 0.0]
         self._levels = dict.fromkeys(self._levels, 0.0)
-        return tuple(Throttle(time=0.0, thrust=name, level=0.0) for name in opened)
+        return tuple(Throttle(time=0.0, thrust=name, level=0.0) for name in open_thrusts)
 
-    def _ended(self, info: StepInfo, elapsed: float) -> str | None:
+    def _end_reason(self, info: StepInfo, elapsed: float) -> str | None:
         """Return the reason why the game is over, and set the score of a landing; None while it runs."""
         frame, ship = info.frame, self.ship
         if not frame.present[ship]:
             return "lost in space"
         touched = {int(pair[1]) if pair[0] == ship else int(pair[0]) for pair in info.contacts.pair if ship in pair}
-        if any(number >= -self._solid for number in touched - {self._pad_number}):  # smaller numbers are zones
+        if any(number >= -self._static_count for number in touched - {self._pad_index}):  # smaller numbers are zones
             return "crashed outside the pad"
-        if self._pad_number not in touched:
-            self._still = 0.0
+        if self._pad_index not in touched:
+            self._rest_time = 0.0
             return None
         first, self._touched = not self._touched, True
         if first:
-            fault = self._hard()
+            fault = self._crash_reason()
             if fault is not None:
                 return fault
             self._cues.append("touch")
-        if abs(self.tilt(frame)) > FALLEN:
+        if abs(self.tilt(frame)) > TIPPED_OVER_ANGLE:
             return "tipped over"
         speed = float(np.hypot(*frame.velocity[ship]))
-        self._still = self._still + elapsed if speed < STILL else 0.0
-        if self._still < STANDING:
+        self._rest_time = self._rest_time + elapsed if speed < REST_SPEED else 0.0
+        if self._rest_time < REST_TIME:
             return None
         self.score = FOR_LANDING + round(FOR_FUEL * self._tank / self._full)
         return LANDED
 
-    def _hard(self) -> str | None:
+    def _crash_reason(self) -> str | None:
         """Return the reason why the first touch is a crash, from the state before it; None if it is none."""
-        assert self._before is not None
-        aside, up = self._before.velocity[self.ship].tolist()
+        assert self._previous_frame is not None
+        sideways, up = self._previous_frame.velocity[self.ship].tolist()
         if -up > DOWN:
             return f"crashed: {-up:.1f} m/s down (limit {DOWN:g})"
-        if abs(aside) > ASIDE:
-            return f"crashed: {abs(aside):.1f} m/s sideways (limit {ASIDE:g})"
-        tilt = abs(self.tilt(self._before))
+        if abs(sideways) > ASIDE:
+            return f"crashed: {abs(sideways):.1f} m/s sideways (limit {ASIDE:g})"
+        tilt = abs(self.tilt(self._previous_frame))
         return (
             f"crashed: tilted by {math.degrees(tilt):.0f}° (limit {math.degrees(TILT):.0f}°)" if tilt > TILT else None
         )
 
-    def _consolation(self) -> int:
+    def _crash_points(self) -> int:
         """Return the points of a crash."""
-        assert self._before is not None
-        place, speed = self._before.position[self.ship], float(np.hypot(*self._before.velocity[self.ship]))
-        near = max(1.0 - math.dist(place.tolist(), self.pad) / FAR, 0.0)
-        return round(FOR_A_CRASH * near * max(1.0 - speed / FAST, 0.0))
+        assert self._previous_frame is not None
+        position, speed = (
+            self._previous_frame.position[self.ship],
+            float(np.hypot(*self._previous_frame.velocity[self.ship])),
+        )
+        proximity = max(1.0 - math.dist(position.tolist(), self.pad) / CRASH_DISTANCE, 0.0)
+        return round(FOR_A_CRASH * proximity * max(1.0 - speed / CRASH_SPEED, 0.0))
 
     def tilt(self, frame: Frame) -> float:
         """Return the angle of the ship, rad, −π to π; positive if it leans to the left."""
@@ -176,15 +179,15 @@ class Landing:
     def display_lines(self) -> Sequence[tuple[str, str]]:
         """Return fuel, height, speeds and tilt; values beyond the limits of a landing are marked by `!`."""
         fuel = ("fuel", f"{100.0 * self._tank / self._full:.0f} %")
-        if self._now is None or not self._now.present[self.ship]:
+        if self._frame is None or not self._frame.present[self.ship]:
             return (fuel,)
-        aside, up = self._now.velocity[self.ship].tolist()
-        tilt = self.tilt(self._now)
+        sideways, up = self._frame.velocity[self.ship].tolist()
+        tilt = self.tilt(self._frame)
         return (
             fuel,
-            ("height", f"{max(self.height(self._now), 0.0):.1f} m"),
+            ("height", f"{max(self.height(self._frame), 0.0):.1f} m"),
             ("down", _marked(f"{format_signed(-up, 1)} m/s", -up > DOWN)),
-            ("sideways", _marked(f"{format_signed(aside, 1)} m/s", abs(aside) > ASIDE)),
+            ("sideways", _marked(f"{format_signed(sideways, 1)} m/s", abs(sideways) > ASIDE)),
             ("tilt", _marked(f"{format_signed(-math.degrees(tilt), 0)}°", abs(tilt) > TILT)),
         )
 
@@ -206,7 +209,7 @@ class Landing:
 
 def _control(name: str, thrust: Thrust) -> Control:
     assert thrust.key is not None
-    return Control(name, name, (thrust.key,), PADS.get(thrust.key), analogue=True)
+    return Control(name, name, (thrust.key,), GAMEPAD_INPUTS.get(thrust.key), analogue=True)
 
 
 def _pad_position(scene: Scene) -> Point:
@@ -229,9 +232,9 @@ def _pad_position(scene: Scene) -> Point:
 
 def _start(scene: Scene, bodies: Bodies, ship: int) -> Move:
     """Return the action that sets the random initial position and velocity of the ship."""
-    chance = draws(Stream.LANDING, scene.world.seed)
+    rng = draws(Stream.LANDING, scene.world.seed)
     (x, y), (vx, vy) = bodies.position[ship].tolist(), bodies.velocity[ship].tolist()
-    x, vx = x + chance.uniform(-ELSEWHERE, ELSEWHERE), vx + chance.uniform(-FASTER, FASTER)
+    x, vx = x + rng.uniform(-ELSEWHERE, ELSEWHERE), vx + rng.uniform(-FASTER, FASTER)
     return Move(time=0.0, body=SHIP, position=(x, y), velocity=(vx, vy))
 
 

@@ -1,4 +1,4 @@
-"""Pinball: tables of devices that read switches and answer with points, sounds and actions."""
+"""Pinball: tables of devices that respond to switches with points, sounds and actions."""
 
 from sandbox.game_spec import Environment, GameSpec
 

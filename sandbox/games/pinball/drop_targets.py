@@ -1,4 +1,4 @@
-"""Drops: a bank of targets that fall when they are hit, and rise together once all are down."""
+"""Drop targets: a bank of targets that drop when they are hit, and rise together once all are down."""
 
 import math
 from collections.abc import Iterator
@@ -10,85 +10,85 @@ from sandbox.games.pinball.playfield import Playfield, PlayfieldElement
 from sandbox.scene.description.base import Point
 
 FALL = 0.26
-"""s, that a target takes to fall. Source: Visual Pinball, 60 units at its default drop speed"""
+"""s, time that a target takes to drop. Source: Visual Pinball, 60 units at its default drop speed"""
 
 REST = 1.5
-"""s, that a full bank stays down"""
+"""s for which a completed bank stays down"""
 
-FULL = 25_000
-"""points of a bank"""
+BANK_POINTS = 25_000
+"""points of a completed bank"""
 
-BONUS, EACH = 3_000, 200
-"""points of the bonus for a bank, and for a target"""
+BANK_BONUS, TARGET_BONUS = 3_000, 200
+"""points added to the bonus by a completed bank, and by a target"""
 
 
 class DropTargetBanks(Device):
-    """One bank. A target that has been hit counts at once, and is in the way until it is down."""
+    """One bank. A target scores when it is hit, and remains solid until it is down."""
 
     def __init__(self, board: Playfield, group: str | None, members: tuple[PlayfieldElement, ...]) -> None:
         self.board, self.group, self.members = board, group, members
         self.falling: dict[int, float] = {}
-        """place of a target → when it will be down, s"""
+        """index of a target → time at which it is down, s"""
         self.down: set[int] = set()
         self.rise: float | None = None
-        """when the bank rises, s, if nothing lies on it"""
+        """s, time at which the bank rises, if no ball is above a target; None if it is not due"""
 
     def on_hit(self, hit: Hit, now: StepContext) -> Iterator[Effect]:
-        """Let a target fall."""
-        place = next((k for k, each in enumerate(self.members) if each is hit.element), None)
-        if place is None or place in self.down or place in self.falling:
+        """Drop a target."""
+        index = next((k for k, each in enumerate(self.members) if each is hit.element), None)
+        if index is None or index in self.down or index in self.falling:
             return
-        self.falling[place] = hit.time + FALL
+        self.falling[index] = hit.time + FALL
         yield PlaySound("drop")
-        yield Award("drop", points_of(hit), self.group, EACH, hit.ball)
+        yield Award("drop", points_of(hit), self.group, TARGET_BONUS, hit.ball)
 
     def tick(self, now: StepContext) -> Iterator[Effect]:
-        """Take fallen targets out of the way; raise a full bank."""
-        for place in sorted(k for k, when in self.falling.items() if when <= now.time):
-            del self.falling[place]
-            self.down.add(place)
-            yield Toggle(time=now.time, thing=self.members[place].name, solid=False)
+        """Make dropped targets passable, award a completed bank, and raise it when its time has come."""
+        for index in sorted(k for k, when in self.falling.items() if when <= now.time):
+            del self.falling[index]
+            self.down.add(index)
+            yield Toggle(time=now.time, thing=self.members[index].name, solid=False)
             if len(self.down) == len(self.members):
                 self.rise = now.time + REST
                 yield PlaySound("bank")
-                yield Award("bank", FULL, self.group, BONUS)
+                yield Award("bank", BANK_POINTS, self.group, BANK_BONUS)
         if self.rise is not None and now.time >= self.rise:
-            yield from self.raised(now)
+            yield from self.raise_targets(now)
 
-    def raised(self, now: StepContext) -> Iterator[Effect]:
-        """Raise what is down, unless a ball lies there: then later."""
-        if any(self._covers(place, ball, now) for place in self.down for ball in now.live):
+    def raise_targets(self, now: StepContext) -> Iterator[Effect]:
+        """Raise the targets that are down; if a ball is above one of them, try again at the next step."""
+        if any(self._covers(index, ball, now) for index in self.down for ball in now.live):
             self.rise = now.time
             return
         self.rise = None
         if self.down:
             yield PlaySound("raise")
-        for place in sorted(self.down):
-            yield Toggle(time=now.time, thing=self.members[place].name, solid=True)
+        for index in sorted(self.down):
+            yield Toggle(time=now.time, thing=self.members[index].name, solid=True)
         self.down.clear()
 
     def start_ball(self, now: StepContext) -> Iterator[Effect]:
-        """Raise the bank for a new ball, also where it was not full."""
-        for place in sorted(self.falling):
-            self.down.add(place)
+        """Raise the targets that are down or dropping, for a new ball."""
+        for index in sorted(self.falling):
+            self.down.add(index)
         self.falling.clear()
-        yield from self.raised(now)
+        yield from self.raise_targets(now)
 
     def lights(self, now: StepContext) -> Iterator[Light]:
-        """Show which targets are down; a full bank blinks until it rises."""
+        """Return the lamps of the targets that are down or dropping; those of a completed bank blink until it rises."""
         full = len(self.down) == len(self.members)
-        return (Light(self.members[place].name, full) for place in sorted({*self.down, *self.falling}))
+        return (Light(self.members[index].name, full) for index in sorted({*self.down, *self.falling}))
 
-    def _covers(self, place: int, ball: int, now: StepContext) -> bool:
-        """Tell whether a ball lies where a target would rise."""
+    def _covers(self, index: int, ball: int, now: StepContext) -> bool:
+        """Return whether a ball overlaps the position of a target."""
         x, y = now.frame.position[ball].tolist()
-        target = self.members[place]
-        room = self.board.radius + target.reach
-        return any(_distance((x, y), a, b) < room for a, b in pairwise(target.outline))
+        target = self.members[index]
+        clearance = self.board.radius + target.reach
+        return any(_distance((x, y), a, b) < clearance for a, b in pairwise(target.outline))
 
 
 def _distance(point: Point, a: Point, b: Point) -> float:
-    """Return how far a point is from a segment, m."""
+    """Return the distance of a point from a segment, m."""
     along = (b[0] - a[0], b[1] - a[1])
     length = along[0] ** 2 + along[1] ** 2
     fraction = ((point[0] - a[0]) * along[0] + (point[1] - a[1]) * along[1]) / length if length else 0.0
@@ -97,7 +97,7 @@ def _distance(point: Point, a: Point, b: Point) -> float:
 
 
 def banks_of(board: Playfield) -> tuple[DropTargetBanks, ...]:
-    """Return the banks of a table; a target without a group is one of its own."""
+    """Return the banks of a table; a target without a group is a bank of one."""
     alone = tuple(each for each in board.of_role("drop") if each.group is None)
     groups = [DropTargetBanks(board, name, members) for name, members in board.groups("drop").items()]
     return (*groups, *(DropTargetBanks(board, None, (each,)) for each in alone))

@@ -46,7 +46,7 @@ class Element(Part):
 
 
 class Scoring(Element):
-    """An element that rules hear of."""
+    """An element that scores."""
 
     score: Points = 0
     """points each time it is hit or entered"""
@@ -176,7 +176,7 @@ class DropTargets(Scoring):
     gap: ElementSize = 0.003
     """gap between two targets, m"""
     thickness: ElementSize = 0.005
-    """width of each target, m"""
+    """thickness of each target, m"""
     score: Points = 500
 
 
@@ -241,8 +241,8 @@ class Plunger(Scoring):
     """speed of the ball after a full pull, m/s"""
 
 
-LEAST_DEPTH = 0.012
-"""m: at 1 kHz no ball slower than 12 m/s passes over what is that deep unnoticed"""
+MIN_ZONE_DEPTH = 0.012
+"""m, smallest extent of a zone along the path of a ball: at 1 kHz, balls slower than 12 m/s are detected in it"""
 
 
 class Rollover(Scoring):
@@ -260,7 +260,7 @@ class Spinner(Scoring):
 
     points: tuple[Point, Point]
     """ends of the axle, m"""
-    thickness: ElementLength = LEAST_DEPTH
+    thickness: ElementLength = MIN_ZONE_DEPTH
     """thickness of the area in which a ball is detected, m"""
     score: Points = 100
 
@@ -332,34 +332,34 @@ class Art(Element):
 
 Built = TypeVar("Built", bound=Element)
 
-PLACES = ("position", "pivot", "light")
-WAYS = ("facing", "direction", "out")
+POSITION_FIELDS = ("position", "pivot", "light")
+DIRECTION_FIELDS = ("facing", "direction", "out")
 
 
-def both(element: Built, kind: str, number: int, axis: float) -> Iterator[tuple[str, Built]]:
-    """Yield what an element stands for, with names: itself, or one on each side of the axis."""
+def mirrored_copies(element: Built, kind: str, number: int, axis: float) -> Iterator[tuple[str, Built]]:
+    """Yield names and elements: the element itself, or, if it is mirrored, one on each side of the axis."""
     name = element.name or f"{kind}-{number + 1}"
     if not element.mirrored:
         yield name, element
         return
-    for one in (element, reflected(element, axis)):
-        yield f"{'left' if middle_of(one)[0] < axis else 'right'} {name}", one
+    for copy in (element, reflected(element, axis)):
+        yield f"{'left' if centre_of_element(copy)[0] < axis else 'right'} {name}", copy
 
 
 def reflected(element: Built, axis: float) -> Built:
-    """Return an element as a mirror along x = axis shows it."""
+    """Return the mirror image of an element across x = axis."""
     changes: dict[str, Any] = {}
     for key in type(element).model_fields:
         value = getattr(element, key)
         if value is None:
             continue
-        if key in PLACES:
+        if key in POSITION_FIELDS:
             changes[key] = (2.0 * axis - value[0], *value[1:])
         elif key == "points":
-            # What has a left and a right keeps them if it runs the other way.
+            # The open side of a gate depends on the order of its points, which a mirror image reverses.
             order = reversed(value) if isinstance(element, Gate) else value
             changes[key] = tuple((2.0 * axis - point[0], *point[1:]) for point in order)
-        elif key in WAYS:
+        elif key in DIRECTION_FIELDS:
             changes[key] = (-value[0], value[1])
         elif key == "stops":
             changes[key] = tuple(math.pi - angle for angle in value)
@@ -368,12 +368,12 @@ def reflected(element: Built, axis: float) -> Built:
     return element.model_copy(update=changes)
 
 
-def middle_of(element: Element) -> Point:
-    """Return about where an element is, m."""
+def centre_of_element(element: Element) -> Point:
+    """Return the approximate centre of an element, m."""
     for key in ("position", "pivot"):
-        place = getattr(element, key, None)
-        if place is not None:
-            return float(place[0]), float(place[1])
+        position = getattr(element, key, None)
+        if position is not None:
+            return float(position[0]), float(position[1])
     points: tuple[tuple[float, ...], ...] = getattr(element, "points", None) or ((0.0, 0.0),)
     return sum(p[0] for p in points) / len(points), sum(p[1] for p in points) / len(points)
 

@@ -69,10 +69,10 @@ class Hit(NamedTuple):
     time: float
     """s"""
     ball: int
-    """number of the body"""
+    """index of the body"""
     element: PlayfieldElement
     speed: float
-    """of the ball, after the step, m/s"""
+    """m/s, of the ball after the step"""
 
 
 class OpenContact(NamedTuple):

@@ -72,7 +72,7 @@ class GameFlow:
         yield PlaySound("drain")
         yield from self.remove_ball(ball, now)
         if now.time < self.saved and not self.nudge.tilted:
-            self.trough.serve(alone=True)
+            self.trough.serve(automatic=True)
             yield PlaySound("save")
             yield ShowMessage("ball saved")
 
@@ -88,7 +88,7 @@ class GameFlow:
             elif not self.board.inside(*now.frame.position[ball].tolist()):
                 yield from self.remove_ball(ball, now)
                 if not self.nudge.tilted:
-                    self.trough.serve(alone=False)
+                    self.trough.serve(automatic=False)
                 yield ShowMessage("ball returned")
 
     def update(self, now: StepContext) -> Iterator[Effect]:
@@ -149,4 +149,4 @@ class GameFlow:
         now.sheet = self.sheet
         for device in self.devices:
             yield from device.start_ball(now)
-        self.trough.serve(alone=False)
+        self.trough.serve(automatic=False)

@@ -1,4 +1,4 @@
-"""Board: a table as its rules see it: which number plays which part, and where balls are put."""
+"""Playfield: elements of a table by index and role, as the rules use them, and the positions where balls are placed."""
 
 import math
 from collections.abc import Iterator
@@ -16,26 +16,26 @@ from sandbox.scene.description.play import PlayPart, Role
 
 Fixed = Plane | Wall | Post
 
-FIRES: dict[Role, float] = {"bumper": 0.054, "slingshot": 0.054, "standup": 0.108, "drop": 0.108}
-"""m/s, the normal approach speed above which a switch closes. Source: Visual Pinball's defaults, in its unit of
-.53975 mm a centisecond: bumpers and slingshots 1, targets 2."""
+SWITCH_THRESHOLDS: dict[Role, float] = {"bumper": 0.054, "slingshot": 0.054, "standup": 0.108, "drop": 0.108}
+"""m/s, normal approach speed above which a switch closes. Source: defaults of Visual Pinball, in its unit of 0.53975 mm
+per centisecond: bumpers and slingshots 1, targets 2."""
 
-LAUNCH = 3.0
-"""m/s, up the lane, of a plunger that states nothing"""
+LAUNCH_SPEED = 3.0
+"""m/s, default launch speed of a plunger, up the lane"""
 
-EJECT = 1.2
-"""m/s, towards the middle of the table, of a hole that states nothing"""
+EJECT_SPEED = 1.2
+"""m/s, default speed at which a kicker ejects a ball, towards the centre of the table"""
 
 LANE_UP, LANE_DOWN, LANE_SIDE = 0.10, 0.10, 0.03
-"""m, about where balls are served, what counts as the lane: a plunger draws a ball down by some 43 mm"""
+"""m, extent of the lane around the position where balls are served: a pulled plunger lowers the ball by about 43 mm"""
 
 MARGIN = 0.05
-"""m: what is so far outside everything fixed has left the table"""
+"""m: a ball farther than this outside all static bodies has left the table"""
 
 
 @dataclass(frozen=True, eq=False)
 class PlayfieldElement:
-    """A thing that plays a part. Copies share it: nothing in it changes."""
+    """Element with a role in the game. It is immutable, so copies of a game share it."""
 
     name: str
     role: Role
@@ -43,17 +43,17 @@ class PlayfieldElement:
     step: int
     score: int
     where: Point
-    """its middle, m"""
+    """m, centre"""
     out: Vector
-    """the velocity with which it lets a ball go, m/s"""
+    """m/s, velocity at which it releases a ball"""
     least: float = 0.0
-    """m/s, the normal impulse over a ball's mass above which its switch closes"""
+    """m/s, normal impulse over the mass of the ball above which its switch closes"""
     outline: tuple[Point, ...] = ()
-    """of a wall, m"""
+    """m, corners of a wall"""
     reach: float = 0.0
-    """from the outline to its surface, m"""
+    """m, distance from the outline to the surface"""
     span: float = 0.0
-    """of a body, from its centre to its farthest point, m"""
+    """m, distance from the centre of a body to its farthest point"""
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         return self
@@ -61,29 +61,29 @@ class PlayfieldElement:
 
 @dataclass(frozen=True, eq=False)
 class Playfield:
-    """A table. Copies share it: nothing in it changes."""
+    """A table. It is immutable, so copies of a game share it."""
 
     elements: tuple[PlayfieldElement, ...]
     switches: dict[int, PlayfieldElement]
-    """by number of the fixed thing, −1 − k"""
+    """elements by the index of their static body, −1 − k"""
     balls: tuple[int, ...]
-    """numbers of the bodies that are played with"""
+    """indices of the balls"""
     names: dict[int, str]
-    """of the balls"""
+    """names of the balls"""
     mass: dict[int, float]
-    """kg, of the balls"""
+    """kg, mass of each ball"""
     radius: float
-    """m, of the largest ball"""
+    """m, radius of the largest ball"""
     serve: Point
-    """where a ball waits for the plunger, m"""
+    """m, position of a ball that waits for the plunger"""
     launch: Vector
-    """m/s, of a ball that the table launches by itself"""
+    """m/s, velocity of a ball that is launched automatically"""
     homes: tuple[Point, ...]
-    """where balls that are out of play lie, m"""
+    """m, positions of the balls that are out of play"""
     up: Vector
     """unit vector against gravity"""
     corners: tuple[Point, Point]
-    """lower left and upper right, m; a ball beyond them is lost"""
+    """m, lower left and upper right corner; a ball outside has left the table"""
     dt: float
     """s"""
     seed: int
@@ -94,14 +94,14 @@ class Playfield:
 
     @classmethod
     def of(cls, scene: Scene, bodies: Bodies) -> Self:
-        """Read a scene.
+        """Return the playfield of a scene.
 
         Raises:
-            UnsuitableSceneError: it has no ball.
+            UnsuitableSceneError: the scene has no ball.
         """
         parts = scene.play.parts
-        numbers = {name: k for k, name in enumerate(bodies.names)}
-        stated = {numbers[part.name]: part for part in parts if part.role == "ball" and part.name in numbers}
+        body_indices = {name: k for k, name in enumerate(bodies.names)}
+        stated = {body_indices[part.name]: part for part in parts if part.role == "ball" and part.name in body_indices}
         balls = tuple(stated) or tuple(k for k, each in enumerate(bodies.element) if _is_ball(bodies, int(each)))
         if not balls:
             raise UnsuitableSceneError('pinball needs a ball: a `[[play.part]]` with role "ball"')
@@ -117,7 +117,7 @@ class Playfield:
             mass={k: float(bodies.mass[k]) for k in balls},
             radius=max(float(bodies.radius[k]) for k in balls),
             serve=(plunger and plunger.at) or starts[balls[0]],
-            launch=(plunger and plunger.out) or (LAUNCH * up[0], LAUNCH * up[1]),
+            launch=(plunger and plunger.out) or (LAUNCH_SPEED * up[0], LAUNCH_SPEED * up[1]),
             homes=tuple(starts[k] for k in balls[1:]),
             up=up,
             corners=_corners(scene),
@@ -127,16 +127,16 @@ class Playfield:
         )
 
     def of_role(self, *roles: Role) -> tuple[PlayfieldElement, ...]:
-        """Return the elements that play certain parts, in the scene's order."""
+        """Return the elements with one of some roles, in the order of the scene."""
         return tuple(each for each in self.elements if each.role in roles)
 
     def groups(self, role: Role) -> dict[str, tuple[PlayfieldElement, ...]]:
-        """Return those of a role that belong together, each group by its steps; what is in no group is left out."""
+        """Return the groups of elements of a role, each sorted by step; elements without a group are left out."""
         groups: dict[str, list[PlayfieldElement]] = {}
         for each in self.of_role(role):
             if each.group is not None:
                 groups.setdefault(each.group, []).append(each)
-        return {name: tuple(sorted(those, key=lambda each: each.step)) for name, those in groups.items()}
+        return {name: tuple(sorted(members, key=lambda each: each.step)) for name, members in groups.items()}
 
     def flippers(self, side: str) -> tuple[PlayfieldElement, ...]:
         """Return the flippers of a side, `left` or `right`."""
@@ -148,16 +148,16 @@ class Playfield:
         )
 
     def height(self, x: float, y: float) -> float:
-        """Return how far up from where balls are served a point is, m."""
+        """Return the height of a point up the slope, above the position where balls are served, m."""
         return (x - self.serve[0]) * self.up[0] + (y - self.serve[1]) * self.up[1]
 
     def in_lane(self, x: float, y: float) -> bool:
-        """Tell whether a point, m, is where balls are served, or where a plunger draws them."""
+        """Return whether a point, m, is in the plunger lane, near the position where balls are served."""
         along, dx, dy = self.height(x, y), x - self.serve[0], y - self.serve[1]
         return -LANE_DOWN <= along <= LANE_UP and abs(dx * self.up[1] - dy * self.up[0]) <= LANE_SIDE
 
     def inside(self, x: float, y: float) -> bool:
-        """Tell whether a point, m, is on the table; what is not a number is not."""
+        """Return whether a point, m, is on the table; a point with a NaN coordinate is not."""
         (left, low), (right, high) = self.corners
         return left <= x <= right and low <= y <= high
 
@@ -180,13 +180,15 @@ def _up(scene: Scene) -> Vector:
 
 
 def _elements(scene: Scene, bodies: Bodies, ball: int) -> Iterator[PlayfieldElement]:
-    """Yield what plays a part, but balls."""
-    things: dict[str, Fixed] = dict(zip(scene.fixed_names, scene.fixed, strict=False))  # pockets and zones come after
-    fires, middle = _thresholds(scene, bodies, ball), _middle(scene)
-    those = {name: k for k, name in enumerate(bodies.names)}
+    """Yield the elements with a role, except balls."""
+    fixed_bodies: dict[str, Fixed] = dict(
+        zip(scene.fixed_names, scene.fixed, strict=False)
+    )  # pockets and zones come after
+    thresholds, middle = _thresholds(scene, bodies, ball), _middle(scene)
+    indices = {name: k for k, name in enumerate(bodies.names)}
     for part in (each for each in scene.play.parts if each.role != "ball"):
-        thing, body = things.get(part.name), those.get(part.name)
-        where, span = part.at or _where(thing), 0.0
+        element, body = fixed_bodies.get(part.name), indices.get(part.name)
+        where, span = part.at or _centre(element), 0.0
         if body is not None:
             (x, y), span = bodies.position[body].tolist(), float(bodies.radius[body])
             where = part.at or (x, y)
@@ -197,10 +199,10 @@ def _elements(scene: Scene, bodies: Bodies, ball: int) -> Iterator[PlayfieldElem
             step=part.step,
             score=part.score,
             where=where,
-            out=part.out or _towards(where, middle),
-            least=fires.get(part.name, 0.0),
-            outline=_outline(thing) if isinstance(thing, Wall) else (),
-            reach=thing.thickness / 2.0 if isinstance(thing, Wall) else 0.0,
+            out=part.out or _eject_velocity(where, middle),
+            least=thresholds.get(part.name, 0.0),
+            outline=_outline(element) if isinstance(element, Wall) else (),
+            reach=element.thickness / 2.0 if isinstance(element, Wall) else 0.0,
             span=span,
         )
 
@@ -208,32 +210,32 @@ def _elements(scene: Scene, bodies: Bodies, ball: int) -> Iterator[PlayfieldElem
 def _thresholds(scene: Scene, bodies: Bodies, ball: int) -> dict[str, float]:
     """Return the impulse over mass, m/s, above which the switch of each struck thing closes, by name.
 
-    A ball that comes with v leaves with e(v)·v, so the impulse tells v, whatever else the step has done to the ball.
-    The law is that of `engines.common.restitution`, which is not imported for one line: it wakes the compiler.
+    A ball that arrives at v leaves at e(v)·v, so v follows from the impulse, whatever else happens to the ball in the
+    step. The law of e(v) is that of `engines.common.restitution`, which is not imported because it loads the compiler.
     """
     surfaces, roles = pair_table(scene, bodies), {part.name: part.role for part in scene.play.parts}
-    fires = {}
-    for number, (name, thing) in enumerate(zip(scene.fixed_names, scene.fixed, strict=False)):
-        if roles.get(name) not in FIRES:
+    thresholds = {}
+    for number, (name, element) in enumerate(zip(scene.fixed_names, scene.fixed, strict=False)):
+        if roles.get(name) not in SWITCH_THRESHOLDS:
             continue
         pair = surfaces.of_body[ball], surfaces.of_fixed[number]
         restitution, falloff = float(surfaces.restitution[pair]), float(surfaces.falloff[pair])
-        kick = None if isinstance(thing, Plane) else thing.kick
-        speed = FIRES[roles[name]] if kick is None else kick.threshold
-        fires[name] = speed * (1.0 + restitution / (1.0 + falloff * speed))
-    return fires
+        kick = None if isinstance(element, Plane) else element.kick
+        speed = SWITCH_THRESHOLDS[roles[name]] if kick is None else kick.threshold
+        thresholds[name] = speed * (1.0 + restitution / (1.0 + falloff * speed))
+    return thresholds
 
 
 def _outline(wall: Wall) -> tuple[Point, ...]:
     return (*wall.points, wall.points[0]) if wall.closed else wall.points
 
 
-def _where(thing: Fixed | None) -> Point:
-    """Return the middle of a thing, m; of what lies nowhere, such as a drive, the origin."""
-    if isinstance(thing, Post):
-        return thing.position
-    if isinstance(thing, Wall):
-        return _mean(thing.points)
+def _centre(element: Fixed | None) -> Point:
+    """Return the centre of a static body, m; the origin for an element without a position, such as a drive."""
+    if isinstance(element, Post):
+        return element.position
+    if isinstance(element, Wall):
+        return _mean(element.points)
     return (0.0, 0.0)
 
 
@@ -241,14 +243,14 @@ def _mean(points: tuple[Point, ...]) -> Point:
     return sum(x for x, _ in points) / len(points), sum(y for _, y in points) / len(points)
 
 
-def _towards(where: Point, middle: Point) -> Vector:
+def _eject_velocity(where: Point, middle: Point) -> Vector:
     x, y = middle[0] - where[0], middle[1] - where[1]
     size = math.hypot(x, y)
-    return (EJECT * x / size, EJECT * y / size) if size else (0.0, EJECT)
+    return (EJECT_SPEED * x / size, EJECT_SPEED * y / size) if size else (0.0, EJECT_SPEED)
 
 
 def _corners(scene: Scene) -> tuple[Point, Point]:
-    """Return the box about everything fixed that has an end, with a margin; without any, no box at all."""
+    """Return the bounding box of walls and posts, with a margin; infinite without any."""
     points = [point for wall in scene.walls for point in wall.points] + [post.position for post in scene.posts]
     if not points:
         return (-math.inf, -math.inf), (math.inf, math.inf)

@@ -1,4 +1,4 @@
-"""Rules of pinball: controls, score panel, observation of learning agents, and the rules that run the devices."""
+"""Rules of pinball: controls, score panel, observation for learning agents, and the rules that run the devices."""
 
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -39,7 +39,7 @@ NUDGES = {"nudge": 1.0 + 0j, "nudge left": 1j, "nudge right": -1j}
 """control → direction of the balls, as a rotation from the upward direction of the table"""
 
 NUDGE_FREQUENCY = 0.05
-"""frequency of random nudges, relative to other controls: the third of a ball tilts the table"""
+"""frequency of random nudges, relative to other controls: the third nudge during a ball tilts the table"""
 
 CONTROLS = (
     Control(LEFT, "left flipper; lane lights move left", ("left shift", "z"), "lb lt"),
@@ -65,12 +65,12 @@ def observation(
     """Yield names and values; names and order are constant.
 
     Args:
-        flow: of the game.
-        modes: what runs.
-        multiball: whether it is on.
-        lamps: the sets of lanes and standing targets.
-        banks: of drop targets.
-        saved: s, in which drained balls come back; 0 for none.
+        flow: state of players and balls.
+        modes: modes of the game.
+        multiball: multiball of the game.
+        lamps: sets of lanes and standup targets.
+        banks: banks of drop targets.
+        saved: remaining ball save, s; 0 for none.
     """
     sheet, nudge = flow.sheet, flow.nudge
     yield "player", flow.turn
@@ -92,8 +92,8 @@ def observation(
     for each in lamps:
         yield from ((f"{name} lit", lit) for name, lit in zip(each.names, each.lit, strict=True))
     for bank in banks:
-        gone = {*bank.down, *bank.falling}
-        yield from ((f"{target.name} down", place in gone) for place, target in enumerate(bank.members))
+        down = {*bank.down, *bank.falling}
+        yield from ((f"{target.name} down", k in down) for k, target in enumerate(bank.members))
 
 
 DisplayLine = tuple[str, str]
@@ -105,11 +105,11 @@ def display_lines(
     """Return labels and texts, the most important first, without the score, which the host shows.
 
     Args:
-        sheets: of the players.
-        turn: who plays, from 0.
-        modes: what runs.
-        saved: s, in which drained balls come back; 0 or less for none.
-        message: the last news; empty for none.
+        sheets: states of the players.
+        turn: index of the present player.
+        modes: modes of the game.
+        saved: remaining ball save, s; 0 or less for none.
+        message: last message; empty for none.
     """
     sheet = sheets[turn]
     ball = f"{min(sheet.ball, BALLS)} of {BALLS}"
@@ -145,7 +145,7 @@ class PinballRules:
     controls: tuple[Control, ...] = CONTROLS
 
     def __init__(self, scene: Scene, bodies: Bodies) -> None:
-        """Begin a game.
+        """Start a game.
 
         Raises:
             UnsuitableSceneError: the scene has no ball.
@@ -166,12 +166,13 @@ class PinballRules:
         self.up: set[str] = set()
         """sides whose flippers are up"""
         self.said = ("", 0.0)
+        """last message, and the time until which it is shown, s"""
         self._cues: list[str] = []
         self._now: StepContext | None = None
 
     @property
     def trough(self) -> Trough:
-        """Trough, which knows where each ball is."""
+        """Trough: the balls in play and out of play."""
         return self.flow.trough
 
     @property
@@ -223,7 +224,7 @@ class PinballRules:
         return display_lines(flow.sheets, flow.turn, self.modes, self._saved(time), message if time < until else "")
 
     def observation(self) -> Sequence[tuple[str, float]]:
-        """Return the state that panel and lamps show, as numbers."""
+        """Return the state of the game that panel and lamps show, as numbers."""
         saved = self._saved(0.0 if self._now is None else self._now.time)
         return list(observation(self.flow, self.modes, self.multiball, self.lamps, self.banks, max(saved, 0.0)))
 
@@ -302,7 +303,7 @@ class PinballRules:
         elif not value:
             for ball in now.live:
                 if self.trough.in_lane(ball, now):
-                    yield from self.trough.launched(ball, now)
+                    yield from self.trough.launch(ball, now)
 
     def _apply(self, effects: Iterable[Effect], now: StepContext) -> list[Action]:
         """Apply effects in order, and the effects that follow from them; return the actions among them."""
@@ -319,7 +320,7 @@ class PinballRules:
                     actions += self._apply(self.flow.remove_ball(effect.ball, now), now)
                 case ServeBalls():
                     for _ in range(effect.balls):
-                        self.trough.serve(alone=True)
+                        self.trough.serve(automatic=True)
                 case BallSave():
                     self.flow.save(now.time + effect.seconds)
                 case ExtraBall():

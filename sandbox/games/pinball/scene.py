@@ -7,7 +7,7 @@ from typing import Any
 from sandbox.games.pinball import build
 from sandbox.games.pinball.build import MATERIALS, Building, pairs, rolling_gravity
 from sandbox.games.pinball.elements import (
-    LEAST_DEPTH,
+    MIN_ZONE_DEPTH,
     Art,
     Drain,
     DropTargets,
@@ -22,7 +22,7 @@ from sandbox.games.pinball.elements import (
     Slingshot,
     Spinner,
     Standup,
-    both,
+    mirrored_copies,
 )
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.game_tables import table_of
@@ -30,15 +30,15 @@ from sandbox.scene.errors import LocatedMessage, Location, path_of
 from sandbox.scene.files.presets import Preset, added, paired, stated
 from sandbox.scene.geometry.polyline import RoundingError, length_of, rounded
 
-CLOSEST = 1e-6
-"""m: the least distance of an element's points"""
+MIN_DISTANCE = 1e-6
+"""m, minimum distance of the points of an element"""
 MAX_COORDINATE = 1e6
-"""m: farther from the origin, zones 0.1 mm wide along a ramp are lost to rounding."""
+"""m: farther from the origin, zones of 0.1 mm along a ramp vanish by rounding."""
 _TOO_FAR = f"is too far away; the coordinates of a pinball table are at most {MAX_COORDINATE:g} m"
 
 
 def faults_of(scene: Scene) -> Iterator[LocatedMessage]:
-    """Yield why a scene's `[pinball]` stands for nothing."""
+    """Yield the faults of the `[pinball]` of a scene, which prevent its expansion."""
     pinball = table_of(scene, Pinball)
     if pinball is None:
         return
@@ -48,17 +48,17 @@ def faults_of(scene: Scene) -> Iterator[LocatedMessage]:
         yield ("pinball", "axis"), _TOO_FAR
     if pinball.outline is not None:
         yield from ((("pinball", "outline", k), _TOO_FAR) for k in _far_corners(pinball.outline))
-        yield from _corners(("pinball", "outline"), pinball.outline, True, pinball.tolerance)
-    for kind, those in elements_of(pinball):
-        for k, element in enumerate(those):
-            far = list(_far_away(element))
-            for location, message in far or _wrong(element, pinball):
+        yield from _corner_faults(("pinball", "outline"), pinball.outline, True, pinball.tolerance)
+    for kind, elements in elements_of(pinball):
+        for k, element in enumerate(elements):
+            distant = list(_distant_points(element))
+            for location, message in distant or _element_faults(element, pinball):
                 yield ("pinball", kind, k, *location), message
-    yield from _called_alike(pinball)
+    yield from _name_faults(pinball)
 
 
-def _far_away(element: Element) -> Iterator[LocatedMessage]:
-    """Yield which points of an element are too far from the origin."""
+def _distant_points(element: Element) -> Iterator[LocatedMessage]:
+    """Yield the points of an element that are too far from the origin."""
     for key in ("position", "pivot"):
         point = getattr(element, key, None)
         if point is not None and list(_far_corners((point,))):
@@ -67,52 +67,55 @@ def _far_away(element: Element) -> Iterator[LocatedMessage]:
 
 
 def _far_corners(corners: Sequence[tuple[float, ...]]) -> Iterator[int]:
-    """Yield the numbers of the corners that are too far from the origin."""
+    """Yield the indices of the corners that are too far from the origin."""
     for k, (x, y, *_) in enumerate(corners):
         if max(abs(x), abs(y)) > MAX_COORDINATE:
             yield k
 
 
 def elements_of(pinball: Pinball) -> Iterator[tuple[str, tuple[Element, ...]]]:
-    """Yield the elements of a table by the headings of their tables, in the order in which they are built."""
+    """Yield kind, as in the headings of the scene file, and elements, in the order of their expansion."""
     for name, field in type(pinball).model_fields.items():
         if field.alias is not None:
             yield field.alias, getattr(pinball, name)
 
 
-def _called_alike(pinball: Pinball) -> Iterator[LocatedMessage]:
-    """Yield the elements that are called as another one is."""
+def _name_faults(pinball: Pinball) -> Iterator[LocatedMessage]:
+    """Yield the elements whose names are not unique."""
     first: dict[str, Location] = {}
-    for kind, those in elements_of(pinball):
-        for k, element in enumerate(those if kind != "art" else ()):  # of paint nobody speaks by name
-            here: Location = ("pinball", kind, k)
-            names = [name for name, _ in both(element, kind, k, pinball.axis)]
+    for kind, elements in elements_of(pinball):
+        for k, element in enumerate(elements if kind != "art" else ()):  # nothing refers to painted areas by name
+            location: Location = ("pinball", kind, k)
+            names = [name for name, _ in mirrored_copies(element, kind, k, pinball.axis)]
             if len(set(names)) < len(names):
                 yield (
-                    (*here, "mirrored"),
+                    (*location, "mirrored"),
                     f"has no effect: the element is on the table's axis, x = {pinball.axis!r} m; remove it",
                 )
                 names = names[:1]
             for name in names:
-                there = first.setdefault(name, here)
-                if there is not here:
-                    yield (*here, "name"), f"{path_of(there, {})} is also named {name!r}; names must be unique"
+                first_location = first.setdefault(name, location)
+                if first_location is not location:
+                    yield (
+                        (*location, "name"),
+                        f"{path_of(first_location, {})} is also named {name!r}; names must be unique",
+                    )
 
 
-def _wrong(element: Element, pinball: Pinball) -> Iterator[LocatedMessage]:
-    """Yield what is wrong with one element, located within it."""
+def _element_faults(element: Element, pinball: Pinball) -> Iterator[LocatedMessage]:
+    """Yield the faults of one element, with locations relative to it."""
     tolerance = pinball.tolerance
     match element:
         case Line():
-            yield from _corners(("points",), element.points, element.closed, tolerance)
+            yield from _corner_faults(("points",), element.points, element.closed, tolerance)
             if element.fill is not None and not element.closed:
                 yield ("fill",), "applies to closed lines only; set `closed = true`, or remove it"
         case Art() if element.points is not None:
-            yield from _corners(("points",), element.points, True, tolerance)
+            yield from _corner_faults(("points",), element.points, True, tolerance)
         case Ramp():
-            yield from _ramp(element, tolerance, 2.0 * pinball.ball_radius)
-        case Gate() | Spinner() | Drain() if math.dist(*element.points) < CLOSEST:
-            yield ("points", 1), "is at the same place as the point before; the ends of a line must differ"
+            yield from _ramp_faults(element, tolerance, 2.0 * pinball.ball_radius)
+        case Gate() | Spinner() | Drain() if math.dist(*element.points) < MIN_DISTANCE:
+            yield ("points", 1), "has the same position as the point before; the ends of a line must differ"
         case Spinner() if math.dist(*element.points) <= element.thickness:
             yield ("points",), f"must be farther apart than the thickness, {element.thickness!r} m"
         case Slingshot() if _height(element) <= element.thickness:
@@ -137,7 +140,7 @@ def _wrong(element: Element, pinball: Pinball) -> Iterator[LocatedMessage]:
                 yield ("stops",), "must be two different angles: at rest and raised, rad"
 
 
-def _corners(
+def _corner_faults(
     at: Location, corners: tuple[FilletCorner, ...], closed: bool, tolerance: float
 ) -> Iterator[LocatedMessage]:
     sharp = next((k for k, corner in enumerate(corners) if len(corner) > 2 and corner[2] < 0.0), None)
@@ -153,30 +156,30 @@ def _corners(
         yield (*at, error.corner), str(error)
 
 
-def _ramp(ramp: Ramp, tolerance: float, ball: float) -> Iterator[LocatedMessage]:
-    wrong = list(_corners(("points",), ramp.points, False, tolerance))
-    yield from wrong
-    if ramp.width <= max(ball, LEAST_DEPTH):
-        yield ("width",), f"is too narrow for the ball; it must be more than {max(ball, LEAST_DEPTH):.4g} m"
-    if wrong:
+def _ramp_faults(ramp: Ramp, tolerance: float, ball: float) -> Iterator[LocatedMessage]:
+    corner_faults = list(_corner_faults(("points",), ramp.points, False, tolerance))
+    yield from corner_faults
+    if ramp.width <= max(ball, MIN_ZONE_DEPTH):
+        yield ("width",), f"is too narrow for the ball; it must be more than {max(ball, MIN_ZONE_DEPTH):.4g} m"
+    if corner_faults:
         return
     length = length_of(rounded(ramp.points, False, tolerance))
     if ramp.climb >= length:
         yield ("climb",), f"must be less than the length of the ramp, {length:.4g} m"
-    elif ramp.climb < 4.0 * LEAST_DEPTH:
-        yield ("climb",), f"is too short for a mouth; it must be at least {4.0 * LEAST_DEPTH:g} m"
+    elif ramp.climb < 4.0 * MIN_ZONE_DEPTH:
+        yield ("climb",), f"is too short for a mouth; it must be at least {4.0 * MIN_ZONE_DEPTH:g} m"
 
 
 def _height(slingshot: Slingshot) -> float:
-    """Return how far the post behind lies from the side that kicks, m."""
+    """Return the distance of the rear post from the kicking side, m."""
     (ax, ay), (bx, by), (cx, cy) = slingshot.points
-    return abs((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)) / max(math.hypot(bx - ax, by - ay), CLOSEST)
+    return abs((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)) / max(math.hypot(bx - ax, by - ay), MIN_DISTANCE)
 
 
 SUBSTEPS = 10
-"""for engines that step: at 1 kHz a ball at 8 m/s covers less than its radius in one"""
+"""substeps of engines with fixed steps: at 1 kHz, a ball at 8 m/s moves by less than its radius in one of them"""
 DURATION = 60.0
-"""s"""
+"""s, default duration"""
 
 BUILD: dict[str, Callable[[Building, str, Any], None]] = {
     "art": build.art,
@@ -197,19 +200,19 @@ BUILD: dict[str, Callable[[Building, str, Any], None]] = {
     "plunger": build.plunger,
     "ball": build.ball,
 }
-"""How each kind of element is built."""
+"""Function that expands an element, by its kind."""
 
 
 def expanded(scene: Scene) -> Scene:
-    """Return the scene of primitives that a scene with a sound `[pinball]` stands for; another as it is.
+    """Return a scene with its valid `[pinball]` expanded to primitives; a scene without one unchanged.
 
-    What the scene states itself comes first in each list, and outranks what is of the same name.
+    Elements of the scene precede the expanded ones in each list, and replace those of the same name.
     """
     pinball = table_of(scene, Pinball)
     if pinball is None:
         return scene
     gravity = scene.world.gravity if "gravity" in scene.world.model_fields_set else rolling_gravity(pinball.slope)
-    to = _built(pinball, gravity)
+    building = _built(pinball, gravity)
     changes: dict[str, Any] = {
         "pinball": None,
         "world": stated(scene.world, {"gravity": gravity, "duration": DURATION}),
@@ -217,30 +220,33 @@ def expanded(scene: Scene) -> Scene:
         "materials": added(scene.materials, MATERIALS),
         "pairs": paired(scene.pairs, pairs(pinball.ball_restitution)),
         "play": stated(scene.play, {"game": pinball.game, "ground": "playfield"}).model_copy(
-            update={"parts": added(scene.play.parts, to.parts), "markings": (*to.markings, *scene.play.markings)}
+            update={
+                "parts": added(scene.play.parts, building.parts),
+                "markings": (*building.markings, *scene.play.markings),
+            }
         ),
     }
     for key in ("walls", "posts", "zones", "balls", "polygons", "drives"):
-        changes[key] = added(getattr(scene, key), getattr(to, key))
+        changes[key] = added(getattr(scene, key), getattr(building, key))
     return scene.model_copy(update=changes)
 
 
 def origins(scene: Scene) -> dict[str, Location]:
-    """Return which element of a scene's sound `[pinball]` each name is of that it would write out."""
+    """Return the location of the element of a valid `[pinball]` by each name in its expansion."""
     pinball = table_of(scene, Pinball)
     return {} if pinball is None else _built(pinball, rolling_gravity(pinball.slope)).origins
 
 
 def _built(pinball: Pinball, gravity: tuple[float, float]) -> Building:
-    to = Building(pinball.axis, pinball.tolerance, pinball.ball_radius, pinball.ball_mass, gravity)
+    building = Building(pinball.axis, pinball.tolerance, pinball.ball_radius, pinball.ball_mass, gravity)
     if pinball.outline is not None:
-        to.paint(pinball.colour, to.line(pinball.outline, closed=True))
-    for kind, those in elements_of(pinball):
-        for k, element in enumerate(those):
-            to.here = ("pinball", kind, k)
-            for name, one in both(element, kind, k, pinball.axis):
-                BUILD[kind](to, name, one)
-    return to
+        building.paint(pinball.colour, building.line(pinball.outline, closed=True))
+    for kind, elements in elements_of(pinball):
+        for k, element in enumerate(elements):
+            building.location = ("pinball", kind, k)
+            for name, copy in mirrored_copies(element, kind, k, pinball.axis):
+                BUILD[kind](building, name, copy)
+    return building
 
 
 PINBALL = Preset(

@@ -60,10 +60,10 @@ class TiltBob:
             if abs(self.angle) < self.trip:
                 continue
             out = self.angle / abs(self.angle)
-            way = (self.rate * out.conjugate()).real
+            outward_rate = (self.rate * out.conjugate()).real
             self.angle = self.trip * out
-            if way > 0.0:
-                self.rate -= (1.0 + BOB_RESTITUTION) * way * out
+            if outward_rate > 0.0:
+                self.rate -= (1.0 + BOB_RESTITUTION) * outward_rate * out
                 struck += 1
         return struck
 

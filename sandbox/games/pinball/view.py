@@ -19,41 +19,41 @@ from sandbox.window.render.static_geometry import draw_markings, draw_static_bod
 
 DARK: RgbColour = (5, 8, 14)
 SHADOW = (0.003, -0.005)
-"""m, from what is fixed to its shadow"""
-SHADE, NOTHING = 90, (255, 0, 255)
-"""how dark shadows are, of 255; and the colour that stands for none"""
+"""m, offset of the shadow of a static body"""
+SHADOW_ALPHA, TRANSPARENT = 90, (255, 0, 255)
+"""opacity of shadows, of 255; and the colour key of the shadow layer"""
 LARGE_DISC = 4000.0
-"""px: what is larger than the picture needs no shadow"""
-RAISED = 0.62
-"""of the radius of a post that kicks: its cap"""
+"""px, radius above which a disc has no shadow: it is larger than the window"""
+CAP_RADIUS = 0.62
+"""radius of the cap of a bumper, as a fraction of the radius of the post"""
 
 
 def draw_playfield(
     surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True
 ) -> None:
-    """Draw such a ground and what is fixed on it, as far as it is in sight."""
+    """Draw a playfield: markings, shadows, lamps, zones and static bodies, as far as they are visible."""
     draw_markings(surface, camera, scene, unit, antialias)
-    _shadows(surface, camera, scene)
+    _draw_shadows(surface, camera, scene)
     draw_lamps(surface, camera, scene, unit, antialias)
-    draw_zones(surface, camera, _coloured(scene), unit, antialias)
+    draw_zones(surface, camera, _with_coloured_zones(scene), unit, antialias)
     draw_static_bodies(surface, camera, on_layer(scene, 0), unit, antialias)
     for post in scene.posts:
         if post.kick is not None:
-            _cap(surface, camera, post, unit, antialias)
+            _draw_cap(surface, camera, post, unit, antialias)
 
 
-def _coloured(scene: Scene) -> Scene:
-    """Return a scene with only those zones that have a colour of their own; paint and lamps mark the others."""
+def _with_coloured_zones(scene: Scene) -> Scene:
+    """Return a scene with only those zones that have a colour; markings and lamps show the others."""
     return scene.model_copy(update={"zones": tuple(zone for zone in scene.zones if zone.colour is not None)})
 
 
-def _cap(surface: pygame.Surface, camera: Camera, post: Post, unit: float, antialias: bool) -> None:
-    """Draw the cap of a bumper: a bright ring, a lid in its colour, a light on it."""
+def _draw_cap(surface: pygame.Surface, camera: Camera, post: Post, unit: float, antialias: bool) -> None:
+    """Draw the cap of a bumper: a bright ring, a lid in its colour, and a highlight."""
     colour = colour_of_fixed(post)
     for fraction, inner, rim in (
         (1.0, mix_colours(DARK, colour, 0.45), mix_colours(colour, INK, 0.35)),
-        (RAISED + 0.12, INK, mix_colours(INK, colour, 0.3)),
-        (RAISED, colour, mix_colours(colour, DARK, 0.35)),
+        (CAP_RADIUS + 0.12, INK, mix_colours(INK, colour, 0.3)),
+        (CAP_RADIUS, colour, mix_colours(colour, DARK, 0.35)),
     ):
         draw_spot(
             surface, camera, post.position, fraction * post.radius, ShapeStyle(inner, rim, 1.5 * unit, 1.0, antialias)
@@ -62,12 +62,12 @@ def _cap(surface: pygame.Surface, camera: Camera, post: Post, unit: float, antia
     draw_spot(surface, camera, glint, 0.2 * post.radius, ShapeStyle(INK, INK, 0.0, 0.35, antialias))
 
 
-def _shadows(surface: pygame.Surface, camera: Camera, scene: Scene) -> None:
-    """Darken the ground beside what is fixed on it, once where shadows overlap."""
+def _draw_shadows(surface: pygame.Surface, camera: Camera, scene: Scene) -> None:
+    """Draw the shadows of static bodies; overlapping shadows darken the ground only once."""
     layer = pygame.Surface(surface.get_size(), 0, surface)
-    layer.fill(NOTHING)
-    layer.set_colorkey(NOTHING)
-    layer.set_alpha(SHADE)
+    layer.fill(TRANSPARENT)
+    layer.set_colorkey(TRANSPARENT)
+    layer.set_alpha(SHADOW_ALPHA)
     for wall in scene.walls:
         if not wall.solid or GROUND not in wall.layers:
             continue
@@ -78,15 +78,15 @@ def _shadows(surface: pygame.Surface, camera: Camera, scene: Scene) -> None:
             draw_line(layer, a, b, DARK, 2.0 * half, antialias=False)
         if 1.0 < half < LARGE_DISC:
             for end in ends:
-                _dark(layer, end, half)
+                _draw_dark_disc(layer, end, half)
     for post in scene.posts:
         x, y = camera.to_screen(np.asarray(post.position) + SHADOW).tolist()
         if post.solid and GROUND in post.layers and post.radius * camera.scale < LARGE_DISC:
-            _dark(layer, (x, y), post.radius * camera.scale)
+            _draw_dark_disc(layer, (x, y), post.radius * camera.scale)
     surface.blit(layer, (0, 0))
 
 
-def _dark(layer: pygame.Surface, at: Pixel, radius: float) -> None:
+def _draw_dark_disc(layer: pygame.Surface, at: Pixel, radius: float) -> None:
     if clip_segment(at, at, layer.get_rect(), radius) is not None:
         pygame.draw.circle(layer, DARK, at, radius)
 

@@ -1,7 +1,8 @@
 """Ballistic collisions of balls without friction: two balls, or a few in one line.
 
-All balls fall alike under uniform gravity, so that relative motion is straight and the time of an impact is the root of
-a quadratic equation. Each ball takes (1 + e) times the closing speed, by the mass fraction of the other.
+All balls have the same acceleration under uniform gravity, so that relative motion is straight and the time of an
+impact is the root of a quadratic equation. An impact changes the velocity of each ball by (1 + e) times the
+closing speed, times the mass fraction of the other ball.
 """
 
 from dataclasses import dataclass
@@ -26,7 +27,7 @@ MAX_IMPACTS = 1000
 """More impacts are an inelastic collapse: balls that come to rest between others bounce without end."""
 SIMULTANEOUS = 1e-9
 """s: impacts of one ball with two others within this time are one impact of three balls, which has no unique outcome;
-equal elastic balls in line pass it on in any order.
+equal elastic balls in line are an exception: the order of the impacts does not matter.
 """
 
 
@@ -58,33 +59,35 @@ class BallisticCollisions:
     """Motion of all balls of a scene."""
 
     facts: SceneFacts
-    legs: tuple[BallisticSegment, ...]
+    segments: tuple[BallisticSegment, ...]
     impacts: tuple[ContactEvent, ...]
     """impacts in the falling frame"""
-    name: str = "balls that meet"
+    name: str = "colliding balls"
 
     def at(self, time: FloatArray) -> BodyMotion:
         """Return the motion of all N bodies at T times."""
-        which = np.searchsorted([leg.begin for leg in self.legs], time, side="right") - 1
-        begin = np.asarray([leg.begin for leg in self.legs])[which]
-        position = np.stack([leg.position for leg in self.legs])[which]
-        velocity = np.stack([leg.velocity for leg in self.legs])[which]
-        pull, bodies = self.facts.gravity, self.facts.bodies
-        fallen = 0.5 * time[:, None] ** 2 * pull
-        position = position + velocity * (time - begin)[:, None, None] + fallen[:, None]
-        velocity = velocity + (time[:, None] * pull)[:, None]
+        which = np.searchsorted([segment.begin for segment in self.segments], time, side="right") - 1
+        begin = np.asarray([segment.begin for segment in self.segments])[which]
+        position = np.stack([segment.position for segment in self.segments])[which]
+        velocity = np.stack([segment.velocity for segment in self.segments])[which]
+        acceleration, bodies = self.facts.gravity, self.facts.bodies
+        fall = 0.5 * time[:, None] ** 2 * acceleration
+        position = position + velocity * (time - begin)[:, None, None] + fall[:, None]
+        velocity = velocity + (time[:, None] * acceleration)[:, None]
         spin = np.broadcast_to(bodies.angular_velocity, (len(time), len(bodies)))
         return BodyMotion(position, velocity, bodies.angle + time[:, None] * spin, spin)
 
     def contacts(self, until: float) -> list[ContactEvent]:
         """Return the impacts up to a time."""
         x, y = self.facts.gravity.tolist()
-        found = []
-        for each in self.impacts:
-            if each.time <= until:
-                half = 0.5 * each.time**2
-                found.append(each._replace(point=(each.point[0] + half * x, each.point[1] + half * y)))
-        return found
+        events = []
+        for event in self.impacts:
+            if event.time <= until:
+                half_square = 0.5 * event.time**2
+                events.append(
+                    event._replace(point=(event.point[0] + half_square * x, event.point[1] + half_square * y))
+                )
+        return events
 
 
 def ballistic_collisions(facts: SceneFacts) -> BallisticCollisions | None:
@@ -111,10 +114,10 @@ def ballistic_collisions(facts: SceneFacts) -> BallisticCollisions | None:
 def _in_line(position: FloatArray, velocity: FloatArray) -> bool:
     """Return whether all positions and velocities are in one line."""
     away = position - position[0]
-    far = away[int(np.hypot(*away.T).argmax())]
-    if not far.any():
+    farthest = away[int(np.hypot(*away.T).argmax())]
+    if not farthest.any():
         return False
-    line, size = direction(far), float(np.abs(position).max())
+    line, size = direction(farthest), float(np.abs(position).max())
     straight = all(abs(cross(each, line)) <= PARALLEL_SINE * size for each in away)
     return straight and all(parallel(each, line) for each in velocity)
 
@@ -122,72 +125,74 @@ def _in_line(position: FloatArray, velocity: FloatArray) -> bool:
 def _follow(facts: SceneFacts) -> BallisticCollisions | None:
     """Return the motion from impact to impact to the end; None if an impact has no unique outcome."""
     bodies, duration = facts.bodies, facts.world.duration
-    surfaces = facts.meet.surfaces
-    numbers = surfaces.of_body
-    restitution, friction = (each[np.ix_(numbers, numbers)] for each in (surfaces.restitution, surfaces.friction))
+    surfaces = facts.matrix.surfaces
+    surface_of = surfaces.of_body
+    restitution, friction = (
+        table[np.ix_(surface_of, surface_of)] for table in (surfaces.restitution, surfaces.friction)
+    )
     mass, reach = bodies.mass, bodies.radius[:, None] + bodies.radius
     apart = np.triu(np.ones((len(bodies), len(bodies)), np.bool_), 1)
-    if not surfaces.fixed_coefficients[np.ix_(numbers, numbers)][apart].all():
+    if not surfaces.fixed_coefficients[np.ix_(surface_of, surface_of)][apart].all():
         return None  # restitution falls with speed
-    passes_on = bool((mass == mass[0]).all() and (restitution[apart] == 1.0).all())
+    is_elastic_chain = bool((mass == mass[0]).all() and (restitution[apart] == 1.0).all())
 
-    away = np.hypot(*np.moveaxis(bodies.position[:, None] - bodies.position, 2, 0))
-    if (away < reach - TOUCH_TOLERANCE)[apart].any():
+    distance = np.hypot(*np.moveaxis(bodies.position[:, None] - bodies.position, 2, 0))
+    if (distance < reach - TOUCH_TOLERANCE)[apart].any():
         return None
-    leg = BallisticSegment(0.0, bodies.position, bodies.velocity)
-    legs: list[BallisticSegment] = [leg]
+    segment = BallisticSegment(0.0, bodies.position, bodies.velocity)
+    segments: list[BallisticSegment] = [segment]
     rows: list[ContactEvent] = []
     while True:
-        found = _next_impact(leg, reach, apart)
-        if found is None or found.time > duration:
-            return BallisticCollisions(facts, tuple(legs), tuple(rows))
+        impact = _next_impact(segment, reach, apart)
+        if impact is None or impact.time > duration:
+            return BallisticCollisions(facts, tuple(segments), tuple(rows))
         if len(rows) == MAX_IMPACTS:
             return None
-        together = [row for row in rows if found.time - row.time <= SIMULTANEOUS and {*row.pair} & {*found.pair}]
-        if together and not passes_on:
+        simultaneous = [row for row in rows if impact.time - row.time <= SIMULTANEOUS and {*row.pair} & {*impact.pair}]
+        if simultaneous and not is_elastic_chain:
             return None
-        i, j = found.pair
-        if friction[i, j] > 0.0 and _slips(leg, bodies.angular_velocity, found):
+        i, j = impact.pair
+        if friction[i, j] > 0.0 and _slips(segment, bodies.angular_velocity, impact):
             return None
-        leg, row = _apply_impact(leg, found, mass, float(restitution[i, j]), bodies.radius)
-        legs.append(leg)
+        segment, row = _apply_impact(segment, impact, mass, float(restitution[i, j]), bodies.radius)
+        segments.append(segment)
         rows.append(row)
 
 
-def _next_impact(leg: BallisticSegment, reach: FloatArray, apart: BoolArray) -> PairImpact | None:
+def _next_impact(segment: BallisticSegment, reach: FloatArray, apart: BoolArray) -> PairImpact | None:
     """Return the first impact of a segment. Its root D = A R² − cross² is free of the cancellation of B² − A C."""
-    offset = leg.position[None] - leg.position[:, None]
-    moving = leg.velocity[None] - leg.velocity[:, None]
+    offset = segment.position[None] - segment.position[:, None]
+    moving = segment.velocity[None] - segment.velocity[:, None]
     a, b = (moving**2).sum(axis=2), (offset * moving).sum(axis=2)
     sideways = offset[..., 0] * moving[..., 1] - offset[..., 1] * moving[..., 0]
     distance = np.hypot(offset[..., 0], offset[..., 1])
     c = (distance - reach) * (distance + reach)
     d = a * reach**2 - sideways**2
-    speed = float(np.abs(leg.velocity).max())
-    meets = apart & (b < -PARALLEL_SINE * speed * distance) & (d > 0.0)
-    if not meets.any():
+    speed = float(np.abs(segment.velocity).max())
+    collides = apart & (b < -PARALLEL_SINE * speed * distance) & (d > 0.0)
+    if not collides.any():
         return None
     with np.errstate(divide="ignore", invalid="ignore"):
-        wait = np.where(meets, np.maximum(c, 0.0) / (np.sqrt(np.maximum(d, 0.0)) - b), np.inf)
-    i, j = (int(k) for k in np.unravel_index(int(wait.argmin()), wait.shape))
-    normal = direction(offset[i, j] + wait[i, j] * moving[i, j])
-    return PairImpact(leg.begin + float(wait[i, j]), (i, j), normal, -float(moving[i, j] @ normal))
+        delay = np.where(collides, np.maximum(c, 0.0) / (np.sqrt(np.maximum(d, 0.0)) - b), np.inf)
+    i, j = (int(k) for k in np.unravel_index(int(delay.argmin()), delay.shape))
+    normal = direction(offset[i, j] + delay[i, j] * moving[i, j])
+    return PairImpact(segment.begin + float(delay[i, j]), (i, j), normal, -float(moving[i, j] @ normal))
 
 
-def _slips(leg: BallisticSegment, spin: FloatArray, impact: PairImpact) -> bool:
+def _slips(segment: BallisticSegment, spin: FloatArray, impact: PairImpact) -> bool:
     """Return whether two colliding balls slip: they spin, or do not collide head on."""
     i, j = impact.pair
-    relative = leg.velocity[j] - leg.velocity[i]
+    relative = segment.velocity[j] - segment.velocity[i]
     return bool(spin[i] or spin[j] or not parallel(relative, impact.normal))
 
 
 def _apply_impact(
-    leg: BallisticSegment, impact: PairImpact, mass: FloatArray, restitution: float, radius: FloatArray
+    segment: BallisticSegment, impact: PairImpact, mass: FloatArray, restitution: float, radius: FloatArray
 ) -> tuple[BallisticSegment, ContactEvent]:
     """Return the segment after an impact, and the impact as a contact."""
     (i, j), normal = impact.pair, impact.normal
-    position = leg.position + leg.velocity * (impact.time - leg.begin)
-    velocity = leg.velocity.copy()
+    position = segment.position + segment.velocity * (impact.time - segment.begin)
+    velocity = segment.velocity.copy()
     gained = (1.0 + restitution) * impact.closing
     total = mass[i] + mass[j]
     velocity[i] -= mass[j] / total * gained * normal

@@ -165,7 +165,7 @@ def bouncing(facts: SceneFacts, number: int) -> Bouncing | None:
     """
     bodies, planes = facts.bodies, facts.scene.planes
     collides = bodies.elements[bodies.element[number]].collides
-    if not bodies.round[number] or facts.scene.attractions or facts.meet.held[number] or facts.thrust[number]:
+    if not bodies.round[number] or facts.scene.attractions or facts.matrix.held[number] or facts.thrust[number]:
         return None
     if len(planes) != 1 or not facts.has_no_drag or collides == "none":
         return None
@@ -176,7 +176,7 @@ def bouncing(facts: SceneFacts, number: int) -> Bouncing | None:
         return None
 
     # Planes come first among the static objects: the only plane has index 0, which is −1 in contacts.
-    surfaces = facts.meet.surfaces
+    surfaces = facts.matrix.surfaces
     sides = surfaces.of_body[number], surfaces.of_fixed[0]
     if not surfaces.fixed_coefficients[sides]:
         return None

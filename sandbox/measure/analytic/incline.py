@@ -130,7 +130,7 @@ def incline_motion(facts: SceneFacts, number: int) -> InclineMotion | None:
     does not tip over by friction.
     """
     bodies, plane = facts.bodies, facts.only_plane()
-    if plane is None or not facts.meet.touches[number] or facts.meet.held[number] or facts.thrust[number]:
+    if plane is None or not facts.matrix.touches[number] or facts.matrix.held[number] or facts.thrust[number]:
         return None
     if bodies.fixed[number] or facts.scene.attractions or not facts.has_no_drag:
         return None
@@ -186,23 +186,25 @@ def phases_of(
         radius: radius of a ball, m; 0 for a body that does not rotate.
         inertia: m r/I of a ball, 1/m; 0 for a body that does not rotate.
     """
-    both, most = 1.0 + inertia * radius, friction * normal_accel
+    inertia_factor, max_friction = 1.0 + inertia * radius, friction * normal_accel
     time = displacement = rotation = 0.0
     slip = speed + radius * spin
     if abs(slip) <= PARALLEL_SINE * (abs(speed) + abs(radius * spin)):
         slip = 0.0
     phases: list[Phase] = []
     while True:
-        need = abs(tangential_accel) / both
-        if slip == 0.0 and need != 0.0 and abs(need - most) <= EDGE_FRACTION * need:
+        required = abs(tangential_accel) / inertia_factor
+        if slip == 0.0 and required != 0.0 and abs(required - max_friction) <= EDGE_FRACTION * required:
             return None
-        slips = slip != 0.0 or need > most
+        slips = slip != 0.0 or required > max_friction
         friction_accel = (
-            -math.copysign(most, slip if slip != 0.0 else tangential_accel) if slips else -tangential_accel / both
+            -math.copysign(max_friction, slip if slip != 0.0 else tangential_accel)
+            if slips
+            else -tangential_accel / inertia_factor
         )
         a, angular_accel = tangential_accel + friction_accel, inertia * friction_accel
         phases.append(Phase(time, displacement, speed, a, rotation, spin, angular_accel, friction_accel, slips))
-        change = tangential_accel + friction_accel * both
+        change = tangential_accel + friction_accel * inertia_factor
         if slip == 0.0 or slip * change >= 0.0:
             return tuple(phases)
         t = -slip / change
@@ -218,27 +220,27 @@ def phases_of(
 
 def _friction(facts: SceneFacts, number: int) -> float | None:
     """Return μ between a body and the plane; None if its pieces have different values."""
-    surfaces = facts.meet.surfaces
-    own = surfaces.of_body[number]
+    surfaces = facts.matrix.surfaces
+    surface = surfaces.of_body[number]
     if not facts.bodies.round[number]:
         begin, end = np.searchsorted(facts.bodies.shapes.body, (number, number + 1)).tolist()
-        if (surfaces.of_shape[begin:end] != own).any():
+        if (surfaces.of_shape[begin:end] != surface).any():
             return None
-    return float(surfaces.friction[own, surfaces.of_fixed[0]])
+    return float(surfaces.friction[surface, surfaces.of_fixed[0]])
 
 
 def _footprint(facts: SceneFacts, number: int, point: FloatArray, normal: FloatArray) -> Footprint | None:
     """Return the footprint of a body; None if it does not touch the plane or overlaps it."""
     bodies = facts.bodies
     centre = bodies.position[number]
-    heights, places = [], []
+    height_parts, offset_parts = [], []
     for corners, radius in posed_pieces(bodies, number, centre[None], bodies.angle[[number]]):
-        heights.append((corners[0] - point) @ normal - radius)
-        places.append((corners[0] - centre) @ perpendicular(normal))
-    height, place = np.concatenate(heights), np.concatenate(places)
+        height_parts.append((corners[0] - point) @ normal - radius)
+        offset_parts.append((corners[0] - centre) @ perpendicular(normal))
+    height, offset = np.concatenate(height_parts), np.concatenate(offset_parts)
     if abs(height.min()) > TOUCH_TOLERANCE:
         return None
-    touching = place[height <= height.min() + TOUCH_TOLERANCE]
+    touching = offset[height <= height.min() + TOUCH_TOLERANCE]
     return Footprint(float(touching.min()), float(touching.max()), float((centre - point) @ normal))
 
 

@@ -86,7 +86,7 @@ def kepler(facts: SceneFacts, number: int) -> Kepler | None:
     almost exactly the escape velocity.
     """
     scene, bodies = facts.scene, facts.bodies
-    if not facts.moves_freely(number) or facts.meet.held[number] or len(scene.attractions) != 1:
+    if not facts.moves_freely(number) or facts.matrix.held[number] or len(scene.attractions) != 1:
         return None
     sun = scene.attractions[0]
     if sun.strength <= 0.0 or sun.softening > 0.0 or facts.gravity.any() or not facts.has_no_drag:

@@ -29,7 +29,7 @@ rounding.
 
 
 class Anchor(NamedTuple):
-    """The only joint of a body, to a point that never moves."""
+    """Only joint of a body, which connects it to a fixed point."""
 
     kind: LinkKind
     figures: FloatArray
@@ -46,7 +46,7 @@ class SceneFacts:
 
     scene: Scene
     bodies: Bodies
-    meet: ContactMatrix
+    matrix: ContactMatrix
     links: JointArrays
     thrust: BoolArray
     """(N,) whether a thrust or a drive acts on the body"""
@@ -74,7 +74,7 @@ class SceneFacts:
 
     def moves_freely(self, number: int) -> bool:
         """Return whether a body can move, cannot collide, and has no thrust."""
-        return bool(not (self.bodies.fixed[number] or self.meet.touches[number] or self.thrust[number]))
+        return bool(not (self.bodies.fixed[number] or self.matrix.touches[number] or self.thrust[number]))
 
     def only_plane(self) -> Plane | None:
         """Return the plane if it is the only static object, otherwise None."""
@@ -92,16 +92,16 @@ class SceneFacts:
         k = int(found[0])
         if math.isfinite(self.links.strength[k]) or math.isfinite(self.links.most_force[k]):
             return None
-        one = self.links.some(np.asarray([k]))
-        (start,), (end,) = one.ends(self.bodies.position, self.bodies.angle)
-        kind, figures = LinkKind(int(one.kind[0])), one.figures[0]
-        if int(one.b[0]) == number:
-            other, place, arm = int(one.a[0]), start, one.anchor_b[0]
+        joint = self.links.some(np.asarray([k]))
+        (start,), (end,) = joint.ends(self.bodies.position, self.bodies.angle)
+        kind, figures = LinkKind(int(joint.kind[0])), joint.figures[0]
+        if int(joint.b[0]) == number:
+            other, position, arm = int(joint.a[0]), start, joint.anchor_b[0]
         else:
-            other, place, arm = int(one.b[0]), end, one.anchor_a[0]
+            other, position, arm = int(joint.b[0]), end, joint.anchor_a[0]
         if other != WORLD and not self.bodies.fixed[other]:
             return None
-        return Anchor(kind, figures, place, arm)
+        return Anchor(kind, figures, position, arm)
 
 
 def thrust_on(scene: Scene, bodies: Bodies) -> BoolArray:
@@ -151,7 +151,7 @@ class BodyMotion(NamedTuple):
 
 
 class BodySolution(Protocol):
-    """Motion of one body that no moving body can collide with or is joined to."""
+    """Motion of one body that neither collides with a moving body nor is joined to one."""
 
     @property
     def name(self) -> str:
@@ -194,5 +194,5 @@ def unsupported_reason(scene: Scene) -> str | None:
     if scene.world.quadratic_drag > 0:
         return "world.quadratic_drag couples x and y: the flight has no closed form"
     if scene.attractions:
-        return "an attraction draws every body: the flight has no closed form here"
+        return "an attraction acts on every body: the flight has no closed form here"
     return None

@@ -22,7 +22,7 @@ class Oscillator:
     rest: FloatArray
     """(2,) m, equilibrium position"""
     offset: FloatArray
-    """(2,) m from there, at time 0"""
+    """(2,) m from the equilibrium, at time 0"""
     velocity: FloatArray
     """(2,) m/s, at time 0"""
     squared: float
@@ -33,14 +33,16 @@ class Oscillator:
     """at time 0, rad"""
     spin: float
     """rad/s, constant"""
-    name: str = "a spring's swing"
+    name: str = "oscillation on a spring"
 
     def at(self, time: FloatArray) -> BodyMotion:
         """Return its motion at T times."""
         c, s = (each[:, None] for each in damped(time, self.squared, self.damping))
-        swung = self.offset * c + (self.velocity + self.damping * self.offset) * s
+        displacement = self.offset * c + (self.velocity + self.damping * self.offset) * s
         velocity = self.velocity * c - (self.damping * self.velocity + self.squared * self.offset) * s
-        return BodyMotion(self.rest + swung, velocity, self.angle + self.spin * time, np.full(len(time), self.spin))
+        return BodyMotion(
+            self.rest + displacement, velocity, self.angle + self.spin * time, np.full(len(time), self.spin)
+        )
 
     def contacts(self, _until: float, _shortest: float) -> list[ContactEvent]:
         """Return no contacts."""
@@ -74,7 +76,7 @@ def oscillator(facts: SceneFacts, number: int) -> Oscillator | None:
     would jump; or its rest length is 0 and it has no damper, so that both components oscillate independently.
     """
     scene, bodies = facts.scene, facts.bodies
-    if not facts.moves_freely(number) or not facts.meet.held[number] or scene.attractions:
+    if not facts.moves_freely(number) or not facts.matrix.held[number] or scene.attractions:
         return None
     anchor = facts.anchor(number)
     if anchor is None or anchor.kind != LinkKind.SPRING or anchor.arm.any() or facts.world.quadratic_drag > 0.0:
@@ -93,7 +95,7 @@ def oscillator(facts: SceneFacts, number: int) -> Oscillator | None:
         return None
     rest = length * unit + push / squared
     offset = arm - rest
-    # Energy never grows, so neither does the swing: ω²u² + u̇² bounds it.
+    # Energy does not grow, so ω²u² + u̇² bounds the amplitude.
     reach = math.sqrt(float(offset @ offset) + float(velocity @ velocity) / squared)
     if length > 0.0 and float(rest @ unit) <= reach:
         return None

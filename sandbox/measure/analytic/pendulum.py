@@ -56,10 +56,10 @@ class Swing:
         if m == 0.0:
             return np.zeros(len(time)), np.zeros(len(time))
         if m1 < 0.0:
-            way = math.copysign(1.0, self.rate)
+            sign = math.copysign(1.0, self.rate)
             inner = 1.0 / m, -m1 / m
-            found = jacobi(way * k * u + first_kind(sine, cosine, *inner), *inner)
-            return 2.0 * found.amplitude, (2.0 * self.frequency * k * way) * found.dn
+            found = jacobi(sign * k * u + first_kind(sine, cosine, *inner), *inner)
+            return 2.0 * found.amplitude, (2.0 * self.frequency * k * sign) * found.dn
         begin = first_kind(sine / k, self.rate / (2.0 * self.frequency * k), m, m1)
         found = jacobi(u + begin, m, m1)
         return 2.0 * np.arctan2(k * found.sn, found.dn), (2.0 * self.frequency * k) * found.cn
@@ -70,7 +70,7 @@ class Pendulum:
     """Motion of one body that swings."""
 
     swing: Swing
-    place: FloatArray
+    pivot: FloatArray
     """(2,) m, pivot point"""
     length: float
     """m, from the pivot point to the centre of mass"""
@@ -87,7 +87,7 @@ class Pendulum:
         theta, rate = self.swing.at(time)
         aside = np.asarray([-self.down[1], self.down[0]])
         sine, cosine = np.sin(theta)[:, None], np.cos(theta)[:, None]
-        position = self.place + self.length * (cosine * self.down + sine * aside)
+        position = self.pivot + self.length * (cosine * self.down + sine * aside)
         velocity = (self.length * rate)[:, None] * (cosine * aside - sine * self.down)
         if self.spin is None:
             return BodyMotion(position, velocity, self.angle + (theta - self.swing.start), rate)
@@ -106,7 +106,7 @@ def pendulum(facts: SceneFacts, number: int) -> Pendulum | None:
     """
     if (
         not facts.moves_freely(number)
-        or not facts.meet.held[number]
+        or not facts.matrix.held[number]
         or facts.scene.attractions
         or not facts.has_no_drag
     ):
@@ -131,10 +131,10 @@ def pendulum(facts: SceneFacts, number: int) -> Pendulum | None:
     pull = math.hypot(*facts.gravity)
     down = direction(facts.gravity) if pull > 0.0 else direction(arm)
     frequency = math.sqrt(float(bodies.mass[number]) * pull * length / moment)
-    own_spin = spin if anchor.kind == LinkKind.ROD else None
+    free_spin = spin if anchor.kind == LinkKind.ROD else None
     theta, half = _halved(down, arm / length)
     return Pendulum(
-        Swing(theta, half, rate, frequency), anchor.place, length, down, float(bodies.angle[number]), own_spin
+        Swing(theta, half, rate, frequency), anchor.place, length, down, float(bodies.angle[number]), free_spin
     )
 
 

@@ -45,7 +45,7 @@ CHUNK = 1_000_000
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Analytic solution of a scene: of each moving body on its own, or of all bodies together."""
+    """Analytic solution of a scene: one of each moving body, or one of all bodies together."""
 
     scene: Scene
     flying: IntArray
@@ -94,16 +94,16 @@ class Solution:
 def solution(scene: Scene) -> Solution | None:
     """Return the analytic solution of a scene, or None if the formulas do not cover all of it.
 
-    It is never an approximation. If no two moving bodies can collide or are joined, each needs a solution of its own;
-    otherwise all need one together.
+    It is never an approximation. If no two moving bodies can collide or are joined, each body is solved separately;
+    otherwise all are solved together.
     """
     if on_floor(scene) or scene.zones or len(scene.layers) > 1:  # no formula includes zones and layers
         return None
     facts = SceneFacts.of(scene)
-    if facts.meet.mutual:
+    if facts.matrix.mutual:
         found = next((form for form in (assemble(facts) for assemble in COUPLED_SOLUTIONS) if form is not None), None)
         return None if found is None else Solution(scene, np.empty(0, np.int64), {}, found)
-    free = ~facts.bodies.fixed & facts.meet.free & ~facts.thrust
+    free = ~facts.bodies.fixed & facts.matrix.free & ~facts.thrust
     if unsupported_reason(scene) is not None:
         free &= False
     alone: dict[int, BodySolution] = {}
@@ -145,8 +145,9 @@ def valid_until(trajectory: Trajectory, number: int) -> float:
 def closed_form(trajectory: Trajectory, scene: Scene, number: int) -> ClosedForm | None:
     """Return the best closed form of a body at the times of a run, or None if it has none.
 
-    It is the body's part in a solution of the whole scene, if it does more than fly and bounce; that holds to its end.
-    Otherwise it is the bouncing of a ball on the only plane, which holds until the ball collides with anything else.
+    It is taken from a solution of the whole scene if the body does more than fly and bounce; it then holds to the end
+    of the run. Otherwise it is the bouncing of a ball on the only plane, which holds until the ball collides with
+    anything else.
     Otherwise it is free flight up to the first contact: a recorded one, or the time at which the formula reaches a
     plane. Missed contacts count if the run was audited; a missed bounce does not end the bouncing.
 
@@ -169,7 +170,7 @@ def _is_driven(scene: Scene, bodies: Bodies) -> BoolArray:
 
 
 def _solved(trajectory: Trajectory, scene: Scene, number: int) -> ClosedForm | None:
-    """Return a body's part in the solution of its scene, if it neither flies freely nor bounces."""
+    """Return the solution of a body within that of its scene, if it neither flies freely nor bounces."""
     found = solution(scene)
     if found is None:
         return None
@@ -218,10 +219,10 @@ def _first_contact(trajectory: Trajectory, number: int, besides: int | None = No
         (trajectory.contact_time, trajectory.contact_pair),
         (trajectory.missed_time, trajectory.missed_pair),
     ):
-        own = (pair == number).any(axis=1)
+        is_own = (pair == number).any(axis=1)
         if besides is not None:
-            own &= (pair != besides).all(axis=1)
-        first = min(first, float(np.min(time[own], initial=np.inf)))
+            is_own &= (pair != besides).all(axis=1)
+        first = min(first, float(np.min(time[is_own], initial=np.inf)))
     return first
 
 

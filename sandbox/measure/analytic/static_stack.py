@@ -1,4 +1,4 @@
-"""Static stack: upright boxes at rest on a level plane and on each other, which stay where they are.
+"""Static stack: upright boxes that stay at rest on a level plane and on each other.
 
 The guarantee is a set of forces that balances every box without friction and without tension: then no motion without
 overlap can lower the bodies, so that none begins, whatever friction adds. Loads are distributed from the top: the
@@ -51,7 +51,7 @@ class Load(NamedTuple):
 
     size: float
     """N"""
-    place: float
+    position: float
     """m along the plane"""
     known: bool
     """whether it is unique: one support carries all"""
@@ -79,7 +79,7 @@ class StaticStack:
 
 
 def static_stack(facts: SceneFacts) -> StaticStack | None:
-    """Return the rest of upright boxes that each lie well inside their supports; None if it does not apply.
+    """Return the rest of upright boxes whose centres each lie well inside their supports; None if it does not apply.
 
     The only static object is a plane perpendicular to gravity. There are no drag, static bodies, joints, attraction,
     thrusts or drives, and no two boxes overlap.
@@ -123,10 +123,10 @@ def _upright(facts: SceneFacts, point: FloatArray, normal: FloatArray) -> Boxes 
     corner = bodies.position[:, None] + rotate_points(shapes.corner.reshape(-1, 4, 2), bodies.angle[:, None]) - point
     sides = []
     for axis in (perpendicular(normal), normal):
-        place = np.sort(corner @ axis, axis=1)
-        if (np.diff(place, axis=1)[:, [0, 2]] > TOUCH_TOLERANCE).any():
+        extent = np.sort(corner @ axis, axis=1)
+        if (np.diff(extent, axis=1)[:, [0, 2]] > TOUCH_TOLERANCE).any():
             return None
-        sides += [place[:, 0], place[:, 3]]
+        sides += [extent[:, 0], extent[:, 3]]
     return Boxes(*sides)
 
 
@@ -147,17 +147,17 @@ def _distribute_loads(boxes: Boxes, on: BoolArray, weight: FloatArray) -> dict[t
             bearings = [Bearing(PLANE, float(boxes.left[number]), float(boxes.right[number]))]
         else:
             bearings = [_bearing(boxes, number, below) for below in np.flatnonzero(on[number]).tolist()]
-        handed = _share_load(bearings, float(size[number]), float(moment[number] / size[number]), bool(known[number]))
-        if handed is None:
+        divided = _divide_load(bearings, float(size[number]), float(moment[number] / size[number]), bool(known[number]))
+        if divided is None:
             return None
-        for below, load in handed.items():
+        for below, load in divided.items():
             loads[number, below] = load
             if below != PLANE:
                 size[below] += load.size
-                moment[below] += load.size * load.place
-        unsure = [bearing.number for bearing in bearings if bearing.number != PLANE]
+                moment[below] += load.size * load.position
+        supports = [bearing.number for bearing in bearings if bearing.number != PLANE]
         if len(bearings) > 1 or not known[number]:
-            known[unsure] = False
+            known[supports] = False
     return loads
 
 
@@ -166,19 +166,19 @@ def _bearing(boxes: Boxes, number: int, below: int) -> Bearing:
     return Bearing(below, float(left), float(right))
 
 
-def _share_load(bearings: list[Bearing], size: float, place: float, known: bool) -> dict[int, Load] | None:
+def _divide_load(bearings: list[Bearing], size: float, position: float, known: bool) -> dict[int, Load] | None:
     """Divide a load between the nearest supports on both sides by the lever rule; a single support takes all of it."""
-    left = [b for b in bearings if 0.5 * (b.left + b.right) <= place]
-    right = [b for b in bearings if 0.5 * (b.left + b.right) > place]
+    left = [b for b in bearings if 0.5 * (b.left + b.right) <= position]
+    right = [b for b in bearings if 0.5 * (b.left + b.right) > position]
     if left and right:
         one = max(left, key=lambda b: b.left + b.right)
         other = min(right, key=lambda b: b.left + b.right)
         x, y = 0.5 * (one.left + one.right), 0.5 * (other.left + other.right)
-        fraction = size * (place - x) / (y - x)
+        fraction = size * (position - x) / (y - x)
         return {one.number: Load(size - fraction, x, False), other.number: Load(fraction, y, False)}
     spare = min((EDGE_FRACTION * (b.right - b.left) for b in bearings), default=0.0)
-    under = next((b for b in bearings if b.left + spare < place < b.right - spare), None)
-    return None if under is None else {under.number: Load(size, place, known and len(bearings) == 1)}
+    under = next((b for b in bearings if b.left + spare < position < b.right - spare), None)
+    return None if under is None else {under.number: Load(size, position, known and len(bearings) == 1)}
 
 
 def _rows(
@@ -192,13 +192,13 @@ def _rows(
     """Return every two boxes in contact as a contact row, with the force in place of the impulse."""
     along, origin = perpendicular(normal), np.asarray(facts.scene.planes[0].point)
 
-    def row(pair: tuple[int, int], x: float, y: float, way: FloatArray, force: float) -> ContactEvent:
-        place, push = origin + x * along + y * normal, force * way
+    def row(pair: tuple[int, int], x: float, y: float, direction: FloatArray, force: float) -> ContactEvent:
+        position, push = origin + x * along + y * normal, force * direction
         return ContactEvent(
             0.0,
             pair,
-            (float(place[0]), float(place[1])),
-            (float(way[0]), float(way[1])),
+            (float(position[0]), float(position[1])),
+            (float(direction[0]), float(direction[1])),
             (float(push[0]), float(push[1])),
         )
 
@@ -212,12 +212,12 @@ def _rows(
     ]
     for above, below in np.argwhere(on).tolist():
         bearing = _bearing(boxes, above, below)
-        way = -normal if above < below else normal
+        direction = -normal if above < below else normal
         pair, x = (min(above, below), max(above, below)), 0.5 * (bearing.left + bearing.right)
-        rows.append(row(pair, x, float(boxes.low[above]), way, force_of(above, below)))
+        rows.append(row(pair, x, float(boxes.low[above]), direction, force_of(above, below)))
     for one, other in np.argwhere(np.triu(beside)).tolist():
-        way = along if boxes.middle(one) < boxes.middle(other) else -along
+        direction = along if boxes.middle(one) < boxes.middle(other) else -along
         x = float(boxes.right[one] if boxes.middle(one) < boxes.middle(other) else boxes.left[one])
         y = 0.5 * float(max(boxes.low[one], boxes.low[other]) + min(boxes.high[one], boxes.high[other]))
-        rows.append(row((one, other), x, y, way, math.nan))
+        rows.append(row((one, other), x, y, direction, math.nan))
     return rows

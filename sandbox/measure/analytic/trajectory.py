@@ -91,14 +91,14 @@ def _retire_bodies(
     end = bodies.born + bodies.lifetime
     if scene.world.bounds is None and not np.isfinite(end).any():
         return retired
-    gone = time[:, None] + SLACK * dt >= end
+    is_retired = time[:, None] + SLACK * dt >= end
     if scene.world.bounds is not None:
         lower, upper = scene.world.bounds
-        gone |= ((position < lower) | (position > upper)).any(axis=2)
-    gone &= ~bodies.fixed
-    gone[0] = False  # engines test after each step
-    for number in np.flatnonzero(gone.any(axis=0)).tolist():
-        first = int(gone[:, number].argmax())
+        is_retired |= ((position < lower) | (position > upper)).any(axis=2)
+    is_retired &= ~bodies.fixed
+    is_retired[0] = False  # engines test after each step
+    for number in np.flatnonzero(is_retired.any(axis=0)).tolist():
+        first = int(is_retired[:, number].argmax())
         retired[number] = time[first]
         position[first:, number], velocity[first:, number] = position[first, number], 0.0
     return retired

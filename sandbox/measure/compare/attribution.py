@@ -21,7 +21,7 @@ MAX_EXPLAINED_RATIO = 0.9
 SUFFICIENT_RATIO = 0.01
 """If one change leaves no more than this fraction of the error, no pairs are tried."""
 MAX_PAIRED = 4
-"""Settings whose changes lower the error most, and are always tried in pairs."""
+"""Number of settings tried in pairs: those whose changes lower the error most."""
 RERUN_LIMIT = 30.0
 """Counted cost, s, that one rerun may have."""
 EQUAL_RATIO = 1.01
@@ -203,9 +203,9 @@ def verdict(engine: str, effects: tuple[SettingEffect, ...], before: float) -> s
         before: error of the unchanged run, m.
     """
     usable = [each for each in effects if each.status == "ok" and each.ratio is not None]
-    least = min((each._ratio for each in usable), default=math.inf)
+    lowest = min((each._ratio for each in usable), default=math.inf)
     # The first of equally effective changes: they differ by rounding.
-    best = next((each for each in usable if each._ratio <= max(EQUAL_RATIO * least, ROUNDING)), None)
+    best = next((each for each in usable if each._ratio <= max(EQUAL_RATIO * lowest, ROUNDING)), None)
     if best is None:
         return f"{engine}: no other setting could be tried"
     if best._ratio > MAX_EXPLAINED_RATIO:

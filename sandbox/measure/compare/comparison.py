@@ -87,9 +87,9 @@ def compare(
     scene = as_scene(scene)
     both = [key for key in sweep or () if short_key(key) in settings]
     if both:
-        raise ValueError(f"{', '.join(both)}: is swept and set; leave one out")
+        raise ValueError(f"{', '.join(both)}: both swept and set; remove one")
     if sweep and truth is not None:
-        raise ValueError("truth: is of one scene and one set of frames; leave it out with a sweep")
+        raise ValueError("truth: belongs to one scene and one set of frames; leave it out with a sweep")
     wanted = scene.solver.replace(**settings) if settings else scene.solver
     scene_as_set = scene.model_copy(update={"solver": wanted}) if settings and sweep else scene
     variants = variants_of(scene_as_set, sweep) if sweep else [Variant(scene)]
@@ -231,7 +231,7 @@ def _engines_of(
 
 
 def _truth_key(scene: Scene, settings: Settings) -> tuple[str, float, int]:
-    """Return what a truth depends on: the scene, and the times of its frames."""
+    """Return the key of a truth: the scene, and the times of its frames."""
     return physics_of(scene), settings.dt, settings.record_every
 
 

@@ -21,7 +21,7 @@ Choice = Literal["match", "above", "left"]
 
 @dataclass(frozen=True)
 class ContactMatch:
-    """Contact of the truth and the matching contact of the run; values of an unmatched side are None."""
+    """Contact of the truth and the matching contact of the run; values of a missing contact are None."""
 
     kind: MatchKind
     between: tuple[str, str]
@@ -54,7 +54,7 @@ def match_contacts(
     smallest. An unmatched contact of the truth is missed, one of the run is phantom, with three exceptions: part of a
     contact that lasts in both is neither; a contact within `END_MARGIN` steps of the end does not count; and if one of
     the two bodies had an error larger than the tolerance before, it is `after_divergence`, because the contact can then
-    have another time, place or partner.
+    have another time, position or partner.
 
     Args:
         run: the run.
@@ -66,28 +66,28 @@ def match_contacts(
     """
     beyond = until + 2.0 * UNMATCHED_STEPS * dt
     # The impulse of a contact beyond the end includes the part beyond it, unless both runs end there.
-    cut = until if until < max(run.time[-1], truth.time[-1]) else math.inf
-    mine, its = (contact_episodes(each, scene, dt, tolerance, beyond) for each in (run, truth))
+    end_of_sums = until if until < max(run.time[-1], truth.time[-1]) else math.inf
+    run_episodes, truth_episodes = (contact_episodes(each, scene, dt, tolerance, beyond) for each in (run, truth))
     found: list[ContactMatch] = []
-    parted = divergence_times(run, truth, tolerance)
-    for pair in sorted({*mine, *its}):
+    diverged_at = divergence_times(run, truth, tolerance)
+    for pair in sorted({*run_episodes, *truth_episodes}):
         names = _body_name(scene, pair[0]), _body_name(scene, pair[1])
-        right, own = its.get(pair, []), mine.get(pair, [])
-        partners = match_times([t.start for t in right], [t.start for t in own], UNMATCHED_STEPS * dt)
+        of_truth, of_run = truth_episodes.get(pair, []), run_episodes.get(pair, [])
+        partners = match_times([t.start for t in of_truth], [t.start for t in of_run], UNMATCHED_STEPS * dt)
         for k, n in partners:
-            if right[k].start <= until:
-                found.append(_matched(names, right[k], own[n], dt, cut))
-        judged = until - END_MARGIN * dt
+            if of_truth[k].start <= until:
+                found.append(_matched(names, of_truth[k], of_run[n], dt, end_of_sums))
+        last_start = until - END_MARGIN * dt
         sides: tuple[tuple[Literal["missed", "phantom"], list[ContactEpisode], list[ContactEpisode], set[int]], ...] = (
-            ("missed", right, own, {k for k, _ in partners}),
-            ("phantom", own, right, {n for _, n in partners}),
+            ("missed", of_truth, of_run, {k for k, _ in partners}),
+            ("phantom", of_run, of_truth, {n for _, n in partners}),
         )
-        for kind, those, others, taken in sides:
-            alone = [touch for k, touch in enumerate(those) if k not in taken and touch.start <= judged]
-            followed = min(float(parted[number]) for number in pair if number >= 0)
+        for kind, episodes, others, taken in sides:
+            unmatched = [touch for k, touch in enumerate(episodes) if k not in taken and touch.start <= last_start]
+            first_divergence = min(float(diverged_at[number]) for number in pair if number >= 0)
             found += [
-                _unmatched(kind, touch.start > followed, names, touch, dt)
-                for touch in alone
+                _unmatched(kind, touch.start > first_divergence, names, touch, dt)
+                for touch in unmatched
                 if not _is_part_of_lasting(touch, others, dt)
             ]
     return tuple(sorted(found, key=lambda event: (event.when, event.between)))
@@ -141,7 +141,7 @@ def match_times(truth: Sequence[float], run: Sequence[float], gap: float) -> lis
 
 
 def _is_part_of_lasting(touch: ContactEpisode, others: Sequence[ContactEpisode], dt: float) -> bool:
-    """Return whether a lasting contact overlaps a lasting contact of the other side."""
+    """Return whether a lasting contact overlaps in time a lasting contact of the other run."""
     return _is_lasting(touch, dt) and any(
         _is_lasting(other, dt) and other.start <= touch.end and touch.start <= other.end for other in others
     )
@@ -151,17 +151,19 @@ def _is_lasting(touch: ContactEpisode, dt: float) -> bool:
     return touch.end - touch.start > MAX_EPISODE_GAP * dt
 
 
-def _matched(names: tuple[str, str], right: ContactEpisode, own: ContactEpisode, dt: float, cut: float) -> ContactMatch:
-    lasting = _is_lasting(right, dt) or _is_lasting(own, dt)
-    open_ended = max(right.end, own.end) > cut and lasting
+def _matched(
+    names: tuple[str, str], of_truth: ContactEpisode, of_run: ContactEpisode, dt: float, cut: float
+) -> ContactMatch:
+    lasting = _is_lasting(of_truth, dt) or _is_lasting(of_run, dt)
+    open_ended = max(of_truth.end, of_run.end) > cut and lasting
     return ContactMatch(
         "matched",
         names,
-        right.start,
-        own.start,
-        own.start - right.start,
-        math.dist(right.point, own.point),
-        None if open_ended else math.dist(right.impulse, own.impulse),
+        of_truth.start,
+        of_run.start,
+        of_run.start - of_truth.start,
+        math.dist(of_truth.point, of_run.point),
+        None if open_ended else math.dist(of_truth.impulse, of_run.impulse),
         lasting,
     )
 

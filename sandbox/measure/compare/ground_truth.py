@@ -38,7 +38,7 @@ that.
 MIN_WORK = 50_000
 """Bodies × steps that one second method may always take: some tenths of a second."""
 CONFIRMATION_LIMIT = 20.0
-"""Counted cost, s, of all second methods together."""
+"""Counted cost, s, of all second methods together (`bounded_run`)."""
 CONVERGED_TOLERANCES = 10.0
 """A second method whose last halving changes it by more than this many tolerances, and by more than the default
 tolerance, has not converged and confirms nothing.
@@ -107,28 +107,28 @@ def confirm(scene: Scene, found: RefinedRun, settings: Settings, tolerance: floa
     Raises:
         TooLargeError: the frames would not fit into memory.
     """
-    lawful, breach = _conserves_until(scene, found.trajectory, tolerance)
-    if lawful < until:
-        until, limit = lawful, breach
+    conserved, breach = _conserves_until(scene, found.trajectory, tolerance)
+    if conserved < until:
+        until, limit = conserved, breach
     else:
         limit = ""
     best: Confirmation | None = None
-    left, work = CONFIRMATION_LIMIT, 0
+    remaining, work = CONFIRMATION_LIMIT, 0
     for name, wanted in _second_methods(scene, found, settings):
         if best is not None and work >= 2.0 * max(WORK_FRACTION * found.work, MIN_WORK):
             break
-        testimony, took, counted = _refine_until_agreement(scene, name, wanted, found, tolerance, until, left)
-        work, left = work + took, left - counted
-        if testimony is None:
+        agreement, added, cost = _refine_until_agreement(scene, name, wanted, found, tolerance, until, remaining)
+        work, remaining = work + added, remaining - cost
+        if agreement is None:
             continue
         by = _method_name(scene, name, wanted, found)
-        if testimony.until >= until:
+        if agreement.until >= until:
             return Confirmation(until, by, limit)
-        if testimony.contradicts:
-            what = f"{found.engine} and {by} converge to different results, {testimony.apart:.2g} m apart"
-            return Confirmation(testimony.until, by if testimony.until > 0.0 else None, what)
-        if best is None or testimony.until > best.until:
-            best = Confirmation(testimony.until, by, f"{by} has not converged and confirms nothing later")
+        if agreement.contradicts:
+            reason = f"{found.engine} and {by} converge to different results, {agreement.apart:.2g} m apart"
+            return Confirmation(agreement.until, by if agreement.until > 0.0 else None, reason)
+        if best is None or agreement.until > best.until:
+            best = Confirmation(agreement.until, by, f"{by} has not converged and confirms nothing later")
     return best or Confirmation(0.0, None, "no second engine or method can run the scene to confirm the first")
 
 
@@ -164,10 +164,10 @@ def _method_name(scene: Scene, name: str, wanted: Settings, found: RefinedRun) -
     """Return the name of a second method: another engine, or the settings that differ."""
     if name != found.engine:
         return name
-    mine, its = (ENGINES[name].resolve(scene, each) for each in (wanted, found.settings))
-    other = {key: getattr(mine, key) for key in CHOICES if getattr(mine, key) != getattr(its, key)}
-    said = [f"without {key}" if value is False else f"{key} {value}" for key, value in other.items()]
-    return f"{name} with {' and '.join(said)}".replace("with without", "without")
+    new, old = (ENGINES[name].resolve(scene, each) for each in (wanted, found.settings))
+    other = {key: getattr(new, key) for key in CHOICES if getattr(new, key) != getattr(old, key)}
+    words = [f"without {key}" if value is False else f"{key} {value}" for key, value in other.items()]
+    return f"{name} with {' and '.join(words)}".replace("with without", "without")
 
 
 def _refine_until_agreement(
@@ -183,7 +183,7 @@ def _refine_until_agreement(
     coarse: Trajectory | None = None
     changed: list[FloatArray] = []
     """by each halving, at each frame, m"""
-    testimony: _Agreement | None = None
+    agreement: _Agreement | None = None
     while work + each <= allowed:
         try:
             run, counted = bounded_run(scene, engine, settings, limit - cost)
@@ -199,10 +199,10 @@ def _refine_until_agreement(
             before = 0.5 * changed[-1] if changed else step
             fastest = float(np.hypot(*np.moveaxis(run.velocity[run.time <= until], 2, 0)).max(initial=0.0))
             slack = tolerance + CONTRADICTION_CHANGES * np.maximum(step, before) + IMPACT_STEPS * fastest * settings.h
-            testimony = _agreement_of(run, away, step, slack, tolerance, converged, until)
-            contradicts = testimony.contradicts and len(changed) + 2 >= MIN_RUNS
-            testimony = testimony._replace(contradicts=contradicts)
-            if testimony.until >= until or contradicts:
+            agreement = _agreement_of(run, away, step, slack, tolerance, converged, until)
+            contradicts = agreement.contradicts and len(changed) + 2 >= MIN_RUNS
+            agreement = agreement._replace(contradicts=contradicts)
+            if agreement.until >= until or contradicts:
                 break
             changed.append(step)
         elif not (away.position[away.time <= until] > tolerance).any() and not len(run.missed_time):
@@ -212,7 +212,7 @@ def _refine_until_agreement(
         if finer is None:
             break
         settings = finer
-    return testimony, work, cost
+    return agreement, work, cost
 
 
 def _agreement_of(
@@ -238,13 +238,13 @@ def _agreement_of(
     end = min(until, float(np.min(run.missed_time, initial=np.inf)))
     apart, compared = away.position, away.time <= end
     agrees = (apart <= tolerance) | ((apart <= ALLOWED_CHANGES * step) & (step <= converged))
-    against = np.flatnonzero(~agrees & compared)
-    if not len(against):
+    disagreeing = np.flatnonzero(~agrees & compared)
+    if not len(disagreeing):
         return _Agreement(end, False, 0.0)
     beyond = np.flatnonzero((apart > slack) & compared)
     contradicts = len(beyond) > 0
     # A method that converges to another result departs from this one before the contradiction is certain.
-    last = np.flatnonzero(agrees[: beyond[0]]) if contradicts else np.arange(against[0])
+    last = np.flatnonzero(agrees[: beyond[0]]) if contradicts else np.arange(disagreeing[0])
     agreed = float(away.time[last[-1]]) if len(last) else 0.0
     return _Agreement(agreed, contradicts, float(apart[beyond].max(initial=0.0)))
 
@@ -264,11 +264,11 @@ def _conserves_until(scene: Scene, run: Trajectory, tolerance: float) -> tuple[f
     if windy or needed & SOURCES or (scene.bodies.born > 0.0).any():
         return end, ""
     energy = energies(run, scene)
-    kept = run.time < np.nanmin(run.retired_time, initial=np.inf)  # a retired body takes its energy with it
+    counted = run.time < np.nanmin(run.retired_time, initial=np.inf)  # a retired body takes its energy with it
     weight = float(np.where(scene.bodies.fixed, 0.0, scene.bodies.mass).sum()) * math.hypot(*scene.world.gravity)
     allowed = GROWTH * float(energy.kinetic.max(initial=0.0)) + weight * tolerance
     grown = energy.total - np.minimum.accumulate(energy.total)
-    broken = np.flatnonzero((grown > allowed) & kept)
+    broken = np.flatnonzero((grown > allowed) & counted)
     if not len(broken):
         return end, ""
     first = int(broken[0])
@@ -385,5 +385,5 @@ def _predictable_until(scene: Scene, engine: str, settings: Settings, found: Tra
 
 
 def _chaos_note(scene: Scene, until: float) -> str:
-    moved = f"; later motion is chaotic: it changes if every body is moved by {PERTURBATION:g} m"
-    return moved if until < scene.world.duration else ""
+    note = f"; later motion is chaotic: it changes if every body is moved by {PERTURBATION:g} m"
+    return note if until < scene.world.duration else ""

@@ -136,21 +136,23 @@ class DivergenceTest:
         """
         deadline = clock_without_compilation() + time_limit
 
-        def ran(which: Setup, engine: str) -> Trajectory:
-            return bounded_run(which, engine, which.scene.solver, math.inf, deadline, audit=False)[0]
+        def run_engine(setup: Setup, engine: str) -> Trajectory:
+            return bounded_run(setup, engine, setup.scene.solver, math.inf, deadline, audit=False)[0]
 
         if len(self.engines) == 1:
             truth = truth_of(scene, scene.solver, self.tolerance)
             if truth is None:
                 return None
-            return self._divergence(scene, ran(Setup.of(scene), self.engines[0]), truth.trajectory, truth.trusted_until)
-        one, other = (ran(Setup.of(scene), engine) for engine in self.engines)
+            return self._divergence(
+                scene, run_engine(Setup.of(scene), self.engines[0]), truth.trajectory, truth.trusted_until
+            )
+        one, other = (run_engine(Setup.of(scene), engine) for engine in self.engines)
         divergence = self._divergence(scene, one, other, scene.world.duration)
         moved = perturb(scene) if divergence is not None else None
         if divergence is None or moved is None:
             return divergence
         for engine, run in zip(self.engines, (one, other), strict=True):
-            again = ran(moved, engine)
+            again = run_engine(moved, engine)
             if (
                 run.status == again.status == "ok"
                 and agreement_time(run, again, scene, self.tolerance) < divergence.time
@@ -165,19 +167,19 @@ class DivergenceTest:
         moving = ~scene.bodies.fixed
         first = errors(one, other, moving).first_above(self.tolerance, until)
         if first is None:  # all common frames agree, but one run may have ended early
-            early = min((run for run in (one, other) if run.status == "diverged"), key=_end, default=None)
-            if early is None or _end(early) > until or one.status == other.status:
+            ended_early = min((run for run in (one, other) if run.status == "diverged"), key=_end, default=None)
+            if ended_early is None or _end(ended_early) > until or one.status == other.status:
                 return None
-            return DivergencePoint(_end(early), None, math.inf)
-        mine, its = common_frames(one, other)
-        at = int(np.flatnonzero(one.time[mine] == first)[0])
-        both = (one.present(mine[at : at + 1]) & other.present(its[at : at + 1]))[0] & moving
+            return DivergencePoint(_end(ended_early), None, math.inf)
+        frames, other_frames = common_frames(one, other)
+        row = int(np.flatnonzero(one.time[frames] == first)[0])
+        both = (one.present(frames[row : row + 1]) & other.present(other_frames[row : row + 1]))[0] & moving
         with np.errstate(over="ignore", invalid="ignore"):
-            away = np.hypot(*(one.position[mine[at]] - other.position[its[at]]).T)
+            away = np.hypot(*(one.position[frames[row]] - other.position[other_frames[row]]).T)
         away = np.where(both, np.where(np.isnan(away), np.inf, away), -1.0)
         worst = int(away.argmax())
-        off = frozenset(map(str, one.names[away > self.tolerance]))
-        return DivergencePoint(first, str(one.names[worst]), float(away[worst]), off)
+        diverged = frozenset(map(str, one.names[away > self.tolerance]))
+        return DivergencePoint(first, str(one.names[worst]), float(away[worst]), diverged)
 
 
 def _end(run: Trajectory) -> float:
@@ -270,18 +272,18 @@ class SceneReduction:
     ) -> None:
         self.scene, self.divergence, self.runs = scene, divergence, 1
         self._test, self._max_scenes, self._end, self._on_progress = disagreement, max_scenes, end, on_progress
-        self._given = scene, divergence
-        self._soonest = EARLIEST_FRACTION * divergence.time
+        self._original = scene, divergence
+        self._earliest = EARLIEST_FRACTION * divergence.time
         self._overlaps = initial_overlaps(scene)
         self._known: dict[str, tuple[Scene, DivergencePoint] | None] = {}
-        self._now: ExplicitDocument = expand_generators(scene, whole=True)
+        self._document: ExplicitDocument = expand_generators(scene, whole=True)
 
     def go(self) -> str | None:
         """Run the search; return the reason why it ended early, or None."""
         ended: str | None = None
         try:
             try:
-                self._smaller()
+                self._reduce()
             except _LimitReachedError as error:
                 ended = str(error)
             return (
@@ -290,12 +292,12 @@ class SceneReduction:
         except KeyboardInterrupt:
             return "interrupted"
 
-    def _smaller(self) -> None:
+    def _reduce(self) -> None:
         for whole in (False, True):
-            laid = expand_generators(self.scene, whole)
+            expanded = expand_generators(self.scene, whole)
             # The duration first, because all later tests are then faster.
-            tries = (*shorter_durations(laid.document, self.divergence.time), laid.document)
-            if any(self._take(laid.with_document(each)) for each in tries):
+            attempts = (*shorter_durations(expanded.document, self.divergence.time), expanded.document)
+            if any(self._take(expanded.with_document(each)) for each in attempts):
                 break
         self._prune()
         self._simplify()
@@ -308,7 +310,7 @@ class SceneReduction:
         found = self._known[key]
         if found is None:
             return False
-        self.scene, self.divergence, self._now = *found, candidate
+        self.scene, self.divergence, self._document = *found, candidate
         return True
 
     def _try(self, candidate: ExplicitDocument) -> tuple[Scene, DivergencePoint] | None:
@@ -337,10 +339,10 @@ class SceneReduction:
 
     def _is_the_same(self, divergence: DivergencePoint | None) -> TypeGuard[DivergencePoint]:
         """Return whether a divergence is not earlier than the original one, and concerns one of the same bodies."""
-        if divergence is None or divergence.time < self._soonest:
+        if divergence is None or divergence.time < self._earliest:
             return False
-        its = self._given[1].bodies
-        return bool(divergence.bodies & its) or divergence.bodies == its
+        original = self._original[1].bodies
+        return bool(divergence.bodies & original) or divergence.bodies == original
 
     def _overlaps_anew(self, scene: Scene) -> bool:
         """Return whether bodies overlap more deeply than in the original scene."""
@@ -350,47 +352,47 @@ class SceneReduction:
 
     def _take_first(self, candidates: Iterable[JsonObject]) -> bool:
         """Continue with the first scene that shows the difference."""
-        return any(self._take(self._now.with_document(each)) for each in candidates)
+        return any(self._take(self._document.with_document(each)) for each in candidates)
 
     def _prune(self) -> None:
-        """Leave out bodies, static objects, joints and forces, again and again until nothing more can be left out."""
+        """Leave out bodies, static objects, joints and forces, repeatedly until nothing more can be left out."""
         before = None
-        while before != self._now.document:
-            before = self._now.document
-            self._leave_out(self._now.body_tables)
-            self._leave_out(self._now.places(FIXED_KINDS))
-            self._leave_out(self._now.places(CONNECTIONS))
-            self._take(self._now.without(unused_materials(self._now.document)))
+        while before != self._document.document:
+            before = self._document.document
+            self._leave_out(self._document.body_tables)
+            self._leave_out(self._document.tables_of(FIXED_KINDS))
+            self._leave_out(self._document.tables_of(CONNECTIONS))
+            self._take(self._document.without(unused_materials(self._document.document)))
 
-    def _leave_out(self, places: Sequence[tuple[str, int]]) -> None:
-        start = self._now
-        ddmin(places, lambda kept: self._take(start.without(frozenset(places) - frozenset(kept))))
+    def _leave_out(self, tables: Sequence[tuple[str, int]]) -> None:
+        start = self._document
+        ddmin(tables, lambda kept: self._take(start.without(frozenset(tables) - frozenset(kept))))
 
     def _simplify(self) -> None:
         """Set values to their defaults, reduce counts and corners, then shorten the duration and round numbers."""
-        start, keys = self._now, optional_keys(self._now.document)
+        start, keys = self._document, optional_keys(self._document.document)
         gone = frozenset(keys)
         ddmin(keys, lambda kept: self._take(start.with_document(without_keys(start.document, gone - frozenset(kept)))))
-        self._prune()  # without gravity nothing needs a floor
-        for k, wall in enumerate(self._now.document.get("wall", ())):
+        self._prune()  # without gravity no floor is needed
+        for k, wall in enumerate(self._document.document.get("wall", ())):
             self._cut_corners(k, wall["points"])
-        for kind, k in self._now.body_tables:
-            for key in smaller_counts(self._now.document[kind][k]):
-                self._take_first(_with_value(self._now.document, kind, k, key[0], n) for n in key[1])
-        self._take_first(shorter_durations(self._now.document, self.divergence.time))
-        self._take_first(rounded_documents(self._now.document, None))
-        for kind, k in (*self._now.body_tables, *self._now.places(FIXED_KINDS)):
-            self._take_first(rounded_documents(self._now.document, (kind, k)))
-        self._take_first(shorter_durations(self._now.document, self.divergence.time))
+        for kind, k in self._document.body_tables:
+            for key in smaller_counts(self._document.document[kind][k]):
+                self._take_first(_with_value(self._document.document, kind, k, key[0], n) for n in key[1])
+        self._take_first(shorter_durations(self._document.document, self.divergence.time))
+        self._take_first(rounded_documents(self._document.document, None))
+        for kind, k in (*self._document.body_tables, *self._document.tables_of(FIXED_KINDS)):
+            self._take_first(rounded_documents(self._document.document, (kind, k)))
+        self._take_first(shorter_durations(self._document.document, self.divergence.time))
 
     def _cut_corners(self, k: int, points: Sequence[Any]) -> None:
-        start = self._now.document
+        start = self._document.document
         if len(points) > 2:
             ddmin(range(len(points)), lambda kept: self._take_corners(start, k, [points[n] for n in kept]))
 
     def _take_corners(self, document: JsonObject, k: int, points: list[Any]) -> bool:
         return len(points) >= 2 and self._take(
-            self._now.with_document(_with_value(document, "wall", k, "points", points))
+            self._document.with_document(_with_value(document, "wall", k, "points", points))
         )
 
     def _is_confirmed(self) -> bool:
@@ -398,14 +400,14 @@ class SceneReduction:
         scene = loads(dumps(self.scene))
         divergence = self._test.of(scene)
         if not self._is_the_same(divergence) or self._overlaps_anew(scene):
-            self.scene, self.divergence = self._given
+            self.scene, self.divergence = self._original
             return False
         self.scene, self.divergence = scene, divergence
         return True
 
 
 def initial_overlaps(scene: Scene) -> dict[frozenset[str], float]:
-    """Return the depth of each overlap at the start of a scene, m, by the names of the two."""
+    """Return the depth of each overlap at the start of a scene, m, by the names of the two bodies."""
     names = (*scene.bodies.names, *reversed(scene.fixed_names))  # −1 − k counts from the end
     return {frozenset((names[a], names[b])): -clear for (a, b), clear in close_pairs(scene) if clear < 0.0}
 

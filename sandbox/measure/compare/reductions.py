@@ -38,13 +38,13 @@ class ExplicitDocument:
         """Tables that have bodies."""
         return list(self.names)
 
-    def places(self, kinds: Collection[str]) -> list[TableKey]:
+    def tables_of(self, kinds: Collection[str]) -> list[TableKey]:
         """Return the tables with some headings."""
         return [(kind, k) for kind in kinds for k in range(len(self.document.get(kind, ())))]
 
     def without(self, gone: Collection[TableKey]) -> "ExplicitDocument":
         """Return the document without some tables, nor references to their bodies by joints, forces and ropes."""
-        lost = frozenset[str]().union(*(self.names.get(place, ()) for place in gone))
+        lost = frozenset[str]().union(*(self.names.get(key, ()) for key in gone))
         document: JsonObject = {}
         names: dict[TableKey, frozenset[str]] = {}
         for kind, tables in self.document.items():
@@ -79,23 +79,23 @@ def expand_generators(scene: Scene, whole: bool = False) -> ExplicitDocument:
     document: JsonObject = {key: value for key, value in source.items() if key not in {"play", *scene.kinds}}
     for kind, k, name in _fixed_names(scene):
         document[kind][k] = {"name": name, **document[kind][k]}
-    numbers = _bodies_of_sources(scene)
+    bodies_of = _bodies_of_sources(scene)
     bodies = scene.bodies
     names: dict[TableKey, frozenset[str]] = {}
-    place = 0
+    source_index = 0
     whole = whole or len(bodies) > MAX_EXPLICIT_BODIES
     for kind, movers in scene.kinds.items():
         for k, mover in enumerate(movers):
-            own = numbers[place]
-            place += 1
+            members = bodies_of[source_index]
+            source_index += 1
             if whole or not _is_single_bodies(mover):
                 table = dict(source[kind][k])
-                single = len(own) == 1 and bodies.names[own[0]]
+                single = len(members) == 1 and bodies.names[members[0]]
                 tables = [(kind, {"name": single, **table} if single and hasattr(mover, "fixed") else table)]
-                groups = [own]
+                groups = [members]
             else:
-                tables = [_body(scene, mover, number) for number in own]
-                groups = [[number] for number in own]
+                tables = [_body(scene, mover, number) for number in members]
+                groups = [[number] for number in members]
             for (heading, table), group in zip(tables, groups, strict=True):
                 listed = document.setdefault(heading, [])
                 names[heading, len(listed)] = frozenset(bodies.names[number] for number in group)
@@ -105,16 +105,16 @@ def expand_generators(scene: Scene, whole: bool = False) -> ExplicitDocument:
 
 def _bodies_of_sources(scene: Scene) -> list[list[int]]:
     """Return the indices of the bodies of each source."""
-    numbers: list[list[int]] = [[] for _ in scene.body_sources]
+    found: list[list[int]] = [[] for _ in scene.body_sources]
     mover = [scene.source_index(element) for element in range(len(scene.elements))]
     for number, element in enumerate(scene.bodies.element.tolist()):
-        numbers[mover[element]].append(number)
-    return numbers
+        found[mover[element]].append(number)
+    return found
 
 
 def _fixed_names(scene: Scene) -> list[tuple[str, int, str]]:
-    places = [(kind, k) for kind in FIXED_KINDS for k in range(len(getattr(scene, f"{kind}s")))]
-    return [(kind, k, name) for (kind, k), name in zip(places, scene.fixed_names, strict=False)]
+    tables = [(kind, k) for kind in FIXED_KINDS for k in range(len(getattr(scene, f"{kind}s")))]
+    return [(kind, k, name) for (kind, k), name in zip(tables, scene.fixed_names, strict=False)]
 
 
 def _is_single_bodies(mover: BodySource) -> bool:
@@ -140,10 +140,10 @@ def _body(scene: Scene, generator: BodySource, number: int) -> tuple[str, JsonOb
     return "ball", {**table, "radius": generator.radius}
 
 
-def _referenced_bodies(bond: JsonObject) -> list[str]:
+def _referenced_bodies(table: JsonObject) -> list[str]:
     """Return the names of the bodies of a joint or force."""
-    one = [bond[key] for key in ("body", "toward") if isinstance(bond.get(key), str)]
-    return [*bond.get("between", ()), *one]
+    single = [table[key] for key in ("body", "toward") if isinstance(table.get(key), str)]
+    return [*table.get("between", ()), *single]
 
 
 def _without_ties(table: JsonObject, lost: frozenset[str]) -> JsonObject:
@@ -178,7 +178,7 @@ NOT_ROUNDED = ("title", "about", "name", "solver", "material", "pair", "play")
 
 
 def optional_keys(document: JsonObject) -> list[ValueKey]:
-    """Return the keys that a document can do without."""
+    """Return the keys of a document that are optional."""
     keys: list[ValueKey] = [("world", -1, key) for key in document.get("world", {}) if key != "duration"]
     for kind, tables in document.items():
         if isinstance(tables, list) and kind not in ("material", "pair", "joint", "attraction", "thrust", "drive"):
@@ -222,18 +222,18 @@ def smaller_counts(table: JsonObject) -> list[tuple[str, list[int]]]:
     ]
 
 
-def shorter_durations(document: JsonObject, parting: float) -> Iterator[JsonObject]:
+def shorter_durations(document: JsonObject, until: float) -> Iterator[JsonObject]:
     """Yield documents with shorter durations of one or two digits that end soon after a time, s."""
     world = document.get("world", {})
-    now = world.get("duration", 10.0)
+    present = world.get("duration", 10.0)
     for digits in (1, 2):
         for spare in (1.0, 1.05, 1.5):
-            end = _round_up(parting * spare, digits)
-            if 0.0 < end < MIN_SHORTENING * now:
+            end = _round_up(until * spare, digits)
+            if 0.0 < end < MIN_SHORTENING * present:
                 yield {**document, "world": {**world, "duration": end}}
 
 
-def rounded_documents(document: JsonObject, place: TableKey | None) -> Iterator[JsonObject]:
+def rounded_documents(document: JsonObject, only: TableKey | None) -> Iterator[JsonObject]:
     """Yield documents whose values have more and more digits: in all tables, or in one."""
     for digits in DIGITS:
         changed: JsonObject = {}
@@ -242,7 +242,7 @@ def rounded_documents(document: JsonObject, place: TableKey | None) -> Iterator[
                 changed[kind] = value
             elif isinstance(value, list):
                 changed[kind] = [
-                    _rounded(table, digits) if place in (None, (kind, k)) else table for k, table in enumerate(value)
+                    _rounded(table, digits) if only in (None, (kind, k)) else table for k, table in enumerate(value)
                 ]
             else:
                 changed[kind] = value

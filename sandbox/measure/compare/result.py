@@ -53,12 +53,12 @@ def set_text(chosen: Mapping[str, Any]) -> str:
 
 
 def short_key(key: str) -> str:
-    """Return a key as a column's head: a setting without `solver.`."""
+    """Return a key as a column heading: a setting without `solver.`."""
     return key.removeprefix("solver.")
 
 
 def value_text(value: Any) -> str:
-    """Return a value as it is read best: a text bare, a number to 9 digits."""
+    """Return a value as text: a string without quotes, a number to 9 digits."""
     if isinstance(value, str):
         return value
     if isinstance(value, float):
@@ -67,15 +67,15 @@ def value_text(value: Any) -> str:
 
 
 def physics_of(scene: Scene) -> str:
-    """Return all that a scene says but for its `[solver]`: scenes that share it have the same truth."""
+    """Return a scene without its `[solver]` as text: scenes with the same text have the same truth."""
     return json.dumps({**to_document(scene), "solver": None}, sort_keys=True, default=str)
 
 
 def truth_settings(own: Settings, all_settings: Sequence[Settings]) -> Settings:
-    """Return the settings by which the truth of a variant is sought.
+    """Return the settings with which the truth of a variant is computed.
 
-    The times of the frames are the variant's own. Iterations and substeps, which make a refined truth better, are the
-    most of all variants, so that the truth does not depend on the variant.
+    The times of the frames are those of the variant. Iterations and substeps, which make a refined truth better, are
+    the largest of all variants, so that the truth does not depend on the variant.
     """
     return own.replace(
         iterations=max(each.iterations for each in all_settings),
@@ -215,7 +215,7 @@ class RowDocument:
 
 @dataclass(frozen=True)
 class SweptRowDocument(RowDocument):
-    """JSON document of a row of a sweep, which has a truth of its own."""
+    """JSON document of a row of a sweep, with the kind of its own truth."""
 
     truth: str | None
 
@@ -284,7 +284,9 @@ class Comparison(HtmlRepr):
         until = f"trusted until {self.best.trusted_until:.4g} s of {whole:.4g} s"
         if self.best.difference:
             until += f"; accurate to about {self.best.difference:.1g} m"
-        others = "" if self.same_scene else "; the truth of the first value: the sweep changes the scene"
+        others = (
+            "" if self.same_scene else "; this is the truth of the first value, because the sweep changes the scene"
+        )
         return f"truth: {name} ({self.best.about}); {until}; tolerance {self.tolerance:.2g} m{others}"
 
     def document(self, scene: str | None = None) -> dict[str, Any]:

@@ -32,7 +32,7 @@ AGREEMENT_FRACTION = 0.1
 MIN_ITERATIONS = 20
 """Smallest number of iterations, so that a truth does not depend on a contact solver that stops early."""
 JUMP_FRACTION = 1e-3
-"""Two runs jump apart if their distance in the frame before is below this fraction of the tolerance."""
+"""Two runs jump apart if their distance in the previous frame is below this fraction of the tolerance."""
 SLOP_FRACTION = 0.01
 """Overlap that may remain, as a fraction of the tolerance."""
 
@@ -47,7 +47,7 @@ PREFERENCES: tuple[dict[str, object], ...] = (
 JOINT_SETTINGS: dict[str, object] = {"integrator": "velocity_verlet", "joints": "rattle"}
 """First choice for scenes with joints: of second order, where impulses alone are of first order."""
 SMOOTH_SETTINGS: dict[str, object] = {"integrator": "rk4"}
-"""First choice without collisions and rigid joints: forces are smooth, and a method of order 4 pays."""
+"""First choice without collisions and rigid joints: forces are smooth, and a method of order 4 converges faster."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,10 +120,10 @@ def _refine_settings(scene: Scene, engine: str, settings: Settings, tolerance: f
             return None
         # Beyond the time at which a perturbation matters, results need not agree.
         other = perturb(scene)
-        enough, _ = _predictable_until(scene, other, engine, settings, coarse, tolerance)
+        required, _ = _predictable_until(scene, other, engine, settings, coarse, tolerance)
     except RunTimeoutError:
         return None
-    left = COST_LIMIT
+    remaining = COST_LIMIT
     work = each = max(len(scene.bodies), 1) * max(frame_count(scene, settings)[0], 1)
     agrees, halvings, about = 0.0, 0, "dt was not halved further"
     last: Errors | None = None
@@ -138,22 +138,22 @@ def _refine_settings(scene: Scene, engine: str, settings: Settings, tolerance: f
             about = "dt cannot be halved further"
             break
         try:
-            fine, counted = bounded_run(scene, engine, finer, left)
-            left -= counted
+            fine, counted = bounded_run(scene, engine, finer, remaining)
+            remaining -= counted
             if fine.status != "ok":
                 about = f"the next halving {fine.status}: {fine.reason}"
                 break
-            # Two runs that tunnel through the same wall agree, too.
+            # Two runs in which a body tunnels through the same wall agree as well.
             missed = float(np.min(fine.missed_time, initial=np.inf))
             close = min(agreement_time(fine, coarse, scene, AGREEMENT_FRACTION * tolerance), missed)
             agrees = min(agreement_time(fine, coarse, scene, tolerance), missed)
             last = errors(fine, coarse, ~scene.bodies.fixed)
             coarse, settings, halvings, work = fine, finer, halvings + 1, work + each
             horizon = None
-            if close >= enough:
+            if close >= required:
                 horizon, jumps = _predictable_until(scene, other, engine, settings, coarse, tolerance)
-                enough = max(enough, horizon)
-                if close >= enough and not jumps:  # a jump is proportional to the step
+                required = max(required, horizon)
+                if close >= required and not jumps:  # a jump is proportional to the step
                     about = f"agrees with the previous halving within {AGREEMENT_FRACTION * tolerance:.2g} m"
                     break
         except RunTimeoutError:
@@ -163,7 +163,7 @@ def _refine_settings(scene: Scene, engine: str, settings: Settings, tolerance: f
         if horizon is None:
             horizon, _ = _predictable_until(scene, other, engine, settings, coarse, tolerance)
     except RunTimeoutError:
-        horizon = min(enough, agrees)
+        horizon = min(required, agrees)
     difference = 0.0 if last is None else last.until(min(agrees, horizon)).max_position or 0.0
     return RefinedRun(engine, settings, halvings, coarse, agrees, about, difference, horizon, work)
 

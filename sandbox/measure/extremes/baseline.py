@@ -16,7 +16,7 @@ from sandbox.resource_limits import read_limited
 from sandbox.scene.files.document import check_text
 
 SLACK = 2.0
-"""Multiple of the tolerance by which a boundary may have moved: old and new are known to within it."""
+"""Multiple of the tolerance by which a boundary may differ: the old and the new one each have this tolerance."""
 
 MAX_BYTES = 64 * 2**20
 
@@ -100,7 +100,7 @@ def _is_limit(document: dict[str, Any]) -> bool:
 
 
 def _is_number(value: Any) -> bool:
-    """Tell whether a JSON value is a number that is finite as a float."""
+    """Return whether a JSON value is a number that is finite as a float."""
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 

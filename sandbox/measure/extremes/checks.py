@@ -1,8 +1,8 @@
 """Checks of a run: rules that every run of a scenario must satisfy, and the verdict.
 
 The state is finite and bounded; energy does not rise beyond the scenario's tolerance; momentum is conserved up to
-rounding; no centre passes an obstacle; no overlap exceeds slop + v·h; bodies come to rest, and stacked bodies stay
-where they are; joints hold to within a hundredth; and the result is accurate enough to be useful.
+rounding; no centre passes an obstacle; no overlap exceeds slop + v·h; bodies come to rest, and stacked bodies do
+not move; joint errors stay below a hundredth; and the result is accurate enough to be useful.
 """
 
 import math
@@ -24,8 +24,8 @@ from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Trajectory
 
 MAX_REACH_FACTOR = 10.0
-"""Factor of the distance that a body can cover by its initial speed and its fall: chains have stretched to 1e9 m
-without a nan.
+"""Factor of the distance that a body can cover by its initial speed and its fall: diverging chains have stretched to
+1e9 m without a nan.
 """
 MAX_MOMENTUM_CHANGE = 1e-12
 """Relative: some thousand roundings."""
@@ -137,8 +137,8 @@ def overlap(tested: RunUnderTest) -> str | None:
     )
     worst = int((deep - allowed).argmax())
     if deep[worst] > allowed[worst]:
-        most = f"the limit {SLOP_FACTOR:g} slop + v·h is {allowed[worst]:.3g} m"
-        return f"an overlap of {deep[worst]:.3g} m at {run.time[worst]:.3g} s; {most}"
+        limit = f"the limit {SLOP_FACTOR:g} slop + v·h is {allowed[worst]:.3g} m"
+        return f"an overlap of {deep[worst]:.3g} m at {run.time[worst]:.3g} s; {limit}"
     return None
 
 
@@ -153,17 +153,17 @@ def separates(tested: RunUnderTest) -> str | None:
 
 def settles(tested: RunUnderTest) -> str | None:
     """At the end all bodies are at rest."""
-    bodies, pull = tested.scene.bodies, math.hypot(*tested.scene.world.gravity)
-    speed = np.where(bodies.fixed, 0.0, np.hypot(*tested.run.velocity[-1].T) / np.sqrt(pull * tested.width))
+    bodies, strength = tested.scene.bodies, math.hypot(*tested.scene.world.gravity)
+    speed = np.where(bodies.fixed, 0.0, np.hypot(*tested.run.velocity[-1].T) / np.sqrt(strength * tested.width))
     worst = int(speed.argmax())
     if speed[worst] > REST_FRACTION:
-        its = float(np.hypot(*tested.run.velocity[-1, worst]))
-        return f"{bodies.names[worst]!r} still moves at {its:.3g} m/s after {tested.run.time[-1]:g} s"
+        remaining = float(np.hypot(*tested.run.velocity[-1, worst]))
+        return f"{bodies.names[worst]!r} still moves at {remaining:.3g} m/s after {tested.run.time[-1]:g} s"
     return None
 
 
 def stands(tested: RunUnderTest) -> str | None:
-    """Stacked bodies stay where they are."""
+    """Stacked bodies do not move."""
     fraction = np.where(tested.scene.bodies.fixed, 0.0, tested.displacement / tested.width)
     worst = int(fraction.argmax())
     if fraction[worst] > MAX_STACK_DISPLACEMENT:
@@ -172,10 +172,10 @@ def stands(tested: RunUnderTest) -> str | None:
 
 
 def joints(tested: RunUnderTest) -> str | None:
-    """Joints hold to within a hundredth of their length."""
-    off = tested.run.info["joint_error"]
-    if off is not None and off > MAX_JOINT_ERROR:
-        return f"the error of a joint is {off:.3g} of its length"
+    """The error of no joint exceeds a hundredth of its length."""
+    error = tested.run.info["joint_error"]
+    if error is not None and error > MAX_JOINT_ERROR:
+        return f"the error of a joint is {error:.3g} of its length"
     return None
 
 

@@ -54,7 +54,7 @@ class Scenario:
     error: Callable[[Scene, Trajectory], float] | None = None
     """error of a run against the known solution, as a fraction; None if the solution is not known"""
     error_of: str = ""
-    """what the error is a fraction of"""
+    """quantity that the error is a fraction of"""
     fail_above: float = np.inf
     """error above which a result is useless and breaks the rule `truth`"""
     energy_tolerance: float | Callable[[Scene, Settings, str], float] = 0.01
@@ -102,7 +102,10 @@ COMMON_SETUPS = (
 
 JOINT_SETUPS = (
     *COMMON_SETUPS[:3],
-    *(EngineSetup(f"reference, {way}", "reference", {"joints": way}) for way in ("relaxation", "xpbd", "rattle")),
+    *(
+        EngineSetup(f"reference, {joints}", "reference", {"joints": joints})
+        for joints in ("relaxation", "xpbd", "rattle")
+    ),
     COMMON_SETUPS[4],
 )
 """Engine configurations for scenes with joints, which have no impacts to be swept."""
@@ -120,7 +123,10 @@ SPRING_SETUPS = (
 
 DETECTION_SETUPS = (
     *COMMON_SETUPS[:4],
-    *(EngineSetup(f"reference, {way}", "reference", {"detection": way}) for way in ("bisect", "shrink")),
+    *(
+        EngineSetup(f"reference, {detection}", "reference", {"detection": detection})
+        for detection in ("bisect", "shrink")
+    ),
     COMMON_SETUPS[4],
 )
 """Engine configurations for scenes in which the detection of impacts matters."""

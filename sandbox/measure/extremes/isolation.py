@@ -1,6 +1,6 @@
-"""Isolated worker: one worker process for many tasks, and another one when it hangs or dies.
+"""Isolated worker: one worker process for many tasks, replaced when it hangs or crashes.
 
-A worker that a signal from outside killed says nothing about its task, which is then given to another worker.
+If a signal from outside kills a worker, its task is not the cause, and another worker repeats it.
 """
 
 import json
@@ -74,7 +74,7 @@ class IsolatedWorker:
         """number of processes started"""
 
     def submit(self, task: Task) -> Outcome:
-        """Return the outcome of a task; if its process hung, died or sent nonsense, a failure with the reason.
+        """Return the outcome of a task; if its process hung or crashed, a failure with the reason.
 
         Raises:
             WorkerError: no process can be started.
@@ -161,7 +161,7 @@ class IsolatedWorker:
                 stderr=self._stderr,
                 text=True,
                 env={**os.environ, **SINGLE_THREADED},
-                start_new_session=True,  # Ctrl-C reaches this process only, which ends the worker
+                start_new_session=True,  # Ctrl-C reaches only the parent process, which ends the worker
             )
         self.started += 1
         threading.Thread(target=_read_lines, args=(self._process, self._lines), daemon=True).start()
@@ -177,7 +177,7 @@ class IsolatedWorker:
         return None
 
     def _crash_outcome(self) -> Outcome:
-        """Return the outcome of a task whose process died."""
+        """Return the outcome of a task whose process crashed."""
         if self._closed:
             raise InterruptedError
         assert self._process is not None

@@ -54,11 +54,11 @@ def prediction_scores(samples: Iterable[Sample], axes: Iterable[Axis]) -> tuple[
     for axis in tested.values():
         counts.setdefault(str(axis.kind), {})
     for sample in samples:
-        its = tested.get(sample.axis)
-        if its is None or sample.verdict == "refused" or sample.outcome.slow:
+        tested_axis = tested.get(sample.axis)
+        if tested_axis is None or sample.verdict == "refused" or sample.outcome.slow:
             continue
-        key = (its.kind in sample.outcome.predicted, its.occurred(sample))
-        count = counts[str(its.kind)]
+        key = (tested_axis.kind in sample.outcome.predicted, tested_axis.occurred(sample))
+        count = counts[str(tested_axis.kind)]
         count[key] = count.get(key, 0) + 1
     return tuple(
         PredictionScore(
@@ -78,7 +78,7 @@ SAMPLE_SECONDS, WORKER_MEMORY = 30.0, 2048
 
 @dataclass(frozen=True)
 class ExtremesPlan:
-    """What is run, with which limits."""
+    """Axes, pairs and engines to run, and the limits."""
 
     axes: tuple[Axis, ...] = tuple(AXES.values())
     pairs: tuple[AxisPair, ...] = PAIRS
@@ -193,9 +193,9 @@ def extremes(plan: ExtremesPlan, on_progress: ProgressCallback | None = None) ->
     """Run a plan. Ctrl-C ends it early with the finished samples.
 
     Args:
-        plan: what to run.
-        on_progress: progress callback; its message has the number of samples and what was finished last, its fraction
-            is the finished part of the axes and pairs.
+        plan: the plan.
+        on_progress: progress callback; its message has the number of samples and the job finished last, its fraction
+            is that of the finished jobs.
 
     Raises:
         WorkerError: no worker process can be started.
@@ -251,7 +251,7 @@ class _Results:
 
 
 def _run_jobs(jobs: list[tuple[str, SampleJob]], plan: ExtremesPlan, on_progress: ProgressCallback) -> _Results:
-    """Do all jobs in as many threads as there are workers. Each thread has a worker process and waits for it."""
+    """Run all jobs in as many threads as there are workers. Each thread has a worker process and waits for it."""
     waiting: SimpleQueue[tuple[str, SampleJob]] = SimpleQueue()
     for each in jobs:
         waiting.put(each)
@@ -265,7 +265,7 @@ def _run_jobs(jobs: list[tuple[str, SampleJob]], plan: ExtremesPlan, on_progress
             thread.start()
         while done < len(jobs):
             try:
-                message = messages.get(timeout=0.2)  # otherwise a signal would have to wait
+                message = messages.get(timeout=0.2)  # without a timeout, a signal would not be handled
             except Empty:
                 continue
             if isinstance(message, BaseException):
@@ -274,11 +274,11 @@ def _run_jobs(jobs: list[tuple[str, SampleJob]], plan: ExtremesPlan, on_progress
                 results.samples.append(message)
                 failed += message.verdict == "failed"
                 continue
-            boundary, what = message
+            boundary, job_name = message
             done += 1
             if boundary is not None:
                 results.boundaries.append(boundary)
-            text = f"{len(results.samples)} cells, {failed} failed; {what}"
+            text = f"{len(results.samples)} cells, {failed} failed; {job_name}"
             on_progress(Progress(text, done / len(jobs)))
     except KeyboardInterrupt:
         results.interrupted = True
@@ -304,14 +304,14 @@ def _close(workers: Sequence[IsolatedWorker], threads: Sequence[threading.Thread
 def _work(
     worker: IsolatedWorker, waiting: "SimpleQueue[tuple[str, SampleJob]]", messages: "SimpleQueue[RunnerMessage]"
 ) -> None:
-    """Do jobs until there are none left or the worker is closed."""
+    """Run jobs until there are none left or the worker is closed."""
     while True:
         try:
-            what, job = waiting.get_nowait()
+            job_name, job = waiting.get_nowait()
         except Empty:
             return
         try:
-            messages.put((job(worker.submit, messages.put), what))
+            messages.put((job(worker.submit, messages.put), job_name))
         except InterruptedError:
             return
         except BaseException as error:  # noqa: BLE001, every exception is raised again in the main thread

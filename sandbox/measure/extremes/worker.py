@@ -1,9 +1,9 @@
-"""Worker process: limits of time and memory, and the tasks that it runs, one JSON line each way.
+"""Worker process: limits of time and memory, and its tasks, one JSON line for each request and each answer.
 
     python -m sandbox.measure.extremes.worker MEMORY_MIB
 
-It writes {"ready": true} when it has imported everything, {"compiling": true} when kernels are compiled, so that an
-answer takes longer, and one outcome for each task. It ends when its standard input does.
+It writes {"ready": true} after all imports, {"compiling": true} when kernels are compiled, so that an answer takes
+longer, and one outcome for each task. It ends at the end of its standard input.
 """
 
 import json

@@ -177,20 +177,20 @@ def close_pairs(start: Scene | Setup, reach: float = 0.0) -> list[tuple[IndexPai
     At least one of a pair can move. A negative clearance is an overlap. Pairs have the indices of `Contacts`.
     """
     setup = Setup.of(start)
-    scene, bodies, meet = setup.scene, setup.bodies, contact_matrix(setup)
-    still = bodies.fixed | is_driven(scene, bodies)
-    meeting = meet.touches | bodies.fixed
+    scene, bodies, matrix = setup.scene, setup.bodies, contact_matrix(setup)
+    immovable = bodies.fixed | is_driven(scene, bodies)
+    collides = matrix.touches | bodies.fixed
     found = []
-    for i, j in _near_pairs(bodies, meeting, reach):
-        if not (still[i] and still[j]) and (bodies.group[i] != bodies.group[j] or bodies.group[i] == 0):
+    for i, j in _near_pairs(bodies, collides, reach):
+        if not (immovable[i] and immovable[j]) and (bodies.group[i] != bodies.group[j] or bodies.group[i] == 0):
             found.append(((i, j), _initial_clearance(setup, (i, j))))
     apart = set(map(tuple, setup.links.apart().tolist()))  # joined bodies that do not collide
     found = [(pair, clear) for pair, clear in found if clear <= reach and pair not in apart]
-    movable = np.flatnonzero(~still & meeting)
+    movable = np.flatnonzero(~immovable & collides)
     for k, thing in enumerate(scene.fixed):
         clear = bounding_clearances(thing, bodies.position, bodies.radius)
-        near = ((number, -1 - k) for number in movable[clear[movable] <= reach].tolist())
-        exact = ((p, float(clear[p[0]]) if bodies.round[p[0]] else _initial_clearance(setup, p)) for p in near)
+        candidates = ((number, -1 - k) for number in movable[clear[movable] <= reach].tolist())
+        exact = ((p, float(clear[p[0]]) if bodies.round[p[0]] else _initial_clearance(setup, p)) for p in candidates)
         found += [(pair, own) for pair, own in exact if own <= reach]
     return found
 
@@ -200,9 +200,9 @@ def _initial_clearance(setup: Setup, pair: IndexPair) -> float:
     return float(clearance(setup.scene, bodies, bodies.position[None], bodies.angle[None], pair)[0])
 
 
-def _near_pairs(bodies: Bodies, meeting: BoolArray, reach: float) -> Iterator[IndexPair]:
+def _near_pairs(bodies: Bodies, collides: BoolArray, reach: float) -> Iterator[IndexPair]:
     """Yield the pairs of bodies whose bounding discs are no farther apart than `reach`."""
-    chosen = np.flatnonzero(meeting)
+    chosen = np.flatnonzero(collides)
     if len(chosen) < 2:
         return
     position, radius = bodies.position, bodies.radius
@@ -224,8 +224,8 @@ def _zone_clearance(centre: FloatArray, zone: Zone) -> FloatArray:
     """Return the distance of a centre from a zone, (T,) m: a body enters a zone with its centre."""
     nearest = np.full(len(centre), np.inf)
     for corners, radius in pieces_of(zone):
-        own = np.broadcast_to(np.asarray(corners), (len(centre), len(corners), 2))
-        _lower_to_distance(nearest, centre[:, None], own, radius)
+        repeated = np.broadcast_to(np.asarray(corners), (len(centre), len(corners), 2))
+        _lower_to_distance(nearest, centre[:, None], repeated, radius)
     return nearest
 
 
@@ -262,8 +262,8 @@ def _lower_to_distance(gaps: FloatArray, first: FloatArray, second: FloatArray, 
         a, b = first.mean(axis=1), second.mean(axis=1)
         reach = np.hypot(*np.moveaxis(first - a[:, None], 2, 0)).max(axis=1)
         reach = reach + np.hypot(*np.moveaxis(second - b[:, None], 2, 0)).max(axis=1)
-        near = np.flatnonzero(~(_length(a - b) - reach - radii >= gaps))
-    gaps[near] = np.fmin(gaps[near], hull_distance(first[near], second[near]) - radii)
+        rows = np.flatnonzero(~(_length(a - b) - reach - radii >= gaps))
+    gaps[rows] = np.fmin(gaps[rows], hull_distance(first[rows], second[rows]) - radii)
 
 
 def _length(vector: FloatArray) -> FloatArray:

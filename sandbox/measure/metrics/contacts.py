@@ -50,18 +50,18 @@ def share_layer(run: Trajectory, scene: Scene, pair: tuple[int, int]) -> BoolArr
     first, second = pair
     if not len(run.layer) or -1 - second >= len(scene.fixed):
         return always
-    own = 1 << run.layer[:, first].clip(0).astype(np.int64)
+    layer_bit = 1 << run.layer[:, first].clip(0).astype(np.int64)
     if second < 0:
-        return np.asarray(own & layers_of_fixed(scene)[-1 - second] != 0)
+        return np.asarray(layer_bit & layers_of_fixed(scene)[-1 - second] != 0)
     return np.asarray(run.layer[:, first] == run.layer[:, second])
 
 
 def can_share_layer(scene: Scene, pair: tuple[int, int]) -> bool:
     """Return whether two bodies can ever be on one layer."""
     first, second = pair
-    own = reachable_layers(scene, scene.bodies)
-    other = own[second] if second >= 0 else layers_of_fixed(scene)[-1 - second]
-    return bool(own[first] & other)
+    reachable = reachable_layers(scene, scene.bodies)
+    other = reachable[second] if second >= 0 else layers_of_fixed(scene)[-1 - second]
+    return bool(reachable[first] & other)
 
 
 MAX_EPISODE_GAP = 4.0
@@ -114,11 +114,11 @@ def _end_times(run: Trajectory, scene: Scene, pair: IndexPair, time: FloatArray,
     """Return the end of contact after each of some times, s: the last frame in which the pair stays within reach."""
     apart = ~(clearance(scene, scene.bodies, run.position, run.angle, pair) <= reach) | ~share_layer(run, scene, pair)
     # For every frame the index of the first frame from it on in which the pair is apart.
-    number = np.where(apart, np.arange(len(apart)), len(apart))
-    following = np.minimum.accumulate(number[::-1])[::-1]
+    index = np.where(apart, np.arange(len(apart)), len(apart))
+    following = np.minimum.accumulate(index[::-1])[::-1]
     first = np.searchsorted(run.time, time, side="left")
-    parted = np.append(following, len(apart))[first]
-    return np.asarray(np.maximum(time, run.time[(parted - 1).clip(0)]))
+    next_apart = np.append(following, len(apart))[first]
+    return np.asarray(np.maximum(time, run.time[(next_apart - 1).clip(0)]))
 
 
 def _merged_rows(
@@ -143,8 +143,8 @@ MAX_PAIRED_BODIES = 50
 def sampled_frames(run: Trajectory, scene: Scene) -> list[int]:
     """Return the indices of the frames that are examined: evenly spaced, with the first and the last."""
     frames, bodies = run.position.shape[:2]
-    most = MAX_DISCS if scene.bodies.round.all() else MAX_SHAPES
-    count = min(frames, max(2, most // max(bodies, 1)))
+    max_values = MAX_DISCS if scene.bodies.round.all() else MAX_SHAPES
+    count = min(frames, max(2, max_values // max(bodies, 1)))
     return [int(k) for k in np.unique(np.linspace(0, frames - 1, count).round())]
 
 
@@ -177,28 +177,30 @@ def max_penetration(run: Trajectory, scene: Scene) -> FloatArray:
         pairs += _initial_neighbours(scene)
     # A body that can change its layer can be above another without colliding: only bodies that cannot are examined.
     if len(scene.layers) > 1:
-        sure = reachable_layers(scene, bodies)
-        pairs = [pair for pair in pairs if sure[pair[0]].bit_count() == 1 and can_share_layer(scene, pair)]
+        reachable = reachable_layers(scene, bodies)
+        pairs = [pair for pair in pairs if reachable[pair[0]].bit_count() == 1 and can_share_layer(scene, pair)]
     for pair in pairs:
         found = np.maximum(found, -clearance(scene, bodies, run.position, run.angle, pair))
     if mutual and bodies.round.all():
-        among = np.flatnonzero(contact_matrix(scene).touches)
-        farthest = 2.0 * float(bodies.radius[among].max())
-        for k, position in enumerate(run.position[:, among]):
-            for i, j in near_pairs(position, farthest):
-                apart = np.hypot(*(position[i] - position[j]).T) - bodies.radius[among[i]] - bodies.radius[among[j]]
+        colliding = np.flatnonzero(contact_matrix(scene).touches)
+        max_distance = 2.0 * float(bodies.radius[colliding].max())
+        for k, position in enumerate(run.position[:, colliding]):
+            for i, j in near_pairs(position, max_distance):
+                apart = (
+                    np.hypot(*(position[i] - position[j]).T) - bodies.radius[colliding[i]] - bodies.radius[colliding[j]]
+                )
                 found[k] = max(found[k], -float(apart.min(initial=np.inf)))
     return found
 
 
 def _initial_neighbours(scene: Scene) -> list[tuple[int, int]]:
-    """Return the pairs of bodies whose bounding discs overlap at the start and that no joint keeps from colliding."""
+    """Return the pairs of bodies whose bounding discs overlap at the start and whose collisions no joint disables."""
     bodies = scene.bodies
     apart = {(a, b) for a, b in scene.links.apart().tolist()}
     found = []
     for i, j in near_pairs(bodies.position, 2.0 * float(bodies.radius.max())):
-        near = np.hypot(*(bodies.position[i] - bodies.position[j]).T) < bodies.radius[i] + bodies.radius[j]
-        for a, b in zip(i[near].tolist(), j[near].tolist(), strict=True):
+        overlapping = np.hypot(*(bodies.position[i] - bodies.position[j]).T) < bodies.radius[i] + bodies.radius[j]
+        for a, b in zip(i[overlapping].tolist(), j[overlapping].tolist(), strict=True):
             pair = (min(a, b), max(a, b))
             if pair not in apart and not (bodies.fixed[a] and bodies.fixed[b]):
                 found.append(pair)

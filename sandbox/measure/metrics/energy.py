@@ -1,4 +1,4 @@
-"""Energy of a run in each frame, and the energy ledger: what each cause added or removed.
+"""Energy of a run in each frame, and the energy ledger: the energy that each cause added or removed.
 
     total = total at the start + sum over all causes + residual
 
@@ -21,7 +21,7 @@ from sandbox.scene.compile.setup import Setup
 from sandbox.trajectory import Trajectory
 
 CHUNK = 10_000_000
-"""Frames × bodies worked on at once: a few arrays of 80 MB."""
+"""Frames × bodies processed at once: a few arrays of 80 MB."""
 
 
 class Energies(NamedTuple):
@@ -52,13 +52,13 @@ def energies(
 
     Raises:
         ValueError: the bodies are not those of the run.
-        IndexError: there is no body of that number.
+        IndexError: there is no body with that index.
     """
     setup = Setup.of(start)
     scene, bodies = setup.scene, setup.bodies if bodies is None else bodies
     frames, count = trajectory.position.shape[:2]
     if count != len(bodies):
-        raise ValueError(f"the run has {count:,} bodies, described are {len(bodies):,}; pass the run's own")
+        raise ValueError(f"the run has {count:,} bodies, but the scene has {len(bodies):,}; pass the bodies of the run")
     columns = slice(None)
     if body is not None:
         if not 0 <= body < count:
@@ -70,9 +70,9 @@ def energies(
     gravity = np.asarray(scene.world.gravity)
     stored = Potential(setup, bodies, body, trajectory.breaks(len(setup.links)))
     needed = slice(None) if stored else columns  # a body can be joined to any other
-    own = columns if stored else slice(None)
+    counted_columns = columns if stored else slice(None)
     size = count if stored or body is None else 1
-    seen = np.zeros(size, dtype=np.bool_)
+    added_before = np.zeros(size, dtype=np.bool_)
     kinetic, potential = np.empty(frames), np.empty(frames)
 
     step = max(1, CHUNK // max(1, size))
@@ -80,10 +80,10 @@ def energies(
         rows = slice(begin, begin + step)
         position, velocity = trajectory.position[rows, columns], trajectory.velocity[rows, columns]
         spin = trajectory.angular_velocity[rows, columns]
-        added = _added(trajectory.position[rows, needed], seen)
-        seen = added[-1]
+        added = _added(trajectory.position[rows, needed], added_before)
+        added_before = added[-1]
         present = added & trajectory.present(rows)[:, needed]
-        counts = present[:, own]
+        counts = present[:, counted_columns]
         # The squares of a diverged state are infinite, which is its energy and no error.
         with np.errstate(over="ignore", invalid="ignore"):
             squared = np.einsum("tnk,tnk->tn", velocity, velocity)
@@ -97,17 +97,17 @@ def energies(
         return Energies(kinetic, potential, kinetic + potential)
 
 
-def _added(position: FloatArray, seen: BoolArray) -> BoolArray:
+def _added(position: FloatArray, added_before: BoolArray) -> BoolArray:
     """Return which bodies have been added by each frame, (T, N).
 
     A body is nan before it is added. A later nan is a diverged state, which has to show in the sum.
 
     Args:
         position: (T, N, 2) m.
-        seen: (N,) bodies that were present before these frames.
+        added_before: (N,) bodies that were present before these frames.
     """
     added = np.asarray(~np.isnan(position).any(axis=2))
-    added[0] |= seen
+    added[0] |= added_before
     return np.asarray(np.logical_or.accumulate(added, axis=0))
 
 
@@ -187,7 +187,7 @@ def ledger_of(trajectory: Trajectory, scene: Scene) -> Ledger:
     """
     if not len(trajectory.energy):
         raise ValueError("the run has no energy account; run it with account=True")
-    # Bodies added during the run are not in the scene; the scale is then the turnover alone.
+    # Bodies added during the run are not in the scene; the scale is then only the turnover.
     known = len(scene.bodies) == len(trajectory.names)
     motion = float(energies(trajectory, scene).kinetic.max()) if known else 0.0
     turnover = float(np.abs(trajectory.account).max(initial=0.0))

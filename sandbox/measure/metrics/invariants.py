@@ -49,16 +49,16 @@ def energy_drift(run: Trajectory, scene: Scene, truth: Trajectory | None, truste
     against = "truth" if trusted and truth is not None else "start"
     if not len(run.time) or run.status != "ok":
         return EnergyDrift(None, against)
-    own = energies(run, scene)
-    change, scale = float(own.total[-1] - own.total[0]), float(own.kinetic.max())
+    run_energy = energies(run, scene)
+    change, scale = float(run_energy.total[-1] - run_energy.total[0]), float(run_energy.kinetic.max())
     if truth is not None:
-        its = energies(truth, scene)
-        scale = float(its.kinetic.max())
+        truth_energy = energies(truth, scene)
+        scale = float(truth_energy.kinetic.max())
         if trusted:
-            change -= float(its.total[-1] - its.total[0])
+            change -= float(truth_energy.total[-1] - truth_energy.total[0])
     if not scene.bodies.round.all() and scale < AT_REST_FRACTION * _lift_energy(scene):
         return EnergyDrift(0.0 if change == 0.0 else None, against)
-    return EnergyDrift(_share(change, scale), against)
+    return EnergyDrift(_ratio(change, scale), against)
 
 
 def _lift_energy(scene: Scene) -> float:
@@ -87,24 +87,24 @@ def momentum_drift(run: Trajectory, scene: Scene) -> float | None:
         return None
     mass = np.where(bodies.fixed, 0.0, bodies.mass)
     explained = mass.sum() * np.asarray(world.gravity) * run.time[-1]
-    still = np.append(bodies.fixed, np.ones(len(scene.fixed_names), dtype=np.bool_))  # −1 − k counts from the end
-    first, second = (still[run.contact_pair[:, side]] for side in (0, 1))
+    is_static = np.append(bodies.fixed, np.ones(len(scene.fixed_names), dtype=np.bool_))  # −1 − k counts from the end
+    first, second = (is_static[run.contact_pair[:, side]] for side in (0, 1))
     explained = explained - run.contact_impulse[~first & second].sum(axis=0)
     explained = explained + run.contact_impulse[first & ~second].sum(axis=0)
     momentum = np.einsum("n,tnk->tk", mass, run.velocity[[0, -1]])
     scale = max(float(np.hypot(*np.moveaxis(frame, 1, 0)) @ mass) for frame in run.velocity)
-    return _share(float(np.hypot(*(momentum[1] - momentum[0] - explained))), scale)
+    return _ratio(float(np.hypot(*(momentum[1] - momentum[0] - explained))), scale)
 
 
 def _acts_on_static(scene: Scene) -> bool:
     """Return whether a joint or an attraction acts between a moving and a static body."""
     bodies, links = scene.bodies, scene.links
-    still = {name for name, fixed in zip(bodies.names, bodies.fixed.tolist(), strict=True) if fixed}
-    drawn = any(not isinstance(each.toward, str) or each.toward in still for each in scene.attractions)
-    return drawn or bool(((links.a < 0) | bodies.fixed[links.a] | bodies.fixed[links.b]).any())
+    static = {name for name, fixed in zip(bodies.names, bodies.fixed.tolist(), strict=True) if fixed}
+    is_attracted = any(not isinstance(each.toward, str) or each.toward in static for each in scene.attractions)
+    return is_attracted or bool(((links.a < 0) | bodies.fixed[links.a] | bodies.fixed[links.b]).any())
 
 
-def _share(change: float, scale: float) -> float | None:
+def _ratio(change: float, scale: float) -> float | None:
     if change == 0.0:
         return 0.0
     return change / scale if math.isfinite(change) and math.isfinite(scale) and scale > 0.0 else None
@@ -121,7 +121,7 @@ CONSTRAINT_KINDS = (
     LinkKind.ROTARY_LIMIT,
     LinkKind.GEAR,
 )
-"""Kinds of joints that hold something in place; springs and motors do not."""
+"""Kinds of joints that are constraints; springs and motors are not."""
 
 
 def joint_errors(trajectory: Trajectory, start: Scene | Setup) -> FloatArray:
@@ -150,12 +150,12 @@ def joint_errors(trajectory: Trajectory, start: Scene | Setup) -> FloatArray:
 def starting_errors(scene: Scene) -> FloatArray:
     """Return the error of each joint at the start of a scene, (J,), as in `joint_errors`."""
     bodies, links = scene.bodies, scene.links
-    there = np.ones((1, len(links)), np.bool_)
-    return np.asarray(_errors(links, bodies.position[None], bodies.angle[None], there)[0])
+    present = np.ones((1, len(links)), np.bool_)
+    return np.asarray(_errors(links, bodies.position[None], bodies.angle[None], present)[0])
 
 
 def joint_error(trajectory: Trajectory, start: Scene | Setup) -> float | None:
-    """Return the largest relative error of any joint in any frame; None if the scene has no joint that holds.
+    """Return the largest relative error of any joint in any frame; None if the scene has no constraint.
 
     Lengths are relative to the length of the rod or the bound of the slide; if that is 0, and for pivots and grooves,
     to the diameter of the smaller body. Angles are in rad. Only recorded frames count, so that with `record_every`
@@ -166,20 +166,20 @@ def joint_error(trajectory: Trajectory, start: Scene | Setup) -> float | None:
     if not np.isin(links.kind, CONSTRAINT_KINDS).any() or not len(trajectory.time):
         return None
     errors = joint_errors(trajectory, setup) / joint_scales(links, setup.bodies)
-    there = errors[~np.isnan(errors)]
-    return float(there.max()) if len(there) else None
+    known = errors[~np.isnan(errors)]
+    return float(known.max()) if len(known) else None
 
 
 def joint_scales(links: JointArrays, bodies: Bodies) -> FloatArray:
     """Return the scale of the error of each joint, (J,): a length in m, or 1 rad."""
-    own = 2.0 * np.minimum(bodies.radius[links.b], np.where(links.a >= 0, bodies.radius[links.a], np.inf))
+    diameter = 2.0 * np.minimum(bodies.radius[links.b], np.where(links.a >= 0, bodies.radius[links.a], np.inf))
     length = np.where(links.kind == LinkKind.ROD, links.figures[:, 0], 0.0)
     length = np.where(links.kind == LinkKind.SLIDE, links.figures[:, 1], length)
     turning = np.isin(links.kind, (LinkKind.ROTARY_LIMIT, LinkKind.GEAR))
-    return np.asarray(np.where(turning, 1.0, np.where(length > 0.0, length, own)))
+    return np.asarray(np.where(turning, 1.0, np.where(length > 0.0, length, diameter)))
 
 
-def _errors(links: JointArrays, position: FloatArray, angle: FloatArray, there: BoolArray) -> FloatArray:
+def _errors(links: JointArrays, position: FloatArray, angle: FloatArray, present: BoolArray) -> FloatArray:
     x, y, _ = links.figures.T
     # The distances of a diverged state are infinite.
     with np.errstate(over="ignore", invalid="ignore"):
@@ -194,19 +194,19 @@ def _errors(links: JointArrays, position: FloatArray, angle: FloatArray, there: 
             LinkKind.ROTARY_LIMIT: np.maximum(x - (angle_b - angle_a), angle_b - angle_a - y),
             LinkKind.GEAR: np.abs(angle_b * y - angle_a - x),
         }
-    found = np.full(there.shape, np.nan)
+    found = np.full(present.shape, np.nan)
     for kind, error in by_kind.items():
         found = np.where(links.kind == kind, np.maximum(np.where(np.isnan(error), math.inf, error), 0.0), found)
-    return np.where(there, found, np.nan)
+    return np.where(present, found, np.nan)
 
 
 def _from_groove(links: JointArrays, position: FloatArray, angle: FloatArray, point: FloatArray) -> FloatArray:
     """Return the distance of points (T, J, 2) from the grooves of their joints, (T, J) m."""
-    near, _ = links.ends(position, angle)
-    turn, along = np.where(links.a >= 0, angle[:, links.a], 0.0), links.figures[:, :2] - links.anchor_a
-    way = rotate_points(along, turn)
+    start, _ = links.ends(position, angle)
+    rotation, along = np.where(links.a >= 0, angle[:, links.a], 0.0), links.figures[:, :2] - links.anchor_a
+    line = rotate_points(along, rotation)
     squared = (along * along).sum(axis=1)
-    offset = point - near
-    fraction = (offset * way).sum(axis=2) / np.where(squared > 0.0, squared, 1.0)
-    away = offset - fraction.clip(0.0, 1.0)[..., None] * way
+    offset = point - start
+    fraction = (offset * line).sum(axis=2) / np.where(squared > 0.0, squared, 1.0)
+    away = offset - fraction.clip(0.0, 1.0)[..., None] * line
     return np.asarray(np.hypot(away[..., 0], away[..., 1]))

@@ -29,11 +29,11 @@ def perturb(start: Scene | Setup, amount: float = PERTURBATION, seed: int = 0) -
     """Return the scene with a displacement of every body that can collide or is attracted.
 
     The direction of each displacement follows from the state of the body and the seed, not from its index, so that an
-    additional body changes nothing for the others. No contact is made or broken: a body with contacts in one direction
-    only, such as a box in a stack, moves perpendicular to it. Bodies that are wedged, such as the balls of a rack, or
-    joined, move together with all bodies that they are connected with. If that is not possible either, the velocity
-    changes by `amount` in m/s. Polygons without contacts are also rotated, by `amount` over their radius. Static and
-    driven bodies stay.
+    additional body does not change those of the others. No contact is made or broken: a body with contacts in one
+    direction only, such as a box in a stack, moves perpendicular to it. Bodies that are wedged, such as the balls of a
+    rack, or joined, move together with all bodies that they are connected with. If that is not possible either, the
+    velocity changes by `amount` in m/s. Polygons without contacts are also rotated, by `amount` over their radius.
+    Static and driven bodies are not displaced.
 
     Args:
         start: scene or setup; it stays unchanged.
@@ -44,9 +44,9 @@ def perturb(start: Scene | Setup, amount: float = PERTURBATION, seed: int = 0) -
         The perturbed setup; None if there is no such body, so that no difference can grow.
     """
     setup = Setup.of(start)
-    scene, bodies, meet = setup.scene, setup.bodies, contact_matrix(setup)
-    still = bodies.fixed | is_driven(scene, bodies)
-    able = ~still & (~meet.free | bool(scene.attractions))
+    scene, bodies, matrix = setup.scene, setup.bodies, contact_matrix(setup)
+    immovable = bodies.fixed | is_driven(scene, bodies)
+    able = ~immovable & (~matrix.free | bool(scene.attractions))
     if not able.any():
         return None
     touching = touching_pairs(setup, max(TOUCH_TOLERANCE, 2.0 * amount))
@@ -55,11 +55,11 @@ def perturb(start: Scene | Setup, amount: float = PERTURBATION, seed: int = 0) -
     normals: dict[int, list[FloatArray]] = {}
     for edge, normal in touching:
         for number in edge:
-            if number >= 0 and not still[number]:
+            if number >= 0 and not immovable[number]:
                 normals.setdefault(number, []).append(normal)
-    bound = np.isin(np.arange(len(bodies)), joined) & ~still
-    for number, own in normals.items():
-        bound[number] |= _perpendicular(own) is None
+    bound = np.isin(np.arange(len(bodies)), joined) & ~immovable
+    for number, normals_of_body in normals.items():
+        bound[number] |= _perpendicular(normals_of_body) is None
     connected = [edge for edge in (*joined, *(edge for edge, _ in touching)) if min(edge) >= 0 and bound[[*edge]].all()]
     group = _groups(len(bodies), connected)
     outward: dict[int, list[FloatArray]] = {}
@@ -96,19 +96,19 @@ def touching_pairs(start: Scene | Setup, touch: float = TOUCH_TOLERANCE) -> list
         touch: largest clearance or overlap of a contact, m.
     """
     setup = Setup.of(start)
-    still = setup.bodies.fixed | is_driven(setup.scene, setup.bodies)
+    immovable = setup.bodies.fixed | is_driven(setup.scene, setup.bodies)
     pairs = [pair for pair, clear in close_pairs(setup, touch) if clear >= -touch]
-    return [((i, j), _normal(setup, j if still[i] else i, (i, j))) for i, j in pairs]
+    return [((i, j), _normal(setup, j if immovable[i] else i, (i, j))) for i, j in pairs]
 
 
 def _normal(setup: Setup, number: int, pair: IndexPair) -> FloatArray:
     """Return the direction in which the clearance of a pair grows as one of its bodies moves, a unit vector (2,)."""
     bodies = setup.bodies
-    place = bodies.position[number]
+    start = bodies.position[number]
     if min(pair) >= 0 and bodies.round[[*pair]].all():
         apart = bodies.position[pair[1]] - bodies.position[pair[0]]
         return np.asarray(apart / (math.hypot(*apart) or 1.0))
-    step = max(1e-7 * float(bodies.radius[number]), 1e5 * float(np.spacing(np.abs(place)).max()))
+    step = max(1e-7 * float(bodies.radius[number]), 1e5 * float(np.spacing(np.abs(start)).max()))
     position = np.repeat(bodies.position[None], 4, axis=0)
     position[:, number] += step * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
     gaps = clearance(setup.scene, bodies, position, np.repeat(bodies.angle[None], 4, axis=0), pair)
@@ -136,7 +136,7 @@ def _hash_rows(figures: FloatArray, seed: int) -> IntArray:
     """Return a pseudo-random number for each row, (N,), by the mixing function of SplitMix64."""
     mixed = np.full(len(figures), seed, dtype=np.uint64)
     with np.errstate(over="ignore"):
-        for column in (figures + 0.0).T:  # which makes −0 a 0
+        for column in (figures + 0.0).T:  # −0 becomes 0
             mixed = mixed + column.copy().view(np.uint64) + np.uint64(0x9E3779B97F4A7C15)
             mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
             mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
@@ -163,16 +163,16 @@ def _perpendicular(normals: list[FloatArray]) -> FloatArray | None:
     return np.where(np.abs(along) < PARALLEL_SINE, 0.0, along)
 
 
-def _shift(places: FloatArray, wanted: FloatArray) -> FloatArray:
+def _shift(positions: FloatArray, wanted: FloatArray) -> FloatArray:
     """Return the displacement nearest to a wanted one that is the same for all positions (K, 2), (2,) m.
 
     It is a multiple of two units in the last place of the largest coordinate, which is added without rounding, so that
     clearances do not change.
     """
-    digit = 2.0 * float(np.spacing(max(np.abs(places).max(), np.abs(wanted).max())))
-    least = np.sign(wanted) * 0.5 * ULPS * digit
+    digit = 2.0 * float(np.spacing(max(np.abs(positions).max(), np.abs(wanted).max())))
+    smallest = np.sign(wanted) * 0.5 * ULPS * digit
     rounded = np.round(wanted / digit) * digit
-    return np.where(np.abs(rounded) < np.abs(least), least, rounded)
+    return np.where(np.abs(rounded) < np.abs(smallest), smallest, rounded)
 
 
 def agreement_time(a: Trajectory, b: Trajectory, scene: Scene, tolerance: float) -> float:

@@ -27,7 +27,7 @@ def common_frames(a: Trajectory, b: Trajectory) -> tuple[IntArray, IntArray]:
 
 
 CHUNK = 2_000_000
-"""Frames × bodies worked on at once."""
+"""Frames × bodies processed at once."""
 TOLERANCE = 0.01
 """Default tolerance as a fraction of the smallest radius, or half width, of the moving bodies."""
 
@@ -80,15 +80,15 @@ def divergence_times(run: Trajectory, truth: Trajectory, tolerance: float) -> Fl
 
     A body that is present in only one of the two has an infinite error.
     """
-    mine, its = common_frames(run, truth)
+    frames, truth_frames = common_frames(run, truth)
     found = np.full(len(run.names), np.inf)
     step = max(1, CHUNK // max(1, len(found)))
-    for begin in range(0, len(mine), step):
+    for begin in range(0, len(frames), step):
         rows = slice(begin, begin + step)
         with np.errstate(over="ignore", invalid="ignore"):
-            away = np.hypot(*np.moveaxis(run.position[mine[rows]] - truth.position[its[rows]], 2, 0))
-        off = ~(away <= tolerance) | (run.present(mine[rows]) != truth.present(its[rows]))
-        first = np.where(off.any(axis=0), run.time[mine[rows]][off.argmax(axis=0)], np.inf)
+            away = np.hypot(*np.moveaxis(run.position[frames[rows]] - truth.position[truth_frames[rows]], 2, 0))
+        is_off = ~(away <= tolerance) | (run.present(frames[rows]) != truth.present(truth_frames[rows]))
+        first = np.where(is_off.any(axis=0), run.time[frames[rows]][is_off.argmax(axis=0)], np.inf)
         found = np.minimum(found, first)
     return found
 
@@ -101,23 +101,23 @@ def errors(run: Trajectory, truth: Trajectory, moving: BoolArray) -> Errors:
         truth: the truth; only frames with equal times are compared.
         moving: bodies that count, (N,).
     """
-    mine, its = common_frames(run, truth)
-    size = len(mine)
+    frames, truth_frames = common_frames(run, truth)
+    size = len(frames)
     largest, squares, count = np.zeros((2, size)), np.zeros((2, size)), np.zeros(size)
     numbers = np.flatnonzero(moving)
     step = max(1, CHUNK // max(1, len(numbers)))
     for begin in range(0, size if len(numbers) else 0, step):
         rows = slice(begin, begin + step)
-        both = (run.present(mine[rows]) & truth.present(its[rows]))[:, numbers]
+        both = (run.present(frames[rows]) & truth.present(truth_frames[rows]))[:, numbers]
         count[rows] = both.sum(axis=1)
         for k, name in enumerate(("position", "velocity")):
-            found, right = getattr(run, name)[mine[rows]], getattr(truth, name)[its[rows]]
+            actual, expected = getattr(run, name)[frames[rows]], getattr(truth, name)[truth_frames[rows]]
             # The distances of a diverged state are infinite.
             with np.errstate(over="ignore", invalid="ignore"):
-                away = np.hypot(*np.moveaxis(found[:, numbers] - right[:, numbers], 2, 0))
+                away = np.hypot(*np.moveaxis(actual[:, numbers] - expected[:, numbers], 2, 0))
                 away = np.where(both, np.where(np.isnan(away), np.inf, away), 0.0)
                 largest[k, rows], squares[k, rows] = away.max(axis=1), np.square(away).sum(axis=1)
-    return Errors(run.time[mine], largest[0], largest[1], squares, count)
+    return Errors(run.time[frames], largest[0], largest[1], squares, count)
 
 
 def default_tolerance(scene: Scene) -> float:

@@ -28,12 +28,12 @@ class ContactHistory:
     def found(self, when: IntArray, pairs: IntArray) -> BoolArray:
         """Return which pairs (M, 2) were in contact in the entries `when` (M,), counted from 0."""
         found = np.zeros(len(pairs), dtype=np.bool_)
-        for look in np.unique(when).tolist():
-            if len(self._pairs[look]):
-                selected = when == look
-                known, wanted = np.sort(pair_keys(*self._pairs[look].T)), pair_keys(*pairs[selected].T)
-                place = np.searchsorted(known, wanted)
-                found[selected] = known[np.minimum(place, len(known) - 1)] == wanted
+        for entry in np.unique(when).tolist():
+            if len(self._pairs[entry]):
+                selected = when == entry
+                known, wanted = np.sort(pair_keys(*self._pairs[entry].T)), pair_keys(*pairs[selected].T)
+                index = np.searchsorted(known, wanted)
+                found[selected] = known[np.minimum(index, len(known) - 1)] == wanted
         return found
 
 

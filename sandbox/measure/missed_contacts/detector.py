@@ -1,7 +1,7 @@
 """Detector of missed contacts: contacts that an engine never detected, or detected too late.
 
 A fixed-step engine tests for overlap at the end of each substep only. A contact that begins and ends within a substep
-is lost; a body that it finds on the far side of an obstacle is pushed out there.
+is lost. A body that has reached the far side of an obstacle is pushed out on that side.
 """
 
 from itertools import pairwise
@@ -43,17 +43,17 @@ class Audit:
 
     The contact distance is the sum of the radii; for a wall it is the radius and half the thickness. A plane is a solid
     that is `BACKING` deep: condition 4 is then no contact, or a centre deeper than the backing. A wall is one object:
-    it is approached if any of its segments in reach is. A body that passes through the line of a segment of which it
-    was clear has missed the wall, whatever the engine finds on the far side and on whichever other segment the body
-    rested. Bodies whose position is nan before or after the substep do not count.
+    it is approached if any of its segments in reach is. A body that passes through the line of a segment from
+    which it was clear has missed the wall, regardless of contacts on the far side and of other segments on which the
+    body rested. Bodies whose position is nan before or after the substep do not count.
 
     A passage therefore counts once: a pair that has passed or is still inside is not clear, or moves apart.
 
     This is exact for discs. Of any other body, the radius is `Bodies.core`, the largest disc about the centre of mass
-    inside the body: whatever passes through that was missed, so that there are no false alarms, but a contact with a
-    corner only is not counted. A body with a core of 0, whose centre of mass lies outside, is left out. Pairs that a
-    joint keeps from colliding, bodies of one group, bodies on different layers or that change their layer within the
-    substep, and bodies that strokes and plungers move through static objects miss nothing.
+    inside the body: a passage through it was missed with certainty, so that there are no false alarms, but a contact
+    with a corner only is not counted. A body with a core of 0, whose centre of mass lies outside, is left out. Pairs
+    whose collisions a joint disables, bodies of one group, bodies on different layers or that change their layer within
+    the substep, and bodies that strokes and plungers move through static objects do not count.
 
     Limits: motion is taken to be straight, as in pymunk. The cost grows with (bodies that jump) × (segments and
     planes), and among balls with the number of close pairs.
@@ -64,13 +64,13 @@ class Audit:
         scene = setup.scene
         self._static_geometry = StaticGeometry.of(scene)
         self._apart = setup.links.apart()
-        self._led = frozenset(drive.body for drive in scene.drives if drive.kind != "torque")
+        self._kinematic = frozenset(drive.body for drive in scene.drives if drive.kind != "torque")
         self._times: list[FloatArray] = []
         self._pairs: list[IntArray] = []
         self._history = ContactHistory()
         self._history.add(np.empty((0, 2), np.int64))
-        self._on: IntArray = np.zeros((0, 0), np.int64)  # layers as bits; empty if there is a single layer
-        self._lay_out(setup.bodies if bodies is None else bodies)
+        self._layer_bits: IntArray = np.zeros((0, 0), np.int64)  # layers as bits; empty if there is a single layer
+        self._classify_bodies(setup.bodies if bodies is None else bodies)
 
     def joined(self, bodies: Bodies) -> None:
         """Include bodies that were added.
@@ -79,7 +79,7 @@ class Audit:
             bodies: all bodies.
         """
         self._examine()
-        self._lay_out(bodies)
+        self._classify_bodies(bodies)
 
     def changed(self, scene: Scene, bodies: Bodies) -> None:
         """Include changes of the static objects.
@@ -90,7 +90,7 @@ class Audit:
         """
         self._examine()
         self._static_geometry = StaticGeometry.of(scene)
-        self._lay_out(bodies)
+        self._classify_bodies(bodies)
 
     def __call__(
         self, time: float, start: FloatArray, end: FloatArray, touching: IntArray, on: IntArray | None = None
@@ -108,17 +108,17 @@ class Audit:
         Raises:
             ValueError: N is not the number of bodies; `joined` adds bodies.
         """
-        if len(start) != self._number:
-            raise ValueError(f"{len(start)} bodies, where the audit knows of {self._number}")
+        if len(start) != self._body_count:
+            raise ValueError(f"{len(start)} bodies, where the audit knows of {self._body_count}")
         if not len(self._core):
             return
         row = len(self._time)
         self._start[row] = start[self._part]
         self._end[row] = end[self._part]
         if on is not None:
-            if not len(self._on):
-                self._on = np.zeros(self._start.shape[:2], np.int64)
-            self._on[row] = on[self._part]
+            if not len(self._layer_bits):
+                self._layer_bits = np.zeros(self._start.shape[:2], np.int64)
+            self._layer_bits[row] = on[self._part]
         self._history.add(touching)
         self._time.append(time)
         if len(self._time) == len(self._start):
@@ -140,41 +140,45 @@ class Audit:
         """Return `times` and `pairs`."""
         return self.times, self.pairs
 
-    def _lay_out(self, bodies: Bodies) -> None:
-        """Derive which bodies can collide with what, and the smallest displacement that can miss a contact."""
-        every = np.asarray([e.collides == "all" for e in bodies.elements], np.bool_)[bodies.element]
+    def _classify_bodies(self, bodies: Bodies) -> None:
+        """Derive the collision classes of the bodies, and the smallest displacement that can miss a contact."""
+        collides_with_all = np.asarray([e.collides == "all" for e in bodies.elements], np.bool_)[bodies.element]
         some = np.asarray([e.collides != "none" for e in bodies.elements], np.bool_)[bodies.element]
-        every, some = every & (bodies.core > 0.0), some & (bodies.core > 0.0)
-        moves, to_all, still = some & ~bodies.fixed, every & ~bodies.fixed, every & bodies.fixed
-        member = to_all | still | (moves & bool(still.any()))
+        collides_with_all, some = collides_with_all & (bodies.core > 0.0), some & (bodies.core > 0.0)
+        moves, moving_to_all, static = (
+            some & ~bodies.fixed,
+            collides_with_all & ~bodies.fixed,
+            collides_with_all & bodies.fixed,
+        )
+        member = moving_to_all | static | (moves & bool(static.any()))
 
         # If a pair jumps, one of the two moves at least half as far.
-        least = np.full(len(bodies), np.inf)
+        smallest = np.full(len(bodies), np.inf)
         cores = bodies.core[member]
         if len(cores) > 1:
-            least[member] = JUMP * (cores + cores.min()) / 2
+            smallest[member] = JUMP * (cores + cores.min()) / 2
         if len(self._static_geometry):
-            least[moves] = np.minimum(least, JUMP * bodies.core)[moves]
+            smallest[moves] = np.minimum(smallest, JUMP * bodies.core)[moves]
 
-        # Bodies of one kind are adjacent: those before the first and after the last relevant one cost nothing.
-        matter = np.flatnonzero(np.isfinite(least))
-        self._number = len(bodies)
-        self._offset = int(matter[0]) if len(matter) else 0
-        self._part = part = slice(self._offset, int(matter[-1]) + 1 if len(matter) else 0)
-        self._moves, self._to_all, self._still = moves[part], to_all[part], still[part]
+        # Bodies of one kind are adjacent: those before the first and after the last relevant one are left out.
+        relevant = np.flatnonzero(np.isfinite(smallest))
+        self._body_count = len(bodies)
+        self._offset = int(relevant[0]) if len(relevant) else 0
+        self._part = part = slice(self._offset, int(relevant[-1]) + 1 if len(relevant) else 0)
+        self._moves, self._to_all, self._static = moves[part], moving_to_all[part], static[part]
         self._core = bodies.core[part]
-        self._lands = self._moves
-        if self._led:  # bodies led by a stroke or a plunger pass through static objects
-            self._lands = self._moves & ~np.isin(bodies.names[part], [*self._led])
+        self._hits_static = self._moves
+        if self._kinematic:  # bodies moved by a stroke or a plunger pass through static objects
+            self._hits_static = self._moves & ~np.isin(bodies.names[part], [*self._kinematic])
         self._group = bodies.group[part] if bodies.group.any() else None
-        self._least2 = least[part] ** 2 * (1 - 1e-9)  # rounding must not hide a pair from the exact test
-        self._verlet_list = VerletList(self._core, member[part], self._meet)
+        self._smallest_squared = smallest[part] ** 2 * (1 - 1e-9)  # rounding must not hide a pair from the exact test
+        self._verlet_list = VerletList(self._core, member[part], self._can_collide)
 
         batch = max(1, min(MAX_BATCH, BATCH_ROWS // max(1, len(self._core))))
         self._time: list[float] = []
         self._start = np.empty((batch, len(self._core), 2))
         self._end = np.empty_like(self._start)
-        self._on = np.zeros((0, 0), np.int64)
+        self._layer_bits = np.zeros((0, 0), np.int64)
 
     def _examine(self) -> None:
         """Examine the recorded substeps."""
@@ -183,15 +187,15 @@ class Audit:
             move = end - start
             move *= move
             length2 = move[..., 0] + move[..., 1]
-        fast = length2 >= self._least2
+        fast = length2 >= self._smallest_squared
         if fast.any():
-            lost = ~(length2 < MAX_COORDINATE**2)
+            is_diverging = ~(length2 < MAX_COORDINATE**2)
             when, body = np.nonzero(fast)
-            lost[when, body] |= (np.abs(start[when, body]) > MAX_COORDINATE).any(axis=1)
-            if lost.any():
-                start[lost] = end[lost] = np.nan
-                length2[lost] = 0.0
-                fast &= ~lost
+            is_diverging[when, body] |= (np.abs(start[when, body]) > MAX_COORDINATE).any(axis=1)
+            if is_diverging.any():
+                start[is_diverging] = end[is_diverging] = np.nan
+                length2[is_diverging] = 0.0
+                fast &= ~is_diverging
             nearing = 2 * float(np.sqrt(length2.max()))
             found = self._balls(start, end, fast, nearing), self._fixed(start, end, fast)
             when = np.concatenate([when for when, _ in found])
@@ -205,16 +209,16 @@ class Audit:
 
     def _fixed(self, start: FloatArray, end: FloatArray, fast: BoolArray) -> tuple[IntArray, IntArray]:
         """Return substeps (M,) and pairs (M, 2) of a body and a static object that missed a contact."""
-        when, body = np.nonzero(fast & self._lands)
-        on = self._on[when, body] if len(self._on) else None
+        when, body = np.nonzero(fast & self._hits_static)
+        on = self._layer_bits[when, body] if len(self._layer_bits) else None
         paths = SweptCircles(when, body + self._offset, start[when, body], end[when, body], self._core[body], on)
         return self._static_geometry.missed(paths, self._history)
 
-    def _meet(self, i: IntArray, j: IntArray) -> BoolArray:
+    def _can_collide(self, i: IntArray, j: IntArray) -> BoolArray:
         """Return which pairs of bodies can collide."""
         able = self._to_all[i] & self._to_all[j]
-        able |= self._moves[i] & self._still[j]
-        able |= self._still[i] & self._moves[j]
+        able |= self._moves[i] & self._static[j]
+        able |= self._static[i] & self._moves[j]
         if self._group is not None:
             able &= (self._group[i] == 0) | (self._group[i] != self._group[j])
         if len(self._apart):
@@ -228,19 +232,19 @@ class Audit:
         No pair approaches by more than `nearing`, m.
         """
         when, i, j = self._verlet_list.encounters(start, end, fast)
-        if len(self._on):
-            near = (self._on[when, i] & self._on[when, j]) != 0
-            when, i, j = when[near], i[near], j[near]
+        if len(self._layer_bits):
+            same_layer = (self._layer_bits[when, i] & self._layer_bits[when, j]) != 0
+            when, i, j = when[same_layer], i[same_layer], j[same_layer]
         parts = len(when) // CHUNK + 1
-        at = np.concatenate(
+        deep = np.concatenate(
             [
                 begin + self._deep(start, end, nearing, *(column[begin:stop] for column in (when, i, j)))
                 for begin, stop in pairwise(np.linspace(0, len(when), parts + 1, dtype=np.int64).tolist())
             ]
         )
-        when, pair = when[at], np.column_stack((i[at], j[at])) + self._offset
-        last = _offset(end, when, i[at], j[at])
-        late = ~approaching(last, last - _offset(start, when, i[at], j[at]))
+        when, pair = when[deep], np.column_stack((i[deep], j[deep])) + self._offset
+        last = _offset(end, when, i[deep], j[deep])
+        late = ~approaching(last, last - _offset(start, when, i[deep], j[deep]))
         late[~late] = ~self._history.found(when[~late] + 1, pair[~late])
         when, pair = when[late], pair[late]
         new = ~self._history.found(when, pair)
@@ -260,9 +264,9 @@ class Audit:
         return at[able]
 
 
-def _offset(place: FloatArray, when: IntArray, i: IntArray, j: IntArray) -> FloatArray:
+def _offset(position: FloatArray, when: IntArray, i: IntArray, j: IntArray) -> FloatArray:
     """Return the offset from the first to the second of each pair, (K, 2) m."""
     # As complex numbers, both coordinates are fetched at once, three times as fast as rows of an array.
-    point, row = place.view(np.complex128).reshape(-1), when * place.shape[1]
+    point, row = position.view(np.complex128).reshape(-1), when * position.shape[1]
     between = point.take(row + j) - point.take(row + i)
     return np.asarray(between.view(np.float64).reshape(-1, 2))

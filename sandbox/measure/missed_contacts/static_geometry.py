@@ -1,4 +1,4 @@
-"""Static geometry of a scene, and which moving circles an engine let pass through it."""
+"""Static geometry of a scene, and the moving circles that passed through it undetected."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -134,13 +134,13 @@ class StaticGeometry:
         first = dot(paths.start[:, None] - self.point, self.normal)
         last = dot(paths.end[:, None] - self.point, self.normal)
         tolerance = np.maximum(TOLERANCE * paths.radius, PLANE_ROUNDING)
-        came_in = first >= (paths.radius - tolerance / 2)[:, None]
-        came_in &= last < (paths.radius - tolerance)[:, None]
+        entered = first >= (paths.radius - tolerance / 2)[:, None]
+        entered &= last < (paths.radius - tolerance)[:, None]
         move = paths.end - paths.start
-        came_in &= (dot(move, move) >= (JUMP * paths.radius) ** 2)[:, None]
+        entered &= (dot(move, move) >= (JUMP * paths.radius) ** 2)[:, None]
         if paths.on is not None:
-            came_in &= (paths.on[:, None] & self.plane_layers) != 0
-        i, plane = np.nonzero(came_in)
+            entered &= (paths.on[:, None] & self.plane_layers) != 0
+        i, plane = np.nonzero(entered)
         when, pair = paths.when[i], np.column_stack((paths.body[i], -1 - plane))
         in_time = history.found(when + 1, pair) & (last[i, plane] >= -BACKING)
         missed = ~in_time & ~history.found(when, pair)
@@ -162,19 +162,19 @@ class StaticGeometry:
         apart = first2 >= (CLEAR * contact) ** 2
 
         # From segments to objects: rows of one path and one wall share an index.
-        both, place = np.unique(np.column_stack((i, self.number[s])), axis=0, return_inverse=True)
-        place, count = place.reshape(-1), len(both)
+        both, group = np.unique(np.column_stack((i, self.number[s])), axis=0, return_inverse=True)
+        group, count = group.reshape(-1), len(both)
         when, pair = paths.when[both[:, 0]], np.column_stack((paths.body[both[:, 0]], both[:, 1]))
         known = history.found(when, pair)
         nearest = np.full(count, np.inf)
-        np.minimum.at(nearest, place, first2)
+        np.minimum.at(nearest, group, first2)
 
         # A contact at the start is with the nearest segment, or with those at the same distance.
-        held = known[place] & (first2 <= nearest[place] + TOLERANCE * contact**2)
-        through = _any(crossed & apart & ~held, place, count)
-        came_in = _any(deep, place, count) & ~_any(~apart, place, count) & ~known
-        in_time = history.found(when + 1, pair) & _any(approached, place, count)
-        missed = through | (came_in & ~in_time)
+        rested = known[group] & (first2 <= nearest[group] + TOLERANCE * contact**2)
+        through = _any(crossed & apart & ~rested, group, count)
+        entered = _any(deep, group, count) & ~_any(~apart, group, count) & ~known
+        in_time = history.found(when + 1, pair) & _any(approached, group, count)
+        missed = through | (entered & ~in_time)
         return when[missed], pair[missed]
 
     def _in_reach(self, paths: SweptCircles) -> tuple[IntArray, IntArray]:
@@ -186,20 +186,20 @@ class StaticGeometry:
         mean = paths.start + 0.5 * move
         across, up = (mean[:, axis, None] - middle[:, axis] for axis in (0, 1))
         reach = (paths.radius + 0.5 * np.sqrt(length2))[:, None] + size
-        near = across * across + up * up <= reach * reach * (1 + 1e-9)  # rounding must not hide a pair
-        near &= length2[:, None] >= (JUMP * (paths.radius[:, None] + self.half)) ** 2
+        is_near = across * across + up * up <= reach * reach * (1 + 1e-9)  # rounding must not hide a pair
+        is_near &= length2[:, None] >= (JUMP * (paths.radius[:, None] + self.half)) ** 2
         if paths.on is not None:
-            near &= (paths.on[:, None] & self.layers) != 0
-        i, s = np.nonzero(near)
+            is_near &= (paths.on[:, None] & self.layers) != 0
+        i, s = np.nonzero(is_near)
         first = offset_from_segment(paths.start[i], self.tail[s], self.along[s])
         reach = paths.radius[i] + self.half[s] + np.sqrt(length2[i])
         close = dot(first, first) <= reach * reach
         return i[close], s[close]
 
 
-def _any(condition: BoolArray, place: IntArray, count: int) -> BoolArray:
+def _any(condition: BoolArray, group: IntArray, count: int) -> BoolArray:
     """Return for which of `count` groups any condition holds."""
-    return np.asarray(np.bincount(place[condition], minlength=count) > 0)
+    return np.asarray(np.bincount(group[condition], minlength=count) > 0)
 
 
 def _rows(pairs: list[tuple[float, float]]) -> FloatArray:

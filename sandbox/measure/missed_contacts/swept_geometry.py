@@ -12,8 +12,8 @@ from sandbox.measure.metrics.clearance import offset_from_segment
 TOLERANCE = 5e-3
 """Depth as a fraction of the contact distance up to which a contact does not count: between equal balls 1 % of a
 radius, the overlap that the slop of an engine leaves. The closing speed of so shallow a graze is at most 0.1 of the
-relative speed. Smaller values cost more and find hardly more: down to 1e-6, the count of a settling pile stayed within
-one in eight.
+relative speed. Smaller values cost more and find hardly more contacts: down to 1e-6, the count of a settling pile
+changed by less than an eighth.
 """
 
 CLEAR = 1 - TOLERANCE / 2

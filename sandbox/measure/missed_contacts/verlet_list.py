@@ -1,9 +1,9 @@
 """Verlet list: pairs of bodies that may collide in a substep, kept from one substep to the next.
 
 The list has every pair within a skin of contact, and stays complete as long as all bodies have moved by less than half
-the skin. The few bodies that have moved farther are listed again, against all others in rows, with a skin of their own
-if they are as fast as a bullet; if they are many, the whole list is rebuilt. Source: L. Verlet, Computer "experiments"
-on classical fluids I, Phys. Rev. 159 (1967), 98.
+the skin. The few bodies that have moved farther are listed again, against all others in rows, with a larger skin if
+they are as fast as a bullet; if they are many, the whole list is rebuilt. Source: L. Verlet, Computer "experiments" on
+classical fluids I, Phys. Rev. 159 (1967), 98.
 """
 
 from collections.abc import Callable, Iterator
@@ -22,8 +22,8 @@ MIN_SKIN = 0.1
 """Smallest half skin as a fraction of the typical radius: thinner lists save nothing more."""
 ROUNDING = 1e-9
 """Relative increase of reaches, far above rounding (1e-16), so that no pair is lost."""
-CELL_SHARE = 4.5
-"""Candidates in the nine cells of a body, if each pair is met once."""
+CELL_CANDIDATES = 4.5
+"""Candidates in the nine cells of a body, if each pair is visited once."""
 
 CanCollide = Callable[[IntArray, IntArray], BoolArray]
 Pairs = tuple[IntArray, IntArray]
@@ -34,16 +34,16 @@ Encounters = tuple[IntArray, IntArray, IntArray]
 class VerletList:
     """Pairs that may come into contact among the `member` bodies of N bodies with radii (N,), m.
 
-    `meet` returns which pairs of indices (K,), (K,) can collide at all.
+    `can_collide` returns which pairs of indices (K,), (K,) can collide at all.
     """
 
-    def __init__(self, radius: FloatArray, member: BoolArray, meet: CanCollide) -> None:
+    def __init__(self, radius: FloatArray, member: BoolArray, can_collide: CanCollide) -> None:
         self._radius = radius
         self._member = member
-        self._meet = meet
+        self._can_collide = can_collide
         self._members = np.flatnonzero(member)
         self._typical = float(np.median(radius[self._members])) if len(self._members) else 0.0
-        self._few = BUILD_COST_PER_BODY + BUILD_COST // max(len(self._members), 1)
+        self._max_renewed = BUILD_COST_PER_BODY + BUILD_COST // max(len(self._members), 1)
         self._anchor = np.full((len(radius), 2), np.inf)
         self._skin = self._typical
         self._half_skin = np.full(len(radius), self._typical)
@@ -61,7 +61,7 @@ class VerletList:
             Substep, lower and higher index of each pair, (K,) each, without duplicates.
         """
         moved_beyond_skin = self._moved_beyond_skin(start, end)
-        if np.count_nonzero(moved_beyond_skin) > self._few:
+        if np.count_nonzero(moved_beyond_skin) > self._max_renewed:
             typical = self._typical_displacement(start[0], end[0])
             skin = min(max(TARGET_LIFETIME * typical, MIN_SKIN * self._typical), self._typical)
             lasting = max(1, int(skin / typical)) if typical > 0 else len(start)
@@ -84,10 +84,10 @@ class VerletList:
         return when, first[at], second[at]
 
     def _moved_beyond_skin(self, start: FloatArray, end: FloatArray) -> BoolArray:
-        """Return which bodies leave their half of the common skin or had a skin of their own, (N,)."""
-        gone = np.isnan(start[0, :, 0])
-        home = (_max_displacement(start, end, self._anchor) <= self._skin) & (self._half_skin <= self._skin)
-        return self._member & ~gone & ~home
+        """Return which bodies leave their half of the common skin or had a larger skin, (N,)."""
+        absent = np.isnan(start[0, :, 0])
+        within_skin = (_max_displacement(start, end, self._anchor) <= self._skin) & (self._half_skin <= self._skin)
+        return self._member & ~absent & ~within_skin
 
     def _present_members(self, start: FloatArray, end: FloatArray) -> IntArray:
         """Return the indices of the members that are present before and after."""
@@ -98,27 +98,28 @@ class VerletList:
         self._anchor[:] = np.inf
         self._first = self._second = np.empty(0, np.int64)
         members = self._present_members(start, end)
-        here, move = start[members], end[members] - start[members]
+        position, move = start[members], end[members] - start[members]
         reach = self._radius[members] + 0.5 * np.sqrt((move * move).sum(axis=1)) * (1 + ROUNDING)
-        first, second = self._numbered(members, self._close(here + 0.5 * move, reach), fast)
+        first, second = self._colliding_pairs(members, self._close(position + 0.5 * move, reach), fast)
         return np.zeros_like(first), first, second
 
     def _renew(self, start: FloatArray, end: FloatArray, moved_beyond_skin: IntArray) -> None:
         """List some bodies again at their present position, with a skin that contains their paths."""
         self._anchor[moved_beyond_skin] = start[0, moved_beyond_skin]
-        here = start[0, moved_beyond_skin]
+        position = start[0, moved_beyond_skin]
         first, last = (
-            np.where(np.isnan(way), here, way) for way in (start[:, moved_beyond_skin], end[:, moved_beyond_skin])
+            np.where(np.isnan(path), position, path)
+            for path in (start[:, moved_beyond_skin], end[:, moved_beyond_skin])
         )
-        self._half_skin[moved_beyond_skin] = np.maximum(_max_displacement(first, last, here), self._skin)
+        self._half_skin[moved_beyond_skin] = np.maximum(_max_displacement(first, last, position), self._skin)
         members = self._members[np.isfinite(self._anchor[self._members]).all(axis=1)]
         reach = self._radius[members] + self._half_skin[members] * (1 + ROUNDING)
-        astray = np.zeros_like(self._member)
-        astray[moved_beyond_skin] = True
-        rows = np.flatnonzero(astray[members])
+        renewed = np.zeros_like(self._member)
+        renewed[moved_beyond_skin] = True
+        rows = np.flatnonzero(renewed[members])
         all_bodies = np.ones_like(self._member)
-        first, second = self._numbered(members, _in_rows(rows, self._anchor[members], reach), all_bodies)
-        keep = ~(astray[self._first] | astray[self._second])
+        first, second = self._colliding_pairs(members, _in_rows(rows, self._anchor[members], reach), all_bodies)
+        keep = ~(renewed[self._first] | renewed[self._second])
         self._first = np.concatenate((self._first[keep], first))
         self._second = np.concatenate((self._second[keep], second))
 
@@ -126,42 +127,42 @@ class VerletList:
         """Return the displacement of bodies in a substep, without that of a few fast ones, m."""
         members = self._present_members(start, end)
         jump = np.sort(np.sqrt(((end[members] - start[members]) ** 2).sum(axis=1)))
-        return float(jump[max(len(jump) - 1 - self._few // 2, len(jump) // 2)]) if len(jump) else 0.0
+        return float(jump[max(len(jump) - 1 - self._max_renewed // 2, len(jump) // 2)]) if len(jump) else 0.0
 
-    def _build(self, place: FloatArray, skin: float) -> None:
+    def _build(self, position: FloatArray, skin: float) -> None:
         """List the pairs that are less than two half skins from contact."""
         self._skin = skin
         self._half_skin[:] = skin
-        self._anchor[:] = place
-        members = self._present_members(place, place)
+        self._anchor[:] = position
+        members = self._present_members(position, position)
         reach = self._radius[members] + skin * (1 + ROUNDING)
         all_bodies = np.ones_like(self._member)
-        self._first, self._second = self._numbered(members, self._close(place[members], reach), all_bodies)
+        self._first, self._second = self._colliding_pairs(members, self._close(position[members], reach), all_bodies)
 
-    def _close(self, place: FloatArray, reach: FloatArray) -> Iterator[Pairs]:
+    def _close(self, position: FloatArray, reach: FloatArray) -> Iterator[Pairs]:
         """Yield every pair nearer than the sum of its reaches, by cells.
 
         Large reaches would make large cells, in which all small ones are candidates; these go in rows.
         """
         order = np.argsort(-reach, kind="stable")
         crowd = np.minimum((reach[order] / self._typical) ** 2, len(order))
-        large = int(np.argmin(np.arange(len(order)) + CELL_SHARE * crowd))
+        large = int(np.argmin(np.arange(len(order)) + CELL_CANDIDATES * crowd))
         if large:
-            yield from _in_rows(np.sort(order[:large]), place, reach)
+            yield from _in_rows(np.sort(order[:large]), position, reach)
         small = order[large:]
-        x, y = np.ascontiguousarray(place.T)
-        for i, j in near_pairs(place[small], 2 * float(reach[small].max(initial=0.0))):
+        x, y = np.ascontiguousarray(position.T)
+        for i, j in near_pairs(position[small], 2 * float(reach[small].max(initial=0.0))):
             i, j = small[i], small[j]
             across, up = x[j] - x[i], y[j] - y[i]
-            near = across * across + up * up < (reach[i] + reach[j]) ** 2
-            yield i[near], j[near]
+            is_near = across * across + up * up < (reach[i] + reach[j]) ** 2
+            yield i[is_near], j[is_near]
 
-    def _numbered(self, members: IntArray, found: Iterator[Pairs], fast: BoolArray) -> Pairs:
+    def _colliding_pairs(self, members: IntArray, found: Iterator[Pairs], fast: BoolArray) -> Pairs:
         """Join chunks of pairs, given as positions among the members, that can collide and have a fast body."""
         pairs = [np.empty((2, 0), np.int64)]
         for chunk in found:
             i, j = members[chunk[0]], members[chunk[1]]
-            able = self._meet(i, j) & (fast[i] | fast[j])
+            able = self._can_collide(i, j) & (fast[i] | fast[j])
             pairs.append(np.stack((np.minimum(i, j)[able], np.maximum(i, j)[able])))
         first, second = np.concatenate(pairs, axis=1)
         return first, second
@@ -173,8 +174,8 @@ def _in_rows(rows: IntArray, centre: FloatArray, reach: FloatArray) -> Iterator[
     in_rows[rows] = True
     for part in np.array_split(rows, max(1, len(rows) * len(centre) // CHUNK)):
         across, up = (centre[part, axis, None] - centre[:, axis] for axis in (0, 1))
-        near = across * across + up * up < (reach[part, None] + reach) ** 2
-        at, j = np.nonzero(near)
+        is_near = across * across + up * up < (reach[part, None] + reach) ** 2
+        at, j = np.nonzero(is_near)
         i = part[at]
         once = (j > i) | ~in_rows[j]
         yield i[once], j[once]
@@ -190,6 +191,6 @@ def _max_displacement(start: FloatArray, end: FloatArray, anchor: FloatArray) ->
     """
     low = np.minimum(start.min(axis=0), end.min(axis=0)) - anchor
     high = np.maximum(start.max(axis=0), end.max(axis=0)) - anchor
-    far = np.maximum(high, -low)
-    far *= far
-    return np.asarray(np.sqrt(far[:, 0] + far[:, 1]))
+    farthest = np.maximum(high, -low)
+    farthest *= farthest
+    return np.asarray(np.sqrt(farthest[:, 0] + farthest[:, 1]))

@@ -4,7 +4,7 @@ from sandbox.measure.preflight.checks import FAILED, warnings
 from sandbox.measure.preflight.diagnostic import Diagnostic, floor_3_digits
 from sandbox.measure.preflight.notes import notes
 from sandbox.measure.preflight.speed_bound import SpeedBounds, top_speeds, unknown_speeds
-from sandbox.measure.preflight.trial_run import PreflightResult, run_preflight
+from sandbox.measure.preflight.trial_run import PreflightResult, TrialCoverage, run_preflight
 from sandbox.measure.preflight.tunnelling import TunnellingRisk, largest_safe_dt, tunnelling_risks
 
 __all__ = [
@@ -12,6 +12,7 @@ __all__ = [
     "Diagnostic",
     "PreflightResult",
     "SpeedBounds",
+    "TrialCoverage",
     "TunnellingRisk",
     "floor_3_digits",
     "largest_safe_dt",

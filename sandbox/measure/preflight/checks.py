@@ -1,4 +1,4 @@
-"""Table of all preflight checks, and the diagnostics that they give for a scene."""
+"""Table of all preflight checks, and the diagnostics of a scene."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator
@@ -28,15 +28,15 @@ from sandbox.scene.description.fixed import Plane, mask_of
 from sandbox.scene.description.world import Settings
 
 
-def kick_warnings(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterator[Diagnostic]:
+def kick_warnings(scene: Scene, settings: Settings, matrix: ContactMatrix) -> Iterator[Diagnostic]:
     """Yield a diagnostic if one substep of gravity makes a resting body fast enough to trigger a kick.
 
     Contacts are detected at the end of a substep: a body in contact has then gained g·h.
     """
     fall = math.hypot(*scene.world.gravity) * settings.h
-    touched = meet.touching.any(axis=1)
-    for name, number in zip(scene.fixed_names, meet.surfaces.of_fixed.tolist(), strict=False):  # pockets come last
-        kick = meet.surfaces.surfaces[number].kick
+    touched = matrix.touching.any(axis=1)
+    for name, number in zip(scene.fixed_names, matrix.surfaces.of_fixed.tolist(), strict=False):  # pockets come last
+        kick = matrix.surfaces.surfaces[number].kick
         if kick is not None and bool(np.asarray(touched)[number]) and fall >= kick.threshold:
             safe = settings.dt * kick.threshold / fall
             message = (
@@ -75,8 +75,8 @@ class PreflightContext:
     settings: Settings
 
     @cached_property
-    def meet(self) -> ContactMatrix:
-        """Which bodies can collide with what."""
+    def matrix(self) -> ContactMatrix:
+        """Contact matrix of the scene."""
         return contact_matrix(self.scene)
 
     @cached_property
@@ -87,7 +87,7 @@ class PreflightContext:
 
 @dataclass(frozen=True)
 class Check:
-    """One check: a function of a situation, and the engines that it applies to."""
+    """One check: a function of the context, and the engines that it applies to."""
 
     find: Callable[[PreflightContext], Iterable[Diagnostic]]
     engines: frozenset[str] | None = None
@@ -108,14 +108,14 @@ def warnings(scene: Scene, settings: Settings | None = None, engine: str | None 
         settings: settings of the run; default: those of the scene.
         engine: name of the engine; default: the checks of all engines.
     """
-    situation = PreflightContext(scene, scene.solver if settings is None else settings)
+    context = PreflightContext(scene, scene.solver if settings is None else settings)
     found: list[Diagnostic] = []
-    for name, forecast in CHECKS.items():
-        if engine is not None and not forecast.concerns(engine):
+    for name, check in CHECKS.items():
+        if engine is not None and not check.concerns(engine):
             continue
         try:
-            found += forecast.find(situation)
-        except Exception as error:  # noqa: BLE001, one forecast's fault must not cost the answers of the others
+            found += check.find(context)
+        except Exception as error:  # noqa: BLE001, an error in one check must not stop the others
             message = f"the forecast {name!r} failed with {type(error).__name__}: {error}; please report this scene"
             found.append(Diagnostic(FAILED, message, {"forecast": name}))
     return found
@@ -130,15 +130,15 @@ def _duration(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
         yield Diagnostic("duration", message, {"dt": settings.dt, "duration": scene.world.duration})
 
 
-def _tunnelling(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterator[Diagnostic]:
+def _tunnelling(scene: Scene, settings: Settings, matrix: ContactMatrix) -> Iterator[Diagnostic]:
     times = detection_factor(settings)
-    at_risk = [passage for passage in tunnelling_risks(scene, meet) if passage.odds(settings.h / times) > ROUNDING]
-    own = {passage.thing for passage in at_risk if not passage.struck}
-    at_risk = [passage for passage in at_risk if not passage.struck or passage.thing not in own]
+    at_risk = [passage for passage in tunnelling_risks(scene, matrix) if passage.odds(settings.h / times) > ROUNDING]
+    unstruck = {passage.thing for passage in at_risk if not passage.struck}
+    at_risk = [passage for passage in at_risk if not passage.struck or passage.thing not in unstruck]
     for passage, things in group_alike(at_risk):
         odds = passage.odds(settings.h / times)
         safe = passage.safe_h * settings.substeps * times
-        way = passage.speed * settings.h
+        displacement = passage.speed * settings.h
         thing = passage.thing if passage.thing in (ANOTHER, ANOTHER_BODY) else repr(passage.thing)
         if things:
             thing += f" and {things:,} other{'s' if things > 1 else ''} like it"
@@ -148,8 +148,8 @@ def _tunnelling(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterat
         if passage.struck:
             ball += ", struck by others,"
         message = (
-            f"{ball} can approach {thing} at up to {passage.speed:.4g} m/s, {way:.3g} m per substep, and tunnel "
-            f"through it undetected: odds up to {100 * odds:.3g} %; dt <= {floor_3_digits(safe)} s is safe"
+            f"{ball} can approach {thing} at up to {passage.speed:.4g} m/s, {displacement:.3g} m per substep, and "
+            f"tunnel through it undetected: odds up to {100 * odds:.3g} %; dt <= {floor_3_digits(safe)} s is safe"
         )
         details: Details = {
             "ball": passage.ball,
@@ -164,7 +164,7 @@ def _tunnelling(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterat
         yield Diagnostic("tunnelling", message, details)
 
 
-def _depth(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterator[Diagnostic]:
+def _depth(scene: Scene, settings: Settings, matrix: ContactMatrix) -> Iterator[Diagnostic]:
     """Yield bodies that can penetrate a plane by more than their half width before the contact is detected.
 
     A contact is detected at the end of a substep, up to v·h deep. `bisect`, `swept` and `shrink` return to the time of
@@ -172,9 +172,9 @@ def _depth(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterator[Di
     """
     if settings.detection not in (None, "discrete"):
         return
-    bodies, speeds = scene.bodies, SpeedBounds(scene, meet)
+    bodies, speeds = scene.bodies, SpeedBounds(scene, matrix)
     layers = reachable_layers(scene, bodies)
-    movers = meet.touches & ~bodies.fixed & (bodies.thin > 0.0)
+    movers = matrix.touches & ~bodies.fixed & (bodies.thin > 0.0)
     found: dict[tuple[str, float], tuple[str, float, int]] = {}
     for plane, name in zip(scene.fixed, scene.fixed_names, strict=False):
         able = np.flatnonzero(movers & (layers & mask_of(plane.layers, scene.layers) != 0))
@@ -186,16 +186,16 @@ def _depth(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterator[Di
         first, half, count = found.get(key, (name, float(bodies.thin[able[k]]), -1))
         found[key] = first, half, count + 1
     for (body, top), (name, half, others) in found.items():
-        way = top * settings.h
-        if way <= half * (1.0 + ROUNDING):
+        depth = top * settings.h
+        if depth <= half * (1.0 + ROUNDING):
             continue
-        safe = settings.dt * half / way
+        safe = settings.dt * half / depth
         more = f" and {others:,} other{'s' if others > 1 else ''} like it" if others else ""
         message = (
-            f"{body!r} can hit {name!r}{more} at up to {top:.4g} m/s and penetrate by {way:.3g} m before the contact "
+            f"{body!r} can hit {name!r}{more} at up to {top:.4g} m/s and penetrate by {depth:.3g} m before the contact "
             f"is detected; dt <= {floor_3_digits(safe)} s keeps that below its half width, {half:.3g} m"
         )
-        details: Details = {"ball": body, "thing": name, "speed": top, "depth": way, "safe_dt": safe}
+        details: Details = {"ball": body, "thing": name, "speed": top, "depth": depth, "safe_dt": safe}
         yield Diagnostic("depth", message, details)
 
 
@@ -209,20 +209,20 @@ def group_alike(found: Iterable[TunnellingRisk]) -> list[tuple[TunnellingRisk, i
     return list(groups.values())
 
 
-def _iterations(settings: Settings, meet: ContactMatrix) -> Iterator[Diagnostic]:
-    if meet.mutual and settings.iterations < MIN_ITERATIONS and meet.restitution > 0:
-        what = "balls" if meet.ball_ball else "bodies"
+def _iterations(settings: Settings, matrix: ContactMatrix) -> Iterator[Diagnostic]:
+    if matrix.mutual and settings.iterations < MIN_ITERATIONS and matrix.restitution > 0:
+        kind = "balls" if matrix.ball_ball else "bodies"
         noun = "iteration" if settings.iterations == 1 else "iterations"
         message = (
-            f"{settings.iterations} {noun} with bouncing {what}: groups can gain energy; "
+            f"{settings.iterations} {noun} with bouncing {kind}: groups can gain energy; "
             f"use iterations >= {MIN_ITERATIONS}"
         )
         yield Diagnostic("iterations", message, {"iterations": settings.iterations})
 
 
-def _rounding(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterator[Diagnostic]:
+def _rounding(scene: Scene, settings: Settings, matrix: ContactMatrix) -> Iterator[Diagnostic]:
     bodies = scene.bodies
-    colliders = meet.touches & ~bodies.fixed
+    colliders = matrix.touches & ~bodies.fixed
     if colliders.any():
         spacing = np.spacing(np.abs(bodies.position[colliders]).max(axis=1)) / bodies.thin[colliders]
         worst = float(spacing.max())
@@ -234,35 +234,36 @@ def _rounding(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterator
             )
             yield Diagnostic("rounding", message, {"ball": name, "share": worst})
             return
-        way = np.hypot(*bodies.velocity[colliders].T) * settings.h
+        displacement = np.hypot(*bodies.velocity[colliders].T) * settings.h
         size = np.spacing(np.abs(bodies.position[colliders]).max(axis=1))
-        lost = np.divide(0.5 * size, way, out=np.zeros_like(way), where=way > 0.0)
+        lost = np.divide(0.5 * size, displacement, out=np.zeros_like(displacement), where=displacement > 0.0)
         worst = float(lost.max())
         if worst > MAX_LOST_FRACTION:
             name = bodies.names[int(np.flatnonzero(colliders)[np.argmax(lost)])]
             message = (
                 f"{name!r} is so far from the origin that rounding changes its displacement of "
-                f"{way[np.argmax(lost)]:.3g} m per substep by up to {100 * worst:.2g} %; move the scene closer to it"
+                f"{displacement[np.argmax(lost)]:.3g} m per substep by up to {100 * worst:.2g} %; move the scene "
+                "closer to it"
             )
             yield Diagnostic("rounding", message, {"ball": name, "share": worst})
 
 
 CHECKS: dict[str, Check] = {
     "duration": Check(lambda s: _duration(s.scene, s.settings)),
-    "tunnelling": Check(lambda s: _tunnelling(s.scene, s.settings, s.meet)),
-    "depth": Check(lambda s: _depth(s.scene, s.settings, s.meet)),
-    "entry": Check(lambda s: entry_warnings(s.scene, s.settings, s.meet)),
-    "overlap": Check(lambda s: overlap_warnings(s.scene, s.meet, s.close)),
-    "iterations": Check(lambda s: _iterations(s.settings, s.meet), frozenset({"pymunk"})),
-    "rounding": Check(lambda s: _rounding(s.scene, s.settings, s.meet)),
-    "kicks": Check(lambda s: kick_warnings(s.scene, s.settings, s.meet)),
+    "tunnelling": Check(lambda s: _tunnelling(s.scene, s.settings, s.matrix)),
+    "depth": Check(lambda s: _depth(s.scene, s.settings, s.matrix)),
+    "entry": Check(lambda s: entry_warnings(s.scene, s.settings, s.matrix)),
+    "overlap": Check(lambda s: overlap_warnings(s.scene, s.matrix, s.close)),
+    "iterations": Check(lambda s: _iterations(s.settings, s.matrix), frozenset({"pymunk"})),
+    "rounding": Check(lambda s: _rounding(s.scene, s.settings, s.matrix)),
+    "kicks": Check(lambda s: kick_warnings(s.scene, s.settings, s.matrix)),
     "joints": Check(lambda s: joint_start_warnings(s.scene)),
     "springs": Check(lambda s: spring_warnings(s.scene, s.settings)),
     "dampers": Check(lambda s: damper_warnings(s.scene, s.settings), frozenset({"reference"})),
-    "orbits": Check(lambda s: orbit_warnings(s.scene, s.settings, s.meet)),
+    "orbits": Check(lambda s: orbit_warnings(s.scene, s.settings, s.matrix)),
     "chains": Check(lambda s: chain_warnings(s.scene, s.settings)),
     "stretch": Check(lambda s: stretch_warnings(s.scene, s.settings)),
     "stacks": Check(lambda s: stack_warnings(s.scene, s.settings, s.close)),
-    "events": Check(lambda s: event_warnings(s.scene, s.meet), EVENT_DRIVEN),
+    "events": Check(lambda s: event_warnings(s.scene, s.matrix), EVENT_DRIVEN),
 }
 """All checks, in the order in which their diagnostics are listed. A new check is a function and a line here."""

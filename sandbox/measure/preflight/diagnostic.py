@@ -1,4 +1,4 @@
-"""Diagnostic: one problem that a run of a scene will or may have, with a remedy; or a note that is worth knowing."""
+"""Diagnostic: one certain or possible problem of a run of a scene, with a remedy; or a note about the scene."""
 
 import math
 from dataclasses import dataclass, field

@@ -41,29 +41,29 @@ def initial_contacts(scene: Scene) -> InitialContacts:
     At least one of a pair can move, and at least one is not a ball.
     """
     bodies = scene.bodies
-    among = np.flatnonzero(collide_with_all(bodies) & (bodies.core >= 0.0))
+    colliding = np.flatnonzero(collide_with_all(bodies) & (bodies.core >= 0.0))
     found: list[tuple[int, int, float]] = []
     apart = {(a, b) for a, b in scene.links.apart().tolist()}
-    if len(among) < 2 or bodies.round[among].all():
+    if len(colliding) < 2 or bodies.round[colliding].all():
         return InitialContacts(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))
-    looked = 0
-    for i, j in near_pairs(bodies.position[among], 2.05 * float(bodies.radius[among].max())):
-        a, b = np.minimum(among[i], among[j]), np.maximum(among[i], among[j])
+    examined = 0
+    for i, j in near_pairs(bodies.position[colliding], 2.05 * float(bodies.radius[colliding].max())):
+        a, b = np.minimum(colliding[i], colliding[j]), np.maximum(colliding[i], colliding[j])
         slack = CONTACT_FRACTION * np.minimum(bodies.thin[a], bodies.thin[b])
         away = np.hypot(*(bodies.position[a] - bodies.position[b]).T) - bodies.radius[a] - bodies.radius[b]
         able = (bodies.group[a] == 0) | (bodies.group[a] != bodies.group[b])
         able &= (away < slack) & ~(bodies.round[a] & bodies.round[b]) & ~(bodies.fixed[a] & bodies.fixed[b])
-        for first, second, most in zip(a[able].tolist(), b[able].tolist(), slack[able].tolist(), strict=True):
-            looked += 1
-            if looked > MAX_PAIRS:
+        for first, second, limit in zip(a[able].tolist(), b[able].tolist(), slack[able].tolist(), strict=True):
+            examined += 1
+            if examined > MAX_PAIRS:
                 break
-            if (first, second) not in apart and (gap := _pair_clearance(bodies, first, second)) <= most:
+            if (first, second) not in apart and (gap := _pair_clearance(bodies, first, second)) <= limit:
                 found.append((first, second, gap))
-        if looked > MAX_PAIRS:
+        if examined > MAX_PAIRS:
             break
-    ones, others, gaps = ([row[k] for row in found] for k in range(3))
+    firsts, seconds, gaps = ([row[k] for row in found] for k in range(3))
     return InitialContacts(
-        np.asarray(ones, dtype=np.int64), np.asarray(others, dtype=np.int64), np.asarray(gaps, dtype=np.float64)
+        np.asarray(firsts, dtype=np.int64), np.asarray(seconds, dtype=np.int64), np.asarray(gaps, dtype=np.float64)
     )
 
 
@@ -79,18 +79,18 @@ GRAZE_FRACTION = 1e-6
 """Overlap by rounding of bodies that are placed in contact, as a fraction of a half width."""
 
 Overlap = tuple[float, str, str]
-"""Depth of an overlap, m, and the names of the two."""
+"""Depth of an overlap, m, and the names of the two objects."""
 
 
-def overlap_warnings(scene: Scene, meet: ContactMatrix, close: InitialContacts) -> Iterator[Diagnostic]:
+def overlap_warnings(scene: Scene, matrix: ContactMatrix, close: InitialContacts) -> Iterator[Diagnostic]:
     """Yield a diagnostic for the overlaps at the start, with the deepest one.
 
-    Pairs that a joint keeps from colliding do not count. Of bodies in planes, walls and posts, only overlaps deeper
+    Pairs whose collisions a joint disables do not count. Of bodies in planes, walls and posts, only overlaps deeper
     than the slop of the engines count.
     """
-    pairs, deepest, what = 0, (0.0, "", ""), "balls"
-    if meet.mutual:
-        balls, pair = _balls(scene, meet)
+    pairs, deepest, kinds = 0, (0.0, "", ""), "balls"
+    if matrix.mutual:
+        balls, pair = _balls(scene, matrix)
         if balls > 0:
             pairs, deepest = balls, pair
         bodies = scene.bodies
@@ -99,32 +99,32 @@ def overlap_warnings(scene: Scene, meet: ContactMatrix, close: InitialContacts) 
         if deep.any():
             k = int(np.argmin(np.where(deep, close.clearance, 0.0)))
             names = bodies.names[int(close.first[k])], bodies.names[int(close.second[k])]
-            pairs, what = pairs + int(deep.sum()), "bodies"
+            pairs, kinds = pairs + int(deep.sum()), "bodies"
             deepest = max(deepest, (-float(close.clearance[k]), *names))
-    held = list(_overlaps_with_static(scene, meet))
-    if held:
-        what = f"{what} and fixed elements" if pairs else "bodies and fixed elements"
-        pairs, deepest = pairs + len(held), max(deepest, max(held))
+    with_static = list(_overlaps_with_static(scene, matrix))
+    if with_static:
+        kinds = f"{kinds} and fixed elements" if pairs else "bodies and fixed elements"
+        pairs, deepest = pairs + len(with_static), max(deepest, max(with_static))
     if pairs > 0:
         depth, first, second = deepest
         count = "overlapping pair" if pairs == 1 else "overlapping pairs"
         message = (
-            f"{pairs:,} {count} of {what} at the start, {first!r} and {second!r} by {depth:.3g} m; "
+            f"{pairs:,} {count} of {kinds} at the start, {first!r} and {second!r} by {depth:.3g} m; "
             "the engine will push them apart"
         )
         yield Diagnostic("overlap", message, {"pairs": pairs, "depth": depth, "first": first, "second": second})
 
 
-def _balls(scene: Scene, meet: ContactMatrix) -> tuple[int, Overlap]:
+def _balls(scene: Scene, matrix: ContactMatrix) -> tuple[int, Overlap]:
     """Return the number of overlapping pairs of moving balls, and the deepest of them."""
     bodies = scene.bodies
-    among = np.flatnonzero(collide_with_all(bodies) & meet.touches & ~bodies.fixed & bodies.round)
-    most = MAX_OVERLAPS + MAX_OVERLAPS_EACH * len(among)  # a scene with more is refused
-    owner = np.where(bodies.group > 0, bodies.group, -1 - np.arange(len(bodies)))[among]
-    position, radius = bodies.position[among], bodies.radius[among]
-    count = count_overlaps(position, radius, most, owner)
+    balls = np.flatnonzero(collide_with_all(bodies) & matrix.touches & ~bodies.fixed & bodies.round)
+    max_pairs = MAX_OVERLAPS + MAX_OVERLAPS_EACH * len(balls)  # a scene with more is refused
+    owner = np.where(bodies.group > 0, bodies.group, -1 - np.arange(len(bodies)))[balls]
+    position, radius = bodies.position[balls], bodies.radius[balls]
+    count = count_overlaps(position, radius, max_pairs, owner)
     first, second = scene.links.apart().T
-    joined = np.isin(first, among) & np.isin(second, among)
+    joined = np.isin(first, balls) & np.isin(second, balls)
     joined &= (bodies.group[first] == 0) | (bodies.group[first] != bodies.group[second])
     away = (
         np.hypot(*(bodies.position[first] - bodies.position[second]).T) - bodies.radius[first] - bodies.radius[second]
@@ -133,12 +133,12 @@ def _balls(scene: Scene, meet: ContactMatrix) -> tuple[int, Overlap]:
     if count <= 0:
         return 0, (0.0, "", "")
     keys = np.minimum(first, second) * len(bodies) + np.maximum(first, second)
-    deepest, i, j = _deepest(position, radius, owner, among, keys, len(bodies))
+    deepest, i, j = _deepest(position, radius, owner, balls, keys, len(bodies))
     return count, (deepest, bodies.names[i], bodies.names[j])
 
 
 def _deepest(
-    position: FloatArray, radius: FloatArray, owner: IntArray, among: IntArray, apart: IntArray, count: int
+    position: FloatArray, radius: FloatArray, owner: IntArray, indices: IntArray, apart: IntArray, count: int
 ) -> tuple[float, int, int]:
     """Return the depth, m, and the indices of the two discs that overlap most.
 
@@ -146,50 +146,50 @@ def _deepest(
         position: (M, 2) m.
         radius: (M,) m.
         owner: (M,); two discs of one owner are no pair.
-        among: (M,) indices among all bodies.
+        indices: (M,) indices among all bodies.
         apart: (K,) pairs that do not collide, as index of the first × count + index of the second.
         count: number of all bodies.
     """
-    deepest, looked_at = (0.0, int(among[0]), int(among[0])), 0
+    deepest, examined = (0.0, int(indices[0]), int(indices[0])), 0
     for i, j in near_pairs(position, 2.0 * float(radius.max())):
-        low, high = np.minimum(among[i], among[j]), np.maximum(among[i], among[j])
+        low, high = np.minimum(indices[i], indices[j]), np.maximum(indices[i], indices[j])
         depth = radius[i] + radius[j] - np.hypot(*(position[i] - position[j]).T)
         depth[(owner[i] == owner[j]) | np.isin(low * count + high, apart)] = -np.inf
         k = int(np.argmax(depth)) if len(depth) else -1
         if k >= 0 and depth[k] > deepest[0]:
             deepest = float(depth[k]), int(low[k]), int(high[k])
-        looked_at += len(i)
-        if looked_at > OVERLAP_BUDGET:
+        examined += len(i)
+        if examined > OVERLAP_BUDGET:
             break
     return deepest
 
 
-def _overlaps_with_static(scene: Scene, meet: ContactMatrix) -> Iterator[Overlap]:
+def _overlaps_with_static(scene: Scene, matrix: ContactMatrix) -> Iterator[Overlap]:
     """Yield the bodies that start in a plane, wall or post, deeper than the slop of the engines.
 
     Scenes with a `[surface]`, one-way walls and driven bodies are left out: cushions are hit at a height, a body in a
-    one-way wall may pass, and a driven body stays where its drive holds it.
+    one-way wall may pass it, and a driven body keeps the position that its drive prescribes.
     """
     if scene.surface is not None:
         return
     bodies, layers = scene.bodies, reachable_layers(scene, scene.bodies)
-    able = meet.touches & ~bodies.fixed & (bodies.thin > 0.0) & ~is_driven(scene, bodies)
-    looked_at = measured = 0
+    able = matrix.touches & ~bodies.fixed & (bodies.thin > 0.0) & ~is_driven(scene, bodies)
+    examined = measured = 0
     for k, (thing, name) in enumerate(zip(scene.fixed, scene.fixed_names, strict=False)):
         if (not isinstance(thing, Plane) and not thing.solid) or (isinstance(thing, Wall) and thing.one_way):
             continue
-        near = np.flatnonzero(able & (layers & mask_of(thing.layers, scene.layers) != 0) & _near(bodies, thing))
-        looked_at += len(near) * (len(thing.points) if isinstance(thing, Wall) else 1)
-        if looked_at > OVERLAP_BUDGET:
+        candidates = np.flatnonzero(able & (layers & mask_of(thing.layers, scene.layers) != 0) & _near(bodies, thing))
+        examined += len(candidates) * (len(thing.points) if isinstance(thing, Wall) else 1)
+        if examined > OVERLAP_BUDGET:
             return
-        depths = -bounding_clearances(thing, bodies.position[near], bodies.radius[near])
-        for number, depth in zip(near[depths > 0.0].tolist(), depths[depths > 0.0].tolist(), strict=True):
+        depths = -bounding_clearances(thing, bodies.position[candidates], bodies.radius[candidates])
+        for number, depth in zip(candidates[depths > 0.0].tolist(), depths[depths > 0.0].tolist(), strict=True):
             if not bodies.round[number]:
                 measured += 1
                 if measured > MAX_PAIRS:
                     return
-                place = bodies.position[None], bodies.angle[None]
-                depth = -float(clearance(scene, bodies, *place, (number, -1 - k))[0])
+                pose = bodies.position[None], bodies.angle[None]
+                depth = -float(clearance(scene, bodies, *pose, (number, -1 - k))[0])
             if depth > SLOP_PER_RADIUS * float(bodies.thin[number]):
                 yield depth, bodies.names[number], name
 

@@ -2,7 +2,7 @@
 
 An iterative solver propagates information from joint to joint, once an iteration. Since impulses are kept, it can
 converge over several substeps, but only if it converges faster than the position correction acts; otherwise the joints
-come apart. The impulses of the slowest mode converge at 2λ per iteration, with λ the least eigenvalue of the joint
+come apart. The impulses of the slowest mode converge at 2λ per iteration, with λ the smallest eigenvalue of the joint
 matrix J·M⁻¹·Jᵀ with its diagonal scaled to 1. The rate of the correction is r = (1 − bias^h)/h, with pymunk's default
 bias 6.3 per second. So iterations/h has to be r/(2λ).
 
@@ -43,50 +43,56 @@ MIN_MASS_RATIO = 10.0
 def chain_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
     """Yield a diagnostic for each group of joints that need more iterations.
 
-    Its kind is `mass_ratio` if equal masses would suffice, otherwise `chain`. Only joints held by impulses count;
-    springs and motors hold nothing.
+    Its kind is `mass_ratio` if equal masses would suffice, otherwise `chain`. Only joints solved by impulses count;
+    springs and motors are no constraints.
     """
     if settings.joints not in (None, "impulses"):
         return
     links = scene.links.of(*IMPULSE_KINDS)
     if len(links) < 2:
         return
-    bodies, has = scene.bodies, settings.iterations / settings.h
+    bodies, available = scene.bodies, settings.iterations / settings.h
     bias = BIAS if settings.bias is None else settings.bias
     rate = (1.0 - bias**settings.h) / settings.h
     free = np.where(bodies.fixed, -1, np.arange(len(bodies)))
     a, b = np.where(links.a >= 0, free[links.a], -1), free[links.b]
-    home = connected_groups(a, b, len(bodies))[np.where(b >= 0, b, a)]
-    for group in np.unique(home).tolist():
-        mine = np.flatnonzero(home == group)
-        some = links.some(mine)
+    group_of = connected_groups(a, b, len(bodies))[np.where(b >= 0, b, a)]
+    for group in np.unique(group_of).tolist():
+        members = np.flatnonzero(group_of == group)
+        some = links.some(members)
         inverse = np.where(bodies.fixed, 0.0, 1.0 / bodies.mass)
         needed = MEASURED_FRACTION * 0.5 * rate / least_eigenvalue(some, inverse)
-        if needed <= has * (1.0 + ROUNDING):
+        if needed <= available * (1.0 + ROUNDING):
             continue
-        alike = MEASURED_FRACTION * 0.5 * rate / least_eigenvalue(some, (inverse > 0.0).astype(np.float64))
+        needed_if_equal = MEASURED_FRACTION * 0.5 * rate / least_eigenvalue(some, (inverse > 0.0).astype(np.float64))
         iterations, dt = required_iterations(needed, settings.h, settings.substeps)
-        details: Details = {"joints": len(some), "joint": some.names[0], "needed": needed, "has": has, "safe_dt": dt}
-        right = f"use solver.iterations >= {iterations:,} or dt <= {floor_3_digits(dt)} s ({needed:.3g} a second)"
-        short = f"with {settings.iterations} iterations every {settings.h:.3g} s ({has:.3g} a second)"
+        details: Details = {
+            "joints": len(some),
+            "joint": some.names[0],
+            "needed": needed,
+            "has": available,
+            "safe_dt": dt,
+        }
+        remedy = f"use solver.iterations >= {iterations:,} or dt <= {floor_3_digits(dt)} s ({needed:.3g} a second)"
+        budget = f"with {settings.iterations} iterations every {settings.h:.3g} s ({available:.3g} a second)"
         k, ratio = _most_unequal(some, inverse)
-        if alike <= has * (1.0 + ROUNDING) and ratio >= MIN_MASS_RATIO:
+        if needed_if_equal <= available * (1.0 + ROUNDING) and ratio >= MIN_MASS_RATIO:
             first, second = bodies.names[int(some.a[k])], bodies.names[int(some.b[k])]
             message = (
                 f"the joint {some.names[k]!r} connects {first!r} and {second!r}, one of which is {ratio:.3g} times as "
-                f"heavy; {short} it would come apart; {right}"
+                f"heavy; {budget} it would come apart; {remedy}"
             )
             yield Diagnostic("mass_ratio", message, {**details, "joint": some.names[k], "ratio": ratio})
         else:
             name = f"the joint {some.names[0]!r} is heavily loaded"
             if len(some) > 1:
                 name = f"{len(some):,} joints, {some.names[0]!r} among them, are connected"
-            message = f"{name}; {short} {'it' if len(some) == 1 else 'they'} would come apart; {right}"
+            message = f"{name}; {budget} {'it' if len(some) == 1 else 'they'} would come apart; {remedy}"
             yield Diagnostic("chain", message, details)
 
 
 def least_eigenvalue(links: JointArrays, inverse_mass: FloatArray) -> float:
-    """Return λ, the least eigenvalue but 0 of the matrix of connected joints, its diagonal scaled to 1.
+    """Return λ, the smallest eigenvalue but 0 of the matrix of connected joints, its diagonal scaled to 1.
 
     The joints are assumed to lie in one line, the critical case: one joint is then one row, with 1/m at its bodies and
     −1/m towards the adjacent joints. M^−½ Jᵀ D⁻¹ J M^−½ has the same eigenvalues, and allows redundant joints.
@@ -95,17 +101,17 @@ def least_eigenvalue(links: JointArrays, inverse_mass: FloatArray) -> float:
         links: joints of one group.
         inverse_mass: (N,) 1/kg; 0 for static bodies.
     """
-    known, place = np.unique(np.concatenate((np.where(links.a >= 0, links.a, links.b), links.b)), return_inverse=True)
-    place = place.reshape(-1)
-    first, second = place[: len(links)], place[len(links) :]
+    known, index = np.unique(np.concatenate((np.where(links.a >= 0, links.a, links.b), links.b)), return_inverse=True)
+    index = index.reshape(-1)
+    first, second = index[: len(links)], index[len(links) :]
     root = np.sqrt(inverse_mass[known])
     on_a, on_b = -root[first] * (links.a >= 0), root[second]
-    own = on_a**2 + on_b**2
+    diagonal = on_a**2 + on_b**2
 
     def product(vector: FloatArray) -> FloatArray:
-        pull = (on_a * vector[first] + on_b * vector[second]) / own
-        both = np.bincount(first, pull * on_a, len(known)) + np.bincount(second, pull * on_b, len(known))
-        return both.astype(np.float64)
+        impulse = (on_a * vector[first] + on_b * vector[second]) / diagonal
+        total = np.bincount(first, impulse * on_a, len(known)) + np.bincount(second, impulse * on_b, len(known))
+        return total.astype(np.float64)
 
     moving = np.flatnonzero(root > 0.0)
     anchored = bool(((on_a == 0.0) | (on_b == 0.0)).any())
@@ -114,19 +120,19 @@ def least_eigenvalue(links: JointArrays, inverse_mass: FloatArray) -> float:
         null = np.zeros(len(known))
         null[moving] = 1.0 / root[moving]
         null /= np.linalg.norm(null)
-    least, _ = extreme_eigenvalues(
+    smallest, _ = extreme_eigenvalues(
         _restricted(product, moving, len(known)), len(moving), null if null is None else null[moving]
     )
-    return max(least, 1e-12)
+    return max(smallest, 1e-12)
 
 
 def _restricted(product: Product, moving: IntArray, count: int) -> Product:
     """Return the product with the rows and columns of the moving bodies."""
 
     def inner(vector: FloatArray) -> FloatArray:
-        whole = np.zeros(count)
-        whole[moving] = vector
-        return np.asarray(product(whole)[moving])
+        full = np.zeros(count)
+        full[moving] = vector
+        return np.asarray(product(full)[moving])
 
     return inner
 
@@ -150,33 +156,35 @@ MAX_STRETCH = 0.01
 def stretch_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
     """Yield a diagnostic if the rods of a hanging chain stretch by more than `MAX_STRETCH`.
 
-    Only rods held by position corrections count.
+    Only rods solved by position corrections count.
     """
     pull = math.hypot(*scene.world.gravity)
     if settings.joints not in ("relaxation", "xpbd", "rattle") or pull == 0.0:
         return
-    links, deep = scene.links.of(LinkKind.ROD), 0
+    links, depth = scene.links.of(LinkKind.ROD), 0
     if not len(links):
         return
-    still = np.append(scene.bodies.fixed, True)  # the world is −1, the last
-    reached = still.copy()
+    is_static = np.append(scene.bodies.fixed, True)  # the world is −1, the last
+    reached = is_static.copy()
     while True:  # one joint farther from the static bodies each time
-        fresh = reached[links.a] ^ reached[links.b]
-        if not fresh.any():
+        next_joints = reached[links.a] ^ reached[links.b]
+        if not next_joints.any():
             break
-        deep += 1
-        reached[links.a[fresh]] = reached[links.b[fresh]] = True
+        depth += 1
+        reached[links.a[next_joints]] = reached[links.b[next_joints]] = True
     length = float(links.figures[:, 0].min())
-    fraction = STRETCH_COEFFICIENT * deep * pull * settings.h**2 / settings.iterations / length if length > 0.0 else 0.0
+    fraction = (
+        STRETCH_COEFFICIENT * depth * pull * settings.h**2 / settings.iterations / length if length > 0.0 else 0.0
+    )
     if fraction > MAX_STRETCH:
-        more = fraction / MAX_STRETCH
-        iterations, dt = math.ceil(settings.iterations * more), settings.dt / math.sqrt(more)
+        excess = fraction / MAX_STRETCH
+        iterations, dt = math.ceil(settings.iterations * excess), settings.dt / math.sqrt(excess)
         message = (
-            f"a chain with {links.names[0]!r} hangs {deep:,} joints deep; {settings.joints} with {settings.iterations} "
-            f"iterations every {settings.h:.3g} s stretches it by {fraction:.2g} of a joint's length; "
-            f"solver.iterations >= {iterations:,} or dt <= {floor_3_digits(dt)} s keeps that to {MAX_STRETCH:g}"
+            f"a chain with {links.names[0]!r} hangs {depth:,} joints deep; {settings.joints} with "
+            f"{settings.iterations} iterations every {settings.h:.3g} s stretches it by {fraction:.2g} of a joint's "
+            f"length; solver.iterations >= {iterations:,} or dt <= {floor_3_digits(dt)} s keeps that to {MAX_STRETCH:g}"
         )
-        details: Details = {"joints": deep, "joint": links.names[0], "share": fraction, "safe_dt": dt}
+        details: Details = {"joints": depth, "joint": links.names[0], "share": fraction, "safe_dt": dt}
         yield Diagnostic("chain", message, details)
 
 
@@ -206,12 +214,12 @@ def joint_start_warnings(scene: Scene) -> Iterator[Diagnostic]:
     if not len(links):
         return
     errors = starting_errors(scene)
-    shares = np.nan_to_num(errors / joint_scales(links, scene.bodies))
-    swapped = _swapped(scene, links) & ~((links.kind == LinkKind.PIVOT) & (shares <= MAX_START_ERROR))
-    off = (shares > MAX_START_ERROR) & ~swapped
-    if off.any():
-        worst = int(np.argmax(np.where(off, shares, 0.0)))
-        yield _start_warning(links, worst, float(errors[worst]), int(off.sum()) - 1)
+    fractions = np.nan_to_num(errors / joint_scales(links, scene.bodies))
+    swapped = _swapped(scene, links) & ~((links.kind == LinkKind.PIVOT) & (fractions <= MAX_START_ERROR))
+    violated = (fractions > MAX_START_ERROR) & ~swapped
+    if violated.any():
+        worst = int(np.argmax(np.where(violated, fractions, 0.0)))
+        yield _start_warning(links, worst, float(errors[worst]), int(violated.sum()) - 1)
     if swapped.any():
         k, others = int(np.argmax(swapped)), int(swapped.sum()) - 1
         name, body = links.names[k], scene.bodies.names[int(links.b[k])]
@@ -241,7 +249,7 @@ def _and_others(count: int) -> str:
 def _swapped(scene: Scene, links: JointArrays) -> BoolArray:
     """Return which joints of one body with the world have anchors that would fit in the other order, (J,)."""
     radius = scene.bodies.radius[links.b]
-    own, other = np.hypot(*links.anchor_b.T), np.hypot(*links.anchor_a.T)
+    own_distance, other_distance = np.hypot(*links.anchor_b.T), np.hypot(*links.anchor_a.T)
     stated = np.arange(len(links)) < len(scene.joints)
-    held = stated & (links.a == WORLD) & np.isin(links.kind, ANCHORED_KINDS)
-    return np.asarray(held & (own > FAR_ANCHOR_RADII * radius) & (other <= radius))
+    applies = stated & (links.a == WORLD) & np.isin(links.kind, ANCHORED_KINDS)
+    return np.asarray(applies & (own_distance > FAR_ANCHOR_RADII * radius) & (other_distance <= radius))

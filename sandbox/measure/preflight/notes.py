@@ -1,4 +1,4 @@
-"""Notes: facts about a scene that are worth knowing and are no problems."""
+"""Notes: facts about a scene that are useful but no problems."""
 
 import math
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ from sandbox.scene.description.bodies import Compound, Polygon, PolygonPart
 from sandbox.scene.geometry.shapes import geometry_of
 
 MAX_OUTLINES = 20
-"""Largest number of outlines with a note of their own."""
+"""Largest number of outlines that get a note each."""
 
 
 def notes(scene: Scene) -> list[Diagnostic]:
@@ -57,22 +57,22 @@ FIRST_ORDER = (None, "explicit_euler", "semi_implicit_euler")
 def _flight(scene: Scene) -> Iterator[Diagnostic]:
     """Yield a note if a first-order integrator displaces a body by more than its half width within one flight."""
     bodies, solver, pull = scene.bodies, scene.solver, math.hypot(*scene.world.gravity)
-    meet = contact_matrix(scene)
-    able = np.flatnonzero(meet.touches & ~bodies.fixed & (bodies.thin > 0.0))
-    if pull == 0.0 or not len(able) or solver.half_kick or solver.integrator not in FIRST_ORDER:
+    matrix = contact_matrix(scene)
+    moving = np.flatnonzero(matrix.touches & ~bodies.fixed & (bodies.thin > 0.0))
+    if pull == 0.0 or not len(moving) or solver.half_kick or solver.integrator not in FIRST_ORDER:
         return
-    time = np.minimum(scene.world.duration, top_speeds(scene, meet)[able] / pull)
-    off = 0.5 * pull * solver.h * time
-    k = int(np.argmax(off / bodies.thin[able]))
-    if off[k] <= float(bodies.thin[able[k]]):
+    time = np.minimum(scene.world.duration, top_speeds(scene, matrix)[moving] / pull)
+    error = 0.5 * pull * solver.h * time
+    k = int(np.argmax(error / bodies.thin[moving]))
+    if error[k] <= float(bodies.thin[moving[k]]):
         return
-    body, scheme = bodies.names[able[k]], solver.integrator or "explicit_euler"
+    body, scheme = bodies.names[moving[k]], solver.integrator or "explicit_euler"
     message = (
-        f"{scheme} displaces {body!r} by g·h·t/2, up to {off[k]:.3g} m within one flight of {time[k]:.3g} s, more than "
-        f"its half width, {bodies.thin[able[k]]:.3g} m; solver.half_kick on pymunk, velocity_verlet on the reference, "
-        "and `exact` have no such error"
+        f"{scheme} displaces {body!r} by g·h·t/2, up to {error[k]:.3g} m within one flight of {time[k]:.3g} s, more "
+        f"than its half width, {bodies.thin[moving[k]]:.3g} m; solver.half_kick on pymunk, velocity_verlet on the "
+        "reference, and `exact` have no such error"
     )
-    yield Diagnostic("flight", message, {"body": body, "error": float(off[k])})
+    yield Diagnostic("flight", message, {"body": body, "error": float(error[k])})
 
 
 def _outlines(scene: Scene) -> Iterator[Diagnostic]:
@@ -98,9 +98,9 @@ def _pieces(element: BodySource) -> list[tuple[int | None, int]]:
     assert isinstance(element, Compound)
     found: list[tuple[int | None, int]] = []
     outlines = 0
-    for bearer, part in enumerate(element.parts):
+    for index, part in enumerate(element.parts):
         if isinstance(part, PolygonPart):
-            count = sum(piece.part == bearer for piece in pieces)
+            count = sum(piece.part == index for piece in pieces)
             if count > 1:
                 found.append((outlines, count))
             outlines += 1
@@ -109,8 +109,8 @@ def _pieces(element: BodySource) -> list[tuple[int | None, int]]:
 
 def _audit(scene: Scene) -> Iterator[Diagnostic]:
     bodies = scene.bodies
-    some = contact_matrix(scene).touches & ~bodies.round
-    count, without = int(some.sum()), int((some & (bodies.core <= 0.0)).sum())
+    not_round = contact_matrix(scene).touches & ~bodies.round
+    count, without = int(not_round.sum()), int((not_round & (bodies.core <= 0.0)).sum())
     if not count:
         return
     message = (

@@ -55,9 +55,9 @@ def break_notes(scene: Scene) -> Iterator[Diagnostic]:
     bodies = scene.bodies
     if scene.surface is None or not demands(scene) & FLOOR or not bodies.round.all():
         return
-    meet = contact_matrix(scene)
-    all_meet = np.asarray([element.collides == "all" for element in bodies.elements], np.bool_)[bodies.element]
-    balls = np.flatnonzero(all_meet & ~bodies.fixed)
+    matrix = contact_matrix(scene)
+    collides_with_all = np.asarray([element.collides == "all" for element in bodies.elements], np.bool_)[bodies.element]
+    balls = np.flatnonzero(collides_with_all & ~bodies.fixed)
     if len(balls) < MIN_RACK_BALLS:
         return
     radius = float(bodies.radius[balls].max())
@@ -68,15 +68,15 @@ def break_notes(scene: Scene) -> Iterator[Diagnostic]:
             "later positions can depend on dt and engine; gaps of 1e-8 m or more define the order"
         )
         yield Diagnostic("rack", message, {"pairs": touching})
-    speed = float(top_speeds(scene, meet)[balls].max())
-    way = speed * scene.solver.h / radius
-    if way > MAX_GRAZE_RADII:
+    speed = float(top_speeds(scene, matrix)[balls].max())
+    travel = speed * scene.solver.h / radius
+    if travel > MAX_GRAZE_RADII:
         safe = MAX_GRAZE_RADII * radius * scene.solver.substeps / speed
         message = (
-            f"balls move up to {way:.3g} radii per substep ({speed:.3g} m/s), and pymunk may miss grazing contacts: "
+            f"balls move up to {travel:.3g} radii per substep ({speed:.3g} m/s), and pymunk may miss grazing contacts: "
             f"positions are reliable until about the first one; dt <= {floor_3_digits(safe)} s detects all"
         )
-        details: Details = {"speed": speed, "radii": way, "safe_dt": safe}
+        details: Details = {"speed": speed, "radii": travel, "safe_dt": safe}
         yield Diagnostic("graze", message, details)
 
 
@@ -98,21 +98,21 @@ STEADY_GRAVITY = 10.0
 """m/s², gravity up to which these rates hold."""
 
 
-def event_rate(scene: Scene, meet: ContactMatrix) -> float:
+def event_rate(scene: Scene, matrix: ContactMatrix) -> float:
     """Return an upper estimate of the events per second of `exact` once all balls lie on each other.
 
     It counts the balls that start above others, although they may come to rest beside them. 0 if nothing can come to
     rest on another body: without gravity or static objects, or with elastic contacts.
     """
     bodies, pull = scene.bodies, math.hypot(*scene.world.gravity)
-    movers = meet.touches & ~bodies.fixed
+    movers = matrix.touches & ~bodies.fixed
     count = int(movers.sum())
-    if pull == 0.0 or count == 0 or not meet.mutual or not bodies.round.all() or not scene.fixed:
+    if pull == 0.0 or count == 0 or not matrix.mutual or not bodies.round.all() or not scene.fixed:
         return 0.0
-    if meet.restitution >= 1.0:
+    if matrix.restitution >= 1.0:
         return 0.0
     columns = _columns(scene)
-    each = UPRIGHT_RATE if columns == 1 else ROUGH_RATE if meet.friction > 0.0 else SMOOTH_RATE
+    each = UPRIGHT_RATE if columns == 1 else ROUGH_RATE if matrix.friction > 0.0 else SMOOTH_RATE
     return (count - columns) * each * max(1.0, pull / STEADY_GRAVITY)
 
 
@@ -129,9 +129,9 @@ def _columns(scene: Scene) -> int:
     return columns
 
 
-def event_warnings(scene: Scene, meet: ContactMatrix) -> Iterator[Diagnostic]:
+def event_warnings(scene: Scene, matrix: ContactMatrix) -> Iterator[Diagnostic]:
     """Yield a diagnostic if `exact` would stop because of too many events."""
-    warning = event_warning(event_rate(scene, meet), len(scene.bodies))
+    warning = event_warning(event_rate(scene, matrix), len(scene.bodies))
     if warning is not None:
         yield warning
 
@@ -141,10 +141,10 @@ def event_warning(rate: float, bodies: int) -> Diagnostic | None:
     allowed = max(ALLOWED_EVENTS, ALLOWED_EVENTS_PER_BALL * bodies)
     if rate <= allowed:
         return None
-    many = f"{rate:.2g} times a second" if math.isfinite(rate) else "without bound"
+    frequency = f"{rate:.2g} times a second" if math.isfinite(rate) else "without bound"
     message = (
-        f"balls that come to rest on each other collide {many} on `exact`, which allows {allowed:,} events a simulated "
-        "second and stops with an error beyond; pymunk and reference let them rest"
+        f"balls that come to rest on each other collide {frequency} on `exact`, which allows {allowed:,} events a "
+        "simulated second and stops with an error beyond; pymunk and reference let them rest"
     )
     details: Details = {"rate": min(rate, MAX_RATE), "allowed": allowed}
     return Diagnostic("event_rate", message, details)
@@ -170,10 +170,10 @@ def lyapunov_time(scene: Scene) -> float | None:
     A gas consists of balls that collide with each other in a box of level and upright planes, without gravity, joints
     or drag.
     """
-    bodies, world, meet = scene.bodies, scene.world, contact_matrix(scene)
-    movers = meet.touches & ~bodies.fixed
+    bodies, world, matrix = scene.bodies, scene.world, contact_matrix(scene)
+    movers = matrix.touches & ~bodies.fixed
     count = int(movers.sum())
-    if not meet.mutual or count < MIN_GAS_BALLS or not bodies.round.all() or len(scene.links) or scene.attractions:
+    if not matrix.mutual or count < MIN_GAS_BALLS or not bodies.round.all() or len(scene.links) or scene.attractions:
         return None
     if any(world.gravity) or world.linear_drag or world.quadratic_drag:
         return None

@@ -32,22 +32,22 @@ def tether_reach(scene: Scene, down: FloatArray) -> FloatArray:
     length = np.where(links.kind == LinkKind.ROD, links.figures[:, 0], 0.0)
     length = np.where(links.kind == LinkKind.SLIDE, links.figures[:, 1], length)
     arm_a, arm_b = (np.hypot(*each.T) for each in (links.anchor_a, links.anchor_b))
-    still = np.append(bodies.fixed, True)  # the world is −1, the last
-    ways: Paths = [[] for _ in range(len(bodies))]
+    is_static = np.append(bodies.fixed, True)  # the world is −1, the last
+    paths: Paths = [[] for _ in range(len(bodies))]
     begin: list[tuple[int, float, FloatArray]] = []
     first, second = links.ends(bodies.position, bodies.angle)
     for k, (a, b) in enumerate(zip(links.a.tolist(), links.b.tolist(), strict=True)):
-        if still[a] and not still[b]:
+        if is_static[a] and not is_static[b]:
             begin.append((b, float(length[k] + arm_b[k]), first[k]))
-        elif a != WORLD and still[b] and not still[a]:
+        elif a != WORLD and is_static[b] and not is_static[a]:
             begin.append((a, float(length[k] + arm_a[k]), second[k]))
-        elif not still[a] and not still[b]:
-            way = float(length[k] + arm_a[k] + arm_b[k])
-            ways[a].append((b, way))
-            ways[b].append((a, way))
+        elif not is_static[a] and not is_static[b]:
+            path_length = float(length[k] + arm_a[k] + arm_b[k])
+            paths[a].append((b, path_length))
+            paths[b].append((a, path_length))
     fall = np.full(len(bodies), math.inf)
-    for place, reach in _by_anchor(begin):
-        lowest = float(place @ down) + _shortest_paths(reach, ways)
+    for anchor, reach in _by_anchor(begin):
+        lowest = float(anchor @ down) + _shortest_paths(reach, paths)
         fall = np.minimum(fall, lowest - bodies.position @ down)
     return fall
 
@@ -55,29 +55,29 @@ def tether_reach(scene: Scene, down: FloatArray) -> FloatArray:
 def _by_anchor(begin: list[tuple[int, float, FloatArray]]) -> list[tuple[FloatArray, list[tuple[float, int]]]]:
     """Group the tethered bodies by their anchor."""
     found: dict[tuple[float, float], list[tuple[float, int]]] = {}
-    for number, way, place in begin:
-        found.setdefault((float(place[0]), float(place[1])), []).append((way, number))
-    few = list(found.items())[:MAX_ANCHORS]
-    return [(np.asarray(place), reach) for place, reach in few]
+    for number, distance, anchor in begin:
+        found.setdefault((float(anchor[0]), float(anchor[1])), []).append((distance, number))
+    kept = list(found.items())[:MAX_ANCHORS]
+    return [(np.asarray(anchor), reach) for anchor, reach in kept]
 
 
 MAX_ANCHORS = 100
 """Largest number of anchors: each costs a search over all joints. The bounds of the others are left out."""
 
 
-def _shortest_paths(reach: list[tuple[float, int]], ways: Paths) -> FloatArray:
+def _shortest_paths(reach: list[tuple[float, int]], paths: Paths) -> FloatArray:
     """Return the shortest path to each body, (N,) m, from the bodies at an anchor (E. W. Dijkstra 1959)."""
-    shortest = np.full(len(ways), math.inf)
+    shortest = np.full(len(paths), math.inf)
     heap = list(reach)
     heapq.heapify(heap)
     while heap:
-        way, number = heapq.heappop(heap)
-        if way >= shortest[number]:
+        distance, number = heapq.heappop(heap)
+        if distance >= shortest[number]:
             continue
-        shortest[number] = way
-        for other, more in ways[number]:
-            if way + more < shortest[other]:
-                heapq.heappush(heap, (way + more, other))
+        shortest[number] = distance
+        for other, step in paths[number]:
+            if distance + step < shortest[other]:
+                heapq.heappush(heap, (distance + step, other))
     return shortest
 
 
@@ -90,7 +90,7 @@ class SpeedBounds:
     """Upper bounds of the speeds of the N bodies of a scene."""
 
     scene: Scene
-    meet: ContactMatrix
+    matrix: ContactMatrix
 
     @cached_property
     def unknown(self) -> tuple[str, ...]:
@@ -118,25 +118,27 @@ class SpeedBounds:
 
     @cached_property
     def squared(self) -> FloatArray:
-        """(N,) m²/s², square of the speed at the start, and what springs and attraction can add."""
+        """(N,) m²/s², square of the speed at the start, with the energy of springs and attraction."""
         scene, bodies = self.scene, self.scene.bodies
         squared = np.square(self.start)
         springs = scene.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)
         if len(springs):
-            there = np.ones((1, len(bodies)), np.bool_)
-            stored = Potential(scene, bodies).of_springs(np.zeros(1), bodies.position[None], bodies.angle[None], there)
-            held = np.zeros(len(bodies), np.bool_)
-            held[springs.b] = True
-            held[springs.a[springs.a >= 0]] = True
-            squared += np.where(held, 2.0 * float(stored[0]) / bodies.mass, 0.0)
+            present = np.ones((1, len(bodies)), np.bool_)
+            stored = Potential(scene, bodies).of_springs(
+                np.zeros(1), bodies.position[None], bodies.angle[None], present
+            )
+            has_spring = np.zeros(len(bodies), np.bool_)
+            has_spring[springs.b] = True
+            has_spring[springs.a[springs.a >= 0]] = True
+            squared += np.where(has_spring, 2.0 * float(stored[0]) / bodies.mass, 0.0)
         for each in scene.attractions:
             if each.strength != 0.0 and not self._is_steep(each):
-                squared += 2.0 * abs(each.strength) * self._fallen(each)
+                squared += 2.0 * abs(each.strength) * self._path_integral(each)
         return np.asarray(squared)
 
     @cached_property
     def thrust(self) -> FloatArray:
-        """(N,) m/s, what thrusts without a key can add."""
+        """(N,) m/s, speed that thrusts without a key can add."""
         scene, bodies = self.scene, self.scene.bodies
         added = np.zeros(len(bodies))
         for each in scene.thrusts:
@@ -168,19 +170,19 @@ class SpeedBounds:
         if self.gravity > 0:
             for plane in scene.planes:
                 normal = np.asarray(plane.normal) / math.hypot(*plane.normal)
-                # Level up to rounding: on other planes bodies slide down without end.
+                # Level up to rounding: on other planes bodies slide down without a limit.
                 if float(normal @ self.down) < -1.0 + 1e-12:
                     drop = np.maximum(height_above(plane, bodies.position) - bodies.core, 0.0)
-                    speed = np.where(~self.meet.touches, speed, np.minimum(speed, self._after(drop)))
+                    speed = np.where(~self.matrix.touches, speed, np.minimum(speed, self._speed_after(drop)))
             if len(scene.links) or not bodies.round.all():
-                speed = np.minimum(speed, self._after(np.maximum(self._fall(), 0.0)))
-        return self._moved(speed)
+                speed = np.minimum(speed, self._speed_after(np.maximum(self._max_fall(), 0.0)))
+        return self._with_thrust_and_wind(speed)
 
     def toward(self, thing: Plane | Wall | Post) -> FloatArray:
         """Return the bound by the start, fall and forces of each body at a contact with a static object, (N,) m/s."""
         bodies = self.scene.bodies
         if isinstance(thing, Plane):
-            return self._across(thing)
+            return self._toward_plane(thing)
         if self.gravity == 0.0:
             return self.own
         if isinstance(thing, Wall):
@@ -192,21 +194,23 @@ class SpeedBounds:
         # A body that falls onto a level wall touches its upper side first; otherwise at its lowest point at the latest.
         on_top = level & (depth + bodies.core <= float(depths.max()) - half)
         drop = np.where(on_top, float(depths.max()) - half - bodies.core - depth, lowest + bodies.radius - depth)
-        return np.minimum(self.own, self._moved(self._after(drop)))
+        return np.minimum(self.own, self._with_thrust_and_wind(self._speed_after(drop)))
 
-    def _across(self, plane: Plane) -> FloatArray:
+    def _toward_plane(self, plane: Plane) -> FloatArray:
         """Return the bound at a contact with a plane, (N,) m/s.
 
         If nothing else can deflect the body, only the component across the plane counts.
         """
         scene, bodies = self.scene, self.scene.bodies
-        others = len(scene.links) or self.meet.mutual or scene.attractions or scene.thrusts or scene.drives
+        others = len(scene.links) or self.matrix.mutual or scene.attractions or scene.thrusts or scene.drives
         if len(scene.fixed) > 1 or others or any(scene.world.wind):
             return self.own
         normal = np.asarray(plane.normal) / math.hypot(*plane.normal)
         pull = max(0.0, -float(np.asarray(scene.world.gravity) @ normal))
         height = np.maximum(height_above(plane, bodies.position) - bodies.core, 0.0)
-        return np.minimum(self.own, self._moved(np.sqrt(np.square(bodies.velocity @ normal) + 2.0 * pull * height)))
+        return np.minimum(
+            self.own, self._with_thrust_and_wind(np.sqrt(np.square(bodies.velocity @ normal) + 2.0 * pull * height))
+        )
 
     @cached_property
     def struck(self) -> FloatArray:
@@ -214,13 +218,13 @@ class SpeedBounds:
 
         Impacts are limited by the energy of the others. A body that falls past all obstacles causes no further impacts.
         """
-        bodies, meet = self.scene.bodies, self.meet
-        movers = ~bodies.fixed & meet.touches
+        bodies, matrix = self.scene.bodies, self.matrix
+        movers = ~bodies.fixed & matrix.touches
         own = self.own
         if self.gravity > 0:
-            own = np.minimum(own, self._moved(self._after(np.maximum(self._fall(), 0.0))))
-        speed = np.where(movers, np.maximum(own, _kick_speed(meet)), own)
-        if meet.mutual and movers.any():
+            own = np.minimum(own, self._with_thrust_and_wind(self._speed_after(np.maximum(self._max_fall(), 0.0))))
+        speed = np.where(movers, np.maximum(own, _kick_speed(matrix)), own)
+        if matrix.mutual and movers.any():
             # From heavy to light: a resting body of mass m takes up to 2M/(M + m) of the speed of the one that hits it.
             masses, of_body = np.unique(bodies.mass[movers], return_inverse=True)
             of_body = of_body.reshape(-1)
@@ -229,7 +233,7 @@ class SpeedBounds:
             energy = 0.5 * float((bodies.mass * np.square(speed))[movers].sum())
             for k in np.unique(np.linspace(0, len(masses) - 1, MAX_MASS_CLASSES).round().astype(int))[::-1].tolist():
                 fastest = np.maximum(fastest, fastest[k] * 2.0 / (1.0 + masses / masses[k]))
-            if not meet.surfaces.kicks.any():
+            if not matrix.surfaces.kicks.any():
                 fastest = np.minimum(fastest, np.sqrt(2.0 * energy / masses))
             speed[movers] = np.maximum(speed[movers], fastest[of_body])
         return np.where(speed > own * (1.0 + ROUNDING), speed, 0.0)
@@ -239,39 +243,39 @@ class SpeedBounds:
         scene, bodies = self.scene, self.scene.bodies
         if isinstance(attraction.toward, str):
             core = float(bodies.core[bodies.number_of[attraction.toward]])
-            return core if self.meet.mutual else 0.0
+            return core if self.matrix.mutual else 0.0
         posts = (
             post for post in scene.posts if post.solid and math.dist(post.position, attraction.toward) < post.radius
         )
         cores = [post.radius - math.dist(post.position, attraction.toward) for post in posts]
         fixed = bodies.fixed & (bodies.core > 0.0)
         away = np.hypot(*(bodies.position - np.asarray(attraction.toward)).T)
-        cores += (bodies.core - away)[fixed].tolist() if self.meet.mutual else []
+        cores += (bodies.core - away)[fixed].tolist() if self.matrix.mutual else []
         return max(0.0, *cores, 0.0)
 
-    def _fallen(self, attraction: Attraction) -> FloatArray:
+    def _path_integral(self, attraction: Attraction) -> FloatArray:
         """Return the integral of 1/(r² + ε²) over each body's path to the centre, or far away from it, (N,) 1/m."""
         bodies, soft, near = self.scene.bodies, attraction.softening, self.core(attraction)
         toward = attraction.toward
-        place = bodies.position[bodies.number_of[toward]] if isinstance(toward, str) else np.asarray(toward)
-        away = np.maximum(np.hypot(*(bodies.position - place).T), near)
-        drawn = attraction.strength > 0.0
+        centre = bodies.position[bodies.number_of[toward]] if isinstance(toward, str) else np.asarray(toward)
+        away = np.maximum(np.hypot(*(bodies.position - centre).T), near)
+        is_attracted = attraction.strength > 0.0
         if soft == 0.0:
             with np.errstate(divide="ignore"):
-                return np.asarray(1.0 / near - 1.0 / away if drawn else 1.0 / away)
+                return np.asarray(1.0 / near - 1.0 / away if is_attracted else 1.0 / away)
         angle = np.arctan(away / soft)
-        return np.asarray((angle - math.atan(near / soft) if drawn else 0.5 * math.pi - angle) / soft)
+        return np.asarray((angle - math.atan(near / soft) if is_attracted else 0.5 * math.pi - angle) / soft)
 
     def _is_steep(self, attraction: Attraction) -> bool:
         """Return whether an attraction can accelerate bodies beyond the speed limit, so that nothing bounds them."""
-        near = max(attraction.softening, self.core(attraction))
-        return abs(attraction.strength) >= near * MAX_SPEED**2 and attraction.strength != 0.0
+        smallest = max(attraction.softening, self.core(attraction))
+        return abs(attraction.strength) >= smallest * MAX_SPEED**2 and attraction.strength != 0.0
 
-    def _after(self, drop: FloatArray) -> FloatArray:
+    def _speed_after(self, drop: FloatArray) -> FloatArray:
         """Return the speeds after a drop, or 0 if a body cannot rise so high, (N,) m/s."""
         return np.asarray(np.sqrt(np.maximum(self.squared + 2.0 * self.gravity * drop, 0.0)))
 
-    def _moved(self, speed: FloatArray) -> FloatArray:
+    def _with_thrust_and_wind(self, speed: FloatArray) -> FloatArray:
         """Return speeds with the contributions of thrusts and wind; 0 for static bodies."""
         world, bodies = self.scene.world, self.scene.bodies
         if world.linear_drag or world.quadratic_drag:
@@ -288,20 +292,20 @@ class SpeedBounds:
         by_linear = self.gravity / linear if linear > 0.0 else math.inf
         return min(by_linear, math.sqrt(self.gravity / quadratic) if quadratic > 0.0 else math.inf)
 
-    def _fall(self) -> FloatArray:
+    def _max_fall(self) -> FloatArray:
         """Return how far each body can fall, (N,) m, until its tether is taut or no obstacle is below it."""
         scene, bodies, down = self.scene, self.scene.bodies, self.down
-        held = tether_reach(scene, down)
-        if scene.planes:  # a plane that is not level descends without end
-            return held
+        reach = tether_reach(scene, down)
+        if scene.planes:  # a plane that is not level has no lowest point
+            return reach
         depth = bodies.position @ down
-        stays = np.where(bodies.fixed, 0.0, held)
-        lowest = float(np.max((depth + stays + bodies.radius)[np.isfinite(stays)], initial=-np.inf))
+        reach_of_moving = np.where(bodies.fixed, 0.0, reach)
+        lowest = float(np.max((depth + reach_of_moving + bodies.radius)[np.isfinite(reach_of_moving)], initial=-np.inf))
         for wall in scene.walls:
             lowest = max(lowest, float((np.asarray(wall.points) @ down).max()) + wall.thickness / 2.0)
         for post in scene.posts:
             lowest = max(lowest, float(np.asarray(post.position) @ down) + post.radius)
-        return np.minimum(held, lowest - depth + bodies.radius) if math.isfinite(lowest) else held
+        return np.minimum(reach, lowest - depth + bodies.radius) if math.isfinite(lowest) else reach
 
 
 def unknown_speeds(scene: Scene) -> tuple[str, ...]:
@@ -309,19 +313,19 @@ def unknown_speeds(scene: Scene) -> tuple[str, ...]:
     return SpeedBounds(scene, contact_matrix(scene)).unknown
 
 
-def top_speeds(scene: Scene, meet: ContactMatrix) -> FloatArray:
+def top_speeds(scene: Scene, matrix: ContactMatrix) -> FloatArray:
     """Return the approximate top speed of each body, (N,) m/s: an upper bound if `SpeedBounds.bounded`."""
-    speeds = SpeedBounds(scene, meet)
+    speeds = SpeedBounds(scene, matrix)
     return np.maximum(speeds.own, speeds.struck)
 
 
-def _kick_speed(meet: ContactMatrix) -> float:
-    """Return the speed that kicks give a body that always returns, m/s; that of one kick if there is no limit."""
-    surfaces, fastest = meet.surfaces, 0.0
+def _kick_speed(matrix: ContactMatrix) -> float:
+    """Return the largest speed of a body that is kicked again and again, m/s; that of one kick if there is no limit."""
+    surfaces, fastest = matrix.surfaces, 0.0
     for b in np.flatnonzero(surfaces.kicks).tolist():
         kick = surfaces.surfaces[b].kick
         assert kick is not None
-        for a in np.flatnonzero(meet.touching[b]).tolist():
+        for a in np.flatnonzero(matrix.touching[b]).tolist():
             e, f = float(surfaces.restitution[a, b]), float(surfaces.falloff[a, b])
             # v = e v/(1 + f v) + k, that is f v² + (1 − e − k f) v − k = 0
             half = 0.5 * (1.0 - e - kick.speed * f)

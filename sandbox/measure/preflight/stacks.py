@@ -4,7 +4,7 @@ Measured on pymunk 7.3.1, boxes placed in contact, friction 0.5, gravity 9.81 m/
 
 A tower of n boxes of height s, 5 to 20 of 0.5 and 1 m, 60 to 480 Hz, 10 s: it falls if iterations/h is below c·n·√(g/s)
 with c = 55 to 65, leans by up to a box and a half up to c = 100, and stands within a third from 150 on. So 10 boxes of
-1 m take 1900 a second to stand at all: 16 iterations at 120 Hz or 10 at 240 suffice, 10 at 120 do not. A tower that
+1 m need 1900 a second to stand at all: 16 iterations at 120 Hz or 10 at 240 suffice, 10 at 120 do not. A tower that
 falls in 10 s only leans before: 6 boxes of 0.5 m at 60 Hz and 10 iterations lean 0.63 of a box in 3 s, with 20
 iterations 0.51, with 27 (c = 61) 0.37. At c = 150 towers of 5 to 10 boxes lean by at most 0.05 of a box in 3 s and 0.52
 in 10 s, whether by more iterations (67) or by substeps (7); 15 boxes by 0.2 and 1.7, by substeps 0.02 and 0.9. Fewer

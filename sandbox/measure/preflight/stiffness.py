@@ -29,10 +29,10 @@ Product = Callable[[FloatArray], FloatArray]
 
 
 def extreme_eigenvalues(product: Product, size: int, null: FloatArray | None = None) -> tuple[float, float]:
-    """Return the least and the largest eigenvalue of a symmetric matrix, given by its product with a vector.
+    """Return the smallest and the largest eigenvalue of a symmetric matrix, given by its product with a vector.
 
-    They are exact to rounding up to `MAX_DENSE` rows. Above, by C. Lanczos 1950 with full orthogonalisation, the least
-    can be too large and the largest too small.
+    They are exact to rounding up to `MAX_DENSE` rows. Above, by C. Lanczos 1950 with full orthogonalisation, the
+    smallest can be too large and the largest too small.
 
     Args:
         product: product of the matrix with a vector (size,).
@@ -50,7 +50,7 @@ def extreme_eigenvalues(product: Product, size: int, null: FloatArray | None = N
         basis[0] = null
         begin = known = 1
     diagonal: list[float] = []
-    beside: list[float] = []
+    off_diagonal: list[float] = []
     while known < len(basis):
         for _ in range(2):  # a second time because of rounding
             vector = vector - basis[:known].T @ (basis[:known] @ vector)
@@ -58,12 +58,12 @@ def extreme_eigenvalues(product: Product, size: int, null: FloatArray | None = N
         if length < 1e-12:  # the Krylov space is exhausted
             break
         if known > begin:
-            beside.append(length)
+            off_diagonal.append(length)
         basis[known] = vector / length
         vector = product(basis[known])
         diagonal.append(float(vector @ basis[known]))
         known += 1
-    values = np.linalg.eigvalsh(np.diag(diagonal) + np.diag(beside, 1) + np.diag(beside, -1))
+    values = np.linalg.eigvalsh(np.diag(diagonal) + np.diag(off_diagonal, 1) + np.diag(off_diagonal, -1))
     return float(values[0]), float(values[-1])
 
 
@@ -119,11 +119,11 @@ def spring_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
             excess = z * (z - 2.0 * mode.zeta)
             if excess > 2.0 * mode.zeta * z * ROUNDING and (rate := 0.5 * math.log1p(excess) / settings.h) > ROUNDING:
                 growth = math.exp(rate) if rate < math.log(MAX_GROWTH) else MAX_GROWTH
-                more = f"{growth:.3g}" if growth < MAX_GROWTH else f"more than {MAX_GROWTH:g}"
+                growth_text = f"{growth:.3g}" if growth < MAX_GROWTH else f"more than {MAX_GROWTH:g}"
                 message = (
                     f"{mode.swings} at up to ω = {mode.omega:.4g} rad/s, and explicit_euler amplifies that at any "
-                    f"step, here by a factor of {more} a second on reference; remove solver.integrator or set it to "
-                    "semi_implicit_euler"
+                    f"step, here by a factor of {growth_text} a second on reference; remove solver.integrator or "
+                    "set it to semi_implicit_euler"
                 )
                 yield Diagnostic("spring", message, {**details, "growth": growth})
             continue
@@ -131,9 +131,9 @@ def spring_warnings(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
         if z < WARNING_FRACTION * limit:
             continue
         safe = WARNING_FRACTION * limit / mode.omega * settings.substeps
-        what = "is unstable" if z >= limit * (1.0 - ROUNDING) else "is almost unstable"
+        verdict = "is unstable" if z >= limit * (1.0 - ROUNDING) else "is almost unstable"
         message = (
-            f"{mode.swings} at up to ω = {mode.omega:.4g} rad/s: ω·h = {z:.3g} {what} (limit {limit:.3g}); "
+            f"{mode.swings} at up to ω = {mode.omega:.4g} rad/s: ω·h = {z:.3g} {verdict} (limit {limit:.3g}); "
             f"dt <= {floor_3_digits(safe)} s is stable"
         )
         yield Diagnostic("spring", message, {**details, "limit": limit, "safe_dt": safe})
@@ -212,36 +212,36 @@ def fastest_modes(scene: Scene) -> list[SpringMode]:
     free = np.where(bodies.fixed, -1, np.arange(len(bodies)))
     a, b = np.where(links.a >= 0, free[links.a], -1), free[links.b]
     label = connected_groups(a, b, len(bodies))
-    home = label[np.where(b >= 0, b, a)]
+    group_of = label[np.where(b >= 0, b, a)]
     inverse = np.where(bodies.fixed, 0.0, 1.0) / np.column_stack((bodies.mass, bodies.mass, bodies.moment)).T
     root = np.sqrt(inverse.T)
     found = []
-    for group in np.unique(home).tolist():
-        mine = links.some(np.flatnonzero(home == group))
-        rows, stiff, damping = _rows(mine, bodies.position, bodies.angle)
-        omega = math.sqrt(_largest(mine, rows, stiff, root))
-        rate = _largest(mine, rows, damping, root) if damping.any() else 0.0
+    for group in np.unique(group_of).tolist():
+        members = links.some(np.flatnonzero(group_of == group))
+        rows, stiff, damping = _rows(members, bodies.position, bodies.angle)
+        omega = math.sqrt(_largest(members, rows, stiff, root))
+        rate = _largest(members, rows, damping, root) if damping.any() else 0.0
         # With one material, damping is proportional to stiffness in all modes; with several, the least is taken.
         with np.errstate(over="ignore"):
-            zeta = 0.5 * omega * float(np.min(mine.figures[:, 2] / mine.figures[:, 1]))
-        found.append(SpringMode(omega, zeta, rate, mine.names[0], len(mine)))
+            zeta = 0.5 * omega * float(np.min(members.figures[:, 2] / members.figures[:, 1]))
+        found.append(SpringMode(omega, zeta, rate, members.names[0], len(members)))
     return found
 
 
 def _largest(links: JointArrays, rows: FloatArray, weight: FloatArray, root: FloatArray) -> float:
     """Return the largest eigenvalue of M⁻¹·Jᵀ·W·J of one group; `root` (N, 3) is M^−½."""
-    known, place = np.unique(np.concatenate((np.where(links.a >= 0, links.a, links.b), links.b)), return_inverse=True)
-    place = place.reshape(-1)
-    first, second = np.tile(place[: len(links)], 3), np.tile(place[len(links) :], 3)
-    there = np.tile(links.a >= 0, 3)[:, None]
+    known, index = np.unique(np.concatenate((np.where(links.a >= 0, links.a, links.b), links.b)), return_inverse=True)
+    index = index.reshape(-1)
+    first, second = np.tile(index[: len(links)], 3), np.tile(index[len(links) :], 3)
+    has_a = np.tile(links.a >= 0, 3)[:, None]
     # Each row's gradient in coordinates in which all masses are 1.
-    on_a, on_b = rows[:, :3] * root[known[first]] * there, rows[:, 3:] * root[known[second]]
+    on_a, on_b = rows[:, :3] * root[known[first]] * has_a, rows[:, 3:] * root[known[second]]
     size = 3 * len(known)
 
     def product(vector: FloatArray) -> FloatArray:
         each = vector.reshape(-1, 3)
-        pull = weight * ((on_a * each[first]).sum(axis=1) + (on_b * each[second]).sum(axis=1))
-        return _gathered(first, pull[:, None] * on_a, second, pull[:, None] * on_b, len(known))
+        force = weight * ((on_a * each[first]).sum(axis=1) + (on_b * each[second]).sum(axis=1))
+        return _gathered(first, force[:, None] * on_a, second, force[:, None] * on_b, len(known))
 
     _, largest = extreme_eigenvalues(product, size)
     return max(largest, 0.0)
@@ -285,19 +285,19 @@ SAFE_TURN = 0.2
 """rad: below it, symplectic integrators conserve the energy of an orbit to some per cent."""
 
 
-def orbit_warnings(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterator[Diagnostic]:
+def orbit_warnings(scene: Scene, settings: Settings, contacts: ContactMatrix) -> Iterator[Diagnostic]:
     """Yield a diagnostic for each attraction that rotates a body's velocity by more than `SAFE_TURN` in a substep."""
-    bodies, speeds = scene.bodies, SpeedBounds(scene, meet)
+    bodies, speeds = scene.bodies, SpeedBounds(scene, contacts)
     for number, each in enumerate(scene.attractions):
         if each.strength <= 0.0:
             continue
-        own = bodies.number_of[each.toward] if isinstance(each.toward, str) else None
-        place = bodies.position[own] if own is not None else np.asarray(each.toward)
+        centre = bodies.number_of[each.toward] if isinstance(each.toward, str) else None
+        place = bodies.position[centre] if centre is not None else np.asarray(each.toward)
         away, velocity = bodies.position - place, bodies.velocity
         distance, speed = np.hypot(*away.T), np.hypot(*velocity.T)
         able = ~bodies.fixed & (distance > 0.0)
-        if own is not None:
-            able[own] = False
+        if centre is not None:
+            able[centre] = False
         if not able.any():
             continue
         solid = speeds.core(each)
@@ -306,16 +306,21 @@ def orbit_warnings(scene: Scene, settings: Settings, meet: ContactMatrix) -> Ite
         able &= (nearest > solid) | (solid == 0.0)  # a body that hits the centre is not deflected there
         if not able.any():
             continue
-        near = np.maximum(nearest, np.maximum(each.softening, np.finfo(float).tiny))
+        closest = np.maximum(nearest, np.maximum(each.softening, np.finfo(float).tiny))
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             drop = np.where(
                 each.softening > 0.0,
                 (np.arctan(distance / max(each.softening, 1e-300)) - np.arctan(nearest / max(each.softening, 1e-300)))
                 / max(each.softening, 1e-300),
-                1.0 / near - 1.0 / distance,
+                1.0 / closest - 1.0 / distance,
             )
-            there = np.sqrt(np.square(speed) + 2.0 * each.strength * np.maximum(drop, 0.0))
-            turn = each.strength / (np.square(nearest) + each.softening**2 + np.finfo(float).tiny) / there * settings.h
+            closest_speed = np.sqrt(np.square(speed) + 2.0 * each.strength * np.maximum(drop, 0.0))
+            turn = (
+                each.strength
+                / (np.square(nearest) + each.softening**2 + np.finfo(float).tiny)
+                / closest_speed
+                * settings.h
+            )
         turn = np.where(able & np.isfinite(turn), turn, np.where(able & ~np.isfinite(turn), MAX_TURN, 0.0))
         k = int(turn.argmax())
         if turn[k] <= SAFE_TURN:

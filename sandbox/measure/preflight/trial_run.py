@@ -1,8 +1,8 @@
 """Trial run: a short headless run of the scene itself, which confirms or refutes the diagnostics of the formulas.
 
-Formulas bound speeds, but do not know in which phase of a step a ball reaches a wall, which ball a crowd ejects, or how
-a tower settles. `run_preflight` therefore runs the first part of the scene with its own settings on the engine in
-question. The work is bounded by counts, so that the result does not depend on the machine: at most `MAX_SUBSTEPS`
+Formulas bound speeds, but cannot predict the phase of the step in which a ball reaches a wall, the ball that a crowd
+ejects, or how a tower settles. `run_preflight` therefore runs the first part of the scene with its settings on the
+chosen engine. The work is bounded by counts, so that the result does not depend on the machine: at most `MAX_SUBSTEPS`
 substeps, `MAX_BODY_SUBSTEPS` substeps times bodies, and on `exact` `MAX_EVENTS` events. That takes 0.1 to 1 s. If it
 covers the whole run, diagnostics that it refutes become notes; if it covers a part, its findings are added to those of
 the formulas.
@@ -36,7 +36,7 @@ from sandbox.trajectory import Trajectory
 MAX_SUBSTEPS, MAX_BODY_SUBSTEPS = 10_000, 60_000
 """Limits of a trial run; the second is substeps times bodies."""
 MIN_SUBSTEPS = 20
-"""A shorter trial run says nothing and is left out."""
+"""A shorter trial run is not informative and is left out."""
 MAX_EVENTS = 100_000
 """Limit of a trial run on `exact`: a tenth of its own limit in a simulated second."""
 EVENT_WINDOW = 0.02
@@ -82,7 +82,7 @@ class TrialRun:
         return str(self.run.info["engine"])
 
     @property
-    def said(self) -> str:
+    def description(self) -> str:
         """Description of the trial run."""
         return f"a trial run on {self.engine}" + ("" if self.whole else f" of the first {self.until:.3g} s")
 
@@ -91,65 +91,65 @@ class TrialRun:
         """Duration of the trial run, s."""
         return self.scene.world.duration
 
-    def may_pass(self, foretold: Diagnostic) -> bool:
+    def may_pass(self, predicted: Diagnostic) -> bool:
         """Return whether a body may tunnel in the rest of the scene, as far as its first part shows.
 
-        Formulas bound the effect of impacts far above reality: such a speed counts only if bodies were as fast to
-        within a factor of `MAX_SPEED_UP`.
+        Formulas overestimate the effect of impacts by far: such a speed counts only if bodies reached it to within a
+        factor of `MAX_SPEED_UP`.
         """
-        if not foretold.details.get("struck"):
+        if not predicted.details.get("struck"):
             return True
         velocity = self.run.velocity
         fastest = float(np.nanmax(np.hypot(velocity[..., 0], velocity[..., 1])))
-        reach = float(foretold.details["safe_dt"]) / self.settings.substeps * float(foretold.details["speed"])
+        reach = float(predicted.details["safe_dt"]) / self.settings.substeps * float(predicted.details["speed"])
         return MAX_SPEED_UP * fastest * self.settings.h > reach
 
     def findings(self) -> Iterator[Diagnostic]:
         """Yield a diagnostic for each problem that occurred."""
         if self.run.status == "diverged" or not np.isfinite(self.run.position[-1]).all():
             reason = self.run.reason or "the state is not finite"
-            yield Diagnostic("diverged", f"{self.said} diverged: {reason}", {"engine": self.engine})
+            yield Diagnostic("diverged", f"{self.description} diverged: {reason}", {"engine": self.engine})
             return
-        yield from self._missed()
-        yield from self._deep()
-        yield from self._torn()
-        yield from self._fallen()
-        yield from self._gained()
+        yield from self._missed_contacts()
+        yield from self._penetrations()
+        yield from self._broken_joints()
+        yield from self._fallen_stacks()
+        yield from self._energy_gains()
 
-    def _missed(self) -> Iterator[Diagnostic]:
+    def _missed_contacts(self) -> Iterator[Diagnostic]:
         """Yield the contacts that the audit found missed, with the closing speed of each body."""
         run, bodies = self.run, self.scene.bodies
-        seen: set[tuple[int, int]] = set()
+        reported: set[tuple[int, int]] = set()
         named: dict[int, int] = {}
         for time, (a, b) in zip(run.missed_time.tolist(), run.missed_pair.tolist(), strict=True):
-            if (a, b) in seen:
+            if (a, b) in reported:
                 continue
-            seen.add((a, b))
+            reported.add((a, b))
             named[b if b < 0 else 0] = named.get(b if b < 0 else 0, 0) + 1
             if named[b if b < 0 else 0] > MAX_NAMED:
                 continue
             frame = max(0, int(np.searchsorted(run.time, time, side="right")) - 1)
             velocity = run.velocity[frame, a] - (run.velocity[frame, b] if b >= 0 else 0.0)
             speed = float(np.hypot(*velocity))
-            reach = float(bodies.thin[a]) + (float(bodies.thin[b]) if b >= 0 else self._half(-1 - b))
+            reach = float(bodies.thin[a]) + (float(bodies.thin[b]) if b >= 0 else self._half_thickness(-1 - b))
             thing = bodies.names[b] if b >= 0 else self.scene.fixed_names[-1 - b]
             safe = reach / speed * self.settings.substeps if speed > 0.0 else math.inf
-            right = f"; dt <= {floor_3_digits(safe)} s is safe at that speed" if math.isfinite(safe) else ""
+            remedy = f"; dt <= {floor_3_digits(safe)} s is safe at that speed" if math.isfinite(safe) else ""
             message = (
                 f"{bodies.names[a]!r} tunnels through {thing!r}, or is detected too late, at {time:.3g} s of "
-                f"{self.said}, at {speed:.4g} m/s or {speed * self.settings.h:.3g} m per substep{right}"
+                f"{self.description}, at {speed:.4g} m/s or {speed * self.settings.h:.3g} m per substep{remedy}"
             )
             details: Details = {"ball": bodies.names[a], "thing": thing, "speed": speed, "time": time, "odds": 1.0}
             if math.isfinite(safe):
                 details["safe_dt"] = safe
             yield Diagnostic("tunnelling", message, details)
 
-    def _half(self, number: int) -> float:
+    def _half_thickness(self, number: int) -> float:
         """Return half the thickness of a static object, m."""
         thing = self.scene.fixed[number]
         return thing.thickness / 2.0 if isinstance(thing, Wall) else thing.radius if isinstance(thing, Post) else 0.0
 
-    def _deep(self) -> Iterator[Diagnostic]:
+    def _penetrations(self) -> Iterator[Diagnostic]:
         """Yield the deepest ball in a plane if its centre was behind the surface."""
         run, bodies = self.run, self.scene.bodies
         able = np.asarray([e.collides != "none" for e in bodies.elements], np.bool_)[bodies.element] & ~bodies.fixed
@@ -167,20 +167,20 @@ class TrialRun:
             speed = float(np.hypot(*run.velocity[max(0, int(frame) - 1), discs[k]]))
             message = (
                 f"the centre of {body!r} is {depth[frame, k]:.3g} m behind the surface of {name!r} at "
-                f"{run.time[frame]:.3g} s of {self.said}, before the contact is detected"
+                f"{run.time[frame]:.3g} s of {self.description}, before the contact is detected"
             )
             details: Details = {"ball": body, "thing": name, "depth": float(depth[frame, k]), "speed": speed}
             details["time"] = float(run.time[frame])
             yield Diagnostic("depth", message, details)
 
-    def _torn(self) -> Iterator[Diagnostic]:
+    def _broken_joints(self) -> Iterator[Diagnostic]:
         error = self.run.info["joint_error"]
         if error is not None and error > MAX_JOINT_ERROR:
-            message = f"the joint error reaches {error:.2g} of a joint's length in {self.said}"
+            message = f"the joint error reaches {error:.2g} of a joint's length in {self.description}"
             yield Diagnostic("chain", message, {"share": min(float(error), 1e300)})
 
-    def _fallen(self) -> Iterator[Diagnostic]:
-        """Yield the body of a stack that moved most, if it left its place."""
+    def _fallen_stacks(self) -> Iterator[Diagnostic]:
+        """Yield the body of a stack that moved most, if the stack has fallen."""
         run, bodies = self.run, self.scene.bodies
         if not any(self.scene.world.gravity) or bodies.round.all() or (bodies.velocity[~bodies.fixed] != 0.0).any():
             return
@@ -198,27 +198,26 @@ class TrialRun:
         mass_a, mass_b = bodies.mass[close.first[both]], bodies.mass[close.second[both]]
         ratio = float((np.maximum(mass_a, mass_b) / np.minimum(mass_a, mass_b)).max(initial=1.0))
         message = (
-            f"the stacked body {bodies.names[stacked[k]]!r} moves by {fraction[k]:.3g} of its width in {self.said}; "
-            "more solver.iterations or a smaller dt may stabilise the stack"
+            f"the stacked body {bodies.names[stacked[k]]!r} moves by {fraction[k]:.3g} of its width in "
+            f"{self.description}; more solver.iterations or a smaller dt may stabilise the stack"
         )
         kind = "mass_ratio" if ratio >= MIN_MASS_RATIO else "stack"
         yield Diagnostic(kind, message, {"body": bodies.names[stacked[k]], "moved": float(fraction[k])})
 
-    def _gained(self) -> Iterator[Diagnostic]:
+    def _energy_gains(self) -> Iterator[Diagnostic]:
         gain = energy_gain(self.run, self.scene)
         if gain > MAX_ENERGY_GAIN:
             springs = len(self.scene.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)) > 0
-            message = (
-                f"energy rises by a fraction {gain:.3g} of the exchanged energy in {self.said}{self._by_impacts()}"
-            )
+            message = f"energy rises by a fraction {gain:.3g} of the exchanged energy in {self.description}"
+            message += self._by_impacts()
             yield Diagnostic("spring" if springs else "energy", message, {"gained": min(gain, 1e300)})
 
     def _by_impacts(self) -> str:
         """Return the possible cause of an energy gain: Newton's restitution with friction, off the centre of mass."""
-        meet = contact_matrix(self.scene)
-        surfaces = meet.surfaces
-        rough = bool((meet.touching & (surfaces.restitution > 0.0) & (surfaces.friction > 0.0)).any())
-        if not (meet.solids and rough) or self.run.info["settings"].get("impact") != "newton":
+        matrix = contact_matrix(self.scene)
+        surfaces = matrix.surfaces
+        rough = bool((matrix.touching & (surfaces.restitution > 0.0) & (surfaces.friction > 0.0)).any())
+        if not (matrix.solids and rough) or self.run.info["settings"].get("impact") != "newton":
             return ""
         return (
             "; restitution with friction can create energy for shapes other than balls: on reference, "
@@ -238,19 +237,19 @@ def energy_gain(run: Trajectory, scene: Scene) -> float:
         return 0.0
     if contact_matrix(scene).surfaces.kicks.any():
         return 0.0
-    every = energies(run, scene)
-    total = every.total
+    energy = energies(run, scene)
+    total = energy.total
     if not math.isfinite(total[0]):  # attracting bodies start at one point: their potential is infinite
         return 0.0
     with np.errstate(over="ignore", invalid="ignore"):
         gain = float(np.nanmax(total - total[0]))
-        stake = float(every.kinetic[0]) + float(np.nanmax(np.abs(every.potential - every.potential[0])))
+        exchanged = float(energy.kinetic[0]) + float(np.nanmax(np.abs(energy.potential - energy.potential[0])))
         moves = ~scene.bodies.fixed
         lift = math.hypot(*scene.world.gravity) * float((scene.bodies.mass * 2.0 * scene.bodies.thin)[moves].sum())
-        stake = max(stake, lift)
+        exchanged = max(exchanged, lift)
     if not math.isfinite(gain):
         return math.inf
-    return gain / stake if stake > 0.0 else 0.0
+    return gain / exchanged if exchanged > 0.0 else 0.0
 
 
 def run_trial(scene: Scene, settings: Settings, engine: str, cover: float = 1.0) -> TrialRun | None:
@@ -261,13 +260,13 @@ def run_trial(scene: Scene, settings: Settings, engine: str, cover: float = 1.0)
     chosen = ENGINES[engine]
     if chosen.missing(scene, settings) or not len(scene.bodies):
         return None
-    most = min(MAX_SUBSTEPS, MAX_BODY_SUBSTEPS // len(scene.bodies))
+    max_substeps = min(MAX_SUBSTEPS, MAX_BODY_SUBSTEPS // len(scene.bodies))
     needed = math.ceil(scene.world.duration / settings.dt) * settings.substeps
-    if most < min(MIN_SUBSTEPS, needed):
+    if max_substeps < min(MIN_SUBSTEPS, needed):
         return None
-    most = min(most, math.ceil(cover * needed)) if cover < 1.0 else most
-    steps = max(1, most // settings.substeps)
-    whole = needed <= most
+    max_substeps = min(max_substeps, math.ceil(cover * needed)) if cover < 1.0 else max_substeps
+    steps = max(1, max_substeps // settings.substeps)
+    whole = needed <= max_substeps
     duration = scene.world.duration if whole else steps * settings.dt
     part = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": duration})})
     frames = duration / settings.dt
@@ -294,15 +293,15 @@ def run_exact_trial(scene: Scene, settings: Settings, cover: float = 1.0) -> tup
     rate, before, window = 0.0, 0, max(1, math.ceil(EVENT_WINDOW / settings.dt))
     try:
         steps = math.ceil(scene.world.duration / settings.dt)
-        most = min(MAX_EXACT_STEPS, math.ceil(cover * steps))
-        for step in range(1, min(steps, most) + 1):
+        max_steps = min(MAX_EXACT_STEPS, math.ceil(cover * steps))
+        for step in range(1, min(steps, max_steps) + 1):
             simulation.step()
             events = int(simulation.work["events"])
             if step % window == 0:
                 rate, before = max(rate, (events - before) / (window * settings.dt)), events
             if events > MAX_EVENTS:
                 return max(rate, (events - before) / (((step - 1) % window + 1) * settings.dt)), simulation.time, False
-        return rate, simulation.time, steps <= most
+        return rate, simulation.time, steps <= max_steps
     except Exhaustion:
         return math.inf, simulation.time, False
     finally:
@@ -379,7 +378,7 @@ def _merge(
     if any(each.kind == "diverged" for each in found):
         return [*diagnostics, *found], []
     families = {INDISTINGUISHABLE.get(each.kind, each.kind) for each in found}
-    seen = {_risk_key(each, trial): each for each in reversed(found) if each.kind in NAMING_KINDS}
+    risks = {_risk_key(each, trial): each for each in reversed(found) if each.kind in NAMING_KINDS}
     kept: list[Diagnostic] = []
     refuted: list[Diagnostic] = []
     for each in diagnostics:
@@ -388,22 +387,22 @@ def _merge(
         elif each.kind not in NAMING_KINDS:
             is_refuted = trial.whole and INDISTINGUISHABLE.get(each.kind, each.kind) not in families
             (refuted if is_refuted else kept).append(each)
-        elif (where := (each.kind, each.details["ball"], each.details["thing"])) in seen:
-            time = seen.pop(where).details["time"]
+        elif (key := (each.kind, each.details["ball"], each.details["thing"])) in risks:
+            time = risks.pop(key).details["time"]
             kept.append(replace(each, details={**each.details, "seen_at": time}))
         else:
             (refuted if trial.whole or not trial.may_pass(each) else kept).append(each)
-    spoken = {INDISTINGUISHABLE.get(each.kind, each.kind) for each in kept if each.kind not in NAMING_KINDS}
-    unforeseen = [
+    kept_families = {INDISTINGUISHABLE.get(each.kind, each.kind) for each in kept if each.kind not in NAMING_KINDS}
+    new = [
         each
         for each in found
         if (
-            _risk_key(each, trial) in seen
+            _risk_key(each, trial) in risks
             if each.kind in NAMING_KINDS
-            else INDISTINGUISHABLE.get(each.kind, each.kind) not in spoken
+            else INDISTINGUISHABLE.get(each.kind, each.kind) not in kept_families
         )
     ]
-    return [*kept, *unforeseen], [_note(each, trial) for each in refuted]
+    return [*kept, *new], [_note(each, trial) for each in refuted]
 
 
 def _risk_key(found: Diagnostic, trial: TrialRun) -> tuple[str, Detail, Detail]:
@@ -417,14 +416,14 @@ def _risk_key(found: Diagnostic, trial: TrialRun) -> tuple[str, Detail, Detail]:
 
 
 STEPPING_ENGINES = ("pymunk", "reference")
-"""Engines of a trial run if no engine is given, in this order."""
+"""Engines tried for a trial run if no engine is given, in this order."""
 
 INDISTINGUISHABLE = {"mass_ratio": "stack", "energy": "iterations", "orbit": "iterations"}
 """Kinds that a trial run cannot distinguish: it shows that a stack falls, or that energy grows."""
 
 
 def _note(refuted: Diagnostic, trial: TrialRun) -> Diagnostic:
-    message = f"{trial.said} did not show this, but another phase, seed or engine may: {refuted.message}"
+    message = f"{trial.description} did not show this, but another phase, seed or engine may: {refuted.message}"
     return Diagnostic(refuted.kind, message, refuted.details)
 
 
@@ -434,8 +433,8 @@ def _with_events(diagnostics: list[Diagnostic], scene: Scene, settings: Settings
     if tried is None:
         return PreflightResult(diagnostics, [], None)
     rate, duration, whole = tried
-    done = TrialCoverage("exact", duration, whole)
+    coverage = TrialCoverage("exact", duration, whole)
     others = [each for each in diagnostics if each.kind != "event_rate"]
     if (warning := event_warning(rate, len(scene.bodies))) is not None:
-        return PreflightResult([*others, warning], [], done)
-    return PreflightResult(others if whole else diagnostics, [], done)
+        return PreflightResult([*others, warning], [], coverage)
+    return PreflightResult(others if whole else diagnostics, [], coverage)

@@ -29,7 +29,7 @@ ANOTHER_BODY = "another body"
 
 @dataclass(frozen=True)
 class TunnellingRisk:
-    """Body that can tunnel through an object, and the substep from which on it can."""
+    """Body that can tunnel through an object, and the longest substep at which it cannot."""
 
     ball: str
     thing: str
@@ -49,20 +49,20 @@ class TunnellingRisk:
 
     def odds(self, h: float) -> float:
         """Return the probability of a missed contact with a substep h, s, and a random phase."""
-        way = self.speed * h
-        return 1.0 - self.reach / way if way > self.reach else 0.0
+        displacement = self.speed * h
+        return 1.0 - self.reach / displacement if displacement > self.reach else 0.0
 
 
 def largest_safe_dt(scene: Scene, settings: Settings | None = None) -> float | None:
-    """Return the largest dt at which nothing in the scene can tunnel, s, at its number of substeps.
+    """Return the largest dt at which no body of the scene can tunnel, s, at its number of substeps.
 
-    It is infinite if nothing can tunnel at any dt, and None if bodies can collide and something accelerates them by an
-    amount that no formula bounds.
+    It is infinite if no body can tunnel at any dt, and None if bodies can collide and are accelerated by an amount that
+    no formula bounds.
     """
     settings = scene.solver if settings is None else settings
-    meet = contact_matrix(scene)
-    found, times = tunnelling_risks(scene, meet), detection_factor(settings)
-    if found and math.isfinite(times) and SpeedBounds(scene, meet).unknown:
+    matrix = contact_matrix(scene)
+    found, times = tunnelling_risks(scene, matrix), detection_factor(settings)
+    if found and math.isfinite(times) and SpeedBounds(scene, matrix).unknown:
         return None
     return min((p.safe_h for p in found), default=math.inf) * settings.substeps * times
 
@@ -84,18 +84,18 @@ SAME_RISK_RATIO = 1.1
 """Ratio of the safe substeps of two bodies up to which they are one risk."""
 
 
-def tunnelling_risks(scene: Scene, meet: ContactMatrix | None = None) -> list[TunnellingRisk]:
+def tunnelling_risks(scene: Scene, matrix: ContactMatrix | None = None) -> list[TunnellingRisk]:
     """Return which bodies can tunnel through each object, and through each other, each at its own speed.
 
-    Bodies with about the same safe substep are one risk with the numbers of the worst of them. If impacts by others can
-    make a body faster than any is by itself, the worst such risk is added.
+    Bodies with about the same safe substep are one risk with the values of the worst of them. If impacts by
+    others can make a body faster than its own fall and forces, the worst such risk is added.
     """
-    meet = contact_matrix(scene) if meet is None else meet
+    matrix = contact_matrix(scene) if matrix is None else matrix
     bodies = scene.bodies
-    movers = np.flatnonzero(meet.touches & ~bodies.fixed)
+    movers = np.flatnonzero(matrix.touches & ~bodies.fixed)
     if not len(movers):
         return []
-    speeds = SpeedBounds(scene, meet)
+    speeds = SpeedBounds(scene, matrix)
     half, struck = bodies.thin[movers], speeds.struck[movers]
     found: list[TunnellingRisk] = []
 
@@ -103,23 +103,23 @@ def tunnelling_risks(scene: Scene, meet: ContactMatrix | None = None) -> list[Tu
         rows = np.flatnonzero(able)
         if not len(rows):
             return
-        own = _groups(bodies.names, movers[rows], reach[rows], speed[rows], thing)
-        found.extend(own)
+        groups = _groups(bodies.names, movers[rows], reach[rows], speed[rows], thing)
+        found.extend(groups)
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):  # bodies at rest never tunnel
             worst = rows[int(np.argmin(reach[rows] / struck[rows]))]
         fastest = TunnellingRisk(
             bodies.names[movers[worst]], thing, float(struck[worst]), float(reach[worst]), struck=True
         )
-        if fastest.safe_h < own[0].safe_h * (1.0 - ROUNDING):
+        if fastest.safe_h < groups[0].safe_h * (1.0 - ROUNDING):
             found.append(fastest)
 
     layers = reachable_layers(scene, bodies)[movers]
     for thing, name in zip(scene.fixed, scene.fixed_names, strict=False):
         if isinstance(thing, Plane) or thing.solid:
-            shares = layers & mask_of(thing.layers, scene.layers) != 0
-            add(shares, half + _half_depth(thing), speeds.toward(thing)[movers], name)
-    fixed = np.flatnonzero(bodies.fixed & meet.touches)
-    if meet.mutual and len(fixed):
+            same_layer = layers & mask_of(thing.layers, scene.layers) != 0
+            add(same_layer, half + _half_depth(thing), speeds.toward(thing)[movers], name)
+    fixed = np.flatnonzero(bodies.fixed & matrix.touches)
+    if matrix.mutual and len(fixed):
         thinnest = fixed[bodies.thin[fixed].argmin()]
         add(
             np.ones(len(movers), np.bool_),
@@ -127,9 +127,9 @@ def tunnelling_risks(scene: Scene, meet: ContactMatrix | None = None) -> list[Tu
             speeds.own[movers],
             bodies.names[thinnest],
         )
-    among = np.flatnonzero(collide_with_all(bodies)[movers])
-    if meet.mutual and len(among) > 1:
-        found.extend(_mutual(scene, speeds, movers[among]))
+    colliding = np.flatnonzero(collide_with_all(bodies)[movers])
+    if matrix.mutual and len(colliding) > 1:
+        found.extend(_mutual(scene, speeds, movers[colliding]))
     return found
 
 
@@ -163,12 +163,12 @@ def _mutual(scene: Scene, speeds: SpeedBounds, number: IntArray) -> list[Tunnell
         with np.errstate(divide="ignore", over="ignore"):
             order = np.argsort(bodies.thin[number] / speeds.own[number], kind="stable")
         number = number[order[:MAX_MUTUAL]]
-    half, own = bodies.thin[number], speeds.own[number]
-    struck = np.maximum(own, speeds.struck[number])
+    half, unstruck = bodies.thin[number], speeds.own[number]
+    struck = np.maximum(unstruck, speeds.struck[number])
     reach = half[:, None] + half
-    two = len(number) == 2 and not scene.fixed and not bodies.fixed.any()
-    closing = own[:, None] + own
-    if two and not len(scene.links) and not (scene.attractions or scene.thrusts or scene.drives):
+    only_two = len(number) == 2 and not scene.fixed and not bodies.fixed.any()
+    closing = unstruck[:, None] + unstruck
+    if only_two and not len(scene.links) and not (scene.attractions or scene.thrusts or scene.drives):
         velocity = bodies.velocity[number]
         closing = np.full((2, 2), float(np.hypot(*(velocity[0] - velocity[1]))))
     other, _ = _shortest_safe(reach, closing)
@@ -182,7 +182,7 @@ def _mutual(scene: Scene, speeds: SpeedBounds, number: IntArray) -> list[Tunnell
     fastest = TunnellingRisk(
         bodies.names[number[k]], another, float(closing[k, last]), float(reach[k, last]), struck=True
     )
-    return [*found, fastest] if not two and fastest.safe_h < found[0].safe_h * (1.0 - ROUNDING) else found
+    return [*found, fastest] if not only_two and fastest.safe_h < found[0].safe_h * (1.0 - ROUNDING) else found
 
 
 def _shortest_safe(reach: FloatArray, closing: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -201,7 +201,7 @@ def collide_with_all(bodies: Bodies) -> BoolArray:
 
 
 def _half_depth(thing: Plane | Wall | Post) -> float:
-    """Return the depth behind its face up to which an object pushes a centre back, m."""
+    """Return the depth behind its surface up to which an object pushes a centre back, m."""
     match thing:
         case Plane():
             return BACKING
@@ -211,12 +211,12 @@ def _half_depth(thing: Plane | Wall | Post) -> float:
             return thing.radius
 
 
-def entry_warnings(scene: Scene, settings: Settings, meet: ContactMatrix) -> Iterator[Diagnostic]:
+def entry_warnings(scene: Scene, settings: Settings, matrix: ContactMatrix) -> Iterator[Diagnostic]:
     """Yield a diagnostic for each zone whose smallest width the fastest body can cross in a substep."""
-    noted = np.flatnonzero(meet.can_enter_zone)
+    noted = np.flatnonzero(matrix.can_enter_zone)
     if not len(noted):
         return
-    speeds, layers = top_speeds(scene, meet)[noted], reachable_layers(scene, scene.bodies)[noted]
+    speeds, layers = top_speeds(scene, matrix)[noted], reachable_layers(scene, scene.bodies)[noted]
     names = scene.fixed_names[len(scene.fixed) + len(scene.pockets) :]
     for zone, name in zip(scene.zones, names, strict=True):
         able = np.flatnonzero(layers & mask_of(zone.layers, scene.layers))

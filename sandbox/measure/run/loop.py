@@ -17,13 +17,13 @@ from sandbox.schedule import ROUNDING, Stretch
 from sandbox.trajectory import Contacts, Frame
 
 WorkCallback = Callable[[int, Mapping[str, int]], None]
-"""Called from time to time, and at the end, with the steps done and the work counters. It may raise to end the run."""
+"""Called at intervals and at the end, with the number of steps and the work counters. It may raise to end the run."""
 
 REPORT_INTERVAL = 0.1
 """s between two calls of the callbacks."""
 
 MAX_PENDING_CONTACTS = 1024
-"""Steps of a game whose contacts are kept apart before they are merged, which bounds memory."""
+"""Steps of a game whose contacts are kept separately before they are merged, which bounds memory."""
 
 
 class RunEnd(NamedTuple):
@@ -175,7 +175,7 @@ class _ActionQueue:
         """the present frame, if it was just read, so that a game need not read it again"""
 
     def apply_due(self, now: float, is_last: bool = False) -> bool:
-        """Apply all actions whose time has come by `now`, s; return whether there were any."""
+        """Apply all actions due by the time `now`, s; return whether there were any."""
         begin = self._due
         while self._due < len(self._actions) and self._actions[self._due].time <= now:
             self._due += 1
@@ -191,7 +191,7 @@ class _ActionQueue:
         return bool(actions)
 
     def notify_end(self) -> None:
-        """Show a game the end of a run within a step, when no action is possible any more."""
+        """Notify the game of the end of a run within a step, when no action is possible any more."""
         if self._game is not None:
             self._game_turn((), is_last=True)
 
@@ -212,8 +212,8 @@ class _ActionQueue:
 
     def contacts(self) -> Contacts:
         """Return all contacts of the run."""
-        rest = self._simulation.contacts()
-        return _by_pair(Contacts.joined([*self._pending, rest]).merged() if self._pending else rest)
+        latest = self._simulation.contacts()
+        return _by_pair(Contacts.joined([*self._pending, latest]).merged() if self._pending else latest)
 
 
 def _by_pair(contacts: Contacts) -> Contacts:

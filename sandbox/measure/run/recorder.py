@@ -163,8 +163,8 @@ class Recorder:
             self.record(frame, frame.time)
 
     def _widen(self, bodies: int) -> None:
-        """Make room for unexpected bodies, such as those that the rules of a game add."""
-        wide = bodies + bodies // 2  # more are to be expected
+        """Enlarge the arrays for unexpected bodies, such as those that the rules of a game add."""
+        wide = bodies + bodies // 2  # more bodies are likely to follow
         if len(self.time) * bytes_per_frame(self._scene, wide, self._account.shape[1]) > free_memory() * FREE_FRACTION:
             raise Exhaustion(f"the frames of {bodies:,} bodies do not fit into memory; use solver.record_every")
         for name in ("position", "velocity", "angle", "angular_velocity", "spin", "layer"):

@@ -63,8 +63,8 @@ def rerun(
     With its own engine and the same versions it ends in the same state, bit for bit: `info["state_hash"]` is that of
     the recording. Another engine computes the whole session, even if the session switched engines.
 
-    The rules of a game run along: `info["game"]` has their score, and in `otherwise` the time, s, from which on they
-    would have acted differently from the recording, which does not happen on the same engine.
+    The rules of a game are evaluated as well: `info["game"]` has their score, and in `otherwise` the first time, s, at
+    which their actions differ from the recording. They do not differ on the same engine.
 
     Args:
         recording: the session.
@@ -168,28 +168,28 @@ class Episode:
             Refusal: the engine does not support the scene.
         """
         self.scene, self.engine = scene, engine
-        self._referee = GameSession(required_rules(scene))
-        self.relay: SwitchableSimulation = start(scene, engine)
-        """what runs"""
-        self.relay.contacts()
+        self._session = GameSession(required_rules(scene))
+        self.simulation: SwitchableSimulation = start(scene, engine)
+        """the running simulation"""
+        self.simulation.contacts()
         self._done: list[Action] = []
         self._levels = [0.0] * len(self.rules.controls)
-        self._look(Contacts.none())
+        self._update_rules(Contacts.none())
 
     @property
     def rules(self) -> Rules:
         """Rules of the game in their present state."""
-        return self._referee.rules
+        return self._session.rules
 
     @property
     def time(self) -> float:
         """Simulated time, s."""
-        return self.relay.time
+        return self.simulation.time
 
     @property
     def late(self) -> bool:
         """Whether the duration of the scene is over."""
-        return self.relay.time >= self.scene.world.duration - 0.5 * self.scene.solver.dt
+        return self.simulation.time >= self.scene.world.duration - 0.5 * self.scene.solver.dt
 
     @property
     def ended(self) -> bool:
@@ -198,7 +198,7 @@ class Episode:
 
     def frame(self) -> Frame:
         """Return the present state."""
-        return self.relay.frame()
+        return self.simulation.frame()
 
     def press(self, levels: Sequence[float]) -> None:
         """Set each control to a level from 0 to 1; a digital control is on above one half.
@@ -210,9 +210,9 @@ class Episode:
             value = _value(control, level)
             if value != self._levels[k]:
                 self._levels[k] = value
-                acts = self._referee.press(self.relay.time, control.name, value)
-                self._do(acts)
-                self._referee.note_actions(acts)
+                acts = self._session.press(self.simulation.time, control.name, value)
+                self._apply(acts)
+                self._session.note_actions(acts)
 
     def step(self) -> None:
         """Advance by one dt and apply the actions of the rules.
@@ -221,8 +221,8 @@ class Episode:
             Divergence, Exhaustion: the engine cannot continue.
             ActionError: an action of the rules is invalid.
         """
-        self.relay.step()
-        self._look(self.relay.contacts())
+        self.simulation.step()
+        self._update_rules(self.simulation.contacts())
 
     def recording(self) -> Recording:
         """Return the session so far as a recording."""
@@ -231,24 +231,24 @@ class Episode:
             engine=self.engine,
             settings=self.scene.solver,
             actions=tuple(self._done),
-            duration=self.relay.time,
-            state_hash=self.relay.state_hash(),
-            presses=self._referee.presses,
+            duration=self.simulation.time,
+            state_hash=self.simulation.state_hash(),
+            presses=self._session.presses,
             score=self.rules.score,
         )
 
     def close(self) -> None:
         """Release the engine."""
-        self.relay.close()
+        self.simulation.close()
 
-    def _look(self, contacts: Contacts) -> None:
-        """Show the rules the present state, and apply their actions."""
-        self._do(self._referee.on_step(self.relay.time, self.relay.frame(), contacts))
+    def _update_rules(self, contacts: Contacts) -> None:
+        """Pass the present state to the rules, and apply their actions."""
+        self._apply(self._session.on_step(self.simulation.time, self.simulation.frame(), contacts))
 
-    def _do(self, acts: Sequence[Action]) -> None:
-        for act in acts:
-            self.relay.apply(act)
-            self._done.append(act)
+    def _apply(self, acts: Sequence[Action]) -> None:
+        for action in acts:
+            self.simulation.apply(action)
+            self._done.append(action)
 
 
 def _value(control: Control, level: float) -> float:

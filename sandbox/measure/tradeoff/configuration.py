@@ -25,7 +25,7 @@ from sandbox.trajectory import Trajectory
 
 MAX_SUBSTEPS, MAX_ITERATIONS = 512, 1000
 MIN_STEPS = 4
-"""Fewest steps of a run with a longer dt than the scene's own: a shorter run says nothing about the error."""
+"""Fewest steps of a run with a longer dt than the scene's own: the error of a shorter run is not meaningful."""
 MAX_FRAMES_PER_STEP = 2.0
 """Longest dt in frames of a game, unless the scene's own is longer."""
 MAX_REFINEMENT, MIN_REFINEMENT = Fraction(256), Fraction(1, 16)
@@ -193,9 +193,9 @@ class SearchSpace:
         return [other for other in found if other != configuration]
 
     def _step_neighbours(self, configuration: Configuration) -> Iterator[Configuration]:
-        own = self.own_settings(configuration.engine)
+        scene_settings = self.own_settings(configuration.engine)
         refinement, substeps, iterations = configuration.refinement, configuration.substeps, configuration.iterations
-        if substeps == own.substeps:  # otherwise more substeps do the same for less
+        if substeps == scene_settings.substeps:  # otherwise more substeps have the same effect at a lower cost
             yield replace(configuration, refinement=refinement / 2)
             if refinement < 4:
                 yield replace(configuration, refinement=refinement * 2)
@@ -227,15 +227,15 @@ class SearchSpace:
 
     @cached_property
     def has_contacts(self) -> bool:
-        """Whether any two things can collide."""
+        """Whether any two objects can collide."""
         return bool(contact_matrix(self.scene).touches.any())
 
     @cached_property
     def has_coupling(self) -> bool:
         """Whether solver iterations can matter: contacts or joints can depend on each other."""
-        meet = contact_matrix(self.scene)
+        matrix = contact_matrix(self.scene)
         return bool(len(self.scene.links)) or (
-            self.has_contacts and (meet.mutual or len(self.scene.fixed) > 1 or meet.solids)
+            self.has_contacts and (matrix.mutual or len(self.scene.fixed) > 1 or matrix.solids)
         )
 
 
@@ -412,8 +412,8 @@ def _run_contexts(
     known: Trajectory | None,
 ) -> _Result:
     """Run all contexts until one fails, and return the worst metrics and the costs."""
-    nothing: dict[str, float | None] = dict.fromkeys(METRICS)
-    worst, cost, spent, seconds, work = nothing, 0.0, 0.0, 0.0, {}
+    unknown: dict[str, float | None] = dict.fromkeys(METRICS)
+    worst, cost, spent, seconds, work = unknown, 0.0, 0.0, 0.0, {}
     for k, context in enumerate(contexts):
         try:
             if k == 0 and known is not None:
@@ -422,14 +422,14 @@ def _run_contexts(
             else:
                 run, counted = bounded_run(context.scene, engine, requested, limit, deadline)
         except RunTimeoutError as error:
-            return _Result("stopped", str(error), nothing, limit, spent + limit, seconds)
+            return _Result("stopped", str(error), unknown, limit, spent + limit, seconds)
         except TooLargeError as error:
-            return _Result("failed", str(error), nothing, 0.0, spent, seconds)
+            return _Result("failed", str(error), unknown, 0.0, spent, seconds)
         seconds, cost = max(seconds, float(run.info["seconds"])), max(cost, counted)
         spent += 0.0 if run is known else counted
         work = dict(run.info["work"])
         if run.status != "ok":
-            return _Result(run.status, run.reason, nothing, cost, spent, seconds, work)
+            return _Result(run.status, run.reason, unknown, cost, spent, seconds, work)
         worst = {name: _worst(worst[name], value) for name, value in measure_all(run, context).items()}
     return _Result("ok", None, worst, cost, spent, seconds, work)
 

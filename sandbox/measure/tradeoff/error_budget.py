@@ -20,13 +20,13 @@ from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Trajectory
 
 ITERATION_FACTOR = 16
-"""Factor of the iterations that stands for infinitely many."""
+"""Factor of the iterations; the result approximates that of infinitely many."""
 MAX_ITERATIONS = 10_000
 """Largest number of iterations that `[solver]` allows."""
 MAX_SUBSTEP_FACTOR = 16
-"""Factor of the substeps that stands for a step of 0; less if the cost limit does not allow it."""
+"""Factor of the substeps; the result approximates that of a step of 0. Smaller if the cost limit does not allow it."""
 STILL_SHRINKING = 1.1
-"""If halving the step lowers the error by more than this factor, the rest belongs to the time step."""
+"""If halving the step lowers the error by more than this factor, the remaining error belongs to the time step."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,8 @@ def error_budget(
     if context.truth is None:
         return None
     runs = _LimitedRuns(context, engine, limit, deadline)
-    own = runs.run(settings)
-    if own is None:
+    coarse = runs.run(settings)
+    if coarse is None:
         return None
     iterated = settings.replace(iterations=min(settings.iterations * ITERATION_FACTOR, MAX_ITERATIONS))
     converged = runs.run(iterated)
@@ -85,8 +85,8 @@ def error_budget(
     return ErrorBudget(
         engine=engine,
         settings=ENGINES[engine].resolve(context.scene, settings),
-        total=runs.distance(own, truth),
-        solver=runs.distance(own, converged),
+        total=runs.distance(coarse, truth),
+        solver=runs.distance(coarse, converged),
         time_step=runs.distance(converged, finest),
         model=None if is_shrinking else residual,
         residual=residual,

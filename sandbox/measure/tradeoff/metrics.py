@@ -27,7 +27,7 @@ REST_FRACTION = 0.01
 
 @dataclass(frozen=True, eq=False)
 class EvaluationContext:
-    """What runs are scored against: scene, truth and scale."""
+    """Reference of the scores of runs: scene, truth and scale."""
 
     scene: Scene
     """the scene, with the seed of this context"""
@@ -154,7 +154,7 @@ def rms_position(run: Trajectory, context: EvaluationContext) -> float | None:
 
 
 def final_position(run: Trajectory, context: EvaluationContext) -> float | None:
-    """Return the largest distance from the truth, m, in the last trusted frame that still has a body."""
+    """Return the largest distance from the truth, m, in the last trusted frame that has a body."""
     if context.truth is None:
         return None
     found = context.errors(run)
@@ -179,8 +179,8 @@ def bounce_height(run: Trajectory, context: EvaluationContext) -> float | None:
         contacts = truth.contact_time[(truth.contact_pair == body).any(axis=1) & hits]
         kept = both[:, body] & (time >= np.min(contacts, initial=np.inf))
         if kept.any():
-            own, right = run.position[frames[kept], body], truth.position[truth_frames[kept], body]
-            error = abs(_highest(own, context.down) - _highest(right, context.down))
+            positions, true_positions = run.position[frames[kept], body], truth.position[truth_frames[kept], body]
+            error = abs(_highest(positions, context.down) - _highest(true_positions, context.down))
             worst = error if worst is None else max(worst, error)
     return worst
 
@@ -204,8 +204,8 @@ def joints(run: Trajectory, context: EvaluationContext) -> float | None:
 def penetration(run: Trajectory, context: EvaluationContext) -> float | None:
     """Return the deepest overlap of any pair in contact, in any frame, m; None without contacts.
 
-    An overlap in the first frame is the scene's, not the engine's. Of such a pair, only depth that is regained after
-    the overlap has decreased counts.
+    An overlap in the first frame is a property of the scene, not of the engine. Of such a pair, only an increase of the
+    depth after the overlap has decreased counts.
     """
     pairs = np.unique(run.contact_pair[are_collisions(run)], axis=0)
     if not len(pairs):
@@ -251,8 +251,8 @@ def settle_time(run: Trajectory, context: EvaluationContext) -> float | None:
     """
     if context.truth is None or context.until < context.scene.world.duration:
         return None
-    own, right = _settled(run, context), _settled(context.truth.trajectory, context)
-    return None if math.isinf(right) else abs(own - right)
+    settled, true_settled = _settled(run, context), _settled(context.truth.trajectory, context)
+    return None if math.isinf(true_settled) else abs(settled - true_settled)
 
 
 def _settled(run: Trajectory, context: EvaluationContext) -> float:

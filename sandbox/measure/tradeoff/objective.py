@@ -67,7 +67,7 @@ def check_objective(metric: str | None, tolerance: float | None, budget: float |
 def complete_objective(
     context: EvaluationContext, metric: str | None, tolerance: float | None, budget: float | None, fps: float
 ) -> Objective:
-    """Return an objective that passed `check_objective`, with defaults for what was not given."""
+    """Return an objective that passed `check_objective`, with defaults for the values not given."""
     chosen, reason = choose_metric(context) if metric is None else (metric_named(metric), "it was requested")
     if tolerance is None:
         fallback = default_tolerance(context.scene)
@@ -124,9 +124,9 @@ def conserves_energy(scene: Scene) -> bool:
         return False
     if scene.links.figures[:, 2].any():
         return False
-    meet = contact_matrix(scene)
-    elastic = (meet.surfaces.restitution == 1.0) & meet.surfaces.fixed_coefficients
-    return bool(elastic[meet.touching].all() and meet.friction == 0.0)
+    matrix = contact_matrix(scene)
+    elastic = (matrix.surfaces.restitution == 1.0) & matrix.surfaces.fixed_coefficients
+    return bool(elastic[matrix.touching].all() and matrix.friction == 0.0)
 
 
 def pareto(items: Iterable[T], cost: Callable[[T], float], error: Callable[[T], float]) -> list[T]:

@@ -1,4 +1,4 @@
-"""Recommendation: the evaluation that answers a question, or the nearest one if there is none."""
+"""Recommendation: the evaluation that satisfies an objective, or the nearest one if none does."""
 
 from collections.abc import Callable, Sequence
 
@@ -16,11 +16,12 @@ FRAME_TOLERANCE = 1.01
 
 NOISE_FACTOR = 1.5
 """Times of different engines within this factor count as equal, and counted work decides. The minimum of 5 repeats in
-turns varied by 2 to 7 % in 8 measurements of 8 settings on a machine at a load of 5; the rest is room for more load."""
+turns varied by 2 to 7 % in 8 measurements of 8 settings on a machine at a load of 5; the rest allows for more load."""
 
 WORK_FACTOR = 4.0
-"""Within one engine, counted work, which has no noise, decides up to this factor of the least time; beyond it, the time
-does. Counted works are within a factor of 2.5 of the time (`bounded_run.COST_WEIGHTS`)."""
+"""Within one engine, counted work, which has no noise, decides up to this factor of the smallest time; beyond it, the
+time decides. Counted works are within a factor of 2.5 of the time (`bounded_run.COST_WEIGHTS`).
+"""
 
 EQUAL_WORK_FACTOR = 1.05
 """Counted works within this factor of the least count as equal, and the setting with fewer changes is taken: the
@@ -37,7 +38,7 @@ def recommend_cheapest(
 
     Args:
         points: the evaluations.
-        objective: what is asked for.
+        objective: metric, tolerance and budget.
         seeds: validation seeds; empty if the scene has no randomness.
         validate: returns the error with these seeds.
     """
@@ -92,18 +93,18 @@ def by_cost(points: Sequence[Evaluation]) -> list[Evaluation]:
     ]
     found = []
     while engines:
-        least = min(own[0].cost or 0.0 for own in engines)
-        close = [own for own in engines if (own[0].cost or 0.0) <= NOISE_FACTOR * least]
-        found.append(min(close, key=lambda own: _counted_cost(own[0])).pop(0))
-        engines = [own for own in engines if own]
+        lowest = min(group[0].cost or 0.0 for group in engines)
+        candidates = [group for group in engines if (group[0].cost or 0.0) <= NOISE_FACTOR * lowest]
+        found.append(min(candidates, key=lambda group: _counted_cost(group[0])).pop(0))
+        engines = [group for group in engines if group]
     return [*found, *sorted((p for p in points if not p.repeats), key=_counted_cost)]
 
 
 def _by_work_and_time(points: Sequence[Evaluation]) -> list[Evaluation]:
     """Return the evaluations of one engine from the cheapest on."""
     by_time = sorted(points, key=lambda each: each.cost or 0.0)
-    near = [p for p in by_time if (p.cost or 0.0) <= WORK_FACTOR * (by_time[0].cost or 0.0)]
-    return [*_by_work(near), *by_time[len(near) :]]
+    comparable = [p for p in by_time if (p.cost or 0.0) <= WORK_FACTOR * (by_time[0].cost or 0.0)]
+    return [*_by_work(comparable), *by_time[len(comparable) :]]
 
 
 def _by_work(points: Sequence[Evaluation]) -> list[Evaluation]:
@@ -153,7 +154,7 @@ def label(point: Evaluation) -> str:
     """Return an engine and the changes of its settings: `reference with integrator = rk4`."""
     changes = ", ".join(f"{key} = {format_value(value)}" for key, value in point.changes.items() if value is not None)
     dropped = ", ".join(key for key, value in point.changes.items() if value is None)
-    parts = [f"{word} {what}" for word, what in (("with", changes), ("without", dropped)) if what]
+    parts = [f"{word} {text}" for word, text in (("with", changes), ("without", dropped)) if text]
     return " ".join([point.engine, *parts]) if parts else f"{point.engine} with the settings of the scene"
 
 

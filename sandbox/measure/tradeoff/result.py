@@ -148,8 +148,8 @@ class Tradeoff(HtmlRepr):
     def _answer(self, found: Recommendation | None, nearest: Recommendation | None) -> str:
         if found is not None:
             return found.sentence
-        none = f"none of the {len(self.points)} settings tried"
-        return none if nearest is None else f"{none}; the nearest is {nearest.sentence}"
+        prefix = f"none of the {len(self.points)} settings tried"
+        return prefix if nearest is None else f"{prefix}; the nearest is {nearest.sentence}"
 
     def document(self, scene: str | None = None) -> dict[str, Any]:
         """Return the trade-off as one JSON document.

@@ -82,8 +82,8 @@ class SettingsSearch:
         return list(self.evaluations.values())
 
     def _search(self) -> None:
-        own = self.space.starts()[: self.max_evaluations]
-        starts = [self._evaluate(each) for each in own if clock_without_compilation() < self.deadline]
+        configurations = self.space.starts()[: self.max_evaluations]
+        starts = [self._evaluate(each) for each in configurations if clock_without_compilation() < self.deadline]
         for start in starts:
             self._refine_to_tolerance(start)
         by_engine = {start.engine: start for start in starts if start is not None and start.status != "stopped"}
@@ -134,7 +134,7 @@ class SettingsSearch:
             promising = [e for c, e in self.evaluations.items() if c not in expanded and self._is_promising(e)]
             if not promising:
                 break
-            # A slow engine leaves the others their part of the effort.
+            # A slow engine does not use up the effort of the others.
             engine = min({each.engine for each in promising}, key=self._spent_on)
             best = min((each for each in promising if each.engine == engine), key=next(turns[engine]))
             expanded.add(best.configuration)
@@ -213,34 +213,34 @@ class SettingsSearch:
     def _bisect_all(self) -> None:
         """Find the fewest substeps and iterations of each evaluation that meets the tolerance and is not dominated."""
         for setting in ("substeps", "iterations") if self.space.has_coupling else ("substeps",):
-            meeting = [each for each in self.evaluations.values() if self._meets(each) and each.engine != "exact"]
-            for each in meeting:
+            accepted = [each for each in self.evaluations.values() if self._meets(each) and each.engine != "exact"]
+            for each in accepted:
                 if self._is_promising(each):
                     self._halve(setting, each)
 
     def _meets(self, evaluation: Evaluation) -> bool:
         return evaluation.ranking_error <= self.tolerance
 
-    def _halve(self, setting: str, meeting: Evaluation) -> None:
+    def _halve(self, setting: str, accepted: Evaluation) -> None:
         """Halve a setting as long as the tolerance is met, then bisect between the last two values."""
         while self._may_continue():
-            value = getattr(meeting.configuration, setting)
-            less = _with(meeting.configuration, setting, value // 2)
-            found = self._evaluate(less, meeting) if self.space.is_valid(less) else None
+            value = getattr(accepted.configuration, setting)
+            halved = _with(accepted.configuration, setting, value // 2)
+            found = self._evaluate(halved, accepted) if self.space.is_valid(halved) else None
             if found is None:
                 return
             if not self._meets(found):
-                self._bisect(setting, value // 2, value, meeting)
+                self._bisect(setting, value // 2, value, accepted)
                 return
-            meeting = found
+            accepted = found
 
-    def _bisect(self, setting: str, low: int, high: int, meeting: Evaluation) -> None:
+    def _bisect(self, setting: str, low: int, high: int, accepted: Evaluation) -> None:
         """Bisect between a value that misses the tolerance and one that meets it, to 1/8 of the latter."""
         while high - low > max(1, high // 8) and self._may_continue():
-            middle = _with(meeting.configuration, setting, (low + high) // 2)
+            middle = _with(accepted.configuration, setting, (low + high) // 2)
             if not self.space.is_valid(middle):
                 return
-            found = self._evaluate(middle, meeting)
+            found = self._evaluate(middle, accepted)
             if found is None:
                 return
             if self._meets(found):

@@ -63,7 +63,7 @@ class Simplification:
 
 @dataclass(frozen=True)
 class ReplacedSetting:
-    """Setting that a simplification replaces, and what the simplification has to satisfy."""
+    """Setting that a simplification replaces, and the conditions that the simplification has to satisfy."""
 
     engine: str
     settings: Settings
@@ -91,8 +91,8 @@ def model_simplifications(contexts: Sequence[EvaluationContext], replaced: Repla
         error, simpler = 0.0, None
         for context in contexts:
             changed = _changed(context.scene, change.change)
-            own = None if changed is None else _error(context, changed, replaced)
-            error = max(error, math.inf if own is None else own)
+            measured = None if changed is None else _error(context, changed, replaced)
+            error = max(error, math.inf if measured is None else measured)
             if not error <= replaced.tolerance:
                 break
             simpler = simpler or changed
@@ -118,12 +118,12 @@ def _closed_form(contexts: Sequence[EvaluationContext], replaced: ReplacedSettin
     (before,) = time_in_turns([TimedRun(scene, replaced.engine, settings)], replaced.repeats)
     if worst > replaced.tolerance or before is None:
         return
-    taken = []
+    seconds = []
     for _ in range(replaced.repeats):
         began = clock_without_compilation()
         solved_run(scene, settings)
-        taken.append(clock_without_compilation() - began)
-    after = Timing.of(taken, scene.world.duration)
+        seconds.append(clock_without_compilation() - began)
+    after = Timing.of(seconds, scene.world.duration)
     if after.least <= MAX_COST_RATIO * before.least:
         what = "no simulation: the scene has a closed-form solution"
         advice = (
@@ -162,7 +162,7 @@ def _simplification(
 
 
 def _changed(scene: Scene, change: Change) -> Scene | None:
-    """Return a changed scene; None if it is invalid or places its bodies differently."""
+    """Return a changed scene; None if it is invalid or its bodies have other positions."""
     document = to_document(scene)
     change(document)
     try:
@@ -175,9 +175,9 @@ def _changed(scene: Scene, change: Change) -> Scene | None:
 def _applicable_changes(contexts: Sequence[EvaluationContext]) -> Iterator[ModelChange]:
     """Yield the changes that the scene and the truths of all seeds allow."""
     scene = contexts[0].scene
-    world, meet = scene.world, contact_matrix(scene)
+    world, matrix = scene.world, contact_matrix(scene)
     pairs = _contact_pairs(contexts)
-    if pairs is not None and meet.touches.any():
+    if pairs is not None and matrix.touches.any():
         if not len(pairs):
             yield ModelChange(
                 'no collisions occur: collides = "none" for all moving bodies',
@@ -185,7 +185,7 @@ def _applicable_changes(contexts: Sequence[EvaluationContext]) -> Iterator[Model
                 "because none occur",
                 _set_collides(scene, "none"),
             )
-        elif meet.mutual and not (pairs >= 0).all(axis=1).any():
+        elif matrix.mutual and not (pairs >= 0).all(axis=1).any():
             yield ModelChange(
                 'no two bodies collide: collides = "fixed" for all moving bodies',
                 'the scene can also be simulated without collisions between bodies (collides = "fixed" for all moving '

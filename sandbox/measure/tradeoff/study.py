@@ -1,8 +1,8 @@
 """Study of the trade-off of a scene: engines and settings are tried, timed and scored against the best known truth.
 
 Which settings are tried, in which order, and their errors depend on the scene and on the counted work that is allowed,
-never on the clock, unless there is a time limit. Times are of this machine; if two are too close to be told apart,
-counted work decides which is cheaper.
+never on the clock, unless there is a time limit. Times are of this machine; if two are within the noise, counted
+work decides which is cheaper.
 """
 
 import math
@@ -60,7 +60,7 @@ from sandbox.scene.files.load import as_scene
 from sandbox.trajectory import Trajectory
 
 DEFAULT_EFFORT = 10.0
-"""Default counted work of the search, about seconds; truth and timing come on top."""
+"""Default counted work of the search, about seconds; truth and timing are additional."""
 DEFAULT_REPEATS = 5
 MAX_POINTS = 120
 TIMED_MARGIN = 0.5
@@ -142,23 +142,23 @@ def tradeoff(
 
     on_progress(Progress("the truth"))
     seeding = _seeds(scene, seeds)
-    closeness = _truth_tolerance(scene, metric, tolerance)
-    contexts = _contexts(scene, base, closeness, seeding.search, zoom, truth)
+    truth_tolerance = _truth_tolerance(scene, metric, tolerance)
+    contexts = _contexts(scene, base, truth_tolerance, seeding.search, zoom, truth)
     if (
         metric is not None
         and metric_named(metric).unit == "px"
         and tolerance
-        and tolerance / contexts[0].zoom < closeness
+        and tolerance / contexts[0].zoom < truth_tolerance
     ):
-        closeness = tolerance / contexts[0].zoom
-        contexts = _contexts(scene, base, closeness, seeding.search, contexts[0].zoom)
+        truth_tolerance = tolerance / contexts[0].zoom
+        contexts = _contexts(scene, base, truth_tolerance, seeding.search, contexts[0].zoom)
     objective = complete_objective(contexts[0], metric, tolerance, budget, fps)
     study = _Study(
         space=SearchSpace(scene, base, tuple(name for name in names if not _refusal(scene, name, base)), 1.0 / fps),
         contexts=contexts,
         objective=objective._replace(max_dt=max(base.dt, FRAME_TOLERANCE / fps)),
         seeding=seeding,
-        closeness=closeness,
+        truth_tolerance=truth_tolerance,
         effort=effort,
         deadline=deadline,
         on_progress=on_progress,
@@ -170,12 +170,12 @@ def tradeoff(
 def _check_arguments(
     seeds: int, zoom: float | None, effort: float, time_limit: float | None, repeats: int, most: int
 ) -> None:
-    for what, count in (("seeds", seeds), ("repeats", repeats), ("most", most)):
+    for name, count in (("seeds", seeds), ("repeats", repeats), ("most", most)):
         if count < 1:
-            raise ValueError(f"{what} is {count}; it must be at least 1")
-    for what, value in (("zoom", zoom), ("effort", effort), ("time limit", time_limit)):
+            raise ValueError(f"{name} is {count}; it must be at least 1")
+    for name, value in (("zoom", zoom), ("effort", effort), ("time limit", time_limit)):
         if value is not None and not 0.0 < value < math.inf:
-            raise ValueError(f"{what} is {value:g}; it must be positive and finite")
+            raise ValueError(f"{name} is {value:g}; it must be positive and finite")
 
 
 @dataclass(frozen=True)
@@ -198,16 +198,16 @@ def _seeds(scene: Scene, count: int) -> _Seeding:
 
 def _truth_tolerance(scene: Scene, metric: str | None, tolerance: float | None) -> float:
     """Return the error that a truth may have, m."""
-    closeness = default_tolerance(scene)
+    truth_tolerance = default_tolerance(scene)
     if tolerance is not None and tolerance > 0.0 and (metric is None or metric_named(metric).unit == "m"):
-        closeness = min(closeness, tolerance)
-    return closeness
+        truth_tolerance = min(truth_tolerance, tolerance)
+    return truth_tolerance
 
 
 def _contexts(
     scene: Scene,
     base: Settings,
-    closeness: float,
+    truth_tolerance: float,
     seeds: Sequence[int],
     zoom: float | None,
     known: Truth | str | None = None,
@@ -217,7 +217,7 @@ def _contexts(
     for seed in seeds:
         is_own = seed == scene.world.seed
         seeded = scene if is_own else with_seed(scene, seed)
-        result = known if is_own and known is not None else find_truth(seeded, base, closeness)
+        result = known if is_own and known is not None else find_truth(seeded, base, truth_tolerance)
         truth, doubt = (result, None) if isinstance(result, Truth) else (None, result)
         zoom = default_zoom(seeded, truth) if zoom is None else zoom  # one scale for all seeds
         found.append(EvaluationContext(seeded, truth, zoom, doubt))
@@ -245,7 +245,7 @@ class _Study:
     contexts: Sequence[EvaluationContext]
     objective: Objective
     seeding: _Seeding
-    closeness: float
+    truth_tolerance: float
     """m, error that a truth may have"""
     effort: float
     deadline: float
@@ -256,7 +256,7 @@ class _Study:
     _validation_errors: dict[Configuration, float] = field(default_factory=dict)
 
     def run(self, runs: Mapping[str, Trajectory], repeats: int, most: int) -> Tradeoff:
-        """Search, time and recommend. After Ctrl-C, recommend from what was evaluated, with the times of those runs."""
+        """Search, time and recommend; after Ctrl-C, with the finished evaluations and their times."""
         budget, duration = self.objective.seconds_budget, self.space.scene.world.duration
         search = SettingsSearch(
             space=self.space,
@@ -279,14 +279,14 @@ class _Study:
         return self._result(search, evaluations, 0, ())
 
     def _reusable(self, runs: Mapping[str, Trajectory]) -> dict[str, Trajectory]:
-        """Return the runs that the engines' own settings in this search would repeat, as far as the metric needs."""
+        """Return the given runs with the own settings of an engine, if they have the data that the metric needs."""
         found: dict[str, Trajectory] = {}
         for name in self.space.engines:
             run = runs.get(name)
             if run is None or (self.objective.metric.name in AUDIT_METRICS and not run.info["audited"]):
                 continue
-            own = ENGINES[name].resolve(self.space.scene, self.space.own_settings(name)).model_dump(mode="json")
-            if run.info["settings"] == own and run.info["seed"] == self.space.scene.world.seed:
+            resolved = ENGINES[name].resolve(self.space.scene, self.space.own_settings(name)).model_dump(mode="json")
+            if run.info["settings"] == resolved and run.info["seed"] == self.space.scene.world.seed:
                 found[name] = run
         return found
 
@@ -352,13 +352,13 @@ class _Study:
             for each in evaluations
             if each.status == "ok"
         }
-        near = self._near_front(evaluations)
-        if repeats and near:
-            once = sum(each.counted_seconds for each in near)
+        near_front = self._near_front(evaluations)
+        if repeats and near_front:
+            once = sum(each.counted_seconds for each in near_front)
             affordable = int(TIMING_FRACTION * self.effort / once) if once else repeats
-            runs = [TimedRun(self.space.scene, each.engine, each.asked) for each in near]
+            runs = [TimedRun(self.space.scene, each.engine, each.asked) for each in near_front]
             found = time_in_turns(runs, min(repeats, max(MIN_REPEATS, affordable)))
-            for each, timing in zip(near, found, strict=True):
+            for each, timing in zip(near_front, found, strict=True):
                 if timing is None:
                     timings.pop(each.configuration, None)
                 else:
@@ -367,22 +367,22 @@ class _Study:
 
     def _near_front(self, evaluations: Sequence[Evaluation]) -> list[Evaluation]:
         """Return the successful evaluations that are near the front of their engine, or have the scene's settings."""
-        near: list[Evaluation] = []
+        near_front: list[Evaluation] = []
         for engine in self.space.engines:
-            own = [each for each in evaluations if each.status == "ok" and each.engine == engine]
-            others = [(each.counted_seconds, each.ranking_error) for each in own]
-            near += [
+            successful = [each for each in evaluations if each.status == "ok" and each.engine == engine]
+            others = [(each.counted_seconds, each.ranking_error) for each in successful]
+            near_front += [
                 each
-                for each in own
+                for each in successful
                 if each.is_own or not is_dominated(each.counted_seconds, each.ranking_error, others, TIMED_MARGIN)
             ]
-        return near
+        return near_front
 
     def _validate(self, point: Evaluation) -> float:
         """Return the error of a configuration with the validation seeds; their truths are found at the first call."""
         if not self._validation_contexts:
             scene, base, zoom = self.space.scene, self.space.base, self.contexts[0].zoom
-            self._validation_contexts = _contexts(scene, base, self.closeness, self.seeding.validation, zoom)
+            self._validation_contexts = _contexts(scene, base, self.truth_tolerance, self.seeding.validation, zoom)
         known = self._validation_errors
         if point.configuration not in known:
             found = evaluate(
@@ -438,7 +438,7 @@ def setting_warnings(scene: Scene, engine: str, settings: Settings) -> list[Diag
     if not limits:
         return found
     safe = largest_safe_dt(scene, settings)
-    # It is unknown if something can add any speed; then the speeds in the diagnostics decide.
+    # It is unknown if an unbounded cause accelerates bodies; then the speeds in the diagnostics decide.
     effect = "prevents tunnelling at these speeds" if safe is None else "prevents tunnelling"
     safe = min(limits) if safe is None else safe
     ratio = settings.substeps * settings.dt / safe if safe > 0.0 else math.inf

@@ -42,11 +42,11 @@ class TimedRun(NamedTuple):
 
 
 def time_in_turns(runs: Sequence[TimedRun], repeats: int) -> list[Timing | None]:
-    """Time several runs in turns, so that a machine that slows down slows down all of them.
+    """Time several runs in turns, so that a change of the machine's speed affects all of them.
 
     Args:
         runs: the runs.
-        repeats: how often each is run, after a warm-up.
+        repeats: number of runs of each, after a warm-up.
 
     Returns:
         The cost of each run; None if it does not reach its end.
@@ -58,13 +58,15 @@ def time_in_turns(runs: Sequence[TimedRun], repeats: int) -> list[Timing | None]
 
 
 def take_turns(timers: Sequence[Callable[[], float | None]], repeats: int) -> list[list[float]]:
-    """Call several timers in turns and return the times of each, s; none of one that failed, which is not called again.
+    """Call several timers in turns and return the times of each, s; an empty list for a timer that failed.
+
+    A timer that failed is not called again.
 
     Args:
         timers: each returns a time, s, or None if it failed.
         repeats: number of turns.
     """
-    taken: list[list[float]] = [[] for _ in timers]
+    times: list[list[float]] = [[] for _ in timers]
     failed = [False] * len(timers)
     for _ in range(repeats):
         for k, timer in enumerate(timers):
@@ -73,10 +75,10 @@ def take_turns(timers: Sequence[Callable[[], float | None]], repeats: int) -> li
             seconds = timer()
             if seconds is None:
                 failed[k] = True
-                taken[k].clear()
+                times[k].clear()
             else:
-                taken[k].append(seconds)
-    return taken
+                times[k].append(seconds)
+    return times
 
 
 @reraise_interrupt()

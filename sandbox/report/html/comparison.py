@@ -38,17 +38,17 @@ DEFAULTS = Settings()
 
 
 def settings_text(settings: Mapping[str, Any], engine: str | None = None) -> str:
-    """Return settings as TOML, without those that are left to the engine.
+    """Return settings as TOML, without those left to the engine.
 
     Args:
-        settings: by name; None is left out, and so are defaults of the settings that are not numerical.
-        engine: written as a comment.
+        settings: settings by name; None is left out, and so are defaults of settings that are not numerical.
+        engine: name of the engine, written as a comment.
     """
     lines = ["[solver]" if engine is None else f"[solver]  # {engine}"]
     for name, value in settings.items():
         if value is None or (name in {"half_kick", "record_every"} and value == getattr(DEFAULTS, name)):
             continue
-        # Strings, integers, floats and booleans are written alike in TOML and JSON.
+        # Strings, integers, floats and booleans have the same form in TOML and JSON.
         lines.append(f"{name} = {json.dumps(value)}")
     return "\n".join(lines)
 
@@ -130,7 +130,7 @@ def comparison_page(comparison: Comparison, replayed: bool = True) -> Page:
     """Return the page of a comparison.
 
     Args:
-        comparison: which.
+        comparison: the comparison.
         replayed: with the replay and the charts beside it.
     """
     scene = comparison.scene
@@ -156,7 +156,7 @@ def meanings_of(*columns: Sequence[HtmlColumn]) -> Markup:
 
 
 def truth_sentence(comparison: Comparison) -> str:
-    """Return what the truth is, as a sentence of its own."""
+    """Return the kind and source of the truth as a complete sentence."""
     text = comparison.sentence()
     return f"{text[0].upper()}{text[1:]}."
 
@@ -165,15 +165,15 @@ def linked_plots(comparison: Comparison, name: str) -> Markup:
     """Return the replay, and beside it the charts over time, which share a time cursor.
 
     Args:
-        comparison: which.
+        comparison: the comparison.
         name: prefix of the identifiers of the charts, unique in the page.
     """
     scene, truth, duration = comparison.scene, comparison.best, comparison.scene.world.duration
     moving, tracks, classes = ~scene.bodies.fixed, [], css_classes(comparison)
     for row_name, run in comparison.trajectories.items():
-        error, own = None, comparison.truth_of(row_name)
-        if own is not None:
-            found = errors(run, own.trajectory, moving)
+        error, row_truth = None, comparison.truth_of(row_name)
+        if row_truth is not None:
+            found = errors(run, row_truth.trajectory, moving)
             error = found.time, found.position
         tracks.append(Track(row_name, classes[row_name], run, error))
     names = ", ".join(comparison.trajectories) or "nothing"
@@ -208,7 +208,7 @@ def engines_table(comparison: Comparison) -> Markup:
 
 
 def cost_of(comparison: Comparison, row: Row) -> float | None:
-    """Return the cost of an engine, ms per simulated second, of this single run that keeps all frames."""
+    """Return the cost of an engine, ms per simulated second, from this single run with all frames."""
     run = comparison.trajectories.get(row.name)
     if row.seconds is None or run is None or not len(run.time) or not run.time[-1] > 0.0:
         return None
@@ -216,7 +216,7 @@ def cost_of(comparison: Comparison, row: Row) -> float | None:
 
 
 def remarks(comparison: Comparison) -> Markup | None:
-    """Return why engines refused or failed, and the reference of the energy error."""
+    """Return the reasons of refusals and failures, and the reference of the energy error."""
     classes = css_classes(comparison)
     found: list[Content] = [
         row.reason
@@ -233,7 +233,7 @@ def remarks(comparison: Comparison) -> Markup | None:
 
 
 def explanations(comparison: Comparison) -> list[Section]:
-    """Return the sections on causes of errors, where they were examined, and on missed and phantom contacts."""
+    """Return the sections on causes of errors, if they were examined, and on missed and phantom contacts."""
     found, classes = [], css_classes(comparison)
     verdicts = [(engine_name(row.name, classes[row.name]), row.verdict) for row in comparison.rows if row.verdict]
     if verdicts:

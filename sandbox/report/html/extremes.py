@@ -23,7 +23,7 @@ from sandbox.report.html.page import (
 
 TEMPLATE = "extremes.html.j2"
 ExtremesMapping = Mapping[str, Any]
-"""What `sandbox extremes --json` prints."""
+"""Document that `sandbox extremes --json` prints."""
 
 SIGNS: dict[Verdict, tuple[str, Shade]] = {
     "exact": ("✓", "good"),
@@ -60,18 +60,18 @@ def extremes_page(document: ExtremesMapping) -> Page:
         lead = "The last level that passed and the first that failed, found by bisection."
         sections.append(Section("Limits", _limits(document["limits"]), lead=lead))
     if document["predictions"]:
-        sections.append(Section("Forecasts", _predictions(document["predictions"]), lead=PREDICTIONS))
+        sections.append(Section("Predictions", _predictions(document["predictions"]), lead=PREDICTIONS))
     lead_of_page = fragment(TEMPLATE, "lead", summary, meanings)
     provenance = document["versions"], document["machine"]
-    return Page("How far each engine goes", "Extremes", sections, lead_of_page, *provenance)
+    return Page("Limits of each engine", "Extremes", sections, lead_of_page, *provenance)
 
 
 def _verdict_table(axis: str, cells: Sequence[ExtremesMapping]) -> Markup:
     """Return the table of an axis: a row for each engine and setup, a column for each level."""
-    own = [cell for cell in cells if cell["axis"] == axis]
-    levels = sorted({float(cell["level"]) for cell in own})
+    axis_cells = [cell for cell in cells if cell["axis"] == axis]
+    levels = sorted({float(cell["level"]) for cell in axis_cells})
     found: dict[tuple[str, str], dict[float, dict[str, str]]] = {}
-    for cell in own:
+    for cell in axis_cells:
         word: Verdict = cell["verdict"]
         shown = {"word": word, "sign": SIGNS[word][0], "reason": cell["reason"]}
         found.setdefault((cell["engine"], _setup(cell)), {})[float(cell["level"])] = shown
@@ -126,4 +126,4 @@ def _predictions(predictions: Sequence[ExtremesMapping]) -> Markup:
         ]
         for row in predictions
     ]
-    return table(columns, cells, "Forecasts")
+    return table(columns, cells, "Predictions")

@@ -31,7 +31,7 @@ THEME = {
 }
 """Variable of the style sheet for each colour of the figures."""
 CSS = "css:"
-"""Begins a gid that names a class."""
+"""Prefix of a gid that names a class."""
 _NAMESPACE = re.compile(r"\{[^}]*\}")
 _LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _SPACE_OF_PATH = re.compile(r"\s*([MLHVCQzZ])\s*")
@@ -47,8 +47,8 @@ def svg_of(figure: Figure, name: str, label: str, css_class: str) -> Element:
     """Return a figure as an SVG element that a page can hold.
 
     Args:
-        figure: its background is not drawn.
-        name: of the chart, unique in the page: identifiers in it are derived from it.
+        figure: the figure; its background is not drawn.
+        name: name of the chart, unique in the page; identifiers in the chart are derived from it.
         label: description for screen readers.
         css_class: class of the element.
     """
@@ -79,13 +79,13 @@ def markup_of(root: Element) -> Markup:
 
 
 def time_chart(figure: Figure, name: str, label: str, duration: float) -> Markup:
-    """Return a chart over time, with the cursor that `charts.js` moves and the geometry which that needs.
+    """Return a chart over time, with the cursor that `charts.js` moves and the geometry that it needs.
 
     Args:
-        figure: of one panel, whose x axis spans 0 to `duration`.
-        name: of the chart, unique in the page.
+        figure: figure with one panel, whose x axis spans 0 to `duration`.
+        name: name of the chart, unique in the page.
         label: description for screen readers.
-        duration: s.
+        duration: duration of the time axis, s.
     """
     root = svg_of(figure, name, label, "chart time")
     width, height = (DPI * float(inches) for inches in figure.get_size_inches())
@@ -99,7 +99,7 @@ def time_chart(figure: Figure, name: str, label: str, duration: float) -> Markup
 
 
 def _convert(parent: Element) -> None:
-    """Rewrite an element and all within: no namespaces, style sheets, metadata and inline styles."""
+    """Rewrite an element and its descendants: no namespaces, style sheets, metadata and inline styles."""
     parent.tag = _NAMESPACE.sub("", parent.tag)
     attributes = {_NAMESPACE.sub("", key): value for key, value in parent.attrib.items()}
     style = attributes.pop("style", "")

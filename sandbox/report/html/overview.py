@@ -62,17 +62,17 @@ class SceneReport:
     """Results of one scene."""
 
     name: str
-    """as the user gave it"""
+    """name or path given by the user"""
     comparison: Comparison | None = None
     failure: str | None = None
-    """why there is no comparison"""
+    """reason why there is no comparison"""
     tradeoff: TradeoffMapping | None = None
-    """what `sandbox tradeoff --json` prints; None if it was not measured"""
+    """document that `sandbox tradeoff --json` prints; None if it was not measured"""
 
 
 @dataclass
 class Overview:
-    """A page that grows scene by scene. It keeps the markup of each scene, not its runs."""
+    """Page to which scenes are added one by one. It stores the markup of each scene, not its runs."""
 
     title: str = "Accuracy and cost of each engine"
     rows: list[list[Content]] = field(default_factory=list)

@@ -33,7 +33,7 @@ Shade = Literal["good", "fair", "bad", "none"]
 
 
 def fragment(template: str, macro: str, *arguments: Any, **named: Any) -> Markup:
-    """Return what a macro of a template renders."""
+    """Return the result of a macro of a template."""
     return Markup(getattr(_environment().get_template(template).module, macro)(*arguments, **named))
 
 
@@ -64,10 +64,10 @@ class HtmlColumn(NamedTuple):
 
 
 def table(columns: Sequence[HtmlColumn], rows: Sequence[Sequence[Content]], caption: str, wide: bool = False) -> Markup:
-    """Return a table, which scrolls by itself where it is wider than the page.
+    """Return a table, which scrolls if it is wider than the page.
 
     Args:
-        columns: of the table; the first one names the rows. An empty cell in it continues the row above.
+        columns: columns of the table; the first one names the rows. An empty cell in it continues the row above.
         rows: a cell for each column.
         caption: description for screen readers.
         wide: take the whole width of the page.
@@ -90,7 +90,7 @@ def definitions(rows: Mapping[str, Content]) -> Markup:
 
 
 def isolated(text: str) -> Markup:
-    """Return a text of the user, isolated: right-to-left writing does not change the order of the texts around it."""
+    """Return a text of the user, isolated: right-to-left text does not change the order of the surrounding texts."""
     return Markup("<bdi>{}</bdi>").format(text)
 
 
@@ -108,8 +108,8 @@ def badge(word: str, shade: Shade, about: str | None = None) -> Markup:
     """Return a word on a coloured background.
 
     Args:
-        word: to show.
-        shade: its colours.
+        word: word to show.
+        shade: class of the colours.
         about: explanation, shown when the pointer is over it.
     """
     return fragment("parts.html.j2", "badge", word, shade, about)
@@ -161,7 +161,8 @@ class Page:
         Control characters, which HTML cannot hold, and lone surrogates become a replacement character.
 
         Args:
-            compact: with small margins and headings, for a frame within another page, to which it reports its height.
+            compact: with small margins and headings, for a frame within another page; the script reports the height to
+            that page.
         """
         style, script = _static("page.css"), "\n".join(map(_static, SCRIPTS))
         if compact:
@@ -196,7 +197,7 @@ def write_page(page: Page, path: str | Path) -> Path:
 
 
 def _provenance(machine: Mapping[str, str | int], versions: Mapping[str, str]) -> list[Markup]:
-    """Return the machine with the date, and the versions, as two lists; none where neither is known."""
+    """Return the machine with the date, and the versions, as two lists; empty if neither is known."""
     if not versions and not machine:
         return []
     facts = {**{key: str(value) for key, value in machine.items()}, "date": f"{datetime.now(UTC):%Y-%m-%d}"}
@@ -209,6 +210,6 @@ def _static(name: str) -> str:
 
 
 def _source(text: str) -> str:
-    """Return how a content security policy names a script or style, by its SHA-256."""
+    """Return the source expression of a script or style for a content security policy, by its SHA-256."""
     digest = hashlib.sha256(f"\n{text}\n".encode()).digest()
     return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"

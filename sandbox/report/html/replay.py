@@ -56,8 +56,8 @@ def replay(scene: Scene, tracks: Sequence[Track], trusted_until: float | None) -
     """Return the canvas with its controls, legend and data.
 
     Args:
-        scene: of all runs.
-        tracks: in the order in which they are drawn; the truth last.
+        scene: scene of all runs.
+        tracks: tracks in the order in which they are drawn; the truth last.
         trusted_until: time until which the truth is trusted, s.
     """
     document = replay_document(scene, tracks, trusted_until)
@@ -110,18 +110,18 @@ def _encoded(
     tracks: Sequence[Track], longest: FloatArray, drawn: IntArray, has_angles: bool, box: QuantisationBox
 ) -> tuple[FloatArray, list[str]]:
     """Return the times of as many frames as the budget allows, and the encoded tracks at these times."""
-    most = MAX_FRAMES
+    max_frames = MAX_FRAMES
     while True:
-        time = longest[_evenly_spread(len(longest), most)]
+        time = longest[_evenly_spread(len(longest), max_frames)]
         texts = [_encode(track, time, drawn, has_angles, box) for track in tracks]
-        if sum(map(len, texts)) <= BUDGET or most <= MIN_FRAMES:
+        if sum(map(len, texts)) <= BUDGET or max_frames <= MIN_FRAMES:
             return time, texts
-        most = max(MIN_FRAMES, most // 2)
+        max_frames = max(MIN_FRAMES, max_frames // 2)
 
 
-def _evenly_spread(count: int, most: int) -> IntArray:
-    """Return the indices of at most so many frames, evenly spread, with the first and the last one."""
-    return np.unique(np.rint(np.linspace(0, max(count - 1, 0), min(count, most))).astype(np.int64))
+def _evenly_spread(count: int, max_frames: int) -> IntArray:
+    """Return the indices of at most `max_frames` frames, evenly spread, with the first and the last one."""
+    return np.unique(np.rint(np.linspace(0, max(count - 1, 0), min(count, max_frames))).astype(np.int64))
 
 
 def _encode(track: Track, time: FloatArray, drawn: IntArray, has_angles: bool, box: QuantisationBox) -> str:
@@ -148,7 +148,7 @@ def _nearest(times: FloatArray, wanted: FloatArray) -> IntArray:
 
 
 def _half_interval(time: FloatArray) -> float:
-    """Return half the interval of frames, s: how far a frame of a run may be from the time at which it is shown."""
+    """Return half the interval of frames, s: the largest error of the time at which a frame of a run is shown."""
     return 0.5 * float(np.median(np.diff(time))) if len(time) > 1 else math.inf
 
 
@@ -169,7 +169,7 @@ def _errors(track: Track, time: FloatArray) -> list[float | None] | None:
     nearest = _nearest(times, time)
     known = np.abs(times[nearest] - time) <= _half_interval(time)
     found = zip(known.tolist(), values[nearest].tolist(), strict=True)
-    return [float(f"{value:.3g}") if fine and math.isfinite(value) else None for fine, value in found]
+    return [float(f"{value:.3g}") if is_known and math.isfinite(value) else None for is_known, value in found]
 
 
 def _breaks(run: Trajectory, scene: Scene) -> Mapping[str, float]:

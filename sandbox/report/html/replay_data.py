@@ -79,7 +79,7 @@ def compress(words: Codes) -> str:
 
 
 def decompress(text: str, shape: tuple[int, ...]) -> Codes:
-    """Return the codes that `compress` got; `replay.js` does the same.
+    """Return the codes of a text from `compress`; `replay.js` has the same function.
 
     Raises:
         ValueError: the text holds another number of codes.
@@ -94,18 +94,18 @@ def decompress(text: str, shape: tuple[int, ...]) -> Codes:
     return np.cumsum(words, axis=0, dtype=np.uint16)
 
 
-MANY_BODIES = 1000
+MIN_TRIMMED_BODIES = 1000
 """From this number of moving bodies on, the viewport leaves out the outermost positions."""
 OUTLIERS = 0.5
 """Positions left out at each side, percent."""
-LARGEST = 1e15
+MAX_COORDINATE = 1e15
 """Positions beyond it, m, are ignored: differences of larger numbers lose a metre to rounding."""
-NEAR = 0.6
+MAX_STATIC_DISTANCE = 0.6
 """Static geometry is shown up to this distance from the moving bodies, as a fraction of the size of their region."""
 MARGIN = 0.06
-"""Free space around all, as a fraction of its size."""
-KEPT = 3.0
-"""Side of the encoded square, in sizes of the viewport: one can zoom out and pan."""
+"""Free space around the shown region, as a fraction of its size."""
+ENCODED_RATIO = 3.0
+"""Side of the encoded square, in sizes of the viewport: space for zooming out and panning."""
 ANCHORED = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.GROOVE, LinkKind.SPRING)
 
 Bounds = tuple[float, float, float, float]
@@ -116,7 +116,7 @@ def viewport(scene: Scene, paths: Iterable[FloatArray]) -> Bounds:
     """Return the part of the world to show: the region of the moving bodies, and static geometry near it.
 
     Args:
-        scene: of the bodies.
+        scene: scene of the bodies.
         paths: positions (T, N, 2), m, of all its bodies; nan is ignored.
     """
     bodies = scene.bodies
@@ -124,12 +124,12 @@ def viewport(scene: Scene, paths: Iterable[FloatArray]) -> Bounds:
     start = _around(bodies.position[None], bodies, everything=True)
     if start is not None and not found:
         found = [start]
-    near = list(_static_bounds(scene))
+    static = list(_static_bounds(scene))
     if not found:
-        found = near or [np.asarray(((-1.0, -1.0), (1.0, 1.0)))]
+        found = static or [np.asarray(((-1.0, -1.0), (1.0, 1.0)))]
     low, high = np.min([each[0] for each in found], axis=0), np.max([each[1] for each in found], axis=0)
-    reach = NEAR * max(float((high - low).max()), 1e-12)
-    for corners in near:
+    reach = MAX_STATIC_DISTANCE * max(float((high - low).max()), 1e-12)
+    for corners in static:
         if (corners[0] <= high + reach).all() and (corners[1] >= low - reach).all():
             inside = np.clip(corners, low - reach, high + reach)
             low, high = np.minimum(low, inside[0]), np.maximum(high, inside[1])
@@ -150,26 +150,26 @@ def viewport(scene: Scene, paths: Iterable[FloatArray]) -> Bounds:
 def quantisation_box(box: Bounds) -> QuantisationBox:
     """Return the square in which a replay encodes positions: the viewport, and as much on each side of it."""
     left, bottom, right, top = box
-    side = KEPT * max(right - left, top - bottom)
+    side = ENCODED_RATIO * max(right - left, top - bottom)
     return QuantisationBox(0.5 * (left + right) - 0.5 * side, 0.5 * (bottom + top) - 0.5 * side, side)
 
 
 def _around(path: FloatArray, bodies: Bodies, everything: bool = False) -> FloatArray | None:
     """Return lower left and upper right corner (2, 2), m, of the region of the moving bodies; None without one."""
-    which = np.ones(len(bodies), np.bool_) if everything else ~bodies.fixed
-    size = int(which.sum())
+    selected = np.ones(len(bodies), np.bool_) if everything else ~bodies.fixed
+    size = int(selected.sum())
     # For a long path, some of the frames suffice.
-    places = path[:: max(1, len(path) * size // 500_000), which]
+    positions = path[:: max(1, len(path) * size // 500_000), selected]
     with np.errstate(invalid="ignore"):
-        counts = (np.abs(places) < LARGEST).all(axis=2)
-    some, around = places[counts], np.broadcast_to(bodies.radius[which], counts.shape)[counts][:, None]
-    if not len(some):
+        counts = (np.abs(positions) < MAX_COORDINATE).all(axis=2)
+    points, radii = positions[counts], np.broadcast_to(bodies.radius[selected], counts.shape)[counts][:, None]
+    if not len(points):
         return None
-    if size > MANY_BODIES:
-        usual = float(np.median(around))
-        low, high = np.percentile(some, (OUTLIERS, 100.0 - OUTLIERS), axis=0)
-        return np.asarray((low - usual, high + usual))
-    return np.asarray(((some - around).min(axis=0), (some + around).max(axis=0)))
+    if size > MIN_TRIMMED_BODIES:
+        typical = float(np.median(radii))
+        low, high = np.percentile(points, (OUTLIERS, 100.0 - OUTLIERS), axis=0)
+        return np.asarray((low - typical, high + typical))
+    return np.asarray(((points - radii).min(axis=0), (points + radii).max(axis=0)))
 
 
 def _static_bounds(scene: Scene) -> Iterator[FloatArray]:
@@ -188,9 +188,9 @@ def _static_bounds(scene: Scene) -> Iterator[FloatArray]:
     for each in scene.attractions:
         if not isinstance(each.toward, str):
             yield np.asarray((each.toward, each.toward))
-    held = links.anchor_a[(links.a < 0) & np.isin(links.kind, ANCHORED)]
-    for place in held:
-        yield np.asarray((place, place))
+    anchors = links.anchor_a[(links.a < 0) & np.isin(links.kind, ANCHORED)]
+    for anchor in anchors:
+        yield np.asarray((anchor, anchor))
 
 
 SIDES = np.asarray(((-1.0, -1.0), (1.0, 1.0)))
@@ -214,7 +214,7 @@ def static_geometry(scene: Scene, drawn: IntArray, origin: tuple[float, float]) 
     """Return shapes, static geometry and joints as JSON.
 
     Args:
-        scene: to draw.
+        scene: the scene.
         drawn: indices of the bodies that a replay draws; joints refer to positions in this array.
         origin: subtracted from every position, m, so that no digits are lost far from the origin of the world.
     """
@@ -268,9 +268,9 @@ def _joints(scene: Scene, drawn: IntArray, origin: tuple[float, float]) -> list[
     static body is anchored in the world.
     """
     links, bodies = scene.links, scene.bodies
-    place = np.full(len(bodies) + 1, -2)
-    place[drawn] = np.arange(len(drawn))
-    place[-1] = -1
+    index_of = np.full(len(bodies) + 1, -2)
+    index_of[drawn] = np.arange(len(drawn))
+    index_of[-1] = -1
     found = []
     ends = links.ends(bodies.position, bodies.angle)
     for k in np.flatnonzero(np.isin(links.kind, list(SYMBOLS)))[:MAX_JOINTS].tolist():
@@ -284,7 +284,7 @@ def _joints(scene: Scene, drawn: IntArray, origin: tuple[float, float]) -> list[
                 row.append(-1)
                 anchors += _moved(end.tolist(), origin)
             else:
-                row.append(int(place[number]))
+                row.append(int(index_of[number]))
                 anchors += [_short(value) for value in anchor.tolist()]
         if -2 not in row[2:4] and row[2:4] != [-1, -1]:
             found.append([*row, *anchors])

@@ -110,8 +110,8 @@ def static_shapes(scene: Scene, frame: PictureFrame) -> list[Shape]:
             parts.append(circle(frame, thing.position, thing.radius, solid))
         else:
             points = [*thing.points, thing.points[0]] if thing.closed else thing.points
-            own = {**solid, "stroke-width": max(2.0, frame.scale * thing.thickness)}
-            parts.append(line(frame.at(np.asarray(points, np.float64)), own))
+            wall_style = {**solid, "stroke-width": max(2.0, frame.scale * thing.thickness)}
+            parts.append(line(frame.at(np.asarray(points, np.float64)), wall_style))
     hole = {"fill": "var(--pocket)", "stroke": "var(--solid-edge)", "stroke-width": 1.0}
     parts += [circle(frame, pocket.position, pocket.radius, hole) for pocket in scene.pockets]
     return parts
@@ -171,7 +171,7 @@ def run_page(run: Trajectory, replayed: bool = True) -> Page:
     """Return the page of a run.
 
     Args:
-        run: which; one without frames, as of an engine that refused the scene, is its status and reason.
+        run: the run; without frames, such as after a refusal, the page has its status and reason.
         replayed: with the replay.
     """
     scene = from_session(dict(run.info["scene"]), "info.scene")
@@ -204,7 +204,7 @@ def _replay(run: Trajectory, scene: Scene) -> Markup:
 
 
 def _with_bodies(run: Trajectory, count: int) -> Trajectory:
-    """Return a run with only its first bodies, those of the scene; bodies added later follow them."""
+    """Return a run with only the bodies of the scene, which come first; bodies added later follow them."""
     columns = ("position", "velocity", "angle", "angular_velocity")
     kept = {key: getattr(run, key)[:, :count] for key in columns}
     return replace(run, names=run.names[:count], retired_time=run.retired_time[:count], **kept)

@@ -65,7 +65,7 @@ def shot_page(shot: ShotResult, replayed: bool = True) -> Page:
         replayed: with the replay.
     """
     events = shot.events
-    # A ball takes part in an event by itself, or as the partner of another ball.
+    # A ball is the subject of an event, or the partner of another ball.
     moving = {name for event in events for name in (event.ball, event.partner if event.kind == "ball" else None)}
     moved = [k for k, name in enumerate(shot.names) if name in moving]
     figures = definitions(_figures(shot, events, len(moved)))
@@ -92,14 +92,14 @@ def _frames(shot: ShotResult) -> Trajectory:
     count = min(math.ceil(FRAMES_PER_SECOND * shot.duration) + 1, MAX_FRAMES)
     times = np.linspace(0.0, shot.duration, count)
     position = shot.at(times)
-    still, balls = np.zeros(position.shape[:2]), len(shot.names)
+    rest, balls = np.zeros(position.shape[:2]), len(shot.names)
     contacts = shot.contacts
     return Trajectory(
         time=times,
         position=position,
         velocity=np.zeros_like(position),
-        angle=still,
-        angular_velocity=still,
+        angle=rest,
+        angular_velocity=rest,
         names=np.asarray(shot.names),
         contact_time=contacts.time,
         contact_pair=contacts.pair,
@@ -133,8 +133,8 @@ def _picture(shot: ShotResult, moved: Sequence[int]) -> Markup:
             disc = {"fill": colour, "stroke": "var(--paper)", "stroke-width": 0.5}
             discs.append(circle(frame, ends[k], radius, disc))
             x, y = frame.at(ends[k]).tolist()
-            place = {"x": f"{x + frame.scale * radius + 2.0:.6g}", "y": f"{y + 4.0:.6g}", "class": "note"}
-            labels.append(Shape("text", place, name))
+            attributes = {"x": f"{x + frame.scale * radius + 2.0:.6g}", "y": f"{y + 4.0:.6g}", "class": "note"}
+            labels.append(Shape("text", attributes, name))
     shapes = [*static_shapes(scene, frame), *lines, *rings, *discs, *labels]
     return frame.svg(shapes, f"Paths of the balls of {scene.title or 'the shot'}", "paths")
 
@@ -143,22 +143,24 @@ def _figures(shot: ShotResult, events: Sequence[ShotEvent], moved: int) -> dict[
     """Return the key figures of a shot by name."""
     kinds = Counter(event.kind for event in events)
     first = next((event for event in events if event.kind == "ball"), None)
-    met = UNKNOWN if first is None else f"{first.ball} and {first.partner} at {format_number(first.time, 6)} s"
-    fell = ", ".join(f"{ball} in {pocket}" for ball, pocket in shot.pocketed.items())
+    first_collision = (
+        UNKNOWN if first is None else f"{first.ball} and {first.partner} at {format_number(first.time, 6)} s"
+    )
+    pocketed_balls = ", ".join(f"{ball} in {pocket}" for ball, pocket in shot.pocketed.items())
     return {
         "balls": f"{len(shot.names):,}, of which {moved:,} moved",
         "duration": f"{format_number(shot.duration, 4)} s",
         "at the end": "all balls at rest" if shot.complete else "not at rest: the time limit ended the shot",
         "collisions of balls": f"{kinds['ball']:,}",
         "cushion contacts": f"{kinds['cushion'] + kinds['jaw']:,}",
-        "first collision": isolated(met),
-        "pocketed": isolated(fell or "none"),
+        "first collision": isolated(first_collision),
+        "pocketed": isolated(pocketed_balls or "none"),
     }
 
 
 def _balls(shot: ShotResult, events: Sequence[ShotEvent], moved: Sequence[int]) -> Markup:
     """Return a row for each ball that moved."""
-    met = Counter(name for event in events if event.kind == "ball" for name in (event.ball, event.partner))
+    collisions = Counter(name for event in events if event.kind == "ball" for name in (event.ball, event.partner))
     cushions = Counter(event.ball for event in events if event.kind in ("cushion", "jaw"))
     rows: list[list[Content]] = []
     for k in moved[:MAX_LISTED]:
@@ -166,7 +168,7 @@ def _balls(shot: ShotResult, events: Sequence[ShotEvent], moved: Sequence[int]) 
         length = None if shot.path is None else _length(shot.way(name))
         pocket = shot.pocketed.get(name)
         end = [UNKNOWN, UNKNOWN] if pocket else [f"{value:.3f}" for value in shot.position[k].tolist()]
-        cells: list[Content] = [format_number(length), f"{met[name]:,}", f"{cushions[name]:,}", *end]
+        cells: list[Content] = [format_number(length), f"{collisions[name]:,}", f"{cushions[name]:,}", *end]
         rows.append([isolated(name), *cells, isolated(pocket) if pocket else UNKNOWN])
     more = len(moved) - MAX_LISTED
     note = paragraph(f"and {format_plural(more, 'more ball')}") if more > 0 else None
@@ -209,19 +211,19 @@ def odds_page(odds: Odds) -> Page:
 
 def _row(odds: Odds, ball: str) -> list[Content]:
     chances = {pocket: odds.chance(ball, pocket) for pocket in odds.shot.pockets}
-    pocket, most = max(chances.items(), key=lambda item: item[1].hits, default=("", None))
+    pocket, likeliest = max(chances.items(), key=lambda item: item[1].hits, default=("", None))
     rest = odds.rest(ball)
-    at = (
+    rest_text = (
         [UNKNOWN, UNKNOWN]
         if rest is None
         else [f"{m:.3f} ± {s:.3f}" for m, s in zip(rest.mean, rest.spread, strict=True)]
     )
-    into = isolated(pocket) if most is not None and most.hits else UNKNOWN
-    return [isolated(ball), str(odds.chance(ball)), into, *at]
+    pocket_text = isolated(pocket) if likeliest is not None and likeliest.hits else UNKNOWN
+    return [isolated(ball), str(odds.chance(ball)), pocket_text, *rest_text]
 
 
 def _odds_picture(odds: Odds) -> Markup:
-    """Return heat maps of where balls come to rest, as a picture in the page itself."""
+    """Return heat maps of the rest positions of balls, as a picture embedded in the page."""
     stream = io.BytesIO()
     with catch_warnings():
         ignore_missing_glyphs()

@@ -61,8 +61,8 @@ def tradeoff_page(document: TradeoffMapping, comparison: Comparison | None = Non
     """Return the page of a trade-off.
 
     Args:
-        document: what `sandbox tradeoff --json` prints.
-        comparison: of the engines on the scene, for a replay.
+        document: document that `sandbox tradeoff --json` prints.
+        comparison: comparison of the engines on the scene, for a replay.
     """
     sections = [Section("Error against cost", diagram(document, "cost"), lead=HOW_TO_CLICK), *details(document)]
     if comparison is not None and comparison.trajectories:
@@ -78,7 +78,7 @@ def page_of_tradeoff(found: Tradeoff) -> Page:
     return tradeoff_page(found.document())
 
 
-LONG, OVER = ">frame", ">budget"
+LONG_STEP, OVER_BUDGET = ">frame", ">budget"
 """Marks of settings whose dt is longer than a frame, and of those whose most expensive frame exceeds the budget."""
 HOW_TO_CLICK = (
     "Each point is one setting of one engine. Click it for its [solver] table, to be copied into the scene file."
@@ -90,7 +90,7 @@ def answers(document: TradeoffMapping) -> Markup | None:
     sentences = document.get("answers") or []
     if not sentences:
         return None
-    picks, shown = _picks(document), set[tuple[str, str]]()
+    picks, shown = _recommended(document), set[tuple[str, str]]()
     items = []
     for text in sentences:
         pick = next((each for each in picks if text.endswith(each["sentence"])), None)
@@ -99,8 +99,8 @@ def answers(document: TradeoffMapping) -> Markup | None:
     return fragment(TEMPLATE, "answers", items, metric_sentence(document))
 
 
-def _picks(document: TradeoffMapping) -> list[TradeoffMapping]:
-    """Return the recommended settings, or the nearest ones where none can be recommended."""
+def _recommended(document: TradeoffMapping) -> list[TradeoffMapping]:
+    """Return the recommended settings, or the nearest ones if none can be recommended."""
     found = [document.get("within_tolerance") or document.get("nearest_to_tolerance")]
     found += [document.get("within_budget") or document.get("nearest_to_budget")]
     found += (document.get("cheapest_by_engine") or {}).values()
@@ -116,7 +116,7 @@ def _new_warnings(pick: TradeoffMapping, shown: set[tuple[str, str]]) -> list[st
 
 
 def metric_sentence(document: TradeoffMapping) -> str:
-    """Return which error metric is used, and why."""
+    """Return the error metric and the reason for it as a sentence."""
     name = str(document["metric"]).replace("_", " ")
     about = f" ({document['metric_about']})" if document.get("metric_about") else ""
     reason = f", chosen because {document['metric_reason']}" if document.get("metric_reason") else ""
@@ -138,8 +138,8 @@ def diagram(document: TradeoffMapping, name: str) -> Markup:
     """Return the diagram, whose points can be selected, beside the facts about the selected point.
 
     Args:
-        document: of the trade-off.
-        name: of the diagram, unique in the page.
+        document: document of the trade-off.
+        name: name of the diagram, unique in the page.
     """
     points = work_points(document)
     metric = document["metric"].replace("_", " ")
@@ -194,9 +194,9 @@ def _facts(point: WorkPoint, document: TradeoffMapping) -> dict[str, Any]:
     if point.status != "ok":
         figures.insert(0, (point.status, row.get("reason") or "no reason given"))
     elif is_longer_than_frame(point, document):
-        figures.insert(0, (LONG, f"not recommended: {_long_reason(document)}"))
-    own = [pick for pick in _picks(document) if point_of([point], pick) is not None]
-    messages = dict.fromkeys(str(each["message"]) for pick in own for each in pick.get("warnings") or ())
+        figures.insert(0, (LONG_STEP, f"not recommended: {_long_reason(document)}"))
+    picks = [pick for pick in _recommended(document) if point_of([point], pick) is not None]
+    messages = dict.fromkeys(str(each["message"]) for pick in picks for each in pick.get("warnings") or ())
     figures += [("note", message) for message in messages]
     title = next(describe(point, document["metric"], unit))
     return {"title": title, "figures": figures, "text": settings_text(point.settings, point.engine)}
@@ -214,9 +214,9 @@ def _frame_text(point: WorkPoint, document: TradeoffMapping) -> str:
 
 
 def _long_reason(document: TradeoffMapping) -> str:
-    """Return the meaning of `LONG`."""
-    own = "" if document["max_dt"] <= FRAME_TOLERANCE / document["fps"] else " and than the dt of the scene"
-    return f"dt is longer than a frame at {document['fps']:g} fps{own}"
+    """Return the meaning of `LONG_STEP`."""
+    exception = "" if document["max_dt"] <= FRAME_TOLERANCE / document["fps"] else " and than the dt of the scene"
+    return f"dt is longer than a frame at {document['fps']:g} fps{exception}"
 
 
 def details(document: TradeoffMapping) -> list[Section]:
@@ -251,7 +251,7 @@ def error_budget(rows: Sequence[TradeoffMapping]) -> Markup:
         rows: each with `engine`, `total`, `model`, `time_step`, `solver` and `left`, in m; unknown parts are None.
             The error at the finest step, `left`, is that of the model where the latter is known.
     """
-    columns = [HtmlColumn("engine"), HtmlColumn("shares"), HtmlColumn("error, m", True)]
+    columns = [HtmlColumn("engine"), HtmlColumn("fractions"), HtmlColumn("error, m", True)]
     columns += [HtmlColumn(f"{name}, m", True) for _, name in PARTS]
     cells = [
         [
@@ -282,10 +282,10 @@ def _bar(row: TradeoffMapping) -> Markup:
 
 
 def _long_legend(points: Sequence[WorkPoint], document: TradeoffMapping) -> Markup | None:
-    """Return the meaning of `LONG`, if a point of a table has that mark."""
+    """Return the meaning of `LONG_STEP`, if a point of a table has that mark."""
     if not any(is_longer_than_frame(point, document) for point in points):
         return None
-    return paragraph(f"{LONG}: {_long_reason(document)}, so the setting is not recommended.")
+    return paragraph(f"{LONG_STEP}: {_long_reason(document)}, so the setting is not recommended.")
 
 
 def _metric_column(document: TradeoffMapping) -> HtmlColumn:
@@ -350,7 +350,7 @@ def _frame_cell(point: WorkPoint, document: TradeoffMapping) -> Content:
     time, budget = frame_time(point, document), document.get("budget")
     if time is None or budget is None or time <= budget:
         return format_number(time)
-    mark = badge(OVER, "fair", f"more than the budget of {format_number(budget)} ms")
+    mark = badge(OVER_BUDGET, "fair", f"more than the budget of {format_number(budget)} ms")
     return concatenated(mark, " ", format_number(time))
 
 
@@ -358,7 +358,7 @@ def _marked_changes(point: WorkPoint, document: TradeoffMapping) -> Content:
     """Return the changes of a point, marked where its dt is longer than a frame."""
     if not is_longer_than_frame(point, document):
         return _changes(point)
-    mark = badge(LONG, "fair", f"{_long_reason(document)}, so it is not recommended")
+    mark = badge(LONG_STEP, "fair", f"{_long_reason(document)}, so it is not recommended")
     return concatenated(_changes(point), " ", mark)
 
 

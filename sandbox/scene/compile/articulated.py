@@ -14,7 +14,7 @@ from sandbox.scene.description.generators import ENDS, STRIDE, BodySegment, Clot
 from sandbox.scene.geometry.vectors import to_world
 
 STARTS_AT, ENDS_AT = -2, -3
-"""In place of a body in a rope's links: the bodies that its start and its end are tied to."""
+"""Placeholders for the bodies that the start and the end of a rope are tied to, in the joints of the rope."""
 
 
 def node_count(rope: Rope) -> int:
@@ -34,9 +34,9 @@ def rope_layout(rope: Rope, gravity: Point) -> Layout:
         )
     fixed = np.zeros(len(position), np.bool_)
     fixed[[0, -1]] = [rope.holds(end) for end in ENDS]
-    own = np.ones(len(position), np.bool_)
-    own[[0, -1]] = [rope.tied(end) is None for end in ENDS]
-    return uniform_layout(position[own], rope.velocity, rope.angle, rope.angular_velocity, fixed[own])
+    is_node = np.ones(len(position), np.bool_)
+    is_node[[0, -1]] = [rope.tied(end) is None for end in ENDS]
+    return uniform_layout(position[is_node], rope.velocity, rope.angle, rope.angular_velocity, fixed[is_node])
 
 
 def rope_course(rope: Rope, gravity: Point) -> FloatArray:
@@ -54,7 +54,7 @@ def rope_course(rope: Rope, gravity: Point) -> FloatArray:
     across = np.asarray((along[1], -along[0]))  # to the right of the chord, for an arc that turns left
     if across @ down < 0.0:
         across = -across
-    # Adjacent chords differ by twice the half turn; the first deviates by the sum that the others turn back.
+    # Adjacent chords differ by twice the half turn; the first deviates by half the total turn.
     tilt = half * (rope.links - 1 - 2 * np.arange(rope.links))
     step = length * (np.outer(np.cos(tilt), along) + np.outer(np.sin(tilt), across))
     return start + np.vstack((np.zeros(2), np.cumsum(step, axis=0)))
@@ -97,14 +97,14 @@ def rope_joints(rope: Rope) -> JointArrays:
         ("start", 0, rope.start, STARTS_AT, -half),
         ("end", count - 1, rope.end, ENDS_AT, half),
     )
-    for end, body, position, stand_in, anchor in ends:
+    for end, body, position, placeholder, anchor in ends:
         if rope.tied(end) is not None:
-            held = JointArrays.alike(LinkKind.PIVOT, [stand_in], [body], (0.0, 0.0), (anchor, 0.0))
+            joint = JointArrays.alike(LinkKind.PIVOT, [placeholder], [body], (0.0, 0.0), (anchor, 0.0))
         elif rope.holds(end):
-            held = JointArrays.alike(LinkKind.PIVOT, [WORLD], [body], position, (anchor, 0.0))
+            joint = JointArrays.alike(LinkKind.PIVOT, [WORLD], [body], position, (anchor, 0.0))
         else:
             continue
-        links = links.joined(held)
+        links = links.joined(joint)
     return links
 
 
@@ -135,11 +135,11 @@ def cloth_joints(cloth: Cloth) -> JointArrays:
 
 def _mesh(cloth: Cloth, right: int, down: int, length: float, stiffness: float | None = None) -> JointArrays:
     """Join every node to the one at an offset of columns and rows: by springs, or by rods without a stiffness."""
-    number = np.arange(cloth.columns * cloth.rows).reshape(cloth.rows, cloth.columns)
+    index = np.arange(cloth.columns * cloth.rows).reshape(cloth.rows, cloth.columns)
     height, width = max(cloth.rows - down, 0), max(cloth.columns - abs(right), 0)
     left, other = max(-right, 0), max(right, 0)
-    a = number[:height, left : left + width].ravel()
-    b = number[down : down + height, other : other + width].ravel()
+    a = index[:height, left : left + width].ravel()
+    b = index[down : down + height, other : other + width].ravel()
     if stiffness is None:
         return JointArrays.alike(LinkKind.ROD, a, b, figures=(length, 0.0, 0.0))
     return JointArrays.alike(LinkKind.SPRING, a, b, figures=(length, stiffness, cloth.damping))
@@ -184,9 +184,9 @@ def limb_layout(ragdoll: Ragdoll) -> Layout:
 def limb_joints(ragdoll: Ragdoll) -> JointArrays:
     """Return the pivots of a ragdoll, then the limits of the same joints, by the indices of its segments."""
     parts, flip = segments(ragdoll), _flip(ragdoll)
-    number = {name: k for k, name in enumerate(parts)}
+    index = {name: k for k, name in enumerate(parts)}
     joined = [(name, part) for name, part in parts.items() if part.parent]
-    a, b = [number[part.parent] for _, part in joined], [number[name] for name, _ in joined]
+    a, b = [index[part.parent] for _, part in joined], [index[name] for name, _ in joined]
     anchor_a = [_anchor(parts[part.parent], part.joint, flip, ragdoll.height) for _, part in joined]
     anchor_b = [_anchor(part, part.joint, flip, ragdoll.height) for _, part in joined]
     pivots = JointArrays.alike(LinkKind.PIVOT, a, b, np.asarray(anchor_a), np.asarray(anchor_b))
@@ -206,11 +206,11 @@ def _pose(name: str, parts: dict[str, BodySegment], poses: dict[str, Pose]) -> P
     part, (side, _, limb) = parts[name], name.partition("-")
     tilt, joint = math.radians(STRIDE.get(side, {}).get(limb, 0.0)), part.joint
     if part.parent:
-        parent, drawn = _pose(part.parent, parts, poses), parts[part.parent]
+        parent, parent_part = _pose(part.parent, parts, poses), parts[part.parent]
         tilt += parent.tilt
-        base, away = drawn.joint if drawn.parent else middle_of(drawn), parent.tilt
-        at = parent.joint if drawn.parent else parent.middle
-        joint = _follow_parent(part.joint, base, at, away)
+        base, parent_tilt = parent_part.joint if parent_part.parent else middle_of(parent_part), parent.tilt
+        parent_joint = parent.joint if parent_part.parent else parent.middle
+        joint = _follow_parent(part.joint, base, parent_joint, parent_tilt)
     middle = _follow_parent(middle_of(part), part.joint, joint, tilt) if part.parent else middle_of(part)
     poses[name] = Pose(middle, joint, tilt)
     return poses[name]

@@ -16,7 +16,15 @@ from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.scene.description.base import GROUND, BodySource, BodySpec, Point
 from sandbox.scene.description.bodies import Capsule
 from sandbox.scene.description.discs import Ball, Disc
-from sandbox.scene.description.generators import DEFAULT_MASS, FAR, NEAR, Cloth, Ragdoll, Rope, segments
+from sandbox.scene.description.generators import (
+    DEFAULT_MASS,
+    FAR_LIMB_COLOUR,
+    NEAR_LIMB_COLOUR,
+    Cloth,
+    Ragdoll,
+    Rope,
+    segments,
+)
 from sandbox.scene.description.scene import SceneDescription, default_name
 from sandbox.scene.description.surface import Spin
 from sandbox.scene.geometry.shapes import Shapes, geometry_of, shapes_of
@@ -75,13 +83,13 @@ def uniform_layout(
 ) -> Layout:
     """Return the start state of n bodies of one prototype; fixed ones are at rest."""
     count = len(position)
-    still = np.zeros(count, np.bool_) if fixed is None else fixed
+    is_fixed = np.zeros(count, np.bool_) if fixed is None else fixed
     return Layout(
         position=position,
-        velocity=np.where(still[:, None], 0.0, np.asarray(velocity, dtype=np.float64)),
+        velocity=np.where(is_fixed[:, None], 0.0, np.asarray(velocity, dtype=np.float64)),
         angle=np.broadcast_to(np.asarray(angle, dtype=np.float64), (count,)).copy(),
-        angular_velocity=np.where(still, 0.0, np.asarray(spin, dtype=np.float64)),
-        fixed=still,
+        angular_velocity=np.where(is_fixed, 0.0, np.asarray(spin, dtype=np.float64)),
+        fixed=is_fixed,
         element=np.zeros(count, np.int64),
     )
 
@@ -134,21 +142,21 @@ def _ragdoll_elements(ragdoll: Ragdoll) -> tuple[BodySource, ...]:
     """Return the segments of a ragdoll: capsules, and a ball as its head."""
     elements: list[BodySource] = []
     parts, height = segments(ragdoll), ragdoll.height
-    behind = next(iter(parts)).partition("-")[0]
-    whole = DEFAULT_MASS if ragdoll.mass is None else ragdoll.mass
+    far_side = next(iter(parts)).partition("-")[0]
+    total_mass = DEFAULT_MASS if ragdoll.mass is None else ragdoll.mass
     for name, segment in parts.items():
-        more: dict[str, Any] = {
+        fields: dict[str, Any] = {
             "position": (0.0, 0.0),
             "radius": segment.radius * height,
-            "mass": segment.mass_percent * 0.01 * whole,
+            "mass": segment.mass_percent * 0.01 * total_mass,
         }
-        more |= _surface(ragdoll)
+        fields |= _surface(ragdoll)
         if ragdoll.colour is None:
-            more["colour"] = FAR if name.startswith(behind) else NEAR
+            fields["colour"] = FAR_LIMB_COLOUR if name.startswith(far_side) else NEAR_LIMB_COLOUR
         if len(segment.ends) == 1:
-            elements.append(Ball(**more))
+            elements.append(Ball(**fields))
         else:
-            elements.append(Capsule(length=math.dist(*segment.ends) * height, **more))
+            elements.append(Capsule(length=math.dist(*segment.ends) * height, **fields))
     return tuple(elements)
 
 
@@ -233,10 +241,10 @@ class Bodies:
 
     def joined_by(self, single: BodySpec, name: str) -> "Bodies":
         """Return these bodies with one more, which gets the next index."""
-        more = join_layouts(
+        added = join_layouts(
             [name], (single,), [layout_of_singles([single])], self.spheres, self.layers, self.visits.shape[1]
         )
-        both = {key: np.concatenate((getattr(self, key), getattr(more, key))) for key in COLUMNS}
+        columns = {key: np.concatenate((getattr(self, key), getattr(added, key))) for key in COLUMNS}
         element = np.append(self.element, len(self.elements))
         elements = (*self.elements, single)
         return Bodies(
@@ -245,7 +253,7 @@ class Bodies:
             elements=elements,
             spheres=self.spheres,
             layers=self.layers,
-            **both,
+            **columns,
         )
 
     def some(self, which: IntArray) -> "Bodies":
@@ -264,7 +272,7 @@ def centre_of(single: BodySpec) -> Point:
 
 
 def layout_of_singles(singles: list[BodySpec]) -> Layout:
-    """Return the start state of bodies that are elements of their own."""
+    """Return the start state of single bodies, each with its own prototype."""
     spins = [(0.0, 0.0, 0.0) if each.fixed else _spin(each) for each in singles]
     return Layout(
         position=_rows([centre_of(each) for each in singles]),

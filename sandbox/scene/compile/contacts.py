@@ -1,10 +1,10 @@
-"""Which pairs of bodies and colliders can ever touch, and the coefficients of each pair of surfaces.
+"""Contact matrix: the pairs of bodies and colliders that can touch, and the coefficients of each pair of surfaces.
 
-The contact matrix is derived from the scene by kind, without simulation. Bodies that can touch nothing need no shape;
-bodies that can touch frictionless surfaces only need no moment of inertia.
+The contact matrix is derived from the scene by kind, without simulation. Bodies without possible contacts need no
+shape; bodies that can touch only frictionless surfaces need no moment of inertia.
 
-Restitution and friction belong to a *pair* of materials. A `[[pair]]` states them; for other pairs `mix` holds: a value
-stated on one side of a contact applies, values on both sides multiply (pymunk's rule), and without any it is 0. A value
+Restitution and friction belong to a *pair* of materials. A `[[pair]]` states them. For other pairs (`mix`) a value
+stated on one side of a contact applies, values on both sides multiply (pymunk's rule), and the default is 0. A value
 stated on a shape takes precedence over its material's. The same holds for the falloff of restitution with speed, except
 that the values of two sides add. Kicks and one-way walls belong to one side.
 """
@@ -48,7 +48,7 @@ def mix(a: float | None, b: float | None) -> float:
 
 @dataclass(frozen=True, eq=False)
 class PairTable:
-    """The S distinct surfaces of a scene, and which bodies and colliders have them."""
+    """The S distinct surfaces of a scene, and the surface of each body and collider."""
 
     surfaces: tuple[ContactMaterial, ...]
     of_body: IntArray
@@ -91,13 +91,13 @@ def pair_table(scene: Scene, bodies: Bodies) -> PairTable:
     surfaces = (*surfaces, *more)
     restitution, friction = _mix_pairs([s.restitution for s in surfaces]), _mix_pairs([s.friction for s in surfaces])
     falloff = np.add.outer(*[np.asarray([s.falloff or 0.0 for s in surfaces], dtype=np.float64)] * 2)
-    having: dict[str | None, list[int]] = {}
-    for number, surface in enumerate(surfaces):
-        having.setdefault(surface.material, []).append(number)
+    by_material: dict[str | None, list[int]] = {}
+    for index, surface in enumerate(surfaces):
+        by_material.setdefault(surface.material, []).append(index)
     for pair in scene.pairs:
-        first, second = (having.get(name, []) for name in pair.between)
-        figures = (restitution, pair.restitution), (friction, pair.friction), (falloff, pair.restitution_falloff)
-        for table, stated in figures:
+        first, second = (by_material.get(name, []) for name in pair.between)
+        coefficients = (restitution, pair.restitution), (friction, pair.friction), (falloff, pair.restitution_falloff)
+        for table, stated in coefficients:
             if stated is not None:
                 table[np.ix_(first, second)] = table[np.ix_(second, first)] = stated
     counts = np.asarray([len(_surface_parts(element)) for element in bodies.elements], dtype=np.int64)
@@ -122,7 +122,7 @@ def _surface_parts(element: BodySource) -> Sequence[HasMaterial]:
 
 
 def _with_body_surface(part: HasMaterial, body: HasMaterial) -> HasMaterial:
-    """Return a part with the surface of its body where it states none; a material of its own replaces all of it."""
+    """Return a part with the surface of its body where it states none; its own material replaces all of it."""
     if part.material is not None:
         return part
     return HasMaterial(
@@ -143,9 +143,9 @@ def index_surfaces(
     """
     materials = {m.name: m for m in scene.materials}
     paired = {name for p in scene.pairs for name in p.between}
-    numbers = {surface: k for k, surface in enumerate(known)}
+    index_by_surface = {surface: k for k, surface in enumerate(known)}
 
-    def number(element: HasMaterial) -> int:
+    def index_of(element: HasMaterial) -> int:
         material = None if element.material is None else materials[element.material]
         restitution, friction, falloff = element.restitution, element.friction, element.restitution_falloff
         if material is not None:
@@ -155,10 +155,12 @@ def index_surfaces(
         kept = element.material if element.material in paired else None
         kick = element.kick if isinstance(element, Wall | Post) else None
         one_way = isinstance(element, Wall) and element.one_way
-        return numbers.setdefault(ContactMaterial(kept, restitution, friction, falloff, kick, one_way), len(numbers))
+        return index_by_surface.setdefault(
+            ContactMaterial(kept, restitution, friction, falloff, kick, one_way), len(index_by_surface)
+        )
 
-    of_element = np.asarray([number(element) for element in elements], dtype=np.int64)
-    return tuple(numbers)[len(known) :], of_element
+    of_element = np.asarray([index_of(element) for element in elements], dtype=np.int64)
+    return tuple(index_by_surface)[len(known) :], of_element
 
 
 def _mix_pairs(stated: list[float | None]) -> FloatArray:
@@ -172,7 +174,7 @@ FIXED_KINDS = (Plane, Wall, Post)
 
 @dataclass(frozen=True, eq=False)
 class ContactMatrix:
-    """Which pairs can touch, among N bodies and F static colliders with S surfaces."""
+    """Possible contacts of N bodies and F static colliders with S surfaces."""
 
     surfaces: PairTable
     touches: BoolArray
@@ -201,7 +203,7 @@ class ContactMatrix:
 
     @property
     def free(self) -> BoolArray:
-        """(N,) can touch nothing, enters no zone, and has no joint."""
+        """(N,) has no possible contact, enters no zone, and has no joint."""
         return ~self.touches & ~self.held & ~self.can_enter_zone
 
     @property
@@ -216,7 +218,7 @@ class ContactMatrix:
 
 
 class Kinds(NamedTuple):
-    """The K distinct kinds of pieces; pieces of one kind can touch the same."""
+    """The K distinct kinds of pieces; pieces of one kind have the same possible contacts."""
 
     surface: IntArray
     """(K,)"""
@@ -237,7 +239,7 @@ class Kinds(NamedTuple):
 
 
 def contact_matrix(start: Scene | Setup, bodies: Bodies | None = None) -> ContactMatrix:
-    """Return the contact matrix: which bodies can ever collide with which bodies and static colliders.
+    """Return the contact matrix: the possible collisions of bodies with each other and with static colliders.
 
     Args:
         start: scene or setup.
@@ -249,9 +251,9 @@ def contact_matrix(start: Scene | Setup, bodies: Bodies | None = None) -> Contac
     reached = reachable_layers(scene, bodies)
     kinds = _kinds(bodies, surfaces, reached)
     surface, to_all = kinds.surface, kinds.to_all
-    moving, still = ~kinds.fixed & kinds.to_any, kinds.fixed & kinds.to_any
+    moving, static = ~kinds.fixed & kinds.to_any, kinds.fixed & kinds.to_any
     pair = np.outer(moving & to_all, moving & to_all) & ~(np.eye(len(surface), dtype=bool) & kinds.alone)
-    pair |= np.outer(moving, still & to_all) | np.outer(still & to_all, moving)
+    pair |= np.outer(moving, static & to_all) | np.outer(static & to_all, moving)
     pair &= (kinds.layers[:, None] & kinds.layers) != 0
 
     size = len(surfaces.surfaces)
@@ -300,12 +302,14 @@ def reachable_layers(scene: Scene, bodies: Bodies) -> IntArray:
     if len(layers) == 1:
         return np.ones(len(bodies), np.int64)
     of_layer = [1 << k for k in range(len(layers))]
-    mouths = [(mask_of(z.layers, layers), 1 << layers.index(z.to_layer)) for z in scene.zones if z.to_layer is not None]
+    transitions = [
+        (mask_of(z.layers, layers), 1 << layers.index(z.to_layer)) for z in scene.zones if z.to_layer is not None
+    ]
     for _ in layers:  # a path between two layers is no longer than their number
-        for mask, to in mouths:
+        for mask, to in transitions:
             of_layer = [bits | to if bits & mask else bits for bits in of_layer]
-    goes = np.asarray([e.collides != "none" for e in bodies.elements], np.bool_)[bodies.element] & ~bodies.fixed
-    return np.asarray(np.where(goes, np.asarray(of_layer)[bodies.layer], 1 << bodies.layer))
+    can_move = np.asarray([e.collides != "none" for e in bodies.elements], np.bool_)[bodies.element] & ~bodies.fixed
+    return np.asarray(np.where(can_move, np.asarray(of_layer)[bodies.layer], 1 << bodies.layer))
 
 
 def bits_of(layer: IntArray | None, count: int) -> IntArray:
@@ -317,12 +321,12 @@ def _can_enter_zone(scene: Scene, bodies: Bodies, reached: IntArray) -> BoolArra
     """Return which bodies zones can detect, (N,)."""
     if not scene.zones:
         return np.zeros(len(bodies), np.bool_)
-    some = np.asarray([e.collides != "none" for e in bodies.elements], np.bool_)[bodies.element] & ~bodies.fixed
-    every = 0
+    detectable = np.asarray([e.collides != "none" for e in bodies.elements], np.bool_)[bodies.element] & ~bodies.fixed
+    zone_layers = 0
     for zone in scene.zones:
-        every |= mask_of(zone.layers, scene.layers)
+        zone_layers |= mask_of(zone.layers, scene.layers)
     still_inside = bodies.visits.any(axis=1)  # leaving a zone is detected after a change of layer too
-    return np.asarray(some & ((reached & every != 0) | still_inside))
+    return np.asarray(detectable & ((reached & zone_layers != 0) | still_inside))
 
 
 def _by_layers(scene: Scene) -> list[tuple[int, IntArray]]:
@@ -383,7 +387,7 @@ def _thrust_turned(scene: Scene, bodies: Bodies) -> BoolArray:
     found = np.zeros(len(bodies), dtype=np.bool_)
     for thrust in scene.thrusts:
         if thrust.body in bodies.number_of:
-            number = bodies.number_of[thrust.body]
-            x, y = geometry_of(bodies.elements[bodies.element[number]]).centre
-            found[number] |= (thrust.point[0] - x) * thrust.force[1] != (thrust.point[1] - y) * thrust.force[0]
+            index = bodies.number_of[thrust.body]
+            x, y = geometry_of(bodies.elements[bodies.element[index]]).centre
+            found[index] |= (thrust.point[0] - x) * thrust.force[1] != (thrust.point[1] - y) * thrust.force[0]
     return found

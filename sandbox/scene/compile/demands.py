@@ -138,8 +138,8 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     yield Demand.DRAG, drag, why if drag else "no drag"
 
     free = int((matrix.free & ~bodies.fixed).sum())
-    alone = f"; {free:,} of {moving:,} cannot collide with anything" if free else ""
-    why = f"{'balls' if matrix.ball_ball else 'no two balls'} can collide{alone}"
+    free_text = f"; {free:,} of {moving:,} cannot collide with anything" if free else ""
+    why = f"{'balls' if matrix.ball_ball else 'no two balls'} can collide{free_text}"
     yield Demand.BALL_BALL, matrix.ball_ball, why
 
     for demand, kind, colliders in (
@@ -156,23 +156,23 @@ def _items(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     why = _count(int((~bodies.round).sum()), "body is not a ball", "bodies are not balls", "all bodies are balls")
     yield Demand.POLYGONS, matrix.solids, f"{why}, {others:,} of them can collide" if matrix.solids else why
 
-    touch = bool(matrix.touching.any())
+    can_collide = bool(matrix.touching.any())
     for demand, largest in ((Demand.RESTITUTION, matrix.restitution), (Demand.FRICTION, matrix.friction)):
         why = f"up to {largest:g}" if largest else "0 for every pair that can collide"
-        yield demand, largest > 0, why if touch else "no collisions possible"
+        yield demand, largest > 0, why if can_collide else "no collisions possible"
 
     yield from _surfaces(scene, matrix)
     yield from _joints(setup)
     yield from _floor(setup)
-    apart = len(scene.layers) > 1
-    yield Demand.LAYERS, apart, ", ".join(scene.layers) if apart else "all bodies are in one layer"
+    has_layers = len(scene.layers) > 1
+    yield Demand.LAYERS, has_layers, ", ".join(scene.layers) if has_layers else "all bodies are in one layer"
     yield Demand.ZONES, bool(scene.zones), f"{len(scene.zones):,}" if scene.zones else "none"
     yield Demand.BOUNDS, world.bounds is not None, "world.bounds is given" if world.bounds else "no bounds"
-    mortal = int(np.isfinite(bodies.lifetime).sum())
+    limited = int(np.isfinite(bodies.lifetime).sum())
     yield (
         Demand.LIFETIMES,
-        mortal > 0,
-        _count(mortal, "body has a lifetime", "bodies have a lifetime", "no body has a lifetime"),
+        limited > 0,
+        _count(limited, "body has a lifetime", "bodies have a lifetime", "no body has a lifetime"),
     )
 
 
@@ -183,11 +183,11 @@ def _surfaces(scene: Scene, matrix: ContactMatrix) -> Iterator[tuple[Demand, boo
     yield Demand.FALLOFF, largest > 0.0, why
     touched = np.asarray(matrix.touching.any(axis=1))
     of_fixed = touched[surfaces.of_fixed]
-    for demand, does, one, many, none in (
+    for demand, has_property, one, many, none in (
         (Demand.KICKS, surfaces.kicks, "wall or post kicks", "walls and posts kick", "no wall or post kicks"),
         (Demand.ONE_WAY, surfaces.one_way, "one-way wall", "one-way walls", "none"),
     ):
-        count = int(np.count_nonzero(does[surfaces.of_fixed] & of_fixed)) if len(does) else 0
+        count = int(np.count_nonzero(has_property[surfaces.of_fixed] & of_fixed)) if len(has_property) else 0
         yield demand, count > 0, _count(count, one, many, none)
     colliders: tuple[Wall | Post, ...] = (*scene.walls, *scene.posts)
     open_ = sum(not collider.solid for collider in colliders)
@@ -199,12 +199,12 @@ def _joints(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:
     for kind, demand in DEMAND_OF_JOINT.items():
         count = int(np.count_nonzero(setup.links.kind == kind))
         yield demand, count > 0, f"{count:,}" if count else "none"
-    for demand, those in (
+    for demand, elements in (
         (Demand.ATTRACTION, scene.attractions),
         (Demand.THRUST, scene.thrusts),
         (Demand.DRIVES, scene.drives),
     ):
-        yield demand, bool(those), f"{len(those):,}" if those else "none"
+        yield demand, bool(elements), f"{len(elements):,}" if elements else "none"
 
 
 def _floor(setup: Setup) -> Iterator[tuple[Demand, bool, str]]:

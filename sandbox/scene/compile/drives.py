@@ -1,4 +1,4 @@
-"""How drives hold their bodies."""
+"""Mounts of driven bodies: start position and hinge of each body with a drive."""
 
 import math
 from dataclasses import replace
@@ -15,7 +15,7 @@ from sandbox.scene.geometry.vectors import rotate
 
 
 class Mount(NamedTuple):
-    """How a drive holds a body."""
+    """Mount of a driven body."""
 
     number: int
     """index of the drive"""
@@ -32,7 +32,7 @@ def names_of(scene: SceneDescription) -> list[str]:
 
 
 def mounts(scene: SceneDescription) -> dict[str, Mount]:
-    """Return how each driven body is held, by its name."""
+    """Return the mount of each driven body, by its name."""
     if not scene.drives:
         return {}
     found, singles = {}, single_bodies(scene)
@@ -45,8 +45,8 @@ def mounts(scene: SceneDescription) -> dict[str, Mount]:
 
 def is_driven(scene: SceneDescription, bodies: Bodies, *, turning: bool = False) -> BoolArray:
     """Return which bodies are driven, (N,); optionally only those that rotate."""
-    those = [drive.body for drive in scene.drives if not (turning and isinstance(drive, PlungerDrive))]
-    return np.isin(bodies.names, those) if those else np.zeros(len(bodies), dtype=np.bool_)
+    driven = [drive.body for drive in scene.drives if not (turning and isinstance(drive, PlungerDrive))]
+    return np.isin(bodies.names, driven) if driven else np.zeros(len(bodies), dtype=np.bool_)
 
 
 def is_immovable(scene: SceneDescription, bodies: Bodies) -> BoolArray:
@@ -60,18 +60,18 @@ def with_drive_moments(scene: SceneDescription, bodies: Bodies) -> Bodies:
     moment = bodies.moment.copy()
     for name, mount in mounts(scene).items():
         if isinstance(mount.drive, TorqueDrive) and mount.drive.moment is not None:
-            number = bodies.number_of[name]
-            lowest = moment_of_mass(mount, float(bodies.mass[number]))
-            moment[number] = max(mount.drive.moment - lowest, 0.0)
+            index = bodies.number_of[name]
+            lowest = moment_of_mass(mount, float(bodies.mass[index]))
+            moment[index] = max(mount.drive.moment - lowest, 0.0)
     return replace(bodies, moment=moment)
 
 
 def single_bodies(scene: SceneDescription) -> dict[str, BodySpec]:
-    """Return the bodies with a table of their own, by name."""
+    """Return the single bodies, which have a table each, by name."""
     return {
         each.name or default_name(kind, k): each
-        for kind, those in scene.kinds.items()
-        for k, each in enumerate(those)
+        for kind, elements in scene.kinds.items()
+        for k, each in enumerate(elements)
         if isinstance(each, BodySpec)
     }
 
@@ -84,7 +84,7 @@ def _hinge(drive: AnyDrive, single: BodySpec, home: Point) -> Point:
 
 
 def mount_of(number: int, drive: AnyDrive, single: BodySpec) -> Mount:
-    """Return how a drive holds a body, given the index of the drive."""
+    """Return the mount of a body, given the index of its drive."""
     home = centre_of(single)
     return Mount(number, drive, home, _hinge(drive, single, home))
 

@@ -1,7 +1,7 @@
 """Expansion of grids, scatters, emitters and stacks, and the start state of the bodies of all generators.
 
-Each generator draws from a random stream of its own, keyed by the seed, its kind and its index among its kind, so
-adding a generator changes no other; see `random_streams.py`. Only uniform doubles are drawn: their stream is stable
+Each generator has its own random stream, keyed by the seed, its kind and its index among its kind, so that adding a
+generator does not change the others; see `random_streams.py`. Only uniform doubles are drawn: their stream is stable
 across versions of numpy.
 """
 
@@ -161,7 +161,7 @@ def layout_of(generator: BodySource, seed: int, index: int, gravity: Point) -> L
     """Return the start state of the bodies of a generator.
 
     Args:
-        generator: an element that stands for several bodies.
+        generator: an element with several bodies.
         seed: of the scene.
         index: index of the generator among its kind.
         gravity: of the scene, m/s²; slack ropes sag along it.

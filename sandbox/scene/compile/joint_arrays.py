@@ -121,9 +121,9 @@ class JointArrays:
 
     def some(self, which: BoolArray | IntArray) -> Self:
         """Return a selection, by mask or by indices."""
-        places = np.arange(len(self))[which]
-        columns = {f.name: getattr(self, f.name)[places] for f in fields(self) if f.name != "names"}
-        return replace(self, names=tuple(self.names[k] for k in places.tolist()), **columns)
+        indices = np.arange(len(self))[which]
+        columns = {f.name: getattr(self, f.name)[indices] for f in fields(self) if f.name != "names"}
+        return replace(self, names=tuple(self.names[k] for k in indices.tolist()), **columns)
 
     def joined(self, more: Self) -> Self:
         """Return these and more joints."""
@@ -185,13 +185,13 @@ class JointArrays:
 
     def among(self, names: Sequence[str], old: Sequence[str]) -> Self:
         """Return the joints whose bodies, by their `old` names, are among new ones, with the new indices."""
-        number = {name: k for k, name in enumerate(names)}
+        index_of = {name: k for k, name in enumerate(names)}
         new = np.asarray(
-            [number.get(name, -2) for name in old] + [WORLD], dtype=np.int64
+            [index_of.get(name, -2) for name in old] + [WORLD], dtype=np.int64
         )  # a = −1 selects the last row
         kept = (new[self.a] != -2) & (new[self.b] != -2) if len(self) else np.empty(0, np.bool_)
-        some = self.some(kept)
-        return replace(some, a=new[some.a], b=new[some.b])
+        selected = self.some(kept)
+        return replace(selected, a=new[selected.a], b=new[selected.b])
 
 
 def _anchors(body: IntArray, anchor: FloatArray, position: FloatArray, angle: FloatArray) -> FloatArray:

@@ -39,16 +39,16 @@ def generator_joints(scene: SceneDescription, bodies: Bodies) -> JointArrays:
     links = JointArrays.none()
     if not (scene.ropes or scene.cloths or scene.ragdolls):
         return links
-    first, still = 0, np.append(is_immovable(scene, bodies), True)  # the world, −1, selects the last row
+    first, immovable = 0, np.append(is_immovable(scene, bodies), True)  # the world, −1, selects the last row
     for kind, sources in scene.kinds.items():
         for k, source in enumerate(sources):
-            own = _joints_of(source, first, bodies)
+            joints = _joints_of(source, first, bodies)
             first += count_of(source)
-            own = own.some(~(still[own.a] & still[own.b]))
+            joints = joints.some(~(immovable[joints.a] & immovable[joints.b]))
             if isinstance(source, SoftBody) and source.strength is not None:
-                own = replace(own, strength=np.full(len(own), source.strength))
+                joints = replace(joints, strength=np.full(len(joints), source.strength))
             stem = source.name or default_name(kind, k)
-            links = links.joined(replace(own, names=tuple(f"{stem}-joint-{n}" for n in range(1, len(own) + 1))))
+            links = links.joined(replace(joints, names=tuple(f"{stem}-joint-{n}" for n in range(1, len(joints) + 1))))
     return links
 
 
@@ -74,12 +74,12 @@ def _with_body_indices(links: JointArrays, first: int) -> JointArrays:
 
 def _attach_rope_ends(links: JointArrays, rope: Rope, bodies: Bodies) -> JointArrays:
     """Return the joints of a rope with the bodies at its ends, anchored where the ends start."""
-    for end, position, stand_in in zip(ENDS, (rope.start, rope.end), (STARTS_AT, ENDS_AT), strict=True):
+    for end, position, placeholder in zip(ENDS, (rope.start, rope.end), (STARTS_AT, ENDS_AT), strict=True):
         name = rope.tied(end)
         if name is not None:
             number = bodies.number_of[name]
             anchor = _to_body_frame(position, number, bodies)
-            first, second = links.a == stand_in, links.b == stand_in
+            first, second = links.a == placeholder, links.b == placeholder
             links = replace(
                 links,
                 a=np.where(first, number, links.a),

@@ -28,7 +28,7 @@ class Potential:
 
         Args:
             start: scene or setup; its springs refer to the indices of its own bodies.
-            bodies: these and all spawned since, which are attracted too.
+            bodies: bodies of `start` and those added since, which are attracted too.
             body: index of the only body whose energy counts; default: all.
             breaks: (J,) s, time at which each joint broke, inf if it did not; default: none broke.
         """
@@ -94,30 +94,30 @@ class Potential:
     def _attracted(
         self, attraction: Attraction, toward: int | None, position: FloatArray, present: BoolArray
     ) -> FloatArray:
-        drawn = np.flatnonzero(self._mass)
+        attracted = np.flatnonzero(self._mass)
         if toward is None:
             centre = np.asarray(attraction.toward, dtype=np.float64)
-            fraction = np.ones(len(drawn)) if self._body is None else (drawn == self._body).astype(np.float64)
-            counts = present[:, drawn]
+            fraction = np.ones(len(attracted)) if self._body is None else (attracted == self._body).astype(np.float64)
+            counts = present[:, attracted]
         else:
-            drawn = drawn[drawn != toward]
+            attracted = attracted[attracted != toward]
             centre = position[:, toward, None]
-            fraction = self._fraction(np.full(len(drawn), toward), drawn)
-            counts = present[:, drawn] & present[:, toward, None]
+            fraction = self._fraction(np.full(len(attracted), toward), attracted)
+            counts = present[:, attracted] & present[:, toward, None]
         counts = counts & (fraction > 0.0)
-        away = position[:, drawn] - centre
-        distance, soft = np.hypot(away[..., 0], away[..., 1]), attraction.softening
+        away = position[:, attracted] - centre
+        distance, epsilon = np.hypot(away[..., 0], away[..., 1]), attraction.softening
         with np.errstate(divide="ignore"):
-            depth = np.arctan2(soft, distance) / soft if soft > 0.0 else 1.0 / distance
-        return np.asarray(np.where(counts, -attraction.strength * depth, 0.0) @ (self._mass[drawn] * fraction))
+            depth = np.arctan2(epsilon, distance) / epsilon if epsilon > 0.0 else 1.0 / distance
+        return np.asarray(np.where(counts, -attraction.strength * depth, 0.0) @ (self._mass[attracted] * fraction))
 
     def _fraction(self, a: IntArray, b: IntArray) -> FloatArray:
         """Return the fraction of the energy of each pair that counts, (K,)."""
         if self._body is None:
             return np.ones(len(b))
         first, second = (a >= 0) & ~self._fixed[a], ~self._fixed[b]
-        mine = ((a == self._body) & first).astype(np.float64) + ((b == self._body) & second)
-        return np.asarray(mine / np.maximum(first.astype(np.float64) + second, 1.0))
+        counted = ((a == self._body) & first).astype(np.float64) + ((b == self._body) & second)
+        return np.asarray(counted / np.maximum(first.astype(np.float64) + second, 1.0))
 
 
 def both_present(links: JointArrays, present: BoolArray) -> BoolArray:

@@ -85,13 +85,13 @@ def start_bodies(scene: SceneDescription) -> "Bodies":
         raise ValueError(f"its [{preset}] is not expanded; sandbox.scene.files.presets.expanded does that")
     names: list[str] = []
     layouts: list[Layout] = []
-    for kind, those in scene.kinds.items():
-        singles = [each for each in those if isinstance(each, BodySpec)]
+    for kind, sources in scene.kinds.items():
+        singles = [each for each in sources if isinstance(each, BodySpec)]
         if singles:
             layouts.append(layout_of_singles(singles))
-            names += [each.name or default_name(kind, k) for k, each in enumerate(those)]
+            names += [each.name or default_name(kind, k) for k, each in enumerate(sources)]
             continue
-        for k, each in enumerate(those):
+        for k, each in enumerate(sources):
             from sandbox.scene.compile.generators import layout_of
 
             layout, stem = layout_of(each, scene.world.seed, k, scene.world.gravity), each.name or default_name(kind, k)

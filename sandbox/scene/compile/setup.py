@@ -67,8 +67,9 @@ class Setup:
     def with_scene(self, scene: Scene) -> Self:
         """Return the same state with changed values of the scene.
 
-        Elements of the scene change, elements of bodies that were added since stay. Bodies and joints are not compiled
-        again, because that would restore removed bodies and broken joints, and lay out ropes along the new gravity.
+        Elements of the scene are replaced; those of bodies that were added since are kept. Bodies and joints are not
+        compiled again, because that would restore removed bodies and broken joints, and lay out ropes along the new
+        gravity.
 
         Args:
             scene: scene with as many elements as this one, such as from `change_value`.

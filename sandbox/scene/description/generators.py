@@ -206,14 +206,14 @@ STRIDE = {
 }
 """Joint angles at the start, degrees; the others are 0."""
 
-NEAR, FAR = "#e69f00", "#56b4e9"
+NEAR_LIMB_COLOUR, FAR_LIMB_COLOUR = "#e69f00", "#56b4e9"
 """Default colours of the limbs in front of and behind the trunk."""
 
 
 def segments(ragdoll: Ragdoll) -> dict[str, BodySegment]:
     """Return the segments by name, in the order of the bodies: those behind the trunk first."""
-    near, far = ("right", "left") if ragdoll.facing == "right" else ("left", "right")
-    return {**_limbs(far), **TRUNK, **_limbs(near)}
+    near_side, far_side = ("right", "left") if ragdoll.facing == "right" else ("left", "right")
+    return {**_limbs(far_side), **TRUNK, **_limbs(near_side)}
 
 
 def _limbs(side: str) -> dict[str, BodySegment]:

@@ -14,7 +14,7 @@ LineWidth = Annotated[float, Field(ge=0, le=1e9)]
 
 
 class Marking(Part):
-    """A disc, ring, polygon or line that is drawn below everything else, in the order of the file."""
+    """A disc, ring, polygon or line that is drawn below all other objects, in the order of the file."""
 
     colour: Colour
     """`#rrggbb`"""
@@ -31,7 +31,7 @@ class Marking(Part):
 
 
 def marking_fault(marking: Marking) -> str | None:
-    """Return why a marking is not a valid shape, or None."""
+    """Return the reason why a marking is not a valid shape, or None."""
     of_circle = marking.position is not None or marking.radius is not None
     if bool(marking.points) == of_circle:
         return "must have either `position` and `radius` (a circle) or `points` (a polygon or line)"

@@ -101,7 +101,7 @@ class SceneDescription(_Header):
     @property
     def body_sources(self) -> tuple[BodySource, ...]:
         """Elements with bodies, in scene order."""
-        return tuple(each for those in self.kinds.values() for each in those)
+        return tuple(each for sources in self.kinds.values() for each in sources)
 
     @property
     def fixed(self) -> tuple[Plane | Wall | Post, ...]:

@@ -1,4 +1,4 @@
-"""Messages for the faults of a file, and checks of the rest of a file with faults."""
+"""Messages for the faults of a file, and checks of the valid parts of a file with faults."""
 
 import copy
 import difflib
@@ -38,11 +38,11 @@ _EXPECTED = {
 }
 
 _RANGES = {"greater_than": "gt", "greater_than_equal": "ge", "less_than": "lt", "less_than_equal": "le"}
-"""The bound that each of pydantic's errors is about."""
+"""Violated bound of each type of pydantic error."""
 
 _LARGE = 1e5
-"""Bounds beyond this only protect the engines from extreme values: a message gives such a bound only if it is the one
-exceeded. The same holds for a smallest positive value below its reciprocal."""
+"""Bounds beyond this only protect the engines from extreme values: a message states such a bound only if it is the
+violated one. The same holds for a smallest positive value below its reciprocal."""
 
 _DEGREES = 720
 """Largest magnitude, two turns, that may be an angle given in degrees by mistake."""
@@ -112,13 +112,13 @@ def explained(error: ValidationError, location: Location) -> list[LocatedMessage
 def _missing_elements(details: Any) -> str:
     """Return the message for an array with too few values: how many it must have, and how many it has."""
     location = tuple(details["loc"])
-    wanted = len(get_args(_annotation_at(location[:-1]))) or location[-1] + 1
+    required = len(get_args(_annotation_at(location[:-1]))) or location[-1] + 1
     has = len(details["input"])
     field = _field_at(location[:-1])
     for each in () if field is None else field.metadata:
         if isinstance(each, Wording):
-            return f"must be {wanted} {each.text}; has {has}"
-    return f"must be an array of {wanted}, has {has}"
+            return f"must be {required} {each.text}; has {has}"
+    return f"must be an array of {required}, has {has}"
 
 
 def _length(location: Location, context: Any) -> str:
@@ -240,14 +240,14 @@ def _known_keys(location: Location) -> str:
         if key in keys_of(model_at((table,))):
             return f"did you mean {table}.{key}?"
     if len(location) == 1:
-        homes = [table for table in list_tables() if key in keys_of(model_at((table, 0)))]
-        if homes:
-            some = ", ".join(f"[[{table}]]" for table in homes[:3])
-            return f"it is a key of {some}{' and others' if len(homes) > 3 else ''}; put it under that heading"
+        tables = [table for table in list_tables() if key in keys_of(model_at((table, 0)))]
+        if tables:
+            headings = ", ".join(f"[[{table}]]" for table in tables[:3])
+            return f"it is a key of {headings}{' and others' if len(tables) > 3 else ''}; put it under that heading"
     word = key.lower()
     if word == "static":
-        here = "fixed = true" if "fixed" in known else "plane, wall or post, or a body with fixed = true"
-        return f"did you mean {here}?"
+        suggestion = "fixed = true" if "fixed" in known else "plane, wall or post, or a body with fixed = true"
+        return f"did you mean {suggestion}?"
     same = [name for name, words in _SYNONYMS.items() if name in known and {word, word.removesuffix("s")} & words]
     close = same or difflib.get_close_matches(key, known, n=1)
     return f"did you mean {close[0]!r}?" if close else f"known keys: {', '.join(known)}"
@@ -326,7 +326,7 @@ def check_valid_remainder(document: dict[str, Any], wrong: Iterable[Location]) -
     """Cross-check a document whose values at `wrong` are faulty.
 
     These values are removed, or replaced by placeholders if required. Faults of the elements that they belong to are
-    then dropped, except those of independent keys. The result is empty if too much is wrong for a reliable check.
+    then dropped, except those of independent keys. The result is empty if the faults do not allow a reliable check.
     """
     document = copy.deepcopy(document)
     touched: set[Location] = set()
@@ -339,7 +339,7 @@ def check_valid_remainder(document: dict[str, Any], wrong: Iterable[Location]) -
             continue
         if len(location) == 1 and location[0] in document and location[0] not in _TABLES:
             if difflib.get_close_matches(str(location[0]), _TABLES, n=1) == ["material"]:
-                return []  # many references would seem to be missing
+                return []  # many references would appear to be missing
             del document[location[0]]  # an unknown key or a title: nothing depends on it
             continue
         depth = 2 if len(location) > 1 and isinstance(location[1], int) else 1
@@ -373,19 +373,19 @@ def check_valid_remainder(document: dict[str, Any], wrong: Iterable[Location]) -
 def _without_faulty(document: dict[str, Any], wrong: list[Location]) -> dict[str, list[int]]:
     """Remove faulty joints and other referencing tables; return the original indices of those that remain.
 
-    All of them are removed if a body's name may be faulty, because they would seem to refer to a missing body.
+    All of them are removed if a body's name may be faulty, because they would appear to refer to a missing body.
     """
     nameless = any(_may_hide_name(location) for location in wrong)
     kept: dict[str, list[int]] = {}
     for (key,) in REFERENCING_TABLES:
-        those = document.get(key)
+        elements = document.get(key)
         faulty = [location for location in wrong if location[0] == key]
-        if nameless or not isinstance(those, list) or any(len(location) < 2 for location in faulty):
+        if nameless or not isinstance(elements, list) or any(len(location) < 2 for location in faulty):
             document.pop(key, None)
             continue
-        out = {location[1] for location in faulty}
-        kept[key] = [k for k in range(len(those)) if k not in out]
-        document[key] = [those[k] for k in kept[key]]
+        removed = {location[1] for location in faulty}
+        kept[key] = [k for k in range(len(elements)) if k not in removed]
+        document[key] = [elements[k] for k in kept[key]]
     return kept
 
 

@@ -126,7 +126,7 @@ def assign_all(result: Any, parts: tuple[str, ...], path: str, value: Any) -> Lo
     if EVERY not in parts[1:-1]:
         return _assign(result, parts, path, value)
     k = parts.index(EVERY, 1)
-    elements, location = _followed(result, parts[:k])
+    elements, location = _value_at(result, parts[:k])
     if not isinstance(elements, list) or EVERY in _names(elements):
         return _assign(result, parts, path, value)
     if not elements:
@@ -136,51 +136,51 @@ def assign_all(result: Any, parts: tuple[str, ...], path: str, value: Any) -> Lo
     return location
 
 
-def _followed(here: Any, parts: tuple[str, ...]) -> tuple[Any, Location]:
+def _value_at(value: Any, parts: tuple[str, ...]) -> tuple[Any, Location]:
     """Return the value at a path and its location; None if the path does not exist."""
     location: Location = ()
     for part in parts:
         key: str | int = part
-        if isinstance(here, list):
+        if isinstance(value, list):
             try:
-                key = index_of(here, parts[: len(location) + 1], "")
+                key = index_of(value, parts[: len(location) + 1], "")
             except AddressError:
                 return None, ()
-        elif not isinstance(here, dict) or part not in here:
+        elif not isinstance(value, dict) or part not in value:
             return None, ()
-        here, location = here[key], (*location, key)
-    return here, location
+        value, location = value[key], (*location, key)
+    return value, location
 
 
 def _assign(result: Any, parts: tuple[str, ...], path: str, value: Any) -> Location:
     """Set a value in place and return its location."""
-    here: Any = result
+    container: Any = result
     location: Location = ()
     for k, part in enumerate(parts):
         last = k == len(parts) - 1
-        if isinstance(here, dict):
-            if not last and part not in here:
+        if isinstance(container, dict):
+            if not last and part not in container:
                 if k == 0 and _is_list(part):
                     raise AddressError(f"{path}: the scene has no [[{part}]]")
-                meant = _meant(here, parts[k:])
+                hint = _hint(container, parts[k:])
                 if k > 0 and k == len(parts) - 2 and parts[-1].isdecimal() and part in _keys(location):
-                    whole = ".".join(parts[: k + 1])
-                    raise AddressError(f"{path}: the scene has no {whole}; set all of it, {whole}=…")
-                if k > 0 or len(parts) != 2 or "an element" in meant:
-                    raise AddressError(f"{path}: the scene has no {'.'.join(parts[: k + 1])}{meant}")
-                here[part] = {}
+                    array = ".".join(parts[: k + 1])
+                    raise AddressError(f"{path}: the scene has no {array}; set all of it, {array}=…")
+                if k > 0 or len(parts) != 2 or "an element" in hint:
+                    raise AddressError(f"{path}: the scene has no {'.'.join(parts[: k + 1])}{hint}")
+                container[part] = {}
             location += (part,)
             if last:
-                here[part] = value
+                container[part] = value
             else:
-                here = here[part]
-        elif isinstance(here, list):
-            index = index_of(here, parts[: k + 1], path)
+                container = container[part]
+        elif isinstance(container, list):
+            index = index_of(container, parts[: k + 1], path)
             location += (index,)
             if last:
-                here[index] = value
+                container[index] = value
             else:
-                here = here[index]
+                container = container[index]
         else:
             raise AddressError(f"{path}: {'.'.join(parts[:k])} is a single value without a {short_repr(part)}")
     return location
@@ -196,19 +196,19 @@ def index_of(elements: list[Any], parts: tuple[str, ...], path: str) -> int:
         return int(part)
     before = ".".join(parts[:-1])
     if any(isinstance(e, dict) and part in e for e in elements) or part in _keys(parts[:-1]):
-        rest = path[len(before) :].lstrip(".")
-        named = f", such as {before}.{quoted(names[0] or '0')}.{rest}," if elements else ""
-        raise AddressError(f"{path}: {before} is a list; name an element{named} or use {before}.*.{rest} for all")
-    some = [name for name in names if name is not None]
-    maker = next((name for name in some if part.startswith(f"{name}-")), None)
-    if maker is not None:
+        remainder = path[len(before) :].lstrip(".")
+        named = f", such as {before}.{quoted(names[0] or '0')}.{remainder}," if elements else ""
+        raise AddressError(f"{path}: {before} is a list; name an element{named} or use {before}.*.{remainder} for all")
+    known_names = [name for name in names if name is not None]
+    generator = next((name for name in known_names if part.startswith(f"{name}-")), None)
+    if generator is not None:
         raise AddressError(
-            f"{path}: {short_repr(part)} is made by the generator {before}.{quoted(maker)}; set a key of that"
+            f"{path}: {short_repr(part)} is made by the generator {before}.{quoted(generator)}; set a key of that"
         )
-    close = difflib.get_close_matches(part, some, n=1)
+    close = difflib.get_close_matches(part, known_names, n=1)
     if close:
         raise AddressError(f"{path}: no element {short_repr(part)}; did you mean {short_repr(close[0])}?")
-    known = f"names: {', '.join(some[:10])}; " if some else ""
+    known = f"names: {', '.join(known_names[:10])}; " if known_names else ""
     numbers = "none" if not elements else "0" if len(elements) == 1 else f"0 to {len(elements) - 1}"
     raise AddressError(f"{path}: no element {short_repr(part)}; {known}numbers: {numbers}")
 
@@ -242,8 +242,8 @@ def _is_list(table: str) -> bool:
     return table in list_tables()
 
 
-def _meant(document: Any, parts: tuple[str, ...]) -> str:
-    """Return a hint for a path whose first part is no table: an element's name, or a similar table."""
+def _hint(document: Any, parts: tuple[str, ...]) -> str:
+    """Return a hint for a path whose first part is no table: the element of that name, or a similar table."""
     if not isinstance(document, dict):
         return ""
     for kind, elements in document.items():
@@ -261,7 +261,7 @@ def elements_hint(document: dict[str, Any], parts: tuple[str, ...]) -> str:
     These have the key of the path, and the most matches of their names with parts of the path, exact or similar;
     without a match, some elements that have the key.
     """
-    wanted = [part for part in parts[1:-1] if not part.isdecimal() and part != EVERY]
+    words = [part for part in parts[1:-1] if not part.isdecimal() and part != EVERY]
     named = [
         (name, f"{kind}.{quoted(name)}.{parts[-1]}")
         for kind, elements in document.items()
@@ -269,8 +269,8 @@ def elements_hint(document: dict[str, Any], parts: tuple[str, ...]) -> str:
         for name in element_names(elements, kind)
         if name is not None
     ]
-    near = {part: difflib.get_close_matches(part, [name for name, _ in named]) for part in wanted}
-    shared = [sum(part in name or name in near[part] for part in wanted) for name, _ in named]
+    similar = {part: difflib.get_close_matches(part, [name for name, _ in named]) for part in words}
+    shared = [sum(part in name or name in similar[part] for part in words) for name, _ in named]
     found = [path for (_, path), count in zip(named, shared, strict=True) if 0 < count == max(shared)]
     if found:
         return f"; did you mean {' or '.join(found[:5])}?"
@@ -326,9 +326,9 @@ def change_value(scene: Scene, path: str, value: Any) -> Scene:
         names = [{} if each.name is None else {"name": each.name} for each in part if hasattr(each, "name")]
         names = names or [{} for _ in part]
         every = rest[0] == EVERY and {"name": EVERY} not in names
-        those = range(len(part)) if every else [index_of(names, (heading, rest[0]), path)]
+        indices = range(len(part)) if every else [index_of(names, (heading, rest[0]), path)]
         elements = list(part)
-        for k in those:
+        for k in indices:
             elements[k] = _with(elements[k], rest[1:], path, value)
         changed = tuple(elements)
     else:

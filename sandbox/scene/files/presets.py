@@ -26,7 +26,7 @@ class Preset(GameTable):
     origins: Callable[[Scene], dict[str, Location]] | None = None
     """returns the location within the table of the origin of each element, by the name of the element"""
     excludes: tuple[str, ...] = ()
-    """tables of other presets that a scene cannot have besides"""
+    """tables of other presets that cannot occur in the same scene"""
 
 
 Assignment = tuple[str, Any]
@@ -63,14 +63,14 @@ def apply_preset_overrides(
             document, location = assign(document, path, value)
             changed.add(location)
         except AddressError as error:
-            if any(key in document and _begins(path, key) for key in PRESETS):
+            if any(key in document and _is_within(path, key) for key in PRESETS):
                 wrong.append(str(error))
             else:
                 later.append((path, value))
     return document, changed, later, wrong
 
 
-def _begins(path: str, key: str) -> bool:
+def _is_within(path: str, key: str) -> bool:
     """Return whether a path leads into a table."""
     return path == key or path.startswith((f"{key}.", f"{key}["))
 
@@ -80,25 +80,25 @@ def stated_location(location: Location, document: dict[str, Any], stated: dict[s
 
     It is the same location, except for an element that a preset created: then it is that of the preset or of its part.
     """
-    if not _is_written(location, stated):
+    if not _is_created(location, stated):
         return location
     presets = presets_of(stated)
     for key, preset in presets.items():
         if preset.origins is not None:
-            those, number = document.get(str(location[0])), location[1] if len(location) > 1 else None
-            name = those[number].get("name") if isinstance(those, list) and isinstance(number, int) else None
+            elements, index = document.get(str(location[0])), location[1] if len(location) > 1 else None
+            name = elements[index].get("name") if isinstance(elements, list) and isinstance(index, int) else None
             return preset.origins(read_model(stated)).get(str(name), (key,))
     return (next(iter(presets), PRESETS[0]),)
 
 
-def _is_written(location: Location, stated: dict[str, Any]) -> bool:
+def _is_created(location: Location, stated: dict[str, Any]) -> bool:
     """Return whether a location is of an element that a preset created."""
     if not location:
         return False
-    here = stated.get(str(location[0]))
-    if isinstance(here, list) and len(location) > 1 and isinstance(location[1], int):
-        return location[1] >= len(here)
-    return here is None
+    elements = stated.get(str(location[0]))
+    if isinstance(elements, list) and len(location) > 1 and isinstance(location[1], int):
+        return location[1] >= len(elements)
+    return elements is None
 
 
 def faults_of(scene: Scene) -> Iterator[LocatedMessage]:
@@ -159,13 +159,13 @@ def stated(part: Stated, values: dict[str, Any]) -> Stated:
     return part.model_copy(update={key: value for key, value in values.items() if key not in part.model_fields_set})
 
 
-def added(own: Sequence[Any], more: Sequence[Any]) -> tuple[Any, ...]:
+def added(elements: Sequence[Any], preset_elements: Sequence[Any]) -> tuple[Any, ...]:
     """Return the scene's own elements, and those of a preset that have other names."""
-    taken = {each.name for each in own}
-    return (*own, *(each for each in more if each.name not in taken))
+    taken = {each.name for each in elements}
+    return (*elements, *(each for each in preset_elements if each.name not in taken))
 
 
-def paired(own: Sequence[Pair], more: Iterable[Pair]) -> tuple[Pair, ...]:
+def paired(pairs: Sequence[Pair], preset_pairs: Iterable[Pair]) -> tuple[Pair, ...]:
     """Return the scene's own pairs of materials, and those of a preset for other pairs."""
-    taken = {frozenset(pair.between) for pair in own}
-    return (*own, *(pair for pair in more if frozenset(pair.between) not in taken))
+    taken = {frozenset(pair.between) for pair in pairs}
+    return (*pairs, *(pair for pair in preset_pairs if frozenset(pair.between) not in taken))

@@ -60,14 +60,14 @@ def find(text: str) -> Path:
     if found:
         names = ", ".join(scene.name for scene in found)
         raise UnknownSceneError(f"{short_repr(text)} is ambiguous: {names}; include the folder")
-    within = scenes_in(text)
-    if within or _is_folder(text):
-        raise UnknownSceneError(f"is a folder; {_folder_message(text, within)}")
+    contained = scenes_in(text)
+    if contained or _is_folder(text):
+        raise UnknownSceneError(f"is a folder; {_folder_message(text, contained)}")
     names_of = {name: scene.name for scene in scenes for name in (scene.path.stem, scene.name)}
     close = dict.fromkeys(names_of[match] for match in difflib.get_close_matches(text[:MAX_ECHO], names_of, n=3))
-    meant = f"; did you mean {' or '.join(close)}?" if close else ";"
+    hint = f"; did you mean {' or '.join(close)}?" if close else ";"
     raise UnknownSceneError(
-        f"no file or shipped scene is named {short_repr(text)}{meant} `sandbox scenes` lists the shipped scenes"
+        f"no file or shipped scene is named {short_repr(text)}{hint} `sandbox scenes` lists the shipped scenes"
     )
 
 
@@ -117,7 +117,7 @@ def _is_folder(text: str) -> bool:
 
 
 def _is_file(text: str) -> bool:
-    """Return whether a text is the path of something readable; an unreadable file is reported when it is read."""
+    """Return whether a text is the path of a file or a pipe; an unreadable file is reported when it is read."""
     try:
         return Path(text).is_file() or Path(text).is_fifo()
     except PermissionError:

@@ -68,9 +68,9 @@ def _statement(text: str, first: int, equals: int, last: int, end: int) -> State
 
 def _keys(text: str) -> tuple[str, ...]:
     keys: list[str] = []
-    here: Any = tomllib.loads(text)
-    while isinstance(here, dict) and here:
-        key, here = next(iter(here.items()))
+    value: Any = tomllib.loads(text)
+    while isinstance(value, dict) and value:
+        key, value = next(iter(value.items()))
         keys.append(key)
     return tuple(keys)
 
@@ -181,8 +181,8 @@ def _edits(text: str, changes: Mapping[str, Any]) -> list[Edit]:
             return [(*statement.value, _inline(text[slice(*statement.value)], changes))]
     if heading is not None:
         stop = next((k for k in range(heading + 1, len(found)) if found[k].heading), len(found))
-        own = {s.keys[-1]: s for s in found[heading + 1 : stop]}
-        return _changed(text, changes, own, found[stop - 1], "")
+        statements_of = {s.keys[-1]: s for s in found[heading + 1 : stop]}
+        return _changed(text, changes, statements_of, found[stop - 1], "")
     dotted = [s for s in found[:first] if s.keys[0] == "solver"]
     if dotted:
         prefix = text[slice(*dotted[-1].head)]
@@ -193,14 +193,14 @@ def _edits(text: str, changes: Mapping[str, Any]) -> list[Edit]:
 
 
 def _changed(
-    text: str, changes: Mapping[str, Any], own: Mapping[str, Statement], last: Statement, prefix: str
+    text: str, changes: Mapping[str, Any], statements_of: Mapping[str, Statement], last: Statement, prefix: str
 ) -> list[Edit]:
-    """Return the edits of settings on lines of their own; new ones are inserted after `last`."""
+    """Return the edits of settings with one line each; new ones are inserted after `last`."""
     edits, lines = [], ""
     ending = _ending(text, last)
     indent = "" if last.heading else text[last.begin : last.head[0]]
     for key, value in changes.items():
-        statement = own.get(key)
+        statement = statements_of.get(key)
         if statement is None:
             lines += f"{indent}{prefix}{key} = {written(value)}{ending}"
         elif value is None:
@@ -208,8 +208,8 @@ def _changed(
         else:
             edits.append((*statement.value, written(value)))
     if lines:
-        broken = text[last.value[1] : last.end].endswith("\n")
-        edits.append((last.end, last.end, lines if broken else ending + lines.removesuffix(ending)))
+        has_line_break = text[last.value[1] : last.end].endswith("\n")
+        edits.append((last.end, last.end, lines if has_line_break else ending + lines.removesuffix(ending)))
     return edits
 
 
@@ -287,11 +287,11 @@ def _plain(value: Any) -> Any:
     return value.item() if hasattr(value, "item") and hasattr(value, "dtype") else value
 
 
-def _is_equal(now: Any, wanted: Any) -> bool:
+def _is_equal(present: Any, wanted: Any) -> bool:
     wanted = _plain(wanted)
-    if isinstance(now, bool) or isinstance(wanted, bool):
-        return now is wanted
-    return bool(now == wanted)
+    if isinstance(present, bool) or isinstance(wanted, bool):
+        return present is wanted
+    return bool(present == wanted)
 
 
 def _ending(text: str, statement: Statement) -> str:

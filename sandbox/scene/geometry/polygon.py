@@ -73,7 +73,7 @@ def orient2d(a: Point, b: Point, c: Point) -> float:
 
 
 def coordinate_rounding(points: Sequence[Point]) -> float:
-    """Return how far rounding of the coordinates can move a corner and its neighbour, m."""
+    """Return the largest relative displacement of a corner and its neighbour by rounding of the coordinates, m."""
     return 4.0 * _EPSILON * max(max(abs(x), abs(y)) for x, y in points)
 
 
@@ -141,23 +141,25 @@ def _crossing(points: Sequence[Point]) -> tuple[int, int] | None:
     """Return the first two non-adjacent edges, in order of x, that intersect; O(n²) if all overlap in x."""
     n = len(points)
     extent = extent_of(points)
-    alive: list[tuple[int, float, float, float, float, float, float]] = []
+    active: list[tuple[int, float, float, float, float, float, float]] = []
     for j in sorted(range(n), key=lambda i: min(points[i][0], points[(i + 1) % n][0])):
         (cx, cy), (dx, dy) = points[j], points[(j + 1) % n]
         left = min(cx, dx)
-        alive = [edge for edge in alive if edge[1] >= left]
-        for i, _, ax, ay, along, up, doubt in alive:
+        active = [edge for edge in active if edge[1] >= left]
+        for i, _, ax, ay, along, up, error_bound in active:
             # Most edges lie clearly on one side of each other; only the rest needs exact signs.
-            one, two = along * (cy - ay) - up * (cx - ax), along * (dy - ay) - up * (dx - ax)
-            if (one > doubt and two > doubt) or (one < -doubt and two < -doubt):
+            first_side, second_side = along * (cy - ay) - up * (cx - ax), along * (dy - ay) - up * (dx - ax)
+            if (first_side > error_bound and second_side > error_bound) or (
+                first_side < -error_bound and second_side < -error_bound
+            ):
                 continue
             if _edges_intersect(points, min(i, j), max(i, j)):
                 return min(i, j), max(i, j)
         along, up = dx - cx, dy - cy
-        doubt = (
+        error_bound = (
             16.0 * _EPSILON * (abs(along) + abs(up)) * extent + MIN_PRODUCT
         )  # four roundings, each of 1 part in 2^53
-        alive.append((j, max(cx, dx), cx, cy, along, up, doubt))
+        active.append((j, max(cx, dx), cx, cy, along, up, error_bound))
     return None
 
 

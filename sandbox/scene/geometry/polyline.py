@@ -82,9 +82,11 @@ def arc_at(corners: Sequence[Corner], k: int, closed: bool = False) -> Arc | Non
     radius = corners[k][2] if len(corners[k]) > 2 else 0.0
     if radius == 0.0 or (not closed and k in (0, len(corners) - 1)):
         return None
-    before, here, after = (corners[n % len(corners)] for n in (k - 1, k, k + 1))
-    come, go = _direction(before, here, k), _direction(here, after, k)
-    turn = math.atan2(come[0] * go[1] - come[1] * go[0], come[0] * go[0] + come[1] * go[1])
+    before, corner, after = (corners[n % len(corners)] for n in (k - 1, k, k + 1))
+    incoming, outgoing = _direction(before, corner, k), _direction(corner, after, k)
+    turn = math.atan2(
+        incoming[0] * outgoing[1] - incoming[1] * outgoing[0], incoming[0] * outgoing[0] + incoming[1] * outgoing[1]
+    )
     if abs(turn) < 1e-9:
         return None
     if abs(turn) > math.pi - 1e-6:
@@ -92,10 +94,10 @@ def arc_at(corners: Sequence[Corner], k: int, closed: bool = False) -> Arc | Non
     side = math.copysign(1.0, turn)
     length = radius * math.tan(0.5 * abs(turn))
     centre = (
-        here[0] - come[0] * length - come[1] * side * radius,
-        here[1] - come[1] * length + come[0] * side * radius,
+        corner[0] - incoming[0] * length - incoming[1] * side * radius,
+        corner[1] - incoming[1] * length + incoming[0] * side * radius,
     )
-    return Arc(centre, radius, math.atan2(-come[0] * side, come[1] * side), turn)
+    return Arc(centre, radius, math.atan2(-incoming[0] * side, incoming[1] * side), turn)
 
 
 def flattened(arc: Arc, tolerance: float) -> Iterator[Point]:
@@ -131,14 +133,14 @@ def length_of(points: Sequence[Point]) -> float:
 def part_of(points: Sequence[Point], begin: float, end: float) -> tuple[Point, ...]:
     """Return the part of a polyline between two arc lengths, m."""
     cut: list[Point] = []
-    gone = 0.0
+    passed = 0.0
     for a, b in pairwise(points):
         size = math.dist(a, b)
-        low, high = max(begin - gone, 0.0), min(end - gone, size)
+        low, high = max(begin - passed, 0.0), min(end - passed, size)
         if high - low > 0.0:
             ends = [(a[0] + (b[0] - a[0]) * s / size, a[1] + (b[1] - a[1]) * s / size) for s in (low, high)]
             cut += ends if not cut else ends[1:]
-        gone += size
+        passed += size
     return tuple(cut)
 
 
@@ -146,11 +148,13 @@ def _fit(corners: Sequence[Corner], arcs: Sequence[Arc | None], closed: bool) ->
     """Refuse arcs that need more length of an edge than it has."""
     for k in range(len(corners) if closed else len(corners) - 1):
         n = (k + 1) % len(corners)
-        room = math.dist(corners[k][:2], corners[n][:2])
-        wanted = sum(arc.tangent_length for arc in (arcs[k], arcs[n]) if arc is not None)
-        if wanted > room + NEAREST:
+        available = math.dist(corners[k][:2], corners[n][:2])
+        required = sum(arc.tangent_length for arc in (arcs[k], arcs[n]) if arc is not None)
+        if required > available + NEAREST:
             which = k if arcs[k] is not None else n
-            message = f"has too large a radius: its arcs take {wanted:.4g} m of an edge that is {room:.4g} m long"
+            message = (
+                f"has too large a radius: its arcs take {required:.4g} m of an edge that is {available:.4g} m long"
+            )
             raise RoundingError(which, message)
 
 

@@ -84,9 +84,11 @@ def geometry_of(element: BodySource) -> ElementGeometry:
 
 @lru_cache(maxsize=4096)
 def _solid_geometry(element: BodySource) -> ElementGeometry:
-    drawn = tuple(_drawn(element))
-    moments = [_moments(piece) for piece, _ in drawn]
-    density = _densities(element, [stated for _, stated in drawn], [fraction.area for fraction in moments])
+    pieces_and_densities = tuple(_described_pieces(element))
+    moments = [_moments(piece) for piece, _ in pieces_and_densities]
+    density = _densities(
+        element, [stated for _, stated in pieces_and_densities], [fraction.area for fraction in moments]
+    )
     weight = [rho * fraction.area for rho, fraction in zip(density, moments, strict=True)]
     mass = math.fsum(weight)
     x, y = (math.fsum(w * s.centroid[k] for w, s in zip(weight, moments, strict=True)) / mass for k in (0, 1))
@@ -94,7 +96,7 @@ def _solid_geometry(element: BodySource) -> ElementGeometry:
         rho * s.second + w * math.dist(s.centroid, (x, y)) ** 2
         for rho, w, s in zip(density, weight, moments, strict=True)
     )
-    pieces = tuple(p._replace(corners=tuple((a - x, b - y) for a, b in p.corners)) for p, _ in drawn)
+    pieces = tuple(p._replace(corners=tuple((a - x, b - y) for a, b in p.corners)) for p, _ in pieces_and_densities)
     bounding_radius = max(math.hypot(*corner) + p.radius for p in pieces for corner in p.corners)
     inner_radius, half_width = max(map(_inside, pieces)), min(map(_half_width, pieces))
     return ElementGeometry(pieces, mass, moment, (x, y), bounding_radius, inner_radius, half_width)
@@ -102,10 +104,10 @@ def _solid_geometry(element: BodySource) -> ElementGeometry:
 
 def _densities(element: BodySource, stated: list[float | None], area: list[float]) -> list[float]:
     """Return the density of each piece, kg/m²: of its part, else of the body, else 1; scaled to a stated mass."""
-    own = [element.density if rho is None else rho for rho in stated]
-    density = [1.0 if rho is None else rho for rho in own]
+    stated_or_body = [element.density if rho is None else rho for rho in stated]
+    density = [1.0 if rho is None else rho for rho in stated_or_body]
     mass = element.mass
-    if mass is None and all(rho is None for rho in own):
+    if mass is None and all(rho is None for rho in stated_or_body):
         mass = 1.0
     if mass is None:
         return density
@@ -113,7 +115,7 @@ def _densities(element: BodySource, stated: list[float | None], area: list[float
     return [rho * (mass / total) for rho in density]
 
 
-def _drawn(element: BodySource) -> list[tuple[Piece, float | None]]:
+def _described_pieces(element: BodySource) -> list[tuple[Piece, float | None]]:
     """Return the pieces of an element in the frame in which it is described, with their stated densities."""
     if isinstance(element, Compound):
         return [
@@ -230,17 +232,19 @@ def shapes_of(element: IntArray, elements: tuple[BodySource, ...]) -> Shapes:
     flat = [p for pieces in pieces_of_element for p in pieces]
     size = np.asarray([len(p.corners) for p in flat], dtype=np.int64)
     start = np.cumsum(size) - size
-    every = np.asarray([c for p in flat for c in p.corners], dtype=np.float64).reshape(-1, 2)
+    all_corners = np.asarray([c for p in flat for c in p.corners], dtype=np.float64).reshape(-1, 2)
     middle = np.asarray([_middle(p) for p in flat], dtype=np.float64).reshape(-1, 2)
     radius = np.asarray([p.radius for p in flat], dtype=np.float64)
     bounding_radius = np.asarray(
         [max(math.dist(c, m) for c in p.corners) + p.radius for p, m in zip(flat, middle.tolist(), strict=True)]
     ).reshape(-1)
     part = np.asarray([p.part for p in flat], dtype=np.int64)
-    own = size[which]
-    first = np.concatenate(([0], np.cumsum(own)))
-    row = np.repeat(start[which], own) + np.arange(first[-1]) - np.repeat(first[:-1], own)
-    return Shapes(body, first, every[row], radius[which], middle[which], bounding_radius[which], piece, part[which])
+    corner_counts = size[which]
+    first = np.concatenate(([0], np.cumsum(corner_counts)))
+    row = np.repeat(start[which], corner_counts) + np.arange(first[-1]) - np.repeat(first[:-1], corner_counts)
+    return Shapes(
+        body, first, all_corners[row], radius[which], middle[which], bounding_radius[which], piece, part[which]
+    )
 
 
 def _middle(piece: Piece) -> tuple[float, float]:
@@ -280,13 +284,13 @@ def middle_of(zone: Zone) -> Point:
         assert zone.position is not None
         return zone.position
     if zone.thickness is not None:
-        left = 0.5 * math.fsum(math.dist(a, b) for a, b in pairwise(zone.points))
+        remaining = 0.5 * math.fsum(math.dist(a, b) for a, b in pairwise(zone.points))
         for a, b in pairwise(zone.points):
             length = math.dist(a, b)
-            if left <= length:
+            if remaining <= length:
                 break
-            left -= length
-        fraction = min(left / length, 1.0)
+            remaining -= length
+        fraction = min(remaining / length, 1.0)
         return a[0] + fraction * (b[0] - a[0]), a[1] + fraction * (b[1] - a[1])
     corners = anticlockwise(zone.points)
     ox, oy = corners[0]
@@ -300,10 +304,10 @@ def middle_of(zone: Zone) -> Point:
 
 def contains(zone: Zone, point: Point) -> bool:
     """Return whether a point, m, is inside a zone."""
-    return any(_holds(piece, point) for piece in pieces_of(zone))
+    return any(_contains(piece, point) for piece in pieces_of(zone))
 
 
-def _holds(piece: ZonePiece, point: Point) -> bool:
+def _contains(piece: ZonePiece, point: Point) -> bool:
     corners = piece.corners
     if len(corners) > 2:
         sides = zip(corners, (*corners[1:], corners[0]), strict=True)

@@ -7,8 +7,8 @@ first. All signs are exact.
 Convex parts are triangles that are merged while the result is convex: at most four times the minimal number of parts
 (S. Hertel, K. Mehlhorn, Fast Triangulation of Simple Polygons, 1983). No corners are added, so adjacent parts meet
 corner to corner. pymunk.autogeometry.convex_decomposition is not used: it cuts along rays, and where a ray ends in a
-corner, as on any grid, it can omit a part or recurse until the process crashes (the tests keep an outline of seven
-corners that does). With a small stack it overflows from a few hundred corners on.
+corner, as on any grid, it can omit a part or recurse until the process crashes (the tests contain such an outline of
+seven corners). With a small stack it overflows from a few hundred corners on.
 """
 
 import math
@@ -118,9 +118,9 @@ def _bent(points: Sequence[Point], slack: float) -> list[Point]:
     """Return the corners at which the outline changes its direction."""
     kept: list[Point] = [points[0]]
     for i in range(1, len(points)):
-        here, ahead = points[i], points[(i + 1) % len(points)]
-        if turns_right(kept[-1], here, ahead, slack) or turns_right(ahead, here, kept[-1], slack):
-            kept.append(here)
+        corner, following = points[i], points[(i + 1) % len(points)]
+        if turns_right(kept[-1], corner, following, slack) or turns_right(following, corner, kept[-1], slack):
+            kept.append(corner)
     if len(kept) > 3 and not (
         turns_right(kept[-1], kept[0], kept[1], slack) or turns_right(kept[1], kept[0], kept[-1], slack)
     ):
@@ -166,7 +166,7 @@ def _check(points: Sequence[Point], parts: Sequence[tuple[Point, ...]], slack: f
                 f"near ({x:g}, {y:g}) the outline is too narrow to be cut into convex parts; "
                 f"make it wider than {shortest:g} m there, or split it by hand"
             )
-    whole = signed_area(points)
-    lost = abs(math.fsum(map(signed_area, parts)) - whole)
-    if not parts or lost > AREA_ERROR * whole + len(points) * coordinate_rounding(points) * extent_of(points):
+    area = signed_area(points)
+    lost = abs(math.fsum(map(signed_area, parts)) - area)
+    if not parts or lost > AREA_ERROR * area + len(points) * coordinate_rounding(points) * extent_of(points):
         raise OutlineError("the outline is too thin to be cut into convex parts; make it wider, or split it by hand")

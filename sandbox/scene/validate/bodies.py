@@ -24,7 +24,7 @@ MAX_OVERLAPS, MAX_OVERLAPS_EACH = 10_000, 10
 """Largest number of overlapping pairs at the start: a constant, and an amount for each body."""
 OVERLAP_BUDGET = 50_000_000
 """Candidate pairs after which the search for overlaps is abandoned; a few seconds."""
-PLACES = {"grid": "origin", "scatter": "lower", "stack": "base", "rope": "start", "cloth": "corner"}
+POSITION_KEYS = {"grid": "origin", "scatter": "lower", "stack": "base", "rope": "start", "cloth": "corner"}
 """Keys that give the position of a generator; for other elements it is `position`."""
 
 
@@ -51,7 +51,7 @@ def check_start_positions(
                 "beyond which it could leave on the wrong side"
             )
             location = prototypes[element][0]
-            key = PLACES.get(str(location[0]), "position")
+            key = POSITION_KEYS.get(str(location[0]), "position")
             yield (*location, key), message
 
     movable = np.asarray([e.collides == "all" for e in bodies.elements], dtype=bool)[bodies.element] & ~bodies.fixed
@@ -96,11 +96,11 @@ def _largest(elements: list[LocatedElement]) -> Location:
 
 def _is_crowded(bodies: Bodies, movable: BoolArray) -> bool:
     """Return whether pieces of bodies other than balls have too many close pairs."""
-    among = movable & ~bodies.round
-    if not among.any():
+    not_round = movable & ~bodies.round
+    if not not_round.any():
         return False
     shapes = bodies.shapes
-    chosen = among[shapes.body]
+    chosen = not_round[shapes.body]
     body = shapes.body[chosen]
     x, y = shapes.middle[chosen].T
     offset = rotate(x, y, np.cos(bodies.angle[body]), np.sin(bodies.angle[body]))
@@ -113,8 +113,8 @@ def _count_bodies_in_zones(scene: Scene, position: FloatArray) -> int:
     count = 0
     for zone in scene.zones:
         points = np.asarray(zone.points if zone.points is not None else [zone.position], np.float64)
-        wide = zone.radius or zone.thickness or 0.0
-        low, high = points.min(axis=0) - wide, points.max(axis=0) + wide
+        margin = zone.radius or zone.thickness or 0.0
+        low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
         count += int(((position >= low) & (position <= high)).all(axis=1).sum())
     return count
 
@@ -136,9 +136,9 @@ def height_above(plane: Plane, position: FloatArray) -> FloatArray:
 
 
 def count_overlaps(
-    position: FloatArray, radius: FloatArray, enough: float = math.inf, owner: IntArray | None = None
+    position: FloatArray, radius: FloatArray, max_count: float = math.inf, owner: IntArray | None = None
 ) -> int:
-    """Count overlapping pairs of discs, stopping early once there are enough or the budget is spent.
+    """Count overlapping pairs of discs, stopping early beyond `max_count` or when the budget is spent.
 
     If radii differ much, one large ball has all small ones as candidates, and the budget may be spent before a crowd of
     small ones is found. So each octave of radii is first counted by itself: of K octaves at one position, the number of
@@ -147,31 +147,33 @@ def count_overlaps(
     Args:
         position: (N, 2) m.
         radius: (N,) m.
-        enough: counting stops beyond this number.
+        max_count: counting stops beyond this number.
         owner: (N,) index of the body of each disc; two discs of one body are no pair.
     """
     owner = np.arange(len(radius)) if owner is None else owner
     position, radius, owner = position[radius > 0.0], radius[radius > 0.0], owner[radius > 0.0]
     octave = np.floor(np.log2(radius))
     present = np.unique(octave).tolist()
-    alike = 0
+    within_octaves = 0
     for each in present if len(present) > 1 else ():
-        those = octave == each
-        alike += _overlaps(position[those], radius[those], owner[those], enough - alike)
-        if alike > enough:
-            return alike
-    return max(alike, _overlaps(position, radius, owner, enough))
+        in_octave = octave == each
+        within_octaves += _overlaps(
+            position[in_octave], radius[in_octave], owner[in_octave], max_count - within_octaves
+        )
+        if within_octaves > max_count:
+            return within_octaves
+    return max(within_octaves, _overlaps(position, radius, owner, max_count))
 
 
-def _overlaps(position: FloatArray, radius: FloatArray, owner: IntArray, enough: float) -> int:
+def _overlaps(position: FloatArray, radius: FloatArray, owner: IntArray, max_count: float) -> int:
     if len(radius) < 2:
         return 0
     overlaps = tested = 0
     for i, j in near_pairs(position, 2.0 * float(radius.max())):
-        near = (np.hypot(*(position[i] - position[j]).T) < radius[i] + radius[j]) & (owner[i] != owner[j])
-        overlaps += int(near.sum())
+        overlapping = (np.hypot(*(position[i] - position[j]).T) < radius[i] + radius[j]) & (owner[i] != owner[j])
+        overlaps += int(overlapping.sum())
         tested += len(i)
-        if overlaps > enough or tested > OVERLAP_BUDGET:
+        if overlaps > max_count or tested > OVERLAP_BUDGET:
             break
     return overlaps
 
@@ -205,9 +207,9 @@ def check_generators(scene: Scene) -> Iterator[LocatedMessage]:
         for key, message in (*_check_lengths(rope), *_check_springs(rope, rope.kind == "springs"), *_check_ends(rope)):
             yield ("rope", k, key), message
     for k, cloth in enumerate(scene.cloths):
-        wanted = cloth.kind == "springs"
-        for where, message in (*_check_springs(cloth, wanted), *_check_pins(cloth)):
-            yield ("cloth", k, *((where,) if isinstance(where, str) else where)), message
+        has_springs = cloth.kind == "springs"
+        for key_path, message in (*_check_springs(cloth, has_springs), *_check_pins(cloth)):
+            yield ("cloth", k, *((key_path,) if isinstance(key_path, str) else key_path)), message
     for k, ragdoll in enumerate(scene.ragdolls):
         if ragdoll.density is not None:
             yield (
@@ -262,9 +264,12 @@ def _check_lengths(rope: Rope) -> Iterator[tuple[str, str]]:
             f"must be 2 or more for a rope that is longer than the distance from start to end, {distance!r} m",
         )
     # Next-but-one neighbours collide: planks are one plank apart, nodes two links.
-    room = each if rope.kind == "planks" else 2.0 * each
-    if rope.collides == "all" and rope.links > 2 and 2.0 * rope.radius >= room:
-        yield "radius", f'makes next-but-one neighbours overlap; use less than {0.5 * room:g} m, or collides = "fixed"'
+    spacing = each if rope.kind == "planks" else 2.0 * each
+    if rope.collides == "all" and rope.links > 2 and 2.0 * rope.radius >= spacing:
+        yield (
+            "radius",
+            f'makes next-but-one neighbours overlap; use less than {0.5 * spacing:g} m, or collides = "fixed"',
+        )
     if rope.kind == "planks":
         for which in ("angle", "angular_velocity"):
             if getattr(rope, which):
@@ -272,7 +277,7 @@ def _check_lengths(rope: Rope) -> Iterator[tuple[str, str]]:
 
 
 def _check_springs(body: Rope | Cloth, needed: bool) -> Iterator[tuple[str, str]]:
-    """Check that springs have a stiffness, and that nothing else has."""
+    """Check that springs have a stiffness, and that other joints have none."""
     if needed and body.stiffness is None:
         yield "stiffness", "is missing; springs need a stiffness, N/m"
     if not needed and body.stiffness is not None:

@@ -1,6 +1,6 @@
 """Checks of polygons, zones, layers and repeated elements.
 
-Static colliders repeated at one place are limited, because a tree of bounding boxes, which most engines use, cannot
+Static colliders repeated at one position are limited, because a tree of bounding boxes, which most engines use, cannot
 separate equal boxes: inserting n of them takes O(n²).
 """
 
@@ -54,11 +54,11 @@ def _is_sound(points: tuple[Point, ...]) -> bool:
 def _check_part_thickness(k: int, compound: Compound) -> Iterator[LocatedMessage]:
     """Yield the parts of a body that rounding would reduce to nothing at their position and angle."""
     polygon_outlines = [(location, *_part_size(part)) for location, part in _parts(compound)]
-    far = max((math.hypot(*part.position) + reach for _, part, reach, _ in polygon_outlines), default=0.0)
+    extent = max((math.hypot(*part.position) + reach for _, part, reach, _ in polygon_outlines), default=0.0)
     for location, _, _, thin in polygon_outlines:
-        if thin < MIN_THICKNESS * far:
+        if thin < MIN_THICKNESS * extent:
             message = (
-                f"is {thin:g} m thin in a body that reaches {far:g} m from its position; "
+                f"is {thin:g} m thin in a body that reaches {extent:g} m from its position; "
                 f"at least {MIN_THICKNESS:g} of that, or rounding would leave nothing of it"
             )
             yield ("body", k, *location), message
@@ -98,8 +98,8 @@ def with_placeholder_shapes(scene: Scene) -> Scene:
     triangle = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0))
     isolated = {"collides": "none", "mass": 1.0, "density": None}
     polygons = tuple(each.model_copy(update={"points": triangle, **isolated}) for each in scene.polygons)
-    nothing = {"boxes": (), "capsules": (), "polygons": ()}
-    disc = {"balls": (BallPart(radius=1.0),), **nothing, **isolated}
+    no_parts = {"boxes": (), "capsules": (), "polygons": ()}
+    disc = {"balls": (BallPart(radius=1.0),), **no_parts, **isolated}
     compounds = tuple(each.model_copy(update=disc) for each in scene.compounds)
     return scene.model_copy(update={"polygons": polygons, "compounds": compounds})
 
@@ -138,8 +138,8 @@ def _shapes(scene: Scene) -> Iterator[tuple[Location, ShapeKey]]:
             yield ("wall", k, "points", n), segment
     for k, post in enumerate(scene.posts):
         yield ("post", k), _disc(post.position, post.radius)
-    for kind, those in scene.kinds.items():
-        for k, single in enumerate(those):
+    for kind, sources in scene.kinds.items():
+        for k, single in enumerate(sources):
             if isinstance(single, BodySpec) and single.fixed and single.collides != "none":
                 for key in _boxes(single):
                     yield (kind, k), key

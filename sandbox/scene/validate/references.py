@@ -54,25 +54,25 @@ def _check_joints(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
             yield ("joint", k, "between"), message
         else:
             yield from _check_rod(k, joint, bodies, index)
-        for where, message in _check_joint(joint):
-            yield ("joint", k, where), message
+        for key, message in _check_joint(joint):
+            yield ("joint", k, key), message
 
 
-def _check_names(kind: str, those: Sequence[Joint | Thrust | Attraction | Driven]) -> Iterator[LocatedMessage]:
+def _check_names(kind: str, elements: Sequence[Joint | Thrust | Attraction | Driven]) -> Iterator[LocatedMessage]:
     """Yield the elements whose name, stated or by default, is used twice within their kind."""
     seen: set[str] = set()
-    for k, each in enumerate(those):
+    for k, each in enumerate(elements):
         name = each.name or default_name(kind, k)
         if name in seen:
             yield (kind, k, "name"), f"another {kind} is also named {name!r}; names must be unique"
         seen.add(name)
 
 
-def _check_rod(k: int, joint: Joint, bodies: Bodies, number: dict[str, int]) -> Iterator[LocatedMessage]:
+def _check_rod(k: int, joint: Joint, bodies: Bodies, index: dict[str, int]) -> Iterator[LocatedMessage]:
     """Yield a rod whose ends start at one point, where it has no direction."""
-    if not isinstance(joint, Rod) or any(name not in number for name in joint.between) or joint.length == 0.0:
+    if not isinstance(joint, Rod) or any(name not in index for name in joint.between) or joint.length == 0.0:
         return
-    start, end = ends_of(joint, bodies, number)
+    start, end = ends_of(joint, bodies, index)
     if math.dist(start, end) < SHORTEST:
         message = (
             f"both points start at ({start[0]:g}, {start[1]:g}) m, so the rod has no direction; "
@@ -82,7 +82,7 @@ def _check_rod(k: int, joint: Joint, bodies: Bodies, number: dict[str, int]) -> 
 
 
 def _check_joint(joint: Joint) -> Iterator[tuple[str, str]]:
-    """Yield the keys of a joint that are invalid by themselves, and why."""
+    """Yield the keys of a joint that are invalid by themselves, with the reasons."""
     match joint:
         case Pivot():
             if (joint.at is None) == (joint.anchors is None):
@@ -322,10 +322,10 @@ def _check_nose_heights(scene: Scene) -> Iterator[LocatedMessage]:
 
 def _check_shot(scene: Scene, bodies: Bodies, k: int, shot: Shot) -> Iterator[LocatedMessage]:
     if miscues(shot):
-        off = math.hypot(shot.side, shot.height)
+        offset = math.hypot(shot.side, shot.height)
         yield (
             ("shot", k, "side"),
-            f"with `height`, the tip is {off:g} of the radius off centre; beyond {MISCUE:g} it slips",
+            f"with `height`, the tip is {offset:g} of the radius off centre; beyond {MISCUE:g} it slips",
         )
     if scene.surface is None:
         yield ("shot", k), "a shot needs a floor; add a [surface]"

@@ -1,4 +1,4 @@
-"""Checks across the elements of a scene, which no single element can make."""
+"""Checks of relations between the elements of a scene."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -184,8 +184,8 @@ def _check_planes_and_walls(scene: Scene) -> Iterator[LocatedMessage]:
                 f"{list(plane.normal)} has no direction; use a vector such as [0, 1] for a floor",
             )
     for k, wall in enumerate(scene.walls):
-        for where, message in check_wall_points(wall):
-            yield ("wall", k, *where), message
+        for key_path, message in check_wall_points(wall):
+            yield ("wall", k, *key_path), message
     yield from _check_wall_options(scene)
 
 
@@ -203,13 +203,13 @@ def _check_wall_options(scene: Scene) -> Iterator[LocatedMessage]:
         for key, usual in (("kick", None), ("one_way", False), ("solid", True), ("restitution_falloff", None)):
             if getattr(collider, key, usual) != usual:
                 yield (*location, key), "is not supported in a scene with a [surface] or pockets; remove it"
-    some: dict[str, Sequence[Material | Pair | BodySource]] = {
+    tables: dict[str, Sequence[Material | Pair | BodySource]] = {
         "material": scene.materials,
         "pair": scene.pairs,
         **scene.kinds,
     }
-    for kind, those in some.items():
-        for k, each in enumerate(those):
+    for kind, elements in tables.items():
+        for k, each in enumerate(elements):
             if each.restitution_falloff:
                 yield (
                     (kind, k, "restitution_falloff"),

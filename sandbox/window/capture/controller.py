@@ -13,7 +13,7 @@ from sandbox.window.playback.recorded import RecordedView
 FRAME_RATE = 25.0
 """pictures/s of a film"""
 MAX_WIDTH = 960
-"""px of a film; a wider window is scaled down"""
+"""px, width of a film; a wider window is scaled down"""
 
 Notify = Callable[[str, str], None]
 """(text, level)"""
@@ -23,7 +23,7 @@ class CaptureController:
     """Captures what a window shows.
 
     Args:
-        folder: of the files.
+        folder: folder of the files.
         film: suffix of films, `.gif` or `.mp4`.
         notify: shows a message.
     """
@@ -33,7 +33,7 @@ class CaptureController:
         self._recorder: FilmRecorder | None = None
         self._seconds, self._pending_seconds = 0.0, 0.0
         self._seeking: tuple[LiveView, str] | None = None
-        """a session to save under a name once its jump in time is complete"""
+        """session to be saved once its jump in time is complete, and its name"""
 
     @property
     def status(self) -> str | None:
@@ -65,8 +65,8 @@ class CaptureController:
         """Add a picture to the film if it is due, and save a session whose jump in time is complete.
 
         Args:
-            surface: of the window.
-            elapsed: since the last call, s.
+            surface: surface of the window.
+            elapsed: time since the last call, s.
         """
         if self._seeking is not None and self._seeking[0].busy is None:
             (view, name), self._seeking = self._seeking, None
@@ -110,5 +110,5 @@ class CaptureController:
             view.session.mark_saved()
         except (CaptureError, OSError) as error:
             outfile.discard()
-            why = str(error) if isinstance(error, CaptureError) else str(unwritable_reason(self._folder, error))
-            self._notify(f"cannot save the session: {why}", "error")
+            reason = str(error) if isinstance(error, CaptureError) else str(unwritable_reason(self._folder, error))
+            self._notify(f"cannot save the session: {reason}", "error")

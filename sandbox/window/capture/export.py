@@ -36,9 +36,9 @@ class ExportOptions:
     fps: float = 30.0
     """pictures/s of a film"""
     speed: float = 1.0
-    """of playback, relative to real time"""
+    """playback speed, relative to real time"""
     overlays: frozenset[str] = frozenset({"shapes"})
-    """of `snapoptions.OVERLAYS`"""
+    """names of overlays, from `snapoptions.OVERLAYS`"""
 
 
 class RunRenderer:
@@ -61,11 +61,11 @@ class RunRenderer:
         """Draw the state at a time, s.
 
         Args:
-            surface: to draw on; it needs no display.
-            camera: which part of the world.
-            time: of the run.
-            overlays: of `snapoptions.OVERLAYS`.
-            speed: of playback, relative to real time.
+            surface: target; it needs no display.
+            camera: visible part of the world.
+            time: time of the run, s.
+            overlays: names of overlays, from `snapoptions.OVERLAYS`.
+            speed: playback speed, relative to real time.
             caption: write title, engine and time into the upper left corner, if the surface is wide enough.
         """
         unit = ui_scale_of(surface.get_size())
@@ -96,13 +96,15 @@ def frame_times(start: float, end: float, fps: float, speed: float = 1.0) -> tup
     """Return the times of a film's pictures, (K,) s of the run, and their durations, (K,) s, with the exact sum.
 
     Args:
-        start: of the film, s of the run.
-        end: of the film, s of the run.
+        start: start of the film, s of the run.
+        end: end of the film, s of the run.
         fps: pictures/s.
-        speed: of playback, relative to real time.
+        speed: playback speed, relative to real time.
     """
     seconds = (end - start) / speed
-    count = max(1, math.ceil(seconds * fps - 0.5 - 1e-9))  # half a picture counts down, however it was rounded
+    count = max(
+        1, math.ceil(seconds * fps - 0.5 - 1e-9)
+    )  # exactly half a picture is rounded down, despite rounding errors
     shown: FloatArray = np.full(count, 1.0 / fps)
     if seconds > 0.0:
         shown[-1] = seconds - (count - 1) / fps

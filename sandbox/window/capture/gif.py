@@ -1,8 +1,8 @@
-"""GIF recorder: films that need no player. Each picture is written when it comes, so memory does not grow with length.
+"""GIF recorder: films that need no player. Each picture is written immediately, so memory does not grow with length.
 
-A gif has at most 256 colours per picture. One palette is kept until a picture comes that it shows badly. Only pixels
-that changed are written, the others stay as they are drawn; so a pixel never changes its colour unless its source does.
-Pillow writes header and frames.
+A gif has at most 256 colours per picture. A palette is used until its error for a picture is too large. Only pixels
+that changed are written, the others remain as drawn; so a pixel only changes its colour if its source does. Pillow
+writes header and frames.
 
 Source: CompuServe, "Graphics Interchange Format, Version 89a", 1990.
 """
@@ -19,15 +19,15 @@ from PIL import GifImagePlugin, Image
 from sandbox.window.capture.image_files import AtomicFile, CaptureError, Pixels, Size, rgb_pixels, unwritable_reason
 
 COMMON_COLOURS = 96
-"""Palette entries of the commonest colours, which are shown exactly; the others come from a median cut"""
+"""number of palette entries for the most frequent colours, which are exact; the others come from a median cut"""
 MAX_ERROR = 20.0
-"""of 255: distance of a colour from its palette entry up to which it is shown well"""
+"""of 255: distance of a colour from its palette entry up to which it is acceptable"""
 MAX_BAD_FRACTION = 3e-4
-"""Fraction of a picture's pixels that may be shown badly before the palette is renewed"""
+"""fraction of a picture's pixels with an unacceptable colour above which the palette is renewed"""
 MIN_DURATION = 0.02
 """s: viewers show a picture with a shorter duration for 0.1 s"""
 TRANSPARENT = 255
-"""Palette index of pixels that did not change; colours have the others"""
+"""palette index of pixels that did not change; colours use the other indices"""
 TRAILER = b";"
 """Last byte of a gif"""
 
@@ -37,10 +37,10 @@ Mask = npt.NDArray[np.bool_]
 
 
 class PaletteQuantiser:
-    """Maps pictures to a palette, which is renewed when it shows a picture badly.
+    """Maps pictures to a palette, which is renewed when its error for a picture is too large.
 
     Args:
-        max_colours: of the palette, at most 256.
+        max_colours: number of colours of the palette, at most 256.
     """
 
     def __init__(self, max_colours: int) -> None:
@@ -55,23 +55,23 @@ class PaletteQuantiser:
         """Return the palette entries of a part of a picture; the palette is renewed for the picture if necessary."""
         count = picture.shape[0] * picture.shape[1]
         if self._lookup is not None:
-            index, bad = self._nearest(self._lookup, part)
-            if bad <= self._tolerated * count:
+            index, bad_count = self._nearest(self._lookup, part)
+            if bad_count <= self._tolerated * count:
                 return index
-        index, bad = self._nearest(self._renew(picture), part)
+        index, bad_count = self._nearest(self._renew(picture), part)
         # With more colours than a palette holds, each picture would renew it, at the cost of a table and a median cut.
-        self._tolerated = max(MAX_BAD_FRACTION, 2.0 * bad / count)
+        self._tolerated = max(MAX_BAD_FRACTION, 2.0 * bad_count / count)
         return index
 
     def _nearest(self, lookup: Image.Image, pixels: Pixels) -> tuple[Indices, int]:
-        """Return the nearest palette entries, and how many pixels they show badly."""
+        """Return the nearest palette entries, and the number of pixels with an unacceptable colour."""
         image = Image.fromarray(np.ascontiguousarray(pixels))
         index = np.asarray(image.quantize(palette=lookup, dither=Image.Dither.NONE))
         error = self.table[index].astype(np.int32) - pixels
         return index, int((np.square(error).sum(axis=2) > MAX_ERROR**2).sum())
 
     def _renew(self, picture: Pixels) -> Image.Image:
-        """Choose a palette for a picture and the one that the previous palette was chosen for."""
+        """Choose a palette for a picture and for the picture of the previous palette."""
         both = picture if self._previous is None else np.concatenate((picture, self._previous))
         self._previous = picture
         self.table = choose_palette(both, self._max_colours)
@@ -109,7 +109,7 @@ class GifRecorder:
     Args:
         outfile: the file.
         size: px.
-        max_frames: of the gif.
+        max_frames: maximum number of frames of the gif.
 
     Raises:
         CaptureError: the file cannot be written.
@@ -177,7 +177,7 @@ class GifRecorder:
 
     def _frame(self, picture: Pixels) -> tuple[Image.Image, tuple[int, int]]:
         """Return the rectangle of a picture that changed, as an image with a palette, and its upper left corner, px."""
-        cells = np.asarray(picture >> 2, np.uint8)  # as fine as colours are told apart by the palette
+        cells = np.asarray(picture >> 2, np.uint8)  # resolution of the palette
         changed = np.ones(picture.shape[:2], np.bool_) if self._cells is None else (cells != self._cells).any(axis=2)
         self._cells = cells
         left, top, right, bottom = _changed_box(changed)
@@ -187,7 +187,7 @@ class GifRecorder:
         return image, (left, top)
 
     def _flush(self) -> None:
-        """Write the pending frame, whose duration is known when the next one comes."""
+        """Write the pending frame, whose duration is known once the next one is added."""
         if self._pending is None:
             return
         (image, corner), self._pending = self._pending, None
@@ -205,7 +205,7 @@ class GifRecorder:
                 corner,
                 duration=10 * shown,  # ms
                 transparency=TRANSPARENT,
-                disposal=1,  # leave it, and draw the next one over it
+                disposal=1,  # the next frame is drawn over this one
                 include_color_table=table != self._first_table,
             )
         )

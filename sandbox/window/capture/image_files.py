@@ -19,7 +19,7 @@ from sandbox.window.render.palette import BACKGROUND
 MAX_STEM = 60
 """characters of a scene's name in the names of its files"""
 MASKS = (0xFF0000, 0xFF00, 0xFF, 0)
-"""of a surface of 32 bits per pixel, in the order that SDL draws fastest; a stated order needs no display"""
+"""masks of a surface of 32 bits per pixel, in the order that SDL draws fastest; explicit masks need no display"""
 
 Size = tuple[int, int]
 """Width and height, px."""
@@ -36,9 +36,9 @@ class AtomicFile:
     """An output file that is written under a temporary name and gets its own name when it is complete."""
 
     temporary: Path
-    """to write to"""
+    """path to write to"""
     path: Path
-    """of the complete file"""
+    """path of the complete file"""
     is_numbered: bool = False
     """whether the first free number is appended to the name; else an existing file is replaced"""
 
@@ -53,7 +53,7 @@ class AtomicFile:
         return cls(temporary_path(folder), folder / f"sandbox-{safe_stem(stem)}{suffix}", is_numbered=True)
 
     def place(self) -> Path:
-        """Give the complete file its name, and return its path.
+        """Rename the complete file to its final name, and return its path.
 
         Raises:
             CaptureError: the file cannot be renamed; the temporary file is removed then.
@@ -85,7 +85,7 @@ class AtomicFile:
                 return self.temporary.replace(path)
             self.temporary.unlink()
             return path
-        raise AssertionError("numbers do not end")
+        raise AssertionError("unreachable: count() is infinite")
 
 
 def safe_stem(name: str) -> str:
@@ -112,7 +112,7 @@ def fit_image(surface: pygame.Surface, size: Size) -> pygame.Surface:
     inner = (min(max(round(width * factor), 1), size[0]), min(max(round(height * factor), 1), size[1]))
     # A bar of one row of pixels comes from rounding alone: stretch the picture over it.
     inner = (size[0] if size[0] - inner[0] < 2 else inner[0], size[1] if size[1] - inner[1] < 2 else inner[1])
-    source = offscreen((width, height))  # smoothscale accepts this pixel format, whatever the surface has
+    source = offscreen((width, height))  # smoothscale requires this pixel format
     source.blit(surface, (0, 0))
     scaled = pygame.transform.smoothscale(source, inner)
     if inner == size:
@@ -158,9 +158,9 @@ def screenshot(surface: pygame.Surface, folder: Path, stem: str) -> Path:
     """Write a surface as `sandbox-<stem>-<n>.png`, n being the first free number, and return its path.
 
     Args:
-        surface: the picture.
-        folder: of the file.
-        stem: the scene's name; see `safe_stem`.
+        surface: picture.
+        folder: folder of the file.
+        stem: name of the scene; see `safe_stem`.
 
     Raises:
         CaptureError: the folder cannot be written to.

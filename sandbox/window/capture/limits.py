@@ -6,7 +6,7 @@ FILM_SUFFIXES = (".gif", ".mp4")
 MAX_GIF_RATE = 50.0
 """pictures/s: viewers show a picture with a shorter duration than 0.02 s for 0.1 s"""
 MAX_GIF_FRAMES = 3000
-"""of one gif, 100 s at 30 pictures/s: viewers unpack the whole gif into memory"""
+"""maximum number of pictures of a gif, 100 s at 30 pictures/s: viewers unpack the whole gif into memory"""
 NEEDS_VIDEO = 'mp4 needs the `video` extra: pip install -e ".[video]"; gif works without it'
 
 

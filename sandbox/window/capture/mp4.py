@@ -18,7 +18,7 @@ from sandbox.window.capture.image_files import AtomicFile, CaptureError, Size, r
 RATE_FACTOR = 18
 """ffmpeg's constant rate factor, 0 (lossless) to 51; at 18 no loss is visible"""
 NEW_GROUP = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
-"""Windows only. Ctrl-C must reach the sandbox alone, which then ends ffmpeg"""
+"""Windows only: Ctrl-C is sent to the sandbox only, which then ends ffmpeg"""
 
 
 class Mp4Recorder:

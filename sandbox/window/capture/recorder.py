@@ -24,7 +24,7 @@ class FilmRecorder(Protocol):
         """Finish the file and return its path.
 
         Raises:
-            CaptureError: the file cannot be finished; nothing is left of it then.
+            CaptureError: the file cannot be finished; it is removed.
         """
 
     def cancel(self) -> None:
@@ -35,8 +35,8 @@ def recorder_for(path: Path, size: Size, fps: float) -> FilmRecorder:
     """Return a recorder by a path's suffix; an existing file is replaced.
 
     Args:
-        path: ends in `.gif` or `.mp4`.
-        size: of the film, px; an mp4 omits the last column or row if a side is odd.
+        path: path that ends in `.gif` or `.mp4`.
+        size: size of the film, px; an mp4 omits the last column or row if a side is odd.
         fps: pictures/s of an mp4. In a gif each picture has its own duration.
 
     Raises:

@@ -190,25 +190,25 @@ MAX_RINGS, RING_POSITIONS = 24, 16
 """Candidate positions around the cursor: number of rings, half a body radius apart, and positions per ring."""
 
 
-def _find_free_position(live: LiveView, made: Ball | Box) -> Ball | Box:
+def _find_free_position(live: LiveView, body: Ball | Box) -> Ball | Box:
     """Return a new body moved to the nearest free position.
 
     Raises:
         ActionError: there is no free position nearby.
     """
-    if made.collides == "none":
-        return made
-    form = geometry_of(made)
+    if body.collides == "none":
+        return body
+    form = geometry_of(body)
     hulls = [Hull(np.asarray(piece.corners), piece.radius) for piece in form.pieces]
     step = 0.5 * max(float(np.hypot(*hull.corners.T).max()) + hull.radius for hull in hulls)
-    x, y = made.position
+    x, y = body.position
     for ring in range(MAX_RINGS):
         for k in range(RING_POSITIONS if ring else 1):
             turn = math.tau * k / RING_POSITIONS
             position = x - ring * step * math.sin(turn), y + ring * step * math.cos(turn)
-            there = [Hull(hull.corners + np.asarray(position), hull.radius) for hull in hulls]
-            if is_free(live.scene, live.bodies, live.frame, there, made.layer):
-                return made.model_copy(update={"position": position})
+            moved_hulls = [Hull(hull.corners + np.asarray(position), hull.radius) for hull in hulls]
+            if is_free(live.scene, live.bodies, live.frame, moved_hulls, body.layer):
+                return body.model_copy(update={"position": position})
     raise ActionError("no room here; point at an empty spot")
 
 

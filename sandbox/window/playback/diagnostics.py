@@ -25,32 +25,32 @@ from sandbox.window.playback.session import Session
 from sandbox.window.playback.snapshot import MissedContactMarker
 
 CATCH_UP_TIME = 0.3
-"""s that the steps of a shadow run may take to compute for one picture"""
+"""s, computation time of the steps of a shadow run per picture"""
 
 
 class ShadowRun:
-    """A second simulation with the actions of a session. An error ends it, not the session."""
+    """A second simulation with the actions of a session. An error ends only the shadow run."""
 
     def __init__(self, point: Checkpoint, step: int = 0) -> None:
-        """Start.
+        """Start a run.
 
         Args:
             point: a checkpoint of the session.
-            step: of that checkpoint.
+            step: step of that checkpoint.
 
         Raises:
             Refusal: its engine cannot continue from there.
             ActionError: its engine refuses a persistent force.
         """
         self.step = step
-        """of the session that it has reached"""
+        """step of the session that the run has reached"""
         self.simulation = SwitchableSimulation.resumed(point)
         self.simulation.patience = CATCH_UP_TIME
         self.frame: Frame | None = self.simulation.frame()
         self.start_time = point.frame.time
-        """s"""
+        """s, time of the checkpoint"""
         self.ended: str | None = None
-        """the error that ended it"""
+        """error that ended the run"""
 
     @property
     def engine(self) -> str:
@@ -90,11 +90,11 @@ class ShadowRun:
 
 
 def create_ghost(point: Checkpoint, step: int = 0, excluded: Collection[str] = ()) -> tuple[ShadowRun, str]:
-    """Return the ghost of a session, on `exact` or else the first engine that can, and why others cannot.
+    """Return the ghost of a session, on `exact` or else the first engine that can continue, and the other refusals.
 
     Args:
         point: a checkpoint of the session.
-        step: of that checkpoint.
+        step: step of that checkpoint.
         excluded: engines that are not tried.
 
     Raises:
@@ -123,22 +123,22 @@ class DivergenceMonitor:
 
         Args:
             point: a checkpoint of the session.
-            step: of that checkpoint.
+            step: step of that checkpoint.
 
         Raises:
             Refusal: the engine cannot continue from there.
-            ActionError: it refuses a persistent force.
+            ActionError: the engine refuses a persistent force.
         """
         self.tolerance = default_tolerance(point.scene)
         self.time = point.frame.time
-        """of the session, s"""
+        """s, time of the session"""
         self.horizon: float | None = None
-        """when the two had departed, s; valid until a new action"""
+        """s, time at which the distance exceeded the tolerance; valid until a new action"""
         self.distance: float | None = None
-        """largest between a body and its twin, m"""
+        """m, largest distance between a body and its twin"""
         perturbed = _perturbed(point)
         self.can_diverge = perturbed is not None
-        """whether any body can meet another or a wall"""
+        """whether any body can collide with another or with a wall"""
         self._twin = ShadowRun(perturbed, step) if perturbed is not None else None
 
     @property
@@ -225,7 +225,7 @@ class MissedContactMonitor:
         self._markers: deque[tuple[tuple[float, float], float]] = deque(maxlen=MAX_MARKERS)
 
     def update(self, frame: Frame) -> int:
-        """Add the contacts missed since the last call; return how many they are."""
+        """Add the contacts missed since the last call; return their number."""
         _, pairs = self._auditor.missed
         new = pairs[self._counted :]
         self._counted = len(pairs)
@@ -246,7 +246,8 @@ class MissedContactMonitor:
 class Diagnostics:
     """The ghost, the divergence monitor, the missed-contact audit and the trails of a session.
 
-    Ghost and twin start from the present state of the session. While it has gone back they wait.
+    Ghost and twin start from the present state of the session. They are not stepped while the session is at an earlier
+    time than they are.
     """
 
     def __init__(self, session: Session, recorded: RecordedRun | None = None) -> None:

@@ -15,7 +15,7 @@ from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Contacts, Frame
 
 MAX_BYTES = 256 * 2**20
-"""of the stored states"""
+"""maximum size of the stored states"""
 BYTES_PER_BODY, BYTES_PER_FRAME = 6 * 8 + 1, 1100
 """The second is the size of the Python objects, measured."""
 MIN_KEYFRAME_INTERVAL = 30

@@ -20,10 +20,10 @@ from sandbox.window.playback.session import ReplacedFuture, ReplayMismatchError,
 from sandbox.window.playback.snapshot import BreakNotifier, Snapshot, active_thrusters, broken_joints
 
 SEEK_BUDGET = 0.04
-"""s of each picture that a seek may take"""
+"""s, computation time of a seek per picture"""
 MIN_STEP_BUDGET, MAX_STEP_BUDGET = 0.012, 0.03
-"""s of each picture that steps may take: as much as all else takes, within these bounds. If they need more, the scene
-is slower than asked."""
+"""s, bounds of the computation time of steps per picture, which is as long as everything else takes. If steps need
+more, the scene runs slower than selected."""
 
 
 class Seek:
@@ -32,17 +32,17 @@ class Seek:
     def __init__(self) -> None:
         self._steps: Iterator[float] | None = None
         self.target = 0
-        """the step of the last seek"""
+        """target step of the last seek"""
         self.fraction = 0.0
-        """of the replay that is done"""
+        """completed fraction of the replay"""
 
     @property
     def is_active(self) -> bool:
-        """Whether the target is yet to be reached."""
+        """Whether the target has not been reached yet."""
         return self._steps is not None
 
     def start(self, session: Session, step: int) -> None:
-        """Start a seek to a step, in place of any other."""
+        """Start a seek to a step; it replaces an active one."""
         self.fraction, self.target = 0.0, step
         self._steps = session.seek(step)
 
@@ -61,12 +61,12 @@ class LiveView:
     """A session, its diagnostics, and the state that is displayed: the present one, or a stored one being scrubbed."""
 
     def __init__(self, session: Session, ghost: RecordedRun | None = None, until: float | None = None) -> None:
-        """Start.
+        """Start the view.
 
         Args:
-            session: what is played.
+            session: session to play.
             ghost: a recorded run to be shown beside it, instead of another engine.
-            until: end of a recording, s: the view asks for a pause there, once.
+            until: end of a recording, s, at which the view requests a pause once.
         """
         self.session = session
         self.clock = FixedStepClock()
@@ -184,7 +184,7 @@ class LiveView:
         picked: int | None = None,
         pull: tuple[tuple[float, float], tuple[float, float]] | None = None,
     ) -> Snapshot:
-        """Return what is drawn.
+        """Return the snapshot to be drawn.
 
         Args:
             overlays: of `snapshot.OVERLAYS`.
@@ -306,10 +306,10 @@ class LiveView:
         self._read_contacts()
 
     def relaunch(self, generator: str) -> None:
-        """Place the balls of a generator anew, each time with another seed.
+        """Place the balls of a generator again, each time with another seed.
 
         Raises:
-            ActionError: it cannot be done.
+            ActionError: the action is refused.
         """
         self._seed = (self._seed + 1) % 2**63
         self.apply(Launch(time=0.0, generator=generator, seed=self._seed))
@@ -330,7 +330,7 @@ class LiveView:
         """Undo the action of an index and all later ones, and start a seek to the time of that action.
 
         Args:
-            index: of the action.
+            index: index of the action.
             inputs: number of inputs of the game that remain; default: those before the time of that action.
 
         Raises:

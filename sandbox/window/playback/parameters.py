@@ -80,8 +80,8 @@ class Parameter:
             digits = 1 if self.step >= 0.05 else 2 if self.step >= 0.005 else 12  # keeps each notch
             value = float(f"{value:.{digits}e}")
         elif self.step > 0:
-            places = max(0, 2 - math.floor(math.log10(self.step)))  # avoids 0.30000000000000004 for multiples of 0.1
-            value = round(round(value / self.step) * self.step, places)
+            decimals = max(0, 2 - math.floor(math.log10(self.step)))  # avoids 0.30000000000000004 for multiples of 0.1
+            value = round(round(value / self.step) * self.step, decimals)
         return min(max(value, self.low), self.high)
 
     def text(self, value: ParameterValue) -> str:
@@ -103,8 +103,8 @@ class SessionParameters:
     """Parameters of a session. The capabilities of the engine are cached by scene and settings."""
 
     def __init__(self) -> None:
-        self._asked: tuple[Scene, str, Settings] | None = None
-        self._able: dict[str, tuple[str, ...]] = {}
+        self._cached_for: tuple[Scene, str, Settings] | None = None
+        self._supported: dict[str, tuple[str, ...]] = {}
 
     def of(self, live: LiveView, file: Scene, picked: int | None) -> tuple[Parameter, ...]:
         """Return the parameters with their present values.
@@ -137,30 +137,38 @@ class SessionParameters:
             self._choice(live, "detection", get_args(DetectionName)),
         )
 
-    def _choice(self, live: LiveView, key: str, words: tuple[str, ...]) -> Parameter:
+    def _choice(self, live: LiveView, key: str, names: tuple[str, ...]) -> Parameter:
         """Return a choice parameter with the options that the engine supports."""
         now = live.scene, live.engine, live.session.simulation.wanted
-        if self._asked is None or any(a is not b for a, b in zip(self._asked, now, strict=True)):
-            self._asked, self._able = now, {}
-        if key not in self._able:
+        if self._cached_for is None or any(a is not b for a, b in zip(self._cached_for, now, strict=True)):
+            self._cached_for, self._supported = now, {}
+        if key not in self._supported:
             engine, simulation = ENGINES[live.engine], live.session.simulation
-            self._able[key] = tuple(
-                word for word in words if not engine.missing(simulation.setup, simulation.wanted.replace(**{key: word}))
+            self._supported[key] = tuple(
+                name for name in names if not engine.missing(simulation.setup, simulation.wanted.replace(**{key: name}))
             )
-        able, value = self._able[key], getattr(live.settings, key)
-        if len(able) < 2:
-            why = f"{live.engine} offers no other" if able else f"not used by {live.engine}"
-            return Parameter(key, key, value=value or "none", choices=(value or "none",), enabled=False, why=why)
-        return Parameter(key, key, value=value, choices=able)
+        supported, value = self._supported[key], getattr(live.settings, key)
+        if len(supported) < 2:
+            reason = f"{live.engine} offers no other" if supported else f"not used by {live.engine}"
+            return Parameter(key, key, value=value or "none", choices=(value or "none",), enabled=False, why=reason)
+        return Parameter(key, key, value=value, choices=supported)
 
 
 def _counts(live: LiveView, file: Scene) -> tuple[Parameter, ...]:
-    steps = live.settings.integrator is not None
-    why = "" if steps else f"{live.engine} has no time step"
-    settings, own = live.settings, file.solver
+    has_steps = live.settings.integrator is not None
+    reason = "" if has_steps else f"{live.engine} has no time step"
+    settings, defaults = live.settings, file.solver
     return (
         Parameter(
-            "substeps", "substeps", 1, 32, settings.substeps, step=1, enabled=steps, why=why, default=own.substeps
+            "substeps",
+            "substeps",
+            1,
+            32,
+            settings.substeps,
+            step=1,
+            enabled=has_steps,
+            why=reason,
+            default=defaults.substeps,
         ),
         Parameter(
             "iterations",
@@ -169,9 +177,9 @@ def _counts(live: LiveView, file: Scene) -> tuple[Parameter, ...]:
             100,
             settings.iterations,
             step=1,
-            enabled=steps,
-            why=why,
-            default=own.iterations,
+            enabled=has_steps,
+            why=reason,
+            default=defaults.iterations,
         ),
     )
 
@@ -182,15 +190,15 @@ def _surface(live: LiveView, file: Scene, picked: int | None, key: str, high: fl
     Material pairs that define the property take precedence over bodies, so their value is shown and set.
     """
     scene = live.scene
-    place = _place(live, picked)
-    if place >= len(scene.body_sources) and picked is None:
+    index = _source_index(live, picked)
+    if index >= len(scene.body_sources) and picked is None:
         return Parameter(key, key, 0.0, high, 0.0, enabled=False, why="the scene has no body")
     disc = (
         live.bodies.elements[live.bodies.element[picked or 0]]
-        if place >= len(scene.body_sources)
-        else scene.body_sources[place]
+        if index >= len(scene.body_sources)
+        else scene.body_sources[index]
     )
-    name = disc.name if picked is None or place < len(scene.body_sources) else live.bodies.names[picked]
+    name = disc.name if picked is None or index < len(scene.body_sources) else live.bodies.names[picked]
     label = key if picked is None else f"{key} of {name or 'this body'}"
     default = None
     pairs = _pairs(scene, disc if picked is not None else None)
@@ -201,12 +209,12 @@ def _surface(live: LiveView, file: Scene, picked: int | None, key: str, high: fl
         if picked is not None:
             label = f"{key} of {disc.material}"
         return Parameter(key, label, 0.0, high, value, default=default)
-    if place < len(file.body_sources):
-        default = stated(file, file.body_sources[place], key)
+    if index < len(file.body_sources):
+        default = stated(file, file.body_sources[index], key)
     return Parameter(key, label, 0.0, high, stated(scene, disc, key), default=default)
 
 
-def _place(live: LiveView, picked: int | None) -> int:
+def _source_index(live: LiveView, picked: int | None) -> int:
     """Return the index of the picked body's element among the scene's body sources; without a body, 0."""
     return 0 if picked is None else live.scene.source_index(int(live.bodies.element[picked]))
 
@@ -238,33 +246,33 @@ def turned(live: LiveView, key: str, value: ParameterValue, picked: int | None) 
 def _paths(live: LiveView, key: str, picked: int | None) -> list[str]:
     """Return the scene paths of a property: of the picked body or its pairs, or of all pairs, bodies and generators."""
     scene = live.scene
-    place = _place(live, picked)
-    if picked is not None and place >= len(scene.body_sources):
+    index = _source_index(live, picked)
+    if picked is not None and index >= len(scene.body_sources):
         element = live.bodies.elements[int(live.bodies.element[picked])]
         pairs = _pairs(scene, element)
         if pairs:
             return [f"pair.{n}.{key}" for n in pairs]
         return [f"{heading_of(element)}.{_quoted(live.bodies.names[picked])}.{key}"]
-    if place < len(scene.body_sources):
-        pairs = _pairs(scene, scene.body_sources[place] if picked is not None else None)
+    if index < len(scene.body_sources):
+        pairs = _pairs(scene, scene.body_sources[index] if picked is not None else None)
         if pairs:
             return [f"pair.{n}.{key}" for n in pairs] if picked is not None else [f"pair.*.{key}"]
     lists: list[tuple[str, Sequence[BodySource]]] = list(scene.kinds.items())
     if picked is None:
-        return [f"{kind}.{each}.{key}" for kind, discs in lists if discs for each in _every(discs)]
+        return [f"{kind}.{each}.{key}" for kind, discs in lists if discs for each in _element_paths(discs)]
     for kind, discs in lists:
-        if place < len(discs):
-            return [f"{kind}.{_part(discs, place)}.{key}"]
-        place -= len(discs)
+        if index < len(discs):
+            return [f"{kind}.{_element_path(discs, index)}.{key}"]
+        index -= len(discs)
     return []
 
 
-def _every(discs: Sequence[BodySource]) -> list[str]:
+def _element_paths(discs: Sequence[BodySource]) -> list[str]:
     """Return the path parts of all elements of a list: `*`, unless an element has that name."""
-    return [_part(discs, k) for k in range(len(discs))] if any(disc.name == "*" for disc in discs) else ["*"]
+    return [_element_path(discs, k) for k in range(len(discs))] if any(disc.name == "*" for disc in discs) else ["*"]
 
 
-def _part(discs: Sequence[BodySource], index: int) -> str:
+def _element_path(discs: Sequence[BodySource], index: int) -> str:
     """Return the path part of an element of a list: its index, or its name if an element is named like the index."""
     name = discs[index].name
     if name is None or all(disc.name != str(index) for disc in discs):

@@ -30,20 +30,20 @@ CONTACT_DURATION = 0.12
 MISSED_CONTACT_DURATION = 0.6
 """s of playback for which a missed contact is marked"""
 TRAIL_DURATION = 1.0
-"""s of playback that a trail goes back"""
+"""s of playback, length of a trail"""
 MAX_TRAIL_FRAMES = 60
-"""stored frames in a trail"""
+"""maximum number of stored frames in a trail"""
 TELEPORT_FACTOR = 2.0
 """A body that moved more than this times speed × time, plus its radius, was placed, not simulated. The radius allows
 for bodies that are pushed apart."""
 
 
 class RecordedRun:
-    """A stored run, and what is drawn of it at any time.
+    """A stored run, and its state at any time, as it is drawn.
 
     Args:
-        trajectory: at least one frame.
-        name: of the run, in error messages.
+        trajectory: trajectory of at least one frame.
+        name: name of the run in error messages.
 
     Raises:
         SceneError: the scene or the bodies of the run are missing or invalid.
@@ -121,7 +121,7 @@ class RecordedRun:
     def snapshot(
         self, time: float, overlays: frozenset[str], speed: float = 1.0, ghost: Frame | None = None
     ) -> Snapshot:
-        """Return what is drawn of a time, s.
+        """Return the snapshot of a time, s.
 
         Args:
             time: of the run.
@@ -326,7 +326,7 @@ class RecordedView:
         picked: int | None = None,
         pull: tuple[tuple[float, float], tuple[float, float]] | None = None,
     ) -> Snapshot:
-        """Return what is drawn at the present time.
+        """Return the snapshot of the present time.
 
         Args:
             overlays: of `snapshot.OVERLAYS`.

@@ -40,14 +40,14 @@ MAX_PENDING_CONTACTS = 64
 
 
 class ReplayMismatchError(Exception):
-    """A replay from a checkpoint leads to another state than was seen before."""
+    """A replay from a checkpoint leads to another state than the original run."""
 
 
 class ReplacedFuture(NamedTuple):
     """The part of a session after some moment, which a new action at that moment has replaced."""
 
     time: float
-    """s, of that moment"""
+    """s, time of that moment"""
     recording: Recording
     """the whole session before the action"""
 
@@ -68,14 +68,14 @@ class Session:
         game: GameSession | None = None,
         until: float = -1.0,
     ) -> None:
-        """Start.
+        """Start a session.
 
         Args:
-            scene: what is simulated.
-            engine: its name.
-            settings: by default those of the scene.
-            actions: to be applied on the way, in order of time.
-            game: one that has not yet begun, with the inputs to be repeated on the way.
+            scene: scene to simulate.
+            engine: name of the engine.
+            settings: solver settings; default: those of the scene.
+            actions: actions to be repeated, in order of time.
+            game: new game, with the inputs to be repeated.
             until: end of a recording, s: up to there the actions of the rules are among `actions`, so that those of
                 `game` are compared with them, not applied.
 
@@ -85,7 +85,7 @@ class Session:
         """
         self._start = scene, engine, settings
         self.ended: str | None = None
-        """why no step can follow: divergence, exhaustion, or a logged action that the engine refuses"""
+        """reason why no step can follow: divergence, exhaustion, or a logged action that the engine refuses"""
         self._exhausted = False
         self._log = ActionLog(actions)
         self._replayed: list[tuple[int, Action]] = []
@@ -135,7 +135,7 @@ class Session:
 
     @property
     def step_number(self) -> int:
-        """Steps since the start."""
+        """Number of steps since the start."""
         return self._step
 
     @property
@@ -182,7 +182,7 @@ class Session:
 
     @property
     def break_times(self) -> FloatArray:
-        """When each joint of the scene breaks, (J,) s, inf if never; also in states later than now."""
+        """Time at which each joint of the scene breaks, (J,) s, inf if never; also in states later than now."""
         return self._breaks.times
 
     @property

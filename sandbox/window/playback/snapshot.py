@@ -92,9 +92,9 @@ class Snapshot:
     """N bodies, including spawned ones"""
     frame: Frame
     overlays: frozenset[str] = frozenset({"shapes"})
-    """of `OVERLAYS`"""
+    """names of overlays, from `OVERLAYS`"""
     contacts: Contacts = field(default_factory=Contacts.none)
-    """of the last steps, with impulses"""
+    """contacts of the last steps, with impulses"""
     seconds: float = 0.0
     """simulated time of those steps, s"""
     ghost: Frame | None = None
@@ -117,9 +117,9 @@ class Snapshot:
     below: float = 0.0
     """px at the top left covered by text"""
     flames: tuple[ThrusterFlame, ...] = ()
-    """of the active thrusters"""
+    """flames of the active thrusters"""
     setup: Setup | None = None
-    """of the running session; None if `bodies` are those of the scene or of a stored run"""
+    """setup of the running session; None if `bodies` are those of the scene or of a stored run"""
 
     @cached_property
     def links(self) -> JointArrays:

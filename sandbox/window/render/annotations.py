@@ -16,21 +16,21 @@ from sandbox.window.render.polygons import PolygonRenderer
 from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
 from sandbox.window.render.text import draw_text, text_size
 
-MOST_NAMES, MOST_BOXES, MOST_CENTRES, MOST_FLASHES = 60, 1000, 4000, 24
-FLASH = 1.5
+MAX_NAMES, MAX_BOXES, MAX_CENTRES, MAX_FLASHES = 60, 1000, 4000, 24
+FLASH_DURATION = 1.5
 """s, time for which a missed contact is shown"""
 
 
 def draw_boxes(view: DrawContext, polygons: PolygonRenderer) -> None:
     """Draw the bounding box of each body."""
-    some = view.first(MOST_BOXES)
-    lone = some.snapshot.bodies.round[some.shown]
-    if not lone.all():
-        for left, top, right, bottom in polygons.boxes(some)[~lone].tolist():
+    some = view.first(MAX_BOXES)
+    is_disc = some.snapshot.bodies.round[some.shown]
+    if not is_disc.all():
+        for left, top, right, bottom in polygons.boxes(some)[~is_disc].tolist():
             if max(abs(left), abs(top), abs(right), abs(bottom)) < SDL_COORDINATE_LIMIT:
                 box = pygame.Rect(math.floor(left), math.floor(top), math.ceil(right - left), math.ceil(bottom - top))
                 pygame.draw.rect(view.surface, FAINT, box, max(1, round(view.ui_scale)))
-    for (x, y), radius in zip(some.centre[lone].tolist(), some.radius[lone].tolist(), strict=True):
+    for (x, y), radius in zip(some.centre[is_disc].tolist(), some.radius[is_disc].tolist(), strict=True):
         if 2.0 * radius < SDL_COORDINATE_LIMIT:
             side = math.ceil(2.0 * radius)
             box = pygame.Rect(math.floor(x - radius), math.floor(y - radius), side, side)
@@ -39,7 +39,7 @@ def draw_boxes(view: DrawContext, polygons: PolygonRenderer) -> None:
 
 def draw_centres(view: DrawContext) -> None:
     """Draw each centre of mass as a quartered circle; on small bodies as a dot."""
-    some = view.first(MOST_CENTRES)
+    some = view.first(MAX_CENTRES)
     size = 5.0 * view.ui_scale
     mark = _quartered(size)
     half = mark.get_width() / 2.0
@@ -74,63 +74,63 @@ def draw_names(view: DrawContext, polygons: PolygonRenderer) -> None:
     """Draw the names of bodies above them; names that would overlap an earlier one are skipped."""
     taken: list[pygame.Rect] = []
     size = 12 * view.ui_scale
-    some = view.first(4 * MOST_NAMES)
+    some = view.first(4 * MAX_NAMES)
     area = view.surface.get_rect()
     bodies = some.snapshot.bodies
-    lone = bodies.round[some.shown]
-    tops = some.centre[:, 1] - some.radius if lone.all() else polygons.boxes(some)[:, 1]
-    room = bodies.core[some.shown] * some.camera.scale
-    rows = zip(some.shown.tolist(), some.centre.tolist(), tops.tolist(), room.tolist(), strict=True)
+    is_disc = bodies.round[some.shown]
+    tops = some.centre[:, 1] - some.radius if is_disc.all() else polygons.boxes(some)[:, 1]
+    radii = bodies.core[some.shown] * some.camera.scale
+    rows = zip(some.shown.tolist(), some.centre.tolist(), tops.tolist(), radii.tolist(), strict=True)
     for number, (x, y), top, radius in rows:
         name = view.snapshot.bodies.names[number]
         name = name if len(name) <= 24 else name[:23] + "…"
         width, height = text_size(name, size)
-        above = top - 3.0 * view.ui_scale
-        if not (abs(x) < SDL_COORDINATE_LIMIT and abs(above) < SDL_COORDINATE_LIMIT):
+        bottom = top - 3.0 * view.ui_scale
+        if not (abs(x) < SDL_COORDINATE_LIMIT and abs(bottom) < SDL_COORDINATE_LIMIT):
             continue
-        place = pygame.Rect(round(x - width / 2), round(above - height), width, height)
-        if place.top < 0 or radius > 3 * height:
-            place.center = round(x), round(y + 0.45 * min(radius, 1e4))
-        if area.contains(place) and place.collidelist(taken) < 0 and len(taken) < MOST_NAMES:
-            taken.append(place.inflate(6, 2))
-            draw_text(view.surface, name, (place.centerx + 1, place.centery + 1), size, BACKGROUND, "center")
-            draw_text(view.surface, name, place.center, size, INK, "center")
+        rect = pygame.Rect(round(x - width / 2), round(bottom - height), width, height)
+        if rect.top < 0 or radius > 3 * height:
+            rect.center = round(x), round(y + 0.45 * min(radius, 1e4))
+        if area.contains(rect) and rect.collidelist(taken) < 0 and len(taken) < MAX_NAMES:
+            taken.append(rect.inflate(6, 2))
+            draw_text(view.surface, name, (rect.centerx + 1, rect.centery + 1), size, BACKGROUND, "center")
+            draw_text(view.surface, name, rect.center, size, INK, "center")
 
 
 def draw_verdicts(view: DrawContext) -> None:
     """Write on each body whether it overlaps another, so that the state is not shown by colour alone."""
     overlapping = view.snapshot.overlapping
     assert overlapping is not None
-    some = view.first(MOST_NAMES)
-    room = some.snapshot.bodies.core[some.shown] * some.camera.scale
-    for number, (x, y), radius in zip(some.shown.tolist(), some.centre.tolist(), room.tolist(), strict=True):
+    some = view.first(MAX_NAMES)
+    radii = some.snapshot.bodies.core[some.shown] * some.camera.scale
+    for number, (x, y), radius in zip(some.shown.tolist(), some.centre.tolist(), radii.tolist(), strict=True):
         touching = number < len(overlapping) and bool(overlapping[number])
         word, size = (
             "overlap" if touching else "clear",
             min(max(0.28 * radius, 11.0 * view.ui_scale), 26.0 * view.ui_scale),
         )
-        place = y - 0.4 * radius  # above the centre mark and the name
+        text_y = y - 0.4 * radius  # above the centre mark and the name
         if text_size(word, size, bold=True)[0] > 1.6 * radius:
-            place = y
+            text_y = y
             word, size = "!", min(max(1.2 * radius, 9.0 * view.ui_scale), 20.0 * view.ui_scale)
             if not touching:
                 continue
-        draw_text(view.surface, word, (x, place), size, INK, "center", bold=True)
+        draw_text(view.surface, word, (x, text_y), size, INK, "center", bold=True)
 
 
 def draw_flashes(view: DrawContext) -> None:
     """Draw a ring that expands and fades at each recently missed contact."""
-    for flash in view.snapshot.flashes[-MOST_FLASHES:]:
-        fraction = flash.age / FLASH
+    for flash in view.snapshot.flashes[-MAX_FLASHES:]:
+        fraction = flash.age / FLASH_DURATION
         with np.errstate(invalid="ignore", over="ignore"):
             x, y = view.camera.to_screen(np.asarray(flash.position)).tolist()
         if not (0.0 <= fraction < 1.0 and abs(x) < SDL_COORDINATE_LIMIT and abs(y) < SDL_COORDINATE_LIMIT):
             continue
         radius = (8.0 + 40.0 * math.sqrt(fraction)) * view.ui_scale
-        look = ShapeStyle(None, WARNING, 3.0 * view.ui_scale, opacity=1.0 - fraction, antialias=view.antialias)
+        style = ShapeStyle(None, WARNING, 3.0 * view.ui_scale, opacity=1.0 - fraction, antialias=view.antialias)
         side = 2 * math.ceil(radius + 1.0)
-        within = pygame.Rect(round(x) - side // 2, round(y) - side // 2, side, side)
-        draw_sdf(view.surface, disc_distance(x, y, radius), look, within)
+        rect = pygame.Rect(round(x) - side // 2, round(y) - side // 2, side, side)
+        draw_sdf(view.surface, disc_distance(x, y, radius), style, rect)
 
 
 def draw_picked(view: DrawContext, discs: CircleRenderer, polygons: PolygonRenderer) -> None:
@@ -140,15 +140,18 @@ def draw_picked(view: DrawContext, discs: CircleRenderer, polygons: PolygonRende
         return
     radius = float(view.snapshot.bodies.radius[number])
     with np.errstate(invalid="ignore", over="ignore"):
-        place = frame.position[number : number + 1]
-        if not frame.present[number] or not view.camera.in_sight(place, radius)[0]:
+        position = frame.position[number : number + 1]
+        if not frame.present[number] or not view.camera.in_sight(position, radius)[0]:
             return
-    (x, y), size = view.camera.to_screen(place)[0].tolist(), max(radius * view.camera.scale, 2.0) + 4.0 * view.ui_scale
+    (x, y), size = (
+        view.camera.to_screen(position)[0].tolist(),
+        max(radius * view.camera.scale, 2.0) + 4.0 * view.ui_scale,
+    )
     angle = float(frame.angle[number])
     if not view.snapshot.bodies.round[number] and size > 8.0 * view.ui_scale and math.isfinite(angle):
-        spot = ScreenPose(x, y, angle, view.camera.scale)
+        pose = ScreenPose(x, y, angle, view.camera.scale)
         polygons.ring(
-            view.surface, view.snapshot.bodies, number, spot, 4.0 * view.ui_scale, YELLOW, 2.0 * view.ui_scale
+            view.surface, view.snapshot.bodies, number, pose, 4.0 * view.ui_scale, YELLOW, 2.0 * view.ui_scale
         )
         return
     discs.ring(view.surface, (x, y), size, YELLOW, CircleStyle(2.0 * view.ui_scale, antialias=view.antialias))
@@ -166,18 +169,18 @@ def draw_pull(view: DrawContext, discs: CircleRenderer) -> None:
     unit = view.ui_scale
     if length > 30.0 * unit:
         ux, uy = (bx - ax) / length, (by - ay) / length
-        turns = 12
+        half_windings = 12
         width = min(8.0 * unit, 1200.0 * unit * unit / length)
-        ends = 0.12
-        spots = [(ax, ay)]
-        for k in range(turns + 1):
-            along = length * (ends + (1.0 - 2.0 * ends) * k / turns)
-            side = 0.0 if k in (0, turns) else width * (1 if k % 2 else -1)
-            spots.append((ax + ux * along - uy * side, ay + uy * along + ux * side))
-        spots.append((bx, by))
+        straight_fraction = 0.12
+        points = [(ax, ay)]
+        for k in range(half_windings + 1):
+            along = length * (straight_fraction + (1.0 - 2.0 * straight_fraction) * k / half_windings)
+            side = 0.0 if k in (0, half_windings) else width * (1 if k % 2 else -1)
+            points.append((ax + ux * along - uy * side, ay + uy * along + ux * side))
+        points.append((bx, by))
     else:
-        spots = [(ax, ay), (bx, by)]
-    for a, b in pairwise(spots):
+        points = [(ax, ay), (bx, by)]
+    for a, b in pairwise(points):
         draw_line(view.surface, a, b, INK, 1.5 * unit, view.antialias)
     for (x, y), size in (((ax, ay), 3.0), ((bx, by), 6.0)):
         tint = np.asarray([YELLOW], np.uint8)

@@ -59,36 +59,36 @@ class BodyGeometry:
             corner=shapes.corner,
             radius=shapes.radius,
         )
-        girth = _girths(pieces)
-        self._girth = np.zeros(len(bodies))
-        np.maximum.at(self._girth, np.repeat(np.arange(len(bodies)), np.diff(pieces.piece)), girth)
-        self.pieces = _with_patches(pieces, girth)
+        half_thickness = _half_thicknesses(pieces)
+        self._half_thickness = np.zeros(len(bodies))
+        np.maximum.at(self._half_thickness, np.repeat(np.arange(len(bodies)), np.diff(pieces.piece)), half_thickness)
+        self.pieces = _with_patches(pieces, half_thickness)
 
     def rims(self, indices: IntArray, scale: float, line: float) -> FloatArray:
         """Return the rim widths of bodies, (K,) px: those of discs of about the same thickness."""
-        girth = self._girth[indices] * scale
-        return np.asarray(np.minimum(0.16 * girth, line * np.minimum(1.0 + girth / 80.0, 2.5)))
+        half_thickness = self._half_thickness[indices] * scale
+        return np.asarray(np.minimum(0.16 * half_thickness, line * np.minimum(1.0 + half_thickness / 80.0, 2.5)))
 
-    def hulls(self, number: int, place: ScreenPose) -> list[Hull]:
+    def hulls(self, number: int, pose: ScreenPose) -> list[Hull]:
         """Return the pieces of a body in screen coordinates, px."""
         pieces, found = self.pieces, []
-        cos, sin = math.cos(place.angle) * place.scale, math.sin(place.angle) * place.scale
-        turn = np.asarray(((cos, -sin), (-sin, -cos)))
+        cos, sin = math.cos(pose.angle) * pose.scale, math.sin(pose.angle) * pose.scale
+        rotation = np.asarray(((cos, -sin), (-sin, -cos)))
         for piece in range(int(pieces.piece[number]), int(pieces.piece[number + 1])):
             corners = pieces.corner[int(pieces.first[piece]) : int(pieces.first[piece + 1])]
-            found.append(Hull(corners @ turn + place[:2], float(pieces.radius[piece]) * place.scale))
+            found.append(Hull(corners @ rotation + pose[:2], float(pieces.radius[piece]) * pose.scale))
         return found
 
-    def distance(self, number: int, place: ScreenPose) -> Distance:
+    def distance(self, number: int, pose: ScreenPose) -> Distance:
         """Return the signed distance function of a body, px: the minimum over its pieces."""
-        parts = [hull_distance(hull) for hull in self.hulls(number, place)]
-        if len(parts) == 1:
-            return parts[0]
-        return lambda x, y: np.asarray(np.minimum.reduce([part(x, y) for part in parts]))
+        distances = [hull_distance(hull) for hull in self.hulls(number, pose)]
+        if len(distances) == 1:
+            return distances[0]
+        return lambda x, y: np.asarray(np.minimum.reduce([piece_distance(x, y) for piece_distance in distances]))
 
-    def within(self, number: int, place: ScreenPose, margin: float = 1.0) -> tuple[float, float, float, float]:
+    def within(self, number: int, pose: ScreenPose, margin: float = 1.0) -> tuple[float, float, float, float]:
         """Return left, top, right and bottom of the bounding box of a body, enlarged by `margin`, px."""
-        hulls = self.hulls(number, place)
+        hulls = self.hulls(number, pose)
         low = np.min([hull.corners.min(axis=0) - hull.radius for hull in hulls], axis=0) - margin
         high = np.max([hull.corners.max(axis=0) + hull.radius for hull in hulls], axis=0) + margin
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
@@ -124,22 +124,22 @@ def clipped_box(box: tuple[float, float, float, float], area: pygame.Rect) -> py
     return pygame.Rect(*corner, math.ceil(right) - corner[0], math.ceil(bottom) - corner[1])
 
 
-def _girths(pieces: ConvexPieces) -> FloatArray:
+def _half_thicknesses(pieces: ConvexPieces) -> FloatArray:
     """Return the approximate half thickness of each piece, (S,) m: 2 · area / perimeter."""
     start = pieces.first[:-1]
     count = np.diff(pieces.first)
     following = np.arange(len(pieces.corner)) + 1
     following[pieces.first[1:] - 1] = start
     a, b = pieces.corner, pieces.corner[following]
-    twice = np.add.reduceat(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], start) if len(start) else np.empty(0)
-    around = np.add.reduceat(np.hypot(*(b - a).T), start) if len(start) else np.empty(0)
-    return np.asarray(pieces.radius + np.where(count > 2, twice / np.maximum(around, 1e-300), 0.0))
+    area2 = np.add.reduceat(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], start) if len(start) else np.empty(0)
+    perimeter = np.add.reduceat(np.hypot(*(b - a).T), start) if len(start) else np.empty(0)
+    return np.asarray(pieces.radius + np.where(count > 2, area2 / np.maximum(perimeter, 1e-300), 0.0))
 
 
-def _with_patches(pieces: ConvexPieces, girth: FloatArray) -> ConvexPieces:
+def _with_patches(pieces: ConvexPieces, half_thickness: FloatArray) -> ConvexPieces:
     """Return the pieces of each body followed by the patches of its seams."""
     compound = np.flatnonzero(np.diff(pieces.piece) > 1)
-    patches = {int(body): patches for body in compound if (patches := _patches(pieces, int(body), girth))}
+    patches = {int(body): patches for body in compound if (patches := _patches(pieces, int(body), half_thickness))}
     if not patches:
         return pieces
     piece, first, corner, radius = [0], [0], list[FloatArray](), list[float]()
@@ -156,7 +156,7 @@ def _with_patches(pieces: ConvexPieces, girth: FloatArray) -> ConvexPieces:
     )
 
 
-def _patches(pieces: ConvexPieces, body: int, girth: FloatArray) -> list[Hull]:
+def _patches(pieces: ConvexPieces, body: int, half_thickness: FloatArray) -> list[Hull]:
     """Return the patches of a body, m."""
     begin, end = int(pieces.piece[body]), int(pieces.piece[body + 1])
     corners = {k: pieces.corner[pieces.first[k] : pieces.first[k + 1]] for k in range(begin, end)}
@@ -166,29 +166,29 @@ def _patches(pieces: ConvexPieces, body: int, girth: FloatArray) -> list[Hull]:
     polygons = [corners[k] for k in sharp]
     tolerance = ABUTTING * float(np.ptp(np.concatenate(polygons), axis=0).max())
     patches, junctions = [], list[FloatArray]()
-    for i, one in enumerate(sharp):
-        for other in sharp[i + 1 :]:
-            for ends in _seams(corners[one], corners[other], tolerance):
-                depth = PATCH_DEPTH * min(girth[one], girth[other])
+    for i, a in enumerate(sharp):
+        for b in sharp[i + 1 :]:
+            for ends in _seams(corners[a], corners[b], tolerance):
+                depth = PATCH_DEPTH * min(half_thickness[a], half_thickness[b])
                 patches.append(Hull(_hexagon(ends, min(depth, 0.4 * math.dist(*ends.tolist()))), 0.0))
                 junctions += [each for each in ends if not _is_among(each, junctions, tolerance)]
-    room = ((point, _room_around(point, polygons, tolerance)) for point in junctions)
-    return patches + [Hull(point[None], radius) for point, radius in room if radius > 0.0]
+    discs = ((point, _inscribed_radius(point, polygons, tolerance)) for point in junctions)
+    return patches + [Hull(point[None], radius) for point, radius in discs if radius > 0.0]
 
 
 def _is_among(point: FloatArray, points: list[FloatArray], tolerance: float) -> bool:
     return any(math.dist(point.tolist(), each.tolist()) <= tolerance for each in points)
 
 
-def _room_around(point: FloatArray, polygons: list[FloatArray], tolerance: float) -> float:
+def _inscribed_radius(point: FloatArray, polygons: list[FloatArray], tolerance: float) -> float:
     """Return the radius, m, of a disc around a seam end that fits within the pieces; 0 on the outline of the body."""
     angle, radius = 0.0, math.inf
     for polygon in polygons:
         along = np.roll(polygon, -1, axis=0) - polygon
         length = np.maximum(np.hypot(*along.T), 1e-300)
         fraction = np.clip(((point - polygon) * along).sum(axis=1) / length**2, 0.0, 1.0)
-        away = np.hypot(*(polygon + fraction[:, None] * along - point).T)
-        (sides,) = np.nonzero(away <= tolerance)
+        distance = np.hypot(*(polygon + fraction[:, None] * along - point).T)
+        (sides,) = np.nonzero(distance <= tolerance)
         if not len(sides):
             continue
         if len(sides) == 1:
@@ -196,7 +196,7 @@ def _room_around(point: FloatArray, polygons: list[FloatArray], tolerance: float
         else:
             one, other = (along[k] / length[k] for k in sides[:2])
             angle += math.pi - math.acos(min(max(float(one @ other), -1.0), 1.0))
-        radius = min(radius, float(np.min(away[away > tolerance], initial=math.inf)))
+        radius = min(radius, float(np.min(distance[distance > tolerance], initial=math.inf)))
     return radius if angle > 2.0 * math.pi - 1e-3 and math.isfinite(radius) else 0.0
 
 
@@ -210,8 +210,8 @@ def _seams(one: FloatArray, other: FloatArray, tolerance: float) -> list[FloatAr
             continue
         along = (b - a) / length
         across = np.asarray((along[1], -along[0]))
-        near = (np.abs((other - a) @ across) <= tolerance) & (np.abs((following - a) @ across) <= tolerance)
-        for k in np.flatnonzero(near):
+        is_collinear = (np.abs((other - a) @ across) <= tolerance) & (np.abs((following - a) @ across) <= tolerance)
+        for k in np.flatnonzero(is_collinear):
             begin, end = float((following[k] - a) @ along), float((other[k] - a) @ along)  # opposite direction
             begin, end = max(begin, 0.0), min(end, length)
             if end - begin > tolerance:

@@ -15,7 +15,7 @@ from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf, sdf_s
 
 LARGEST = 96.0
 """px, largest radius that is drawn as a sprite; larger discs are painted directly, clipped to the surface"""
-FINEST = 128
+SPRITES_PER_PX = 128
 """Sprites per px of radius: radii are quantised to 1/128 px."""
 OFFSETS = 4
 """Sub-pixel positions of a sprite along each axis, so that slow balls move smoothly."""
@@ -25,11 +25,11 @@ SPRITE_CROWD = 48
 """Number of large discs above which they are drawn without antialiasing; they mostly cover each other."""
 SHORTEST_SPOKE = 4.0
 """px, smallest radius with a rotation mark"""
-THIN = 14.0
+MAX_THIN_RADIUS = 14.0
 """px, largest radius with a rotation mark one pixel wide"""
-THICK = 300
+MAX_THICK_MARKS = 300
 """Number of rotation marks above which all are one pixel wide."""
-DARK = 0.5
+DARKEN_FRACTION = 0.5
 """Fraction by which the colours of rims and rotation marks are mixed with the background."""
 
 
@@ -82,20 +82,20 @@ class CircleRenderer:
     def _blit(
         self, surface: pygame.Surface, centre: FloatArray, radius: FloatArray, colours: ColourArray, style: CircleStyle
     ) -> None:
-        size = np.maximum(np.rint(radius * FINEST), 1.0).astype(np.int64)
+        size = np.maximum(np.rint(radius * SPRITES_PER_PX), 1.0).astype(np.int64)
         steps = OFFSETS if style.antialias else 1
-        place = np.floor(centre * steps + 0.5).astype(np.int64)
-        corner = place // steps - (np.ceil(size / FINEST).astype(np.int64) + 1)[:, None]
-        keys = _keys(size, colours, place % steps).tolist()
+        subpixel = np.floor(centre * steps + 0.5).astype(np.int64)
+        corner = subpixel // steps - (np.ceil(size / SPRITES_PER_PX).astype(np.int64) + 1)[:, None]
+        keys = _keys(size, colours, subpixel % steps).tolist()
         if self._pixels > SPRITE_BUDGET:
             self._sprites.clear()
             self._pixels = 0
-        known = self._sprites.setdefault(style, {})
-        for key in set(keys).difference(known):
-            known[key] = sprite = _sprite(key, style)
+        sprites = self._sprites.setdefault(style, {})
+        for key in set(keys).difference(sprites):
+            sprites[key] = sprite = _sprite(key, style)
             self._pixels += sprite.get_width() * sprite.get_height()
-        places = zip(corner[:, 0].tolist(), corner[:, 1].tolist(), strict=True)
-        surface.blits(list(zip(map(known.__getitem__, keys), places, strict=True)), False)
+        positions = zip(corner[:, 0].tolist(), corner[:, 1].tolist(), strict=True)
+        surface.blits(list(zip(map(sprites.__getitem__, keys), positions, strict=True)), False)
 
 
 def _keys(size: IntArray, colours: ColourArray, offset: IntArray) -> IntArray:
@@ -109,16 +109,18 @@ def _keys(size: IntArray, colours: ColourArray, offset: IntArray) -> IntArray:
 def _sprite(key: int, style: CircleStyle) -> pygame.Surface:
     down, across = key & 3, key >> 2 & 3
     blue, green, red = key >> 4 & 255, key >> 12 & 255, key >> 20 & 255
-    radius = (key >> 28) / FINEST
+    radius = (key >> 28) / SPRITES_PER_PX
     half = math.ceil(radius) + 1
-    along = np.arange(2 * half + 1, dtype=np.float64) + 0.5
+    pixels = np.arange(2 * half + 1, dtype=np.float64) + 0.5
     # Coverage that falls off linearly over a pixel adds 1/12 px² to the squared radius, visible on tiny discs.
-    true = math.sqrt(max(radius**2 - 1.0 / 12.0, 0.04)) if style.antialias else radius
-    distance = disc_distance(half + across / OFFSETS, half + down / OFFSETS, true)
-    return sdf_surface(shade_sdf(distance(along[:, None], along[None, :]), _look(radius, (red, green, blue), style)))
+    drawn_radius = math.sqrt(max(radius**2 - 1.0 / 12.0, 0.04)) if style.antialias else radius
+    distance = disc_distance(half + across / OFFSETS, half + down / OFFSETS, drawn_radius)
+    return sdf_surface(
+        shade_sdf(distance(pixels[:, None], pixels[None, :]), _shape_style(radius, (red, green, blue), style))
+    )
 
 
-def _look(radius: float, colour: RgbColour, style: CircleStyle) -> ShapeStyle:
+def _shape_style(radius: float, colour: RgbColour, style: CircleStyle) -> ShapeStyle:
     if style.hollow:
         return ShapeStyle(None, colour, style.line, antialias=style.antialias)
     rim = min(0.16 * radius, style.line * min(1.0 + radius / 80.0, 2.5))
@@ -136,13 +138,13 @@ def _paint(
     low = max(x - radius - 1.0, -1.0), max(y - radius - 1.0, -1.0)
     high = min(x + radius + 2.0, area.right + 1.0), min(y + radius + 2.0, area.bottom + 1.0)
     if low[0] < high[0] and low[1] < high[1]:
-        within = pygame.Rect(int(low[0]), int(low[1]), math.ceil(high[0] - low[0]), math.ceil(high[1] - low[1]))
-        draw_sdf(surface, disc_distance(x, y, radius), _look(radius, colour, style), within)
+        rect = pygame.Rect(int(low[0]), int(low[1]), math.ceil(high[0] - low[0]), math.ceil(high[1] - low[1]))
+        draw_sdf(surface, disc_distance(x, y, radius), _shape_style(radius, colour, style), rect)
 
 
 def darken(colour: RgbColour) -> RgbColour:
     """Return the colour of the rim and the rotation mark of a ball."""
-    red, green, blue = (round(c + (b - c) * DARK) for c, b in zip(colour, BACKGROUND, strict=True))
+    red, green, blue = (round(c + (b - c) * DARKEN_FRACTION) for c, b in zip(colour, BACKGROUND, strict=True))
     return red, green, blue
 
 
@@ -165,17 +167,19 @@ def draw_rotation_marks(
         antialias: whether edges are smooth.
     """
     shown = np.flatnonzero((radius >= SHORTEST_SPOKE) & (radius < 1e6) & np.isfinite(angle))
-    way = np.stack((np.cos(angle[shown]), -np.sin(angle[shown])), 1)
+    direction = np.stack((np.cos(angle[shown]), -np.sin(angle[shown])), 1)
     middle, reach = centre[shown] - 0.5, radius[shown, None]  # SDL pixel centres are at integers
-    ends = np.concatenate((middle + way * reach * 0.35, middle + way * (reach * 0.95 - 1.0)), 1)
-    tones = np.rint(colours[shown] * (1.0 - DARK) + np.asarray(BACKGROUND) * DARK).astype(np.uint8)
-    thin = (reach[:, 0] <= THIN) | (len(shown) > THICK)
+    ends = np.concatenate((middle + direction * reach * 0.35, middle + direction * (reach * 0.95 - 1.0)), 1)
+    tones = np.rint(colours[shown] * (1.0 - DARKEN_FRACTION) + np.asarray(BACKGROUND) * DARKEN_FRACTION).astype(
+        np.uint8
+    )
+    is_thin = (reach[:, 0] <= MAX_THIN_RADIUS) | (len(shown) > MAX_THICK_MARKS)
     line = pygame.draw.aaline if antialias else pygame.draw.line
     # Flat lists of numbers: thousands of small tuples would trigger the garbage collector.
-    columns = (column.tolist() for column in (packed_pixels(tones[thin], surface), *ends[thin].T))
+    columns = (column.tolist() for column in (packed_pixels(tones[is_thin], surface), *ends[is_thin].T))
     for tone, ax, ay, bx, by in zip(*columns, strict=True):
         line(surface, tone, (ax, ay), (bx, by))
-    for k in np.flatnonzero(~thin).tolist():
+    for k in np.flatnonzero(~is_thin).tolist():
         ax, ay, bx, by = (ends[k] + 0.5).tolist()
         red, green, blue = tones[k].tolist()
         width = min(0.08 * float(reach[k, 0]), 6.0)
@@ -183,7 +187,7 @@ def draw_rotation_marks(
 
 
 OVERSAMPLING = 4
-"""per axis, of the images of `draw_disc`"""
+"""oversampling factor per axis of the images of `draw_disc`"""
 
 
 def draw_disc(

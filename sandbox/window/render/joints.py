@@ -40,13 +40,13 @@ COILED = 500
 """Number of springs up to which each is drawn as a zigzag."""
 SOLID_RODS = 500
 """Number of rods up to which each is drawn wider than one pixel."""
-NAIL = 3.2
+ANCHOR_RADIUS = 3.2
 """px, radius of the mark at an anchor on the world"""
-ZIGS = 18
+HALF_WINDINGS = 18
 """Half windings of a spring."""
-SHORTEST = 20.0
+MIN_COIL_LENGTH = 20.0
 """px, length below which a spring is drawn as a line"""
-STRAINED = 0.1
+HALF_COLOUR_STRAIN = 0.1
 """Strain at which a spring shows half of its full colour."""
 _REST = mix_colours(BACKGROUND, SURFACE, 0.75)
 ROD = mix_colours(BACKGROUND, SURFACE, 0.9)
@@ -86,31 +86,31 @@ def joint_segments(view: DrawContext) -> JointSegments:
     count = min(len(frame.position), len(view.snapshot.bodies))
     if not len(links):
         return JointSegments(links, np.empty((0, 4)))
-    there = frame.present[:count]
-    known = (links.b < count) & (links.a < count)
-    if not known.all():
-        links = links.some(known)
-    sound = there[links.b] & ((links.a < 0) | there[links.a])
+    present = frame.present[:count]
+    has_bodies = (links.b < count) & (links.a < count)
+    if not has_bodies.all():
+        links = links.some(has_bodies)
+    is_visible = present[links.b] & ((links.a < 0) | present[links.a])
     with np.errstate(invalid="ignore", over="ignore"):
         a, b = links.ends(frame.position, frame.angle)
         ends = np.hstack((view.camera.to_screen(a), view.camera.to_screen(b)))
         width, height = view.camera.size
         margin = 100.0 * view.ui_scale
         low, high = np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])
-        sound &= (high > -margin).all(axis=1) & (low < (width + margin, height + margin)).all(axis=1)
-        sound &= np.isfinite(ends).all(axis=1)
-    return JointSegments(links if sound.all() else links.some(sound), ends[sound])
+        is_visible &= (high > -margin).all(axis=1) & (low < (width + margin, height + margin)).all(axis=1)
+        is_visible &= np.isfinite(ends).all(axis=1)
+    return JointSegments(links if is_visible.all() else links.some(is_visible), ends[is_visible])
 
 
 def draw_joints(view: DrawContext, joints: JointSegments, discs: CircleRenderer) -> None:
     """Draw rods, strings and springs, and their anchors on the world."""
     fast = joints.of(LinkKind.ROD, LinkKind.SLIDE, LinkKind.SPRING)
-    nails = fast.ends[fast.links.a < 0, :2]
-    tint = np.broadcast_to(np.asarray(SURFACE, np.uint8), (len(nails), 3))
-    size = np.full(len(nails), (NAIL if len(nails) <= SOLID_RODS else 0.5 * NAIL) * view.ui_scale)
-    discs.draw(view.surface, nails, size, tint, CircleStyle(0.0, antialias=view.antialias))
-    _solid_rods(view, joints.of(LinkKind.ROD), ROD, 2.4)
-    _solid_rods(view, joints.of(LinkKind.SLIDE), STRING, 1.4)
+    anchors = fast.ends[fast.links.a < 0, :2]
+    tint = np.broadcast_to(np.asarray(SURFACE, np.uint8), (len(anchors), 3))
+    size = np.full(len(anchors), (ANCHOR_RADIUS if len(anchors) <= SOLID_RODS else 0.5 * ANCHOR_RADIUS) * view.ui_scale)
+    discs.draw(view.surface, anchors, size, tint, CircleStyle(0.0, antialias=view.antialias))
+    _draw_rods(view, joints.of(LinkKind.ROD), ROD, 2.4)
+    _draw_rods(view, joints.of(LinkKind.SLIDE), STRING, 1.4)
     springs = joints.of(LinkKind.SPRING)
     if not len(springs.links):
         return
@@ -121,7 +121,7 @@ def draw_joints(view: DrawContext, joints: JointSegments, discs: CircleRenderer)
     rest = springs.links.figures[:, 0] * view.camera.scale
     for k, row in enumerate(springs.ends.tolist()):
         red, green, blue = SHADES[shade[k]].tolist()
-        _coil(view, (row[0], row[1]), (row[2], row[3]), float(rest[k]), (red, green, blue))
+        _draw_coil(view, (row[0], row[1]), (row[2], row[3]), float(rest[k]), (red, green, blue))
 
 
 def strain(springs: JointSegments, scale: float) -> IntArray:
@@ -129,11 +129,11 @@ def strain(springs: JointSegments, scale: float) -> IntArray:
     rest = springs.links.figures[:, 0] * scale
     with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
         stretch = np.where(rest > 0.0, springs.length / rest - 1.0, 1.0)
-        fraction = stretch / (np.abs(stretch) + STRAINED)
+        fraction = stretch / (np.abs(stretch) + HALF_COLOUR_STRAIN)
     return np.rint(32.0 + 32.0 * np.nan_to_num(fraction, nan=1.0)).astype(np.int64)
 
 
-def _solid_rods(view: DrawContext, rods: JointSegments, colour: tuple[int, int, int], width: float) -> None:
+def _draw_rods(view: DrawContext, rods: JointSegments, colour: tuple[int, int, int], width: float) -> None:
     if len(rods.links) > SOLID_RODS:
         tones: ColourArray = np.broadcast_to(np.asarray(colour, np.uint8), (len(rods.links), 3))
         draw_thin_lines(view.surface, rods.ends, packed_pixels(tones, view.surface), view.antialias)
@@ -142,30 +142,30 @@ def _solid_rods(view: DrawContext, rods: JointSegments, colour: tuple[int, int, 
         draw_line(view.surface, (ax, ay), (bx, by), colour, width * view.ui_scale, view.antialias)
 
 
-def _coil(view: DrawContext, a: Pixel, b: Pixel, rest: float, colour: tuple[int, int, int]) -> None:
+def _draw_coil(view: DrawContext, a: Pixel, b: Pixel, rest: float, colour: tuple[int, int, int]) -> None:
     """Draw a spring as a zigzag of constant wire length: stretching widens the pitch and narrows the coil."""
     length, unit = float(np.hypot(b[0] - a[0], b[1] - a[1])), view.ui_scale
     reach = 4.0 * max(view.camera.size)
-    far = max(map(abs, (*a, *b))) > reach
-    if not SHORTEST * unit <= length or far:
+    is_far = max(map(abs, (*a, *b))) > reach
+    if not MIN_COIL_LENGTH * unit <= length or is_far:
         draw_line(view.surface, a, b, colour, 1.4 * unit, view.antialias)
         return
     ux, uy = (b[0] - a[0]) / length, (b[1] - a[1]) / length
-    lead = min(0.1 * length, 14.0 * unit)
-    pitch = (length - 2.0 * lead) / ZIGS
+    straight_end = min(0.1 * length, 14.0 * unit)
+    pitch = (length - 2.0 * straight_end) / HALF_WINDINGS
     widest = min(max(0.09 * rest, 3.0 * unit), 9.0 * unit)
-    wire = np.hypot(2.0 * widest, 0.8 * rest / ZIGS)
+    wire = np.hypot(2.0 * widest, 0.8 * rest / HALF_WINDINGS)
     width = min(max(0.5 * float(np.sqrt(max(wire**2 - pitch**2, 0.0))), 0.35 * widest), 1.3 * widest)
-    spots = [a]
-    for k in range(ZIGS + 1):
-        along, side = lead + pitch * k, 0.0 if k in (0, ZIGS) else width if k % 2 else -width
-        spots.append((a[0] + ux * along - uy * side, a[1] + uy * along + ux * side))
-    spots.append(b)
+    points = [a]
+    for k in range(HALF_WINDINGS + 1):
+        along, side = straight_end + pitch * k, 0.0 if k in (0, HALF_WINDINGS) else width if k % 2 else -width
+        points.append((a[0] + ux * along - uy * side, a[1] + uy * along + ux * side))
+    points.append(b)
     if view.antialias:
         for shift in (-0.75, -0.25) if unit < 1.5 else (-1.0, -0.5, 0.0):
-            pygame.draw.aalines(view.surface, colour, False, [(x + shift, y + shift) for x, y in spots])
+            pygame.draw.aalines(view.surface, colour, False, [(x + shift, y + shift) for x, y in points])
         return
-    for p, q in pairwise(spots):
+    for p, q in pairwise(points):
         draw_line(view.surface, p, q, colour, 1.5 * unit, antialias=False)
 
 
@@ -191,12 +191,12 @@ _TINTS: dict[LinkKind, RgbColour] = {
 class AngleDial(NamedTuple):
     """Where and how the dial of a rotary joint is drawn."""
 
-    place: Pixel
+    centre: Pixel
     size: float
     """px, radius"""
     base: float
     """rad, angle of the first body"""
-    turned: float
+    relative_angle: float
     """rad, angle of the second body relative to the first"""
     figures: tuple[float, float, float]
     """parameters of the joint"""
@@ -204,16 +204,16 @@ class AngleDial(NamedTuple):
 
 def draw_joint_symbols(view: DrawContext, joints: JointSegments, discs: CircleRenderer) -> None:
     """Draw the symbols of all visible joints."""
-    ways: dict[LinkKind, Callable[[DrawContext, JointSegments], None]] = {
-        LinkKind.ROD: _rod_symbols,
-        LinkKind.GEAR: _gears,
-        LinkKind.SLIDE: _slides,
-        LinkKind.GROOVE: _grooves,
-        LinkKind.ROTARY_LIMIT: _limits,
-        LinkKind.ROTARY_SPRING: _turning_springs,
-        LinkKind.MOTOR: _motors,
+    renderers: dict[LinkKind, Callable[[DrawContext, JointSegments], None]] = {
+        LinkKind.ROD: _draw_rod_symbols,
+        LinkKind.GEAR: _draw_gears,
+        LinkKind.SLIDE: _draw_slides,
+        LinkKind.GROOVE: _draw_grooves,
+        LinkKind.ROTARY_LIMIT: _draw_limits,
+        LinkKind.ROTARY_SPRING: _draw_rotary_springs,
+        LinkKind.MOTOR: _draw_motors,
     }
-    for kind in (*ways, LinkKind.SPRING, LinkKind.PIVOT):
+    for kind in (*renderers, LinkKind.SPRING, LinkKind.PIVOT):
         some = joints.of(kind)
         if len(some.links) > MAX_SYMBOLS:
             tint = np.broadcast_to(
@@ -222,51 +222,51 @@ def draw_joint_symbols(view: DrawContext, joints: JointSegments, discs: CircleRe
             if kind is LinkKind.SPRING:
                 tint = SHADES[strain(some, view.camera.scale)]
             draw_thin_lines(view.surface, some.ends, packed_pixels(tint, view.surface), view.antialias)
-        elif len(some.links) and kind in ways:
-            ways[kind](view, some)
+        elif len(some.links) and kind in renderers:
+            renderers[kind](view, some)
         if kind in (LinkKind.ROD, LinkKind.SLIDE, LinkKind.SPRING) and 0 < len(some.links) <= MAX_SYMBOLS:
-            _dots(view, np.vstack((some.ends[:, :2], some.ends[:, 2:])), 2.6, _TINTS[kind], discs)
+            _draw_dots(view, np.vstack((some.ends[:, :2], some.ends[:, 2:])), 2.6, _TINTS[kind], discs)
         if kind in (LinkKind.PIVOT, LinkKind.GROOVE) and 0 < len(some.links) <= MAX_SYMBOLS:
-            _rings(view, some.ends[:, 2:], _TINTS[kind], discs)
+            _draw_rings(view, some.ends[:, 2:], _TINTS[kind], discs)
 
 
-def _dots(view: DrawContext, places: FloatArray, size: float, colour: RgbColour, discs: CircleRenderer) -> None:
-    kept = view.inside(places, 10.0 * view.ui_scale)
-    for wide, tone in ((size + 1.2, BACKGROUND), (size, colour)):
-        radius = np.full(len(kept), wide * view.ui_scale)
-        tint = np.broadcast_to(np.asarray(tone, np.uint8), (len(kept), 3))
-        discs.draw(view.surface, places[kept], radius, tint, CircleStyle(0.0, antialias=view.antialias))
+def _draw_dots(view: DrawContext, points: FloatArray, size: float, colour: RgbColour, discs: CircleRenderer) -> None:
+    visible = view.inside(points, 10.0 * view.ui_scale)
+    for dot_radius, tone in ((size + 1.2, BACKGROUND), (size, colour)):
+        radius = np.full(len(visible), dot_radius * view.ui_scale)
+        tint = np.broadcast_to(np.asarray(tone, np.uint8), (len(visible), 3))
+        discs.draw(view.surface, points[visible], radius, tint, CircleStyle(0.0, antialias=view.antialias))
 
 
-def _rings(view: DrawContext, places: FloatArray, colour: RgbColour, discs: CircleRenderer) -> None:
+def _draw_rings(view: DrawContext, points: FloatArray, colour: RgbColour, discs: CircleRenderer) -> None:
     """Draw the symbol of a revolute joint: a ring on a dark disc."""
-    _dots(view, places, 5.0, BACKGROUND, discs)
-    kept = view.inside(places, 10.0 * view.ui_scale)
-    radius = np.full(len(kept), 5.0 * view.ui_scale)
-    tint = np.broadcast_to(np.asarray(colour, np.uint8), (len(kept), 3))
+    _draw_dots(view, points, 5.0, BACKGROUND, discs)
+    visible = view.inside(points, 10.0 * view.ui_scale)
+    radius = np.full(len(visible), 5.0 * view.ui_scale)
+    tint = np.broadcast_to(np.asarray(colour, np.uint8), (len(visible), 3))
     style = CircleStyle(1.8 * view.ui_scale, hollow=True, antialias=view.antialias)
-    discs.draw(view.surface, places[kept], radius, tint, style)
+    discs.draw(view.surface, points[visible], radius, tint, style)
 
 
-def _rod_symbols(view: DrawContext, rods: JointSegments) -> None:
+def _draw_rod_symbols(view: DrawContext, rods: JointSegments) -> None:
     for ax, ay, bx, by in rods.ends.tolist():
         draw_line(view.surface, (ax, ay), (bx, by), INK, 1.4 * view.ui_scale, view.antialias)
 
 
-def _gears(view: DrawContext, gears: JointSegments) -> None:
+def _draw_gears(view: DrawContext, gears: JointSegments) -> None:
     rows = _from_bodies(view, gears)
     draw_dashes(view.surface, [((ax, ay), (bx, by)) for ax, ay, bx, by in rows.tolist()], INK, 2.0 * view.ui_scale)
-    places = rows[:, 2:]
-    for x, y in places[view.inside(places, 2.0 * LARGE_SYMBOL)][:MAX_DIALS].tolist():
+    points = rows[:, 2:]
+    for x, y in points[view.inside(points, 2.0 * LARGE_SYMBOL)][:MAX_DIALS].tolist():
         arc(view, (x, y), 0.7 * SMALL_SYMBOL * view.ui_scale, 0.0, math.tau, INK, 1.2)
 
 
-def _slides(view: DrawContext, slides: JointSegments) -> None:
+def _draw_slides(view: DrawContext, slides: JointSegments) -> None:
     """Draw strings as dashed lines with a tick at each end, brighter if the string is taut."""
     scale, unit = view.camera.scale, view.ui_scale
     rows = zip(slides.ends.tolist(), slides.links.figures.tolist(), slides.length.tolist(), strict=True)
-    for (ax, ay, bx, by), (least, most, _), length in rows:
-        taut = length >= 0.998 * most * scale or length <= 1.002 * least * scale
+    for (ax, ay, bx, by), (min_length, max_length, _), length in rows:
+        taut = length >= 0.998 * max_length * scale or length <= 1.002 * min_length * scale
         colour = INK if taut else SKY
         draw_dashes(view.surface, [((ax, ay), (bx, by))], colour, 6.0 * unit, view.antialias)
         if length > 0.0:
@@ -275,16 +275,16 @@ def _slides(view: DrawContext, slides: JointSegments) -> None:
                 draw_line(view.surface, (px - x, py - y), (px + x, py + y), colour, 1.6 * unit, view.antialias)
 
 
-def _grooves(view: DrawContext, grooves: JointSegments) -> None:
+def _draw_grooves(view: DrawContext, grooves: JointSegments) -> None:
     """Draw grooves: two parallel lines with round ends."""
     links, frame = grooves.links, view.snapshot.frame
     angle = np.where(links.a < 0, 0.0, frame.angle[links.a])
-    place = np.where((links.a < 0)[:, None], 0.0, frame.position[links.a])
+    position = np.where((links.a < 0)[:, None], 0.0, frame.position[links.a])
     (x, y, _), cos, sin = links.figures.T, np.cos(angle), np.sin(angle)
     with np.errstate(invalid="ignore", over="ignore"):
-        far = view.camera.to_screen(place + np.column_stack((cos * x - sin * y, sin * x + cos * y)))
+        ends_b = view.camera.to_screen(position + np.column_stack((cos * x - sin * y, sin * x + cos * y)))
     half = 5.0 * view.ui_scale
-    for (ax, ay, *_), (bx, by) in zip(grooves.ends.tolist(), far.tolist(), strict=True):
+    for (ax, ay, *_), (bx, by) in zip(grooves.ends.tolist(), ends_b.tolist(), strict=True):
         length = math.hypot(bx - ax, by - ay)
         if not 0.0 < length < SDL_COORDINATE_LIMIT or max(abs(ax), abs(ay)) > SDL_COORDINATE_LIMIT:
             continue
@@ -293,67 +293,67 @@ def _grooves(view: DrawContext, grooves: JointSegments) -> None:
             shift = -uy * side, ux * side
             start, end = (ax + shift[0], ay + shift[1]), (bx + shift[0], by + shift[1])
             draw_line(view.surface, start, end, SKY, 1.4 * view.ui_scale, view.antialias)
-        turned = math.atan2(-uy, ux)
-        arc(view, (ax, ay), half, turned + 0.5 * math.pi, math.pi, SKY, 1.4)
-        arc(view, (bx, by), half, turned - 0.5 * math.pi, math.pi, SKY, 1.4)
+        direction = math.atan2(-uy, ux)
+        arc(view, (ax, ay), half, direction + 0.5 * math.pi, math.pi, SKY, 1.4)
+        arc(view, (bx, by), half, direction - 0.5 * math.pi, math.pi, SKY, 1.4)
 
 
-def _limits(view: DrawContext, limits: JointSegments) -> None:
+def _draw_limits(view: DrawContext, limits: JointSegments) -> None:
     """Draw the permitted arc of the second body, and a needle at its angle."""
-    for (x, y), size, base, turned, (least, most, _) in _dials(view, limits):
-        first, span = base + least, min(max(most - least, 0.0), math.tau)
+    for (x, y), size, base, relative_angle, (min_angle, max_angle, _) in _dials(view, limits):
+        first, span = base + min_angle, min(max(max_angle - min_angle, 0.0), math.tau)
         arc(view, (x, y), size, first, span, INK, 2.0)
         for stop in (first, first + span):
             inner, outer = spot((x, y), 0.8 * size, stop), spot((x, y), 1.2 * size, stop)
             path(view, [inner, outer], INK, 2.0)
-        tip, foot = spot((x, y), 1.1 * size, base + turned), spot((x, y), 0.45 * size, base + turned)
+        tip, foot = spot((x, y), 1.1 * size, base + relative_angle), spot((x, y), 0.45 * size, base + relative_angle)
         path(view, [foot, tip], YELLOW, 2.0)
 
 
-def _turning_springs(view: DrawContext, springs: JointSegments) -> None:
+def _draw_rotary_springs(view: DrawContext, springs: JointSegments) -> None:
     """Draw a spiral that winds up with the spring."""
-    for (x, y), size, base, turned, (rest, _, _) in _dials(view, springs):
-        strained = max(min(turned - rest, 2.0 * math.tau), -2.0 * math.tau)
-        wound = 1.5 * math.tau + strained
-        colour = tuple(SHADES[round(32.0 + 32.0 * strained / (abs(strained) + 0.5))].tolist())
+    for (x, y), size, base, relative_angle, (rest, _, _) in _dials(view, springs):
+        twist = max(min(relative_angle - rest, 2.0 * math.tau), -2.0 * math.tau)
+        wound = 1.5 * math.tau + twist
+        colour = tuple(SHADES[round(32.0 + 32.0 * twist / (abs(twist) + 0.5))].tolist())
         count = 28
-        spots = [
-            spot((x, y), size * (0.25 + 0.75 * k / count), base + turned - wound * (1.0 - k / count))
+        points = [
+            spot((x, y), size * (0.25 + 0.75 * k / count), base + relative_angle - wound * (1.0 - k / count))
             for k in range(count + 1)
         ]
-        path(view, spots, (colour[0], colour[1], colour[2]), 1.4)
+        path(view, points, (colour[0], colour[1], colour[2]), 1.4)
 
 
-def _motors(view: DrawContext, motors: JointSegments) -> None:
+def _draw_motors(view: DrawContext, motors: JointSegments) -> None:
     """Draw three quarters of a circle with an arrowhead in the driving direction."""
     for (x, y), size, base, _, (rate, _, _) in _dials(view, motors):
-        way = 1.0 if rate >= 0.0 else -1.0
-        first, span = base - way * 0.75 * math.pi, way * 1.35 * math.pi
+        sign = 1.0 if rate >= 0.0 else -1.0
+        first, span = base - sign * 0.75 * math.pi, sign * 1.35 * math.pi
         arc(view, (x, y), 1.15 * size, first, span, INK, 2.2)
         last = first + span
-        neck, tip = spot((x, y), 1.15 * size, last - way * 0.15), spot((x, y), 1.15 * size, last + way * 0.35)
+        neck, tip = spot((x, y), 1.15 * size, last - sign * 0.15), spot((x, y), 1.15 * size, last + sign * 0.35)
         draw_arrow(view.surface, neck, tip, INK, 2.2 * view.ui_scale, view.antialias, BACKGROUND)
 
 
 def _dials(view: DrawContext, joints: JointSegments) -> list[AngleDial]:
     """Return the dials of rotary joints: at a pivot of the same two bodies, else at the centre of the second body."""
     frame, bodies, links = view.snapshot.frame, view.snapshot.bodies, joints.links
-    every, pivots = view.snapshot.links, {}
-    for k in np.flatnonzero(every.kind == LinkKind.PIVOT).tolist():
-        pivots[int(every.a[k]), int(every.b[k])] = k
-    _, hinge = every.ends(frame.position, frame.angle)
+    all_links, pivots = view.snapshot.links, {}
+    for k in np.flatnonzero(all_links.kind == LinkKind.PIVOT).tolist():
+        pivots[int(all_links.a[k]), int(all_links.b[k])] = k
+    _, hinge = all_links.ends(frame.position, frame.angle)
     found = []
     rows = zip(links.a.tolist(), links.b.tolist(), links.figures.tolist(), strict=True)
     for a, b, figures in list(rows)[:MAX_DIALS]:
-        own = pivots.get((a, b), pivots.get((b, a)))
-        place = frame.position[b] if own is None else hinge[own]
-        x, y = view.camera.to_screen(place).tolist()
+        pivot = pivots.get((a, b), pivots.get((b, a)))
+        position = frame.position[b] if pivot is None else hinge[pivot]
+        x, y = view.camera.to_screen(position).tolist()
         base = 0.0 if a < 0 else float(frame.angle[a])
-        turned = float(frame.angle[b]) - base
-        if max(abs(x), abs(y)) < SDL_COORDINATE_LIMIT and math.isfinite(base) and math.isfinite(turned):
-            room = float(bodies.core[b]) * view.camera.scale
-            size = min(max(0.6 * room, SMALL_SYMBOL * view.ui_scale), LARGE_SYMBOL * view.ui_scale)
-            found.append(AngleDial((x, y), size, base, turned, (figures[0], figures[1], figures[2])))
+        relative_angle = float(frame.angle[b]) - base
+        if max(abs(x), abs(y)) < SDL_COORDINATE_LIMIT and math.isfinite(base) and math.isfinite(relative_angle):
+            radius = float(bodies.core[b]) * view.camera.scale
+            size = min(max(0.6 * radius, SMALL_SYMBOL * view.ui_scale), LARGE_SYMBOL * view.ui_scale)
+            found.append(AngleDial((x, y), size, base, relative_angle, (figures[0], figures[1], figures[2])))
     return found
 
 
@@ -379,95 +379,109 @@ def arc(
     low, half = min(first, first + span), min(0.5 * abs(span), math.pi)
     distance = arc_distance(*centre, radius, low + half, half)
     (x, y) = centre
-    _trace(view, distance, (x - radius, y - radius, x + radius, y + radius), colour, width)
+    _draw_contour(view, distance, (x - radius, y - radius, x + radius, y + radius), colour, width)
 
 
-def path(view: DrawContext, spots: list[Pixel], colour: RgbColour, width: float) -> None:
+def path(view: DrawContext, points: list[Pixel], colour: RgbColour, width: float) -> None:
     """Draw a polyline with a dark outline."""
-    parts = [capsule_distance(a, b, 0.0) for a, b in pairwise(spots)]
-    columns, rows = zip(*spots, strict=True)
+    segments = [capsule_distance(a, b, 0.0) for a, b in pairwise(points)]
+    columns, rows = zip(*points, strict=True)
     box = min(columns), min(rows), max(columns), max(rows)
-    _trace(view, lambda x, y: np.asarray(np.minimum.reduce([part(x, y) for part in parts])), box, colour, width)
+    _draw_contour(
+        view, lambda x, y: np.asarray(np.minimum.reduce([segment(x, y) for segment in segments])), box, colour, width
+    )
 
 
-def _trace(
+def _draw_contour(
     view: DrawContext, distance: SignedDistance, box: tuple[float, float, float, float], colour: RgbColour, width: float
 ) -> None:
     """Draw the zero contour of a signed distance within a box (left, top, right, bottom), px."""
     half, halo = 0.5 * width * view.ui_scale, 1.2 * view.ui_scale
     margin = half + halo + 1.0
-    wide = box[0] - margin, box[1] - margin, box[2] + margin, box[3] + margin
-    within = clipped_box(wide, view.surface.get_clip())
-    if within.width:
+    outer = box[0] - margin, box[1] - margin, box[2] + margin, box[3] + margin
+    area = clipped_box(outer, view.surface.get_clip())
+    if area.width:
         look = ShapeStyle(colour, BACKGROUND, halo, antialias=view.antialias)
-        draw_sdf(view.surface, lambda x, y: np.asarray(distance(x, y) - half - halo), look, within)
+        draw_sdf(view.surface, lambda x, y: np.asarray(distance(x, y) - half - halo), look, area)
 
 
-PIN = 4.0
+HINGE_RADIUS = 4.0
 """px, radius of the mark of a hinge"""
-SHARE = 0.45
+MAX_HINGE_FRACTION = 0.45
 """Largest radius of a hinge mark, as a fraction of the largest disc inscribed in its body."""
-SMALL_PIN, LARGE_PIN = 14.0, 90.0
+MIN_ARC_RADIUS, MAX_ARC_RADIUS = 14.0, 90.0
 """px, smallest and largest radius of the arcs of drives"""
-BEYOND = 1.0
+ARC_CLEARANCE = 1.0
 """Distance of the arc beyond the centre of the body, as a fraction of the largest inscribed disc."""
 
 
 def draw_hinges(view: DrawContext, discs: CircleRenderer) -> None:
     """Draw the hinges of driven bodies that are visible."""
     bodies = view.snapshot.bodies
-    for mount, number, place in _seen(view):
+    for mount, number, pixel in _visible_mounts(view):
         if not isinstance(mount.drive, PlungerDrive):
-            size = min(PIN * view.ui_scale, SHARE * float(bodies.core[number]) * view.camera.scale)
+            size = min(
+                HINGE_RADIUS * view.ui_scale, MAX_HINGE_FRACTION * float(bodies.core[number]) * view.camera.scale
+            )
             for fraction, colour in ((1.0, BACKGROUND), (0.55, mix_colours(BACKGROUND, INK, 0.85))):
                 tint = np.asarray([colour], np.uint8)
                 style = CircleStyle(0.0, antialias=view.antialias)
-                discs.draw(view.surface, np.asarray([place]), np.asarray([fraction * size]), tint, style)
+                discs.draw(view.surface, np.asarray([pixel]), np.asarray([fraction * size]), tint, style)
 
 
 def draw_stops(view: DrawContext) -> None:
     """Draw the stops of drives, the range between them, and a needle at the position of the body."""
     frame = view.snapshot.frame
-    for mount, number, place in _seen(view):
+    for mount, number, pixel in _visible_mounts(view):
         level = 0.0 if frame.drives is None else float(frame.drives[mount.number, 0])
         colour = mix_colours(SKY, ORANGE, level)
         drive = mount.drive
         if isinstance(drive, PlungerDrive):
-            _slide(view, drive, place, frame.position[number].tolist(), mount.home, colour)
+            _draw_travel(view, drive, pixel, frame.position[number].tolist(), mount.home, colour)
             continue
         (x, y), (rest, end) = mount.hinge, drive.stops
-        own = math.atan2(-y, -x) if x or y else 0.0  # direction from the hinge to the centre of the body
-        length = (math.hypot(x, y) + BEYOND * float(view.snapshot.bodies.core[number])) * view.camera.scale
-        size = min(max(length, SMALL_PIN * view.ui_scale), LARGE_PIN * view.ui_scale)
-        arc(view, place, size, own + rest, max(min(end - rest, math.tau), -math.tau), INK, 1.4)
+        rest_angle = math.atan2(-y, -x) if x or y else 0.0  # direction from the hinge to the centre of the body
+        length = (math.hypot(x, y) + ARC_CLEARANCE * float(view.snapshot.bodies.core[number])) * view.camera.scale
+        size = min(max(length, MIN_ARC_RADIUS * view.ui_scale), MAX_ARC_RADIUS * view.ui_scale)
+        arc(view, pixel, size, rest_angle + rest, max(min(end - rest, math.tau), -math.tau), INK, 1.4)
         for stop in (rest, end):
-            path(view, [spot(place, 0.92 * size, own + stop), spot(place, 1.08 * size, own + stop)], INK, 1.4)
-        turned = own + float(frame.angle[number])
-        path(view, [spot(place, 0.25 * size, turned), spot(place, 1.04 * size, turned)], colour, 2.0)
+            path(
+                view,
+                [spot(pixel, 0.92 * size, rest_angle + stop), spot(pixel, 1.08 * size, rest_angle + stop)],
+                INK,
+                1.4,
+            )
+        needle_angle = rest_angle + float(frame.angle[number])
+        path(view, [spot(pixel, 0.25 * size, needle_angle), spot(pixel, 1.04 * size, needle_angle)], colour, 2.0)
 
 
-def _slide(
-    view: DrawContext, drive: PlungerDrive, place: Pixel, now: list[float], home: tuple[float, float], colour: RgbColour
+def _draw_travel(
+    view: DrawContext,
+    drive: PlungerDrive,
+    pixel: Pixel,
+    position: list[float],
+    rest: tuple[float, float],
+    colour: RgbColour,
 ) -> None:
     """Draw the travel of a plunger as a line with end ticks, and a tick at its present position."""
     length = math.hypot(*drive.direction)
     ux, uy = drive.direction[0] / length, -drive.direction[1] / length  # y points down on the screen
-    far = drive.travel * view.camera.scale
-    pulled = math.dist(now, home) * view.camera.scale
+    travel = drive.travel * view.camera.scale
+    pulled = math.dist(position, rest) * view.camera.scale
     tick = 5.0 * view.ui_scale
-    back = place[0] - far * ux, place[1] - far * uy
-    path(view, [place, back], INK, 1.6)
-    for (x, y), tone in ((place, INK), (back, INK), ((place[0] - pulled * ux, place[1] - pulled * uy), colour)):
+    end_pixel = pixel[0] - travel * ux, pixel[1] - travel * uy
+    path(view, [pixel, end_pixel], INK, 1.6)
+    for (x, y), tone in ((pixel, INK), (end_pixel, INK), ((pixel[0] - pulled * ux, pixel[1] - pulled * uy), colour)):
         path(view, [(x - tick * uy, y + tick * ux), (x + tick * uy, y - tick * ux)], tone, 2.2)
 
 
-def _seen(view: DrawContext) -> Iterator[tuple[Mount, int, Pixel]]:
+def _visible_mounts(view: DrawContext) -> Iterator[tuple[Mount, int, Pixel]]:
     """Yield the mount, the index and the hinge or stop position (px) of each visible driven body."""
     names = view.snapshot.bodies.names
     numbers = {names[number]: number for number in view.shown.tolist()}
     for name, mount in mounts(view.snapshot.scene).items():
         if name in numbers:
             drive = mount.drive
-            seat = mount.home if isinstance(drive, PlungerDrive) else drive.pivot
-            x, y = view.camera.to_screen(np.asarray(seat)).tolist()
+            position = mount.home if isinstance(drive, PlungerDrive) else drive.pivot
+            x, y = view.camera.to_screen(np.asarray(position)).tolist()
             yield mount, numbers[name], (x, y)

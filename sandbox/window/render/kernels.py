@@ -1,6 +1,6 @@
 """Rasterisers of points, polygons and thin lines, compiled if numba is installed.
 
-The scratch array `room` is (V, 9). Columns 0 to 4 hold, for each corner, its x and y in px, then the unit normal and
+The array `scratch` is (V, 9). Columns 0 to 4 hold, for each corner, its x and y in px, then the unit normal and
 the offset of the side that starts there. Columns 5 to 8 of the first row of a piece hold the inner and outer span of
 the current row of pixels.
 """
@@ -21,7 +21,7 @@ FULL = 256
 
 @bare_kernel
 def blend_packed(under: int, over: int, fraction: int) -> int:
-    """Return `under` blended with `over` by share / `FULL`; all four bytes alike, two per multiplication."""
+    """Return `under` blended with `over` by fraction / `FULL`; all four bytes alike, two per multiplication."""
     rest = FULL - fraction
     even = ((under & 0xFF00FF) * rest + (over & 0xFF00FF) * fraction + 0x800080) >> 8 & 0xFF00FF
     odd = ((under >> 8 & 0xFF00FF) * rest + (over >> 8 & 0xFF00FF) * fraction + 0x800080) & 0xFF00FF00
@@ -44,19 +44,19 @@ def rasterise_points(
     """Draw particles as squares.
 
     Args:
-        pixels: of the surface, flat.
-        stride: of a row, px.
+        pixels: pixels of the surface, flat.
+        stride: length of a row, px.
         area: left, top, right and bottom of the clip rectangle, px.
         position: (N, 2) m.
         colours: (N,) in the pixel format of the surface.
         present: (N,) whether a particle is drawn.
-        centre: of the camera, m.
-        scale: of the camera, px/m.
-        middle: of the surface, px.
-        side: of a square, px.
+        centre: centre of the camera, m.
+        scale: scale of the camera, px/m.
+        middle: centre of the surface, px.
+        side: side of a square, px.
     """
     left, top, right, bottom = area
-    back = side // 2
+    half_side = side // 2
     for i in range(len(position)):
         if not present[i]:
             continue
@@ -64,14 +64,19 @@ def rasterise_points(
         x = (position[i, 0] - centre[0]) * scale + middle[0]
         y = (position[i, 1] - centre[1]) * -scale + middle[1]
         # For values from 0, int() rounds down. Comparisons with nan are false.
-        if x >= left + back and x < right - side + back + 1 and y >= top + back and y < bottom - side + back + 1:
-            corner = (int(y) - back) * stride + int(x) - back
+        if (
+            x >= left + half_side
+            and x < right - side + half_side + 1
+            and y >= top + half_side
+            and y < bottom - side + half_side + 1
+        ):
+            corner = (int(y) - half_side) * stride + int(x) - half_side
             for row in range(side):
                 for column in range(side):
                     pixels[corner + row * stride + column] = colours[i]
         elif side > 1 and x > left - side and x < right + side and y > top - side and y < bottom + side:
-            first, above = int(np.floor(x)) - back, int(np.floor(y)) - back
-            for row in range(max(above, top), min(above + side, bottom)):
+            first, top_row = int(np.floor(x)) - half_side, int(np.floor(y)) - half_side
+            for row in range(max(top_row, top), min(top_row + side, bottom)):
                 for column in range(max(first, left), min(first + side, right)):
                     pixels[row * stride + column] = colours[i]
 
@@ -104,12 +109,12 @@ def rasterise_faded_points(
 
 @bare_kernel
 def span(
-    y: float, room: FloatArray, first: int, last: int, offset: float, left: float, right: float
+    y: float, scratch: FloatArray, first: int, last: int, offset: float, left: float, right: float
 ) -> tuple[float, float]:
     """Return the x range of a row of pixels that is at most `offset` outside all sides of a polygon."""
     from_x, to_x = left, right
     for k in range(first, last):
-        across, bound = room[k, 2], offset - (room[k, 3] * y + room[k, 4])
+        across, bound = scratch[k, 2], offset - (scratch[k, 3] * y + scratch[k, 4])
         if across > 1e-9:
             to_x = min(to_x, bound / across)
         elif across < -1e-9:
@@ -121,26 +126,26 @@ def span(
 
 @bare_kernel
 def inner_span(
-    y: float, room: FloatArray, first: int, last: int, radius: float, left: float, right: float
+    y: float, scratch: FloatArray, first: int, last: int, radius: float, left: float, right: float
 ) -> tuple[float, float]:
-    """Return the x range of a row that lies inside a piece for certain; `radius` may be negative."""
+    """Return an x range of a row that is inside a piece (conservative bound); `radius` may be negative."""
     if last - first > 2:
-        return span(y, room, first, last, min(radius, 0.0), left, right)
+        return span(y, scratch, first, last, min(radius, 0.0), left, right)
     if radius <= 0.0:
         return left, left - 1.0
     if last - first == 1:
-        under = radius * radius - (y - room[first, 1]) ** 2
-        half = math.sqrt(max(under, 0.0))
-        return max(left, room[first, 0] - half), min(right, room[first, 0] + half) if under > 0.0 else left - 1.0
-    from_x, to_x = span(y, room, first, last, radius, left, right)
+        half2 = radius * radius - (y - scratch[first, 1]) ** 2
+        half = math.sqrt(max(half2, 0.0))
+        return max(left, scratch[first, 0] - half), min(right, scratch[first, 0] + half) if half2 > 0.0 else left - 1.0
+    from_x, to_x = span(y, scratch, first, last, radius, left, right)
     for k in range(first, last):  # limited by the ends of the segment
-        after = 2 * first + 1 - k
-        dx, dy = room[after, 0] - room[k, 0], room[after, 1] - room[k, 1]
-        bound = dy * (room[k, 1] - y)
+        other_end = 2 * first + 1 - k
+        dx, dy = scratch[other_end, 0] - scratch[k, 0], scratch[other_end, 1] - scratch[k, 1]
+        bound = dy * (scratch[k, 1] - y)
         if dx > 1e-9:
-            from_x = max(from_x, room[k, 0] + bound / dx)
+            from_x = max(from_x, scratch[k, 0] + bound / dx)
         elif dx < -1e-9:
-            to_x = min(to_x, room[k, 0] + bound / dx)
+            to_x = min(to_x, scratch[k, 0] + bound / dx)
         elif bound > 0.0:
             to_x = left - 1.0
     return from_x, to_x
@@ -148,19 +153,19 @@ def inner_span(
 
 @bare_kernel
 def outer_span(
-    y: float, room: FloatArray, first: int, last: int, radius: float, left: float, right: float
+    y: float, scratch: FloatArray, first: int, last: int, radius: float, left: float, right: float
 ) -> tuple[float, float]:
     """Return the x range of a row outside which no pixel lies inside the piece (conservative bound)."""
     low_x, high_x, low_y, high_y = math.inf, -math.inf, math.inf, -math.inf
     for k in range(first, last):
-        low_x, high_x = min(low_x, room[k, 0]), max(high_x, room[k, 0])
-        low_y, high_y = min(low_y, room[k, 1]), max(high_y, room[k, 1])
+        low_x, high_x = min(low_x, scratch[k, 0]), max(high_x, scratch[k, 0])
+        low_y, high_y = min(low_y, scratch[k, 1]), max(high_y, scratch[k, 1])
     if y < low_y - radius or y > high_y + radius:
         return left, left - 1.0
     from_x, to_x = max(left, low_x - radius), min(right, high_x + radius)
     if last - first == 1:
         return from_x, to_x
-    return span(y, room, first, last, radius, from_x, to_x)
+    return span(y, scratch, first, last, radius, from_x, to_x)
 
 
 class PolygonPose(NamedTuple):
@@ -186,47 +191,49 @@ def _side_distance2(x: float, y: float, ax: float, ay: float, bx: float, by: flo
 
 
 @bare_kernel
-def _piece_distance(x: float, y: float, room: FloatArray, first: int, last: int, radius: float) -> float:
-    """Return the signed distance from a piece placed by `_place`; beyond ½ px, a lower bound."""
+def _piece_distance(x: float, y: float, scratch: FloatArray, first: int, last: int, radius: float) -> float:
+    """Return the signed distance from a piece placed by `_place_corners`; beyond ½ px, a lower bound."""
     if last - first > 2:
-        most, side = -np.inf, first
+        largest, side = -np.inf, first
         for k in range(first, last):
-            away = room[k, 2] * x + room[k, 3] * y + room[k, 4]
-            if away > most:
-                most, side = away, k
-        if most <= 0.0 or most - radius >= 0.5:
-            return most - radius
+            distance = scratch[k, 2] * x + scratch[k, 3] * y + scratch[k, 4]
+            if distance > largest:
+                largest, side = distance, k
+        if largest <= 0.0 or largest - radius >= 0.5:
+            return largest - radius
         after = first if side + 1 == last else side + 1
-        nx, ny = room[side, 2], room[side, 3]
-        behind = (room[side, 1] - y) * nx - (room[side, 0] - x) * ny
-        beyond = (room[after, 1] - y) * nx - (room[after, 0] - x) * ny
-        if behind * beyond <= 0.0:  # the foot of the perpendicular lies on the side
-            return most - radius
+        nx, ny = scratch[side, 2], scratch[side, 3]
+        before_end = (scratch[side, 1] - y) * nx - (scratch[side, 0] - x) * ny
+        after_end = (scratch[after, 1] - y) * nx - (scratch[after, 0] - x) * ny
+        if before_end * after_end <= 0.0:  # the foot of the perpendicular lies on the side
+            return largest - radius
     best = np.inf
     for k in range(first, last if last - first > 2 else first + 1):
         after = first if k + 1 == last else k + 1
-        best = min(best, _side_distance2(x, y, room[k, 0], room[k, 1], room[after, 0], room[after, 1]))
+        best = min(best, _side_distance2(x, y, scratch[k, 0], scratch[k, 1], scratch[after, 0], scratch[after, 1]))
     return math.sqrt(best) - radius
 
 
 @bare_kernel
 def _body_distance(
-    x: float, y: float, body: int, pieces: ConvexPieces, room: FloatArray, scale: float, deep: float
+    x: float, y: float, body: int, pieces: ConvexPieces, scratch: FloatArray, scale: float, inner_limit: float
 ) -> float:
-    """Return the minimum signed distance from the pieces of a body, px; clamped below at `deep`."""
-    away = np.inf
+    """Return the minimum signed distance from the pieces of a body, px; clamped below at `inner_limit`."""
+    distance = np.inf
     for piece in range(pieces.piece[body], pieces.piece[body + 1]):
         first, last = pieces.first[piece], pieces.first[piece + 1]
-        if x < room[first, 7] or x > room[first, 8]:
+        if x < scratch[first, 7] or x > scratch[first, 8]:
             continue
-        away = min(away, _piece_distance(x, y, room, first, last, pieces.radius[piece] * scale))
-        if away <= deep:
-            return deep
-    return away
+        distance = min(distance, _piece_distance(x, y, scratch, first, last, pieces.radius[piece] * scale))
+        if distance <= inner_limit:
+            return inner_limit
+    return distance
 
 
 @bare_kernel
-def _place(pieces: ConvexPieces, body: int, pose: PolygonPose, room: FloatArray) -> tuple[float, float, float, float]:
+def _place_corners(
+    pieces: ConvexPieces, body: int, pose: PolygonPose, scratch: FloatArray
+) -> tuple[float, float, float, float]:
     """Transform the corners of a body to the screen and compute the outward normal and the offset of each side.
 
     Returns:
@@ -234,35 +241,35 @@ def _place(pieces: ConvexPieces, body: int, pose: PolygonPose, room: FloatArray)
     """
     left, top, right, bottom = np.inf, np.inf, -np.inf, -np.inf
     for piece in range(pieces.piece[body], pieces.piece[body + 1]):
-        wide = pieces.radius[piece] * pose.scale + 1.0
+        margin = pieces.radius[piece] * pose.scale + 1.0
         first, last = pieces.first[piece], pieces.first[piece + 1]
         for k in range(first, last):
             x, y = pieces.corner[k, 0], pieces.corner[k, 1]
             px = pose.x + (pose.cos * x - pose.sin * y) * pose.scale
             py = pose.y - (pose.sin * x + pose.cos * y) * pose.scale
-            room[k, 0], room[k, 1] = px, py
-            left, right = min(left, px - wide), max(right, px + wide)
-            top, bottom = min(top, py - wide), max(bottom, py + wide)
+            scratch[k, 0], scratch[k, 1] = px, py
+            left, right = min(left, px - margin), max(right, px + margin)
+            top, bottom = min(top, py - margin), max(bottom, py + margin)
         for k in range(first, last):
-            after = first if k + 1 == last else k + 1
-            nx, ny = room[k, 1] - room[after, 1], room[after, 0] - room[k, 0]
+            next_corner = first if k + 1 == last else k + 1
+            nx, ny = scratch[k, 1] - scratch[next_corner, 1], scratch[next_corner, 0] - scratch[k, 0]
             length = max(math.sqrt(nx * nx + ny * ny), 1e-300)
-            room[k, 2], room[k, 3] = nx / length, ny / length
-            room[k, 4] = -(nx * room[k, 0] + ny * room[k, 1]) / length
+            scratch[k, 2], scratch[k, 3] = nx / length, ny / length
+            scratch[k, 4] = -(nx * scratch[k, 0] + ny * scratch[k, 1]) / length
     return left, top, right, bottom
 
 
 @bare_kernel
-def _shaded(pixel: int, away: float, deep: float, fill: int, rim: int, hollow: bool, antialias: bool) -> int:
-    """Return a pixel blended with the body, whose edge is at a signed distance of `away` px."""
-    cover, shade = min(max(0.5 - away, 0.0), 1.0), min(max(away - deep, 0.0), 1.0)
+def _shaded(pixel: int, distance: float, inner_limit: float, fill: int, rim: int, hollow: bool, antialias: bool) -> int:
+    """Return a pixel blended with the body, whose edge is at a signed distance, px."""
+    cover, shade = min(max(0.5 - distance, 0.0), 1.0), min(max(distance - inner_limit, 0.0), 1.0)
     if not antialias:
         cover, shade = math.floor(cover + 0.5), math.floor(shade + 0.5)
     if hollow:
         cover, shade = cover * shade, 1.0
     tone = blend_packed(fill, rim, int(shade * FULL + 0.5)) if shade < 1.0 else rim
-    part = int(cover * FULL + 0.5)
-    return tone if part == FULL else blend_packed(pixel, tone, part)
+    coverage = int(cover * FULL + 0.5)
+    return tone if coverage == FULL else blend_packed(pixel, tone, coverage)
 
 
 @bare_kernel
@@ -270,10 +277,10 @@ def _polygon_row(
     pixels: npt.NDArray[np.uint32],
     start: int,
     y: float,
-    room: FloatArray,
+    scratch: FloatArray,
     corners: tuple[int, int],
     ends: tuple[float, float],
-    deep: float,
+    inner_limit: float,
     fill: int,
     rim: int,
     hollow: bool,
@@ -281,8 +288,8 @@ def _polygon_row(
 ) -> None:
     """Draw a row of a body that is a single polygon: the common case, with no search over the pieces for each pixel."""
     first, last = corners
-    from_x, to_x = span(y, room, first, last, 0.5, ends[0], ends[1])
-    from_in, to_in = span(y, room, first, last, deep, ends[0], ends[1])
+    from_x, to_x = span(y, scratch, first, last, 0.5, ends[0], ends[1])
+    from_in, to_in = span(y, scratch, first, last, inner_limit, ends[0], ends[1])
     column, stop = int(from_x), math.ceil(to_x)
     inner, outer = stop, stop
     if from_in <= to_in:
@@ -293,9 +300,11 @@ def _polygon_row(
                 pixels[start + inner : start + outer] = fill
             column = outer
             continue
-        away = _piece_distance(column + 0.5, y, room, first, last, 0.0)
-        if away < 0.5:
-            pixels[start + column] = _shaded(int(pixels[start + column]), away, deep, fill, rim, hollow, antialias)
+        distance = _piece_distance(column + 0.5, y, scratch, first, last, 0.0)
+        if distance < 0.5:
+            pixels[start + column] = _shaded(
+                int(pixels[start + column]), distance, inner_limit, fill, rim, hollow, antialias
+            )
         column += 1
 
 
@@ -305,7 +314,7 @@ def rasterise_polygons(
     stride: int,
     area: tuple[int, int, int, int],
     pieces: ConvexPieces,
-    room: FloatArray,
+    scratch: FloatArray,
     indices: IntArray,
     pose: FloatArray,
     line: FloatArray,
@@ -321,7 +330,7 @@ def rasterise_polygons(
         stride: of a row, px.
         area: left, top, right and bottom of the clip rectangle, px.
         pieces: of all bodies.
-        room: (V, 9) scratch array.
+        scratch: (V, 9) scratch array.
         indices: (K,) indices of the bodies that are drawn.
         pose: (K, 5) as in `PolygonPose`.
         line: (K,) rim widths, px.
@@ -331,51 +340,57 @@ def rasterise_polygons(
         antialias: whether edges are smooth.
     """
     for k in range(len(indices)):
-        body, here = indices[k], PolygonPose(pose[k, 0], pose[k, 1], pose[k, 2], pose[k, 3], pose[k, 4])
+        body, body_pose = indices[k], PolygonPose(pose[k, 0], pose[k, 1], pose[k, 2], pose[k, 3], pose[k, 4])
         begin, end = pieces.piece[body], pieces.piece[body + 1]
         low, high = pieces.first[begin], pieces.first[end]
-        left, top, right, bottom = _place(pieces, body, here, room)
+        left, top, right, bottom = _place_corners(pieces, body, body_pose, scratch)
         left, top = max(left, float(area[0])), max(top, float(area[1]))
         right, bottom = min(right, float(area[2])), min(bottom, float(area[3]))
         if not (left < right and top < bottom):
             continue
         polygon = pieces.radius[begin] == 0.0 and end - begin == 1 and high - low > 2
-        radius = pieces.radius[begin] * here.scale
-        deep = -(line[k] + 0.5)
+        radius = pieces.radius[begin] * body_pose.scale
+        inner_limit = -(line[k] + 0.5)
         inner, outer = int(fill[k]), int(rim[k])
         for row in range(int(top), math.ceil(bottom)):
             y, start = row + 0.5, row * stride
             if polygon:
-                _polygon_row(pixels, start, y, room, (low, high), (left, right), deep, inner, outer, hollow, antialias)
+                _polygon_row(
+                    pixels, start, y, scratch, (low, high), (left, right), inner_limit, inner, outer, hollow, antialias
+                )
                 continue
             for piece in range(begin, end):
                 first, last = pieces.first[piece], pieces.first[piece + 1]
-                wide = pieces.radius[piece] * here.scale
-                room[first, 5], room[first, 6] = inner_span(y, room, first, last, wide + deep, left, right)
-                room[first, 7], room[first, 8] = outer_span(y, room, first, last, wide + 0.5, left, right)
+                piece_radius = pieces.radius[piece] * body_pose.scale
+                scratch[first, 5], scratch[first, 6] = inner_span(
+                    y, scratch, first, last, piece_radius + inner_limit, left, right
+                )
+                scratch[first, 7], scratch[first, 8] = outer_span(
+                    y, scratch, first, last, piece_radius + 0.5, left, right
+                )
             column, stop = int(left), math.ceil(right)
             while column < stop:
-                x, beyond, empty = column + 0.5, column, stop
+                x, filled, empty = column + 0.5, column, stop
                 for piece in range(begin, end):
                     first = pieces.first[piece]
-                    if room[first, 5] <= x <= room[first, 6]:
-                        beyond = max(beyond, min(int(room[first, 6] - 0.5) + 1, stop))
-                    if x <= room[first, 8]:
-                        empty = min(empty, int(max(room[first, 7] - 0.5, float(column))))
+                    if scratch[first, 5] <= x <= scratch[first, 6]:
+                        filled = max(filled, min(int(scratch[first, 6] - 0.5) + 1, stop))
+                    if x <= scratch[first, 8]:
+                        empty = min(empty, int(max(scratch[first, 7] - 0.5, float(column))))
                 if empty > column:  # no piece covers this column
                     column = empty
                     continue
-                if beyond > column:
+                if filled > column:
                     if not hollow:
-                        pixels[start + column : start + beyond] = inner
-                    column = beyond
+                        pixels[start + column : start + filled] = inner
+                    column = filled
                     continue
                 if end - begin == 1:  # passing all arrays costs more than the rest
-                    away = _piece_distance(x, y, room, low, high, radius)
+                    distance = _piece_distance(x, y, scratch, low, high, radius)
                 else:
-                    away = _body_distance(x, y, body, pieces, room, here.scale, deep)
+                    distance = _body_distance(x, y, body, pieces, scratch, body_pose.scale, inner_limit)
                 pixel = int(pixels[start + column])
-                pixels[start + column] = _shaded(pixel, away, deep, inner, outer, hollow, antialias)
+                pixels[start + column] = _shaded(pixel, distance, inner_limit, inner, outer, hollow, antialias)
                 column += 1
 
 
@@ -413,9 +428,9 @@ def rasterise_lines(
             fraction = min(along + 0.5, bx) - max(along - 0.5, ax) if last > first else max(bx - ax, 0.5)
             across = ay + slope * (along - ax)
             row = math.floor(across)
-            part = across - row
+            upper_fraction = across - row
             for side in range(2):
-                cover = fraction * (part if side else 1.0 - part)
+                cover = fraction * (upper_fraction if side else 1.0 - upper_fraction)
                 if across_low <= row + side < across_high:
-                    place = along * stride + row + side if steep else (row + side) * stride + along
-                    pixels[place] = blend_packed(int(pixels[place]), tone, int(cover * FULL + 0.5))
+                    index = along * stride + row + side if steep else (row + side) * stride + along
+                    pixels[index] = blend_packed(int(pixels[index]), tone, int(cover * FULL + 0.5))

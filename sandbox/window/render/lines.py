@@ -56,13 +56,13 @@ def draw_line(
     surface: pygame.Surface, a: Pixel, b: Pixel, colour: RgbColour, width: float = 1.0, antialias: bool = True
 ) -> None:
     """Draw a line with flat ends, `width` px wide."""
-    part = clip_segment(a, b, surface.get_clip(), width + 4.0)
-    if part is None:
+    clipped = clip_segment(a, b, surface.get_clip(), width + 4.0)
+    if clipped is None:
         return
-    (ax, ay), (bx, by) = part
+    (ax, ay), (bx, by) = clipped
     start, end = (ax - 0.5, ay - 0.5), (bx - 0.5, by - 0.5)  # SDL pixel centres are at integers
     if not antialias:
-        pygame.draw.line(surface, colour, _whole(start), _whole(end), max(1, round(width)))
+        pygame.draw.line(surface, colour, _nearest_pixel(start), _nearest_pixel(end), max(1, round(width)))
         return
     length = math.hypot(bx - ax, by - ay)
     if width < 1.5 or length < 1e-9:
@@ -93,7 +93,7 @@ def draw_line(
 def fill_polygon(surface: pygame.Surface, corners: list[Pixel], colour: RgbColour, antialias: bool = True) -> None:
     """Fill a polygon whose corners lie on or near the surface."""
     moved = [(x - 0.5, y - 0.5) for x, y in corners]
-    pygame.draw.polygon(surface, colour, [_whole(p) for p in moved])
+    pygame.draw.polygon(surface, colour, [_nearest_pixel(p) for p in moved])
     if antialias:
         pygame.draw.aalines(surface, colour, True, moved)
 
@@ -108,11 +108,11 @@ def clip_polygon(corners: list[Pixel], area: pygame.Rect) -> list[Pixel]:
     for axis, sign, limit in ((0, 1.0, left), (0, -1.0, right), (1, 1.0, top), (1, -1.0, bottom)):
         kept: list[Pixel] = []
         for a, b in zip(corners, (*corners[1:], *corners[:1]), strict=True):
-            here, there = sign * (a[axis] - limit), sign * (b[axis] - limit)
-            if here >= 0.0:
+            inside_a, inside_b = sign * (a[axis] - limit), sign * (b[axis] - limit)
+            if inside_a >= 0.0:
                 kept.append(a)
-            if (here >= 0.0) != (there >= 0.0):
-                fraction = here / (here - there)
+            if (inside_a >= 0.0) != (inside_b >= 0.0):
+                fraction = inside_a / (inside_a - inside_b)
                 kept.append((a[0] + fraction * (b[0] - a[0]), a[1] + fraction * (b[1] - a[1])))
         corners = kept
     return corners if len(corners) > 2 else []
@@ -143,8 +143,8 @@ def draw_arrow(
         corners = [b, (neck[0] + side[0], neck[1] + side[1]), (neck[0] - side[0], neck[1] - side[1])]
         fill_polygon(surface, corners, colour, antialias)
         if edge is not None and antialias:
-            wide = [(x + 1.2 * (x - neck[0]) / head - 0.5, y + 1.2 * (y - neck[1]) / head - 0.5) for x, y in corners]
-            pygame.draw.aalines(surface, edge, True, wide)
+            outline = [(x + 1.2 * (x - neck[0]) / head - 0.5, y + 1.2 * (y - neck[1]) / head - 0.5) for x, y in corners]
+            pygame.draw.aalines(surface, edge, True, outline)
 
 
 def draw_dashes(
@@ -157,10 +157,10 @@ def draw_dashes(
     """Draw dashed segments; the dashes are fixed to the segment, not to the clip rectangle."""
     area = surface.get_clip()
     for a, b in corners:
-        part = clip_segment(a, b, area)
-        if part is None:
+        clipped = clip_segment(a, b, area)
+        if clipped is None:
             continue
-        (ax, ay), (bx, by) = part
+        (ax, ay), (bx, by) = clipped
         length = math.hypot(bx - ax, by - ay)
         if length == 0.0:
             continue
@@ -174,13 +174,13 @@ def draw_dashes(
             at += 2.0 * dash
 
 
-def _whole(point: Pixel) -> tuple[int, int]:
+def _nearest_pixel(point: Pixel) -> tuple[int, int]:
     return math.floor(point[0] + 0.5), math.floor(point[1] + 0.5)  # `round` rounds halves to even
 
 
 MANY_LINES = 300
 """Number of lines from which the import of the compiled pass pays off."""
-BEYOND = 4000.0
+UNCLIPPED_MARGIN = 4000.0
 """px outside the surface up to which a line is not clipped"""
 
 
@@ -193,7 +193,7 @@ def draw_thin_lines(surface: pygame.Surface, ends: FloatArray, tones: Packed, an
         tones: (K,) from `packed_pixels` for this surface.
         antialias: whether edges are smooth.
     """
-    kept, ends = _cut(surface, ends)
+    kept, ends = _clip_lines(surface, ends)
     tones = tones[kept]
     if antialias and len(ends) >= MANY_LINES and is_flat(surface):
         from sandbox.engines.common.kernel import COMPILED
@@ -212,23 +212,25 @@ def draw_thin_lines(surface: pygame.Surface, ends: FloatArray, tones: Packed, an
         line(surface, tone, (ax, ay), (bx, by))
 
 
-def _cut(surface: pygame.Surface, ends: FloatArray) -> tuple[BoolArray, FloatArray]:
-    """Return which lines come near the surface, (K,), and those lines, clipped at `BEYOND` px around it."""
+def _clip_lines(surface: pygame.Surface, ends: FloatArray) -> tuple[BoolArray, FloatArray]:
+    """Return which lines come near the surface, (K,), and those lines, clipped at `UNCLIPPED_MARGIN` px around it."""
     area = surface.get_clip()
-    low = np.asarray((area.left, area.top)) - BEYOND
-    high = np.asarray((area.right, area.bottom)) + BEYOND
+    low = np.asarray((area.left, area.top)) - UNCLIPPED_MARGIN
+    high = np.asarray((area.right, area.bottom)) + UNCLIPPED_MARGIN
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         a, b = ends[:, :2], ends[:, 2:]
-        near = np.asarray(np.isfinite(ends).all(axis=1), np.bool_)
-        near &= (np.maximum(a, b) >= (area.left, area.top)).all(axis=1)
-        near &= (np.minimum(a, b) <= (area.right, area.bottom)).all(axis=1)
+        is_near = np.asarray(np.isfinite(ends).all(axis=1), np.bool_)
+        is_near &= (np.maximum(a, b) >= (area.left, area.top)).all(axis=1)
+        is_near &= (np.minimum(a, b) <= (area.right, area.bottom)).all(axis=1)
         inside = np.asarray(((ends >= np.tile(low, 2)) & (ends <= np.tile(high, 2))).all(axis=1), np.bool_)
-        if bool(inside[near].all()):
-            return near, ends[near]
-        way = b - a
-        shares = np.stack(((low - a) / way, (high - a) / way))
-        first = np.fmax(np.fmin(*shares).max(axis=1), 0.0)
-        last = np.fmin(np.fmax(*shares).min(axis=1), 1.0)
-        cut = np.where(inside[:, None], ends, np.hstack((a + first[:, None] * way, a + last[:, None] * way)))
-        near &= (first < last) & (np.abs(cut) < 4.0 * BEYOND + 2.0 * max(area.size)).all(axis=1) | inside & near
-    return near, cut[near]
+        if bool(inside[is_near].all()):
+            return is_near, ends[is_near]
+        vector = b - a
+        fractions = np.stack(((low - a) / vector, (high - a) / vector))
+        first = np.fmax(np.fmin(*fractions).max(axis=1), 0.0)
+        last = np.fmin(np.fmax(*fractions).min(axis=1), 1.0)
+        cut = np.where(inside[:, None], ends, np.hstack((a + first[:, None] * vector, a + last[:, None] * vector)))
+        is_near &= (first < last) & (np.abs(cut) < 4.0 * UNCLIPPED_MARGIN + 2.0 * max(area.size)).all(
+            axis=1
+        ) | inside & is_near
+    return is_near, cut[is_near]

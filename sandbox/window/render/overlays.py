@@ -26,9 +26,9 @@ from sandbox.window.render.particles import ParticleRenderer, packed_pixels
 from sandbox.window.render.polygons import PolygonRenderer
 from sandbox.window.render.vectors import draw_contacts, draw_impulses, draw_velocities
 
-OUTLINE = ((0.0, -0.13), (0.12, -0.19), (0.3, -0.17), (0.6, -0.09), (1.0, 0.0))
+FLAME_OUTLINE = ((0.0, -0.13), (0.12, -0.19), (0.3, -0.17), (0.6, -0.09), (1.0, 0.0))
 """One side of a flame outline: along and across, as fractions of its length."""
-INNER = 0.55
+INNER_FLAME = 0.55
 """Size of the inner flame as a fraction of the outer."""
 MIN_FLAME = 2.0
 """px, length of the shortest flame that is drawn"""
@@ -37,36 +37,38 @@ MIN_FLAME = 2.0
 def draw_flames(view: DrawContext) -> None:
     """Draw all thruster flames; the bodies are drawn over their roots."""
     frame, camera = view.snapshot.frame, view.camera
-    for number, place, way in view.snapshot.flames:
+    for number, point, direction in view.snapshot.flames:
         if number >= len(frame.position) or not frame.present[number]:
             continue
         angle, (x, y) = float(frame.angle[number]), frame.position[number].tolist()
         if not math.isfinite(x + y + angle):
             continue
         sine, cosine = math.sin(angle), math.cos(angle)
-        root = x + place[0] * cosine - place[1] * sine, y + place[0] * sine + place[1] * cosine
-        out = way[0] * cosine - way[1] * sine, way[0] * sine + way[1] * cosine
+        root = x + point[0] * cosine - point[1] * sine, y + point[0] * sine + point[1] * cosine
+        out = direction[0] * cosine - direction[1] * sine, direction[0] * sine + direction[1] * cosine
         begin, end = camera.to_screen(np.array((root, (root[0] + out[0], root[1] + out[1])))).tolist()
         along = end[0] - begin[0], end[1] - begin[1]
         if math.hypot(*along) >= MIN_FLAME and max(map(abs, (*begin, *end))) < SDL_COORDINATE_LIMIT:
-            _tongue(view, begin, along, 1.0, ORANGE)
-            _tongue(view, begin, along, INNER, YELLOW)
+            _draw_flame(view, begin, along, 1.0, ORANGE)
+            _draw_flame(view, begin, along, INNER_FLAME, YELLOW)
 
 
-def _tongue(view: DrawContext, begin: list[float], along: tuple[float, float], size: float, colour: RgbColour) -> None:
+def _draw_flame(
+    view: DrawContext, begin: list[float], along: tuple[float, float], size: float, colour: RgbColour
+) -> None:
     (x, y), (dx, dy) = begin, along
-    sides = [*OUTLINE, *((fraction, -across) for fraction, across in reversed(OUTLINE[:-1]))]
+    sides = [*FLAME_OUTLINE, *((fraction, -across) for fraction, across in reversed(FLAME_OUTLINE[:-1]))]
     points = [(x + size * (a * dx - b * dy), y + size * (a * dy + b * dx)) for a, b in sides]
     pygame.draw.polygon(view.surface, colour, points)
     if view.antialias:
         pygame.draw.aalines(view.surface, colour, True, points)
 
 
-LINES = 300
+MAX_TRAIL_LINES = 300
 """Number of bodies up to which trails are drawn as lines."""
-PLACES = 96
+MAX_TRAIL_POINTS = 96
 """Largest number of points of a trail that is drawn as a line."""
-SHADES = 8
+TRAIL_SHADES = 8
 """Steps in which a trail fades."""
 MAX_DRAWN_POINTS = 200_000
 
@@ -75,61 +77,63 @@ def draw_trails(view: DrawContext, points: ParticleRenderer) -> None:
     """Draw the trails of the visible bodies, fading with age."""
     if not len(view.shown) or sum(len(piece) for piece in view.snapshot.trails) < 2:
         return
-    crowd = len(view.shown) > LINES
+    crowd = len(view.shown) > MAX_TRAIL_LINES
     some = view.first(MAX_DRAWN_POINTS // 16)
-    places = _joined(view.snapshot.trails, some.shown, max(MAX_DRAWN_POINTS // len(some.shown), 1) if crowd else PLACES)
-    shades = np.linspace(0.15, 0.85, SHADES)
+    positions = _join_trails(
+        view.snapshot.trails, some.shown, max(MAX_DRAWN_POINTS // len(some.shown), 1) if crowd else MAX_TRAIL_POINTS
+    )
+    shades = np.linspace(0.15, 0.85, TRAIL_SHADES)
     tints = [np.rint(np.asarray(BACKGROUND) * (1 - s) + some.colours * s).astype(np.uint8) for s in shades]
-    bounds = np.linspace(0, len(places), SHADES + 1).astype(int).tolist()
+    bounds = np.linspace(0, len(positions), TRAIL_SHADES + 1).astype(int).tolist()
     for shade, (first, last) in enumerate(pairwise(bounds)):
         if crowd:
             tones = np.tile(packed_pixels(tints[shade], view.surface), last - first)
-            points.draw(view.surface, view.camera, places[first:last].reshape(-1, 2), tones)
+            points.draw(view.surface, view.camera, positions[first:last].reshape(-1, 2), tones)
         elif last > first:
-            _lines(view, places[first : last + 1], tints[shade])
+            _draw_trail_lines(view, positions[first : last + 1], tints[shade])
 
 
-def _joined(pieces: tuple[FloatArray, ...], shown: IntArray, most: int) -> FloatArray:
+def _join_trails(pieces: tuple[FloatArray, ...], shown: IntArray, max_points: int) -> FloatArray:
     """Return trail points of bodies, (T, K, 2) m, thinned to about `most`; nan for bodies that a piece lacks."""
     total = sum(len(piece) for piece in pieces)
-    every = -(-total // most)
+    every = -(-total // max_points)
     rows = []
     skip = (total - 1) % every  # keeps the newest point
     for piece in pieces:
-        kept = piece[skip::every]
+        thinned = piece[skip::every]
         skip = (skip - len(piece)) % every
-        known = shown < piece.shape[1]
-        part = np.full((len(kept), len(shown), 2), np.nan)
-        part[:, known] = kept[:, shown[known]]
-        rows.append(part)
+        has_body = shown < piece.shape[1]
+        row = np.full((len(thinned), len(shown), 2), np.nan)
+        row[:, has_body] = thinned[:, shown[has_body]]
+        rows.append(row)
     return np.concatenate(rows)
 
 
-def _lines(view: DrawContext, places: FloatArray, tints: ColourArray) -> None:
+def _draw_trail_lines(view: DrawContext, positions: FloatArray, tints: ColourArray) -> None:
     """Draw one shade of all trails, with a gap where a body was absent or far outside the surface."""
-    if len(places) < 2:
+    if len(positions) < 2:
         return
     width, height = view.camera.size
     with np.errstate(invalid="ignore", over="ignore"):
-        pixels = view.camera.to_screen(places) - 0.5
+        pixels = view.camera.to_screen(positions) - 0.5
         x, y = pixels[..., 0], pixels[..., 1]
-        near = (np.abs(x - width / 2) < 4 * width + 100) & (np.abs(y - height / 2) < 4 * height + 100)
-    draw = pygame.draw.aalines if view.antialias and len(tints) <= LINES // 4 else pygame.draw.lines
-    whole = np.asarray(near.all(axis=0), np.bool_)
+        is_near = (np.abs(x - width / 2) < 4 * width + 100) & (np.abs(y - height / 2) < 4 * height + 100)
+    draw = pygame.draw.aalines if view.antialias and len(tints) <= MAX_TRAIL_LINES // 4 else pygame.draw.lines
+    is_complete = np.asarray(is_near.all(axis=0), np.bool_)
     for k, (tint, trail) in enumerate(zip(tints.tolist(), pixels.transpose(1, 0, 2).tolist(), strict=True)):
-        if whole[k]:
+        if is_complete[k]:
             draw(view.surface, tint, False, trail)
             continue
-        sound = near[:, k]
-        turns = np.concatenate(([0], np.flatnonzero(np.diff(sound)) + 1, [len(sound)])).tolist()
-        for first, last in pairwise(turns):
-            if sound[first] and last - first > 1:
+        is_drawn = is_near[:, k]
+        changes = np.concatenate(([0], np.flatnonzero(np.diff(is_drawn)) + 1, [len(is_drawn)])).tolist()
+        for first, last in pairwise(changes):
+            if is_drawn[first] and last - first > 1:
                 draw(view.surface, tint, False, trail[first:last])
 
 
-BODILY = frozenset({"velocities", "bounds", "centres", "names", "trails"})
+BODY_OVERLAYS = frozenset({"velocities", "bounds", "centres", "names", "trails"})
 """Overlays that need the indices of the visible bodies."""
-APART = 3.0
+MIN_GHOST_DISTANCE = 3.0
 """px between a body and its ghost above which a line connects them"""
 MAX_GHOSTS = 4000
 
@@ -144,7 +148,7 @@ class OverlayRenderer:
 
     def need_bodies(self, snapshot: Snapshot) -> bool:
         """Return whether an overlay needs all visible bodies, including those drawn as points."""
-        return not BODILY.isdisjoint(snapshot.overlays) or snapshot.overlapping is not None
+        return not BODY_OVERLAYS.isdisjoint(snapshot.overlays) or snapshot.overlapping is not None
 
     def below(self, view: DrawContext) -> None:
         """Draw the overlays below the bodies."""
@@ -161,7 +165,7 @@ class OverlayRenderer:
         if drives and "shapes" in overlays:
             draw_hinges(view, self._discs)
         if view.snapshot.ghost is not None:
-            self._ghost(view)
+            self._draw_ghost(view)
         if "bounds" in overlays:
             draw_boxes(view, self._polygons)
         if "joints" in overlays and len(view.snapshot.links):
@@ -187,31 +191,33 @@ class OverlayRenderer:
         if "names" in overlays:
             draw_names(view, self._polygons)
 
-    def _ghost(self, view: DrawContext) -> None:
+    def _draw_ghost(self, view: DrawContext) -> None:
         """Draw the bodies of the ghost engine hollow, each connected to its counterpart where they differ."""
         ghost, frame, camera = view.snapshot.ghost, view.snapshot.frame, view.camera
         assert ghost is not None
         count = min(len(ghost.position), len(frame.position), len(view.snapshot.bodies))
-        place, radius = ghost.position[:count], view.snapshot.bodies.radius[:count]
+        position, radius = ghost.position[:count], view.snapshot.bodies.radius[:count]
         with np.errstate(invalid="ignore", over="ignore"):
-            there = camera.in_sight(place, radius) & ghost.present[:count]
-        seen = np.flatnonzero(there & ~view.snapshot.bodies.fixed[:count])  # static bodies never differ
-        if len(seen) > MAX_GHOSTS:
-            seen = seen[np.linspace(0, len(seen) - 1, MAX_GHOSTS).astype(np.intp)]
-        if not len(seen):
+            visible = camera.in_sight(position, radius) & ghost.present[:count]
+        ghosts = np.flatnonzero(visible & ~view.snapshot.bodies.fixed[:count])  # static bodies never differ
+        if len(ghosts) > MAX_GHOSTS:
+            ghosts = ghosts[np.linspace(0, len(ghosts) - 1, MAX_GHOSTS).astype(np.intp)]
+        if not len(ghosts):
             return
         with np.errstate(invalid="ignore", over="ignore"):  # the body itself may be at nan or inf
-            centre, own = camera.to_screen(place[seen]), camera.to_screen(frame.position[seen])
-        tint = np.broadcast_to(np.asarray(INK, np.uint8), (len(seen), 3))
+            centre, own = camera.to_screen(position[ghosts]), camera.to_screen(frame.position[ghosts])
+        tint = np.broadcast_to(np.asarray(INK, np.uint8), (len(ghosts), 3))
         style = view.style(1.5)._replace(hollow=True)
-        size, bodies = radius[seen] * camera.scale, view.snapshot.bodies
-        lone = bodies.round[seen] | (size < 2.0 * view.ui_scale)
-        self._discs.draw(view.surface, centre[lone], np.maximum(size[lone], 2.0 * view.ui_scale), tint[lone], style)
-        indices, angle = seen[~lone], ghost.angle[seen[~lone]]
-        self._polygons.draw(view.surface, bodies, indices, centre[~lone], angle, camera.scale, tint[~lone], style)
+        size, bodies = radius[ghosts] * camera.scale, view.snapshot.bodies
+        is_disc = bodies.round[ghosts] | (size < 2.0 * view.ui_scale)
+        self._discs.draw(
+            view.surface, centre[is_disc], np.maximum(size[is_disc], 2.0 * view.ui_scale), tint[is_disc], style
+        )
+        indices, angle = ghosts[~is_disc], ghost.angle[ghosts[~is_disc]]
+        self._polygons.draw(view.surface, bodies, indices, centre[~is_disc], angle, camera.scale, tint[~is_disc], style)
         with np.errstate(invalid="ignore", over="ignore"):
             gap = np.hypot(*(centre - own).T)
-        for k in np.flatnonzero((gap > APART * view.ui_scale) & frame.present[seen]).tolist():
+        for k in np.flatnonzero((gap > MIN_GHOST_DISTANCE * view.ui_scale) & frame.present[ghosts]).tolist():
             (ax, ay), (bx, by) = own[k].tolist(), centre[k].tolist()
             draw_line(
                 view.surface, (ax, ay), (bx, by), mix_colours(FAINT, INK, 0.3), 1.0 * view.ui_scale, view.antialias

@@ -110,16 +110,16 @@ def _split_channels(tones: Packed) -> ColourArray:
 
 def packed_pixels(colours: ColourArray, surface: pygame.Surface) -> Packed:
     """Return colours (N, 3) in the pixel format of a surface, (N,); for 3 bytes per pixel as 0xRRGGBB."""
-    wide = colours.astype(np.uint32)
+    channels = colours.astype(np.uint32)
     if surface.get_bytesize() == 3:
-        return np.asarray(wide[:, 0] << 16 | wide[:, 1] << 8 | wide[:, 2], np.uint32)
+        return np.asarray(channels[:, 0] << 16 | channels[:, 1] << 8 | channels[:, 2], np.uint32)
     if surface.get_bytesize() < 4:
         distinct, which = np.unique(colours.reshape(-1, 3), axis=0, return_inverse=True)
         tones = [surface.map_rgb((red, green, blue)) for red, green, blue in distinct.tolist()]
         return np.asarray(tones, np.uint32)[which.reshape(-1)]
     red, green, blue, _ = surface.get_shifts()
     alpha = np.uint32(surface.get_masks()[3] & 0xFFFFFFFF)
-    return np.asarray(wide[:, 0] << red | wide[:, 1] << green | wide[:, 2] << blue | alpha, np.uint32)
+    return np.asarray(channels[:, 0] << red | channels[:, 1] << green | channels[:, 2] << blue | alpha, np.uint32)
 
 
 SHADES = 64
@@ -144,8 +144,8 @@ class LifetimeColours:
         consecutive = len(numbers) == 0 or int(numbers[-1]) == first + len(numbers) - 1
         self.indices: slice | IntArray = slice(first, first + len(numbers)) if consecutive else numbers
         """(F,) indices of the fading bodies"""
-        self._place = np.full(len(bodies), -1, np.int64)
-        self._place[numbers] = np.arange(len(numbers))
+        self._row_of_body = np.full(len(bodies), -1, np.int64)
+        self._row_of_body[numbers] = np.arange(len(numbers))
         self._first: IntArray = row[numbers] * SHADES
         self._born, self._rate = bodies.born[numbers], SHADES / bodies.lifetime[numbers]
 
@@ -180,7 +180,7 @@ class LifetimeColours:
 
     def over(self, colours: ColourArray, numbers: IntArray, time: float) -> ColourArray:
         """Return a copy of the colours (K, 3) of bodies, by index (K,), with fading ones set for a time in s."""
-        place = self._place[numbers]
+        place = self._row_of_body[numbers]
         fade = place >= 0
         colours = colours.copy()
         colours[fade] = self.shades[self._shade(time, place[fade])]

@@ -13,7 +13,7 @@ from sandbox.arrays import FloatArray, IntArray
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.window.hit_test import Hull, rounded_hull
 from sandbox.window.render.body_geometry import BodyGeometry, ScreenPose, clipped_box
-from sandbox.window.render.circles import DARK, CircleStyle, darken
+from sandbox.window.render.circles import DARKEN_FRACTION, CircleStyle, darken
 from sandbox.window.render.draw_context import DrawContext
 from sandbox.window.render.lines import SDL_COORDINATE_LIMIT, Pixel, clip_polygon, fill_polygon
 from sandbox.window.render.palette import BACKGROUND, ColourArray, RgbColour
@@ -33,13 +33,13 @@ class PolygonRenderer:
     """Draws bodies of any shape, and caches their geometry between frames."""
 
     def __init__(self) -> None:
-        self._known: tuple[Bodies, BodyGeometry] | None = None
+        self._cached: tuple[Bodies, BodyGeometry] | None = None
 
     def geometry(self, bodies: Bodies) -> BodyGeometry:
         """Return the geometry of bodies, cached for the last `Bodies`."""
-        if self._known is None or self._known[0] is not bodies:
-            self._known = bodies, BodyGeometry(bodies)
-        return self._known[1]
+        if self._cached is None or self._cached[0] is not bodies:
+            self._cached = bodies, BodyGeometry(bodies)
+        return self._cached[1]
 
     def draw(
         self,
@@ -71,19 +71,19 @@ class PolygonRenderer:
         line = geometry.rims(indices, scale, style.line)
         if style.hollow:
             line = np.full(len(indices), style.line)
-        near = bool((np.abs(centre).max(axis=1) + bodies.radius[indices] * scale < SDL_COORDINATE_LIMIT).all())
+        is_near = bool((np.abs(centre).max(axis=1) + bodies.radius[indices] * scale < SDL_COORDINATE_LIMIT).all())
         worth = len(indices) > FEW_POLYGONS or "numba" in sys.modules
-        if worth and near and _in_one_pass(surface, geometry, indices, centre, angle, scale, colours, line, style):
+        if worth and is_near and _in_one_pass(surface, geometry, indices, centre, angle, scale, colours, line, style):
             return
         rows = zip(
             indices.tolist(), centre.tolist(), angle.tolist(), map(tuple, colours.tolist()), line.tolist(), strict=True
         )
-        for number, (x, y), turned, colour, width in rows:
-            pose = ScreenPose(x, y, turned, scale)
+        for number, (x, y), angle_k, colour, width in rows:
+            pose = ScreenPose(x, y, angle_k, scale)
             if style.hollow:
                 self.ring(surface, bodies, number, pose, 0.0, colour, width, style.antialias)
             else:
-                _draw_plain(surface, geometry.hulls(number, pose), colour, width, style.antialias, near)
+                _draw_plain(surface, geometry.hulls(number, pose), colour, width, style.antialias, is_near)
 
     def ring(
         self,
@@ -99,10 +99,10 @@ class PolygonRenderer:
         """Draw an outline of a body, `line` px wide, with its outer edge at `gap` px from the body."""
         geometry = self.geometry(bodies)
         distance = geometry.distance(number, place)
-        within = clipped_box(geometry.within(number, place, gap + 2.0), surface.get_clip())
-        if within.width:
-            look = ShapeStyle(None, colour, line, antialias=antialias)
-            draw_sdf(surface, lambda x, y: np.asarray(distance(x, y) - gap), look, within)
+        rect = clipped_box(geometry.within(number, place, gap + 2.0), surface.get_clip())
+        if rect.width:
+            ring_style = ShapeStyle(None, colour, line, antialias=antialias)
+            draw_sdf(surface, lambda x, y: np.asarray(distance(x, y) - gap), ring_style, rect)
 
     def boxes(self, view: DrawContext) -> FloatArray:
         """Return left, top, right and bottom of the bounding boxes of the visible bodies, (K, 4) px."""
@@ -134,7 +134,10 @@ def _in_one_pass(
     pose = np.column_stack((centre, np.cos(angle), np.sin(angle), np.full(len(indices), scale)))
     inner = outer = packed_pixels(colours, surface)
     if not style.hollow and style.line:
-        outer = packed_pixels(np.rint(colours * (1.0 - DARK) + np.asarray(BACKGROUND) * DARK).astype(np.uint8), surface)
+        outer = packed_pixels(
+            np.rint(colours * (1.0 - DARKEN_FRACTION) + np.asarray(BACKGROUND) * DARKEN_FRACTION).astype(np.uint8),
+            surface,
+        )
     rasterise_polygons(
         flat_pixels(surface),
         surface.get_pitch() // 4,

@@ -33,11 +33,11 @@ from sandbox.window.render.static_geometry import (
     on_layer,
 )
 
-POINT = 1.2
+MAX_POINT_RADIUS = 1.2
 """px, radius below which a ball is drawn as a point"""
-CROWD = 20_000
+CROWD_COUNT = 20_000
 """Number of bodies above which the size of points is rounded down."""
-ROUNDISH = 0.9
+MIN_ROUNDNESS = 0.9
 """Ratio of inscribed to bounding radius above which a non-circular body gets a rotation mark."""
 
 
@@ -74,7 +74,7 @@ class Renderer:
         self._discs = CircleRenderer()
         self._points = ParticleRenderer()
         self._polygons = PolygonRenderer()
-        self._decks = LayerRenderer()
+        self._layers = LayerRenderer()
         self._lamps = LampRenderer()
         self._games = GameViews()
         self._overlays = OverlayRenderer(self._discs, self._points, self._polygons)
@@ -82,7 +82,7 @@ class Renderer:
         self._sizes: BodySizes | None = None
         self._known: tuple[Bodies, Scene] | None = None
         self._colours: ColourArray = np.empty((0, 3), np.uint8)
-        self._turning: BoolArray = np.empty(0, np.bool_)
+        self._can_rotate: BoolArray = np.empty(0, np.bool_)
         self._tones: tuple[ColourArray, tuple[object, ...], Packed] | None = None
         self._ageing: LifetimeColours | None = None
 
@@ -113,15 +113,15 @@ class Renderer:
         self._blit_background(surface, camera, snapshot, antialias, unit)
         if snapshot.lit:
             self._lamps.draw(surface, camera, snapshot.scene, snapshot.lit)
-        self._know(snapshot)
-        sizes = self._sized(snapshot.bodies, camera.scale, unit)
+        self._update_bodies(snapshot)
+        sizes = self._body_sizes(snapshot.bodies, camera.scale, unit)
         colours, ageing = self._colours, self._ageing
         if snapshot.overlapping is not None:
-            colours, ageing = _by_contact(snapshot.overlapping, len(snapshot.bodies)), None
+            colours, ageing = _contact_colours(snapshot.overlapping, len(snapshot.bodies)), None
         if "shapes" in snapshot.overlays and sizes.side:
             self._draw_points(surface, camera, snapshot, sizes, colours, ageing)
 
-        shown = _in_sight(camera, snapshot, None if self._overlays.need_bodies(snapshot) else sizes.large)
+        shown = _visible_bodies(camera, snapshot, None if self._overlays.need_bodies(snapshot) else sizes.large)
         tint = colours[shown] if ageing is None else ageing.over(colours[shown], shown, snapshot.frame.time)
         view = DrawContext(
             surface=surface,
@@ -166,7 +166,7 @@ class Renderer:
         layer = layers_among(view.snapshot.frame, view.shown[which])
         for k in range(len(scene.layers)):
             if k > 0:
-                self._decks.draw(view.surface, view.camera, scene, k, view.ui_scale, view.antialias)
+                self._layers.draw(view.surface, view.camera, scene, k, view.ui_scale, view.antialias)
             self._draw_bodies(view, which[layer == k])
 
     def _draw_bodies(self, view: DrawContext, which: IntArray | None) -> None:
@@ -175,19 +175,31 @@ class Renderer:
         if which is not None:
             centre, radius, colours, shown = centre[which], radius[which], colours[which], shown[which]
         bodies, frame = view.snapshot.bodies, view.snapshot.frame
-        turning, lone = self._turning[shown], bodies.round[shown]
-        if lone.all():
+        can_rotate, is_disc = self._can_rotate[shown], bodies.round[shown]
+        if is_disc.all():
             self._discs.draw(view.surface, centre, radius, colours, view.style())
         else:
-            those, angle = shown[~lone], frame.angle[shown[~lone]]
+            indices, angle = shown[~is_disc], frame.angle[shown[~is_disc]]
             self._polygons.draw(
-                view.surface, bodies, those, centre[~lone], angle, view.camera.scale, colours[~lone], view.style()
+                view.surface,
+                bodies,
+                indices,
+                centre[~is_disc],
+                angle,
+                view.camera.scale,
+                colours[~is_disc],
+                view.style(),
             )
-            self._discs.draw(view.surface, centre[lone], radius[lone], colours[lone], view.style())
-            turning &= lone | (bodies.core[shown] > ROUNDISH * bodies.radius[shown])
+            self._discs.draw(view.surface, centre[is_disc], radius[is_disc], colours[is_disc], view.style())
+            can_rotate &= is_disc | (bodies.core[shown] > MIN_ROUNDNESS * bodies.radius[shown])
             radius = bodies.core[shown] * view.camera.scale
-        if not turning.all():
-            centre, radius, colours, shown = centre[turning], radius[turning], colours[turning], shown[turning]
+        if not can_rotate.all():
+            centre, radius, colours, shown = (
+                centre[can_rotate],
+                radius[can_rotate],
+                colours[can_rotate],
+                shown[can_rotate],
+            )
         if len(shown):
             draw_rotation_marks(view.surface, centre, radius, frame.angle[shown], colours, view.antialias)
 
@@ -201,9 +213,9 @@ class Renderer:
         ageing: LifetimeColours | None,
     ) -> None:
         """Draw the bodies that are too small for discs; fading ones in the colour of their age."""
-        form = (surface.get_masks(), surface.get_bytesize())
-        if self._tones is None or self._tones[0] is not colours or self._tones[1] != form:
-            self._tones = colours, form, packed_pixels(colours, surface)
+        pixel_format = (surface.get_masks(), surface.get_bytesize())
+        if self._tones is None or self._tones[0] is not colours or self._tones[1] != pixel_format:
+            self._tones = colours, pixel_format, packed_pixels(colours, surface)
         if ageing is not None:
             ageing.fade(self._tones[2], packed_pixels(ageing.shades, surface), snapshot.frame.time)
         frame = snapshot.frame
@@ -211,21 +223,21 @@ class Renderer:
         indices = None if sizes.all_tiny and frame.present.all() else frame.present[:count] & sizes.tiny[:count]
         self._points.draw(surface, camera, frame.position[:count], self._tones[2][:count], indices, sizes.side)
 
-    def _sized(self, bodies: Bodies, scale: float, unit: float) -> "BodySizes":
+    def _body_sizes(self, bodies: Bodies, scale: float, unit: float) -> "BodySizes":
         """Return the classification of bodies at a scale, cached for the last arguments."""
-        known = self._sizes
-        if known is None or known.bodies is not bodies or known.scale != scale or known.unit != unit:
-            tiny = bodies.radius * scale < POINT * max(unit, 1.0)
+        sizes = self._sizes
+        if sizes is None or sizes.bodies is not bodies or sizes.scale != scale or sizes.unit != unit:
+            tiny = bodies.radius * scale < MAX_POINT_RADIUS * max(unit, 1.0)
             side = 0
             if tiny.any():
                 diameter = 2.0 * float(np.median(bodies.radius[tiny])) * scale
                 # In a crowd the gaps are more visible than the points: round down.
-                side = int(diameter) if len(tiny) > CROWD else round(diameter)
+                side = int(diameter) if len(tiny) > CROWD_COUNT else round(diameter)
                 side = min(max(side, round(unit), 1), MAX_POINT_SIZE)
-            self._sizes = known = BodySizes(bodies, scale, unit, tiny, bool(tiny.all()), np.flatnonzero(~tiny), side)
-        return known
+            self._sizes = sizes = BodySizes(bodies, scale, unit, tiny, bool(tiny.all()), np.flatnonzero(~tiny), side)
+        return sizes
 
-    def _know(self, snapshot: Snapshot) -> None:
+    def _update_bodies(self, snapshot: Snapshot) -> None:
         """Compute what is constant for given bodies: their colours, and which can rotate."""
         bodies, scene = snapshot.bodies, snapshot.scene
         if self._known is not None and self._known[0] is bodies and self._known[1] is scene:
@@ -233,16 +245,16 @@ class Renderer:
         self._known, self._colours = (bodies, scene), colour_of(bodies)
         ageing = LifetimeColours(bodies)
         self._ageing = ageing if len(ageing) else None
-        turned = (bodies.angle != 0.0) | (bodies.angular_velocity != 0.0)
-        self._turning = turned | contact_matrix(snapshot.setup or scene, bodies).turnable
+        has_rotated = (bodies.angle != 0.0) | (bodies.angular_velocity != 0.0)
+        self._can_rotate = has_rotated | contact_matrix(snapshot.setup or scene, bodies).turnable
 
     def _blit_background(
         self, surface: pygame.Surface, camera: Camera, snapshot: Snapshot, antialias: bool, unit: float
     ) -> None:
-        form = (surface.get_size(), surface.get_masks(), surface.get_bytesize())
-        wanted = CachedBackground(snapshot.scene, camera, "bounds" in snapshot.overlays, antialias, unit, form)
-        known = self._background
-        if known is None or known[0].scene is not wanted.scene or known[0][1:] != wanted[1:]:
+        surface_format = (surface.get_size(), surface.get_masks(), surface.get_bytesize())
+        key = CachedBackground(snapshot.scene, camera, "bounds" in snapshot.overlays, antialias, unit, surface_format)
+        cached = self._background
+        if cached is None or cached[0].scene is not key.scene or cached[0][1:] != key[1:]:
             drawn = pygame.Surface(surface.get_size(), 0, surface)
             drawn.fill(BACKGROUND)
             game = self._games.view_of(snapshot.scene)
@@ -253,13 +265,13 @@ class Renderer:
                 draw_zones(drawn, camera, snapshot.scene, unit, antialias)
                 ground = snapshot.scene if len(snapshot.scene.layers) == 1 else on_layer(snapshot.scene, 0)
                 draw_static_bodies(drawn, camera, ground, unit, antialias)
-            if wanted.bounds:
+            if key.bounds:
                 draw_bounds(drawn, camera, snapshot.scene.world.bounds, unit, antialias)
-            self._background = known = (wanted, drawn)
-        surface.blit(known[1], (0, 0))
+            self._background = cached = (key, drawn)
+        surface.blit(cached[1], (0, 0))
 
 
-def _in_sight(camera: Camera, snapshot: Snapshot, among: IntArray | None) -> IntArray:
+def _visible_bodies(camera: Camera, snapshot: Snapshot, among: IntArray | None) -> IntArray:
     """Return the indices of the bodies that are present and at least partly visible."""
     frame = snapshot.frame
     count = min(len(frame.position), len(snapshot.bodies))
@@ -270,8 +282,8 @@ def _in_sight(camera: Camera, snapshot: Snapshot, among: IntArray | None) -> Int
     else:
         among = None
     with np.errstate(invalid="ignore", over="ignore"):  # far-away positions may overflow or be nan
-        seen = np.flatnonzero(camera.in_sight(position, radius) & present)
-    return seen if among is None else among[seen]
+        visible = np.flatnonzero(camera.in_sight(position, radius) & present)
+    return visible if among is None else among[visible]
 
 
 def _background_context(
@@ -293,7 +305,7 @@ def _background_context(
     )
 
 
-def _by_contact(overlapping: BoolArray, count: int) -> ColourArray:
+def _contact_colours(overlapping: BoolArray, count: int) -> ColourArray:
     """Return the body colours of a scene that shows contact by colour, (count, 3)."""
     touching = np.zeros(count, np.bool_)
     touching[: len(overlapping)] = overlapping[:count]
@@ -304,9 +316,9 @@ WIDE, HIGH = 0.72, 0.38
 """Largest width and height of an inset, as fractions of the free area."""
 MARGIN = 10
 """px at a UI scale of 1, distance to the edges of the surface"""
-LARGER = 1.5
+MIN_MAGNIFICATION = 1.5
 """Smallest magnification, relative to the main view, at which an inset is shown."""
-EDGE = mix_colours(SKY, INK, 0.25)
+EDGE_COLOUR = mix_colours(SKY, INK, 0.25)
 
 
 class InsetRenderer:
@@ -341,29 +353,31 @@ class InsetRenderer:
         box = snapshot.scene.play.inset
         if box is None:
             return None
-        place = _place(box, free, round(MARGIN * unit), aside)
-        near = Camera.fitting(box, place.size, margin=0.0)
-        if min(place.size) < 1 or near.scale < LARGER * camera.scale or camera.turned:
+        rect = _inset_rect(box, free, round(MARGIN * unit), aside)
+        inset_camera = Camera.fitting(box, rect.size, margin=0.0)
+        if min(rect.size) < 1 or inset_camera.scale < MIN_MAGNIFICATION * camera.scale or camera.turned:
             return None
-        if self._surface is None or self._surface.get_size() != place.size:
-            self._surface = pygame.Surface(place.size, 0, surface)
-        self._picture.draw(self._surface, near, snapshot, antialias=antialias, unit=unit, scale=False, hud=False)
-        surface.blit(self._surface, place)
-        thick = max(round(1.5 * unit), 1)
-        pygame.draw.rect(surface, EDGE, place, thick)
+        if self._surface is None or self._surface.get_size() != rect.size:
+            self._surface = pygame.Surface(rect.size, 0, surface)
+        self._picture.draw(
+            self._surface, inset_camera, snapshot, antialias=antialias, unit=unit, scale=False, hud=False
+        )
+        surface.blit(self._surface, rect)
+        width = max(round(1.5 * unit), 1)
+        pygame.draw.rect(surface, EDGE_COLOUR, rect, width)
         (left, bottom), (right, top) = camera.to_screen(np.asarray(box)).tolist()
-        seen = pygame.Rect(round(left), round(top), round(right - left), round(bottom - top)).clip(surface.get_rect())
-        if not place.colliderect(seen):
-            pygame.draw.rect(surface, EDGE, seen, thick)
-        return place
+        region = pygame.Rect(round(left), round(top), round(right - left), round(bottom - top)).clip(surface.get_rect())
+        if not rect.colliderect(region):
+            pygame.draw.rect(surface, EDGE_COLOUR, region, width)
+        return rect
 
 
-def _place(box: ViewBox, free: pygame.Rect, margin: int, aside: int) -> pygame.Rect:
+def _inset_rect(box: ViewBox, free: pygame.Rect, margin: int, occupied: int) -> pygame.Rect:
     """Return the largest permitted rectangle for the inset of a box."""
     (left, bottom), (right, top) = box
-    room = free.width - 2 * margin - (aside + margin if aside else 0)
-    scale = min(min(WIDE * free.width, room) / (right - left), HIGH * free.height / (top - bottom))
+    available = free.width - 2 * margin - (occupied + margin if occupied else 0)
+    scale = min(min(WIDE * free.width, available) / (right - left), HIGH * free.height / (top - bottom))
     size = max(round(scale * (right - left)), 0), max(round(scale * (top - bottom)), 0)
-    place = pygame.Rect((0, 0), size)
-    place.bottomright = free.right - margin - (aside + margin if aside else 0), free.bottom - margin
-    return place
+    rect = pygame.Rect((0, 0), size)
+    rect.bottomright = free.right - margin - (occupied + margin if occupied else 0), free.bottom - margin
+    return rect

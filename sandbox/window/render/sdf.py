@@ -33,18 +33,18 @@ class ShapeStyle(NamedTuple):
     antialias: bool = True
 
 
-def shade_sdf(distance: FloatArray, look: ShapeStyle) -> npt.NDArray[np.uint32]:
+def shade_sdf(distance: FloatArray, style: ShapeStyle) -> npt.NDArray[np.uint32]:
     """Return the pixels (…) of a shape as 0xAARRGGBB; nan distances are transparent."""
-    near = np.nan_to_num(distance, nan=FAR_OUTSIDE, posinf=FAR_OUTSIDE, neginf=-FAR_OUTSIDE).astype(np.float32)
-    inside = np.clip(0.5 - near, 0.0, 1.0)
-    rim = np.clip(near + np.float32(look.line + 0.5), 0.0, 1.0) if look.line > 0 else np.zeros_like(near)
-    if not look.antialias:
+    finite = np.nan_to_num(distance, nan=FAR_OUTSIDE, posinf=FAR_OUTSIDE, neginf=-FAR_OUTSIDE).astype(np.float32)
+    inside = np.clip(0.5 - finite, 0.0, 1.0)
+    rim = np.clip(finite + np.float32(style.line + 0.5), 0.0, 1.0) if style.line > 0 else np.zeros_like(finite)
+    if not style.antialias:
         inside, rim = np.rint(inside), np.rint(rim)
-    if look.fill is None:
+    if style.fill is None:
         inside = inside * rim
         rim = np.ones_like(rim)
-    pixels = np.rint(inside * np.float32(255.0 * look.opacity)).astype(np.uint32)
-    for edge, middle in zip(look.rim, look.fill or look.rim, strict=True):
+    pixels = np.rint(inside * np.float32(255.0 * style.opacity)).astype(np.uint32)
+    for edge, middle in zip(style.rim, style.fill or style.rim, strict=True):
         pixels = pixels << 8 | np.rint(middle + (edge - middle) * rim).astype(np.uint32)
     return np.asarray(pixels, np.uint32)
 
@@ -109,35 +109,35 @@ def line_distance(offset: float, normal: tuple[float, float]) -> SignedDistance:
 
 
 def draw_sdf(
-    surface: pygame.Surface, distance: SignedDistance, look: ShapeStyle, within: pygame.Rect | None = None
+    surface: pygame.Surface, distance: SignedDistance, style: ShapeStyle, bounds: pygame.Rect | None = None
 ) -> None:
     """Paint a shape of any size and position onto a surface.
 
     Args:
         surface: of any format.
         distance: of the shape.
-        look: the style.
-        within: px, bounding box of the shape, if known.
+        style: style of the shape.
+        bounds: px, bounding box of the shape, if known.
     """
-    area = surface.get_clip() if within is None else surface.get_clip().clip(within)
+    area = surface.get_clip() if bounds is None else surface.get_clip().clip(bounds)
     if not area.width or not area.height:
         return
     left, top = np.arange(area.left, area.right, TILE), np.arange(area.top, area.bottom, TILE)
     across, along = (np.asarray(corner + TILE / 2.0, np.float64) for corner in (left, top))
     middle = distance(across[:, None], along[None, :])
     reach = TILE / 2.0 * np.sqrt(2.0) + 1.0
-    full = middle < -reach - look.line
-    if look.fill is not None and look.opacity == 1.0:
-        _fill(surface, full, area, look.fill)
+    full = middle < -reach - style.line
+    if style.fill is not None and style.opacity == 1.0:
+        _fill(surface, full, area, style.fill)
         edge = ~full & (middle < reach)
     else:
-        edge = (middle < reach) if look.fill is not None else (middle < reach) & ~full
+        edge = (middle < reach) if style.fill is not None else (middle < reach) & ~full
     column, row = np.nonzero(edge)
     if not len(column):
         return
     x = np.asarray(left[column, None] + np.arange(TILE) + 0.5, np.float64)[:, :, None]
     y = np.asarray(top[row, None] + np.arange(TILE) + 0.5, np.float64)[:, None, :]
-    pixels = shade_sdf(distance(x, y), look)
+    pixels = shade_sdf(distance(x, y), style)
     strip = sdf_surface(pixels.reshape(-1, TILE), encoded=False)
     clip = surface.get_clip()
     surface.set_clip(area)

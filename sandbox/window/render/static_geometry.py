@@ -46,13 +46,13 @@ from sandbox.window.render.sdf import (
     line_distance,
 )
 
-HATCH, HATCHES = 9.0, 600
+HATCH_SPACING, MAX_HATCHES = 9.0, 600
 """px between hatch lines of a plane, and their largest number"""
-WAYS = 60.0
+ARROW_SPACING = 60.0
 """px between the arrows of a one-way wall"""
-CAP = 5.0
+MIN_RING_RADIUS = 5.0
 """Radius above which a post with a kick shows its ring, px at a UI scale of 1."""
-ABSENT = 0.4
+ABSENT_FRACTION = 0.4
 """Fraction of its colour that non-solid geometry keeps."""
 MAX_ROUND_WALLS = 300
 """Number of visible segments of a wall up to which they have round ends and a rim; above it, they are plain lines."""
@@ -63,11 +63,11 @@ def draw_static_bodies(
 ) -> None:
     """Draw the visible planes, walls and posts of a scene."""
     for plane in scene.planes:
-        _plane(surface, camera, plane, unit, antialias)
+        _draw_plane(surface, camera, plane, unit, antialias)
     for wall in scene.walls:
-        _wall(surface, camera, wall, unit, antialias)
+        _draw_wall(surface, camera, wall, unit, antialias)
     for post in scene.posts:
-        _post(surface, camera, post, unit, antialias)
+        _draw_post(surface, camera, post, unit, antialias)
 
 
 def draw_bounds(
@@ -85,7 +85,7 @@ def outline(camera: Camera, box: ViewBox) -> list[tuple[Pixel, Pixel]]:
     return list(pairwise((x, y) for x, y in camera.to_screen(world).tolist()))
 
 
-def _plane(surface: pygame.Surface, camera: Camera, plane: Plane, unit: float, antialias: bool) -> None:
+def _draw_plane(surface: pygame.Surface, camera: Camera, plane: Plane, unit: float, antialias: bool) -> None:
     length = math.hypot(*plane.normal)
     nx, ny = plane.normal[0] / length, plane.normal[1] / length
     middle = camera.size[0] / 2.0, camera.size[1] / 2.0
@@ -98,21 +98,21 @@ def _plane(surface: pygame.Surface, camera: Camera, plane: Plane, unit: float, a
     filling = SOLID if plane.colour is None else mix_colours(BACKGROUND, edge, 0.25)
     draw_sdf(surface, line_distance(offset, down), ShapeStyle(filling, edge, 2.0 * unit, antialias=antialias))
 
-    foot = middle[0] - height * down[0], middle[1] - height * down[1]
+    nearest = middle[0] - height * down[0], middle[1] - height * down[1]
     along = -down[1], down[0]
     reach = camera.size[0] + camera.size[1]
     if abs(height) < reach:
         phase = math.fmod(
             ((plane.point[0] - camera.centre[0]) * along[0] - (plane.point[1] - camera.centre[1]) * along[1])
             * camera.scale,
-            HATCH * unit,
+            HATCH_SPACING * unit,
         )
-        _hatch(surface, foot, along, down, phase, reach, mix_colours(filling, edge, 0.3), unit, antialias)
+        _draw_hatch(surface, nearest, along, down, phase, reach, mix_colours(filling, edge, 0.3), unit, antialias)
 
 
-def _hatch(
+def _draw_hatch(
     surface: pygame.Surface,
-    foot: Pixel,
+    nearest: Pixel,
     along: Pixel,
     out: Pixel,
     phase: float,
@@ -123,63 +123,65 @@ def _hatch(
 ) -> None:
     """Draw short slanted lines behind the edge of a plane; they are fixed to the point of the plane."""
     ends = (
-        (foot[0] - along[0] * reach, foot[1] - along[1] * reach),
-        (foot[0] + along[0] * reach, foot[1] + along[1] * reach),
+        (nearest[0] - along[0] * reach, nearest[1] - along[1] * reach),
+        (nearest[0] + along[0] * reach, nearest[1] + along[1] * reach),
     )
-    part = clip_segment(*ends, surface.get_clip(), 20.0 * unit)
-    if part is None:
+    clipped = clip_segment(*ends, surface.get_clip(), 20.0 * unit)
+    if clipped is None:
         return
-    step = HATCH * unit
-    low, high = sorted((p[0] - foot[0]) * along[0] + (p[1] - foot[1]) * along[1] for p in part)
+    step = HATCH_SPACING * unit
+    low, high = sorted((p[0] - nearest[0]) * along[0] + (p[1] - nearest[1]) * along[1] for p in clipped)
     first = math.ceil((low - phase) / step)
-    for k in range(first, min(math.floor((high - phase) / step) + 1, first + HATCHES)):
+    for k in range(first, min(math.floor((high - phase) / step) + 1, first + MAX_HATCHES)):
         s = phase + k * step
-        x, y = foot[0] + along[0] * s - out[0] * 3.0 * unit, foot[1] + along[1] * s - out[1] * 3.0 * unit
-        slant = (along[0] - out[0]) * 6.0 * unit, (along[1] - out[1]) * 6.0 * unit
-        draw_line(surface, (x, y), (x + slant[0], y + slant[1]), colour, 1.0, antialias)
+        x, y = nearest[0] + along[0] * s - out[0] * 3.0 * unit, nearest[1] + along[1] * s - out[1] * 3.0 * unit
+        stroke = (along[0] - out[0]) * 6.0 * unit, (along[1] - out[1]) * 6.0 * unit
+        draw_line(surface, (x, y), (x + stroke[0], y + stroke[1]), colour, 1.0, antialias)
 
 
-def _wall(surface: pygame.Surface, camera: Camera, wall: Wall, unit: float, antialias: bool) -> None:
+def _draw_wall(surface: pygame.Surface, camera: Camera, wall: Wall, unit: float, antialias: bool) -> None:
     points = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points)
     half = wall.thickness / 2.0 * camera.scale
-    thin = half <= 1.0 * unit
+    is_thin = half <= 1.0 * unit
     half = max(half, 1.0 * unit)
     edge = colour_of_fixed(wall, SURFACE)
-    filling = edge if thin else SOLID if wall.colour is None else mix_colours(BACKGROUND, edge, 0.4)
+    filling = edge if is_thin else SOLID if wall.colour is None else mix_colours(BACKGROUND, edge, 0.4)
     area = surface.get_clip()
     pixels = camera.to_screen(points).tolist()
-    parts = [part for a, b in pairwise(pixels) if (part := clip_segment((a[0], a[1]), (b[0], b[1]), area, half + 4.0))]
+    segments = [
+        segment for a, b in pairwise(pixels) if (segment := clip_segment((a[0], a[1]), (b[0], b[1]), area, half + 4.0))
+    ]
     if not wall.solid:
         ends = (((a[0], a[1]), (b[0], b[1])) for a, b in pairwise(pixels))
-        draw_dashes(surface, ends, mix_colours(BACKGROUND, edge, ABSENT), 5.0 * unit, antialias)
+        draw_dashes(surface, ends, mix_colours(BACKGROUND, edge, ABSENT_FRACTION), 5.0 * unit, antialias)
         return
     if wall.one_way:
         for a, b in pairwise(pixels):
-            _ways_through(surface, (a[0], a[1]), (b[0], b[1]), half, edge, unit, antialias)
-    plain = len(parts) > MAX_ROUND_WALLS
-    rim = 0.0 if thin else min(1.5 * unit, half)
+            _draw_passing_arrows(surface, (a[0], a[1]), (b[0], b[1]), half, edge, unit, antialias)
+    has_plain_lines = len(segments) > MAX_ROUND_WALLS
+    rim = 0.0 if is_thin else min(1.5 * unit, half)
     # All outlines first, then all fills, so that no outline shows inside a corner.
     for inset, colour in ((0.0, edge), (rim, filling)) if rim else ((0.0, edge),):
-        for a, b in parts:
-            if plain and half < 4000.0:
+        for a, b in segments:
+            if has_plain_lines and half < 4000.0:
                 draw_line(surface, a, b, colour, 2.0 * (half - inset), antialias)
             else:
-                look = ShapeStyle(colour, colour, 0.0, antialias=antialias)
-                draw_sdf(surface, capsule_distance(a, b, half - inset), look, _around(a, b, half, area))
+                style = ShapeStyle(colour, colour, 0.0, antialias=antialias)
+                draw_sdf(surface, capsule_distance(a, b, half - inset), style, _surrounding_rect(a, b, half, area))
 
 
-def _ways_through(
+def _draw_passing_arrows(
     surface: pygame.Surface, a: Pixel, b: Pixel, half: float, colour: RgbColour, unit: float, antialias: bool
 ) -> None:
     """Draw small arrows on the left side of a wall, in its passing direction, at fixed points of the wall."""
-    part, length = clip_segment(a, b, surface.get_clip(), half + 12.0 * unit), math.dist(a, b)
-    if part is None or length < 2.0:
+    clipped, length = clip_segment(a, b, surface.get_clip(), half + 12.0 * unit), math.dist(a, b)
+    if clipped is None or length < 2.0:
         return
     ux, uy = (b[0] - a[0]) / length, (b[1] - a[1]) / length
     out = uy, -ux  # left of the direction a → b, with y down
-    step = length / max(1, round(length / (WAYS * unit)))
-    first = math.floor(math.dist(a, part[0]) / step)
-    for k in range(first, min(math.ceil(math.dist(a, part[1]) / step), first + HATCHES)):
+    step = length / max(1, round(length / (ARROW_SPACING * unit)))
+    first = math.floor(math.dist(a, clipped[0]) / step)
+    for k in range(first, min(math.ceil(math.dist(a, clipped[1]) / step), first + MAX_HATCHES)):
         s = (k + 0.5) * step
         x, y = a[0] + s * ux + half * out[0], a[1] + s * uy + half * out[1]
         tip = x + 10.0 * unit * out[0], y + 10.0 * unit * out[1]
@@ -189,7 +191,7 @@ def _ways_through(
             draw_line(surface, tip, barb, colour, 1.5 * unit, antialias)
 
 
-def _around(a: Pixel, b: Pixel, reach: float, area: pygame.Rect) -> pygame.Rect:
+def _surrounding_rect(a: Pixel, b: Pixel, reach: float, area: pygame.Rect) -> pygame.Rect:
     """Return the part of an area within `reach` of the bounding box of two points."""
     left, top = max(min(a[0], b[0]) - reach - 2.0, area.left), max(min(a[1], b[1]) - reach - 2.0, area.top)
     right, bottom = min(max(a[0], b[0]) + reach + 2.0, area.right), min(max(a[1], b[1]) + reach + 2.0, area.bottom)
@@ -198,25 +200,25 @@ def _around(a: Pixel, b: Pixel, reach: float, area: pygame.Rect) -> pygame.Rect:
     return pygame.Rect(int(left), int(top), math.ceil(right) - int(left), math.ceil(bottom) - int(top))
 
 
-def _post(surface: pygame.Surface, camera: Camera, post: Post, unit: float, antialias: bool) -> None:
-    place = np.asarray([post.position])
+def _draw_post(surface: pygame.Surface, camera: Camera, post: Post, unit: float, antialias: bool) -> None:
+    position = np.asarray([post.position])
     radius = max(post.radius * camera.scale, 1.0 * unit)
-    if not camera.in_sight(place, radius / camera.scale)[0]:
+    if not camera.in_sight(position, radius / camera.scale)[0]:
         return
-    x, y = camera.to_screen(place)[0].tolist()
+    x, y = camera.to_screen(position)[0].tolist()
     edge = colour_of_fixed(post, NEUTRAL)
-    around = _around((x, y), (x, y), radius, surface.get_clip())
+    rect = _surrounding_rect((x, y), (x, y), radius, surface.get_clip())
     if not post.solid:
-        faint = mix_colours(BACKGROUND, edge, ABSENT)
+        faint = mix_colours(BACKGROUND, edge, ABSENT_FRACTION)
         draw_sdf(
-            surface, disc_distance(x, y, radius), ShapeStyle(BACKGROUND, faint, 1.0 * unit, antialias=antialias), around
+            surface, disc_distance(x, y, radius), ShapeStyle(BACKGROUND, faint, 1.0 * unit, antialias=antialias), rect
         )
         return
-    look = ShapeStyle(mix_colours(BACKGROUND, edge, 0.55), edge, min(1.5 * unit, radius), antialias=antialias)
-    draw_sdf(surface, disc_distance(x, y, radius), look, around)
-    if post.kick is not None and radius > CAP * unit:  # ring of a bumper
+    style = ShapeStyle(mix_colours(BACKGROUND, edge, 0.55), edge, min(1.5 * unit, radius), antialias=antialias)
+    draw_sdf(surface, disc_distance(x, y, radius), style, rect)
+    if post.kick is not None and radius > MIN_RING_RADIUS * unit:  # ring of a bumper
         ring = ShapeStyle(mix_colours(BACKGROUND, edge, 0.3), edge, 1.5 * unit, antialias=antialias)
-        draw_sdf(surface, disc_distance(x, y, 0.6 * radius), ring, around)
+        draw_sdf(surface, disc_distance(x, y, 0.6 * radius), ring, rect)
 
 
 OPACITY = 165
@@ -232,7 +234,7 @@ Sprite = tuple[pygame.Surface, tuple[int, int]]
 class _DrawnLayer(NamedTuple):
     """Cached surface of a layer."""
 
-    of: tuple[object, ...]
+    key: tuple[object, ...]
     picture: Sprite | None
 
 
@@ -244,11 +246,11 @@ def lowest_layer(mask: int) -> int:
 def on_layer(scene: Scene, layer: int) -> Scene:
     """Return a scene with only the walls and posts whose lowest layer is `layer`; planes belong to layer 0."""
 
-    def here(layers: tuple[str, ...]) -> bool:
+    def is_on_layer(layers: tuple[str, ...]) -> bool:
         return lowest_layer(mask_of(layers, scene.layers)) == layer
 
-    walls = tuple(wall for wall in scene.walls if here(wall.layers))
-    posts = tuple(post for post in scene.posts if here(post.layers))
+    walls = tuple(wall for wall in scene.walls if is_on_layer(wall.layers))
+    posts = tuple(post for post in scene.posts if is_on_layer(post.layers))
     return scene.model_copy(update={"walls": walls, "posts": posts, "planes": () if layer else scene.planes})
 
 
@@ -262,7 +264,7 @@ class LayerRenderer:
 
     def __init__(self) -> None:
         self._scene: Scene | None = None
-        self._decks: tuple[Scene, ...] = ()
+        self._layers: tuple[Scene, ...] = ()
         self._drawn: dict[int, _DrawnLayer] = {}
 
     def draw(
@@ -271,24 +273,24 @@ class LayerRenderer:
         """Draw the walls and posts of a layer, translucent, over a surface."""
         if self._scene is not scene:  # a new scene may keep its raised layers
             self._scene = scene
-            self._decks = tuple(on_layer(scene, k) for k in range(len(scene.layers)))
-        deck = self._decks[layer]
-        wanted = deck.walls, deck.posts, camera, unit, antialias
-        known = self._drawn.get(layer)
-        if known is None or known.of != wanted:
-            self._drawn[layer] = known = _DrawnLayer(wanted, _deck(surface, camera, deck, unit, antialias))
-        if known.picture is not None:
-            surface.blit(*known.picture)
+            self._layers = tuple(on_layer(scene, k) for k in range(len(scene.layers)))
+        layer_scene = self._layers[layer]
+        key = layer_scene.walls, layer_scene.posts, camera, unit, antialias
+        cached = self._drawn.get(layer)
+        if cached is None or cached.key != key:
+            self._drawn[layer] = cached = _DrawnLayer(key, _layer_sprite(surface, camera, layer_scene, unit, antialias))
+        if cached.picture is not None:
+            surface.blit(*cached.picture)
 
 
-def _deck(surface: pygame.Surface, camera: Camera, deck: Scene, unit: float, antialias: bool) -> Sprite | None:
+def _layer_sprite(surface: pygame.Surface, camera: Camera, scene: Scene, unit: float, antialias: bool) -> Sprite | None:
     """Return a translucent sprite of a layer; overlapping parts do not add up in opacity. None if not visible."""
-    places = [(point, wall.thickness / 2.0) for wall in deck.walls for point in wall.points]
-    places += [(post.position, post.radius) for post in deck.posts]
-    if not places:
+    discs = [(point, wall.thickness / 2.0) for wall in scene.walls for point in wall.points]
+    discs += [(post.position, post.radius) for post in scene.posts]
+    if not discs:
         return None
-    pixels = np.asarray(camera.to_screen(np.asarray([place for place, _ in places])))
-    reach = np.asarray([[size * camera.scale] for _, size in places]) + MARGIN * unit
+    pixels = np.asarray(camera.to_screen(np.asarray([position for position, _ in discs])))
+    reach = np.asarray([[size * camera.scale] for _, size in discs]) + MARGIN * unit
     low, high = (
         (pixels - reach).min(axis=0).clip(-SDL_COORDINATE_LIMIT, SDL_COORDINATE_LIMIT),
         (pixels + reach).max(axis=0).clip(-SDL_COORDINATE_LIMIT, SDL_COORDINATE_LIMIT),
@@ -301,12 +303,12 @@ def _deck(surface: pygame.Surface, camera: Camera, deck: Scene, unit: float, ant
     for ground, colour in ((dark, (0, 0, 0)), (light, (255, 255, 255))):
         ground.fill(colour)
         ground.set_clip(box)
-        draw_static_bodies(ground, camera, deck, unit, antialias)
+        draw_static_bodies(ground, camera, scene, unit, antialias)
     black, white = (pygame.surfarray.array3d(each.subsurface(box)).astype(np.int32) for each in (dark, light))
     cover = (255 - (white - black).mean(axis=2)).clip(0, 255)
     picture = pygame.Surface(box.size, pygame.SRCALPHA, 32)
-    own = black * (255.0 / np.maximum(cover, 1.0))[:, :, None]
-    pygame.surfarray.pixels3d(picture)[:] = own.clip(0, 255).astype(np.uint8)
+    colours = black * (255.0 / np.maximum(cover, 1.0))[:, :, None]
+    pygame.surfarray.pixels3d(picture)[:] = colours.clip(0, 255).astype(np.uint8)
     pygame.surfarray.pixels_alpha(picture)[:] = (cover * (OPACITY / 255.0)).astype(np.uint8)
     return picture, box.topleft
 
@@ -318,20 +320,20 @@ def draw_markings(
     for marking in scene.play.markings:
         colour = hex_colour(marking.colour)
         if marking.position is not None and marking.radius is not None:
-            _circle(surface, camera, marking, (marking.position, marking.radius), colour, unit, antialias)
+            _draw_circle(surface, camera, marking, (marking.position, marking.radius), colour, unit, antialias)
         elif marking.filled:
             corners = camera.to_screen(np.asarray(marking.points)).tolist()
             kept = clip_polygon([(x, y) for x, y in corners], surface.get_clip())
             if kept:
                 fill_polygon(surface, kept, colour, antialias)
         else:
-            places: list[Pixel] = [(x, y) for x, y in camera.to_screen(np.asarray(marking.points)).tolist()]
+            pixels: list[Pixel] = [(x, y) for x, y in camera.to_screen(np.asarray(marking.points)).tolist()]
             width = min(max(marking.width * camera.scale, unit), SDL_COORDINATE_LIMIT)
-            for a, b in pairwise(places):
+            for a, b in pairwise(pixels):
                 draw_line(surface, a, b, colour, width, antialias)
 
 
-def _circle(
+def _draw_circle(
     surface: pygame.Surface,
     camera: Camera,
     marking: Marking,
@@ -340,19 +342,19 @@ def _circle(
     unit: float,
     antialias: bool,
 ) -> None:
-    place = np.asarray([circle[0]])
-    wide = 0.0 if marking.filled else max(marking.width * camera.scale, unit)
-    radius = max(circle[1] * camera.scale, unit) + 0.5 * wide
-    if not camera.in_sight(place, np.asarray([radius / camera.scale]))[0]:
+    position = np.asarray([circle[0]])
+    line_width = 0.0 if marking.filled else max(marking.width * camera.scale, unit)
+    radius = max(circle[1] * camera.scale, unit) + 0.5 * line_width
+    if not camera.in_sight(position, np.asarray([radius / camera.scale]))[0]:
         return
-    x, y = camera.to_screen(place)[0].tolist()
+    x, y = camera.to_screen(position)[0].tolist()
     area = surface.get_clip()
     left, top = max(x - radius - 2.0, area.left), max(y - radius - 2.0, area.top)
     right, bottom = min(x + radius + 2.0, area.right), min(y + radius + 2.0, area.bottom)
     if left < right and top < bottom:
-        within = pygame.Rect(int(left), int(top), math.ceil(right) - int(left), math.ceil(bottom) - int(top))
-        look = ShapeStyle(colour if marking.filled else None, colour, wide, antialias=antialias)
-        draw_sdf(surface, disc_distance(x, y, radius), look, within)
+        rect = pygame.Rect(int(left), int(top), math.ceil(right) - int(left), math.ceil(bottom) - int(top))
+        look = ShapeStyle(colour if marking.filled else None, colour, line_width, antialias=antialias)
+        draw_sdf(surface, disc_distance(x, y, radius), look, rect)
 
 
 FILLED, LINED = 0.13, 0.55
@@ -396,10 +398,10 @@ def _distance(zone: Zone, camera: Camera) -> tuple[SignedDistance, pygame.Rect]:
         return _outline(corners), _box(corners, 0.0)
     half = 0.5 * zone.thickness * camera.scale
     ends = [(x, y) for x, y in corners.tolist()]
-    parts = [capsule_distance(a, b, half) for a, b in pairwise(ends)]
+    segments = [capsule_distance(a, b, half) for a, b in pairwise(ends)]
 
     def nearest(px: FloatArray, py: FloatArray) -> FloatArray:
-        return np.asarray(np.minimum.reduce([part(px, py) for part in parts]))
+        return np.asarray(np.minimum.reduce([segment(px, py) for segment in segments]))
 
     return nearest, _box(corners, half)
 
@@ -410,12 +412,12 @@ def _outline(corners: FloatArray) -> SignedDistance:
 
     def distance(px: FloatArray, py: FloatArray) -> FloatArray:
         px, py = np.broadcast_arrays(px, py)
-        apart, inside = np.full(px.shape, np.inf), np.zeros(px.shape, np.bool_)
+        distance_to_side, inside = np.full(px.shape, np.inf), np.zeros(px.shape, np.bool_)
         for (ax, ay), (bx, by) in sides:
-            apart = np.minimum(apart, capsule_distance((ax, ay), (bx, by), 0.0)(px, py))
+            distance_to_side = np.minimum(distance_to_side, capsule_distance((ax, ay), (bx, by), 0.0)(px, py))
             if ay != by:
                 inside ^= ((ay > py) != (by > py)) & (px < ax + (bx - ax) * (py - ay) / (by - ay))
-        return np.where(inside, -apart, apart)
+        return np.where(inside, -distance_to_side, distance_to_side)
 
     return distance
 

@@ -46,7 +46,7 @@ def draw_text(
     x, y = at
     if not (abs(x) < SDL_COORDINATE_LIMIT and abs(y) < SDL_COORDINATE_LIMIT):  # also rejects nan
         return pygame.Rect(0, 0, 0, 0)
-    words = _rendered(renderable(text), _whole(size), colour, bold, mono)
+    words = _rendered(renderable(text), _integer_size(size), colour, bold, mono)
     rect = words.get_rect(**{anchor: (round(x), round(y))})
     surface.blit(words, rect)
     return rect
@@ -54,10 +54,10 @@ def draw_text(
 
 def text_size(text: str, size: float, bold: bool = False, mono: bool = False) -> tuple[int, int]:
     """Return the width and height of a line of text, px."""
-    return _font(_whole(size), bold, mono).size(renderable(text))
+    return _font(_integer_size(size), bold, mono).size(renderable(text))
 
 
-def _whole(size: float) -> int:
+def _integer_size(size: float) -> int:
     return round(min(max(size, SMALLEST), MAX_TEXT_SIZE)) if math.isfinite(size) else SMALLEST
 
 
@@ -131,24 +131,24 @@ def _plate(
     return made
 
 
-def largest_area(shape: tuple[float, float], free: pygame.Rect, taken: Sequence[pygame.Rect]) -> pygame.Rect:
-    """Return the part of the free area, outside all taken rectangles, that holds the largest rectangle of a shape.
+def largest_area(shape: tuple[float, float], free: pygame.Rect, occupied: Sequence[pygame.Rect]) -> pygame.Rect:
+    """Return the part of the free area, outside all occupied rectangles, that holds the largest rectangle of a shape.
 
     Args:
         shape: width and height, in any unit.
         free: px.
-        taken: px; ignored if no area remains.
+        occupied: px; ignored if no area remains.
     """
-    taken = [each.clip(free) for each in taken if each.clip(free).size > (0, 0) and free.colliderect(each)]
-    lefts, rights = {free.left, *(each.right for each in taken)}, {free.right, *(each.left for each in taken)}
-    tops, bottoms = {free.top, *(each.bottom for each in taken)}, {free.bottom, *(each.top for each in taken)}
-    best, most = free, 0.0
+    occupied = [each.clip(free) for each in occupied if each.clip(free).size > (0, 0) and free.colliderect(each)]
+    lefts, rights = {free.left, *(each.right for each in occupied)}, {free.right, *(each.left for each in occupied)}
+    tops, bottoms = {free.top, *(each.bottom for each in occupied)}, {free.bottom, *(each.top for each in occupied)}
+    best, best_scale = free, 0.0
     for left, right in product(sorted(lefts), sorted(rights, reverse=True)):
         for top, bottom in product(sorted(tops), sorted(bottoms, reverse=True)):
             scale = min((right - left) / shape[0], (bottom - top) / shape[1])
-            room = pygame.Rect(left, top, max(right - left, 0), max(bottom - top, 0))
-            if scale > most and room.collidelist(taken) < 0:
-                best, most = room, scale
+            candidate = pygame.Rect(left, top, max(right - left, 0), max(bottom - top, 0))
+            if scale > best_scale and candidate.collidelist(occupied) < 0:
+                best, best_scale = candidate, scale
     return best
 
 
@@ -179,8 +179,8 @@ def wrap_text(
         count = 1
         while count < len(words) and text_size(" ".join(words[: count + 1]), size, bold, mono)[0] <= width:
             count += 1
-        whole = " ".join(words) if len(lines) == most - 1 else " ".join(words[:count])
-        lines.append(ellipsis(whole, size, width, bold, mono))
+        line = " ".join(words) if len(lines) == most - 1 else " ".join(words[:count])
+        lines.append(ellipsis(line, size, width, bold, mono))
         words = words[count:]
     return tuple(lines)
 

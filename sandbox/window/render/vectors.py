@@ -14,11 +14,11 @@ from sandbox.window.render.lines import draw_arrow, draw_line
 from sandbox.window.render.palette import BACKGROUND, INK, ORANGE, SKY, YELLOW, RgbColour, mix_colours
 from sandbox.window.render.text import draw_text
 
-MOST_CURVED = 400
+MAX_RECOMPUTED = 400
 """Number of contacts with walls and posts whose normals are recomputed."""
-SLACK = 0.02
+FEATURE_TOLERANCE = 0.02
 """Tolerance of a touching feature beyond the closest distance, in radii."""
-MAX_CURVE = 256
+MAX_WALL_POINTS = 256
 """Number of wall points up to which normals are recomputed."""
 
 
@@ -37,38 +37,38 @@ def contact_points(view: DrawContext) -> tuple[FloatArray, FloatArray]:
     normal = contacts.normal.copy()
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
         balls = known & (second >= 0) & (second < count)
-        way = position[second[balls]] - position[a[balls]]
-        normal[balls] = way / np.hypot(way[:, 0], way[:, 1])[:, None]
-        _round(view, normal, np.flatnonzero(known & (second < 0))[:MOST_CURVED])
+        offset = position[second[balls]] - position[a[balls]]
+        normal[balls] = offset / np.hypot(offset[:, 0], offset[:, 1])[:, None]
+        _recompute_curved(view, normal, np.flatnonzero(known & (second < 0))[:MAX_RECOMPUTED])
         normal = np.where(np.isfinite(normal).all(axis=1, keepdims=True), normal, contacts.normal)
-        place = position[a] + normal * bodies.radius[a][:, None]
-        lone = np.append(bodies.round, True)
+        point = position[a] + normal * bodies.radius[a][:, None]
+        is_disc = np.append(bodies.round, True)
         b = np.where((second >= 0) & (second < count), second, len(bodies))
-        rows = np.flatnonzero(known & ~(lone[a] & lone[b]))
-        place[rows], normal[rows] = contacts.point[rows], contacts.normal[rows]
-        _solid(view, place, normal, rows[:MOST_CURVED])
-    sound = known[:, None] & np.isfinite(place).all(axis=1, keepdims=True)
-    return np.where(sound, place, contacts.point), normal
+        rows = np.flatnonzero(known & ~(is_disc[a] & is_disc[b]))
+        point[rows], normal[rows] = contacts.point[rows], contacts.normal[rows]
+        _recompute_solid(view, point, normal, rows[:MAX_RECOMPUTED])
+    is_valid = known[:, None] & np.isfinite(point).all(axis=1, keepdims=True)
+    return np.where(is_valid, point, contacts.point), normal
 
 
-def _round(view: DrawContext, normal: FloatArray, rows: "np.ndarray[tuple[int], np.dtype[np.intp]]") -> None:
+def _recompute_curved(view: DrawContext, normal: FloatArray, rows: "np.ndarray[tuple[int], np.dtype[np.intp]]") -> None:
     """Recompute the normals of contacts with walls and posts, which change as a ball rolls around them."""
     fixed, position = view.snapshot.scene.fixed, view.snapshot.frame.position
-    for row, (number, thing) in zip(rows.tolist(), view.snapshot.contacts.pair[rows].tolist(), strict=True):
-        if -1 - thing >= len(fixed):
+    for row, (number, other) in zip(rows.tolist(), view.snapshot.contacts.pair[rows].tolist(), strict=True):
+        if -1 - other >= len(fixed):
             continue
-        solid, centre = fixed[-1 - thing], position[number]
-        if isinstance(solid, Post):
-            way = np.asarray(solid.position) - centre
-        elif isinstance(solid, Wall) and len(solid.points) <= MAX_CURVE:
-            way = _nearest(solid, centre) - centre
+        element, centre = fixed[-1 - other], position[number]
+        if isinstance(element, Post):
+            offset = np.asarray(element.position) - centre
+        elif isinstance(element, Wall) and len(element.points) <= MAX_WALL_POINTS:
+            offset = _nearest(element, centre) - centre
         else:
             continue
-        normal[row] = way / np.hypot(*way)
+        normal[row] = offset / np.hypot(*offset)
 
 
-def _solid(
-    view: DrawContext, place: FloatArray, normal: FloatArray, rows: "np.ndarray[tuple[int], np.dtype[np.intp]]"
+def _recompute_solid(
+    view: DrawContext, point: FloatArray, normal: FloatArray, rows: "np.ndarray[tuple[int], np.dtype[np.intp]]"
 ) -> None:
     """Recompute contacts that involve a non-circular body: the midpoint between the closest features."""
     bodies, frame, fixed = view.snapshot.bodies, view.snapshot.frame, view.snapshot.scene.fixed
@@ -80,26 +80,26 @@ def _solid(
             others = hulls_of(bodies, frame, other) if np.isfinite(frame.position[other]).all() else []
         else:
             others = _hulls_of_fixed(fixed[-1 - other], frame.position[number]) if -1 - other < len(fixed) else []
-        tolerance = SLACK * float(bodies.radius[number])
-        found = [hull_gap(one, two, tolerance) for one in own for two in others]
+        tolerance = FEATURE_TOLERANCE * float(bodies.radius[number])
+        found = [hull_gap(hull_a, hull_b, tolerance) for hull_a in own for hull_b in others]
         if found:
-            place[row] = min(found, key=lambda each: each[0])[1]
-        for disc, way in ((number, 1.0), (other, -1.0)):
+            point[row] = min(found, key=lambda each: each[0])[1]
+        for disc, sign in ((number, 1.0), (other, -1.0)):
             if disc >= 0 and bodies.round[disc]:  # the normal passes through the centre of the disc
-                out = (place[row] - frame.position[disc]) * way
+                out = (point[row] - frame.position[disc]) * sign
                 normal[row] = out / np.hypot(*out)
 
 
-def _hulls_of_fixed(thing: Plane | Wall | Post, near: FloatArray) -> list[Hull]:
+def _hulls_of_fixed(element: Plane | Wall | Post, point: FloatArray) -> list[Hull]:
     """Return static geometry as hulls; of a plane, the part near a point."""
-    if isinstance(thing, Post):
-        return [Hull(np.asarray([thing.position]), thing.radius)]
-    if isinstance(thing, Wall):
-        ends = (*thing.points, thing.points[0]) if thing.closed else thing.points
-        return [Hull(np.asarray(pair), thing.thickness / 2.0) for pair in pairwise(ends[:MAX_CURVE])]
-    normal = np.asarray(thing.normal) / math.hypot(*thing.normal)
-    foot = near - ((near - thing.point) @ normal) * normal
-    along = np.asarray((-normal[1], normal[0])) * 1e3 * max(1.0, float(np.abs(near - foot).max()))
+    if isinstance(element, Post):
+        return [Hull(np.asarray([element.position]), element.radius)]
+    if isinstance(element, Wall):
+        ends = (*element.points, element.points[0]) if element.closed else element.points
+        return [Hull(np.asarray(pair), element.thickness / 2.0) for pair in pairwise(ends[:MAX_WALL_POINTS])]
+    normal = np.asarray(element.normal) / math.hypot(*element.normal)
+    foot = point - ((point - element.point) @ normal) * normal
+    along = np.asarray((-normal[1], normal[0])) * 1e3 * max(1.0, float(np.abs(point - foot).max()))
     return [Hull(np.asarray((foot - along, foot + along)), 0.0)]
 
 
@@ -116,9 +116,9 @@ MAX_ARROWS = 1000
 """Largest number of arrows of one kind: velocities and contacts are sampled evenly, forces by strength."""
 ARROW_CROWD = 300
 """Number above which contact marks are smaller and arrows have no dark outline."""
-SPAN = 0.1
+VELOCITY_TIME = 0.1
 """s: the arrow of a velocity v has length v · SPAN"""
-NORMAL = 16.0
+NORMAL_LENGTH = 16.0
 """px, length of a contact normal"""
 WEIGHT = 26.0
 """px, length of a force of one weight m·g"""
@@ -130,7 +130,7 @@ HEAT: tuple[RgbColour, ...] = tuple(
     for k in range(33)
 )
 """Colours of forces by line length, from blue through yellow to white."""
-LABELS = 12
+MAX_LABELS = 12
 """Number of forces up to which each is labelled in newtons."""
 
 
@@ -139,39 +139,39 @@ def draw_velocities(view: DrawContext) -> None:
     some = view.first(MAX_ARROWS)
     longest = max(min(view.camera.size) / 3.0, 1.0)
     with np.errstate(invalid="ignore", over="ignore"):
-        way = view.camera.vectors_to_screen(view.snapshot.frame.velocity[some.shown] * SPAN)
-        length = np.hypot(way[:, 0], way[:, 1])
-        way = way * np.minimum(1.0, longest / np.maximum(length, 1e-300))[:, None]
+        arrow = view.camera.vectors_to_screen(view.snapshot.frame.velocity[some.shown] * VELOCITY_TIME)
+        length = np.hypot(arrow[:, 0], arrow[:, 1])
+        arrow = arrow * np.minimum(1.0, longest / np.maximum(length, 1e-300))[:, None]
     for k in np.flatnonzero((length > 2.0 * view.ui_scale) & np.isfinite(length)).tolist():
-        (x, y), (dx, dy) = some.centre[k].tolist(), way[k].tolist()
+        (x, y), (dx, dy) = some.centre[k].tolist(), arrow[k].tolist()
         edge = BACKGROUND if len(some.shown) <= ARROW_CROWD and length[k] > 16.0 * view.ui_scale else None
         draw_arrow(view.surface, (x, y), (x + dx, y + dy), ORANGE, 2.0 * view.ui_scale, view.antialias, edge)
 
 
-def _in_sight(view: DrawContext, most: int) -> tuple[IntArray, FloatArray, FloatArray]:
+def _visible_contacts(view: DrawContext, max_count: int) -> tuple[IntArray, FloatArray, FloatArray]:
     """Return the visible contacts: indices (K,), positions (K, 2) px and normals (K, 2), y down."""
-    place, normal = contact_points(view)
+    point, normal = contact_points(view)
     with np.errstate(invalid="ignore", over="ignore"):
-        pixels = view.camera.to_screen(place)
-    seen = view.inside(pixels, 20.0 * view.ui_scale)
-    if len(seen) > most:
-        seen = seen[np.linspace(0, len(seen) - 1, most).astype(np.intp)]
+        pixels = view.camera.to_screen(point)
+    visible = view.inside(pixels, 20.0 * view.ui_scale)
+    if len(visible) > max_count:
+        visible = visible[np.linspace(0, len(visible) - 1, max_count).astype(np.intp)]
     with np.errstate(over="ignore"):  # a recorded normal may have any length
-        return seen, pixels[seen], view.camera.vectors_to_screen(normal[seen]) / view.camera.scale
+        return visible, pixels[visible], view.camera.vectors_to_screen(normal[visible]) / view.camera.scale
 
 
 def draw_contacts(view: DrawContext, discs: CircleRenderer) -> None:
     """Draw contact points, and the normals from the first body to the second."""
-    seen, place, normal = _in_sight(view, MAX_ARROWS)
-    if not len(seen):
+    visible, point, normal = _visible_contacts(view, MAX_ARROWS)
+    if not len(visible):
         return
-    crowded = len(seen) > ARROW_CROWD
-    reach = (0.5 if crowded else 1.0) * NORMAL * view.ui_scale
-    for (x, y), (nx, ny) in zip(place.tolist(), normal.tolist(), strict=True):
+    crowded = len(visible) > ARROW_CROWD
+    reach = (0.5 if crowded else 1.0) * NORMAL_LENGTH * view.ui_scale
+    for (x, y), (nx, ny) in zip(point.tolist(), normal.tolist(), strict=True):
         draw_line(view.surface, (x, y), (x + nx * reach, y + ny * reach), INK, 1.0 * view.ui_scale, view.antialias)
-    tint = np.broadcast_to(np.asarray(ORANGE, np.uint8), (len(seen), 3))
-    size = np.full(len(seen), (1.8 if crowded else 3.0) * view.ui_scale)
-    discs.draw(view.surface, place, size, tint, CircleStyle(0.0, antialias=view.antialias))
+    tint = np.broadcast_to(np.asarray(ORANGE, np.uint8), (len(visible), 3))
+    size = np.full(len(visible), (1.8 if crowded else 3.0) * view.ui_scale)
+    discs.draw(view.surface, point, size, tint, CircleStyle(0.0, antialias=view.antialias))
 
 
 def draw_impulses(view: DrawContext) -> None:
@@ -180,27 +180,27 @@ def draw_impulses(view: DrawContext) -> None:
     A force equal to the weight of the lighter body has a fixed length. If that would make the largest visible force too
     long, or if there is no gravity, the scale is set by the largest force instead.
     """
-    seen, place, normal = _in_sight(view, 4 * MAX_ARROWS)
-    if not len(seen) or not view.snapshot.seconds > 0.0:
+    visible, point, normal = _visible_contacts(view, 4 * MAX_ARROWS)
+    if not len(visible) or not view.snapshot.seconds > 0.0:
         return
     contacts, gravity = view.snapshot.contacts, math.hypot(*view.snapshot.scene.world.gravity)
     with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        force = np.hypot(*contacts.impulse[seen].T) / view.snapshot.seconds
+        force = np.hypot(*contacts.impulse[visible].T) / view.snapshot.seconds
         force[~np.isfinite(force)] = 0.0
         fraction = force / max(float(force.max()), 1e-300)
         weights = (
-            force / (_lighter(view, contacts.pair[seen]) * gravity) if gravity > 0.0 else np.full_like(force, np.inf)
+            force / (_lighter(view, contacts.pair[visible]) * gravity) if gravity > 0.0 else np.full_like(force, np.inf)
         )
         length = np.minimum(WEIGHT * float(np.max(weights)), LONGEST_ARROW) * fraction * view.ui_scale
     drawn = np.flatnonzero(length > 1.0)
     drawn = drawn[np.argsort(force[drawn], kind="stable")][-MAX_ARROWS:]  # the strongest last, on top
     for k in drawn.tolist():
-        (x, y), (nx, ny), half = place[k].tolist(), normal[k].tolist(), float(length[k]) / 2.0
+        (x, y), (nx, ny), half = point[k].tolist(), normal[k].tolist(), float(length[k]) / 2.0
         ends = (x - nx * half, y - ny * half), (x + nx * half, y + ny * half)
         strength = min(2.0 * half / (LONGEST_ARROW * view.ui_scale), 1.0)
         width = (1.0 + 2.6 * strength) * view.ui_scale
         draw_line(view.surface, *ends, HEAT[int(32.0 * strength)], width, view.antialias)
-        if len(drawn) <= LABELS:
+        if len(drawn) <= MAX_LABELS:
             text, (right, down) = f"{float(force[k]):.3g} N", (10.0 * view.ui_scale, 12.0 * view.ui_scale)
             draw_text(
                 view.surface, text, (x + right + 1, y + down + 1), 12 * view.ui_scale, BACKGROUND, "midleft", mono=True

@@ -186,17 +186,17 @@ def _round_up(value: float) -> float:
     return next((part * power for part in (1.0, 2.0, 2.5, 5.0) if part * power >= value), 10.0 * power)
 
 
-def spread_labels(wanted: Sequence[float], gap: float, low: float, high: float) -> tuple[float, ...]:
+def spread_labels(targets: Sequence[float], gap: float, low: float, high: float) -> tuple[float, ...]:
     """Return positions close to those wanted, in the same order, at least `gap` apart and within bounds if possible."""
-    order = sorted(range(len(wanted)), key=lambda k: wanted[k])
+    order = sorted(range(len(targets)), key=lambda k: targets[k])
     placed: list[float] = []
     for k in order:
-        placed.append(max(wanted[k], low if not placed else placed[-1] + gap))
+        placed.append(max(targets[k], low if not placed else placed[-1] + gap))
     limit = high
     for n in reversed(range(len(placed))):
         placed[n] = min(placed[n], limit)
         limit = placed[n] - gap
-    found = [0.0] * len(wanted)
+    found = [0.0] * len(targets)
     for n, k in enumerate(order):
         found[k] = placed[n]
     return tuple(found)

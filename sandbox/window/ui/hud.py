@@ -24,7 +24,7 @@ MIN_TEXT_SIZE = 9.0
 MAX_STATUS_HEIGHT_FRACTION = 0.4
 """largest height of the status plate as a fraction of the area"""
 MIN_MESSAGE_WIDTH = 14.0
-"""in text heights, width below which a message is placed above another plate rather than beside it"""
+"""width in text heights below which a message is placed above another plate rather than beside it"""
 
 MAX_RANK_BESIDE_FAULTS = 2
 """highest rank of rows that are shown together with faults of a scene file"""
@@ -41,7 +41,7 @@ class HudRow(NamedTuple):
     text: str
     colour: RgbColour = INK
     mark: Mark = ""
-    """shape before the text, so that no state is shown by colour alone"""
+    """shape before the text, because a state must not be shown by colour alone"""
     bold: bool = False
     mono: bool = False
     rank: int = 5
@@ -106,7 +106,7 @@ class HudText(NamedTuple):
     """Layout of the status plate."""
 
     rect: pygame.Rect
-    """of the plate; empty if no row fits"""
+    """rectangle of the plate; empty if no row fits"""
     lines: tuple[tuple[HudRow, str], ...]
     """rows and their text, truncated to fit"""
 
@@ -130,29 +130,29 @@ def layout_rows(status: HudStatus, area: pygame.Rect, ui_scale: float, taken: Se
     if status.faults:
         shown = tuple(row for row in shown if row.rank <= MAX_RANK_BESIDE_FAULTS)
     pad, line_height = _pad(size), round(1.42 * size)
-    room = pygame.Rect(
+    available = pygame.Rect(
         area.topleft,
         (area.width, min(area.height, max(round(MAX_STATUS_HEIGHT_FRACTION * area.height), 5 * line_height))),
     )
     for each in taken:
-        if each.top < room.bottom and each.left > area.left + 8 * size:
-            room.width = min(room.width, each.left - round(0.5 * size) - area.left)
-    count = (room.height - 2 * pad) // line_height
+        if each.top < available.bottom and each.left > area.left + 8 * size:
+            available.width = min(available.width, each.left - round(0.5 * size) - area.left)
+    count = (available.height - 2 * pad) // line_height
     if count < 1 or area.width < 2 * size or area.height < size:
         return HudText(pygame.Rect(area.topleft, (0, 0)), ())
     least = sorted(row.rank for row in shown)[:count][-1]
-    kept = [row for row in shown if row.rank <= least][:count]
-    indent, width = round(1.3 * size), room.width - 2 * pad
-    texts = [ellipsis(row.text, size, width - (indent if row.mark else 0), row.bold, row.mono) for row in kept]
+    visible_rows = [row for row in shown if row.rank <= least][:count]
+    indent, width = round(1.3 * size), available.width - 2 * pad
+    texts = [ellipsis(row.text, size, width - (indent if row.mark else 0), row.bold, row.mono) for row in visible_rows]
     widest = max(
         text_size(text, size, row.bold, row.mono)[0] + (indent if row.mark else 0)
-        for row, text in zip(kept, texts, strict=True)
+        for row, text in zip(visible_rows, texts, strict=True)
     )
     grain = round(2 * size)  # keeps the width constant while digits change
     rect = pygame.Rect(
-        area.topleft, (min(-(-widest // grain) * grain, width) + 2 * pad, len(kept) * line_height + 2 * pad)
+        area.topleft, (min(-(-widest // grain) * grain, width) + 2 * pad, len(visible_rows) * line_height + 2 * pad)
     )
-    return HudText(rect, tuple(zip(kept, texts, strict=True)))
+    return HudText(rect, tuple(zip(visible_rows, texts, strict=True)))
 
 
 def draw_hud(
@@ -184,11 +184,11 @@ def draw_hud(
         The rectangle of the box with the faults of the scene file; empty without faults.
     """
     plates, nothing = {} if plates is None else plates, pygame.Rect(0, 0, 0, 0)
-    whole = pygame.Rect(0, 0, max(surface.get_width() - right, 0), max(surface.get_height() - bottom, 0))
-    area, size = _scale_area(whole, ui_scale)
+    visible = pygame.Rect(0, 0, max(surface.get_width() - right, 0), max(surface.get_height() - bottom, 0))
+    area, size = _scale_area(visible, ui_scale)
     if area.width < 2 * size or area.height < size:
         return nothing
-    rows = layout_rows(status, whole, ui_scale, taken)
+    rows = layout_rows(status, visible, ui_scale, taken)
     _draw_rows(surface, rows, size)
     plates["state"] = rows.rect
     plates["rate"] = _draw_rate(surface, status, area, [rows.rect, *taken], size)

@@ -1,4 +1,4 @@
-"""The account of the exact engine: it closes to rounding, obeys closed forms, and leaves no trace on the run."""
+"""Energy ledger of the exact engine: it closes to rounding, obeys closed forms and does not affect the run."""
 
 from functools import partial
 from pathlib import Path
@@ -17,12 +17,12 @@ from tests import accounts
 
 SCENES = Path(__file__).parents[3] / "scenes"
 G = 10.0
-# Rounding of thousands of sums; a thousandth of what is promised
-kept = partial(accounts.kept, engine="exact", closes=1e-12)
+# Rounding of thousands of sums; a thousandth of the documented bound.
+closed_account = partial(accounts.closed_account, engine="exact", closes=1e-12)
 
 
 def scene_of(*balls: dict[str, Any], e: float = 0.5, mu: float = 0.0, slope: float = 0.0, g: float = G) -> Scene:
-    coat = {"restitution": e, "friction": mu}
+    coefficients = {"restitution": e, "friction": mu}
     gravity = [-g * np.sin(slope), -g * np.cos(slope)]
     return from_document(
         {
@@ -30,7 +30,7 @@ def scene_of(*balls: dict[str, Any], e: float = 0.5, mu: float = 0.0, slope: flo
             "solver": {"dt": 0.01},
             "plane": [{"point": [0, 0], "normal": [0, 1], "material": "coat"}],
             "material": [{"name": "coat"}],
-            "pair": [{"between": ["coat", "coat"], **coat}],
+            "pair": [{"between": ["coat", "coat"], **coefficients}],
             "ball": [{"material": "coat", **ball} for ball in balls],
         }
     )
@@ -52,53 +52,55 @@ def ball(name: str, x: float, y: float, **more: Any) -> dict[str, Any]:
         ("benchmark/gas", 150),
     ],
 )
-def test_exact_account_of_a_shipped_scene_closes(name: str, steps: int) -> None:
-    kept(sandbox.load(SCENES / f"{name}.toml"), steps)
+def test_ledger_of_a_shipped_scene_closes(name: str, steps: int) -> None:
+    closed_account(sandbox.load(SCENES / f"{name}.toml"), steps)
 
 
-def test_endless_bounces_end_at_rest_and_restitution_has_all_of_the_height() -> None:
-    account = kept(scene_of(ball("a", 0, 1.5)), 300)
+def test_infinite_bounces_book_all_potential_energy_as_restitution() -> None:
+    account = closed_account(scene_of(ball("a", 0, 1.5)), 300)
     assert account[Cause.RESTITUTION] == pytest.approx(-2.0 * G * 1.0, rel=1e-12)  # rounding of some 50 bounces
     assert account[Cause.PHANTOM] == pytest.approx(0.0, abs=1e-14)  # rounding
 
 
 def test_sliding_ball_loses_a_third_of_its_energy_to_friction_until_it_rolls() -> None:
-    account = kept(scene_of(ball("a", 0, 0.5, velocity=[3.0, 0.0]), mu=0.2), 200)
-    # A disc rolls at two thirds of its speed: of ½ m v² a third is gone.
+    account = closed_account(scene_of(ball("a", 0, 0.5, velocity=[3.0, 0.0]), mu=0.2), 200)
+    # A disc rolls at two thirds of its speed, which removes a third of ½ m v².
     assert account[Cause.FRICTION] == pytest.approx(-0.5 * 2.0 * 9.0 / 3.0, rel=1e-12)  # rounding
     assert account[Cause.RESTITUTION] == pytest.approx(0.0, abs=1e-14)  # rounding
 
 
-def test_friction_downhill_is_force_times_way_slipped() -> None:
+def test_friction_work_downhill_is_force_times_slip_distance() -> None:
     slope, mu, steps = 0.8, 0.2, 150
-    account = kept(scene_of(ball("a", 0, 0.5), mu=mu, slope=slope), steps)
+    account = closed_account(scene_of(ball("a", 0, 0.5), mu=mu, slope=slope), steps)
     force, time = mu * 2.0 * G * np.cos(slope), steps * 0.01
-    # From rest it slides and turns: the slip grows by a + 2 F/m, of which friction brings 3 F/m less.
+    # From rest it slides and rotates: gravity increases the slip velocity, and friction reduces it by 3 F/m.
     slip = 0.5 * (G * np.sin(slope) - 3.0 * force / 2.0) * time**2
     assert account[Cause.FRICTION] == pytest.approx(-force * slip, rel=1e-12)  # rounding
 
 
-def test_head_on_impact_takes_what_restitution_leaves_over() -> None:
+def test_energy_loss_of_a_head_on_impact_follows_restitution() -> None:
     e, v, m1, m2 = 0.5, 4.0, 2.0, 6.0
     balls = ball("a", 0, 3, velocity=[v, 0]), ball("b", 2, 3, mass=m2)
-    account = kept(scene_of(*balls, e=e, g=0.0), 60)
+    account = closed_account(scene_of(*balls, e=e, g=0.0), 60)
     assert account[Cause.RESTITUTION] == pytest.approx(-0.5 * m1 * m2 / (m1 + m2) * (1 - e**2) * v**2, rel=1e-14)
     assert account[Cause.FRICTION] == 0.0
 
 
-def test_rough_oblique_impact_books_both_ways_apart() -> None:
+def test_oblique_impact_books_friction_and_restitution_separately() -> None:
     mu, e, v, w = 0.1, 0.5, 3.0, 4.0
-    account = kept(scene_of(ball("a", 0, 0.8, velocity=[w, -v]), e=e, mu=mu, g=0.0), 20)
+    account = closed_account(scene_of(ball("a", 0, 0.8, velocity=[w, -v]), e=e, mu=mu, g=0.0), 20)
     normal = 2.0 * (1 + e) * v
-    # Friction slips throughout: it takes μ J times the mean slip, w less half of 3 μ J/m.
+    # The contact slips throughout: friction removes μ J times the mean slip, w − ½·3 μ J/m.
     assert account[Cause.FRICTION] == pytest.approx(-mu * normal * (w - 1.5 * mu * normal / 2.0), rel=1e-14)
     assert account[Cause.RESTITUTION] == pytest.approx(-0.5 * 2.0 * (1 - e**2) * v**2, rel=1e-14)  # rounding, as above
 
 
 def test_elastic_gas_of_the_exact_engine_has_no_friction() -> None:
-    account = kept(sandbox.load(SCENES / "benchmark/gas.toml"), 100)
+    account = closed_account(sandbox.load(SCENES / "benchmark/gas.toml"), 100)
     assert account[Cause.FRICTION] == 0.0
-    assert account[Cause.RESTITUTION] == pytest.approx(0.0, abs=1e-13 * 78.5)  # rounding, of the gas's energy
+    assert account[Cause.RESTITUTION] == pytest.approx(
+        0.0, abs=1e-13 * 78.5
+    )  # rounding, relative to the energy of the gas
 
 
 ACTIONS: accounts.Timed = [
@@ -110,16 +112,16 @@ ACTIONS: accounts.Timed = [
 ]
 
 
-@pytest.mark.parametrize("part", [None, 0.37])
-def test_exact_account_goes_on_through_actions(part: float | None) -> None:
+@pytest.mark.parametrize("fraction", [None, 0.37])
+def test_ledger_stays_closed_through_actions(fraction: float | None) -> None:
     balls = ball("a", 0, 0.5), ball("b", 3, 1.0, velocity=[-1, 0]), ball("c", 6, 3, collides="none")
-    account = kept(scene_of(*balls, mu=0.3), 80, ACTIONS, part)
+    account = closed_account(scene_of(*balls, mu=0.3), 80, ACTIONS, fraction)
     assert account[Cause.RETIRED] < 0.0
     assert account[Cause.ACTIONS] != 0.0
     assert account[Cause.FRICTION] < 0.0
 
 
-def test_ball_spawned_with_a_velocity_starts_where_it_was_put() -> None:
+def test_ball_spawned_with_a_velocity_starts_at_its_position() -> None:
     simulation = start(scene_of(ball("a", 9, 0.5)), "exact")
     for _ in range(50):
         simulation.step()
@@ -127,6 +129,6 @@ def test_ball_spawned_with_a_velocity_starts_where_it_was_put() -> None:
     simulation.apply(Spawn(time=0, ball=new))
     simulation.step()
     frame = simulation.frame()
-    # It had moved since time 0 once, by half of its velocities.
+    # Regression: it once started displaced by the motion since time 0.
     assert frame.position[-1] == pytest.approx([0.01, 3.0 + 2.0 * 0.01 - 0.5 * G * 0.01**2], rel=1e-14)  # rounding
     assert frame.angle[-1] == pytest.approx(0.04, rel=1e-14)  # rounding

@@ -1,4 +1,4 @@
-"""The exact engine under any scene: it ends, stays finite, and does so again."""
+"""Exact engine on random scenes: it ends, stays finite and is reproducible."""
 
 import numpy as np
 import pytest
@@ -16,8 +16,8 @@ pytestmark = pytest.mark.full  # property tests with many examples
 
 
 @st.composite
-def runnable(draw: st.DrawFn) -> Scene:
-    """Sound scenes without drag and without words that only other engines know."""
+def supported_scenes(draw: st.DrawFn) -> Scene:
+    """Draw valid scenes without drag and without settings that only other engines support."""
     document: Document = draw(documents(most=3))
     document["solver"] = {"dt": document.get("solver", {}).get("dt", 0.01)}
     for key in ("linear_drag", "quadratic_drag"):
@@ -28,7 +28,7 @@ def runnable(draw: st.DrawFn) -> Scene:
 
 
 def outcome(simulation: ExactSimulation) -> tuple[str | None, str]:
-    """Step; return why it ended, if it did, and the hash of the state at the end."""
+    """Run ten steps; return the reason of an early end, if any, and the final state hash."""
     ended = None
     try:
         for _ in range(10):
@@ -42,11 +42,11 @@ def outcome(simulation: ExactSimulation) -> tuple[str | None, str]:
 
 
 @pytest.mark.slow
-@given(runnable())
+@given(supported_scenes())
 @settings(max_examples=80)
-def test_any_scene_runs_finite_or_ends_with_a_reason_and_does_so_again(scene: Scene) -> None:
+def test_any_scene_stays_finite_or_ends_with_a_reason_reproducibly(scene: Scene) -> None:
     first, again = ExactEngine().start(scene), ExactEngine().start(scene)
-    first.contacts()  # recording contacts must not matter
+    first.contacts()  # recording contacts must not change the result
     assert outcome(first) == outcome(again)
     contacts = first.contacts()
     assert np.isfinite(contacts.time).all()

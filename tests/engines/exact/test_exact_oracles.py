@@ -1,4 +1,4 @@
-"""The exact engine against what nobody here wrote: mpmath at 40 digits, and scipy's DOP853 with events."""
+"""Exact engine against independent oracles: mpmath at 40 digits and scipy's DOP853 with events."""
 
 import math
 
@@ -16,7 +16,7 @@ G = 9.81
 mpmath.mp.dps = 40
 
 
-def bouncing(restitution, height=5.0, dt=0.5):
+def bouncing_scene(restitution, height=5.0, dt=0.5):
     return from_document(
         {
             "world": {"gravity": [0, -G]},
@@ -28,7 +28,7 @@ def bouncing(restitution, height=5.0, dt=0.5):
 
 
 def test_200_elastic_bounces_agree_with_40_digits():
-    simulation = ExactEngine().start(bouncing(1.0))
+    simulation = ExactEngine().start(bouncing_scene(1.0))
     simulation.contacts()
     while simulation.events < 200:
         simulation.step()
@@ -41,39 +41,39 @@ def test_200_elastic_bounces_agree_with_40_digits():
     time = mpmath.mpf(simulation.time)
     phase = mpmath.fmod(time - fall, 2 * fall)
     height = mpmath.mpf("0.5") + phase * (g * fall) - g * phase**2 / 2
-    assert abs(simulation.frame().position[0, 1] - height) < 1e-11  # 10 m/s times what the time is off
+    assert abs(simulation.frame().position[0, 1] - height) < 1e-11  # 10 m/s times the error in time
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.2, 0.5, 0.8, 0.95])
 def test_bouncing_ends_at_the_zeno_time(restitution):
-    simulation = ExactEngine().start(bouncing(restitution, dt=0.1))
+    simulation = ExactEngine().start(bouncing_scene(restitution, dt=0.1))
     simulation.contacts()
     first = math.sqrt(2 * 5 / G)
     end = first * (1 + restitution) / (1 - restitution)
     while simulation.time < end:
         simulation.step()
     contacts = simulation.contacts()
-    assert contacts.time[-1] == pytest.approx(end, abs=1e-12 * max(1.0, end))  # 1e-13 is cut, times round at 4e-15
+    assert contacts.time[-1] == pytest.approx(end, abs=1e-12 * max(1.0, end))  # truncated at 1e-13
     frame = simulation.frame()
     assert frame.velocity[0].tolist() == [0.0, 0.0]
-    assert frame.position[0, 1] == pytest.approx(0.5, abs=1e-13)  # what the cut leaves out, and rounding of places
+    assert frame.position[0, 1] == pytest.approx(0.5, abs=1e-13)  # truncation of the series and rounding of positions
 
 
 def gas_by_mpmath(position, velocity, radius, size, collisions):
-    """Return time and state at each of the first collisions of balls in a box, by brute force in 40 digits."""
+    """Return time, positions and velocities after some collisions of balls in a box, by brute force in 40 digits."""
     x = [[mpmath.mpf(float(c)) for c in row] for row in position]
     v = [[mpmath.mpf(float(c)) for c in row] for row in velocity]
     r, box = mpmath.mpf(radius), mpmath.mpf(size)
-    now, done = mpmath.mpf(0), 0
-    while done < collisions:
-        best, who = mpmath.inf, None
+    time, count = mpmath.mpf(0), 0
+    while count < collisions:
+        earliest, event = mpmath.inf, None
         for i in range(len(x)):
             for axis in (0, 1):
                 speed = v[i][axis]
                 if speed != 0:
                     t = ((box - r if speed > 0 else r) - x[i][axis]) / speed
-                    if t < best:
-                        best, who = t, (i, None, axis)
+                    if t < earliest:
+                        earliest, event = t, (i, None, axis)
             for j in range(i):
                 d = [x[i][k] - x[j][k] for k in (0, 1)]
                 w = [v[i][k] - v[j][k] for k in (0, 1)]
@@ -82,23 +82,23 @@ def gas_by_mpmath(position, velocity, radius, size, collisions):
                     continue
                 a, c = w[0] ** 2 + w[1] ** 2, d[0] ** 2 + d[1] ** 2 - 4 * r * r
                 root = b * b - a * c
-                if root > 0 and (-b - mpmath.sqrt(root)) / a < best:
-                    best, who = (-b - mpmath.sqrt(root)) / a, (i, j, 0)
-        now += best
+                if root > 0 and (-b - mpmath.sqrt(root)) / a < earliest:
+                    earliest, event = (-b - mpmath.sqrt(root)) / a, (i, j, 0)
+        time += earliest
         for i in range(len(x)):
             for k in (0, 1):
-                x[i][k] += v[i][k] * best
-        i, j, axis = who
+                x[i][k] += v[i][k] * earliest
+        i, j, axis = event
         if j is None:
             v[i][axis] = -v[i][axis]
             continue
-        done += 1
+        count += 1
         n = [(x[i][k] - x[j][k]) / (2 * r) for k in (0, 1)]
         closing = sum((v[i][k] - v[j][k]) * n[k] for k in (0, 1))
         for k in (0, 1):
             v[i][k] -= closing * n[k]
             v[j][k] += closing * n[k]
-    return now, x, v
+    return time, x, v
 
 
 def test_gas_of_16_agrees_with_40_digits_up_to_its_50th_collision():
@@ -116,22 +116,25 @@ def test_gas_of_16_agrees_with_40_digits_up_to_its_50th_collision():
             ],
         }
     )
-    now, x, _ = gas_by_mpmath(position, velocity, 0.25, 4, 50)
+    time, x, _ = gas_by_mpmath(position, velocity, 0.25, 4, 50)
     simulation = ExactEngine().start(scene)
     simulation.contacts()
-    whole, part = divmod(float(now), 0.01)
-    for _ in range(int(whole)):
+    steps, remainder = divmod(float(time), 0.01)
+    for _ in range(int(steps)):
         simulation.step()
-    simulation.finish(part / 0.01)
+    simulation.finish(remainder / 0.01)
     contacts = simulation.contacts()
     times = contacts.time[contacts.pair[:, 1] >= 0]
-    assert len(times) in (49, 50)  # the last is at the very end, on either side of rounding
-    # A gas of 16 balls loses 11 digits in 100 collisions, so some 5 of 16 in 50.
+    assert len(times) in (49, 50)  # rounding decides whether the last one, at the end time, is included
+    # A gas of 16 balls loses 11 digits in 100 collisions, so about 5 of 16 in 50.
     assert np.abs(simulation.frame().position - np.array(x, dtype=np.float64)).max() < 1e-9
 
 
 def flight_by_dop853(state, gaps, restitution, until):
-    """Return times of impact and the last state of a ball that flies among things given by their gaps and normals."""
+    """Return times of impact and the final state of a ball that flies among obstacles.
+
+    Each obstacle is a function that returns the gap and the normal at a position.
+    """
 
     def flight(_, s):
         return [s[2], s[3], 0.0, -G]
@@ -143,29 +146,29 @@ def flight_by_dop853(state, gaps, restitution, until):
         crossing.terminal, crossing.direction = True, -1.0
         return crossing
 
-    now, times = 0.0, []
+    time, times = 0.0, []
     while True:
-        tight = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-13, "max_step": 0.02}
-        run = solve_ivp(flight, (now, until), state, events=[event(gap) for gap in gaps], **tight)
-        state, now = run.y[:, -1], float(run.t[-1])
+        tolerances = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-13, "max_step": 0.02}
+        run = solve_ivp(flight, (time, until), state, events=[event(gap) for gap in gaps], **tolerances)
+        state, time = run.y[:, -1], float(run.t[-1])
         if run.status == 0:
             return times, state
         hit = next(k for k, found in enumerate(run.t_events) if len(found))
-        times.append(now)
+        times.append(time)
         normal = gaps[hit](state[:2])[1]
         closing = -(state[2:] @ normal)
         state = np.concatenate((state[:2] + 1e-13 * normal, state[2:] + (1 + restitution) * closing * normal))
 
 
 def test_ball_among_planes_a_post_and_a_wall_end_agrees_with_dop853():
-    """Flat and curved things, so that both quadratics and quartics are asked."""
+    """Flat and curved obstacles exercise both the quadratic and the quartic solver."""
     radius, e = 0.2, 0.9
 
     def plane(point, normal):
         normal = np.asarray(normal) / np.hypot(*normal)
         return lambda x: (float((x - point) @ normal) - radius, normal)
 
-    def knob(centre, size):
+    def circle(centre, size):
         def gap(x):
             offset = x - centre
             distance = np.hypot(*offset)
@@ -178,8 +181,8 @@ def test_ball_among_planes_a_post_and_a_wall_end_agrees_with_dop853():
         plane((0.0, 0.0), (0.0, 1.0)),
         plane((-2.0, 0.0), (1.0, 0.1)),
         plane((2.5, 0.0), (-1.0, 0.0)),
-        knob((0.4, 0.6), 0.3),
-        knob((1.5, 0.8), 0.01),
+        circle((0.4, 0.6), 0.3),
+        circle((1.5, 0.8), 0.01),
     ]
     times, state = flight_by_dop853(start, gaps, e, 4.0)
     scene = from_document(
@@ -202,6 +205,6 @@ def test_ball_among_planes_a_post_and_a_wall_end_agrees_with_dop853():
     contacts = simulation.contacts()
     assert len(times) >= 8
     assert {-4, -5} <= set(contacts.pair[:, 1].tolist())  # the wall's end and the post
-    # A curved impact multiplies an error of 1e-13 by some 5, and there are ten of them, a few on curves.
+    # An impact on a curve amplifies an error of 1e-13 about 5 times; there are ten impacts, a few of them on curves.
     np.testing.assert_allclose(contacts.time, times, atol=1e-9)
     np.testing.assert_allclose(simulation.frame().position[0], state[:2], atol=1e-8)

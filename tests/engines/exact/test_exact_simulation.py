@@ -17,7 +17,7 @@ from sandbox.scene.files.load import from_document
 
 G = 9.81
 
-MIXED = {
+MIXED_SCENE = {
     "world": {"gravity": [0.3, -G]},
     "material": [{"name": "m", "restitution": 0.7, "friction": 0.3}],
     "plane": [{"point": [0, -1], "normal": [0.1, 1], "material": "m"}],
@@ -33,123 +33,125 @@ MIXED = {
     ],
 }
 
-BOUNCE = {
+BOUNCING_SCENE = {
     "world": {"gravity": [0, -G]},
     "plane": [{"point": [0, 0], "normal": [0, 1], "friction": 0.4}],
     "ball": [{"position": [0, 1.5], "velocity": [1, 0], "radius": 0.5, "restitution": 0.5}],
 }
 
 
-def started(document, dt=0.01):
+def simulation_of(document, dt=0.01):
     return ExactEngine().start(from_document({**document, "solver": {"dt": dt}}))
 
 
-def stepped(simulation, steps):
+def advance(simulation, steps):
     for _ in range(steps):
         simulation.step()
     return simulation
 
 
-@pytest.mark.parametrize("document", [MIXED, BOUNCE])
-def test_frames_do_not_depend_on_dt_bit_for_bit(document):
+@pytest.mark.parametrize("document", [MIXED_SCENE, BOUNCING_SCENE])
+def test_frames_are_bit_identical_for_any_dt(document):
     # 2⁻⁸ and 2⁻²: both reach 1.5 s without rounding.
-    fine, coarse = stepped(started(document, 2.0**-8), 384), stepped(started(document, 0.25), 6)
+    fine, coarse = advance(simulation_of(document, 2.0**-8), 384), advance(simulation_of(document, 0.25), 6)
     assert fine.time == coarse.time == 1.5
     assert fine.state_hash() == coarse.state_hash()
 
 
-def test_an_action_takes_effect_alike_whatever_the_dt():
+def test_action_has_the_same_effect_for_any_dt():
     hashes = set()
     for dt, steps in ((2.0**-8, 128), (0.25, 2)):
-        simulation = stepped(started(MIXED, dt), steps)
+        simulation = advance(simulation_of(MIXED_SCENE, dt), steps)
         simulation.apply(Impulse(time=0.5, body="ball-1", impulse=(1.0, 2.0), angular=0.1))
-        hashes.add(stepped(simulation, 2 * steps).state_hash())
+        hashes.add(advance(simulation, 2 * steps).state_hash())
     assert len(hashes) == 1
 
 
-@pytest.mark.parametrize("document", [MIXED, BOUNCE])
-def test_impulses_add_up_to_the_change_of_momentum(document):
-    simulation = started(document)
+@pytest.mark.parametrize("document", [MIXED_SCENE, BOUNCING_SCENE])
+def test_contact_impulses_sum_to_the_momentum_change(document):
+    simulation = simulation_of(document)
     simulation.contacts()
-    contacts, frame = stepped(simulation, 200).contacts(), simulation.frame()
+    contacts, frame = advance(simulation, 200).contacts(), simulation.frame()
     mass, gravity = simulation.bodies.mass[:, None], np.array(document["world"]["gravity"])
     expected = mass * (simulation.bodies.velocity + gravity * simulation.time) * ~simulation.bodies.fixed[:, None]
-    got = mass * frame.velocity
+    momentum = mass * frame.velocity
     for (first, second), impulse in zip(contacts.pair.tolist(), contacts.impulse, strict=True):
-        got[first] += impulse * (not simulation.bodies.fixed[first])
+        momentum[first] += impulse * (not simulation.bodies.fixed[first])
         if second >= 0:
-            got[second] -= impulse * (not simulation.bodies.fixed[second])
-    assert got == pytest.approx(expected, abs=1e-12 * 2 * G * simulation.time)  # of the weight's impulse
+            momentum[second] -= impulse * (not simulation.bodies.fixed[second])
+    assert momentum == pytest.approx(
+        expected, abs=1e-12 * 2 * G * simulation.time
+    )  # relative to the impulse of the weight
 
 
-def test_asking_at_every_step_tells_the_same_as_asking_once():
-    whole, parts = started(MIXED), started(MIXED)
-    whole.contacts()
-    found = [parts.contacts()]
+def test_contacts_queried_every_step_equal_contacts_queried_once():
+    queried_once, queried_often = simulation_of(MIXED_SCENE), simulation_of(MIXED_SCENE)
+    queried_once.contacts()
+    batches = [queried_often.contacts()]
     for _ in range(200):
-        whole.step()
-        parts.step()
-        found.append(parts.contacts())
-    once = whole.contacts()
+        queried_once.step()
+        queried_often.step()
+        batches.append(queried_often.contacts())
+    expected = queried_once.contacts()
     summed = {}
-    for contacts in found:
+    for contacts in batches:
         for event in contacts:
             key = event.time, event.pair, event.point
             summed[key] = summed.get(key, 0) + np.array(event.impulse)
-    assert list(summed) == [(event.time, event.pair, event.point) for event in once]
-    for event, impulse in zip(once, summed.values(), strict=True):
+    assert list(summed) == [(event.time, event.pair, event.point) for event in expected]
+    for event, impulse in zip(expected, summed.values(), strict=True):
         assert impulse == pytest.approx(event.impulse, abs=1e-12)  # the order of up to 200 additions differs
-    assert whole.state_hash() == parts.state_hash()
+    assert queried_once.state_hash() == queried_often.state_hash()
 
 
-def test_first_call_tells_what_rests_now():
-    simulation = stepped(started(BOUNCE), 300)
+def test_first_query_returns_resting_contacts():
+    simulation = advance(simulation_of(BOUNCING_SCENE), 300)
     contacts = simulation.contacts()
     assert contacts.pair.tolist() == [[0, -1]]
     assert contacts.time.tolist() == [3.0]
-    later = stepped(simulation, 100).contacts()
+    later = advance(simulation, 100).contacts()
     assert later.time.tolist() == [3.0]
-    assert later.impulse[0] == pytest.approx([0, -G], abs=1e-13)  # its weight for a second
+    assert later.impulse[0] == pytest.approx([0, -G], abs=1e-13)  # its weight over one second
 
 
 @pytest.mark.parametrize("count", [2, 3, 5])
-def test_touching_balls_in_line_pass_momentum_on(count):
+def test_touching_balls_in_a_line_transfer_momentum(count):
     row = [{"position": [0.2 * k, 0], "radius": 0.1, "restitution": 1} for k in range(5)]
-    hitting = {"velocity": [1, 0], "radius": 0.1, "restitution": 1}
-    row += [{"position": [-1.0 - 0.2 * k, 0], **hitting} for k in range(count)]
-    simulation = stepped(started({"ball": row}), 300)
+    moving = {"velocity": [1, 0], "radius": 0.1, "restitution": 1}
+    row += [{"position": [-1.0 - 0.2 * k, 0], **moving} for k in range(count)]
+    simulation = advance(simulation_of({"ball": row}), 300)
     speeds = np.sort(simulation.frame().velocity[:, 0])
-    assert speeds == pytest.approx([0.0] * 5 + [1.0] * count, abs=1e-14)  # k in, k out, to rounding
+    assert speeds == pytest.approx([0.0] * 5 + [1.0] * count, abs=1e-14)  # k balls in, k balls out, to rounding
 
 
 @pytest.mark.parametrize("restitution", [1.0, 0.9, 0.3, 0.0])
-def test_a_symmetric_rack_breaks_without_a_hang_and_keeps_momentum(restitution):
+def test_symmetric_rack_breaks_without_hanging_and_conserves_momentum(restitution):
     rack = [
         {"position": [0.1 * math.sqrt(3) * r * (1 + 1e-15), 0.2 * (k - r / 2)], "radius": 0.1}
         for r in range(5)
         for k in range(r + 1)
     ]
     balls = [{"position": [-1, 0], "velocity": [3, 0], "radius": 0.1}, *rack]
-    simulation = started({"ball": [{**ball, "restitution": restitution} for ball in balls]})
-    stepped(simulation, 300)
+    simulation = simulation_of({"ball": [{**ball, "restitution": restitution} for ball in balls]})
+    advance(simulation, 300)
     velocity = simulation.frame().velocity
     assert velocity.sum(axis=0) == pytest.approx([3.0, 0.0], abs=3e-14)  # rounding of some hundred impacts
     energy = float((velocity**2).sum())
     assert energy == pytest.approx(9.0, rel=1e-13) if restitution == 1.0 else energy < 9.0
     frame = simulation.frame().position
-    apart = np.hypot(*(frame[:, None] - frame[None]).transpose(2, 0, 1))[np.triu_indices(16, 1)]
-    assert apart.min() > 0.2 - 1e-12  # none in another, but for rounding
+    distances = np.hypot(*(frame[:, None] - frame[None]).transpose(2, 0, 1))[np.triu_indices(16, 1)]
+    assert distances.min() > 0.2 - 1e-12  # no overlap beyond rounding
 
 
-def test_a_pile_finishes_or_is_given_up_with_a_reason():
+def test_pile_finishes_or_is_exhausted_with_a_reason():
     wall = {"points": [[-1, 4], [-1, 0], [1, 0], [1, 4]], "restitution": 0.3, "friction": 0.3}
     balls = [
         {"position": [-0.8 + 0.3 * (k % 6) + 0.02 * (k // 6), 0.2 + 0.31 * (k // 6)], "radius": 0.1} for k in range(30)
     ]
     balls = [{**ball, "restitution": 0.5, "friction": 0.3} for ball in balls]
-    simulation = started({"world": {"gravity": [0, -G]}, "wall": [wall], "ball": balls}, dt=0.02)
+    simulation = simulation_of({"world": {"gravity": [0, -G]}, "wall": [wall], "ball": balls}, dt=0.02)
     try:
-        stepped(simulation, 10)
+        advance(simulation, 10)
     except Exhaustion as exhaustion:
         assert "events within" in str(exhaustion)
         assert "pymunk, reference" in str(exhaustion)
@@ -158,34 +160,34 @@ def test_a_pile_finishes_or_is_given_up_with_a_reason():
     assert np.isfinite(simulation.frame().position).all()
 
 
-def test_a_pile_whose_events_come_too_fast_to_last_is_given_up_early(monkeypatch):
-    monkeypatch.setattr("sandbox.engines.exact.simulation.PER_SECOND", 20_000)  # few, so that no compiler is needed
+def test_pile_with_too_many_events_is_exhausted_early(monkeypatch):
+    monkeypatch.setattr("sandbox.engines.exact.simulation.PER_SECOND", 20_000)  # low: fast uncompiled
     monkeypatch.setattr("sandbox.engines.exact.simulation.PER_SECOND_AND_BALL", 1)
     normals = {(0, 0): [0, 1], (-0.001, 0): [1, 0], (1.27, 0): [-1, 0]}
     walls = [{"point": list(point), "normal": normal, "friction": 1.0} for point, normal in normals.items()]
-    places = [[0.056 + 0.105 * (k % 12), 0.05 + (0.1 + 1e-6) * (k // 12)] for k in range(120)]
-    balls = [{"position": place, "radius": 0.05, "restitution": 0.0, "friction": 1.0} for place in places]
-    simulation = started({"world": {"gravity": [0, -G]}, "plane": walls, "ball": balls}, dt=0.01)
+    positions = [[0.056 + 0.105 * (k % 12), 0.05 + (0.1 + 1e-6) * (k // 12)] for k in range(120)]
+    balls = [{"position": position, "radius": 0.05, "restitution": 0.0, "friction": 1.0} for position in positions]
+    simulation = simulation_of({"world": {"gravity": [0, -G]}, "plane": walls, "ball": balls}, dt=0.01)
     with pytest.raises(Exhaustion, match=r"5,000 events within 0.0312 s where the limit is 20,000 per second"):
-        stepped(simulation, 100)
-    # Two batches of an eighth of the budget each, and no more than one before them that was still slow.
+        advance(simulation, 100)
+    # Two batches of an eighth of the budget each, after at most one slower batch.
     assert simulation.events < 10_000
 
 
-def test_what_is_too_fast_is_given_up(monkeypatch):
+def test_too_fast_ball_exhausts_the_simulation(monkeypatch):
     monkeypatch.setattr("sandbox.engines.exact.simulation.PER_SECOND", 20_000)
     walls = [{"point": [0, 0], "normal": [1, 0]}, {"point": [0.3, 0], "normal": [-1, 0]}]
     ball = {"position": [0.15, 0], "velocity": [1e9, 0], "radius": 0.1, "restitution": 1}
-    simulation = started({"plane": walls, "ball": [ball]}, dt=1.0)
+    simulation = simulation_of({"plane": walls, "ball": [ball]}, dt=1.0)
     with pytest.raises(Exhaustion, match=r"5,000 events within 0\.0312 s .*, last of 'ball-1' and 'plane-"):
         simulation.step()
 
 
-def test_refusals_name_what_is_missing_and_who_could():
-    drag = from_document({**BOUNCE, "world": {"gravity": [0, -G], "linear_drag": 0.1}})
+def test_refusals_name_the_missing_feature_and_a_supporting_engine():
+    drag = from_document({**BOUNCING_SCENE, "world": {"gravity": [0, -G], "linear_drag": 0.1}})
     with pytest.raises(Refusal, match=r"^exact .* drag.*pymunk"):
         start(drag, "exact")
-    scene, engine = from_document(BOUNCE), ExactEngine()
+    scene, engine = from_document(BOUNCING_SCENE), ExactEngine()
     for choice in (
         {"integrator": "rk4"},
         {"slop": 0.01},
@@ -193,60 +195,60 @@ def test_refusals_name_what_is_missing_and_who_could():
         {"half_kick": True},
         {"broad_phase": "grid"},
     ):
-        (lack,) = engine.missing(scene, scene.solver.replace(**choice))
-        assert next(iter(choice)) in lack
-        assert "remove it" in lack
+        (reason,) = engine.missing(scene, scene.solver.replace(**choice))
+        assert next(iter(choice)) in reason
+        assert "remove it" in reason
     assert engine.missing(scene, scene.solver.replace(substeps=7, iterations=3)) == ()
 
 
-def test_overlaps_are_refused_and_touches_are_not():
+def test_overlaps_are_refused_but_touching_bodies_are_not():
     def balls(gap, **more):
         pair = [{"position": [0, 0], "radius": 0.5}, {"position": [1 + gap, 0], "radius": 0.5, **more}]
         return from_document({"ball": pair})
 
     engine = ExactEngine()
-    (lack,) = engine.missing(balls(-0.1), balls(0).solver)
-    assert lack.startswith("'ball-1' and 'ball-2' overlap by 0.1 m")
+    (reason,) = engine.missing(balls(-0.1), balls(0).solver)
+    assert reason.startswith("'ball-1' and 'ball-2' overlap by 0.1 m")
     assert engine.missing(balls(-1e-10), balls(0).solver) == ()
     assert engine.missing(balls(-0.1, collides="fixed"), balls(0).solver) == ()
-    sunk = from_document({**BOUNCE, "ball": [{"position": [0, 0.4], "radius": 0.5}]})
-    (lack,) = engine.missing(sunk, sunk.solver)
-    assert "'ball-1' and 'plane-1' overlap by 0.1 m" in lack
+    sunk = from_document({**BOUNCING_SCENE, "ball": [{"position": [0, 0.4], "radius": 0.5}]})
+    (reason,) = engine.missing(sunk, sunk.solver)
+    assert "'ball-1' and 'plane-1' overlap by 0.1 m" in reason
 
 
-def test_actions_that_it_cannot_do_change_nothing():
-    simulation = stepped(started(MIXED), 5)
+def test_invalid_actions_change_nothing():
+    simulation = advance(simulation_of(MIXED_SCENE), 5)
     before = simulation.state_hash()
-    for action, why in (
+    for action, message in (
         (Force(time=0, body="ball-1", force=(1.0, 0.0)), "pymunk and reference"),
         (Move(time=0, body="ball-1", position=(0.3, 1.0)), "overlap"),
         (Spawn(time=0, ball=Ball(position=(0.3, 1.0), radius=0.1)), "overlap"),
         (SetParameter(time=0, path="world.linear_drag", value=0.1), "drag"),
         (Remove(time=0, body="nobody"), "nobody"),
     ):
-        with pytest.raises(ActionError, match=why):
+        with pytest.raises(ActionError, match=message):
             simulation.apply(action)
         assert simulation.state_hash() == before
 
 
-def test_gravity_turned_off_lets_a_ball_at_rest_be():
-    simulation = stepped(started(BOUNCE), 400)
+def test_upward_gravity_lifts_a_resting_ball_off_the_floor():
+    simulation = advance(simulation_of(BOUNCING_SCENE), 400)
     rolling = simulation.frame().velocity[0].copy()
     simulation.apply(SetParameter(time=4.0, path="world.gravity", value=[0.0, 1.0]))
-    frame = stepped(simulation, 100).frame()
+    frame = advance(simulation, 100).frame()
     assert frame.velocity[0] == pytest.approx([rolling[0], 1.0], abs=1e-15)  # it rises from the floor
     assert frame.position[0, 1] == pytest.approx(1.0, abs=1e-14)
 
 
-def test_moved_spawned_and_removed_balls_meet_others_where_they_are():
+def test_moved_and_spawned_balls_collide_at_their_new_positions():
     balls = [{"position": [0, 0], "velocity": [1, 0], "radius": 0.5, "restitution": 1}]
-    simulation = started({"ball": balls})
+    simulation = simulation_of({"ball": balls})
     simulation.apply(Spawn(time=0, ball=Ball(name="new", position=(2.0, 0.0), radius=0.5, restitution=1.0)))
-    stepped(simulation, 150)
+    advance(simulation, 150)
     assert simulation.frame().velocity[:, 0].tolist() == [0.0, 1.0]
     assert simulation.frame().position[:, 0] == pytest.approx([1.0, 2.5], abs=1e-15)
     simulation.apply(Move(time=1.5, body="ball-1", position=(5.0, 0.0)))
-    stepped(simulation, 200)
+    advance(simulation, 200)
     assert simulation.frame().velocity[:, 0].tolist() == [1.0, 0.0]
     simulation.apply(Remove(time=3.5, body="new"))
     frame = simulation.frame()
@@ -254,16 +256,16 @@ def test_moved_spawned_and_removed_balls_meet_others_where_they_are():
     assert dict(simulation.retired) == {1: 3.5}
 
 
-def test_ball_that_leaves_the_bounds_is_retired_and_far_ones_end_the_run():
+def test_ball_out_of_bounds_is_retired_and_a_distant_ball_diverges():
     world = {"bounds": [[-2, -2], [2, 2]]}
-    simulation = stepped(
-        started({"world": world, "ball": [{"position": [0, 0], "velocity": [10, 0], "radius": 1}]}), 30
+    simulation = advance(
+        simulation_of({"world": world, "ball": [{"position": [0, 0], "velocity": [10, 0], "radius": 1}]}), 30
     )
     assert simulation.retired[0] == pytest.approx(0.21)  # the first frame beyond 0.2 s
-    away = started({"ball": [{"position": [1e16, 0], "velocity": [1e12, 0], "radius": 1}]}, dt=10)
+    distant = simulation_of({"ball": [{"position": [1e16, 0], "velocity": [1e12, 0], "radius": 1}]}, dt=10)
     with pytest.raises(Divergence):
         for _ in range(10**5):
-            away.step()
+            distant.step()
 
 
 PROGRAM = """
@@ -291,14 +293,14 @@ def test_compiled_and_plain_kernels_agree_bit_for_bit():
             for k in range(16)
         ],
     }
-    incline = {**BOUNCE, "plane": [{"point": [0, 0], "normal": [0.5, 0.8660254037844386], "friction": 0.5}]}
-    cases = json.dumps([[BOUNCE, 300], [gas, 200], [incline, 200], [MIXED, 150]])
+    incline = {**BOUNCING_SCENE, "plane": [{"point": [0, 0], "normal": [0.5, 0.8660254037844386], "friction": 0.5}]}
+    cases = json.dumps([[BOUNCING_SCENE, 300], [gas, 200], [incline, 200], [MIXED_SCENE, 150]])
     outputs = set()
     for disabled in ("0", "1"):
         environment = {**os.environ, "NUMBA_DISABLE_JIT": disabled}
-        done = subprocess.run(
+        process = subprocess.run(
             [sys.executable, "-c", PROGRAM], input=cases, env=environment, capture_output=True, text=True, check=True
         )
-        outputs.add(done.stdout)
+        outputs.add(process.stdout)
     assert len(outputs) == 1
     assert len(outputs.pop().splitlines()) == 4

@@ -1,4 +1,4 @@
-"""Rest, rolling and sliding, each a closed form."""
+"""Resting, rolling and sliding contact against closed forms."""
 
 import math
 
@@ -12,11 +12,11 @@ from sandbox.scene.files.shipped_scenes import find
 G = 9.81
 
 
-def started(document, dt=0.01):
+def simulation_of(document, dt=0.01):
     return ExactEngine().start(from_document({"world": {"gravity": [0, -G]}, "solver": {"dt": dt}, **document}))
 
 
-def stepped(simulation, seconds):
+def advance(simulation, seconds):
     for _ in range(round(seconds / simulation.settings.dt)):
         simulation.step()
     return simulation.frame()
@@ -24,14 +24,14 @@ def stepped(simulation, seconds):
 
 def test_sliding_disc_rolls_after_v_over_3_mu_g():
     floor = {"point": [0, 0], "normal": [0, 1], "friction": 0.2}
-    simulation = started({"plane": [floor], "ball": [{"position": [0, 0.5], "velocity": [3, 0], "radius": 0.5}]})
-    frame = stepped(simulation, 2.0)
+    simulation = simulation_of({"plane": [floor], "ball": [{"position": [0, 0.5], "velocity": [3, 0], "radius": 0.5}]})
+    frame = advance(simulation, 2.0)
     end = 3 / (3 * 0.2 * G)
-    way = 3 * end - 0.1 * G * end**2 + 2 * (2 - end)
-    assert frame.velocity[0] == pytest.approx([2.0, 0.0], abs=1e-14)  # rounding of a few operations, as all below
+    distance = 3 * end - 0.1 * G * end**2 + 2 * (2 - end)
+    assert frame.velocity[0] == pytest.approx([2.0, 0.0], abs=1e-14)  # rounding of a few operations, likewise below
     assert frame.angular_velocity[0] == pytest.approx(-4.0, abs=1e-14)
-    assert frame.position[0] == pytest.approx([way, 0.5], abs=1e-14)
-    assert simulation.events == 2  # it begins to rest, and to roll
+    assert frame.position[0] == pytest.approx([distance, 0.5], abs=1e-14)
+    assert simulation.events == 2  # the start of contact and of rolling
 
 
 @pytest.mark.parametrize(
@@ -40,18 +40,18 @@ def test_sliding_disc_rolls_after_v_over_3_mu_g():
 def test_incline_rolls_or_slips(friction, acceleration):
     scene = load(find("incline"), [f"plane.slope.friction={friction}"])
     simulation = ExactEngine().start(scene)
-    frame = stepped(simulation, 2.0)
+    frame = advance(simulation, 2.0)
     assert np.hypot(*(frame.position - scene.bodies.position)[0]) == pytest.approx(2 * acceleration, rel=1e-14)
     assert np.hypot(*frame.velocity[0]) == pytest.approx(2 * acceleration, rel=1e-14)
-    turned = -4 * acceleration if friction > 0.1 else -4 * 2 * 0.1 * G * math.sqrt(0.75)  # v/r, or μ m g_n r/I t
-    assert frame.angular_velocity[0] == pytest.approx(turned, rel=1e-13)
+    spin = -4 * acceleration if friction > 0.1 else -4 * 2 * 0.1 * G * math.sqrt(0.75)  # v/r, or μ m g_n r/I t
+    assert frame.angular_velocity[0] == pytest.approx(spin, rel=1e-13)
 
 
-def test_inelastic_ball_stays_where_it_falls():
-    simulation = started(
+def test_inelastic_ball_stays_where_it_lands():
+    simulation = simulation_of(
         {"plane": [{"point": [0, 0], "normal": [0, 1]}], "ball": [{"position": [0, 3], "radius": 0.5}]}
     )
-    frame = stepped(simulation, 3.0)
+    frame = advance(simulation, 3.0)
     assert frame.position[0].tolist() == pytest.approx([0, 0.5], abs=1e-15)  # one rounding
     assert frame.velocity[0].tolist() == [0, 0]
 
@@ -61,47 +61,47 @@ def test_ball_comes_to_rest_in_a_corner(friction):
     rough = {"friction": friction, "restitution": 0.5}
     planes = [{"point": [0, 0], "normal": [-1, 1], **rough}, {"point": [0, 0], "normal": [1, 1.5], **rough}]
     ball = {"position": [0.3, 3], "radius": 0.5, "angular_velocity": 30}
-    simulation = started({"plane": planes, "ball": [ball]})
+    simulation = simulation_of({"plane": planes, "ball": [ball]})
     simulation.contacts()
-    stepped(simulation, 8.0)
+    advance(simulation, 8.0)
     earlier = simulation.contacts()
-    frame = stepped(simulation, 2.0)
+    frame = advance(simulation, 2.0)
     assert frame.velocity[0].tolist() == [0, 0]
     assert frame.angular_velocity[0] == (30.0 if friction == 0 else 0.0)
     x, y = frame.position[0]
-    assert (y - x) / math.sqrt(2) == pytest.approx(0.5, abs=1e-12)  # the cut of two series of bounces
+    assert (y - x) / math.sqrt(2) == pytest.approx(0.5, abs=1e-12)  # truncation of two series of bounces
     assert (x + 1.5 * y) / math.hypot(1, 1.5) == pytest.approx(0.5, abs=1e-12)
     later = simulation.contacts()
     assert len(later) == 2
-    assert later.impulse.sum(axis=0) == pytest.approx([0, -2 * G], abs=1e-13)  # its weight, for two seconds
+    assert later.impulse.sum(axis=0) == pytest.approx([0, -2 * G], abs=1e-13)  # its weight over two seconds
     assert set(later.time) <= set(earlier.time)
 
 
 def test_ball_rolls_over_a_joint_and_off_the_end():
     wall = {"points": [[-1, 0], [0, 0], [1, 0]], "thickness": 0.1, "friction": 0.3}
     ball = {"position": [-0.9, 0.15], "velocity": [3.0, 0], "angular_velocity": -30.0, "radius": 0.1}
-    simulation = started({"wall": [wall], "ball": [ball]})
+    simulation = simulation_of({"wall": [wall], "ball": [ball]})
     simulation.contacts()
-    frame = stepped(simulation, 1.0)
+    frame = advance(simulation, 1.0)
     flight = 1.0 - 1.9 / 3.0
-    # v² > g (r + half the thickness): it leaves at once. What is left is a hop of 5e-4 m/s at the end of the wall.
+    # v² > g (r + half the thickness): it leaves at once. The error is a hop of 5e-4 m/s at the end of the wall.
     assert frame.position[0] == pytest.approx([1 + 3 * flight, 0.15 - G * flight**2 / 2], abs=1e-3)
     assert simulation.contacts().pair[0].tolist() == [0, -1]
 
 
-def test_ball_on_top_of_a_peg_hops_in_place():
+def test_ball_on_top_of_a_post_hops_in_place():
     post = {"position": [0, 0], "radius": 0.5, "restitution": 0.5}
-    frame = stepped(started({"post": [post], "ball": [{"position": [0, 2], "radius": 0.3}]}), 2.0)
-    assert frame.position[0] == pytest.approx([0, 0.8], abs=1.3e-8)  # v²/2g of a hop
+    frame = advance(simulation_of({"post": [post], "ball": [{"position": [0, 2], "radius": 0.3}]}), 2.0)
+    assert frame.position[0] == pytest.approx([0, 0.8], abs=1.3e-8)  # v²/2g of one hop
     assert abs(frame.velocity[0, 1]) <= 5e-4
 
 
-def test_ball_at_rest_is_knocked_off_its_feet_and_falls_back():
+def test_resting_ball_is_knocked_off_the_floor_and_lands_again():
     floor = {"point": [0, 0], "normal": [0, 1]}
     balls = [
         {"position": [0, 0.5], "radius": 0.5, "restitution": 0.5},
         {"position": [0.5, 3.0], "radius": 0.5, "restitution": 0.5, "velocity": [0, -2]},
     ]
-    frame = stepped(started({"plane": [floor], "ball": balls}), 5.0)
-    assert frame.position[:, 1] == pytest.approx([0.5, 0.5], abs=1e-12)  # both lie again, to the cut
-    assert frame.velocity[0, 0] + frame.velocity[1, 0] == pytest.approx(0.0, abs=1e-14)  # smooth floor: rounding
+    frame = advance(simulation_of({"plane": [floor], "ball": balls}), 5.0)
+    assert frame.position[:, 1] == pytest.approx([0.5, 0.5], abs=1e-12)  # both rest again, up to truncation
+    assert frame.velocity[0, 0] + frame.velocity[1, 0] == pytest.approx(0.0, abs=1e-14)  # frictionless floor: rounding

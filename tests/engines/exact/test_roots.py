@@ -1,4 +1,4 @@
-"""Quartics: first falls through zero, against mpmath's roots."""
+"""Quartics: first downward zero crossings against mpmath's roots."""
 
 import math
 
@@ -13,21 +13,21 @@ from sandbox.engines.exact.common.roots import curved_entry, first_downward_root
 small = st.floats(-10, 10).map(lambda x: round(x, 3))
 
 
-def first_fall_by_mpmath(coefficients, until):
-    """Return the first simple real root in (0, until] at which the polynomial falls, by 40 digits."""
+def first_downward_root_by_mpmath(coefficients, until):
+    """Return the first simple real root in (0, until] at which the polynomial falls, in 40 digits."""
     while coefficients and coefficients[-1] == 0:
         coefficients = coefficients[:-1]
     if len(coefficients) < 2:
         return math.inf
     with mpmath.workdps(40):
-        rising = [mpmath.mpf(c) for c in coefficients]
-        falling = [k * c for k, c in enumerate(rising)][1:]
+        terms = [mpmath.mpf(c) for c in coefficients]
+        derivative = [k * c for k, c in enumerate(terms)][1:]
         real = []
         for start in np.roots(coefficients[::-1]).tolist():
             root = mpmath.mpc(start)
             for _ in range(8):  # Newton, from 1e-8 or better
-                slope = sum(c * root**k for k, c in enumerate(falling))
-                root -= sum(c * root**k for k, c in enumerate(rising)) / slope if slope else 0
+                slope = sum(c * root**k for k, c in enumerate(derivative))
+                root -= sum(c * root**k for k, c in enumerate(terms)) / slope if slope else 0
             if abs(root.imag) < mpmath.mpf(10) ** -15:
                 real.append(root.real)
         real.sort()
@@ -39,20 +39,20 @@ def first_fall_by_mpmath(coefficients, until):
 
 
 @given(st.lists(small, min_size=5, max_size=5))
-def test_first_fall_is_that_of_40_digits(coefficients):
+def test_first_downward_root_matches_40_digits(coefficients):
     coefficients[0] = abs(coefficients[0]) + 0.5
     found = first_downward_root(*coefficients, 50.0)
-    expected = first_fall_by_mpmath(coefficients, 50.0)
+    expected = first_downward_root_by_mpmath(coefficients, 50.0)
     if found == expected == math.inf:
         return
     if math.isfinite(found) and math.isfinite(expected):
         slope = (polynomial(*coefficients, found + 1e-6) - polynomial(*coefficients, found - 1e-6)) / 2e-6
         scale = sum(abs(c) * found**k for k, c in enumerate(coefficients))
-        # A root is as sharp as the polynomial's rounding over its slope.
+        # The error of a root is the rounding of the polynomial divided by its slope.
         assert abs(found - expected) <= 1e-14 * scale / max(abs(slope), 1e-12) + 1e-12 * found + 1e-7 * (
             abs(slope) < 1e-3
         )
-    else:  # only a double root, a touch, may be seen by one and not by the other
+    else:  # only a double root (a touch) may be found by one and not by the other
         t = min(found, expected)
         scale = sum(abs(c) * t**k for k, c in enumerate(coefficients))
         assert abs(polynomial(*coefficients, t)) <= 1e-12 * scale
@@ -68,19 +68,19 @@ def test_quadratic_roots_are_roots(a, b, c):
 
 
 @given(st.floats(-3, 3), st.floats(1.5, 6), st.floats(-5, 5), st.floats(-5, 5))
-def test_ball_thrown_at_a_peg_meets_it_where_the_parabola_does(x, y, vx, vy):
+def test_ball_thrown_at_a_post_hits_it_where_its_parabola_does(x, y, vx, vy):
     found = curved_entry(-x, -y, -vx, -vy, 0.0, 9.81, 0.5, False, math.inf)
     gaps = [math.hypot(x + vx * t, y + vy * t - 4.905 * t * t) - 0.5 for t in (k * 1e-3 for k in range(4000))]
     inside = [k for k, gap in enumerate(gaps) if gap < -1e-9]
     if found == math.inf:
         assert not inside
         return
-    assert abs(math.hypot(x + vx * found, y + vy * found - 4.905 * found**2) - 0.5) < 1e-12  # places of some 10 m
+    assert abs(math.hypot(x + vx * found, y + vy * found - 4.905 * found**2) - 0.5) < 1e-12  # coordinates of about 10 m
     assert not inside or inside[0] * 1e-3 >= found - 1e-9  # it is the first
 
 
-def test_touching_circles_are_judged_by_how_they_move():
+def test_touching_circles_are_judged_by_their_relative_motion():
     assert curved_entry(1.0, 0.0, -1.0, 0.0, 0.0, -1.0, 1.0, False, math.inf) == 0.0
-    assert curved_entry(0.0, -1.0, 0.0, 0.0, 0.0, 9.81, 1.0, False, math.inf) == 0.0  # pressed
-    back = curved_entry(0.0, -1.0, 0.0, -2.0, 0.0, 9.81, 1.0, True, math.inf)
-    assert back == pytest.approx(4 / 9.81, rel=1e-13)  # thrown up from the top of a peg, and down again
+    assert curved_entry(0.0, -1.0, 0.0, 0.0, 0.0, 9.81, 1.0, False, math.inf) == 0.0  # pressed together
+    returning = curved_entry(0.0, -1.0, 0.0, -2.0, 0.0, 9.81, 1.0, True, math.inf)
+    assert returning == pytest.approx(4 / 9.81, rel=1e-13)  # thrown up from the top of a post, and down again

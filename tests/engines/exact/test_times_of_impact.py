@@ -1,4 +1,4 @@
-"""Near-grazing pairs: no event missed, none invented, judged in exact rational arithmetic."""
+"""Near-grazing pairs: events are found exactly when rational arithmetic finds them."""
 
 import math
 from fractions import Fraction
@@ -10,13 +10,13 @@ from sandbox.engines.exact.common.roots import line_entry, pair_entry
 
 
 def touches(dx, dy, vx, vy, reach):
-    """Decide in rational arithmetic whether two circles ever meet, approaching."""
+    """Return, by rational arithmetic, whether two approaching circles collide."""
     dx, dy, vx, vy, reach = (Fraction(float(each)) for each in (dx, dy, vx, vy, reach))
     cross = dx * vy - dy * vx
     return dx * vx + dy * vy < 0 and (vx * vx + vy * vy) * reach * reach > cross * cross
 
 
-def test_20000_near_grazing_pairs_are_judged_as_exact_arithmetic_does():
+def test_20000_near_grazing_pairs_match_exact_arithmetic():
     random = np.random.default_rng(5)
     wrong = hits = 0
     for _ in range(20_000):
@@ -34,7 +34,7 @@ def test_20000_near_grazing_pairs_are_judged_as_exact_arithmetic_does():
         wrong += (found < math.inf) != hit
         if hit and found < math.inf:
             gap = math.hypot(dx + vx * found, dy + vy * found) - 1.0
-            assert abs(gap) < 1e-13 * distance  # places up to 100 round at 1e-14
+            assert abs(gap) < 1e-13 * distance  # coordinates up to 100 round at 1e-14
     assert 5_000 < hits < 15_000
     assert wrong == 0
 
@@ -46,8 +46,8 @@ def test_leaving_a_plane_is_not_hitting_it(gravity):
         assert tau == (pytest.approx(6.0 / gravity, rel=1e-12) if gravity > 0 else math.inf)  # c moves it by c/3
 
 
-def test_flat_entry_has_all_its_digits_where_naive_roots_have_none():
+def test_line_entry_is_accurate_where_naive_roots_lose_all_digits():
     # c + b τ + a τ²/2 with b² ≫ 2 a c: the naive form subtracts two numbers that agree in all digits.
     assert line_entry(1e-9, -1e5, -9.81) == pytest.approx(1e-14, rel=1e-15)
     assert line_entry(5.0, 0.0, -9.81) == pytest.approx(math.sqrt(10 / 9.81), rel=1e-15)
-    assert line_entry(5.0, -1.0, 9.81) == math.inf  # pulled back before it arrives
+    assert line_entry(5.0, -1.0, 9.81) == math.inf  # turns back before it arrives

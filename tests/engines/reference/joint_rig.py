@@ -1,4 +1,4 @@
-"""A few bodies, their links, and the shortest loop that steps them, for the tests of joints."""
+"""Rig for the tests of joints: a few bodies, their links and a minimal step loop."""
 
 import math
 from typing import Any
@@ -11,16 +11,16 @@ from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
 
 G = 9.81
 BIAS = 0.9**60
-"""pymunk's own: a tenth of an error is undone in a sixtieth of a second."""
+"""pymunk's default error bias: a tenth of a joint error is corrected in 1/60 s."""
 
 
 def link(kind: LinkKind, a: int, b: int, *figures: float, **more: Any) -> dict[str, Any]:
     return {"kind": kind, "a": a, "b": b, "figures": [*figures, 0.0, 0.0, 0.0][:3], **more}
 
 
-def compile_joints(*some: dict[str, Any]) -> JointArrays:
+def compile_joints(*links: dict[str, Any]) -> JointArrays:
     def column(name: str, default: Any, kind: type = np.float64) -> Any:
-        return np.array([one.get(name, default) for one in some], dtype=kind)
+        return np.array([each.get(name, default) for each in links], dtype=kind)
 
     return JointArrays(
         kind=column("kind", 0, np.int64),
@@ -32,13 +32,13 @@ def compile_joints(*some: dict[str, Any]) -> JointArrays:
         most_force=column("most_force", np.inf),
         collide=column("collide", False, np.bool_),
         strength=column("strength", np.inf),
-        number=np.arange(len(some)),
-        names=tuple(f"link {k}" for k in range(len(some))),
+        number=np.arange(len(links)),
+        names=tuple(f"link {k}" for k in range(len(links))),
     )
 
 
 class Rig:
-    """Bodies with links, stepped as the engine does, without contacts."""
+    """Bodies with links, stepped as the engine steps them, without contacts."""
 
     def __init__(
         self,
@@ -48,7 +48,7 @@ class Rig:
         mass: Any = 1.0,
         moment: Any = math.inf,
         *,
-        how: str = "impulses",
+        method: str = "impulses",
         integrator: str = "semi_implicit_euler",
         iterations: int = 10,
         bias: float = BIAS,
@@ -63,22 +63,22 @@ class Rig:
         self.x = np.stack((pose, np.broadcast_to(rates, pose.shape)))
         self.mass = np.broadcast_to(np.asarray(mass, dtype=float), len(pose)).copy()
         self.moment = np.broadcast_to(np.asarray(moment, dtype=float), len(pose)).copy()
-        self.solver = JointSolver(links, 1 / self.mass, 1 / self.moment, bias, iterations, how, cap)
+        self.solver = JointSolver(links, 1 / self.mass, 1 / self.moment, bias, iterations, method, cap)
         self.integrator = INTEGRATORS[integrator]
-        steady = np.zeros_like(pose)
-        steady[np.isfinite(self.mass), 1] = -gravity
-        acting = forces or (lambda x: 0.0)
-        self.u = Inputs(steady, drag, contacts=lambda x: self.solver.forces(x) + acting(x))
+        constant = np.zeros_like(pose)
+        constant[np.isfinite(self.mass), 1] = -gravity
+        applied = forces or (lambda x: 0.0)
+        self.u = Inputs(constant, drag, contacts=lambda x: self.solver.forces(x) + applied(x))
         self.time, self.gravity = 0.0, gravity
 
     def step(self, h: float) -> None:
         moved = self.integrator.step(transition, self.time, self.x, self.u, h)
         if self.solver.method == "impulses":
-            share = self.integrator.fraction
-            self.solver.prepare(kick_pose(moved, share, h), h)
+            fraction = self.integrator.fraction
+            self.solver.prepare(kick_pose(moved, fraction, h), h)
             kicked = moved[1].copy()
             self.solver.solve(moved[1])
-            moved[0] += share * h * (moved[1] - kicked)
+            moved[0] += fraction * h * (moved[1] - kicked)
         else:
             self.solver.project(self.x, moved, h)
         self.x, self.time = moved, self.time + h
@@ -111,26 +111,11 @@ class Rig:
     @property
     def angular_momentum(self) -> float:
         x, v = self.pose[:, :2], self.rates[:, :2]
-        own = np.where(np.isfinite(self.moment), self.moment, 0.0) * self.rates[:, 2]
-        return float((self.mass * (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0]) + own).sum())
+        spin = np.where(np.isfinite(self.moment), self.moment, 0.0) * self.rates[:, 2]
+        return float((self.mass * (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0]) + spin).sum())
 
 
 def pendulum(angle: float, **more: Any) -> Rig:
     """Return a ball on a rod of 1 m that hangs from the origin, `angle` degrees from straight down, at rest."""
     a = math.radians(angle)
     return Rig(compile_joints(link(LinkKind.ROD, -1, 0, 1.0)), [math.sin(a), -math.cos(a)], **more)
-
-
-def period(rig: Rig, h: float, swings: int = 1) -> float:
-    """Return the time from the first to a later turning point on the far side, halved and doubled into a period.
-
-    The angle's zeros are found between steps by a straight line.
-    """
-    crossings: list[float] = []
-    while len(crossings) < 2 * swings + 1:
-        old = rig.pose[0, 0]
-        rig.step(h)
-        new = rig.pose[0, 0]
-        if (old > 0.0) != (new > 0.0):
-            crossings.append(rig.time - h * new / (new - old))
-    return (crossings[-1] - crossings[0]) / swings

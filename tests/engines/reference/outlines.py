@@ -1,4 +1,4 @@
-"""Convex pieces at random, laid out as kernels take them, and what other libraries say of two of them."""
+"""Random convex pieces in the layout of the kernels, and reference results from shapely and qhull."""
 
 import math
 from collections.abc import Iterator
@@ -14,27 +14,27 @@ Outline = tuple[np.ndarray, float]
 """corners (n, 2), counter-clockwise, and radius"""
 
 
-def laid_out(*outlines: Outline) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def pack_outlines(*outlines: Outline) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return corner, first, radius."""
     corners = [np.asarray(corners, dtype=np.float64).reshape(-1, 2) for corners, _ in outlines]
     first = np.cumsum([0, *(len(each) for each in corners)])
     return np.concatenate(corners), first, np.asarray([radius for _, radius in outlines], dtype=np.float64)
 
 
-def met(p: Outline, q: Outline, reach: float = math.inf) -> np.ndarray:
+def collide(p: Outline, q: Outline, reach: float = math.inf) -> np.ndarray:
     """Return the rows that collide_pieces writes."""
     out = np.full((2, 6), math.nan)
-    return out[: collide_pieces(*laid_out(p, q), 0, 1, reach, out)]
+    return out[: collide_pieces(*pack_outlines(p, q), 0, 1, reach, out)]
 
 
-def met_plane(p: Outline, point: tuple[float, float], normal: tuple[float, float], reach: float) -> np.ndarray:
+def collide_plane(p: Outline, point: tuple[float, float], normal: tuple[float, float], reach: float) -> np.ndarray:
     """Return the rows that collide_half_plane writes."""
     out = np.full((2, 6), math.nan)
-    return out[: collide_half_plane(*laid_out(p), 0, *point, *normal, reach, out)]
+    return out[: collide_half_plane(*pack_outlines(p), 0, *point, *normal, reach, out)]
 
 
 def moved(outline: Outline, x: float, y: float, angle: float = 0.0) -> Outline:
-    """Return an outline turned about the origin, then shifted."""
+    """Return an outline rotated about the origin, then translated."""
     cos, sin = math.cos(angle), math.sin(angle)
     return outline[0] @ np.array([[cos, sin], [-sin, cos]]) + (x, y), outline[1]
 
@@ -58,8 +58,8 @@ def ring(count: int, radius: float = 1.0) -> Outline:
     return np.column_stack((radius * np.cos(angle), radius * np.sin(angle))), 0.0
 
 
-def any_outline(random: np.random.Generator) -> Outline:
-    """Return a disc, capsule, box, triangle, sliver or polygon of about 1 m around the origin; some are rounded."""
+def random_outline(random: np.random.Generator) -> Outline:
+    """Return a disc, capsule, box, triangle, sliver or polygon of about 1 m near the origin; some are rounded."""
     radius = 0.0 if random.random() < 0.5 else random.uniform(0.01, 0.5)
     kind = random.integers(6)
     if kind == 0:
@@ -81,25 +81,25 @@ def size_of(*outlines: Outline) -> float:
     return max(float(np.ptp(corners, axis=0).max()) + 2 * radius for corners, radius in outlines)
 
 
-def pairs(seed: int, count: int) -> Iterator[tuple[Outline, Outline, float]]:
-    """Yield pairs of outlines, about half of them in overlap, and their size."""
+def random_pairs(seed: int, count: int) -> Iterator[tuple[Outline, Outline, float]]:
+    """Yield pairs of outlines and their size; about half of the pairs overlap."""
     random = np.random.default_rng(seed)
     for _ in range(count):
-        p = any_outline(random)
-        q = moved(any_outline(random), *random.normal(0.0, 1.0, 2))
+        p = random_outline(random)
+        q = moved(random_outline(random), *random.normal(0.0, 1.0, 2))
         yield p, q, size_of(p, q)
 
 
-def body_of(outline: Outline) -> Any:
-    """Return the hull of the corners as shapely has it."""
+def hull_of(outline: Outline) -> Any:
+    """Return the convex hull of the corners as a shapely geometry."""
     return shapely.MultiPoint(outline[0]).convex_hull
 
 
 def separation_of(p: Outline, q: Outline) -> float:
     """Return the separation, m: shapely's distance where the hulls are apart, else qhull's least penetration."""
-    wide = p[1] + q[1]
-    distance = float(shapely.distance(body_of(p), body_of(q)))
+    radii = p[1] + q[1]
+    distance = float(shapely.distance(hull_of(p), hull_of(q)))
     if distance > 0.0 or len(p[0]) + len(q[0]) < 4:
-        return distance - wide
+        return distance - radii
     difference = (q[0][None, :, :] - p[0][:, None, :]).reshape(-1, 2)
-    return float(ConvexHull(difference).equations[:, 2].max()) - wide
+    return float(ConvexHull(difference).equations[:, 2].max()) - radii

@@ -1,4 +1,4 @@
-"""Scenes and simulations for the tests of the reference engine."""
+"""Builders of scenes and simulations for the tests of the reference engine."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,8 +17,8 @@ FLOOR = {"name": "floor", "point": [0, 0], "normal": [0, 1]}
 
 EARTH = {"gravity": [0.0, -9.81]}
 
-PYMUNK_WAY = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse"}
-"""The choices by which the reference is pymunk's scheme over again."""
+PYMUNK_SETTINGS = {"integrator": "explicit_euler", "detection": "discrete", "response": "impulse"}
+"""Settings with which the reference engine reproduces pymunk's scheme."""
 
 
 def ball(x: float, y: float, **more: Any) -> dict[str, Any]:
@@ -34,31 +34,34 @@ def shipped(name: str) -> Scene:
     return load(ROOT / "scenes" / f"{name}.toml")
 
 
-def running(scene: Scene, engine: str = "reference", **settings: Any) -> Simulation:
+def simulation_of(scene: Scene, engine: str = "reference", **settings: Any) -> Simulation:
     return start(scene, engine, scene.solver.replace(**settings))
 
 
-def stepped(simulation: Simulation, steps: int) -> Simulation:
+def advance(simulation: Simulation, steps: int) -> Simulation:
     for _ in range(steps):
         simulation.step()
     return simulation
 
 
 def side_by_side(scene: Scene, steps: int, **settings: Any) -> Iterator[tuple[Simulation, Simulation]]:
-    """Yield pymunk and the reference, both after each step."""
-    theirs, ours = running(scene, "pymunk", **settings), running(scene, "reference", **PYMUNK_WAY, **settings)
+    """Yield the simulations of pymunk and of the reference engine after each step."""
+    theirs, ours = (
+        simulation_of(scene, "pymunk", **settings),
+        simulation_of(scene, "reference", **PYMUNK_SETTINGS, **settings),
+    )
     for _ in range(steps):
         theirs.step()
         ours.step()
         yield theirs, ours
 
 
-def roster_of(scene: Scene) -> BodyStore:
+def body_store_of(scene: Scene) -> BodyStore:
     return BodyStore(Setup.of(scene), scene.solver.h)
 
 
 def small_pile(count: int = 60) -> Scene:
-    """Return balls that fall into a box and settle: rubbing, bouncing little."""
+    """Return balls that fall into a box and settle, with friction and little restitution."""
     coefficients = {"restitution": 0.1, "friction": 0.5}
     planes = [
         {**FLOOR, "material": "stone"},

@@ -1,4 +1,4 @@
-"""Broad phases: whichever is chosen, the same contacts are found, and none nearer than the margin is lost."""
+"""Broad phases: all find the same contacts and lose no pair that is nearer than the margin."""
 
 import math
 from itertools import combinations
@@ -10,63 +10,64 @@ from hypothesis import strategies as st
 
 from sandbox.engines.reference.broad_phase import BROAD_PHASES, FIRST, SECOND, can_collide, cell_of, pair_key
 from sandbox.engines.reference.collision import CirclePipeline
-from tests.engines.reference.pieces import ball, roster_of, running, scene_of, shipped, small_pile, stepped
+from tests.engines.reference.pieces import advance, ball, body_store_of, scene_of, shipped, simulation_of, small_pile
 
-WORDS = st.sampled_from(["all", "fixed", "none"])
+COLLIDES = st.sampled_from(["all", "fixed", "none"])
 
 
 @st.composite
 def crowds(draw):
-    """Balls near each other, of very different sizes, somewhere; some coincide, some stay where they are."""
+    """Draw balls near each other, of very different sizes, at some offset; some coincide, some are fixed."""
     offset = draw(st.sampled_from([0.0, 1e3, 1e6, 1e9, -1e9]))
-    places = st.one_of(st.integers(-6, 6).map(float), st.floats(-6, 6), st.sampled_from([0.1, 0.3, 0.7]))
+    offsets = st.one_of(st.integers(-6, 6).map(float), st.floats(-6, 6), st.sampled_from([0.1, 0.3, 0.7]))
     balls = []
     for _ in range(draw(st.integers(1, 12))):
-        x, y = offset + draw(places), offset + draw(places)
+        x, y = offset + draw(offsets), offset + draw(offsets)
         radius = draw(st.sampled_from([1e-6, 0.1, 0.35, 0.5, 1.0, 1 / 3, 10.0, 1e4]))
-        more = {"radius": radius, "collides": draw(WORDS)}
+        more = {"radius": radius, "collides": draw(COLLIDES)}
         if draw(st.booleans()):
             more["fixed"] = True
         balls.append(ball(x, y, **more))
     return balls
 
 
-def meets(one, other):
-    """The rule of `collides`, from the scene itself."""
-    words = [each["collides"] for each in (one, other)]
+def expected_to_collide(one, other):
+    """Return whether two balls collide by the rule of `collides`, from the scene document."""
+    modes = [each["collides"] for each in (one, other)]
     fixed = [bool(each.get("fixed")) for each in (one, other)]
-    if "none" in words or all(fixed):
+    if "none" in modes or all(fixed):
         return False
     if any(fixed):
-        return words[fixed.index(True)] == "all"
-    return words == ["all", "all"]
+        return modes[fixed.index(True)] == "all"
+    return modes == ["all", "all"]
 
 
-def found(finder, position, margin=0.0):
+def contact_columns(finder, position, margin=0.0):
     contacts = finder.manifolds(position, finder.candidates(position, margin), margin)
     return [column.tolist() for column in contacts]
 
 
 @given(crowds())
-def test_all_find_the_same_manifolds(balls):
-    store = roster_of(scene_of(*balls))
-    results = [found(CirclePipeline(store, name), store.position) for name in BROAD_PHASES]
+def test_all_broad_phases_find_the_same_manifolds(balls):
+    store = body_store_of(scene_of(*balls))
+    results = [contact_columns(CirclePipeline(store, name), store.position) for name in BROAD_PHASES]
     assert all(result == results[0] for result in results)
     overlapping = [
         pair_key(i, j)
         for (i, a), (j, b) in combinations(enumerate(balls), 2)
-        if meets(a, b) and math.dist(a["position"], b["position"]) < a["radius"] + b["radius"]
+        if expected_to_collide(a, b) and math.dist(a["position"], b["position"]) < a["radius"] + b["radius"]
     ]
     assert results[0][0] == overlapping
 
 
 @given(crowds(), st.floats(0, 5))
-def test_none_loses_a_pair_nearer_than_the_margin(balls, margin):
-    store = roster_of(scene_of(*balls))
+def test_no_broad_phase_loses_a_pair_nearer_than_the_margin(balls, margin):
+    store = body_store_of(scene_of(*balls))
     near = {
         pair_key(i, j)
         for (i, a), (j, b) in combinations(enumerate(balls), 2)
-        if meets(a, b) and math.dist(a["position"], b["position"]) < a["radius"] + b["radius"] + margin * (1 - 1e-12)
+        if expected_to_collide(a, b)
+        and math.dist(a["position"], b["position"]) < a["radius"] + b["radius"] + margin * (1 - 1e-12)
     }
     for name in BROAD_PHASES:
         keys = CirclePipeline(store, name).candidates(store.position, margin).balls.tolist()
@@ -75,12 +76,12 @@ def test_none_loses_a_pair_nearer_than_the_margin(balls, margin):
 
 
 @given(crowds(), st.randoms(use_true_random=False))
-def test_the_order_kept_from_step_to_step_changes_nothing(balls, random):
-    store = roster_of(scene_of(*balls))
-    used = CirclePipeline(store, "sweep")
+def test_sweep_order_kept_between_steps_does_not_change_the_result(balls, random):
+    store = body_store_of(scene_of(*balls))
+    reused = CirclePipeline(store, "sweep")
     for _ in range(3):
         moved = store.position + np.array([[random.uniform(-3, 3), random.uniform(-3, 3)] for _ in balls])
-        assert found(used, moved) == found(CirclePipeline(store, "all_pairs"), moved)
+        assert contact_columns(reused, moved) == contact_columns(CirclePipeline(store, "all_pairs"), moved)
 
 
 def touching_within_rounding(count):
@@ -95,65 +96,67 @@ def touching_within_rounding(count):
 
 
 @pytest.mark.parametrize("name", BROAD_PHASES)
-def test_touches_within_the_rounding_of_a_far_place_are_not_lost(name):
+def test_overlaps_below_rounding_far_from_the_origin_are_found(name):
     for x, a, other, b in touching_within_rounding(300):
         balls = [ball(x, 0.0, radius=a), ball(other, 0.0, radius=b)]
-        store = roster_of(scene_of(*balls))
-        assert found(CirclePipeline(store, name), store.position)[0] == [pair_key(0, 1)]
+        store = body_store_of(scene_of(*balls))
+        assert contact_columns(CirclePipeline(store, name), store.position)[0] == [pair_key(0, 1)]
 
 
 @pytest.mark.parametrize("name", BROAD_PHASES)
-def test_balls_near_the_end_of_doubles_are_neighbours_if_they_touch(name):
-    # Cells 2.02 m wide around the 2⁵²th: their numbers are rounded, and on one side twice as coarsely.
+def test_touching_balls_are_found_where_cell_indices_are_rounded(name):
+    # Cells 2.02 m wide around index 2⁵²: indices are rounded, twice as coarsely on the upper side.
     wide = 2.02
     start = 2.0**52 * wide
     for k in range(-40, 40):
         x = start + 2.0 * k
-        store = roster_of(scene_of(ball(x, 0.0, radius=wide / 2), ball(x + 2.0, 0.0, radius=wide / 2)))
-        assert found(CirclePipeline(store, name), store.position)[0] == [pair_key(0, 1)]
+        store = body_store_of(scene_of(ball(x, 0.0, radius=wide / 2), ball(x + 2.0, 0.0, radius=wide / 2)))
+        assert contact_columns(CirclePipeline(store, name), store.position)[0] == [pair_key(0, 1)]
 
 
 @pytest.mark.parametrize("name", BROAD_PHASES)
 @pytest.mark.parametrize("balls", [[], [ball(0, 0)], [ball(0, 0), ball(0, 0)], [ball(0, 0, collides="none")] * 3])
 def test_empty_and_smallest_scenes(name, balls):
     balls = [{**each, "name": f"b{k}"} for k, each in enumerate(balls)]
-    if not balls:  # a scene of nothing else is a fault
+    if not balls:  # a scene without any object is invalid
         document = {"plane": [{"point": [0, 0], "normal": [0, 1]}]}
-        finder = CirclePipeline(roster_of(scene_of(**document)), name)
-        assert found(finder, np.empty((0, 2)))[0] == []
+        finder = CirclePipeline(body_store_of(scene_of(**document)), name)
+        assert contact_columns(finder, np.empty((0, 2)))[0] == []
         return
-    store = roster_of(scene_of(*balls))
+    store = body_store_of(scene_of(*balls))
     expected = [pair_key(0, 1)] if len(balls) == 2 else []
-    assert found(CirclePipeline(store, name), store.position)[0] == expected
+    assert contact_columns(CirclePipeline(store, name), store.position)[0] == expected
 
 
 @pytest.mark.parametrize("name", BROAD_PHASES)
-def test_coincident_centres_have_the_normal_of_munk(name):
-    store = roster_of(scene_of(ball(3, 4), ball(3, 4)))
+def test_coincident_centres_have_pymunks_normal(name):
+    store = body_store_of(scene_of(ball(3, 4), ball(3, 4)))
     contacts = CirclePipeline(store, name).overlaps(store.position)
     assert (contacts.separation.tolist(), contacts.normal.tolist()) == ([-1.0], [[1.0, 0.0]])
 
 
 @pytest.mark.parametrize("name", BROAD_PHASES)
-def test_more_pairs_than_there_is_room_for_are_all_kept(name):
+def test_pairs_beyond_the_initial_capacity_are_kept(name):
     balls = [ball(0.001 * k, 0.0, name=f"b{k}") for k in range(40)]
-    store = roster_of(scene_of(*balls))
+    store = body_store_of(scene_of(*balls))
     assert len(CirclePipeline(store, name).overlaps(store.position).key) == 40 * 39 // 2
 
 
 @pytest.mark.parametrize("name", BROAD_PHASES)
-def test_a_position_that_is_no_number_meets_nobody_and_hides_nobody(name):
-    store = roster_of(scene_of(ball(0, 0), ball(0.5, 0), ball(0.2, 0.2)))
+def test_nan_position_collides_with_nothing_and_hides_no_other_pair(name):
+    store = body_store_of(scene_of(ball(0, 0), ball(0.5, 0), ball(0.2, 0.2)))
     position = store.position.copy()
     position[2] = np.nan
-    keys = found(CirclePipeline(store, name), position)[0]
+    keys = contact_columns(CirclePipeline(store, name), position)[0]
     assert set(keys) <= {pair_key(0, 1)}
     assert name == "sweep" or keys == [pair_key(0, 1)]
 
 
-def test_circles_tests_every_pair_that_may_meet_and_the_others_far_fewer():
+def test_circles_tests_every_collidable_pair_and_the_others_far_fewer():
     wide = [ball(3.0 * k, 0.1 * (k % 7), name=f"b{k}") for k in range(400)]
-    store = roster_of(scene_of(*wide, ball(0, 50, fixed=True), ball(9, 50, fixed=True), ball(4, 50, collides="fixed")))
+    store = body_store_of(
+        scene_of(*wide, ball(0, 50, fixed=True), ball(9, 50, fixed=True), ball(4, 50, collides="fixed"))
+    )
     tests = {}
     for name in BROAD_PHASES:
         finder = CirclePipeline(store, name)
@@ -163,51 +166,51 @@ def test_circles_tests_every_pair_that_may_meet_and_the_others_far_fewer():
     assert max(tests["grid"], tests["sweep"]) < tests["circles"] / 50  # at most the neighbours of each
 
 
-def test_one_huge_ball_spoils_the_grid_and_not_the_sweep():
+def test_one_huge_ball_defeats_the_grid_but_not_the_sweep():
     small = [ball(3.0 * k, 0.0, name=f"b{k}") for k in range(200)]
-    store = roster_of(scene_of(*small, ball(300, -1e4 - 1, radius=1e4)))
+    store = body_store_of(scene_of(*small, ball(300, -1e4 - 1, radius=1e4)))
     tests = {}
     for name in ("grid", "sweep"):
         finder = CirclePipeline(store, name)
         finder.overlaps(store.position)
         tests[name] = finder.work["broad_tests"]
-    assert tests["grid"] >= 200 * 199 // 2  # all are in one cell, or in the next
+    assert tests["grid"] >= 200 * 199 // 2  # all are in one cell or in neighbouring cells
     assert tests["sweep"] < tests["grid"] / 20
 
 
-def same_runs(scene, steps, **settings):
-    runs = [stepped(running(scene, broad_phase=name, **settings), steps) for name in BROAD_PHASES]
+def runs_are_identical(scene, steps, **settings):
+    runs = [advance(simulation_of(scene, broad_phase=name, **settings), steps) for name in BROAD_PHASES]
     assert runs[0].work["contacts"] > 0
     return len({run.state_hash() for run in runs}) == 1
 
 
-def test_a_gas_runs_the_same_on_all():
-    assert same_runs(shipped("benchmark/gas"), 120, dt=0.01)
+def test_gas_runs_identically_on_all_broad_phases():
+    assert runs_are_identical(shipped("benchmark/gas"), 120, dt=0.01)
 
 
-def test_a_pile_runs_the_same_on_all():
-    assert same_runs(small_pile(), 80)
+def test_pile_runs_identically_on_all_broad_phases():
+    assert runs_are_identical(small_pile(), 80)
 
 
 @pytest.mark.parametrize("detection", ["bisect", "swept", "shrink"])
-def test_a_pile_runs_the_same_on_all_with_each_detection(detection):
-    assert same_runs(small_pile(18), 40, detection=detection)
+def test_pile_runs_identically_on_all_broad_phases_with_each_detection(detection):
+    assert runs_are_identical(small_pile(18), 40, detection=detection)
 
 
-def test_penalty_runs_the_same_on_all():
-    assert same_runs(small_pile(), 20, response="penalty", substeps=20)
+def test_penalty_pile_runs_identically_on_all_broad_phases():
+    assert runs_are_identical(small_pile(), 20, response="penalty", substeps=20)
 
 
-def test_unlike_sizes_run_the_same_on_all():
+def test_mixed_sizes_run_identically_on_all_broad_phases():
     radii = [0.02, 0.3, 0.05, 1.0, 0.1]
     balls = [ball(1.1 * (k % 6), 1.2 + 1.3 * (k // 6), radius=radii[k % 5] / 2, name=f"b{k}") for k in range(30)]
     scene = scene_of(
         *balls, ball(3, -3, radius=3.0, fixed=True, name="hill"), world={"gravity": [0.0, -9.81]}, solver={"dt": 0.005}
     )
-    assert same_runs(scene, 200)
+    assert runs_are_identical(scene, 200)
 
 
-def test_keys_hold_both_numbers_and_ascend_as_pairs_do():
+def test_pair_keys_hold_both_indices_and_sort_like_pairs():
     pairs = [(0, 0), (0, 1), (0, SECOND), (1, 0), (5, 7), (SECOND, SECOND)]
     keys = [pair_key(i, j) for i, j in pairs]
     assert keys == sorted(keys)
@@ -215,13 +218,13 @@ def test_keys_hold_both_numbers_and_ascend_as_pairs_do():
 
 
 @given(st.integers(0, 2), st.booleans(), st.integers(0, 2), st.booleans())
-def test_meeting_does_not_depend_on_who_is_asked_first(a, a_moves, b, b_moves):
+def test_can_collide_is_symmetric_and_false_for_two_static_bodies(a, a_moves, b, b_moves):
     assert can_collide(a, a_moves, b, b_moves) == can_collide(b, b_moves, a, a_moves)
     assume(not (a_moves or b_moves))
     assert not can_collide(a, a_moves, b, b_moves)
 
 
-def test_cells_are_numbered_from_left_to_right_as_far_as_numbers_go():
+def test_cell_indices_ascend_with_x_up_to_huge_coordinates():
     assert [cell_of(x, 0.5) for x in (-1.0, -0.1, 0.0, 0.49, 0.5)] == [-2, -1, 0, 0, 1]
     assert cell_of(-1e300, 1e-9) < cell_of(1e300, 1e-9)
     assert cell_of(math.nan, 1.0) == 0

@@ -1,4 +1,4 @@
-"""Dissipation: an impact never creates energy, and is Newton's where that creates none."""
+"""Dissipative impacts: they never create energy, and equal Newton's law where that creates none."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ from tests.accounts import ledger
 
 pytestmark = pytest.mark.full  # property tests with many examples
 
-ROOM = [
+ROOM_PLANES = [
     {"point": [0, -2], "normal": [0, 1]},
     {"point": [0, 2], "normal": [0, -1]},
     {"point": [-2, 0], "normal": [1, 0]},
@@ -23,12 +23,12 @@ ROOM = [
 ]
 
 
-def thrown(seed: int, count: int, e: float, mu: float, **solver: object) -> Scene:
-    """Boxes and capsules thrown about a room without gravity."""
+def thrown_bodies(seed: int, count: int, e: float, mu: float, **solver: object) -> Scene:
+    """Return a scene of boxes and capsules thrown about a room without gravity."""
     random = np.random.default_rng(seed)
     bodies: dict[str, list[dict[str, object]]] = {"box": [], "capsule": []}
     for k in range(count):
-        own = {
+        common = {
             "name": f"body {k}",
             "position": [-1.0 + 2.0 * (k % 2), -1.0 + 2.0 * (k // 2)],
             "angle": random.uniform(0, 6.28),
@@ -40,57 +40,59 @@ def thrown(seed: int, count: int, e: float, mu: float, **solver: object) -> Scen
         shape = {"size": random.uniform(0.1, 0.8, 2).tolist()}
         if k % 3 == 2:
             shape = {"length": random.uniform(0.2, 0.6), "radius": random.uniform(0.05, 0.2)}
-        bodies["capsule" if k % 3 == 2 else "box"].append({**own, **shape})
-    planes = [{**plane, "restitution": 1.0, "friction": 1.0} for plane in ROOM]
+        bodies["capsule" if k % 3 == 2 else "box"].append({**common, **shape})
+    planes = [{**plane, "restitution": 1.0, "friction": 1.0} for plane in ROOM_PLANES]
     return from_document(
         {"title": "", "world": {"duration": 1.0}, "solver": {"dt": 0.002, **solver}, "plane": planes, **bodies}
     )
 
 
-def kinetic(run: sandbox.Trajectory, scene: Scene) -> np.ndarray:
+def kinetic_energy(run: sandbox.Trajectory, scene: Scene) -> np.ndarray:
     mass, moment = scene.bodies.mass, scene.bodies.moment
     return np.asarray(0.5 * ((run.velocity**2).sum(axis=2) @ mass + run.angular_velocity**2 @ moment))
 
 
 @given(st.integers(0, 10**6), st.integers(1, 4), st.floats(0, 1), st.floats(0, 2))
-@example(seed=4, count=4, e=0.0, mu=1.0)  # whose passes without restitution end before they agree
+@example(seed=4, count=4, e=0.0, mu=1.0)  # the iterations without restitution end before convergence
 @example(seed=4, count=2, e=0.0, mu=1.0)
 @settings(max_examples=15, deadline=None)
-def test_no_impact_creates_energy(seed: int, count: int, e: float, mu: float) -> None:
-    scene = thrown(seed, count, e, mu, impact="dissipative")
+def test_dissipative_impacts_never_create_energy(seed: int, count: int, e: float, mu: float) -> None:
+    scene = thrown_bodies(seed, count, e, mu, impact="dissipative")
     for integrator, detection in (("explicit_euler", "discrete"), ("velocity_verlet", "bisect")):
-        energy = kinetic(sandbox.run(scene, engine="reference", integrator=integrator, detection=detection), scene)
+        energy = kinetic_energy(
+            sandbox.run(scene, engine="reference", integrator=integrator, detection=detection), scene
+        )
         assert (
             np.diff(energy) <= 1e-11 * energy[0]
-        ).all()  # rounding of some impacts a step, each 1e-13 of its turnover
+        ).all()  # rounding of some impacts a step, each 1e-13 of the energy that it exchanges
 
 
-def test_newtons_law_does_create_energy() -> None:
-    """The law above is no empty one: the same bodies by Newton's law."""
+def test_newtons_law_creates_energy() -> None:
+    """Control for the test above: the same bodies with Newton's law."""
     gains = []
     for seed in range(8):
-        scene = thrown(seed, 2, 0.9, 0.8)
-        energy = kinetic(sandbox.run(scene, engine="reference"), scene)
+        scene = thrown_bodies(seed, 2, 0.9, 0.8)
+        energy = kinetic_energy(sandbox.run(scene, engine="reference"), scene)
         gains.append(float(np.diff(energy).max() / energy[0]))
     assert max(gains) > 0.01
 
 
 @pytest.mark.parametrize("kind", ["frictionless", "balls"])
-def test_where_newtons_law_creates_none_both_are_the_same_bit_for_bit(kind: str) -> None:
+def test_both_laws_are_bit_identical_where_newtons_law_creates_no_energy(kind: str) -> None:
     if kind == "frictionless":
-        scene = thrown(3, 4, 0.8, 0.0)
+        scene = thrown_bodies(3, 4, 0.8, 0.0)
     else:
         ball = {"radius": 0.3, "restitution": 0.8, "friction": 0.6, "velocity": [2.0, 1.0]}
         balls = [{**ball, "position": [x, 0.0], "angular_velocity": 30.0 * x} for x in (-1.0, 0.0, 1.0)]
-        planes = [{**plane, "friction": 1.0} for plane in ROOM]
+        planes = [{**plane, "friction": 1.0} for plane in ROOM_PLANES]
         scene = from_document({"title": "", "world": {"duration": 2.0}, "plane": planes, "ball": balls})
     runs = [sandbox.run(scene, engine="reference", impact=impact) for impact in ("newton", "dissipative")]
     for name in ("position", "velocity", "angular_velocity"):
         assert np.array_equal(getattr(runs[0], name), getattr(runs[1], name))
 
 
-def test_the_ledger_names_what_impacts_create() -> None:
-    """A box thrown onto rough ground: what Newton's law creates is phantom energy, on both engines alike."""
+def test_ledger_books_energy_created_by_impacts_as_phantom() -> None:
+    """A box is thrown onto rough ground: energy created by Newton's law is booked as phantom on both engines."""
     box = {"position": [0, 1], "size": [0.2447, 0.1003], "velocity": [-1.6, -5.0], "angular_velocity": -12.0}
     gains = []
     for angle in (1.2, 1.3, 1.36, 1.4, 1.5):
@@ -103,16 +105,20 @@ def test_the_ledger_names_what_impacts_create() -> None:
                 "box": [{**box, "angle": angle}],
             }
         )
-        books = [ledger(scene, "pymunk"), ledger(scene, "reference"), ledger(scene, "reference", impact="dissipative")]
-        assert all(book.closes_to < 1e-9 for book in books)  # rounding of the works of 500 substeps
-        gains.append([book.of(Cause.PHANTOM) / book.total[0] for book in books])
-    pymunk, newton, cut = np.array(gains).T
+        ledgers = [
+            ledger(scene, "pymunk"),
+            ledger(scene, "reference"),
+            ledger(scene, "reference", impact="dissipative"),
+        ]
+        assert all(each.closes_to < 1e-9 for each in ledgers)  # rounding of the works of 500 substeps
+        gains.append([each.of(Cause.PHANTOM) / each.total[0] for each in ledgers])
+    pymunk, newton, dissipative = np.array(gains).T
     assert pymunk.max() > 0.05 and newton.max() > 0.05
-    assert cut.max() < 1e-12  # rounding
+    assert dissipative.max() < 1e-12  # rounding
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
-def test_check_foretells_what_impacts_create(engine: str) -> None:
+def test_preflight_warns_of_energy_created_by_impacts(engine: str) -> None:
     box = {"position": [0, 1], "size": [0.2447, 0.1003], "velocity": [-1.6, -5.0], "angular_velocity": -12.3}
     scene = from_document(
         {
@@ -123,13 +129,13 @@ def test_check_foretells_what_impacts_create(engine: str) -> None:
             "box": [{**box, "angle": 1.36}],
         }
     )
-    (told,) = [each for each in run_preflight(scene, engine=engine).warnings if each.kind == "energy"]
-    assert "dissipative" in told.message
-    cut = scene.solver.replace(impact="dissipative")
-    assert not [each for each in run_preflight(scene, cut, "reference").warnings if each.kind == "energy"]
+    (warning,) = [each for each in run_preflight(scene, engine=engine).warnings if each.kind == "energy"]
+    assert "dissipative" in warning.message
+    dissipative = scene.solver.replace(impact="dissipative")
+    assert not [each for each in run_preflight(scene, dissipative, "reference").warnings if each.kind == "energy"]
 
 
-def test_largest_share_is_where_the_work_ends_to_take() -> None:
+def test_largest_fraction_is_where_the_work_reaches_zero() -> None:
     work, slope, curve = (
         np.array([-1.0, -1.0, -2.0, 0.5, 0.0]),
         np.array([0.0, 3.0, 0.5, 1.0, 0.0]),
@@ -139,6 +145,6 @@ def test_largest_share_is_where_the_work_ends_to_take() -> None:
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "exact"])
-def test_other_engines_refuse_the_choice(engine: str) -> None:
-    run = sandbox.run(thrown(0, 1, 0.5, 0.5), engine=engine, impact="dissipative")
+def test_other_engines_refuse_dissipative_impacts(engine: str) -> None:
+    run = sandbox.run(thrown_bodies(0, 1, 0.5, 0.5), engine=engine, impact="dissipative")
     assert run.status == "refused"

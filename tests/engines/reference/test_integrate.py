@@ -1,4 +1,4 @@
-"""Integrating one's own f(t, x, u): orders of convergence, inputs, shapes, and what is refused."""
+"""`integrate` of a user's f(t, x, u): orders of convergence, inputs, shapes and errors."""
 
 import math
 from collections.abc import Callable
@@ -19,7 +19,7 @@ def oscillator(t: float, x: FloatArray, u: float | None) -> FloatArray:
 
 
 def driven_and_damped(t: float, x: FloatArray, u: FloatArray) -> FloatArray:
-    """Return ẋ of a driven oscillator, whose input u cancels all but the motion sin(t)."""
+    """Return ẋ of a driven oscillator; the input u is chosen such that the solution is sin(t)."""
     return np.stack((x[1], u - 0.3 * x[1] - x[0]))
 
 
@@ -36,7 +36,7 @@ def oscillator_error(method: str, steps: int) -> float:
 
 
 def driven_error(method: str, steps: int) -> float:
-    def u(t: float) -> float:  # -sin t + 0.3 cos t + sin t: the motion is sin t
+    def u(t: float) -> float:  # -sin t + 0.3 cos t + sin t: the solution is sin t
         return 0.3 * math.cos(t)
 
     found = sandbox.integrate(driven_and_damped, [0.0, 1.0], np.linspace(0.0, 3.0, steps + 1), method, u)
@@ -75,8 +75,8 @@ def test_result_has_times_states_order_and_calls() -> None:
 
 
 def test_motion_back_in_time_returns_to_the_start() -> None:
-    there = sandbox.integrate(oscillator, [1.0, 0.5], np.linspace(0.0, 2.0, 101), "leapfrog")
-    back = sandbox.integrate(oscillator, there.x[-1], np.linspace(2.0, 0.0, 101), "leapfrog")
+    forward = sandbox.integrate(oscillator, [1.0, 0.5], np.linspace(0.0, 2.0, 101), "leapfrog")
+    back = sandbox.integrate(oscillator, forward.x[-1], np.linspace(2.0, 0.0, 101), "leapfrog")
     assert back.x[-1] == pytest.approx([1.0, 0.5], abs=1e-12)  # leapfrog is reversible, but for rounding
 
 
@@ -94,7 +94,7 @@ def test_motion_back_in_time_returns_to_the_start() -> None:
         (([1.0], [0.0, 1.0]), r"f fails at x0 of shape \(1,\): IndexError"),
     ],
 )
-def test_what_is_wrong_is_refused(arguments: tuple[object, ...], reason: str) -> None:
+def test_invalid_arguments_raise_value_error(arguments: tuple[object, ...], reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         sandbox.integrate(oscillator, *arguments)  # type: ignore[arg-type]
 
@@ -106,7 +106,7 @@ def test_methods_for_second_order_systems_need_positions_and_velocities(method: 
 
 
 @pytest.mark.parametrize(
-    ("name", "meant"),
+    ("name", "suggestion"),
     [
         ("euler", "explicit_euler"),
         ("Forward Euler", "explicit_euler"),
@@ -118,13 +118,13 @@ def test_methods_for_second_order_systems_need_positions_and_velocities(method: 
         ("rk45", "rk4"),
     ],
 )
-def test_near_name_of_a_method_is_suggested(name: str, meant: str) -> None:
-    with pytest.raises(ValueError, match=f"did you mean '{meant}'"):
+def test_similar_name_of_a_method_is_suggested(name: str, suggestion: str) -> None:
+    with pytest.raises(ValueError, match=f"did you mean '{suggestion}'"):
         sandbox.integrate(oscillator, [1.0, 0.0], [0.0, 1.0], name)
 
 
 @pytest.mark.parametrize("method", ["", "adams", 4, ["rk4"], None])
-def test_method_that_is_near_none_is_refused_without_a_suggestion(method: object) -> None:
+def test_unknown_method_is_refused_without_a_suggestion(method: object) -> None:
     with pytest.raises(ValueError, match=r"no integrator .*; integrators: "):
         sandbox.integrate(oscillator, [1.0, 0.0], [0.0, 1.0], method)  # type: ignore[arg-type]
 
@@ -137,7 +137,7 @@ def test_method_that_is_near_none_is_refused_without_a_suggestion(method: object
         (1.0, "f: a function f"),
     ],
 )
-def test_function_of_other_arguments_is_refused(f: Callable[..., object], reason: str) -> None:
+def test_function_with_the_wrong_signature_is_refused(f: Callable[..., object], reason: str) -> None:
     with pytest.raises(TypeError, match=reason):
         sandbox.integrate(f, [1.0, 0.0], [0.0, 1.0])  # type: ignore[arg-type]
 
@@ -151,12 +151,12 @@ def test_function_of_other_arguments_is_refused(f: Callable[..., object], reason
         ([[1.0, 0.0]], r"f returns the shape \(1, 2\)"),
     ],
 )
-def test_result_of_another_shape_is_refused(result: object, reason: str) -> None:
+def test_result_of_the_wrong_shape_is_refused(result: object, reason: str) -> None:
     with pytest.raises(ValueError, match=reason):
         sandbox.integrate(lambda t, x, u: result, [1.0, 0.0], [0.0, 1.0])  # type: ignore[arg-type, return-value]
 
 
-def test_function_with_optional_arguments_is_called_with_three() -> None:
+def test_function_with_optional_arguments_is_called_with_three_arguments() -> None:
     def decay(t: float, x: FloatArray, u: object = None, rate: float = 1.0) -> FloatArray:
         return -rate * x
 

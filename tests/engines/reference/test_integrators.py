@@ -1,4 +1,4 @@
-"""Integrators: orders fitted against DOP853, and what each is known to do to an oscillator and a projectile."""
+"""Integrators: orders fitted against DOP853, and known errors on an oscillator and a projectile."""
 
 import math
 from itertools import pairwise
@@ -13,7 +13,7 @@ from sandbox.engines.reference.integrators import INTEGRATORS, Inputs, amplifica
 
 SYMPLECTIC = ["semi_implicit_euler", "velocity_verlet", "leapfrog"]
 
-# The scheme asks its inputs whether accelerations depend on velocity; this one says yes.
+# The scheme reads from its inputs whether accelerations depend on velocity; with contacts they do.
 DAMPED = Inputs(np.zeros((1, 1)), contacts=lambda x: np.zeros_like(x[0]))
 CONSERVATIVE = Inputs(np.zeros((1, 1)))
 
@@ -45,7 +45,7 @@ def run(step, f, x, u, time, steps):
 
 @pytest.mark.parametrize("problem", PROBLEMS)
 @pytest.mark.parametrize("name", INTEGRATORS)
-def test_the_error_falls_with_the_declared_order(name, problem):
+def test_error_converges_with_the_declared_order(name, problem):
     f, u, x, time, coarsest = PROBLEMS[problem]
     scheme = INTEGRATORS[name]
     solution = solve_ivp(
@@ -55,7 +55,9 @@ def test_the_error_falls_with_the_declared_order(name, problem):
     steps = [coarsest[scheme.order] * 2**k for k in range(4)]
     errors = [float(np.abs(run(scheme.step, f, x, u, time, n) - truth).max()) for n in steps]
     slope = -np.polyfit(np.log(steps), np.log(errors), 1)[0]
-    assert slope == pytest.approx(scheme.order, abs=0.2)  # three halvings from not quite the asymptotic range on
+    assert slope == pytest.approx(
+        scheme.order, abs=0.2
+    )  # three halvings, starting slightly outside the asymptotic range
 
 
 def oscillator(frequency, damping=0.0):
@@ -63,7 +65,7 @@ def oscillator(frequency, damping=0.0):
 
 
 def energies(name, frequency, h, steps):
-    """Return the energies of an oscillator released at rest from 1 m, as parts of the first."""
+    """Return the energies of an oscillator released at rest from 1 m, relative to the initial energy."""
     x, f, out = np.array([[[1.0]], [[0.0]]]), oscillator(frequency), []
     for k in range(steps):
         x = INTEGRATORS[name].step(f, k * h, x, CONSERVATIVE, h)
@@ -72,46 +74,46 @@ def energies(name, frequency, h, steps):
 
 
 @given(st.floats(0.1, 10), st.floats(1e-3, 0.5), st.integers(1, 50))
-def test_explicit_euler_gains_energy_by_its_formula(frequency, z, steps):
-    gained = energies("explicit_euler", frequency, z / frequency, steps)
+def test_explicit_euler_gains_energy_as_its_formula_predicts(frequency, z, steps):
+    relative = energies("explicit_euler", frequency, z / frequency, steps)
     expected = (1.0 + z * z) ** np.arange(1, steps + 1)
-    assert gained == pytest.approx(expected, rel=1e-15 * 10 * steps)  # ten roundings a step
+    assert relative == pytest.approx(expected, rel=1e-15 * 10 * steps)  # ten roundings a step
 
 
 @given(st.floats(0.1, 10), st.floats(1e-3, 1.9), st.integers(1, 300))
-def test_semi_implicit_euler_stays_in_its_band(frequency, z, steps):
-    held = energies("semi_implicit_euler", frequency, z / frequency, steps)
+def test_energy_of_semi_implicit_euler_stays_in_its_band(frequency, z, steps):
+    relative = energies("semi_implicit_euler", frequency, z / frequency, steps)
     slack = 1e-13 / (1.0 - z / 2.0)  # roundings of 300 steps, larger where the band widens without bound
-    assert held.min() >= (1.0 - slack) / (1.0 + z / 2.0)
-    assert held.max() <= (1.0 + slack) / (1.0 - z / 2.0)
+    assert relative.min() >= (1.0 - slack) / (1.0 + z / 2.0)
+    assert relative.max() <= (1.0 + slack) / (1.0 - z / 2.0)
 
 
-def test_the_band_of_semi_implicit_euler_is_reached():
-    held = energies("semi_implicit_euler", 1.0, 0.5, 2000)
-    assert held.min() == pytest.approx(1 / 1.25, rel=1e-3)  # 2,000 phases come within 1e-3 of the turning one
-    assert held.max() == pytest.approx(1 / 0.75, rel=1e-3)  # likewise
+def test_energy_of_semi_implicit_euler_reaches_the_bounds_of_its_band():
+    relative = energies("semi_implicit_euler", 1.0, 0.5, 2000)
+    assert relative.min() == pytest.approx(1 / 1.25, rel=1e-3)  # 2,000 phases come within 1e-3 of the extremum
+    assert relative.max() == pytest.approx(1 / 0.75, rel=1e-3)  # likewise
 
 
 @pytest.mark.parametrize("name", ["velocity_verlet", "leapfrog"])
 @given(z=st.floats(0.01, 1.95), steps=st.integers(1, 300))
-def test_verlet_swings_with_the_frequency_known_for_it(name, z, steps):
+def test_verlet_oscillates_at_its_numerical_frequency(name, z, steps):
     angle = 2.0 * math.asin(z / 2.0)  # ω_num·h
     x = np.array([[[1.0]], [[0.0]]])
     for k in range(steps):
         x = INTEGRATORS[name].step(oscillator(1.0), k * z, x, CONSERVATIVE, z)
-    # roundings add up like the steps, and more so where the two eigenvalues all but coincide
+    # rounding grows with the steps, and more where the two eigenvalues nearly coincide
     assert x[0, 0, 0] == pytest.approx(math.cos(steps * angle), abs=1e-13 * steps / math.sqrt(1.0 - z * z / 4.0))
 
 
 @pytest.mark.parametrize(("name", "limit"), [(name, 2.0) for name in SYMPLECTIC] + [("rk4", 2.0 * math.sqrt(2.0))])
-def test_runs_are_bounded_just_below_the_limit_and_not_above(name, limit):
+def test_runs_are_bounded_just_below_the_stability_limit_only(name, limit):
     assert energies(name, 1.0, limit * 0.995, 3000).max() < 500.0  # the widest band: 1/(1 − 0.995), squared and more
     with np.errstate(over="ignore", invalid="ignore"):
         assert not energies(name, 1.0, limit * 1.005, 3000).max() < 1e20
 
 
 @given(st.floats(1e-3, 100), st.floats(1e-3, 2.8))
-def test_amplification_is_that_of_the_closed_forms(frequency, z):
+def test_amplification_matches_the_closed_forms(frequency, z):
     def of(name):
         return amplification(INTEGRATORS[name].step, frequency, 0.0, z / frequency)
 
@@ -119,41 +121,52 @@ def test_amplification_is_that_of_the_closed_forms(frequency, z):
     assert of("rk4") ** 2 == pytest.approx(1 - z**6 / 72 + z**8 / 576, rel=1e-13)  # as above, z⁸ is up to 4,000
     for name in SYMPLECTIC:
         if z < 1.99:
-            assert of(name) == pytest.approx(1.0, abs=1e-12)  # near 2 the eigenvalues' errors grow as a root
+            assert of(name) == pytest.approx(
+                1.0, abs=1e-12
+            )  # near 2 the errors of the eigenvalues grow as a square root
         elif z > 2.01:
             larger = z * z / 2 - 1 + math.sqrt((z * z / 2 - 1) ** 2 - 1)
             assert of(name) == pytest.approx(larger, rel=1e-12)  # as above
 
 
 @given(st.floats(0.01, 3), st.floats(0, 4))
-def test_amplification_with_damping_is_the_stability_function_of_the_eigenvalues(z, damping):
+def test_amplification_with_damping_matches_the_stability_function(z, damping):
     root = complex(damping * damping - 1.0) ** 0.5
     exact = [(-damping + sign * root) * z for sign in (1, -1)]
     for name, terms in (("explicit_euler", 1), ("rk4", 4)):
-        wanted = max(abs(sum(each**k / math.factorial(k) for k in range(terms + 1))) for each in exact)
+        expected = max(abs(sum(eigenvalue**k / math.factorial(k) for k in range(terms + 1))) for eigenvalue in exact)
         found = amplification(INTEGRATORS[name].step, 1.0, damping, z)
-        # at critical damping both eigenvalues coincide, and are only good to the root of rounding
-        assert found == pytest.approx(wanted, rel=1e-7, abs=1e-7)
+        # at critical damping the eigenvalues coincide and are accurate to the square root of rounding only
+        assert found == pytest.approx(expected, rel=1e-7, abs=1e-7)
 
 
-LEAD = {"explicit_euler": 0.5, "semi_implicit_euler": -0.5, "velocity_verlet": 0.0, "leapfrog": 0.0, "rk4": 0.0}
+# Position error of a projectile in units of g·h·t.
+POSITION_ERROR = {
+    "explicit_euler": 0.5,
+    "semi_implicit_euler": -0.5,
+    "velocity_verlet": 0.0,
+    "leapfrog": 0.0,
+    "rk4": 0.0,
+}
 
 
 @pytest.mark.parametrize("name", INTEGRATORS)
 @given(h=st.floats(1e-3, 0.1), steps=st.integers(1, 100), speed=st.floats(-20, 20))
-def test_projectiles_err_by_the_known_amount(name, h, steps, speed):
+def test_position_error_of_projectiles_matches_the_closed_form(name, h, steps, speed):
     u = Inputs(np.array([[0.0, -9.81]]))
     x = np.array([[[0.0, 10.0]], [[1.0, speed]]])
     time = h * steps
     x = run(INTEGRATORS[name].step, transition, x, u, time, steps)
     error = x[0, 0, 1] - (10.0 + speed * time - 0.5 * 9.81 * time**2)
     scale = 10.0 + abs(speed) * time + 9.81 * time**2
-    assert error == pytest.approx(LEAD[name] * 9.81 * h * time, abs=1e-15 * steps * scale)  # a few roundings a step
+    assert error == pytest.approx(
+        POSITION_ERROR[name] * 9.81 * h * time, abs=1e-15 * steps * scale
+    )  # a few roundings a step
     assert x[1, 0, 1] == pytest.approx(speed - 9.81 * time, abs=1e-15 * steps * (20 + 9.81 * time))  # likewise
 
 
 @pytest.mark.parametrize("name", INTEGRATORS)
-def test_a_step_is_pure(name):
+def test_step_is_pure(name):
     x = np.array([[[1.0, 2.0]], [[3.0, 4.0]]])
     u = Inputs(np.array([[0.0, -9.81]]), linear_drag=0.5)
     one, two = (INTEGRATORS[name].step(transition, 0.0, x, u, 0.1) for _ in range(2))
@@ -162,17 +175,17 @@ def test_a_step_is_pure(name):
 
 
 @pytest.mark.parametrize("name", SYMPLECTIC[1:])
-def test_symmetric_schemes_run_backwards(name):
+def test_symmetric_schemes_are_reversible(name):
     x = start = np.array([[[0.5, 0.0]], [[0.0, math.sqrt(3.0)]]])
     for k in range(200):
         x = INTEGRATORS[name].step(kepler, k * 0.01, x, CONSERVATIVE, 0.01)
     for k in range(200):
         x = INTEGRATORS[name].step(kepler, -k * 0.01, x, CONSERVATIVE, -0.01)
-    assert np.abs(x - start).max() < 1e-12  # 400 steps' roundings, stretched by the passage near the centre
+    assert np.abs(x - start).max() < 1e-12  # rounding of 400 steps, amplified by the passage near the centre
 
 
 @pytest.mark.parametrize("name", INTEGRATORS)
-def test_share_is_what_positions_have_of_a_kick_within_the_step(name):
+def test_fraction_is_the_part_of_a_kick_that_moves_positions_within_the_step(name):
     def f(kick):
         return lambda t, x, u: np.stack((x[1], np.full_like(x[1], kick)))
 
@@ -180,11 +193,11 @@ def test_share_is_what_positions_have_of_a_kick_within_the_step(name):
     scheme = INTEGRATORS[name]
     with_kick, without = (scheme.step(f(kick), 0.0, x, CONSERVATIVE, h) for kick in (1.0, 0.0))
     moved, gained = (with_kick - without)[:, 0, 0]
-    assert moved == pytest.approx(scheme.fraction * h * gained, rel=1e-15)  # rk4's sixths are rounded
+    assert moved == pytest.approx(scheme.fraction * h * gained, rel=1e-15)  # the sixths of rk4 are rounded
 
 
 @given(st.floats(0.01, 2), st.floats(0.01, 2), st.floats(-20, 20))
-def test_drag_is_that_of_the_formula(linear, quadratic, speed):
+def test_drag_matches_its_formula(linear, quadratic, speed):
     u = Inputs(np.array([[0.0, -9.81]]), linear, quadratic, (1.0, -2.0))
     rates = transition(0.0, np.array([[[0.0, 0.0]], [[speed, 3.0]]]), u)
     w = np.array([speed - 1.0, 5.0])
@@ -193,13 +206,13 @@ def test_drag_is_that_of_the_formula(linear, quadratic, speed):
     assert rates[1, 0] == pytest.approx(expected, rel=1e-14, abs=1e-13)  # three terms that may cancel
 
 
-def test_what_is_not_mobile_feels_no_air():
+def test_immobile_bodies_feel_no_drag():
     u = Inputs(np.zeros((2, 2)), linear_drag=1.0, mobile=np.array([[1.0], [0.0]]))
     rates = transition(0.0, np.array([np.zeros((2, 2)), np.ones((2, 2))]), u)
     assert rates[1].tolist() == [[-1.0, -1.0], [0.0, 0.0]]
 
 
-def test_orders_are_in_the_order_of_the_table():
+def test_integrators_are_listed_by_ascending_order():
     orders = [scheme.order for scheme in INTEGRATORS.values()]
     assert all(a <= b for a, b in pairwise(orders))
     assert orders == [1, 1, 2, 2, 4]

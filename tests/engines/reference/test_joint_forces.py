@@ -1,4 +1,4 @@
-"""Attraction and thrust: Kepler's orbits, what is given back, and forces that turn with their body."""
+"""Attraction and thrust: Kepler orbits, reaction forces, and forces that rotate with their body."""
 
 import math
 
@@ -11,9 +11,9 @@ from tests.engines.reference.joint_rig import Rig, compile_joints
 pytestmark = pytest.mark.full  # long runs and sweeps
 
 
-def pull(inverse_mass, *, target=-1, place=(0.0, 0.0), strength=1.0, softening=0.0):
-    """Return one attraction as a force function."""
-    arrays = np.array([target]), np.array([place], dtype=float), np.array([strength]), np.array([softening])
+def attraction(inverse_mass, *, target=-1, point=(0.0, 0.0), strength=1.0, softening=0.0):
+    """Return the force function of one attraction."""
+    arrays = np.array([target]), np.array([point], dtype=float), np.array([strength]), np.array([softening])
 
     def forces(x):
         out = np.zeros_like(x[1])
@@ -24,15 +24,17 @@ def pull(inverse_mass, *, target=-1, place=(0.0, 0.0), strength=1.0, softening=0
 
 
 def orbit(integrator):
-    """Return a body at the near point of an orbit of e = ½ and half-axis 1 around a sun of GM = 1."""
-    return Rig(compile_joints(), [0.5, 0], [[0, math.sqrt(3), 0]], gravity=0, integrator=integrator, forces=pull([1.0]))
+    """Return a body at the pericentre of an orbit of eccentricity ½ and semi-major axis 1 around a sun of GM = 1."""
+    return Rig(
+        compile_joints(), [0.5, 0], [[0, math.sqrt(3), 0]], gravity=0, integrator=integrator, forces=attraction([1.0])
+    )
 
 
 def energy_of(rig):
     return 0.5 * (rig.rates[0, :2] ** 2).sum() - 1 / math.hypot(*rig.pose[0, :2])
 
 
-def test_kepler_by_rk4_returns_after_a_period():
+def test_kepler_orbit_with_rk4_closes_after_a_period():
     rig = orbit("rk4")
     assert energy_of(rig) == pytest.approx(-0.5, rel=1e-15)  # E = −GM/2a
     h = 2 * math.pi / 4000
@@ -43,19 +45,21 @@ def test_kepler_by_rk4_returns_after_a_period():
 
 
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet", "leapfrog"])
-def test_symplectic_schemes_keep_keplers_second_law_and_a_band_of_energy(integrator):
+def test_symplectic_schemes_conserve_angular_momentum_and_bound_the_energy_error(integrator):
     rig, worst = orbit(integrator), 0.0
     for _ in range(10_000):
         rig.step(2 * math.pi / 2000)
         worst = max(worst, abs(energy_of(rig) + 0.5))
-    assert rig.angular_momentum == pytest.approx(math.sqrt(0.75), rel=1e-11)  # kept to 10,000 steps' rounding
+    assert rig.angular_momentum == pytest.approx(
+        math.sqrt(0.75), rel=1e-11
+    )  # conserved to the rounding of 10,000 steps
     assert worst < (
         4e-3 if integrator == "semi_implicit_euler" else 2e-5
     )  # 5 orbits; measured 2.2e-3, and 1.3e-5 at most
 
 
-def test_two_bodies_go_round_each_other_and_keep_their_momentum():
-    """Strength G·m₂ on the first, and its answer: relative motion as around G (m₁ + m₂)."""
+def test_two_bodies_orbit_each_other_and_conserve_momentum():
+    """Strength G·m₂ on the first body and the reaction on the second: relative motion as around G (m₁ + m₂)."""
     mass = np.array([1.0, 3.0])
     rig = Rig(
         compile_joints(),
@@ -64,7 +68,7 @@ def test_two_bodies_go_round_each_other_and_keep_their_momentum():
         mass=mass,
         gravity=0,
         integrator="rk4",
-        forces=pull(1 / mass, target=1, strength=0.75),
+        forces=attraction(1 / mass, target=1, strength=0.75),
     )
     rig.run(2 * math.pi, 2 * math.pi / 1000)
     assert rig.pose[:, :2] == pytest.approx(np.array([[0.75, 0], [-0.25, 0]]), abs=1e-8)  # fourth order, a circle
@@ -72,36 +76,36 @@ def test_two_bodies_go_round_each_other_and_keep_their_momentum():
     assert rig.angular_momentum == pytest.approx(0.75, rel=1e-9)  # fourth order
 
 
-def test_attraction_is_softened_and_spares_what_is_fixed_or_in_its_midst():
+def test_attraction_is_softened_and_skips_fixed_bodies_and_bodies_at_its_centre():
     pose = np.array([[3.0, 4.0, 0.0], [3.0, 4.0, 0.0], [0.0, 0.0, 0.0]])
-    out = pull([2.0, 0.0, 1.0], strength=50.0, softening=5.0)(np.stack((pose, pose)))
+    out = attraction([2.0, 0.0, 1.0], strength=50.0, softening=5.0)(np.stack((pose, pose)))
     assert out == pytest.approx(np.array([[-0.6, -0.8, 0], [0, 0, 0], [0, 0, 0]]), rel=1e-15)  # 50/(25 + 25)
 
 
-def push_of(throttle, *, force, point=(0.0, 0.0), inverse_mass=0.5, inverse_moment=4.0):
-    own = np.array([0]), np.array([point]), np.array([force]), np.array([throttle])
+def thrust(throttle, *, force, point=(0.0, 0.0), inverse_mass=0.5, inverse_moment=4.0):
+    arrays = np.array([0]), np.array([point]), np.array([force]), np.array([throttle])
 
     def forces(x):
         out = np.zeros_like(x[1])
-        add_thrust(x[0], *own, np.array([inverse_mass]), np.array([inverse_moment]), out)
+        add_thrust(x[0], *arrays, np.array([inverse_mass]), np.array([inverse_moment]), out)
         return out
 
     return forces
 
 
-def test_thrust_turns_with_its_body():
+def test_thrust_rotates_with_its_body():
     """At a steady spin ω, v = F/(m ω) (sin ωt, 1 − cos ωt)."""
     spin, speed = 3.0, 2.0 * 0.5 / 3.0
     rig = Rig(
-        compile_joints(), [0, 0], [[0, 0, spin]], gravity=0, integrator="rk4", forces=push_of(1.0, force=(2.0, 0.0))
+        compile_joints(), [0, 0], [[0, 0, spin]], gravity=0, integrator="rk4", forces=thrust(1.0, force=(2.0, 0.0))
     )
     rig.run(1.0, 0.01)
     expected = [speed * math.sin(spin), speed * (1 - math.cos(spin)), spin]
     assert rig.rates[0] == pytest.approx(expected, abs=1e-8)  # fourth order at ω h = .03
 
 
-def test_thrust_off_the_centre_turns_its_body_by_its_throttle():
-    acting = push_of(0.5, force=(2.0, 0.0), point=(0.0, -0.1))
-    rig = Rig(compile_joints(), [0, 0], gravity=0, integrator="rk4", forces=acting).run(1.0, 0.01)
+def test_thrust_off_the_centre_exerts_a_torque_scaled_by_the_throttle():
+    forces = thrust(0.5, force=(2.0, 0.0), point=(0.0, -0.1))
+    rig = Rig(compile_joints(), [0, 0], gravity=0, integrator="rk4", forces=forces).run(1.0, 0.01)
     assert rig.rates[0, 2] == pytest.approx(0.4, rel=1e-13)  # τ/I = .5 · .1 · 2 · 4, at any angle
     assert rig.pose[0, 2] == pytest.approx(0.2, rel=1e-13)  # half of that, at t = 1

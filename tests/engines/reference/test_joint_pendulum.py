@@ -1,4 +1,4 @@
-"""Pendulums: periods in closed form, how fast each way converges, energy, and pymunk's joints step by step."""
+"""Pendulums: periods in closed form, convergence of each method, energy, and pymunk's joints step by step."""
 
 import math
 
@@ -13,7 +13,7 @@ from tests.engines.reference.joint_rig import BIAS, G, Rig, compile_joints, link
 pytestmark = pytest.mark.full  # long runs and sweeps
 
 PERIODS = {5: 2.0070219, 90: 2.3678419, 170: 4.8935243}
-"""By amplitude in degrees: 4 √(L/g) K(sin²(θ₀/2)), s, for L = 1 m"""
+"""Period by amplitude in degrees: 4 √(L/g) K(sin²(θ₀/2)), s, for L = 1 m."""
 
 FIRST_ORDER = [
     ("impulses", "explicit_euler"),
@@ -28,14 +28,14 @@ FIRST_ORDER = [
 SECOND_ORDER = [("rattle", "velocity_verlet"), ("rattle", "leapfrog"), ("rattle", "rk4")]
 
 
-def exact(angle: float) -> float:
+def exact_period(angle: float) -> float:
     return float(4 / math.sqrt(G) * ellipk(math.sin(math.radians(angle) / 2) ** 2))
 
 
-def measured(rig: Rig, h: float) -> float:
-    """Return four times the time to the bottom, found between two steps by a straight line.
+def measured_period(rig: Rig, h: float) -> float:
+    """Return four times the time to the bottom, interpolated linearly between two steps.
 
-    Later quarters tell of energy lost rather than of the swing.
+    Later quarters of the swing would include the effect of lost energy.
     """
     while True:
         old = rig.pose[0, 0]
@@ -45,60 +45,62 @@ def measured(rig: Rig, h: float) -> float:
             return float(4 * (rig.time - h * new / (new - old)))
 
 
-def errors(angle: float, steps: tuple[int, ...], **how: str) -> np.ndarray:
-    return np.array([measured(pendulum(angle, **how), 1 / n) for n in steps]) - exact(angle)
+def errors(angle: float, steps: tuple[int, ...], **settings: str) -> np.ndarray:
+    return np.array([measured_period(pendulum(angle, **settings), 1 / n) for n in steps]) - exact_period(angle)
 
 
 @pytest.mark.parametrize(("angle", "period"), PERIODS.items())
-def test_the_closed_form_is_the_published_one(angle, period):
-    assert exact(angle) == pytest.approx(period, abs=6e-8)  # as many digits as are given
+def test_closed_form_matches_published_periods(angle, period):
+    assert exact_period(angle) == pytest.approx(period, abs=6e-8)  # as many digits as the reference has
 
 
 @pytest.mark.parametrize("angle", PERIODS)
-@pytest.mark.parametrize(("how", "integrator"), FIRST_ORDER)
-def test_ways_of_first_order_approach_the_period_as_the_step_shrinks(how, integrator, angle):
-    coarse, fine = errors(angle, (480, 960), how=how, integrator=integrator)
-    assert abs(coarse) < 6e-3 * exact(angle)  # measured: at most .5 %, by explicit Euler from 90°
-    assert 2 * fine - coarse == pytest.approx(0.0, abs=2e-5 * exact(angle))  # what is left is of second order in h
-    if abs(coarse) > 1e-4:  # from 5°, in two of them, first order all but cancels
+@pytest.mark.parametrize(("method", "integrator"), FIRST_ORDER)
+def test_first_order_methods_converge_to_the_period(method, integrator, angle):
+    coarse, fine = errors(angle, (480, 960), method=method, integrator=integrator)
+    assert abs(coarse) < 6e-3 * exact_period(angle)  # measured: at most .5 %, by explicit Euler from 90°
+    assert 2 * fine - coarse == pytest.approx(
+        0.0, abs=2e-5 * exact_period(angle)
+    )  # the remainder is of second order in h
+    if abs(coarse) > 1e-4:  # from 5°, in two of them, the first order nearly cancels
         assert math.log2(coarse / fine) == pytest.approx(1.0, abs=0.03)  # measured .99 to 1.01
 
 
 @pytest.mark.parametrize("angle", PERIODS)
-@pytest.mark.parametrize(("how", "integrator"), SECOND_ORDER)
-def test_rattle_converges_with_the_square_of_the_step(how, integrator, angle):
-    error = errors(angle, (120, 240, 480), how=how, integrator=integrator)
-    assert abs(error[1]) < 3e-5 * exact(angle)  # measured 7e-6, 2.4e-5, 2e-5
+@pytest.mark.parametrize(("method", "integrator"), SECOND_ORDER)
+def test_rattle_converges_with_the_square_of_the_step(method, integrator, angle):
+    error = errors(angle, (120, 240, 480), method=method, integrator=integrator)
+    assert abs(error[1]) < 3e-5 * exact_period(angle)  # measured 7e-6, 2.4e-5, 2e-5
     assert np.log2(error[:-1] / error[1:]) == pytest.approx(2.0, abs=0.05)  # measured 1.99 to 2.01
 
 
 @pytest.mark.parametrize("angle", PERIODS)
-def test_rattle_keeps_energy_and_length(angle):
-    rig = pendulum(angle, how="rattle", integrator="velocity_verlet")
+def test_rattle_conserves_energy_and_length(angle):
+    rig = pendulum(angle, method="rattle", integrator="velocity_verlet")
     before, worst = rig.energy, 0.0
     swing = before + G
     for _ in range(10 * 240):
         rig.step(1 / 240)
         worst = max(worst, abs(rig.energy - before))
-        assert math.hypot(*rig.pose[0, :2]) == pytest.approx(1.0, abs=1e-15)  # ten passes are converged to rounding
+        assert math.hypot(*rig.pose[0, :2]) == pytest.approx(1.0, abs=1e-15)  # ten iterations converge to rounding
     assert worst < 1e-4 * swing  # measured up to 8.5e-5: a band of order (h ω)² that does not widen
 
 
-@pytest.mark.parametrize("how", ["impulses", "relaxation", "xpbd"])
-def test_ways_of_first_order_lose_energy_in_proportion_to_the_step(how):
+@pytest.mark.parametrize("method", ["impulses", "relaxation", "xpbd"])
+def test_energy_loss_of_first_order_methods_is_proportional_to_the_step(method):
     loss = []
     for n in (480, 960):
-        rig = pendulum(90, how=how)
+        rig = pendulum(90, method=method)
         before = rig.energy
         loss.append(before - rig.run(4, 1 / n).energy)
     assert loss[1] > 0.0
-    assert loss[0] / loss[1] == pytest.approx(2.0, abs=0.25)  # the loss itself shortens later swings, and their losses
+    assert loss[0] / loss[1] == pytest.approx(2.0, abs=0.25)  # the loss reduces later swings and thereby their losses
 
 
-def test_impulses_lose_as_much_as_pymunk_in_twenty_seconds():
-    """Its PinJoint from 90° at 240 Hz: 11 % of the energy above the bottom, whatever the iterations."""
+def test_impulses_lose_as_much_energy_as_pymunk_in_twenty_seconds():
+    """PinJoint of pymunk loses 11 % of the energy above the bottom from 90° at 240 Hz, for any number of iterations."""
     rig = pendulum(90, integrator="explicit_euler").run(20, 1 / 240)
-    assert 1.0 - (rig.energy + G) / G == pytest.approx(0.11, abs=0.01)  # given in whole per cent
+    assert 1.0 - (rig.energy + G) / G == pytest.approx(0.11, abs=0.01)  # the reference is in whole per cent
 
 
 @pytest.mark.parametrize("angle", PERIODS)
@@ -108,30 +110,32 @@ def test_impulses_keep_the_length_within_their_bias(angle):
     for _ in range(1000):
         rig.step(1 / 240)
         error = math.hypot(*rig.pose[0, :2]) - 1.0
-        # A straight step leaves the circle by (v h)²/2, and the share 1 − bias^h of what there is goes in each.
+        # A straight step leaves the circle by (v h)²/2, and each step corrects the fraction 1 − bias^h of the error.
         assert -1e-12 <= error <= 1.01 * top / 240**2 / 2 / (1 - BIAS ** (1 / 240))  # the sum of a geometric series
 
 
 @pytest.mark.parametrize(
-    ("how", "integrator", "accuracy"),
+    ("method", "integrator", "accuracy"),
     [
         ("impulses", "semi_implicit_euler", 2e-3),  # first order: measured 8.4e-4
         ("xpbd", "semi_implicit_euler", 2e-3),  # first order: 9.6e-4
         ("rattle", "velocity_verlet", 1e-5),  # second order: 7.3e-6
     ],
 )
-def test_a_rod_on_a_pivot_at_its_end_swings_by_its_moment(how, integrator, accuracy):
+def test_rod_on_an_end_pivot_has_the_period_of_a_physical_pendulum(method, integrator, accuracy):
     """A physical pendulum: 1 m long, I = 1/12 about its centre, d = ½, m g d sinθ = −(I + m d²) θ̈, from 90°."""
-    held = compile_joints(link(LinkKind.PIVOT, -1, 0, anchor_b=(0.0, 0.5)))
-    rig = Rig(held, [0.5, 0.0, math.pi / 2], moment=1 / 12, how=how, integrator=integrator, iterations=20)
+    joints = compile_joints(link(LinkKind.PIVOT, -1, 0, anchor_b=(0.0, 0.5)))
+    rig = Rig(joints, [0.5, 0.0, math.pi / 2], moment=1 / 12, method=method, integrator=integrator, iterations=20)
     period = 4 * math.sqrt((1 / 12 + 1 / 4) / (G / 2)) * ellipk(0.5)
-    assert measured(rig, 1 / 480) == pytest.approx(period, rel=accuracy)
+    assert measured_period(rig, 1 / 480) == pytest.approx(period, rel=accuracy)
     end = rig.pose[0, :2] + 0.5 * np.array([-math.sin(rig.pose[0, 2]), math.cos(rig.pose[0, 2])])
-    assert np.hypot(*end) < (2e-3 if how == "impulses" else 1e-14)  # measured 1.6e-3, as the length; else solved
+    assert np.hypot(*end) < (
+        2e-3 if method == "impulses" else 1e-14
+    )  # measured 1.6e-3, as for the length; other methods solve it
 
 
 @pytest.mark.parametrize(
-    ("how", "integrator", "band"),
+    ("method", "integrator", "band"),
     [
         ("impulses", "semi_implicit_euler", 0.02),  # measured .014
         ("relaxation", "semi_implicit_euler", 0.15),  # .124
@@ -140,14 +144,14 @@ def test_a_rod_on_a_pivot_at_its_end_swings_by_its_moment(how, integrator, accur
         ("rattle", "rk4", 1e-5),  # 9.7e-6
     ],
 )
-def test_a_double_pendulum_keeps_its_energy_as_its_way_allows(how, integrator, band):
-    held = compile_joints(link(LinkKind.ROD, -1, 0, 1.0), link(LinkKind.ROD, 0, 1, 1.0))
-    rig = Rig(held, [[1, 0], [2, 0]], how=how, integrator=integrator, iterations=20)
+def test_energy_of_a_double_pendulum_stays_in_the_band_of_its_method(method, integrator, band):
+    joints = compile_joints(link(LinkKind.ROD, -1, 0, 1.0), link(LinkKind.ROD, 0, 1, 1.0))
+    rig = Rig(joints, [[1, 0], [2, 0]], method=method, integrator=integrator, iterations=20)
     before, worst = rig.energy, 0.0
     for _ in range(5 * 960):
         rig.step(1 / 960)
         worst = max(worst, abs(rig.energy - before) / (2 * G))
-        assert how == "rattle" or rig.energy < before + 1e-9  # the others lose only
+        assert method == "rattle" or rig.energy < before + 1e-9  # the others only lose energy
     assert worst < band
 
 
@@ -173,8 +177,8 @@ JOINTS = {
 
 @pytest.mark.parametrize("most_force", [math.inf, 6.0])
 @pytest.mark.parametrize("name", JOINTS)
-def test_impulses_are_pymunks_step_by_step(name, most_force):
-    """Drift and kick in its order, the same step, iterations and bias: the same algebra, so rounding alone differs."""
+def test_impulses_match_pymunk_step_by_step(name, most_force):
+    """Same order of drift and kick, step, iterations and bias: the same algebra, so only rounding differs."""
     theirs, ours = JOINTS[name]
     space = pymunk.Space()
     space.gravity, space.iterations = (0, -G), 10
@@ -193,7 +197,7 @@ def test_impulses_are_pymunks_step_by_step(name, most_force):
         assert [*body.velocity, body.angular_velocity] == pytest.approx(rig.rates[0], rel=1e-11, abs=1e-11)  # as above
 
 
-def test_a_chain_of_three_is_pymunks_step_by_step():
+def test_chain_of_three_matches_pymunk_step_by_step():
     space = pymunk.Space()
     space.gravity, space.iterations = (0, -G), 7
     before, bodies = space.static_body, []
@@ -205,10 +209,12 @@ def test_a_chain_of_three_is_pymunks_step_by_step():
         space.add(body, joint)
         bodies.append(body)
         before = body
-    held = compile_joints(*(link(LinkKind.ROD, k - 1, k, 1.0) for k in range(3)))
-    rig = Rig(held, [[1, 0], [2, 0], [3, 0]], mass=[1, 2, 3], integrator="explicit_euler", iterations=7)
+    joints = compile_joints(*(link(LinkKind.ROD, k - 1, k, 1.0) for k in range(3)))
+    rig = Rig(joints, [[1, 0], [2, 0], [3, 0]], mass=[1, 2, 3], integrator="explicit_euler", iterations=7)
     for _ in range(240):
         space.step(1 / 240)
         rig.step(1 / 240)
-        place = [c for body in bodies for c in body.position]
-        assert place == pytest.approx(rig.pose[:, :2].ravel(), abs=1e-9)  # chaos: rounding grows about e-fold in .1 s
+        positions = [c for body in bodies for c in body.position]
+        assert positions == pytest.approx(
+            rig.pose[:, :2].ravel(), abs=1e-9
+        )  # chaotic: rounding grows about e-fold in 0.1 s

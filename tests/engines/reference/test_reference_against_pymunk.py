@@ -1,10 +1,10 @@
-"""The reference as explicit_euler, discrete and impulse is pymunk's scheme over again; here the two are compared.
+"""Reference engine against pymunk: with explicit_euler, discrete and impulse it implements pymunk's scheme.
 
-Where agreement ends: under drag, which pymunk is given by exponential steps. And where contacts share a body: pymunk
-solves them in the order in which its tree finds them, the reference by ascending body numbers, and ten passes end at
-results that differ by what is left to converge. For contacts that share no body the order changes nothing. Whatever
-differs, by order or by rounding (pymunk's planes are long segments, whose normals carry 1e-13), chaos then multiplies:
-a gas doubles differences with every collision or so, and after tens of collisions a ball no agreement is left.
+The engines differ under drag, which the pymunk adapter applies by exponential steps, and where contacts share a body:
+pymunk solves them in the order of its tree, the reference by ascending body index, and ten iterations leave different
+residuals. For contacts that share no body the order has no effect. Chaos amplifies any difference in order or rounding
+(pymunk's planes are long segments whose normals have errors of 1e-13): in a gas differences about double with every
+collision, and no agreement is left after tens of collisions per ball.
 """
 
 import math
@@ -19,13 +19,13 @@ from sandbox.scene.description.discs import Ball
 from tests.engines.reference.pieces import (
     EARTH,
     FLOOR,
-    PYMUNK_WAY,
+    PYMUNK_SETTINGS,
+    advance,
     ball,
-    running,
     scene_of,
     shipped,
     side_by_side,
-    stepped,
+    simulation_of,
 )
 
 pytestmark = pytest.mark.full  # property tests with many examples
@@ -40,7 +40,7 @@ def difference(theirs, ours):
     return max(float(np.abs(x - y).max()) for x, y in (*pairs, (a.angular_velocity, b.angular_velocity)))
 
 
-def same_bits(theirs, ours):
+def bit_identical(theirs, ours):
     a, b = theirs.frame(), ours.frame()
     pairs = (a.position, b.position), (a.velocity, b.velocity), (a.angle, b.angle)
     return all(np.array_equal(x, y) for x, y in (*pairs, (a.angular_velocity, b.angular_velocity)))
@@ -56,17 +56,17 @@ coordinates, speeds = st.floats(-1e6, 1e6), st.floats(-1e4, 1e4)
     st.integers(1, 4),
     st.sampled_from(["none", "all"]),
 )
-def test_free_flight_is_the_same_bit_for_bit(states, gravity, dt, substeps, collides):
+def test_free_flight_is_bit_identical(states, gravity, dt, substeps, collides):
     balls = [
-        # far enough apart never to meet, where they could
+        # far enough apart to never collide where collisions are enabled
         ball(x + (1e9 * k if collides == "all" else 0.0), y, velocity=[vx, vy], angular_velocity=w, collides=collides)
         for k, (x, y, vx, vy, w) in enumerate(states)
     ]
     scene = scene_of(*balls, world={"gravity": list(gravity)}, solver={"dt": dt, "substeps": substeps})
-    assert all(same_bits(theirs, ours) for theirs, ours in side_by_side(scene, 10))
+    assert all(bit_identical(theirs, ours) for theirs, ours in side_by_side(scene, 10))
 
 
-WHOLE = {
+STEPS = {
     "tutorial/bounce": 6000,
     "benchmark/two_balls": 1000,
     "benchmark/newtons_cradle": 1000,
@@ -74,28 +74,28 @@ WHOLE = {
 }
 
 
-@pytest.mark.parametrize("name", WHOLE)
+@pytest.mark.parametrize("name", STEPS)
 def test_shipped_scenes_agree_at_every_frame(name):
-    # m, m/s and rad after seconds of contact: what is rounded otherwise adds up to 1e-13 on the incline
-    assert max(difference(*both) for both in side_by_side(shipped(name), WHOLE[name])) < 1e-12
+    # m, m/s and rad after seconds of contact: different rounding adds up to 1e-13 on the incline
+    assert max(difference(*both) for both in side_by_side(shipped(name), STEPS[name])) < 1e-12
 
 
-def test_a_gas_agrees_for_its_first_second():
-    # 225 balls, some 150 impacts: each multiplies what differs by some, and nearly none of its balls has had five
+def test_gas_agrees_for_its_first_second():
+    # 225 balls and about 150 impacts: each amplifies differences, and almost no ball has had five
     assert max(difference(*both) for both in side_by_side(shipped("benchmark/gas"), 200)) < 1e-9
 
 
-def test_agreement_of_a_pile_ends_with_the_order_of_contacts():
-    """Contacts that share bodies are solved in another order: agreement to what ten passes leave, not to rounding."""
+def test_pile_agrees_until_contacts_share_bodies():
+    """Contacts that share bodies are solved in another order: agreement to the residual of ten iterations."""
     balls = [ball(0.51 * (k % 2), 0.52 + 0.9 * k, name=f"b{k}", restitution=0.1) for k in range(6)]
     walls = [{"point": [-0.6, 0], "normal": [1, 0]}, {"point": [1.1, 0], "normal": [-1, 0]}, FLOOR]
     scene = scene_of(*balls, world=EARTH, plane=walls, solver={"dt": 0.005})
-    apart = []
+    differences = []
     for theirs, ours in side_by_side(scene, 800):
-        apart.append(difference(theirs, ours))
-    assert max(apart[:20]) < 1e-12  # one contact each so far: rounding
-    assert max(apart) > 1e-6
-    # Both end at rest, in the same order, each contact somewhere within the slop of 5 mm
+        differences.append(difference(theirs, ours))
+    assert max(differences[:20]) < 1e-12  # one contact per ball so far: rounding
+    assert max(differences) > 1e-6
+    # Both end at rest in the same order, each contact within the slop of 5 mm.
     assert np.abs(theirs.frame().position - ours.frame().position).max() < 0.01
     assert np.abs(ours.frame().velocity).max() < 1e-9  # m/s; settled
 
@@ -104,29 +104,29 @@ def test_agreement_of_a_pile_ends_with_the_order_of_contacts():
     st.floats(-3, 3), st.floats(-8, 0), st.floats(-20, 20), st.floats(0, 1), st.floats(0, 2), st.floats(0.1, 3),
     st.floats(-0.5, 0.5),
 )  # fmt: skip
-def test_one_ball_on_a_slope_agrees_whatever_it_does(vx, vy, spin, e, mu, mass, tilt):
+def test_single_ball_on_a_slope_agrees(vx, vy, spin, e, mu, mass, tilt):
     slope = {"point": [0, 0], "normal": [math.sin(tilt), math.cos(tilt)], "friction": mu}
     thrown = ball(0, 1.0, velocity=[vx, vy], angular_velocity=spin, restitution=e, mass=mass)
     scene = scene_of(thrown, world=EARTH, plane=[slope], solver={"dt": 0.01})
-    # pymunk's plane is a segment of some 1e4 m: its normal carries 1e-13, and a touch may come out a step off
-    apart = [difference(*both) for both in side_by_side(scene, 40)]
-    assert np.median(apart) < 1e-9
+    # pymunk's plane is a segment of about 1e4 m: its normal has an error of 1e-13, and a contact may begin a step off
+    differences = [difference(*both) for both in side_by_side(scene, 40)]
+    assert np.median(differences) < 1e-9
 
 
 @given(st.floats(-0.4, 0.4), st.floats(1, 5), st.floats(0, 1), st.floats(0, 1), st.floats(0.01, 100))
-def test_two_rubbing_balls_agree_to_rounding(offset, speed, e, mu, mass):
+def test_two_balls_with_friction_agree_to_rounding(offset, speed, e, mu, mass):
     stuff = {"material": [{"name": "m"}], "pair": [{"between": ["m", "m"], "restitution": e, "friction": mu}]}
     balls = [
         ball(-1.5, offset, velocity=[speed, 0], angular_velocity=3.0, material="m"),
         ball(0, 0, mass=mass, material="m"),
     ]
     scene = scene_of(*balls, **stuff, solver={"dt": 0.01})
-    # some roundings, magnified by the ratio of masses
+    # rounding, amplified by the mass ratio
     assert max(difference(*both) for both in side_by_side(scene, 100)) < 1e-10
 
 
-def drive(actions):
-    """Run a mixed scene on both, applying an action at the start of its step; yield both after each."""
+def run_with_actions(actions):
+    """Run a mixed scene on both engines, apply each action at the start of its step, and yield both after each step."""
     rubber = {"material": [{"name": "rubber", "restitution": 0.5, "friction": 0.3}]}
     balls = [
         ball(-3, 2, name="a", material="rubber"),
@@ -136,7 +136,7 @@ def drive(actions):
     scene = scene_of(
         *balls, **rubber, world={**EARTH, "bounds": [[-50, -50], [50, 50]]}, plane=[FLOOR], solver={"dt": 0.005}
     )
-    theirs, ours = running(scene, "pymunk"), running(scene, **PYMUNK_WAY)
+    theirs, ours = simulation_of(scene, "pymunk"), simulation_of(scene, **PYMUNK_SETTINGS)
     for k in range(200):
         for action in actions.get(k, ()):
             theirs.apply(action)
@@ -164,52 +164,55 @@ SESSIONS = {
 
 
 @pytest.mark.parametrize("name", SESSIONS)
-def test_actions_do_the_same(name):
-    apart = [difference(*both) for both in drive(SESSIONS[name])]
+def test_actions_have_the_same_effect(name):
+    differences = [difference(*both) for both in run_with_actions(SESSIONS[name])]
     if name == "drag":
-        # pymunk is given drag by an exponential step, the reference takes an Euler one: first order apart
-        assert 1e-6 < max(apart) < 0.005
+        # first-order difference: the pymunk adapter applies drag by an exponential step, the reference by an Euler step
+        assert 1e-6 < max(differences) < 0.005
     else:
-        assert max(apart) < 1e-9  # roundings of pymunk's planes, kept small by few contacts
+        assert max(differences) < 1e-9  # rounding of pymunk's planes, small because there are few contacts
 
 
-def test_who_leaves_the_bounds_retires_at_the_same_time():
-    for theirs, ours in drive(SESSIONS["leaving"]):
+def test_body_that_leaves_the_bounds_retires_at_the_same_time():
+    for theirs, ours in run_with_actions(SESSIONS["leaving"]):
         assert dict(theirs.retired) == dict(ours.retired)
     assert list(ours.retired) == [0]
 
 
-@pytest.mark.parametrize("name", WHOLE)
+@pytest.mark.parametrize("name", STEPS)
 def test_contact_rows_agree(name):
     scene = shipped(name)
     rows = []
-    for simulation in (running(scene, "pymunk"), running(scene, **PYMUNK_WAY)):
+    for simulation in (simulation_of(scene, "pymunk"), simulation_of(scene, **PYMUNK_SETTINGS)):
         simulation.contacts()
-        rows.append(stepped(simulation, WHOLE[name]).contacts())
+        rows.append(advance(simulation, STEPS[name]).contacts())
     theirs, ours = rows
     assert theirs.pair.tolist() == ours.pair.tolist()
     assert theirs.time.tolist() == ours.time.tolist()
     assert np.abs(theirs.normal - ours.normal).max() < 1e-12  # pymunk's planes: see above
     assert np.abs(theirs.point - ours.point).max() < 1e-11  # as above, on a segment of some 1e4 m
-    assert np.abs(theirs.impulse - ours.impulse).max() < 1e-11  # 2,000 steps' sums
+    assert np.abs(theirs.impulse - ours.impulse).max() < 1e-11  # sums over 2,000 steps
 
 
 def test_contact_rows_of_a_gas_agree_for_its_first_second():
     rows = []
-    for simulation in (running(shipped("benchmark/gas"), "pymunk"), running(shipped("benchmark/gas"), **PYMUNK_WAY)):
+    for simulation in (
+        simulation_of(shipped("benchmark/gas"), "pymunk"),
+        simulation_of(shipped("benchmark/gas"), **PYMUNK_SETTINGS),
+    ):
         simulation.contacts()
-        rows.append(stepped(simulation, 200).contacts())
+        rows.append(advance(simulation, 200).contacts())
     theirs, ours = rows
     assert theirs.pair.tolist() == ours.pair.tolist()
     assert theirs.time.tolist() == ours.time.tolist()
     assert np.abs(theirs.impulse - ours.impulse).max() < 1e-9  # as the states agree
 
 
-@pytest.mark.parametrize("part", [0.25, 0.5, 0.9])
-def test_a_last_part_of_a_step_ends_where_pymunks_does_in_flight(part):
+@pytest.mark.parametrize("fraction", [0.25, 0.5, 0.9])
+def test_partial_last_step_in_flight_matches_pymunk(fraction):
     scene = scene_of(ball(0, 3, velocity=[2, 1], angular_velocity=1.0), world=EARTH, solver={"dt": 0.01, "substeps": 4})
-    theirs, ours = running(scene, "pymunk"), running(scene, **PYMUNK_WAY)
+    theirs, ours = simulation_of(scene, "pymunk"), simulation_of(scene, **PYMUNK_SETTINGS)
     for simulation in (theirs, ours):
-        stepped(simulation, 10).finish(part)
+        advance(simulation, 10).finish(fraction)
     assert difference(theirs, ours) < 1e-15 * 10  # one is interpolated, the other stepped
-    assert ours.time == (10 + part) * 0.01
+    assert ours.time == (10 + fraction) * 0.01

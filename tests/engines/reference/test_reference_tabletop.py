@@ -28,16 +28,16 @@ def table(*balls: dict[str, Any], dt: float = 0.005, **more: Any) -> Scene:
     return from_document({"world": {"duration": 5.0}, **document})
 
 
-def after(simulation: Simulation, steps: int) -> Simulation:
+def advance(simulation: Simulation, steps: int) -> Simulation:
     for _ in range(steps):
         simulation.step()
     return simulation
 
 
-def test_slide_becomes_a_roll_at_five_sevenths_of_the_speed() -> None:
+def test_sliding_ball_rolls_at_five_sevenths_of_its_speed() -> None:
     speed, deceleration = 1.4, 0.2 * 9.81
-    ends = 2.0 * speed / (7.0 * deceleration)
-    frame = after(start(table(ball("a", 0, 0, speed, 0), dt=ends / 50), "reference"), 50).frame()
+    roll_time = 2.0 * speed / (7.0 * deceleration)
+    frame = advance(start(table(ball("a", 0, 0, speed, 0), dt=roll_time / 50), "reference"), 50).frame()
     assert frame.velocity[0, 0] == pytest.approx(5 / 7 * speed, abs=1e-12)  # closed form, rounding
     assert frame.roll is not None
     assert frame.roll[0, 1] * R == pytest.approx(frame.velocity[0, 0], abs=1e-12)  # likewise
@@ -45,28 +45,28 @@ def test_slide_becomes_a_roll_at_five_sevenths_of_the_speed() -> None:
 
 @pytest.mark.parametrize("speed", [3.0, 300.0])
 def test_no_ball_tunnels_through_another(speed: float) -> None:
-    """300 m/s are 25 diameters in a step."""
+    """At 300 m/s a ball moves 25 diameters in a step."""
     scene = table(ball("a", 0, 0, speed, 0), ball("b", 0.7, 0.01))
     simulation = start(scene, "reference")
     simulation.contacts()
-    after(simulation, 60)
+    advance(simulation, 60)
     assert simulation.frame().velocity[1, 0] > 0.3 * speed  # half, less restitution and friction
     assert simulation.contacts().pair.tolist() == [[0, 1]]
 
 
-def test_a_ball_falls_into_a_pocket_and_returns_by_a_move() -> None:
+def test_ball_falls_into_a_pocket_and_a_move_returns_it() -> None:
     scene = table(ball("a", 0, 0, 2.0, 0), pocket=[{"position": [0.5, 0.0], "radius": 0.05}])
     simulation = start(scene, "reference")
     simulation.contacts(), simulation.account()
     energy = total_energy(simulation)
-    after(simulation, 80)
+    advance(simulation, 80)
     assert simulation.frame().position.tolist() == [[0.5, 0.0]]
     assert simulation.contacts().pair.tolist() == [[0, -1 - len(scene.fixed)]]
     assert sum(simulation.account().values()) == pytest.approx(-energy, rel=1e-12)  # rounding
     with pytest.raises(ActionError, match="is in a pocket"):
         simulation.apply(Impulse(time=0.0, body="a", impulse=(1.0, 0.0)))
     simulation.apply(Move(time=0.0, body="a", position=(0.1, 0.1), velocity=(1.0, 0.0)))
-    assert after(simulation, 1).frame().position[0, 0] > 0.1
+    assert advance(simulation, 1).frame().position[0, 0] > 0.1
 
 
 def test_energy_closes_over_a_break_with_cushions() -> None:
@@ -79,24 +79,26 @@ def test_energy_closes_over_a_break_with_cushions() -> None:
         simulation.step()
         change = total_energy(simulation) - energy
         assert change <= 1e-12 * energy  # rounding
-        assert sum(simulation.account().values()) == pytest.approx(change, abs=1e-11 * energy)  # of some 100 sums
+        assert sum(simulation.account().values()) == pytest.approx(
+            change, abs=1e-11 * energy
+        )  # rounding of about 100 sums
     position = simulation.frame().position
     assert (position > 0.0).all()
     assert (position < [2.0, 1.0]).all()
 
 
-def test_a_step_in_parts_and_actions_give_the_same_states_again() -> None:
-    def played() -> str:
+def test_run_with_actions_and_a_partial_step_is_reproducible() -> None:
+    def final_hash() -> str:
         simulation = start(table(ball("cue", 0.3, 0.5), ball("a", 1.0, 0.52), wall=[RAIL]), "reference")
         simulation.apply(Strike(time=0.0, ball="cue", aim=0.0, speed=4.0, side=0.2))
-        after(simulation, 40)
+        advance(simulation, 40)
         simulation.apply(Spawn(time=0.0, ball=Ball(name="b", position=(1.5, 0.2), radius=R, mass=M)))
         simulation.apply(Remove(time=0.0, body="a"))
-        after(simulation, 40).finish(0.5)
+        advance(simulation, 40).finish(0.5)
         assert simulation.retired.keys() == {1}
         return simulation.state_hash()
 
-    assert played() == played()
+    assert final_hash() == final_hash()
 
 
 @pytest.mark.parametrize(
@@ -108,7 +110,7 @@ def test_a_step_in_parts_and_actions_give_the_same_states_again() -> None:
         ({"world": {"duration": 1.0, "linear_drag": 0.1}}, "does not model drag on a floor"),
     ],
 )
-def test_what_is_not_supported_on_a_surface_is_refused(more: dict[str, Any], reason: str) -> None:
+def test_unsupported_settings_on_a_surface_are_refused(more: dict[str, Any], reason: str) -> None:
     with pytest.raises(Refusal) as refused:
         start(table(ball("a", 0, 0, 1, 0), **more), "reference")
     assert any(reason in each for each in refused.value.reasons)
@@ -124,9 +126,9 @@ def test_only_balls_of_the_same_radius_can_be_added() -> None:
 
 
 def test_observer_sees_balls_in_pockets_as_nan() -> None:
-    seen: list[Any] = []
+    observed: list[Any] = []
     simulation = start(table(ball("a", 0, 0, 2, 0), pocket=[{"position": [0.1, 0], "radius": 0.05}]), "reference")
-    simulation.watch(lambda time, start, end, pairs: seen.append((time, end.copy())))
-    after(simulation, 20)
-    assert [time for time, _ in seen] == pytest.approx(0.005 * np.arange(20), abs=1e-15)  # rounding
-    assert np.isnan(seen[-1][1]).all()
+    simulation.watch(lambda time, start, end, pairs: observed.append((time, end.copy())))
+    advance(simulation, 20)
+    assert [time for time, _ in observed] == pytest.approx(0.005 * np.arange(20), abs=1e-15)  # rounding
+    assert np.isnan(observed[-1][1]).all()

@@ -1,4 +1,4 @@
-"""Layers, zones and one-way walls on the reference: under every choice, against closed forms, and at their edges."""
+"""Layers, zones and one-way walls on the reference engine: all settings, closed forms and edge cases."""
 
 import math
 from typing import Any
@@ -22,9 +22,9 @@ from sandbox.scene.geometry.shapes import contains
 pytestmark = pytest.mark.full  # long runs and sweeps
 
 H = 0.001
-"""s, the substep"""
+"""Substep, s."""
 
-HOWS: dict[str, dict[str, Any]] = {
+VARIANTS: dict[str, dict[str, Any]] = {
     "discrete": {},
     "semi-implicit": {"integrator": "semi_implicit_euler"},
     "verlet": {"integrator": "velocity_verlet"},
@@ -38,18 +38,21 @@ HOWS: dict[str, dict[str, Any]] = {
     "grid": {"broad_phase": "grid"},
     "sweep": {"broad_phase": "sweep"},
 }
-hows = pytest.mark.parametrize("how", list(HOWS))
+each_variant = pytest.mark.parametrize("variant", list(VARIANTS))
 
 
 def course(body: dict[str, Any] | None = None, **world: Any) -> Scene:
-    """Return a body that goes up a mouth, over a fence, down again, through a gate, to a wall and back to the gate."""
-    one = {"name": "it", "position": [0.0, 0.0], "velocity": [1.0, 0.0], "restitution": 1.0}
-    one |= body or {"radius": 0.05}
+    """Return a course for one body.
+
+    It moves to an upper layer, over a fence, back to the ground, through a gate, to a wall and back to the gate.
+    """
+    moving = {"name": "it", "position": [0.0, 0.0], "velocity": [1.0, 0.0], "restitution": 1.0}
+    moving |= body or {"radius": 0.05}
     return from_document(
         {
             "world": {"duration": 5.0, **world},
             "solver": {"dt": 5 * H, "substeps": 5},
-            "box" if "size" in one else "ball": [one],
+            "box" if "size" in moving else "ball": [moving],
             "wall": [
                 {"name": "fence", "points": [[1, -1], [1, 1]]},
                 {"name": "gate", "points": [[2, 1], [2, -1]], "one_way": True},
@@ -63,71 +66,74 @@ def course(body: dict[str, Any] | None = None, **world: Any) -> Scene:
     )
 
 
-def begun(scene: Scene, how: str) -> SwitchableSimulation:
-    return start(scene, "reference", scene.solver.replace(**HOWS[how]))
+def start_variant(scene: Scene, variant: str) -> SwitchableSimulation:
+    return start(scene, "reference", scene.solver.replace(**VARIANTS[variant]))
 
 
-def advance(relay: SwitchableSimulation, seconds: float) -> None:
-    while relay.time < seconds - 1e-9:
-        relay.step()
+def advance(simulation: SwitchableSimulation, seconds: float) -> None:
+    while simulation.time < seconds - 1e-9:
+        simulation.step()
 
 
-CASES = [(how, "ball") for how in HOWS] + [(how, "box") for how in HOWS if how != "swept"]
-"""swept knows balls alone, and says so"""
+CASES = [(variant, "ball") for variant in VARIANTS] + [(variant, "box") for variant in VARIANTS if variant != "swept"]
+"""swept supports balls only."""
 
 
-@pytest.mark.parametrize(("how", "kind"), CASES)
-def test_every_choice_knows_layers_and_gates(how: str, kind: str) -> None:
+@pytest.mark.parametrize(("variant", "kind"), CASES)
+def test_layers_and_gates_work_with_every_variant(variant: str, kind: str) -> None:
     scene = course({"size": [0.1, 0.1]} if kind == "box" else {"radius": 0.05})
-    run = sandbox.run(scene, "reference", account=True, **HOWS[how])
+    run = sandbox.run(scene, "reference", account=True, **VARIANTS[variant])
     assert run.status == "ok", run.reason
     touched = [scene.fixed_names[-1 - other] for _, other in run.contact_pair.tolist()]
-    # 0.45 m from gate to end, both ways, between 1.5 and 5 s: it is on its way to the gate again.
+    # 0.45 m from gate to end in both directions, between 1.5 and 5 s: it ends moving towards the gate.
     assert [*dict.fromkeys(touched)] == ["mouth", "foot", "end", "gate"]
     assert touched.count("mouth") == touched.count("foot") == 1
-    out = run.time < 1.95  # through all this nothing has touched it
-    assert (run.velocity[out, 0] == [1.0, 0.0]).all()
-    # Back and forth between 2.05 and 2.45 m, elastic; a spring lets go within a step, and each time acts to its end.
+    before_contact = run.time < 1.95  # no contact up to here
+    assert (run.velocity[before_contact, 0] == [1.0, 0.0]).all()
+    # Elastic bounces between 2.05 and 2.45 m; a penalty force acts to the end of the step in which its contact ends.
     assert np.abs(run.velocity[-1, 0]) == pytest.approx(
-        [1.0, 0.0], abs=0.05 if "penalty" in how else 1e-11
-    )  # 1e-12 an impact
+        [1.0, 0.0], abs=0.05 if "penalty" in variant else 1e-11
+    )  # 1e-12 per impact
     assert 2.05 - 0.01 < run.position[-1, 0, 0] < 2.45 + 0.01
     residual = run.energy - run.energy[0] - run.account.sum(axis=1)
     assert np.abs(residual).max() < 1e-12  # J, rounding; it has 0.5 J
 
 
-@hows
-def test_every_choice_holds_and_lets_go(how: str) -> None:
+@each_variant
+def test_holding_zone_holds_and_releases_with_every_variant(variant: str) -> None:
     zones = [
         {"name": "hole", "position": [0.5, 0.0], "radius": 0.06, "holds": True},
         {"points": [[0.2, -1], [0.4, -1], [0.4, 1], [0.2, 1]], "gravity": [2.0, 0.0]},
     ]
-    hits = {"position": [0.5, 1.0], "velocity": [0.0, -1.0], "radius": 0.05, "restitution": 1.0}
-    balls = [{"name": "it", "position": [0.0, 0.0], "velocity": [1.0, 0.0], "radius": 0.05, "restitution": 1.0}, hits]
+    striking = {"position": [0.5, 1.0], "velocity": [0.0, -1.0], "radius": 0.05, "restitution": 1.0}
+    balls = [
+        {"name": "it", "position": [0.0, 0.0], "velocity": [1.0, 0.0], "radius": 0.05, "restitution": 1.0},
+        striking,
+    ]
     scene = from_document({"solver": {"dt": 5 * H, "substeps": 5}, "ball": balls, "zone": zones})
-    relay = begun(scene, how)
-    relay.account()
-    began = sandbox.engines.common.energy_balance.total_energy(relay)
-    advance(relay, 2.0)
-    frame = relay.frame()
+    simulation = start_variant(scene, variant)
+    simulation.account()
+    initial_energy = sandbox.engines.common.energy_balance.total_energy(simulation)
+    advance(simulation, 2.0)
+    frame = simulation.frame()
     assert frame.visits is not None and frame.visits[0].tolist() == [HELD, 0]
     assert frame.position[0].tolist() == [0.5, 0.0]
     assert frame.velocity[1] == pytest.approx(
-        [0.0, 1.0], abs=0.05 if "penalty" in how else 1e-11
-    )  # 1e-12 an impact  # as above
-    relay.apply(Impulse(time=0.0, body="it", impulse=(-1.0, 0.0)))
-    advance(relay, 2.2)
-    assert relay.frame().velocity[0, 0] < -1.0 + 2.0 * 0.2 + 0.01
-    assert relay.frame().position[0, 0] < 0.42
-    brought = sum(relay.account().values())
-    assert sandbox.engines.common.energy_balance.total_energy(relay) - began == pytest.approx(
-        brought, abs=1e-12
+        [0.0, 1.0], abs=0.05 if "penalty" in variant else 1e-11
+    )  # 1e-12 per impact
+    simulation.apply(Impulse(time=0.0, body="it", impulse=(-1.0, 0.0)))
+    advance(simulation, 2.2)
+    assert simulation.frame().velocity[0, 0] < -1.0 + 2.0 * 0.2 + 0.01
+    assert simulation.frame().position[0, 0] < 0.42
+    booked = sum(simulation.account().values())
+    assert sandbox.engines.common.energy_balance.total_energy(simulation) - initial_energy == pytest.approx(
+        booked, abs=1e-12
     )  # rounding of 1 J
 
 
 @pytest.mark.parametrize("integrator", ["velocity_verlet", "leapfrog", "rk4"])
 def test_free_body_in_a_gravity_zone_moves_by_the_closed_form(integrator: str) -> None:
-    """X = v t + ½ g t² with the zone's g, whatever the world's; these schemes are exact for it."""
+    """X = v t + ½ g t² with the gravity of the zone instead of the world's; these schemes are exact for it."""
     zone = {"position": [0.0, 0.0], "radius": 90.0, "gravity": [0.7, -1.3]}
     world = {"duration": 2.0, "gravity": [0.0, -9.81]}
     ball = {"position": [0.0, 0.0], "velocity": [1.0, 3.0], "radius": 0.1}
@@ -139,8 +145,8 @@ def test_free_body_in_a_gravity_zone_moves_by_the_closed_form(integrator: str) -
 
 
 @pytest.mark.parametrize("integrator", ["explicit_euler", "velocity_verlet"])
-def test_energy_gained_on_a_slope_is_the_slopes(integrator: str) -> None:
-    """Through a slope of 0.4 m at g = 5: m g·0.4 by drives, but for the substeps at both edges, v·h each."""
+def test_energy_gained_in_a_gravity_zone_is_booked_as_drives(integrator: str) -> None:
+    """A zone 0.4 m wide with g = 5 adds m g·0.4 to drives, up to one substep, v·h, at either edge."""
     slope = {"points": [[0.2, -1], [0.6, -1], [0.6, 1], [0.2, 1]], "gravity": [5.0, -2.0]}
     ball = {"position": [0.0, 0.0], "velocity": [1.0, 0.0], "radius": 0.05, "mass": 2.0}
     world = {"duration": 0.8, "gravity": [0.0, -2.0]}
@@ -158,16 +164,18 @@ def test_energy_gained_on_a_slope_is_the_slopes(integrator: str) -> None:
     st.floats(-1.2, 1.2),
 )
 @settings(max_examples=100, deadline=None)
-def test_outlines_agree_with_convex_pieces(spokes: list[tuple[float, float]], x: float, y: float) -> None:
-    """A star about the origin, its corners at growing angles: two ways to tell what is inside, which share nothing."""
+def test_is_inside_agrees_with_contains_for_star_outlines(
+    spokes: list[tuple[float, float]], x: float, y: float
+) -> None:
+    """A star about the origin with corners at ascending angles: two independent point-in-polygon tests agree."""
     turns = np.cumsum([turn for _, turn in spokes])
     angles = 2.0 * math.pi * turns / (turns[-1] + 0.1)
     corners = tuple((r * math.cos(a), r * math.sin(a)) for (r, _), a in zip(spokes, angles.tolist(), strict=True))
     ends = np.asarray(corners)
-    lines = np.roll(ends, -1, axis=0) - ends
-    off = np.asarray((x, y)) - ends
-    share = np.clip((off * lines).sum(axis=1) / (lines * lines).sum(axis=1), 0.0, 1.0)[:, None]
-    on_edge = np.hypot(*(off - share * lines).T).min() < 1e-9  # where rounding decides
+    edges = np.roll(ends, -1, axis=0) - ends
+    offset = np.asarray((x, y)) - ends
+    fraction = np.clip((offset * edges).sum(axis=1) / (edges * edges).sum(axis=1), 0.0, 1.0)[:, None]
+    on_edge = np.hypot(*(offset - fraction * edges).T).min() < 1e-9  # decided by rounding
     zones = [Zone(points=corners), Zone(points=corners, thickness=0.2), Zone(position=(0.1, 0.2), radius=0.5)]
     edge, first, reach, _ = make_zone_shapes(zones)
     for k, zone in enumerate(zones):
@@ -178,21 +186,21 @@ def test_outlines_agree_with_convex_pieces(spokes: list[tuple[float, float]], x:
 
 @given(st.floats(-0.9, 0.6), st.floats(0.3, 30.0))
 @settings(max_examples=30, deadline=None)
-def test_bent_gate_stops_who_is_inside_and_lets_in_who_is_outside(height: float, speed: float) -> None:
-    """A closed gate, its left inside: it is entered without a trace, and never left.
+def test_closed_gate_admits_bodies_from_outside_and_stops_them_inside(height: float, speed: float) -> None:
+    """A closed gate with its left side inside: a body enters without contact and never leaves.
 
-    At its corners it is: who comes in there passes both walls at once, and may leave by the other.
+    Corners are an exception: a body that enters there passes both walls at once and may leave by the other.
     """
     for corners in ([[-1, -1], [1, -1], [1, 1], [-1, 1]], [[-1, -1], [1, -1], [0.2, 0.0], [1, 1], [-1, 1]]):
         wall = {"points": corners, "closed": True, "one_way": True, "restitution": 1.0, "thickness": 0.02}
         ball = {"position": [-1.5, height], "velocity": [speed, 0.3 * speed], "radius": 0.05}
-        dt = 0.02 / speed  # less than its radius a step, so that none passes unseen
+        dt = 0.02 / speed  # less than its radius a step, to prevent tunnelling
         document = {"solver": {"dt": dt}, "world": {"duration": 1.0}, "ball": [ball], "wall": [wall]}
-        relay = start(from_document(document), "reference")
+        simulation = start(from_document(document), "reference")
         entered = False
         for _ in range(400):
-            relay.step()
-            frame = relay.frame()
+            simulation.step()
+            frame = simulation.frame()
             inside = contains(Zone(points=tuple(map(tuple, corners))), tuple(frame.position[0].tolist()))
             assert inside or not entered
             if not entered:
@@ -201,79 +209,81 @@ def test_bent_gate_stops_who_is_inside_and_lets_in_who_is_outside(height: float,
         assert entered
 
 
-def test_two_that_are_held_side_by_side_and_one_that_is_fixed_leave_each_other_alone() -> None:
+def test_held_bodies_do_not_collide_with_each_other_or_with_a_fixed_body() -> None:
     zones = [{"position": [x, 0.0], "radius": 0.05, "holds": True} for x in (0.0, 0.1)]
     balls = [{"name": f"b{k}", "position": [0.1 * k, 0.0], "radius": 0.1} for k in range(2)]
     fixed = {"position": [0.05, 0.1], "radius": 0.1, "fixed": True}
     scene = from_document({"world": {"gravity": [0.0, -5.0]}, "ball": [*balls, fixed], "zone": zones})
-    relay = start(scene, "reference")
-    relay.contacts()
-    advance(relay, 0.5)
-    assert relay.frame().position[:2].tolist() == [[0.0, 0.0], [0.1, 0.0]]
-    assert not relay.frame().velocity.any()
-    assert {other for _, other in relay.contacts().pair.tolist()} == {-1, -2}  # notes alone
+    simulation = start(scene, "reference")
+    simulation.contacts()
+    advance(simulation, 0.5)
+    assert simulation.frame().position[:2].tolist() == [[0.0, 0.0], [0.1, 0.0]]
+    assert not simulation.frame().velocity.any()
+    assert {other for _, other in simulation.contacts().pair.tolist()} == {-1, -2}  # zone entries only
 
 
-def test_gate_that_closes_about_somebody_stops_or_lets_through_by_where_it_is() -> None:
-    """Solid again while two stand in it, one on either side: the one on the left is pushed back, the other passes."""
+def test_gate_made_solid_stops_or_passes_overlapping_bodies_by_their_side() -> None:
+    """The gate becomes solid while two bodies overlap it: the one on the left is pushed back, the other passes."""
     balls = [
         {"name": name, "position": [x, y], "velocity": [v, 0.0], "radius": 0.1}
         for name, x, y, v in (("left", -0.2, 0.5, 1.0), ("right", 0.25, -0.5, -1.0))
     ]
     gate = {"name": "gate", "points": [[0, -1], [0, 1]], "one_way": True, "solid": False}
     scene = from_document({"solver": {"dt": 0.005}, "ball": balls, "wall": [gate]})
-    relay = start(scene, "reference")
-    advance(relay, 0.15)  # the one is at −0.05 m, the other at 0.1
-    relay.apply(Toggle(time=0.0, thing="gate", solid=True))
-    advance(relay, 1.0)
-    x = relay.frame().position[:, 0]
+    simulation = start(scene, "reference")
+    advance(simulation, 0.15)  # one is at −0.05 m, the other at 0.1 m
+    simulation.apply(Toggle(time=0.0, thing="gate", solid=True))
+    advance(simulation, 1.0)
+    x = simulation.frame().position[:, 0]
     assert x[0] < 0.0
     assert x[1] == pytest.approx(0.25 - 1.0, abs=1e-12)  # sums of v·h
-    relay.apply(Reshape(time=0.0, thing="gate", points=((-2.0, 1.0), (-2.0, -1.0))))  # its left is to the right now
-    advance(relay, 3.0)
-    assert relay.frame().position[1, 0] > -2.0
+    simulation.apply(
+        Reshape(time=0.0, thing="gate", points=((-2.0, 1.0), (-2.0, -1.0)))
+    )  # its left side now faces right
+    advance(simulation, 3.0)
+    assert simulation.frame().position[1, 0] > -2.0
 
 
 @pytest.mark.parametrize("response", ["impulse", "penalty"])
-def test_first_box_among_balls_comes_where_there_are_layers_and_gates(response: str) -> None:
-    """From then on contacts are looked for in another way, and go by other keys."""
+def test_first_box_spawned_among_balls_keeps_layers_and_gates(response: str) -> None:
+    """The first box switches the collision pipeline and the format of contact keys."""
     scene = course()
-    relay = start(scene, "reference", scene.solver.replace(response=response))
-    advance(relay, 1.95)  # as it comes into the gate
+    simulation = start(scene, "reference", scene.solver.replace(response=response))
+    advance(simulation, 1.95)  # as it enters the gate
     box = Box(name="box", position=(0.7, 0.5), velocity=(1.0, 0.0), size=(0.1, 0.1))
-    relay.apply(Spawn(time=0.0, box=box))
-    advance(relay, 2.2)
-    assert relay.frame().velocity[0].tolist() == [1.0, 0.0]  # it has passed
-    advance(relay, 3.0)
-    assert relay.frame().position[1, 0] < 1.0  # on the ground the fence is in its way
+    simulation.apply(Spawn(time=0.0, box=box))
+    advance(simulation, 2.2)
+    assert simulation.frame().velocity[0].tolist() == [1.0, 0.0]  # it has passed
+    advance(simulation, 3.0)
+    assert simulation.frame().position[1, 0] < 1.0  # the fence blocks the ground layer
 
 
-def test_zone_is_noted_in_a_last_part_of_a_step() -> None:
+def test_zone_entry_in_a_partial_last_step_is_recorded() -> None:
     zone = {"position": [1.0, 0.0], "radius": 0.5, "to_layer": "up"}
     ball = {"position": [0.0, 0.0], "velocity": [1.0, 0.0], "radius": 0.05}
     document = {"solver": {"dt": 0.1, "substeps": 4}, "ball": [ball], "zone": [zone]}
-    relay = start(from_document(document), "reference")
-    relay.contacts()
+    simulation = start(from_document(document), "reference")
+    simulation.contacts()
     for _ in range(4):
-        relay.step()
-    relay.finish(0.95)  # at 0.495 s it is 5 mm before the edge
-    assert relay.frame().layer.tolist() == [0]
-    relay = start(from_document({**document, "solver": {"dt": 0.1, "substeps": 1}}), "reference")
-    relay.contacts()
+        simulation.step()
+    simulation.finish(0.95)  # at 0.495 s it is 5 mm before the edge of the zone
+    assert simulation.frame().layer.tolist() == [0]
+    simulation = start(from_document({**document, "solver": {"dt": 0.1, "substeps": 1}}), "reference")
+    simulation.contacts()
     for _ in range(5):
-        relay.step()
-    relay.finish(0.1)
-    assert relay.frame().layer.tolist() == [1]
-    assert relay.contacts().time.tolist() == pytest.approx([0.51])
+        simulation.step()
+    simulation.finish(0.1)
+    assert simulation.frame().layer.tolist() == [1]
+    assert simulation.contacts().time.tolist() == pytest.approx([0.51])
 
 
-def test_body_that_appears_in_a_zone_is_noted_after_the_next_substep() -> None:
+def test_zone_entry_of_a_spawned_body_is_recorded_after_the_next_substep() -> None:
     zone = {"position": [1.0, 0.0], "radius": 0.5, "to_layer": "up"}
     scene = from_document({"solver": {"dt": 0.01}, "ball": [{"position": [-1.0, 0.0], "radius": 0.1}], "zone": [zone]})
-    relay = start(scene, "reference")
-    relay.contacts()
-    relay.apply(Spawn(time=0.0, ball=Ball(name="new", position=(1.0, 0.1), radius=0.1)))
-    assert relay.frame().layer.tolist() == [0, 0]
-    relay.step()
-    assert relay.frame().layer.tolist() == [0, 1]
-    assert relay.contacts().time.tolist() == [0.01]
+    simulation = start(scene, "reference")
+    simulation.contacts()
+    simulation.apply(Spawn(time=0.0, ball=Ball(name="new", position=(1.0, 0.1), radius=0.1)))
+    assert simulation.frame().layer.tolist() == [0, 0]
+    simulation.step()
+    assert simulation.frame().layer.tolist() == [0, 1]
+    assert simulation.contacts().time.tolist() == [0.01]

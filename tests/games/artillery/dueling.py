@@ -1,8 +1,8 @@
-"""Scenes of two tanks, 140 m from each other on level columns."""
+"""Scene of two tanks, 140 m apart on level columns."""
 
 
 def two_tanks(world: str = "", game: str = "", red: str = "", blue: str = "") -> str:
-    """Return a scene with further lines in `[world]`, in `[artillery]`, and of the two players."""
+    """Return the text of the scene, with further lines in `[world]`, `[artillery]` and the two players."""
     return f"""
 [world]
 gravity = [0.0, -9.81]

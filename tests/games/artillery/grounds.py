@@ -1,4 +1,4 @@
-"""Grounds and worlds for tests of artillery."""
+"""Terrains and worlds for the tests of artillery."""
 
 import math
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ def flat(height: float, width: float = 400.0, columns: int = 400) -> Ground:
 
 
 def hills(seed: int, roughness: float, pads: Sequence[float] = (), width: float = 300.0) -> Ground:
-    """Ground as a scene has it, level at some places."""
+    """Return ground as a scene builds it, levelled around the positions `pads`, m."""
     heights = heights_of(Terrain(width=width, columns=300, roughness=roughness), seed)
     for at in pads:
         heights = levelled(heights, width, at, 2.5)

@@ -1,4 +1,4 @@
-"""The player at the keys: without error it hits as a bot does, and what it pressed is all that a script needs."""
+"""Bot that plays by key presses: without error it hits, and a script of its presses replays the game."""
 
 import math
 
@@ -7,13 +7,12 @@ import pytest
 from sandbox.games.artillery.battlefield import WEAPONS
 from sandbox.games.artillery.bot import ArtilleryBot
 from sandbox.games.artillery.rules import ArtilleryRules
-from sandbox.games.contract import Policy, UnsuitableSceneError
+from sandbox.games.contract import Policy
 from sandbox.games.players import POLICIES, ScriptedInput
 from sandbox.games.registry import rules_of
 from sandbox.games.session import HeadlessGame
 from sandbox.measure.run.runner import run
-from sandbox.scene.files.load import load, loads
-from sandbox.scene.files.shipped_scenes import find
+from sandbox.scene.files.load import loads
 from tests.games.artillery.dueling import two_tanks
 
 pytestmark = pytest.mark.full  # long runs and sweeps
@@ -21,7 +20,7 @@ pytestmark = pytest.mark.full  # long runs and sweeps
 FIELD = two_tanks("duration = 12.0", "money = 0", blue="bot = 0.0")
 
 
-def played(policy: Policy) -> tuple[ArtilleryRules, HeadlessGame, str]:
+def play(policy: Policy) -> tuple[ArtilleryRules, HeadlessGame, str]:
     scene = loads(FIELD)
     rules = rules_of(scene)
     assert isinstance(rules, ArtilleryRules)
@@ -30,21 +29,19 @@ def played(policy: Policy) -> tuple[ArtilleryRules, HeadlessGame, str]:
     return rules, bout, trajectory.info["state_hash"]
 
 
-def test_full_skill_hits_by_keys_alone() -> None:
-    rules, bout, state = played(ArtilleryBot(1, skill=1.0))
-    own = [shot for shot in rules.shots if shot.shooter == "Red"]
-    assert own
-    first, blue = own[0], loads(FIELD).bodies.position[1].tolist()
+def test_full_skill_hits_by_key_presses() -> None:
+    rules, bout, state = play(ArtilleryBot(1, skill=1.0))
+    shots = [shot for shot in rules.shots if shot.shooter == "Red"]
+    assert shots
+    first, blue = shots[0], loads(FIELD).bodies.position[1].tolist()
     assert first.place is not None
     assert math.dist(first.place, blue) <= WEAPONS[0].radius
     assert rules.score > 0
-    again, seen, same = played(ScriptedInput(bout.presses))
-    assert (again.score, seen.presses, same) == (rules.score, bout.presses, state)
+    replayed, replayed_bout, replayed_state = play(ScriptedInput(bout.presses))
+    assert (replayed.score, replayed_bout.presses, replayed_state) == (rules.score, bout.presses, state)
 
 
-def test_skill_is_a_share_and_the_game_has_to_be_artillery() -> None:
+def test_skill_outside_0_to_1_is_refused_and_the_bot_is_the_skilled_player() -> None:
     with pytest.raises(ValueError, match="0 to 1"):
         ArtilleryBot(1, skill=1.5)
     assert isinstance(POLICIES["skilled"](loads(FIELD)), ArtilleryBot)
-    with pytest.raises(UnsuitableSceneError, match="not landing"):
-        POLICIES["skilled"](load(find("landing")))

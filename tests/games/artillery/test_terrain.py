@@ -1,4 +1,4 @@
-"""`[terrain]` and `[artillery]`: hills from the seed, columns that are whole quanta, and tanks that stand on them."""
+"""`[terrain]` and `[artillery]`: hills from the seed, column heights in whole quanta, and tanks on level ground."""
 
 import itertools
 
@@ -41,17 +41,17 @@ def columns(scene: Scene) -> tuple[float, ...]:
 
 
 @given(st.integers(0, 2**63 - 1), st.integers(2, 400), st.floats(0, 1))
-def test_hills_fill_their_range_and_hang_on_the_seed(seed: int, count: int, roughness: float) -> None:
+def test_hills_fill_their_range_and_depend_on_the_seed(seed: int, count: int, roughness: float) -> None:
     terrain = Terrain(width=100.0, columns=count, base=5.0, height=20.0, roughness=roughness)
     heights = heights_of(terrain, seed)
     assert len(heights) == count
-    assert (min(heights), max(heights)) == (5.0, 25.0)  # both are whole quanta
+    assert (min(heights), max(heights)) == (5.0, 25.0)  # both are multiples of the quantum
     assert all((height / QUANTUM).is_integer() for height in heights)
     assert heights == heights_of(terrain, seed)
     assert count == 2 or heights != heights_of(terrain, seed ^ 1)
 
 
-def test_rough_ground_is_rougher() -> None:
+def test_roughness_increases_the_steps_of_the_ground() -> None:
     def steps(roughness: float) -> float:
         heights = heights_of(Terrain(width=100.0, columns=257, base=0.0, height=1.0, roughness=roughness), 3)
         return sum(abs(a - b) for a, b in itertools.pairwise(heights))
@@ -60,7 +60,7 @@ def test_rough_ground_is_rougher() -> None:
 
 
 @given(st.lists(st.floats(0, 1e6), min_size=2, max_size=50), st.floats(1e-3, 1e6))
-def test_a_course_tells_its_columns(heights: list[float], width: float) -> None:
+def test_columns_are_recovered_from_a_course(heights: list[float], width: float) -> None:
     assert columns_of(course_of(heights, width)) == (tuple(heights), width)
     moved = [(x, y) for x, y in course_of(heights, width)]
     moved[1] = (moved[1][0] + 0.1 * width / len(heights), moved[1][1])
@@ -80,7 +80,7 @@ def test_tanks_stand_on_level_ground() -> None:
     assert scene.walls[0].friction == 0.5
 
 
-def test_it_is_the_same_read_written_and_read_again() -> None:
+def test_scene_survives_a_round_trip_and_overrides_change_it() -> None:
     scene = loads(DUEL)
     assert loads(dumps(scene)) == scene
     assert from_document(to_document(scene)) == scene
@@ -94,13 +94,13 @@ def test_it_is_the_same_read_written_and_read_again() -> None:
 
 
 @given(st.integers(0, 2**63 - 1))
-def test_another_seed_lays_out_other_hills_also_where_they_were_written_out(seed: int) -> None:
+def test_another_seed_rebuilds_the_hills_of_an_expanded_scene(seed: int) -> None:
     scene = loads(DUEL)
     assert with_seed(scene, seed) == loads(DUEL, overrides=[f"world.seed={seed}"])
     assert with_seed(with_seed(scene, seed), scene.world.seed) == scene
 
 
-def test_another_seed_leaves_what_was_changed_by_hand() -> None:
+def test_another_seed_keeps_overrides() -> None:
     scene = loads(DUEL, overrides=["wall.terrain.restitution=0.3", "box.Red.position=[30.0, 90.0]"])
     other = with_seed(scene, 6)
     assert columns(other) == columns(loads(DUEL, overrides=["world.seed=6"]))
@@ -111,7 +111,7 @@ def test_another_seed_leaves_what_was_changed_by_hand() -> None:
     assert columns(with_seed(flat, 6)) == (2.0,) * 100
 
 
-def test_stated_heights_are_the_ground() -> None:
+def test_stated_heights_are_used_as_the_ground() -> None:
     given_heights = [3.0, 4.0, 5.0, 6.0] * 5
     text = DUEL.replace("columns = 100\nbase = 8.0\nheight = 30.0", f"heights = {given_heights}")
     text = text.replace("tank", "").replace("position = 30.0", "position = 25.0")
@@ -122,7 +122,7 @@ def test_stated_heights_are_the_ground() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "path", "told"),
+    ("change", "path", "words"),
     [
         (("position = 30.0", "position = 199.5"), "artillery.player.Red.position", "between 1.5 and 198.5 m"),
         (
@@ -136,28 +136,28 @@ def test_stated_heights_are_the_ground() -> None:
         (("columns = 100", "columns = 1"), "terrain.columns", "must be between 2 and 5000"),
     ],
 )
-def test_what_is_wrong_is_told(change: tuple[str, str], path: str, told: str) -> None:
+def test_faults_have_path_and_line(change: tuple[str, str], path: str, words: str) -> None:
     with pytest.raises(SceneError) as caught:
         loads(DUEL.replace(*change), "duel.toml")
     faults = [(fault.path, fault.message) for fault in caught.value.faults]
-    assert any(where == path and told in message for where, message in faults), faults
+    assert any(found == path and words in message for found, message in faults), faults
     assert all(fault.line is not None for fault in caught.value.faults)
 
 
-def test_players_need_ground_of_columns() -> None:
-    alone = DUEL[DUEL.index("[artillery]") :]
+def test_players_need_ground_made_of_columns() -> None:
+    without_terrain = DUEL[DUEL.index("[artillery]") :]
     with pytest.raises(SceneError, match=r"add a \[terrain\]"):
-        loads(alone)
+        loads(without_terrain)
     wall = '[[wall]]\nname = "terrain"\npoints = [[0.0, 1.0], [50.0, 1.0], [60.0, 2.0], [200.0, 2.0]]\n'
     with pytest.raises(SceneError, match="columns of equal width"):
-        loads(wall + alone)
+        loads(wall + without_terrain)
     even = str([list(point) for point in course_of([4.0] * 40, 200.0)])
-    assert loads(f'[[wall]]\nname = "terrain"\npoints = {even}\n' + alone).boxes[0].position == (30.0, 4.75)
+    assert loads(f'[[wall]]\nname = "terrain"\npoints = {even}\n' + without_terrain).boxes[0].position == (30.0, 4.75)
     with pytest.raises(SceneError, match="remove one of the two"):
         loads(DUEL + wall)
 
 
-def test_settled_heights_are_near_and_never_below_the_foot() -> None:
+def test_settled_heights_are_nearest_quanta_and_not_negative() -> None:
     assert settled(1.0) == 1.0
     assert settled(-3.0) == 0.0
     assert abs(settled(0.1) - 0.1) <= QUANTUM / 2

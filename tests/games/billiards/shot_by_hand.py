@@ -1,4 +1,4 @@
-"""Shots written out: `cue hits 1`, `1 at rail`, `1 in corner`, one after the other; a tuple is at one time."""
+"""Shots as text lines: `cue hits 1`, `1 at rail`, `1 in corner`, in order; the events of a tuple are simultaneous."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -16,9 +16,9 @@ def shot(*lines: str | tuple[str, ...]) -> tuple[BallEvent, ...]:
     )
 
 
-def played(rules: Ruleset[Any], state: Any, *lines: str | tuple[str, ...], **call: Any) -> Ruling[Any]:
+def judge(rules: Ruleset[Any], state: Any, *lines: str | tuple[str, ...], **call: Any) -> Ruling[Any]:
     return rules.judge(state, ShotCall(**call), shot(*lines))
 
 
-def fallen(balls: Iterable[str]) -> tuple[str, ...]:
+def potted_lines(balls: Iterable[str]) -> tuple[str, ...]:
     return tuple(f"{ball} in corner" for ball in balls)

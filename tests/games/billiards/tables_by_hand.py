@@ -1,4 +1,4 @@
-"""Tables for tests: the shipped ones, and balls put where a test wants them."""
+"""Billiards tables of tests: the shipped scenes, and matches with balls at given positions."""
 
 from functools import cache
 from pathlib import Path
@@ -23,19 +23,19 @@ def match(name: str, **terms: Any) -> Match:
     return Match.begin(table(name), **terms)
 
 
-def lying(name: str, places: dict[str, Point], **terms: Any) -> Match:
-    """A match with balls elsewhere; those that are not named are where they begin."""
+def match_with_balls_at(name: str, positions: dict[str, Point], **terms: Any) -> Match:
+    """Return a match with balls at given positions; the other balls are at their initial positions."""
     scene = table(name)
     position = scene.bodies.position.copy()
-    for ball, at in places.items():
+    for ball, at in positions.items():
         position[scene.bodies.names.index(ball)] = at
-    begun = Match.begin(scene, **terms)
-    plain = begun.document() | {"position": position.tolist()}
-    return Match.restored(scene, plain)
+    initial = Match.begin(scene, **terms)
+    document = initial.document() | {"position": position.tolist()}
+    return Match.restored(scene, document)
 
 
 def run_until_rest(simulation: Simulation) -> Contacts:
-    """Step until every ball is at rest; return the contacts since they were last asked for."""
+    """Step until every ball is at rest; return the contacts since the last call of `contacts`."""
     simulation.step()
     while not simulation.frame().is_at_rest:
         simulation.step()

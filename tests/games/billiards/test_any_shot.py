@@ -1,4 +1,4 @@
-"""Every game, whatever happens: nothing raises, what is kept stays sound, a frame ends."""
+"""Every game with random shots: no exception, valid states, and every frame ends."""
 
 import json
 from dataclasses import replace
@@ -27,30 +27,30 @@ turns = st.lists(
 
 
 def shot_of(rules: Ruleset[Any], state: Any, events: list[tuple[str, int, int]]) -> tuple[BallEvent, ...]:
-    """Events of balls that are there; a cue ball that touches what is on is as likely as anything else."""
+    """Return events of balls on the table; half of the ball events are the cue ball hitting a ball on."""
     cue = rules.cue_ball(state)
     balls = (cue, *(ball for ball in state.table if ball != cue))
     targets = sorted(rules.legal_targets(state))
-    told: list[BallEvent] = []
+    result: list[BallEvent] = []
     for time, (kind, a, b) in enumerate(events):
         if kind == "ball":
             pair = (cue, targets[b % len(targets)]) if a % 2 else (balls[a % len(balls)], balls[b % len(balls)])
-            told.append(BallEvent(time - a % 2, pair[0], "ball", pair[1]))
+            result.append(BallEvent(time - a % 2, pair[0], "ball", pair[1]))
         elif kind == "pocket" and rules.name not in CAROM:
-            told.append(BallEvent(time, balls[a % len(balls)], "pocket", POCKETS[b % 2]))
+            result.append(BallEvent(time, balls[a % len(balls)], "pocket", POCKETS[b % 2]))
         else:
-            told.append(BallEvent(time, balls[a % len(balls)], "cushion", "rail"))
-    return tuple(told)
+            result.append(BallEvent(time, balls[a % len(balls)], "cushion", "rail"))
+    return tuple(result)
 
 
 def call_of(rules: Ruleset[Any], state: Any, pick: int) -> ShotCall:
-    asked = rules.choices(state)
-    ball = (None, *asked.balls)[pick % (len(asked.balls) + 1)]
-    pocket = (None, *POCKETS)[pick % 3] if asked.pocket else None
-    return ShotCall(ball, pocket, safety=asked.safety and pick % 7 == 0, push_out=asked.push_out and pick % 2 == 0)
+    choices = rules.choices(state)
+    ball = (None, *choices.balls)[pick % (len(choices.balls) + 1)]
+    pocket = (None, *POCKETS)[pick % 3] if choices.pocket else None
+    return ShotCall(ball, pocket, safety=choices.safety and pick % 7 == 0, push_out=choices.push_out and pick % 2 == 0)
 
 
-def is_sound(rules: Ruleset[Any], state: Any) -> None:
+def assert_valid_state(rules: Ruleset[Any], state: Any) -> None:
     start = rules.start(state.players)
     assert len(state.scores) == state.players
     assert min(state.scores) >= 0
@@ -64,16 +64,16 @@ def is_sound(rules: Ruleset[Any], state: Any) -> None:
     assert rules.restored(json.loads(json.dumps(rules.document(state)))) == state
 
 
-def follows(rules: Ruleset[Any], before: Any, verdict: Ruling[Any]) -> None:
-    """What one shot may do."""
+def assert_valid_transition(rules: Ruleset[Any], before: Any, verdict: Ruling[Any]) -> None:
+    """Check the changes that one shot may make."""
     after = verdict.state
-    gained = tuple(now - then for now, then in zip(after.scores, before.scores, strict=True))
-    assert verdict.points == gained
-    assert min(gained) >= 0
+    gains = tuple(now - then for now, then in zip(after.scores, before.scores, strict=True))
+    assert verdict.points == gains
+    assert min(gains) >= 0
     assert set(after.table) <= set(before.table)
     assert {each.ball for each in verdict.respot} <= set(after.table)
     assert verdict.continues <= (after.turn == before.turn and not after.over)
-    if isinstance(after, SnookerState) and not before.free:  # a free ball brings a colour with it, as a red does
+    if isinstance(after, SnookerState) and not before.free:  # a free ball is followed by a colour, as a red is
         level = "scores level: the black is respotted" in verdict.messages
         assert level or remaining(after) <= remaining(before)
 
@@ -82,41 +82,41 @@ def follows(rules: Ruleset[Any], before: Any, verdict: Ruling[Any]) -> None:
 @pytest.mark.parametrize("name", RULESETS)
 @settings(max_examples=60, deadline=None)
 @given(turns=turns, misses=st.booleans())
-def test_any_shots_leave_a_sound_state(name: str, players: int, turns: list[Any], misses: bool) -> None:
+def test_any_shots_give_a_valid_state(name: str, players: int, turns: list[Any], misses: bool) -> None:
     rules = RULESETS[name]
     state = rules.start(players)
     if isinstance(state, SnookerState):
-        state = replace(state, misses=misses, table=state.table[10:])  # few reds, so that the colours are reached
+        state = replace(state, misses=misses, table=state.table[10:])  # few reds, to reach the colours
     for events, pick, snookered, choice in turns:
         offered = rules.choices(state).decisions
         if offered and choice % 3:
             state = rules.decide(state, offered[choice % len(offered)]).state
-            is_sound(rules, state)
+            assert_valid_state(rules, state)
             if state.over:
                 break
         shot, call = shot_of(rules, state, events), call_of(rules, state, pick)
         verdict = rules.judge(state, call, shot)
-        assert rules.judge(state, call, shot) == verdict  # nothing but the state is remembered
-        is_sound(rules, verdict.state)
-        follows(rules, state, verdict)
+        assert rules.judge(state, call, shot) == verdict  # rules have no memory besides the state
+        assert_valid_state(rules, verdict.state)
+        assert_valid_transition(rules, state, verdict)
         state = verdict.state
         if state.over:
             break
         cue = rules.cue_ball(state)
         near = tuple(ball for ball in state.table if ball != cue)[: choice % 2]
         state = rules.settle(state, Situation(near, snookered, near)).state
-        is_sound(rules, state)
+        assert_valid_state(rules, state)
 
 
 @pytest.mark.parametrize("players", [1, 2])
 @pytest.mark.parametrize("name", RULESETS)
 @settings(max_examples=20, deadline=None)
 @given(mistakes=st.lists(st.integers(0, 2), max_size=12))
-def test_frame_of_players_who_make_what_is_on_ends(name: str, players: int, mistakes: list[int]) -> None:
-    """Each shot makes what is on, but for some that miss, scratch or touch nothing."""
+def test_frame_of_successful_shots_with_some_mistakes_ends(name: str, players: int, mistakes: list[int]) -> None:
+    """Each shot pots the ball on or makes the carom, except for some that miss, scratch or hit nothing."""
     rules = RULESETS[name]
     state = rules.start(players)
-    balls = 2 * len(state.table) + 110  # a colour with each red; the distances of carom
+    balls = 2 * len(state.table) + 110  # a colour after each red; the distances of carom
     for turn in range(len(mistakes) + balls):
         cue, target = rules.cue_ball(state), min(rules.legal_targets(state), key=len)
         touch = BallEvent(0.0, cue, "ball", target)
@@ -129,8 +129,8 @@ def test_frame_of_players_who_make_what_is_on_ends(name: str, players: int, mist
         if turn < len(mistakes):
             scratch = BallEvent(1.0, cue, "pocket", "left")
             lines = [[], [touch], [touch, *([] if name in CAROM else [scratch])]][mistakes[turn]]
-        asked = rules.choices(state)
-        call = ShotCall(target if target in asked.balls else None, "left" if asked.pocket else None)
+        choices = rules.choices(state)
+        call = ShotCall(target if target in choices.balls else None, "left" if choices.pocket else None)
         state = rules.judge(state, call, lines).state
         if state.over:
             break
@@ -138,7 +138,7 @@ def test_frame_of_players_who_make_what_is_on_ends(name: str, players: int, mist
 
 
 @pytest.mark.parametrize("name", RULESETS)
-def test_what_is_no_state_is_refused(name: str) -> None:
+def test_malformed_state_is_refused(name: str) -> None:
     rules = RULESETS[name]
     good = rules.document(rules.start())
     for bad in ({}, [], {**good, "turn": "who"}, {**good, "turn": 2}, {**good, "more": 1}):

@@ -1,4 +1,4 @@
-"""`[billiards]` of a scene file: what it stands for, what outranks it, and what is wrong with it."""
+"""`[billiards]` of a scene file: its expansion, elements that override it, and faults."""
 
 from typing import Any, get_args
 
@@ -37,7 +37,7 @@ speed = 8.0
 
 
 @pytest.mark.parametrize(("table", "game"), TABLES)
-def test_preset_becomes_a_scene_of_primitives(table: str, game: str) -> None:
+def test_preset_expands_to_a_scene_of_primitives(table: str, game: str) -> None:
     scene = from_document({"billiards": {"table": table, "game": game}})
     assert scene.billiards is None
     assert scene.surface is not None
@@ -49,14 +49,14 @@ def test_preset_becomes_a_scene_of_primitives(table: str, game: str) -> None:
     assert loads(dumps(scene)) == scene
 
 
-def test_every_game_has_rules_for_the_balls_it_is_racked_with() -> None:
+def test_rules_of_every_game_match_its_rack() -> None:
     assert set(RULESETS) == set(get_args(TableGame)) == set(RACKS)
     for name, rules in RULESETS.items():
         if name != "free":
             assert rules.rack == RACKS[name]  # type: ignore[index]
 
 
-def test_balls_are_of_their_set() -> None:
+def test_balls_have_the_size_and_mass_of_their_set() -> None:
     for table, game, kind in (("pool-9ft", "8-ball", "pool"), ("snooker-12ft", "snooker", "snooker")):
         scene = from_document({"billiards": {"table": table, "game": game}})
         assert [ball.name for ball in scene.balls] == list(BALLS[kind].colours)
@@ -68,7 +68,7 @@ def test_balls_are_of_their_set() -> None:
     assert 0.205 <= BALLS["carom"].mass <= 0.22
 
 
-def test_figures_of_balls_and_cushions_are_stated_or_the_set_s() -> None:
+def test_parameters_of_balls_and_cushions_default_to_the_set() -> None:
     more = {"ball_radius": 0.03, "ball_mass": 0.2, "ball_restitution": 0.9, "cushion_friction": 0.1, "nose": 0.04}
     scene = from_document({"billiards": {**EIGHT["billiards"], **more}})
     assert {(ball.radius, ball.mass) for ball in scene.balls} == {(0.03, 0.2)}
@@ -83,8 +83,8 @@ def test_figures_of_balls_and_cushions_are_stated_or_the_set_s() -> None:
     assert {wall.height for wall in carom.walls} == {0.037}
 
 
-def test_what_the_scene_states_outranks_the_preset() -> None:
-    own = {
+def test_elements_of_the_scene_override_the_preset() -> None:
+    document = {
         **EIGHT,
         "world": {"duration": 3.0},
         "surface": {"rolling_friction": 0.02},
@@ -95,7 +95,7 @@ def test_what_the_scene_states_outranks_the_preset() -> None:
         "ball": [{"name": "cue", "position": [0.3, 0.3], "radius": 0.03}],
         "pocket": [{"name": "left pocket", "position": [-0.1, 1.27], "radius": 0.05}],
     }
-    scene = from_document(own)
+    scene = from_document(document)
     assert scene.world.duration == 3.0
     assert scene.surface is not None
     assert (scene.surface.rolling_friction, scene.surface.sliding_friction) == (0.02, 0.2)
@@ -108,25 +108,25 @@ def test_what_the_scene_states_outranks_the_preset() -> None:
 
 def test_balls_are_placed_by_name() -> None:
     scene = from_document({"billiards": {**EIGHT["billiards"], "place": {"cue": [0.4, 0.5], "8": [0.6, 0.6]}}})
-    places = {ball.name: ball.position for ball in scene.balls}
-    assert (places["cue"], places["8"], len(places)) == ((0.4, 0.5), (0.6, 0.6), 16)
+    positions = {ball.name: ball.position for ball in scene.balls}
+    assert (positions["cue"], positions["8"], len(positions)) == ((0.4, 0.5), (0.6, 0.6), 16)
     scene = from_document({"billiards": {"table": "pool-9ft", "place": {"cue": [0.4, 0.5], "3": [0.6, 0.6]}}})
     assert [ball.name for ball in scene.balls] == ["cue", "3"]
     assert len({ball.colour for ball in scene.balls}) == 2
 
 
-def test_rack_stands_on_a_table_of_one_s_own_by_its_spots() -> None:
+def test_rack_is_placed_on_a_custom_table_by_its_spots() -> None:
     spots = [{"name": "head", "position": [-1.0, 0.0]}, {"name": "foot", "position": [1.0, 0.0]}]
     wall = {"points": [[-2, -1], [2, -1], [2, 1], [-2, 1]], "closed": True, "height": 0.037, "material": "cushion"}
     scene = from_document({"billiards": {"game": "9-ball", "gap": 0.0}, "play": {"spot": spots}, "wall": [wall]})
-    places = {str(ball.name): np.asarray(ball.position) for ball in scene.balls}
-    assert places["1"] == pytest.approx([1.0, 0.0])
-    assert places["9"] - places["1"] == pytest.approx([2.0 * 0.05715 * np.sqrt(0.75), 0.0])  # two rows on, along x
+    positions = {str(ball.name): np.asarray(ball.position) for ball in scene.balls}
+    assert positions["1"] == pytest.approx([1.0, 0.0])
+    assert positions["9"] - positions["1"] == pytest.approx([2.0 * 0.05715 * np.sqrt(0.75), 0.0])  # two rows, along x
     assert (len(scene.walls), scene.play.area) == (1, None)
     assert loads(dumps(scene)) == scene
 
 
-def test_overrides_reach_the_preset_and_what_it_stands_for() -> None:
+def test_overrides_apply_to_the_preset_and_its_expansion() -> None:
     sets = [
         "ball.cue.velocity=[0.5, 1.0]",
         "shot.break.aim=1.4",
@@ -148,7 +148,7 @@ def test_overrides_reach_the_preset_and_what_it_stands_for() -> None:
     assert [b.position for b in loads(TEXT, overrides=["world.seed=8"]).balls] != [b.position for b in plain.balls]
 
 
-def test_override_brings_a_preset_or_mends_it() -> None:
+def test_override_adds_a_preset_or_corrects_it() -> None:
     scene = from_document({}, overrides=["billiards.game=9-ball", "billiards.table=pool-8ft"])
     assert len(scene.balls) == 10
     faulty = TEXT.replace("pool-9ft", "pool-10ft").replace("speed = 8.0", "speed = -8.0")
@@ -173,7 +173,7 @@ def test_override_brings_a_preset_or_mends_it() -> None:
         ({**EIGHT, "wall": [{"name": "cue", "points": [[5, 0], [6, 0]], "height": 0.03}]}, "wall.cue.name", "unique"),
     ],
 )
-def test_faults_are_told_where_they_are(document: dict[str, Any], path: str, words: str) -> None:
+def test_faults_have_their_path(document: dict[str, Any], path: str, words: str) -> None:
     with pytest.raises(SceneError) as caught:
         from_document(document)
     (fault,) = caught.value.faults
@@ -181,23 +181,23 @@ def test_faults_are_told_where_they_are(document: dict[str, Any], path: str, wor
     assert words in fault.message
 
 
-def test_faults_of_what_is_written_out_point_at_the_preset() -> None:
+def test_faults_of_expanded_elements_point_at_the_preset() -> None:
     with pytest.raises(SceneError) as caught:
         loads(TEXT + "\n[world]\nbounds = [[0.0, 0.0], [1.0, 1.0]]\n", "eight.toml")
     faults = caught.value.faults
-    assert len(faults) == 15  # the rack lies outside, the cue ball does not
+    assert len(faults) == 15  # the rack lies outside the bounds, the cue ball inside
     assert {fault.line for fault in faults} == {4}
     assert "ball.8" in {fault.path for fault in faults}
 
 
-def test_every_fault_is_told_beside_a_preset() -> None:
+def test_every_fault_beside_a_preset_is_reported() -> None:
     document = {**EIGHT, "shot": [SHOT, {**SHOT, "name": "again", "ball": "17"}], "world": {"duration": -1}}
     with pytest.raises(SceneError) as caught:
         from_document(document)
     assert {fault.path for fault in caught.value.faults} == {"world.duration", "shot.again.ball"}
 
 
-def test_faults_are_told_before_overrides_of_what_could_not_be_written_out() -> None:
+def test_faults_of_the_preset_precede_those_of_overrides_of_its_elements() -> None:
     with pytest.raises(SceneError) as caught:
         from_document({"billiards": {"table": "pool"}}, overrides=["ball.cue.mass=0.2"])
     assert [fault.path for fault in caught.value.faults] == ["billiards.table"]
@@ -205,7 +205,7 @@ def test_faults_are_told_before_overrides_of_what_could_not_be_written_out() -> 
         from_document(EIGHT, overrides=["ball.queue.mass=0.2"])
 
 
-def test_scene_made_by_hand_is_not_laid_out_without_its_preset() -> None:
+def test_scene_built_in_python_has_no_bodies_before_its_preset_is_expanded() -> None:
     scene = Scene(billiards=Billiards(table="carom-10ft", game="straight-rail"))
     with pytest.raises(ValueError, match="is not expanded"):
         _ = scene.bodies

@@ -1,4 +1,4 @@
-"""Frames: bots play them out; nothing is lost, nothing illegal, and they replay."""
+"""Frames played by bots: they end, every turn leaves a valid table, and they replay."""
 
 from dataclasses import replace
 
@@ -17,88 +17,89 @@ TERMS = {"three-cushion": {"distance": 2}, "straight-rail": {"distance": 3}, "sn
 GAMES = ["8-ball", "9-ball", "snooker", "three-cushion", "straight-rail"]
 
 
-def sound(turn: FrameTurn, now: Match) -> None:
-    """Check what holds after every turn: what is on the table lies there and apart, what is down in a pocket."""
-    here = now.on_table
-    for name, (x, y, r) in here.items():
+def assert_valid_table(turn: FrameTurn, now: Match) -> None:
+    """Check that balls in play are on the table and do not overlap, and that potted balls are in a pocket."""
+    on_table = now.on_table
+    for name, (x, y, r) in on_table.items():
         assert now.layout.pocket_at((x, y)) is None, name
         (x0, y0), (x1, y1) = now.layout.area
-        # Between the jaws of a pocket a ball may come to rest beyond the noses of the cushions, but not behind them.
+        # Between the jaws of a pocket a ball may rest beyond the line of the noses, but not behind the cushions.
         jaws = any((x - u) ** 2 + (y - v) ** 2 < (s + r) ** 2 for u, v, s in now.layout.pockets.values())
         assert jaws or (x0 < x < x1 and y0 < y < y1), (name, x, y)
-    for name in set(now.layout.names) - set(here):
+    for name in set(now.layout.names) - set(on_table):
         assert now.layout.pocket_at(now.position[now.layout.number[name]]) is not None, name
-    discs = list(here.values())
+    discs = list(on_table.values())
     for k, (x, y, r) in enumerate(discs):
         for u, v, s in discs[:k]:
-            assert ((x - u) ** 2 + (y - v) ** 2) ** 0.5 >= r + s - 1e-9  # what counts as no overlap in a scene
+            assert ((x - u) ** 2 + (y - v) ** 2) ** 0.5 >= r + s - 1e-9  # tolerance of overlaps in a scene
     if now.state.in_hand is not None and not now.over:
         assert now.refusal(now.position[now.layout.number[now.cue]]) is None
 
 
-def frame(name: str, skills: tuple[float, float], seed: int = 1) -> FrameRecord:
-    begun = Match.begin(table(name, seed), **TERMS.get(name, {}))
-    return play_frame(begun, [BilliardsBot(skill, 2 * seed + k) for k, skill in enumerate(skills)], on_turn=sound)
+def play_frame_of(name: str, skills: tuple[float, float], seed: int = 1) -> FrameRecord:
+    initial = Match.begin(table(name, seed), **TERMS.get(name, {}))
+    bots = [BilliardsBot(skill, 2 * seed + k) for k, skill in enumerate(skills)]
+    return play_frame(initial, bots, on_turn=assert_valid_table)
 
 
 def test_frame_of_9_ball_ends_and_replays() -> None:
-    played = frame("9-ball", (0.8, 0.6))
-    assert played.match.over
-    assert played.match.state.winner in (0, 1)
-    assert played.match.shots == len(played.shots)
-    again = played.replayed()
-    assert again.match == played.match
-    assert again.session == played.session
+    record = play_frame_of("9-ball", (0.8, 0.6))
+    assert record.match.over
+    assert record.match.state.winner in (0, 1)
+    assert record.match.shots == len(record.shots)
+    again = record.replayed()
+    assert again.match == record.match
+    assert again.session == record.session
 
 
 def test_session_leads_to_the_same_state_without_the_rules() -> None:
-    played = frame("three-cushion", (0.9, 0.9))
-    session = Recording.from_json(played.session.to_json())
-    assert rerun(session, audit=False).info["state_hash"] == played.session.state_hash
+    record = play_frame_of("three-cushion", (0.9, 0.9))
+    session = Recording.from_json(record.session.to_json())
+    assert rerun(session, audit=False).info["state_hash"] == record.session.state_hash
 
 
-def test_frame_is_cut_off_where_it_does_not_end() -> None:
-    class Timid:
+def test_frame_is_cut_off_at_the_maximum_number_of_turns() -> None:
+    class WeakPlayer:
         def decide(self, match: Match) -> Decision:
             return "play"
 
         def plan(self, match: Match) -> FramePlan:
             return FramePlan(Stroke(aim=0.0, speed=0.1))
 
-    played = play_frame(match("three-cushion"), [Timid(), Timid()], most=3)
-    assert (len(played.turns), played.match.over, played.match.turn) == (3, False, 1)
+    record = play_frame(match("three-cushion"), [WeakPlayer(), WeakPlayer()], most=3)
+    assert (len(record.turns), record.match.over, record.match.turn) == (3, False, 1)
 
 
-def test_what_may_not_be_done_is_refused() -> None:
-    class Cheat(BilliardsBot):
+def test_illegal_placement_and_missing_player_are_refused() -> None:
+    class IllegalPlacement(BilliardsBot):
         def plan(self, match: Match) -> FramePlan:
             return FramePlan(Stroke(aim=0.0, speed=1.0), place=(0.6, 2.0))
 
     with pytest.raises(GameError, match="behind the head string"):
-        play_frame(match("9-ball"), [Cheat(), Cheat()])
+        play_frame(match("9-ball"), [IllegalPlacement(), IllegalPlacement()])
     with pytest.raises(GameError, match="has 2 players, not 1"):
         play_frame(match("9-ball"), [BilliardsBot()])
 
 
-def test_replay_of_turns_that_do_not_fit_is_refused() -> None:
-    played = frame("straight-rail", (0.9, 0.9))
-    other = replace(played, turns=played.turns[1:])
+def test_replay_of_inconsistent_turns_is_refused() -> None:
+    record = play_frame_of("straight-rail", (0.9, 0.9))
+    other = replace(record, turns=record.turns[1:])
     with pytest.raises(GameError, match="does not reach this"):
-        replace(other, turns=(replace(other.turns[0], player=1 - played.turns[0].player), *other.turns)).replayed()
+        replace(other, turns=(replace(other.turns[0], player=1 - record.turns[0].player), *other.turns)).replayed()
 
 
-def test_free_play_takes_any_table_and_one_player() -> None:
-    begun = Match.begin(table("three-cushion"), "free", players=1)
-    assert begun.cue == "white"
-    played = play_frame(begun, [BilliardsBot(0.9)], most=4, on_turn=sound)
-    assert not played.match.over
+def test_free_play_accepts_any_table_and_one_player() -> None:
+    initial = Match.begin(table("three-cushion"), "free", players=1)
+    assert initial.cue == "white"
+    record = play_frame(initial, [BilliardsBot(0.9)], most=4, on_turn=assert_valid_table)
+    assert not record.match.over
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("skills", [(0.9, 0.7), (0.4, 0.1)])
 @pytest.mark.parametrize("game", GAMES)
-def test_frames_of_every_game_end_soundly_and_replay(game: str, skills: tuple[float, float]) -> None:
+def test_frames_of_every_game_end_with_a_valid_table_and_replay(game: str, skills: tuple[float, float]) -> None:
     for seed in (1,) if game == "snooker" else (1, 2):
-        played = frame(game, skills, seed)
-        assert played.match.over
-        assert played.replayed() == played
+        record = play_frame_of(game, skills, seed)
+        assert record.match.over
+        assert record.replayed() == record

@@ -1,4 +1,4 @@
-"""Frames on engines of fixed steps: the same rules read what these tell of a shot."""
+"""Frames on engines with fixed steps: the same rules judge their shots."""
 
 from sandbox.games.billiards.bot import BilliardsBot
 from sandbox.games.billiards.headless import play_frame

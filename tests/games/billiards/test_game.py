@@ -29,13 +29,13 @@ UP = 0.5 * math.pi
 
 
 class Table:
-    """A game between the steps of a simulation."""
+    """A game and its simulation, stepped together."""
 
     def __init__(self, name: str, **terms: Any) -> None:
-        begun = match(name, **terms)
-        self.rules = BilliardsRules(begun)
+        initial = match(name, **terms)
+        self.rules = BilliardsRules(initial)
         self.game = GameSession(self.rules)
-        self.simulation = sandbox.start(begun.scene, "exact")
+        self.simulation = sandbox.start(initial.scene, "exact")
         self.simulation.contacts()
         self.actions: list[Action] = []
         self.apply(self.game.on_step(0.0, self.simulation.frame(), Contacts.none()))
@@ -81,9 +81,9 @@ def test_strike_is_judged_once_every_ball_is_at_rest() -> None:
     assert table.rules.match.verdict is not None
 
 
-def test_scratch_gives_the_other_player_the_ball_in_hand_and_puts_it_on_the_table() -> None:
+def test_scratch_gives_the_opponent_ball_in_hand_and_returns_it_to_the_table() -> None:
     table = Table("9-ball")
-    table.strike(-0.75 * math.pi, 6.0)  # away from the balls: a foul, whatever falls
+    table.strike(-0.75 * math.pi, 6.0)  # away from the balls: a foul, whichever balls fall
     now = table.rules.match
     assert (now.turn, now.state.in_hand) == (1, "anywhere")
     table.step()
@@ -99,7 +99,7 @@ def test_controls_shoot_place_and_call() -> None:
     assert (strike.ball, strike.speed) == ("cue", 8.0)
     assert strike.aim == pytest.approx(UP)
     table.press("shoot", 0.5)
-    assert len(table.actions) == 1  # balls roll: nothing can be struck
+    assert len(table.actions) == 1  # while balls roll no shot is possible
     table.finish_shot()
     table.strike(-UP, 0.3)  # a foul
     assert table.rules.match.state.in_hand == "anywhere"
@@ -138,7 +138,7 @@ def test_balls_moved_by_hand_are_accepted_between_shots() -> None:
     assert table.rules.match.position[table.rules.match.layout.number["cue"]] == (0.5, 0.5)
 
 
-def test_another_ball_than_the_cue_ball_is_not_judged() -> None:
+def test_strike_of_a_ball_other_than_the_cue_ball_is_not_judged() -> None:
     table = Table("9-ball")
     table.do(Strike(time=0.0, ball="1", aim=UP, speed=0.5))
     table.finish_shot()
@@ -173,7 +173,7 @@ def test_random_player_plays_every_game_and_the_recording_replays(name: str) -> 
     assert again.info["game"]["log"] == game.trajectory.info["game"]["log"]
 
 
-def test_shot_of_the_scene_is_the_first_of_the_game() -> None:
+def test_shot_of_the_scene_is_the_first_shot_of_the_game() -> None:
     scene = load("9-ball")
     rules = required_rules(scene)
     assert isinstance(rules, BilliardsRules)
@@ -193,8 +193,8 @@ class NoShots:
         return ()
 
 
-def test_recording_without_inputs_is_watched() -> None:
-    """As sessions of the window were stored before billiards had rules: actions alone."""
+def test_recording_without_inputs_reaches_the_same_match() -> None:
+    """Old sessions of the window have actions only, from before billiards had rules."""
     bot = Table("9-ball")
     policy = BilliardsPolicy(3)
     for _ in range(4):
@@ -202,31 +202,31 @@ def test_recording_without_inputs_is_watched() -> None:
         for name, value in policy.decide(info, bot.rules):
             bot.press(name, value)
         bot.finish_shot()
-    watched = BilliardsRules(match("9-ball"))
-    game, simulation = GameSession(watched), sandbox.start(match("9-ball").scene, "exact")
+    watching = BilliardsRules(match("9-ball"))
+    game, simulation = GameSession(watching), sandbox.start(match("9-ball").scene, "exact")
     simulation.contacts()
-    left = list(bot.actions)
+    pending = list(bot.actions)
     while simulation.time < bot.simulation.time:
         own = game.on_step(simulation.time, simulation.frame(), simulation.contacts())
-        due = [action for action in left if action.time <= simulation.time]
-        left = left[len(due) :]
+        due = [action for action in pending if action.time <= simulation.time]
+        pending = pending[len(due) :]
         for action in due:
             simulation.apply(action)
         game.replay(simulation.time, own, due)
         simulation.step()
     game.on_step(simulation.time, simulation.frame(), simulation.contacts())
     assert simulation.state_hash() == bot.simulation.state_hash()
-    assert watched.match.shots == bot.rules.match.shots
-    assert watched.match.state == bot.rules.match.state
+    assert watching.match.shots == bot.rules.match.shots
+    assert watching.match.state == bot.rules.match.state
 
 
-def test_rules_start_on_request_alone() -> None:
+def test_rules_start_only_on_request() -> None:
     scene = table("9-ball")
     assert rules_of(scene) is None
     assert (has_rules(scene), has_rules(scene, on_request=True)) == (False, True)
 
 
-def test_table_that_lacks_a_ball_is_refused() -> None:
+def test_table_without_a_required_ball_is_refused() -> None:
     scene = load("9-ball")
     without = scene.model_copy(update={"balls": tuple(ball for ball in scene.balls if ball.name != "9")})
     with pytest.raises(UnsuitableSceneError, match="no ball 9"):

@@ -1,4 +1,4 @@
-"""Placing: what is legal, and that nothing nearer is."""
+"""Placement of balls: legal positions, and the nearest of them."""
 
 import math
 
@@ -17,7 +17,7 @@ R = POOL.radius[0]
 OTHERS: list[PlacedDisc] = [(0.6, 1.2, R), (0.6 + 2.0 * R + 0.01, 1.2, R), (0.2, 0.3, R)]
 
 
-def test_what_is_refused_is_told() -> None:
+def test_refused_positions_have_a_reason() -> None:
     assert placement_refusal(POOL, "anywhere", (0.3, 2.0), R, OTHERS) is None
     assert placement_refusal(POOL, "anywhere", (0.6, 1.2 + 1.9 * R), R, OTHERS) == "another ball is there"
     assert placement_refusal(POOL, "anywhere", (0.5 * R, 1.0), R, []) == "the ball would be outside the cushions"
@@ -25,41 +25,41 @@ def test_what_is_refused_is_told() -> None:
     assert placement_refusal(POOL, "anywhere", (math.nan, 1.0), R, []) == "the ball would be outside the cushions"
     assert (
         placement_refusal(POOL, "anywhere", (0.01, 0.01), R, []) == "the ball would be outside the cushions"
-    )  # in the pocket
+    )  # inside a pocket
     assert (
         placement_refusal(POOL, "behind the head string", (0.3, 0.7), R, [])
         == "the ball must be placed behind the head string"
     )
     assert (
         placement_refusal(POOL, "behind the head string", (0.3, 0.635), R, []) is None
-    )  # on the string, where racks have it
+    )  # on the head string, where racks place the cue ball
 
 
-def test_d_is_a_half_disc_towards_baulk() -> None:
+def test_d_is_a_half_disc_on_the_baulk_side() -> None:
     radius, (x, y) = SNOOKER.radius[0], SNOOKER.spots["brown"]
-    for far, way, good in ((0.28, -1.0, True), (0.30, -1.0, False), (0.1, 1.0, False), (0.0, 1.0, True)):
-        told = placement_refusal(SNOOKER, "in the D", (x, y + way * far), radius, [])
-        assert told == (None if good else "the ball must be placed in the D")
+    for distance, sign, legal in ((0.28, -1.0, True), (0.30, -1.0, False), (0.1, 1.0, False), (0.0, 1.0, True)):
+        refusal = placement_refusal(SNOOKER, "in the D", (x, y + sign * distance), radius, [])
+        assert refusal == (None if legal else "the ball must be placed in the D")
 
 
-def test_legal_place_is_the_nearest_itself() -> None:
+def test_nearest_position_of_a_legal_position_is_itself() -> None:
     assert nearest(POOL, "anywhere", (0.3, 2.0), R, OTHERS) == (0.3, 2.0)
 
 
-def test_nearest_beside_a_ball_touches_it_but_for_a_hair() -> None:
-    place = nearest(POOL, "anywhere", (0.6, 1.25), R, OTHERS)
-    assert place is not None
-    assert math.dist(place, (0.6, 1.2)) == pytest.approx(2.0 * R + 1e-5, abs=1e-9)  # the hair that balls are apart
-    assert place[0] == pytest.approx(0.6, abs=1e-9)  # straight away from it
+def test_nearest_position_beside_a_ball_keeps_a_small_gap() -> None:
+    position = nearest(POOL, "anywhere", (0.6, 1.25), R, OTHERS)
+    assert position is not None
+    assert math.dist(position, (0.6, 1.2)) == pytest.approx(2.0 * R + 1e-5, abs=1e-9)  # 1e-5 m: gap between balls
+    assert position[0] == pytest.approx(0.6, abs=1e-9)  # straight away from the ball
 
 
 @given(
-    place=st.sampled_from(["anywhere", "behind the head string", "in the D"]),
+    region=st.sampled_from(["anywhere", "behind the head string", "in the D"]),
     at=st.tuples(st.floats(-1.0, 2.5), st.floats(-1.0, 4.5)),
     seed=st.integers(0, 50),
 )
-def test_nearest_is_legal_and_nothing_on_a_grid_is_nearer(
-    place: PlacementRegion, at: tuple[float, float], seed: int
+def test_nearest_position_is_legal_and_no_grid_point_is_nearer(
+    region: PlacementRegion, at: tuple[float, float], seed: int
 ) -> None:
     radius, random = SNOOKER.radius[0], np.random.default_rng(seed)
     (x0, y0), (x1, y1) = SNOOKER.area
@@ -67,16 +67,16 @@ def test_nearest_is_legal_and_nothing_on_a_grid_is_nearer(
         (float(x), float(y), radius)
         for x, y in zip(random.uniform(x0, x1, 20), random.uniform(y0, 0.4 * y1, 20), strict=True)
     ]
-    found = nearest(SNOOKER, place, at, radius, others)
+    found = nearest(SNOOKER, region, at, radius, others)
     assert found is not None
-    assert placement_refusal(SNOOKER, place, found, radius, others) is None
+    assert placement_refusal(SNOOKER, region, found, radius, others) is None
     grid = np.stack(np.meshgrid(np.linspace(x0, x1, 60), np.linspace(y0, y1, 120)), axis=-1).reshape(-1, 2)
-    legal = grid[allowed(SNOOKER, place, grid, radius, others)]
-    # 2 mm: places around balls and along the D are tried 5° apart, and in narrow corners only some of them
+    legal = grid[allowed(SNOOKER, region, grid, radius, others)]
+    # 2 mm: positions around balls and along the D are tried 5° apart, and only some of them in narrow corners
     assert math.dist(found, at) <= np.hypot(*(legal - at).T).min(initial=math.inf) + 2e-3
 
 
-def test_no_room_is_none() -> None:
+def test_no_legal_position_gives_none() -> None:
     (x, y), radius = SNOOKER.spots["brown"], SNOOKER.radius[0]
     assert nearest(SNOOKER, "in the D", (x, y), radius, [(x, y, 1.0)]) is None
     assert spread(SNOOKER, "in the D", radius, [(x, y, 1.0)]) == []

@@ -6,7 +6,7 @@ import pytest
 
 from sandbox.games.billiards.rules.base import GameError, Situation
 from sandbox.games.billiards.rules.snooker import COLOURS, REDS, VALUES, Snooker, SnookerState, remaining
-from tests.games.billiards.shot_by_hand import fallen, played
+from tests.games.billiards.shot_by_hand import judge, potted_lines
 
 RULES = Snooker()
 START = RULES.start()
@@ -17,7 +17,7 @@ BLACK = replace(PLAY, on="black", table=("black",))
 SNOOKERED = Situation(snookered=True)
 
 
-def test_start_is_in_the_d_with_reds_on_and_147_to_be_made() -> None:
+def test_start_is_in_the_d_with_reds_on_and_147_points_remaining() -> None:
     assert START.in_hand == "in the D"
     assert RULES.legal_targets(START) == set(REDS)
     assert remaining(START) == 147
@@ -25,8 +25,8 @@ def test_start_is_in_the_d_with_reds_on_and_147_to_be_made() -> None:
     assert not RULES.settle(START, SNOOKERED).state.free
 
 
-def test_red_scores_one_stays_down_and_a_colour_is_next() -> None:
-    verdict = played(RULES, START, "cue hits red-1", "red-1 in left")
+def test_potted_red_scores_one_stays_down_and_a_colour_is_next() -> None:
+    verdict = judge(RULES, START, "cue hits red-1", "red-1 in left")
     assert verdict.continues
     assert verdict.points == (1, 0)
     assert (verdict.state.on, verdict.state.run, verdict.state.opening) == ("colour", 1, False)
@@ -35,55 +35,55 @@ def test_red_scores_one_stays_down_and_a_colour_is_next() -> None:
 
 
 def test_each_red_of_a_stroke_scores() -> None:
-    assert played(RULES, PLAY, "cue hits red-1", "red-1 in left", "red-2 in right").points == (2, 0)
+    assert judge(RULES, PLAY, "cue hits red-1", "red-1 in left", "red-2 in right").points == (2, 0)
 
 
 @pytest.mark.parametrize("colour", COLOURS)
-def test_colour_scores_its_value_comes_back_and_red_is_next(colour: str) -> None:
-    verdict = played(RULES, COLOUR, f"cue hits {colour}", f"{colour} in left", ball=colour)
+def test_potted_colour_scores_its_value_is_respotted_and_red_is_next(colour: str) -> None:
+    verdict = judge(RULES, COLOUR, f"cue hits {colour}", f"{colour} in left", ball=colour)
     assert verdict.points == (VALUES[colour], 0)
     assert (verdict.state.on, verdict.continues) == ("red", True)
     assert [each.spots[0] for each in verdict.respot] == [colour]
     assert verdict.state.table == COLOUR.table
 
 
-def test_spots_that_are_taken_give_way_to_the_highest() -> None:
-    (verdict,) = played(RULES, COLOUR, "cue hits blue", "blue in left", ball="blue").respot
+def test_respot_lists_the_own_spot_then_the_highest_spots() -> None:
+    (verdict,) = judge(RULES, COLOUR, "cue hits blue", "blue in left", ball="blue").respot
     assert verdict.spots == ("blue", "black", "pink", "brown", "green", "yellow")
 
 
-def test_colour_that_is_touched_is_nominated_by_that() -> None:
-    assert played(RULES, COLOUR, "cue hits pink", "pink in left").points == (6, 0)
+def test_first_colour_hit_counts_as_nominated() -> None:
+    assert judge(RULES, COLOUR, "cue hits pink", "pink in left").points == (6, 0)
 
 
-def test_last_red_has_its_colour_back_then_the_yellow_is_on() -> None:
+def test_colour_after_the_last_red_is_respotted_and_yellow_is_on() -> None:
     state = replace(PLAY, table=("red-9", *COLOURS))
-    state = played(RULES, state, "cue hits red-9", "red-9 in left").state
-    verdict = played(RULES, state, "cue hits black", "black in left", ball="black")
+    state = judge(RULES, state, "cue hits red-9", "red-9 in left").state
+    verdict = judge(RULES, state, "cue hits black", "black in left", ball="black")
     assert [each.ball for each in verdict.respot] == ["black"]
     assert (verdict.state.on, verdict.state.table) == ("yellow", COLOURS)
 
 
-def test_last_red_and_no_colour_has_the_yellow_on() -> None:
+def test_missed_colour_after_the_last_red_has_yellow_on() -> None:
     state = replace(COLOUR, table=COLOURS)
-    verdict = played(RULES, state, "cue hits black", ball="black")
+    verdict = judge(RULES, state, "cue hits black", ball="black")
     assert (verdict.state.turn, verdict.state.on) == (1, "yellow")
 
 
 def test_colours_in_order_stay_down() -> None:
-    verdict = played(RULES, ORDER, "cue hits yellow", "yellow in left")
+    verdict = judge(RULES, ORDER, "cue hits yellow", "yellow in left")
     assert (verdict.state.on, verdict.respot) == ("green", ())
     assert RULES.legal_targets(verdict.state) == {"green"}
 
 
-def test_stroke_without_a_ball_passes_and_is_no_foul_off_the_cushions() -> None:
-    verdict = played(RULES, PLAY, "cue hits red-1")
+def test_stroke_without_a_pot_or_cushion_passes_the_turn_without_a_foul() -> None:
+    verdict = judge(RULES, PLAY, "cue hits red-1")
     assert not verdict.fouls
     assert (verdict.state.turn, verdict.state.on, verdict.state.run) == (1, "red", 0)
 
 
 def test_missed_colour_passes_with_red_on() -> None:
-    verdict = played(RULES, COLOUR, "cue hits pink", ball="pink")
+    verdict = judge(RULES, COLOUR, "cue hits pink", ball="pink")
     assert (verdict.state.turn, verdict.state.on) == (1, "red")
 
 
@@ -107,10 +107,10 @@ FOULS = [
 
 
 @pytest.mark.parametrize(("state", "call", "lines", "penalty", "why"), FOULS)
-def test_foul_scores_for_the_other(
+def test_foul_scores_for_the_opponent(
     state: SnookerState, call: dict[str, str], lines: tuple[str, ...], penalty: int, why: str
 ) -> None:
-    verdict = played(RULES, state, *lines, **call)
+    verdict = judge(RULES, state, *lines, **call)
     assert verdict.fouls == (why,)
     assert verdict.points == (0, penalty)
     assert verdict.state.scores == (state.scores[0], penalty)
@@ -119,78 +119,78 @@ def test_foul_scores_for_the_other(
     assert verdict.state.decisions == ("play", "pass")
 
 
-def test_several_fouls_of_a_stroke_count_once_by_the_dearest() -> None:
-    verdict = played(RULES, PLAY, "cue hits yellow", "black in left", "cue in left")
+def test_several_fouls_of_a_stroke_count_once_with_the_highest_penalty() -> None:
+    verdict = judge(RULES, PLAY, "cue hits yellow", "black in left", "cue in left")
     assert len(verdict.fouls) == 3
     assert verdict.points == (0, 7)
     assert verdict.state.in_hand == "in the D"
 
 
-def test_foul_scores_nothing_keeps_reds_down_and_brings_colours_back_the_highest_first() -> None:
-    verdict = played(RULES, PLAY, "cue hits red-1", "red-1 in left", "blue in left", "black in right")
+def test_foul_scores_nothing_and_respots_only_colours_highest_first() -> None:
+    verdict = judge(RULES, PLAY, "cue hits red-1", "red-1 in left", "blue in left", "black in right")
     assert verdict.state.scores == (0, 7)
     assert [each.ball for each in verdict.respot] == ["black", "blue"]
     assert verdict.state.table == (*REDS[1:], *COLOURS)
 
 
-def test_colour_on_that_falls_on_a_foul_comes_back() -> None:
-    verdict = played(RULES, ORDER, "cue hits yellow", "yellow in left", "cue in left")
+def test_colour_on_potted_on_a_foul_is_respotted() -> None:
+    verdict = judge(RULES, ORDER, "cue hits yellow", "yellow in left", "cue in left")
     assert verdict.state.on == "yellow"
     assert [each.ball for each in verdict.respot] == ["yellow"]
 
 
 def test_red_cannot_be_nominated() -> None:
     with pytest.raises(GameError, match="'red-2' cannot be called now"):
-        played(RULES, COLOUR, ball="red-2")
+        judge(RULES, COLOUR, ball="red-2")
     with pytest.raises(GameError, match="'pink' cannot be called now"):
-        played(RULES, PLAY, ball="pink")
+        judge(RULES, PLAY, ball="pink")
 
 
 MISS = replace(RULES.start(misses=True), opening=False, in_hand=None)
 
 
-def test_miss_may_be_played_again_from_where_it_was_and_the_points_stay() -> None:
+def test_miss_can_be_replayed_from_the_same_position_and_points_stay() -> None:
     state = replace(MISS, on="colour", table=COLOUR.table, scores=(8, 0), run=8)
-    verdict = played(RULES, state, "cue hits red-2", "red-2 in left", ball="pink")
+    verdict = judge(RULES, state, "cue hits red-2", "red-2 in left", ball="pink")
     assert verdict.state.decisions == ("play", "pass", "restore")
     back = RULES.decide(verdict.state, "restore")
     assert back.restore
     assert back.state == replace(state, scores=(8, 6))
 
 
-def test_miss_is_none_without_the_rule_or_where_the_ball_on_was_hit() -> None:
-    assert "restore" not in played(RULES, PLAY, "cue at rail").state.decisions
-    assert "restore" not in played(RULES, MISS, "cue hits red-1", "cue in left").state.decisions
+def test_no_miss_without_the_rule_or_when_the_ball_on_was_hit() -> None:
+    assert "restore" not in judge(RULES, PLAY, "cue at rail").state.decisions
+    assert "restore" not in judge(RULES, MISS, "cue hits red-1", "cue in left").state.decisions
 
 
-# 27 are left, and the foul costs 4: who is 24 behind needs more for it, who is 28 behind needed them before.
+# 27 points remain and the foul costs 4: a player 24 behind needs fouls after it, a player 28 behind before it.
 @pytest.mark.parametrize(("scores", "offered"), [((0, 23), True), ((0, 24), False), ((27, 0), True), ((28, 0), False)])
-def test_miss_is_none_where_points_of_fouls_are_needed(scores: tuple[int, int], offered: bool) -> None:
+def test_no_miss_when_a_player_needs_points_from_fouls(scores: tuple[int, int], offered: bool) -> None:
     state = replace(MISS, on="yellow", table=COLOURS, scores=scores)
-    assert ("restore" in played(RULES, state).state.decisions) == offered
+    assert ("restore" in judge(RULES, state).state.decisions) == offered
 
 
-def test_black_alone_ends_with_the_first_score() -> None:
-    verdict = played(RULES, replace(BLACK, scores=(10, 12)), "cue hits black", "black in left")
+def test_final_black_potted_ends_the_frame() -> None:
+    verdict = judge(RULES, replace(BLACK, scores=(10, 12)), "cue hits black", "black in left")
     assert verdict.points == (7, 0)
     assert (verdict.state.over, verdict.state.winner) == (True, 0)
 
 
-def test_black_alone_ends_with_the_first_foul() -> None:
-    verdict = played(RULES, replace(BLACK, scores=(20, 12)), "cue hits black", "cue in left")
+def test_foul_on_the_final_black_ends_the_frame() -> None:
+    verdict = judge(RULES, replace(BLACK, scores=(20, 12)), "cue hits black", "cue in left")
     assert (verdict.state.over, verdict.state.winner, verdict.state.scores) == (True, 0, (20, 19))
 
 
-def test_black_alone_that_stays_up_passes_the_turn() -> None:
-    verdict = played(RULES, replace(BLACK, scores=(20, 18)), "cue hits black")
+def test_missed_black_passes_the_turn() -> None:
+    verdict = judge(RULES, replace(BLACK, scores=(20, 18)), "cue hits black")
     assert not verdict.state.over
     assert (verdict.state.turn, verdict.state.on) == (1, "black")
 
 
 @pytest.mark.parametrize("lines", [("cue hits black", "black in left"), ("cue in left",)])
-def test_level_scores_spot_the_black_and_the_next_score_or_foul_ends(lines: tuple[str, ...]) -> None:
+def test_level_scores_respot_the_black_and_the_next_score_or_foul_ends(lines: tuple[str, ...]) -> None:
     scores = (5, 12) if "black in left" in lines else (12, 5)
-    verdict = played(RULES, replace(BLACK, scores=scores), *lines)
+    verdict = judge(RULES, replace(BLACK, scores=scores), *lines)
     state = verdict.state
     assert not state.over
     assert [each.ball for each in verdict.respot] == ["black"]
@@ -198,29 +198,29 @@ def test_level_scores_spot_the_black_and_the_next_score_or_foul_ends(lines: tupl
     assert not state.fouled
     first = RULES.decide(state, "pass").state
     assert first.turn == 0
-    assert played(RULES, first, "cue hits black", "black in left").state.winner == 0
-    assert played(RULES, first).state.winner == 1
+    assert judge(RULES, first, "cue hits black", "black in left").state.winner == 0
+    assert judge(RULES, first).state.winner == 1
 
 
-def test_frame_may_be_claimed_with_more_than_a_black_between() -> None:
+def test_frame_can_be_claimed_with_a_lead_of_more_than_the_black() -> None:
     state = replace(PLAY, on="pink", table=("pink", "black"))
-    near, far = (
-        played(RULES, replace(state, scores=(each, 10)), "cue hits pink", "pink in left").state for each in (11, 12)
+    close, claimable = (
+        judge(RULES, replace(state, scores=(each, 10)), "cue hits pink", "pink in left").state for each in (11, 12)
     )
-    assert near.decisions == ()
-    assert far.decisions == ("play", "claim")
-    over = RULES.decide(far, "claim").state
+    assert close.decisions == ()
+    assert claimable.decisions == ("play", "claim")
+    over = RULES.decide(claimable, "claim").state
     assert (over.over, over.winner) == (True, 0)
     assert RULES.choices(replace(over, free=True)).balls == ()
 
 
-def test_who_plays_alone_makes_147_and_gives_no_points_away() -> None:
+def test_single_player_can_make_147_and_fouls_cost_nothing() -> None:
     state = RULES.start(players=1)
-    foul = played(RULES, state)
+    foul = judge(RULES, state)
     assert (foul.state.scores, foul.state.turn, foul.state.decisions) == ((0,), 0, ())
     for red in REDS:
-        state = played(RULES, state, f"cue hits {red}", *fallen([red])).state
-        state = played(RULES, state, "cue hits black", *fallen(["black"]), ball="black").state
+        state = judge(RULES, state, f"cue hits {red}", *potted_lines([red])).state
+        state = judge(RULES, state, "cue hits black", *potted_lines(["black"]), ball="black").state
     for colour in COLOURS:
-        state = played(RULES, state, f"cue hits {colour}", *fallen([colour])).state
+        state = judge(RULES, state, f"cue hits {colour}", *potted_lines([colour])).state
     assert (state.over, state.winner, state.scores) == (True, 0, (147,))

@@ -1,4 +1,4 @@
-"""Tables of billiards: noses, facings, jaws and pockets, held against shapes made by shapely."""
+"""Billiard tables: noses, facings, jaws and pockets, compared with shapely geometry."""
 
 import math
 from functools import cache
@@ -16,8 +16,8 @@ from sandbox.scene.files.load import from_document
 NAMES = get_args(TableName)
 POCKETED = [name for name in NAMES if name != "carom-10ft"]
 ROUND = 64
-"""Corners of a quarter circle: shapely's discs are too small by 1 − cos(π/256), 8e-5 of the radius."""
-FINE = 1e-5  # m: more than the polygons of discs of 0.1 m are off by
+"""Segments of a quarter circle: shapely's discs are too small by 1 − cos(π/256), 8e-5 of the radius."""
+FINE = 1e-5  # m: above the error of the polygons of discs of 0.1 m
 
 
 @cache
@@ -34,7 +34,7 @@ def disc(centre: tuple[float, float], radius: float) -> Polygon:
 
 
 @cache
-def solid(name: str) -> list[Polygon]:
+def cushions(name: str) -> list[Polygon]:
     scene = table(name)
     return [LineString(wall.points) for wall in scene.walls] + [
         disc(post.position, post.radius) for post in scene.posts
@@ -42,110 +42,118 @@ def solid(name: str) -> list[Polygon]:
 
 
 @cache
-def holes(name: str) -> Polygon:
+def pocket_area(name: str) -> Polygon:
     return unary_union([disc(pocket.position, pocket.radius) for pocket in table(name).pockets])
 
 
 @cache
-def roam(name: str) -> Polygon:
-    """Where the centre of a ball can get from the middle of the table, before it falls into a pocket."""
+def reachable(name: str) -> Polygon:
+    """Return the region that the centre of a ball can reach from the middle of the table before it is potted."""
     area = TABLES[name]  # type: ignore[index]
     near = box(-1.0, -1.0, area.width + 1.0, area.length + 1.0)
-    barred = unary_union([each.buffer(radius_of(name) - FINE, quad_segs=ROUND) for each in solid(name)])
-    free = near.difference(unary_union([barred, holes(name)]))
+    obstacles = unary_union([each.buffer(radius_of(name) - FINE, quad_segs=ROUND) for each in cushions(name)])
+    free = near.difference(unary_union([obstacles, pocket_area(name)]))
     parts = getattr(free, "geoms", [free])
     (part,) = [part for part in parts if part.contains(Point(area.width / 2.0, area.length / 2.0))]
     return part
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_nothing_leaves_a_table_but_into_a_pocket(name: str) -> None:
-    area, centre = TABLES[name], roam(name)  # type: ignore[index]
-    # A centre is on the cloth, a radius from the noses, or between the facings of a pocket, not beyond its middle.
+def test_balls_leave_a_table_only_into_a_pocket(name: str) -> None:
+    area, centre = TABLES[name], reachable(name)  # type: ignore[index]
+    # The centre is on the cloth, a radius from the noses, or between the facings of a pocket, up to its middle.
     assert box(0.0, 0.0, area.width, area.length).buffer(0.06).contains(centre)
-    # Every edge of that region is a cushion that a ball touches, or the rim of a pocket.
+    # Every edge of that region is a cushion in contact with the ball, or the rim of a pocket.
     edges = np.asarray(centre.exterior.segmentize(0.005).coords)
     reach = radius_of(name)
     rims = [(pocket.position, pocket.radius) for pocket in table(name).pockets]
-    touched = shapely.distance(np.asarray(solid(name))[:, None], shapely.points(edges)).min(axis=0)
+    touched = shapely.distance(np.asarray(cushions(name))[:, None], shapely.points(edges)).min(axis=0)
     rim = np.min([np.abs(np.hypot(*(edges - at).T) - size) for at, size in rims], axis=0) if rims else np.inf
     assert np.minimum(np.abs(touched - reach), rim).max() < 3.0 * FINE  # polygons of discs, and FINE itself
 
 
 @pytest.mark.parametrize("name", POCKETED)
-def test_every_straight_way_ends_at_a_cushion_or_in_a_pocket(name: str) -> None:
-    area, walls, far = TABLES[name], unary_union(solid(name)), 10.0  # type: ignore[index]
-    random, ended = np.random.default_rng(5), set[str]()
+def test_every_straight_path_ends_at_a_cushion_or_in_a_pocket(name: str) -> None:
+    area, walls, far = TABLES[name], unary_union(cushions(name)), 10.0  # type: ignore[index]
+    random, ended, pockets = np.random.default_rng(5), set[str](), pocket_area(name)
     for x, y, turn in random.random((400, 3)) * (area.width, area.length, 2.0 * math.pi):
-        way = LineString([(x, y), (x + far * math.cos(turn), y + far * math.sin(turn))])
-        stop = walls.intersection(way).distance(Point(x, y)) if walls.intersects(way) else math.inf
-        fall = holes(name).intersection(way).distance(Point(x, y)) if holes(name).intersects(way) else math.inf
-        assert min(stop, fall) < far
-        ended.add("cushion" if stop < fall else "pocket")
+        path = LineString([(x, y), (x + far * math.cos(turn), y + far * math.sin(turn))])
+        cushion_distance = walls.intersection(path).distance(Point(x, y)) if walls.intersects(path) else math.inf
+        pocket_distance = pockets.intersection(path).distance(Point(x, y)) if pockets.intersects(path) else math.inf
+        assert min(cushion_distance, pocket_distance) < far
+        ended.add("cushion" if cushion_distance < pocket_distance else "pocket")
     assert ended == {"cushion", "pocket"}
 
 
 @pytest.mark.parametrize("name", POCKETED)
-def test_ball_aimed_at_the_middle_of_a_mouth_falls_untouched(name: str) -> None:
-    figures = TABLES[name]  # type: ignore[index]
-    middle, open_to = (figures.width / 2.0, figures.length / 2.0), solid(name)
+def test_ball_aimed_at_the_middle_of_a_mouth_falls_without_touching_a_cushion(name: str) -> None:
+    preset = TABLES[name]  # type: ignore[index]
+    middle, walls = (preset.width / 2.0, preset.length / 2.0), cushions(name)
     for pocket in table(name).pockets:
         x, y = pocket.position
-        corner = not 0.0 < y < figures.length
-        opening = figures.corner if corner else figures.middle
+        corner = not 0.0 < y < preset.length
+        opening = preset.corner if corner else preset.middle
         assert opening is not None
         out = np.array([math.copysign(1.0, x), math.copysign(1.0, y) if corner else 0.0])
         out /= np.hypot(*out)
         mouth = pocket.position - out * (opening.shelf + opening.radius)
-        for start in (mouth - 0.3 * out, np.asarray(middle)):  # along its axis; and from the middle of the table
+        for start in (mouth - 0.3 * out, np.asarray(middle)):  # along its axis, and from the middle
             far = LineString([start, start + 3.0 * (mouth - start)])
-            way = LineString([start, far.intersection(disc(pocket.position, pocket.radius)).coords[0]])
-            assert min(each.distance(way) for each in open_to) > radius_of(name)
+            path = LineString([start, far.intersection(disc(pocket.position, pocket.radius)).coords[0]])
+            assert min(each.distance(path) for each in walls) > radius_of(name)
 
 
-@pytest.mark.parametrize("name", ["pool-7ft", "pool-8ft", "pool-9ft"])  # in snooker it brushes a jaw on its way
-def test_ball_aimed_at_a_hole_from_the_middle_of_the_table_falls_untouched(name: str) -> None:
+@pytest.mark.parametrize("name", ["pool-7ft", "pool-8ft", "pool-9ft"])  # in snooker the ball brushes a jaw on that path
+def test_ball_aimed_at_a_pocket_from_the_middle_falls_without_touching_a_cushion(name: str) -> None:
     middle = (TABLES[name].width / 2.0, TABLES[name].length / 2.0)  # type: ignore[index]
     for pocket in table(name).pockets:
-        way = LineString([middle, pocket.position]).difference(disc(pocket.position, pocket.radius))
-        assert min(each.distance(way) for each in solid(name)) > radius_of(name)
+        path = LineString([middle, pocket.position]).difference(disc(pocket.position, pocket.radius))
+        assert min(each.distance(path) for each in cushions(name)) > radius_of(name)
 
 
 @pytest.mark.parametrize("name", POCKETED)
-def test_pockets_are_reached_from_the_cloth_and_take_none_of_it(name: str) -> None:
+def test_pockets_are_reachable_and_overlap_the_cloth_only_in_corners(name: str) -> None:
     area, reach = TABLES[name], radius_of(name)  # type: ignore[index]
     bed = box(0.0, 0.0, area.width, area.length).buffer(-reach, join_style="mitre")
     for pocket in table(name).pockets:
         rim = disc(pocket.position, pocket.radius)
-        assert rim.exterior.intersection(roam(name).buffer(FINE)).length > reach  # as wide as a ball, at least
+        assert rim.exterior.intersection(reachable(name).buffer(FINE)).length > reach  # at least as wide as a ball
         corner = pocket.position[1] < 0.0 or pocket.position[1] > area.length
-        # in a corner it lies behind the mouth, so that what rolls along a cushion falls; at the sides behind the noses
-        lost = rim.intersection(bed).area
-        assert lost < 0.1 * rim.area if corner else lost == 0.0
-        assert all(rim.intersection(Polygon(each.buffer(1e-9))).area < 1e-4 * rim.area for each in solid(name))
+        # A corner pocket begins behind its mouth, so that a ball rolling along a cushion falls; a side pocket lies
+        # behind the noses.
+        overlap = rim.intersection(bed).area
+        assert overlap < 0.1 * rim.area if corner else overlap == 0.0
+        assert all(rim.intersection(Polygon(each.buffer(1e-9))).area < 1e-4 * rim.area for each in cushions(name))
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_tables_mirror(name: str) -> None:
+def test_tables_are_symmetric(name: str) -> None:
     scene, area = table(name), TABLES[name]  # type: ignore[index]
     for across, along in ((True, False), (False, True), (True, True)):
 
         def mirrored(x: float, y: float, across: bool = across, along: bool = along) -> tuple[float, float]:
             return (area.width - x if across else x), (area.length - y if along else y)
 
-        for own in (
+        for elements in (
             [tuple(sorted(wall.points)) for wall in scene.walls],
             [((*post.position, post.radius),) for post in scene.posts],
             [((*pocket.position, pocket.radius),) for pocket in scene.pockets],
         ):
-            there = [tuple(sorted((*mirrored(p[0], p[1]), *p[2:]) for p in points)) for points in own]
-            # rounding of lengths of some metres
-            assert np.allclose(sorted(map(np.ravel, map(np.asarray, own)), key=list), _ordered(there, own), atol=1e-14)
+            images = [tuple(sorted((*mirrored(p[0], p[1]), *p[2:]) for p in points)) for points in elements]
+            # rounding of lengths of a few metres
+            assert np.allclose(
+                sorted(map(np.ravel, map(np.asarray, elements)), key=list),
+                _ordered(images, elements),
+                atol=1e-14,
+            )
 
 
-def _ordered(there: list, own: list) -> list:  # type: ignore[type-arg]
-    """Return mirrored things in the order of those that they lie on."""
-    mirrored, whole = np.asarray([np.ravel(each) for each in there]), sorted((np.ravel(each) for each in own), key=list)
+def _ordered(images: list, elements: list) -> list:  # type: ignore[type-arg]
+    """Return mirrored elements in the order of the elements that they coincide with."""
+    mirrored, whole = (
+        np.asarray([np.ravel(each) for each in images]),
+        sorted((np.ravel(each) for each in elements), key=list),
+    )
     return [mirrored[np.argmin(np.abs(mirrored - each).sum(axis=1))] for each in whole]
 
 
@@ -159,12 +167,12 @@ def test_jaws_are_tangent_to_nose_and_facing(name: str) -> None:
         noses = [wall for wall in near if wall.name is not None and wall.name.endswith("cushion")]
         assert len(noses) == 1
         for wall in near:
-            # the end of each line lies on the arc, and the line leads away square to the radius; rounding
+            # the end of each line lies on the arc, and the line leaves perpendicular to the radius; rounding
             end = min(wall.points, key=lambda at: math.dist(at, post.position))
             assert math.dist(end, post.position) == pytest.approx(post.radius, abs=1e-14)
             other = next(at for at in wall.points if at != end)
-            way = np.subtract(other, end) / math.dist(other, end)
-            assert np.dot(way, np.subtract(end, post.position)) == pytest.approx(0.0, abs=1e-14)
+            path = np.subtract(other, end) / math.dist(other, end)
+            assert np.dot(path, np.subtract(end, post.position)) == pytest.approx(0.0, abs=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -176,14 +184,14 @@ def test_jaws_are_tangent_to_nose_and_facing(name: str) -> None:
         (BCA_SIDE, (5.375, 5.625), (0.0, 0.375), (101, 105)),
     ],
 )
-def test_openings_of_pool_keep_to_the_rules(opening, mouth, shelf, angle) -> None:  # type: ignore[no-untyped-def]
+def test_pool_pocket_openings_follow_the_rules(opening, mouth, shelf, angle) -> None:  # type: ignore[no-untyped-def]
     assert mouth[0] <= opening.mouth / INCH <= mouth[1]
     assert shelf[0] <= opening.shelf / INCH <= shelf[1]
     assert angle[0] <= opening.angle <= angle[1]
 
 
 @pytest.mark.parametrize("name", ["pool-7ft", "pool-8ft", "pool-9ft"])
-def test_facings_turn_from_the_noses_by_the_angle_of_the_cut(name: str) -> None:
+def test_facings_meet_the_noses_at_the_cut_angle(name: str) -> None:
     walls = {wall.name: np.asarray(wall.points) for wall in table(name).walls}
     for facing, nose, opening in (
         ("lower left pocket facing 2", "lower cushion", TABLES[name].corner),  # type: ignore[index]
@@ -193,11 +201,11 @@ def test_facings_turn_from_the_noses_by_the_angle_of_the_cut(name: str) -> None:
         along = np.subtract(*walls[nose][::-1])
         cosine = np.dot(into, along) / np.hypot(*into) / np.hypot(*along)
         assert opening is not None
-        # rounding; both cushions run from the pocket on, or towards it
+        # rounding; both cushions run away from the pocket, or towards it
         assert abs(cosine) == pytest.approx(abs(math.cos(math.radians(opening.angle))), abs=1e-12)
 
 
-def test_snooker_is_marked_as_its_rules_say() -> None:
+def test_snooker_spots_follow_the_rules() -> None:
     spots = spots_of("snooker-12ft")
     length, width = 3.569, 1.778
     assert spots["brown"] == (width / 2.0, 0.737)

@@ -1,4 +1,4 @@
-"""Telling: contacts of engines as happenings by names."""
+"""Shot events: contacts of an engine converted to named events."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from sandbox.games.billiards.referee import shot_events, touching_pairs
 from sandbox.games.billiards.rules.base import BallEvent
 from sandbox.games.billiards.table_geometry import TableGeometry
 from sandbox.trajectory import Contacts
-from tests.games.billiards.tables_by_hand import lying, table
+from tests.games.billiards.tables_by_hand import match_with_balls_at, table
 
 POOL = TableGeometry.of(table("9-ball"))
 FIXED = POOL.scene.fixed_names
@@ -20,8 +20,8 @@ def contacts(*rows: tuple[float, int, int]) -> Contacts:
 
 def test_balls_cushions_jaws_and_pockets_are_named() -> None:
     jaw, pocket = FIXED.index("right pocket jaw 1"), FIXED.index("right pocket")
-    told = shot_events(POOL, contacts((3.0, 0, 1), (3.1, 1, -1), (3.2, 1, -1 - jaw), (3.3, 1, -1 - pocket)), 2.5)
-    assert told == (
+    events = shot_events(POOL, contacts((3.0, 0, 1), (3.1, 1, -1), (3.2, 1, -1 - jaw), (3.3, 1, -1 - pocket)), 2.5)
+    assert events == (
         BallEvent(0.5, "cue", "ball", "1"),
         BallEvent(3.1 - 2.5, "1", "cushion", FIXED[0]),
         BallEvent(3.2 - 2.5, "1", "cushion", "right pocket jaw 1"),
@@ -29,36 +29,37 @@ def test_balls_cushions_jaws_and_pockets_are_named() -> None:
     )
 
 
-def test_what_began_before_the_stroke_is_left_out() -> None:
+def test_contacts_before_the_stroke_are_left_out() -> None:
     assert shot_events(POOL, contacts((2.0, 0, -1)), 2.5) == ()
 
 
-def test_what_touches_from_the_start_counts_once_it_was_left() -> None:
-    against = frozenset({(0, 1), (2, -1)})
+def test_initial_contacts_count_only_after_separation() -> None:
+    touching = frozenset({(0, 1), (2, -1)})
     rows = contacts((0.0, 0, 1), (1e-4, 2, -1), (0.0, 0, 3), (0.3, 0, 2), (0.7, 2, -1), (0.8, 0, 1))
-    told = shot_events(POOL, rows, 0.0, against)
+    events = shot_events(POOL, rows, 0.0, touching)
     expected = [("cue", "3"), ("cue", "2"), ("2", FIXED[0]), ("cue", "1")]
-    assert [(each.ball, each.other) for each in told] == expected
+    assert [(each.ball, each.other) for each in events] == expected
 
 
-def test_ball_frozen_to_a_cushion_and_pressed_into_it_is_not_driven_there() -> None:
-    against = frozenset({(2, -1), (2, 3), (3, -2)})  # the 2 and the 3 touch each other, and a cushion each
+def test_ball_frozen_to_a_cushion_and_pressed_into_it_is_not_driven_to_it() -> None:
+    touching = frozenset({(2, -1), (2, 3), (3, -2)})  # the 2 and the 3 touch each other and one cushion each
     rows = contacts((0.659, 0, 2), (0.6591, 2, -1), (0.66, 3, -2), (0.9, 3, -2), (0.95, 2, -2), (1.2, 2, -1))
-    told = shot_events(POOL, rows, 0.0, against, "cue")
-    assert [(each.time, each.ball) for each in told if each.kind == "cushion"] == [(0.9, "3"), (0.95, "2"), (1.2, "2")]
+    events = shot_events(POOL, rows, 0.0, touching, "cue")
+    driven = [(each.time, each.ball) for each in events if each.kind == "cushion"]
+    assert driven == [(0.9, "3"), (0.95, "2"), (1.2, "2")]
 
 
-def test_struck_ball_frozen_to_a_cushion_counts_there_once_it_comes_back() -> None:
+def test_struck_ball_frozen_to_a_cushion_counts_after_it_returns() -> None:
     rows = contacts((1e-3, 0, -1), (0.4, 0, 1), (0.402, 0, -1))
-    told = shot_events(POOL, rows, 0.0, frozenset({(0, -1)}), "cue")
-    assert [each.kind for each in told] == ["ball", "cushion"]
+    events = shot_events(POOL, rows, 0.0, frozenset({(0, -1)}), "cue")
+    assert [each.kind for each in events] == ["ball", "cushion"]
 
 
 def test_touching_balls_cushions_and_jaws_are_found() -> None:
     radius = POOL.radius[0]
     post = POOL.scene.posts[0]
     by_jaw = (post.position[0] + 0.6 * (post.radius + radius), post.position[1] + 0.8 * (post.radius + radius))
-    match = lying(
+    match = match_with_balls_at(
         "9-ball",
         {"1": (0.5, 1.0), "2": (0.5 + 2.0 * radius, 1.0), "3": (0.5, 1.0 + 2.0 * radius + 1e-5),
          "4": (0.6, radius), "5": by_jaw},
@@ -68,4 +69,4 @@ def test_touching_balls_cushions_and_jaws_are_found() -> None:
     expected = {(number["1"], number["2"]), (number["4"], -1 - lower), (number["5"], -1 - jaw)}
     found = touching_pairs(POOL, match.position)
     assert expected <= found
-    assert not any(number["3"] in pair for pair in found)  # 1e-5 m apart, ten times what counts as touching
+    assert not any(number["3"] in pair for pair in found)  # 1e-5 m apart, ten times the tolerance of touching

@@ -1,4 +1,4 @@
-"""Matches of curling played by hand, a stone at a time."""
+"""A match of curling that a test plays stone by stone."""
 
 from sandbox.engines.contract import Simulation
 from sandbox.engines.registry import start
@@ -10,16 +10,16 @@ from sandbox.scene.files.load import load
 from sandbox.scene.files.shipped_scenes import find
 
 DT = 0.05
-"""s: motion is exact whatever it is, and hits are taken back to when they were"""
+"""s; the motion is exact at any step, and collisions are resolved at their exact times"""
 
 
-def sheet(*changes: str) -> Scene:
-    """Return the shipped scene with a coarse step, for two people, changed."""
-    return load(find("games/curling"), [f"solver.dt={DT}", "play.curling.people=2", *changes])
+def sheet(*overrides: str) -> Scene:
+    """Return the shipped scene with a coarse step and two human players, with overrides."""
+    return load(find("games/curling"), [f"solver.dt={DT}", "play.curling.people=2", *overrides])
 
 
 class Rink:
-    """A match under way."""
+    """A running match."""
 
     def __init__(self, scene: Scene) -> None:
         self.rules = Curling(scene, scene.bodies)
@@ -40,12 +40,12 @@ class Rink:
             simulation.apply(action)
         simulation.step()
 
-    def place(self, name: str) -> Point:
+    def position_of(self, name: str) -> Point:
         x, y = self.simulation.frame().position[self.names.index(name)].tolist()
         return x, y
 
     def until(self, cue: str, most: float = 90.0) -> None:
-        """Go on until a sound is heard."""
+        """Step until the rules emit a sound cue, for at most `most` seconds."""
         self.cues.clear()
         end = self.simulation.time + most
         while cue not in self.cues:
@@ -53,14 +53,14 @@ class Rink:
             self.step()
 
     def hold(self, control: str, time: float) -> None:
-        """Hold a control for a time, s, to a step."""
+        """Hold a control for a time, s, rounded to a step."""
         self.step((control, 1.0))
         for _ in range(round(time / DT) - 1):
             self.step()
         self.step((control, 0.0))
 
     def throw(self, *, aside: float = 0.0, weight: float = 0.0, turn: int = 1) -> None:
-        """Deliver a stone with the broom so far to the left, m, and for so far beyond the tee; wait for the next."""
+        """Deliver a stone with the broom `aside` m to the left and `weight` m beyond the tee; wait for the next."""
         if turn < 0:
             self.step(("turn", 1.0), ("turn", 0.0))
         if aside:

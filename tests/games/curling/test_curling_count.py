@@ -1,4 +1,4 @@
-"""What stones count, and which are in play, by their places."""
+"""Score of an end, and stones out of play, by the positions of the stones."""
 
 import math
 
@@ -30,22 +30,25 @@ RED, YELLOW = 0, 1
 FOOT = 0.3048
 
 
-def test_the_sheet_is_that_of_the_rules() -> None:
-    # in feet, as it was laid out before it was metric, to the millimetre of the rules
+def test_sheet_has_the_dimensions_of_the_rules() -> None:
+    # in feet, the original unit of the sheet; the rules state millimetres
     lengths = [LENGTH, HOG, BACK, TEES, TEES - 2 * HOG, *RINGS]
     assert lengths == pytest.approx([feet * FOOT for feet in (150, 21, 6, 114, 72, 6, 4, 2, 0.5)], abs=1e-3)
     assert math.tau * STONE == pytest.approx(0.9144, rel=1e-15)
 
 
-def test_stones_that_wait_or_are_gone_lie_apart_and_off_the_sheet() -> None:
-    places = [
-        where(team, k) for where in (parked_position, removed_position) for team in (RED, YELLOW) for k in range(STONES)
+def test_parked_and_removed_stones_do_not_overlap_and_are_off_the_sheet() -> None:
+    positions = [
+        position_of(team, k)
+        for position_of in (parked_position, removed_position)
+        for team in (RED, YELLOW)
+        for k in range(STONES)
     ]
-    for n, place in enumerate(places):
-        assert abs(place[1]) - STONE > WIDTH / 2
-        assert all(math.dist(place, other) > 2 * STONE for other in places[:n])
+    for n, position in enumerate(positions):
+        assert abs(position[1]) - STONE > WIDTH / 2
+        assert all(math.dist(position, other) > 2 * STONE for other in positions[:n])
     assert stone_name(YELLOW, 7) == "yellow-8"
-    assert pytest.approx(HOG - TEES) == RELEASE + STONE  # its front at the nearer hog line
+    assert pytest.approx(HOG - TEES) == RELEASE + STONE  # the front of the stone is at the nearer hog line
 
 
 @pytest.mark.parametrize(
@@ -58,20 +61,20 @@ def test_stones_that_wait_or_are_gone_lie_apart_and_off_the_sheet() -> None:
         ([(RED, (0.0, 0.5)), (YELLOW, (0.3, 0.0)), (YELLOW, (0.0, -0.6))], YELLOW, 1),
         ([(RED, (0.0, 1.9)), (RED, (0.0, -1.9)), (RED, (1.0, 1.0))], RED, 3),  # the rim of a stone is enough
         ([(RED, (0.0, 2.0))], None, 0),
-        ([(RED, (-3.0, 0.0)), (YELLOW, (0.0, 1.0))], YELLOW, 1),  # a guard counts nothing
-        ([(RED, (0.5, 0.0)), (YELLOW, (0.0, 0.5))], None, 0),  # nobody can tell
+        ([(RED, (-3.0, 0.0)), (YELLOW, (0.0, 1.0))], YELLOW, 1),  # a guard does not score
+        ([(RED, (0.5, 0.0)), (YELLOW, (0.0, 0.5))], None, 0),  # equal distances: a blank end
         ([(RED, (0.1 * k, 0.0)) for k in range(8)], RED, 8),
         ([(RED, (0.1 * k, 0.0)) for k in range(8)] + [(YELLOW, (0.0, 0.35))], RED, 4),
     ],
 )
-def test_an_end_is_worth(stones: list[tuple[int, Point]], team: int | None, points: int) -> None:
+def test_score_of_an_end(stones: list[tuple[int, Point]], team: int | None, points: int) -> None:
     assert end_score(stones) == (team, points)
     assert end_score(stones[::-1]) == (team, points)
-    swapped = [(1 - whose, place) for whose, place in stones]
+    swapped = [(1 - owner, position) for owner, position in stones]
     assert end_score(swapped) == (None if team is None else 1 - team, points)
 
 
-def test_who_is_out_of_play() -> None:
+def test_stones_out_of_play_and_hogged_stones() -> None:
     eps = 1e-9
     assert is_out_of_play((0.0, WIDTH / 2 - STONE))  # the side line is touched
     assert not is_out_of_play((0.0, -WIDTH / 2 + STONE + eps))
@@ -82,7 +85,7 @@ def test_who_is_out_of_play() -> None:
 
 
 @pytest.mark.parametrize(
-    ("place", "guard"),
+    ("position", "guard"),
     [
         ((-3.0, 0.0), True),
         ((-6.4, 0.0), False),  # not past the hog line
@@ -93,12 +96,12 @@ def test_who_is_out_of_play() -> None:
         ((1.0, 2.2), False),
     ],
 )
-def test_the_free_guard_zone_lies_before_the_tee_line_and_outside_the_house(place: Point, guard: bool) -> None:
-    assert in_free_guard_zone(place) is guard
-    assert not (in_free_guard_zone(place) and in_house(place))
+def test_the_free_guard_zone_lies_before_the_tee_line_and_outside_the_house(position: Point, guard: bool) -> None:
+    assert in_free_guard_zone(position) is guard
+    assert not (in_free_guard_zone(position) and in_house(position))
 
 
-def test_turns_alternate_and_the_hammer_goes_to_who_did_not_score() -> None:
+def test_turns_alternate_and_the_hammer_passes_to_the_team_that_did_not_score() -> None:
     score = CurlingScore(ends=2)
     teams = []
     for _ in range(16):

@@ -1,4 +1,4 @@
-"""A table without an engine: hits and places are said by the test, and `Move`s are obeyed."""
+"""A pinball table without an engine: the test states hits and positions, and `Move` actions are applied."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -15,9 +15,9 @@ from sandbox.trajectory import Contacts, Frame
 DT = 0.01
 MASS = 0.08
 SERVE, OPEN = (0.48, 0.1), (0.2, 0.6)
-"""where balls wait for the plunger, and somewhere on the table"""
+"""m: position of a ball that waits for the plunger, and a position in play"""
 
-THINGS = {
+PARTS = {
     "bumper a": 'role = "bumper"',
     "sling": 'role = "slingshot"',
     "standup 1": 'role = "standup"\ngroup = "bull"',
@@ -38,7 +38,7 @@ THINGS = {
     "right bat": 'role = "flipper"\ngroup = "right"',
     "plunger": f'role = "plunger"\nat = [{SERVE[0]}, {SERVE[1]}]\nout = [0.0, 3.0]',
 }
-"""Every part but the drops is a post; whether a real table has a zone or a drive there is all one to the rules."""
+"""Every part except the drop targets is a post: the rules do not depend on the kind of element."""
 
 HEAD = """
 [world]
@@ -54,11 +54,11 @@ closed = true
 """
 
 
-def table(*leave_out: str, balls: int = 3, players: int = 1, restitution: float = 0.5) -> Scene:
-    """Return a table with everything, but for some things."""
+def table(*omitted: str, balls: int = 3, players: int = 1, restitution: float = 0.5) -> Scene:
+    """Return a table with every part, except some."""
     text = HEAD + f'[play]\ngame = "pinball"\nplayers = {players}\n'
-    for k, (name, part) in enumerate(THINGS.items()):
-        if name in leave_out:
+    for k, (name, part) in enumerate(PARTS.items()):
+        if name in omitted:
             continue
         text += f'[[play.part]]\nname = "{name}"\n{part}\n'
         if name.startswith("drop"):
@@ -76,13 +76,13 @@ def table(*leave_out: str, balls: int = 3, players: int = 1, restitution: float 
 
 @dataclass
 class Table:
-    """A game in progress, and the world that a test says there is."""
+    """A running game, with a state that the test sets."""
 
     scene: Scene
     game: PinballRules = field(init=False)
     step: int = 0
     actions: list[Action] = field(default_factory=list)
-    """all that the rules did so far"""
+    """all actions of the rules so far"""
     cues: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -90,41 +90,41 @@ class Table:
         self.position = self.scene.bodies.position.copy()
         self.velocity = np.zeros_like(self.position)
         self.present = np.ones(len(self.position), np.bool_)
-        self.look()
+        self.advance()
 
     @property
     def time(self) -> float:
         return self.step * DT
 
-    def look(self, *hits: tuple[str, float] | tuple[str, float, int]) -> list[Action]:
-        """Pass a step in which balls hit things at a speed, m/s; return what the rules do."""
+    def advance(self, *hits: tuple[str, float] | tuple[str, float, int]) -> list[Action]:
+        """Advance by a step in which balls hit parts at a speed, m/s; return the actions of the rules."""
         time = self.time
-        now = self.game.on_step(StepInfo(time, self.frame(), self._contacts(hits), ()))
-        self._obey(now)
+        actions = self.game.on_step(StepInfo(time, self.frame(), self._contacts(hits), ()))
+        self._apply(actions)
         self.cues += self.game.sounds()
         self.step += 1
-        return list(now)
+        return list(actions)
 
     def wait(self, seconds: float) -> list[Action]:
-        """Pass time in which nothing is hit."""
-        return [action for _ in range(round(seconds / DT)) for action in self.look()]
+        """Advance by a time, s, without hits; return the actions of the rules."""
+        return [action for _ in range(round(seconds / DT)) for action in self.advance()]
 
     def press(self, name: str, value: float = 1.0) -> list[Action]:
-        """Set a control."""
-        now = self.game.on_input(name, value)
-        self._obey(now)
+        """Set a control; return the actions of the rules."""
+        actions = self.game.on_input(name, value)
+        self._apply(actions)
         self.cues += self.game.sounds()
-        return list(now)
+        return list(actions)
 
     def play(self, ball: int = 0) -> None:
-        """Let the served ball leave the lane, and the save run out."""
+        """Move the served ball out of the lane, and wait until the ball save has ended."""
         self.wait(0.05)
         self.put(ball, OPEN)
         self.wait(8.1)
 
-    def put(self, ball: int, where: tuple[float, float], velocity: tuple[float, float] = (0.0, 0.5)) -> None:
-        """Have a ball somewhere, moving."""
-        self.position[ball], self.velocity[ball] = where, velocity
+    def put(self, ball: int, position: tuple[float, float], velocity: tuple[float, float] = (0.0, 0.5)) -> None:
+        """Set position and velocity of a ball."""
+        self.position[ball], self.velocity[ball] = position, velocity
 
     def frame(self) -> Frame:
         """Return the state."""
@@ -137,7 +137,7 @@ class Table:
         """Return the score panel."""
         return dict(self.game.display_lines())
 
-    def _obey(self, actions: Iterable[Action]) -> None:
+    def _apply(self, actions: Iterable[Action]) -> None:
         for action in actions:
             self.actions.append(action)
             if isinstance(action, Move):
@@ -145,44 +145,44 @@ class Table:
                 self.put(ball, action.position, action.velocity or (0.0, 0.0))
 
     def _contacts(self, hits: Iterable[tuple[str, float] | tuple[str, float, int]]) -> Contacts:
-        """Return a contact for each hit, with the impulse m(1 + e)v that such a speed gives, e being .5."""
+        """Return a contact for each hit, with the impulse m(1 + e)v of its speed v, for e = 0.5."""
         rows = []
-        for name, speed, *who in hits:
-            thing = -1 - self.scene.fixed_names.index(name)
-            rows.append((self.time, (who[0] if who else 0, thing), MASS * 1.5 * speed))
+        for name, speed, *ball in hits:
+            part = -1 - self.scene.fixed_names.index(name)
+            rows.append((self.time, (ball[0] if ball else 0, part), MASS * 1.5 * speed))
         return contacts(rows)
 
 
 def contacts(rows: Iterable[tuple[float, tuple[int, int], float]]) -> Contacts:
     """Return contacts by time, pair and normal impulse, N·s; normals point up."""
-    those = list(rows)
+    listed = list(rows)
     return Contacts(
-        np.asarray([time for time, _, _ in those]),
-        np.asarray([pair for _, pair, _ in those], np.int64).reshape(-1, 2),
-        np.zeros((len(those), 2)),
-        np.tile([0.0, 1.0], (len(those), 1)),
-        np.asarray([[0.0, impulse] for _, _, impulse in those]).reshape(-1, 2),
+        np.asarray([time for time, _, _ in listed]),
+        np.asarray([pair for _, pair, _ in listed], np.int64).reshape(-1, 2),
+        np.zeros((len(listed), 2)),
+        np.tile([0.0, 1.0], (len(listed), 1)),
+        np.asarray([[0.0, impulse] for _, _, impulse in listed]).reshape(-1, 2),
     )
 
 
-def thrown(action: Action, velocity: tuple[float, float]) -> bool:
-    """Tell whether a ball gets a velocity, as nearly as coils throw."""
+def is_launch(action: Action, velocity: tuple[float, float]) -> bool:
+    """Return whether a `Move` gives a ball a velocity, within the variation of coils."""
     if not isinstance(action, Move) or action.velocity is None:
         return False
-    share = np.dot(action.velocity, velocity) / np.dot(velocity, velocity)
-    return bool(0.95 <= share <= 1.0 and np.allclose(action.velocity, np.multiply(share, velocity), atol=1e-12))
+    factor = np.dot(action.velocity, velocity) / np.dot(velocity, velocity)
+    return bool(0.95 <= factor <= 1.0 and np.allclose(action.velocity, np.multiply(factor, velocity), atol=1e-12))
 
 
 def toggles(actions: Iterable[Action]) -> list[tuple[str, bool]]:
-    """Return what was made solid, or not."""
+    """Return name and solidity of each `Toggle`."""
     return [(action.thing, action.solid) for action in actions if isinstance(action, Toggle)]
 
 
 def drives(actions: Iterable[Action]) -> list[tuple[str, float]]:
-    """Return what was driven, and how far."""
+    """Return name and level of each `Drive`."""
     return [(action.drive, action.level) for action in actions if isinstance(action, Drive)]
 
 
 def moves(actions: Iterable[Action]) -> list[tuple[str, tuple[float, float]]]:
-    """Return which bodies were put where."""
+    """Return body and position of each `Move`."""
     return [(action.body, action.position) for action in actions if isinstance(action, Move)]

@@ -1,4 +1,4 @@
-"""The full table, seen again: flippers, zones, layers and toggles, from a session to the same score and state."""
+"""Replay of the full table: flippers, zones, layers and toggles lead to the same score and state."""
 
 import json
 from pathlib import Path
@@ -13,7 +13,7 @@ from sandbox.scene.files.load import load
 FULL = Path(__file__).parents[3] / "scenes" / "pinball" / "full.toml"
 
 
-def test_session_of_the_full_table_leads_to_the_same_score_and_state() -> None:
+def test_session_of_the_full_table_replays_to_the_same_score_and_state() -> None:
     scene = load(FULL)
     scene = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": 12.0})})
     first = run(scene, "pymunk", audit=False, bout=PlayerSpec("skilled").start_game(scene))
@@ -30,7 +30,7 @@ def test_session_of_the_full_table_leads_to_the_same_score_and_state() -> None:
     )
     session = Recording.from_json(session.to_json())
     bout = PlayerSpec.from_recording(session).start_game(session.scene)
-    again = run(session.whole_scene, "pymunk", actions=session.actions, audit=False, bout=bout)
-    assert again.info["state_hash"] == info["state_hash"]
-    assert again.info["game"]["score"] == info["game"]["score"] > 0
-    assert again.info["game"]["otherwise"] is None
+    replayed = run(session.whole_scene, "pymunk", actions=session.actions, audit=False, bout=bout)
+    assert replayed.info["state_hash"] == info["state_hash"]
+    assert replayed.info["game"]["score"] == info["game"]["score"] > 0
+    assert replayed.info["game"]["otherwise"] is None

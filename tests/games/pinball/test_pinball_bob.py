@@ -1,4 +1,4 @@
-"""The tilt bob against its closed forms, and against an integrator that knows none."""
+"""Tilt bob, against closed forms and against a numerical integrator."""
 
 import math
 
@@ -15,24 +15,24 @@ PERIOD = 2.0 * math.pi / OMEGA
 
 
 def amplitude(bob: TiltBob) -> float:
-    """Of the free swing that a bob without damping is in, rad."""
+    """Return the amplitude of the free swing of an undamped bob, rad."""
     return math.hypot(abs(bob.angle), abs(bob.rate) / OMEGA)
 
 
-def free(damping: float = 0.0) -> TiltBob:
-    """A bob without a ring."""
+def bob_without_ring(damping: float = 0.0) -> TiltBob:
+    """Return a bob without a ring."""
     return TiltBob(damping, math.inf)
 
 
 @given(st.floats(0.01, 10.0), st.floats(0.001, 0.5))
-def test_push_leaves_the_amplitude_of_the_closed_form(push: float, seconds: float) -> None:
-    bob = free()
+def test_push_gives_the_amplitude_of_the_closed_form(push: float, seconds: float) -> None:
+    bob = bob_without_ring()
     bob.swing(seconds, push)
     expected = 2.0 * push / GRAVITY * abs(math.sin(OMEGA * seconds / 2.0))
     assert amplitude(bob) == pytest.approx(expected, abs=1e-12 * push)  # rounding of 500 exact substeps
 
 
-def test_swing_is_that_of_an_integrator() -> None:
+def test_swing_agrees_with_a_numerical_integrator() -> None:
     bob = TiltBob(DAMPING, math.inf)
     bob.swing(JOLT_TIME, complex(3.0, -2.0))
     bob.swing(0.3, 0j)
@@ -46,36 +46,36 @@ def test_swing_is_that_of_an_integrator() -> None:
         end = solve_ivp(
             lambda t, y: rates(JOLT_TIME, y), (0.0, 0.3), pushed.y[:, -1], rtol=1e-11, atol=1e-13
         )  # fmt: skip
-        assert getattr(bob.angle, axis) == pytest.approx(end.y[0, -1], abs=1e-7)  # of the integrator: its edge at 25 ms
+        assert getattr(bob.angle, axis) == pytest.approx(end.y[0, -1], abs=1e-7)  # error of the integrator at 25 ms
 
 
-def test_one_whole_nudge_would_swing_it_by_seven_degrees_and_strikes_the_ring_as_it_ends() -> None:
-    bob = free()
+def test_full_nudge_has_seven_degrees_amplitude_and_strikes_the_ring_at_its_end() -> None:
+    bob = bob_without_ring()
     bob.swing(JOLT_TIME, JOLT)
-    assert math.degrees(amplitude(bob)) == pytest.approx(7.08, abs=0.01)  # rounding of the figure
-    assert math.degrees(abs(bob.angle)) == pytest.approx(0.874, abs=0.001)  # rounding of the figure
-    ringed = TiltBob(0.0)
-    assert ringed.swing(JOLT_TIME, JOLT) == 0
-    assert ringed.swing(0.005, 0j) == 1
+    assert math.degrees(amplitude(bob)) == pytest.approx(7.08, abs=0.01)  # rounding of the constant
+    assert math.degrees(abs(bob.angle)) == pytest.approx(0.874, abs=0.001)  # rounding of the constant
+    with_ring = TiltBob(0.0)
+    assert with_ring.swing(JOLT_TIME, JOLT) == 0
+    assert with_ring.swing(0.005, 0j) == 1
 
 
-def test_least_push_that_trips_is_a_seventh_of_a_nudge() -> None:
+def test_smallest_push_that_trips_is_a_seventh_of_a_nudge() -> None:
     least = TRIP * GRAVITY / (2.0 * math.sin(OMEGA * JOLT_TIME / 2.0))
-    assert least / JOLT == pytest.approx(0.1413, abs=1e-4)  # rounding of the figure
-    for share, strokes in ((0.995, 0), (1.005, 1)):  # the ring is looked at every 1 ms, the swing is flat at its top
+    assert least / JOLT == pytest.approx(0.1413, abs=1e-4)  # rounding of the constant
+    for factor, strokes in ((0.995, 0), (1.005, 1)):  # the ring is tested every 1 ms, near the maximum of the swing
         bob = TiltBob(0.0)
-        bob.swing(JOLT_TIME, share * least)
+        bob.swing(JOLT_TIME, factor * least)
         assert bob.swing(PERIOD / 2.0, 0j) == strokes
 
 
 @pytest.mark.parametrize(("later", "trips"), [(PERIOD, True), (PERIOD / 2.0, False)])
-def test_two_small_pushes_trip_in_phase_alone(later: float, trips: bool) -> None:
+def test_two_small_pushes_trip_only_in_phase(later: float, trips: bool) -> None:
     small = 0.6 * TRIP * GRAVITY / (2.0 * math.sin(OMEGA * JOLT_TIME / 2.0))
     bob = TiltBob(0.0)
-    struck = bob.swing(JOLT_TIME, small) + bob.swing(later - JOLT_TIME, 0j)
-    assert struck == 0
-    struck = bob.swing(JOLT_TIME, small) + bob.swing(PERIOD, 0j)
-    assert (struck > 0) is trips
+    strokes = bob.swing(JOLT_TIME, small) + bob.swing(later - JOLT_TIME, 0j)
+    assert strokes == 0
+    strokes = bob.swing(JOLT_TIME, small) + bob.swing(PERIOD, 0j)
+    assert (strokes > 0) is trips
 
 
 @given(st.complex_numbers(max_magnitude=20.0), st.floats(0.001, 0.2))
@@ -90,7 +90,7 @@ def test_bob_comes_to_rest() -> None:
     bob = TiltBob()
     bob.swing(JOLT_TIME, JOLT)
     assert not bob.still
-    bob.swing(15.0 * PERIOD, 0j)  # e^(−2π·.05·15) = .9 %, of at most the .017 rad of the ring
+    bob.swing(15.0 * PERIOD, 0j)  # e^(−2π·.05·15) = 0.9 %, of at most the 0.017 rad of the ring
     assert abs(bob.angle) < 0.01 * TRIP
     bob.swing(30.0 * PERIOD, 0j)
     assert bob.still

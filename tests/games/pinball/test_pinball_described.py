@@ -1,4 +1,4 @@
-"""`[pinball]` of a scene file: what it stands for, what outranks it, and what is wrong with it."""
+"""`[pinball]` of a scene file: its expansion, elements that override it, and faults."""
 
 import math
 from typing import Any
@@ -64,7 +64,7 @@ def test_every_kind_of_element_is_built() -> None:
     assert set(kinds) == set(BUILD) == set(EVERY) - {"axis", "outline", "colour"}
 
 
-def test_table_becomes_a_scene_of_primitives_and_stays_one() -> None:
+def test_table_expands_to_a_scene_of_primitives() -> None:
     scene = table()
     assert scene.pinball is None
     assert scene.play.game == "pinball"
@@ -73,7 +73,7 @@ def test_table_becomes_a_scene_of_primitives_and_stays_one() -> None:
     assert expanded(scene) is scene
 
 
-def test_parts_say_what_everything_is_to_the_rules() -> None:
+def test_parts_give_every_element_its_role() -> None:
     scene = table()
     parts = {part.name: part for part in scene.play.parts}
     roles = {
@@ -90,11 +90,12 @@ def test_parts_say_what_everything_is_to_the_rules() -> None:
     assert (parts["hole"].out, parts["hole"].at) == ((0.1, -1.0), (0.35, 0.6))
     lane = parts["plunger"].at
     assert lane is not None
-    assert math.dist(lane, (0.48, 0.1)) == pytest.approx(0.01349, rel=2e-3)  # a ball's radius above the tip, and a hair
+    # a ball's radius above the tip, plus a small gap
+    assert math.dist(lane, (0.48, 0.1)) == pytest.approx(0.01349, rel=2e-3)
 
 
-def test_targets_of_a_bank_are_counted_from_the_left_as_the_ball_sees_them() -> None:
-    for facing, order in (([0, -1], 1), ([0, 1], -1)):  # seen from below, left is where x is least
+def test_targets_of_a_bank_are_numbered_from_the_left_facing_the_bank() -> None:
+    for facing, order in (([0, -1], 1), ([0, 1], -1)):  # seen from below, left is towards smaller x
         bank = {"name": "bank", "position": [0.25, 0.85], "facing": facing}
         walls = [wall for wall in table(drops=[bank]).walls if str(wall.name).startswith("bank")]
         xs = [wall.points[0][0] for wall in walls][::order]
@@ -103,17 +104,17 @@ def test_targets_of_a_bank_are_counted_from_the_left_as_the_ball_sees_them() -> 
         assert faces == {0.85}
 
 
-def test_materials_are_those_of_the_table_of_figures() -> None:
+def test_materials_have_the_documented_properties() -> None:
     known = {m.name: (m.restitution, m.restitution_falloff, m.friction) for m in table().materials}
     assert known["rubber"] == (0.8, 0.3, 0.6)
     assert known["target"] == (0.35, 0.5, 0.2)
     assert known["post"] == (0.9, 0.1, 0.3)
     assert known["flipper"] == (0.8, 0.43, 0.6)
     assert known["wall"] == (0.3, None, 0.3)
-    assert known["steel"] == (None, None, None)  # of a contact, the other side's hold
+    assert known["steel"] == (None, None, None)  # a contact uses the values of the other material
 
 
-def test_kicks_are_those_of_the_elements() -> None:
+def test_kicks_have_the_values_of_their_elements() -> None:
     scene = table()
     (pop,) = [post for post in scene.posts if post.name == "pop"]
     sling = {str(wall.name): wall for wall in scene.walls if str(wall.name).startswith("left sling")}
@@ -125,14 +126,14 @@ def test_kicks_are_those_of_the_elements() -> None:
     assert back.kick is None
 
 
-def test_mirrored_elements_stand_on_both_sides_of_the_axis() -> None:
+def test_mirrored_elements_are_on_both_sides_of_the_axis() -> None:
     scene = table()
     walls = {wall.name: wall for wall in scene.walls}
     for name in ("sling", "sling back", "target"):
         left, right = walls[f"left {name}"].points, walls[f"right {name}"].points
-        there = sorted((0.5 - x, y) for x, y in left)
-        assert [tuple(point) for point in sorted(right)] == [pytest.approx(point, abs=1e-15) for point in there]
-    # A gate keeps the side from which it is solid: above, left of its direction, as it is drawn.
+        mirrored = sorted((0.5 - x, y) for x, y in left)
+        assert [tuple(point) for point in sorted(right)] == [pytest.approx(point, abs=1e-15) for point in mirrored]
+    # A mirrored gate keeps its solid side: above, on the left of its direction.
     for gate in (walls["left gate"], walls["right gate"]):
         (ax, _), (bx, _) = gate.points
         assert gate.one_way
@@ -141,7 +142,7 @@ def test_mirrored_elements_stand_on_both_sides_of_the_axis() -> None:
     assert left.angle + right.angle == pytest.approx(math.pi, abs=1e-15)
 
 
-def test_ramp_has_rails_on_its_layer_a_mouth_that_lifts_and_an_end_that_lets_down() -> None:
+def test_ramp_has_rails_on_its_layer_and_zones_that_change_the_layer() -> None:
     scene = table()
     zones = {zone.name: zone for zone in scene.zones}
     assert (zones["ramp"].layers, zones["ramp"].to_layer) == (("ground",), "ramp")
@@ -151,12 +152,12 @@ def test_ramp_has_rails_on_its_layer_a_mouth_that_lifts_and_an_end_that_lets_dow
     assert [wall.name for wall in rails] == ["ramp left rail", "ramp right rail"]
     climb = zones["ramp climb 1"].gravity
     assert climb is not None
-    # down the climb: (5/7) g rise/climb beside the playfield's own
+    # down the climb: (5/7) g rise/climb, added to the gravity of the playfield
     assert climb[1] == pytest.approx(scene.world.gravity[1] - 5.0 / 7.0 * 9.81 * 0.04 / 0.12, rel=1e-12)
     assert climb[0] == pytest.approx(0.0, abs=1e-12)
 
 
-def test_what_has_a_colour_inside_is_painted_and_lies_over_the_playfield() -> None:
+def test_filled_walls_are_markings_above_the_playfield() -> None:
     wall = {"points": [[0, 0], [0.1, 0], [0.1, 0.1, 0.02]], "closed": True, "fill": "#123456"}
     markings = table(wall=[wall]).play.markings
     assert [marking.colour for marking in markings[:3]] == ["#14304a", "#e9b44c", "#123456"]
@@ -165,8 +166,8 @@ def test_what_has_a_colour_inside_is_painted_and_lies_over_the_playfield() -> No
     assert max(y for _, y in markings[0].points or ()) == pytest.approx(1.0, abs=2e-5)  # the tolerance
 
 
-def test_what_the_scene_states_outranks_the_table() -> None:
-    own = {
+def test_elements_of_the_scene_override_the_table() -> None:
+    document = {
         "pinball": EVERY,
         "world": {"gravity": [0.0, -1.0], "duration": 3.0},
         "solver": {"substeps": 4},
@@ -175,8 +176,8 @@ def test_what_the_scene_states_outranks_the_table() -> None:
         "ball": [{"name": "ball", "position": [0.3, 0.3], "radius": 0.02}],
         "post": [{"name": "pop", "position": [0.3, 0.7], "radius": 0.03}],
     }
-    own["material"] += [{"name": "steel"}]
-    scene = from_document(own)
+    document["material"] += [{"name": "steel"}]
+    scene = from_document(document)
     assert scene.world.gravity == (0.0, -1.0)
     assert (scene.world.duration, scene.solver.substeps) == (3.0, 4)
     assert {m.name: m.restitution for m in scene.materials}["rubber"] == 0.5
@@ -185,7 +186,7 @@ def test_what_the_scene_states_outranks_the_table() -> None:
     assert [(post.name, post.kick) for post in scene.posts if post.radius == 0.03] == [("pop", None)]
 
 
-def test_overrides_reach_elements_and_what_they_stand_for() -> None:
+def test_overrides_apply_to_elements_and_their_expansion() -> None:
     sets = ["pinball.bumper.pop.speed=1.5", "pinball.slope=0.2", "ball.ball.velocity=[0.0, 1.0]", "post.0.radius=0.02"]
     scene = loads(TEXT, overrides=sets)
     assert [post.kick.speed for post in scene.posts if post.kick is not None] == [1.5, 1.5]
@@ -203,7 +204,7 @@ def test_overrides_reach_elements_and_what_they_stand_for() -> None:
         ("pinball.bumpr.pop.speed=1", "the scene has no pinball.bumpr"),
     ],
 )
-def test_override_of_an_element_that_there_is_not_tells_which_there_are(override: str, words: str) -> None:
+def test_override_of_an_unknown_element_lists_the_known_ones(override: str, words: str) -> None:
     with pytest.raises(SceneError) as caught:
         loads(TEXT, overrides=[override])
     assert words in str(caught.value)
@@ -258,7 +259,7 @@ def test_override_of_an_element_that_there_is_not_tells_which_there_are(override
         ({"outline": [[0, 0], [1, 0, 5], [1, 1]]}, "pinball.outline[1]", "too large a radius"),
     ],
 )
-def test_faults_are_told_where_they_are(changes: dict[str, Any], path: str, words: str) -> None:
+def test_faults_have_their_path(changes: dict[str, Any], path: str, words: str) -> None:
     with pytest.raises(SceneError) as caught:
         from_document({"pinball": changes})
     (fault,) = caught.value.faults
@@ -266,7 +267,7 @@ def test_faults_are_told_where_they_are(changes: dict[str, Any], path: str, word
     assert words in fault.message
 
 
-def test_fault_is_told_with_file_line_and_path() -> None:
+def test_fault_has_file_line_and_path() -> None:
     with pytest.raises(SceneError) as caught:
         loads(TEXT.replace("[0.0, 1.0, 0.2]", "[0.0, 1.0, 2.0]").replace("[0.2, 0.7]", '"high"'), "two.toml")
     assert [str(fault).split(": ")[:2] for fault in caught.value.faults] == [
@@ -278,7 +279,7 @@ def test_fault_is_told_with_file_line_and_path() -> None:
     assert str(fault).startswith("two.toml:14: pinball.wall.side.points[1]: has too large a radius: its arcs take 2 m")
 
 
-def test_faults_of_what_is_written_out_point_at_the_element() -> None:
+def test_faults_of_expanded_elements_point_at_the_element() -> None:
     bank = '[[pinball.drops]]\nname = "bank"\nposition = [0.2, 0.5]\nfacing = [0, -1]\n'
     with pytest.raises(SceneError) as caught:
         loads(TEXT.replace('name = "side"', 'name = "bank 2"') + bank, "two.toml")
@@ -287,7 +288,7 @@ def test_faults_of_what_is_written_out_point_at_the_element() -> None:
     assert "unique" in fault.message
 
 
-def test_elements_that_are_called_alike_are_told_by_themselves() -> None:
+def test_elements_with_equal_names_are_reported() -> None:
     with pytest.raises(SceneError) as caught:
         loads(TEXT.replace('name = "side"', 'name = "right pop"'), "two.toml")
     (fault,) = caught.value.faults
@@ -298,14 +299,14 @@ def test_elements_that_are_called_alike_are_told_by_themselves() -> None:
     assert str(fault).startswith("two.toml:10: pinball.bumper.pop.mirrored: has no effect")
 
 
-def test_a_scene_is_one_table() -> None:
+def test_pinball_cannot_be_combined_with_billiards_or_a_surface() -> None:
     with pytest.raises(SceneError, match=r"combined with \[billiards\]"):
         from_document({"pinball": {}, "billiards": {"table": "pool-9ft"}})
     with pytest.raises(SceneError, match="applies to billiards"):
         from_document({"pinball": {}, "surface": {}})
 
 
-def test_scene_made_by_hand_is_not_laid_out_without_its_table() -> None:
+def test_scene_built_in_python_has_no_bodies_before_its_table_is_expanded() -> None:
     scene = Scene(pinball=Pinball())
     with pytest.raises(ValueError, match="is not expanded"):
         _ = scene.bodies

@@ -1,4 +1,4 @@
-"""Which lamps are lit, and when."""
+"""Lit lamps, and when."""
 
 import copy
 
@@ -12,80 +12,81 @@ from tests.games.pinball.pinball_by_hand import DT, OPEN, Table, table
 
 
 @pytest.fixture
-def played() -> Table:
-    """A ball on the table, whose save has run out, and nothing lit."""
-    each = Table(table())
-    each.play()
-    assert isinstance(each.game, HasLamps)
-    assert each.game.lit_lamps() == frozenset()
-    return each
+def game() -> Table:
+    """A game with a ball in play after its ball save, and no lamp lit."""
+    game = Table(table())
+    game.play()
+    assert isinstance(game.game, HasLamps)
+    assert game.game.lit_lamps() == frozenset()
+    return game
 
 
-def seen(played: Table, seconds: float = BLINK_PERIOD) -> list[frozenset[str]]:
-    """Return what is lit at every step of a time."""
+def lit_lamps_over(game: Table, seconds: float = BLINK_PERIOD) -> list[frozenset[str]]:
+    """Return the lit lamps at every step of a time."""
     found = []
     for _ in range(round(seconds / DT)):
-        played.look()
-        found.append(played.game.lit_lamps())
+        game.advance()
+        found.append(game.game.lit_lamps())
     return found
 
 
 @pytest.mark.parametrize("name", ["bumper a", "sling", "outlane"])
-def test_hit_is_a_flash(played: Table, name: str) -> None:
-    played.look((name, 0.5))
-    assert played.game.lit_lamps() == {name}
-    played.wait(FLASH + DT)
-    assert played.game.lit_lamps() == frozenset()
+def test_hit_flashes_the_lamp(game: Table, name: str) -> None:
+    game.advance((name, 0.5))
+    assert game.game.lit_lamps() == {name}
+    game.wait(FLASH + DT)
+    assert game.game.lit_lamps() == frozenset()
 
 
-def test_lamp_of_a_set_stays_lit_until_the_set_is_full(played: Table) -> None:
-    played.look(("lane 2", 0.5))
-    assert seen(played)[-1] == {"lane 2"}
-    played.press("left flipper")
-    assert played.game.lit_lamps() == {"lane 1"}
-    played.look(("lane 2", 0.5))
-    played.look(("lane 3", 0.5))
-    assert not seen(played)[-1] & {"lane 1", "lane 2", "lane 3"}
+def test_lamp_of_a_set_stays_lit_until_the_set_is_full(game: Table) -> None:
+    game.advance(("lane 2", 0.5))
+    assert lit_lamps_over(game)[-1] == {"lane 2"}
+    game.press("left flipper")
+    assert game.game.lit_lamps() == {"lane 1"}
+    game.advance(("lane 2", 0.5))
+    game.advance(("lane 3", 0.5))
+    assert not lit_lamps_over(game)[-1] & {"lane 1", "lane 2", "lane 3"}
 
 
-def test_drop_target_is_lit_while_it_is_down_and_a_full_bank_blinks(played: Table) -> None:
-    played.look(("drop 1", 0.5))
-    assert seen(played)[-1] == {"drop 1"}
-    played.look(("drop 2", 0.5))
-    played.wait(FALL)
-    lit = [each & {"drop 1", "drop 2"} for each in seen(played)]
+def test_drop_target_is_lit_while_it_is_down_and_a_full_bank_blinks(game: Table) -> None:
+    game.advance(("drop 1", 0.5))
+    assert lit_lamps_over(game)[-1] == {"drop 1"}
+    game.advance(("drop 2", 0.5))
+    game.wait(FALL)
+    lit = [each & {"drop 1", "drop 2"} for each in lit_lamps_over(game)]
     assert set(lit) == {frozenset(), frozenset({"drop 1", "drop 2"})}
-    assert lit.count(frozenset()) == pytest.approx(len(lit) / 2, abs=1.1)  # half of the time, to a step at either end
+    # half of the time, within a step at either end
+    assert lit.count(frozenset()) == pytest.approx(len(lit) / 2, abs=1.1)
 
 
-def test_lock_that_counts_is_lit() -> None:
-    each = Table(table("bumper a", "spinner", "hole", balls=2))  # without a mode that its hole could begin
-    each.play()
-    each.game.sheet.lit = True
-    assert seen(each)[-1] == {"lock"}
+def test_ready_lock_is_lit() -> None:
+    game = Table(table("bumper a", "spinner", "hole", balls=2))  # without a mode that the hole could start
+    game.play()
+    game.game.sheet.lit = True
+    assert lit_lamps_over(game)[-1] == {"lock"}
 
 
-def test_mode_blinks_at_what_it_counts(played: Table) -> None:
-    modes = played.game.modes
+def test_mode_blinks_the_elements_that_it_counts(game: Table) -> None:
+    modes = game.game.modes
     modes.mode, modes.left, modes.to_go = modes.modes[0], 30.0, 12
     assert modes.mode.roles == ("bumper",)
-    played.put(0, OPEN)
-    assert set(seen(played)) == {frozenset(), frozenset({"bumper a"})}
+    game.put(0, OPEN)
+    assert set(lit_lamps_over(game)) == {frozenset(), frozenset({"bumper a"})}
 
 
-def test_tilted_table_is_dark(played: Table) -> None:
-    played.look(("lane 2", 0.5))
-    assert played.game.lit_lamps()
-    played.game.nudge.tilted = True
-    assert played.game.lit_lamps() == frozenset()
+def test_tilted_table_is_dark(game: Table) -> None:
+    game.advance(("lane 2", 0.5))
+    assert game.game.lit_lamps()
+    game.game.nudge.tilted = True
+    assert game.game.lit_lamps() == frozenset()
 
 
-def test_looking_at_lamps_changes_nothing(played: Table) -> None:
-    played.look(("lane 2", 0.5))
-    other = copy.deepcopy(played.game)
+def test_reading_lamps_does_not_change_the_state(game: Table) -> None:
+    game.advance(("lane 2", 0.5))
+    other = copy.deepcopy(game.game)
     for _ in range(3):
         other.lit_lamps()
     assert [copy.deepcopy(other).lit_lamps(), other.display_lines()] == [
-        played.game.lit_lamps(),
-        played.game.display_lines(),
+        game.game.lit_lamps(),
+        game.game.display_lines(),
     ]

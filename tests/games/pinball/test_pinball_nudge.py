@@ -1,4 +1,4 @@
-"""Nudges, the tilt, and the search for a ball."""
+"""Nudges, tilt and ball search."""
 
 import numpy as np
 import pytest
@@ -9,14 +9,14 @@ from tests.games.pinball.pinball_by_hand import MASS, OPEN, SERVE, Table, drives
 
 
 @pytest.fixture
-def played() -> Table:
-    each = Table(table())
-    each.play()
-    return each
+def game() -> Table:
+    game = Table(table())
+    game.play()
+    return game
 
 
-def given(actions: list[Action], dt: float = 0.01) -> np.ndarray:
-    """The velocity that forces give to ball 0, m/s, one look a step from the first action on."""
+def velocity_change(actions: list[Action], dt: float = 0.01) -> np.ndarray:
+    """Return the velocity that forces give to ball 0, m/s, with a sample per step from the first action on."""
     force, total = np.zeros(2), np.zeros(2)
     steps: dict[float, np.ndarray] = {}
     for action in actions:
@@ -26,7 +26,7 @@ def given(actions: list[Action], dt: float = 0.01) -> np.ndarray:
     for k in range(round((last - first) / dt) + 1):
         force = steps.get(next((t for t in steps if abs(t - first - k * dt) < 1e-9), -1.0), force)
         total = total + force / MASS * dt
-    assert not force.any()  # it has ended
+    assert not force.any()  # the push has ended
     return total
 
 
@@ -35,139 +35,139 @@ DIRECTIONS = {"nudge": (0.0, 1.0), "nudge left": (-1.0, 0.0), "nudge right": (1.
 
 @pytest.mark.parametrize("control", DIRECTIONS)
 @pytest.mark.parametrize("strength", [1.0, 0.3])
-def test_nudge_gives_a_ball_half_g_for_25_ms(played: Table, control: str, strength: float) -> None:
-    actions = played.press(control, strength) + played.wait(0.1)
+def test_nudge_accelerates_a_ball_by_half_g_for_25_ms(game: Table, control: str, strength: float) -> None:
+    actions = game.press(control, strength) + game.wait(0.1)
     expected = strength * 0.5 * GRAVITY * JOLT_TIME * np.asarray(DIRECTIONS[control])
-    # Though 25 ms are two steps and a half; rounding of times near 8 s against 25 ms.
-    np.testing.assert_allclose(given(actions), expected, atol=1e-12)
+    # 25 ms are 2.5 steps; the tolerance is the rounding of times near 8 s against 25 ms.
+    np.testing.assert_allclose(velocity_change(actions), expected, atol=1e-12)
 
 
-def test_ball_in_the_lane_or_in_a_hole_is_not_pushed() -> None:
+def test_ball_in_the_lane_is_not_pushed() -> None:
     game = Table(table())
     game.wait(0.05)
     assert not any(isinstance(action, Force) for action in game.press("nudge"))
 
 
-def test_ball_that_is_caught_while_pushed_is_pushed_no_more(played: Table) -> None:
-    played.press("nudge")
-    assert [a.force for a in played.look(("hole", 0.0)) if isinstance(a, Force)] == [(0.0, 0.0)]
+def test_push_ends_when_a_hole_captures_the_ball(game: Table) -> None:
+    game.press("nudge")
+    assert [a.force for a in game.advance(("hole", 0.0)) if isinstance(a, Force)] == [(0.0, 0.0)]
 
 
-def test_whole_nudge_warns_and_the_third_tilts(played: Table) -> None:
+def test_full_nudge_warns_and_the_third_tilts(game: Table) -> None:
     for expected in (["warning"], ["warning", "warning"]):
-        played.press("nudge")
-        played.wait(4.0)
-        assert [cue for cue in played.cues if cue in ("warning", "tilt")] == expected
-    played.press("left flipper")
-    played.press("nudge")
-    done = played.wait(0.1)
-    assert played.cues[-1] == "tilt"
-    assert drives(done) == [("left bat", 0.0)]
-    assert played.lines()[""] == "TILT!"
+        game.press("nudge")
+        game.wait(4.0)
+        assert [cue for cue in game.cues if cue in ("warning", "tilt")] == expected
+    game.press("left flipper")
+    game.press("nudge")
+    actions = game.wait(0.1)
+    assert game.cues[-1] == "tilt"
+    assert drives(actions) == [("left bat", 0.0)]
+    assert game.lines()[""] == "TILT!"
 
 
-def test_light_nudges_cost_nothing(played: Table) -> None:
+def test_light_nudges_do_not_warn(game: Table) -> None:
     for _ in range(10):
-        played.press("nudge", 0.13)  # of what trips a bob without damping: .1413
-        played.wait(8.0)
-    assert "warning" not in played.cues
+        game.press("nudge", 0.13)  # an undamped bob trips at 0.1413
+        game.wait(8.0)
+    assert "warning" not in game.cues
 
 
-def test_strokes_of_one_push_count_once(played: Table) -> None:
-    played.press("nudge")
-    played.wait(SAME_PUSH_TIME)
-    assert played.cues.count("warning") == 1
+def test_repeated_strokes_of_one_push_count_once(game: Table) -> None:
+    game.press("nudge")
+    game.wait(SAME_PUSH_TIME)
+    assert game.cues.count("warning") == 1
 
 
-def tilted(played: Table) -> None:
+def tilt_table(game: Table) -> None:
     for _ in range(3):
-        played.press("nudge left")
-        played.wait(1.0)
-    assert played.game.nudge.tilted
+        game.press("nudge left")
+        game.wait(1.0)
+    assert game.game.nudge.tilted
 
 
-def test_tilted_table_is_dead_until_the_drain_and_counts_no_bonus(played: Table) -> None:
-    played.look(("drop 1", 0.5))
-    before = played.game.score
-    tilted(played)
-    assert drives(played.press("left flipper")) == [("left bat", 0.0)]
-    assert played.press("nudge") == []
-    played.look(("bumper a", 1.0), ("standup 1", 1.0), ("standup 2", 1.0))
-    assert played.game.score == before
-    assert "Mode" not in played.lines()
-    played.look(("drain", 0.0))
-    played.wait(2.9)
-    assert played.lines()["Ball"] == "1 of 3"
-    played.wait(0.3)
-    assert (played.game.score, played.lines()["Ball"]) == (before, "2 of 3")
-    assert not played.game.nudge.tilted
-    assert drives(played.press("left flipper")) == [("left bat", 1.0)]
+def test_tilted_table_is_dead_until_the_drain_and_pays_no_bonus(game: Table) -> None:
+    game.advance(("drop 1", 0.5))
+    before = game.game.score
+    tilt_table(game)
+    assert drives(game.press("left flipper")) == [("left bat", 0.0)]
+    assert game.press("nudge") == []
+    game.advance(("bumper a", 1.0), ("standup 1", 1.0), ("standup 2", 1.0))
+    assert game.game.score == before
+    assert "Mode" not in game.lines()
+    game.advance(("drain", 0.0))
+    game.wait(2.9)
+    assert game.lines()["Ball"] == "1 of 3"
+    game.wait(0.3)
+    assert (game.game.score, game.lines()["Ball"]) == (before, "2 of 3")
+    assert not game.game.nudge.tilted
+    assert drives(game.press("left flipper")) == [("left bat", 1.0)]
 
 
-def test_tilt_saves_no_ball() -> None:
+def test_tilt_disables_the_ball_save() -> None:
     game = Table(table())
     game.wait(0.05)
     game.put(0, OPEN)
     game.wait(0.1)
-    tilted(game)
-    game.look(("drain", 0.0))
+    tilt_table(game)
+    game.advance(("drain", 0.0))
     assert "save" not in game.cues
 
 
-def test_bob_is_driven_as_hard_as_the_balls(played: Table) -> None:
-    played.game.nudge.bob.trip = np.inf
-    played.press("nudge right", 1.0)
-    played.wait(0.04)
-    # In looks of 10 ms, though the push is over in the middle of one; the table itself goes to the left.
+def test_bob_has_the_acceleration_of_the_balls(game: Table) -> None:
+    game.game.nudge.bob.trip = np.inf
+    game.press("nudge right", 1.0)
+    game.wait(0.04)
+    # In steps of 10 ms, though the push ends within one; a nudge to the right pushes the bob to the left.
     expected = TiltBob(trip=np.inf)
     expected.swing(JOLT_TIME, -JOLT)
     expected.swing(0.04 - JOLT_TIME, 0j)
-    assert played.game.nudge.bob.angle == pytest.approx(expected.angle, rel=1e-9)  # times near 8 s, rounded
+    assert game.game.nudge.bob.angle == pytest.approx(expected.angle, rel=1e-9)  # rounding of times near 8 s
 
 
-def test_search_pulses_every_coil_after_ten_slow_seconds(played: Table) -> None:
-    played.look(("lane 1", 0.0))
-    played.put(0, OPEN, (0.0, 0.0))
-    assert drives(played.wait(9.9)) == []
-    assert drives(played.wait(1.0)) == [("left bat", 1.0), ("left bat", 0.0), ("right bat", 1.0), ("right bat", 0.0)]
-    assert played.lines()[""] == "ball search"
+def test_search_pulses_every_coil_after_ten_slow_seconds(game: Table) -> None:
+    game.advance(("lane 1", 0.0))
+    game.put(0, OPEN, (0.0, 0.0))
+    assert drives(game.wait(9.9)) == []
+    assert drives(game.wait(1.0)) == [("left bat", 1.0), ("left bat", 0.0), ("right bat", 1.0), ("right bat", 0.0)]
+    assert game.lines()[""] == "ball search"
 
 
-def test_switch_ends_a_search(played: Table) -> None:
-    played.look(("lane 2", 0.0))
-    played.put(0, OPEN, (0.0, 0.0))
-    played.wait(10.05)
-    played.look(("lane 1", 0.0))
-    assert drives(played.wait(9.0)) == [("left bat", 0.0)]  # what was on goes off
+def test_switch_ends_a_ball_search(game: Table) -> None:
+    game.advance(("lane 2", 0.0))
+    game.put(0, OPEN, (0.0, 0.0))
+    game.wait(10.05)
+    game.advance(("lane 1", 0.0))
+    assert drives(game.wait(9.0)) == [("left bat", 0.0)]  # an active coil is released
 
 
-def test_search_kicks_in_its_second_round_and_fetches_the_ball_in_its_third(played: Table) -> None:
-    played.put(0, OPEN, (0.0, 0.0))
-    kicks, fetched = [], []
-    while not fetched:
-        assert played.time < 60.0
-        done = played.look()
-        kicks += [action for action in done if isinstance(action, Impulse)]
-        fetched = moves(done)
+def test_search_kicks_in_its_second_round_and_returns_the_ball_in_its_third(game: Table) -> None:
+    game.put(0, OPEN, (0.0, 0.0))
+    kicks, returns = [], []
+    while not returns:
+        assert game.time < 60.0
+        actions = game.advance()
+        kicks += [action for action in actions if isinstance(action, Impulse)]
+        returns = moves(actions)
     (kick,) = kicks
     assert np.hypot(*kick.impulse) == pytest.approx(0.5 * MASS)
-    assert [where for _, where in fetched][-1] == SERVE
-    assert played.lines()["Ball"] == "1 of 3"
+    assert [position for _, position in returns][-1] == SERVE
+    assert game.lines()["Ball"] == "1 of 3"
 
 
-@pytest.mark.parametrize("why", ["in the lane", "flipper up", "moving"])
-def test_table_does_not_search_while_it_knows_better(played: Table, why: str) -> None:
-    if why == "in the lane":
-        played.put(0, SERVE, (0.0, 0.0))
-    elif why == "flipper up":
-        played.put(0, OPEN, (0.0, 0.0))
-        played.press("left flipper")
+@pytest.mark.parametrize("state", ["in the lane", "flipper up", "moving"])
+def test_no_search_while_a_ball_waits_is_held_or_moves(game: Table, state: str) -> None:
+    if state == "in the lane":
+        game.put(0, SERVE, (0.0, 0.0))
+    elif state == "flipper up":
+        game.put(0, OPEN, (0.0, 0.0))
+        game.press("left flipper")
     else:
-        played.put(0, OPEN, (0.0, 0.5))
-    assert drives(played.wait(19.0)) == []
+        game.put(0, OPEN, (0.0, 0.5))
+    assert drives(game.wait(19.0)) == []
 
 
-def test_search_is_by_the_seed_alone() -> None:
+def test_search_depends_only_on_the_seed() -> None:
     def kick(seed: int) -> tuple[float, float]:
         scene = table()
         world = scene.world.model_copy(update={"seed": seed})
@@ -175,7 +175,7 @@ def test_search_is_by_the_seed_alone() -> None:
         game.play()
         game.put(0, OPEN, (0.0, 0.0))
         while True:
-            for action in game.look():
+            for action in game.advance():
                 if isinstance(action, Impulse):
                     return action.impulse
 
@@ -183,17 +183,17 @@ def test_search_is_by_the_seed_alone() -> None:
     assert kick(5) != kick(6)
 
 
-def test_tilt_is_of_a_ball_that_is_loose_and_the_plunger_is_only_a_rod() -> None:
+def test_tilt_needs_a_ball_in_play_and_keeps_the_plunger_working() -> None:
     game = Table(table())
     game.wait(0.05)
-    for _ in range(5):  # the ball waits in the lane, where a jolt wins nothing
+    for _ in range(5):  # the ball waits in the lane, where a nudge has no use
         game.press("nudge")
         game.wait(4.0)
     assert not game.game.nudge.tilted
     game.put(0, OPEN)
     game.wait(0.1)
-    tilted(game)
-    game.put(0, SERVE)  # it was not shot far enough: without the plunger the game would never go on
+    tilt_table(game)
+    game.put(0, SERVE)  # the ball fell back into the lane: without the plunger the game would not continue
     game.wait(0.1)
     assert drives(game.press("plunger", 0.8)) == [("plunger", 0.8)]
     assert drives(game.press("left flipper")) == [("left bat", 0.0)]

@@ -1,4 +1,4 @@
-"""Games of pinball on an engine, headless: what a plain table of walls and posts is enough for."""
+"""Headless games of pinball on an engine, on a plain table of walls and posts."""
 
 import json
 
@@ -103,64 +103,64 @@ def play(scene: Scene, player: PlayerSpec) -> Trajectory:
 
 
 @pytest.fixture(scope="module")
-def played() -> Trajectory:
+def trajectory() -> Trajectory:
     return play(plain(), PlayerSpec("shoot", SHOOT))
 
 
-def test_plain_table_is_played_to_its_end(played: Trajectory) -> None:
-    game = played.info["game"]
+def test_plain_table_is_played_to_its_end(trajectory: Trajectory) -> None:
+    game = trajectory.info["game"]
     assert game["over"] == "game over"
     assert game["score"] > 0
     assert game["score"] == round(game["score"], -1)
-    assert played.time[-1] < 60.0
+    assert trajectory.time[-1] < 60.0
 
 
-def test_score_is_what_the_contacts_are_worth(played: Trajectory) -> None:
+def test_score_is_the_sum_over_the_contacts(trajectory: Trajectory) -> None:
     scene = plain()
     names, score = dict(enumerate(scene.fixed_names)), 0
-    worth = {"a": (500, 0.9 * 0.9, 0.054), "b": (500, 0.9 * 0.9, 0.054), "c": (2_000 + 100, 0.9 * 0.5, 0.108)}
-    along = (played.contact_impulse * played.contact_normal).sum(axis=1) / 0.08
-    for (_, thing), speed in zip(played.contact_pair.tolist(), along.tolist(), strict=True):
-        points, restitution, least = worth.get(names[-1 - thing], (0, 0.0, 0.0))
+    values = {"a": (500, 0.9 * 0.9, 0.054), "b": (500, 0.9 * 0.9, 0.054), "c": (2_000 + 100, 0.9 * 0.5, 0.108)}
+    speeds = (trajectory.contact_impulse * trajectory.contact_normal).sum(axis=1) / 0.08
+    for (_, thing), speed in zip(trajectory.contact_pair.tolist(), speeds.tolist(), strict=True):
+        points, restitution, least = values.get(names[-1 - thing], (0, 0.0, 0.0))
         if points and speed > (1.0 + restitution) * least:
             score += points
-    assert played.info["game"]["score"] == score  # a standing target adds 100 to a bonus that counts once
+    assert trajectory.info["game"]["score"] == score  # a standup target adds 100 to a bonus with multiplier one
 
 
-def test_session_replays_to_the_same_score_and_state(played: Trajectory) -> None:
-    scene, info = plain(), played.info
+def test_session_replays_to_the_same_score_and_state(trajectory: Trajectory) -> None:
+    scene, info = plain(), trajectory.info
     session = Recording(
         scene,
         "pymunk",
         Settings.model_validate(info["settings"]),
         actions_from_json(json.dumps(info["actions"])),
-        float(played.time[-1]),
+        float(trajectory.time[-1]),
         info["state_hash"],
         presses=tuple(Press(*press) for press in info["game"]["presses"]),
     )
-    again = run(
+    replayed = run(
         session.whole_scene,
         "pymunk",
         actions=session.actions,
         audit=False,
         bout=PlayerSpec.from_recording(session).start_game(scene),
     )
-    assert again.info["state_hash"] == info["state_hash"]
-    assert again.info["game"]["score"] == info["game"]["score"]
-    assert again.info["game"]["otherwise"] is None
+    assert replayed.info["state_hash"] == info["state_hash"]
+    assert replayed.info["game"]["score"] == info["game"]["score"]
+    assert replayed.info["game"]["otherwise"] is None
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-def test_random_player_plays_alike_by_the_seed_alone(seed: int) -> None:
+def test_random_player_depends_only_on_the_seed(seed: int) -> None:
     one, two = (play(plain(20.0, seed), PlayerSpec()) for _ in range(2))
     assert one.info["state_hash"] == two.info["state_hash"]
     other = play(plain(20.0, seed + 10), PlayerSpec())
     assert other.info["state_hash"] != one.info["state_hash"]
 
 
-def test_ball_never_leaves_what_encloses_it(played: Trajectory) -> None:
-    x, y = played.position[:, 0].T
-    assert np.isfinite(played.position).all()
+def test_ball_never_leaves_the_cabinet(trajectory: Trajectory) -> None:
+    x, y = trajectory.position[:, 0].T
+    assert np.isfinite(trajectory.position).all()
     assert (x > 0.0).all()
     assert (x < 0.5).all()
     assert (y > 0.0).all()
@@ -175,7 +175,7 @@ def test_table_without_a_ball_is_refused() -> None:
         rules_of(scene)
 
 
-def test_hand_plays_pinball_alone() -> None:
+def test_bot_refuses_other_games_and_invalid_skill() -> None:
     other, frame = required_rules(load(find("landing"))), start(plain(), "pymunk").frame()
     with pytest.raises(UnsuitableSceneError, match="only plays pinball"):
         PinballBot(1).decide(StepInfo(0.0, frame, Contacts.none(), ()), other)

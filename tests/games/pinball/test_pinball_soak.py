@@ -1,4 +1,4 @@
-"""Shipped tables under long play: nothing is stuck for good, lost, or not finite."""
+"""Shipped tables under long play: no ball is stuck, lost or not finite."""
 
 import math
 from pathlib import Path
@@ -23,7 +23,7 @@ from sandbox.measure.run.sessions import play_out
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import load
 from sandbox.trajectory import Frame
-from tests.games.pinball.passing_watch import TIP, Watch
+from tests.games.pinball.passing_watch import TIP, PassageObserver
 
 pytestmark = pytest.mark.full  # long runs and sweeps
 
@@ -37,7 +37,7 @@ PLAYERS = {
 
 
 PARTS = [*(("random", 1 + 100 * k) for k in range(6)), ("clumsy", 1), ("skilled", 1), ("skilled", 101)]
-"""of the long play: who plays, and the seed of the first game"""
+"""long play: player, and seed of the first game"""
 
 
 def seeded(path: Path, seed: int) -> Scene:
@@ -46,82 +46,80 @@ def seeded(path: Path, seed: int) -> Scene:
 
 
 class Game(NamedTuple):
-    """What became of one."""
+    """Result of a game."""
 
     rules: PinballRules
-    said: list[tuple[float, str]]
-    """and when, s"""
+    messages: list[tuple[float, str]]
+    """time, s, and text"""
     seconds: float
     missed: list[tuple[float, str, str]]
-    """contacts that the engine missed: when, s, and between whom"""
-    through: list[tuple[float, str]]
-    """balls that went through a bat, or a gate from its wrong side: when, s, and which of the two"""
-    deepest: float
-    """m, that a ball got into a bat"""
+    """contacts that the engine missed: time, s, and the two bodies"""
+    passages: list[tuple[float, str]]
+    """balls that passed through a flipper, or a gate from its solid side: time, s, and element"""
+    max_depth: float
+    """m, overlap of a ball with a flipper"""
 
 
-class Keeper:
-    """Looks after balls: all are finite and on the table, and none lies where nobody can help it."""
+class BallChecker:
+    """Checks that all balls are finite and on the table, and that none stays at rest out of reach."""
 
     def __init__(self, rules: PinballRules, dt: float) -> None:
         self.rules, self.dt, self.rest = rules, dt, dict.fromkeys(rules.board.balls, 0.0)
-        self.low, self.high = np.add(rules.board.corners, [[MARGIN], [-MARGIN]])  # of all that is fixed
+        self.low, self.high = np.add(rules.board.corners, [[MARGIN], [-MARGIN]])  # bounds of the static elements
 
-    def look(self, frame: Frame) -> None:
+    def check(self, frame: Frame) -> None:
         rules, balls = self.rules, list(self.rules.board.balls)
-        places = frame.position[balls]
+        positions = frame.position[balls]
         assert np.isfinite(frame.position).all()
         assert np.isfinite(frame.velocity).all()
-        assert (places >= self.low).all(), (frame.time, places)
-        assert (places <= self.high).all(), (frame.time, places)
+        assert (positions >= self.low).all(), (frame.time, positions)
+        assert (positions <= self.high).all(), (frame.time, positions)
         for ball in balls:
             in_lane = rules.board.in_lane(*frame.position[ball].tolist())
             waits = ball not in rules.trough.live or ball in rules.holes.held or in_lane
             rests = not waits and not rules.up and math.hypot(*frame.velocity[ball].tolist()) < 0.005
             self.rest[ball] = self.rest[ball] + self.dt if rests else 0.0
-            assert self.rest[ball] <= SEARCH_AFTER + SEARCH_AFTER / 2.0, (
-                frame.time,
-                frame.position[ball],
-            )  # a round of search
+            # a ball search takes half of SEARCH_AFTER
+            assert self.rest[ball] <= SEARCH_AFTER + SEARCH_AFTER / 2.0, (frame.time, frame.position[ball])
 
 
 def play(scene: Scene, policy: Policy, seconds: float, audit: bool = False) -> Game:
-    """Play one game, for so long at most, s."""
+    """Play one game, for at most `seconds`."""
     simulation = start(scene, "pymunk")
     simulation.contacts()
     auditor = TimedAudit(scene, simulation) if audit else None
     rules = PinballRules(scene, simulation.bodies)
-    watch = Watch(scene, simulation.bodies, rules.board.balls)
+    watch = PassageObserver(scene, simulation.bodies, rules.board.balls)
     if auditor is not None:
         simulation.watch(_Both(auditor, watch))
-    referee, keeper, said = GameSession(rules), Keeper(rules, scene.solver.dt), list[tuple[float, str]]()
+    referee, checker, messages = GameSession(rules), BallChecker(rules, scene.solver.dt), list[tuple[float, str]]()
     while rules.game_over is None and simulation.time < seconds:
         frame = simulation.frame()
-        keeper.look(frame)
+        checker.check(frame)
         own = referee.on_step(simulation.time, frame, simulation.contacts())
         pressed = [
             action
             for control, value in policy.decide(referee.step_info, rules)
             for action in referee.press(simulation.time, control, value)
         ]
-        if not said or said[-1][1] != rules.said[0]:
-            said.append((simulation.time, rules.said[0]))
+        if not messages or messages[-1][1] != rules.said[0]:
+            messages.append((simulation.time, rules.said[0]))
         referee.note_actions(pressed)
         for action in (*own, *pressed):
             simulation.apply(action)
         simulation.step()
     missed = [] if auditor is None else [(t, *named(scene, pair)) for t, pair in zip(*auditor.missed, strict=True)]
-    return Game(rules, said, simulation.time, missed, watch.through, watch.deepest)
+    return Game(rules, messages, simulation.time, missed, watch.passages, watch.max_depth)
 
 
 class _Both:
     """Two observers of one simulation."""
 
-    def __init__(self, *those: Observer) -> None:
-        self.those = those
+    def __init__(self, *observers: Observer) -> None:
+        self.observers = observers
 
     def __call__(self, time: float, start: FloatArray, end: FloatArray, touching: IntArray) -> None:
-        for each in self.those:
+        for each in self.observers:
             each(time, start, end, touching)
 
 
@@ -133,57 +131,55 @@ def named(scene: Scene, pair: IntArray) -> tuple[str, str]:
 @pytest.mark.slow
 @pytest.mark.parametrize(("player", "first"), PARTS)
 @pytest.mark.parametrize("path", TABLES, ids=lambda path: path.stem)
-def test_no_ball_is_stuck_lost_or_through_anything_in_an_hour_of_play(path: Path, player: str, first: int) -> None:
-    """An hour of random play on each table, half an hour of others, in nine parts that workers can share."""
-    left, seed, games = 600.0, first, 0
-    while left > 0.0:
-        game = play(seeded(path, seed), PLAYERS[player](seed), left, audit=True)
+def test_no_ball_is_stuck_lost_or_passes_through_an_element_in_an_hour(path: Path, player: str, first: int) -> None:
+    """An hour of random play on each table and half an hour of bots, in nine parts that run in parallel."""
+    remaining, seed, games = 600.0, first, 0
+    while remaining > 0.0:
+        game = play(seeded(path, seed), PLAYERS[player](seed), remaining, audit=True)
         assert game.missed == [], seed
-        assert game.through == [], seed
-        assert game.deepest < TIP, seed
-        words = [text for _, text in game.said]
+        assert game.passages == [], seed
+        assert game.max_depth < TIP, seed
+        words = [text for _, text in game.messages]
         for trouble in ("ball found", "ball returned", "ball gone"):
-            assert trouble not in words, (seed, game.said)
+            assert trouble not in words, (seed, game.messages)
         games += game.rules.game_over is not None
-        left, seed = left - game.seconds, seed + 1
-    assert games >= 2  # of one to two minutes
+        remaining, seed = remaining - game.seconds, seed + 1
+    assert games >= 2  # a game lasts one to two minutes
 
 
 @pytest.mark.parametrize("path", TABLES, ids=lambda path: path.stem)
 def test_game_is_played_and_scored(path: Path) -> None:
     game = play(seeded(path, 1), PinballBot(1), 15.0)
     assert game.rules.score > 0
-    assert "ball search" not in [text for _, text in game.said]
+    assert "ball search" not in [text for _, text in game.messages]
 
 
-def test_multiball_of_the_full_table_puts_all_balls_into_play() -> None:
+def test_multiball_of_the_full_table_launches_all_balls() -> None:
     scene = seeded(next(path for path in TABLES if path.stem == "full"), 1)
     simulation = start(scene, "pymunk")
     simulation.contacts()
     rules = PinballRules(scene, simulation.bodies)
-    referee, hand = GameSession(rules), PinballBot(1, 0.8)
-    store = simulation.frame().position[rules.board.balls[1]].copy()
-    most = 0
+    referee, bot = GameSession(rules), PinballBot(1, 0.8)
+    stored = simulation.frame().position[rules.board.balls[1]].copy()
+    max_balls = 0
     while simulation.time < 12.0:
         frame = simulation.frame()
         own = referee.on_step(simulation.time, frame, simulation.contacts())
         pressed = []
         if simulation.time > 2.0:
-            pressed = [
-                a for c, v in hand.decide(referee.step_info, rules) for a in referee.press(simulation.time, c, v)
-            ]
+            pressed = [a for c, v in bot.decide(referee.step_info, rules) for a in referee.press(simulation.time, c, v)]
         referee.note_actions(pressed)
         for action in (*own, *pressed):
             simulation.apply(action)
-        if abs(simulation.time - 1.0) < 1e-9:  # the third ball comes into the lock
-            assert np.array_equal(frame.position[rules.board.balls[1]], store)  # the others have not stirred
+        if abs(simulation.time - 1.0) < 1e-9:  # the third ball enters the lock
+            assert np.array_equal(frame.position[rules.board.balls[1]], stored)  # the other balls have not moved
             rules.sheet.locked, rules.sheet.lit = 2, True
             hole = next(each for each in rules.board.of_role("kicker") if each.group == "lock")
             simulation.apply(Move(time=1.0, body="ball", position=hole.where, velocity=(0.0, 0.0)))
         simulation.step()
-        most = max(most, len(rules.trough.flown))
+        max_balls = max(max_balls, len(rules.trough.flown))
     assert rules.sheet.score >= 10_000
-    assert most == 3
+    assert max_balls == 3
 
 
 SCRIPT = """\

@@ -1,4 +1,4 @@
-"""Switches: which contacts are hits, and how hard they were."""
+"""Switches: contacts that count as hits, by their speed of approach."""
 
 import pytest
 from hypothesis import given
@@ -14,24 +14,24 @@ BOARD = Playfield.of(SCENE, SCENE.bodies)
 FRAME = Table(SCENE).frame()
 
 
-def number(name: str) -> int:
+def index_of(name: str) -> int:
     return -1 - SCENE.fixed_names.index(name)
 
 
-def names(switches: Switches, *rows: tuple[float, tuple[int, int], float]) -> list[str]:
+def hit_names(switches: Switches, *rows: tuple[float, tuple[int, int], float]) -> list[str]:
     return [hit.element.name for hit in switches.read(StepInfo(0.0, FRAME, contacts(rows), ()))]
 
 
 @pytest.mark.parametrize(("name", "threshold"), [("bumper a", 0.054), ("sling", 0.054), ("standup 1", 0.108)])
-@given(share=st.floats(0.1, 10.0))
-def test_switch_closes_above_its_threshold_of_approach(name: str, threshold: float, share: float) -> None:
-    if abs(share - 1.0) < 1e-9:
+@given(factor=st.floats(0.1, 10.0))
+def test_switch_closes_above_its_threshold_of_approach(name: str, threshold: float, factor: float) -> None:
+    if abs(factor - 1.0) < 1e-9:
         return
-    given_ = MASS * (1.0 + 0.5) * threshold * share  # m(1 + e)v
-    assert names(Switches(BOARD), (0.0, (0, number(name)), given_)) == ([name] if share > 1.0 else [])
+    impulse = MASS * (1.0 + 0.5) * threshold * factor  # m(1 + e)v
+    assert hit_names(Switches(BOARD), (0.0, (0, index_of(name)), impulse)) == ([name] if factor > 1.0 else [])
 
 
-def test_kick_and_falloff_of_the_thing_decide() -> None:
+def test_threshold_depends_on_kick_and_falloff_of_the_element() -> None:
     scene = table().model_copy(update={"posts": tuple(_kicking(post) for post in table().posts)})
     board = Playfield.of(scene, scene.bodies)
     bumper = next(each for each in board.elements if each.name == "bumper a")
@@ -44,26 +44,26 @@ def _kicking(post):
     return post.model_copy(update={"kick": Kick(speed=0.8, threshold=0.2), "restitution_falloff": 3.0})
 
 
-def test_contact_that_lasts_is_one_hit() -> None:
-    switches, row = Switches(BOARD), (0.5, (0, number("bumper a")), 1.0)
-    assert names(switches, row) == ["bumper a"]
-    assert names(switches, row) == []
-    assert names(switches, (0.7, *row[1:])) == ["bumper a"]
+def test_persistent_contact_is_one_hit() -> None:
+    switches, row = Switches(BOARD), (0.5, (0, index_of("bumper a")), 1.0)
+    assert hit_names(switches, row) == ["bumper a"]
+    assert hit_names(switches, row) == []
+    assert hit_names(switches, (0.7, *row[1:])) == ["bumper a"]
 
 
-def test_hit_whose_impulse_spans_two_steps_counts_but_leaning_does_not() -> None:
+def test_impulse_over_two_steps_counts_but_resting_contact_does_not() -> None:
     least = MASS * 1.5 * 0.054
-    switches, half = Switches(BOARD), (0.5, (0, number("bumper a")), 0.6 * least)
-    assert names(switches, half) == []
-    assert names(switches, half) == ["bumper a"]
-    leaning = (0.9, (0, number("bumper a")), 0.3 * least)
-    assert [names(switches, leaning) for _ in range(20)] == [[]] * 20
+    switches, half = Switches(BOARD), (0.5, (0, index_of("bumper a")), 0.6 * least)
+    assert hit_names(switches, half) == []
+    assert hit_names(switches, half) == ["bumper a"]
+    leaning = (0.9, (0, index_of("bumper a")), 0.3 * least)
+    assert [hit_names(switches, leaning) for _ in range(20)] == [[]] * 20
 
 
 def test_zones_close_without_impulse() -> None:
-    assert names(Switches(BOARD), (0.0, (0, number("lane 1")), 0.0)) == ["lane 1"]
+    assert hit_names(Switches(BOARD), (0.0, (0, index_of("lane 1")), 0.0)) == ["lane 1"]
 
 
-def test_what_plays_no_part_is_no_switch() -> None:
+def test_elements_without_a_part_are_no_switches() -> None:
     switches = Switches(BOARD)
-    assert names(switches, (0.0, (0, number("frame")), 1.0), (0.0, (0, 1), 1.0)) == []
+    assert hit_names(switches, (0.0, (0, index_of("frame")), 1.0), (0.0, (0, 1), 1.0)) == []

@@ -1,4 +1,4 @@
-"""An oracle nobody here wrote: scipy's DOP853 at its tightest."""
+"""Independent numerical solutions for the closed forms: scipy's DOP853 at its tightest tolerance."""
 
 from collections.abc import Callable, Sequence
 
@@ -17,25 +17,25 @@ FloatArray = npt.NDArray[np.float64]
 def integrated(
     law: Callable[[float, FloatArray], Sequence[float]], start: Sequence[float], time: FloatArray
 ) -> FloatArray:
-    """Return the state at T times, (state, T); steps are short, as between them its order is but seven."""
+    """Return the state at T times, (state, T). Steps are short, because dense output is of order 7 only."""
     end = float(time[-1])
-    done = solve_ivp(law, (0.0, end), start, "DOP853", time, rtol=1e-13, atol=1e-13, max_step=0.05)
-    assert done.success
-    return np.asarray(done.y)
+    result = solve_ivp(law, (0.0, end), start, "DOP853", time, rtol=1e-13, atol=1e-13, max_step=0.05)
+    assert result.success
+    return np.asarray(result.y)
 
 
 def scene_of(*parts: str, world: str = "duration = 10.0") -> Scene:
     return loads(f"[world]\n{world}\n" + "\n".join(parts))
 
 
-def form_of(scene: Scene) -> Solution:
+def solution_of(scene: Scene) -> Solution:
     """Return a scene's solution, which it must have."""
     found = solution(scene)
     assert found is not None
     return found
 
 
-def motion_of(scene: Scene, time: FloatArray, number: int = 0) -> BodyMotion:
-    """Return one body's motion by formula."""
-    motion = form_of(scene).at(time)
-    return BodyMotion(*(each[:, number] for each in motion))
+def motion_of(scene: Scene, time: FloatArray, index: int = 0) -> BodyMotion:
+    """Return the closed-form motion of one body."""
+    motion = solution_of(scene).at(time)
+    return BodyMotion(*(each[:, index] for each in motion))

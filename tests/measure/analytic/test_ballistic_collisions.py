@@ -1,4 +1,4 @@
-"""Balls that meet once, or pass a blow on in line, against the published formulas and 40-digit arithmetic."""
+"""Single collisions of two balls, and impacts along a row, against published formulas and 40-digit arithmetic."""
 
 import math
 
@@ -12,7 +12,7 @@ from sandbox.measure.analytic import solution
 from sandbox.measure.analytic.trajectory import solved_run
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.scene import Scene
-from tests.measure.analytic.oracle import form_of, motion_of, scene_of
+from tests.measure.analytic.oracle import motion_of, scene_of, solution_of
 
 
 def balls(
@@ -23,7 +23,7 @@ def balls(
     world: str = "duration = 4.0",
     extra: str = "",
 ) -> Scene:
-    """Balls of 0.5 m radius, each by place and velocity."""
+    """Return balls of 0.5 m radius, each given by position and velocity."""
     head = f"[[material]]\nname = 'm'\n[[pair]]\nbetween = ['m', 'm']\nrestitution = {e!r}\nfriction = {friction}\n"
     rows = [
         f"[[ball]]\nposition = [{x!r}, {y!r}]\nvelocity = [{vx!r}, {vy!r}]\nradius = 0.5\nmaterial = 'm'\n"
@@ -35,19 +35,21 @@ def balls(
 
 @pytest.mark.parametrize("e", [0.0, 0.3, 1.0])
 @pytest.mark.parametrize("masses", [(1.0, 1.0), (3.0, 1.0), (1e12, 1.0), (1.0, 1e12)])
-def test_two_part_by_the_published_formula(masses: tuple[float, float], e: float) -> None:
+def test_two_balls_separate_by_the_published_formula(masses: tuple[float, float], e: float) -> None:
     (m1, m2), v = masses, 4.0
     scene = balls((-3.0, 0.0, v, 0.0), (0.0, 0.0, 0.0, 0.0), mass=masses, e=e)
-    right = [(m1 - e * m2) * v / (m1 + m2), (1.0 + e) * m1 * v / (m1 + m2)]
-    found = form_of(scene).at(np.array([0.25, 0.5, 2.5]))
-    assert found.velocity[:, :, 0] == pytest.approx(np.array([[v, 0.0], right, right]), abs=1e-15 * v)  # a rounding
-    assert found.position[2, :, 0] == pytest.approx([-1.0 + 2.0 * right[0], 2.0 * right[1]], abs=4e-15)  # of 16 m
-    run_ = solved_run(scene, scene.solver)
-    assert run_ is not None
-    assert run_.contact_time.tolist() == [0.5]
-    assert run_.contact_normal.tolist() == [[1.0, 0.0]]
-    # Relative: what the first gives the second is the momentum that the second gains.
-    assert run_.contact_impulse[0, 0] == pytest.approx(m2 * right[1], rel=1e-15)
+    expected = [(m1 - e * m2) * v / (m1 + m2), (1.0 + e) * m1 * v / (m1 + m2)]
+    found = solution_of(scene).at(np.array([0.25, 0.5, 2.5]))
+    assert found.velocity[:, :, 0] == pytest.approx(
+        np.array([[v, 0.0], expected, expected]), abs=1e-15 * v
+    )  # a rounding
+    assert found.position[2, :, 0] == pytest.approx([-1.0 + 2.0 * expected[0], 2.0 * expected[1]], abs=4e-15)  # of 16 m
+    trajectory = solved_run(scene, scene.solver)
+    assert trajectory is not None
+    assert trajectory.contact_time.tolist() == [0.5]
+    assert trajectory.contact_normal.tolist() == [[1.0, 0.0]]
+    # The impulse on the second ball is the momentum that it gains.
+    assert trajectory.contact_impulse[0, 0] == pytest.approx(m2 * expected[1], rel=1e-15)
 
 
 @given(
@@ -57,63 +59,65 @@ def test_two_part_by_the_published_formula(masses: tuple[float, float], e: float
     speed=st.floats(0.5, 50.0),
     drift=st.floats(-3.0, 3.0),
 )
-def test_oblique_impact_keeps_momentum_and_the_law_of_restitution(
+def test_oblique_impact_conserves_momentum_and_obeys_restitution(
     offset: float, e: float, ratio: float, speed: float, drift: float
 ) -> None:
     scene = balls((-3.0, offset, speed, drift), (0.0, 0.0, 0.0, drift), mass=(ratio, 1.0), e=e, world="duration = 20.0")
-    ((row,),) = [form_of(scene).together.contacts(20.0)]
-    before, after = form_of(scene).at(np.array([0.0, 20.0])).velocity
+    ((row,),) = [solution_of(scene).together.contacts(20.0)]
+    before, after = solution_of(scene).at(np.array([0.0, 20.0])).velocity
     n = np.asarray(row.normal)
     size = speed * max(ratio, 1.0)
     momentum = ratio * (after[0] - before[0]) + after[1] - before[1]
     assert momentum == pytest.approx([0.0, 0.0], abs=1e-14 * size)  # roundings
     assert (after[1] - after[0]) @ n == pytest.approx(-e * float((before[1] - before[0]) @ n), abs=1e-14 * size)
-    # 40 digits know the time of a grazing hit that a naive root would miss by half the digits.
+    # With 40 digits the time of a grazing impact is exact; a naive root in doubles loses half of its digits.
     with mpmath.workdps(40):
         x = mpmath.mpf(3) - mpmath.sqrt(1 - mpmath.mpf(offset) ** 2)
-        right = float(x / mpmath.mpf(speed))
-    assert row.time == pytest.approx(right, rel=1e-13 / math.sqrt(1.0 - offset * offset))  # as the root's own condition
+        expected = float(x / mpmath.mpf(speed))
+    assert row.time == pytest.approx(
+        expected, rel=1e-13 / math.sqrt(1.0 - offset * offset)
+    )  # the condition number of the root
 
 
-def test_equal_elastic_balls_part_at_right_angles() -> None:
+def test_equal_elastic_balls_separate_at_right_angles() -> None:
     after = motion_of(balls((-3.0, 0.6, 1.0, 0.0), (0.0, 0.0, 0.0, 0.0)), np.array([4.0]), 0).velocity[0]
     other = motion_of(balls((-3.0, 0.6, 1.0, 0.0), (0.0, 0.0, 0.0, 0.0)), np.array([4.0]), 1).velocity[0]
     assert float(after @ other) == pytest.approx(0.0, abs=1e-15)  # a rounding of numbers below 1
-    assert np.hypot(*after) == pytest.approx(0.6, rel=1e-14)  # sin of the angle that it hits at
+    assert np.hypot(*after) == pytest.approx(0.6, rel=1e-14)  # sine of the impact angle
 
 
-def test_balls_that_miss_fly_on_and_spins_stay() -> None:
+def test_balls_that_miss_continue_in_straight_lines() -> None:
     scene = balls((-3.0, 1.01, 1.0, 0.0), (0.0, 0.0, 0.0, 0.0))
-    assert form_of(scene).at(np.array([4.0])).position[0].tolist() == [[1.0, 1.01], [0.0, 0.0]]
+    assert solution_of(scene).at(np.array([4.0])).position[0].tolist() == [[1.0, 1.01], [0.0, 0.0]]
 
 
-def test_all_fall_alike_while_they_meet() -> None:
+def test_uniform_gravity_does_not_affect_a_collision() -> None:
     starts = (-3.0, 0.6, 1.0, 0.5), (0.0, 0.0, 0.0, 0.5)
     time = np.linspace(0.0, 4.0, 9)
-    free, falling = (form_of(balls(*starts, e=0.7, world=f"gravity = {g}\nduration = 4.0")).at(time)
+    free, falling = (solution_of(balls(*starts, e=0.7, world=f"gravity = {g}\nduration = 4.0")).at(time)
                      for g in ([0.0, 0.0], [0.3, -9.81]))  # fmt: skip
     fallen = 0.5 * time[:, None, None] ** 2 * np.array([0.3, -9.81])
-    assert falling.position == pytest.approx(free.position + fallen, abs=1e-14)  # a rounding of 80 m
+    assert falling.position == pytest.approx(free.position + fallen, abs=1e-14)  # one rounding of 80 m
 
 
 @pytest.mark.parametrize("gap", [0.0, 1e-4])
 @pytest.mark.parametrize("count", [1, 2, 3])
-def test_cradle_passes_on_as_many_as_come_in(count: int, gap: float) -> None:
+def test_cradle_ejects_as_many_balls_as_arrive(count: int, gap: float) -> None:
     row = [(k * (1.0 + gap), 0.0, 0.0, 0.0) for k in range(5 - count)]
-    coming = [(-1.0 - (1.0 + gap) * k, 0.0, 2.0, 0.0) for k in range(1, count + 1)][::-1]
-    scene = balls(*coming, *row)
-    after = form_of(scene).at(np.array([4.0])).velocity[0, :, 0]
-    assert after == pytest.approx([0.0] * (5 - count) + [2.0] * count, abs=1e-15)  # a rounding a blow
-    events = form_of(scene).together.contacts(4.0)
-    assert len(events) == count * (5 - count)  # each of those that come meets each that stands, in effect
+    incoming = [(-1.0 - (1.0 + gap) * k, 0.0, 2.0, 0.0) for k in range(1, count + 1)][::-1]
+    scene = balls(*incoming, *row)
+    after = solution_of(scene).at(np.array([4.0])).velocity[0, :, 0]
+    assert after == pytest.approx([0.0] * (5 - count) + [2.0] * count, abs=1e-15)  # one rounding per impact
+    events = solution_of(scene).together.contacts(4.0)
+    assert len(events) == count * (5 - count)  # in effect, each incoming ball hits each standing one
 
 
-def test_exact_engine_agrees() -> None:
+def test_exact_engine_agrees_with_closed_form() -> None:
     scene = balls((-3.0, 0.6, 1.0, 0.2), (0.0, 0.0, 0.0, 0.3), mass=(1.0, 2.5), e=0.7)
-    own, found = solved_run(scene, scene.solver), run(scene, "exact", audit=False)
-    assert own is not None
-    assert own.position == pytest.approx(found.position, abs=1e-13)  # both to rounding
-    assert own.contact_impulse == pytest.approx(found.contact_impulse, rel=1e-12)  # likewise
+    closed, found = solved_run(scene, scene.solver), run(scene, "exact", audit=False)
+    assert closed is not None
+    assert closed.position == pytest.approx(found.position, abs=1e-13)  # both to rounding
+    assert closed.contact_impulse == pytest.approx(found.contact_impulse, rel=1e-12)  # likewise
 
 
 @pytest.mark.parametrize(
@@ -132,10 +136,10 @@ def test_exact_engine_agrees() -> None:
     ids=["rubbing", "a third aside", "both sides at once", "through three at once", "drag", "overlap", "bounds",
          "a post", "a box"],
 )  # fmt: skip
-def test_what_has_no_certain_outcome_has_no_form(scene: Scene) -> None:
+def test_collision_of_uncertain_outcome_has_no_closed_form(scene: Scene) -> None:
     assert solution(scene) is None
 
 
-def test_blow_on_both_sides_at_once_is_certain_for_equal_elastic_balls() -> None:
+def test_simultaneous_impact_from_both_sides_is_solved_for_equal_elastic_balls() -> None:
     scene = balls((-3.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 0.0), (3.0, 0.0, -2.0, 0.0))
-    assert form_of(scene).at(np.array([4.0])).velocity[0, :, 0] == pytest.approx([-2.0, 0.0, 1.0], abs=1e-15)
+    assert solution_of(scene).at(np.array([4.0])).velocity[0, :, 0] == pytest.approx([-2.0, 0.0, 1.0], abs=1e-15)

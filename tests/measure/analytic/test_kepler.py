@@ -1,4 +1,4 @@
-"""Orbits by Kepler's equation, against DOP853; what is no such orbit has no form."""
+"""Orbits by Kepler's equation against DOP853, and scenes that are no Kepler orbits."""
 
 import math
 
@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from sandbox.measure.analytic import solution
 from sandbox.measure.analytic.kepler import Kepler
 from sandbox.scene.compile.scene import Scene
-from tests.measure.analytic.oracle import form_of, integrated, motion_of, scene_of
+from tests.measure.analytic.oracle import integrated, motion_of, scene_of, solution_of
 
 TIME = np.linspace(0.0, 15.0, 61)
 SUN = "[[attraction]]\ntoward = [0.2, -0.1]\nstrength = 1.0\n"
@@ -21,7 +21,7 @@ def planet(x: float, y: float, vx: float, vy: float, sun: str = SUN, world: str 
     return scene_of(ball, sun, world=world)
 
 
-def pull(_: float, s: np.ndarray) -> list[float]:
+def state_derivative(_: float, s: np.ndarray) -> list[float]:
     r = float(np.hypot(*s[:2]))
     return [*s[2:], *(-s[:2] / r**3)]
 
@@ -39,41 +39,45 @@ def pull(_: float, s: np.ndarray) -> list[float]:
     ],
     ids=["e = ½", "circle", "rising", "backwards", "e = 0.91", "hyperbola", "hyperbola falling in"],
 )
-def test_orbit_is_dop853s(start: tuple[float, float, float, float]) -> None:
-    right = integrated(pull, start, TIME)
+def test_orbit_agrees_with_dop853(start: tuple[float, float, float, float]) -> None:
+    expected = integrated(state_derivative, start, TIME)
     found = motion_of(planet(*start), TIME)
-    # 1e-13 a step, magnified by each close passage: four of e = 0.91, 40 times as fast as the mean.
-    assert found.position - [0.2, -0.1] == pytest.approx(right[:2].T, abs=3e-9)
-    assert found.velocity == pytest.approx(right[2:].T, abs=1e-7)
+    # 1e-13 a step, magnified at each periapsis: e = 0.91 passes four, at 40 times the mean speed.
+    assert found.position - [0.2, -0.1] == pytest.approx(expected[:2].T, abs=3e-9)
+    assert found.velocity == pytest.approx(expected[2:].T, abs=1e-7)
 
 
-@given(x=st.floats(0.3, 3.0), vx=st.floats(-1.5, 1.5), vy=st.floats(0.2, 2.0), turned=st.floats(0.0, 6.28))
-def test_energy_and_angular_momentum_stay(x: float, vx: float, vy: float, turned: float) -> None:
-    c, s = math.cos(turned), math.sin(turned)
+@given(x=st.floats(0.3, 3.0), vx=st.floats(-1.5, 1.5), vy=st.floats(0.2, 2.0), angle=st.floats(0.0, 6.28))
+def test_orbit_conserves_energy_and_angular_momentum(x: float, vx: float, vy: float, angle: float) -> None:
+    c, s = math.cos(angle), math.sin(angle)
     scene = planet(c * x, s * x, c * vx - s * vy, s * vx + c * vy)
     if solution(scene) is None:  # a parabola, to rounding
         assert abs(2.0 - x * (vx * vx + vy * vy)) <= 2e-6
         return
     found = motion_of(scene, TIME)
     r, v = (found.position - [0.2, -0.1]).T, found.velocity.T
-    near = float(np.hypot(*r).min())
-    # An orbit of perihelion q rounds by 1e-16 at a speed of √(2/q), and its f and g cancel where it is far.
+    periapsis = float(np.hypot(*r).min())
+    # At periapsis q the speed √(2/q) rounds by 1e-16; far out, the Lagrange coefficients f and g cancel.
     energy = 0.5 * (v**2).sum(axis=0) - 1.0 / np.hypot(*r)
-    assert energy == pytest.approx(np.full(len(TIME), energy[0]), abs=1e-10 / near**2)
+    assert energy == pytest.approx(np.full(len(TIME), energy[0]), abs=1e-10 / periapsis**2)
     momentum = r[0] * v[1] - r[1] * v[0]
-    assert momentum == pytest.approx(np.full(len(TIME), momentum[0]), abs=1e-10 / near)
+    assert momentum == pytest.approx(np.full(len(TIME), momentum[0]), abs=1e-10 / periapsis)
 
 
-def test_planet_is_back_after_its_period_and_half_way_at_half_of_it() -> None:
+def test_planet_returns_after_one_period_and_is_opposite_after_half() -> None:
     scene = planet(0.5, 0.0, 0.0, math.sqrt(3.0))
-    form = form_of(scene).alone[0]
+    form = solution_of(scene).alone[0]
     assert isinstance(form, Kepler)
-    assert (form.half_axis, form.period) == pytest.approx((1.0, 2.0 * math.pi), rel=1e-15)  # e = ½ in its own units
+    assert (form.half_axis, form.period) == pytest.approx(
+        (1.0, 2.0 * math.pi), rel=1e-15
+    )  # e = ½ in units of the semi-axis
     found = motion_of(scene, np.array([math.pi, 2.0 * math.pi, 200.0 * math.pi]))
-    assert found.position == pytest.approx(np.array([[-1.3, -0.1], [0.7, -0.1], [0.7, -0.1]]), abs=1e-11)  # of 100
+    assert found.position == pytest.approx(
+        np.array([[-1.3, -0.1], [0.7, -0.1], [0.7, -0.1]]), abs=1e-11
+    )  # over 100 periods
 
 
-def test_planet_about_a_fixed_body_goes_as_about_a_place() -> None:
+def test_orbit_about_a_fixed_body_equals_orbit_about_a_point() -> None:
     star = "[[ball]]\nname = 's'\nposition = [0.2, -0.1]\nradius = 0.01\nfixed = true\ncollides = 'none'\n"
     scene = planet(1.0, 0.0, 0.0, 0.9, sun=star + SUN.replace("[0.2, -0.1]", "'s'"))
     assert (motion_of(scene, TIME).position == motion_of(planet(1.0, 0.0, 0.0, 0.9), TIME).position).all()
@@ -96,5 +100,5 @@ def test_planet_about_a_fixed_body_goes_as_about_a_place() -> None:
     ids=["softened", "repelled", "two suns", "gravity", "drag", "parabola", "falling in", "another ball", "a plane",
          "a spring"],
 )  # fmt: skip
-def test_what_is_no_orbit_has_no_form(scene: Scene) -> None:
+def test_scene_that_is_no_kepler_orbit_has_no_closed_form(scene: Scene) -> None:
     assert solution(scene) is None

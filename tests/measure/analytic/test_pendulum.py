@@ -1,4 +1,4 @@
-"""Pendulums by elliptic functions, against DOP853 and the published periods; what is no pendulum has no form."""
+"""Pendulums by elliptic functions against DOP853 and published periods, and scenes that are no pendulums."""
 
 import math
 
@@ -11,7 +11,7 @@ from scipy.special import ellipk
 from sandbox.measure.analytic import solution
 from sandbox.measure.analytic.pendulum import Pendulum, Swing
 from sandbox.scene.compile.scene import Scene
-from tests.measure.analytic.oracle import form_of, integrated, motion_of, scene_of
+from tests.measure.analytic.oracle import integrated, motion_of, scene_of, solution_of
 
 G = 9.81
 WORLD = "gravity = [0.0, -9.81]\nduration = 10.0"
@@ -19,8 +19,8 @@ TIME = np.linspace(0.0, 10.0, 201)
 ROD = "[[joint]]\nkind = 'rod'\nbetween = ['bob']\nlength = 1.0\n"
 
 
-def hung(degrees: float, rate: float = 0.0, joint: str = ROD, extra: str = "", world: str = WORLD) -> Scene:
-    """A bob on a rod of 1 m, at an angle from straight down, turning at a rate."""
+def pendulum_scene(degrees: float, rate: float = 0.0, joint: str = ROD, extra: str = "", world: str = WORLD) -> Scene:
+    """Return a bob on a rod of 1 m, at an angle from straight down, rotating at a rate in rad/s."""
     x, y = math.sin(math.radians(degrees)), -math.cos(math.radians(degrees))
     bob = (
         f"[[ball]]\nname = 'bob'\nposition = [{x!r}, {y!r}]\nvelocity = [{-y * rate!r}, {x * rate!r}]\n"
@@ -30,7 +30,7 @@ def hung(degrees: float, rate: float = 0.0, joint: str = ROD, extra: str = "", w
 
 
 def swing_of(scene: Scene) -> Swing:
-    form = form_of(scene).alone[0]
+    form = solution_of(scene).alone[0]
     assert isinstance(form, Pendulum)
     return form.swing
 
@@ -50,47 +50,47 @@ def swing_of(scene: Scene) -> Swing:
         (179.9, 0.0),
     ],
 )
-def test_swing_is_dop853s(degrees: float, rate: float) -> None:
-    right = integrated(lambda _, s: [s[1], -G * math.sin(s[0])], [math.radians(degrees), rate], TIME)
-    found = motion_of(hung(degrees, rate), TIME)
-    expected = np.array([np.sin(right[0]), -np.cos(right[0])]).T
-    # The oracle's 1e-13 a step, and near the top e^(√g t) of growth until it has fallen: at 179.9° 7e5-fold.
+def test_pendulum_agrees_with_dop853(degrees: float, rate: float) -> None:
+    solved = integrated(lambda _, s: [s[1], -G * math.sin(s[0])], [math.radians(degrees), rate], TIME)
+    found = motion_of(pendulum_scene(degrees, rate), TIME)
+    expected = np.array([np.sin(solved[0]), -np.cos(solved[0])]).T
+    # DOP853 errs by 1e-13 a step; near the top errors grow by e^(√g t) until it has fallen: at 179.9° by 7e5.
     tolerance = 1e-7 if degrees == 179.9 else 2e-10
     assert found.position == pytest.approx(expected, abs=tolerance)
     assert found.velocity == pytest.approx(
-        right[1][:, None] * np.column_stack((np.cos(right[0]), np.sin(right[0]))), abs=10 * tolerance
-    )  # at up to 10 /s
+        solved[1][:, None] * np.column_stack((np.cos(solved[0]), np.sin(solved[0]))), abs=10 * tolerance
+    )  # at up to 10 rad/s
 
 
 @pytest.mark.parametrize(("degrees", "period"), [(5, 2.0070219), (90, 2.3678419), (170, 4.8935243)])
-def test_period_is_the_published_one(degrees: float, period: float) -> None:
-    found = swing_of(hung(degrees)).period
-    assert found == pytest.approx(period, abs=6e-8)  # given to seven decimals
+def test_period_agrees_with_published_values(degrees: float, period: float) -> None:
+    found = swing_of(pendulum_scene(degrees)).period
+    assert found == pytest.approx(period, abs=6e-8)  # published to seven decimals
     exact = 4.0 / math.sqrt(G) * ellipk(math.sin(math.radians(degrees) / 2) ** 2)
-    assert found == pytest.approx(exact, rel=1e-14)  # scipy rounds its parameter, too
+    assert found == pytest.approx(exact, rel=1e-14)  # scipy rounds its parameter too
 
 
-def _sound(rate: float) -> float:
-    """Return a rate, or 0 for one whose components are so small that doubles no longer hold their ratio."""
+def _flush_tiny(rate: float) -> float:
+    """Return the rate, or 0 if its components are so small that doubles do not preserve their ratio."""
     return rate if abs(rate) > 1e-290 else 0.0
 
 
-@given(degrees=st.floats(-179.0, 179.0), rate=st.floats(-12.0, 12.0).map(_sound))
-def test_energy_and_length_stay(degrees: float, rate: float) -> None:
-    found = motion_of(hung(degrees, rate), TIME)
+@given(degrees=st.floats(-179.0, 179.0), rate=st.floats(-12.0, 12.0).map(_flush_tiny))
+def test_pendulum_conserves_energy_and_length(degrees: float, rate: float) -> None:
+    found = motion_of(pendulum_scene(degrees, rate), TIME)
     energy = 0.5 * (found.velocity**2).sum(axis=1) + G * found.position[:, 1]
     assert energy == pytest.approx(np.full(len(TIME), energy[0]), abs=2e-11)  # 1e-13 of phase, of up to 90 J/kg
-    assert np.hypot(*found.position.T) == pytest.approx(np.ones(len(TIME)), abs=1e-15)  # the rounding of a sine
+    assert np.hypot(*found.position.T) == pytest.approx(np.ones(len(TIME)), abs=1e-15)  # rounding of a sine
 
 
-def test_pendulum_is_back_after_a_period_whether_it_swings_or_turns_over() -> None:
-    for scene in (hung(70, 1.0), hung(70, 9.0), hung(70, -9.0)):
+def test_pendulum_returns_after_one_period_swinging_or_rotating() -> None:
+    for scene in (pendulum_scene(70, 1.0), pendulum_scene(70, 9.0), pendulum_scene(70, -9.0)):
         period = swing_of(scene).period
         found = motion_of(scene, np.array([0.0, period, 3.0 * period]))
         assert found.position == pytest.approx(np.repeat(found.position[:1], 3, axis=0), abs=1e-13)  # roundings
 
 
-def test_pendulum_at_its_top_and_at_its_bottom_stays() -> None:
+def test_pendulum_at_rest_at_top_or_bottom_stays_at_rest() -> None:
     for y in (1.0, -1.0):
         scene = scene_of(
             f"[[ball]]\nname = 'bob'\nposition = [0.0, {y}]\nradius = 0.1\ncollides = 'none'\n", ROD, world=WORLD
@@ -100,54 +100,54 @@ def test_pendulum_at_its_top_and_at_its_bottom_stays() -> None:
         assert not found.velocity.any()
 
 
-def test_pendulum_without_gravity_goes_round_evenly() -> None:
-    found = motion_of(hung(90, 2.0, world="duration = 10.0"), TIME)
+def test_pendulum_without_gravity_rotates_uniformly() -> None:
+    found = motion_of(pendulum_scene(90, 2.0, world="duration = 10.0"), TIME)
     assert found.position == pytest.approx(
         np.column_stack((np.cos(2 * TIME), np.sin(2 * TIME))), abs=1e-14
-    )  # of 20 rad
+    )  # roundings of 20 rad
 
 
-def test_plank_on_a_pivot_swings_by_its_moment_and_turns_with_it() -> None:
+def test_plank_on_a_pivot_swings_by_its_moment_of_inertia() -> None:
     plank = (
         "[[box]]\nname = 'plank'\nposition = [0.5, 0.0]\nsize = [1.0, 0.2]\nmass = 3.0\ncollides = 'none'\n"
         "[[joint]]\nkind = 'pivot'\nbetween = ['plank']\nat = [0.0, 0.0]\n"
     )
     found = motion_of(scene_of(plank, world=WORLD), TIME)
     squared = 3.0 * G * 0.5 / (3.0 * (1.0 + 0.04) / 12.0 + 3.0 * 0.25)
-    right = integrated(lambda _, s: [s[1], -squared * math.sin(s[0])], [math.pi / 2, 0.0], TIME)
-    assert found.angle == pytest.approx(right[0] - math.pi / 2, abs=1e-10)  # the oracle's 1e-13 a step
-    assert found.spin == pytest.approx(right[1], abs=1e-9)  # likewise, times ω
+    solved = integrated(lambda _, s: [s[1], -squared * math.sin(s[0])], [math.pi / 2, 0.0], TIME)
+    assert found.angle == pytest.approx(solved[0] - math.pi / 2, abs=1e-10)  # DOP853 errs by 1e-13 a step
+    assert found.spin == pytest.approx(solved[1], abs=1e-9)  # likewise, times ω
     assert found.position == pytest.approx(0.5 * np.column_stack((np.cos(found.angle), np.sin(found.angle))), abs=1e-15)
 
 
-def test_bob_keeps_the_spin_that_a_rod_at_its_centre_cannot_change() -> None:
-    found = motion_of(hung(60, extra="angular_velocity = 3.0\n"), TIME)
+def test_bob_on_a_rod_at_its_centre_keeps_its_spin() -> None:
+    found = motion_of(pendulum_scene(60, extra="angular_velocity = 3.0\n"), TIME)
     assert found.angle == pytest.approx(3.0 * TIME, abs=1e-14)  # one rounding of 30
 
 
 @pytest.mark.parametrize(
     "scene",
     [
-        hung(60, joint=ROD + ROD),
-        hung(60, joint=ROD + "anchors = [[0.05, 0.0], [0.0, 0.0]]\n"),
-        hung(60, joint=ROD.replace("1.0", "1.001")),
-        hung(60, joint=ROD + "strength = 100.0\n"),
-        hung(60, joint="[[joint]]\nkind = 'slide'\nbetween = ['bob']\nleast = 0.0\nmost = 1.0\n"),
-        hung(60, world=WORLD + "\nlinear_drag = 0.1"),
-        hung(60, world=WORLD + "\nquadratic_drag = 0.1"),
-        hung(60, joint=ROD + "[[attraction]]\ntoward = [0.0, 5.0]\nstrength = 1.0\n"),
-        hung(60, joint=ROD + "[[thrust]]\nbody = 'bob'\nforce = [1.0, 0.0]\n"),
-        hung(60, joint=ROD + "[[ball]]\nposition = [3.0, 0.0]\nradius = 0.1\n[[joint]]\nkind = 'spring'\n"
+        pendulum_scene(60, joint=ROD + ROD),
+        pendulum_scene(60, joint=ROD + "anchors = [[0.05, 0.0], [0.0, 0.0]]\n"),
+        pendulum_scene(60, joint=ROD.replace("1.0", "1.001")),
+        pendulum_scene(60, joint=ROD + "strength = 100.0\n"),
+        pendulum_scene(60, joint="[[joint]]\nkind = 'slide'\nbetween = ['bob']\nleast = 0.0\nmost = 1.0\n"),
+        pendulum_scene(60, world=WORLD + "\nlinear_drag = 0.1"),
+        pendulum_scene(60, world=WORLD + "\nquadratic_drag = 0.1"),
+        pendulum_scene(60, joint=ROD + "[[attraction]]\ntoward = [0.0, 5.0]\nstrength = 1.0\n"),
+        pendulum_scene(60, joint=ROD + "[[thrust]]\nbody = 'bob'\nforce = [1.0, 0.0]\n"),
+        pendulum_scene(60, joint=ROD + "[[ball]]\nposition = [3.0, 0.0]\nradius = 0.1\n[[joint]]\nkind = 'spring'\n"
              "between = ['bob', 'ball-2']\nstiffness = 1.0\n"),
     ],
     ids=["two rods", "off its centre", "too long", "may break", "string", "drag", "quadratic drag", "attraction",
          "thrust", "a spring to another"],
 )  # fmt: skip
-def test_what_is_no_pendulum_has_no_form(scene: Scene) -> None:
+def test_scene_that_is_no_pendulum_has_no_closed_form(scene: Scene) -> None:
     assert solution(scene) is None
 
 
-def test_bob_that_could_meet_something_or_pulls_at_its_rod_has_no_form() -> None:
+def test_bob_that_may_collide_or_strains_its_rod_has_no_closed_form() -> None:
     bob = "[[ball]]\nname = 'bob'\nposition = [1.0, 0.0]\nradius = 0.1\n"
     assert solution(scene_of(bob, ROD, world=WORLD)) is not None
     assert solution(scene_of(bob, ROD, "[[post]]\nposition = [0, -1]\nradius = 0.1\n", world=WORLD)) is None

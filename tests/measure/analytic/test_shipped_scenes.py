@@ -1,4 +1,4 @@
-"""Closed forms against 40-digit arithmetic, against each other, and against what they must refuse."""
+"""Closed forms of flight and bouncing against 40-digit arithmetic and each other, and unsupported scenes."""
 
 import mpmath
 import numpy as np
@@ -33,12 +33,12 @@ def run_of(
     retired: dict[int, float] | None = None,
     names: tuple[str, ...] | None = None,
 ) -> Trajectory:
-    """A run of which only times, contacts and retirements matter."""
+    """Return a run of which only times, contacts and retirements matter."""
     time = np.asarray(time, dtype=float)
     names = scene.bodies.names if names is None else names
-    gone = np.full(len(names), np.nan)
-    for number, when in (retired or {}).items():
-        gone[number] = when
+    retired_time = np.full(len(names), np.nan)
+    for index, when in (retired or {}).items():
+        retired_time[index] = when
     shape = len(time), len(names)
     rows = np.zeros((len(contacts), 2))
     return Trajectory(
@@ -49,20 +49,20 @@ def run_of(
         contact_point=rows,
         contact_normal=rows,
         contact_impulse=rows,
-        retired_time=gone,
+        retired_time=retired_time,
         missed_time=np.asarray([t for t, _ in missed], dtype=float),
         missed_pair=np.asarray([p for _, p in missed], dtype=np.int64).reshape(-1, 2),
     )
 
 
 def flight_40(t: float, x: float, v: float, g: float, k: float, wind: float) -> tuple[mpmath.mpf, ...]:
-    """Position, velocity, and the sum of the sizes of the terms of each, at 40 digits."""
+    """Return position, velocity, and the sum of the magnitudes of the terms of each, at 40 digits."""
     with mpmath.workdps(40):
         t, x, v, g, k, wind = map(mpmath.mpf, (t, x, v, g, k, wind))
         if k == 0:
             terms = [x, v * t, g * t**2 / 2], [v, g * t]
         else:
-            # z² of the smallest k vanishes beside 1 in all but the last of these digits.
+            # For the smallest k, z² is lost beside 1 with fewer digits.
             with mpmath.workdps(800):
                 z = k * t
                 decay = mpmath.exp(-z)
@@ -91,7 +91,7 @@ def test_free_flight_without_drag_is_the_parabola() -> None:
     assert np.array_equal(velocity, np.column_stack((np.ones(9), 2.0 - 8.0 * time)))
 
 
-def test_free_flight_of_many_is_that_of_each() -> None:
+def test_free_flight_of_several_bodies_equals_that_of_each() -> None:
     random = np.random.default_rng(3)
     time, x, v = np.linspace(0.0, 4.0, 7), random.normal(size=(5, 2)), random.normal(size=(5, 2))
     world = World(gravity=(1.0, -G), linear_drag=0.4, wind=(2.0, -1.0))
@@ -103,10 +103,10 @@ def test_free_flight_of_many_is_that_of_each() -> None:
         assert np.array_equal(velocity[:, n], one[1])
 
 
-def test_free_flight_ends_at_the_terminal_velocity() -> None:
+def test_free_flight_approaches_the_terminal_velocity() -> None:
     world = World(gravity=(0.0, -G), linear_drag=2.0, wind=(3.0, 0.0))
     _, velocity = free_flight(np.array([1e3]), np.zeros(2), np.array([50.0, 50.0]), world)
-    assert velocity[0] == pytest.approx((3.0, -G / 2.0), rel=1e-15)  # what is left of the start is e⁻²⁰⁰⁰ = 0
+    assert velocity[0] == pytest.approx((3.0, -G / 2.0), rel=1e-15)  # the initial velocity has decayed by e⁻²⁰⁰⁰ = 0
 
 
 def test_free_flight_under_quadratic_drag_is_refused() -> None:
@@ -125,9 +125,9 @@ def test_bounces_from_5_m_have_the_known_times_and_peaks() -> None:
     height, velocity = bounces(peaks, 5.0, 0.0, G, 0.8)
     assert height == pytest.approx([3.2, 2.048, 1.31072], rel=1e-14)  # 0.64ⁿ · 5, a few roundings
     assert velocity == pytest.approx(np.zeros(3), abs=1e-14)  # of speeds near 10 m/s
-    over = first * 1.8 / 0.2
-    assert over == pytest.approx(9.0867380, abs=5e-8)  # the digits printed
-    height, velocity = bounces(np.array([over - 1e-3, over + 1e-9, 1e6]), 5.0, 0.0, G, 0.8)
+    rest_time = first * 1.8 / 0.2
+    assert rest_time == pytest.approx(9.0867380, abs=5e-8)  # the digits printed
+    height, velocity = bounces(np.array([rest_time - 1e-3, rest_time + 1e-9, 1e6]), 5.0, 0.0, G, 0.8)
     assert height[0] > 0
     assert height[1:].tolist() == velocity[1:].tolist() == [0.0, 0.0]
 
@@ -136,12 +136,14 @@ def test_bounces_from_5_m_have_the_known_times_and_peaks() -> None:
     e=st.floats(0.01, 1.0),
     height=st.floats(0.0, 100.0),
     speed=st.floats(-20.0, 20.0),
-    share=st.floats(0.0, 1.0),
+    fraction=st.floats(0.0, 1.0),
 )
-@example(e=1.0 - 2.0**-53, height=5.0, speed=0.0, share=0.3)
-@example(e=1.0 - 1e-9, height=5.0, speed=-3.0, share=0.7)
-@example(e=0.5, height=0.0, speed=1e-160, share=0.5)
-def test_bounces_agree_with_stepping_from_impact_to_impact(e: float, height: float, speed: float, share: float) -> None:
+@example(e=1.0 - 2.0**-53, height=5.0, speed=0.0, fraction=0.3)
+@example(e=1.0 - 1e-9, height=5.0, speed=-3.0, fraction=0.7)
+@example(e=0.5, height=0.0, speed=1e-160, fraction=0.5)
+def test_bounces_agree_with_stepping_from_impact_to_impact(
+    e: float, height: float, speed: float, fraction: float
+) -> None:
     with mpmath.workdps(40):
         g, v = mpmath.mpf(G), mpmath.mpf(speed)
         impact = mpmath.sqrt(v**2 + 2 * g * height)
@@ -150,45 +152,44 @@ def test_bounces_agree_with_stepping_from_impact_to_impact(e: float, height: flo
         for _ in range(12):
             at, v = at + last, e * impact
             impact, last = v, 2 * v / g
-        when = float(at + share * last)
-        inside = mpmath.mpf(when) - at
-        expected, rate = v * inside - g * inside**2 / 2, v - g * inside
+        when = float(at + fraction * last)
+        elapsed = mpmath.mpf(when) - at
+        expected, rate = v * elapsed - g * elapsed**2 / 2, v - g * elapsed
     got_height, got_rate = bounces(np.array([when]), height, speed, G, e)
     scale = float(np.hypot(speed, np.sqrt(2 * G * height)))
-    slack = (
-        1e-13 * max(1.0, when) * max(1.0, scale)
-    )  # a time of size `when` carries 1e-16 of itself, a dozen times over
-    assert abs(got_height[0] - float(expected)) <= slack
-    near = min(abs(float(inside)), abs(float(last - inside))) <= 1e-12 * max(1.0, when)
+    # A dozen roundings of a time of size `when`, 1e-16 of it each.
+    tolerance = 1e-13 * max(1.0, when) * max(1.0, scale)
+    assert abs(got_height[0] - float(expected)) <= tolerance
+    near_impact = min(abs(float(elapsed)), abs(float(last - elapsed))) <= 1e-12 * max(1.0, when)
     # Within rounding of an impact the speed may be that before or after it.
-    assert near or abs(got_rate[0] - float(rate)) <= G * slack
+    assert near_impact or abs(got_rate[0] - float(rate)) <= G * tolerance
 
 
 @given(e=st.floats(0.0, 1.0), height=st.floats(0.0, 1e6), speed=st.floats(-1e3, 1e3))
-def test_bounces_never_sink_nor_gain_energy(e: float, height: float, speed: float) -> None:
+def test_bouncing_ball_never_sinks_or_gains_energy(e: float, height: float, speed: float) -> None:
     above, velocity = bounces(np.geomspace(1e-9, 1e9, 500), height, speed, G, e)
     energy = G * above + 0.5 * velocity**2
     start = G * height + 0.5 * speed**2
     assert np.all(above >= 0.0)
     assert np.all(energy <= start * (1 + 1e-12))  # a dozen roundings
-    # Before a loss shows, the fall's own rounding does: v − g t from a great height.
+    # Energy may rise by the rounding of v − g t after a fall from a great height.
     assert np.all(np.diff(energy) <= 1e-9 * start)
 
 
-def test_an_elastic_ball_never_comes_to_rest() -> None:
+def test_elastic_ball_never_comes_to_rest() -> None:
     period = 2 * np.sqrt(2 * 5.0 / G)
     height, _ = bounces(np.arange(1000) * period, 5.0, 0.0, G, 1.0)
-    assert height == pytest.approx(np.full(1000, 5.0), rel=1e-12)  # at a peak an error in time counts squared
+    assert height == pytest.approx(np.full(1000, 5.0), rel=1e-12)  # at a peak the error of time enters squared
 
 
-def test_a_dead_ball_stays_where_it_lands() -> None:
+def test_ball_without_restitution_stays_where_it_lands() -> None:
     height, velocity = bounces(np.array([0.5, 2.0]), 5.0, 0.0, G, 0.0)
     assert height.tolist() == [5.0 - 0.5 * G * 0.25, 0.0]
     assert velocity.tolist() == [-G * 0.5, 0.0]
 
 
 @pytest.mark.parametrize(("height", "gravity", "e"), [(-1.0, G, 0.5), (1.0, -G, 0.5), (1.0, G, 1.1), (1.0, G, np.nan)])
-def test_bounces_out_of_range_are_refused(height: float, gravity: float, e: float) -> None:
+def test_bounces_rejects_arguments_out_of_range(height: float, gravity: float, e: float) -> None:
     with pytest.raises(ValueError, match="bounces need"):
         bounces(np.zeros(1), height, 0.0, gravity, e)
 
@@ -203,7 +204,7 @@ def test_without_gravity_a_ball_bounces_once() -> None:
     assert velocity.tolist() == [2.0] * 5
 
 
-def test_closed_form_without_gravity_is_mirrored_by_a_plane() -> None:
+def test_closed_form_without_gravity_is_reflected_by_a_plane() -> None:
     scene = loads(GROUND + BALL.replace("0.8", "1.0") + "velocity = [2.0, -4.0]\n")
     time = np.arange(5.0)
     form = closed_form(run_of(scene, time, contacts=((1.5, (0, -1)),)), scene, 0)
@@ -239,9 +240,9 @@ def test_closed_form_of_a_dropped_ball_bounces_to_rest() -> None:
     assert form.position[-1, 1] == pytest.approx(0.5, abs=1e-15)  # at rest on the ground
 
 
-def test_closed_form_bounces_off_a_slope_square_to_gravity() -> None:
+def test_closed_form_bounces_off_a_slope_perpendicular_to_gravity() -> None:
     flat = scene_of(GROUND, BALL)
-    # The same drop, turned by an angle of 3-4-5, the plane moved off the origin.
+    # The same drop, rotated by the angle of a 3-4-5 triangle, with the plane away from the origin.
     slope = loads(
         "[world]\ngravity = [-5.886, -7.848]\n[[plane]]\npoint = [10.0, 20.0]\nnormal = [0.3, 0.4]\n"
         '[[ball]]\nname = "ball"\nposition = [13.3, 24.4]\nradius = 0.5\nrestitution = 0.8\n'
@@ -251,11 +252,11 @@ def test_closed_form_bounces_off_a_slope_square_to_gravity() -> None:
     assert one is not None
     assert other is not None
     height = (other.position - (10.0, 20.0)) @ (0.6, 0.8)
-    assert height == pytest.approx(one.position[:, 1], abs=1e-12)  # a drop off by 4e-15 m, over some 20 bounces
-    assert (other.position - (10.0, 20.0)) @ (0.8, -0.6) == pytest.approx(np.zeros(101), abs=1e-14)  # of 24 m
+    assert height == pytest.approx(one.position[:, 1], abs=1e-12)  # a height rounded by 4e-15 m, over about 20 bounces
+    assert (other.position - (10.0, 20.0)) @ (0.8, -0.6) == pytest.approx(np.zeros(101), abs=1e-14)  # roundings of 24 m
 
 
-def test_closed_form_slides_along_a_plane_that_does_not_rub() -> None:
+def test_closed_form_slides_along_a_frictionless_plane() -> None:
     moving = BALL + "velocity = [3.0, 0.0]\n"
     time = np.linspace(0.0, 4.0, 41)
     hit = ((1.01, (0, -1)),)
@@ -268,7 +269,7 @@ def test_closed_form_slides_along_a_plane_that_does_not_rub() -> None:
     rough = scene_of(GROUND, moving + "friction = 0.5\n")
     form = closed_form(run_of(rough, time, contacts=hit), rough, 0)
     assert form is not None
-    assert np.array_equal(form.valid, time < 1.0096376)  # free flight to the ground, and no further
+    assert np.array_equal(form.valid, time < 1.0096376)  # only the free flight to the ground is valid
 
 
 @pytest.mark.parametrize(
@@ -280,7 +281,7 @@ def test_closed_form_slides_along_a_plane_that_does_not_rub() -> None:
         ("", GROUND + GROUND, ""),
     ],
 )
-def test_where_bouncing_has_no_formula_the_first_flight_has(world: str, ground: str, ball: str) -> None:
+def test_first_flight_is_valid_where_bouncing_has_no_formula(world: str, ground: str, ball: str) -> None:
     scene = scene_of(ground, BALL + ball, world=world)
     time = np.linspace(0.0, 3.0, 301)
     form = closed_form(run_of(scene, time), scene, 0)
@@ -288,11 +289,11 @@ def test_where_bouncing_has_no_formula_the_first_flight_has(world: str, ground: 
     normal = np.array([0.1, 3.0]) / np.hypot(0.1, 3.0) if "0.1, 3.0" in ground else np.array([0.0, 1.0])
     above = form.position @ normal - 0.5 > 0
     assert 0 < above.sum() < 301
-    # No contact was recorded: the formula itself ends where it meets the ground.
+    # No contact was recorded: validity ends where the formula itself reaches the ground.
     assert np.array_equal(form.valid, above)
 
 
-def test_a_ball_that_meets_nothing_flies_through_the_ground() -> None:
+def test_ball_without_collisions_falls_through_the_ground() -> None:
     scene = scene_of(GROUND, BALL + 'collides = "none"\n')
     time = np.linspace(0.0, 3.0, 31)
     form = closed_form(run_of(scene, time), scene, 0)
@@ -301,7 +302,7 @@ def test_a_ball_that_meets_nothing_flies_through_the_ground() -> None:
     assert form.position[-1, 1] == pytest.approx(5.5 - 0.5 * G * 9.0, rel=1e-15)  # a few roundings of 44 m
 
 
-def test_bouncing_ends_where_the_ball_meets_another() -> None:
+def test_bouncing_is_valid_until_contact_with_another_ball() -> None:
     other = BALL.replace('"ball"', '"other"')
     scene = scene_of(GROUND, BALL, other)
     time = np.linspace(0.0, 3.0, 31)
@@ -313,14 +314,14 @@ def test_bouncing_ends_where_the_ball_meets_another() -> None:
     assert np.array_equal(second.valid, time < 1.55)
 
 
-def test_a_missed_bounce_does_not_end_the_bouncing() -> None:
+def test_missed_bounce_does_not_end_validity() -> None:
     scene = scene_of(GROUND, BALL)
     form = closed_form(run_of(scene, np.linspace(0, 3, 31), missed=((1.0, (0, -1)),)), scene, 0)
     assert form is not None
     assert form.valid.all()
 
 
-def test_a_ball_resting_from_the_start_rests_by_formula() -> None:
+def test_closed_form_of_a_resting_ball_stays_at_rest() -> None:
     scene = scene_of(GROUND, BALL.replace("5.5", "0.5"))
     form = closed_form(run_of(scene, [0.0, 1.0, 2.0], contacts=((0.0, (0, -1)),)), scene, 0)
     assert form is not None
@@ -328,7 +329,7 @@ def test_a_ball_resting_from_the_start_rests_by_formula() -> None:
     assert form.velocity.tolist() == [[0.0, 0.0]] * 3
 
 
-def test_closed_form_is_none_where_there_is_none() -> None:
+def test_closed_form_is_none_for_unsupported_bodies() -> None:
     time = [0.0, 1.0, 2.0]
     windy = scene_of(BALL, world="quadratic_drag = 0.1")
     assert closed_form(run_of(windy, time), windy, 0) is None
@@ -341,7 +342,7 @@ def test_closed_form_is_none_where_there_is_none() -> None:
     assert closed_form(spawned, plain, 1) is None
 
 
-def test_closed_form_of_what_swings_rolls_or_stands_is_that_of_its_scene() -> None:
+def test_closed_form_of_a_body_equals_that_of_its_scene() -> None:
     time = np.linspace(0.0, 1.0, 11)
     for name in ("pendulum_90", "slide_to_roll", "newtons_cradle", "kepler", "tower"):
         scene = load(find(name), ["world.duration=1.0", "solver.dt=0.1"])
@@ -351,5 +352,5 @@ def test_closed_form_of_what_swings_rolls_or_stands_is_that_of_its_scene() -> No
         assert form is not None
         assert form.spin is not None
         assert form.valid.all()
-        assert form.position == pytest.approx(right.position[:, last], abs=1e-15)  # times that round differently
+        assert form.position == pytest.approx(right.position[:, last], abs=1e-15)  # times are rounded differently
         assert form.spin == pytest.approx(right.angular_velocity[:, last], abs=1e-14)  # likewise

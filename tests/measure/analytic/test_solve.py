@@ -1,4 +1,4 @@
-"""Solutions of whole scenes: forms beside each other, and how fast one is refused."""
+"""Solutions of whole scenes: independent bodies side by side, and early rejection of scenes without a solution."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from sandbox.measure.analytic.model import SceneFacts
 from sandbox.measure.analytic.solve import BODY_SOLUTIONS, COUPLED_SOLUTIONS
 from sandbox.measure.analytic.trajectory import solved_run
 from sandbox.scene.compile.scene import Scene
-from tests.measure.analytic.oracle import form_of, scene_of
+from tests.measure.analytic.oracle import scene_of, solution_of
 
 MIXED = (
     "[[plane]]\npoint = [0.0, 0.0]\nnormal = [0.0, 1.0]\nfriction = 0.5\n",
@@ -21,26 +21,26 @@ MIXED = (
 WORLD = "gravity = [0.0, -9.81]\nduration = 2.0"
 
 
-def test_each_body_has_a_form_of_its_own_where_none_meets_another() -> None:
+def test_bodies_that_never_collide_have_independent_closed_forms() -> None:
     both = scene_of(*MIXED, world=WORLD)
-    form = form_of(both)
+    form = solution_of(both)
     assert form.about == "free flight, bouncing, rolling on a plane, a pendulum"
     time = np.linspace(0.0, 2.0, 21)
-    for number, name in enumerate(both.bodies.names):
+    for index, name in enumerate(both.bodies.names):
         alone = scene_of(
             *(each for each in MIXED if ("[[ball]]" not in each and "swings" not in each) or name in each), world=WORLD
         )
-        assert (form.at(time).position[:, number] == form_of(alone).at(time).position[:, 0]).all()
+        assert (form.at(time).position[:, index] == solution_of(alone).at(time).position[:, 0]).all()
 
 
-def test_one_body_without_a_form_leaves_the_scene_without() -> None:
+def test_scene_with_one_unsolvable_body_has_no_solution() -> None:
     extra = "[[ball]]\nname = 'x'\nposition = [20.0, 3.0]\nradius = 0.1\ncollides = 'none'\n"
     assert solution(scene_of(*MIXED, extra, world=WORLD)) is not None
-    rubbing = extra.replace("'none'\n", "'fixed'\nvelocity = [1.0, 0.0]\n")
-    assert solution(scene_of(*MIXED, rubbing, world=WORLD)) is None
+    sliding = extra.replace("'none'\n", "'fixed'\nvelocity = [1.0, 0.0]\n")
+    assert solution(scene_of(*MIXED, sliding, world=WORLD)) is None
 
 
-def test_contacts_are_in_the_order_of_time_and_each_bodys_own() -> None:
+def test_contacts_are_sorted_by_time_with_the_pair_of_each_body() -> None:
     scene = scene_of(*MIXED, world=WORLD)
     found = solved_run(scene, scene.solver)
     assert found is not None
@@ -64,26 +64,26 @@ CROWD = "columns = 100\nrows = 100\nspacing = [1.0, 1.0]\nradius = 0.4\n"
     ],
     ids=["all meet", "rubbing", "one is driven", "a wall of 3,000"],
 )  # fmt: skip
-def test_crowd_is_refused_after_one_body_is_looked_at(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Counted rather than timed."""
-    asked = []
+def test_crowd_is_rejected_after_one_body_is_examined(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Calls of the recognisers are counted, because a test does not assert on time."""
+    calls = []
 
     def counted(recognise):
-        return lambda *given: asked.append(1) or recognise(*given)
+        return lambda *args: calls.append(1) or recognise(*args)
 
     monkeypatch.setattr("sandbox.measure.analytic.solve.BODY_SOLUTIONS", tuple(map(counted, BODY_SOLUTIONS)))
     monkeypatch.setattr("sandbox.measure.analytic.solve.COUPLED_SOLUTIONS", tuple(map(counted, COUPLED_SOLUTIONS)))
     assert solution(scene) is None
-    assert len(asked) <= len(BODY_SOLUTIONS)
+    assert len(calls) <= len(BODY_SOLUTIONS)
 
 
-def test_tie_is_the_one_joint_to_what_never_moves_whichever_comes_first() -> None:
+def test_anchor_is_the_single_joint_to_a_static_body_in_either_order() -> None:
     ball = "[[ball]]\nname = 'b'\nposition = [1.0, 0.0]\nradius = 0.1\ncollides = 'none'\n"
     nail = "[[ball]]\nname = 'n'\nposition = [0.0, 2.0]\nradius = 0.1\nfixed = true\ncollides = 'none'\n"
     for between in ("'b', 'n'", "'n', 'b'"):
-        given = SceneFacts.of(scene_of(ball, nail, f"[[joint]]\nkind = 'rod'\nbetween = [{between}]\n"))
-        tie = given.anchor(0)
-        assert tie is not None
-        assert (tie.place.tolist(), tie.arm.tolist()) == ([0.0, 2.0], [0.0, 0.0])
+        facts = SceneFacts.of(scene_of(ball, nail, f"[[joint]]\nkind = 'rod'\nbetween = [{between}]\n"))
+        anchor = facts.anchor(0)
+        assert anchor is not None
+        assert (anchor.place.tolist(), anchor.arm.tolist()) == ([0.0, 2.0], [0.0, 0.0])
     loose = nail.replace("fixed = true\n", "")
     assert SceneFacts.of(scene_of(ball, loose, "[[joint]]\nkind = 'rod'\nbetween = ['b', 'n']\n")).anchor(0) is None

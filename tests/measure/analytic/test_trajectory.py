@@ -1,4 +1,4 @@
-"""Closed forms of whole scenes: which scenes have one, and what it says."""
+"""Closed-form runs of whole scenes: which scenes have one, and its contacts, frames and retirements."""
 
 import numpy as np
 import pytest
@@ -12,21 +12,21 @@ from sandbox.scene.files.shipped_scenes import find
 GROUND = "[[plane]]\nname = 'ground'\npoint = [0, 0]\nnormal = [0, 1]\n"
 
 
-def dropped(extra: str = "", ground: str = GROUND, world: str = "", solver: str = "dt = 0.01") -> Scene:
+def drop_scene(extra: str = "", ground: str = GROUND, world: str = "", solver: str = "dt = 0.01") -> Scene:
     ball = "[[ball]]\nname = 'a'\nposition = [0, 5.5]\nradius = 0.5\nmass = 2.0\n"
     head = f"[world]\ngravity = [0.0, -10.0]\nduration = 6.0\n{world}\n[solver]\n{solver}\n"
     return loads(f"{head}{ground}{ball}{extra}")
 
 
 def test_bounces_have_the_times_and_impulses_of_the_formula() -> None:
-    scene = dropped("restitution = 0.5")
+    scene = drop_scene("restitution = 0.5")
     form = solved_run(scene, scene.solver)
     assert form is not None
     # From 5 m at g = 10: at 1 s with 10 m/s, then flights of 1, ½, ¼ … s; over at 3 s.
     expected = [1.0, 2.0, 2.5, 2.75, 2.875, 2.9375, 2.96875, 2.984375]
-    assert form.contact_time == pytest.approx(expected, rel=1e-14)  # a sum of eight exact numbers but for the root
+    assert form.contact_time == pytest.approx(expected, rel=1e-14)  # a sum of eight numbers, exact except for the root
     impulses = [2.0 * 1.5 * 10.0 / 2**n for n in range(7)]
-    # The last row takes the rest: what is left of the fall, 10/128 m/s, and the weight from then on.
+    # The last row includes the rest: the remaining impact speed of 10/128 m/s, and the weight from then on.
     impulses.append(2.0 * (10.0 / 128.0 + 10.0 * (6.0 - 2.984375)))
     assert form.contact_impulse[:, 1] == pytest.approx([-j for j in impulses], rel=1e-12)  # likewise
     assert form.contact_impulse[:, 0].tolist() == [0.0] * 8
@@ -34,31 +34,31 @@ def test_bounces_have_the_times_and_impulses_of_the_formula() -> None:
     assert form.contact_pair.tolist() == [[0, -1]] * 8
 
 
-def test_impulses_carry_the_momentum() -> None:
-    scene = dropped("restitution = 0.8\nvelocity = [2.0, 1.0]")
+def test_contact_impulses_balance_momentum() -> None:
+    scene = drop_scene("restitution = 0.8\nvelocity = [2.0, 1.0]")
     form = solved_run(scene, scene.solver)
     assert form is not None
-    gained = 2.0 * (form.velocity[-1, 0] - form.velocity[0, 0])
-    taken = form.contact_impulse.sum(axis=0)
-    # Σ impulses on the ground = weight · time − what the ball gained; a dozen roundings of sums near 120.
-    assert taken == pytest.approx(np.array([0.0, -20.0 * 6.0]) - gained, abs=1e-11)
+    gain = 2.0 * (form.velocity[-1, 0] - form.velocity[0, 0])
+    impulse = form.contact_impulse.sum(axis=0)
+    # Σ impulses on the ground = weight · time − momentum gain of the ball; a dozen roundings of sums near 120.
+    assert impulse == pytest.approx(np.array([0.0, -20.0 * 6.0]) - gain, abs=1e-11)
 
 
-def test_truth_is_the_engines_only_without_an_error_of_its_own() -> None:
-    """Explicit Euler falls g·h·T/2 short, up to the first bounce at 1 s."""
-    scene = dropped("restitution = 0.5")
+def test_engine_differs_from_closed_form_by_its_known_error() -> None:
+    """Explicit Euler lags behind the fall by g·h·T/2 until the first bounce at 1 s."""
+    scene = drop_scene("restitution = 0.5")
     form, found = solved_run(scene, scene.solver), run(scene, "pymunk", audit=False)
     assert form is not None
     before = form.time < 1.0
-    off = found.position[before, 0, 1] - form.position[before, 0, 1]
-    assert off == pytest.approx(10.0 * 0.01 * form.time[before] / 2.0, abs=1e-12)  # 100 roundings of numbers below 10
+    error = found.position[before, 0, 1] - form.position[before, 0, 1]
+    assert error == pytest.approx(10.0 * 0.01 * form.time[before] / 2.0, abs=1e-12)  # 100 roundings of numbers below 10
 
 
 @pytest.mark.parametrize(
     "solver", ["dt = 0.01", "dt = 0.07", "dt = 0.07\nrecord_every = 4", "dt = 0.5\nrecord_every = 5"]
 )
-def test_frames_lie_where_an_engine_keeps_them(solver: str) -> None:
-    scene = dropped("restitution = 0.5", solver=solver)
+def test_frame_times_are_those_of_an_engine(solver: str) -> None:
+    scene = drop_scene("restitution = 0.5", solver=solver)
     assert np.array_equal(frame_times(scene, scene.solver), run(scene, "pymunk", audit=False).time)
 
 
@@ -76,7 +76,7 @@ def test_frames_lie_where_an_engine_keeps_them(solver: str) -> None:
         ("gas", False),
     ],
 )
-def test_shipped_scenes_have_one_or_not(name: str, has: bool) -> None:
+def test_closed_form_exists_for_the_expected_shipped_scenes(name: str, has: bool) -> None:
     scene = load(find(name))
     assert (solved_run(scene, scene.solver) is not None) == has
 
@@ -84,31 +84,33 @@ def test_shipped_scenes_have_one_or_not(name: str, has: bool) -> None:
 @pytest.mark.parametrize(
     "scene",
     [
-        dropped(world="quadratic_drag = 0.1"),
-        dropped(world="linear_drag = 0.1"),
-        dropped("[[ball]]\nname = 'b'\nposition = [9, 9]\nradius = 0.1"),
-        dropped(ground=GROUND + "[[post]]\nname = 'peg'\nposition = [50, 0]\nradius = 0.1\n"),
-        dropped(ground="[[plane]]\npoint = [0, 0]\nnormal = [0.1, 1]\n"),
-        dropped("velocity = [1, 0]\nfriction = 0.5"),
+        drop_scene(world="quadratic_drag = 0.1"),
+        drop_scene(world="linear_drag = 0.1"),
+        drop_scene("[[ball]]\nname = 'b'\nposition = [9, 9]\nradius = 0.1"),
+        drop_scene(ground=GROUND + "[[post]]\nname = 'peg'\nposition = [50, 0]\nradius = 0.1\n"),
+        drop_scene(ground="[[plane]]\npoint = [0, 0]\nnormal = [0.1, 1]\n"),
+        drop_scene("velocity = [1, 0]\nfriction = 0.5"),
     ],
     ids=["quadratic drag", "drag and a plane", "two balls", "a post", "a slope", "rubbing"],
 )
-def test_scene_that_formulas_do_not_cover_has_none(scene: Scene) -> None:
+def test_scene_not_covered_by_formulas_has_no_closed_form(scene: Scene) -> None:
     assert solved_run(scene, scene.solver) is None
 
 
-def test_body_that_leaves_the_bounds_is_retired_as_by_an_engine() -> None:
-    scene = dropped(
+def test_body_leaving_the_bounds_is_retired_when_an_engine_retires_it() -> None:
+    scene = drop_scene(
         "collides = 'none'", world="bounds = [[-1.0, 0.0], [1.0, 10.0]]", solver="dt = 0.01\nhalf_kick = true"
     )
     form, found = solved_run(scene, scene.solver), run(scene, "pymunk", audit=False)
     assert form is not None
-    assert form.retired_time.tolist() == found.retired_time.tolist() == [pytest.approx(1.05)]  # ½·10·1.05² > 5.5 first
+    assert (
+        form.retired_time.tolist() == found.retired_time.tolist() == [pytest.approx(1.05)]
+    )  # first frame with ½·10·t² > 5.5
     assert form.position[-1, 0] == pytest.approx(found.position[-1, 0], abs=1e-12)  # 105 roundings
     assert form.velocity[-1].tolist() == [[0.0, 0.0]]
 
 
-def test_body_whose_life_is_over_is_retired_as_by_an_engine() -> None:
+def test_body_with_expired_lifetime_is_retired_when_an_engine_retires_it() -> None:
     scene = loads(
         "[world]\ngravity = [0.0, -10.0]\nduration = 1.0\n[solver]\ndt = 0.01\nhalf_kick = true\n"
         "[[emitter]]\nname = 'e'\nposition = [0, 0]\ncount = 3\nvelocity_min = [0, 0]\nvelocity_max = [1, 1]\n"

@@ -1,4 +1,4 @@
-"""Comparing: whole comparisons, with figures that are known beforehand."""
+"""Whole comparisons of engines, against known numbers."""
 
 from dataclasses import dataclass, replace
 from typing import Any, get_args
@@ -53,8 +53,8 @@ KEYS = [
 
 
 @dataclass(frozen=True)
-class Recalled:
-    """pymunk under another name, to which `missing` may be added."""
+class RenamedPymunk:
+    """pymunk with a different name, and optionally with missing features."""
 
     name: str
     lacks: tuple[str, ...] = ()
@@ -73,18 +73,18 @@ class Recalled:
 
 def install(monkeypatch: pytest.MonkeyPatch, **engines: Engine) -> None:
     """Leave pymunk and these engines in the registry."""
-    for name in [*reversed(registry.ENGINES)]:  # put back in the opposite order: that of the registry
+    for name in [*reversed(registry.ENGINES)]:  # restored in reverse order: that of the registry
         if name != "pymunk":
             monkeypatch.delitem(registry.ENGINES, name)
     for name, engine in engines.items():
         monkeypatch.setitem(registry.ENGINES, name, engine)
 
 
-def test_explicit_euler_is_off_by_half_a_step_of_velocity() -> None:
+def test_explicit_euler_error_is_half_a_step_of_velocity() -> None:
     scene = load(find("ball"))
     (row,) = compare(scene, ["pymunk"]).rows
     assert row.score.max_position == pytest.approx(9.81 * 0.01 * 1.0 / 2.0, rel=1e-12)  # g·h·T/2, 100 roundings
-    # Beyond 5 mm, 1 % of the radius, from T = 2·0.005/(g·h) = 0.102 s on.
+    # Above 5 mm, 1 % of the radius, from T = 2·0.005/(g·h) = 0.102 s on.
     assert row.first_divergence == pytest.approx(0.11, rel=1e-12)
     assert row.count("matched") == row.count("missed") == row.count("phantom") == 0
     assert row.seconds is not None
@@ -96,18 +96,18 @@ def test_bounce_is_matched_with_its_delay() -> None:
     assert (comparison.truth, comparison.trusted_until) == ("closed_form", 2.0)
     (row,) = comparison.rows
     before = [error for error in (9.81 * 0.001 * t / 2.0 for t in (0.407, 0.408)) if error > 0.002]
-    assert len(before) == 1  # the tolerance is passed between these two frames
+    assert len(before) == 1  # the tolerance is exceeded between these two frames
     assert row.first_divergence == pytest.approx(0.408, rel=1e-12)
     (event,) = row.events or ()
     assert event.between == ("ball", "ground")
     assert event.time == pytest.approx(1.0096375546923, rel=1e-12)  # √(2·5/9.81)
     assert event.delta_time is not None
-    assert 0.0 < event.delta_time < 0.002  # late by g·h·T/2 over v = 0.5 ms, and a step until it is seen
+    assert 0.0 < event.delta_time < 0.002  # late by g·h·T/2 over v = 0.5 ms, and by one step of detection
 
 
-def test_row_has_exactly_the_keys_promised() -> None:
+def test_document_has_exactly_the_documented_keys() -> None:
     document = compare(BOUNCE, ["pymunk"]).document("bounce")
-    promised = [
+    expected = [
         "scene",
         "title",
         "truth",
@@ -120,7 +120,7 @@ def test_row_has_exactly_the_keys_promised() -> None:
         "engines",
         "interrupted",
     ]
-    assert list(document) == promised
+    assert list(document) == expected
     assert list(document["engines"][0]) == KEYS
     assert (document["scene"], document["title"]) == ("bounce", "Bounce")
     assert document["engines"][0]["settings"]["integrator"] == "explicit_euler"
@@ -134,12 +134,12 @@ def test_engine_that_refuses_is_a_row_with_its_reason() -> None:
     assert "integrator 'rk4'" in row.reason
     assert row.score == (None, None, None, None)
     assert row.events is row.seconds is row.energy_drift is None
-    assert comparison.truth == "closed_form"  # belongs to the scene, not to who is judged
+    assert comparison.truth == "closed_form"  # belongs to the scene, not to the compared engine
     assert comparison.trajectories == {}
 
 
 def test_without_names_every_engine_has_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
-    install(monkeypatch, other=Recalled("other"), unable=Recalled("unable", ("it models nothing",)))
+    install(monkeypatch, other=RenamedPymunk("other"), unable=RenamedPymunk("unable", ("it models nothing",)))
     comparison = compare(BOUNCE)
     assert [(row.engine, row.status) for row in comparison.rows] == [
         ("pymunk", "ok"),
@@ -150,21 +150,21 @@ def test_without_names_every_engine_has_a_row(monkeypatch: pytest.MonkeyPatch) -
 
 
 BOUNDED = "world.bounds=[[-9.0, -9.0], [9.0, 9.0]]"
-"""Nobody gets there, but no formula knows: so engines are asked for the truth."""
+"""No body gets there, but bounds exclude a closed form, so that an engine computes the truth."""
 
 
-def test_exact_is_the_truth_where_it_models_the_scene(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_exact_is_the_truth_if_it_models_the_scene(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = load(find("two_balls"), ["solver.dt=0.01", BOUNDED])
-    install(monkeypatch, exact=Recalled("exact"))
+    install(monkeypatch, exact=RenamedPymunk("exact"))
     comparison = compare(scene, ["pymunk"])
     assert comparison.truth == "exact"
     assert comparison.rows[0].score.max_position == 0.0
-    install(monkeypatch, exact=Recalled("exact", ("it does not model this",)))
+    install(monkeypatch, exact=RenamedPymunk("exact", ("it does not model this",)))
     assert compare(scene, ["pymunk"]).truth == "refined"
 
 
-def test_exact_that_is_too_much_work_gives_way_and_it_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    install(monkeypatch, exact=Recalled("exact"))
+def test_exact_stopped_by_its_limit_is_replaced_by_a_refined_truth(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, exact=RenamedPymunk("exact"))
     monkeypatch.setattr(truth_module, "EXACT_LIMIT", -1.0)
     scene = load(find("two_balls"), ["solver.dt=0.01", BOUNDED])
     truth = truth_of(scene, scene.solver, 1e-3)
@@ -173,7 +173,7 @@ def test_exact_that_is_too_much_work_gives_way_and_it_is_said(monkeypatch: pytes
     assert "; exact was stopped: more counted work than" in truth.about
 
 
-def test_truth_does_not_depend_on_the_choices_that_are_judged(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_truth_does_not_depend_on_the_compared_settings(monkeypatch: pytest.MonkeyPatch) -> None:
     install(monkeypatch)
     scene = load(find("newtons_cradle"), ["world.duration=0.4", BOUNDED])
     rough, fine = (compare(scene, ["pymunk"], iterations=n, slop=s) for n, s in ((2, 0.01), (20, 0.0)))
@@ -188,7 +188,7 @@ def test_refined_truth_agrees_with_the_known_answer(monkeypatch: pytest.MonkeyPa
     truth = truth_of(scene, scene.solver, 1e-3)
     assert truth is not None
     assert (truth.kind, truth.trusted_until) == ("refined", 1.0)
-    # They meet after 0.375 s and go on at 2.5 and 4.5 m/s: a tenth of the tolerance, of which the last step may be off.
+    # They collide at 0.375 s and separate at 2.5 and 4.5 m/s; the last refinement may err by a tenth of the tolerance.
     assert truth.trajectory.position[-1, 0, 0] == pytest.approx(-2.0 + 4.0 * 0.375 + 2.5 * 0.625, abs=2e-4)
     assert truth.trajectory.position[-1, 1, 0] == pytest.approx(4.5 * 0.625, abs=2e-4)  # likewise
 
@@ -197,10 +197,10 @@ def test_missed_wall_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     install(monkeypatch)
     (row,) = compare(load(find("bullet")), ["pymunk"]).rows
     assert [(e.kind, e.between) for e in row.events or ()] == [("missed", ("bullet", "wall"))]
-    assert row.energy_drift == pytest.approx(0.75, rel=1e-9)  # it kept all, and should have kept e² = ¼
+    assert row.energy_drift == pytest.approx(0.75, rel=1e-9)  # it kept all of its energy instead of e² = ¼
 
 
-def test_why_names_half_kick_in_free_flight_and_the_factor_of_a_finer_step() -> None:
+def test_why_names_half_kick_and_the_effect_of_finer_steps() -> None:
     (row,) = compare(load(find("ball")), ["pymunk"], why=True).rows
     tried = {(effect.setting, effect.value): effect for effect in row.why}
     assert tried["dt", 0.005].ratio == pytest.approx(0.5, rel=1e-9)  # first order; hundreds of roundings of 10 m
@@ -211,12 +211,12 @@ def test_why_names_half_kick_in_free_flight_and_the_factor_of_a_finer_step() -> 
     assert tried["half_kick", True].max_position_error == pytest.approx(0.0, abs=1e-12)  # roundings of 10 m
     assert row.verdict is not None
     assert row.verdict.startswith("pymunk: the most effective change is half_kick = True: ")
-    assert not any(" and " in effect.label for effect in row.why)  # one alone suffices
+    assert not any(" and " in effect.label for effect in row.why)  # a single change suffices
 
 
 @pytest.mark.slow
-def test_why_tries_two_methods_where_neither_suffices_alone() -> None:
-    """A bounce is exact to rounding with exact flight and the time of impact, and with either alone it is not."""
+def test_why_combines_two_methods_if_neither_suffices_alone() -> None:
+    """A bounce is exact to rounding with both exact flight and exact impact times, and with neither alone."""
     (row,) = compare(BOUNCE, ["reference"], why=True).rows
     tried = {effect.label: effect for effect in row.why}
     flight, impact = "integrator = velocity_verlet", "detection = bisect"
@@ -230,45 +230,45 @@ def test_why_tries_two_methods_where_neither_suffices_alone() -> None:
     assert f"the most effective change is {flight} and {impact}" in row.verdict
 
 
-def test_why_has_nothing_to_say_of_an_engine_that_is_right() -> None:
+def test_why_is_empty_for_an_engine_without_error() -> None:
     (row,) = compare(load(find("ball")), ["pymunk"], why=True, half_kick=True).rows
     assert (row.why, row.verdict) == ((), None)
 
 
-def chosen(annotation: Any) -> Any:
-    """Return some value of a setting's type."""
+def sample_value(annotation: Any) -> Any:
+    """Return a value of the type of a setting."""
     parts = [part for part in get_args(annotation) if part is not type(None)]
     if parts and isinstance(parts[0], str):
         return parts[0]
     kind = next((part for part in (annotation, *parts) if part in (bool, int, float)), None)
-    return {bool: False, int: 3, float: 0.25}[kind] if kind else chosen(parts[0])
+    return {bool: False, int: 3, float: 0.25}[kind] if kind else sample_value(parts[0])
 
 
-def test_every_setting_is_tried_or_left_out_for_a_reason() -> None:
-    """Law for all settings there are, those added later included: filled in, each yields a valid change."""
-    filled = Settings(**{name: chosen(info.annotation) for name, info in Settings.model_fields.items()})
+def test_every_setting_is_changed_or_excluded_with_a_reason() -> None:
+    """Every setting, including later ones, yields a valid change if it has a value."""
+    filled = Settings(**{name: sample_value(info.annotation) for name, info in Settings.model_fields.items()})
     tried: dict[str, list[dict[str, Any]]] = {}
     for name, _, changes in setting_changes(filled):
         tried.setdefault(name, []).append(changes)
         other = filled.replace(**changes)
         assert other != filled
-        assert other.dt * other.record_every == filled.dt * filled.record_every  # the same frames are kept
+        assert other.dt * other.record_every == filled.dt * filled.record_every  # the same frames are recorded
     assert set(tried) | set(NOT_CHANGED) == set(Settings.model_fields)
     assert not set(tried) & set(NOT_CHANGED)
     assert all(NOT_CHANGED.values())
-    words = {name: len(set(map(str, values))) for name, values in tried.items()}
-    assert words["integrator"] == len(get_args(IntegratorName)) - 1
-    assert words["detection"] == len(get_args(DetectionName)) - 1
+    counts = {name: len(set(map(str, values))) for name, values in tried.items()}
+    assert counts["integrator"] == len(get_args(IntegratorName)) - 1
+    assert counts["detection"] == len(get_args(DetectionName)) - 1
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
-def test_every_setting_that_an_engine_fills_in_is_tried(engine: str) -> None:
+def test_every_setting_that_an_engine_resolves_is_changed(engine: str) -> None:
     filled = registry.ENGINES[engine].resolve(BOUNCE, BOUNCE.solver)
     stated = {name for name in Settings.model_fields if getattr(filled, name) is not None}
     assert {name for name, _, _ in setting_changes(filled)} == stated - set(NOT_CHANGED)
 
 
-def test_verdict_names_the_first_of_equals() -> None:
+def test_verdict_names_the_first_of_equal_effects() -> None:
     effect = SettingEffect("dt", 0.5, "ok", None, 0.4, 0.4)
     others = [
         replace(effect, setting="integrator", value=value, max_position_error=r, ratio=r)
@@ -279,13 +279,13 @@ def test_verdict_names_the_first_of_equals() -> None:
     assert "no other setting could be tried" in verdict("e", (replace(effect, status="refused", ratio=None),), 1.0)
 
 
-def test_scene_without_bodies_is_compared_too() -> None:
+def test_scene_without_bodies_can_be_compared() -> None:
     comparison = compare(loads("[world]\nduration = 0.1\n"), ["pymunk"])
     (row,) = comparison.rows
     assert (row.status, row.score.max_position, row.energy_drift, row.momentum_drift) == ("ok", None, 0.0, 0.0)
 
 
-def test_engine_that_diverges_is_told_from_where() -> None:
+def test_diverged_engine_is_a_row_with_its_status() -> None:
     scene = loads(
         "[world]\ngravity = [1e9, 0]\nduration = 10.0\n[solver]\ndt = 0.1\n"
         "[[plane]]\npoint = [0, 0]\nnormal = [0, 1]\n[[ball]]\nposition = [0, 1]\nradius = 0.5\n"
@@ -299,7 +299,7 @@ def test_engine_that_diverges_is_told_from_where() -> None:
 
 
 @pytest.mark.parametrize("tolerance", [0.0, -1.0, float("nan"), float("inf")])
-def test_tolerance_out_of_range_is_refused(tolerance: float) -> None:
+def test_tolerance_out_of_range_is_rejected(tolerance: float) -> None:
     with pytest.raises(ValueError, match="positive and finite"):
         compare(BOUNCE, ["pymunk"], tolerance=tolerance)
 
@@ -309,27 +309,27 @@ def test_unknown_engine_is_an_error() -> None:
         sandbox.compare(BOUNCE, engines=["nonsense"])
 
 
-def test_whoever_asks_is_told_what_is_done() -> None:
+def test_progress_names_each_stage_of_a_comparison() -> None:
     states: list[Progress] = []
     compare(load(find("ball")), ["pymunk"], why=True, on_progress=states.append)
     assert [state.message for state in states] == ["the truth", "pymunk", "pymunk: why"]
 
 
-def test_truth_that_is_known_is_not_sought_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_given_truth_is_not_computed_again(monkeypatch: pytest.MonkeyPatch) -> None:
     known = truth_of(BOUNCE, BOUNCE.solver, 1e-3)
 
-    def sought(*_: Any) -> None:
+    def fail(*_: Any) -> None:
         raise AssertionError("the truth is known")
 
-    monkeypatch.setattr("sandbox.measure.compare.comparison.find_truth", sought)
-    monkeypatch.setattr("sandbox.measure.tradeoff.study.find_truth", sought)
-    judged = compare(BOUNCE, ("pymunk",), truth=known)
-    assert judged.best is known
-    weighed = sandbox.tradeoff(BOUNCE, ("pymunk",), truth=known, most=1, repeats=1)
-    assert weighed.points[0].error == judged.rows[0].score.max_position
+    monkeypatch.setattr("sandbox.measure.compare.comparison.find_truth", fail)
+    monkeypatch.setattr("sandbox.measure.tradeoff.study.find_truth", fail)
+    compared = compare(BOUNCE, ("pymunk",), truth=known)
+    assert compared.best is known
+    studied = sandbox.tradeoff(BOUNCE, ("pymunk",), truth=known, most=1, repeats=1)
+    assert studied.points[0].error == compared.rows[0].score.max_position
 
 
-def test_what_a_notebook_shows_is_short() -> None:
+def test_representations_in_a_notebook_are_short() -> None:
     comparison = compare(load(find("gas"), ["world.duration=1.0"]), ["pymunk"], why=True)
     run, (row,) = comparison.trajectories["pymunk"], comparison.rows
     for value in (comparison, comparison.best, row, run, run.at([0])):

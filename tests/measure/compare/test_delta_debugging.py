@@ -1,4 +1,4 @@
-"""Delta debugging: what it returns holds, and lacks nothing that could be left out alone."""
+"""Delta debugging: the result satisfies the predicate, and no single item of it can be removed."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -7,33 +7,33 @@ from sandbox.measure.compare.reduce import ddmin
 
 
 @given(st.integers(1, 60), st.sets(st.integers(0, 59), max_size=8))
-def test_what_needs_some_items_is_left_with_these(count: int, wanted: set[int]) -> None:
+def test_ddmin_returns_exactly_the_needed_items(count: int, wanted: set[int]) -> None:
     needed = {item for item in wanted if item < count}
     assert ddmin(range(count), lambda kept: needed <= set(kept)) == tuple(sorted(needed))
 
 
 @given(st.integers(1, 12), st.randoms(use_true_random=False))
-def test_nothing_can_be_left_out_alone_whatever_is_asked(count: int, random: object) -> None:
+def test_no_single_item_of_the_result_can_be_removed_for_any_predicate(count: int, random: object) -> None:
     answers: dict[tuple[int, ...], bool] = {tuple(range(count)): True}
-    asked = 0
+    calls = 0
 
     def holds(kept: tuple[int, ...]) -> bool:
-        nonlocal asked
-        asked += 1
+        nonlocal calls
+        calls += 1
         return answers.setdefault(kept, random.random() < 0.2)
 
     kept = ddmin(range(count), holds)
-    assert asked <= count**2 + 3 * count + 1  # Zeller and Hildebrandt's worst case, and the question for nothing
+    assert calls <= count**2 + 3 * count + 1  # worst case of Zeller and Hildebrandt, and the call for the empty set
     assert answers[kept]
     if len(kept) > 1:
         assert not any(holds(kept[:k] + kept[k + 1 :]) for k in range(len(kept)))
 
 
-def test_one_of_many_is_found_in_few_questions() -> None:
-    asked = []
-    assert ddmin(range(1024), lambda kept: asked.append(kept) or 700 in kept) == (700,)
-    assert len(asked) <= 2 * 10 + 1
+def test_single_needed_item_of_many_is_found_in_few_calls() -> None:
+    calls = []
+    assert ddmin(range(1024), lambda kept: calls.append(kept) or 700 in kept) == (700,)
+    assert len(calls) <= 2 * 10 + 1
 
 
-def test_nothing_is_left_where_nothing_is_needed() -> None:
+def test_result_is_empty_if_no_item_is_needed() -> None:
     assert ddmin("abc", lambda _: True) == ()

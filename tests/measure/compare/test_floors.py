@@ -1,4 +1,4 @@
-"""Comparing engines on floors: the exact one is the truth, and pockets are things like others."""
+"""Comparisons of engines on floors: the exact engine is the truth, and pockets count as contacts."""
 
 from typing import Any
 
@@ -19,16 +19,16 @@ SCENE: dict[str, Any] = {
 }
 
 
-def test_engines_agree_on_what_falls_into_a_pocket() -> None:
+def test_engines_agree_on_a_ball_that_falls_into_a_pocket() -> None:
     comparison = compare(from_document(SCENE), engines=("pymunk", "exact"))
     assert comparison.truth == "exact"
     for row in comparison.rows:
         assert row.status == "ok"
         assert row.score.max_position is not None
-        assert row.score.max_position < 1e-9  # m: both have paths in closed form
+        assert row.score.max_position < 1e-9  # m: both use closed-form paths
         assert row.count("missed") == row.count("phantom") == 0
         assert row.count("matched") == 2  # the wall, and the pocket
 
 
-def test_balls_on_a_floor_have_no_closed_form_of_their_own() -> None:
+def test_ball_on_a_floor_has_no_closed_form_solution() -> None:
     assert solution(from_document({**SCENE, "wall": [], "post": [], "pocket": []})) is None

@@ -1,4 +1,4 @@
-"""Witnesses: a refined truth ends where a second method contradicts it, or where it breaks a conservation law."""
+"""Refined truths end where a second method contradicts them, or where they violate a conservation law."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -33,14 +33,14 @@ position = [0.0, 0.745]
 radius = 0.1
 restitution = 0.5
 """
-"""It falls 0.645 m and meets the floor at √0.129 = 0.359 s."""
-MEETS = 0.129**0.5
+"""The ball falls 0.645 m and hits the floor at √0.129 = 0.359 s."""
+IMPACT_TIME = 0.129**0.5
 TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
-class Another:
-    """pymunk with another world than the scene's: it converges, and to something else."""
+class AlteredPymunk:
+    """pymunk with an altered world: it converges, but to a different result."""
 
     gravity: float = 1.0
     """a factor"""
@@ -63,28 +63,28 @@ class Another:
 
 
 def install(monkeypatch: pytest.MonkeyPatch, **engines: Any) -> None:
-    """Leave only these engines in the registry, and no formula."""
+    """Leave only these engines in the registry, and disable closed forms."""
     monkeypatch.setattr("sandbox.measure.compare.ground_truth.solution", lambda _: None)
-    for name in [*reversed(registry.ENGINES)]:  # put back in the opposite order: that of the registry
+    for name in [*reversed(registry.ENGINES)]:  # restored in reverse order: that of the registry
         monkeypatch.delitem(registry.ENGINES, name)
     for name, engine in engines.items():
         monkeypatch.setitem(registry.ENGINES, name, engine)
 
 
 def test_two_engines_that_agree_confirm_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
-    install(monkeypatch, pymunk=PymunkEngine(), another=Another())
+    install(monkeypatch, pymunk=PymunkEngine(), another=AlteredPymunk())
     truth = truth_of(loads(DROP), loads(DROP).solver, TOLERANCE)
     assert truth is not None
     assert (truth.kind, truth.trusted_until, truth.witness) == ("refined", 1.0, "another")
     assert "confirmed by another" in truth.about
 
 
-def test_a_truth_ends_where_two_engines_part(monkeypatch: pytest.MonkeyPatch) -> None:
-    install(monkeypatch, pymunk=PymunkEngine(), another=Another(restitution=0.5))
+def test_truth_ends_where_two_engines_diverge(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, pymunk=PymunkEngine(), another=AlteredPymunk(restitution=0.5))
     comparison = compare(loads(DROP), ["pymunk"], tolerance=TOLERANCE)
-    # After the impact at 3.6 m/s they differ by 0.9 m/s, so by the tolerance within 1.2 ms: 0.36 s is the first frame.
+    # After impact at 3.6 m/s they differ by 0.9 m/s, hence by the tolerance within 1.2 ms: 0.36 s is the first frame.
     assert comparison.trusted_until is not None
-    assert MEETS - 0.01 <= comparison.trusted_until <= MEETS + 0.01  # frames are 0.01 s apart
+    assert IMPACT_TIME - 0.01 <= comparison.trusted_until <= IMPACT_TIME + 0.01  # frames are 0.01 s apart
     until = f"no truth is known after {comparison.trusted_until:.4g} s"
     assert f"{until}: pymunk and another converge to different results" in comparison.sentence()
     (row,) = comparison.rows
@@ -92,8 +92,8 @@ def test_a_truth_ends_where_two_engines_part(monkeypatch: pytest.MonkeyPatch) ->
 
 
 @pytest.mark.slow
-def test_where_two_engines_never_agree_there_is_no_truth(monkeypatch: pytest.MonkeyPatch) -> None:
-    install(monkeypatch, pymunk=PymunkEngine(), another=Another(gravity=10.0))
+def test_there_is_no_truth_if_two_engines_never_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(monkeypatch, pymunk=PymunkEngine(), another=AlteredPymunk(gravity=10.0))
     scene = loads(DROP)
     found = find_truth(scene, scene.solver, 1e-4)  # ½·90·0.01² is 4.5 mm in the first frame
     assert isinstance(found, str)
@@ -102,21 +102,23 @@ def test_where_two_engines_never_agree_there_is_no_truth(monkeypatch: pytest.Mon
     assert "pymunk and another converge to different results" in document["truth_about"]
     (row,) = document["engines"]
     assert row["status"] == "ok"
-    assert row["energy_drift"] is not None  # what is conserved needs no truth
+    assert row["energy_drift"] is not None  # conserved quantities need no truth
     assert row["max_position_error"] is row["missed_contacts"] is row["first_divergence"] is None
 
 
-def test_energy_that_grows_without_a_source_ends_the_truth(monkeypatch: pytest.MonkeyPatch) -> None:
-    install(monkeypatch, one=Another(restitution=2.2), other=Another(restitution=2.2))  # 1.1: both are wrong alike
+def test_truth_ends_where_energy_grows_without_a_source(monkeypatch: pytest.MonkeyPatch) -> None:
+    install(
+        monkeypatch, one=AlteredPymunk(restitution=2.2), other=AlteredPymunk(restitution=2.2)
+    )  # e = 1.1: both are wrong equally
     comparison = compare(loads(DROP), ["one"], tolerance=TOLERANCE)
     assert comparison.trusted_until is not None
-    assert MEETS - 0.01 <= comparison.trusted_until <= MEETS + 0.01  # frames are 0.01 s apart
+    assert IMPACT_TIME - 0.01 <= comparison.trusted_until <= IMPACT_TIME + 0.01  # frames are 0.01 s apart
     assert "the energy in one grows" in comparison.sentence()
 
 
 @pytest.mark.slow
-def test_one_method_alone_confirms_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    dragged = loads(DROP.replace("duration", "linear_drag = 0.1\nduration"))  # with which half_kick is no choice
+def test_single_method_is_not_confirmed(monkeypatch: pytest.MonkeyPatch) -> None:
+    dragged = loads(DROP.replace("duration", "linear_drag = 0.1\nduration"))  # which excludes half_kick
     install(monkeypatch, pymunk=PymunkEngine())
     found = find_truth(dragged, dragged.solver, TOLERANCE)
     assert isinstance(found, str)
@@ -124,7 +126,7 @@ def test_one_method_alone_confirms_nothing(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 @pytest.mark.slow
-def test_another_method_of_the_same_engine_is_a_witness(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_second_method_of_the_same_engine_confirms_a_truth(monkeypatch: pytest.MonkeyPatch) -> None:
     install(monkeypatch, pymunk=PymunkEngine())
     scene = loads(DROP)
     truth = truth_of(scene, scene.solver, TOLERANCE)
@@ -133,27 +135,27 @@ def test_another_method_of_the_same_engine_is_a_witness(monkeypatch: pytest.Monk
     assert truth.trusted_until == 1.0
 
 
-def test_a_witness_takes_half_the_work_of_the_answer_or_three_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_confirmation_takes_at_most_half_the_work_or_three_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(witness, "MIN_WORK", 0)
     steps: dict[str, int] = {}
     for module in (refined, witness):
-        honest = module.bounded_run
+        original = module.bounded_run
 
         def counted(
             start: Scene | Setup, engine: str, settings: Settings, limit: float,
-            *, name: str = module.__name__, honest: Any = honest, **options: Any,
+            *, name: str = module.__name__, original: Any = original, **options: Any,
         ) -> Any:  # fmt: skip
             steps[name] = steps.get(name, 0) + round(Setup.of(start).scene.world.duration / settings.h)
-            return honest(start, engine, settings, limit, **options)
+            return original(start, engine, settings, limit, **options)
 
         monkeypatch.setattr(module, "bounded_run", counted)
-    install(monkeypatch, pymunk=PymunkEngine(), another=Another(restitution=0.9))
+    install(monkeypatch, pymunk=PymunkEngine(), another=AlteredPymunk(restitution=0.9))
     assert truth_of(loads(DROP), loads(DROP).solver, TOLERANCE) is not None
     assert 0 < steps[witness.__name__] <= max(0.5 * steps[refined.__name__], (1 + 2 + 4) * 100)
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-4])
-def test_a_method_of_the_first_order_confirms_what_it_converges_to(tolerance: float) -> None:
+def test_first_order_method_confirms_the_limit_of_its_convergence(tolerance: float) -> None:
     scene = from_document(
         {
             "world": {"gravity": [0.0, -9.81], "duration": 1.5, "linear_drag": 1e-4},
@@ -168,7 +170,7 @@ def test_a_method_of_the_first_order_confirms_what_it_converges_to(tolerance: fl
     assert truth.trusted_until == 1.5
 
 
-def test_energy_that_wind_brings_has_a_source() -> None:
+def test_energy_gained_from_wind_does_not_end_the_truth() -> None:
     scene = from_document(
         {
             "world": {"duration": 1.0, "linear_drag": 1.0, "quadratic_drag": 0.1, "wind": [4.0, 0.0]},

@@ -1,4 +1,4 @@
-"""Minimising: what is left shows the disagreement, and nothing in it is idle."""
+"""Reduction of scenes: the reduced scene shows the disagreement, and has no unnecessary parts."""
 
 import math
 from functools import cache
@@ -50,7 +50,7 @@ velocity = [100.0, 0.0]
 radius = 0.01
 mass = 0.01
 """
-"""100 m/s is 10 cm a step, and the wall 2 cm thick: between two steps the bullet is through."""
+"""100 m/s is 10 cm a step, and the wall is 2 cm thick: the bullet passes it between two steps."""
 
 PASSING = """
 [world]
@@ -73,7 +73,7 @@ lower = [-9.0, 3.0]
 upper = [9.0, 9.0]
 radius = 0.1
 """
-"""At 200 m/s of 2 cm they pass through each other, and see it in no step."""
+"""At a closing speed of 200 m/s balls of 2 cm pass through each other without an overlap in any step."""
 
 SPRINGS = """
 [world]
@@ -102,7 +102,7 @@ stiffness = 100.0
 body = "b"
 force = [0.0, 0.0]
 """
-"""A spring lets a bob go, the rod and its two balls stay at rest."""
+"""A stretched spring releases a bob; the rod and its two balls stay at rest."""
 
 ROLLING = """
 [world]
@@ -124,24 +124,24 @@ position = [-1.05, 0.01]
 velocity = [20.0, 0.0]
 radius = 0.01
 """
-"""A ball rolls over a floor, 20 cm a step, and is through a wall at 0.31 s."""
+"""A ball rolls over a floor, 20 cm a step, and passes a wall at 0.31 s."""
 
 BOTH = DivergenceTest(["pymunk", "exact"], 1e-4)
 
 
 @cache
-def least_of(text: str, asked: DivergenceTest = BOTH, **bounds: float) -> ReducedScene:
-    """Minimise a scene's text."""
-    return minimise(loads(text), asked, **bounds)
+def reduced(text: str, test: DivergenceTest = BOTH, **bounds: float) -> ReducedScene:
+    """Minimise a scene given as text."""
+    return minimise(loads(text), test, **bounds)
 
 
-def shows(scene: Scene, asked: DivergenceTest = BOTH) -> bool:
-    """Tell whether a scene, as it would be read from a file, shows a disagreement."""
-    return asked.of(loads(dumps(scene))) is not None
+def shows_divergence(scene: Scene, test: DivergenceTest = BOTH) -> bool:
+    """Return whether a scene, written and read again, shows a disagreement."""
+    return test.of(loads(dumps(scene))) is not None
 
 
-def test_a_bullet_that_tunnels_is_left_with_its_wall() -> None:
-    found = least_of(TUNNEL)
+def test_tunnelling_bullet_is_reduced_to_itself_and_its_wall() -> None:
+    found = reduced(TUNNEL)
     assert (found.bodies, found.fixed, found.ended) == ((13, 1), (2, 1), None)
     scene = found.scene
     assert (scene.bodies.names, scene.fixed_names) == (("bullet",), ("thin",))
@@ -149,47 +149,47 @@ def test_a_bullet_that_tunnels_is_left_with_its_wall() -> None:
     assert scene.world.duration < 0.02
     assert scene.solver == loads(TUNNEL).solver
     assert found.divergence is not None
-    assert (found.divergence.body, found.divergence.time) == ("bullet", 0.01)  # of the 11 cm to the wall, 10 cm a step
-    assert shows(scene)
+    assert (found.divergence.body, found.divergence.time) == ("bullet", 0.01)  # the wall is 11 cm away, a step is 10 cm
+    assert shows_divergence(scene)
     assert minimise(scene, BOTH).bodies == (1, 1)
 
 
-def test_two_that_pass_through_each_other_are_both_kept() -> None:
-    found = least_of(PASSING)
+def test_two_balls_that_pass_through_each_other_are_both_kept() -> None:
+    found = reduced(PASSING)
     assert found.bodies == (11, 2)
     assert found.scene.bodies.names == ("left", "right")
-    assert shows(found.scene)
+    assert shows_divergence(found.scene)
 
 
-def test_joints_go_with_their_bodies_and_the_one_that_matters_stays() -> None:
-    asked = DivergenceTest(["pymunk", "reference"], 1e-3)
-    found = least_of(SPRINGS, asked)
+def test_joints_are_removed_with_their_bodies_except_the_relevant_one() -> None:
+    test = DivergenceTest(["pymunk", "reference"], 1e-3)
+    found = reduced(SPRINGS, test)
     assert found.scene.bodies.names == ("bob",)
     assert [joint.kind for joint in found.scene.joints] == ["spring"]
     assert found.scene.thrusts == ()
-    assert shows(found.scene, asked)
+    assert shows_divergence(found.scene, test)
 
 
-def test_one_engine_is_held_against_the_truth() -> None:
-    asked = DivergenceTest(["pymunk"], 1e-4)
-    found = least_of(PASSING, asked)
+def test_single_engine_is_compared_with_the_truth() -> None:
+    test = DivergenceTest(["pymunk"], 1e-4)
+    found = reduced(PASSING, test)
     assert found.bodies == (11, 2)
-    assert str(asked) == "pymunk and the truth"
-    assert shows(found.scene, asked)
+    assert str(test) == "pymunk and the truth"
+    assert shows_divergence(found.scene, test)
 
 
-def test_the_same_scene_is_found_every_time() -> None:
-    first, second = least_of(TUNNEL), minimise(loads(TUNNEL), BOTH)
+def test_reduction_is_deterministic() -> None:
+    first, second = reduced(TUNNEL), minimise(loads(TUNNEL), BOTH)
     assert (dumps(first.scene), first.runs) == (dumps(second.scene), second.runs)
 
 
-def test_where_engines_agree_there_is_nothing_to_minimise() -> None:
+def test_scene_without_disagreement_is_not_reduced() -> None:
     text = TUNNEL.replace("velocity = [100.0, 0.0]", "velocity = [1.0, 0.0]")
-    found = least_of(text)
+    found = reduced(text)
     assert (found.divergence, found.scene, found.bodies, found.runs) == (None, loads(text), (13, 13), 1)
 
 
-def test_what_a_nudge_changes_as_much_is_no_disagreement(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_divergence_that_a_perturbation_causes_too_is_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "agreement_time", lambda *_: 0.005)
     assert BOTH.of(loads(TUNNEL)) is None
 
@@ -211,11 +211,11 @@ name = "below"
 points = [[10.0, 0.01], [10.2, 0.01]]
 thickness = 0.001
 """
-"""To one digit both balls are at (10, 0.03), and to any digit but the last the left one is in the wall."""
+"""With positions rounded to one digit, the balls overlap each other, and the right one overlaps the wall."""
 
 
-class Found(DivergenceTest):
-    """Whatever still has all names of which something hangs, parts."""
+class DivergenceByNames(DivergenceTest):
+    """Test that reports a divergence while all the needed names are in the scene."""
 
     def of(self, scene: Scene, time_limit: float = math.inf) -> DivergencePoint | None:
         names = {*scene.bodies.names, *scene.fixed_names}
@@ -223,11 +223,11 @@ class Found(DivergenceTest):
         return DivergencePoint(0.05, "left", 1.0, frozenset({"left"})) if wanted else None
 
 
-def test_no_step_lays_two_things_into_each_other() -> None:
-    """Law: what overlaps in the smallest scene overlaps in the scene given, and no less deep."""
+def test_reduction_creates_no_overlap() -> None:
+    """Overlaps of the reduced scene are overlaps of the given scene too, and no deeper than there."""
     for text in (NEIGHBOURS, NEIGHBOURS.replace("10.06", "10.03")):  # apart, and overlapping from the start
         scene = loads(text)
-        found = minimise(scene, Found(["pymunk", "reference"], 1e-4))
+        found = minimise(scene, DivergenceByNames(["pymunk", "reference"], 1e-4))
         before, after = initial_overlaps(scene), initial_overlaps(loads(dumps(found.scene)))
         assert found.runs > 5
         assert found.scene != scene
@@ -235,73 +235,75 @@ def test_no_step_lays_two_things_into_each_other() -> None:
             assert depth <= before.get(pair, 0.0) + TOUCH_TOLERANCE
 
 
-def test_another_body_that_parts_is_another_disagreement(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = DivergenceTest(["pymunk", "reference"], 1e-4)
+def test_divergence_of_a_different_body_is_a_different_disagreement(monkeypatch: pytest.MonkeyPatch) -> None:
+    test = DivergenceTest(["pymunk", "reference"], 1e-4)
 
     def of(scene: Scene, time_limit: float = math.inf) -> DivergencePoint | None:
         name = "right" if "right" in scene.bodies.names else "left"
         return DivergencePoint(0.05, name, 1.0, frozenset({name}))
 
-    monkeypatch.setattr(asked, "of", of)
-    found = minimise(loads(NEIGHBOURS), asked)
-    assert found.scene.bodies.names == ("right",)  # the left one alone, which is tried first, would part as well
+    monkeypatch.setattr(test, "of", of)
+    found = minimise(loads(NEIGHBOURS), test)
+    assert found.scene.bodies.names == ("right",)  # the left one alone, tried first, would diverge too
 
 
 @pytest.mark.parametrize("after", [1, 4, 9])
-def test_interrupted_it_keeps_the_smallest_so_far(after: int) -> None:
+def test_interrupted_reduction_returns_the_smallest_scene_so_far(after: int) -> None:
     count = 0
 
-    def told(_: Progress) -> None:
+    def interrupt(_: Progress) -> None:
         nonlocal count
         count += 1
         if count > after:
             raise KeyboardInterrupt
 
-    found = minimise(loads(TUNNEL), BOTH, on_progress=told)
+    found = minimise(loads(TUNNEL), BOTH, on_progress=interrupt)
     assert found.ended == "interrupted"
-    assert found.runs == after + 2  # the scene given, and the one that was about to be tried
-    assert shows(found.scene)
+    assert found.runs == after + 2  # the given scene, and the one that was about to be tried
+    assert shows_divergence(found.scene)
     assert found.bodies[1] < 13 or after == 1
 
 
-def test_it_ends_at_its_bounds_with_what_it_has() -> None:
-    found = least_of(TUNNEL, max_scenes=5)
+def test_reduction_ends_at_its_limit_with_a_valid_scene() -> None:
+    found = reduced(TUNNEL, max_scenes=5)
     assert (found.ended, found.runs) == ("5 scenes have been tried", 5)
-    assert shows(found.scene)
+    assert shows_divergence(found.scene)
 
 
-def test_an_answer_that_is_not_found_again_leaves_the_scene_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = DivergenceTest(BOTH.engines, BOTH.tolerance)
-    honest = asked.of
+def test_irreproducible_divergence_leaves_the_scene_unchanged(monkeypatch: pytest.MonkeyPatch) -> None:
+    test = DivergenceTest(BOTH.engines, BOTH.tolerance)
+    original = test.of
 
-    def fickle(scene: Scene, time_limit: float = math.inf) -> DivergencePoint | None:
-        return None if time_limit == math.inf else honest(scene, time_limit)  # only the last try has all the time
+    def irreproducible(scene: Scene, time_limit: float = math.inf) -> DivergencePoint | None:
+        return (
+            None if time_limit == math.inf else original(scene, time_limit)
+        )  # only the final check is not limited in time
 
-    monkeypatch.setattr(asked, "of", fickle)
-    found = minimise(loads(TUNNEL), asked, max_scenes=5)
+    monkeypatch.setattr(test, "of", irreproducible)
+    found = minimise(loads(TUNNEL), test, max_scenes=5)
     assert (found.scene, found.bodies) == (loads(TUNNEL), (13, 13))
     assert found.ended == "the result of an engine is not reproducible, so nothing was removed"
 
 
-def test_a_scene_that_parts_sooner_parts_for_another_reason() -> None:
-    # Without its floor the ball would fall, and in 0.1 s Euler's fall is g·h·T/2 = 5 mm behind.
-    asked = DivergenceTest(["pymunk", "exact"], 0.005)
-    found = least_of(ROLLING, asked)
+def test_scene_that_diverges_earlier_is_not_accepted() -> None:
+    # Without its floor the ball would fall, and within 0.1 s Euler lags the fall by g·h·T/2 = 5 mm.
+    test = DivergenceTest(["pymunk", "exact"], 0.005)
+    found = reduced(ROLLING, test)
     assert (found.scene.bodies.names, found.scene.fixed_names) == (("rolling",), ("thin",))
-    assert found.scene.world.gravity == (0.0, 0.0)  # so the floor could go after all
+    assert found.scene.world.gravity == (0.0, 0.0)  # so that the floor could be removed after all
     assert found.divergence is not None
     assert found.divergence.time >= 0.8 * 0.31
-    assert shows(found.scene, asked)
+    assert shows_divergence(found.scene, test)
 
 
-def test_three_engines_are_no_disagreement() -> None:
+def test_divergence_test_of_three_engines_is_rejected() -> None:
     with pytest.raises(ValueError, match="two engines, not 3"):
         DivergenceTest(["pymunk", "exact", "reference"], 1e-3)
 
 
 @pytest.mark.parametrize("name", ["benchmark/pyramid", "benchmark/pile", "joints/bridge", "tutorial/spaceship"])
 @pytest.mark.parametrize("whole", [False, True])
-def test_a_scene_spelled_out_has_the_same_bodies(name: str, whole: bool) -> None:
+def test_scene_with_expanded_generators_has_the_same_bodies(name: str, whole: bool) -> None:
     scene = load(next(each.path for each in shipped() if each.name == name))
     found = from_document(expand_generators(scene, whole).document)
     assert found.bodies.names == scene.bodies.names
@@ -311,15 +313,15 @@ def test_a_scene_spelled_out_has_the_same_bodies(name: str, whole: bool) -> None
     assert len(found.links) == len(scene.links)
 
 
-def test_what_is_left_out_takes_along_who_speaks_of_it() -> None:
+def test_removed_body_takes_its_references_along() -> None:
     text = SPRINGS + '[[attraction]]\ntoward = "b"\nstrength = 1.0\n'
     text += '[[rope]]\nstart = [5.0, 0.0]\nend = [8.0, 0.0]\nlinks = 4\ntie = { start = "a", end = "b" }\n'
     text = text.replace("end = [8.0, 0.0]", "end = [6.0, 0.0]")
     whole = expand_generators(loads(text))
-    left = whole.without([("ball", 2)]).document
-    assert [ball["name"] for ball in left["ball"]] == ["bob", "a"]
-    assert [joint["kind"] for joint in left["joint"]] == ["spring"]
-    assert "attraction" not in left
-    assert "thrust" not in left
-    assert left["rope"][0]["tie"] == {"start": "a"}
-    assert from_document(left).bodies.names[:2] == ("bob", "a")
+    remaining = whole.without([("ball", 2)]).document
+    assert [ball["name"] for ball in remaining["ball"]] == ["bob", "a"]
+    assert [joint["kind"] for joint in remaining["joint"]] == ["spring"]
+    assert "attraction" not in remaining
+    assert "thrust" not in remaining
+    assert remaining["rope"][0]["tie"] == {"start": "a"}
+    assert from_document(remaining).bodies.names[:2] == ("bob", "a")

@@ -1,4 +1,4 @@
-"""Refined truths, held against an independent solver, and the notes that `compare` prints on them."""
+"""Refined truths against an independent solver, and the notes of `compare` about them."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from sandbox import compare, load
 from sandbox.arrays import FloatArray
-from sandbox.cli.compare import _below_accuracy, _joint_order
+from sandbox.cli.compare import _accuracy_lines, _joint_order
 from sandbox.measure.compare.ground_truth import truth_of
 from sandbox.scene.files.shipped_scenes import find
 
@@ -14,7 +14,7 @@ pytestmark = pytest.mark.full  # long runs and sweeps
 
 
 def test_free_flight_with_quadratic_drag_is_refined_by_rk4() -> None:
-    """The truth of smooth motion is of order 4, or it would be no better than the integrators that it judges."""
+    """The truth of smooth motion must be of order 4 to be better than the integrators that it judges."""
     scene = load(find("projectile"), ["world.quadratic_drag=0.1"])
     truth = truth_of(scene, scene.solver, 1e-3)
     assert truth is not None
@@ -28,16 +28,16 @@ def test_free_flight_with_quadratic_drag_is_refined_by_rk4() -> None:
 
     found = solve_ivp(rates, (0.0, 3.0), [*y0, *v0], rtol=1e-12, atol=1e-13)
     error = float(np.abs(truth.trajectory.position[-1, 0] - found.y[:2, -1]).max())
-    assert error < 2 * truth.difference < 1e-7  # RK4 at h = 5 ms: its error is a 15th of the difference of two halvings
+    assert error < 2 * truth.difference < 1e-7  # RK4 at h = 5 ms: the error is 1/15 of the last difference
 
 
-def test_rk4_is_as_good_as_a_refined_truth_under_drag() -> None:
-    """An order of convergence shows only where the truth is better than the best of the compared methods."""
+def test_rk4_error_is_below_the_accuracy_of_a_refined_truth_under_drag() -> None:
+    """An order of convergence shows only if the truth is better than the best of the compared methods."""
     scene = load(find("projectile"), ["world.quadratic_drag=0.1"])
     comparison = compare(scene, sweep={"solver.integrator": ["velocity_verlet", "rk4"]})
     verlet, rk4 = (row.score.max_position or 0.0 for row in comparison.rows)
     assert verlet > 1e3 * rk4  # 2.9e-4 m of order 2, 2e-8 m of order 4
-    (note,) = _below_accuracy(comparison)
+    (note,) = _accuracy_lines(comparison)
     assert "rk4" in note
 
 

@@ -1,4 +1,4 @@
-"""Comparing scenes with boxes and joints: truths against formulas, and what is told of the engines."""
+"""Comparisons of scenes with boxes and joints: truths against formulas, and rows of the engines."""
 
 import math
 
@@ -30,7 +30,7 @@ SLOPE = math.radians(30.0)
 
 
 def sliding(friction: float) -> Scene:
-    """A crate of 0.4 m laid on a slope of 30°, touching it."""
+    """Return a crate of 0.4 m on a slope of 30°, in contact with it."""
     sin, cos = math.sin(SLOPE), math.cos(SLOPE)
     return loads(
         f"[world]\ngravity = [0.0, -9.81]\nduration = 0.5\n[solver]\ndt = 0.005\n"
@@ -48,27 +48,29 @@ def tower(boxes: int) -> Scene:
     return loads(text)
 
 
-def test_a_crate_that_slides_is_refined_to_the_formula() -> None:
+def test_refined_truth_of_a_sliding_crate_agrees_with_the_formula() -> None:
     scene = sliding(0.3)
     truth = refine(scene, scene.solver, default_tolerance(scene))
     assert truth is not None
     assert truth.agrees_until == 0.5
-    way = -(truth.trajectory.position[:, 0] - scene.bodies.position[0]) @ (math.cos(SLOPE), math.sin(SLOPE))
-    right = 0.5 * 9.81 * (math.sin(SLOPE) - 0.3 * math.cos(SLOPE)) * truth.trajectory.time**2
-    assert way == pytest.approx(right, abs=0.1 * default_tolerance(scene))  # to which successive answers agree
+    distance = -(truth.trajectory.position[:, 0] - scene.bodies.position[0]) @ (math.cos(SLOPE), math.sin(SLOPE))
+    expected = 0.5 * 9.81 * (math.sin(SLOPE) - 0.3 * math.cos(SLOPE)) * truth.trajectory.time**2
+    assert distance == pytest.approx(
+        expected, abs=0.1 * default_tolerance(scene)
+    )  # agreement of successive refinements
 
 
-def test_a_pendulum_is_refined_until_it_is_at_the_bottom_after_a_quarter_of_its_period() -> None:
+def test_refined_pendulum_is_at_the_bottom_after_a_quarter_period() -> None:
     scene = loads(PENDULUM)
     truth = refine(scene, scene.solver, 1e-3)
     assert truth is not None
     assert truth.agrees_until == 1.0
-    # From the horizontal the period of 1 m is 2.3678419 s: after a quarter the bob is below what holds it.
+    # From the horizontal the period at 1 m is 2.3678419 s: after a quarter the bob is below its anchor.
     x = np.interp(2.3678419 / 4.0, truth.trajectory.time, truth.trajectory.position[:, 0, 0])
-    assert x == pytest.approx(0.0, abs=3e-4)  # the agreement, and a chord of 4.4 m/s · 10 ms that bends by 1e-4 m
+    assert x == pytest.approx(0.0, abs=3e-4)  # agreement, and interpolation over 4.4 m/s · 10 ms: 1e-4 m
 
 
-def test_pendulum_is_compared_and_the_way_its_rod_is_held_is_a_knob() -> None:
+def test_joint_method_is_a_setting_that_lowers_the_error_of_a_pendulum() -> None:
     found = compare(loads(PENDULUM), ["pymunk", "reference"], tolerance=1e-3, why=True)
     for row in found.rows:
         assert row.status == "ok"
@@ -82,7 +84,7 @@ def test_pendulum_is_compared_and_the_way_its_rod_is_held_is_a_knob() -> None:
     assert "joints = rattle" in found.rows[1].verdict
 
 
-def test_joints_are_a_knob_only_where_there_are_some() -> None:
+def test_joint_method_is_tried_only_in_scenes_with_joints() -> None:
     jointed, free = loads(PENDULUM), sliding(0.3)
     names = [
         {name for name, _, _ in setting_changes(ENGINES["reference"].resolve(s, s.solver))} for s in (jointed, free)
@@ -90,17 +92,17 @@ def test_joints_are_a_knob_only_where_there_are_some() -> None:
     assert names[0] - names[1] == {"joints"}
 
 
-def test_tower_touches_from_the_start_and_its_trembling_is_no_energy_drift() -> None:
+def test_tower_has_lasting_contacts_and_no_energy_drift() -> None:
     scene = tower(3)
     found = compare(scene, ["pymunk"])
     (row,) = found.rows
     assert (row.status, row.count("matched"), row.count("missed"), row.count("phantom")) == ("ok", 3, 0, 0)
     assert row.first_divergence is None
     assert row.energy_drift is None
-    assert row.momentum_drift == pytest.approx(0.0, abs=1e-9)  # Σ impulses of the ground = weight · time, but rounding
+    assert row.momentum_drift == pytest.approx(0.0, abs=1e-9)  # Σ impulses of the ground = weight · time, to rounding
 
 
-def test_gaps_are_those_of_turned_boxes() -> None:
+def test_clearances_of_rotated_boxes() -> None:
     scene = loads(
         "[[plane]]\nname = 'p'\npoint = [0, -1]\nnormal = [0, 1]\n"
         "[[wall]]\nname = 'w'\npoints = [[3, -1], [3, 1]]\nthickness = 0.2\n"
@@ -112,15 +114,15 @@ def test_gaps_are_those_of_turned_boxes() -> None:
     position = np.tile(bodies.position, (3, 1, 1))
     angle = np.array([[0.0, 0.0], [0.0, math.pi / 2], [0.0, math.atan2(1.0, 2.0)]])
     gaps = {k: clearance(scene, bodies, position, angle, (1, k)) for k in (-1, -2, -3)}
-    # Lying, standing, and with a corner towards the right; about its diagonal the top and bottom are 2·sin + cos high.
-    high = math.sin(angle[2, 1]) + 0.5 * math.cos(angle[2, 1])
-    assert gaps[-1] == pytest.approx([0.5, 0.0, 1.0 - high], abs=1e-15)  # sines
+    # Flat, upright, and with a corner to the right; on its diagonal, top and bottom are 2·sin + cos apart.
+    half_height = math.sin(angle[2, 1]) + 0.5 * math.cos(angle[2, 1])
+    assert gaps[-1] == pytest.approx([0.5, 0.0, 1.0 - half_height], abs=1e-15)  # sines
     assert gaps[-2] == pytest.approx([1.9, 2.4, 2.9 - root], abs=1e-15)  # likewise
     assert gaps[-3][:2] == pytest.approx([2.0, 1.5], abs=1e-15)  # likewise
     assert clearance(scene, bodies, position, angle, (0, 1))[:2] == pytest.approx([0.75, 1.25], abs=1e-15)  # likewise
 
 
-def test_nudge_moves_a_box_and_leaves_its_joints() -> None:
+def test_perturbation_displaces_a_box_and_keeps_its_joints() -> None:
     scene = loads(PENDULUM.replace("[[ball]]", "[[box]]").replace("radius = 0.1", "size = [0.2, 0.2]"))
     other = perturb(scene)
     assert other is not None
@@ -140,7 +142,7 @@ def test_nudge_moves_a_box_and_leaves_its_joints() -> None:
     ids=["joined", "thrust", "attracted"],
 )
 @pytest.mark.parametrize("collides", ["none", "all"])
-def test_what_is_joined_attracted_or_thrust_has_no_closed_form(extra: str, collides: str) -> None:
+def test_body_with_joint_attraction_or_thrust_has_no_closed_form(extra: str, collides: str) -> None:
     text = (
         "[world]\ngravity = [0, -10]\nduration = 0.5\n[[plane]]\npoint = [0, 0]\nnormal = [0, 1]\n"
         f"[[ball]]\nname = 'a'\nposition = [0, 5]\nradius = 0.5\ncollides = '{collides}'\n"
@@ -152,17 +154,17 @@ def test_what_is_joined_attracted_or_thrust_has_no_closed_form(extra: str, colli
     assert closed_form(run(bound, audit=False), bound, 0) is None
 
 
-def test_boxes_fly_by_formula_until_a_corner_touches() -> None:
+def test_closed_form_of_a_falling_box_is_valid_until_a_corner_touches() -> None:
     scene = loads(
         "[world]\ngravity = [0, -10]\nduration = 1.0\n[solver]\ndt = 0.001\n"
         "[[plane]]\npoint = [0, 0]\nnormal = [0, 1]\n"
         "[[box]]\nname = 'b'\nposition = [0, 3]\nangle = 0.7853981633974483\nsize = [1, 1]\n"
     )
-    assert solved_run(scene, scene.solver) is None  # it may meet the plane, and is no ball
+    assert solved_run(scene, scene.solver) is None  # it may hit the plane, and is no ball
     form = closed_form(run(scene, audit=False), scene, 0)
     assert form is not None
     last = form.valid.nonzero()[0][-1] * 0.001
-    # Half a diagonal above the ground, which it has left to fall: ½·10·t² = 3 − √½.
+    # It falls until its centre is half a diagonal above the ground: ½·10·t² = 3 − √½.
     assert last == pytest.approx(math.sqrt((3.0 - math.sqrt(0.5)) / 5.0), abs=0.0011)  # a step
     free = loads(
         "[world]\ngravity = [0, -10]\nduration = 1.0\n"
@@ -173,14 +175,14 @@ def test_boxes_fly_by_formula_until_a_corner_touches() -> None:
     assert whole.angle[-1, 0] == pytest.approx(2.0, rel=1e-15)  # a product
 
 
-def test_drift_of_a_spring_counts_what_it_stores() -> None:
+def test_energy_drift_includes_the_energy_of_a_spring() -> None:
     scene = loads(
         "[world]\nduration = 0.9\n[solver]\ndt = 0.001\n[[ball]]\nname = 'a'\nposition = [0, 0]\nradius = 0.1\n"
         "[[ball]]\nname = 'b'\nposition = [2, 0]\nradius = 0.1\n"
         "[[joint]]\nkind = 'spring'\nbetween = ['a', 'b']\nrest_length = 1.0\nstiffness = 50.0\n"
     )
     found = run(scene, audit=False)
-    share, _ = energy_drift(found, scene, None, False)
-    # ω = 10: within the band ωh/2 of the scheme; without what is stored it would be the whole, or a part of it.
-    assert share == pytest.approx(0.0, abs=0.005)
-    assert momentum_drift(found, scene) == pytest.approx(0.0, abs=1e-12)  # the two pull each other
+    fraction, _ = energy_drift(found, scene, None, False)
+    # ω = 10: within the band ωh/2 of the scheme; without the stored energy the drift would be of order 1.
+    assert fraction == pytest.approx(0.0, abs=0.005)
+    assert momentum_drift(found, scene) == pytest.approx(0.0, abs=1e-12)  # equal and opposite forces

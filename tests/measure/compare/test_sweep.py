@@ -1,4 +1,4 @@
-"""Comparisons with swept values: rows, truths, engines found, and what is refused."""
+"""Comparisons with swept values: rows, truths, engines, and rejected arguments."""
 
 import pytest
 
@@ -24,7 +24,7 @@ def fall() -> Scene:
     return sandbox.loads(FALL)
 
 
-def test_integrators_are_rows_of_the_one_engine_that_has_them(fall: Scene) -> None:
+def test_integrator_sweep_has_rows_of_the_only_engine_with_all_of_them(fall: Scene) -> None:
     found = sandbox.compare(fall, sweep={"solver.integrator": ["explicit_euler", "semi_implicit_euler", "rk4"]})
     assert [(row.engine, row.set["solver.integrator"], row.status) for row in found.rows] == [
         ("reference", "explicit_euler", "ok"),
@@ -32,7 +32,7 @@ def test_integrators_are_rows_of_the_one_engine_that_has_them(fall: Scene) -> No
         ("reference", "rk4", "ok"),
     ]
     euler, other, rk4 = (row.score.max_position for row in found.rows)
-    # g·h·T/2 = 10 · 0.01 · 0.5 / 2 m, late and early; rk4 is exact for a parabola.
+    # g·h·T/2 = 10 · 0.01 · 0.5 / 2 m, behind and ahead; rk4 is exact for a parabola.
     assert (euler, other) == (pytest.approx(0.025, rel=1e-9), pytest.approx(0.025, rel=1e-9))
     assert rk4 is not None
     assert rk4 < 1e-12
@@ -41,7 +41,7 @@ def test_integrators_are_rows_of_the_one_engine_that_has_them(fall: Scene) -> No
     assert found.rows[2].name == "reference, integrator rk4"
 
 
-def test_steps_have_truths_at_their_own_frames_and_errors_fall_with_them(fall: Scene) -> None:
+def test_step_sweep_has_truths_at_the_frames_of_each_step(fall: Scene) -> None:
     found = sandbox.compare(fall, ["pymunk"], sweep={"solver.dt": [0.01, 0.005, 0.0025]})
     errors = [row.score.max_position for row in found.rows]
     assert errors == [pytest.approx(0.5 * 10 * 0.5 * h, rel=1e-6) for h in (0.01, 0.005, 0.0025)]
@@ -50,7 +50,7 @@ def test_steps_have_truths_at_their_own_frames_and_errors_fall_with_them(fall: S
     assert found.same_scene
 
 
-def test_sweeps_multiply_and_a_scene_that_changes_has_its_own_truth(fall: Scene) -> None:
+def test_sweeps_are_combined_and_each_changed_scene_has_its_truth(fall: Scene) -> None:
     sweep = {"world.gravity": [[0.0, -10.0], [0.0, -20.0]], "solver.dt": [0.01, 0.005]}
     found = sandbox.compare(fall, ["pymunk"], sweep=sweep)
     assert [(tuple(row.set["world.gravity"]), row.set["solver.dt"]) for row in found.rows] == [
@@ -83,16 +83,16 @@ def test_representation_lists_the_rows_in_few_lines(fall: Scene) -> None:
 
 
 @pytest.mark.parametrize("values", [[], "rk4"])
-def test_values_that_are_no_sequence_are_refused(fall: Scene, values: object) -> None:
+def test_sweep_without_a_sequence_of_values_is_rejected(fall: Scene, values: object) -> None:
     with pytest.raises(ValueError, match=r"solver\.integrator needs a sequence of values"):
         sandbox.compare(fall, sweep={"solver.integrator": values})  # type: ignore[dict-item]
 
 
-def test_unknown_key_is_a_fault(fall: Scene) -> None:
+def test_unknown_key_raises_scene_error(fall: Scene) -> None:
     with pytest.raises(sandbox.SceneError, match="integratr"):
         sandbox.compare(fall, sweep={"solver.integratr": ["rk4"]})
 
 
-def test_value_that_is_swept_and_set_is_refused(fall: Scene) -> None:
-    with pytest.raises(ValueError, match=r"solver\.dt: is swept and set"):
+def test_key_both_swept_and_set_is_rejected(fall: Scene) -> None:
+    with pytest.raises(ValueError, match=r"solver\.dt: both swept and set"):
         sandbox.compare(fall, sweep={"solver.dt": [0.01]}, dt=0.1)

@@ -1,4 +1,4 @@
-"""Stored boundaries: what is better, worse, and as it was."""
+"""Stored boundaries: which are better, worse or unchanged."""
 
 import json
 from dataclasses import replace
@@ -15,7 +15,7 @@ NOW = Boundary("speed", "pymunk", {}, "pymunk", 1.0, 1.01, "passed the wall", "t
 
 
 def before(limit: float | None, first: float | None = -1.0, axis: str = "speed") -> list[dict[str, Any]]:
-    """Return a boundary as it was stored; by default what failed first was 1 % beyond."""
+    """Return a stored boundary; by default its first failure is 1 % beyond the limit."""
     if first == -1.0:
         first = 9.0 if limit is None else 1.01 * limit
     return [{"axis": axis, "setup": "pymunk", "limit": limit, "first_failure": first}]
@@ -34,10 +34,10 @@ def before(limit: float | None, first: float | None = -1.0, axis: str = "speed")
         (before(1.0), replace(NOW, first_failure=None), False),
         (before(10.0, 9.0, "iterations"), replace(NOW, axis="iterations", limit=20.0, first_failure=19.0), True),
         (before(20.0, 19.0, "iterations"), replace(NOW, axis="iterations", limit=10.0, first_failure=9.0), False),
-        (before(10.0, axis="stack"), replace(NOW, axis="stack", unit="boxes", limit=9.0), None),  # one more or less
+        (before(10.0, axis="stack"), replace(NOW, axis="stack", unit="boxes", limit=9.0), None),  # a difference of one
         (before(10.0, axis="stack"), replace(NOW, axis="stack", unit="boxes", limit=8.0), True),
         (before(5.0, axis="chain"), NOW, None),  # not in both
-        # Looked at level by level, it is known no better than between two of them.
+        # Without bisection, a boundary is known to lie between two levels only.
         (before(1.7, 1.72), replace(NOW, first_failure=2.0), None),
         (before(59.0, 60.0, "stack"), replace(NOW, axis="stack", limit=20.0, first_failure=None), None),
         (before(1.7, 1.72), replace(NOW, first_failure=1.69), True),
@@ -45,12 +45,14 @@ def before(limit: float | None, first: float | None = -1.0, axis: str = "speed")
         (before(20.0, None, "iterations"), replace(NOW, axis="iterations", limit=10.0, first_failure=None), None),
     ],
 )
-def test_what_has_moved_is_told(old: list[dict[str, Any]], now: Boundary, worse: bool | None) -> None:
+def test_changes_are_found_beyond_the_accuracy_of_boundaries(
+    old: list[dict[str, Any]], now: Boundary, worse: bool | None
+) -> None:
     found = changes(old, [now])
     assert [change.worse for change in found] == ([] if worse is None else [worse])
 
 
-def test_change_is_a_line() -> None:
+def test_change_is_described_in_one_line() -> None:
     (change,) = changes(before(2.0), [NOW])
     assert str(change) == "speed on pymunk: worse: passed up to 2 before, up to 1 now: passed the wall"
 
@@ -74,7 +76,7 @@ def test_change_is_a_line() -> None:
         ("[" * 100_000, "cannot be read"),
     ],
 )
-def test_file_without_boundaries_is_a_fault(tmp_path: Path, text: str, words: str) -> None:
+def test_file_without_boundaries_raises_stored_error(tmp_path: Path, text: str, words: str) -> None:
     file = tmp_path / "stored.json"
     file.write_text(text, encoding="utf-8")
     with pytest.raises(StoredError, match=words):

@@ -1,4 +1,4 @@
-"""Wardens: a task that hangs, eats memory, aborts or crashes is told with its reason, and the next one runs."""
+"""Isolated workers: a task that hangs, exhausts memory, aborts or crashes fails with its reason; the next one runs."""
 
 import sys
 from pathlib import Path
@@ -48,7 +48,7 @@ serve(answer, 1024)
 """
 
 
-def warden(folder: Path, seconds: float = 20.0) -> IsolatedWorker:
+def isolated_worker(folder: Path, seconds: float = 20.0) -> IsolatedWorker:
     script = folder / "worker.py"
     script.write_text(MISBEHAVING, encoding="utf-8")
     return IsolatedWorker(seconds, 1024, [sys.executable, str(script), str(folder / "marks")])
@@ -58,24 +58,24 @@ def task(case: str) -> Task:
     return Task(case, {}, "pymunk")
 
 
-def test_whatever_happens_is_told_and_the_run_goes_on(tmp_path: Path) -> None:
-    told = {}
-    with warden(tmp_path) as worker:
+def test_every_failure_is_reported_and_the_next_task_runs(tmp_path: Path) -> None:
+    outcomes = {}
+    with isolated_worker(tmp_path) as worker:
         for case in ("well", "memory", "abort", "crash", "quit", "chatter", "raise"):
             outcome = worker.submit(task(case))
-            told[case] = outcome.verdict, outcome.rule, outcome.reason
+            outcomes[case] = outcome.verdict, outcome.rule, outcome.reason
             assert worker.submit(task("well")).verdict == "exact"
-        assert worker.started == 5  # the first, and one after each death
-    assert told["well"] == told["chatter"] == ("exact", None, "well")
-    assert told["memory"] == ("failed", "process", "out of memory")
-    assert told["abort"] == ("failed", "process", "the process was killed by SIGABRT: Aborting: it was too much")
-    assert told["crash"] == ("failed", "process", "the process was killed by SIGSEGV")
-    assert told["quit"] == ("failed", "process", "the process ended with status 3")
-    assert told["raise"][2].endswith("ValueError: made up")
+        assert worker.started == 5  # the first, and one after each crash
+    assert outcomes["well"] == outcomes["chatter"] == ("exact", None, "well")
+    assert outcomes["memory"] == ("failed", "process", "out of memory")
+    assert outcomes["abort"] == ("failed", "process", "the process was killed by SIGABRT: Aborting: it was too much")
+    assert outcomes["crash"] == ("failed", "process", "the process was killed by SIGSEGV")
+    assert outcomes["quit"] == ("failed", "process", "the process ended with status 3")
+    assert outcomes["raise"][2].endswith("ValueError: made up")
 
 
-def test_task_whose_worker_is_killed_from_outside_is_asked_again(tmp_path: Path) -> None:
-    with warden(tmp_path) as worker:
+def test_task_whose_worker_is_killed_from_outside_is_repeated(tmp_path: Path) -> None:
+    with isolated_worker(tmp_path) as worker:
         assert worker.submit(task("killed once")).verdict == "exact"
         assert worker.started == 2
         (tmp_path / "marks").unlink()
@@ -85,22 +85,22 @@ def test_task_whose_worker_is_killed_from_outside_is_asked_again(tmp_path: Path)
         assert worker.submit(task("well")).verdict == "exact"
 
 
-def test_worker_that_is_stopped_is_ended_in_time(tmp_path: Path) -> None:
-    with warden(tmp_path, seconds=0.5) as worker:
+def test_worker_stopped_by_a_signal_is_ended_at_the_time_limit(tmp_path: Path) -> None:
+    with isolated_worker(tmp_path, seconds=0.5) as worker:
         assert worker.submit(task("well")).verdict == "exact"
         assert worker.submit(task("stop")).slow
         assert worker.submit(task("well")).verdict == "exact"
 
 
-def test_task_that_hangs_is_stopped_in_time(tmp_path: Path) -> None:
-    with warden(tmp_path, seconds=0.5) as worker:
+def test_task_that_hangs_is_stopped_at_the_time_limit(tmp_path: Path) -> None:
+    with isolated_worker(tmp_path, seconds=0.5) as worker:
         outcome = worker.submit(task("sleep"))
         assert outcome.reason == "took longer than 0.5 s, and was stopped"
         assert (outcome.verdict, outcome.rule, outcome.slow) == ("failed", "process", True)
         assert worker.submit(task("well")).verdict == "exact"
 
 
-def test_worker_that_cannot_start_is_an_error_with_its_last_words() -> None:
+def test_worker_that_cannot_start_raises_with_its_last_output() -> None:
     command = [sys.executable, "-c", "raise SystemExit('no such thing')"]
     with IsolatedWorker(5.0, 1024, command) as worker, pytest.raises(WorkerError, match="status 1: no such thing"):
         worker.submit(task("well"))
@@ -122,14 +122,14 @@ def test_worker_that_is_killed_while_it_starts_is_started_again(kills: int, tmp_
             assert caught.value.was_killed
 
 
-def test_closed_warden_interrupts_who_asks(tmp_path: Path) -> None:
-    worker = warden(tmp_path)
+def test_submit_to_a_closed_worker_raises_interrupted_error(tmp_path: Path) -> None:
+    worker = isolated_worker(tmp_path)
     worker.close()
     with pytest.raises(InterruptedError):
         worker.submit(task("well"))
 
 
-def test_causes_of_death_have_names() -> None:
+def test_exit_status_is_described_in_words() -> None:
     assert exit_text(-9) == "the process was killed by SIGKILL"
     assert exit_text(-64) in ("the process was killed by SIGRTMAX", "the process was killed by signal 64")
     assert exit_text(1) == "the process ended with status 1"

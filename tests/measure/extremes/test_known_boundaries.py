@@ -1,4 +1,4 @@
-"""Boundaries that are known: where engines tunnel, and where springs explode. Axes are sound throughout."""
+"""Known boundaries, where engines tunnel and where springs become unstable; axes and pairs have valid scenes."""
 
 import math
 
@@ -16,8 +16,8 @@ pytestmark = pytest.mark.full  # long runs and sweeps
 
 def limit_of(axis: Axis, levels: tuple[float, ...], name: str) -> Boundary:
     (setup,) = (setup for setup in axis.setups if setup.name == name)
-    cells: list[Sample] = []
-    found = run_axis(axis, setup, levels, (), evaluate_task, cells.append)
+    samples: list[Sample] = []
+    found = run_axis(axis, setup, levels, (), evaluate_task, samples.append)
     assert found.monotone
     return found
 
@@ -25,15 +25,15 @@ def limit_of(axis: Axis, levels: tuple[float, ...], name: str) -> Boundary:
 @pytest.mark.parametrize(
     ("setup", "known"), [("pymunk", 1.0), ("pymunk, 4 substeps", 4.0), ("reference", 1.0), ("reference, bisect", 1.0)]
 )
-def test_bullet_passes_once_a_substep_is_longer_than_radius_and_half_the_wall(setup: str, known: float) -> None:
+def test_bullet_tunnels_beyond_a_substep_of_its_radius_plus_half_the_wall(setup: str, known: float) -> None:
     found = limit_of(AXES["speed"], (0.5, 100.0), setup)
     assert found.rule == "through"
-    assert found.limit == pytest.approx(known, rel=0.01)  # to which boundaries are found
+    assert found.limit == pytest.approx(known, rel=0.01)  # the accuracy of boundaries
     assert found.first_failure == pytest.approx(known, rel=0.0101)  # as above, on the other side
 
 
 @pytest.mark.parametrize("setup", ["reference, swept", "reference, shrink", "exact"])
-def test_bullet_passes_none_that_looks_along_its_way(setup: str) -> None:
+def test_bullet_does_not_tunnel_with_continuous_detection(setup: str) -> None:
     assert limit_of(AXES["speed"], (0.5, 100.0), setup).first_failure is None
 
 
@@ -46,19 +46,19 @@ def test_bullet_passes_none_that_looks_along_its_way(setup: str) -> None:
         ("reference, rk4", 2.0 * math.sqrt(2.0)),
     ],
 )
-def test_swing_grows_from_the_limit_of_its_scheme_on(setup: str, known: float) -> None:
+def test_spring_becomes_unstable_at_the_limit_of_its_scheme(setup: str, known: float) -> None:
     found = limit_of(AXES["stiffness"], (1.0, 10.0), setup)
-    # To 1 %; and close to its limit rk4 grows too slowly to be seen in 200 steps, by 1e-4 a step at 0.3 % beyond.
+    # Within 1 %; just above its limit rk4 grows too slowly to show in 200 steps, by 1e-4 a step at 0.3 % beyond.
     assert found.limit == pytest.approx(known, rel=0.011)
 
 
 @pytest.mark.parametrize("name", AXES)
-def test_axis_has_scenes_at_all_its_levels(name: str) -> None:
+def test_axis_has_distinct_scenes_at_its_quick_levels(name: str) -> None:
     axis = AXES[name]
     assert set(axis.quick) <= set(axis.levels)
-    rising = axis.levels[-1] > axis.levels[0]
-    assert list(axis.levels) == sorted(axis.levels, reverse=not rising)
-    assert list(axis.quick) == sorted(axis.quick, reverse=not rising)
+    increasing = axis.levels[-1] > axis.levels[0]
+    assert list(axis.levels) == sorted(axis.levels, reverse=not increasing)
+    assert list(axis.quick) == sorted(axis.quick, reverse=not increasing)
     scenes = [from_document(axis.document(level)) for level in axis.quick]
     assert len({dumps(scene) for scene in scenes}) == len(scenes)
 
@@ -86,13 +86,13 @@ def test_unknown_parameter_is_an_error() -> None:
         (Task("drop", {}, "pymunk", {"detection": "swept"}), "detection 'swept' is not supported"),
     ],
 )
-def test_what_is_refused_is_refused_with_its_reason(task: Task, words: str) -> None:
+def test_refused_task_has_its_reason(task: Task, words: str) -> None:
     outcome = evaluate_task(task)
     assert outcome.verdict == "refused"
     assert words in outcome.reason
 
 
-def test_same_task_has_the_same_outcome_but_for_its_time() -> None:
+def test_same_task_has_the_same_outcome_except_for_its_duration() -> None:
     for setup in (EngineSetup("a", "pymunk"), EngineSetup("b", "reference"), EngineSetup("c", "exact")):
         task = Task("rack", {"iterations": 10}, setup.engine)
         first, again = (evaluate_task(task).__dict__ | {"seconds": 0.0} for _ in range(2))

@@ -1,4 +1,4 @@
-"""Scores of forecasts, counted on made-up cells."""
+"""Scores of predictions, counted on synthetic samples."""
 
 import pytest
 
@@ -9,34 +9,34 @@ from sandbox.measure.extremes.scenarios import AXES
 pytestmark = pytest.mark.full  # long runs and sweeps
 
 
-def cell(verdict: Verdict, predicted: tuple[str, ...] = (), rule: str | None = None, axis: str = "speed") -> Sample:
+def sample(verdict: Verdict, predicted: tuple[str, ...] = (), rule: str | None = None, axis: str = "speed") -> Sample:
     return Sample(axis, 1.0, "pymunk", {}, "pymunk", Outcome(verdict, "", rule, predicted=predicted))
 
 
-def test_warnings_are_held_against_what_came() -> None:
-    cells = [
-        *[cell("failed", ("tunnelling", "spring"), "through")] * 3,
-        cell("exact", ("tunnelling",)),
-        cell("failed", ("tunnelling",), "energy"),  # failed, but of something else
-        *[cell("failed", ("stack",), "through")] * 2,  # warned of something else
-        *[cell("degraded")] * 5,
-        *[cell("refused", ("tunnelling",))] * 7,
-        cell("failed", ("tunnelling",), "through", axis="friction"),  # an axis that is about no kind
+def test_warnings_are_scored_by_the_failures_that_occurred() -> None:
+    samples = [
+        *[sample("failed", ("tunnelling", "spring"), "through")] * 3,
+        sample("exact", ("tunnelling",)),
+        sample("failed", ("tunnelling",), "energy"),  # failed for a different reason
+        *[sample("failed", ("stack",), "through")] * 2,  # a different warning
+        *[sample("degraded")] * 5,
+        *[sample("refused", ("tunnelling",))] * 7,
+        sample("failed", ("tunnelling",), "through", axis="friction"),  # an axis without a kind of warning
     ]
-    (score,) = prediction_scores(cells, [AXES["speed"], AXES["friction"]])
+    (score,) = prediction_scores(samples, [AXES["speed"], AXES["friction"]])
     assert score == PredictionScore("tunnelling", 3, 2, 2, 5)
     assert score.precision == pytest.approx(3 / 5, rel=1e-15)  # one rounding
     assert score.recall == pytest.approx(3 / 5, rel=1e-15)  # as above
 
 
-def test_shares_of_nothing_are_unknown() -> None:
-    (score,) = prediction_scores([cell("exact")], [AXES["speed"]])
+def test_precision_and_recall_are_none_without_predictions() -> None:
+    (score,) = prediction_scores([sample("exact")], [AXES["speed"]])
     assert score == PredictionScore("tunnelling", 0, 0, 0, 1)
     assert (score.precision, score.recall) == (None, None)
     assert prediction_scores([], []) == ()
 
 
-def test_kinds_of_several_axes_are_one_score() -> None:
+def test_axes_of_one_kind_have_a_common_score() -> None:
     axes = [AXES["stack"], AXES["tower_iterations"]]
-    cells = [cell("failed", ("stack",), "stands", each.name) for each in axes]
-    assert prediction_scores(cells, axes) == (PredictionScore("stack", 2, 0, 0, 0),)
+    samples = [sample("failed", ("stack",), "stands", each.name) for each in axes]
+    assert prediction_scores(samples, axes) == (PredictionScore("stack", 2, 0, 0, 0),)

@@ -1,4 +1,4 @@
-"""Runs in which joints break: when, how many, and what is measured of them from then on."""
+"""Runs in which joints break: break times, counts, and energies and errors after the break."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from sandbox.trajectory import Frame, Trajectory
 
 every_engine = pytest.mark.parametrize("engine", ["pymunk", "reference"])
 
-APART = """
+BREAKING = """
 [world]
 duration = 1.0
 [solver]
@@ -57,15 +57,15 @@ between = ["c"]
 anchors = [[0.0, 0.0], [1.0, 3.0]]
 strength = 0.01
 """
-"""The spring breaks where it stores ½·F²/k = 0.625 J; the rod to the world at once."""
+"""The spring breaks where it stores ½·F²/k = 0.625 J; the rod to the world breaks at once."""
 
 
 def scene() -> Scene:
-    return loads(APART)
+    return loads(BREAKING)
 
 
 @every_engine
-def test_run_tells_when_each_joint_broke(engine: str) -> None:
+def test_run_records_when_each_joint_broke(engine: str) -> None:
     found = run(scene(), engine)
     assert np.isfinite(found.broken_time).tolist() == [False, True, True]
     assert found.info["broken"] == 2
@@ -81,25 +81,25 @@ def test_run_tells_when_each_joint_broke(engine: str) -> None:
 def test_broken_spring_stores_nothing(engine: str) -> None:
     found = run(scene(), engine)
     stored = energies(found, scene()).potential
-    over = found.time >= found.broken_time[1] - 1e-9
-    assert 0 < np.count_nonzero(over) < len(over)
-    assert not stored[over].any()
-    assert 0.5 < stored[~over].max() <= 0.626  # J: up to its strength, and in a frame before that
-    for k in (len(over) // 2, -1):
+    broken = found.time >= found.broken_time[1] - 1e-9
+    assert 0 < np.count_nonzero(broken) < len(broken)
+    assert not stored[broken].any()
+    assert 0.5 < stored[~broken].max() <= 0.626  # J: at most its strength, in a frame before the break
+    for k in (len(broken) // 2, -1):
         state = found.position[k], found.velocity[k], found.angle[k], found.angular_velocity[k]
         frame = Frame(float(found.time[k]), *(each.copy() for each in state), np.ones(3, np.bool_))
-        told = energy_of(frame, scene().bodies, (0.0, 0.0), scene(), found.breaks(3))
-        assert told[1] == pytest.approx(stored[k], rel=1e-12)
+        energy = energy_of(frame, scene().bodies, (0.0, 0.0), scene(), found.breaks(3))
+        assert energy[1] == pytest.approx(stored[k], rel=1e-12)
 
 
 @every_engine
-def test_break_at_the_time_of_a_frame_counts_from_that_frame_on(engine: str) -> None:
-    """Times of frames are products, and those of what broke in a later leg are sums: they round."""
+def test_joint_that_breaks_at_a_frame_time_is_broken_in_that_frame(engine: str) -> None:
+    """Frame times are products, and break times of a later leg are sums: they differ by rounding."""
     found = run(scene(), engine)
     k = int(np.searchsorted(found.time, found.broken_time[1]))
-    for nudge in (-1e-15, 0.0, 1e-15):
+    for offset in (-1e-15, 0.0, 1e-15):
         breaks = found.broken_time.copy()
-        breaks[1] = found.time[k] + nudge
+        breaks[1] = found.time[k] + offset
         at_frame = Trajectory(**{**vars(found), "broken_time": breaks})
         assert energies(at_frame, scene()).potential[k] == 0.0
         assert energies(at_frame, scene()).potential[k - 1] > 0.0
@@ -109,18 +109,18 @@ def test_break_at_the_time_of_a_frame_counts_from_that_frame_on(engine: str) -> 
 def test_broken_rod_has_no_error(engine: str) -> None:
     found = run(scene(), engine)
     errors = joint_errors(found, scene())
-    over = found.time >= found.broken_time[2] - 1e-9
-    assert np.isnan(errors[over, 2]).all()
-    assert not np.isnan(errors[~over, 2]).any()
+    broken = found.time >= found.broken_time[2] - 1e-9
+    assert np.isnan(errors[broken, 2]).all()
+    assert not np.isnan(errors[~broken, 2]).any()
     whole = joint_error(found, scene())
     unbroken = joint_error(Trajectory(**{**vars(found), "broken_time": np.empty(0)}), scene())
     assert whole is not None
     assert unbroken is not None
-    assert whole < 0.01 < unbroken  # of its length: the rod that holds, and the one that was left behind
+    assert whole < 0.01 < unbroken  # of its length: the intact rod, and the broken one
 
 
 @every_engine
-def test_stored_run_keeps_what_broke_and_older_ones_are_read_as_whole(engine: str, tmp_path: Path) -> None:
+def test_break_times_are_stored_and_older_files_load_as_unbroken(engine: str, tmp_path: Path) -> None:
     found = run(scene(), engine)
     path = found.save(tmp_path / "run.npz")
     assert np.array_equal(Trajectory.load(path).broken_time, found.broken_time, equal_nan=True)
@@ -131,7 +131,7 @@ def test_stored_run_keeps_what_broke_and_older_ones_are_read_as_whole(engine: st
 
 
 @every_engine
-def test_replay_breaks_the_same_at_the_same_times(engine: str) -> None:
+def test_replay_breaks_the_same_joints_at_the_same_times(engine: str) -> None:
     first = run(scene(), engine)
     session = Recording(scene(), engine, scene().solver, (), 1.0, first.info["state_hash"])
     again = rerun(Recording.from_json(session.to_json()))
@@ -139,7 +139,7 @@ def test_replay_breaks_the_same_at_the_same_times(engine: str) -> None:
     assert np.array_equal(again.broken_time, first.broken_time, equal_nan=True)
 
 
-def test_row_tells_how_many_broke() -> None:
+def test_row_counts_broken_joints() -> None:
     record = run_or_fetch(Job("apart", scene(), "pymunk"))
     assert record.row()["broken_joints"] == 2
     refused = run_or_fetch(Job("apart", scene(), "exact"))

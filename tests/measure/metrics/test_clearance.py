@@ -1,4 +1,4 @@
-"""How far bodies are above a plane, and hulls from each other, against sampling and by hand."""
+"""Clearance of bodies above a plane and distance of convex hulls, against sampling and hand-computed values."""
 
 import math
 
@@ -25,9 +25,9 @@ ANGLES = np.linspace(0.0, math.pi, 9)
     ],
 )
 def test_gap_above_a_plane_is_the_height_of_the_lowest_point(name: str, reach: np.ndarray) -> None:
-    number = SCENE.bodies.names.index(name)
-    at = np.tile((7.0, 3.0), (9, 1))
-    gap = plane_clearance(SCENE.bodies, number, at, ANGLES, np.array([-5.0, 1.0]), np.array([0.0, 1.0]))
+    index = SCENE.bodies.names.index(name)
+    position = np.tile((7.0, 3.0), (9, 1))
+    gap = plane_clearance(SCENE.bodies, index, position, ANGLES, np.array([-5.0, 1.0]), np.array([0.0, 1.0]))
     assert gap == pytest.approx(2.0 - reach, abs=1e-15)  # sines and their sums
 
 
@@ -36,14 +36,14 @@ def hull(rng: np.random.Generator, corners: int) -> np.ndarray:
     return np.column_stack((np.cos(angle), np.sin(angle))) * rng.uniform(0.2, 1.5) + rng.uniform(-2.0, 2.0, 2)
 
 
-def sampled(shape: np.ndarray, among: int = 200) -> np.ndarray:
+def sampled(shape: np.ndarray, count: int = 200) -> np.ndarray:
     """Return points along the border of a hull."""
-    share = np.linspace(0.0, 1.0, among)[:, None]
-    return np.concatenate([a + share * (b - a) for a, b in zip(shape, np.roll(shape, -1, axis=0), strict=True)])
+    fraction = np.linspace(0.0, 1.0, count)[:, None]
+    return np.concatenate([a + fraction * (b - a) for a, b in zip(shape, np.roll(shape, -1, axis=0), strict=True)])
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_distance_of_hulls_is_that_of_points_sampled_along_them(seed: int) -> None:
+def test_distance_of_hulls_agrees_with_points_sampled_along_them(seed: int) -> None:
     rng = np.random.default_rng(seed)
     a, b = hull(rng, 1 + seed % 5), hull(rng, 1 + seed // 5 % 6)
     found = float(hull_distance(a[None], b[None])[0])
@@ -53,15 +53,15 @@ def test_distance_of_hulls_is_that_of_points_sampled_along_them(seed: int) -> No
         # No sampled point is nearer; the nearest is off by half a sample's length at most, 1.5 % of 3 m.
         assert found - 1e-12 <= nearest <= found + 0.025
         return
-    # They overlap: moved apart by the depth along some direction they touch, and along none by less.
+    # They overlap: the depth is the smallest displacement along any direction after which they only touch.
     directions = np.linspace(0.0, 2.0 * math.pi, 721)
-    ways = np.column_stack((np.cos(directions), np.sin(directions)))
-    least = min(float((a @ way).max() - (b @ way).min()) for way in ways)
+    axes = np.column_stack((np.cos(directions), np.sin(directions)))
+    least = min(float((a @ axis).max() - (b @ axis).min()) for axis in axes)
     assert -found <= least + 1e-12
-    assert least <= -found + 0.03  # half a degree of a way out of 3 m at most
+    assert least <= -found + 0.03  # at most half a degree of direction, of 3 m
 
 
-def test_hulls_that_touch_or_cross_are_no_distance_apart() -> None:
+def test_touching_hulls_have_distance_zero_and_crossing_ones_a_negative_one() -> None:
     square = np.array([[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]])
     assert hull_distance(square, square + np.array([1.0, 0.0])).tolist() == [0.0]
     assert hull_distance(square, square + np.array([0.75, 0.0])).tolist() == [-0.25]
@@ -72,8 +72,8 @@ def test_hulls_that_touch_or_cross_are_no_distance_apart() -> None:
     assert hull_distance(np.array([[[2.0, 0.0]]]), np.array([[[0.0, 0.0], [1.0, 0.0]]])).tolist() == [1.0]
 
 
-def test_pieces_turn_with_their_body() -> None:
-    number = SCENE.bodies.names.index("rod")
-    ((corners, radius),) = posed_pieces(SCENE.bodies, number, np.array([[1.0, 2.0]]), np.array([math.pi / 2]))
+def test_pieces_rotate_with_their_body() -> None:
+    index = SCENE.bodies.names.index("rod")
+    ((corners, radius),) = posed_pieces(SCENE.bodies, index, np.array([[1.0, 2.0]]), np.array([math.pi / 2]))
     assert radius == 0.25
     assert corners[0] == pytest.approx(np.array([[1.0, 1.0], [1.0, 3.0]]), abs=1e-15)  # cosine of a right angle

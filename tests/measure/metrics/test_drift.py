@@ -1,4 +1,4 @@
-"""Drift: what energy and momentum change by without a cause."""
+"""Drift: changes of energy and momentum without a cause."""
 
 from dataclasses import replace
 
@@ -20,22 +20,22 @@ def falling(world: str = "") -> Scene:
     )
 
 
-def test_energy_of_explicit_euler_grows_as_its_error() -> None:
-    """It ends m·g·(g·h·T/2) too high, as a share of ½·m·(gT)²: h/T."""
+def test_energy_drift_of_explicit_euler_is_its_known_error() -> None:
+    """It ends m·g·(g·h·T/2) too high; as a fraction of ½·m·(gT)² this is h/T."""
     scene = falling()
     drift = energy_drift(run(scene, audit=False), scene, solved_run(scene, scene.solver), True)
-    assert drift.share == pytest.approx(0.01, rel=1e-10)  # of differences of 3000 J: 1e-13 · 3000 / 150
+    assert drift.fraction == pytest.approx(0.01, rel=1e-10)  # of differences of 3000 J: 1e-13 · 3000 / 150
     assert drift.against == "truth"
 
 
-def test_energy_that_impacts_rightly_take_is_no_drift() -> None:
+def test_energy_lost_in_impacts_is_no_drift_against_the_truth() -> None:
     scene = load(find("bounce"), ["world.duration=12.0", "solver.dt=0.002"])
     truth, found = solved_run(scene, scene.solver), run(scene, audit=False)
-    against_truth = energy_drift(found, scene, truth, True).share
+    against_truth = energy_drift(found, scene, truth, True).fraction
     against_start = energy_drift(found, scene, truth, False)
-    assert against_truth == pytest.approx(0.0, abs=2e-3)  # at rest at last, as deep as the slop, 5 mm of 5 m
-    # All of m·g·5 m. The largest kinetic energy is that of a frame up to dt early: less by 2·g·dt/v.
-    assert against_start.share == pytest.approx(-1.0, abs=4e-3)
+    assert against_truth == pytest.approx(0.0, abs=2e-3)  # at rest in the end, at a depth of the slop: 5 mm of 5 m
+    # All of m·g·5 m is lost. The largest kinetic energy is of a frame up to dt before impact: lower by 2·g·dt/v.
+    assert against_start.fraction == pytest.approx(-1.0, abs=4e-3)
     assert against_start.against == "start"
 
 
@@ -46,7 +46,7 @@ def test_momentum_is_explained_by_gravity_and_contacts() -> None:
     assert drift < 1e-12  # 6,000 roundings of numbers about 10
 
 
-def test_contact_that_is_not_recorded_shows_as_a_drift() -> None:
+def test_unrecorded_contact_shows_as_momentum_drift() -> None:
     scene = load(find("bounce"))
     found = run(scene, audit=False)
     impulse = found.contact_impulse.copy()
@@ -56,7 +56,7 @@ def test_contact_that_is_not_recorded_shows_as_a_drift() -> None:
     assert momentum_drift(replace(found, contact_impulse=impulse), scene) == pytest.approx(lost, rel=1e-9)  # see above
 
 
-def test_impulses_between_balls_cancel_but_those_of_fixed_balls_count() -> None:
+def test_impulses_between_moving_balls_cancel_and_those_of_fixed_balls_count() -> None:
     scene = loads(
         "[world]\nduration = 1.0\n[solver]\ndt = 0.01\n"
         "[[ball]]\nposition = [-3, 0]\nradius = 0.5\nfixed = true\nrestitution = 1\n"
@@ -69,14 +69,14 @@ def test_impulses_between_balls_cancel_but_those_of_fixed_balls_count() -> None:
 
 
 @pytest.mark.parametrize("world", ["linear_drag = 0.1", "bounds = [[-200, 97], [200, 200]]"])
-def test_momentum_that_cannot_be_accounted_for_is_unknown(world: str) -> None:
+def test_momentum_drift_is_none_with_drag_or_lost_bodies(world: str) -> None:
     scene = falling(world)
     assert momentum_drift(run(scene, audit=False), scene) is None
 
 
-def test_run_that_did_not_reach_its_end_has_no_drift() -> None:
+def test_refused_run_has_no_drift() -> None:
     scene = load(find("bounce"), ["solver.integrator='rk4'"])
     refused = run(scene, audit=False)
     assert refused.status == "refused"
-    assert energy_drift(refused, scene, None, False).share is None
+    assert energy_drift(refused, scene, None, False).fraction is None
     assert momentum_drift(refused, scene) is None

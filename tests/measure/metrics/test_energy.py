@@ -1,4 +1,4 @@
-"""Energies against hand-counted joules."""
+"""Energies against hand-computed joules."""
 
 import numpy as np
 import pytest
@@ -34,8 +34,8 @@ fixed = true
 """
 
 
-def still(scene: Scene, frames: int = 4, **changes: object) -> Trajectory:
-    """A run in which everything keeps its starting state, but for the changes."""
+def resting_run(scene: Scene, frames: int = 4, **changes: object) -> Trajectory:
+    """Return a run in which every body keeps its initial state, except for the given changes."""
     bodies = scene.bodies
     arrays = {
         "time": np.arange(frames, dtype=float),
@@ -54,10 +54,10 @@ def still(scene: Scene, frames: int = 4, **changes: object) -> Trajectory:
     return Trajectory(**{**arrays, **changes})
 
 
-def test_energies_add_up_over_what_moves() -> None:
+def test_energies_are_summed_over_moving_bodies() -> None:
     scene = loads(BALLS)
-    found = energies(still(scene), scene)
-    # a: ½·5·25 + ½·(½·5·4)·4 = 82.5 and −5·(0.5 − 6) = 27.5; b: 0 and 2; the fixed ball counts nothing.
+    found = energies(resting_run(scene), scene)
+    # a: ½·5·25 + ½·(½·5·4)·4 = 82.5 and −5·(0.5 − 6) = 27.5; b: 0 and 2; the fixed ball does not count.
     assert found.kinetic.tolist() == [82.5] * 4
     assert found.potential.tolist() == [29.5] * 4
     assert found.total.tolist() == [112.0] * 4
@@ -65,7 +65,7 @@ def test_energies_add_up_over_what_moves() -> None:
 
 def test_energies_of_one_body_sum_to_those_of_all() -> None:
     scene = loads(BALLS)
-    run = still(scene)
+    run = resting_run(scene)
     parts = [energies(run, scene, body=n) for n in range(3)]
     assert parts[0].total.tolist() == [110.0] * 4
     assert parts[1].total.tolist() == [2.0] * 4
@@ -76,19 +76,21 @@ def test_energies_of_one_body_sum_to_those_of_all() -> None:
 
 def test_a_body_counts_until_it_is_retired() -> None:
     scene = loads(BALLS)
-    found = energies(still(scene, retired_time=np.array([2.0, np.nan, np.nan])), scene)
+    found = energies(resting_run(scene, retired_time=np.array([2.0, np.nan, np.nan])), scene)
     assert found.total.tolist() == [112.0, 112.0, 2.0, 2.0]
 
 
-def test_a_body_counts_from_when_it_is_there() -> None:
+def test_a_body_counts_from_its_first_frame() -> None:
     scene = loads(BALLS)
     bodies = scene.bodies.joined_by(Ball(name="new", position=(0.0, 1.0), radius=1.0, mass=3.0), "new")
-    run = still(scene)
+    run = resting_run(scene)
     position = np.concatenate((run.position, np.full((4, 1, 2), np.nan)), axis=1)
     velocity, spin = position * np.nan, np.full((4, 4), np.nan)
     velocity[:, :3], spin[:, :3] = run.velocity, run.angular_velocity
     position[2:, 3], velocity[2:, 3], spin[2:, 3] = (0.0, 1.0), (2.0, 0.0), 0.0
-    run = still(scene, position=position, velocity=velocity, angular_velocity=spin, retired_time=np.full(4, np.nan))
+    run = resting_run(
+        scene, position=position, velocity=velocity, angular_velocity=spin, retired_time=np.full(4, np.nan)
+    )
     assert energies(run, scene, bodies=bodies).total.tolist() == [112.0, 112.0, 124.0, 124.0]
     with pytest.raises(ValueError, match="4 bodies"):
         energies(run, scene)
@@ -96,7 +98,7 @@ def test_a_body_counts_from_when_it_is_there() -> None:
 
 def test_a_diverged_state_shows_in_the_energy() -> None:
     scene = loads(BALLS)
-    run = still(scene)
+    run = resting_run(scene)
     run.velocity[2, 0], run.position[3, 0] = (1e200, 0.0), np.nan
     found = energies(run, scene)
     assert found.kinetic[2] == np.inf
@@ -104,25 +106,25 @@ def test_a_diverged_state_shows_in_the_energy() -> None:
     assert found.total[:2].tolist() == [112.0, 112.0]
 
 
-def test_chunks_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_chunk_size_does_not_change_energies(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = loads(BALLS)
     random = np.random.default_rng(5)
     position = random.normal(size=(50, 3, 2))
-    position[:17, 1] = np.nan  # not there yet
+    position[:17, 1] = np.nan  # not added yet
     position[40:, 0] = np.nan  # diverged
     velocity, spin = random.normal(size=(50, 3, 2)), random.normal(size=(50, 3))
-    run = still(scene, 50, position=position, velocity=velocity, angular_velocity=spin)
+    run = resting_run(scene, 50, position=position, velocity=velocity, angular_velocity=spin)
     whole = energies(run, scene)
     monkeypatch.setattr(energy, "CHUNK", 21)
     for a, b in zip(whole, energies(run, scene), strict=True):
-        assert a == pytest.approx(b, rel=1e-15, nan_ok=True)  # products may be summed in another order
+        assert a == pytest.approx(b, rel=1e-15, nan_ok=True)  # products may be summed in a different order
 
 
 def test_energy_of_a_bouncing_ball_falls_by_e_squared() -> None:
     scene = loads("[world]\ngravity = [0.0, -9.81]\n[[ball]]\nposition = [0.0, 5.0]\nradius = 0.5\n")
     time = np.linspace(0.0, 3.0, 301)
     height, speed = bounces(time, 5.0, 0.0, 9.81, 0.8)
-    run = still(
+    run = resting_run(
         scene,
         301,
         time=time,
@@ -130,11 +132,11 @@ def test_energy_of_a_bouncing_ball_falls_by_e_squared() -> None:
         velocity=np.column_stack((0 * time, speed))[:, None],
     )
     levels = np.where(time < 1.0096376, 1.0, np.where(time < 1.0096376 * 2.6, 0.64, 0.4096)) * 5.0 * 9.81
-    assert energies(run, scene).total == pytest.approx(levels, rel=1e-13)  # heights and speeds of a dozen roundings
+    assert energies(run, scene).total == pytest.approx(levels, rel=1e-13)  # a dozen roundings in heights and speeds
 
 
 def test_no_bodies_and_no_frames_have_no_energy() -> None:
     empty = loads("[world]\nduration = 1.0\n")
-    assert energies(still(empty), empty).total.tolist() == [0.0] * 4
+    assert energies(resting_run(empty), empty).total.tolist() == [0.0] * 4
     scene = loads(BALLS)
-    assert energies(still(scene, 0), scene).total.shape == (0,)
+    assert energies(resting_run(scene, 0), scene).total.shape == (0,)

@@ -1,4 +1,4 @@
-"""Joint errors against distances known by hand, and against what engines leave."""
+"""Joint errors against hand-computed distances, and joint errors of engines."""
 
 import math
 from itertools import pairwise
@@ -9,7 +9,7 @@ import pytest
 from sandbox.measure.metrics.invariants import joint_error, joint_errors
 from sandbox.measure.run.runner import run
 from sandbox.scene.files.load import loads
-from tests.measure.metrics.test_energy import still
+from tests.measure.metrics.test_energy import resting_run
 
 TWO = """
 [[box]]
@@ -23,12 +23,12 @@ size = [2.0, 0.2]
 """
 
 
-def off(joint: str, position: tuple[float, float] = (3.0, 0.0), angle: float = 0.0) -> float:
-    """Return the error of one joint where the second box lies elsewhere than it started."""
+def error_at(joint: str, position: tuple[float, float] = (3.0, 0.0), angle: float = 0.0) -> float:
+    """Return the error of one joint with the second box at another pose than its initial one."""
     scene = loads(f'{TWO}[[joint]]\nbetween = ["a", "b"]\n{joint}\n')
-    moved, turned = still(scene).position, still(scene).angle
+    moved, turned = resting_run(scene).position, resting_run(scene).angle
     moved[:, 1], turned[:, 1] = position, angle
-    (error,) = joint_errors(still(scene, position=moved, angle=turned), scene)[-1]
+    (error,) = joint_errors(resting_run(scene, position=moved, angle=turned), scene)[-1]
     return float(error)
 
 
@@ -54,45 +54,47 @@ GROOVE = 'kind = "groove"\ngroove = [[0.0, 0.0], [0.0, 4.0]]'
         ('kind = "gear"\nratio = 2.0', (9.0, 9.0), 0.5, 1.0),
     ],
 )
-def test_error_is_the_distance_from_what_is_held(
+def test_joint_error_is_the_distance_from_its_constraint(
     joint: str, position: tuple[float, float], angle: float, error: float
 ) -> None:
-    assert off(joint, position, angle) == pytest.approx(error, abs=1e-15)  # sines of right angles round
+    assert error_at(joint, position, angle) == pytest.approx(error, abs=1e-15)  # rounding of sines of right angles
 
 
 @pytest.mark.parametrize("joint", ['kind = "spring"\nstiffness = 1.0', 'kind = "motor"\nrate = 1.0'])
-def test_springs_and_motors_hold_nothing(joint: str) -> None:
-    assert math.isnan(off(joint, (9.0, 9.0)))
+def test_springs_and_motors_have_no_joint_error(joint: str) -> None:
+    assert math.isnan(error_at(joint, (9.0, 9.0)))
     scene = loads(f'{TWO}[[joint]]\nbetween = ["a", "b"]\n{joint}\n')
-    assert joint_error(still(scene), scene) is None
+    assert joint_error(resting_run(scene), scene) is None
 
 
-def test_joint_ends_with_its_body() -> None:
+def test_joint_of_a_retired_body_has_no_error() -> None:
     scene = loads(f'{TWO}[[joint]]\nkind = "rod"\nbetween = ["a", "b"]\n')
-    gone = still(scene, retired_time=np.array([np.nan, 2.0]))
-    assert np.isnan(joint_errors(gone, scene)[:, 0]).tolist() == [False, False, True, True]
+    retired = resting_run(scene, retired_time=np.array([np.nan, 2.0]))
+    assert np.isnan(joint_errors(retired, scene)[:, 0]).tolist() == [False, False, True, True]
 
 
 @pytest.mark.parametrize(
-    ("joint", "share"),
+    ("joint", "fraction"),
     [
         ('kind = "rod"', 1.0 / 3.0),
         ('kind = "slide"\nmost = 2.0', 1.0),
         ('kind = "pivot"\nanchors = [[1.5, 0.0], [-1.5, 0.0]]', 1.0 / math.hypot(2.0, 0.2)),
     ],
 )
-def test_largest_error_is_a_share_of_a_length(joint: str, share: float) -> None:
+def test_largest_error_is_a_fraction_of_a_length(joint: str, fraction: float) -> None:
     scene = loads(f'{TWO}[[joint]]\nbetween = ["a", "b"]\n{joint}\n')
-    moved = still(scene).position
+    moved = resting_run(scene).position
     moved[2, 1] = (4.0, 0.0)
-    assert joint_error(still(scene, position=moved), scene) == pytest.approx(share, rel=1e-14)  # a few roundings
+    assert joint_error(resting_run(scene, position=moved), scene) == pytest.approx(
+        fraction, rel=1e-14
+    )  # a few roundings
 
 
-def test_a_diverged_joint_is_infinitely_far_off() -> None:
+def test_diverged_joint_has_infinite_error() -> None:
     scene = loads(f'{TWO}[[joint]]\nkind = "rod"\nbetween = ["a", "b"]\n')
-    position = still(scene).position
+    position = resting_run(scene).position
     position[3, 1] = np.nan
-    assert joint_error(still(scene, position=position), scene) == math.inf
+    assert joint_error(resting_run(scene, position=position), scene) == math.inf
 
 
 def test_scene_without_joints_has_no_joint_error() -> None:
@@ -101,8 +103,8 @@ def test_scene_without_joints_has_no_joint_error() -> None:
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
-def test_joint_error_of_a_pendulum_falls_with_the_step(engine: str) -> None:
-    """A rod is put right after each step that left its circle by (v·h)²/2L: what stays is of the order of h."""
+def test_joint_error_of_a_pendulum_is_of_first_order_in_the_step(engine: str) -> None:
+    """Each step leaves the circle by (v·h)²/2L and the rod is corrected after it; the remaining error is O(h)."""
     found = []
     for dt in (0.01, 0.005, 0.0025):
         scene = loads(

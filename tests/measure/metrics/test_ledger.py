@@ -1,4 +1,4 @@
-"""Ledgers: what a run's account comes to, kept with the run."""
+"""Energy ledgers of runs: their rows, residual, scale and storage."""
 
 import json
 from dataclasses import replace
@@ -32,54 +32,54 @@ restitution = 0.5
 """)
 
 
-def test_ledger_has_a_row_for_every_frame_that_is_kept() -> None:
-    kept = ledger(SCENE, "reference")
-    assert kept.time.tolist() == run(SCENE, "reference").time.tolist()
-    assert kept.entries.shape == (len(kept.time), len(Cause))
-    assert kept.causes == tuple(Cause)
-    assert not kept.entries[0].any()
-    assert kept.entries[-1].any()
+def test_ledger_has_a_row_for_every_recorded_frame() -> None:
+    recorded = ledger(SCENE, "reference")
+    assert recorded.time.tolist() == run(SCENE, "reference").time.tolist()
+    assert recorded.entries.shape == (len(recorded.time), len(Cause))
+    assert recorded.causes == tuple(Cause)
+    assert not recorded.entries[0].any()
+    assert recorded.entries[-1].any()
 
 
-def test_totals_are_those_that_are_measured_of_the_frames() -> None:
+def test_ledger_totals_equal_energies_measured_from_frames() -> None:
     trajectory = run(SCENE, "reference", account=True)
     measured = energies(trajectory, SCENE).total
-    assert trajectory.energy == pytest.approx(measured, rel=1e-15)  # sums in another order
+    assert trajectory.energy == pytest.approx(measured, rel=1e-15)  # sums in a different order
     assert trajectory.info["energy_end"] == trajectory.energy[-1]
 
 
-def test_residual_is_what_no_cause_brought() -> None:
+def test_residual_is_the_energy_change_without_a_cause() -> None:
     causes = ("restitution", "drag")
     entries = np.array([[0.0, 0.0], [-1.0, -2.0]])
-    kept = Ledger(np.array([0.0, 1.0]), np.array([10.0, 6.5]), causes, entries, scale=5.0)
-    assert kept.residual.tolist() == [0.0, -0.5]
-    assert kept.closes_to == 0.1
-    assert (kept.of(Cause.DRAG), kept.of(Cause.JOINTS)) == (-2.0, 0.0)
-    told = to_json(kept.document())
-    assert json.loads(json.dumps(told, allow_nan=False)) == told
-    assert told["causes"] == {"restitution": -1.0, "drag": -2.0}
-    assert (told["start"], told["end"], told["residual"], told["scale"]) == (10.0, 6.5, -0.5, 5.0)
+    record = Ledger(np.array([0.0, 1.0]), np.array([10.0, 6.5]), causes, entries, scale=5.0)
+    assert record.residual.tolist() == [0.0, -0.5]
+    assert record.closes_to == 0.1
+    assert (record.of(Cause.DRAG), record.of(Cause.JOINTS)) == (-2.0, 0.0)
+    document = to_json(record.document())
+    assert json.loads(json.dumps(document, allow_nan=False)) == document
+    assert document["causes"] == {"restitution": -1.0, "drag": -2.0}
+    assert (document["start"], document["end"], document["residual"], document["scale"]) == (10.0, 6.5, -0.5, 5.0)
 
 
-def test_figures_that_are_not_finite_are_null() -> None:
-    kept = Ledger(np.zeros(2), np.array([1.0, np.inf]), ("drag",), np.array([[0.0], [np.nan]]), 1.0)
-    told = to_json(kept.document())
-    assert (told["end"], told["causes"]["drag"], told["residual"]) == (None, None, None)
+def test_non_finite_numbers_become_null() -> None:
+    record = Ledger(np.zeros(2), np.array([1.0, np.inf]), ("drag",), np.array([[0.0], [np.nan]]), 1.0)
+    document = to_json(record.document())
+    assert (document["end"], document["causes"]["drag"], document["residual"]) == (None, None, None)
 
 
-def test_scale_is_what_was_in_motion_or_turned_over() -> None:
-    assert ledger(SCENE, "reference").scale == pytest.approx(5.0, rel=0.05)  # m g · 0.5 m, where steps meet the floor
-    still = SCENE.model_copy(update={"world": SCENE.world.model_copy(update={"gravity": (0.0, 0.0)})})
-    nothing = ledger(still, "reference")
-    assert (nothing.scale, nothing.closes_to) == (0.0, 0.0)
+def test_scale_is_the_largest_kinetic_energy_or_turnover() -> None:
+    assert ledger(SCENE, "reference").scale == pytest.approx(5.0, rel=0.05)  # m g · 0.5 m, up to the step of impact
+    weightless = SCENE.model_copy(update={"world": SCENE.world.model_copy(update={"gravity": (0.0, 0.0)})})
+    resting = ledger(weightless, "reference")
+    assert (resting.scale, resting.closes_to) == (0.0, 0.0)
 
 
-def test_account_is_stored_with_the_run_and_read_back(tmp_path: Path) -> None:
-    kept = run(SCENE, "reference", account=True)
-    found = Trajectory.load(kept.save(tmp_path / "run.npz"))
-    assert found.energy.tobytes() == kept.energy.tobytes()
-    assert found.account.tobytes() == kept.account.tobytes()
-    assert ledger_of(found, SCENE).document() == ledger_of(kept, SCENE).document()
+def test_account_is_stored_and_loaded_with_the_run(tmp_path: Path) -> None:
+    stored = run(SCENE, "reference", account=True)
+    found = Trajectory.load(stored.save(tmp_path / "run.npz"))
+    assert found.energy.tobytes() == stored.energy.tobytes()
+    assert found.account.tobytes() == stored.account.tobytes()
+    assert ledger_of(found, SCENE).document() == ledger_of(stored, SCENE).document()
     part = found.at([0, -1])
     assert part.account.shape == (2, len(Cause))
 
@@ -91,31 +91,31 @@ def test_runs_without_an_account_have_no_ledger(tmp_path: Path) -> None:
         ledger_of(plain, SCENE)
     path = plain.save(tmp_path / "run.npz")
     with np.load(path) as arrays:  # as earlier versions stored it
-        kept = {name: arrays[name] for name in arrays.files if name not in ("energy", "account")}
-    np.savez_compressed(path, **kept)
+        remaining = {name: arrays[name] for name in arrays.files if name not in ("energy", "account")}
+    np.savez_compressed(path, **remaining)
     assert len(Trajectory.load(path).energy) == 0
 
 
-def test_a_run_with_an_account_is_the_same_run() -> None:
-    plain, kept = run(SCENE, "reference"), run(SCENE, "reference", account=True)
-    assert kept.info["state_hash"] == plain.info["state_hash"]
-    assert kept.position.tobytes() == plain.position.tobytes()
-    assert kept.contact_impulse.tobytes() == plain.contact_impulse.tobytes()
-    assert kept.info["work"] == plain.info["work"]
+def test_accounting_does_not_change_the_run() -> None:
+    plain, accounted = run(SCENE, "reference"), run(SCENE, "reference", account=True)
+    assert accounted.info["state_hash"] == plain.info["state_hash"]
+    assert accounted.position.tobytes() == plain.position.tobytes()
+    assert accounted.contact_impulse.tobytes() == plain.contact_impulse.tobytes()
+    assert accounted.info["work"] == plain.info["work"]
 
 
-def test_what_only_takes_gives_phantom_energy() -> None:
+def test_energy_gained_by_a_dissipative_cause_is_phantom() -> None:
     account = EnergyLedger()
     account.add(Cause.JOINTS, 2.0)
     account.add(Cause.JOINTS, -1.0)
-    account.add(Cause.DRAG, 3.0)  # wind may give
-    account.add_unchecked(Cause.RESTITUTION, 0.5)  # what it had lent
+    account.add(Cause.DRAG, 3.0)  # wind may add energy
+    account.add_unchecked(Cause.RESTITUTION, 0.5)  # stored energy that is returned
     entries = {cause: energy for cause, energy in account.entries().items() if energy}
     assert entries == {Cause.PHANTOM: 2.0, Cause.JOINTS: -1.0, Cause.DRAG: 3.0, Cause.RESTITUTION: 0.5}
 
 
 @pytest.mark.parametrize(
-    ("along", "across", "booked"),
+    ("along", "across", "booked_entries"),
     [
         (-2.0, -1.0, {Cause.RESTITUTION: -2.0, Cause.FRICTION: -1.0}),
         (-3.0, 1.0, {Cause.RESTITUTION: -2.0}),
@@ -125,14 +125,16 @@ def test_what_only_takes_gives_phantom_energy() -> None:
         (0.0, 0.0, {}),
     ],
 )
-def test_contacts_give_phantom_energy_only_together(along: float, across: float, booked: dict[Cause, float]) -> None:
+def test_contact_energy_is_phantom_only_if_the_sum_is_positive(
+    along: float, across: float, booked_entries: dict[Cause, float]
+) -> None:
     account = EnergyLedger()
     account.add_contacts(along, across)
-    assert {cause: energy for cause, energy in account.entries().items() if energy} == booked
+    assert {cause: energy for cause, energy in account.entries().items() if energy} == booked_entries
 
 
-def test_a_ledger_of_frames_that_moved_elsewhere_does_not_close() -> None:
-    """The check can fail: totals are not taken from the account."""
+def test_ledger_with_altered_frame_energies_does_not_close() -> None:
+    """The check can fail, because the totals are not taken from the account."""
     trajectory = run(SCENE, "reference", account=True)
     wrong = replace(trajectory, energy=trajectory.energy + np.linspace(0.0, 1.0, len(trajectory.energy)))
     assert ledger_of(wrong, SCENE).closes_to > 0.1

@@ -1,4 +1,4 @@
-"""Horizon: what a nudge is, and where it comes to matter."""
+"""Perturbation of a scene, and the predictability horizon that it yields."""
 
 import math
 from typing import Any
@@ -20,8 +20,8 @@ from tests.runs_by_hand import run_of, scene_of
 pytestmark = pytest.mark.full  # long runs and sweeps
 
 
-def moved(scene: Scene, **options: Any) -> FloatArray:
-    """Return by how much each body of a scene is moved, (N, 2) m; the scene itself stays as it was."""
+def displacements(scene: Scene, **options: Any) -> FloatArray:
+    """Return the displacement of each body by the perturbation, (N, 2) m; the scene itself must not change."""
     before = scene.bodies
     other = perturb(scene, **options)
     assert other is not None
@@ -29,20 +29,20 @@ def moved(scene: Scene, **options: Any) -> FloatArray:
     return other.bodies.position - before.position
 
 
-def test_every_body_that_can_meet_something_is_moved_in_a_direction_of_its_own() -> None:
+def test_bodies_that_can_collide_are_displaced_in_individual_directions() -> None:
     scene = load(find("gas"))
-    away = moved(scene)
-    assert np.hypot(*away.T) == pytest.approx(
-        np.full(len(away), PERTURBATION), rel=0.01
-    )  # places of 10 m have 2e-15 m digits
-    assert len(np.unique(np.round(np.arctan2(*away.T), 2))) > 100  # of 225, in a quarter of 628 steps of 0.01 rad each
-    assert (moved(scene) == away).all()
-    assert (moved(scene, seed=1) != away).any(axis=1).all()
+    offset = displacements(scene)
+    assert np.hypot(*offset.T) == pytest.approx(
+        np.full(len(offset), PERTURBATION), rel=0.01
+    )  # positions of 10 m have a resolution of 2e-15 m
+    assert len(np.unique(np.round(np.arctan2(*offset.T), 2))) > 100  # of 225 bodies, in 349 bins of 0.01 rad
+    assert (displacements(scene) == offset).all()
+    assert (displacements(scene, seed=1) != offset).any(axis=1).all()
 
 
-def test_nudge_far_out_is_not_lost_in_rounding() -> None:
+def test_perturbation_far_from_the_origin_is_not_lost_in_rounding() -> None:
     scene = loads("[[ball]]\nposition = [1e9, 0]\nradius = 1\n[[ball]]\nposition = [2e9, 0]\nradius = 1\n")
-    assert np.abs(moved(scene)[:, 0]).tolist() == [4 * np.spacing(1e9), 4 * np.spacing(2e9)]
+    assert np.abs(displacements(scene)[:, 0]).tolist() == [4 * np.spacing(1e9), 4 * np.spacing(2e9)]
 
 
 RACK = "".join(
@@ -58,21 +58,21 @@ def boxes(count: int) -> str:
     return "".join(f"[[box]]\nname = 'b{k}'\nposition = [0, {k + 0.5}]\nsize = [1, 1]\n" for k in range(count))
 
 
-def test_a_rack_whose_balls_touch_moves_as_one() -> None:
-    away = moved(loads(RACK + "[[ball]]\nname = 'cue'\nposition = [-5, 0]\nradius = 0.5\n"))
-    assert (away[:-1] == away[0]).all()
-    assert (away[-1] != away[0]).any()
+def test_touching_balls_of_a_rack_are_displaced_together() -> None:
+    offset = displacements(loads(RACK + "[[ball]]\nname = 'cue'\nposition = [-5, 0]\nradius = 0.5\n"))
+    assert (offset[:-1] == offset[0]).all()
+    assert (offset[-1] != offset[0]).any()
 
 
-def test_boxes_of_a_stack_move_along_their_contacts() -> None:
+def test_boxes_of_a_stack_are_displaced_along_their_contacts() -> None:
     scene = loads(FLOOR + boxes(5))
-    away = moved(scene)
-    assert (away[:, 1] == 0.0).all()
-    assert np.abs(away[:, 0]) == pytest.approx(np.full(5, PERTURBATION), rel=1e-9)  # beside 0 there is room for digits
-    assert len(set(away[:, 0].tolist())) == 2  # to either side, so some move against each other
+    offset = displacements(scene)
+    assert (offset[:, 1] == 0.0).all()
+    assert np.abs(offset[:, 0]) == pytest.approx(np.full(5, PERTURBATION), rel=1e-9)  # near 0 the resolution suffices
+    assert len(set(offset[:, 0].tolist())) == 2  # to both sides, so some move relative to each other
 
 
-def test_what_is_wedged_keeps_its_place_and_is_given_a_velocity() -> None:
+def test_wedged_body_keeps_its_position_and_is_given_a_velocity() -> None:
     scene = loads(FLOOR + WALL + boxes(1))
     other = perturb(scene)
     assert other is not None
@@ -81,7 +81,7 @@ def test_what_is_wedged_keeps_its_place_and_is_given_a_velocity() -> None:
     assert (other.bodies.angle == scene.bodies.angle).all()
 
 
-def test_a_polygon_that_touches_nothing_is_turned_too() -> None:
+def test_polygon_without_contacts_is_rotated_too() -> None:
     scene = loads(FLOOR + "[[box]]\nposition = [0, 3]\nsize = [1, 1]\n")
     other = perturb(scene)
     assert other is not None
@@ -91,8 +91,8 @@ def test_a_polygon_that_touches_nothing_is_turned_too() -> None:
 
 
 @pytest.mark.parametrize("name", [each.name for each in shipped() if "100k" not in each.name])
-def test_no_perturbation_brings_an_overlap_or_takes_a_contact(name: str) -> None:
-    """Law, for every shipped scene: gaps between things that touch change by rounding and no more."""
+def test_perturbation_neither_creates_overlaps_nor_breaks_contacts(name: str) -> None:
+    """For every shipped scene, the clearance of touching pairs changes by rounding only."""
     scene = load(find(name))
     other = perturb(scene)
     if other is None:
@@ -100,7 +100,9 @@ def test_no_perturbation_brings_an_overlap_or_takes_a_contact(name: str) -> None
     old, new = scene.bodies, other.bodies
     for pair, _ in touching_pairs(scene):
         gaps = clearance(scene, old, np.stack((old.position, new.position)), np.stack((old.angle, new.angle)), pair)
-        assert abs(gaps[1] - gaps[0]) <= 1e-14 * max(1.0, np.abs(old.position[pair[0]]).max())  # some 50 last digits
+        assert abs(gaps[1] - gaps[0]) <= 1e-14 * max(
+            1.0, np.abs(old.position[pair[0]]).max()
+        )  # about 50 units in the last place
     if not ENGINES["exact"].missing(scene, scene.solver):
         assert ENGINES["exact"].missing(other, scene.solver) == ()
 
@@ -124,31 +126,33 @@ points = [[-2.0, -2.0], [2.0, -2.0], [2.0, 2.0], [-2.0, 2.0]]
 closed = true
 restitution = 1.0
 """
-APART = {
+ISOLATED = {
     "far": "[[ball]]\nname = 'far'\nposition = [30, 0.1]\nradius = 0.2\nvelocity = [1, 0.3]\n",
     "caged": "[[ball]]\nname = 'caged'\nposition = [10, 0.1]\nradius = 0.2\nvelocity = [1, 0.3]\nrestitution = 1.0\n"
     "[[wall]]\npoints = [[9, -1], [11, -1], [11, 1], [9, 1]]\nclosed = true\nrestitution = 1.0\n",
 }
 
 
-@pytest.mark.parametrize("apart", APART)
-def test_a_ball_that_meets_nothing_changes_no_horizon(apart: str) -> None:
-    """Law: what another ball does in a place of its own says nothing of a crowd."""
-    crowd, more = loads(CROWD), loads(CROWD + APART[apart])
-    assert more.bodies.names[0] == apart  # balls stand before a scatter
+@pytest.mark.parametrize("name", ISOLATED)
+def test_isolated_ball_does_not_change_the_horizon(name: str) -> None:
+    """A ball that cannot reach the crowd does not affect the horizon of the crowd."""
+    crowd, more = loads(CROWD), loads(CROWD + ISOLATED[name])
+    assert more.bodies.names[0] == name  # balls precede a scatter
     alone, beside = (truth_of(scene, scene.solver, 1e-3) for scene in (crowd, more))
     assert alone is not None
     assert beside is not None
     assert alone.kind == beside.kind == "exact"
     assert 0.5 < alone.trusted_until < 5.0
-    assert beside.trusted_until == alone.trusted_until  # the crowd is perturbed alike, and `exact` moves each by itself
+    assert (
+        beside.trusted_until == alone.trusted_until
+    )  # same perturbation of the crowd; `exact` moves bodies separately
 
 
-def test_scene_in_which_nothing_can_meet_has_no_nudge() -> None:
+def test_scene_without_possible_contacts_has_no_perturbation() -> None:
     assert perturb(loads("[[ball]]\nposition = [0, 0]\nradius = 1\n")) is None
 
 
-def test_perturbation_changes_places_and_nothing_else() -> None:
+def test_perturbation_changes_only_positions() -> None:
     scene = load(find("gas"))
     other = perturb(scene)
     assert other is not None
@@ -160,7 +164,7 @@ def test_perturbation_changes_places_and_nothing_else() -> None:
     assert np.array_equal(mine.restitution, its.restitution)
 
 
-def test_runs_agree_until_the_last_frame_before_they_part() -> None:
+def test_agreement_time_is_the_last_frame_before_divergence() -> None:
     scene = scene_of()
     truth = run_of(scene)
     position = truth.position.copy()
@@ -171,8 +175,8 @@ def test_runs_agree_until_the_last_frame_before_they_part() -> None:
     assert agreement_time(truth, run_of(scene, position), scene, 0.1) == 0.0
 
 
-def test_chaos_ends_the_trust_before_the_end() -> None:
-    """A ball among pegs: each bounce multiplies 1e-12 m by some ten, so that twenty are beyond knowing."""
+def test_chaotic_truth_is_trusted_only_before_its_end() -> None:
+    """A ball among pegs: each bounce multiplies 1e-12 m by about ten, so that twenty bounces are unpredictable."""
     pegs = "".join(
         f"[[post]]\nposition = [{x + 0.5 * (y % 2)}, {y}]\nradius = 0.35\nrestitution = 1.0\n"
         for x in range(-3, 4)

@@ -1,4 +1,4 @@
-"""What springs and attraction store, against hand-counted joules, and against what runs do with it."""
+"""Potential energy of springs and attraction, against hand-computed joules and against its conservation in runs."""
 
 import math
 
@@ -10,9 +10,9 @@ from sandbox.measure.metrics.energy import energies
 from sandbox.measure.run.runner import run
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Frame
-from tests.measure.metrics.test_energy import still
+from tests.measure.metrics.test_energy import resting_run
 
-SPRUNG = """
+SPRINGS = """
 [[ball]]
 name = "a"
 position = [0.0, 0.0]
@@ -46,26 +46,28 @@ stiffness = 200.0
 
 
 def test_springs_store_half_k_times_their_strain_squared() -> None:
-    scene = loads(SPRUNG)
+    scene = loads(SPRINGS)
     # ½·10·(5 − 2)² + ½·8·1² + ½·200·(0.5 − 0.2)²
-    assert energies(still(scene), scene).potential == pytest.approx([45.0 + 4.0 + 9.0] * 4, rel=1e-15)  # sums of 3
+    assert energies(resting_run(scene), scene).potential == pytest.approx(
+        [45.0 + 4.0 + 9.0] * 4, rel=1e-15
+    )  # sums of 3
 
 
-def test_what_two_share_is_half_of_each_and_what_the_world_holds_is_all_of_one() -> None:
-    scene = loads(SPRUNG)
-    parts = [energies(still(scene), scene, body=n).potential[0] for n in range(3)]
+def test_spring_energy_is_halved_between_bodies_but_not_with_the_world() -> None:
+    scene = loads(SPRINGS)
+    parts = [energies(resting_run(scene), scene, body=n).potential[0] for n in range(3)]
     assert parts == pytest.approx([22.5 + 4.0 + 4.5, 22.5, 4.5], rel=1e-15)  # as above
 
 
-def test_spring_ends_with_a_body_that_is_gone() -> None:
-    scene = loads(SPRUNG)
-    gone = still(scene, retired_time=np.array([np.nan, 2.0, np.nan]))
-    # The balls rest without gravity: all that changes is the spring between them.
-    assert energies(gone, scene).total == pytest.approx([58.0, 58.0, 13.0, 13.0], rel=1e-15)  # as above
+def test_spring_of_a_retired_body_stores_nothing() -> None:
+    scene = loads(SPRINGS)
+    retired = resting_run(scene, retired_time=np.array([np.nan, 2.0, np.nan]))
+    # The balls rest without gravity: only the energy of the spring between them changes.
+    assert energies(retired, scene).total == pytest.approx([58.0, 58.0, 13.0, 13.0], rel=1e-15)  # as above
 
 
-def test_energy_of_a_frame_counts_springs_where_the_scene_is_given() -> None:
-    scene = loads(SPRUNG)
+def test_frame_energy_includes_springs_if_the_scene_is_given() -> None:
+    scene = loads(SPRINGS)
     bodies = scene.bodies
     present = np.ones(3, np.bool_)
     frame = Frame(0.0, bodies.position, bodies.velocity, bodies.angle, bodies.angular_velocity, present)
@@ -98,37 +100,39 @@ softening = {softening}
     ids=["none", "too little to matter", "as far as the planet"],
 )
 @pytest.mark.parametrize("toward", ['"sun"', "[0.0, 0.0]"])
-def test_attraction_is_as_deep_as_its_integral(toward: str, softening: float, depth: float) -> None:
+def test_attraction_potential_equals_its_integral(toward: str, softening: float, depth: float) -> None:
     """∫ s/(r² + ε²) dr from r to infinity: s/r, or (s/ε)·(π/2 − atan(r/ε))."""
     scene = loads(ATTRACTED.format(mass=1.0, fixed="true", toward=toward, softening=softening))
-    assert energies(still(scene), scene).potential == pytest.approx([-2.0 * depth] * 4, rel=1e-14)  # a few roundings
+    assert energies(resting_run(scene), scene).potential == pytest.approx(
+        [-2.0 * depth] * 4, rel=1e-14
+    )  # a few roundings
 
 
-def test_attraction_between_two_that_move_counts_once() -> None:
+def test_attraction_between_two_moving_bodies_counts_once() -> None:
     scene = loads(ATTRACTED.format(mass=5.0, fixed="false", toward='"sun"', softening=0.0))
-    run_ = still(scene)
-    assert energies(run_, scene).potential.tolist() == [-4.0] * 4
-    assert [energies(run_, scene, body=n).potential[0] for n in range(2)] == [-2.0, -2.0]
+    trajectory = resting_run(scene)
+    assert energies(trajectory, scene).potential.tolist() == [-4.0] * 4
+    assert [energies(trajectory, scene, body=n).potential[0] for n in range(2)] == [-2.0, -2.0]
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
 @pytest.mark.parametrize(
     ("text", "band"),
     [
-        # The semi-implicit scheme's own band is ±ωh/2, ω = √(k/m) = 10: 0.005 of ½·100·0.25 J.
+        # The energy band of the semi-implicit scheme is ±ωh/2, ω = √(k/m) = 10: 0.005 of ½·100·0.25 J.
         (
             '[[ball]]\nname = "b"\nposition = [1.5, 0]\nradius = 0.1\n'
             '[[joint]]\nkind = "spring"\nbetween = ["b"]\nanchors = [[0, 0], [0, 0]]\n'
             "rest_length = 1.0\nstiffness = 100\n",
             0.006 * 12.5,
         ),
-        # Kepler, e = 0.5 from the far end: at the near one ω = |v|/r is √(1.5/0.125), and h·ω/2 = 0.0017 of 1.5 J.
+        # Kepler, e = 0.5 from the apoapsis: at the periapsis ω = |v|/r = √(1.5/0.125), and h·ω/2 = 0.0017 of 1.5 J.
         (
             '[[ball]]\nname = "b"\nposition = [1.5, 0]\nvelocity = [0, 0.5773502691896258]\nradius = 0.01\n'
             "[[attraction]]\ntoward = [0.0, 0.0]\nstrength = 1.0\n",
             0.003 * 1.5,
         ),
-        # A pair about a common centre: half as much again of everything.
+        # A pair about its common centre: 1.5 times the values above.
         (
             '[[ball]]\nname = "b"\nposition = [0.75, 0]\nvelocity = [0, 0.5]\nradius = 0.01\n'
             '[[ball]]\nname = "s"\nposition = [-0.75, 0]\nvelocity = [0, -0.5]\nradius = 0.01\n'
@@ -138,8 +142,8 @@ def test_attraction_between_two_that_move_counts_once() -> None:
     ],
     ids=["spring", "Kepler", "pair"],
 )
-def test_energy_stays_within_the_bands_of_the_scheme(engine: str, text: str, band: float) -> None:
+def test_energy_stays_within_the_band_of_the_scheme(engine: str, text: str, band: float) -> None:
     scene = loads(f"[world]\nduration = 6.0\n[solver]\ndt = 0.001\nrecord_every = 10\n{text}")
     found = energies(run(scene, engine, audit=False), scene)
-    assert np.ptp(found.kinetic) > 5.0 * band  # else the band would hold of a potential left out
+    assert np.ptp(found.kinetic) > 5.0 * band  # otherwise the band would hold without the potential too
     assert np.abs(found.total - found.total[0]).max() < band

@@ -1,4 +1,4 @@
-"""Errors: a known offset is found as it is."""
+"""Trajectory errors, measured on runs with known offsets."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ MOVING = ~SCENE.bodies.fixed
 def test_known_offset_is_the_error() -> None:
     truth = run_of(SCENE)
     position, velocity = truth.position.copy(), truth.velocity.copy()
-    position[:, 0] += (3.0, 4.0)  # 5 m away; the other ball is where it should be
+    position[:, 0] += (3.0, 4.0)  # 5 m away; the other ball has no error
     velocity[:, 1, 0] += 2.0
     found = errors(run_of(SCENE, position, velocity=velocity), truth, MOVING)
     score = found.until(2.0)
@@ -24,7 +24,7 @@ def test_known_offset_is_the_error() -> None:
     assert found.position.tolist() == [5.0] * 21
 
 
-def test_only_frames_up_to_the_end_count() -> None:
+def test_only_frames_up_to_the_given_time_count() -> None:
     truth = run_of(SCENE)
     position = truth.position.copy()
     position[:, 0, 1] += np.arange(21) * 0.25
@@ -43,7 +43,7 @@ def test_fixed_bodies_do_not_count() -> None:
     assert errors(run_of(SCENE, position), truth, MOVING).until(2.0).max_position == 0.0
 
 
-def test_retired_bodies_count_only_while_both_have_them() -> None:
+def test_retired_bodies_count_only_while_present_in_both_runs() -> None:
     truth = run_of(SCENE, retired=np.array([1.0, np.nan, np.nan]))
     position = truth.position.copy()
     position[truth.time >= 1.0, 0] = np.nan
@@ -53,7 +53,7 @@ def test_retired_bodies_count_only_while_both_have_them() -> None:
     assert found.count.tolist() == [2.0] * 10 + [1.0] * 11
 
 
-def test_state_that_is_no_number_is_infinitely_off() -> None:
+def test_nan_position_has_infinite_error() -> None:
     truth = run_of(SCENE)
     position = truth.position.copy()
     position[5:, 0] = np.nan
@@ -62,7 +62,7 @@ def test_state_that_is_no_number_is_infinitely_off() -> None:
     assert found.first_above(1.0, 2.0) == truth.time[5]
 
 
-def test_frames_of_different_steps_meet_where_they_coincide() -> None:
+def test_common_frames_of_different_steps_are_those_of_equal_time() -> None:
     truth, fine = run_of(SCENE), run_of(SCENE, time=np.append(np.arange(40) * 0.05, 2.0))
     mine, its = common_frames(fine, truth)
     assert mine.tolist() == list(range(0, 41, 2))
@@ -72,9 +72,9 @@ def test_frames_of_different_steps_meet_where_they_coincide() -> None:
 
 
 def test_run_without_frames_has_no_score() -> None:
-    none = run_of(SCENE, position=np.empty((0, 3, 2)), time=np.empty(0))
-    assert errors(none, run_of(SCENE), MOVING).until(2.0) == (None, None, None, None)
+    empty = run_of(SCENE, position=np.empty((0, 3, 2)), time=np.empty(0))
+    assert errors(empty, run_of(SCENE), MOVING).until(2.0) == (None, None, None, None)
 
 
-def test_scene_in_which_nothing_moves_has_no_score() -> None:
+def test_scene_without_moving_bodies_has_no_score() -> None:
     assert errors(run_of(SCENE), run_of(SCENE), np.zeros(3, dtype=bool)).until(2.0) == (None, None, None, None)

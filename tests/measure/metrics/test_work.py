@@ -1,4 +1,4 @@
-"""Work: counted, not timed, so that a change which makes an engine do more of it is seen without a clock."""
+"""Work counters of the engines: a change that makes an engine do more work is detected without timing."""
 
 import json
 import os
@@ -14,9 +14,9 @@ from sandbox.engines.switching import start
 from sandbox.scene.files.shipped_scenes import find
 
 SLACK = 1.02
-"""Contacts come and go by rounding, which a processor's libraries may do otherwise; a percent in the largest pile."""
+"""Contacts begin and end by rounding, which depends on the math library: a percent of work in the largest pile."""
 
-WATCHED = {
+EXPECTED_WORK = {
     ("gas", 0.5, "pymunk"): {"substeps": 100, "contact_iterations": 570},
     ("gas", 0.5, "reference"): {"broad_tests": 12_886, "pair_tests": 90_940, "contact_iterations": 980},
     ("gas", 0.5, "exact"): {"events": 57, "predictions": 325, "pair_tests": 74_425},
@@ -28,7 +28,7 @@ WATCHED = {
     ("hanging_chain", 0.1, "reference"): {"pair_tests": 0, "joint_iterations": 28_800},
     ("sparks", 0.5, "reference"): {"broad_tests": 0, "pair_tests": 61_200, "contact_iterations": 3_640},
 }
-"""Scene, s of it, engine: how much of what it did when this was last looked at."""
+"""Scene, duration in s and engine: its work counters at the last update."""
 
 NAMES = {
     "substeps",
@@ -52,7 +52,7 @@ def work_of(name: str, seconds: float, engine: str) -> Mapping[str, int]:
 
 
 @pytest.mark.parametrize("name", ["two_balls", "pendulum_90", "newtons_cradle"])
-def test_counters_have_the_same_names_everywhere(name: str) -> None:
+def test_engines_use_common_names_of_counters(name: str) -> None:
     counted = {"pymunk": {"substeps", "contacts", "contact_iterations", "joint_iterations"}}
     counted |= {"reference": NAMES - {"events", "predictions"}, "exact": {"events", "predictions", "pair_tests"}}
     for engine, names in counted.items():
@@ -60,8 +60,8 @@ def test_counters_have_the_same_names_everywhere(name: str) -> None:
             assert set(work_of(name, 0.5, engine)) == names
 
 
-def test_two_balls_that_meet_once_cost_what_can_be_counted_by_hand() -> None:
-    # 500 substeps of 1 ms, one pair looked at in each and at the start, one impact of 10 passes.
+def test_work_of_a_single_collision_equals_a_hand_count() -> None:
+    # 500 substeps of 1 ms, one pair tested in each and at the start, one impact of 10 iterations.
     assert work_of("two_balls", 0.5, "reference") == {
         "substeps": 500,
         "broad_tests": 0,
@@ -72,32 +72,32 @@ def test_two_balls_that_meet_once_cost_what_can_be_counted_by_hand() -> None:
     }
     native = {"substeps": 500, "contacts": 1, "contact_iterations": 10, "joint_iterations": 0}
     assert work_of("two_balls", 0.5, "pymunk") == native
-    # Both look ahead at the start and after the impact, each at a list of two.
+    # Both balls predict at the start and after the impact, each over a list of two.
     assert work_of("two_balls", 0.5, "exact") == {"events": 1, "predictions": 4, "pair_tests": 8}
 
 
-def test_a_blow_through_five_balls_is_four_events_and_two_predictions_after_each() -> None:
+def test_impact_through_five_balls_is_four_events_with_two_predictions_each() -> None:
     assert work_of("newtons_cradle", 0.5, "exact") == {"events": 4, "predictions": 5 + 2 * 4, "pair_tests": 13 * 5}
 
 
-def test_a_joint_is_visited_once_a_pass_and_twice_where_it_is_held_twice() -> None:
+def test_joint_is_solved_once_per_iteration_and_twice_by_rattle() -> None:
     for engine in ("pymunk", "reference"):
         assert work_of("pendulum_90", 0.5, engine)["joint_iterations"] == 500 * 10
     scene = load(find("pendulum_90"), [("world.duration", 0.5)])
     visits = {
-        how: run(scene, "reference", audit=False, joints=how).info["work"]["joint_iterations"]
-        for how in ("relaxation", "xpbd", "rattle")
+        method: run(scene, "reference", audit=False, joints=method).info["work"]["joint_iterations"]
+        for method in ("relaxation", "xpbd", "rattle")
     }
     assert visits == {"relaxation": 5000, "xpbd": 5000, "rattle": 10_000}
 
 
-def test_a_last_substep_that_is_cut_short_counts() -> None:
+def test_shortened_last_substep_is_counted() -> None:
     scene = load(find("two_balls"), [("world.duration", 0.0125), ("solver.substeps", 4)])
     for engine in ("pymunk", "reference"):
         assert run(scene, engine, audit=False).info["work"]["substeps"] == 12 * 4 + 2
 
 
-def test_pymunk_counts_contacts_only_while_somebody_asks_for_them() -> None:
+def test_pymunk_counts_contacts_only_after_they_are_requested() -> None:
     scene = load(find("pile"))
     simulation = start(scene, "pymunk")
     for _ in range(20):
@@ -108,22 +108,22 @@ def test_pymunk_counts_contacts_only_while_somebody_asks_for_them() -> None:
     assert simulation.work["contact_iterations"] == simulation.work["contacts"] * scene.solver.iterations > 0
 
 
-@pytest.mark.parametrize(("name", "seconds", "engine"), WATCHED, ids=str)
-def test_work_is_no_more_than_it_was(name: str, seconds: float, engine: str) -> None:
+@pytest.mark.parametrize(("name", "seconds", "engine"), EXPECTED_WORK, ids=str)
+def test_work_is_within_the_expected_amount(name: str, seconds: float, engine: str) -> None:
     found = work_of(name, seconds, engine)
-    allowed = WATCHED[name, seconds, engine]
-    assert {key: found[key] for key, most in allowed.items() if found[key] > SLACK * most} == {}
-    # Far less is good news, and a reason to lower what is allowed.
-    assert {key: found[key] for key, most in allowed.items() if found[key] < most / SLACK} == {}
+    expected = EXPECTED_WORK[name, seconds, engine]
+    assert {key: found[key] for key, amount in expected.items() if found[key] > SLACK * amount} == {}
+    # Far less work is an improvement: lower the expected amount.
+    assert {key: found[key] for key, amount in expected.items() if found[key] < amount / SLACK} == {}
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference", "exact"])
-def test_work_is_the_same_at_every_repeat(engine: str) -> None:
+def test_work_is_the_same_in_every_run(engine: str) -> None:
     scene = load(find("gas"), [("world.duration", 0.5)])
     assert run(scene, engine, audit=False).info["work"] == work_of("gas", 0.5, engine)
 
 
-def test_work_is_the_same_compiled_or_not() -> None:
+def test_work_does_not_depend_on_compilation() -> None:
     code = """
         import json
         from sandbox import load, run

@@ -1,4 +1,4 @@
-"""Gaps of zones: how far a centre is outside; and notes are no collisions for whoever counts them."""
+"""Clearance of zones is the distance of a centre outside of them; zone events are not counted as collisions."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def test_gap_is_the_distance_of_the_centre_from_the_zone() -> None:
         assert found == pytest.approx(expected, abs=1e-12)  # rounding
 
 
-def test_notes_are_no_collisions() -> None:
+def test_zone_events_are_not_collisions() -> None:
     ball = {"position": [0, 0], "velocity": [1, 0], "radius": 0.1, "restitution": 1.0}
     zones = [{"position": [0.5, 0], "radius": 0.2}, {"position": [0.8, 0], "radius": 0.2, "to_layer": "up"}]
     wall = {"points": [[2, -1], [2, 1]], "layers": ["up"]}
@@ -33,16 +33,18 @@ def test_notes_are_no_collisions() -> None:
     run = sandbox.run(scene)
     assert are_collisions(run).tolist() == [False, False, True]
     assert collisions(run) == 1
-    assert momentum_drift(run, scene) == pytest.approx(0.0, abs=1e-12)  # the wall's impulse explains all
+    assert momentum_drift(run, scene) == pytest.approx(
+        0.0, abs=1e-12
+    )  # the impulse of the wall explains the whole change
     shared = share_layer(run, scene, (0, -1))
     assert shared.tolist() == (run.layer[:, 0] == 1).tolist()
 
 
-def test_a_scene_spelled_out_keeps_layers_and_zones() -> None:
+def test_scene_with_expanded_generators_keeps_layers_and_zones() -> None:
     grid = {"origin": [0, 0], "columns": 2, "spacing": [1, 1], "radius": 0.1, "layer": "up"}
     zone = {"position": [0.5, 0], "radius": 0.2, "layers": ["up"]}
     scene = from_document({"grid": [grid], "zone": [zone], "ball": [{"position": [0, 3], "radius": 0.1}]})
-    written = from_document(expand_generators(scene).document)
-    layers = dict(zip(written.bodies.names, written.bodies.layer.tolist(), strict=True))
+    expanded = from_document(expand_generators(scene).document)
+    layers = dict(zip(expanded.bodies.names, expanded.bodies.layer.tolist(), strict=True))
     assert layers == dict(zip(scene.bodies.names, scene.bodies.layer.tolist(), strict=True))
-    assert len(written.zones) == 1
+    assert len(expanded.zones) == 1

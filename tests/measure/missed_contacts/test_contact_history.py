@@ -5,32 +5,32 @@ from sandbox.measure.missed_contacts.contact_history import ContactHistory
 PAIRS = np.array([[3, 7], [0, -1], [999_999, -1_000_000], [5, 6]])
 
 
-def test_a_pair_is_found_at_its_own_look_only():
-    looks = ContactHistory()
-    looks.add(PAIRS[:2])
-    looks.add(PAIRS[2:])
+def test_pair_is_found_in_its_own_step_only():
+    history = ContactHistory()
+    history.add(PAIRS[:2])
+    history.add(PAIRS[2:])
     when = np.array([0, 1, 0, 1])
-    assert looks.found(when, PAIRS[[0, 0, 2, 2]]).tolist() == [True, False, False, True]
+    assert history.found(when, PAIRS[[0, 0, 2, 2]]).tolist() == [True, False, False, True]
 
 
-def test_nothing_is_found_at_a_look_without_contacts():
-    looks = ContactHistory()
-    looks.add(np.empty((0, 2), np.int64))
-    assert looks.found(np.zeros(4, np.int64), PAIRS).tolist() == [False] * 4
+def test_no_pair_is_found_in_a_step_without_contacts():
+    history = ContactHistory()
+    history.add(np.empty((0, 2), np.int64))
+    assert history.found(np.zeros(4, np.int64), PAIRS).tolist() == [False] * 4
 
 
-def test_neighbouring_numbers_are_not_taken_for_each_other():
-    looks = ContactHistory()
-    looks.add(np.array([[1, 0], [0, 5]]))
-    asked = np.array([[0, 1], [1, -1], [0, 4], [0, 6], [0, 5]])
-    assert looks.found(np.zeros(5, np.int64), asked).tolist() == [False] * 4 + [True]
+def test_pairs_with_adjacent_indices_are_distinguished():
+    history = ContactHistory()
+    history.add(np.array([[1, 0], [0, 5]]))
+    pairs = np.array([[0, 1], [1, -1], [0, 4], [0, 6], [0, 5]])
+    assert history.found(np.zeros(5, np.int64), pairs).tolist() == [False] * 4 + [True]
 
 
-def test_the_last_look_is_kept_and_what_was_added_is_a_copy():
-    looks, pairs = ContactHistory(), PAIRS.copy()
-    looks.add(PAIRS[:1])
-    looks.add(pairs)
+def test_forget_keeps_the_last_step_and_add_copies_its_pairs():
+    history, pairs = ContactHistory(), PAIRS.copy()
+    history.add(PAIRS[:1])
+    history.add(pairs)
     pairs[:] = 0
-    looks.forget()
-    assert len(looks) == 1
-    assert looks.found(np.zeros(4, np.int64), PAIRS).all()
+    history.forget()
+    assert len(history) == 1
+    assert history.found(np.zeros(4, np.int64), PAIRS).all()

@@ -26,7 +26,7 @@ def pairs(*rows):
 
 
 def step(scene, ends, touching=NOTHING, before=None):
-    """Return who is missed when the balls go from where the scene has them to `ends` in one substep."""
+    """Return the missed pairs of a substep that moves the balls from their initial positions to `ends`."""
     audit, start = Audit(scene), scene.bodies.position
     if before is not None:
         audit(0.0, start, start, before)
@@ -34,38 +34,40 @@ def step(scene, ends, touching=NOTHING, before=None):
     return audit.pairs.tolist()
 
 
-def overlaps(scene, place):
-    """Look as a discrete engine does: which pairs overlap, by the plainest arithmetic."""
+def overlaps(scene, position):
+    """Return the overlapping pairs by plain arithmetic, as a discrete engine finds them."""
     radius, found = scene.bodies.radius, []
-    for i in range(len(place)):
-        others = range(i + 1, len(place))
-        found += [(i, j) for j in others if math.dist(place[i], place[j]) < radius[i] + radius[j]]
+    for i in range(len(position)):
+        others = range(i + 1, len(position))
+        found += [(i, j) for j in others if math.dist(position[i], position[j]) < radius[i] + radius[j]]
         for k, thing in enumerate(scene.fixed):
             if isinstance(thing, Plane):
-                deep = np.dot(place[i] - thing.point, thing.normal) < radius[i]
+                overlapping = np.dot(position[i] - thing.point, thing.normal) < radius[i]
             elif isinstance(thing, Post):
-                deep = math.dist(place[i], thing.position) < radius[i] + thing.radius
+                overlapping = math.dist(position[i], thing.position) < radius[i] + thing.radius
             else:
                 ends = thing.points + thing.points[: thing.closed]
-                deep = any(to_segment(place[i], a, b) < radius[i] + thing.thickness / 2 for a, b in pairwise(ends))
-            if deep:
+                overlapping = any(
+                    distance_to_segment(position[i], a, b) < radius[i] + thing.thickness / 2 for a, b in pairwise(ends)
+                )
+            if overlapping:
                 found.append((i, -1 - k))
     return pairs(*found)
 
 
-def to_segment(p, a, b):
+def distance_to_segment(p, a, b):
     a, b = np.array(a), np.array(b)
-    share = np.clip(np.dot(p - a, b - a) / np.dot(b - a, b - a), 0, 1)
-    return np.linalg.norm(p - a - share * (b - a))
+    fraction = np.clip(np.dot(p - a, b - a) / np.dot(b - a, b - a), 0, 1)
+    return np.linalg.norm(p - a - fraction * (b - a))
 
 
 def fly(scene, velocity, steps):
-    """Let the balls fly straight, through everything, and audit an engine that looks after each substep."""
-    audit, place = Audit(scene), scene.bodies.position
+    """Move the balls in straight lines, and audit an engine that detects overlaps after each substep."""
+    audit, position = Audit(scene), scene.bodies.position
     for k in range(steps):
-        after = place + velocity
-        audit(float(k), place, after, overlaps(scene, after))
-        place = after
+        after = position + velocity
+        audit(float(k), position, after, overlaps(scene, after))
+        position = after
     return audit
 
 
@@ -73,7 +75,7 @@ def fly(scene, velocity, steps):
 
 
 @pytest.mark.parametrize("ratio", [0.5, 0.99, 1.2, 2.0, 10.0, 100.0])
-def test_wall_misses_as_often_as_the_formula_says(ratio):
+def test_wall_is_missed_with_the_probability_of_the_formula(ratio):
     # P(miss) = max(0, 1 − (r + w/2) / (v·h)) over all phases
     radius, count = 0.1, 400
     jump = ratio * (radius + 0.01)
@@ -81,21 +83,21 @@ def test_wall_misses_as_often_as_the_formula_says(ratio):
     for phase in (np.arange(count) + 0.5) / count:
         scene = Scene(balls=(ball(-0.11 - phase * jump - jump, radius=radius),), walls=(WALL,))
         missed += len(fly(scene, np.array([[jump, 0.0]]), 4).times)
-    assert missed / count == pytest.approx(max(0.0, 1 - 1 / ratio), abs=2 / count)  # the phases' own grain
+    assert missed / count == pytest.approx(max(0.0, 1 - 1 / ratio), abs=2 / count)  # the resolution of the phases
 
 
 @pytest.mark.parametrize("touching", [pairs((0, -1)), NOTHING])
-def test_wall_passed_is_missed_once_whether_or_not_the_engine_sees_the_far_side(touching):
+def test_passed_wall_is_missed_once_even_if_detected_on_the_far_side(touching):
     audit = Audit(scene := Scene(balls=(ball(-0.2),), walls=(WALL,)))
-    places = [np.array([[x, 0.0]]) for x in (-0.2, 0.05, 0.08, 0.3, 0.6)]
+    positions = [np.array([[x, 0.0]]) for x in (-0.2, 0.05, 0.08, 0.3, 0.6)]
     for k in range(4):
-        audit(float(k), places[k], places[k + 1], touching if k < 2 else NOTHING)
+        audit(float(k), positions[k], positions[k + 1], touching if k < 2 else NOTHING)
     assert audit.pairs.tolist() == [[0, -1]]
     assert audit.times.tolist() == [0.0]
-    assert len(overlaps(scene, places[1]))
+    assert len(overlaps(scene, positions[1]))
 
 
-def test_wall_seen_in_time_is_not_missed():
+def test_wall_detected_in_time_is_not_missed():
     scene = Scene(balls=(ball(-0.2),), walls=(WALL,))
     assert step(scene, [(-0.05, 0.0)], pairs((0, -1))) == []
     assert step(scene, [(-0.05, 0.0)], NOTHING) == [[0, -1]]
@@ -107,38 +109,38 @@ def test_wall_in_contact_before_is_not_clear():
     assert step(scene, [(0.3, 0.0)], before=pairs((0, -2))) == [[0, -1]]
 
 
-def test_wall_laid_out_to_touch_counts_as_clear():
+def test_wall_that_touches_initially_counts_as_clear():
     # 0.3 − 0.1·3 is not 0: the gap may be −5e-17
     wall = Wall(points=((0.3, -1.0), (0.3, 1.0)))
     assert step(Scene(balls=(ball(0.1 + 0.1 - 1e-16),), walls=(wall,)), [(0.9, 0.0)]) == [[0, -1]]
 
 
-def test_wall_is_not_missed_by_who_passes_its_end():
+def test_wall_is_not_missed_by_a_ball_that_passes_its_end():
     scene = Scene(balls=(ball(-0.5, 1.12),), walls=(WALL,))
     assert step(scene, [(0.5, 1.12)]) == []
 
 
-def test_wall_end_grazed_is_missed_like_a_post():
+def test_grazed_end_of_a_wall_is_missed_like_a_post():
     assert step(Scene(balls=(ball(-0.5, 1.05),), walls=(WALL,)), [(0.5, 1.05)]) == [[0, -1]]
-    past = [(0.03, 1.05)]  # still in contact, but past the end's centre
+    past = [(0.03, 1.05)]  # still in contact, but past the centre of the end
     assert step(Scene(balls=(ball(-0.5, 1.05),), walls=(WALL,)), past, pairs((0, -1))) == [[0, -1]]
     short = [(-0.03, 1.05)]
     assert step(Scene(balls=(ball(-0.5, 1.05),), walls=(WALL,)), short, pairs((0, -1))) == []
 
 
-def test_polyline_is_one_thing_however_many_segments_are_passed():
+def test_polyline_is_missed_once_for_any_number_of_segments():
     fence = Wall(points=((0.0, -1.0), (0.0, 0.01), (0.1, -1.0), (0.1, 1.0)))
     assert step(Scene(balls=(ball(-0.5),), walls=(fence,)), [(0.5, 0.0)]) == [[0, -1]]
 
 
-def test_polyline_rolled_along_is_not_missed_at_its_joints():
+def test_rolling_along_a_polyline_misses_none_of_its_joints():
     floor = Wall(points=tuple((x / 2, 0.0) for x in range(8)))
     scene = Scene(balls=(ball(0.3, 0.0995),), walls=(floor,))
     end = [(0.95, 0.0995)]
     assert step(scene, end, pairs((0, -1)), before=pairs((0, -1))) == []
 
 
-def test_polyline_left_through_its_side_is_missed_by_who_rests_on_its_floor():
+def test_ball_resting_on_a_polyline_misses_its_passed_side():
     box = Wall(points=((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (0.0, 2.0)), closed=True)
     scene = Scene(balls=(ball(1.0, 0.0995),), walls=(box,))
     assert step(scene, [(2.5, 0.0995)], before=pairs((0, -1))) == [[0, -1]]
@@ -150,7 +152,7 @@ def test_polyline_crossed_exactly_at_a_joint_is_missed():
     assert step(Scene(balls=(ball(-0.5),), walls=(fence,)), [(0.05, 0.0)], pairs((0, -1))) == [[0, -1]]
 
 
-def test_many_walls_and_bodies_are_told_apart():
+def test_many_walls_and_bodies_are_distinguished():
     walls = tuple(Wall(points=((float(x), -1.0), (float(x), 400.0))) for x in range(1, 60))
     balls = tuple(ball(0.5, 1.0 + y) for y in range(300))
     scene = Scene(balls=balls, walls=walls)
@@ -163,9 +165,9 @@ def test_many_walls_and_bodies_are_told_apart():
 
 
 @pytest.mark.parametrize("as_ball", [True, False])
-def test_post_and_fixed_ball_are_missed_alike(as_ball):
-    still = {"balls": (ball(-1.0), ball(0.0, fixed=True))} if as_ball else {"balls": (ball(-1.0),)}
-    scene = Scene(**still, posts=() if as_ball else (Post(position=(0.0, 0.0), radius=0.1),))
+def test_post_and_fixed_ball_are_missed_equally(as_ball):
+    shapes = {"balls": (ball(-1.0), ball(0.0, fixed=True))} if as_ball else {"balls": (ball(-1.0),)}
+    scene = Scene(**shapes, posts=() if as_ball else (Post(position=(0.0, 0.0), radius=0.1),))
     rest = [(0.0, 0.0)] if as_ball else []
     other = 1 if as_ball else -1
     assert step(scene, [(1.0, 0.0), *rest]) == [[0, other]]
@@ -173,24 +175,24 @@ def test_post_and_fixed_ball_are_missed_alike(as_ball):
     assert step(scene, [(-0.05, 0.0), *rest], pairs((0, other))) == []
 
 
-def test_plane_is_missed_only_deeper_than_its_backing_or_unseen():
+def test_plane_is_missed_only_below_its_backing_or_undetected():
     scene = Scene(planes=(Plane(point=(0.0, 0.0), normal=(0.0, 3.0)),), balls=(ball(0.0, 5.0),))
-    seen = pairs((0, -1))
-    assert step(scene, [(0.0, -BACKING + 1)], seen) == []
-    assert step(scene, [(0.0, -BACKING - 1)], seen) == [[0, -1]]
+    detected = pairs((0, -1))
+    assert step(scene, [(0.0, -BACKING + 1)], detected) == []
+    assert step(scene, [(0.0, -BACKING - 1)], detected) == [[0, -1]]
     assert step(scene, [(0.0, -3 * BACKING)]) == [[0, -1]]
     assert step(scene, [(0.0, 0.1 * (1 - 2 * TOLERANCE))]) == [[0, -1]]
     assert step(scene, [(0.0, 0.1)]) == []
 
 
-def test_plane_counts_one_passage_once():
+def test_plane_is_missed_once_per_passage():
     audit = Audit(Scene(planes=(Plane(point=(0.0, 0.0), normal=(0.0, 1.0)),), balls=(ball(0.0, 5.0),)))
     for k in range(5):
         audit(float(k), np.array([[0.0, 5.0 - 800 * k]]), np.array([[0.0, 5.0 - 800 * (k + 1)]]), NOTHING)
     assert audit.times.tolist() == [0.0]
 
 
-def test_fixed_things_bear_their_numbers_in_scene_order():
+def test_fixed_shapes_are_indexed_in_scene_order():
     scene = Scene(
         planes=(Plane(point=(0.0, -9e3), normal=(0.0, 1.0)), Plane(point=(2.0, 0.0), normal=(-1.0, 0.0))),
         walls=(Wall(points=((0.9, 5.0), (0.9, 6.0))), Wall(points=((1.0, -1.0), (1.0, 1.0)))),
@@ -215,11 +217,11 @@ def test_balls_that_graze_are_missed_when_deeper_than_the_tolerance(depth, count
     assert len(step(Scene(balls=(ball(-1.0), ball(0.0, offset))), [(1.0, 0.0), (0.0, offset)])) == count
 
 
-def test_balls_seen_late_are_missed_and_in_time_are_not():
+def test_balls_are_missed_only_if_detected_late():
     scene = Scene(balls=(ball(-1.0), ball(0.0, 0.15)))
-    seen = pairs((0, 1))
-    assert step(scene, [(-0.01, 0.0), (0.0, 0.15)], seen) == []
-    assert step(scene, [(0.01, 0.0), (0.0, 0.15)], seen) == [[0, 1]]
+    detected = pairs((0, 1))
+    assert step(scene, [(-0.01, 0.0), (0.0, 0.15)], detected) == []
+    assert step(scene, [(0.01, 0.0), (0.0, 0.15)], detected) == [[0, 1]]
     assert step(scene, [(-0.01, 0.0), (0.0, 0.15)], pairs((0, -1))) == [[0, 1]]
 
 
@@ -229,26 +231,26 @@ def test_balls_in_contact_before_are_not_clear():
     assert step(scene, [(1.0, 0.0), (0.2, 0.0)]) == [[0, 1]]
 
 
-def test_balls_that_move_together_at_any_speed_miss_nothing():
+def test_balls_with_equal_velocity_miss_no_contacts():
     scene = Scene(balls=(ball(0.0), ball(0.201), ball(0.402)))
     assert step(scene, scene.bodies.position + np.array([1e6, 3e5])) == []
 
 
-def test_slow_bounces_miss_nothing():
-    # A ball that bounces between planes, off a discrete look, at 0.3 radii a substep
+def test_slow_bounces_miss_no_contacts():
+    # A ball that bounces between planes by discrete detection, at 0.3 radii a substep
     scene = Scene(
         planes=(Plane(point=(0.0, 0.0), normal=(0.0, 1.0)), Plane(point=(0.0, 1.0), normal=(0.0, -1.0))),
         balls=(ball(0.0, 0.5),),
     )
-    audit, place, velocity, contacts = Audit(scene), np.array([[0.0, 0.5]]), np.array([[0.01, 0.03]]), 0
+    audit, position, velocity, contacts = Audit(scene), np.array([[0.0, 0.5]]), np.array([[0.01, 0.03]]), 0
     for k in range(500):
-        after = place + velocity
+        after = position + velocity
         found = overlaps(scene, after)
         contacts += len(found)
-        audit(float(k), place, after, found)
-        for _, number in found:
-            velocity[0, 1] = abs(velocity[0, 1]) * (1 if number == -1 else -1)
-        place = after
+        audit(float(k), position, after, found)
+        for _, index in found:
+            velocity[0, 1] = abs(velocity[0, 1]) * (1 if index == -1 else -1)
+        position = after
     assert contacts > 10
     assert len(audit.times) == 0
 
@@ -259,20 +261,20 @@ FLAGS = ["all", "fixed", "none"]
 @pytest.mark.parametrize("one", FLAGS)
 @pytest.mark.parametrize("other", FLAGS)
 @pytest.mark.parametrize("fixed", [False, True])
-def test_only_what_can_meet_is_missed(one, other, fixed):
+def test_only_pairs_that_can_collide_are_missed(one, other, fixed):
     balls = (ball(-1.0, collides=one), ball(0.0, collides=other, fixed=fixed))
-    can_meet = (other == "all" and one != "none") if fixed else (one == other == "all")
+    can_collide = (other == "all" and one != "none") if fixed else (one == other == "all")
     scene = Scene(balls=balls, posts=(Post(position=(0.5, 0.0), radius=0.1),))
-    expected = [[0, -1]] * (one != "none") + [[0, 1]] * can_meet
+    expected = [[0, -1]] * (one != "none") + [[0, 1]] * can_collide
     assert step(scene, [(1.0, 0.0), (0.0, 0.0)]) == expected
 
 
-def test_two_fixed_balls_never_meet():
+def test_two_fixed_balls_are_not_missed():
     scene = Scene(balls=(ball(0.0, fixed=True), ball(1.0, fixed=True), ball(9.0)))
     assert step(scene, [(2.0, 0.0), (1.0, 0.0), (9.0, 0.0)]) == []
 
 
-def test_numbers_hold_behind_particles_that_meet_nothing():
+def test_indices_are_correct_behind_particles_without_collisions():
     spark = Emitter(position=(0.0, 0.0), count=3, velocity_min=(0.0, 0.0), velocity_max=(1.0, 1.0))
     sparks = tuple(ball(0.0, collides="none") for _ in range(5))
     scene = Scene(balls=(*sparks, ball(-1.0), ball(0.0)), walls=(WALL,), emitters=(spark,))
@@ -281,22 +283,22 @@ def test_numbers_hold_behind_particles_that_meet_nothing():
     assert step(scene, ends) == [[5, -1], [5, 6]]
 
 
-# ---- who is gone, who joins, what is refused ----
+# ---- retired and added bodies, rejected arguments ----
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e200])
-def test_bodies_that_are_gone_miss_nothing_and_hide_nobody(value):
+def test_non_finite_bodies_miss_nothing_and_affect_no_others(value):
     scene = Scene(balls=(ball(-1.0), ball(0.0), ball(-1.0, 0.5)), walls=(WALL,))
-    gone = [(value, value), (0.0, 0.0), (1.0, 0.5)]
-    assert step(scene, gone) == [[2, -1]]
+    invalid = [(value, value), (0.0, 0.0), (1.0, 0.5)]
+    assert step(scene, invalid) == [[2, -1]]
     audit = Audit(scene)
-    audit(0.0, scene.bodies.position, np.array(gone), NOTHING)
-    audit(1.0, np.array(gone), np.array(gone), NOTHING)
-    audit(2.0, np.array(gone), scene.bodies.position, NOTHING)
+    audit(0.0, scene.bodies.position, np.array(invalid), NOTHING)
+    audit(1.0, np.array(invalid), np.array(invalid), NOTHING)
+    audit(2.0, np.array(invalid), scene.bodies.position, NOTHING)
     assert audit.pairs.tolist() == [[2, -1], [2, -1]]
 
 
-def test_bullet_that_is_gone_afterwards_is_counted_before():
+def test_miss_of_a_bullet_counts_although_it_vanishes_afterwards():
     scene = Scene(balls=(ball(-1.0), ball(0.0)))
     audit, start = Audit(scene), scene.bodies.position
     after = np.array([(500.0, 0.0), (0.0, 0.0)])
@@ -307,7 +309,7 @@ def test_bullet_that_is_gone_afterwards_is_counted_before():
     assert audit.pairs.tolist() == [[0, 1]]
 
 
-def test_spawned_bodies_join():
+def test_spawned_bodies_are_audited():
     scene = Scene(balls=(ball(-1.0),))
     audit = Audit(scene)
     audit(0.0, np.array([[-1.0, 0.0]]), np.array([[-1.0, 0.0]]), NOTHING)
@@ -320,7 +322,7 @@ def test_spawned_bodies_join():
     assert audit.missed()[1].tolist() == [[0, 1]]
 
 
-def test_a_joining_body_does_not_make_others_forget_their_contacts():
+def test_spawned_body_does_not_clear_the_contacts_of_others():
     scene = Scene(balls=(ball(0.0), ball(0.2)))
     audit = Audit(scene)
     audit(0.0, scene.bodies.position, scene.bodies.position, pairs((0, 1)))
@@ -330,14 +332,14 @@ def test_a_joining_body_does_not_make_others_forget_their_contacts():
     assert len(audit.times) == 0
 
 
-def test_a_scene_without_bodies_is_audited():
+def test_scene_without_bodies_can_be_audited():
     audit = Audit(Scene(walls=(WALL,)))
     audit(0.0, np.empty((0, 2)), np.empty((0, 2)), NOTHING)
     assert audit.times.shape == (0,)
     assert audit.pairs.shape == (0, 2)
 
 
-def test_the_engine_may_reuse_its_arrays():
+def test_engine_may_reuse_its_arrays():
     scene = Scene(balls=(ball(-1.0), ball(0.0)))
     start, end, touching = scene.bodies.position.copy(), np.array([[1.0, 0.0], [0.0, 0.0]]), pairs((0, 1))
     audit = Audit(scene)
@@ -346,26 +348,26 @@ def test_the_engine_may_reuse_its_arrays():
     assert audit.pairs.tolist() == [[0, 1]]
 
 
-# ---- the whole against all pairs, one by one ----
+# ---- the audit against all pairs, one by one ----
 
 
 def by_definition(scene, start, end, before, after):
-    """Return who is missed among balls and posts, straight from the definition, pair by pair."""
+    """Return the missed pairs of balls and posts by the definition, pair by pair."""
     radius, found = scene.bodies.radius, []
     n, posts = len(start), scene.posts
-    known, seen = {tuple(p) for p in before.tolist()}, {tuple(p) for p in after.tolist()}
+    known, detected = {tuple(p) for p in before.tolist()}, {tuple(p) for p in after.tolist()}
     for i in range(n):
         others = [(j, start[j], end[j], radius[j]) for j in range(i + 1, n)]
         others += [(-1 - k, np.array(p.position), np.array(p.position), p.radius) for k, p in enumerate(posts)]
-        for number, here, there, size in others:
+        for index, here, there, size in others:
             gap, move, contact = here - start[i], there - here - end[i] + start[i], radius[i] + size
             length = np.hypot(*move)
-            if length < JUMP * contact or np.hypot(*gap) < CLEAR * contact or (i, number) in known:
+            if length < JUMP * contact or np.hypot(*gap) < CLEAR * contact or (i, index) in known:
                 continue
-            share = min(max(-(gap @ move) / length**2, 0), 1)
+            fraction = min(max(-(gap @ move) / length**2, 0), 1)
             late = (gap + move) @ move >= 0
-            if np.hypot(*(gap + share * move)) < DEEP * contact and (late or (i, number) not in seen):
-                found.append([i, number])
+            if np.hypot(*(gap + fraction * move)) < DEEP * contact and (late or (i, index) not in detected):
+                found.append([i, index])
     return sorted(found)
 
 
@@ -376,14 +378,14 @@ def test_gas_is_audited_by_the_definition(seed, speed, count):
     posts = tuple(Post(position=(x, y), radius=0.05) for x, y in rng.random((3, 2)).tolist())
     scene = Scene(balls=balls, posts=posts)
     audit, expected, before = Audit(scene), [], NOTHING
-    place, velocity = scene.bodies.position, rng.normal(size=(count, 2)) * speed
+    position, velocity = scene.bodies.position, rng.normal(size=(count, 2)) * speed
     for k in range(20):
-        after = place + velocity
+        after = position + velocity
         found = overlaps(scene, after)
-        found = found[rng.random(len(found)) < 0.8]  # an engine with bad eyes
-        audit(float(k), place, after, found)
-        expected += [[k, *pair] for pair in by_definition(scene, place, after, before, found)]
-        place, before = after, found
+        found = found[rng.random(len(found)) < 0.8]  # an engine that overlooks some contacts
+        audit(float(k), position, after, found)
+        expected += [[k, *pair] for pair in by_definition(scene, position, after, before, found)]
+        position, before = after, found
         velocity[rng.random(count) < 0.2] *= -1
     times, missed = audit.missed()
     assert np.column_stack((times, missed)).tolist() == expected
@@ -398,30 +400,30 @@ def test_order_of_bodies_does_not_matter(seed):
     one = Scene(balls=balls, walls=(WALL,))
     other = Scene(balls=tuple(balls[k] for k in order), walls=(WALL,))
     expected = step(one, one.bodies.position + move)
-    numbered = np.append(order, -1)  # the wall stays −1
+    indices = np.append(order, -1)  # the wall keeps −1
     swapped = [
-        sorted(numbered[pair].tolist(), key=lambda k: (k < 0, k))
+        sorted(indices[pair].tolist(), key=lambda k: (k < 0, k))
         for pair in step(other, other.bodies.position + move[order])
     ]
     assert sorted(swapped) == expected
 
 
-def test_reading_in_between_changes_nothing():
+def test_reading_results_in_between_changes_nothing():
     scene = Scene(balls=tuple(ball(x / 4, (x * 7 % 5) / 4) for x in range(20)), walls=(WALL,))
     velocity = np.random.default_rng(1).normal(size=(20, 2)) * 0.2
-    one, other, place = Audit(scene), Audit(scene), scene.bodies.position
+    one, other, position = Audit(scene), Audit(scene), scene.bodies.position
     for k in range(50):
-        after = place + velocity
-        one(float(k), place, after, found := overlaps(scene, after))
-        other(float(k), place, after, found)
+        after = position + velocity
+        one(float(k), position, after, found := overlaps(scene, after))
+        other(float(k), position, after, found)
         other.missed()
-        place = after
+        position = after
     assert len(one.times) > 3
     assert one.pairs.tolist() == other.pairs.tolist()
     assert one.times.tolist() == other.times.tolist()
 
 
-def test_a_bullet_of_a_million_metres_meets_those_on_its_line_only():
+def test_bullet_over_a_million_metres_misses_only_balls_on_its_line():
     columns = np.arange(1000.0)
     balls = (ball(-5.0), *(ball(x, 0.0 if x % 3 == 0 else 0.3) for x in columns.tolist()))
     scene = Scene(balls=balls)

@@ -1,4 +1,4 @@
-"""The audit of layers: who flies through what is on another layer misses nothing; on its own it does."""
+"""Audit with layers: shapes of another layer are not missed, and those of the same layer are."""
 
 from typing import Any
 
@@ -19,7 +19,7 @@ BULLET: dict[str, Any] = {"position": [0.0, 0.0], "velocity": [70.0, 0.0], "radi
 @both
 @pytest.mark.parametrize("thing", ["wall", "post", "ball"])
 @pytest.mark.parametrize(("layer", "missed"), [("ground", 0), ("up", 1)])
-def test_bullet_misses_what_is_on_its_own_layer(engine: str, thing: str, layer: str, missed: int) -> None:
+def test_bullet_misses_only_shapes_of_its_own_layer(engine: str, thing: str, layer: str, missed: int) -> None:
     more: dict[str, Any] = {"wall": {"wall": [WALL]}, "post": {"post": [POST]}, "ball": {}}[thing]
     balls = [{**BULLET, "layer": layer}, *([TARGET] if thing == "ball" else [])]
     run = sandbox.run(from_document({"world": {"duration": 0.05}, "ball": balls, **more}), engine)
@@ -27,10 +27,10 @@ def test_bullet_misses_what_is_on_its_own_layer(engine: str, thing: str, layer: 
 
 
 @both
-def test_who_has_just_come_to_a_layer_is_audited_there(engine: str) -> None:
-    mouth = {"position": [0.0, 0.0], "radius": 0.05, "to_layer": "up"}
+def test_body_is_audited_on_its_new_layer_after_a_change(engine: str) -> None:
+    zone = {"position": [0.0, 0.0], "radius": 0.05, "to_layer": "up"}
     run = sandbox.run(
-        from_document({"world": {"duration": 0.05}, "ball": [BULLET], "wall": [WALL], "zone": [mouth]}), engine
+        from_document({"world": {"duration": 0.05}, "ball": [BULLET], "wall": [WALL], "zone": [zone]}), engine
     )
     assert run.missed_contacts == 1
 

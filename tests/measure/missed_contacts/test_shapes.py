@@ -1,4 +1,4 @@
-"""Missed contacts of bodies that are no balls: by the largest disc inside, and never of joined pairs."""
+"""Missed contacts of other shapes than balls, by their largest inner disc, and of joined pairs."""
 
 import numpy as np
 import pytest
@@ -10,8 +10,8 @@ from sandbox.trajectory import Trajectory
 WALL = "[[wall]]\nname = 'w'\npoints = [[0, -5], [0, 5]]\n"
 
 
-def shot(body: str, dt: float = 0.1, wall: str = WALL) -> Trajectory:
-    """Shoot a body at 30 m/s from 1.6 m off, 3 m a step: past the wall within the first."""
+def shoot(body: str, dt: float = 0.1, wall: str = WALL) -> Trajectory:
+    """Run a body at 30 m/s from 1.6 m before a wall; at 3 m a step it passes the wall within the first."""
     text = f"[world]\nduration = 0.5\n[solver]\ndt = {dt}\n{wall}{body}\nvelocity = [30, 0]\nname = 'b'\n"
     return run(loads(text))
 
@@ -25,13 +25,13 @@ def shot(body: str, dt: float = 0.1, wall: str = WALL) -> Trajectory:
     ],
     ids=["ball", "box", "capsule"],
 )
-def test_what_passes_a_wall_in_one_step_is_missed_whatever_its_shape(body: str) -> None:
-    found = shot(body)
+def test_wall_passed_in_one_step_is_missed_by_any_shape(body: str) -> None:
+    found = shoot(body)
     assert (found.missed_contacts, found.missed_pair.tolist()) == (1, [[0, -1]])
-    assert shot(body, dt=0.001).missed_contacts == 0
+    assert shoot(body, dt=0.001).missed_contacts == 0
 
 
-def test_body_whose_core_is_zero_is_left_out() -> None:
+def test_body_without_an_inner_disc_is_not_audited() -> None:
     """A horseshoe with its centre of mass in the gap."""
     horseshoe = (
         "[[body]]\nposition = [-1.6, 0]\n[[body.box]]\nsize = [0.1, 1.0]\n"
@@ -45,8 +45,8 @@ def test_body_whose_core_is_zero_is_left_out() -> None:
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
-def test_boxes_that_tumble_into_each_other_slowly_are_no_false_alarm(engine: str) -> None:
-    """A step covers less than any half width, so that nothing can be missed."""
+def test_slowly_tumbling_boxes_miss_no_contacts(engine: str) -> None:
+    """A step covers less than any half width, so that no contact can be missed."""
     rng = np.random.default_rng(3)
     boxes = "".join(
         f"[[box]]\nname = 'b{k}'\nposition = [{x}, {y}]\nangle = {rng.uniform(0, 3):.3f}\nsize = [0.8, 0.3]\n"
@@ -61,8 +61,8 @@ def test_boxes_that_tumble_into_each_other_slowly_are_no_false_alarm(engine: str
 
 
 @pytest.mark.parametrize(("collide", "missed"), [("false", 0), ("true", 1)])
-def test_joined_pair_misses_what_it_may_meet_alone(collide: str, missed: int) -> None:
-    """A heavy ball passes one that it is tied to by a long string, in one step."""
+def test_joined_pair_misses_contacts_only_if_it_can_collide(collide: str, missed: int) -> None:
+    """A ball passes another one, to which a long string connects it, in one step."""
     found = run(
         loads(
             "[world]\nduration = 0.2\n[solver]\ndt = 0.1\n"
@@ -74,7 +74,7 @@ def test_joined_pair_misses_what_it_may_meet_alone(collide: str, missed: int) ->
     assert found.missed_contacts == missed
 
 
-def test_limbs_of_one_figure_pass_each_other_unmissed() -> None:
+def test_limbs_of_a_ragdoll_do_not_miss_each_other() -> None:
     scene = loads(
         "[world]\nduration = 1.0\ngravity = [0, -9.81]\n[solver]\ndt = 0.05\n"
         "[[post]]\nposition = [0.1, -1]\nradius = 0.1\n[[ragdoll]]\nname = 'doll'\nposition = [0, 2]\n"

@@ -4,11 +4,11 @@ import pytest
 from sandbox.measure.missed_contacts.verlet_list import VerletList
 
 
-def everything(i, j):
+def accept_all(i, j):
     return np.ones(len(i), dtype=bool)
 
 
-def encountered(neighbours, start, end, fast):
+def encounters_of(neighbours, start, end, fast):
     when, first, second = neighbours.encounters(start, end, fast)
     assert (first < second).all()
     found = list(zip(when.tolist(), first.tolist(), second.tolist(), strict=True))
@@ -16,14 +16,14 @@ def encountered(neighbours, start, end, fast):
     return set(found)
 
 
-def really(radius, start, end, fast):
-    """Say when which pairs come into contact, from all pairs."""
+def expected_encounters(radius, start, end, fast):
+    """Return (step, body, body) of all encounters, by testing all pairs."""
     i, j = np.triu_indices(len(radius), 1)
     gap = start[:, j] - start[:, i]
     move = end[:, j] - end[:, i] - gap
     length2 = (move**2).sum(axis=2)
-    share = np.clip(-(gap * move).sum(axis=2) / np.where(length2 > 0, length2, 1), 0, 1)
-    near = ((gap + share[..., None] * move) ** 2).sum(axis=2) < (radius[i] + radius[j]) ** 2
+    fraction = np.clip(-(gap * move).sum(axis=2) / np.where(length2 > 0, length2, 1), 0, 1)
+    near = ((gap + fraction[..., None] * move) ** 2).sum(axis=2) < (radius[i] + radius[j]) ** 2
     when, pair = np.nonzero(near & (fast[:, i] | fast[:, j]))
     return set(zip(when.tolist(), i[pair].tolist(), j[pair].tolist(), strict=True))
 
@@ -34,53 +34,55 @@ def really(radius, start, end, fast):
 def test_no_encounter_is_lost_over_many_batches(count, speed, spread):
     rng = np.random.default_rng(count)
     radius = spread ** rng.random(count)
-    place = rng.random((count, 2)) * 3 * np.sqrt(count * np.mean(radius**2))
+    position = rng.random((count, 2)) * 3 * np.sqrt(count * np.mean(radius**2))
     velocity = rng.normal(size=(count, 2)) * speed
     velocity[: max(1, count // 50)] *= 300  # bullets
-    neighbours = VerletList(radius, np.ones(count, dtype=bool), everything)
-    some = 0
+    neighbours = VerletList(radius, np.ones(count, dtype=bool), accept_all)
+    total = 0
     for _ in range(6):
         velocity += rng.normal(size=velocity.shape) * 0.2 * speed
-        way = place + np.arange(9)[:, None, None] * velocity
-        way[5:, 0] += 3.0  # one is moved by hand, in between
-        start, end = way[:-1], way[1:].copy()
+        path = position + np.arange(9)[:, None, None] * velocity
+        path[5:, 0] += 3.0  # one body is moved between two steps
+        start, end = path[:-1], path[1:].copy()
         end[4, 0] -= 3.0
         fast = rng.random((8, count)) < 0.6
-        real = really(radius, start, end, fast)
-        some += len(real)
-        assert real <= encountered(neighbours, start, end, fast)
-        place = way[-1]
-    assert some or count == 2
+        expected = expected_encounters(radius, start, end, fast)
+        total += len(expected)
+        assert expected <= encounters_of(neighbours, start, end, fast)
+        position = path[-1]
+    assert total or count == 2
 
 
-def test_bodies_that_vanish_are_found_until_then():
+def test_encounters_of_a_body_are_found_until_it_vanishes():
     radius = np.ones(300)
-    place = np.stack(np.meshgrid(np.arange(20) * 5.0, np.arange(15) * 5.0), axis=-1).reshape(-1, 2)
-    start = np.repeat(place[None], 4, axis=0)
+    position = np.stack(np.meshgrid(np.arange(20) * 5.0, np.arange(15) * 5.0), axis=-1).reshape(-1, 2)
+    start = np.repeat(position[None], 4, axis=0)
     end = start.copy()
-    end[1, 0] = place[299]  # a bullet across the field …
-    start[2:, 0] = end[2:, 0] = np.nan  # … is gone afterwards
+    end[1, 0] = position[299]  # a bullet across the field …
+    start[2:, 0] = end[2:, 0] = np.nan  # … vanishes afterwards
     fast = np.zeros((4, 300), dtype=bool)
     fast[:, 0] = True
-    found = encountered(VerletList(radius, np.ones(300, dtype=bool), everything), start, end, fast)
-    assert really(radius, start, end, fast) <= found
+    found = encounters_of(VerletList(radius, np.ones(300, dtype=bool), accept_all), start, end, fast)
+    assert expected_encounters(radius, start, end, fast) <= found
     assert (1, 0, 299) in found
 
 
-def test_who_takes_no_part_and_who_cannot_meet_is_left_out():
+def test_non_members_and_filtered_pairs_are_left_out():
     start = np.zeros((1, 4, 2))
     fast = np.ones((1, 4), dtype=bool)
     member = np.array([True, True, True, False])
     neighbours = VerletList(np.ones(4), member, lambda i, j: (i + j) != 3)
-    assert encountered(neighbours, start, start, fast) == {(0, 0, 1), (0, 0, 2)}
+    assert encounters_of(neighbours, start, start, fast) == {(0, 0, 1), (0, 0, 2)}
 
 
 def test_the_list_stays_short_after_bullets():
-    place = np.stack(np.meshgrid(np.arange(40) * 5.0, np.arange(25) * 5.0), axis=-1).reshape(-1, 2)
-    neighbours = VerletList(np.ones(1000), np.ones(1000, dtype=bool), everything)
+    position = np.stack(np.meshgrid(np.arange(40) * 5.0, np.arange(25) * 5.0), axis=-1).reshape(-1, 2)
+    neighbours = VerletList(np.ones(1000), np.ones(1000, dtype=bool), accept_all)
     fast = np.ones((1, 1000), dtype=bool)
     for bullet in range(20):
-        end = place.copy()
+        end = position.copy()
         end[bullet] += 1e6
-        encountered(neighbours, place[None], end[None], fast)
-    assert len(encountered(neighbours, place[None], place[None], fast)) < 10_000  # 20 bullets met 1,000 each
+        encounters_of(neighbours, position[None], end[None], fast)
+    assert (
+        len(encounters_of(neighbours, position[None], position[None], fast)) < 10_000
+    )  # 20 bullets each encountered 1,000 bodies

@@ -1,4 +1,4 @@
-"""Forecasts of breaks on a floor: what is told of racks that touch and of steps that hide grazes, and that it is so."""
+"""Notes on break shots: racks whose balls touch, and steps too long to resolve grazing contacts."""
 
 import math
 from typing import Any
@@ -18,11 +18,11 @@ RADIUS = 0.03
 
 def rack(gap: float, rate: float, rows: int = 3, **more: Any) -> Scene:
     pitch = 2 * RADIUS + gap
-    places = [(0.0, 0.0)]
-    places += [
+    positions = [(0.0, 0.0)]
+    positions += [
         (0.3 + row * pitch * math.sqrt(0.75), (k - row / 2) * pitch) for row in range(rows) for k in range(row + 1)
     ]
-    balls = [{"position": place, "radius": RADIUS, "restitution": 0.95} for place in places]
+    balls = [{"position": position, "radius": RADIUS, "restitution": 0.95} for position in positions]
     return from_document(
         {
             "solver": {"dt": 1.0 / rate},
@@ -34,26 +34,26 @@ def rack(gap: float, rate: float, rows: int = 3, **more: Any) -> Scene:
     )
 
 
-def told(scene: Scene) -> list[str]:
+def note_kinds(scene: Scene) -> list[str]:
     return [note.kind for note in notes(scene)]
 
 
-def test_racks_that_touch_and_long_steps_are_told_of() -> None:
-    assert told(rack(0.0, 1000)) == ["rack"]
-    assert told(rack(1e-4, 1000)) == []
-    assert told(rack(1e-4, 60)) == ["graze"]
-    assert told(rack(1e-4, 60, surface={}, contact_models={})) == []
-    assert told(rack(0.0, 60, rows=1)) == []  # two balls are no break
+def test_touching_racks_and_long_steps_are_noted() -> None:
+    assert note_kinds(rack(0.0, 1000)) == ["rack"]
+    assert note_kinds(rack(1e-4, 1000)) == []
+    assert note_kinds(rack(1e-4, 60)) == ["graze"]
+    assert note_kinds(rack(1e-4, 60, surface={}, contact_models={})) == []
+    assert note_kinds(rack(0.0, 60, rows=1)) == []  # two balls are no break
 
 
-def test_the_step_that_is_told_to_see_all_is_the_longest_without_a_note() -> None:
+def test_recommended_step_is_the_longest_without_a_note() -> None:
     (note,) = notes(rack(1e-4, 60))
     safe = float(note.details["safe_dt"])
-    assert told(rack(1e-4, 1.001 / safe)) == []
-    assert told(rack(1e-4, 0.999 / safe)) == ["graze"]
+    assert note_kinds(rack(1e-4, 1.001 / safe)) == []
+    assert note_kinds(rack(1e-4, 0.999 / safe)) == ["graze"]
 
 
-def ends(gap: float, rate: float) -> FloatArray:
+def final_positions(gap: float, rate: float) -> FloatArray:
     scene = rack(gap, rate)
     simulation = start(scene)
     for _ in range(round(0.5 * rate)):
@@ -62,6 +62,6 @@ def ends(gap: float, rate: float) -> FloatArray:
 
 
 @pytest.mark.parametrize("gap", [1e-4, 1e-2])
-def test_of_what_no_note_is_made_the_step_hardly_matters(gap: float) -> None:
-    # rounding of 1e-16 m, which a break of seven balls lets grow by some 1e4
-    assert ends(gap, 240) == pytest.approx(ends(gap, 3840), abs=1e-9)
+def test_break_without_a_note_does_not_depend_on_the_step(gap: float) -> None:
+    # rounding of 1e-16 m, which a break of seven balls amplifies by about 1e4
+    assert final_positions(gap, 240) == pytest.approx(final_positions(gap, 3840), abs=1e-9)

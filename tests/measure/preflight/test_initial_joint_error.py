@@ -1,4 +1,4 @@
-"""Joints that start away from what they hold, and anchors in the wrong order: `check` warns of both."""
+"""Joints that are violated at the start, and anchors in the wrong order: `check` warns of both."""
 
 import pytest
 
@@ -18,8 +18,8 @@ radius = 0.3
 """
 
 
-def found(joint: str) -> list[Diagnostic]:
-    """The warnings about the start of joints of a scene with two balls and a joint."""
+def initial_warnings(joint: str) -> list[Diagnostic]:
+    """Return the warnings about initial joint errors of a scene with two balls and a joint."""
     return [w for w in warnings(loads(f"{TWO}[[joint]]\n{joint}\n")) if w.kind in ("joint_start", "anchors")]
 
 
@@ -28,12 +28,12 @@ BOTH = 'between = ["bob", "other"]\n'
 
 
 @pytest.mark.parametrize("kind", ["rod", "spring", "slide", "pivot"])
-def test_swapped_anchors_of_one_body_are_warned_of_and_the_right_order_is_not(kind: str) -> None:
+def test_only_swapped_anchors_of_one_body_are_warned_of(kind: str) -> None:
     more = {"spring": "stiffness = 10\n", "slide": "most = 5\n"}.get(kind, "")
-    high = 9.2 if kind == "pivot" else 10  # a pivot's two points are one
+    high = 9.2 if kind == "pivot" else 10  # the two points of a pivot coincide
     right, wrong = f"anchors = [[0, 0.2], [0, {high}]]", f"anchors = [[0, {high}], [0, 0.2]]"
-    assert found(f'kind = "{kind}"\n{ONE}{more}{right}') == []
-    (warning,) = found(f'kind = "{kind}"\n{ONE}{more}{wrong}')
+    assert initial_warnings(f'kind = "{kind}"\n{ONE}{more}{right}') == []
+    (warning,) = initial_warnings(f'kind = "{kind}"\n{ONE}{more}{wrong}')
     assert (warning.kind, warning.details) == ("anchors", {"joint": "joint-1", "body": "bob", "others": 0})
     assert f"{high} m from its centre" in warning.message
 
@@ -49,8 +49,8 @@ def test_swapped_anchors_of_one_body_are_warned_of_and_the_right_order_is_not(ki
         (f'kind = "gear"\n{BOTH}ratio = 2\nphase = 0.5', 0.5),
     ],
 )
-def test_joint_that_starts_violated_is_warned_of_with_the_size_of_its_error(joint: str, error: float) -> None:
-    (warning,) = found(joint)
+def test_initially_violated_joint_is_warned_of_with_its_error(joint: str, error: float) -> None:
+    (warning,) = initial_warnings(joint)
     assert warning.kind == "joint_start"
     assert warning.details["error"] == pytest.approx(error)
     assert f"error of {error:.3g} " in warning.message
@@ -67,11 +67,11 @@ def test_joint_that_starts_violated_is_warned_of_with_the_size_of_its_error(join
         f'kind = "motor"\n{ONE}rate = 3',
     ],
 )
-def test_joint_that_starts_as_it_holds_is_not_warned_of(joint: str) -> None:
-    assert found(joint) == []
+def test_initially_satisfied_joint_is_not_warned_of(joint: str) -> None:
+    assert initial_warnings(joint) == []
 
 
-def test_of_many_the_worst_is_named_and_the_others_are_counted() -> None:
+def test_worst_violated_joint_is_named_and_the_others_are_counted() -> None:
     lines = [f'[[joint]]\nkind = "rod"\n{BOTH}length = {length}\ncollide = true\n' for length in (2.9, 1.0, 2.0)]
     (warning,) = [w for w in warnings(loads(TWO + "".join(lines))) if w.kind == "joint_start"]
     assert warning.details == {"joint": "joint-2", "error": pytest.approx(2.0), "others": 2}

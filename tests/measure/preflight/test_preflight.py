@@ -1,4 +1,4 @@
-"""Forecasts: odds of a miss, the largest safe step, and what else is warned of."""
+"""Preflight checks: odds of tunnelling, the largest safe step, and other warnings and notes."""
 
 import math
 
@@ -25,31 +25,31 @@ def bullet(speed: float, radius: float, thickness: float, solver: str = "") -> S
 
 
 @given(st.floats(1.0, 1e6), st.floats(1e-3, 1.0), st.floats(0.0, 1.0), st.floats(1e-6, 10.0), st.integers(1, 9))
-def test_odds_of_a_bullet_are_none_up_to_the_safe_dt_and_grow_from_there(
+def test_tunnelling_odds_are_zero_up_to_the_safe_dt_and_then_grow(
     v: float, r: float, w: float, dt: float, substeps: int
 ) -> None:
-    """What the odds are is tested below, by flights with random phases."""
+    """The values of the odds are tested below, by flights with random phases."""
     scene = bullet(v, r, w, f"dt = {dt!r}\nsubsteps = {substeps}")
     (passage,) = tunnelling_risks(scene)
     safe = largest_safe_dt(scene)
     assert safe is not None
     h, limit = dt / substeps, safe / substeps
-    assert v * limit == pytest.approx(r + w / 2, rel=1e-12)  # a contact's depth; rounding of a product
+    assert v * limit == pytest.approx(r + w / 2, rel=1e-12)  # depth of a contact; rounding of a product
     assert passage.odds(0.999 * limit) == 0.0
     assert 0.0 < passage.odds(1.001 * limit) < passage.odds(2.0 * limit) < 1.0
-    told = [warning for warning in warnings(scene) if warning.kind == "tunnelling"]
-    assert len(told) == (passage.odds(h) > 1e-9)  # less is rounding
-    for warning in told:
+    tunnelling = [warning for warning in warnings(scene) if warning.kind == "tunnelling"]
+    assert len(tunnelling) == (passage.odds(h) > 1e-9)  # less is rounding
+    for warning in tunnelling:
         assert (warning.details["ball"], warning.details["thing"], warning.details["speed"]) == ("b", "w", v)
         assert (warning.details["odds"], warning.details["safe_dt"]) == (passage.odds(h), safe)
 
 
-# `COUNT` bullets fly side by side at a wall, each from a place of its own: random phases.
+# `COUNT` bullets fly side by side at a wall, each from its own distance: random phases.
 COUNT = 200
 
 
 def volley(seed: int, thing: str, dt: float) -> tuple[int, int]:
-    """Return how many of the bullets the audit calls missed, and how many the engine saw to touch."""
+    """Return how many bullets the audit reports as missed, and how many have contacts in the engine."""
     scene = loads(
         f"[world]\nduration = 0.5\nseed = {seed}\n[solver]\ndt = {dt!r}\n{thing}\n"
         f'[[grid]]\nname = "b"\norigin = [-6.0, 0.0]\ncolumns = 1\nrows = {COUNT}\nspacing = [1.0, 1.0]\njitter = 0.3\n'
@@ -61,7 +61,7 @@ def volley(seed: int, thing: str, dt: float) -> tuple[int, int]:
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("thickness", [0.0, 0.1])
-def test_below_the_safe_step_no_bullet_misses_and_above_it_some_do(seed: int, thickness: float) -> None:
+def test_bullets_miss_a_wall_only_above_the_safe_step(seed: int, thickness: float) -> None:
     wall = f"[[wall]]\npoints = [[0, -5], [0, {COUNT + 5}]]\nthickness = {thickness}\n"
     safe = largest_safe_dt(bullet(20.0, 0.05, thickness))
     assert volley(seed, wall, 0.99 * safe) == (0, COUNT)
@@ -69,17 +69,17 @@ def test_below_the_safe_step_no_bullet_misses_and_above_it_some_do(seed: int, th
         missed, touched = volley(seed, wall, factor * safe)
         assert missed + touched >= COUNT
         odds = 1 - 1 / factor
-        # Five standard deviations of a binomial count: one seed in a million fails, and these are fixed.
+        # Five standard deviations of a binomial count: one seed in a million fails, and these seeds are fixed.
         assert missed == pytest.approx(COUNT * odds, abs=5 * math.sqrt(COUNT * odds * (1 - odds)))
 
 
-def test_balls_among_themselves_pass_by_their_closing_speed_and_both_radii() -> None:
+def test_tunnelling_of_two_balls_depends_on_closing_speed_and_both_radii() -> None:
     scene = loads(
         '[[ball]]\nname = "a"\nposition = [0, 0]\nvelocity = [30, 0]\nradius = 0.1\n'
         '[[ball]]\nname = "b"\nposition = [9, 0]\nvelocity = [-10, 0]\nradius = 0.3\n'
     )
     (passage,) = tunnelling_risks(scene)
-    # Nothing else is there to turn them round: they close at 40 m/s, and touch at the sum of their own radii.
+    # Nothing else can turn them round: they approach at 40 m/s, and touch at the sum of their radii.
     assert (passage.speed, passage.reach) == (40.0, 0.4)
     (warning,) = warnings(scene, scene.solver.replace(dt=0.02))
     assert warning.kind == "tunnelling"
@@ -96,7 +96,7 @@ def test_each_body_at_risk_is_named_with_its_own_speed() -> None:
     assert found[0].message.startswith("'fast' can approach 'w' at up to 60 m/s, 0.6 m per substep")
 
 
-def test_floor_drawn_as_a_wall_is_met_at_the_speed_of_the_fall() -> None:
+def test_impact_speed_on_a_floor_wall_is_that_of_the_fall() -> None:
     scene = loads(
         "[world]\ngravity = [0, -9.81]\nduration = 20.0\n[[wall]]\nname = 'floor'\npoints = [[-5, 0], [5, 0]]\n"
         "thickness = 0.1\n[[ball]]\nposition = [0, 1.15]\nradius = 0.1\n"
@@ -106,7 +106,7 @@ def test_floor_drawn_as_a_wall_is_met_at_the_speed_of_the_fall() -> None:
     assert warnings(scene) == []
 
 
-def test_ball_below_a_wall_that_it_cannot_reach_is_no_risk() -> None:
+def test_ball_that_cannot_reach_a_wall_is_no_tunnelling_risk() -> None:
     scene = loads(
         "[world]\ngravity = [0, -10]\nduration = 9.0\n[solver]\ndt = 0.1\n[[wall]]\npoints = [[-5, 9], [5, 9]]\n"
         "[[ball]]\nposition = [0, 0]\nvelocity = [0, 10]\nradius = 0.1\n"  # rises by 5 m
@@ -114,29 +114,29 @@ def test_ball_below_a_wall_that_it_cannot_reach_is_no_risk() -> None:
     assert [passage.speed for passage in tunnelling_risks(scene)] == [0.0]
 
 
-def test_bodies_that_nothing_bounds_have_no_safe_step() -> None:
+def test_safe_step_is_none_only_for_unbounded_speeds() -> None:
     ball = '[[ball]]\nname = "b"\nposition = [3, 0]\nradius = 0.1\n[[post]]\nposition = [0, 0]\nradius = 0.2\n'
     sun = "[[attraction]]\ntoward = [0, 0]\nstrength = 10.0\n"
     assert largest_safe_dt(loads(ball)) == math.inf
     assert largest_safe_dt(loads(ball + sun.replace("[0, 0]", "[0, 1]"))) is None
-    # Where a post stands in its place: v² = 2·s·(1/0.2 − 1/3).
-    onto = math.sqrt(2 * 10.0 * (1 / 0.2 - 1 / 3.0))
-    assert largest_safe_dt(loads(ball + sun)) == pytest.approx(0.3 / onto, rel=1e-12)  # roundings
+    # A post around the centre of attraction bounds the speed: v² = 2·s·(1/0.2 − 1/3).
+    impact_speed = math.sqrt(2 * 10.0 * (1 / 0.2 - 1 / 3.0))
+    assert largest_safe_dt(loads(ball + sun)) == pytest.approx(0.3 / impact_speed, rel=1e-12)  # roundings
     soft = loads(ball + sun + "softening = 0.1\n")
     # From 3 m to the post by energy: v² = 2·(s/ε)·(atan(3/ε) − atan(0.2/ε)).
     fastest = math.sqrt(2 * 100.0 * (math.atan(30.0) - math.atan(2.0)))
     assert largest_safe_dt(soft) == pytest.approx(0.3 / fastest, rel=1e-12)  # roundings
-    wound = ball + '[[joint]]\nkind = "spring"\nbetween = ["b"]\nrest_length = 1.0\nstiffness = 200.0\n'
+    stretched = ball + '[[joint]]\nkind = "spring"\nbetween = ["b"]\nrest_length = 1.0\nstiffness = 200.0\n'
     # ½·200·2² J in 1 kg
-    assert largest_safe_dt(loads(wound + "anchors = [[0, 0], [0, 0]]\n")) == pytest.approx(0.3 / math.sqrt(800.0))
-    pushed = '[world]\nduration = 2.0\n[[thrust]]\nbody = "b"\nforce = [5.0, 0]\n'
-    assert largest_safe_dt(loads(pushed + ball)) == pytest.approx(0.3 / 10.0)
+    assert largest_safe_dt(loads(stretched + "anchors = [[0, 0], [0, 0]]\n")) == pytest.approx(0.3 / math.sqrt(800.0))
+    driven = '[world]\nduration = 2.0\n[[thrust]]\nbody = "b"\nforce = [5.0, 0]\n'
+    assert largest_safe_dt(loads(driven + ball)) == pytest.approx(0.3 / 10.0)
 
 
 @pytest.mark.parametrize(
     ("masses", "expected"), [((4.0, 1.0), 16.0), ((16.0, 4.0, 1.0), 25.6)], ids=["one impact", "two impacts"]
 )
-def test_impacts_from_heavy_to_light_add_up(masses: tuple[float, ...], expected: float) -> None:
+def test_speed_gains_of_impacts_from_heavy_to_light_multiply(masses: tuple[float, ...], expected: float) -> None:
     text = "".join(
         f"[[ball]]\nposition = [{5 * k}, 0]\nradius = 1\nmass = {mass}\n" + "velocity = [10, 0]\n" * (k == 0)
         for k, mass in enumerate(masses)
@@ -147,10 +147,10 @@ def test_impacts_from_heavy_to_light_add_up(masses: tuple[float, ...], expected:
     )  # 1.6 times at each impact
 
 
-@pytest.mark.parametrize(("share", "holds"), [(0.95, True), (1.05, False)])
+@pytest.mark.parametrize(("fraction", "holds"), [(0.95, True), (1.05, False)])
 @pytest.mark.parametrize("integrator", ["semi_implicit_euler", "velocity_verlet", "leapfrog", "rk4"])
-def test_dampers_too_strong_for_the_step_are_foretold_on_the_reference(
-    integrator: str, share: float, holds: bool
+def test_dampers_too_strong_for_the_step_are_predicted_for_reference(
+    integrator: str, fraction: float, holds: bool
 ) -> None:
     def damped(rate: float) -> Scene:
         return loads(
@@ -161,14 +161,14 @@ def test_dampers_too_strong_for_the_step_are_foretold_on_the_reference(
 
     (warning,) = warnings(damped(1e3), engine="reference")
     limit = float(warning.details["limit"])
-    scene = damped(share * limit / 0.01)
+    scene = damped(fraction * limit / 0.01)
     assert ([w.kind for w in warnings(scene, engine="reference")] == []) == holds
     assert warnings(scene, engine="pymunk") == []
     found = run(scene, "reference", audit=False)
     assert (found.status == "ok" and abs(found.position[-1, 0, 0] - 1.0) < 0.3) == holds
 
 
-def test_posts_planes_and_fixed_balls_have_their_own_depth() -> None:
+def test_posts_planes_and_fixed_balls_have_individual_depths() -> None:
     scene = loads(
         '[[plane]]\nname = "p"\npoint = [0, -9]\nnormal = [0, 1]\n'
         '[[post]]\nname = "q"\nposition = [5, 0]\nradius = 0.25\n'
@@ -179,9 +179,9 @@ def test_posts_planes_and_fixed_balls_have_their_own_depth() -> None:
     assert largest_safe_dt(scene) == 0.075
 
 
-@settings(max_examples=30)  # a run each
+@settings(max_examples=30)  # each example is a run
 @given(st.floats(0.0, 50.0), st.floats(-10.0, 10.0), st.floats(0.1, 20.0), st.floats(0.0, 1.0))
-def test_over_a_level_floor_speed_is_bounded_by_the_drop(height: float, up: float, g: float, e: float) -> None:
+def test_speed_above_a_level_floor_is_bounded_by_the_drop(height: float, up: float, g: float, e: float) -> None:
     scene = loads(
         f"[world]\ngravity = [0.0, -{g!r}]\nduration = 2.0\n[solver]\ndt = 0.01\n"
         f"[[plane]]\npoint = [0, 0]\nnormal = [0, 1]\nrestitution = {e!r}\n"
@@ -191,12 +191,12 @@ def test_over_a_level_floor_speed_is_bounded_by_the_drop(height: float, up: floa
     start = math.hypot(1.0, up)
     assert bound == pytest.approx(min(start + 2 * g, math.sqrt(start**2 + 2 * g * height)), rel=1e-12)  # roundings
     speed = np.hypot(*run(scene, audit=False).velocity[:, 0].T).max()
-    # A step late at the floor is a step's gravity more, and the floor then lifts what is deep by as much again.
+    # Contact one step late adds one step of gravity, and the correction of the overlap adds as much again.
     assert speed <= bound + 3 * g * 0.01
 
 
 @pytest.mark.parametrize("normal", ["[0.1, 1.0]", "[0.0, -1.0]", "[1.0, 0.0]"])
-def test_what_is_no_level_floor_bounds_nothing(normal: str) -> None:
+def test_plane_that_is_no_level_floor_does_not_bound_the_speed(normal: str) -> None:
     scene = loads(
         "[world]\ngravity = [0.0, -10.0]\nduration = 3.0\n"
         f"[[plane]]\npoint = [0, 0]\nnormal = {normal}\n[[ball]]\nposition = [1, 1]\nradius = 0.5\n"
@@ -204,7 +204,7 @@ def test_what_is_no_level_floor_bounds_nothing(normal: str) -> None:
     assert top_speeds(scene, contact_matrix(scene)).tolist() == [30.0]
 
 
-def test_lighter_ball_gets_up_to_twice_the_speed_of_a_heavy_one() -> None:
+def test_light_ball_gains_up_to_twice_the_speed_of_a_heavy_one() -> None:
     scene = loads(
         "[[ball]]\nposition = [0, 0]\nvelocity = [10, 0]\nradius = 1\nmass = 3\n"
         "[[ball]]\nposition = [5, 0]\nradius = 1\nmass = 1\n"
@@ -234,11 +234,11 @@ def kinds(text: str) -> list[str]:
         (1, 0.5, 1.0, ["overlap", "iterations"]),
     ],
 )
-def test_overlap_and_iterations_are_warned_of(iterations: int, e: float, x: float, expected: list[str]) -> None:
+def test_overlap_and_few_iterations_are_warned_of(iterations: int, e: float, x: float, expected: list[str]) -> None:
     assert kinds(PAIR.format(iterations=iterations, e=e, x=x)) == expected
 
 
-def test_overlap_is_counted_in_pairs_of_what_can_meet() -> None:
+def test_overlaps_are_counted_in_pairs_that_can_collide() -> None:
     ball = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
     (warning,) = warnings(loads(ball * 3))
     assert warning.kind == "overlap"
@@ -246,21 +246,19 @@ def test_overlap_is_counted_in_pairs_of_what_can_meet() -> None:
     assert kinds((ball + 'collides = "none"\n') * 3) == []
     passing = (ball + 'collides = "fixed"\n') * 3
     assert kinds(passing) == []
-    assert kinds(passing + ball + ball.replace("[0, 0]", "[2, 0]")) == []  # two that meet are no reason either
+    assert kinds(passing + ball + ball.replace("[0, 0]", "[2, 0]")) == []  # two colliding balls add no warning
 
 
-@pytest.mark.parametrize(("place", "told"), [(1e12, False), (1e13, True), (1e15, True)])
-def test_rounding_far_from_the_origin_is_warned_of(place: float, told: bool) -> None:
-    far = loads(
-        f'[[post]]\nposition = [0, 0]\nradius = 1\n[[ball]]\nname = "b"\nposition = [{place!r}, 0]\nradius = 0.5\n'
-    )
+@pytest.mark.parametrize(("x", "is_warned"), [(1e12, False), (1e13, True), (1e15, True)])
+def test_rounding_far_from_the_origin_is_warned_of(x: float, is_warned: bool) -> None:
+    far = loads(f'[[post]]\nposition = [0, 0]\nradius = 1\n[[ball]]\nname = "b"\nposition = [{x!r}, 0]\nradius = 0.5\n')
     found = warnings(far)
-    assert [w.kind for w in found] == ["rounding"] * told
+    assert [w.kind for w in found] == ["rounding"] * is_warned
     for warning in found:
-        assert warning.details == {"ball": "b", "share": np.spacing(place) / 0.5}
+        assert warning.details == {"ball": "b", "share": np.spacing(x) / 0.5}
 
 
-def test_particles_that_meet_nothing_are_warned_of_nothing() -> None:
+def test_particles_without_collisions_yield_no_warnings() -> None:
     scene = loads(
         "[world]\nduration = 9.0\ngravity = [0, -10]\n[solver]\niterations = 1\n"
         "[[emitter]]\nposition = [1e15, 0]\ncount = 50\nvelocity_min = [-1e9, 0]\nvelocity_max = [1e9, 1]\n"
@@ -270,7 +268,7 @@ def test_particles_that_meet_nothing_are_warned_of_nothing() -> None:
 
 
 @given(strategies.scenes())
-def test_any_scene_is_forecast_with_numbers(scene: Scene) -> None:
+def test_any_scene_yields_finite_numbers(scene: Scene) -> None:
     safe = largest_safe_dt(scene)
     assert safe > 0.0
     for warning in warnings(scene):
@@ -284,27 +282,27 @@ def test_any_scene_is_forecast_with_numbers(scene: Scene) -> None:
 
 
 @given(st.floats(1e-300, 1e300))
-def test_limit_is_written_short_and_not_above_itself(limit: float) -> None:
+def test_limit_is_rounded_down_to_three_digits(limit: float) -> None:
     text = floor_3_digits(limit)
-    assert float(text) <= limit * (1 + 1e-9)  # as much counts as rounding
+    assert float(text) <= limit * (1 + 1e-9)  # less counts as rounding
     assert float(text) >= limit * 0.99  # three digits
     assert len(text) <= 10
 
 
-def test_limit_that_is_short_stays_as_it_is() -> None:
+def test_limit_of_few_digits_is_unchanged() -> None:
     assert [floor_3_digits(x) for x in (0.0002, 0.1 + 0.2, 0.00019999999999999998, 101.0, 1e-9)] == [
         "0.0002", "0.3", "0.0002", "101", "1e-09",
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("dt", "warned"), [(1.0, False), (1.1, True)])
-def test_step_longer_than_the_run_is_warned_of(dt: float, warned: bool) -> None:
+@pytest.mark.parametrize(("dt", "is_warned"), [(1.0, False), (1.1, True)])
+def test_step_longer_than_the_run_is_warned_of(dt: float, is_warned: bool) -> None:
     text = f"[world]\nduration = 1.0\n[solver]\ndt = {dt}\n[[ball]]\nposition = [0.0, 0.0]\nradius = 1.0\n"
-    assert ["duration" in w.kind for w in warnings(loads(text))] == [True] * warned
+    assert ["duration" in w.kind for w in warnings(loads(text))] == [True] * is_warned
 
 
 def spring_scene(omega_h: float, solver: str = "", count: int = 1, damping: float = 0.0) -> Scene:
-    """A row of balls of 1 kg on springs, from a wall on; at dt = 0.01 one alone has this ω·h."""
+    """Return a row of balls of 1 kg on springs, the first fixed to the world; one alone has this ω·h at dt = 0.01."""
     text = f"[world]\nduration = 5.0\n[solver]\ndt = 0.01\n{solver}\n"
     for k in range(1, count + 1):
         text += f'[[ball]]\nname = "b{k}"\nposition = [{k}.001, 0]\nradius = 0.1\ncollides = "none"\n'
@@ -315,10 +313,10 @@ def spring_scene(omega_h: float, solver: str = "", count: int = 1, damping: floa
     return loads(text)
 
 
-@pytest.mark.parametrize(("omega_h", "told"), [(1.49, False), (1.51, True), (1.99, True), (2.01, True)])
-def test_spring_near_the_limit_of_the_scheme_is_warned_of(omega_h: float, told: bool) -> None:
+@pytest.mark.parametrize(("omega_h", "is_warned"), [(1.49, False), (1.51, True), (1.99, True), (2.01, True)])
+def test_spring_near_the_limit_of_the_scheme_is_warned_of(omega_h: float, is_warned: bool) -> None:
     found = warnings(spring_scene(omega_h))
-    assert [w.kind for w in found] == ["spring"] * told
+    assert [w.kind for w in found] == ["spring"] * is_warned
     for warning in found:
         assert warning.details["omega_h"] == pytest.approx(omega_h, rel=1e-12)  # a root of a square
         assert warning.details["safe_dt"] == pytest.approx(1.5 * 0.01 / omega_h, rel=1e-12)  # likewise
@@ -327,53 +325,53 @@ def test_spring_near_the_limit_of_the_scheme_is_warned_of(omega_h: float, told: 
 
 
 @pytest.mark.parametrize(("omega_h", "bounded"), [(1.99, True), (2.01, False)])
-def test_the_limit_of_springs_is_where_pymunk_has_it(omega_h: float, bounded: bool) -> None:
-    away = np.abs(run(spring_scene(omega_h), audit=False).position[:, 0, 0] - 1.0).max()
-    # From 1 mm: within the scheme's band, 1/√(1 − ωh/2) = 14 times; else e^(2·acosh(ωh/2)) a step, 500 times over.
-    assert (away < 0.02) == bounded
+def test_spring_limit_is_that_of_pymunk(omega_h: float, bounded: bool) -> None:
+    amplitude = np.abs(run(spring_scene(omega_h), audit=False).position[:, 0, 0] - 1.0).max()
+    # From 1 mm: stable, it grows by 1/√(1 − ωh/2) = 14 at most; else by e^(2·acosh(ωh/2)) in each of 500 steps.
+    assert (amplitude < 0.02) == bounded
 
 
-def test_chain_of_springs_is_twice_as_fast_as_one() -> None:
+def test_chain_of_springs_oscillates_twice_as_fast_as_one() -> None:
     (warning,) = warnings(spring_scene(0.99, count=40))
-    # The highest mode of 40 that are held at one end: 2 ω·cos(π/(2·40 + 1)).
+    # The highest mode of 40 balls fixed at one end: 2 ω·cos(π/(2·40 + 1)).
     assert warning.details["omega_h"] == pytest.approx(0.99 * 2.0 * math.cos(math.pi / 81.0), rel=1e-6)  # small angles
-    (many,) = warnings(spring_scene(0.99, count=400))  # more rows than are written out: by iteration
-    assert many.details["omega_h"] == pytest.approx(1.98, rel=1e-3)  # 160 iterations for one end of the spectrum
+    (many,) = warnings(spring_scene(0.99, count=400))  # more rows than the dense matrix has: by iteration
+    assert many.details["omega_h"] == pytest.approx(1.98, rel=1e-3)  # 160 iterations towards one end of the spectrum
 
 
-def test_lever_arm_makes_a_spring_faster() -> None:
+def test_lever_arm_raises_the_frequency_of_a_spring() -> None:
     text = (
         "[solver]\ndt = 0.01\n[[box]]\nname = 'b'\nposition = [0, 0]\nsize = [2.0, 1.0]\nmass = 3.0\n"
         "[[joint]]\nkind = 'spring'\nbetween = ['b']\nanchors = [[1.0, 0.0], [1.0, 5.0]]\nstiffness = 30000.0\n"
     )
     (warning,) = warnings(loads(text))
     moment = 3.0 * (4.0 + 1.0) / 12.0
-    # Pulling up at the end of an arm of 1 m.
+    # A vertical force at the end of an arm of 1 m.
     expected = math.sqrt(30000.0 * (1.0 / 3.0 + 1.0 / moment))
-    assert warning.details["omega"] == pytest.approx(expected, rel=1e-12)  # an eigenvalue's rounding
+    assert warning.details["omega"] == pytest.approx(expected, rel=1e-12)  # rounding of an eigenvalue
 
 
-def test_explicit_euler_is_told_what_it_gains_and_damping_undoes_it() -> None:
+def test_explicit_euler_is_warned_of_its_growth_unless_damped() -> None:
     euler = "integrator = 'explicit_euler'"
     (warning,) = warnings(spring_scene(0.1, euler))
-    assert warning.details["growth"] == pytest.approx((1.0 + 0.01) ** 50, rel=1e-9)  # a power of rounding
+    assert warning.details["growth"] == pytest.approx((1.0 + 0.01) ** 50, rel=1e-9)  # rounding in a power
     found = run(spring_scene(0.1, euler), "reference", audit=False)
-    grown = np.abs(found.position[-100:, 0, 0] - 1.0).max() / 0.001
-    # After the 4 to 5 s that the last second has; the top of a swing of 0.63 s is met within a step of 0.06 rad.
-    assert 1.01**200 * 0.99 < grown < 1.01**250 * 1.01
-    # c = k·h is where |R| = 1.
+    growth = np.abs(found.position[-100:, 0, 0] - 1.0).max() / 0.001
+    # Growth after 4 to 5 s, of the last second; a maximum of the oscillation of 0.63 s lies within a step of 0.06 rad.
+    assert 1.01**200 * 0.99 < growth < 1.01**250 * 1.01
+    # |R| = 1 at c = k·h.
     assert warnings(spring_scene(0.1, euler, damping=1.001)) == []
     assert len(warnings(spring_scene(0.1, euler, damping=0.9))) == 1
 
 
-def test_rk4_has_a_limit_of_its_own() -> None:
+def test_rk4_has_its_own_limit() -> None:
     assert warnings(spring_scene(2.0, "integrator = 'rk4'")) == []
     (warning,) = warnings(spring_scene(2.5, "integrator = 'rk4'"))
     assert warning.details["limit"] == 2.0 * math.sqrt(2.0)
 
 
 def chain(links: int, load: float = 1.0, solver: str = "") -> Scene:
-    """Balls on rods, hung up at one end, the last of another mass."""
+    """Return balls on rods, suspended at one end, the last with another mass."""
     text = f"[world]\ngravity = [0, -9.81]\nduration = 3.0\n[solver]\n{solver}\n"
     for k in range(1, links + 1):
         mass = load if k == links else 1.0
@@ -386,52 +384,54 @@ def chain(links: int, load: float = 1.0, solver: str = "") -> Scene:
 
 
 @pytest.mark.parametrize("links", [5, 10, 20, 40])
-def test_chain_needs_what_was_measured(links: int) -> None:
+def test_iterations_needed_for_a_chain_agree_with_measurements(links: int) -> None:
     (warning,) = warnings(chain(links, solver="dt = 0.02\niterations = 1"))
     assert warning.kind == "chain"
     needed = warning.details["needed"]
-    # 2.4 n² iterations a second; the chain is half a link longer than n for its slowest mode.
+    # 2.4 n² iterations per second; for its slowest mode the chain is half a link longer than n.
     assert needed == pytest.approx(2.4 * links**2, rel=0.15)
 
 
-@pytest.mark.parametrize(("share", "holds"), [(0.5, False), (1.1, True)])
+@pytest.mark.parametrize(("fraction", "holds"), [(0.5, False), (1.1, True)])
 @pytest.mark.parametrize(("links", "load"), [(20, 1.0), (2, 100.0), (5, 100.0)])
-def test_chain_holds_or_not_as_was_told(links: int, load: float, share: float, holds: bool) -> None:
-    told = [w for w in warnings(chain(links, load, "dt = 0.005\niterations = 1")) if w.kind in ("chain", "mass_ratio")]
-    iterations = share * float(told[0].details["needed"]) * 0.005
+def test_chain_holds_or_breaks_as_predicted(links: int, load: float, fraction: float, holds: bool) -> None:
+    found = [w for w in warnings(chain(links, load, "dt = 0.005\niterations = 1")) if w.kind in ("chain", "mass_ratio")]
+    iterations = fraction * float(found[0].details["needed"]) * 0.005
     solver = f"dt = {0.005 * math.ceil(iterations) / iterations!r}\niterations = {math.ceil(iterations)}"
     scene = chain(links, load, solver)
     assert (warnings(scene) == []) == holds
     error = run(scene, audit=False).info["joint_error"]
-    # Torn apart it is off by half a link and more; else by what a step's fall stretches it, some percent of one.
+    # Torn apart, the error is half a link or more; else it is the stretch by the fall in one step, a few percent.
     assert (error < 0.25) == holds
 
 
-def test_what_is_torn_apart_by_a_load_is_a_mass_ratio() -> None:
+def test_chain_torn_by_its_load_is_warned_of_as_mass_ratio() -> None:
     (warning,) = warnings(chain(3, 100.0, "dt = 0.016666\niterations = 10"))
     assert (warning.kind, warning.details["joint"], warning.details["ratio"]) == ("mass_ratio", "j3", 100.0)
     assert warning.message.startswith("the joint 'j3' connects 'b2' and 'b3', one of which is 100 times as heavy")
 
 
-@pytest.mark.parametrize("way", ["relaxation", "xpbd", "rattle"])
+@pytest.mark.parametrize("method", ["relaxation", "xpbd", "rattle"])
 @pytest.mark.parametrize(("links", "iterations", "dt"), [(20, 10, 1 / 60), (50, 10, 1 / 240), (20, 2, 1 / 120)])
-def test_chain_held_by_positions_gives_way_as_was_told(way: str, links: int, iterations: int, dt: float) -> None:
-    solver = f"dt = {dt!r}\niterations = {iterations}\njoints = {way!r}\n"
+def test_chain_of_position_methods_stretches_as_predicted(method: str, links: int, iterations: int, dt: float) -> None:
+    solver = f"dt = {dt!r}\niterations = {iterations}\njoints = {method!r}\n"
     scene = chain(links, solver=solver)
     (warning,) = warnings(scene)
     assert (warning.kind, warning.details["joints"]) == ("chain", links)
-    # The law's own factor was measured at 0.8 to 1.8, and is taken as 1.6.
-    told = pytest.approx(warning.details["share"], rel=0.4)
-    assert run(scene, "reference", audit=False).info["joint_error"] == told
+    # The factor of the formula was measured at 0.8 to 1.8, and is taken as 1.6.
+    predicted = pytest.approx(warning.details["share"], rel=0.4)
+    assert run(scene, "reference", audit=False).info["joint_error"] == predicted
     assert warnings(scene, scene.solver.replace(dt=0.99 * float(warning.details["safe_dt"]))) == []
 
 
-def test_loose_and_doubly_held_chains_have_a_slowest_mode_too() -> None:
-    """Of n bodies and n − 1 joints with both ends free, of n + 1 with both held: 4 times as fast as with one."""
-    links = chain(41, solver="dt = 0.016666\niterations = 1")
-    loose = links.model_copy(update={"joints": links.joints[1:]})
-    (one,), (none,) = warnings(links), warnings(loose)
-    assert float(one.details["needed"]) == pytest.approx(4.0 * float(none.details["needed"]), rel=0.05)  # ends
+def test_free_chain_needs_a_quarter_of_the_iterations_of_a_suspended_one() -> None:
+    """The slowest mode with both ends free is twice as fast as with one end fixed, so 4 times fewer iterations do."""
+    suspended = chain(41, solver="dt = 0.016666\niterations = 1")
+    free = suspended.model_copy(update={"joints": suspended.joints[1:]})
+    (suspended_warning,), (free_warning,) = warnings(suspended), warnings(free)
+    assert float(suspended_warning.details["needed"]) == pytest.approx(
+        4.0 * float(free_warning.details["needed"]), rel=0.05
+    )  # effects of the ends
 
 
 def tower(boxes: int, masses: tuple[float, ...] = (), solver: str = "", gap: float = 0.0) -> Scene:
@@ -444,38 +444,38 @@ def tower(boxes: int, masses: tuple[float, ...] = (), solver: str = "", gap: flo
     return loads(text)
 
 
-@pytest.mark.parametrize(("iterations", "told"), [(10, True), (32, False)])
-def test_tower_that_will_fall_is_warned_of(iterations: int, told: bool) -> None:
+@pytest.mark.parametrize(("iterations", "is_warned"), [(10, True), (32, False)])
+def test_tower_that_will_fall_is_warned_of(iterations: int, is_warned: bool) -> None:
     scene = tower(10, solver=f"dt = 0.016666\niterations = {iterations}")
     found = warnings(scene)
-    assert [w.kind for w in found] == ["stack"] * told
+    assert [w.kind for w in found] == ["stack"] * is_warned
     for warning in found:
         assert (warning.details["body"], warning.details["bodies"]) == ("b1", 10)
         assert warning.details["needed"] == pytest.approx(60.0 * 10.0 * math.sqrt(9.81), rel=1e-12)  # roundings
     top = run(scene, audit=False).position[-1, 9, 1]
-    assert (top < 8.5) == told  # it lost more than a box's height, or none
+    assert (top < 8.5) == is_warned  # it lost more than the height of a box, or nothing
 
 
-def test_what_is_no_tower_is_not_warned_of() -> None:
-    few = "dt = 0.016666\niterations = 5"
-    assert warnings(tower(4, solver=few)) == []
-    assert warnings(tower(10, solver=few, gap=0.1)) == []
-    side_by_side = tower(10, solver=few).model_copy(update={"world": loads("[world]\nduration = 6.0\n").world})
-    assert warnings(side_by_side) == []
+def test_low_spaced_or_weightless_stack_is_not_warned_of() -> None:
+    few_iterations = "dt = 0.016666\niterations = 5"
+    assert warnings(tower(4, solver=few_iterations)) == []
+    assert warnings(tower(10, solver=few_iterations, gap=0.1)) == []
+    weightless = tower(10, solver=few_iterations).model_copy(update={"world": loads("[world]\nduration = 6.0\n").world})
+    assert warnings(weightless) == []
 
 
-@pytest.mark.parametrize(("iterations", "told"), [(10, True), (160, False)])
-def test_light_box_under_a_heavy_one_is_warned_of(iterations: int, told: bool) -> None:
+@pytest.mark.parametrize(("iterations", "is_warned"), [(10, True), (160, False)])
+def test_light_box_under_a_heavy_one_is_warned_of(iterations: int, is_warned: bool) -> None:
     scene = tower(2, (1.0, 100.0), f"dt = 0.016666\niterations = {iterations}")
     found = warnings(scene)
-    assert [w.kind for w in found] == ["mass_ratio"] * told
+    assert [w.kind for w in found] == ["mass_ratio"] * is_warned
     for warning in found:
         assert (warning.details["body"], warning.details["other"], warning.details["ratio"]) == ("b2", "b1", 100.0)
-    # Crushed, the upper comes down by its whole height; else it sinks by a part of it at most.
-    assert (run(scene, audit=False).position[-1, 1, 1] < 1.1) == told
+    # If it is crushed, the upper box falls by its whole height; otherwise it sinks by a fraction of it at most.
+    assert (run(scene, audit=False).position[-1, 1, 1] < 1.1) == is_warned
 
 
-def test_boxes_laid_out_to_touch_do_not_overlap_and_joined_ones_may() -> None:
+def test_touching_boxes_do_not_overlap_and_joined_ones_may() -> None:
     fine = "dt = 0.001\niterations = 50"
     assert warnings(tower(3, solver=fine)) == []
     (warning,) = warnings(tower(3, solver=fine, gap=-0.1))
@@ -500,7 +500,7 @@ BOX = "[[box]]\nname = 'a'\nposition = [0, {y}]\nsize = [4, 2]\n"
 
 @pytest.mark.parametrize("body", [BALL, BOX])
 @pytest.mark.parametrize(("thing", "top"), [(GROUND, 0.0), (FENCE, 0.1), (PEG, 0.5)])
-def test_bodies_that_start_in_fixed_things_are_named_with_their_depth(body: str, thing: str, top: float) -> None:
+def test_overlap_with_a_fixed_shape_is_warned_of_with_its_depth(body: str, thing: str, top: float) -> None:
     (warning,) = warnings(loads("[world]\nduration = 0.01\n" + thing + body.format(y=0.4 + top)))
     names = warning.details["first"], warning.details["second"]
     assert (warning.kind, warning.details["pairs"], names[0]) == ("overlap", 1, "a")
@@ -512,17 +512,17 @@ def test_bodies_that_start_in_fixed_things_are_named_with_their_depth(body: str,
 @pytest.mark.parametrize(
     "more", ["fixed = true\n", 'collides = "none"\n', 'layer = "up"\n'], ids=["fixed", "passing", "on another layer"]
 )
-def test_bodies_that_fixed_things_do_not_part_may_start_in_them(more: str) -> None:
+def test_body_without_collisions_may_overlap_fixed_shapes(more: str) -> None:
     other = "[[zone]]\nposition = [9, 9]\nradius = 0.1\nto_layer = 'up'\n"
     assert kinds("[world]\nduration = 0.01\n" + FENCE + BALL.format(y=0.4) + more + other) == []
 
 
-def test_walls_that_let_pass_may_have_bodies_in_them() -> None:
+def test_body_may_overlap_sensor_and_one_way_walls() -> None:
     for passing in ("solid = false\n", "one_way = true\n"):
         assert kinds("[world]\nduration = 0.01\n" + FENCE + passing + BALL.format(y=0.4)) == []
 
 
-def test_deepest_overlap_is_named_among_bodies_and_fixed_things() -> None:
+def test_deepest_overlap_among_bodies_and_fixed_shapes_is_named() -> None:
     text = GROUND + FENCE.replace("[-3, 0]", "[-3, 1]") + BALL.format(y=-0.5) + BALL.format(y=0.9).replace("'a'", "'b'")
     (warning,) = (w for w in warnings(loads(text)) if w.kind == "overlap")
     assert warning.details["pairs"] == 5
@@ -530,7 +530,7 @@ def test_deepest_overlap_is_named_among_bodies_and_fixed_things() -> None:
     assert warning.details["depth"] == pytest.approx(1.5, rel=1e-12)
 
 
-def test_thin_box_tunnels_by_its_half_width() -> None:
+def test_tunnelling_reach_of_a_box_is_its_half_width() -> None:
     scene = loads(
         "[[wall]]\nname = 'w'\npoints = [[5, -1], [5, 1]]\nthickness = 0.1\n"
         "[[box]]\nname = 'b'\nposition = [0, 0]\nvelocity = [30, 0]\nsize = [2.0, 0.5]\n"
@@ -539,55 +539,55 @@ def test_thin_box_tunnels_by_its_half_width() -> None:
     assert passage.reach == pytest.approx(0.25 + 0.05, rel=1e-15)  # a sum
 
 
-def test_what_hangs_falls_no_farther_than_it_is_held() -> None:
+def test_speed_of_a_pendulum_is_bounded_by_its_length() -> None:
     pendulum = loads(
         "[world]\ngravity = [0, -10]\nduration = 60.0\n[[post]]\nname = 'p'\nposition = [0, -3]\nradius = 0.1\n"
         "[[ball]]\nname = 'b'\nposition = [2, 0]\nradius = 0.1\n[[joint]]\nkind = 'rod'\nbetween = ['b']\n"
         "anchors = [[0, 0], [0, 0]]\n"
     )
-    slack = pendulum.model_copy(update={"joints": ()})
-    # 2 m below the place it hangs on at most, from the height of that.
+    released = pendulum.model_copy(update={"joints": ()})
+    # From the height of its anchor it falls to 2 m below the anchor at most.
     assert top_speeds(pendulum, contact_matrix(pendulum)).tolist() == pytest.approx([math.sqrt(2 * 10 * 2)], rel=1e-12)
-    assert top_speeds(slack, contact_matrix(slack)).tolist() == [600.0]
+    assert top_speeds(released, contact_matrix(released)).tolist() == [600.0]
 
 
-def test_box_that_is_past_all_that_could_stop_it_falls_unheeded() -> None:
+def test_speed_is_bounded_by_the_fall_past_the_last_obstacle() -> None:
     scene = loads(
         "[world]\ngravity = [0, -10]\nduration = 60.0\n[[wall]]\npoints = [[-1, 0], [1, 0]]\nthickness = 0.2\n"
         "[[box]]\nposition = [0, 4]\nsize = [0.6, 0.8]\n"
     )
-    # From 4 m to where its highest point, half a diagonal up, leaves the wall's lower side.
+    # From 4 m to where its highest point, half a diagonal up, passes the lower side of the wall.
     assert top_speeds(scene, contact_matrix(scene)).tolist() == pytest.approx(
         [math.sqrt(2 * 10 * (4 + 0.1 + 0.5))], rel=1e-12
     )
 
 
-def test_notes_tell_of_concave_outlines_and_of_what_an_audit_counts() -> None:
+def test_notes_report_concave_outlines_and_bodies_audited_as_discs() -> None:
     scene = loads(
         "[[polygon]]\nname = 'L'\npoints = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]\nposition = [5, 1]\n"
         "[[polygon]]\nname = 'convex'\npoints = [[0, 0], [2, 0], [2, 1]]\nposition = [9, 1]\n"
         "[[body]]\nname = 'two'\nposition = [0, 0]\n[[body.box]]\nsize = [1, 1]\n[[body.polygon]]\n"
         "points = [[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]\n"
     )
-    told = {note.details["body"]: note for note in notes(scene) if note.kind == "outline"}
-    assert {name: note.details["pieces"] for name, note in told.items()} == {"L": 2, "two": 2}
-    assert told["L"].message == "the outline of 'L' is concave and is decomposed into 2 convex pieces"
+    outlines = {note.details["body"]: note for note in notes(scene) if note.kind == "outline"}
+    assert {name: note.details["pieces"] for name, note in outlines.items()} == {"L": 2, "two": 2}
+    assert outlines["L"].message == "the outline of 'L' is concave and is decomposed into 2 convex pieces"
     (audit,) = [note for note in notes(scene) if note.kind == "audit"]
     assert audit.details["bodies"] == 3
     assert notes(loads("[[ball]]\nposition = [0, 0]\nradius = 1\n")) == []
 
 
-def test_flight_of_first_order_is_noted_with_its_error() -> None:
+def test_first_order_flight_is_noted_with_its_error() -> None:
     scene = loads(
         "[world]\ngravity = [0, -10]\nduration = 2.0\n[solver]\ndt = 0.08\n[[plane]]\npoint = [0, 0]\nnormal = [0, 1]\n"
         "[[ball]]\nname = 'b'\nposition = [0, 20.5]\nradius = 0.5\n"
     )
     (note,) = [each for each in notes(scene) if each.kind == "flight"]
-    assert note.details == {"body": "b", "error": pytest.approx(0.5 * 10 * 0.08 * 2.0, rel=1e-12)}  # a root's rounding
-    flown = loads(
+    assert note.details == {"body": "b", "error": pytest.approx(0.5 * 10 * 0.08 * 2.0, rel=1e-12)}  # rounding of a root
+    falling = loads(
         "[world]\ngravity = [0, -10]\nduration = 2.0\n[solver]\ndt = 0.08\n[[ball]]\nposition = [0, 0]\nradius = 1\n"
     )
-    off = run(flown, audit=False).position[-1, 0, 1] + 0.5 * 10 * 2.0**2
-    assert off == pytest.approx(float(note.details["error"]), rel=1e-9)  # explicit Euler: exactly g·h·t/2
+    error = run(falling, audit=False).position[-1, 0, 1] + 0.5 * 10 * 2.0**2
+    assert error == pytest.approx(float(note.details["error"]), rel=1e-9)  # explicit Euler: exactly g·h·t/2
     exact = scene.model_copy(update={"solver": scene.solver.replace(integrator="velocity_verlet", detection="bisect")})
     assert "flight" not in [each.kind for each in notes(exact)]

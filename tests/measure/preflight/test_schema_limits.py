@@ -1,4 +1,4 @@
-"""Forecasts at the ends of the schema's ranges: every scene gets an answer, of finite figures."""
+"""Preflight checks at the limits of the schema: every scene gets warnings with finite numbers."""
 
 import math
 from typing import Any
@@ -12,11 +12,11 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import SceneError
 from sandbox.scene.files.load import from_document
 
-pytestmark = pytest.mark.slow  # some 10 s
+pytestmark = pytest.mark.slow  # about 10 s
 
 
 def ends(low: float, high: float, *usual: float) -> st.SearchStrategy[float]:
-    """A number at either end of its range, or an ordinary one."""
+    """Return a strategy of numbers at either end of their range, and usual ones."""
     return st.sampled_from([low, high, *usual])
 
 
@@ -25,7 +25,7 @@ def vectors(high: float, *usual: float) -> st.SearchStrategy[list[float]]:
 
 
 MASS, SIZE = ends(1e-15, 1e30, 1.0), ends(1e-9, 1e9, 0.5)
-PLACE, SPEED = vectors(1e16, 1.0, -3.0), vectors(7e11, 1.0)
+POSITION, SPEED = vectors(1e16, 1.0, -3.0), vectors(7e11, 1.0)
 STIFF, DAMPING = ends(1e-300, 1e30, 5e6), ends(0.0, 1e30, 1.0)
 NAMES = ["a", "b", "c"]
 
@@ -33,14 +33,14 @@ NAMES = ["a", "b", "c"]
 @st.composite
 def joints(draw: st.DrawFn) -> dict[str, Any]:
     length, anchors = ends(0.0, 1e9, 1.0), st.lists(vectors(1e16, 1.0), min_size=2, max_size=2)
-    turned = ends(-1e12, 1e12, 0.0)
+    angles = ends(-1e12, 1e12, 0.0)
     kinds: dict[str, dict[str, Any]] = {
         "rod": {"length": length, "anchors": anchors},
         "slide": {"most": length, "anchors": anchors},
-        "pivot": {"at": PLACE},
+        "pivot": {"at": POSITION},
         "spring": {"stiffness": STIFF, "damping": DAMPING, "rest_length": length, "anchors": anchors},
-        "rotary_spring": {"stiffness": STIFF, "damping": DAMPING, "rest_angle": turned},
-        "motor": {"rate": turned},
+        "rotary_spring": {"stiffness": STIFF, "damping": DAMPING, "rest_angle": angles},
+        "motor": {"rate": angles},
         "gear": {"ratio": ends(-1e6, 1e6, 1.0)},
     }
     kind = draw(st.sampled_from(sorted(kinds)))
@@ -56,23 +56,23 @@ def documents(draw: st.DrawFn) -> dict[str, Any]:
     document: dict[str, Any] = {"ball": [], "box": []}
     for name in NAMES:
         kind, shape = draw(st.sampled_from(shapes))
-        body = draw(st.fixed_dictionaries({"position": PLACE, **shape}, optional={**state, **surface}))
+        body = draw(st.fixed_dictionaries({"position": POSITION, **shape}, optional={**state, **surface}))
         document[kind].append({"name": name, **body})
     document["joint"] = draw(st.lists(joints(), max_size=3))
     document["plane"] = draw(
-        st.lists(st.fixed_dictionaries({"point": PLACE, "normal": st.just([0, 1])}, optional=surface), max_size=1)
+        st.lists(st.fixed_dictionaries({"point": POSITION, "normal": st.just([0, 1])}, optional=surface), max_size=1)
     )
     points = st.lists(vectors(1e16, 1.0, 2.0, 3.0), min_size=2, max_size=2)
     document["wall"] = draw(
         st.lists(st.fixed_dictionaries({"points": points, "thickness": ends(0.0, 1e9, 0.1)}), max_size=1)
     )
-    document["zone"] = draw(st.lists(st.fixed_dictionaries({"position": PLACE, "radius": SIZE}), max_size=1))
+    document["zone"] = draw(st.lists(st.fixed_dictionaries({"position": POSITION, "radius": SIZE}), max_size=1))
     document["thrust"] = draw(
         st.lists(st.fixed_dictionaries({"body": st.sampled_from(NAMES), "force": vectors(1e30, 1.0)}), max_size=1)
     )
-    pull = {"toward": PLACE | st.sampled_from(NAMES), "strength": ends(-1e30, 1e30, 10.0)}
+    attraction = {"toward": POSITION | st.sampled_from(NAMES), "strength": ends(-1e30, 1e30, 10.0)}
     document["attraction"] = draw(
-        st.lists(st.fixed_dictionaries(pull, optional={"softening": ends(0.0, 1e9, 1.0)}), max_size=1)
+        st.lists(st.fixed_dictionaries(attraction, optional={"softening": ends(0.0, 1e9, 1.0)}), max_size=1)
     )
     document["world"] = draw(
         st.fixed_dictionaries(
@@ -102,7 +102,7 @@ def documents(draw: st.DrawFn) -> dict[str, Any]:
     return {key: value for key, value in document.items() if value != []}
 
 
-def answer(scene: Scene) -> None:
+def assert_finite_answers(scene: Scene) -> None:
     safe = largest_safe_dt(scene)
     assert safe is None or safe > 0.0
     for each in (*warnings(scene), *notes(scene)):
@@ -111,22 +111,22 @@ def answer(scene: Scene) -> None:
         assert all(isinstance(v, str) or math.isfinite(v) for v in each.details.values()), each
 
 
-# Many combinations contradict each other and are no scenes: that is the format's business.
+# Many combinations are contradictory and no valid scenes; the schema rejects these.
 @settings(max_examples=300, suppress_health_check=[HealthCheck.filter_too_much])
 @given(documents())
-def test_any_scene_at_the_ends_of_the_schema_gets_finite_answers(document: dict[str, Any]) -> None:
+def test_scene_at_the_limits_of_the_schema_gets_finite_answers(document: dict[str, Any]) -> None:
     try:
         scene = from_document(document)
     except SceneError:
         assume(False)
-    answer(scene)
+    assert_finite_answers(scene)
 
 
 @pytest.mark.parametrize("stiffness", [5e6, 1e30])
-def test_explicit_euler_on_a_stiff_spring_is_answered(stiffness: float) -> None:
+def test_explicit_euler_on_a_stiff_spring_gets_finite_answers(stiffness: float) -> None:
     ball = {"name": "a", "position": [1.0, 0.0], "radius": 0.1}
     spring = {"kind": "spring", "between": ["a"], "stiffness": stiffness, "anchors": [[0, 0], [0, 0]]}
     solver = {"dt": 0.001, "integrator": "explicit_euler"}
     scene = from_document({"ball": [ball], "joint": [spring], "solver": solver})
-    answer(scene)
+    assert_finite_answers(scene)
     assert "spring" in [each.kind for each in warnings(scene)]

@@ -1,4 +1,4 @@
-"""Recorder: how many frames a run has, and whether they fit."""
+"""Recorder: number of frames of a run, and their memory."""
 
 import re
 import subprocess
@@ -27,7 +27,7 @@ def scene_of(duration: float) -> Scene:
 
 @given(st.integers(1, 10**6), st.integers(1, 9999), st.integers(-6, 0))
 @example(3, 1, -1)  # 0.3 / 0.1 = 2.9999999999999996
-def test_duration_of_whole_steps_has_no_part(steps: int, digits: int, power: int) -> None:
+def test_duration_of_whole_steps_has_no_partial_step(steps: int, digits: int, power: int) -> None:
     dt = Decimal(digits).scaleb(power)
     if not Decimal("1e-9") <= dt <= 10:
         dt = Decimal("0.01")
@@ -35,39 +35,41 @@ def test_duration_of_whole_steps_has_no_part(steps: int, digits: int, power: int
 
 
 @given(st.integers(0, 10**5), st.floats(1e-3, 0.999))
-def test_duration_between_steps_has_the_part_that_is_left(steps: int, share: float) -> None:
-    whole, part = frame_count(scene_of((steps + share) * 0.01), Settings(dt=0.01))
+def test_duration_between_steps_has_a_partial_step(steps: int, fraction: float) -> None:
+    whole, part = frame_count(scene_of((steps + fraction) * 0.01), Settings(dt=0.01))
     assert whole == steps
-    assert part == pytest.approx(share, abs=1e-10)  # 1e5 steps, rounded by 1e-16 of that, thrice
+    assert part == pytest.approx(fraction, abs=1e-10)  # 1e5 steps, three relative roundings of 1e-16
 
 
 @given(st.floats(1e-300, 1e9), st.floats(1e-9, 10.0))
-def test_steps_and_part_make_up_any_duration(duration: float, dt: float) -> None:
+def test_steps_and_partial_step_add_up_to_any_duration(duration: float, dt: float) -> None:
     steps, part = frame_count(scene_of(duration), Settings(dt=dt))
     assert steps >= 0
     assert 0.0 <= part < 1.0
     assert steps + part > 0.0
-    assert (steps + part) * dt == pytest.approx(duration, rel=2e-9)  # what counts as whole is within 1e-9
+    assert (steps + part) * dt == pytest.approx(duration, rel=2e-9)  # a step counts as whole within 1e-9
 
 
 @given(st.integers(0, 300), st.sampled_from([0.0, 0.5]), st.integers(1, 400))
-def test_kept_frames_are_counted(steps: int, part: float, every: int) -> None:
+def test_recorded_frames_are_counted(steps: int, part: float, every: int) -> None:
     if steps == 0 and part == 0.0:
         part = 0.5
-    kept = {*range(0, steps + 1, every), steps + part}
-    assert recorded_frames(steps, part, every) == len(kept)
+    recorded = {*range(0, steps + 1, every), steps + part}
+    assert recorded_frames(steps, part, every) == len(recorded)
 
 
 @given(st.integers(1, 10_000), st.integers(1, 50), st.sampled_from([0.0, 0.5]), st.integers(2, 300), st.integers(1, 20))
-def test_frames_that_do_not_fit_name_a_number_that_does(
-    steps: int, bodies: int, part: float, room: int, every: int
+def test_error_for_too_many_frames_names_an_interval_that_fits(
+    steps: int, bodies: int, part: float, capacity: int, every: int
 ) -> None:
     scene, settings = scene_of((steps + part) * 0.01), Settings(dt=0.01, record_every=every)
     with pytest.MonkeyPatch.context() as patch:
-        # Room for so many frames, and half a one.
-        patch.setattr(recorder, "free_memory", lambda: (room + 0.5) * bytes_per_frame(scene, bodies) / FREE_FRACTION)
+        # Memory for `capacity` frames and a half.
+        patch.setattr(
+            recorder, "free_memory", lambda: (capacity + 0.5) * bytes_per_frame(scene, bodies) / FREE_FRACTION
+        )
         needed = recorded_frames(steps, part, every)
-        if needed <= room:
+        if needed <= capacity:
             assert recorder.require_memory(scene, settings, bodies) == needed
             return
         with pytest.raises(TooLargeError) as caught:
@@ -76,16 +78,16 @@ def test_frames_that_do_not_fit_name_a_number_that_does(
         assert found is not None
         fits = int(found[1])
         assert fits > every
-        assert recorder.require_memory(scene, settings.replace(record_every=fits), bodies) <= room
+        assert recorder.require_memory(scene, settings.replace(record_every=fits), bodies) <= capacity
 
 
-def test_two_frames_that_do_not_fit_ask_for_fewer_bodies(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_error_if_two_frames_do_not_fit_asks_for_fewer_bodies(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recorder, "free_memory", lambda: 1000)
     with pytest.raises(TooLargeError, match=r"^101 frames of 1,000 bodies take .* use fewer bodies$"):
         Recorder(scene_of(1.0), Settings(), 1000)
 
 
-def test_message_says_what_is_needed_and_what_there_is(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_message_states_needed_and_available_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recorder, "free_memory", lambda: int(1e9))
     with pytest.raises(TooLargeError) as caught:
         Recorder(scene_of(1.0), Settings(dt=1e-8, record_every=2), 1)
@@ -95,7 +97,7 @@ def test_message_says_what_is_needed_and_what_there_is(monkeypatch: pytest.Monke
     )
 
 
-def test_account_of_energy_counts_as_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_energy_account_counts_as_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recorder, "free_memory", lambda: int(200 * 56 / FREE_FRACTION))
     assert recorder.require_memory(scene_of(1.0), Settings(), 1) == 101
     with pytest.raises(TooLargeError, match="record_every"):
@@ -109,8 +111,8 @@ def test_free_memory_is_a_positive_number_of_bytes() -> None:
 def test_free_memory_is_within_the_limit_of_address_space() -> None:
     code = "import resource\nresource.setrlimit(resource.RLIMIT_AS, (2**30, 2**30))\n"
     code += "from sandbox.resource_limits import free_memory\nprint(free_memory())"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert 0 < int(done.stdout) < 2**30
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert 0 < int(result.stdout) < 2**30
 
 
 def frame_at(time: float, bodies: int) -> Frame:
@@ -118,45 +120,45 @@ def frame_at(time: float, bodies: int) -> Frame:
     return Frame(time, vectors, vectors, numbers, numbers, np.ones(bodies, dtype=np.bool_))
 
 
-def test_recorder_keeps_every_nth_and_the_last() -> None:
-    kept = Recorder(scene_of(0.05), Settings(record_every=2), 1)
-    assert [kept.is_due(k, k == 5) for k in range(1, 6)] == [False, True, False, True, True]
+def test_recorder_records_every_nth_and_the_last_frame() -> None:
+    recording = Recorder(scene_of(0.05), Settings(record_every=2), 1)
+    assert [recording.is_due(k, k == 5) for k in range(1, 6)] == [False, True, False, True, True]
     for time in (0.0, 0.02, 0.04, 0.05):
-        kept.record(frame_at(time, 1), time)
-    arrays = kept.arrays(1)
+        recording.record(frame_at(time, 1), time)
+    arrays = recording.arrays(1)
     assert arrays["time"].tolist() == [0.0, 0.02, 0.04, 0.05]
     assert arrays["position"].shape == (4, 1, 2)
 
 
-def test_frame_at_an_early_end_is_kept_once() -> None:
-    kept = Recorder(scene_of(0.05), Settings(), 1)
-    kept.record(frame_at(0.0, 1), 0.0)
+def test_frame_at_an_early_end_is_recorded_once() -> None:
+    recording = Recorder(scene_of(0.05), Settings(), 1)
+    recording.record(frame_at(0.0, 1), 0.0)
     for time in (0.0, 0.01, 0.01):
-        kept.record_unless_recorded(frame_at(time, 1))
-    assert kept.arrays(1)["time"].tolist() == [0.0, 0.01]
+        recording.record_unless_recorded(frame_at(time, 1))
+    assert recording.arrays(1)["time"].tolist() == [0.0, 0.01]
 
 
-def test_bodies_that_come_later_are_nan_before() -> None:
-    kept = Recorder(scene_of(0.02), Settings(), 3)
-    kept.record(frame_at(0.0, 1), 0.0)
-    kept.record(frame_at(0.01, 2), 0.01)
-    arrays = kept.arrays(2)
+def test_bodies_added_later_are_nan_before() -> None:
+    recording = Recorder(scene_of(0.02), Settings(), 3)
+    recording.record(frame_at(0.0, 1), 0.0)
+    recording.record(frame_at(0.01, 2), 0.01)
+    arrays = recording.arrays(2)
     assert arrays["angle"].shape == (2, 2)
     assert np.isnan(arrays["angle"]).tolist() == [[False, True], [False, False]]
 
 
 def test_scene_without_bodies_has_frames() -> None:
-    kept = Recorder(loads('title = "Nobody"'), Settings(), 0)
-    kept.record(frame_at(0.0, 0), 0.0)
-    assert kept.arrays(0)["position"].shape == (1, 0, 2)
+    recording = Recorder(loads('title = "Nobody"'), Settings(), 0)
+    recording.record(frame_at(0.0, 0), 0.0)
+    assert recording.arrays(0)["position"].shape == (1, 0, 2)
 
 
-def test_bodies_that_nobody_foresaw_find_room(monkeypatch: pytest.MonkeyPatch) -> None:
-    kept = Recorder(scene_of(0.05), Settings(), 1)
+def test_recorder_grows_for_added_bodies_until_memory_is_exhausted(monkeypatch: pytest.MonkeyPatch) -> None:
+    recording = Recorder(scene_of(0.05), Settings(), 1)
     for k, count in enumerate((1, 1, 5, 6)):
-        kept.record(frame_at(0.01 * k, count), 0.01 * k)
-    arrays = kept.arrays(6)
+        recording.record(frame_at(0.01 * k, count), 0.01 * k)
+    arrays = recording.arrays(6)
     assert (~np.isnan(arrays["angle"])).sum(axis=1).tolist() == [1, 1, 5, 6]
     monkeypatch.setattr(recorder, "free_memory", lambda: 100)
     with pytest.raises(Exhaustion, match="frames of 60 bodies do not fit into memory"):
-        kept.record(frame_at(0.04, 60), 0.04)
+        recording.record(frame_at(0.04, 60), 0.04)

@@ -1,4 +1,4 @@
-"""Replays: a session without its window ends in the same state, bit for bit, on every engine that can."""
+"""Replays: a recorded session ends in the same state, bit for bit, on every engine that supports it."""
 
 from typing import Any
 
@@ -52,20 +52,20 @@ small = st.floats(-5.0, 5.0)
 bodies = st.sampled_from(["a", "b", "post", "g-1", "g-4", "s-2", "new", "spawned-15", "zzz"])
 
 
-def done() -> st.SearchStrategy[Action]:
-    """Actions of every kind that all engines know, and that lead nowhere near the limits."""
-    places = st.tuples(st.floats(-4.0, 2.0), st.floats(1.0, 8.0))
+def actions() -> st.SearchStrategy[Action]:
+    """Return actions of every kind that all engines support, with values far from the limits."""
+    positions = st.tuples(st.floats(-4.0, 2.0), st.floats(1.0, 8.0))
     pairs = st.tuples(small, small)
     balls = st.builds(
-        Ball, position=places, radius=st.sampled_from([0.1, 0.3]), name=st.sampled_from([None, "new"]),
+        Ball, position=positions, radius=st.sampled_from([0.1, 0.3]), name=st.sampled_from([None, "new"]),
         restitution=st.just(0.5), collides=st.sampled_from(["all", "none"]),
     )  # fmt: skip
     paths = st.sampled_from(["ball.*.restitution", "plane.floor.friction", "grid.g.restitution", "world.linear_drag"])
     values: dict[str, Any] = {"dt": st.sampled_from([0.005, 0.01, 1 / 60, 0.02]), "substeps": st.integers(1, 3)}
     kinds: list[st.SearchStrategy[Action]] = [
         st.builds(Impulse, time=st.just(0.0), body=bodies, impulse=pairs, angular=small),
-        st.builds(Move, time=st.just(0.0), body=bodies, position=places, velocity=st.none() | pairs),
-        st.builds(Pull, time=st.just(0.0), body=bodies, grip=st.just((0.05, 0.0)), target=st.none() | places),
+        st.builds(Move, time=st.just(0.0), body=bodies, position=positions, velocity=st.none() | pairs),
+        st.builds(Pull, time=st.just(0.0), body=bodies, grip=st.just((0.05, 0.0)), target=st.none() | positions),
         st.builds(Remove, time=st.just(0.0), body=bodies),
         st.builds(Spawn, time=st.just(0.0), ball=balls),
         st.builds(SetParameter, time=st.just(0.0), path=paths, value=st.floats(0.0, 1.0)),
@@ -77,12 +77,12 @@ def done() -> st.SearchStrategy[Action]:
     return st.one_of(kinds)
 
 
-Played = list[tuple[int, int | None, Action]]
-"""Steps to make, then perhaps steps to go back, then what is done."""
+Plan = list[tuple[int, int | None, Action]]
+"""Steps to advance, steps to seek back or None, and an action."""
 
 
-def played(engine: str, plan: Played, scene: Scene = SCENE) -> Session:
-    """Return a session in which all was done that could be."""
+def play(engine: str, plan: Plan, scene: Scene = SCENE) -> Session:
+    """Return a session with all possible actions of a plan applied."""
     session = Session(scene, engine)
     for steps, back, action in plan:
         session.advance(steps)
@@ -95,19 +95,19 @@ def played(engine: str, plan: Played, scene: Scene = SCENE) -> Session:
             except ActionError as error:
                 assert str(error)
     session.advance(5)
-    for _ in session.seek(session.history.last_step):  # a recording goes to the last step, also after a way back
+    for _ in session.seek(session.history.last_step):  # a recording ends at the last step, even after seeking back
         pass
     return session
 
 
-plans = st.lists(st.tuples(st.integers(0, 25), st.none() | st.integers(0, 30), done()), max_size=10)
+plans = st.lists(st.tuples(st.integers(0, 25), st.none() | st.integers(0, 30), actions()), max_size=10)
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 @given(plan=plans)
 @settings(max_examples=12)
-def test_session_replays_to_the_same_state_through_json(engine: str, plan: Played) -> None:
-    session = played(engine, plan)
+def test_session_replays_to_the_same_state_through_json(engine: str, plan: Plan) -> None:
+    session = play(engine, plan)
     recording = session.recording()
     again = Recording.from_json(recording.to_json())
     assert again == recording
@@ -121,9 +121,9 @@ def test_session_replays_to_the_same_state_through_json(engine: str, plan: Playe
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_session_of_every_kind_of_action_replays_on_every_engine(engine: str) -> None:
-    """What is done here every engine can do, whatever came before."""
-    plan: Played = [
+def test_session_with_every_kind_of_action_replays_on_every_engine(engine: str) -> None:
+    """Every engine supports these actions in any state."""
+    plan: Plan = [
         (10, None, Impulse(time=0.0, body="a", impulse=(0.5, 1.0), angular=0.1)),
         (5, None, Pull(time=0.0, body="b", grip=(0.1, 0.2), target=(0.5, 1.5))),
         (20, None, Switch(time=0.0, engine="exact")),
@@ -136,25 +136,25 @@ def test_session_of_every_kind_of_action_replays_on_every_engine(engine: str) ->
         (9, None, Launch(time=0.0, generator="s", seed=8)),
         (9, None, Switch(time=0.0, engine="pymunk", settings={"substeps": 2})),
     ]
-    session = played(engine, plan)
+    session = play(engine, plan)
     recording = session.recording()
     assert [action.kind for action in recording.actions if action.kind != "switch"] == [
         "impulse", "pull", "pull", "move", "spawn", "set", "remove", "launch",
     ]  # fmt: skip
-    own = rerun(recording)
-    assert own.info["state_hash"] == recording.state_hash
-    assert own.time[-1] == recording.duration
+    replayed = rerun(recording)
+    assert replayed.info["state_hash"] == recording.state_hash
+    assert replayed.time[-1] == recording.duration
     for other in ENGINES:
         found = rerun(recording, other)
         assert (found.status, found.reason) == ("ok", None)
         assert found.info["engine"] == other
         assert found.time[-1] == recording.duration
-        assert found.names.tolist() == own.names.tolist()
+        assert found.names.tolist() == replayed.names.tolist()
         assert found.number("g-1") in np.flatnonzero(~np.isnan(found.retired_time))
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_session_that_was_just_started_replays(engine: str) -> None:
+def test_session_without_steps_replays(engine: str) -> None:
     session = Session(SCENE, engine)
     recording = session.recording()
     assert recording.duration == 0.0
@@ -172,7 +172,7 @@ def test_session_that_was_just_started_replays(engine: str) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_what_is_done_at_the_very_end_is_in_the_last_frame(engine: str) -> None:
+def test_action_at_the_end_is_in_the_last_frame(engine: str) -> None:
     session = Session(SCENE, engine)
     session.advance(10)
     session.apply(Move(time=0.0, body="a", position=(-5.0, 9.0), velocity=(0.0, 0.0)))
@@ -183,7 +183,7 @@ def test_what_is_done_at_the_very_end_is_in_the_last_frame(engine: str) -> None:
     assert len(found.time) == 11
 
 
-def test_action_that_another_engine_cannot_do_ends_its_replay_with_the_reason() -> None:
+def test_replay_ends_with_a_reason_at_an_action_the_engine_cannot_apply() -> None:
     session = Session(SCENE, "reference")
     session.advance(10)
     session.apply(Switch(time=0.0, settings={"detection": "swept"}))
@@ -200,7 +200,7 @@ def test_session_that_diverged_replays_to_its_end(engine: str) -> None:
     session = Session(from_document({"ball": [ball], "solver": {"dt": 10.0}}), engine)
     session.advance(10_000)
     assert session.ended is not None
-    assert session.step_number == 9011  # 9.9e15 + 9011 · 1e13 is the first beyond 1e17
+    assert session.step_number == 9011  # 9.9e15 + 9011 · 1e13 is the first position beyond 1e17
     recording = session.recording()
     found = rerun(recording)
     assert found.status == "diverged"
@@ -208,6 +208,6 @@ def test_session_that_diverged_replays_to_its_end(engine: str) -> None:
     assert found.info["state_hash"] == recording.state_hash
 
 
-def test_unknown_engine_is_told() -> None:
+def test_unknown_engine_raises() -> None:
     with pytest.raises(UnknownEngineError, match="engines: "):
         rerun(Session(SCENE).recording(), "zzz")

@@ -1,4 +1,4 @@
-"""Runs: which frames they keep, when actions act, how they end, and that looking changes nothing."""
+"""Runs: recorded frames, times of actions, ends of runs, and observation without side effects."""
 
 import hashlib
 import json
@@ -60,14 +60,14 @@ count = 5
 velocity_min = [-1.0, 1.0]
 velocity_max = [1.0, 5.0]
 """
-"""Balls that meet a floor, a wall and each other, rub and spin, and sparks that meet nothing."""
+"""Balls with friction and spin that collide with a floor, a wall and each other, and sparks without collisions."""
 
 FRAMES = ("time", "position", "velocity", "angle", "angular_velocity")
 CONTACTS = ("contact_time", "contact_pair", "contact_point", "contact_normal", "contact_impulse")
 
 
 def flight(duration: float, dt: float = 0.01, substeps: int = 1, every: int = 1, world: str = "") -> Scene:
-    """A ball that starts at rest at (1, 2), in free flight."""
+    """Return a ball in free flight that starts at rest at (1, 2)."""
     return loads(
         f"[world]\nduration = {duration!r}\n{world}\n"
         f"[solver]\ndt = {dt!r}\nsubsteps = {substeps}\nrecord_every = {every}\n"
@@ -111,19 +111,17 @@ def test_frames_lie_at_multiples_of_dt_and_at_the_duration(
 
 
 @given(steps_of_a_run, st.integers(1, 4), st.integers(1, 45))
-def test_last_part_of_a_step_lies_on_the_schemes_own_path(
-    steps: tuple[str, int, str], substeps: int, every: int
-) -> None:
+def test_partial_last_step_follows_the_scheme(steps: tuple[str, int, str], substeps: int, every: int) -> None:
     dt, end = Fraction(steps[0]), (steps[1] + Fraction(steps[2])) * Fraction(steps[0])
     scene = flight(float(end), float(dt), substeps, every, "gravity = [3.0, -10.0]")
-    # Explicit Euler between its points in exact arithmetic: positions go straight, by the velocity before.
+    # Explicit Euler in exact arithmetic: between steps, positions move linearly with the previous velocity.
     h, time = dt / substeps, Fraction(0)
     position, velocity = [Fraction(1), Fraction(2)], [Fraction(0), Fraction(0)]
     while time < end:
         span = min(h, end - time)
-        for axis, pull in enumerate((3, -10)):
+        for axis, gravity in enumerate((3, -10)):
             position[axis] += velocity[axis] * span
-            velocity[axis] += pull * span
+            velocity[axis] += gravity * span
         time += span
     result = run(scene)
     # 160 additions of numbers up to 30, each rounded by 4e-15 at most.
@@ -131,7 +129,7 @@ def test_last_part_of_a_step_lies_on_the_schemes_own_path(
     assert result.velocity[-1, 0] == pytest.approx([float(v) for v in velocity], abs=1e-12)  # likewise
 
 
-def test_duration_far_below_a_step_is_a_part_of_it() -> None:
+def test_duration_far_below_a_step_is_a_partial_step() -> None:
     result = run(flight(1e-9, dt=10.0, world="gravity = [0.0, -10.0]"))
     assert result.time.tolist() == [0.0, 1e-9]
     assert result.velocity[-1, 0, 1] == pytest.approx(
@@ -141,26 +139,26 @@ def test_duration_far_below_a_step_is_a_part_of_it() -> None:
 
 @pytest.mark.parametrize("duration", [0.8, 0.804, 0.8099])
 @pytest.mark.parametrize("every", [2, 3, 7, 79, 80, 81, 1000])
-def test_thinned_frames_are_those_of_the_full_run(duration: float, every: int) -> None:
+def test_thinned_frames_are_a_subset_of_the_full_run(duration: float, every: int) -> None:
     scene = loads(CROWD, overrides=[("world.duration", duration)])
     full, thin = run(scene), run(scene, record_every=every)
-    kept = sorted({*range(0, 81, every), len(full.time) - 1})
+    recorded = sorted({*range(0, 81, every), len(full.time) - 1})
     for name in FRAMES:
-        assert np.array_equal(getattr(thin, name), getattr(full, name)[kept])
+        assert np.array_equal(getattr(thin, name), getattr(full, name)[recorded])
     assert same(full, thin, (*CONTACTS, "missed_time", "missed_pair"))
 
 
-def test_substeps_alone_decide_the_state_however_they_are_grouped() -> None:
+def test_state_depends_on_the_substep_and_not_on_its_grouping() -> None:
     scene = loads(CROWD)
     fine, grouped = run(scene, dt=0.0078125), run(scene, dt=0.03125, substeps=4)  # powers of two: equal substeps
     at = np.searchsorted(fine.time, grouped.time[:-1])
     assert np.array_equal(fine.position[at], grouped.position[:-1])
 
 
-# Looking changes nothing
+# Observation has no side effects
 
 
-def test_audit_and_contacts_change_no_bit() -> None:
+def test_audit_and_contacts_do_not_change_the_state() -> None:
     scene = loads(CROWD)
     audited, plain = run(scene), run(scene, audit=False)
     assert same(audited, plain)
@@ -192,8 +190,8 @@ def digest(result: Trajectory) -> str:
 
 
 @pytest.mark.parametrize("hash_seed", ["0", "12345"])
-def test_same_run_in_another_process_is_the_same_to_the_bit(hash_seed: str) -> None:
-    done = subprocess.run(
+def test_run_in_another_process_is_identical_to_the_bit(hash_seed: str) -> None:
+    process = subprocess.run(
         [sys.executable, "-c", DIGEST],
         capture_output=True,
         text=True,
@@ -201,7 +199,7 @@ def test_same_run_in_another_process_is_the_same_to_the_bit(hash_seed: str) -> N
         timeout=120,
         env={"PYTHONHASHSEED": hash_seed, "PYTHONPATH": ":".join(sys.path)},
     )
-    assert done.stdout.strip() == digest(run(loads(CROWD), actions=ACTIONS))
+    assert process.stdout.strip() == digest(run(loads(CROWD), actions=ACTIONS))
 
 
 # Actions
@@ -218,33 +216,33 @@ ACTIONS: tuple[Action, ...] = (
 
 
 @given(st.integers(0, 100), st.sampled_from(["0", "0.5"]))
-def test_impulse_acts_from_the_first_step_of_its_time_or_later_or_at_the_end(thousandths: int, part: str) -> None:
+def test_impulse_acts_from_the_first_step_at_or_after_its_time(thousandths: int, part: str) -> None:
     steps = 10 + Fraction(part)
     kick = Impulse(time=thousandths / 1000, body="a", impulse=(2.0, -4.0))
     result = run(flight(float(steps / 100)), actions=[kick])
-    first = math.ceil(Fraction(thousandths, 10))  # number of the step
+    first = math.ceil(Fraction(thousandths, 10))  # index of the step
     for k, time in enumerate(result.time):
-        after = max(Fraction(0), min(Fraction(k), steps) - first) / 100  # s since then
-        kicked = after > 0 or Fraction(k) == steps == first  # what comes at the very end shows in the last frame
+        after = max(Fraction(0), min(Fraction(k), steps) - first) / 100  # s since that step
+        kicked = after > 0 or Fraction(k) == steps == first  # an impulse at the very end shows in the last frame
         assert result.velocity[k, 0].tolist() == ([1.0, -2.0] if kicked else [0.0, 0.0]), time
         # Ten additions of numbers up to 2.
         assert result.position[k, 0] == pytest.approx([1 + float(after), 2 - 2 * float(after)], abs=1e-14)
 
 
-def test_actions_of_one_time_act_in_the_order_given_and_others_in_that_of_time() -> None:
-    to = [Move(time=t, body="a", position=(x, 0.0)) for t, x in ((0.05, 7.0), (0.02, 3.0), (0.02, 4.0))]
-    result = run(flight(0.1), actions=to)
+def test_actions_are_sorted_by_time_and_keep_their_order_at_equal_times() -> None:
+    moves = [Move(time=t, body="a", position=(x, 0.0)) for t, x in ((0.05, 7.0), (0.02, 3.0), (0.02, 4.0))]
+    result = run(flight(0.1), actions=moves)
     assert result.position[:, 0, 0].tolist() == [1.0] * 3 + [4.0] * 3 + [7.0] * 5
 
 
-def test_actions_after_the_end_never_happen() -> None:
+def test_actions_after_the_end_are_ignored() -> None:
     late = Spawn(time=0.101, ball=Ball(position=(0.0, 0.0), radius=1.0)), Remove(time=5.0, body="nobody")
     result = run(flight(0.1), actions=late)
     assert (result.status, result.names.tolist()) == ("ok", ["a"])
     assert same(result, run(flight(0.1)))
 
 
-def test_actions_of_the_very_end_show_in_the_last_frame_alone() -> None:
+def test_actions_at_the_end_show_only_in_the_last_frame() -> None:
     result = run(flight(0.1), actions=[Spawn(time=0.1, ball=Ball(name="b", position=(3.0, 4.0), radius=1.0))])
     assert result.names.tolist() == ["a", "b"]
     assert np.isnan(result.position[:-1, 1]).all()
@@ -252,7 +250,7 @@ def test_actions_of_the_very_end_show_in_the_last_frame_alone() -> None:
 
 
 def replayed(recording: Recording) -> str:
-    """Step a recording by hand, and return the hash of where it ends."""
+    """Step a recording by hand, and return the hash of its final state."""
     simulation = start(recording.scene, recording.engine, recording.settings)
     waiting = list(recording.actions)
     for k in range(frame_count(recording.scene, recording.settings)[0]):
@@ -287,22 +285,22 @@ def test_run_ends_where_stepping_by_hand_ends() -> None:
     assert np.array_equal(frame.velocity, result.velocity[-1])
 
 
-# Who comes and goes
+# Added and retired bodies
 
 
-def test_retired_body_stays_in_its_place_and_is_reported() -> None:
+def test_retired_body_keeps_its_position_and_is_reported() -> None:
     scene = flight(1.0, 0.1, world="bounds = [[0.0, 0.0], [1.45, 5.0]]")
     result = run(scene, actions=[Impulse(time=0.0, body="a", impulse=(2.0, 0.0))])
     assert result.status == "ok"
     assert result.retired_time.tolist() == [0.5]
-    gone = result.time >= 0.5
-    assert (result.position[gone] == result.position[5]).all()
+    retired = result.time >= 0.5
+    assert (result.position[retired] == result.position[5]).all()
     assert result.position[5, 0, 0] == pytest.approx(1.5, rel=1e-15)  # five additions
-    assert not result.velocity[gone].any()
-    assert (result.velocity[~gone][1:, 0, 0] == 1.0).all()
+    assert not result.velocity[retired].any()
+    assert (result.velocity[~retired][1:, 0, 0] == 1.0).all()
 
 
-def test_removed_body_stays_in_its_place_and_is_reported() -> None:
+def test_removed_body_keeps_its_position_and_is_reported() -> None:
     kick = Impulse(time=0.0, body="a", impulse=(2.0, 0.0))
     result = run(flight(1.0, 0.1), actions=[kick, Remove(time=0.3, body="a")])
     assert result.retired_time.tolist() == [pytest.approx(0.3, rel=1e-15)]  # 3·0.1
@@ -310,12 +308,12 @@ def test_removed_body_stays_in_its_place_and_is_reported() -> None:
     assert not result.velocity[4:].any()
 
 
-def test_spawned_body_is_nan_before_it_is_there() -> None:
+def test_spawned_body_is_nan_before_it_is_added() -> None:
     ball = Ball(name="b", position=(5.0, 5.0), velocity=(1.0, 0.0), radius=0.1, angular_velocity=2.0)
     result = run(flight(1.0, 0.1), actions=[Spawn(time=0.35, ball=ball)])
     assert result.names.tolist() == ["a", "b"]
     for array in (result.position, result.velocity, result.angle, result.angular_velocity):
-        assert np.isnan(array[:5, 1]).all()  # it is there from the step on that starts at 0.4 s
+        assert np.isnan(array[:5, 1]).all()  # it is added with the step that starts at 0.4 s
         assert not np.isnan(array[5:, 1]).any()
         assert not np.isnan(array[:, 0]).any()
     assert result.position[5, 1].tolist() == [5.1, 5.0]
@@ -323,10 +321,10 @@ def test_spawned_body_is_nan_before_it_is_there() -> None:
     assert math.isfinite(result.info["energy_end"])
 
 
-# How it ends
+# Ends of runs
 
 
-def test_run_tells_everything_that_it_was() -> None:
+def test_run_info_has_scene_settings_actions_and_results() -> None:
     scene = loads(CROWD)
     result = run(scene, actions=ACTIONS, dt=0.02)
     info = json.loads(json.dumps(dict(result.info), allow_nan=False))
@@ -349,8 +347,8 @@ def test_run_tells_everything_that_it_was() -> None:
     assert (info["seconds"] > 0, info["audited"]) == (True, True)
 
 
-def test_diverging_run_keeps_what_it_has() -> None:
-    # 9.5e11 m/s a step: just allowed, and beyond all bounds with the eleventh.
+def test_diverging_run_keeps_its_frames() -> None:
+    # 9.5e11 m/s a step: just allowed, and out of range with the eleventh.
     push = Force(time=0.3, body="a", force=(1.9e13, 0.0))
     result = run(flight(2.0, 0.1, every=2), actions=[push])
     assert (result.status, result.info["steps"]) == ("diverged", 13)
@@ -360,7 +358,7 @@ def test_diverging_run_keeps_what_it_has() -> None:
     assert result.info["energy_start"] == 0.0
 
 
-def test_body_carried_out_of_reach_of_its_plane_diverges() -> None:
+def test_body_out_of_range_of_its_plane_diverges() -> None:
     scene = loads(CROWD, overrides=["world.gravity=[1e9, 0.0]", "world.duration=5.0", "world.seed=1"])
     result = run(scene, dt=0.1)
     assert result.status == "diverged"
@@ -376,7 +374,7 @@ def test_body_carried_out_of_reach_of_its_plane_diverges() -> None:
         (SetParameter(time=0.05, path="solver.dt", value=1.0), "at 0.05 s: 'solver.dt' cannot be changed"),
     ],
 )
-def test_action_that_cannot_be_done_fails_the_run_and_keeps_what_it_has(action: Action, reason: str) -> None:
+def test_invalid_action_fails_the_run_and_keeps_its_frames(action: Action, reason: str) -> None:
     for every, times in ((1, [0.0, 0.01, 0.02, 0.03, 0.04, 0.05]), (5, [0.0, 0.05]), (3, [0.0, 0.03, 0.05])):
         result = run(flight(0.1, every=every), actions=[action])
         assert (result.status, result.info["steps"]) == ("failed", 5)
@@ -394,7 +392,7 @@ def test_refused_run_has_no_frames() -> None:
     assert (result.info["steps"], result.info["energy_end"], result.missed_contacts) == (0, None, None)
 
 
-def test_unknown_engine_and_wrong_settings_are_errors() -> None:
+def test_unknown_engine_and_invalid_settings_raise() -> None:
     scene = flight(0.1)
     with pytest.raises(UnknownEngineError, match="unknown engine 'none'; engines: pymunk"):
         run(scene, "none")
@@ -403,7 +401,7 @@ def test_unknown_engine_and_wrong_settings_are_errors() -> None:
             run(scene, **wrong)
 
 
-def test_run_that_would_not_fit_is_refused_before_its_first_step() -> None:
+def test_run_too_large_for_memory_is_rejected_before_its_first_step() -> None:
     states: list[Progress] = []
     scene = loads("[world]\nduration = 1.0\n[[grid]]\norigin = [0, 0]\ncolumns = 10000\nspacing = [3, 3]\nradius = 1\n")
     with pytest.raises(TooLargeError, match=r"solver\.record_every = \d+ would fit"):
@@ -411,16 +409,16 @@ def test_run_that_would_not_fit_is_refused_before_its_first_step() -> None:
     assert states == []
 
 
-def test_progress_ends_at_all_of_it() -> None:
+def test_progress_increases_to_1() -> None:
     states: list[Progress] = []
     run(loads(CROWD), on_progress=states.append)
-    shares = [state.fraction for state in states if state.fraction is not None]
-    assert shares[-1] == 1.0
-    assert shares == sorted(shares)
-    assert shares[0] > 0.0
+    fractions = [state.fraction for state in states if state.fraction is not None]
+    assert fractions[-1] == 1.0
+    assert fractions == sorted(fractions)
+    assert fractions[0] > 0.0
 
 
-def test_scene_that_was_run_is_the_scene_as_it_was() -> None:
+def test_run_does_not_change_its_scene() -> None:
     scene = loads(CROWD)
     before = dumps(scene)
     run(scene, actions=ACTIONS, dt=0.02)

@@ -1,4 +1,4 @@
-"""Games without a window: who may act between steps, what is kept of it, and that it leads to the same again."""
+"""Headless games: policies and rules act between steps, and recordings replay to the same state."""
 
 import copy
 from pathlib import Path
@@ -28,9 +28,9 @@ def toy_rules(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(registry.RULES, "landing", Toy)
 
 
-@pytest.mark.parametrize("player", [name for name in POLICIES if name != "skilled"])  # which plays pinball alone
+@pytest.mark.parametrize("player", [name for name in POLICIES if name != "skilled"])  # which plays pinball only
 @pytest.mark.parametrize("engine", ENGINES)
-def test_game_leads_to_the_same_from_its_recording(engine: str, player: str) -> None:
+def test_game_replays_to_the_same_result_from_its_recording(engine: str, player: str) -> None:
     game = play_out(toy_scene(), player, engine)
     recording = Recording.from_json(game.recording.to_json())
     again = rerun(recording, audit=False)
@@ -42,35 +42,35 @@ def test_game_leads_to_the_same_from_its_recording(engine: str, player: str) -> 
         np.testing.assert_array_equal(getattr(again, name), getattr(game.trajectory, name))
 
 
-def test_game_is_the_scenes_seed() -> None:
+def test_game_depends_on_the_seed_of_the_scene() -> None:
     assert play_out(toy_scene()).recording == play_out(toy_scene()).recording
     assert play_out(toy_scene(seed=8)).recording.presses != play_out(toy_scene()).recording.presses
 
 
-def test_contacts_are_heard_as_without_a_game() -> None:
-    """A row a contact, however often the rules were told of it: here of a ball that comes to rest."""
+def test_contacts_are_recorded_as_without_a_game() -> None:
+    """A contact has one row although the rules receive it repeatedly, here of a ball that comes to rest."""
     scene = toy_scene(duration=4.0)
-    still = loads(TOY.replace("restitution = 0.9", "restitution = 0.5"), overrides=[("world.duration", 4.0)])
-    for each in (scene, still):
+    settling = loads(TOY.replace("restitution = 0.9", "restitution = 0.5"), overrides=[("world.duration", 4.0)])
+    for each in (scene, settling):
         game = play_out(each, "none")
         alone = run(each, actions=game.recording.actions, audit=False)
         np.testing.assert_array_equal(alone.contact_time, game.trajectory.contact_time)
         np.testing.assert_array_equal(alone.contact_pair, game.trajectory.contact_pair)
-        # Sums of thousands of impulses, in another order.
+        # Sums of thousands of impulses, in a different order.
         np.testing.assert_allclose(alone.contact_impulse, game.trajectory.contact_impulse, rtol=1e-12, atol=1e-12)
         assert alone.info["state_hash"] == game.trajectory.info["state_hash"]
 
 
-def test_frames_hold_bodies_that_nobody_had_foreseen() -> None:
+def test_frames_include_bodies_spawned_by_the_rules() -> None:
     game = play_out(toy_scene(duration=6.0), "none")
     run_of = game.trajectory
     spawned = [action for action in game.recording.actions if action.kind == "spawn"]
     assert len(spawned) >= 2
     assert run_of.position.shape[1] == 1 + len(spawned)
     for k, action in enumerate(spawned, start=1):
-        there = np.isfinite(run_of.position[:, k, 0])
-        assert (run_of.time[there] > action.time).all()
-        assert (run_of.time[~there] <= action.time).all()
+        present = np.isfinite(run_of.position[:, k, 0])
+        assert (run_of.time[present] > action.time).all()
+        assert (run_of.time[~present] <= action.time).all()
 
 
 class Short(Toy):
@@ -86,33 +86,33 @@ def test_run_ends_with_the_game(monkeypatch: pytest.MonkeyPatch, every: int) -> 
     game = play_out(scene, "none")
     assert game.over == "enough"
     first = float(game.trajectory.contact_time[0])
-    assert first <= game.recording.duration <= first + 0.011  # s: seen after the step of the touch
+    assert first <= game.recording.duration <= first + 0.011  # s: detected after the step of the contact
     assert game.trajectory.time[-1] == game.recording.duration
     last = game.recording.actions[-1]
-    assert last.time == game.recording.duration  # what the rules did as it ended is part of it
+    assert last.time == game.recording.duration  # includes the actions of the rules at the end
     again = rerun(game.recording, audit=False)
     assert again.info["state_hash"] == game.recording.state_hash
     assert again.info["game"]["over"] == "enough"
 
 
-def test_game_whose_duration_is_no_multiple_of_a_step() -> None:
+def test_game_duration_need_not_be_a_multiple_of_the_step() -> None:
     game = play_out(toy_scene(duration=0.505), ScriptedInput([Press(0.1, "kick", 1.0)]))
     assert game.trajectory.time[-1] == 0.505
     assert rerun(game.recording, audit=False).info["state_hash"] == game.recording.state_hash
 
 
-def test_actions_that_are_given_are_the_players() -> None:
+def test_given_actions_reach_the_rules_like_those_of_a_player() -> None:
     scene = toy_scene()
     rules = Toy(scene, scene.bodies)
     given = Impulse(time=0.05, body="a", impulse=(0.0, 1.0))
-    bout = HeadlessGame(rules, POLICIES["none"](scene), "none")
-    told = run(scene, actions=[given], bout=bout, audit=False)
+    game = HeadlessGame(rules, POLICIES["none"](scene), "none")
+    result = run(scene, actions=[given], bout=game, audit=False)
     bounces = int(dict(rules.display_lines())["bounces"])
-    assert bout.score == bounces + 0.5
-    assert given.model_dump(mode="json") in told.info["actions"]
+    assert game.score == bounces + 0.5
+    assert given.model_dump(mode="json") in result.info["actions"]
 
 
-def test_rules_that_ask_for_the_impossible_end_the_run() -> None:
+def test_impossible_action_of_the_rules_fails_the_run() -> None:
     game = play_out(
         loads(TOY.replace('name = "a"', 'name = "a"\nfixed = true')), ScriptedInput([Press(0.1, "kick", 1.0)])
     )
@@ -120,7 +120,7 @@ def test_rules_that_ask_for_the_impossible_end_the_run() -> None:
     assert "'a'" in (game.trajectory.reason or "")
 
 
-def test_script_presses_before_the_step_of_its_time() -> None:
+def test_scripted_press_acts_before_the_step_at_its_time() -> None:
     game = play_out(toy_scene(), ScriptedInput([Press(0.105, "kick", 1.0), Press(0.0, "aim", 1.0)]))
     aim, kick = game.recording.presses
     assert (aim.time, kick.control) == (0.0, "kick")
@@ -130,7 +130,7 @@ def test_script_presses_before_the_step_of_its_time() -> None:
 
 
 def test_random_player_presses_at_its_rates() -> None:
-    """Each control goes down and up in turn, with values of its kind; over seeds as often as the rates say."""
+    """Each control is pressed and released in turn, with valid values; over many seeds at the given rates."""
     scene, counts = toy_scene(), []
     frame = start(scene, "pymunk").frame()
     for seed in range(60):
@@ -144,26 +144,26 @@ def test_random_player_presses_at_its_rates() -> None:
             assert all(0.0 < value <= 1.0 for value in values[::2])
         assert set(pressed["kick"]) <= {0.0, 1.0}
         counts.append(len(pressed["kick"][::2]))
-    # Rates of 0.2 to 2 a second for 20 s, even by factors, less the time that a control is held: 4 to 40 presses,
+    # Rates of 0.2 to 2 per second, log-uniform, for 20 s, less the time that a control is held: 4 to 40 presses,
     # mean below that of 20·(2 − 0.2)/ln 10 = 15.6.
     assert 8.0 < np.mean(counts) < 16.0
 
 
-def test_copied_policies_go_on_alike() -> None:
+def test_copied_policy_makes_the_same_decisions() -> None:
     scene = toy_scene()
     frame = start(scene, "pymunk").frame()
     rules, policy = Toy(scene, scene.bodies), RandomInput(1)
 
     def decide(which: RandomInput, begin: int) -> list[Any]:
-        seen = (StepInfo(0.01 * step, frame, Contacts.none(), ()) for step in range(begin, begin + 500))
-        return [which.decide(each, rules) for each in seen]
+        steps = (StepInfo(0.01 * step, frame, Contacts.none(), ()) for step in range(begin, begin + 500))
+        return [which.decide(each, rules) for each in steps]
 
     decide(policy, 0)
     other = copy.deepcopy(policy)
     assert decide(policy, 500) == decide(other, 500)
 
 
-def test_scene_without_a_game_is_not_played() -> None:
+def test_scene_without_a_game_cannot_be_played() -> None:
     scene = loads(TOY.replace('game = "landing"', ""))
     with pytest.raises(UnsuitableSceneError, match="has no game with rules"):
         play_out(scene)

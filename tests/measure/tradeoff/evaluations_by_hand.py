@@ -1,4 +1,4 @@
-"""Evaluation contexts, evaluations and runs moved by hand, as a test wants them."""
+"""Evaluation contexts, evaluations and shifted runs made for tests."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -16,7 +16,7 @@ from tests.runs_by_hand import run_of
 def context_of(
     scene: Scene, truth: Trajectory | None = None, until: float | None = None, zoom: float = 100.0
 ) -> EvaluationContext:
-    """Return a context whose truth is a run made by hand, by default one in which nothing moves; `until` 0 for none."""
+    """Return a context whose truth is a given run, by default one without motion; without a truth if `until` is 0."""
     if until == 0.0:
         return EvaluationContext(scene, None, zoom)
     run = run_of(scene) if truth is None else truth
@@ -26,7 +26,7 @@ def context_of(
 
 
 def shifted(run: Trajectory, frames: slice | int, body: int, by: tuple[float, float]) -> FloatArray:
-    """Return a run's positions with one body moved in some frames."""
+    """Return the positions of a run with one body displaced in some frames."""
     found = run.position.copy()
     found[frames, body] += by
     return found
@@ -40,14 +40,14 @@ def point_of(
     repeats: int = 1,
     **settings: Any,
 ) -> Evaluation:
-    """Return a point of a cost, ms per simulated second; it is counted as what it takes, if nothing else is said."""
-    chosen = Settings(**settings)
+    """Return an evaluation of a cost in ms per simulated second; its counted cost is the same by default."""
+    resolved = Settings(**settings)
     metrics: Mapping[str, float | None] = dict.fromkeys(METRICS)
     return Evaluation(
-        configuration=Configuration.of(engine, chosen),
+        configuration=Configuration.of(engine, resolved),
         engine=engine,
-        asked=chosen,
-        settings=chosen,
+        asked=resolved,
+        settings=resolved,
         changes=settings,
         error=error,
         cost=cost,

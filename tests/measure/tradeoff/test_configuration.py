@@ -1,4 +1,4 @@
-"""Configurations: which there are, and that their frames can be held against the truth."""
+"""Configurations: their neighbours and limits, and frames at times of the truth."""
 
 from fractions import Fraction
 
@@ -15,7 +15,7 @@ from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import loads
 from tests.runs_by_hand import BALLS, DROP, SWING, scene_of
 
-FINER = st.sampled_from([Fraction(2) ** k for k in range(-4, 9)])
+REFINEMENTS = st.sampled_from([Fraction(2) ** k for k in range(-4, 9)])
 ENGINE = ("pymunk", "exact", "reference")
 
 
@@ -25,28 +25,30 @@ def space_of(text: str = DROP, **settings: object) -> SearchSpace:
 
 
 def around(space: SearchSpace, engine: str, rounds: int = 2) -> set[Configuration]:
-    """Return all configurations up to so many choices away."""
+    """Return all configurations within a number of changes from the start."""
     found = {configuration for configuration in space.starts() if configuration.engine == engine}
     for _ in range(rounds):
         found |= {other for configuration in found for other in space.neighbours(configuration)}
     return found
 
 
-@given(st.floats(1e-6, 0.03), FINER)
-def test_step_is_that_part_of_the_base_to_the_last_bit(dt: float, finer: Fraction) -> None:
-    settings = Configuration("pymunk", finer).settings(Settings(dt=dt))
-    assert Fraction(settings.dt) * finer == Fraction(dt)
+@given(st.floats(1e-6, 0.03), REFINEMENTS)
+def test_step_is_an_exact_fraction_of_the_base(dt: float, refinement: Fraction) -> None:
+    settings = Configuration("pymunk", refinement).settings(Settings(dt=dt))
+    assert Fraction(settings.dt) * refinement == Fraction(dt)
 
 
-@given(st.floats(1e-6, 0.03), st.integers(1, 12), FINER)
-def test_frames_are_kept_at_times_at_which_the_base_keeps_them(dt: float, every: int, finer: Fraction) -> None:
+@given(st.floats(1e-6, 0.03), st.integers(1, 12), REFINEMENTS)
+def test_frames_are_recorded_at_times_of_frames_of_the_base(dt: float, every: int, refinement: Fraction) -> None:
     base = Settings(dt=dt, record_every=every)
-    settings = Configuration("pymunk", finer).settings(base)
-    between = Fraction(settings.dt) * settings.record_every
-    own = Fraction(dt) * every
-    assert between / own == max(Fraction((between / own).numerator), Fraction(1))  # a whole number of the base's
-    if (finer * every).denominator == 1:
-        assert between == own
+    settings = Configuration("pymunk", refinement).settings(base)
+    interval = Fraction(settings.dt) * settings.record_every
+    base_interval = Fraction(dt) * every
+    assert interval / base_interval == max(
+        Fraction((interval / base_interval).numerator), Fraction(1)
+    )  # a multiple of the base interval
+    if (refinement * every).denominator == 1:
+        assert interval == base_interval
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "exact"])
@@ -54,8 +56,8 @@ def test_frames_are_kept_at_times_at_which_the_base_keeps_them(dt: float, every:
 def test_all_frames_of_a_run_are_found_in_the_truth(engine: str, every: int) -> None:
     space = space_of(record_every=every)
     base = run(space.scene, engine, audit=False, **space.base.model_dump())
-    for finer in (Fraction(1, 4), Fraction(1, 2), Fraction(1), Fraction(4)):
-        settings = space.settings(Configuration(engine, finer))
+    for refinement in (Fraction(1, 4), Fraction(1, 2), Fraction(1), Fraction(4)):
+        settings = space.settings(Configuration(engine, refinement))
         mine, its = common_frames(run(space.scene, engine, audit=False, **settings.model_dump()), base)
         assert len(mine) >= 2
         steps = round(0.4 / settings.dt)
@@ -64,7 +66,7 @@ def test_all_frames_of_a_run_are_found_in_the_truth(engine: str, every: int) -> 
 
 
 @pytest.mark.parametrize(("text", "engine"), [(DROP, "pymunk"), (DROP, "exact"), (SWING, "reference")])
-def test_engines_take_every_variant_that_is_near(text: str, engine: str) -> None:
+def test_engines_support_every_neighbour(text: str, engine: str) -> None:
     space = space_of(text)
     for configuration in around(space, engine, rounds=1) - set(space.starts()):
         assert space.is_valid(configuration)
@@ -74,14 +76,14 @@ def test_engines_take_every_variant_that_is_near(text: str, engine: str) -> None
 
 
 @pytest.mark.parametrize(("text", "engine"), [(SWING, "pymunk"), (DROP, "reference")])
-def test_no_two_variants_are_the_same(text: str, engine: str) -> None:
+def test_all_configurations_have_distinct_settings(text: str, engine: str) -> None:
     space = space_of(text)
     found = around(space, engine)
     assert len(found) > 10
     assert len({space.resolved(configuration) for configuration in found}) == len(found)
 
 
-def test_variant_is_not_near_itself_and_its_neighbours_lead_back() -> None:
+def test_neighbour_relation_is_symmetric_and_excludes_itself() -> None:
     space = space_of()
     (start, *_) = space.starts()
     for other in space.neighbours(start):
@@ -89,35 +91,35 @@ def test_variant_is_not_near_itself_and_its_neighbours_lead_back() -> None:
         assert start in space.neighbours(other)
 
 
-def test_exact_has_but_its_frames() -> None:
+def test_configurations_of_exact_differ_only_in_the_frame_interval() -> None:
     space = space_of(dt=0.002)
     found = around(space, "exact", rounds=8)
     assert found == {Configuration("exact", Fraction(1, 2**k)) for k in range(4)}  # up to 0.016 s, a frame of a game
 
 
-def test_steps_last_two_frames_of_a_game_at_most() -> None:
+def test_steps_are_at_most_two_frames_of_a_game() -> None:
     space = space_of(dt=0.01)
     assert max(space.settings(v).dt for v in around(space, "pymunk", rounds=3)) == 0.02  # 0.04 s is beyond 2/60 s
     assert max(v.dt for v in [space.settings(v) for v in around(space, "exact", rounds=3)]) == 0.01
 
 
-def test_steps_of_a_scene_that_are_coarser_than_a_frame_stay() -> None:
+def test_scene_steps_coarser_than_a_frame_are_unchanged() -> None:
     assert around(space_of(dt=0.05), "exact") == {Configuration("exact")}
 
 
-def test_what_cannot_matter_is_not_turned() -> None:
+def test_options_without_effect_are_not_varied() -> None:
     free = loads("[world]\nduration = 1.0\n[[ball]]\nname = 'a'\nposition = [0, 0]\nvelocity = [1, 0]\nradius = 1\n")
     space = SearchSpace(free, free.solver, ENGINE)
-    turned = {key for configuration in around(space, "reference", rounds=1) for key, _ in configuration.options}
-    assert turned == {"integrator"}  # no contact, no joint, no gravity
+    varied = {key for configuration in around(space, "reference", rounds=1) for key, _ in configuration.options}
+    assert varied == {"integrator"}  # no contact, no joint, no gravity
     assert {configuration.iterations for configuration in around(space, "reference", rounds=1)} == {10}
     single = space_of()
-    assert not single.has_coupling  # one ball on one plane: the first pass is right
+    assert not single.has_coupling  # one ball on one plane: one iteration is exact
     assert space_of(SWING).has_coupling
     assert space_of(BALLS).has_coupling
 
 
-def test_words_of_the_scene_are_left_out_for_those_who_lack_them() -> None:
+def test_unsupported_settings_of_the_scene_are_omitted_per_engine() -> None:
     space = space_of(integrator="rk4", detection="swept", substeps=4)
     pymunk, exact, reference = (space.own_settings(name) for name in ENGINE)
     assert (reference.integrator, reference.detection) == ("rk4", "swept")
@@ -126,7 +128,7 @@ def test_words_of_the_scene_are_left_out_for_those_who_lack_them() -> None:
     assert [configuration.substeps for configuration in space.starts()] == [4, 4, 4]
 
 
-def test_bounds_hold() -> None:
+def test_configurations_out_of_range_are_invalid() -> None:
     space = space_of()
     for configuration in (
         Configuration("pymunk", MAX_REFINEMENT * 2),
@@ -139,4 +141,4 @@ def test_bounds_hold() -> None:
     ):
         assert not space.is_valid(configuration)
     tiny = space_of(dt=1e-8)
-    assert not tiny.is_valid(Configuration("pymunk", Fraction(16)))  # dt below its bound
+    assert not tiny.is_valid(Configuration("pymunk", Fraction(16)))  # dt below its minimum

@@ -1,4 +1,4 @@
-"""The split of an error into model, time step and iterations, where each is known."""
+"""The error budget: parts of model, time step and iterations, in cases where each part is known."""
 
 import json
 
@@ -41,7 +41,7 @@ position = [0.05, 0.0]
 velocity = [100.0, 0.0]
 radius = 0.00001
 """
-"""The wall is so thin that not even 16 times the substeps find it."""
+"""The wall is so thin that even 16 times the substeps do not detect it."""
 CRADLE = """
 [world]
 gravity = [0.0, -10.0]
@@ -66,44 +66,44 @@ def context_for(scene: Scene) -> EvaluationContext:
 
 
 @pytest.mark.parametrize("engine", ["pymunk"])
-def test_error_of_euler_is_that_of_the_time_step(engine: str) -> None:
+def test_error_of_euler_is_attributed_to_the_time_step(engine: str) -> None:
     scene = scene_of(FLIGHT)
     found = error_budget(context_for(scene), engine, scene.solver, 60.0)
     assert found is not None
     total = 10.0 * 0.02 * 0.4 / 2.0  # g·h·T/2: velocities are one step behind
     assert found.total == pytest.approx(total, rel=1e-9)  # a sum of 20 steps, and rounding
     assert found.substep_factor == 16
-    assert found.time_step == pytest.approx(total * 15.0 / 16.0, rel=1e-9)  # a sixteenth of the step leaves as much
+    assert found.time_step == pytest.approx(total * 15.0 / 16.0, rel=1e-9)  # a sixteenth of the step leaves 1/16 of it
     assert found.residual == pytest.approx(total / 16.0, rel=1e-9)
     assert found.solver == 0.0
-    assert found.model is None  # what is left still halves with the step
+    assert found.model is None  # the residual still halves with the step
 
 
-def test_wall_that_no_step_finds_is_the_models() -> None:
+def test_error_at_an_undetected_wall_is_attributed_to_the_model() -> None:
     scene = scene_of(BULLET)
     found = error_budget(context_for(scene), "pymunk", scene.solver, 60.0)
     assert found is not None
     assert found.model == found.residual
-    # Through it flies on for 1.05 m, where it should have stopped at the wall (restitution 0).
+    # The bullet passes the wall by 1.05 m, where it should have stopped (restitution 0).
     assert found.model == pytest.approx(1.05, abs=1e-3)
     assert found.time_step == pytest.approx(0.0, abs=1e-12)  # straight flight, rounding
 
 
-def test_chain_of_one_pass_is_off_by_its_iterations() -> None:
+def test_error_of_a_chain_with_one_iteration_is_attributed_to_the_solver() -> None:
     scene = scene_of(CRADLE)
     context = context_of(scene, until=0.0)
-    asked = scene.solver
+    settings = scene.solver
     from sandbox.measure.run.runner import run
 
-    truth = run(scene, "pymunk", audit=False, **asked.replace(iterations=100, substeps=8).model_dump())
+    truth = run(scene, "pymunk", audit=False, **settings.replace(iterations=100, substeps=8).model_dump())
     context = EvaluationContext(scene, Truth("refined", "by hand", truth, 0.2), 100.0)
-    found = error_budget(context, "pymunk", asked, 60.0)
+    found = error_budget(context, "pymunk", settings, 60.0)
     assert found is not None
     assert found.solver > 0.5 * found.total > 0.0
-    assert found.total <= found.solver + found.time_step + found.residual + 1e-12  # a way round is no shorter; rounding
+    assert found.total <= found.solver + found.time_step + found.residual + 1e-12  # triangle inequality; rounding
 
 
-def test_nothing_is_split_without_truth_or_time_or_where_it_is_refused() -> None:
+def test_there_is_no_budget_without_truth_or_time_or_if_refused() -> None:
     scene = scene_of(FLIGHT)
     assert error_budget(context_of(scene, until=0.0), "pymunk", scene.solver, 60.0) is None
     assert error_budget(context_for(scene), "pymunk", scene.solver, 0.0) is None

@@ -1,4 +1,4 @@
-"""Figures: numbers as they are told."""
+"""Formatting of quantities with units."""
 
 import pytest
 
@@ -6,7 +6,7 @@ from sandbox.formatting import format_quantity
 
 
 @pytest.mark.parametrize(
-    ("value", "unit", "told"),
+    ("value", "unit", "text"),
     [
         (0.00031, "m", "310 µm"),
         (0.005, "m", "5 mm"),
@@ -19,5 +19,5 @@ from sandbox.formatting import format_quantity
         (0.01, "", "0.01"),
     ],
 )
-def test_figure_is_told_in_the_unit_that_reads_best(value: float, unit: str, told: str) -> None:
-    assert format_quantity(value, unit) == told
+def test_quantity_is_formatted_with_a_suitable_unit_prefix(value: float, unit: str, text: str) -> None:
+    assert format_quantity(value, unit) == text

@@ -1,4 +1,4 @@
-"""Metrics: each on runs made by hand, whose answer is known."""
+"""Metrics on synthetic runs with known values."""
 
 import math
 
@@ -14,7 +14,7 @@ from sandbox.trajectory import Trajectory
 from tests.measure.tradeoff.evaluations_by_hand import context_of, shifted
 from tests.runs_by_hand import BALLS, run_of, scene_of
 
-OF_TRUTH = ("max_position", "final_position", "rms_position", "pixels", "bounce_height", "settle_time", "drift")
+NEEDS_TRUTH = ("max_position", "final_position", "rms_position", "pixels", "bounce_height", "settle_time", "drift")
 
 
 @pytest.fixture
@@ -22,9 +22,9 @@ def scene() -> Scene:
     return scene_of()
 
 
-def test_distances_are_of_the_worst_body_in_its_worst_frame(scene: Scene) -> None:
-    still = run_of(scene)
-    run = run_of(scene, shifted(still, 7, 1, (0.03, 0.04)))
+def test_max_position_is_of_the_worst_body_and_frame(scene: Scene) -> None:
+    resting = run_of(scene)
+    run = run_of(scene, shifted(resting, 7, 1, (0.03, 0.04)))
     found = measure_all(run, context_of(scene, zoom=200.0))
     assert found["max_position"] == pytest.approx(0.05, rel=1e-12)  # 3-4-5, to rounding
     assert found["pixels"] == pytest.approx(10.0, rel=1e-12)  # × 200 px/m
@@ -33,25 +33,25 @@ def test_distances_are_of_the_worst_body_in_its_worst_frame(scene: Scene) -> Non
     assert found["rms_position"] == pytest.approx(0.05 / math.sqrt(42.0), rel=1e-12)
 
 
-def test_what_is_fixed_does_not_count(scene: Scene) -> None:
+def test_fixed_bodies_do_not_count(scene: Scene) -> None:
     run = run_of(scene, shifted(run_of(scene), slice(None), 2, (1.0, 0.0)))
     assert measure_all(run, context_of(scene))["max_position"] == 0.0
 
 
-def test_nothing_counts_beyond_what_the_truth_is_trusted_for(scene: Scene) -> None:
+def test_frames_after_the_trusted_time_do_not_count(scene: Scene) -> None:
     run = run_of(scene, shifted(run_of(scene), slice(11, None), 0, (1.0, 0.0)))
     short, whole = (measure_all(run, context_of(scene, until=until)) for until in (1.0, None))
     assert (short["max_position"], short["final_position"], short["settle_time"]) == (0.0, 0.0, None)
     assert (whole["max_position"], whole["final_position"], whole["settle_time"]) == (1.0, 1.0, 0.0)
 
 
-def test_without_a_truth_only_what_needs_none_is_told(scene: Scene) -> None:
+def test_metrics_against_the_truth_are_none_without_a_truth(scene: Scene) -> None:
     found = measure_all(run_of(scene), context_of(scene, until=0.0))
-    assert [name for name in OF_TRUTH if found[name] is not None] == []
+    assert [name for name in NEEDS_TRUTH if found[name] is not None] == []
     assert found["energy"] == 0.0
 
 
-def test_refused_run_has_no_figures() -> None:
+def test_refused_run_has_no_metrics() -> None:
     scene = scene_of(BALLS + "[[joint]]\nkind = 'rod'\nbetween = ['a', 'b']\n")
     run = run_scene(scene, "exact")
     assert run.status == "refused"
@@ -59,7 +59,7 @@ def test_refused_run_has_no_figures() -> None:
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 1e300])
-def test_state_that_is_not_finite_is_infinitely_far_off(scene: Scene, bad: float) -> None:
+def test_non_finite_state_has_a_huge_error(scene: Scene, bad: float) -> None:
     position = run_of(scene).position.copy()
     position[12:, 0] = bad
     velocity = np.zeros_like(position)
@@ -73,7 +73,7 @@ def test_state_that_is_not_finite_is_infinitely_far_off(scene: Scene, bad: float
     assert not any(value is not None and math.isnan(value) for value in found.values())
 
 
-def test_bounce_height_is_of_what_follows_the_first_contact(scene: Scene) -> None:
+def test_bounce_height_counts_from_the_first_contact(scene: Scene) -> None:
     truth = run_of(scene, contacts=[(1.05, (0, -1))])
     before = run_of(scene, shifted(truth, slice(0, 11), 0, (0.0, 3.0)))
     assert measure_all(before, context_of(scene, truth))["bounce_height"] == 0.0
@@ -90,21 +90,21 @@ def test_bounce_height_needs_a_contact_and_gravity(scene: Scene) -> None:
     assert measure_all(touched, context_of(weightless, touched))["bounce_height"] is None
 
 
-def test_bounce_height_of_fewer_frames_is_of_those_that_both_have(scene: Scene) -> None:
-    place = run_of(scene).position.copy()
-    place[:, 0, 1] += np.linspace(0.0, -4.0, 21)  # falls by 0.2 m a frame
-    truth = run_of(scene, place, contacts=[(0.3, (0, -1))])
-    same = run_of(scene, place[::2], time=truth.time[::2])
-    # Its first frame after the contact is a step later, and lower; it is right all the same.
+def test_bounce_height_uses_common_frames_only(scene: Scene) -> None:
+    position = run_of(scene).position.copy()
+    position[:, 0, 1] += np.linspace(0.0, -4.0, 21)  # falls by 0.2 m a frame
+    truth = run_of(scene, position, contacts=[(0.3, (0, -1))])
+    same = run_of(scene, position[::2], time=truth.time[::2])
+    # Its first frame after the contact is a step later, and lower, which is no error.
     assert measure_all(same, context_of(scene, truth))["bounce_height"] == 0.0
 
 
-def test_energy_is_a_share_of_the_energy_in_motion(scene: Scene) -> None:
+def test_energy_error_is_a_fraction_of_the_kinetic_energy(scene: Scene) -> None:
     velocity = np.zeros((21, 3, 2))
     velocity[:, 0, 0] = 2.0
     truth = run_of(scene, velocity=velocity)
     faster = velocity.copy()
-    faster[-1, 0, 0] = 3.0  # 4.5 J where 2 J are right: 2.5 J of 2 J
+    faster[-1, 0, 0] = 3.0  # 4.5 J instead of 2 J: 2.5 J of 2 J
     assert measure_all(run_of(scene, velocity=faster), context_of(scene, truth))["energy"] == pytest.approx(
         1.25, rel=1e-12
     )
@@ -115,10 +115,10 @@ def test_energy_is_a_share_of_the_energy_in_motion(scene: Scene) -> None:
     )
 
 
-def test_penetration_is_the_deepest_of_any_that_touched(scene: Scene) -> None:
-    place = shifted(run_of(scene), 4, 0, (0.0, -4.6))  # centre 0.4 m above the ground, radius 0.5 m
-    assert measure_all(run_of(scene, place), context_of(scene))["penetration"] is None  # nobody saw it
-    touched = run_of(scene, place, contacts=[(0.4, (0, -1)), (0.5, (1, -1))])
+def test_penetration_is_the_deepest_of_pairs_with_contacts(scene: Scene) -> None:
+    position = shifted(run_of(scene), 4, 0, (0.0, -4.6))  # centre 0.4 m above the ground, radius 0.5 m
+    assert measure_all(run_of(scene, position), context_of(scene))["penetration"] is None  # no contact was recorded
+    touched = run_of(scene, position, contacts=[(0.4, (0, -1)), (0.5, (1, -1))])
     assert measure_all(touched, context_of(scene))["penetration"] == pytest.approx(
         0.1, rel=1e-12
     )  # rounding of 5 − 4.6
@@ -126,20 +126,20 @@ def test_penetration_is_the_deepest_of_any_that_touched(scene: Scene) -> None:
     assert measure_all(clear, context_of(scene))["penetration"] == 0.0
 
 
-def test_overlap_at_the_start_counts_only_where_it_gets_deeper_again(scene: Scene) -> None:
+def test_initial_overlap_counts_only_if_it_deepens_again(scene: Scene) -> None:
     height = 5.0 + np.asarray([-4.8, -4.7, -4.9, -4.6, -4.4, *[0.0] * 16])  # centre 0.2 m above the ground at first
-    place = run_of(scene).position.copy()
-    place[:, 0, 1] = height
-    run = run_of(scene, place, contacts=[(0.4, (0, -1))])
+    position = run_of(scene).position.copy()
+    position[:, 0, 1] = height
+    run = run_of(scene, position, contacts=[(0.4, (0, -1))])
     assert measure_all(run, context_of(scene))["penetration"] == pytest.approx(0.2, rel=1e-12)  # from 0.2 to 0.4 m deep
-    place[:, 0, 1] = np.maximum.accumulate(height)
-    assert measure_all(run_of(scene, place, contacts=[(0.4, (0, -1))]), context_of(scene))["penetration"] == 0.0
+    position[:, 0, 1] = np.maximum.accumulate(height)
+    assert measure_all(run_of(scene, position, contacts=[(0.4, (0, -1))]), context_of(scene))["penetration"] == 0.0
 
 
-def test_drift_is_of_what_lies_still_in_truth_and_of_the_second_half(scene: Scene) -> None:
+def test_drift_counts_bodies_that_rest_in_the_second_half_of_the_truth(scene: Scene) -> None:
     moving = run_of(scene).position.copy()
-    moving[:, 1, 0] += np.linspace(0.0, 1.0, 21)  # b wanders in truth: it does not count
-    moving[:5, 0, 1] += np.linspace(1.0, 0.0, 5)  # a falls in truth before it lies still
+    moving[:, 1, 0] += np.linspace(0.0, 1.0, 21)  # b moves in the truth: it does not count
+    moving[:5, 0, 1] += np.linspace(1.0, 0.0, 5)  # a falls in the truth before it rests
     context = context_of(scene, run_of(scene, moving))
     early = shifted(run_of(scene, moving), slice(0, 5), 0, (1.0, 0.0))
     assert measure_all(run_of(scene, early), context)["drift"] == 0.0
@@ -147,14 +147,14 @@ def test_drift_is_of_what_lies_still_in_truth_and_of_the_second_half(scene: Scen
     assert measure_all(run_of(scene, late), context)["drift"] == pytest.approx(0.02, rel=1e-12)
 
 
-def test_drift_of_what_stands_in_truth_from_the_start_counts_from_there(scene: Scene) -> None:
-    """A stack that falls at once lies still in the second half too."""
+def test_drift_of_a_body_at_rest_in_truth_counts_from_the_start(scene: Scene) -> None:
+    """A stack that falls at once rests in the second half too."""
     context = context_of(scene, run_of(scene))
     fallen = shifted(run_of(scene), slice(5, None), 0, (0.3, -0.4))
     assert measure_all(run_of(scene, fallen), context)["drift"] == pytest.approx(0.5, rel=1e-12)
 
 
-def test_stack_whose_truth_is_trusted_for_a_short_time_is_scored_by_drift_and_not_by_overlaps(scene: Scene) -> None:
+def test_drift_is_chosen_for_resting_bodies_with_a_short_trusted_time(scene: Scene) -> None:
     metric, reason = choose_metric(context_of(scene, run_of(scene), until=0.5))
     assert metric.name == "drift"
     assert reason == "positions are predictable for 0.5 s of 2 s only, and 2 bodies should stay at rest"
@@ -165,20 +165,20 @@ def test_stack_whose_truth_is_trusted_for_a_short_time_is_scored_by_drift_and_no
     assert (metric.name, reason) == ("max_position", "the truth (exact) is trusted to the end, 2 s")
 
 
-def test_nothing_drifts_where_all_moves(scene: Scene) -> None:
+def test_drift_is_none_if_all_bodies_move(scene: Scene) -> None:
     moving = run_of(scene).position + np.linspace(0.0, 1.0, 21)[:, None, None]
     assert measure_all(run_of(scene, moving), context_of(scene, run_of(scene, moving)))["drift"] is None
 
 
-def test_missed_contacts_and_passes_are_counted_of_audited_runs(scene: Scene) -> None:
+def test_missed_contacts_and_passes_are_counted_in_audited_runs_only(scene: Scene) -> None:
     rows = [(0.1 * k, (0, -1)) for k in range(3)]
-    blind = run_of(scene, contacts=rows)
-    assert [measure_all(blind, context_of(scene))[name] for name in ("missed_contacts", "passes")] == [None, None]
+    unaudited = run_of(scene, contacts=rows)
+    assert [measure_all(unaudited, context_of(scene))[name] for name in ("missed_contacts", "passes")] == [None, None]
     run = run_of(scene, contacts=rows, audited=True)
     assert [measure_all(run, context_of(scene))[name] for name in ("missed_contacts", "passes")] == [0.0, 0.0]
     missed = with_missed(run, 1)
     assert [measure_all(missed, context_of(scene))[name] for name in ("missed_contacts", "passes")] == [1.0, 0.25]
-    assert measure_all(run_of(scene, audited=True), context_of(scene))["passes"] is None  # of no meetings
+    assert measure_all(run_of(scene, audited=True), context_of(scene))["passes"] is None  # no contacts at all
 
 
 def with_missed(run: Trajectory, count: int) -> Trajectory:
@@ -187,7 +187,7 @@ def with_missed(run: Trajectory, count: int) -> Trajectory:
     return Trajectory(**{**values, **lost})
 
 
-def test_settle_time_is_of_the_last_body_and_infinite_where_it_never_does(scene: Scene) -> None:
+def test_settle_time_is_of_the_last_body_and_may_be_infinite(scene: Scene) -> None:
     def settling(frame: int) -> Trajectory:
         velocity = np.zeros((21, 3, 2))
         velocity[:frame, 1, 0] = 1.0
@@ -201,29 +201,29 @@ def test_settle_time_is_of_the_last_body_and_infinite_where_it_never_does(scene:
     assert measure_all(settling(10), context_of(scene, settling(21)))["settle_time"] is None
 
 
-def test_bodies_that_are_gone_do_not_count(scene: Scene) -> None:
+def test_retired_bodies_do_not_count(scene: Scene) -> None:
     truth = run_of(scene, retired=[0.95, 0.95, np.nan])
     run = run_of(scene, shifted(truth, slice(10, None), 0, (7.0, 0.0)), retired=[0.95, 0.95, np.nan])
     found = measure_all(run, context_of(scene, truth))
     assert found["max_position"] == 0.0
     assert found["final_position"] == 0.0
-    # Gone from the first frame on: there is nothing to tell.
-    gone = run_of(scene, retired=[0.0, 0.0, np.nan])
-    nothing = measure_all(gone, context_of(scene, gone))
-    assert [nothing[name] for name in ("max_position", "final_position", "rms_position")] == [None, None, None]
+    # Retired from the first frame on: no metric is defined.
+    retired = run_of(scene, retired=[0.0, 0.0, np.nan])
+    metrics = measure_all(retired, context_of(scene, retired))
+    assert [metrics[name] for name in ("max_position", "final_position", "rms_position")] == [None, None, None]
 
 
-def test_last_frame_that_counts_is_the_last_with_a_body_left(scene: Scene) -> None:
+def test_final_position_is_of_the_last_frame_with_a_body(scene: Scene) -> None:
     truth = run_of(scene, retired=[0.95, 0.95, np.nan])
     run = run_of(scene, shifted(truth, slice(None), 0, (0.5, 0.0)), retired=[0.95, 0.95, np.nan])
     assert measure_all(run, context_of(scene, truth))["final_position"] == 0.5
 
 
-def test_each_metric_bears_its_name_and_says_what_it_is() -> None:
+def test_each_metric_has_its_name_and_a_description() -> None:
     assert all(name == metric.name and metric.about for name, metric in METRICS.items())
 
 
-def test_zoom_fills_the_window() -> None:
+def test_default_zoom_fits_the_scene_into_the_window() -> None:
     scene = loads("[[ball]]\nname = 'a'\nposition = [0, 0]\nradius = 1.0\n")
     assert default_zoom(scene, None) == 0.9 * 720.0 / 2.0  # 2 m high
     empty = loads(
@@ -232,7 +232,11 @@ def test_zoom_fills_the_window() -> None:
     assert math.isfinite(default_zoom(empty, None))
 
 
-def test_strayed_is_of_the_second_half(scene: Scene) -> None:
+def test_displacement_is_of_the_second_half(scene: Scene) -> None:
     run = run_of(scene)
     assert displacement(run_of(scene, shifted(run, 9, 0, (9.0, 0.0)))).tolist() == [0.0, 0.0, 0.0]
-    assert displacement(run_of(scene, shifted(run, 10, 0, (0.0, 2.0)))).tolist() == [2.0, 0.0, 0.0]  # the middle itself
+    assert displacement(run_of(scene, shifted(run, 10, 0, (0.0, 2.0)))).tolist() == [
+        2.0,
+        0.0,
+        0.0,
+    ]  # the middle frame counts

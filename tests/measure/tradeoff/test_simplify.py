@@ -1,4 +1,4 @@
-"""Proposals: cheaper models, told of only where they keep to the tolerance. Costs are made by hand; errors are not."""
+"""Simplified models, proposed only within the tolerance. Costs are synthetic; errors are measured."""
 
 import json
 
@@ -19,25 +19,25 @@ from tests.runs_by_hand import DROP, scene_of
 pytestmark = pytest.mark.full  # long runs and sweeps
 
 LOW = DROP.replace("position = [0.0, 1.0]", "position = [0.0, 0.6]")
-APART = f"""{LOW}
+SEPARATE = f"""{LOW}
 [[ball]]
 name = "b"
 position = [3.0, 0.6]
 radius = 0.5
 restitution = 0.5
 """
-"""Two balls that both bounce, and never meet."""
+"""Two bouncing balls that never collide."""
 
 DRAGGED = DROP.replace("duration = 0.4", "duration = 0.2\nlinear_drag = {}")
 
 
 def price(scene: Scene, engine: str, settings: Settings) -> float:
-    """Every demand costs a second: what demands less is cheaper, on whatever machine."""
+    """Return a cost of one second per demand: fewer demands are cheaper on any machine."""
     return float(len(demands(scene)))
 
 
 def finest(scene: Scene) -> Truth:
-    """Return the finest answer as the truth, whether or not a second method confirms it: that is tested elsewhere."""
+    """Return the finest refinement as the truth, even if no second method confirms it, which is tested elsewhere."""
     found = refine(scene, scene.solver, 1e-6)
     assert found is not None
     return Truth("refined", "by hand", found.trajectory, scene.world.duration)
@@ -56,24 +56,24 @@ def proposed(
     return model_simplifications(contexts, replaced)
 
 
-def test_balls_that_never_meet_need_not_look_for_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
-    # By the fine step, first order, it is g·h·T/2 = 0.001 m off, with what the bounce adds.
-    found = proposed(monkeypatch, APART, tolerance=0.01)
+def test_ball_collisions_can_be_disabled_for_balls_that_never_collide(monkeypatch: pytest.MonkeyPatch) -> None:
+    # The first-order error of the fine step is g·h·T/2 = 0.001 m, plus that of the bounce.
+    found = proposed(monkeypatch, SEPARATE, tolerance=0.01)
     (fixed,) = [each for each in found if "fixed" in each.what]
     assert fixed.engine == "pymunk"
     assert fixed.error <= 0.01
     assert fixed.ratio < 1.0
-    apart = scene_of(APART)
-    assert Demand.BALL_BALL in demands(apart)
-    assert fixed.ratio == (len(demands(apart)) - 1) / len(demands(apart))
+    separate = scene_of(SEPARATE)
+    assert Demand.BALL_BALL in demands(separate)
+    assert fixed.ratio == (len(demands(separate)) - 1) / len(demands(separate))
 
 
-def test_balls_that_meet_on_another_seed_have_to_look(monkeypatch: pytest.MonkeyPatch) -> None:
-    meeting = APART.replace("[3.0, 0.6]", "[1.2, 0.6]\nvelocity = [-2.0, 0.0]")
-    assert not [each for each in proposed(monkeypatch, APART, meeting, tolerance=10.0) if "fixed" in each.what]
+def test_ball_collisions_are_kept_if_balls_collide_in_a_second_scene(monkeypatch: pytest.MonkeyPatch) -> None:
+    colliding = SEPARATE.replace("[3.0, 0.6]", "[1.2, 0.6]\nvelocity = [-2.0, 0.0]")
+    assert not [each for each in proposed(monkeypatch, SEPARATE, colliding, tolerance=10.0) if "fixed" in each.what]
 
 
-def test_drag_that_does_nothing_may_go_and_drag_that_does_may_not(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_only_negligible_drag_can_be_omitted(monkeypatch: pytest.MonkeyPatch) -> None:
     weak, strong = (proposed(monkeypatch, DRAGGED.format(drag), tolerance=2e-3) for drag in ("1e-4", "5.0"))
     assert "no drag" in [each.what for each in weak]
     assert "no drag" not in [each.what for each in strong]
@@ -91,20 +91,20 @@ def test_closed_form_is_proposed_first(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_nothing_beyond_the_tolerance_is_proposed(monkeypatch: pytest.MonkeyPatch) -> None:
     for tolerance in (1e-12, 1e-4, 1e-2):
-        for text in (APART, DRAGGED.format("0.1")):
+        for text in (SEPARATE, DRAGGED.format("0.1")):
             assert all(each.error <= tolerance for each in proposed(monkeypatch, text, tolerance=tolerance))
 
 
-def test_what_is_no_cheaper_is_not_proposed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_simplification_that_is_no_cheaper_is_not_proposed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MAX_COST_RATIO", 0.0)
-    assert proposed(monkeypatch, APART, tolerance=10.0) == []
+    assert proposed(monkeypatch, SEPARATE, tolerance=10.0) == []
 
 
-def test_metric_that_says_nothing_proposes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert proposed(monkeypatch, APART, tolerance=10.0, metric="joint_error") == []
+def test_undefined_metric_yields_no_proposals(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert proposed(monkeypatch, SEPARATE, tolerance=10.0, metric="joint_error") == []
 
 
-def test_scene_without_anything_to_leave_out_has_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_scene_without_removable_features_has_no_proposals(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = scene_of(DROP)
     monkeypatch.setattr(timing, "run_seconds", price)
     replaced = ReplacedSetting("pymunk", scene.solver, METRICS["energy"], 1.0, 60.0)

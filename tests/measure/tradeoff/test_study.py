@@ -1,4 +1,4 @@
-"""Weighing: small scenes from end to end, their picks run again by others."""
+"""Trade-off studies of small scenes from end to end, with independent runs of the recommendations."""
 
 import json
 import math
@@ -29,8 +29,8 @@ from tests.runs_by_hand import DROP, SWING, scene_of
 
 pytestmark = pytest.mark.full  # long runs and sweeps
 
-PROMISED = {"scene", "truth", "metric", "points", "pareto", "within_tolerance", "within_budget"}
-OF_A_POINT = {"engine", "settings", "error", "cost_ms_per_second", "status"}
+DOCUMENT_KEYS = {"scene", "truth", "metric", "points", "pareto", "within_tolerance", "within_budget"}
+POINT_KEYS = {"engine", "settings", "error", "cost_ms_per_second", "status"}
 RANDOM = """
 [world]
 gravity = [0.0, -10.0]
@@ -68,26 +68,26 @@ velocity = [20.0, 0.0]
 radius = 0.02
 restitution = 1.0
 """
-"""A ball that the search stops with 5 substeps, and that can pass the wall with fewer than 8 at another phase."""
+"""A ball that the wall stops with 5 substeps, but that can pass it with fewer than 8 at a different phase."""
 
 
-def weighed(scene: Scene, *engines: str, **more: Any) -> Tradeoff:
+def study(scene: Scene, *engines: str, **more: Any) -> Tradeoff:
     return tradeoff(scene, engines or ("pymunk",), **{"most": 14, "repeats": 1, **more})
 
 
 def error_of(scene: Scene, point: Evaluation, metric: str = "max_position") -> float:
-    """Run a point's settings on their own and return the error."""
+    """Run the settings of a point independently and return the error."""
     settings = point.asked.model_dump()
     run = sandbox.run(scene, point.engine, **settings)
-    judge = EvaluationContext(scene, truth_of(scene, scene.solver, 1e-4), 100.0)
-    error = METRICS[metric].measure(run, judge)
+    context = EvaluationContext(scene, truth_of(scene, scene.solver, 1e-4), 100.0)
+    error = METRICS[metric].measure(run, context)
     assert error is not None
     return error
 
 
-def test_pick_keeps_to_the_tolerance_when_run_on_its_own() -> None:
+def test_recommendation_is_within_the_tolerance_in_an_independent_run() -> None:
     scene = scene_of(DROP)
-    found = weighed(scene, tolerance=4e-3)
+    found = study(scene, tolerance=4e-3)
     assert found.truth == "closed_form"
     assert found.metric.name == "max_position"
     assert found.within_tolerance is not None
@@ -95,15 +95,15 @@ def test_pick_keeps_to_the_tolerance_when_run_on_its_own() -> None:
     assert point.error is not None
     assert point.error <= 4e-3
     assert error_of(scene, point) == point.error
-    able = [p for p in found.points if p.repeats and (p.error or 0.0) <= 4e-3]
-    least = min(p.cost or 0.0 for p in able)
-    close = [p for p in able if (p.cost or 0.0) <= WORK_FACTOR * least]
+    accurate = [p for p in found.points if p.repeats and (p.error or 0.0) <= 4e-3]
+    least = min(p.cost or 0.0 for p in accurate)
+    close = [p for p in accurate if (p.cost or 0.0) <= WORK_FACTOR * least]
     assert (point.counted or 0.0) <= EQUAL_WORK_FACTOR * min(p.counted or 0.0 for p in close)
 
 
-def test_pick_of_a_random_scene_keeps_to_the_tolerance_on_seeds_that_nobody_used() -> None:
+def test_recommendation_for_a_random_scene_is_within_the_tolerance_on_new_seeds() -> None:
     scene = scene_of(RANDOM)
-    found = weighed(scene, tolerance=6e-3, seeds=2)
+    found = study(scene, tolerance=6e-3, seeds=2)
     assert found.seeds == (4, 5)
     assert found.within_tolerance is not None
     assert found.within_tolerance.fresh_seeds == (6, 7, 8)
@@ -113,62 +113,62 @@ def test_pick_of_a_random_scene_keeps_to_the_tolerance_on_seeds_that_nobody_used
         assert error_of(with_seed(scene, seed), found.within_tolerance.point) <= 6e-3
 
 
-def test_seeds_go_round_at_their_end() -> None:
+def test_fresh_seeds_wrap_around_at_the_largest_seed() -> None:
     last = scene_of(RANDOM.replace("seed = 4", f"seed = {2**63 - 1}"))
-    found = weighed(last, tolerance=1.0, most=1)
+    found = study(last, tolerance=1.0, most=1)
     assert found.within_tolerance is not None
     assert found.within_tolerance.fresh_seeds == (0, 1, 2)
 
 
-def test_scene_without_chances_has_one_seed() -> None:
-    found = weighed(scene_of(DROP), seeds=5, most=1)
+def test_scene_without_random_parts_has_one_seed() -> None:
+    found = study(scene_of(DROP), seeds=5, most=1)
     assert found.seeds == (0,)
     assert found.within_tolerance is None or found.within_tolerance.fresh_seeds == ()
 
 
-def test_refused_engine_is_a_point_that_says_why() -> None:
-    found = weighed(scene_of(SWING), "pymunk", "exact", most=2)
+def test_refused_engine_is_a_point_with_its_reason() -> None:
+    found = study(scene_of(SWING), "pymunk", "exact", most=2)
     (refused,) = [point for point in found.points if point.engine == "exact"]
     assert refused.status == "refused"
     assert "rod" in (refused.reason or "")
     assert (refused.error, refused.cost) == (None, None)
 
 
-def test_nobody_able_is_an_answer_too() -> None:
-    found = weighed(scene_of(SWING), "exact")
+def test_study_without_a_suitable_engine_has_an_answer() -> None:
+    found = study(scene_of(SWING), "exact")
     assert [point.status for point in found.points] == ["refused"]
     assert (found.pareto, found.within_tolerance) == ((), None)
     assert "none of the 1" in found.answers()[0]
 
 
 def test_settings_that_diverge_are_points_with_a_reason() -> None:
-    wild = scene_of(
+    diverging = scene_of(
         DROP.replace("gravity = [0.0, -10.0]", "gravity = [1e9, 0.0]").replace("duration = 0.4", "duration = 10.0")
     )
-    found = weighed(wild, most=2, dt=0.1, metric="energy")
-    bad = [point for point in found.points if point.status == "diverged"]
-    assert bad
-    assert all(point.reason and point.error is None and not point.is_usable for point in bad)
-    assert not set(map(id, bad)) & set(map(id, found.pareto))
+    found = study(diverging, most=2, dt=0.1, metric="energy")
+    failed = [point for point in found.points if point.status == "diverged"]
+    assert failed
+    assert all(point.reason and point.error is None and not point.is_usable for point in failed)
+    assert not set(map(id, failed)) & set(map(id, found.pareto))
     json.dumps(found.document(), allow_nan=False)
 
 
-def test_words_that_an_engine_lacks_are_left_out_for_it() -> None:
+def test_settings_that_an_engine_does_not_support_are_omitted() -> None:
     scene = scene_of(DROP.replace("dt = 0.02", 'dt = 0.02\nintegrator = "rk4"'))
     assert ENGINES["pymunk"].missing(scene, scene.solver)
-    found = weighed(scene, most=3)
+    found = study(scene, most=3)
     assert [point.status for point in found.points] == ["ok"] * 3
     assert found.points[0].changes == {"integrator": None}
     assert "without integrator" in label(found.points[0])
 
 
-def test_document_has_the_keys_promised_and_no_figure_that_json_lacks() -> None:
-    found = weighed(scene_of(DROP), tolerance=4e-3, budget=5.0)
+def test_document_has_the_documented_keys_and_valid_json_numbers() -> None:
+    found = study(scene_of(DROP), tolerance=4e-3, budget=5.0)
     document = json.loads(json.dumps(found.document("drop.toml"), allow_nan=False))
-    assert set(document) >= PROMISED
+    assert set(document) >= DOCUMENT_KEYS
     assert (document["scene"], document["metric"], document["truth"]) == ("drop.toml", "max_position", "closed_form")
     for row in [*document["points"], *document["pareto"], document["within_tolerance"], document["within_budget"]]:
-        assert set(row) >= OF_A_POINT
+        assert set(row) >= POINT_KEYS
     errors = [row["error"] for row in document["pareto"]]
     costs = [row["cost_ms_per_second"] for row in document["pareto"]]
     assert errors == sorted(errors, reverse=True)
@@ -176,16 +176,16 @@ def test_document_has_the_keys_promised_and_no_figure_that_json_lacks() -> None:
     assert [each.split(" setting")[0] for each in document["answers"]] == ["cheapest", "most accurate"]
 
 
-def test_work_is_counted_and_the_same_every_time() -> None:
-    first, second = (weighed(scene_of(DROP), most=3) for _ in range(2))
+def test_work_counters_are_reproducible() -> None:
+    first, second = (study(scene_of(DROP), most=3) for _ in range(2))
     assert [point.work for point in first.points] == [point.work for point in second.points]
     assert all(point.work for point in first.points)
 
 
-def test_machine_and_load_change_neither_what_is_tried_nor_its_errors_nor_the_answer(
+def test_machine_speed_and_load_do_not_change_the_result(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """By a slow clock a run takes 1,000 times as long, and one run in three is interrupted by another program."""
+    """A slow clock makes runs take 1,000 times as long, and a third of all runs is delayed by other programs."""
     found = []
     for slow in (1.0, 1e3):
         noise = Random(3)
@@ -195,7 +195,7 @@ def test_machine_and_load_change_neither_what_is_tried_nor_its_errors_nor_the_an
 
         monkeypatch.setattr(cost_module, "run_seconds", timed)
         monkeypatch.setattr(cost_module, "clock_without_compilation", lambda slow=slow: slow * perf_counter())
-        found.append(weighed(scene_of(DROP), "pymunk", "exact", tolerance=4e-3, repeats=5, most=30))
+        found.append(study(scene_of(DROP), "pymunk", "exact", tolerance=4e-3, repeats=5, most=30))
     first, second = found
     assert [(p.engine, p.settings, p.error, p.counted) for p in first.points] == [
         (p.engine, p.settings, p.error, p.counted) for p in second.points
@@ -208,31 +208,31 @@ def test_machine_and_load_change_neither_what_is_tried_nor_its_errors_nor_the_an
 
 
 def clock(scene: Scene, settings: Settings) -> float:
-    """Return s that a run takes on a machine where a substep takes 10 µs."""
+    """Return the duration of a run in s on a machine where a substep takes 10 µs."""
     return 1e-5 * scene.world.duration / settings.h
 
 
-def test_scenes_own_setting_is_a_point_of_every_engine_and_marked() -> None:
-    found = weighed(scene_of(DROP), "pymunk", "exact", "reference", tolerance=1e-9, effort=1e-9)
+def test_settings_of_the_scene_are_a_marked_point_of_every_engine() -> None:
+    found = study(scene_of(DROP), "pymunk", "exact", "reference", tolerance=1e-9, effort=1e-9)
     own = [point for point in found.points if point.is_own]
     assert [point.engine for point in own] == ["pymunk", "exact", "reference"]
     assert all(not point.changes and point.repeats for point in own)
     assert [row["scene_setting"] for row in found.document()["points"]] == [point.is_own for point in found.points]
 
 
-def test_runs_that_are_known_are_not_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_given_runs_are_not_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = scene_of(DROP)
     runs = sandbox.compare(scene, ("pymunk", "exact")).trajectories
-    plain = weighed(scene, "pymunk", "exact", most=2)
+    plain = study(scene, "pymunk", "exact", most=2)
     monkeypatch.setattr("sandbox.measure.tradeoff.configuration.bounded_run", None)
-    again = weighed(scene, "pymunk", "exact", most=2, runs=runs)
+    again = study(scene, "pymunk", "exact", most=2, runs=runs)
     assert [(p.settings, p.error, p.counted) for p in plain.points] == [
         (p.settings, p.error, p.counted) for p in again.points
     ]
 
 
-def test_nearest_is_given_where_nothing_is_within_the_tolerance_or_the_budget() -> None:
-    found = weighed(scene_of(DROP), tolerance=1e-12, budget=1e-9)
+def test_nearest_is_given_if_nothing_meets_the_tolerance_or_budget() -> None:
+    found = study(scene_of(DROP), tolerance=1e-12, budget=1e-9)
     assert (found.within_tolerance, found.within_budget) == (None, None)
     assert found.nearest_to_tolerance is not None
     assert found.nearest_to_budget is not None
@@ -243,18 +243,18 @@ def test_nearest_is_given_where_nothing_is_within_the_tolerance_or_the_budget() 
 
 
 def test_metric_and_its_reason_are_stated() -> None:
-    found = weighed(scene_of(DROP), most=1)
+    found = study(scene_of(DROP), most=1)
     assert (found.metric.name, found.metric_reason) == (
         "max_position",
         "the truth (closed form) is trusted to the end, 0.4 s",
     )
     assert found.document()["metric_reason"] == found.metric_reason
-    assert weighed(scene_of(DROP), most=1, metric="energy").metric_reason == "it was requested"
+    assert study(scene_of(DROP), most=1, metric="energy").metric_reason == "it was requested"
 
 
-def test_where_two_methods_contradict_each_other_an_invariant_is_the_metric_and_the_reason_is_stated() -> None:
+def test_metric_is_an_invariant_with_a_reason_if_two_methods_contradict() -> None:
     why = "reference, dt halved 8 times; pymunk contradicts it from 0 s on"
-    found = weighed(scene_of(DROP), most=2, truth=why)
+    found = study(scene_of(DROP), most=2, truth=why)
     assert (found.best, found.truth, found.metric.name) == (None, None, "penetration")
     assert found.metric_reason == f"no truth is known ({why}), and bodies can collide"
     assert found.document()["truth_about"] == why
@@ -263,7 +263,7 @@ def test_where_two_methods_contradict_each_other_an_invariant_is_the_metric_and_
 
 def test_metric_in_pixels_scales_with_the_zoom() -> None:
     scene = scene_of(DROP)
-    small, large = (weighed(scene, metric="pixels", zoom=zoom, most=1).points[0].error for zoom in (10.0, 1000.0))
+    small, large = (study(scene, metric="pixels", zoom=zoom, most=1).points[0].error for zoom in (10.0, 1000.0))
     assert small is not None
     assert large == pytest.approx(100.0 * small, rel=1e-12)
 
@@ -287,15 +287,13 @@ def test_metric_in_pixels_scales_with_the_zoom() -> None:
         {"most": 0},
     ],
 )
-def test_senseless_figure_is_refused_before_anything_is_run(
-    wrong: dict[str, Any], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_invalid_argument_is_rejected_before_any_run(wrong: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "find_truth", None)
     with pytest.raises(ValueError, match=r"at least|positive"):
         tradeoff(scene_of(DROP), **wrong)
 
 
-def test_unknown_names_are_refused_before_anything_is_run(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unknown_names_are_rejected_before_any_run(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "find_truth", None)
     with pytest.raises(UnknownMetricError, match="metrics: max_position"):
         tradeoff(scene_of(DROP), metric="beauty")
@@ -303,62 +301,66 @@ def test_unknown_names_are_refused_before_anything_is_run(monkeypatch: pytest.Mo
         tradeoff(scene_of(DROP), ["unity"])
 
 
-def test_nothing_missed_is_a_tolerance_of_nothing() -> None:
-    found = weighed(scene_of(DROP), metric="missed_contacts", most=3)
+def test_default_tolerance_of_missed_contacts_is_zero() -> None:
+    found = study(scene_of(DROP), metric="missed_contacts", most=3)
     assert found.tolerance == 0.0
     assert found.within_tolerance is not None
     assert found.within_tolerance.point.error == 0.0
 
 
-def test_nothing_that_moves_is_no_trap() -> None:
-    still = scene_of(DROP.replace("radius = 0.5", "radius = 0.5\nfixed = true"))
-    found = weighed(still, most=3)
+def test_scene_without_moving_bodies_can_be_studied() -> None:
+    fixed = scene_of(DROP.replace("radius = 0.5", "radius = 0.5\nfixed = true"))
+    found = study(fixed, most=3)
     json.dumps(found.document(), allow_nan=False)
     assert all(point.status == "ok" for point in found.points)
     assert found.metric.name == "energy"
     assert found.within_tolerance is not None
 
 
-def test_metric_that_says_nothing_is_told() -> None:
-    found = weighed(scene_of(DROP), metric="joint_error", most=3)
+def test_undefined_metric_is_reported() -> None:
+    found = study(scene_of(DROP), metric="joint_error", most=3)
     assert found.within_tolerance is None
     assert found.answers() == ["joint_error cannot be measured in this scene; choose another --metric"]
 
 
-def test_who_watches_is_told_what_is_being_done() -> None:
-    told: list[Progress] = []
-    weighed(scene_of(DROP), most=2, on_progress=told.append)
-    assert told[0].message == "the truth"
-    assert "1 tried: pymunk, dt, 1 × 10" in [each.message for each in told]
-    assert Progress("timing") in told
+def test_progress_names_each_stage_of_a_study() -> None:
+    states: list[Progress] = []
+    study(scene_of(DROP), most=2, on_progress=states.append)
+    assert states[0].message == "the truth"
+    assert "1 tried: pymunk, dt, 1 × 10" in [each.message for each in states]
+    assert Progress("timing") in states
 
 
-def tunnelling(pick: Recommendation) -> list[Diagnostic]:
-    return [each for each in pick.warnings if each.kind == "tunnelling"]
+def tunnelling(recommendation: Recommendation) -> list[Diagnostic]:
+    return [each for each in recommendation.warnings if each.kind == "tunnelling"]
 
 
-def test_recommended_setting_that_can_tunnel_says_so_and_how_many_substeps_prevent_it() -> None:
+def test_recommended_setting_that_may_tunnel_is_warned_of_with_safe_substeps() -> None:
     scene = scene_of(BULLET)
-    found = weighed(scene, metric="missed_contacts", budget=100.0, most=30)
-    pick = found.within_tolerance
-    assert pick is not None
-    assert pick.point.error == 0.0
-    (warning,) = tunnelling(pick)
+    found = study(scene, metric="missed_contacts", budget=100.0, most=30)
+    recommendation = found.within_tolerance
+    assert recommendation is not None
+    assert recommendation.point.error == 0.0
+    (warning,) = tunnelling(recommendation)
     safe = warning.details["safe_substeps"]
     assert isinstance(safe, int)
-    dt, reach, speed = pick.point.settings.dt, 0.02 + 0.01 / 2, 20.0
+    dt, reach, speed = recommendation.point.settings.dt, 0.02 + 0.01 / 2, 20.0
     assert safe == math.ceil(dt * speed / reach * (1.0 - 1e-9))  # rounding: 8 is 8.000000000000002
-    assert pick.point.settings.substeps < safe
+    assert recommendation.point.settings.substeps < safe
     assert f"substeps >= {safe}" in warning.message
     document = json.loads(json.dumps(found.document(), allow_nan=False))
     assert document["within_tolerance"]["warnings"][0]["safe_substeps"] == safe
-    assert tunnelling(found.cheapest_by_engine["pymunk"] or pick) == [warning]
-    assert not any(each.kind == "tunnelling" for each in setting_warnings(scene, "pymunk", with_substeps(pick, safe)))
-    assert any(each.kind == "tunnelling" for each in setting_warnings(scene, "pymunk", with_substeps(pick, safe - 1)))
+    assert tunnelling(found.cheapest_by_engine["pymunk"] or recommendation) == [warning]
+    assert not any(
+        each.kind == "tunnelling" for each in setting_warnings(scene, "pymunk", with_substeps(recommendation, safe))
+    )
+    assert any(
+        each.kind == "tunnelling" for each in setting_warnings(scene, "pymunk", with_substeps(recommendation, safe - 1))
+    )
 
 
-def with_substeps(pick: Recommendation, substeps: int) -> Settings:
-    return pick.point.asked.replace(substeps=substeps)
+def with_substeps(recommendation: Recommendation, substeps: int) -> Settings:
+    return recommendation.point.asked.replace(substeps=substeps)
 
 
 def test_warnings_are_those_of_check_for_the_same_settings() -> None:
@@ -377,12 +379,16 @@ def test_more_substeps_than_allowed_are_not_advised() -> None:
     assert "safe_substeps" not in warning.details
 
 
-def test_longest_step_of_a_recommendation_is_a_frame_or_the_step_of_the_scene() -> None:
+def test_max_dt_is_a_frame_or_the_step_of_the_scene() -> None:
     scene = scene_of(BULLET)
-    found = weighed(scene, most=12)
+    found = study(scene, most=12)
     assert found.max_dt == FRAME_TOLERANCE / 60.0
     assert found.document()["max_dt"] == found.max_dt
     assert any(point.settings.dt > found.max_dt for point in found.points)
-    picks = [found.within_tolerance, found.nearest_to_tolerance, *found.cheapest_by_engine.values()]
-    assert all(pick.point.settings.dt <= found.max_dt for pick in picks if pick is not None)
-    assert weighed(scene, most=1, dt=0.1).max_dt == 0.1
+    recommendations = [found.within_tolerance, found.nearest_to_tolerance, *found.cheapest_by_engine.values()]
+    assert all(
+        recommendation.point.settings.dt <= found.max_dt
+        for recommendation in recommendations
+        if recommendation is not None
+    )
+    assert study(scene, most=1, dt=0.1).max_dt == 0.1

@@ -1,4 +1,4 @@
-"""Costs are timed in turns, with nothing recorded. No time is asserted on."""
+"""Costs are timed in turns, without recording. No test asserts on time."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -26,10 +26,10 @@ def test_cost_is_scaled_to_a_simulated_second() -> None:
 @pytest.mark.parametrize("engine", ["pymunk", "exact"])
 def test_run_is_stepped_to_its_end(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = scene_of(DROP)
-    real, ended = module.start, []
+    original, ended = module.start, []
 
     def watched(scene: Scene, engine: str, settings: Settings) -> object:
-        simulation = real(scene, engine, settings)
+        simulation = original(scene, engine, settings)
         close = simulation.close
         simulation.close = lambda: (ended.append(simulation.frame().time), close())  # type: ignore[method-assign]
         return simulation
@@ -39,11 +39,11 @@ def test_run_is_stepped_to_its_end(engine: str, monkeypatch: pytest.MonkeyPatch)
         seconds = run_seconds(scene, engine, scene.solver.replace(dt=dt))
         assert seconds is not None
         assert seconds > 0.0
-    assert ended == pytest.approx([0.4, 0.4], rel=1e-12)  # the sum of the steps
+    assert ended == pytest.approx([0.4, 0.4], rel=1e-12)  # sum of the steps
 
 
 @pytest.mark.parametrize("error", [Divergence(0.1, "a", "is gone"), Exhaustion("enough")])
-def test_run_that_does_not_end_has_no_cost_and_is_closed(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_run_that_fails_has_no_cost_and_is_closed(error: Exception, monkeypatch: pytest.MonkeyPatch) -> None:
     closed = []
 
     def step() -> None:
@@ -53,10 +53,10 @@ def test_run_that_does_not_end_has_no_cost_and_is_closed(error: Exception, monke
     monkeypatch.setattr(module, "start", lambda *_: broken)
     scene = scene_of(DROP)
     assert time_in_turns([TimedRun(scene, "pymunk", scene.solver)], 3) == [None]
-    assert closed == [True, True]  # the warm-up and the first turn; it is not tried again
+    assert closed == [True, True]  # the warm-up and the first turn; no repeat after that
 
 
-def test_ways_are_warmed_up_and_timed_in_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_runs_are_warmed_up_and_timed_in_turns(monkeypatch: pytest.MonkeyPatch) -> None:
     order: list[str] = []
 
     def seconds(scene: Scene, engine: str, settings: Settings) -> float:
@@ -77,16 +77,16 @@ def test_ways_are_warmed_up_and_timed_in_turns(monkeypatch: pytest.MonkeyPatch) 
     [
         (0.02, 0.02 * module.WARM_UP_STEPS),  # of a run of 0.4 s
         (0.4, 0.4),
-        (0.5, 0.4),  # a step that the end of the run cuts
+        (0.5, 0.4),  # a step that the end of the run shortens
     ],
 )
-def test_warm_up_is_short_and_also_of_a_run_of_one_step(
+def test_warm_up_is_short_even_for_a_run_of_one_step(
     engine: str, dt: float, end: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    real, started = module.start, list[Simulation]()
+    original, started = module.start, list[Simulation]()
 
     def begin(*arguments: Any) -> Simulation:
-        started.append(real(*arguments))
+        started.append(original(*arguments))
         return started[-1]
 
     monkeypatch.setattr(module, "start", begin)

@@ -1,4 +1,4 @@
-"""Pages in a browser: a headless Chromium that may ask no network for anything, and a scene that tries to break out."""
+"""Pages in a browser: a headless Chromium without network requests, and pages with hostile texts."""
 
 import json
 import shutil
@@ -37,12 +37,12 @@ class Browser:
         """Show a page from its file, in a window of 1300 × 1000 px."""
         self.log()
         self.requests()
-        told = [{"name": key.replace("_", "-"), "value": value} for key, value in features.items()]
-        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": told})
+        media_features = [{"name": key.replace("_", "-"), "value": value} for key, value in features.items()]
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": media_features})
         size = {"width": 1300, "height": 1000, "deviceScaleFactor": 1, "mobile": False}
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
         self.driver.get(page.as_uri())
-        self.do("document.documentElement.style.scrollBehavior = 'auto'")  # who clicks does not wait for scrolling
+        self.do("document.documentElement.style.scrollBehavior = 'auto'")  # so that clicks need not wait for scrolling
 
     def do(self, script: str, *arguments: object) -> Any:
         """Run a script in the page and return what it returns."""
@@ -56,11 +56,11 @@ class Browser:
         )
 
     def log(self) -> list[str]:
-        """Return what the console has told since the last call."""
+        """Return the messages of the console since the last call."""
         return [f"{entry['level']}: {entry['message']}" for entry in self.driver.get_log("browser")]
 
     def requests(self) -> list[str]:
-        """Return what the page has fetched since the last call, itself included; not the browser's own first tab."""
+        """Return the URLs that the page requested since the last call, including its own, without the first tab."""
         events = [json.loads(entry["message"])["message"] for entry in self.driver.get_log("performance")]
         sent = [event["params"] for event in events if event["method"] == "Network.requestWillBeSent"]
         return [each["request"]["url"] for each in sent if each["documentURL"].startswith("file:")]
@@ -72,7 +72,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     programs = {name: shutil.which(name) for name in ("chromium", "chromedriver")}
     missing = [name for name, path in programs.items() if path is None]
     if missing:
-        pytest.skip(f"seeing pages in a browser needs {' and '.join(missing)} (Debian: chromium, chromium-driver)")
+        pytest.skip(f"showing pages in a browser needs {' and '.join(missing)} (Debian: chromium, chromium-driver)")
     options = Options()
     options.binary_location = str(programs["chromium"])
     for flag in (*FLAGS, f"--user-data-dir={tmp_path_factory.mktemp('profile')}"):

@@ -1,4 +1,4 @@
-"""What pages are made of in tests: a scene, a trade-off, extremes; all with texts that would do harm if they could."""
+"""Documents of test pages: a scene, a trade-off and extremes, all with hostile texts."""
 
 from dataclasses import replace
 from typing import Any
@@ -19,7 +19,7 @@ from sandbox.scene.description.world import Settings
 from sandbox.scene.files.load import loads
 
 HOSTILE = """</script><img src="x" onerror="window.harm=1">'"&amp;"""
-"""Ends a script, and starts one of its own."""
+"""Text that ends a script element and starts its own."""
 
 SCENE = f"""
 title = '''<b id="harm">Title</b>'''
@@ -56,13 +56,13 @@ restitution = 0.5
 
 def point(engine: str, dt: float, error: float | None, cost: float | None, **settings: Any) -> Evaluation:
     """Return a point of a trade-off."""
-    chosen, work = Settings(dt=dt, **settings), {"substeps": round(1.0 / dt)}
+    resolved, work = Settings(dt=dt, **settings), {"substeps": round(1.0 / dt)}
     metrics = {"max_position": error, "energy": 0.25}
     return Evaluation(
         configuration=Configuration(engine),
         engine=engine,
-        asked=chosen,
-        settings=chosen,
+        asked=resolved,
+        settings=resolved,
         changes={"dt": dt},
         error=error,
         cost=cost,
@@ -77,10 +77,10 @@ def point(engine: str, dt: float, error: float | None, cost: float | None, **set
     )
 
 
-def weighed(points: tuple[Evaluation, ...], **more: Any) -> Tradeoff:
-    """Return a trade-off of points; all else is nothing, but for what is given."""
+def tradeoff_of(points: tuple[Evaluation, ...], **more: Any) -> Tradeoff:
+    """Return a trade-off of points; other fields are empty unless given."""
     scene = loads(SCENE, "hostile.toml")
-    rest = {
+    defaults = {
         "best": None,
         "doubt": None,
         "metric": METRICS["max_position"],
@@ -105,11 +105,11 @@ def weighed(points: tuple[Evaluation, ...], **more: Any) -> Tradeoff:
         "machine": {"cpu": "a <processor>", "cores": 2},
         "versions": {"python": "3"},
     }
-    return Tradeoff(scene=scene, points=points, **{**rest, **more})
+    return Tradeoff(scene=scene, points=points, **{**defaults, **more})
 
 
 def tradeoff_document() -> dict[str, Any]:
-    """Return a trade-off of two engines, with a failure and a method of its own."""
+    """Return a trade-off of three engines, with a failure and a second method."""
     points = (
         point("pymunk", 0.01, 0.1, 2.0),
         point("pymunk", 0.001, 0.01, 20.0),
@@ -121,7 +121,7 @@ def tradeoff_document() -> dict[str, Any]:
     risk = Diagnostic("tunnelling", f"substeps >= 20 prevents tunnelling of {HOSTILE}", {"safe_substeps": 20})
     cheapest = {"pymunk": Recommendation(points[1], "cheapest of pymunk", (), None, (risk,)), "exact": None}
     scene = loads(SCENE, "hostile.toml")
-    found = weighed(
+    found = tradeoff_of(
         points,
         best=Truth("closed_form", "formulas", run(scene, "exact"), 1.0),
         pareto=(points[0], points[3], points[4], points[5]),
@@ -135,7 +135,7 @@ def tradeoff_document() -> dict[str, Any]:
 
 
 def extremes_document() -> dict[str, Any]:
-    """Return extremes of an axis: every verdict, and one of four warnings a false alarm."""
+    """Return extremes of an axis with every verdict, and one false alarm among four warnings."""
     axis, changes = AXES["dt"], {"substeps": 4}
     failed = Outcome("failed", HOSTILE, min(axis.failure_rules), predicted=("tunnelling",))
     outcomes = (
@@ -147,9 +147,9 @@ def extremes_document() -> dict[str, Any]:
         failed,
     )
     setup = "pymunk, 4 substeps"
-    cells = tuple(
+    samples = tuple(
         Sample(axis.name, level, "pymunk", changes, setup, outcome)
         for level, outcome in zip(axis.levels, outcomes, strict=False)
     )
     limit = Boundary(axis.name, "pymunk", changes, setup, axis.levels[2], axis.levels[3], HOSTILE)
-    return Extremes(ExtremesPlan((axis,), ()), cells, (), (limit,), (), 1.0).document()
+    return Extremes(ExtremesPlan((axis,), ()), samples, (), (limit,), (), 1.0).document()

@@ -1,4 +1,4 @@
-"""Bars of the parts of an error."""
+"""Bars of the parts of an error budget."""
 
 import re
 from typing import Any
@@ -29,7 +29,7 @@ def test_error_at_the_finest_step_is_shown_if_the_model_is_unknown() -> None:
     assert fractions(row(None, 0.75, 0.25)) == pytest.approx({"left": 0.25, "time_step": 0.75}, rel=1e-6)
 
 
-def test_error_of_nothing_has_an_empty_bar() -> None:
+def test_zero_error_has_an_empty_bar() -> None:
     assert fractions(row(0.0, 0.0, 0.0)) == {}
 
 

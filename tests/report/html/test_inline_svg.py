@@ -1,4 +1,4 @@
-"""Figures as SVG in a page: no inline styles, colours of the theme, texts as texts, points and curves with classes."""
+"""Figures as SVG in a page: no inline styles, colours of the theme, escaped texts, classes of points and curves."""
 
 import re
 from xml.etree.ElementTree import Element
@@ -12,12 +12,12 @@ from tests.report.html.page_documents import HOSTILE
 
 
 def figure() -> Figure:
-    made, panel = chart_figure()
+    chart, panel = chart_figure()
     panel.plot([0.0, 1.0, 2.0], [0.0, 1.0, 4.0], color=COLOURS[1], gid="css:line e1")
     panel.plot([1.0], [1.0], color=INK, marker="o", gid="point:7")
     panel.set_ylabel(shortened(HOSTILE))
     finish_chart(panel, "x, m", 2.0)
-    return made
+    return chart
 
 
 @pytest.fixture(scope="module")
@@ -25,20 +25,20 @@ def root() -> Element:
     return svg_of(figure(), "plot", "a label", "chart")
 
 
-def test_nothing_is_styled_inline_and_nothing_is_left_of_the_file(root: Element) -> None:
+def test_svg_has_no_inline_styles_and_no_file_metadata(root: Element) -> None:
     assert not [element.tag for element in root.iter() if "style" in element.attrib]
     assert not {"metadata", "style", "script"} & {element.tag for element in root.iter()}
     assert "xmlns" not in markup_of(root)
     assert "font-family" not in markup_of(root)
 
 
-def test_colours_are_variables_of_the_page(root: Element) -> None:
+def test_colours_are_css_variables(root: Element) -> None:
     colours = {element.get(key) for element in root.iter() for key in ("stroke", "fill")} - {None, "none"}
     assert {"var(--e1)", "var(--ink)", "var(--truth)"} <= colours
     assert not [colour for colour in colours if str(colour).startswith("#")]
 
 
-def test_artists_have_their_class_and_points_their_index(root: Element) -> None:
+def test_curves_have_their_class_and_points_their_index(root: Element) -> None:
     (curve,) = root.findall(".//g[@class='line e1']")
     assert curve.find("path") is not None
     (point,) = root.findall(".//g[@data-gid='point:7']")
@@ -56,7 +56,7 @@ def test_identifiers_differ_between_charts() -> None:
     assert not names[0] & names[1]
 
 
-def test_same_figure_is_the_same_text() -> None:
+def test_same_figure_yields_the_same_markup() -> None:
     assert markup_of(svg_of(figure(), "a", "", "")) == markup_of(svg_of(figure(), "a", "", ""))
 
 

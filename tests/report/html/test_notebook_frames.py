@@ -1,4 +1,4 @@
-"""Notebook displays in a browser: two in one document run, are as tall as their pages, and fetch nothing."""
+"""Notebook displays in a browser: they are painted, as tall as their pages, and request nothing from a network."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -45,7 +45,7 @@ def test_two_displays_of_one_run_are_painted(browser: Browser, comparison: Compa
     page = tmp_path / "notebook.html"
     page.write_text(f"<!doctype html><meta charset=utf-8>{frame}{frame}", encoding="utf-8")
     browser.show(page)
-    require_painted_and_tall(browser)
+    assert_painted_and_full_height(browser)
     assert [line for line in browser.log() if "SEVERE" in line] == []
     assert [url for url in browser.requests() if url.startswith("http")] == []
 
@@ -55,12 +55,12 @@ def test_display_without_charts_is_painted(browser: Browser, display: Callable[[
     page = tmp_path / "notebook.html"
     page.write_text(f"<!doctype html><meta charset=utf-8>{display()._repr_html_()}", encoding="utf-8")
     browser.show(page)
-    require_painted_and_tall(browser)
+    assert_painted_and_full_height(browser)
     assert [line for line in browser.log() if "SEVERE" in line] == []
 
 
-def require_painted_and_tall(browser: Browser) -> None:
-    """Require that the replay in each frame is painted, and that each frame is as tall as its page."""
+def assert_painted_and_full_height(browser: Browser) -> None:
+    """Assert that the replay in each frame is painted, and that each frame is as tall as its page."""
     for frame_element in browser.driver.find_elements("tag name", "iframe"):
         browser.do("arguments[0].scrollIntoView()", frame_element)
         browser.driver.switch_to.frame(frame_element)

@@ -1,4 +1,4 @@
-"""Pages as a reader has them: in a browser, without a network, played, scrubbed, clicked."""
+"""Pages in a browser without a network: playing, scrubbing, clicking."""
 
 from pathlib import Path
 
@@ -21,41 +21,41 @@ TIME = "return Number(document.querySelector('.replay').dataset.time)"
 SCRUB = "const it = document.querySelector('.scrub'); it.value = arguments[0]; it.dispatchEvent(new Event('input'))"
 
 
-def shown(browser: Browser, page: Path, **features: str) -> Browser:
+def show_page(browser: Browser, page: Path, **features: str) -> Browser:
     """Show a page and wait until its first replay is unpacked and drawn."""
     browser.show(page, **features)
     browser.wait(READY)
-    painted(browser)
+    next_picture(browser)
     return browser
 
 
-def painted(browser: Browser) -> str:
-    """Wait for two pictures to have passed, and return the canvas."""
+def next_picture(browser: Browser) -> str:
+    """Wait for two animation frames, and return the picture of the canvas."""
     browser.driver.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
     return str(browser.do(PICTURE))
 
 
 @pytest.mark.parametrize("kind", ["comparison", "tradeoff", "extremes", "overview"])
-def test_page_complains_of_nothing_and_fetches_nothing(kind: str, browser: Browser, pages: Pages) -> None:
+def test_page_logs_no_errors_and_requests_nothing(kind: str, browser: Browser, pages: Pages) -> None:
     browser.show(pages[kind])
     if kind != "extremes":
         browser.do("document.querySelector('.replay').scrollIntoView()")
         browser.wait(READY)
-        painted(browser)
+        next_picture(browser)
     assert browser.log() == []
     assert {url for url in browser.requests() if not url.startswith("data:")} == {pages[kind].as_uri()}
     assert browser.do("return performance.getEntriesByType('resource').length") == 0
 
 
 @pytest.mark.parametrize("kind", ["comparison", "tradeoff", "extremes", "overview"])
-def test_hostile_texts_are_shown_and_do_nothing(kind: str, browser: Browser, pages: Pages) -> None:
+def test_hostile_texts_are_shown_and_not_executed(kind: str, browser: Browser, pages: Pages) -> None:
     browser.show(pages[kind])
     assert browser.do("return window.harm === undefined && !document.querySelector('img, #harm')")
     assert HOSTILE in browser.do("return document.documentElement.textContent")
     assert browser.log() == []
 
 
-def test_policy_stops_what_escaping_would_let_through(browser: Browser, pages: Pages, tmp_path: Path) -> None:
+def test_content_policy_blocks_injected_markup(browser: Browser, pages: Pages, tmp_path: Path) -> None:
     broken = tmp_path / "broken.html"
     text = pages["extremes"].read_text(encoding="utf-8")
     added = "<script>window.harm=1</script><img src='https://example.invalid/x.png' onerror='window.harm=1'>"
@@ -66,7 +66,7 @@ def test_policy_stops_what_escaping_would_let_through(browser: Browser, pages: P
 
 
 def test_play_moves_until_paused(browser: Browser, pages: Pages) -> None:
-    shown(browser, pages["comparison"])
+    show_page(browser, pages["comparison"])
     before = browser.do(PICTURE)
     button = browser.driver.find_element(By.CSS_SELECTOR, "[data-action=play]")
     button.click()
@@ -74,56 +74,56 @@ def test_play_moves_until_paused(browser: Browser, pages: Pages) -> None:
     button.click()
     assert browser.do("return document.querySelector('.replay').dataset.playing") == "false"
     stopped = browser.do(TIME)
-    assert painted(browser) != before
+    assert next_picture(browser) != before
     assert browser.do(TIME) == stopped
 
 
 def test_scrubbing_moves_picture_cursor_and_errors(browser: Browser, pages: Pages) -> None:
-    shown(browser, pages["comparison"])
+    show_page(browser, pages["comparison"])
     before, cursor = browser.do(PICTURE), browser.do(CURSOR)
     browser.do(SCRUB, 0.4)
-    assert painted(browser) != before
+    assert next_picture(browser) != before
     chart = browser.do("const d = document.querySelector('svg.time').dataset; return [d.left, d.right].map(Number)")
     # The scene lasts 1 s; coordinates are written to 0.01.
     assert browser.do(CURSOR) == pytest.approx(0.6 * chart[0] + 0.4 * chart[1], abs=0.01)
     assert cursor == chart[0]
-    # Explicit Euler has fallen g·h·T/2 = 0.02 m less by then.
+    # Explicit Euler lags the fall by g·h·T/2 = 0.02 m then.
     assert browser.do("return document.querySelector('.legend .error').textContent") == "0.02 m"
     assert browser.do("return document.querySelectorAll('.legend .error')[1].textContent") == "0 m"
 
 
-def test_clicking_in_a_plot_goes_there(browser: Browser, pages: Pages) -> None:
-    shown(browser, pages["comparison"])
+def test_click_in_a_chart_seeks_to_its_time(browser: Browser, pages: Pages) -> None:
+    show_page(browser, pages["comparison"])
     before = browser.do(PICTURE)
     chart = browser.driver.find_elements(By.CSS_SELECTOR, "svg.time")[1]  # the energy; its axis begins elsewhere
-    place = browser.do(
+    offset = browser.do(
         "const [chart] = arguments, box = chart.getBoundingClientRect(), d = chart.dataset;"
         "return ((Number(d.left) + 0.75 * (d.right - d.left)) / d.width - 0.5) * box.width",
         chart,
     )
-    ActionChains(browser.driver).move_to_element_with_offset(chart, round(place), 0).click().perform()
-    assert browser.do(TIME) == pytest.approx(0.75, abs=0.003)  # a pixel of 400 that are 1 s
-    assert painted(browser) != before
+    ActionChains(browser.driver).move_to_element_with_offset(chart, round(offset), 0).click().perform()
+    assert browser.do(TIME) == pytest.approx(0.75, abs=0.003)  # one pixel of 400 per second
+    assert next_picture(browser) != before
     ActionChains(browser.driver).move_to_element(chart).click_and_hold().move_by_offset(-5000, 0).release()
     assert float(browser.do("return document.querySelector('.scrub').value")) == pytest.approx(0.75, abs=0.003)  # same
 
 
 def test_legend_hides_an_engine(browser: Browser, pages: Pages) -> None:
-    shown(browser, pages["comparison"])
+    show_page(browser, pages["comparison"])
     browser.do(SCRUB, 0.9)
-    before = painted(browser)
+    before = next_picture(browser)
     box = browser.driver.find_element(By.CSS_SELECTOR, "[data-track=pymunk]")
     box.click()
-    assert painted(browser) != before
+    assert next_picture(browser) != before
     assert browser.do("return document.querySelector('.replay').dataset.shown") == "exact,truth"
     hidden = "return [...document.querySelectorAll('svg.time .line.e0')].map((it) => getComputedStyle(it).display)"
     assert set(browser.do(hidden)) == {"none"}
     box.click()
-    assert painted(browser) == before
+    assert next_picture(browser) == before
 
 
 def test_keys_step_play_and_zoom(browser: Browser, pages: Pages) -> None:
-    shown(browser, pages["comparison"])
+    show_page(browser, pages["comparison"])
     replay = browser.driver.find_element(By.CSS_SELECTOR, ".replay")
     browser.do("arguments[0].focus()", replay)
     keys = ActionChains(browser.driver)
@@ -133,11 +133,11 @@ def test_keys_step_play_and_zoom(browser: Browser, pages: Pages) -> None:
     assert browser.do(TIME) == 1.0
     ActionChains(browser.driver).send_keys(Keys.HOME).perform()
     assert browser.do(TIME) == 0.0
-    before = painted(browser)
+    before = next_picture(browser)
     ActionChains(browser.driver).send_keys("+").perform()
-    assert painted(browser) != before
+    assert next_picture(browser) != before
     ActionChains(browser.driver).send_keys("0").perform()
-    assert painted(browser) == before
+    assert next_picture(browser) == before
     ActionChains(browser.driver).send_keys(" ").perform()
     assert browser.do("return document.querySelector('.replay').dataset.playing") == "true"
     ActionChains(browser.driver).send_keys(" ").perform()
@@ -145,67 +145,67 @@ def test_keys_step_play_and_zoom(browser: Browser, pages: Pages) -> None:
 
 
 def test_dragging_and_wheel_move_the_picture(browser: Browser, pages: Pages) -> None:
-    shown(browser, pages["comparison"])
+    show_page(browser, pages["comparison"])
     canvas = browser.driver.find_element(By.CSS_SELECTOR, "canvas")
     browser.do("arguments[0].scrollIntoView({block: 'center'})", canvas)
-    before = painted(browser)
+    before = next_picture(browser)
     wheel = "arguments[0].dispatchEvent(new WheelEvent('wheel', {deltaY: -200, cancelable: true, bubbles: true}))"
-    assert browser.do(f"return {wheel}", canvas)  # nobody has turned to it: the page scrolls
-    assert painted(browser) == before
+    assert browser.do(f"return {wheel}", canvas)  # without focus, the wheel scrolls the page
+    assert next_picture(browser) == before
     ActionChains(browser.driver).drag_and_drop_by_offset(canvas, 60, 30).perform()
-    moved = painted(browser)
+    moved = next_picture(browser)
     assert moved != before
     assert not browser.do(f"return {wheel}", canvas)
-    assert painted(browser) != moved
+    assert next_picture(browser) != moved
 
 
 def test_reduced_motion_stops_at_the_end(browser: Browser, pages: Pages) -> None:
-    shown(browser, pages["comparison"], prefers_reduced_motion="reduce")
+    show_page(browser, pages["comparison"], prefers_reduced_motion="reduce")
     browser.do(SCRUB, 0.98)
     browser.driver.find_element(By.CSS_SELECTOR, "[data-action=play]").click()
     assert browser.wait("document.querySelector('.replay').dataset.playing === 'false'")
     assert browser.do(TIME) == 1.0
 
 
-def test_dark_theme_and_print_have_colours_of_their_own(browser: Browser, pages: Pages) -> None:
-    shown(browser, pages["comparison"], prefers_color_scheme="dark")
-    paper = "return getComputedStyle(document.body).backgroundColor"
-    dark, picture = browser.do(paper), browser.do(PICTURE)
+def test_dark_theme_and_print_have_different_colours(browser: Browser, pages: Pages) -> None:
+    show_page(browser, pages["comparison"], prefers_color_scheme="dark")
+    background = "return getComputedStyle(document.body).backgroundColor"
+    dark, picture = browser.do(background), browser.do(PICTURE)
     browser.do("window.dispatchEvent(new Event('beforeprint'))")
     printed = browser.do(PICTURE)
     browser.do("window.dispatchEvent(new Event('afterprint'))")
     assert browser.do(PICTURE) == picture
-    shown(browser, pages["comparison"], prefers_color_scheme="light")
-    assert browser.do(paper) != dark
+    show_page(browser, pages["comparison"], prefers_color_scheme="light")
+    assert browser.do(background) != dark
     assert browser.do(PICTURE) == printed != picture
 
 
-def test_far_replays_are_unpacked_when_they_come_near(browser: Browser, pages: Pages) -> None:
+def test_distant_replays_are_unpacked_when_scrolled_into_view(browser: Browser, pages: Pages) -> None:
     browser.show(pages["overview"])
     last = "[...document.querySelectorAll('.replay')].at(-1)"
-    painted(browser)
+    next_picture(browser)
     assert browser.do(f"return {last}.dataset.ready") is None
     browser.do(f"{last}.scrollIntoView({{behavior: 'instant'}})")
     assert browser.wait(f"{last}.dataset.ready") == "true"
 
 
-def test_point_of_a_trade_off_tells_its_settings(browser: Browser, pages: Pages) -> None:
+def test_selected_point_of_a_trade_off_shows_its_settings(browser: Browser, pages: Pages) -> None:
     browser.show(pages["tradeoff"])
-    told = "return document.querySelector('.chosen code').textContent"
+    settings_script = "return document.querySelector('.chosen code').textContent"
     answer = '[solver]  # reference\ndt = 0.01\nsubsteps = 1\niterations = 10\nintegrator = "velocity_verlet"'
-    assert browser.do(told) == answer  # the cheapest within the tolerance is chosen at first
+    assert browser.do(settings_script) == answer  # the cheapest within the tolerance is selected initially
     browser.driver.find_element(By.CSS_SELECTOR, "[data-point='1']").click()
-    assert browser.do(told).startswith("[solver]  # pymunk\ndt = 0.001\n")
+    assert browser.do(settings_script).startswith("[solver]  # pymunk\ndt = 0.001\n")
     browser.do("document.querySelector('[data-point=\"0\"]').focus()")
     ActionChains(browser.driver).send_keys(Keys.ARROW_RIGHT).perform()
-    assert browser.do("return document.querySelector('.tradeoff').dataset.chosen") == "3"  # the next of the front
+    assert browser.do("return document.querySelector('.tradeoff').dataset.chosen") == "3"  # the next point of the front
     browser.driver.find_element(By.CSS_SELECTOR, "[data-point='2']").click()
     assert HOSTILE in browser.do("return document.querySelector('.chosen').textContent")
 
 
 @pytest.mark.parametrize("width", [360, 800, 1600])
 @pytest.mark.parametrize("kind", ["comparison", "tradeoff", "extremes", "overview"])
-def test_page_is_never_wider_than_its_window(kind: str, width: int, browser: Browser, pages: Pages) -> None:
+def test_page_is_not_wider_than_its_window(kind: str, width: int, browser: Browser, pages: Pages) -> None:
     browser.show(pages[kind])
     size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
     browser.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)

@@ -1,4 +1,4 @@
-"""Parts of a page: texts that are escaped, tables, documents, the content policy."""
+"""Parts of a page: escaped texts, tables, documents, the content policy."""
 
 import json
 import math
@@ -31,17 +31,17 @@ from sandbox.report.html.replay import replay
 from sandbox.report.html.tradeoff import tradeoff_page
 from sandbox.report.tradeoff_plot import budget_of, pareto_of, work_points
 from sandbox.scene.files.load import loads
-from tests.report.html.page_documents import HOSTILE, SCENE, extremes_document, tradeoff_document, weighed
+from tests.report.html.page_documents import HOSTILE, SCENE, extremes_document, tradeoff_document, tradeoff_of
 
 
-class Read(HTMLParser):
-    """Elements and text of a document."""
+class ParsedHtml(HTMLParser):
+    """Elements and text of an HTML document."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
         self.elements: list[str] = []
         self.text = ""
-        self.feed(str(text))  # slices of markup would be escaped when joined
+        self.feed(str(text))  # str, because slices of Markup are escaped when joined
 
     def handle_starttag(self, name: str, attributes: list[tuple[str, str | None]]) -> None:
         self.elements.append(name)
@@ -52,14 +52,14 @@ class Read(HTMLParser):
 
 @given(st.text())
 def test_any_text_is_shown_as_text(text: str) -> None:
-    read = Read(paragraph(isolated(text)))
-    assert read.elements == ["p", "bdi"]
+    parsed = ParsedHtml(paragraph(isolated(text)))
+    assert parsed.elements == ["p", "bdi"]
     printed = "".join(c for c in text if c.isprintable())
-    assert printed in "".join(c for c in read.text if c.isprintable())
+    assert printed in "".join(c for c in parsed.text if c.isprintable())
 
 
 @pytest.mark.parametrize(
-    "made",
+    "part",
     [
         badge(HOSTILE, "bad", HOSTILE),
         engine_name(HOSTILE),
@@ -68,10 +68,10 @@ def test_any_text_is_shown_as_text(text: str) -> None:
         Section(HOSTILE, paragraph(HOSTILE), "anchor", HOSTILE).markup(),
     ],
 )
-def test_every_part_escapes_texts(made: Markup) -> None:
-    read = Read(made)
-    assert not {"img", "script"} & set(read.elements)
-    assert HOSTILE in read.text
+def test_every_part_escapes_its_texts(part: Markup) -> None:
+    parsed = ParsedHtml(part)
+    assert not {"img", "script"} & set(parsed.elements)
+    assert HOSTILE in parsed.text
 
 
 def test_markup_is_not_escaped_twice() -> None:
@@ -84,7 +84,7 @@ def test_control_characters_and_lone_surrogates_of_a_page_are_replaced() -> None
     html.encode("utf-8")
 
 
-def test_data_cannot_end_its_element_and_holds_no_nan() -> None:
+def test_data_cannot_end_its_element_and_rejects_nan() -> None:
     document = tradeoff_document()
     html = tradeoff_page(document).html()
     (facts,) = re.findall(r'class="facts">(.*?)</script>', html, re.DOTALL)
@@ -93,16 +93,16 @@ def test_data_cannot_end_its_element_and_holds_no_nan() -> None:
         replay(loads(SCENE, "hostile.toml"), [], trusted_until=math.nan)
 
 
-def test_table_has_a_cell_a_column_and_names_rows() -> None:
-    made = table((HtmlColumn("a"), HtmlColumn("b", True)), [["<x>", "1"], ["", "2"]], "things")
-    assert Read(made).elements.count("td") == 2
-    assert "&lt;x&gt;" in made
-    assert '<tr class="more">' in made
+def test_table_has_one_cell_per_column_and_marks_continued_rows() -> None:
+    part = table((HtmlColumn("a"), HtmlColumn("b", True)), [["<x>", "1"], ["", "2"]], "things")
+    assert ParsedHtml(part).elements.count("td") == 2
+    assert "&lt;x&gt;" in part
+    assert '<tr class="more">' in part
     with pytest.raises(ValueError, match="zip"):
         table((HtmlColumn("a"),), [["x", "y"]], "things")
 
 
-def test_page_is_written_whole_with_a_policy_that_names_its_parts(tmp_path: Path) -> None:
+def test_page_is_written_atomically_with_a_policy_of_hashes(tmp_path: Path) -> None:
     page = Page("T", "kind", [Section("One", paragraph("x"), "one")], "lead", {"python": "3"}, {"cpu": "<c>"})
     path = write_page(page, tmp_path / "a.html")
     assert [each.name for each in tmp_path.iterdir()] == ["a.html"]
@@ -116,12 +116,12 @@ def test_page_is_written_whole_with_a_policy_that_names_its_parts(tmp_path: Path
     assert "&lt;c&gt;" in text
 
 
-def test_tradeoff_of_nothing_and_extremes_of_nothing_are_pages() -> None:
-    assert "0 points" in tradeoff_page(weighed(()).document()).html()
+def test_empty_trade_off_and_empty_extremes_are_pages() -> None:
+    assert "0 points" in tradeoff_page(tradeoff_of(()).document()).html()
     assert "0 cells" in extremes_page(Extremes(ExtremesPlan((), ()), (), (), (), (), 0.0).document()).html()
 
 
-def test_every_point_of_a_trade_off_is_drawn_failures_too() -> None:
+def test_every_point_of_a_trade_off_is_drawn_including_failures() -> None:
     html = tradeoff_page(tradeoff_document()).html()
     assert len(re.findall(r'data-point="\d"', html)) == 6
     assert len(re.findall(r'aria-label="pymunk; dt 0.1 s, 1 substep; diverged', html)) == 1
@@ -132,22 +132,22 @@ def test_warnings_for_recommended_settings_are_below_their_answers() -> None:
     document = tradeoff_document()
     html = tradeoff_page(document).html()
     answers = html[html.index('class="answers"') : html.index("</ul>")]
-    (warned,) = [item for item in answers.split("<li>")[1:] if "substeps &gt;= 20 prevents" in item]
-    assert warned.startswith("Cheapest setting of pymunk within the tolerance")
+    (item,) = [item for item in answers.split("<li>")[1:] if "substeps &gt;= 20 prevents" in item]
+    assert item.startswith("Cheapest setting of pymunk within the tolerance")
     assert 'src="x"' not in answers
 
 
-def test_chosen_point_has_its_warnings_and_its_time_per_frame() -> None:
+def test_selected_point_has_its_warnings_and_time_per_frame() -> None:
     html = tradeoff_page(tradeoff_document()).html()
     facts = json.loads(re.findall(r'class="facts">(.*?)</script>', html, re.DOTALL)[0])
     own, safe = dict(facts[0]["figures"]), dict(facts[1]["figures"])
-    assert own["time per frame"] == "0.0333 ms of the budget of 0.5 ms"  # 2 ms/s, 60 frames a second
+    assert own["time per frame"] == "0.0333 ms of the budget of 0.5 ms"  # 2 ms/s at 60 frames per second
     assert own[">frame"].startswith("not recommended: dt is longer than a frame")
     assert "substeps >= 20" in safe["note"]
     assert ">frame" not in safe
 
 
-def test_settings_with_a_step_longer_than_a_frame_and_dear_frames_are_marked() -> None:
+def test_settings_beyond_a_frame_or_the_budget_are_marked() -> None:
     html = tradeoff_page({**tradeoff_document(), "budget": 0.05}).html()
     front = html[html.index("The Pareto front</bdi>") : html.index("Sources of error")]
     assert front.count("&gt;frame</span>") == 4  # dt is 0.01 s on the whole front
@@ -157,22 +157,22 @@ def test_settings_with_a_step_longer_than_a_frame_and_dear_frames_are_marked() -
     assert "&gt;budget" not in unmarked
 
 
-def test_extremes_have_a_cell_a_level() -> None:
+def test_extremes_have_a_cell_for_every_level() -> None:
     html = extremes_page(extremes_document()).html()
     for word in ("exact", "degraded", "refused", "failed"):
         assert f'class="cell {word}"' in html
     assert "75 %" in html
 
 
-def test_methods_are_named_by_what_differs() -> None:
+def test_methods_are_named_by_their_differing_settings() -> None:
     document = tradeoff_document()
     points = work_points(document)
     assert [point.method for point in points if point.engine == "reference"] == ["", "velocity verlet"]
     assert [point.index for point in pareto_of(document, points)] == [0, 3, 4, 5]
-    assert budget_of(document) == 30.0  # ms a simulated second: 0.5 a frame, 60 frames
+    assert budget_of(document) == 30.0  # ms per simulated second: 0.5 ms per frame, 60 frames
 
 
-def test_settings_are_a_solver_table_that_a_scene_can_have() -> None:
+def test_settings_text_is_a_valid_solver_table_of_a_scene() -> None:
     text = settings_text({"dt": 1e-4, "substeps": 2, "slop": None, "half_kick": True, "integrator": "rk4"}, "reference")
     solver = loads(f"{text}\n[[ball]]\nposition = [0.0, 0.0]\nradius = 1.0\n", "made.toml").solver
     assert (solver.dt, solver.substeps, solver.half_kick, solver.integrator) == (1e-4, 2, True, "rk4")

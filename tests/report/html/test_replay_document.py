@@ -1,4 +1,4 @@
-"""The replay's document: what it keeps of scenes and runs, and what it says of the rest."""
+"""Replay documents: the included frames, shapes and bodies, and notes about omitted ones."""
 
 import math
 from dataclasses import replace
@@ -49,32 +49,32 @@ between = ["a", "b"]
 
 
 @pytest.fixture(scope="module")
-def fallen() -> tuple[Scene, Trajectory]:
+def fall_run() -> tuple[Scene, Trajectory]:
     scene = loads(FALL, "fall.toml")
     return scene, run(scene, "pymunk", audit=False)
 
 
-def test_positions_come_back_as_in_the_run(fallen: tuple[Scene, Trajectory]) -> None:
-    scene, found = fallen
+def test_positions_are_restored_as_in_the_run(fall_run: tuple[Scene, Trajectory]) -> None:
+    scene, found = fall_run
     document = replay_document(scene, [Track("pymunk", "e0", found)], None)
     time, step = document["time"], document["step"]
     assert len(time) == module.MAX_FRAMES
     assert (time[0], time[-1]) == (0.0, 1.0)
-    words = decompress(document["tracks"][0]["codes"], (len(time), 2, 3))
+    codes = decompress(document["tracks"][0]["codes"], (len(time), 2, 3))
     frames = [round(t / 0.001) for t in time]
     left = document["view"][0]
-    back = words[..., :2] * step - document["half"]
-    right = found.position[frames][:, :2]
-    # From another origin, positions are the same within half a step and the rounding of 1e6 m.
-    assert np.ptp(back - right, axis=(0, 1)) == pytest.approx(0.0, abs=step + 1e-9)
-    assert left < back[..., 0].min()
-    turn = words[-1, 1, 2] * (2.0 * math.pi / 65536.0)
-    assert turn == pytest.approx(found.angle[-1, 1] % (2.0 * math.pi), abs=1e-4)  # half a part of a turn: 4.8e-5
+    restored = codes[..., :2] * step - document["half"]
+    expected = found.position[frames][:, :2]
+    # Apart from the origin, positions agree within half a step and the rounding of 1e6 m.
+    assert np.ptp(restored - expected, axis=(0, 1)) == pytest.approx(0.0, abs=step + 1e-9)
+    assert left < restored[..., 0].min()
+    turn = codes[-1, 1, 2] * (2.0 * math.pi / 65536.0)
+    assert turn == pytest.approx(found.angle[-1, 1] % (2.0 * math.pi), abs=1e-4)  # half a step of an angle: 4.8e-5
     assert "600 of 1,001 frames" in document["note"]
 
 
-def test_geometry_has_shapes_fixed_bodies_and_joints(fallen: tuple[Scene, Trajectory]) -> None:
-    scene, found = fallen
+def test_geometry_has_shapes_fixed_bodies_and_joints(fall_run: tuple[Scene, Trajectory]) -> None:
+    scene, found = fall_run
     geometry = replay_document(scene, [Track("pymunk", "e0", found)], None)["geometry"]
     assert geometry["names"] == ["a", "b"]
     assert [len(geometry["shapes"][kind][0]) for kind in geometry["shape"]] == [3, 9]  # radius and corners
@@ -83,27 +83,27 @@ def test_geometry_has_shapes_fixed_bodies_and_joints(fallen: tuple[Scene, Trajec
     assert (symbol, a, b) == ("rod", 0, 1)
 
 
-def test_run_that_ends_early_is_absent_later(fallen: tuple[Scene, Trajectory]) -> None:
-    scene, found = fallen
+def test_run_that_ends_early_is_absent_later(fall_run: tuple[Scene, Trajectory]) -> None:
+    scene, found = fall_run
     short = found.at(list(range(301)))
     tracks = [Track("whole", "e0", found), Track("short", "e1", short)]
     document = replay_document(scene, tracks, None)
-    words = decompress(document["tracks"][1]["codes"], (len(document["time"]), 2, 3))
-    gone = words[:, 0, 0] == ABSENT
-    assert gone.tolist() == [t > 0.3011 for t in document["time"]]  # up to half an interval late counts as there
+    codes = decompress(document["tracks"][1]["codes"], (len(document["time"]), 2, 3))
+    absent = codes[:, 0, 0] == ABSENT
+    assert absent.tolist() == [t > 0.3011 for t in document["time"]]  # a frame up to half an interval later is present
 
 
-def test_retired_body_is_absent_and_errors_are_kept(fallen: tuple[Scene, Trajectory]) -> None:
-    scene, found = fallen
-    gone = replace(found, retired_time=np.asarray([0.5, np.nan, np.nan]))
+def test_retired_body_is_absent_and_errors_are_kept(fall_run: tuple[Scene, Trajectory]) -> None:
+    scene, found = fall_run
+    retired = replace(found, retired_time=np.asarray([0.5, np.nan, np.nan]))
     error = found.time, np.where(found.time < 0.5, 0.125, math.inf)
-    document = replay_document(scene, [Track("pymunk", "e0", gone, error)], None)
-    words = decompress(document["tracks"][0]["codes"], (len(document["time"]), 2, 3))
-    assert (words[:, 0, 0] == ABSENT).tolist() == [t >= 0.5 for t in document["time"]]
+    document = replay_document(scene, [Track("pymunk", "e0", retired, error)], None)
+    codes = decompress(document["tracks"][0]["codes"], (len(document["time"]), 2, 3))
+    assert (codes[:, 0, 0] == ABSENT).tolist() == [t >= 0.5 for t in document["time"]]
     assert document["tracks"][0]["errors"] == [0.125 if t < 0.5 else None for t in document["time"]]
 
 
-def test_of_many_bodies_a_part_is_drawn_and_noted() -> None:
+def test_subset_of_many_bodies_is_drawn_and_noted() -> None:
     scene = loads(
         "[world]\nduration = 0.05\n[[scatter]]\nname = 'a'\ncount = 5000\nradius = 0.001\n"
         "lower = [0.0, 0.0]\nupper = [10.0, 10.0]\ncollides = 'none'\n",
@@ -115,8 +115,10 @@ def test_of_many_bodies_a_part_is_drawn_and_noted() -> None:
     assert "1,667 of 5,000 bodies are drawn" in document["note"]
 
 
-def test_budget_limits_frames(fallen: tuple[Scene, Trajectory], monkeypatch: pytest.MonkeyPatch) -> None:
-    scene, found = fallen
+def test_data_budget_limits_the_number_of_frames(
+    fall_run: tuple[Scene, Trajectory], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, found = fall_run
     monkeypatch.setattr(module, "BUDGET", 100)
     document = replay_document(scene, [Track("pymunk", "e0", found)], None)
     assert len(document["time"]) == module.MIN_FRAMES

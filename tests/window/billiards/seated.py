@@ -1,4 +1,4 @@
-"""Tables for tests: few balls, so that strokes are short."""
+"""Billiards tables with few balls, so that strokes are short, and helpers that play on them."""
 
 from sandbox.games.billiards.view.controls import BilliardsControls
 from sandbox.games.billiards.view.player import Players
@@ -7,7 +7,7 @@ from sandbox.window.app_state import Messages, create_session
 from sandbox.window.game_host import controls_of, host_of
 
 RADIUS = 0.028575
-"""m, of pool balls"""
+"""Radius of pool balls, m."""
 
 FREE = """
 title = "Free"
@@ -43,19 +43,19 @@ def controls_at(text: str, players: Players | None = None) -> BilliardsControls:
     return controls
 
 
-def turn(controls: BilliardsControls, elapsed: float = 1.0 / 60.0) -> None:
-    """Let real time pass, s, as the window does."""
+def advance(controls: BilliardsControls, elapsed: float = 1.0 / 60.0) -> None:
+    """Advance by a real time, s, as the window does."""
     host = controls.player.host
     host.live.update(elapsed, host.waiting)
     controls.update(elapsed)
 
 
-def roll_out(controls: BilliardsControls, until: float = 60.0) -> None:
-    """Let the balls roll until the rules wait."""
+def roll_out(controls: BilliardsControls, limit: float = 60.0) -> None:
+    """Step until the rules wait for input."""
     host = controls.player.host
-    turn(controls)
+    advance(controls)
     while not host.waiting:
-        assert host.live.session.time < until
+        assert host.live.session.time < limit
         if host.live.busy is None and not host.waiting:
             host.live.step()
-        turn(controls, 0.0)
+        advance(controls, 0.0)

@@ -1,4 +1,4 @@
-"""A game in a session: strokes, turns, and the way back."""
+"""A billiards game in a session: strokes, turns, undo and the bot."""
 
 import math
 from dataclasses import replace
@@ -10,30 +10,30 @@ from sandbox.action import ActionError, Strike
 from sandbox.games.billiards.rules.base import Ruling
 from sandbox.games.billiards.view.hud import status_line
 from sandbox.measure.run.sessions import rerun
-from tests.window.billiards.seated import FREE, NINE, RADIUS, controls_at, roll_out, turn
+from tests.window.billiards.seated import FREE, NINE, RADIUS, advance, controls_at, roll_out
 
 pytestmark = pytest.mark.full  # a window or a film
 
 
-def test_time_stands_still_until_somebody_strikes() -> None:
+def test_time_stops_until_the_first_stroke() -> None:
     table = controls_at(FREE)
     game = table.player
     for _ in range(30):
-        turn(table)
+        advance(table)
     assert game.live.session.time == 0.0
     game.shoot()
-    turn(table)
+    advance(table)
     assert game.live.session.time > 0.0
 
 
-def test_shot_of_the_scene_is_laid_ready_and_not_played() -> None:
+def test_shot_of_the_scene_presets_the_cue_without_a_stroke() -> None:
     table = controls_at(NINE)
     game = table.player
     assert (game.cue.aim, game.cue.speed, game.cue.side) == (1.5708, 4.0, 0.2)
     assert not game.live.frame.velocity.any()
 
 
-def test_forecast_is_what_is_played() -> None:
+def test_predicted_shot_equals_the_played_shot() -> None:
     table = controls_at(FREE)
     game = table.player
     game.cue.aim, game.cue.speed = math.pi / 2 - 0.02, 1.5
@@ -47,12 +47,12 @@ def test_forecast_is_what_is_played() -> None:
     assert math.dist(found.ghost, game.position[found.hit]) == pytest.approx(2 * RADIUS, abs=1e-9)  # they touch
     game.shoot()
     roll_out(table)
-    # The same engine, the same numbers; only the clock of a session counts in steps.
+    # The same engine computes both; only the clock of a session counts in steps.
     assert game.live.frame.position[aim.ball] == pytest.approx(found.cue_path[-1], abs=1e-9)
     assert game.live.frame.position[found.hit] == pytest.approx(found.object_path[-1], abs=1e-9)
 
 
-def test_forecast_does_not_change_the_table() -> None:
+def test_prediction_does_not_change_the_table() -> None:
     table = controls_at(FREE)
     game = table.player
     before = game.live.session.simulation.state_hash()
@@ -67,7 +67,7 @@ def test_miss_is_a_foul_and_gives_the_ball_in_hand() -> None:
     game = table.player
     game.shoot()
     roll_out(table)
-    game.cue.aim, game.cue.speed = -math.pi / 2, 0.3  # away from all
+    game.cue.aim, game.cue.speed = -math.pi / 2, 0.3  # away from all balls
     shooter = game.match.turn
     if game.match.state.in_hand is None:
         game.shoot()
@@ -77,14 +77,14 @@ def test_miss_is_a_foul_and_gives_the_ball_in_hand() -> None:
     assert game.match.turn != shooter or game.match.state.in_hand is not None
 
 
-def test_undo_takes_a_stroke_back_while_the_balls_roll() -> None:
+def test_undo_restores_the_table_while_the_balls_roll() -> None:
     table = controls_at(FREE)
     game = table.player
     before = game.live.session.simulation.state_hash()
     game.cue.aim = 1.4
     game.shoot(2.0)
     for _ in range(20):
-        turn(table)
+        advance(table)
     assert game.live.session.time > 0.0
     game.undo()
     game.live.finish_seek()
@@ -94,7 +94,7 @@ def test_undo_takes_a_stroke_back_while_the_balls_roll() -> None:
     assert game.host.waiting
 
 
-def test_stroke_after_undo_goes_its_own_way_and_replays() -> None:
+def test_stroke_after_undo_replaces_it_and_replays() -> None:
     table = controls_at(FREE)
     game = table.player
     game.shoot(2.0)
@@ -111,7 +111,7 @@ def test_stroke_after_undo_goes_its_own_way_and_replays() -> None:
     assert rerun(session).info["state_hash"] == session.state_hash
 
 
-def test_undo_without_a_stroke_says_so() -> None:
+def test_undo_without_a_stroke_is_an_error() -> None:
     with pytest.raises(ActionError, match="no shot"):
         controls_at(FREE).player.undo()
 
@@ -120,12 +120,12 @@ def test_stroke_while_balls_roll_is_refused() -> None:
     table = controls_at(FREE)
     game = table.player
     game.shoot()
-    turn(table)
+    advance(table)
     with pytest.raises(ActionError, match="at rest"):
         game.shoot()
 
 
-def test_going_back_finds_the_turn_of_then_and_time_goes_on() -> None:
+def test_seeking_back_restores_the_turn_and_replays_to_the_end() -> None:
     table = controls_at(NINE)
     game = table.player
     game.shoot()
@@ -137,26 +137,26 @@ def test_going_back_finds_the_turn_of_then_and_time_goes_on() -> None:
     assert game.match.turn == 0
     assert game.match.state.opening
     assert not game.can_shoot
-    assert not game.host.waiting  # what was done is seen again
+    assert not game.host.waiting  # recorded strokes are replayed
     while not game.host.waiting:
         game.live.step()
-        turn(table, 0.0)
+        advance(table, 0.0)
     assert game.live.session.time == end
     assert game.match == after
 
 
-def test_strokes_of_a_hand_that_moves_balls_begin_where_they_lie() -> None:
+def test_match_uses_positions_of_balls_moved_by_the_user() -> None:
     from sandbox.action import Move
 
     table = controls_at(FREE)
     game = table.player
     game.live.apply(Move(time=0.0, body="2", position=(0.7, 0.7), velocity=(0.0, 0.0)))
-    turn(table)
-    number = game.live.bodies.names.index("2")
-    assert game.match.position[number] == (0.7, 0.7)
+    advance(table)
+    index = game.live.bodies.names.index("2")
+    assert game.match.position[index] == (0.7, 0.7)
 
 
-def test_bot_answers_the_break() -> None:
+def test_bot_plays_after_the_break() -> None:
     table = controls_at(NINE, "you vs bot")
     game = table.player
     game.shoot(6.0)
@@ -166,27 +166,27 @@ def test_bot_answers_the_break() -> None:
             break
         if not game.host.waiting:
             game.live.step()
-        turn(table, 0.02)
+        advance(table, 0.02)
     assert game.is_own_turn
     if game.strokes > 1:
         session = game.live.session.recording()
         assert rerun(session).info["state_hash"] == session.state_hash
         game.undo()
         game.live.finish_seek()
-        assert game.is_own_turn  # back at the person's stroke
+        assert game.is_own_turn  # undone to the stroke of the human player
     table.close()
 
 
-def test_bot_has_one_name_and_no_aim_while_it_thinks() -> None:
+def test_thinking_bot_is_named_in_the_status_and_shows_no_aim() -> None:
     table = controls_at(NINE, "you vs bot")
     game = table.player
-    state, said = replace(game.match.state, turn=1), ("foul: scratch; player 2 has the ball in hand",)
-    game.rules.match = replace(game.match, state=state, verdict=Ruling(state, messages=said))
+    state, messages = replace(game.match.state, turn=1), ("foul: scratch; player 2 has the ball in hand",)
+    game.rules.match = replace(game.match, state=state, verdict=Ruling(state, messages=messages))
     assert game.is_bot_thinking
     assert table.aim() is None
     assert status_line(game) == "foul: scratch; bot has the ball in hand; bot is thinking"
     for _ in range(200_000):
-        turn(table, 0.02)
+        advance(table, 0.02)
         if not game.is_bot_thinking:
             break
     aim = table.aim()
@@ -196,7 +196,7 @@ def test_bot_has_one_name_and_no_aim_while_it_thinks() -> None:
     table.close()
 
 
-def test_ball_in_hand_goes_only_where_the_rules_say() -> None:
+def test_ball_in_hand_is_limited_to_the_area_of_the_rules() -> None:
     table = controls_at(NINE)
     game = table.player
     assert game.match.state.in_hand == "behind the head string"
@@ -208,17 +208,17 @@ def test_ball_in_hand_goes_only_where_the_rules_say() -> None:
     game.carry((0.4, 1.9))
     assert game.refused
     assert game.carried is not None
-    assert game.carried[1] <= head + 1e-9  # the rounding of the line
+    assert game.carried[1] <= head + 1e-9  # rounding of the head string
     game.carry((0.4, 0.3))
     game.put_down()
     assert game.position[game.ball] == (0.4, 0.3)
     assert game.carried is None
-    turn(table)  # the rules see an action after the next step
+    advance(table)  # the rules see an action after the next step
     assert game.host.waiting
     assert game.match.position[game.ball] == (0.4, 0.3)
 
 
-def test_ball_that_is_not_in_hand_stays() -> None:
+def test_ball_that_is_not_in_hand_cannot_be_picked_up() -> None:
     table = controls_at(NINE)
     game = table.player
     game.shoot(5.0)
@@ -228,7 +228,7 @@ def test_ball_that_is_not_in_hand_stays() -> None:
             game.toggle_in_hand()
 
 
-def test_free_play_gives_the_ball_in_hand_at_any_time() -> None:
+def test_free_play_allows_ball_in_hand_at_any_time() -> None:
     table = controls_at(FREE)
     game = table.player
     game.shoot(1.0)

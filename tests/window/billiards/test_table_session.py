@@ -36,13 +36,13 @@ name = "1"
 position = [0.5, 1.0]
 radius = 0.03
 """
-"""a surface with balls, and without a game"""
+"""A surface with balls, without a game."""
 SCRATCH = -2.3
-"""rad, of a stroke away from the rack, which is a foul"""
+"""Aim of a stroke away from the rack, which is a foul, rad."""
 
 
-def played(table: BilliardsControls) -> Recording:
-    """Return a session of two strokes with a call, a ball in hand, and a respot."""
+def play_two_strokes(table: BilliardsControls) -> Recording:
+    """Play two strokes with a foul and a ball in hand, and return the recording."""
     player = table.player
     player.cue.aim = SCRATCH
     player.shoot(3.0)
@@ -65,9 +65,9 @@ def rules_in(live: LiveView) -> BilliardsRules:
     return live.session.game.rules
 
 
-def test_recording_has_the_score_and_its_replay_has_the_same_match() -> None:
+def test_replay_of_a_recording_has_the_same_score_and_match() -> None:
     table = controls_at(NINE)
-    recording = played(table)
+    recording = play_two_strokes(table)
     assert recording.score == table.player.rules.score
     run = rerun(recording, audit=False)
     assert run.info["state_hash"] == recording.state_hash
@@ -77,10 +77,10 @@ def test_recording_has_the_score_and_its_replay_has_the_same_match() -> None:
 
 
 @pytest.mark.parametrize("reopen", ["restored", "replayed"])
-def test_reopened_session_has_the_match(reopen: str) -> None:
+def test_reopened_session_restores_the_match(reopen: str) -> None:
     table = controls_at(NINE, "you vs bot")
-    table.player.opponent = None  # both players are played here
-    recording = played(table)
+    table.player.opponent = None  # the test plays both players
+    recording = play_two_strokes(table)
     view = session_of_recording(recording) if reopen == "restored" else _shown(recording, None)
     assert isinstance(view, LiveView)
     view.seek(round(recording.duration / recording.settings.dt))
@@ -102,7 +102,7 @@ def test_players_are_inputs_of_the_recording() -> None:
     view.close()
 
 
-def test_surface_with_a_cue_ball_is_played_without_a_game_in_its_file() -> None:
+def test_surface_with_a_cue_ball_is_playable_without_a_game_in_its_file() -> None:
     table = controls_at(PLAIN)
     player = table.player
     assert player.players == "one player"
@@ -118,7 +118,7 @@ def test_surface_with_a_cue_ball_is_played_without_a_game_in_its_file() -> None:
     view.close()
 
 
-def test_session_without_room_for_the_rules_is_restored_and_replayed_without_them(tmp_path: Path) -> None:
+def test_session_of_a_table_too_small_for_rules_reopens_without_them(tmp_path: Path) -> None:
     path = tmp_path / "narrow.toml"
     path.write_text('title = "Narrow"\n[surface]\n[[ball]]\nname = "cue"\nposition = [0.0, 0.0]\nradius = 0.03\n')
     state = AppState()
@@ -155,7 +155,7 @@ def test_undo_keeps_decisions_and_calls_before_the_stroke() -> None:
     assert player.host.waiting
 
 
-def test_undo_of_a_stroke_by_controls_removes_its_inputs() -> None:
+def test_undo_removes_the_control_inputs_of_a_stroke() -> None:
     table = controls_at(FREE)
     player, session = table.player, table.player.live.session
     for control, value in player.rules.stroke_inputs(player.cue.stroke):
@@ -168,7 +168,7 @@ def test_undo_of_a_stroke_by_controls_removes_its_inputs() -> None:
     assert (session.game.all_presses, session.actions, session.time) == ((), (), 0.0)
 
 
-def test_session_of_a_match_between_bots_reopens_with_its_match() -> None:
+def test_reopened_session_of_two_bots_restores_the_match() -> None:
     bots = [BilliardsBot(0.6, 0), BilliardsBot(0.6, 1)]
     played_frame = play_frame(Match.begin(loads(NINE)), bots, most=3)
     view = session_of_recording(Recording.from_json(played_frame.session.to_json()))
@@ -183,15 +183,15 @@ def test_session_of_a_match_between_bots_reopens_with_its_match() -> None:
 @pytest.fixture
 def window(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[App]:
     monkeypatch.setenv("SANDBOX_DATA", str(tmp_path))
-    opened = App(AppState(), size=(1000, 620), folder=tmp_path, say=lambda _: None)
-    assert opened.app_state.open(find("9-ball"))
-    opened.run_frame(0.02)
-    yield opened
-    opened.close()
+    window = App(AppState(), size=(1000, 620), folder=tmp_path, say=lambda _: None)
+    assert window.app_state.open(find("9-ball"))
+    window.run_frame(0.02)
+    yield window
+    window.close()
 
 
 @pytest.mark.parametrize(("winner", "asked"), [(0, True), (1, False)])
-def test_won_frame_enters_the_high_scores_unless_the_bot_has_won(window: App, winner: int, asked: bool) -> None:
+def test_high_score_is_offered_only_when_the_human_player_wins(window: App, winner: int, asked: bool) -> None:
     window.app_state.set_parameter("players", "you vs bot")
     controls, host = window.app_state.controls, window.app_state.host
     assert isinstance(controls, BilliardsControls)

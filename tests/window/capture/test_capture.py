@@ -1,4 +1,4 @@
-"""Screenshots and films: whole, where they belong, and showing what was added."""
+"""Screenshots and films: complete files at the right paths with the added pictures."""
 
 import re
 import sys
@@ -21,32 +21,32 @@ from tests.films import gif_frames, mp4_frames
 pytestmark = pytest.mark.full  # a window or a film
 
 SIZE = (96, 54)
-BACK, BALL = (20, 24, 31), (86, 180, 233)
+BACKGROUND, BALL = (20, 24, 31), (86, 180, 233)
 
 
 def picture(x: int = 20, size: tuple[int, int] = SIZE, colour: tuple[int, int, int] = BALL) -> pygame.Surface:
-    """A disc of radius 8 px at half the height."""
+    """Return a picture of a disc of radius 8 px at half the height."""
     surface = offscreen(size)
-    surface.fill(BACK)
+    surface.fill(BACKGROUND)
     pygame.draw.circle(surface, colour, (x, size[1] // 2), 8)
     return surface
 
 
-def left_in(folder: Path) -> list[str]:
+def file_names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_screenshot_takes_the_first_free_number_and_shows_the_surface(tmp_path: Path) -> None:
+def test_screenshot_uses_the_first_free_number_and_equals_the_surface(tmp_path: Path) -> None:
     (tmp_path / "sandbox-bounce-2.png").write_bytes(b"mine")
     paths = [screenshot(picture(), tmp_path, "bounce") for _ in range(2)]
     assert [path.name for path in paths] == ["sandbox-bounce-1.png", "sandbox-bounce-3.png"]
     assert (tmp_path / "sandbox-bounce-2.png").read_bytes() == b"mine"
     with Image.open(paths[1]) as image:
         assert np.array_equal(np.asarray(image.convert("RGB")), rgb_pixels(picture(), SIZE))
-    assert len(left_in(tmp_path)) == 3
+    assert len(file_names(tmp_path)) == 3
 
 
-def test_screenshots_at_the_same_moment_are_all_kept(tmp_path: Path) -> None:
+def test_concurrent_screenshots_are_all_kept(tmp_path: Path) -> None:
     surface, barrier = picture(), threading.Barrier(8)
 
     def shoot() -> None:
@@ -58,16 +58,16 @@ def test_screenshots_at_the_same_moment_are_all_kept(tmp_path: Path) -> None:
         thread.start()
     for thread in threads:
         thread.join()
-    assert left_in(tmp_path) == [f"sandbox-race-{n}.png" for n in range(1, 9)]
+    assert file_names(tmp_path) == [f"sandbox-race-{n}.png" for n in range(1, 9)]
 
 
-def test_file_system_without_links_is_served_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_screenshots_work_on_a_file_system_without_links(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object) -> None:
         raise PermissionError(1, "Operation not permitted")
 
     monkeypatch.setattr("os.link", refuse)
     names = [screenshot(picture(), tmp_path, "a").name for _ in range(2)]
-    assert names == left_in(tmp_path) == ["sandbox-a-1.png", "sandbox-a-2.png"]
+    assert names == file_names(tmp_path) == ["sandbox-a-1.png", "sandbox-a-2.png"]
 
 
 @pytest.mark.parametrize(
@@ -80,12 +80,12 @@ def test_file_system_without_links_is_served_too(tmp_path: Path, monkeypatch: py
         ("Ωm_1", "m_1"),
     ],
 )
-def test_names_become_safe_for_a_file(name: str, stem: str) -> None:
+def test_safe_stem_removes_unsafe_characters(name: str, stem: str) -> None:
     assert safe_stem(name) == stem
     assert re.fullmatch(r"[A-Za-z0-9_-]{1,60}", safe_stem(name * 100))
 
 
-def test_folder_that_is_not_there_is_told(tmp_path: Path) -> None:
+def test_missing_folder_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(CaptureError, match="cannot be written: No such file"):
         screenshot(picture(), tmp_path / "nowhere", "a")
     for suffix in (".gif", ".mp4"):
@@ -100,7 +100,7 @@ def test_recorder_leaves_one_file_or_none(suffix: str, tmp_path: Path) -> None:
     recorder.add(picture(), 0.1)
     assert not path.exists()
     recorder.cancel()
-    assert left_in(tmp_path) == []
+    assert file_names(tmp_path) == []
 
     path.write_bytes(b"old")
     recorder = recorder_for(path, SIZE, 30.0)
@@ -108,41 +108,41 @@ def test_recorder_leaves_one_file_or_none(suffix: str, tmp_path: Path) -> None:
     assert path.read_bytes() == b"old"
     assert recorder.close() == path
     recorder.cancel()
-    assert left_in(tmp_path) == [path.name]
+    assert file_names(tmp_path) == [path.name]
     assert len(path.read_bytes()) > 100  # more than any header alone
 
 
 @pytest.mark.parametrize("suffix", [".gif", ".mp4"])
-def test_film_without_pictures_is_none(suffix: str, tmp_path: Path) -> None:
+def test_film_without_pictures_is_an_error_and_leaves_no_file(suffix: str, tmp_path: Path) -> None:
     recorder = recorder_for(tmp_path / f"film{suffix}", SIZE, 30.0)
     with pytest.raises(CaptureError, match="at least one frame"):
         recorder.close()
-    assert left_in(tmp_path) == []
+    assert file_names(tmp_path) == []
 
 
 @pytest.mark.parametrize("suffix", [".gif", ".mp4"])
-def test_recorder_in_a_folder_takes_the_first_free_number(suffix: str, tmp_path: Path) -> None:
+def test_recorder_in_a_folder_uses_the_first_free_number(suffix: str, tmp_path: Path) -> None:
     (tmp_path / f"sandbox-a-b-1{suffix}").touch()
     recorder = recorder_in(tmp_path, "a b", suffix, SIZE, 30.0)
     recorder.add(picture(), 0.1)
     assert recorder.close() == tmp_path / f"sandbox-a-b-2{suffix}"
 
 
-def test_gif_has_every_picture_where_it_was_for_as_long_as_it_was(tmp_path: Path) -> None:
+def test_gif_keeps_every_picture_and_its_duration(tmp_path: Path) -> None:
     recorder = recorder_for(tmp_path / "film.gif", SIZE, 30.0)
-    places = [20, 24, 24, 60, 61]
-    for x in places:
+    positions = [20, 24, 24, 60, 61]
+    for x in positions:
         recorder.add(picture(x), 1 / 30)
     frames, shown = gif_frames(recorder.close())
     assert shown == [30, 40, 30, 30, 40]  # whole 0.01 s at each end: 33.3, 66.7, 100, 133.3, 166.7 ms
-    for x, frame in zip(places, frames, strict=True):
+    for x, frame in zip(positions, frames, strict=True):
         assert np.array_equal(frame, rgb_pixels(picture(x), SIZE))  # two colours fit any palette
     with Image.open(tmp_path / "film.gif") as image:
         assert image.info["loop"] == 0
 
 
 @pytest.mark.parametrize("fps", [10, 24, 30, 50])
-def test_gif_durations_add_up_to_the_real_time(fps: int, tmp_path: Path) -> None:
+def test_gif_durations_sum_to_the_real_time(fps: int, tmp_path: Path) -> None:
     recorder = recorder_for(tmp_path / "film.gif", SIZE, fps)
     for k in range(fps):
         recorder.add(picture(10 + k), 1 / fps)
@@ -151,7 +151,7 @@ def test_gif_durations_add_up_to_the_real_time(fps: int, tmp_path: Path) -> None
     assert max(shown) - min(shown) <= 10  # one unit of a gif
 
 
-def test_gif_leaves_out_what_viewers_would_show_too_long(tmp_path: Path) -> None:
+def test_gif_drops_frames_shorter_than_viewers_support(tmp_path: Path) -> None:
     recorder = recorder_for(tmp_path / "film.gif", SIZE, 60.0)
     for k in range(120):
         recorder.add(picture(10 + k % 60), 1 / 60)
@@ -160,10 +160,10 @@ def test_gif_leaves_out_what_viewers_would_show_too_long(tmp_path: Path) -> None
     assert np.array_equal(frames[1], rgb_pixels(picture(12), SIZE))
 
 
-def test_gif_of_many_colours_stays_close_and_does_not_flicker(tmp_path: Path) -> None:
+def test_gif_of_many_colours_is_accurate_and_does_not_flicker(tmp_path: Path) -> None:
     rows, columns = np.mgrid[:54, :96]
     ramp = np.stack((columns * 2, rows * 4, 255 - columns - rows), axis=-1).astype(np.uint8)
-    ramp[:6] = BACK  # what moves uncovers nothing new
+    ramp[:6] = BACKGROUND  # the moving square uncovers no new colours
     still = pygame.image.frombytes(ramp.tobytes(), SIZE, "RGB")
     recorder = recorder_for(tmp_path / "film.gif", SIZE, 30.0)
     for k in range(6):
@@ -171,10 +171,10 @@ def test_gif_of_many_colours_stays_close_and_does_not_flicker(tmp_path: Path) ->
         pygame.draw.rect(surface, (255, 255, 255), (10 * k, 0, 6, 6))
         recorder.add(surface, 0.04)
     frames, _ = gif_frames(recorder.close())
-    away = np.abs(frames[0][6:] - ramp[6:]).max()
-    assert away <= MAX_ERROR  # 5,000 colours in 255 entries
+    error = np.abs(frames[0][6:] - ramp[6:]).max()
+    assert error <= MAX_ERROR  # 5,000 colours in 255 entries
     for frame in frames[1:]:
-        assert np.array_equal(frame[6:], frames[0][6:])  # what does not change keeps its very colour
+        assert np.array_equal(frame[6:], frames[0][6:])  # unchanged pixels keep exactly the same colour
 
 
 def test_gif_gets_a_new_palette_for_new_colours(tmp_path: Path) -> None:
@@ -184,10 +184,10 @@ def test_gif_gets_a_new_palette_for_new_colours(tmp_path: Path) -> None:
         recorder.add(picture(colour=colour), 0.1)
     frames, _ = gif_frames(recorder.close())
     assert [tuple(frame[27, 20]) for frame in frames] == colours
-    assert {tuple(frame[0, 0]) for frame in frames} == {BACK}
+    assert {tuple(frame[0, 0]) for frame in frames} == {BACKGROUND}
 
 
-def test_palette_is_kept_where_it_serves() -> None:
+def test_palette_is_reused_while_it_fits() -> None:
     quantiser = PaletteQuantiser(255)
     tables = []
     for colour in (BALL, BALL, (255, 40, 40), BALL):
@@ -198,10 +198,10 @@ def test_palette_is_kept_where_it_serves() -> None:
     assert [now is before for before, now in pairwise(tables)] == [True, False, True]
 
 
-def test_gif_does_not_flicker_where_its_palette_is_renewed(tmp_path: Path) -> None:
+def test_gif_does_not_flicker_when_its_palette_changes(tmp_path: Path) -> None:
     rows, columns = np.mgrid[:54, :96]
     ramp = np.stack((columns * 2, rows * 4, 255 - columns - rows), axis=-1).astype(np.uint8)
-    ramp[:20] = BACK
+    ramp[:20] = BACKGROUND
     recorder = recorder_for(tmp_path / "film.gif", SIZE, 30.0)
     for colour in ((255, 255, 255), (255, 0, 0), (0, 255, 0)):  # none is near a colour of the ramp
         surface = pygame.image.frombytes(ramp.tobytes(), SIZE, "RGB")
@@ -213,7 +213,7 @@ def test_gif_does_not_flicker_where_its_palette_is_renewed(tmp_path: Path) -> No
         assert np.array_equal(frame[20:], frames[0][20:])
 
 
-def test_gif_has_a_limit_and_keeps_what_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_gif_has_a_frame_limit_and_keeps_earlier_frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(capture, "MAX_GIF_FRAMES", 3)
     recorder = recorder_for(tmp_path / "film.gif", SIZE, 30.0)
     for k in range(3):
@@ -223,7 +223,7 @@ def test_gif_has_a_limit_and_keeps_what_it_has(tmp_path: Path, monkeypatch: pyte
     assert gif_frames(recorder.close())[1] == [50, 50, 50]
 
 
-def test_full_disk_is_told_and_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_full_disk_is_an_error_and_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     recorder = recorder_for(tmp_path / "film.gif", SIZE, 30.0)
     recorder.add(picture(), 0.1)
 
@@ -233,23 +233,23 @@ def test_full_disk_is_told_and_leaves_nothing(tmp_path: Path, monkeypatch: pytes
     monkeypatch.setattr(recorder._stream, "write", fail)
     with pytest.raises(CaptureError, match="No space left on device"):
         recorder.close()
-    assert left_in(tmp_path) == []
+    assert file_names(tmp_path) == []
 
 
-def test_mp4_decodes_to_what_was_added(tmp_path: Path) -> None:
+def test_mp4_decodes_to_the_added_pictures(tmp_path: Path) -> None:
     recorder = recorder_for(tmp_path / "film.mp4", (160, 90), 25.0)
-    places = list(range(20, 140, 4))
-    for x in places:
+    positions = list(range(20, 140, 4))
+    for x in positions:
         recorder.add(picture(x, (160, 90)), 1 / 25)
     frames, about = mp4_frames(recorder.close())
     assert len(frames) == 30
     assert all(word in about for word in ("h264", "yuv420p", "160x90", "25 fps"))
-    for x, frame in zip(places, frames, strict=True):
+    for x, frame in zip(positions, frames, strict=True):
         assert np.abs(frame[45, x] - BALL).max() <= 12  # of 255: a lossy codec, colours at half resolution
-        assert np.abs(frame[5, 5] - BACK).max() <= 6  # of 255: a flat area
+        assert np.abs(frame[5, 5] - BACKGROUND).max() <= 6  # of 255: a flat area
 
 
-def test_mp4_repeats_and_drops_pictures_to_keep_the_time(tmp_path: Path) -> None:
+def test_mp4_repeats_and_drops_pictures_to_keep_real_time(tmp_path: Path) -> None:
     recorder = recorder_for(tmp_path / "film.mp4", SIZE, 30.0)
     for seconds in (0.5, 0.001, 0.001, 0.498):
         recorder.add(picture(), seconds)
@@ -257,22 +257,22 @@ def test_mp4_repeats_and_drops_pictures_to_keep_the_time(tmp_path: Path) -> None
     assert len(frames) == 30
 
 
-def test_mp4_of_odd_size_loses_a_row_and_a_column(tmp_path: Path) -> None:
+def test_mp4_of_odd_size_is_cropped_by_a_row_and_a_column(tmp_path: Path) -> None:
     recorder = recorder_for(tmp_path / "film.mp4", (97, 55), 30.0)
     recorder.add(picture(size=(97, 55)), 0.1)
     frames, _ = mp4_frames(recorder.close())
     assert [frame.shape for frame in frames] == [(54, 96, 3)] * 3
 
 
-def test_mp4_without_its_extra_names_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_mp4_without_its_extra_names_the_package_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     monkeypatch.setattr(capture, "can_make_mp4", lambda: False)
     with pytest.raises(CaptureError, match=r'pip install -e "\.\[video\]"'):
         recorder_for(tmp_path / "film.mp4", SIZE, 30.0)
-    assert left_in(tmp_path) == []
+    assert file_names(tmp_path) == []
 
 
-def test_ffmpeg_that_fails_is_told_in_its_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failing_ffmpeg_is_reported_with_its_own_message(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     program = tmp_path / "ffmpeg"
     program.write_text("#!/bin/sh\necho 'disk on fire' >&2\ncat > /dev/null\nexit 3\n")
     program.chmod(0o755)
@@ -281,10 +281,10 @@ def test_ffmpeg_that_fails_is_told_in_its_words(tmp_path: Path, monkeypatch: pyt
     recorder.add(picture(), 0.1)
     with pytest.raises(CaptureError, match=r"^ffmpeg: disk on fire$"):
         recorder.close()
-    assert left_in(tmp_path) == ["ffmpeg"]
+    assert file_names(tmp_path) == ["ffmpeg"]
 
 
-def test_ffmpeg_that_dies_meanwhile_is_told(tmp_path: Path) -> None:
+def test_ffmpeg_killed_while_recording_is_an_error(tmp_path: Path) -> None:
     recorder = recorder_for(tmp_path / "film.mp4", (640, 360), 30.0)
     recorder._process.kill()
     recorder._process.wait()
@@ -293,7 +293,7 @@ def test_ffmpeg_that_dies_meanwhile_is_told(tmp_path: Path) -> None:
             recorder.add(picture(size=(640, 360)), 0.1)
     with pytest.raises(CaptureError):
         recorder.close()
-    assert left_in(tmp_path) == []
+    assert file_names(tmp_path) == []
 
 
 @pytest.mark.parametrize(("suffix", "word"), [(".avi", ".gif or .mp4"), ("", ".gif or .mp4")])
@@ -308,7 +308,7 @@ def test_impossible_films_are_refused(size: tuple[int, int], fps: float, tmp_pat
         recorder_for(tmp_path / "film.gif", size, fps)
 
 
-def test_larger_surface_is_averaged_down(tmp_path: Path) -> None:
+def test_larger_surface_is_downsampled_by_averaging(tmp_path: Path) -> None:
     large = offscreen((192, 108))
     large.fill((0, 0, 0))
     large.fill((200, 100, 0), (0, 0, 192, 1))
@@ -316,13 +316,13 @@ def test_larger_surface_is_averaged_down(tmp_path: Path) -> None:
     assert tuple(rgb_pixels(large, SIZE)[1, 10]) == (0, 0, 0)
 
 
-def test_other_proportions_get_bars() -> None:
+def test_other_aspect_ratios_get_bars() -> None:
     white = offscreen((50, 50))
     white.fill((255, 255, 255))
-    seen = rgb_pixels(white, (100, 50))
-    assert (seen[:, 25:75] == 255).all()
-    assert (seen[:, :25] == BACK).all()
-    assert (seen[:, 75:] == BACK).all()
+    pixels = rgb_pixels(white, (100, 50))
+    assert (pixels[:, 25:75] == 255).all()
+    assert (pixels[:, :25] == BACKGROUND).all()
+    assert (pixels[:, 75:] == BACKGROUND).all()
     assert fit_image(white, (50, 50)) is white
 
 
@@ -330,15 +330,15 @@ def test_other_proportions_get_bars() -> None:
     ("size", "width", "within"),
     [((1920, 1080), 960, (960, 540)), ((801, 601), 4000, (800, 600)), ((3000, 1), 100, (100, 2))],
 )
-def test_size_within_a_width_is_even(size: tuple[int, int], width: int, within: tuple[int, int]) -> None:
+def test_size_within_a_width_has_even_sides(size: tuple[int, int], width: int, within: tuple[int, int]) -> None:
     assert size_within(size, width) == within
 
 
-def test_recorders_keep_the_protocol(tmp_path: Path) -> None:
+def test_recorders_can_be_cancelled_twice(tmp_path: Path) -> None:
     recorders: list[FilmRecorder] = [
         recorder_for(tmp_path / f"film{suffix}", SIZE, 30.0) for suffix in (".gif", ".mp4")
     ]
     for recorder in recorders:
         recorder.cancel()
         recorder.cancel()
-    assert left_in(tmp_path) == []
+    assert file_names(tmp_path) == []

@@ -1,4 +1,4 @@
-"""Films of stored runs: the state at any time, what a picture shows, and pixels where the run says."""
+"""Films of stored runs: interpolated states, snapshots, and pixels at the positions of the run."""
 
 from dataclasses import replace
 
@@ -57,7 +57,7 @@ def film_of(text: str = FALL, *actions: Action) -> RecordedRun:
     return RecordedRun(run(loads(text), actions=actions))
 
 
-def test_frames_are_the_stored_ones_at_their_times() -> None:
+def test_frames_at_stored_times_equal_the_stored_states() -> None:
     film = film_of()
     stored = film.trajectory
     for k, time in enumerate(stored.time.tolist()):
@@ -69,7 +69,7 @@ def test_frames_are_the_stored_ones_at_their_times() -> None:
         assert frame.present.all()
 
 
-def test_frames_between_are_linear_in_place_and_angle() -> None:
+def test_frames_between_stored_times_interpolate_position_and_angle() -> None:
     film = film_of()
     stored = film.trajectory
     frame = film.frame(0.325)
@@ -81,7 +81,7 @@ def test_frames_between_are_linear_in_place_and_angle() -> None:
     assert np.array_equal(film.frame(99.0).position, stored.position[-1])
 
 
-def test_body_that_is_removed_stays_until_then_and_is_gone_after() -> None:
+def test_removed_body_is_present_until_its_removal() -> None:
     film = film_of(FALL, Remove(time=0.45, body="b"))
     stored = film.trajectory
     retired = float(stored.retired_time[1])
@@ -91,10 +91,10 @@ def test_body_that_is_removed_stays_until_then_and_is_gone_after() -> None:
     assert np.array_equal(before.position[1], stored.position[4, 1])
     assert after.present.tolist() == [True, False]
     assert after.velocity[1].tolist() == [0.0, 0.0]
-    assert after.position[0] != pytest.approx(stored.position[5, 0], abs=1e-3)  # m: the other one goes on
+    assert after.position[0] != pytest.approx(stored.position[5, 0], abs=1e-3)  # m: the other one keeps moving
 
 
-def test_body_that_appears_is_not_there_before() -> None:
+def test_spawned_body_is_absent_before_its_spawn() -> None:
     film = film_of(FALL, Spawn(time=0.2, ball=Ball(position=(3.0, 3.0), radius=0.25)))
     assert film.bodies.names == ("a", "b", "spawned-3")
     assert film.bodies.radius.tolist() == [0.5, 0.5, 0.25]
@@ -104,7 +104,7 @@ def test_body_that_appears_is_not_there_before() -> None:
     assert film.frame(time).present.all()
 
 
-def test_body_that_is_put_elsewhere_does_not_slide_there() -> None:
+def test_moved_body_jumps_without_interpolation() -> None:
     film = film_of(FALL, Move(time=0.3, body="a", position=(50.0, 0.0)))
     jump = int(np.argmax(np.abs(np.diff(film.trajectory.position[:, 0, 0]))))
     time = float(film.trajectory.time[jump]) + 0.05
@@ -113,7 +113,7 @@ def test_body_that_is_put_elsewhere_does_not_slide_there() -> None:
     assert frame.position[1] == pytest.approx(film.trajectory.position[jump : jump + 2, 1].mean(axis=0))
 
 
-def test_state_that_is_no_number_is_not_there() -> None:
+def test_body_with_a_state_that_is_not_finite_is_absent() -> None:
     stored = run(loads(FALL))
     position = stored.position.copy()
     position[5:, 0] = np.nan, np.inf
@@ -127,7 +127,7 @@ def test_state_that_is_no_number_is_not_there() -> None:
     ("start", "end", "fps", "speed", "count"),
     [(0.0, 3.0, 30.0, 1.0, 90), (0.5, 1.0, 24.0, 0.25, 48), (0.0, 1.0, 30.0, 4.0, 7), (1.0, 1.0, 30.0, 1.0, 1)],
 )
-def test_moments_lie_at_k_over_fps_and_fill_the_time(
+def test_frame_times_are_multiples_of_one_over_fps_and_fill_the_duration(
     start: float, end: float, fps: float, speed: float, count: int
 ) -> None:
     times, shown = frame_times(start, end, fps, speed)
@@ -137,7 +137,7 @@ def test_moments_lie_at_k_over_fps_and_fill_the_time(
     assert shown.sum() == pytest.approx((end - start) / speed or 1 / fps, rel=1e-12)  # of up to 90 roundings
 
 
-def test_contacts_linger_for_a_moment_of_the_film() -> None:
+def test_contacts_are_shown_for_the_contact_duration() -> None:
     film = film_of(BOUNCE)
     (first, *_) = film.trajectory.contact_time.tolist()
     everything = frozenset(OVERLAYS)
@@ -148,7 +148,7 @@ def test_contacts_linger_for_a_moment_of_the_film() -> None:
     assert len(film.snapshot(first + 0.5 * CONTACT_DURATION, everything, speed=0.25).contacts) == 0
 
 
-def test_trails_end_where_the_bodies_are() -> None:
+def test_trails_end_at_the_current_positions() -> None:
     film = film_of(FALL, Remove(time=0.45, body="b"))
     past, now = film.snapshot(0.75, frozenset({"trails"})).trails
     assert np.array_equal(past[:, 0], film.trajectory.position[: len(past), 0])
@@ -159,7 +159,7 @@ def test_trails_end_where_the_bodies_are() -> None:
     assert film.snapshot(0.75, frozenset({"shapes"})).trails == ()
 
 
-def test_missed_contact_flashes_where_it_was_missed() -> None:
+def test_missed_contact_flashes_at_its_position() -> None:
     text = (
         "[world]\nduration = 0.1\n[solver]\ndt = 0.01\n[[wall]]\npoints = [[1, -1], [1, 1]]\n"
         "[[ball]]\nposition = [0.5, 0]\nvelocity = [90, 0]\nradius = 0.01\n"
@@ -173,23 +173,23 @@ def test_missed_contact_flashes_where_it_was_missed() -> None:
 
 
 @pytest.mark.parametrize("time", [0.0, 0.33, 1.0])
-def test_pixels_of_a_body_are_where_the_run_says(time: float) -> None:
+def test_body_is_drawn_at_the_position_of_the_run(time: float) -> None:
     film, size = film_of(), (320, 180)
     surface, camera = offscreen(size), Camera.fitting(film.bounds, size)
     RunRenderer(film).draw(surface, camera, time, caption=False)
-    seen = rgb_pixels(surface, size).astype(int)
+    pixels = rgb_pixels(surface, size).astype(int)
     x, y = camera.to_screen(film.frame(time).position[0])
     reach = 0.5 * camera.scale
     for dx, dy in ((0.0, 0.6), (-0.6, 0.0), (0.0, -0.6)):  # not on the spoke that shows its angle
-        spot = seen[int(y + dy * reach), int(x + dx * reach)]
-        assert np.abs(spot - SKY).max() <= 40  # of 255: a disc may be shaded
+        pixel = pixels[int(y + dy * reach), int(x + dx * reach)]
+        assert np.abs(pixel - SKY).max() <= 40  # of 255: a disc may be shaded
     for dx, dy in ((1.3, 0.0), (-1.3, 0.0), (0.0, 1.3), (0.0, -1.3)):
         column, row = int(x + dx * reach), int(y + dy * reach)
         if 0 <= column < size[0] and 0 <= row < size[1]:
-            assert np.abs(seen[row, column] - BACKGROUND).max() <= 40  # of 255: a grid line may lie there
+            assert np.abs(pixels[row, column] - BACKGROUND).max() <= 40  # of 255: a grid line may be there
 
 
-def test_caption_is_written_into_the_corner_alone() -> None:
+def test_caption_changes_only_its_corner() -> None:
     film, size = film_of(), (480, 270)
     camera = Camera.fitting(film.bounds, size)
     pictures = []
@@ -203,7 +203,7 @@ def test_caption_is_written_into_the_corner_alone() -> None:
     assert columns.max() < 240
 
 
-def test_energy_is_drawn_into_its_corner_at_any_time() -> None:
+def test_energy_graph_changes_only_its_corner_at_any_time() -> None:
     film, size = film_of(BOUNCE), (960, 540)
     camera = Camera.fitting(film.bounds, size)
     for time in (1.0, 0.0, 0.5):  # also backwards
@@ -224,7 +224,7 @@ def test_every_overlay_can_be_drawn() -> None:
     assert not np.array_equal(rgb_pixels(plain, size), rgb_pixels(full, size))
 
 
-def test_crowd_is_all_of_a_few_and_without_strays_of_many() -> None:
+def test_crowd_bounds_contain_few_bodies_and_ignore_outliers_of_many() -> None:
     rng = np.random.default_rng(3)
     position = rng.uniform(-1.0, 1.0, (50, 40, 2))
     low, high = crowd_bounds(position, np.full(40, 0.1), np.empty((0, 2)))
@@ -234,14 +234,15 @@ def test_crowd_is_all_of_a_few_and_without_strays_of_many() -> None:
     position[:, 7] = np.linspace(0.0, 1e6, 50)[:, None]
     position[3, 8], position[9, 9] = np.nan, np.inf
     low, high = crowd_bounds(position, np.full(40, 0.1), np.array([[-1.5, 0.0], [1e9, 0.0]]))
-    assert (low[0], high[0]) == (-1.5, pytest.approx(1.1, abs=0.05))  # m: the last bit is one of 38 bodies' extremes
+    # 0.05 m: the upper bound is the extreme of 38 random bodies
+    assert (low[0], high[0]) == (-1.5, pytest.approx(1.1, abs=0.05))
     single = np.zeros((3, 1, 2))
     single[:, 0, 1] = 0.0, 5.0, 10.0
     assert crowd_bounds(single, np.array([0.5]), np.empty((0, 2))) == ((-0.5, -0.5), (0.5, 10.5))
     assert crowd_bounds(np.empty((1, 0, 2)), np.empty(0), np.empty((0, 2))) == ((-1.0, -1.0), (1.0, 1.0))
 
 
-def damaged(**info: object) -> Trajectory:
+def damaged_run(**info: object) -> Trajectory:
     stored = run(loads(FALL))
     return replace(stored, info={**stored.info, **info})
 
@@ -255,20 +256,20 @@ def damaged(**info: object) -> Trajectory:
         ({"scene": {"ball": [{"position": [0, 0], "radius": 1}]}}, "names"),
     ],
 )
-def test_run_that_does_not_tell_what_it_is_of_is_refused(info: dict[str, object], path: str) -> None:
+def test_run_with_missing_or_invalid_info_is_refused(info: dict[str, object], path: str) -> None:
     with pytest.raises(SceneError) as caught:
-        RecordedRun(damaged(**info), "my run")
+        RecordedRun(damaged_run(**info), "my run")
     assert {(fault.file, fault.path) for fault in caught.value.faults} == {("my run", path)}
 
 
-def test_scene_and_bodies_are_those_of_the_run() -> None:
+def test_scene_and_bodies_of_a_run_equal_the_original() -> None:
     scene = loads(FALL)
     stored = run(scene)
     assert scene_of_run(stored) == scene
     assert bodies_of_run(stored, scene) is scene.bodies
 
 
-def test_same_time_is_computed_once() -> None:
+def test_frame_of_the_same_time_is_cached() -> None:
     film = film_of()
     frame = film.frame(0.123)
     assert film.snapshot(0.123, frozenset(OVERLAYS)).frame is frame
@@ -278,7 +279,7 @@ def test_same_time_is_computed_once() -> None:
     assert film.frame(0.123).state_hash() == frame.state_hash()
 
 
-def test_contacts_in_sight_are_those_that_are_drawn() -> None:
+def test_contacts_of_a_film_equal_those_of_its_snapshots() -> None:
     film = film_of(BOUNCE)
     (first, *_) = film.trajectory.contact_time.tolist()
     for speed in (0.5, 1.0):

@@ -1,4 +1,4 @@
-"""Films of games with lamps: a stored run shows those that were lit."""
+"""Films of games with lamps: frames of a stored run show the lamps that were lit."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -21,32 +21,32 @@ CLASSIC = Path(__file__).parents[3] / "scenes" / "pinball" / "classic.toml"
 
 
 @pytest.fixture(scope="module")
-def played() -> Trajectory:
+def stored_run() -> Trajectory:
     scene = load(CLASSIC, ("world.duration=8.0",))
     return run(scene, audit=False, bout=PlayerSpec("skilled").start_game(scene))
 
 
-def test_picture_of_a_run_shows_the_lamps_that_were_lit(played: Trajectory, tmp_path: Path) -> None:
-    played.save(tmp_path / "run.npz")
+def test_frame_of_a_stored_run_shows_its_lit_lamps(stored_run: Trajectory, tmp_path: Path) -> None:
+    stored_run.save(tmp_path / "run.npz")
     film = RecordedRun(Trajectory.load(tmp_path / "run.npz"))
-    dark = RecordedRun(replace(played, info=played.info | {"game": None}))
-    time, names = next((time, names) for time, names in played.info["game"]["lamps"] if names)
+    dark = RecordedRun(replace(stored_run, info=stored_run.info | {"game": None}))
+    time, names = next((time, names) for time, names in stored_run.info["game"]["lamps"] if names)
     assert film.snapshot(time, frozenset()).lit == frozenset(names)
     lamps = {part.name: part.light for part in film.scene.play.parts}
-    shots = []
+    pictures = []
     for each in (film, dark):
         surface = offscreen((540, 960))
         camera = Camera.fitting(each.bounds, (540, 960))
         RunRenderer(each).draw(surface, camera, time, caption=False)
-        shots.append(rgb_pixels(surface, (540, 960)).astype(int).sum(axis=2))
-    brighter = np.argwhere(shots[0] > shots[1])
+        pictures.append(rgb_pixels(surface, (540, 960)).astype(int).sum(axis=2))
+    brighter = np.argwhere(pictures[0] > pictures[1])
     assert len(brighter)
     rows_and_columns = camera.to_screen(np.asarray([lamps[name] for name in names]))[:, ::-1]
-    away = np.linalg.norm(brighter[:, None] - rows_and_columns[None], axis=2).min(axis=1)
-    assert away.max() <= 6.5 * RADIUS * camera.scale + 2.0  # no farther than a glow reaches
+    distance = np.linalg.norm(brighter[:, None] - rows_and_columns[None], axis=2).min(axis=1)
+    assert distance.max() <= 6.5 * RADIUS * camera.scale + 2.0  # within the radius of the glow
 
 
-def test_lamps_that_are_none_are_told(played: Trajectory) -> None:
-    info = played.info | {"game": played.info["game"] | {"lamps": [["never", 3]]}}
+def test_invalid_lamp_records_are_an_error(stored_run: Trajectory) -> None:
+    info = stored_run.info | {"game": stored_run.info["game"] | {"lamps": [["never", 3]]}}
     with pytest.raises(SceneError, match=r"info\.game: invalid lamp record"):
-        RecordedRun(replace(played, info=info))
+        RecordedRun(replace(stored_run, info=info))

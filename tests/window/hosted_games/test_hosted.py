@@ -1,4 +1,4 @@
-"""Games with rules in the window: keys, gamepads, the panel, going back, starting again."""
+"""Games in the window: keys, gamepads, score panel, seeking and restart."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -28,7 +28,7 @@ from sandbox.window.ui.score_panel import draw_score, layout_score
 from sandbox.window.view_bounds import view_bounds
 from tests.toy_game import TOY, Toy
 from tests.window.pressing import FOCUS_LOST, key, key_up
-from tests.window.windowed import turned, window_on
+from tests.window.windowed import open_window, run_frame
 
 pytestmark = pytest.mark.full  # a window or a film
 
@@ -36,7 +36,7 @@ UP, LEFT, R, P = pygame.K_UP, pygame.K_LEFT, pygame.K_r, pygame.K_p
 
 
 class Buttons(Toy):
-    """The toy with two keys for a control, and a lamp that is lit by every second point."""
+    """The toy game with two keys for a control, and a lamp that is lit at odd scores."""
 
     controls = (
         Control("kick", "kick it", ("up", "left shift"), "a -lefty"),
@@ -54,9 +54,9 @@ def toy_rules(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def window(tmp_path: Path) -> Iterator[App]:
-    with window_on(TOY, tmp_path, (1000, 640)) as opened:
-        opened.app_state.start_game()
-        yield opened
+    with open_window(TOY, tmp_path, (1000, 640)) as window:
+        window.app_state.start_game()
+        yield window
 
 
 def presses_of(live: LiveView) -> list[tuple[str, float]]:
@@ -69,138 +69,138 @@ def host_of(window: App) -> GameHost:
     return window.app_state.host
 
 
-def test_keys_set_controls_until_they_are_let_go(window: App) -> None:
-    live = turned(window, key(UP))
+def test_keys_set_controls_until_they_are_released(window: App) -> None:
+    live = run_frame(window, key(UP))
     assert presses_of(live) == [("kick", 1.0)]
-    turned(window, key(UP))  # the keyboard repeats what is held
-    live = turned(window, key_up(UP))
+    run_frame(window, key(UP))  # key repeat of the keyboard
+    live = run_frame(window, key_up(UP))
     assert presses_of(live) == [("kick", 1.0), ("kick", 0.0)]
     assert host_of(window).rules.score == 0.5
 
 
-def test_control_is_let_go_with_the_last_of_its_keys(window: App) -> None:
-    turned(window, key(UP), key(pygame.K_LSHIFT))
-    live = turned(window, key_up(UP))
+def test_control_is_released_with_the_last_of_its_keys(window: App) -> None:
+    run_frame(window, key(UP), key(pygame.K_LSHIFT))
+    live = run_frame(window, key_up(UP))
     assert presses_of(live) == [("kick", 1.0)]
-    live = turned(window, key_up(pygame.K_LSHIFT))
+    live = run_frame(window, key_up(pygame.K_LSHIFT))
     assert presses_of(live)[-1] == ("kick", 0.0)
 
 
-def test_who_looks_elsewhere_lets_go(window: App) -> None:
-    turned(window, key(UP))
-    assert presses_of(turned(window, FOCUS_LOST))[-1] == ("kick", 0.0)
+def test_controls_are_released_when_the_window_loses_focus(window: App) -> None:
+    run_frame(window, key(UP))
+    assert presses_of(run_frame(window, FOCUS_LOST))[-1] == ("kick", 0.0)
 
 
-def test_help_lists_controls_and_scene_keys_are_theirs(window: App) -> None:
+def test_help_lists_the_keys_of_the_controls(window: App) -> None:
     bindings = window.app_state.key_bindings
     assert bindings.help_rows == (("Up or Left Shift", "kick it"), ("Left", "how far"))
     assert bindings.gamepad_rows == (("A, stick up", "kick it"), ("LT", "how far"), ("start", "pause / resume"))
     assert {UP, LEFT, pygame.K_LSHIFT} <= bindings.pressed.keys()
 
 
-def test_help_tells_the_cross_of_a_gamepad_from_its_stick() -> None:
+def test_help_distinguishes_d_pad_and_stick_of_a_gamepad() -> None:
     assert gamepad_help((Control("go", "go", ("left",), "y left +leftx up"),))[0] == (
         "Y, D-pad left, stick right, D-pad up",
         "go",
     )
 
 
-def test_restart_is_a_new_game(window: App) -> None:
-    turned(window, key(UP), elapsed=0.3)
+def test_restart_starts_a_new_game(window: App) -> None:
+    run_frame(window, key(UP), elapsed=0.3)
     old = host_of(window)
-    live = turned(window, key(R), elapsed=0.0)
+    live = run_frame(window, key(R), elapsed=0.0)
     assert host_of(window) is not old
     assert live.session.step_number == 0
     assert host_of(window).rules.score == 0
-    live = turned(window, key_up(UP))  # held since the game before: it is none of this one's
+    live = run_frame(window, key_up(UP))  # the key was pressed in the previous game
     assert presses_of(live) == []
 
 
-def test_reload_is_a_new_game(window: App) -> None:
-    turned(window, key(UP), elapsed=0.3)
-    live = turned(window, key(pygame.K_l, mod=pygame.KMOD_CTRL), elapsed=0.0)
+def test_reload_starts_a_new_game(window: App) -> None:
+    run_frame(window, key(UP), elapsed=0.3)
+    live = run_frame(window, key(pygame.K_l, mod=pygame.KMOD_CTRL), elapsed=0.0)
     assert (host_of(window).rules.score, presses_of(live)) == (0, [])
 
 
-def test_going_back_brings_the_score_of_then(window: App) -> None:
+def test_seeking_restores_the_score(window: App) -> None:
     for _ in range(30):
-        live = turned(window)
+        live = run_frame(window)
     scores = [host_of(window).rules.score]
     assert scores[0] >= 1
     live.seek(5)
     live.finish_seek()
     assert host_of(window).rules.score == 0
-    assert host_of(window).cues() == ()  # nothing new happened
+    assert host_of(window).cues() == ()  # no new events
     live.seek(150)
     live.finish_seek()
     assert host_of(window).rules.score == scores[0]
 
 
-def test_looking_back_shows_the_score_and_lamps_of_then(window: App) -> None:
-    seen = {}
+def test_scrubbing_shows_the_score_and_lamps_of_that_time(window: App) -> None:
+    displays = {}
     for _ in range(30):
-        live = turned(window)
-        seen[live.frame.time] = host_of(window).shown()
-    assert len({(shown.board.score, shown.lit) for shown in seen.values()}) > 2
-    for time, shown in seen.items():
+        live = run_frame(window)
+        displays[live.frame.time] = host_of(window).shown()
+    assert len({(shown.board.score, shown.lit) for shown in displays.values()}) > 2
+    for time, shown in displays.items():
         live.scrub(time)
         assert host_of(window).shown() == shown
-    assert host_of(window).rules.score == float(shown.board.score)  # the game itself stays where it is
+    assert host_of(window).rules.score == float(shown.board.score)  # scrubbing does not change the game
     live.commit_scrub()
     live.finish_seek()
     assert host_of(window).shown() == shown
 
 
-def test_past_of_another_way_is_forgotten() -> None:
+def test_display_history_discards_entries_of_a_replaced_future() -> None:
     def shown(score: str) -> GameDisplay:
         return GameDisplay(ScoreDisplay(score, (), None), frozenset())
 
-    past = DisplayHistory()
-    assert past.at(1.0) is None
+    history = DisplayHistory()
+    assert history.at(1.0) is None
     for time in range(10):
-        past.add(float(time), float(time), shown(str(time // 2)))
-    assert [past.at(time) for time in (-1.0, 4.0, 5.5, 99.0)] == [shown(score) for score in ("0", "2", "2", "4")]
-    past.add(5.0, 9.0, shown("2"))  # seen again
-    assert past.at(9.0) == shown("4")
-    past.add(5.0, 5.0, shown("three"))  # played on from there
-    assert [past.at(time) for time in (4.9, 5.0, 9.0)] == [shown("2"), shown("three"), shown("three")]
+        history.add(float(time), float(time), shown(str(time // 2)))
+    assert [history.at(time) for time in (-1.0, 4.0, 5.5, 99.0)] == [shown(score) for score in ("0", "2", "2", "4")]
+    history.add(5.0, 9.0, shown("2"))  # replayed
+    assert history.at(9.0) == shown("4")
+    history.add(5.0, 5.0, shown("three"))  # played on differently from there
+    assert [history.at(time) for time in (4.9, 5.0, 9.0)] == [shown("2"), shown("three"), shown("three")]
 
 
-def test_past_of_a_long_game_is_thinned_where_it_is_long_ago() -> None:
-    past = DisplayHistory()
+def test_display_history_of_a_long_game_thins_old_entries() -> None:
+    history = DisplayHistory()
     for time in range(3 * MAX_ENTRIES):
-        past.add(float(time), float(time), GameDisplay(ScoreDisplay(str(time), (), None), frozenset()))
-    found = [int(then.board.score) for time in range(3 * MAX_ENTRIES) if (then := past.at(float(time)))]
+        history.add(float(time), float(time), GameDisplay(ScoreDisplay(str(time), (), None), frozenset()))
+    found = [int(display.board.score) for time in range(3 * MAX_ENTRIES) if (display := history.at(float(time)))]
     assert len(set(found)) <= MAX_ENTRIES
     assert found[-100:] == list(range(3 * MAX_ENTRIES - 100, 3 * MAX_ENTRIES))
     assert found == sorted(found)
     assert found[0] == 0
 
 
-def test_what_was_held_later_is_let_go_of_on_another_way(window: App) -> None:
-    turned(window, key(LEFT), elapsed=0.2)
-    held = turned(window, elapsed=0.2).session.step_number
-    live = turned(window, key_up(LEFT), elapsed=0.2)
+def test_control_held_after_the_seek_time_is_released_when_play_continues(window: App) -> None:
+    run_frame(window, key(LEFT), elapsed=0.2)
+    held = run_frame(window, elapsed=0.2).session.step_number
+    live = run_frame(window, key_up(LEFT), elapsed=0.2)
     live.seek(held // 2)
     live.finish_seek()
-    live = turned(window, key(UP), key_up(UP))
+    live = run_frame(window, key(UP), key_up(UP))
     assert presses_of(live) == [("aim", 1.0), ("kick", 1.0), ("aim", 0.0), ("kick", 0.0)]
 
 
 def test_pause_and_steps_keep_the_game(window: App) -> None:
-    turned(window, key(P))
-    live = turned(window, key(UP), key_up(UP), elapsed=0.5)
+    run_frame(window, key(P))
+    live = run_frame(window, key(UP), key_up(UP), elapsed=0.5)
     step = live.session.step_number
-    turned(window, key(pygame.K_PERIOD, unicode="."))
+    run_frame(window, key(pygame.K_PERIOD, unicode="."))
     assert live.session.step_number == step + 1
     assert presses_of(live) == [("kick", 1.0), ("kick", 0.0)]
     assert host_of(window).rules.score == 0.5
 
 
-def test_engine_changes_and_the_game_goes_on(window: App) -> None:
-    turned(window, key(UP), key_up(UP), elapsed=0.3)
+def test_game_continues_after_an_engine_switch(window: App) -> None:
+    run_frame(window, key(UP), key_up(UP), elapsed=0.3)
     assert window.app_state.switch_engine("reference")
-    live = turned(window, key(UP), key_up(UP), elapsed=0.3)
+    live = run_frame(window, key(UP), key_up(UP), elapsed=0.3)
     assert host_of(window).rules.score == 1.0
     recording = live.session.recording()
     run = rerun(recording, audit=False)
@@ -208,10 +208,10 @@ def test_engine_changes_and_the_game_goes_on(window: App) -> None:
     assert run.info["game"]["otherwise"] is None
 
 
-def test_session_that_is_saved_replays(window: App, tmp_path: Path) -> None:
-    turned(window, key(LEFT), elapsed=0.3)
-    turned(window, key(UP), key_up(UP), elapsed=0.3)
-    turned(window, key(pygame.K_s, mod=pygame.KMOD_CTRL), elapsed=0.0)
+def test_saved_session_replays(window: App, tmp_path: Path) -> None:
+    run_frame(window, key(LEFT), elapsed=0.3)
+    run_frame(window, key(UP), key_up(UP), elapsed=0.3)
+    run_frame(window, key(pygame.K_s, mod=pygame.KMOD_CTRL), elapsed=0.0)
     (file,) = tmp_path.glob("*.json")
     recording = Recording.load(file)
     assert len(recording.presses) == 3
@@ -219,23 +219,23 @@ def test_session_that_is_saved_replays(window: App, tmp_path: Path) -> None:
     assert (run.info["state_hash"], run.info["game"]["score"]) == (recording.state_hash, recording.score)
 
 
-def test_panel_is_drawn_and_tells_the_end(window: App) -> None:
-    turned(window)
+def test_score_panel_is_drawn_and_marks_the_end_of_the_game(window: App) -> None:
+    run_frame(window)
     host = host_of(window)
     assert host.shown().board == ScoreDisplay("0.0", (("bounces", "0"), ("aim", "0.50")), None)
-    going = pygame.surfarray.array3d(window.context.surface)
+    before_end = pygame.surfarray.array3d(window.context.surface)
     rules = host.rules
     assert isinstance(rules, Toy)
     rules.game_over = "enough"
-    turned(window, elapsed=0.0)
-    over = pygame.surfarray.array3d(window.context.surface)
-    red = (np.abs(over.astype(int) - WARNING).sum(axis=2) < 20) & (going != over).any(axis=2)
-    assert red.any()  # the mark before the words
-    assert presses_of(turned(window, key(UP))) == []  # nobody plays any more
+    run_frame(window, elapsed=0.0)
+    after_end = pygame.surfarray.array3d(window.context.surface)
+    red = (np.abs(after_end.astype(int) - WARNING).sum(axis=2) < 20) & (before_end != after_end).any(axis=2)
+    assert red.any()  # the mark before the text
+    assert presses_of(run_frame(window, key(UP))) == []  # the game is over
 
 
-def lies_clear(window: App) -> bool:
-    """Tell whether the whole scene is seen beside the score panel and the state of things."""
+def is_uncovered(window: App) -> bool:
+    """Return whether score panel and state display cover no part of the scene."""
     assert window.app_state.view is not None
     corners = window.context.camera.to_screen(np.asarray(view_bounds(window.app_state.view.scene)))
     (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
@@ -247,35 +247,35 @@ def lies_clear(window: App) -> bool:
 
 
 @pytest.mark.parametrize("size", [(1280, 800), (1000, 300), (640, 480)])  # the last has the score at the bottom
-def test_scene_lies_clear_of_the_score_panel(window: App, size: tuple[int, int]) -> None:
-    turned(window)
-    assert lies_clear(window)
+def test_scene_is_not_covered_by_the_score_panel(window: App, size: tuple[int, int]) -> None:
+    run_frame(window)
+    assert is_uncovered(window)
     window.context.resize(pygame.Surface(size))
-    assert lies_clear(window)
+    assert is_uncovered(window)
     before = window.context.camera
     window.context.refit_if_covered()
-    assert window.context.camera == before  # nothing has grown
+    assert window.context.camera == before  # the panel has not grown
 
 
-def test_scene_makes_room_as_the_panel_grows_unless_somebody_moved_it(window: App) -> None:
-    turned(window)
+def test_camera_refits_as_the_panel_grows_unless_the_user_moved_it(window: App) -> None:
+    run_frame(window)
     rules, before = host_of(window).rules, window.context.camera
     assert isinstance(rules, Toy)
     rules.game_over = "enough, after a long time"
-    turned(window, elapsed=0.0)
+    run_frame(window, elapsed=0.0)
     assert window.context.camera != before
-    assert lies_clear(window)
+    assert is_uncovered(window)
     rules.game_over = None
-    turned(window, elapsed=0.0)
+    run_frame(window, elapsed=0.0)
     window.context.is_fitted, window.context.camera = False, before
     rules.game_over = "enough"
-    turned(window, elapsed=0.0)
+    run_frame(window, elapsed=0.0)
     assert window.context.camera == before
 
 
 @pytest.mark.parametrize("size", [(1280, 800), (900, 300), (420, 300), (200, 150), (60, 40)])
 @pytest.mark.parametrize("over", [None, "a long story of how it came to this end, and what was to be learnt of it"])
-def test_panel_stays_in_what_is_free(size: tuple[int, int], over: str | None) -> None:
+def test_score_panel_stays_within_the_free_area(size: tuple[int, int], over: str | None) -> None:
     pygame.font.init()
     surface = pygame.Surface(size)
     lines = tuple((f"label {k}", f"{10**k} m/s") for k in range(8))
@@ -289,70 +289,72 @@ def test_panel_stays_in_what_is_free(size: tuple[int, int], over: str | None) ->
         assert free.contains(rect)
 
 
-class Pad:
-    def __init__(self, number: int, name: str) -> None:
-        self._number, self._name = number, name
+class FakePad:
+    def __init__(self, instance_id: int, name: str) -> None:
+        self._instance_id, self._name = instance_id, name
 
     def get_name(self) -> str:
         return self._name
 
     def get_instance_id(self) -> int:
-        return self._number
+        return self._instance_id
 
 
-def joy(kind: int, number: int = 7, **more: Any) -> pygame.event.Event:
-    return pygame.event.Event(kind, instance_id=number, **more)
+def joy(kind: int, instance_id: int = 7, **more: Any) -> pygame.event.Event:
+    return pygame.event.Event(kind, instance_id=instance_id, **more)
 
 
 @pytest.fixture
-def plugged(window: App) -> Callable[[str], None]:
-    """Plug a gamepad in, as the hardware would."""
+def plug_in(window: App) -> Callable[[str], None]:
+    """Return a function that connects a gamepad by the event of the hardware."""
 
     def plug(name: str) -> None:
-        window._gamepads._open_device = lambda _: Pad(7, name)
-        turned(window, pygame.event.Event(pygame.JOYDEVICEADDED, device_index=0), elapsed=0.0)
+        window._gamepads._open_device = lambda _: FakePad(7, name)
+        run_frame(window, pygame.event.Event(pygame.JOYDEVICEADDED, device_index=0), elapsed=0.0)
 
     return plug
 
 
-def test_gamepad_plays(window: App, plugged: Callable[[str], None]) -> None:
-    plugged("Xbox 360 Controller")
+def test_gamepad_buttons_triggers_and_sticks_set_controls(window: App, plug_in: Callable[[str], None]) -> None:
+    plug_in("Xbox 360 Controller")
     assert ("info", "gamepad connected: Xbox 360 Controller") in window.app_state.messages.visible()
     window.draw()
     assert window.context.gui.has_gamepad
-    live = turned(window, joy(pygame.JOYBUTTONDOWN, button=0))
-    live = turned(window, joy(pygame.JOYBUTTONUP, button=0))
+    live = run_frame(window, joy(pygame.JOYBUTTONDOWN, button=0))
+    live = run_frame(window, joy(pygame.JOYBUTTONUP, button=0))
     assert presses_of(live) == [("kick", 1.0), ("kick", 0.0)]
-    live = turned(window, joy(pygame.JOYAXISMOTION, axis=2, value=0.0))  # the trigger, half-way
+    live = run_frame(window, joy(pygame.JOYAXISMOTION, axis=2, value=0.0))  # the trigger, half-way
     assert presses_of(live)[-1] == ("aim", 0.5)
-    live = turned(window, joy(pygame.JOYAXISMOTION, axis=2, value=0.001))  # no rung of its own
+    live = run_frame(window, joy(pygame.JOYAXISMOTION, axis=2, value=0.001))  # below the resolution of analogue levels
     assert len(presses_of(live)) == 3
-    live = turned(window, joy(pygame.JOYAXISMOTION, axis=1, value=-0.3), joy(pygame.JOYAXISMOTION, axis=0, value=1.0))
-    assert len(presses_of(live)) == 3  # less than half-way is no kick, and nothing is to the right
-    live = turned(window, joy(pygame.JOYAXISMOTION, axis=1, value=-0.9))
+    live = run_frame(
+        window, joy(pygame.JOYAXISMOTION, axis=1, value=-0.3), joy(pygame.JOYAXISMOTION, axis=0, value=1.0)
+    )
+    assert len(presses_of(live)) == 3  # less than half-way is no kick, and no control is bound to the right
+    live = run_frame(window, joy(pygame.JOYAXISMOTION, axis=1, value=-0.9))
     assert presses_of(live)[-1] == ("kick", 1.0)
 
 
-def test_gamepad_that_is_pulled_out_lets_go(window: App, plugged: Callable[[str], None]) -> None:
-    plugged("DualSense Wireless Controller")
-    turned(window, joy(pygame.JOYBUTTONDOWN, button=0))
-    live = turned(window, joy(pygame.JOYDEVICEREMOVED))
+def test_disconnected_gamepad_releases_its_controls(window: App, plug_in: Callable[[str], None]) -> None:
+    plug_in("DualSense Wireless Controller")
+    run_frame(window, joy(pygame.JOYBUTTONDOWN, button=0))
+    live = run_frame(window, joy(pygame.JOYDEVICEREMOVED))
     assert presses_of(live) == [("kick", 1.0), ("kick", 0.0)]
-    assert presses_of(turned(window, joy(pygame.JOYBUTTONDOWN, button=0)))[2:] == []  # it is gone
-    plugged("DualSense Wireless Controller")  # and comes again
-    assert presses_of(turned(window, joy(pygame.JOYBUTTONDOWN, button=0)))[2:] == [("kick", 1.0)]
+    assert presses_of(run_frame(window, joy(pygame.JOYBUTTONDOWN, button=0)))[2:] == []  # disconnected
+    plug_in("DualSense Wireless Controller")  # reconnected
+    assert presses_of(run_frame(window, joy(pygame.JOYBUTTONDOWN, button=0)))[2:] == [("kick", 1.0)]
 
 
 @pytest.mark.parametrize(("name", "start"), [("Xbox Series X Controller", 7), ("PS4 Controller", 6)])
-def test_start_pauses(window: App, plugged: Callable[[str], None], name: str, start: int) -> None:
-    plugged(name)
-    turned(window, joy(pygame.JOYBUTTONDOWN, button=start))
+def test_start_button_pauses_and_resumes(window: App, plug_in: Callable[[str], None], name: str, start: int) -> None:
+    plug_in(name)
+    run_frame(window, joy(pygame.JOYBUTTONDOWN, button=start))
     assert window.app_state.paused
-    turned(window, joy(pygame.JOYBUTTONUP, button=start), joy(pygame.JOYBUTTONDOWN, button=start))
+    run_frame(window, joy(pygame.JOYBUTTONUP, button=start), joy(pygame.JOYBUTTONDOWN, button=start))
     assert not window.app_state.paused
 
 
-def test_hats_and_crosses_are_the_same() -> None:
+def test_hat_and_d_pad_buttons_give_the_same_directions() -> None:
     from sandbox.window.input.gamepad import _words
 
     assert _words(joy(pygame.JOYHATMOTION, hat=0, value=(-1, 1)), XBOX) == {
@@ -368,7 +370,7 @@ def test_hats_and_crosses_are_the_same() -> None:
     assert _words(joy(pygame.JOYAXISMOTION, axis=0, value=0.1), XBOX) == {"-leftx": 0.0, "+leftx": 0.0}
 
 
-def test_unknown_gamepads_are_laid_out_like_the_most_common() -> None:
+def test_unknown_gamepads_use_the_xbox_layout() -> None:
     assert layout_of("Some Pad") is XBOX
     assert layout_of("Sony Interactive Entertainment DualSense") is PLAYSTATION
     for layout in {id(each): each for each in (*LAYOUTS.values(), XBOX)}.values():
@@ -377,17 +379,17 @@ def test_unknown_gamepads_are_laid_out_like_the_most_common() -> None:
         assert layout.start not in layout.buttons
 
 
-def test_gamepads_that_cannot_be_had_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_gamepad_support_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     def fails() -> None:
         raise pygame.error("no joysticks here")
 
-    heard: list[str] = []
+    messages: list[str] = []
     monkeypatch.setattr(pygame.joystick, "init", fails)
-    Gamepads(heard.append).start()
-    assert heard == ["no gamepads: no joysticks here"]
+    Gamepads(messages.append).start()
+    assert messages == ["no gamepads: no joysticks here"]
 
 
-def test_keys_are_called_by_their_names() -> None:
+def test_codes_of_key_names() -> None:
     assert codes_of("left shift") == (pygame.K_LSHIFT,)
     assert codes_of("/") == (pygame.K_SLASH,)
     assert pygame.K_RETURN in codes_of("enter")
@@ -397,14 +399,16 @@ def test_keys_are_called_by_their_names() -> None:
 
 
 @pytest.mark.parametrize("path", [scene.path for scene in shipped()], ids=lambda path: path.stem)
-def test_controls_of_every_shipped_game_can_be_reached(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.undo()  # the game itself, not the toy
+def test_controls_of_every_shipped_game_have_valid_keys_and_buttons(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.undo()  # the real game, not the toy
     scene = load(path)
     rules = rules_of(scene) if scene.play.game in RULES else None
     if rules is None:
         return
     codes = [code for control in rules.controls for key in control.keys for code in codes_of(key)]
-    assert len(set(codes)) == len(codes)  # no key of two controls
+    assert len(set(codes)) == len(codes)  # no key has two controls
     assert len({control.name for control in rules.controls}) == len(rules.controls)
     assert all(control.keys or control.pad for control in rules.controls)
     words = {word for layout in (XBOX, PLAYSTATION) for word in (*layout.buttons.values(), *layout.triggers.values())}
@@ -413,17 +417,17 @@ def test_controls_of_every_shipped_game_can_be_reached(path: Path, monkeypatch: 
     assert all(about for _, about in control_help(rules.controls))
 
 
-def test_cues_are_heard_once_sound_is_asked_for(window: App, monkeypatch: pytest.MonkeyPatch) -> None:
-    heard: list[str] = []
-    monkeypatch.setattr(Sounds, "cue", lambda _, name: heard.append(name))
+def test_cues_of_a_game_are_passed_to_the_sounds(window: App, monkeypatch: pytest.MonkeyPatch) -> None:
+    cues: list[str] = []
+    monkeypatch.setattr(Sounds, "cue", lambda _, name: cues.append(name))
     for _ in range(30):
-        turned(window)
-    assert heard == ["bounce"] * int(host_of(window).rules.score)
+        run_frame(window)
+    assert cues == ["bounce"] * int(host_of(window).rules.score)
 
 
-def test_cues_have_sounds_of_their_own() -> None:
+def test_cues_have_distinct_sounds() -> None:
     sounds = Sounds()
-    assert not sounds.cue("win")  # off until asked for
+    assert not sounds.cue("win")  # off by default
     assert sounds.enable()
     assert sounds.cue("win")
     sounds.disable()
@@ -433,30 +437,32 @@ def test_cues_have_sounds_of_their_own() -> None:
         samples = cue_sound(cue)
         assert samples.dtype == np.int16
         assert 1000 < np.abs(samples).max() <= 0.8 * 32767 + 1
-        assert np.abs(samples[-16:]).max() < 400  # it ends in silence
+        assert np.abs(samples[-16:]).max() < 400  # fades out to silence
 
 
-def test_scene_that_its_game_does_not_fit_is_shown_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_scene_that_its_game_refuses_is_opened_without_the_game(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.undo()
     file = tmp_path / "toy.toml"
     file.write_text(TOY)  # landing needs a ship
-    stage = AppState()
-    assert stage.open(file)
-    assert stage.host is None
-    assert stage.live is not None
-    level, text = stage.messages.visible()[-1]
+    state = AppState()
+    assert state.open(file)
+    assert state.host is None
+    assert state.live is not None
+    level, text = state.messages.visible()[-1]
     assert (level, text.partition(",")[0]) == ("warning", "landing needs a body 'ship'")
-    stage.close()
+    state.close()
 
 
 @pytest.mark.parametrize("name", ["duel", "curling", "pinball/full", "8-ball"])
 def test_game_announces_its_hint(name: str) -> None:
-    opened = App(AppState(), size=(900, 600), say=lambda _: None)
-    opened.app_state.open(find(name))
-    opened.run_frame(0.02)
-    (text,) = (text for _, text in opened.app_state.messages.visible())
+    window = App(AppState(), size=(900, 600), say=lambda _: None)
+    window.app_state.open(find(name))
+    window.run_frame(0.02)
+    (text,) = (text for _, text in window.app_state.messages.visible())
     assert text.endswith("F1: all keys")
-    opened.close()
+    window.close()
 
 
 def test_game_without_a_hint_announces_its_first_keys(window: App) -> None:
@@ -466,8 +472,8 @@ def test_game_without_a_hint_announces_its_first_keys(window: App) -> None:
     assert texts[-2:] == ["Up or Left Shift: kick it", "Left: how far"]
 
 
-class Patient(Buttons):
-    """The toy in a world where time stops unless the ball has just been kicked."""
+class WaitingToy(Buttons):
+    """The toy game with rules that wait, and so stop time, unless the ball has just been kicked."""
 
     until = 0.0
 
@@ -483,30 +489,30 @@ class Patient(Buttons):
 
 
 def test_time_stops_while_the_rules_wait_for_the_player(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setitem(registry.RULES, "landing", Patient)
-    with window_on(TOY, tmp_path) as window:
+    monkeypatch.setitem(registry.RULES, "landing", WaitingToy)
+    with open_window(TOY, tmp_path) as window:
         window.app_state.start_game()
         for _ in range(5):
-            live = turned(window)
+            live = run_frame(window)
         assert live.session.time == 0.0
         assert host_of(window).waiting
-        turned(window, key(UP))
+        run_frame(window, key(UP))
         for _ in range(10):
-            live = turned(window)
-        # The rules see the kick after its step, of 0.01 s; then 20 steps follow, which end within a picture.
+            live = run_frame(window)
+        # The rules see the kick after its step of 0.01 s; 20 steps follow, which end within a frame.
         assert live.session.time == pytest.approx(0.21, abs=1e-9)  # the sum of steps
         assert live.clock.real_speed == live.clock.speed  # the wait does not count as slowness
         live.step()
-        assert live.session.time == pytest.approx(0.22, abs=1e-9)  # steps by hand are made all the same
+        assert live.session.time == pytest.approx(0.22, abs=1e-9)  # single steps still work
         live.apply(Impulse(time=0.0, body="a", impulse=(0.0, 1.0)))  # an action of the player, without a control
         for _ in range(10):
-            live = turned(window)
+            live = run_frame(window)
         assert live.session.time == pytest.approx(0.43, abs=1e-9)
         session = live.session.recording()
         live.seek(5)
         live.finish_seek()
-        assert not host_of(window).waiting  # what was played is shown again
+        assert not host_of(window).waiting  # recorded play is replayed
         for _ in range(20):
-            live = turned(window)
+            live = run_frame(window)
         assert live.session.time == pytest.approx(0.43, abs=1e-9)
         assert live.session.recording() == session

@@ -1,4 +1,4 @@
-"""The game of the how-to "Write a game": one file outside the package, run headless, in a window, and by Gymnasium."""
+"""The game of the how-to "Write a game": a file outside of the package; headless, in a window, and as environment."""
 
 import importlib
 import re
@@ -35,7 +35,7 @@ GOLD, WHITE = (255, 215, 0), (255, 255, 255)
 
 @pytest.fixture
 def keepy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleType]:
-    """The module of the how-to."""
+    """Import the module of the how-to."""
     found = re.search(
         r"<!-- file: keepy_uppy\.py -->\n```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL
     )
@@ -47,16 +47,16 @@ def keepy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[ModuleTyp
     del sys.modules["keepy_uppy"]
 
 
-def test_game_runs_headless_and_is_replayed(keepy: ModuleType) -> None:
+def test_game_runs_headless_and_replays(keepy: ModuleType) -> None:
     assert "keepy-uppy" in game_names()
     game = play_out(loads(keepy.SCENE), keepy.Kicker(2))
     assert (game.score, game.over) == (2, "the ball touched the floor")
-    again = rerun(game.recording)
-    assert again.info["state_hash"] == game.recording.state_hash
-    assert again.info["game"]["score"] == 2
+    replay = rerun(game.recording)
+    assert replay.info["state_hash"] == game.recording.state_hash
+    assert replay.info["game"]["score"] == 2
 
 
-def test_view_draws_the_ball_by_the_state_of_the_rules(keepy: ModuleType) -> None:
+def test_view_colours_the_ball_by_the_state_of_the_rules(keepy: ModuleType) -> None:
     scene, camera = loads(keepy.SCENE), Camera((0.0, 1.0), 100.0, (400, 400))
     for in_reach, colour in ((True, GOLD), (False, WHITE)):
         surface = offscreen(camera.size)
@@ -100,7 +100,7 @@ def test_game_is_a_gymnasium_environment(keepy: ModuleType) -> None:
     env.close()
 
 
-def test_game_of_this_package_is_not_replaced() -> None:
+def test_built_in_game_cannot_be_replaced() -> None:
     with pytest.raises(ValueError, match="'pinball'"):
         register_game(GameSpec(names=("keepy-uppy", "pinball")))
     assert "keepy-uppy" not in game_names()

@@ -1,4 +1,4 @@
-"""Keys that a scene's drives have: held they are at level 1, and two things may have one key."""
+"""Keys of the drives of a scene: a held key sets level 1, and thrust and drive may share a key."""
 
 import pygame
 import pytest
@@ -13,8 +13,8 @@ BOX = {"name": "rod", "position": [0.0, 0.0], "size": [1.0, 1.0]}
 PLUNGER = {"kind": "plunger", "body": "rod", "direction": [0.0, 1.0], "travel": 1.0, "speed": 1.0}
 
 
-class Told:
-    """Stands for a session, and keeps what it is told."""
+class RecordingSession:
+    """Fake session that records the applied actions."""
 
     def __init__(self, scene):
         self.scene, self.actions = scene, []
@@ -23,14 +23,14 @@ class Told:
         self.actions.append(action)
 
 
-def test_every_key_that_a_scene_may_name_is_a_key_of_the_window():
+def test_every_key_of_the_scene_format_is_a_key_of_the_window():
     assert {*DriveKey.__args__} == {*KEYS} >= {*ThrustKey.__args__}
 
 
 @pytest.mark.parametrize("key", KEYS)
-def test_key_that_is_held_is_level_1(key):
+def test_held_key_sets_level_1(key):
     scene = from_document({"box": [BOX], "drive": [{**PLUNGER, "key": key}]})
-    live = Told(scene)
+    live = RecordingSession(scene)
     bindings = key_bindings(live, BodyTools())
     bindings.pressed[KEYS[key]]()
     bindings.released[KEYS[key]]()
@@ -39,11 +39,11 @@ def test_key_that_is_held_is_level_1(key):
     assert bindings.help_rows == ((key.capitalize(), "drive drive-1"),)
 
 
-def test_thrust_and_drive_on_one_key_both_act():
+def test_thrust_and_drive_with_the_same_key_both_act():
     ship = {"name": "ship", "position": [5.0, 0.0], "size": [1.0, 1.0]}
     thrust = {"name": "main", "body": "ship", "force": [1.0, 0.0], "key": "up"}
     scene = from_document({"box": [BOX, ship], "thrust": [thrust], "drive": [{**PLUNGER, "key": "up"}]})
-    live = Told(scene)
+    live = RecordingSession(scene)
     key_bindings(live, BodyTools()).pressed[pygame.K_UP]()
     assert [type(action) for action in live.actions] == [Throttle, Drive]
     assert len([*thrust_and_drive_keys(scene)]) == 2

@@ -1,4 +1,4 @@
-"""What is hand-made is not lost without being asked, and can be brought back."""
+"""Unsaved changes by the user: confirmation before they are lost, undo, and added bodies."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,10 +18,10 @@ from sandbox.window.hit_test import overlapping_bodies
 from sandbox.window.input.body_tools import BodyTools, count_changes
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.parameters import SessionParameters
-from sandbox.window.playback.parameters import turned as turned_knob
+from sandbox.window.playback.parameters import turned as parameter_actions
 from sandbox.window.playback.session import Session
 from tests.window.pressing import key, key_up, move
-from tests.window.windowed import turned, window_on
+from tests.window.windowed import open_window, run_frame
 
 pytestmark = pytest.mark.full  # every shipped scene
 
@@ -39,17 +39,17 @@ B, R, ESCAPE = pygame.K_b, pygame.K_r, pygame.K_ESCAPE
 
 @pytest.fixture
 def window(tmp_path: Path) -> Iterator[App]:
-    with window_on(REST, tmp_path) as opened:
-        pygame.event.clear()  # those of its opening
-        turned(opened, move(100, 300))
-        yield opened
+    with open_window(REST, tmp_path) as window:
+        pygame.event.clear()  # events of opening the window
+        run_frame(window, move(100, 300))
+        yield window
 
 
-def strike(window: App, code: int, mod: int = 0) -> None:
-    turned(window, key(code, mod), key_up(code))
+def tap(window: App, code: int, mod: int = 0) -> None:
+    run_frame(window, key(code, mod), key_up(code))
 
 
-def test_changes_are_counted_as_a_person_would() -> None:
+def test_consecutive_actions_of_one_kind_count_as_one_change() -> None:
     spawn = Spawn(time=0.0, ball=Ball(position=(0.0, 0.0), radius=1.0))
     drag = [Move(time=0.0, body="a", position=(float(k), 0.0)) for k in range(5)]
     actions: list[Action] = [
@@ -67,156 +67,156 @@ def test_changes_are_counted_as_a_person_would() -> None:
 
 
 @pytest.mark.parametrize("code", [R, ESCAPE, pygame.K_LEFTBRACKET])
-def test_key_that_would_lose_a_body_asks_first(window: App, code: int) -> None:
-    strike(window, B)
+def test_key_that_discards_an_added_body_asks_first(window: App, code: int) -> None:
+    tap(window, B)
     live = window.app_state.live
-    strike(window, code)
+    tap(window, code)
     assert window.app_state.question is not None
     assert window.app_state.question.startswith("1 hand-made change will be lost")
     assert window.context.exit_status is None
     assert window.app_state.live is live
-    strike(window, code)
+    tap(window, code)
     assert window.context.exit_status == 0 or window.app_state.live is not live
     assert window.app_state.question is None
 
 
-def test_cross_asks_once(window: App) -> None:
-    strike(window, B)
-    turned(window, pygame.event.Event(pygame.QUIT))
+def test_close_button_asks_once(window: App) -> None:
+    tap(window, B)
+    run_frame(window, pygame.event.Event(pygame.QUIT))
     assert window.context.exit_status is None
-    turned(window, pygame.event.Event(pygame.QUIT))
+    run_frame(window, pygame.event.Event(pygame.QUIT))
     assert window.context.exit_status == 0
 
 
-def test_any_other_key_takes_the_question_back(window: App) -> None:
-    strike(window, B)
-    strike(window, R)
-    strike(window, pygame.K_p)
+def test_any_other_key_cancels_the_question(window: App) -> None:
+    tap(window, B)
+    tap(window, R)
+    tap(window, pygame.K_p)
     assert window.app_state.question is None
-    strike(window, R)
+    tap(window, R)
     assert window.app_state.question is not None
 
 
 @pytest.mark.parametrize("code", [R, ESCAPE])
-def test_nothing_is_asked_where_nothing_is_lost(window: App, code: int) -> None:
+def test_no_question_without_unsaved_changes(window: App, code: int) -> None:
     live = window.app_state.live
-    strike(window, code)
+    tap(window, code)
     assert window.context.exit_status == 0 or window.app_state.live is not live
 
 
-def test_nothing_is_asked_once_the_session_is_saved(window: App) -> None:
-    strike(window, B)
-    strike(window, pygame.K_s, pygame.KMOD_CTRL)
-    strike(window, ESCAPE)
+def test_no_question_after_the_session_is_saved(window: App) -> None:
+    tap(window, B)
+    tap(window, pygame.K_s, pygame.KMOD_CTRL)
+    tap(window, ESCAPE)
     assert window.context.exit_status == 0
 
 
-def test_restart_keeps_values_and_so_does_not_ask_for_them(window: App) -> None:
+def test_restart_keeps_parameters_without_asking_and_quit_asks(window: App) -> None:
     window.commands._store_parameter("gravity", -3.0, True)
-    turned(window)
+    run_frame(window)
     live = window.app_state.live
-    strike(window, R)
+    tap(window, R)
     assert window.app_state.live is not live
     window.commands._store_parameter("gravity", -4.0, True)
-    turned(window)
-    strike(window, ESCAPE)
+    run_frame(window)
+    tap(window, ESCAPE)
     assert window.app_state.question is not None
 
 
-def test_undo_brings_back_what_a_restart_has_lost(window: App) -> None:
-    strike(window, B)
-    strike(window, R)
-    strike(window, R)
+def test_undo_restores_a_body_lost_by_a_restart(window: App) -> None:
+    tap(window, B)
+    tap(window, R)
+    tap(window, R)
     assert window.app_state.live is not None
     assert len(window.app_state.live.bodies) == 1
-    strike(window, pygame.K_z, pygame.KMOD_CTRL)
+    tap(window, pygame.K_z, pygame.KMOD_CTRL)
     window.app_state.live.finish_seek()
     assert len(window.app_state.live.bodies) == 2
 
 
-def test_what_undo_brings_back_is_unsaved_and_undo_exchanges_the_two(window: App) -> None:
+def test_undone_restart_counts_as_unsaved_and_undo_swaps_the_sessions(window: App) -> None:
     def bodies() -> int:
         assert window.app_state.live is not None
         window.app_state.live.finish_seek()
         return len(window.app_state.live.bodies)
 
-    strike(window, B)
-    for _ in range(3):  # the third restarts what has nothing to lose
-        strike(window, R)
-    strike(window, pygame.K_z, pygame.KMOD_CTRL)
+    tap(window, B)
+    for _ in range(3):  # the third restarts a session without changes
+        tap(window, R)
+    tap(window, pygame.K_z, pygame.KMOD_CTRL)
     assert bodies() == 2
     assert window.app_state.count_unsaved() == 1
-    strike(window, R)
-    strike(window, R)
-    turned(window, move(400, 300))
-    strike(window, B)
-    turned(window, move(250, 450))
-    strike(window, B)
+    tap(window, R)
+    tap(window, R)
+    run_frame(window, move(400, 300))
+    tap(window, B)
+    run_frame(window, move(250, 450))
+    tap(window, B)
     assert bodies() == 3
     for expected in (2, 3, 2):
-        strike(window, pygame.K_z, pygame.KMOD_CTRL)
+        tap(window, pygame.K_z, pygame.KMOD_CTRL)
         assert bodies() == expected
 
 
-def test_undo_brings_back_what_was_replaced_at_an_earlier_moment(window: App) -> None:
+def test_undo_restores_the_future_replaced_by_a_change_at_an_earlier_time(window: App) -> None:
     for _ in range(4):
-        live = turned(window)
-    end, whole = live.step_number, live.session.recording()
+        live = run_frame(window)
+    end, full_recording = live.step_number, live.session.recording()
     for _ in range(3):
-        strike(window, pygame.K_COMMA)
-    assert live.session.recording() == whole  # closing now keeps all of it
-    strike(window, B)
+        tap(window, pygame.K_COMMA)
+    assert live.session.recording() == full_recording  # the recording is still complete
+    tap(window, B)
     assert any("is replaced" in text for _, text in window.app_state.messages.visible())
-    strike(window, pygame.K_z, pygame.KMOD_CTRL)
+    tap(window, pygame.K_z, pygame.KMOD_CTRL)
     assert window.app_state.live is not None
     window.app_state.live.finish_seek()
     assert window.app_state.live.step_number == end
-    assert window.app_state.live.session.recording().state_hash == whole.state_hash
+    assert window.app_state.live.session.recording().state_hash == full_recording.state_hash
 
 
-def test_picker_asks_before_another_scene_takes_the_place(window: App) -> None:
-    strike(window, B)
+def test_picker_asks_before_it_opens_another_scene(window: App) -> None:
+    tap(window, B)
     live = window.app_state.live
-    strike(window, pygame.K_o, pygame.KMOD_CTRL)
-    strike(window, pygame.K_RETURN)
+    tap(window, pygame.K_o, pygame.KMOD_CTRL)
+    tap(window, pygame.K_RETURN)
     assert window.context.gui.scene_browser is not None
     assert window.app_state.live is live
-    strike(window, pygame.K_RETURN)
+    tap(window, pygame.K_RETURN)
     assert window.context.gui.scene_browser is None
     assert window.app_state.live is not live
 
 
 @pytest.mark.parametrize("box", [False, True], ids=["ball", "box"])
 @pytest.mark.parametrize("name", ["bounce", "pyramid", "rube_goldberg", "bridge"])
-def test_new_bodies_overlap_nothing_wherever_they_are_put(name: str, box: bool) -> None:
-    live, hands, rng = LiveView(Session(load(find(name)))), BodyTools(), np.random.default_rng(1)
+def test_added_bodies_overlap_no_other_bodies(name: str, box: bool) -> None:
+    live, tools, rng = LiveView(Session(load(find(name)))), BodyTools(), np.random.default_rng(1)
     before = overlapping_bodies(live.scene, live.bodies, live.frame).sum()
     low, high = live.frame.position.min(axis=0) - 0.5, live.frame.position.max(axis=0) + 0.5
     for x, y in rng.uniform(low, high, (20, 2)).tolist():
-        hands.add(live, (x, y), 5.0, box=box)
+        tools.add(live, (x, y), 5.0, box=box)
     assert len(live.bodies) >= 20
-    assert overlapping_bodies(live.scene, live.bodies, live.frame).sum() <= before  # those of the file may
+    assert overlapping_bodies(live.scene, live.bodies, live.frame).sum() <= before  # bodies of the file may overlap
     live.close()
 
 
-def test_new_body_goes_where_it_is_pointed_if_there_is_room_and_is_refused_in_a_full_place() -> None:
+def test_added_body_is_placed_at_or_near_the_mouse_or_refused_without_room() -> None:
     full = [{"position": [0.0, 0.0], "radius": 0.9}]
     live = LiveView(Session(from_document({"ball": full})))
-    hands = BodyTools()
-    hands.add(live, (5.0, 5.0), 1.0)
+    tools = BodyTools()
+    tools.add(live, (5.0, 5.0), 1.0)
     assert live.frame.position[-1] == pytest.approx((5.0, 5.0), abs=0.0)
-    hands.add(live, (0.1, 0.0), 1.0)
+    tools.add(live, (0.1, 0.0), 1.0)
     assert np.hypot(*live.frame.position[-1]) >= 1.8
     live.close()
     ground = LiveView(Session(from_document({"plane": [{"point": [0, 0], "normal": [0, 1]}]})))
     with pytest.raises(ActionError, match="no room"):
-        hands.add(ground, (0.0, -100.0), 40.0)  # a ball of 1 m, 100 m below the ground
+        tools.add(ground, (0.0, -100.0), 40.0)  # a ball of 1 m, 100 m below the ground
     ground.close()
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(("key", "value"), [("restitution", 0.25), ("friction", 0.75)])
-def test_knob_sets_the_surface_of_a_body_added_by_hand(engine: str, key: str, value: float) -> None:
+def test_parameter_sets_restitution_and_friction_of_an_added_body(engine: str, key: str, value: float) -> None:
     scene = from_document(
         {
             "world": {"gravity": [0, -10.0]},
@@ -226,18 +226,18 @@ def test_knob_sets_the_surface_of_a_body_added_by_hand(engine: str, key: str, va
     )
     live = LiveView(Session(scene, engine))
     BodyTools().add(live, (5.0, 2.0), 1.0)
-    knob = next(each for each in SessionParameters().of(live, scene, 1) if each.key == key)
-    assert knob.enabled
-    for action in turned_knob(live, key, value, 1):
+    parameter = next(each for each in SessionParameters().of(live, scene, 1) if each.key == key)
+    assert parameter.enabled
+    for action in parameter_actions(live, key, value, 1):
         live.apply(action)
     assert next(each for each in SessionParameters().of(live, scene, 1) if each.key == key).value == value
     assert next(each for each in SessionParameters().of(live, scene, 0) if each.key == key).value == (
         key == "restitution"
     )
-    live.session.advance(100)  # 1 s: it has fallen 1.5 m at 5.5 m/s, and come up again
+    live.session.advance(100)  # 1 s: the bodies have fallen 1.5 m, to 5.5 m/s, and rebounded
     if key == "restitution":
         up = live.session.frame.velocity[:, 1]
-        assert up[1] < 0.5 * up[0]  # the other one keeps its own
+        assert up[1] < 0.5 * up[0]  # the other one keeps its restitution
     recording = live.session.recording()
     assert rerun(recording, audit=False).info["state_hash"] == recording.state_hash
     live.close()
@@ -247,7 +247,7 @@ def test_knob_sets_the_surface_of_a_body_added_by_hand(engine: str, key: str, va
     ("path", "value"),
     [("ball.spawned-1.restitution", 1.5), ("box.spawned-1.friction", 0.5), ("ball.none.friction", 0.5)],
 )
-def test_surface_of_a_spawned_body_is_checked(path: str, value: float) -> None:
+def test_invalid_parameter_of_a_spawned_body_is_refused(path: str, value: float) -> None:
     session = Session(from_document({"ball": [{"name": "a", "position": [0, 2], "radius": 0.5}]}))
     session.apply(Spawn(time=0.0, ball=Ball(position=(5.0, 0.0), radius=1.0, name="spawned-1")))
     before = session.frame.state_hash()

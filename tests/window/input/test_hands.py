@@ -1,4 +1,4 @@
-"""Hands: what pointing, dragging and keys do to bodies, on a running session and on a stored run."""
+"""Body tools: picking, dragging, nudging, adding and removing bodies of a session."""
 
 from typing import Any
 
@@ -26,229 +26,230 @@ def live(engine: str = "pymunk", **more: Any) -> LiveView:
     return LiveView(Session(from_document({**DOCUMENT, **more}), engine))
 
 
-def grasp(hands: BodyTools, live: LiveView, place: tuple[float, float], reach: float, paused: bool) -> bool:
-    """Pick the body at a place and take hold of it, as a drag does."""
-    found = hands.pick(live, place, reach)
-    hands.grab(live, paused)
+def pick_and_grab(tools: BodyTools, live: LiveView, point: tuple[float, float], reach: float, paused: bool) -> bool:
+    """Pick the body at a point and grab it, as a drag does."""
+    found = tools.pick(live, point, reach)
+    tools.grab(live, paused)
     return found
 
 
-def passed(live: LiveView, steps: int) -> LiveView:
+def step_times(live: LiveView, steps: int) -> LiveView:
     for _ in range(steps):
         live.step()
     return live
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference", "exact"])
-def test_body_dragged_while_paused_is_exactly_under_the_hand(engine: str) -> None:
-    show, hands = passed(live(engine), 3), BodyTools()
-    assert grasp(hands, show, (0.25, -0.125), 0.0, paused=True)
-    assert (hands.picked, hands.is_holding) == (0, True)
-    for place in ((1.25, 0.875), (-3.0, 2.0), (0.5, 0.5)):
-        hands.drag(show, place)
-        assert show.frame.position[0].tolist() == [place[0] - 0.25, place[1] + 0.125]
-    assert hands.spring_line(show) is None
-    hands.release(show)
-    assert not hands.is_holding
-    assert [type(action) for action in show.session.actions] == [Move] * 3
-    assert passed(show, 5).frame.position[0].tolist() == [0.25, 0.625]
+def test_body_dragged_while_paused_stays_exactly_under_the_mouse(engine: str) -> None:
+    view, tools = step_times(live(engine), 3), BodyTools()
+    assert pick_and_grab(tools, view, (0.25, -0.125), 0.0, paused=True)
+    assert (tools.picked, tools.is_holding) == (0, True)
+    for point in ((1.25, 0.875), (-3.0, 2.0), (0.5, 0.5)):
+        tools.drag(view, point)
+        assert view.frame.position[0].tolist() == [point[0] - 0.25, point[1] + 0.125]
+    assert tools.spring_line(view) is None
+    tools.release(view)
+    assert not tools.is_holding
+    assert [type(action) for action in view.session.actions] == [Move] * 3
+    assert step_times(view, 5).frame.position[0].tolist() == [0.25, 0.625]
 
 
 @pytest.mark.parametrize("paused", [True, False])
-def test_driven_body_is_left_to_its_key(paused: bool) -> None:
+def test_driven_body_cannot_be_dragged(paused: bool) -> None:
     drive = {"kind": "stroke", "body": "a", "pivot": [0, 0], "stops": [0.0, 1.0], "rate": 1.0}
-    show, hands = live(drive=[drive]), BodyTools()
+    view, tools = live(drive=[drive]), BodyTools()
     with pytest.raises(ActionError, match=r"^a cannot be dragged; its key moves it"):
-        grasp(hands, show, (0.25, 0.0), 0.0, paused)
-    assert not hands.is_holding
-    hands.drag(show, (1.0, 1.0))
-    assert show.session.actions == ()
+        pick_and_grab(tools, view, (0.25, 0.0), 0.0, paused)
+    assert not tools.is_holding
+    tools.drag(view, (1.0, 1.0))
+    assert view.session.actions == ()
 
 
 def test_fixed_body_can_be_moved_while_paused_and_not_pulled() -> None:
-    show, hands = live(), BodyTools()
-    assert grasp(hands, show, (5.0, 0.0), 0.0, paused=True)
-    hands.drag(show, (5.0, 3.0))
-    hands.release(show)
-    assert show.frame.position[1].tolist() == [5.0, 3.0]
-    assert grasp(hands, show, (5.0, 3.0), 0.0, paused=False)
-    assert hands.picked == 1
-    assert not hands.is_holding
-    hands.drag(show, (0.0, 9.0))
-    hands.release(show)
-    assert passed(show, 5).frame.position[1].tolist() == [5.0, 3.0]
+    view, tools = live(), BodyTools()
+    assert pick_and_grab(tools, view, (5.0, 0.0), 0.0, paused=True)
+    tools.drag(view, (5.0, 3.0))
+    tools.release(view)
+    assert view.frame.position[1].tolist() == [5.0, 3.0]
+    assert pick_and_grab(tools, view, (5.0, 3.0), 0.0, paused=False)
+    assert tools.picked == 1
+    assert not tools.is_holding
+    tools.drag(view, (0.0, 9.0))
+    tools.release(view)
+    assert step_times(view, 5).frame.position[1].tolist() == [5.0, 3.0]
 
 
 @pytest.mark.parametrize("paused", [True, False])
-def test_body_that_went_on_is_held_where_it_was_looked_at(paused: bool) -> None:
-    """It flies and turns between the press and the first motion of the mouse."""
-    show, hands = live(), BodyTools()
-    show.apply(Impulse(time=0.0, body="a", impulse=(8.0, 0.0)))
-    grasp(hands, show, (0.0, 0.25), 0.0, paused=False)
-    hands.drag(show, (9.0, 3.0))
-    passed(show, 40)
-    hands.release(show)
-    (x, y), angle = show.frame.position[0].tolist(), float(show.frame.angle[0])
-    before = len(show.session.actions)
-    assert hands.pick(show, (x + 0.25, y), 0.0)
-    assert (len(show.session.actions), hands.is_holding) == (before, False)
-    passed(show, 20)
-    hands.grab(show, paused)
-    hands.drag(show, (5.0, 5.0))
-    turned = float(show.frame.angle[0]) - angle
-    assert abs(turned) > 1e-3  # else this says nothing
-    spot = 0.25 * np.cos(turned), 0.25 * np.sin(turned)
+def test_body_that_moves_after_the_press_is_grabbed_at_the_pressed_point(paused: bool) -> None:
+    """The body moves and rotates between the press and the first motion of the mouse."""
+    view, tools = live(), BodyTools()
+    view.apply(Impulse(time=0.0, body="a", impulse=(8.0, 0.0)))
+    pick_and_grab(tools, view, (0.0, 0.25), 0.0, paused=False)
+    tools.drag(view, (9.0, 3.0))
+    step_times(view, 40)
+    tools.release(view)
+    (x, y), angle = view.frame.position[0].tolist(), float(view.frame.angle[0])
+    before = len(view.session.actions)
+    assert tools.pick(view, (x + 0.25, y), 0.0)
+    assert (len(view.session.actions), tools.is_holding) == (before, False)
+    step_times(view, 20)
+    tools.grab(view, paused)
+    tools.drag(view, (5.0, 5.0))
+    turned = float(view.frame.angle[0]) - angle
+    assert abs(turned) > 1e-3  # otherwise the test checks nothing
+    offset = 0.25 * np.cos(turned), 0.25 * np.sin(turned)
     if paused:
-        assert show.frame.position[0] == pytest.approx((5.0 - spot[0], 5.0 - spot[1]), rel=1e-12)  # some roundings
+        assert view.frame.position[0] == pytest.approx((5.0 - offset[0], 5.0 - offset[1]), rel=1e-12)  # some roundings
     else:
-        there = show.frame.position[0] + spot
-        assert (hands.spring_line(show) or ((0.0, 0.0), None))[0] == pytest.approx(there, rel=1e-12)  # some roundings
+        grabbed_point = view.frame.position[0] + offset
+        held = (tools.spring_line(view) or ((0.0, 0.0), None))[0]
+        assert held == pytest.approx(grabbed_point, rel=1e-12)  # some roundings
 
 
-def test_pulled_body_comes_under_the_hand_and_flies_on_when_let_go() -> None:
-    show, hands = live(), BodyTools()
-    grasp(hands, show, (0.0, 0.25), 0.0, paused=False)
-    assert hands.is_holding
-    hands.drag(show, (2.0, 0.25))
-    passed(show, 4)
-    held, hand = hands.spring_line(show) or ((0.0, 0.0), (0.0, 0.0))
-    assert hand == (2.0, 0.25)
+def test_pulled_body_reaches_the_mouse_and_keeps_its_velocity_when_released() -> None:
+    view, tools = live(), BodyTools()
+    pick_and_grab(tools, view, (0.0, 0.25), 0.0, paused=False)
+    assert tools.is_holding
+    tools.drag(view, (2.0, 0.25))
+    step_times(view, 4)
+    held, mouse = tools.spring_line(view) or ((0.0, 0.0), (0.0, 0.0))
+    assert mouse == (2.0, 0.25)
     assert 0.0 < held[0] < 2.0
-    passed(show, 1500)
-    held, hand = hands.spring_line(show) or ((0.0, 0.0), (0.0, 0.0))
-    assert held == pytest.approx((2.0, 0.25), abs=0.02)  # it goes on turning about the hand
-    hands.release(show)
-    assert hands.spring_line(show) is None
-    velocity = show.frame.velocity[0].tolist()
-    assert passed(show, 5).frame.velocity[0].tolist() == velocity
-    kinds = [type(action) for action in show.session.actions]
+    step_times(view, 1500)
+    held, mouse = tools.spring_line(view) or ((0.0, 0.0), (0.0, 0.0))
+    assert held == pytest.approx((2.0, 0.25), abs=0.02)  # it keeps rotating about the mouse
+    tools.release(view)
+    assert tools.spring_line(view) is None
+    velocity = view.frame.velocity[0].tolist()
+    assert step_times(view, 5).frame.velocity[0].tolist() == velocity
+    kinds = [type(action) for action in view.session.actions]
     assert kinds == [Pull] * 3
-    assert show.session.actions[-1] == Pull(time=show.session.actions[-1].time, body="a")
+    assert view.session.actions[-1] == Pull(time=view.session.actions[-1].time, body="a")
 
 
-def test_nothing_is_grasped_where_there_is_nothing() -> None:
-    show, hands = live(), BodyTools()
-    hands.picked = 2
-    assert not grasp(hands, show, (0.0, 9.0), 0.1, paused=False)
-    assert hands.picked is None
-    hands.drag(show, (1.0, 1.0))
-    hands.release(show)
-    hands.grab(show, paused=True)
-    assert not hands.is_holding
-    for deed in (hands.remove, hands.nudge):
+def test_press_on_empty_space_picks_and_grabs_no_body() -> None:
+    view, tools = live(), BodyTools()
+    tools.picked = 2
+    assert not pick_and_grab(tools, view, (0.0, 9.0), 0.1, paused=False)
+    assert tools.picked is None
+    tools.drag(view, (1.0, 1.0))
+    tools.release(view)
+    tools.grab(view, paused=True)
+    assert not tools.is_holding
+    for tool in (tools.remove, tools.nudge):
         with pytest.raises(ActionError, match="select a body first: click it"):
-            deed(show)
-    assert show.session.actions == ()
+            tool(view)
+    assert view.session.actions == ()
 
 
-@pytest.mark.parametrize(("number", "place", "speed"), [(0, (0.0, 0.0), 1.0), (2, (9.0, 0.0), 0.1)])
-def test_nudge_adds_exactly_its_impulse(number: int, place: tuple[float, float], speed: float) -> None:
-    """1 m/s, or ten radii a second of a small body."""
-    show, hands = live(), BodyTools()
-    grasp(hands, show, place, 0.0, paused=True)
+@pytest.mark.parametrize(("index", "point", "speed"), [(0, (0.0, 0.0), 1.0), (2, (9.0, 0.0), 0.1)])
+def test_nudge_adds_exactly_its_impulse(index: int, point: tuple[float, float], speed: float) -> None:
+    """The change of speed is 1 m/s, or ten radii per second for a small body."""
+    view, tools = live(), BodyTools()
+    pick_and_grab(tools, view, point, 0.0, paused=True)
     for k in (1, 2):
-        hands.nudge(show)
-        velocity = show.frame.velocity[number]
+        tools.nudge(view)
+        velocity = view.frame.velocity[index]
         assert velocity == pytest.approx([0.6 * speed * k, 0.8 * speed * k], rel=1e-15)  # a rounding or two
-    mass = float(show.bodies.mass[number])
-    action = show.session.actions[0]
+    mass = float(view.bodies.mass[index])
+    action = view.session.actions[0]
     assert isinstance(action, Impulse)
     assert action.impulse == (0.6 * mass * speed, 0.8 * mass * speed)
 
 
-def test_new_ball_is_like_the_picked_one_or_like_the_first() -> None:
-    show, hands = live(), BodyTools()
-    hands.add(show, (0.0, 9.0), 10.0)
-    hands.picked = 2
-    hands.add(show, (3.0, 9.0), 10.0)
-    first, second = (action.ball for action in show.session.actions if isinstance(action, Spawn))
+def test_added_ball_copies_the_picked_or_the_first_ball() -> None:
+    view, tools = live(), BodyTools()
+    tools.add(view, (0.0, 9.0), 10.0)
+    tools.picked = 2
+    tools.add(view, (3.0, 9.0), 10.0)
+    first, second = (action.ball for action in view.session.actions if isinstance(action, Spawn))
     assert (first.radius, first.mass, first.material, first.collides) == (0.5, 2.0, "rubber", "all")
     assert (second.radius, second.density, second.material, second.collides) == (0.01, 3.0, None, "fixed")
-    assert show.frame.position[3:].tolist() == [[0.0, 9.0], [3.0, 9.0]]
-    assert show.bodies.mass[3] == 2.0
-    hands.picked = 3
-    hands.add(show, (6.0, 9.0), 10.0)
-    assert show.bodies.radius[5] == 0.5
-    assert len(set(show.bodies.names)) == 6
+    assert view.frame.position[3:].tolist() == [[0.0, 9.0], [3.0, 9.0]]
+    assert view.bodies.mass[3] == 2.0
+    tools.picked = 3
+    tools.add(view, (6.0, 9.0), 10.0)
+    assert view.bodies.radius[5] == 0.5
+    assert len(set(view.bodies.names)) == 6
 
 
-def test_new_ball_of_an_empty_scene_suits_the_view() -> None:
-    show = LiveView(Session(from_document({"title": "t"})))
-    BodyTools().add(show, (1.0, 2.0), 20.0)
-    assert show.bodies.radius.tolist() == [0.5]
-    BodyTools().add(show, (5.0, 2.0), 0.0)  # the smallest radius there may be, or that of the first
-    assert len(show.bodies) == 2
+def test_added_ball_of_an_empty_scene_is_scaled_to_the_view() -> None:
+    view = LiveView(Session(from_document({"title": "t"})))
+    BodyTools().add(view, (1.0, 2.0), 20.0)
+    assert view.bodies.radius.tolist() == [0.5]
+    BodyTools().add(view, (5.0, 2.0), 0.0)  # the smallest valid radius, or that of the first
+    assert len(view.bodies) == 2
 
 
-def test_new_ball_that_would_overlap_is_put_beside_so_that_exact_takes_it() -> None:
-    show, hands = live("exact"), BodyTools()
-    hands.add(show, (0.2, 0.0), 10.0)
-    assert len(show.bodies) == 4
-    assert not overlapping_bodies(show.scene, show.bodies, show.frame)[-1]
+def test_added_ball_is_shifted_to_avoid_overlap_on_the_exact_engine() -> None:
+    view, tools = live("exact"), BodyTools()
+    tools.add(view, (0.2, 0.0), 10.0)
+    assert len(view.bodies) == 4
+    assert not overlapping_bodies(view.scene, view.bodies, view.frame)[-1]
 
 
-def test_removed_body_is_gone_and_no_longer_picked_or_held() -> None:
-    show, hands = live(), BodyTools()
-    grasp(hands, show, (0.0, 0.0), 0.0, paused=False)
-    passed(show, 2)
-    hands.remove(show)
-    assert not show.frame.present[0]
-    assert (hands.picked, hands.is_holding) == (None, False)
-    hands.drag(show, (1.0, 1.0))
-    hands.release(show)
-    assert isinstance(show.session.actions[-1], Remove)
-    passed(show, 2)
+def test_removed_body_is_absent_and_no_longer_picked_or_held() -> None:
+    view, tools = live(), BodyTools()
+    pick_and_grab(tools, view, (0.0, 0.0), 0.0, paused=False)
+    step_times(view, 2)
+    tools.remove(view)
+    assert not view.frame.present[0]
+    assert (tools.picked, tools.is_holding) == (None, False)
+    tools.drag(view, (1.0, 1.0))
+    tools.release(view)
+    assert isinstance(view.session.actions[-1], Remove)
+    step_times(view, 2)
 
 
-def test_body_that_was_removed_elsewhere_can_be_let_go() -> None:
-    show, hands = live(), BodyTools()
-    grasp(hands, show, (0.0, 0.0), 0.0, paused=False)
-    show.apply(Remove(time=0.0, body="a"))
-    assert hands.spring_line(show) is None
+def test_held_body_removed_by_another_action_can_be_released() -> None:
+    view, tools = live(), BodyTools()
+    pick_and_grab(tools, view, (0.0, 0.0), 0.0, paused=False)
+    view.apply(Remove(time=0.0, body="a"))
+    assert tools.spring_line(view) is None
     with pytest.raises(ActionError, match="has been removed"):
-        hands.drag(show, (1.0, 1.0))
-    hands.release(show)
-    passed(show, 2)
+        tools.drag(view, (1.0, 1.0))
+    tools.release(view)
+    step_times(view, 2)
 
 
-def test_picked_body_that_has_not_come_yet_is_none() -> None:
-    """The session goes back to before it was added."""
-    show, hands = passed(live(), 3), BodyTools()
-    hands.add(show, (0.0, 9.0), 10.0)
-    hands.picked = 3
-    assert hands.picked_index(show) == 3
-    show.seek(1)
-    while show.busy is not None:
-        show.update(0.0, paused=True)
-    assert len(show.bodies) == 3
-    assert hands.picked_index(show) is None
-    for deed in (hands.remove, hands.nudge):
+def test_picked_body_is_none_after_seeking_to_before_its_spawn() -> None:
+    """The session seeks to a time before the body was added."""
+    view, tools = step_times(live(), 3), BodyTools()
+    tools.add(view, (0.0, 9.0), 10.0)
+    tools.picked = 3
+    assert tools.picked_index(view) == 3
+    view.seek(1)
+    while view.busy is not None:
+        view.update(0.0, paused=True)
+    assert len(view.bodies) == 3
+    assert tools.picked_index(view) is None
+    for tool in (tools.remove, tools.nudge):
         with pytest.raises(ActionError, match="select a body first: click it"):
-            deed(show)
-    assert show.session.actions == ()
-    hands.add(show, (0.0, 9.0), 10.0)
-    assert show.bodies.radius[3] == 0.5
+            tool(view)
+    assert view.session.actions == ()
+    tools.add(view, (0.0, 9.0), 10.0)
+    assert view.bodies.radius[3] == 0.5
 
 
-def test_arrows_put_a_body_elsewhere_at_rest() -> None:
-    show, hands = live(), BodyTools()
-    show.apply(Impulse(time=0.0, body="a", impulse=(1.0, 0.0)))
-    hands.shift(show, "a", (0.0, 0.5))
-    hands.shift(show, "a", (-0.5, 0.0))
-    assert show.frame.position[0].tolist() == [-0.5, 0.5]
-    assert show.frame.velocity[0].tolist() == [0.0, 0.0]
-    hands.shift(show, "zzz", (1.0, 1.0))
-    assert len(show.session.actions) == 3
+def test_shift_moves_a_body_and_stops_it() -> None:
+    view, tools = live(), BodyTools()
+    view.apply(Impulse(time=0.0, body="a", impulse=(1.0, 0.0)))
+    tools.shift(view, "a", (0.0, 0.5))
+    tools.shift(view, "a", (-0.5, 0.0))
+    assert view.frame.position[0].tolist() == [-0.5, 0.5]
+    assert view.frame.velocity[0].tolist() == [0.0, 0.0]
+    tools.shift(view, "zzz", (1.0, 1.0))
+    assert len(view.session.actions) == 3
 
 
-def test_names_of_any_kind_can_be_held() -> None:
+def test_bodies_with_any_name_can_be_dragged_and_nudged() -> None:
     names = ["a.b", 'say "hi"', "it's", "0", "*"]
     balls = [{"name": name, "position": [3.0 * k, 0.0], "radius": 1} for k, name in enumerate(names)]
-    show = LiveView(Session(from_document({"ball": balls})))
+    view = LiveView(Session(from_document({"ball": balls})))
     for k in range(len(names)):
-        hands = BodyTools()
-        grasp(hands, show, (3.0 * k, 0.0), 0.0, paused=True)
-        hands.drag(show, (3.0 * k, 5.0))
-        hands.nudge(show)
-    assert show.frame.position[:, 1].tolist() == [5.0] * 5
-    assert np.allclose(show.frame.velocity, [0.6, 0.8], rtol=1e-15)  # a rounding
+        tools = BodyTools()
+        pick_and_grab(tools, view, (3.0 * k, 0.0), 0.0, paused=True)
+        tools.drag(view, (3.0 * k, 5.0))
+        tools.nudge(view)
+    assert view.frame.position[:, 1].tolist() == [5.0] * 5
+    assert np.allclose(view.frame.velocity, [0.6, 0.8], rtol=1e-15)  # a rounding

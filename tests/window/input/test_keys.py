@@ -1,4 +1,4 @@
-"""Keys: every binding that is promised, spelled out; claims; Ctrl; other layouts; held keys."""
+"""Keys: all documented bindings, keys claimed by scenes, modifiers, keyboard layouts and key repeat."""
 
 import pygame
 import pytest
@@ -71,7 +71,7 @@ def test_named_key_gives_its_command(code: int) -> None:
 
 
 @pytest.mark.parametrize("letter", "abcdefghijklmnopqrstuvwxyz0123456789-=.,[] ")
-def test_key_with_ctrl_gives_that_of_ctrl_or_nothing(letter: str) -> None:
+def test_key_with_ctrl_gives_only_ctrl_commands(letter: str) -> None:
     for mod in (pygame.KMOD_LCTRL, pygame.KMOD_RCTRL, pygame.KMOD_LCTRL | pygame.KMOD_CAPS):
         assert command_for(key(ord(letter), mod, unicode=letter)) == WITH_CTRL.get(letter)
 
@@ -96,19 +96,19 @@ def test_shift_and_b_add_a_box(mod: int) -> None:
     assert command_for(key(pygame.K_b, mod | pygame.KMOD_LALT, unicode="B")) is None
 
 
-def test_claimed_key_gives_nothing_but_the_global_ones_stay() -> None:
+def test_claimed_keys_give_no_command_except_global_ones() -> None:
     every = frozenset(code for binding in BINDINGS for code in binding.keys)
     kept = {code for code in every if command_for(key(code), every) is not None}
     assert kept == GLOBAL == {pygame.K_p, pygame.K_o, pygame.K_F1, pygame.K_ESCAPE}
 
 
-def test_claim_on_space_leaves_the_other_pause_key() -> None:
+def test_claim_on_space_leaves_p_as_pause_key() -> None:
     claimed = frozenset({pygame.K_SPACE})
     assert command_for(key(pygame.K_SPACE, unicode=" "), claimed) is None
     assert command_for(key(pygame.K_p, unicode="p"), claimed) == Command.PAUSE
 
 
-def test_claimed_punctuation_is_not_found_by_its_character() -> None:
+def test_claimed_punctuation_gives_no_command_by_its_character() -> None:
     assert command_for(key(pygame.K_PERIOD, unicode="."), frozenset({pygame.K_PERIOD})) is None
 
 
@@ -119,47 +119,47 @@ def test_claimed_letter_keeps_its_ctrl_command() -> None:
     assert command_for(key(pygame.K_l, CTRL), claimed) == Command.RELOAD
 
 
-def test_bracket_behind_altgr_is_the_bracket_and_not_its_digit() -> None:
+def test_bracket_typed_with_altgr_is_not_its_digit() -> None:
     for mod in (pygame.KMOD_MODE, pygame.KMOD_RALT, pygame.KMOD_LCTRL | pygame.KMOD_RALT):
         assert command_for(key(pygame.K_8, mod, unicode="[")) == Command.PREVIOUS
         assert command_for(key(pygame.K_9, mod, unicode="]")) == Command.NEXT
 
 
-def test_digit_of_a_french_board_is_found_by_its_character() -> None:
+def test_digit_of_a_french_keyboard_is_found_by_its_character() -> None:
     assert command_for(key(pygame.K_AMPERSAND, pygame.KMOD_LSHIFT, unicode="1")) == Command.SHAPES
 
 
-def test_equals_and_plus_of_a_german_board_make_it_faster() -> None:
+def test_equals_and_plus_of_a_german_keyboard_give_faster() -> None:
     assert command_for(key(pygame.K_0, pygame.KMOD_LSHIFT, unicode="=")) == Command.FASTER
     assert command_for(key(pygame.K_PLUS, unicode="+")) == Command.FASTER
 
 
-def test_letter_of_a_russian_board_is_found_by_its_place() -> None:
+def test_letter_of_a_russian_keyboard_is_found_by_its_scancode() -> None:
     assert command_for(key(ord("з"), unicode="з", scancode=pygame.KSCAN_P)) == Command.PAUSE
     assert command_for(key(ord("з"), CTRL, scancode=pygame.KSCAN_P)) == Command.SCREENSHOT
     assert command_for(key(ord("х"), unicode="х", scancode=pygame.KSCAN_LEFTBRACKET)) == Command.PREVIOUS
 
 
-def test_other_events_and_keys_give_nothing() -> None:
+def test_other_events_and_keys_give_no_command() -> None:
     assert command_for(key_up(pygame.K_p)) is None
     assert command_for(pygame.event.Event(pygame.MOUSEMOTION, pos=(0, 0))) is None
     assert command_for(key(pygame.K_F7)) is None
     assert command_for(key(pygame.K_q, unicode="q")) is None
 
 
-def test_every_command_has_a_binding_and_no_key_two() -> None:
+def test_every_command_has_a_binding_and_every_key_one_command() -> None:
     assert {binding.command for binding in BINDINGS} == set(Command)
     bound = [(code, binding.modifiers) for binding in BINDINGS for code in binding.keys]
     assert len(bound) == len(set(bound))
 
 
-def test_overlay_commands_are_the_overlays_in_their_order() -> None:
+def test_overlay_commands_follow_the_order_of_overlays() -> None:
     found = tuple(command.overlay for command in Command if command.overlay is not None)
     assert found == OVERLAYS
     assert Command.PAUSE.overlay is None
 
 
-def test_held_key_repeats_only_where_it_should() -> None:
+def test_only_step_and_speed_keys_repeat() -> None:
     repeating = {Command.STEP, Command.BACK, Command.SLOWER, Command.FASTER}
     for binding in BINDINGS:
         keyboard = Keyboard()
@@ -170,16 +170,16 @@ def test_held_key_repeats_only_where_it_should() -> None:
         assert keyboard.command(event) == binding.command
 
 
-def test_held_key_is_known_whoever_claims_it() -> None:
+def test_repeat_of_a_claimed_key_is_detected() -> None:
     keyboard, claimed = Keyboard(), frozenset({pygame.K_SPACE})
-    known = []
+    repeats = []
     for event in (key(pygame.K_SPACE), key(pygame.K_SPACE), key_up(pygame.K_SPACE), key(pygame.K_SPACE)):
         keyboard.command(event, claimed)
-        known.append(keyboard.is_repeat)
-    assert known == [False, True, True, False]
+        repeats.append(keyboard.is_repeat)
+    assert repeats == [False, True, True, False]
 
 
-def test_key_counts_as_new_after_the_focus_was_lost() -> None:
+def test_key_is_not_a_repeat_after_the_focus_was_lost() -> None:
     keyboard = Keyboard()
     keyboard.command(key(pygame.K_p))
     keyboard.command(FOCUS_LOST)

@@ -1,4 +1,4 @@
-"""Joints that break while they are watched: whole before, gone after, on every way to a moment."""
+"""Breaking joints in a live view: shown before their break and hidden after it, however a time is reached."""
 
 from collections.abc import Iterator
 
@@ -37,12 +37,12 @@ damping = 0.05
 mass = 0.1
 strength = 3.5
 """
-"""The uppermost threads bear 3 N in the end, and more as the cloth swings."""
+"""The uppermost threads carry 3 N at rest, and more while the cloth swings."""
 
 
 @pytest.fixture(autouse=True)
-def patient(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """No test depends on how fast the machine is."""
+def no_step_budget(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Remove the time budget of steps, so that no test depends on the speed of the machine."""
     monkeypatch.setattr(module, "MIN_STEP_BUDGET", 1e9)
     monkeypatch.setattr(module, "MAX_STEP_BUDGET", 1e9)
     return iter(())
@@ -52,72 +52,72 @@ def cloth() -> Scene:
     return loads(CLOTH)
 
 
-def shown(show: LiveView | RecordedView) -> Snapshot:
-    return show.snapshot(ALL)
+def snapshot(view: LiveView | RecordedView) -> Snapshot:
+    return view.snapshot(ALL)
 
 
-def at(show: LiveView, step: int) -> LiveView:
-    show.seek(step)
-    show.finish_seek()
-    return show
+def seek_to(view: LiveView, step: int) -> LiveView:
+    view.seek(step)
+    view.finish_seek()
+    return view
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
-def test_joints_are_seen_until_they_break_and_again_on_the_way_back(engine: str) -> None:
-    show = LiveView(Session(cloth(), engine))
-    assert len(shown(show).links) == len(cloth().links)
-    whole = [len(shown(at(show, step)).links) for step in range(0, 61, 5)]
-    assert whole[0] == len(cloth().links) > whole[-1]
-    assert whole == sorted(whole, reverse=True)
-    broke = show.session.break_times[np.isfinite(show.session.break_times)]
-    assert len(broke) == whole[0] - whole[-1]
+def test_joints_are_shown_until_they_break_and_again_after_seeking_back(engine: str) -> None:
+    view = LiveView(Session(cloth(), engine))
+    assert len(snapshot(view).links) == len(cloth().links)
+    joint_counts = [len(snapshot(seek_to(view, step)).links) for step in range(0, 61, 5)]
+    assert joint_counts[0] == len(cloth().links) > joint_counts[-1]
+    assert joint_counts == sorted(joint_counts, reverse=True)
+    break_times = view.session.break_times[np.isfinite(view.session.break_times)]
+    assert len(break_times) == joint_counts[0] - joint_counts[-1]
     for step in (10, 60, 0, 35):  # back and forth
-        assert len(shown(at(show, step)).links) == whole[step // 5]
-    at(show, 0).scrub(0.6)  # only looked at, from before it broke
-    assert len(shown(show).links) == whole[-1]
-    show.close()
+        assert len(snapshot(seek_to(view, step)).links) == joint_counts[step // 5]
+    seek_to(view, 0).scrub(0.6)  # scrubbed only: the session is at a time before the breaks
+    assert len(snapshot(view).links) == joint_counts[-1]
+    view.close()
 
 
-def test_energy_of_what_is_watched_leaves_out_what_broke() -> None:
-    show, found = at(LiveView(Session(cloth())), 60), run(cloth())
-    stored = RecordedView(RecordedRun(found))
+def test_energy_of_a_live_view_excludes_broken_joints() -> None:
+    view, trajectory = seek_to(LiveView(Session(cloth())), 60), run(cloth())
+    stored = RecordedView(RecordedRun(trajectory))
     stored.scrub(0.6)
-    assert show.energy() == pytest.approx(stored.energy(), rel=1e-12)  # the same frame, told twice
-    assert shown(show).links.names == shown(stored).links.names
-    assert len(shown(stored).links) < len(cloth().links)
-    show.close()
+    assert view.energy() == pytest.approx(stored.energy(), rel=1e-12)  # the same frame, computed twice
+    assert snapshot(view).links.names == snapshot(stored).links.names
+    assert len(snapshot(stored).links) < len(cloth().links)
+    view.close()
 
 
-def test_doing_something_else_forgets_what_broke_later() -> None:
-    show = at(LiveView(Session(cloth())), 60)
-    assert np.isfinite(show.session.break_times).any()
-    at(show, 0)
-    assert np.isfinite(show.session.break_times).any()  # it would go the same way
-    show.apply(Force(time=0.0, body="rag-16", force=(0.0, 0.5)))
-    assert not np.isfinite(show.session.break_times).any()
-    show.close()
+def test_action_in_the_past_discards_later_breaks() -> None:
+    view = seek_to(LiveView(Session(cloth())), 60)
+    assert np.isfinite(view.session.break_times).any()
+    seek_to(view, 0)
+    assert np.isfinite(view.session.break_times).any()  # seeking alone keeps the recorded future
+    view.apply(Force(time=0.0, body="rag-16", force=(0.0, 0.5)))
+    assert not np.isfinite(view.session.break_times).any()
+    view.close()
 
 
-def test_joints_hold_the_same_bodies_after_a_switch_that_left_some_behind() -> None:
-    show = at(LiveView(Session(cloth())), 60)
-    links = shown(show).links
-    show.apply(Switch(time=0.0, engine="reference"))
-    assert np.array_equal(shown(show).links.b, links.b)
-    assert len(shown(at(show, 0)).links) == len(cloth().links)
-    show.close()
+def test_joints_keep_their_bodies_after_an_engine_switch_without_broken_ones() -> None:
+    view = seek_to(LiveView(Session(cloth())), 60)
+    links = snapshot(view).links
+    view.apply(Switch(time=0.0, engine="reference"))
+    assert np.array_equal(snapshot(view).links.b, links.b)
+    assert len(snapshot(seek_to(view, 0)).links) == len(cloth().links)
+    view.close()
 
 
-def test_breaks_are_told_at_once_and_then_once_a_second() -> None:
-    show = LiveView(Session(cloth()))
+def test_breaks_are_notified_at_once_and_then_once_a_second() -> None:
+    view = LiveView(Session(cloth()))
     for _ in range(60):
-        show.update(0.01, paused=False)
-    told = [text for _, text in show.notifications if text.endswith("broke")]
-    assert len(told) == 1
-    show.close()
+        view.update(0.01, paused=False)
+    notifications = [text for _, text in view.notifications if text.endswith("broke")]
+    assert len(notifications) == 1
+    view.close()
 
 
-def test_film_refuses_a_run_with_other_joints_than_its_scene() -> None:
-    found = run(cloth())
-    odd = Trajectory(**{**vars(found), "broken_time": np.full(3, np.nan)})
+def test_recorded_run_refuses_joints_that_differ_from_the_scene() -> None:
+    trajectory = run(cloth())
+    mismatched = Trajectory(**{**vars(trajectory), "broken_time": np.full(3, np.nan)})
     with pytest.raises(SceneError, match="broken_time: the run had 3 joints"):
-        RecordedRun(odd)
+        RecordedRun(mismatched)

@@ -1,4 +1,4 @@
-"""Flames: which thrusts fire, where, which way and how long."""
+"""Flames of thrusters: which are active, and their position, direction and length."""
 
 import math
 
@@ -19,7 +19,7 @@ SHIP = """
 title = "Ship"
 [[polygon]]
 name = "ship"
-points = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]   # the centre of mass lies at (1, 1)
+points = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]   # the centre of mass is at (1, 1)
 angle = 0.5
 [[thrust]]
 name = "main"
@@ -36,29 +36,30 @@ begin = 1.0
 end = 2.0
 """
 SCENE = loads(SHIP)
-REACH = math.sqrt(2.0)  # m, from the middle of a square of 2 m to its corner
+REACH = math.sqrt(2.0)  # m, from the centre of a square of 2 m to its corner
 
 
 def throttle(level: float) -> dict[str, Throttle]:
     return {"main": Throttle(time=0.0, thrust="main", level=level)}
 
 
-def test_thrust_with_a_key_burns_as_far_as_it_is_open() -> None:
+def test_flame_of_a_throttled_thrust_scales_with_its_level() -> None:
     assert active_thrusters(SCENE, SCENE.bodies, {}, 0.0) == ()
     assert active_thrusters(SCENE, SCENE.bodies, throttle(0.0), 0.0) == ()
     (flame,) = active_thrusters(SCENE, SCENE.bodies, throttle(0.25), 0.0)
     assert flame.body == 0
-    assert flame.place == pytest.approx((-1.0, 0.0))  # seen from the centre of mass
-    assert flame.way == pytest.approx((-0.5 * LONG * REACH, 0.0))  # against the force, by the root of 0.25
+    assert flame.place == pytest.approx((-1.0, 0.0))  # relative to the centre of mass
+    # Against the force; the length is proportional to the square root of 0.25.
+    assert flame.way == pytest.approx((-0.5 * LONG * REACH, 0.0))
 
 
-def test_thrust_of_a_time_burns_then() -> None:
+def test_timed_thrust_has_a_flame_only_in_its_interval() -> None:
     assert [len(active_thrusters(SCENE, SCENE.bodies, {}, time)) for time in (0.99, 1.0, 1.99, 2.0)] == [0, 1, 1, 0]
     (flame,) = active_thrusters(SCENE, SCENE.bodies, {}, 1.0)
-    assert flame.way == pytest.approx((0.0, -0.5 * LONG * REACH))  # a fourth of the strongest force
+    assert flame.way == pytest.approx((0.0, -0.5 * LONG * REACH))  # a quarter of the strongest force
 
 
-def test_window_shows_what_fires() -> None:
+def test_snapshot_of_a_live_view_contains_active_flames() -> None:
     live = LiveView(Session(SCENE))
     assert live.snapshot(frozenset({"shapes"})).flames == ()
     live.apply(Throttle(time=0.0, thrust="main", level=1.0))
@@ -67,7 +68,7 @@ def test_window_shows_what_fires() -> None:
     live.close()
 
 
-def test_flame_is_drawn_behind_the_nozzle_and_turns_with_the_body() -> None:
+def test_flame_is_drawn_behind_the_nozzle_and_rotates_with_the_body() -> None:
     pygame.font.init()
     surface = pygame.Surface((400, 400))
     camera = Camera((1.0, 1.0), 40.0, (400, 400))
@@ -78,8 +79,8 @@ def test_flame_is_drawn_behind_the_nozzle_and_turns_with_the_body() -> None:
     orange = np.abs(pygame.surfarray.array3d(surface).astype(int) - ORANGE).sum(axis=2) < 10
     centre = live.frame.position[0]
     along = np.array((math.cos(0.5), math.sin(0.5)))
-    for share, there in ((0.9, True), (1.2, False)):  # of its length behind the body's edge
-        place = centre - along * (1.0 + share * LONG * REACH)
-        x, y = camera.to_screen(place[None])[0].round().astype(int)
-        assert orange[x - 3 : x + 4, y - 3 : y + 4].any() == there
+    for fraction, is_flame in ((0.9, True), (1.2, False)):  # of its length behind the edge of the body
+        point = centre - along * (1.0 + fraction * LONG * REACH)
+        x, y = camera.to_screen(point[None])[0].round().astype(int)
+        assert orange[x - 3 : x + 4, y - 3 : y + 4].any() == is_flame
     live.close()

@@ -1,4 +1,4 @@
-"""History: what was seen, within its memory, and the checkpoints."""
+"""History of frames within a memory budget, and keyframes."""
 
 from itertools import pairwise
 
@@ -27,19 +27,19 @@ def frame(time: float, bodies: int = 1) -> Frame:
     return Frame(time, two.copy(), two.copy(), one.copy(), one.copy(), np.ones(bodies, np.bool_))
 
 
-def point() -> Checkpoint:
+def checkpoint() -> Checkpoint:
     return SwitchableSimulation(from_document({"ball": [{"position": [0, 0], "radius": 1}]})).checkpoint()
 
 
-def filled(steps: int, dt: float = 0.01) -> History:
+def filled_history(steps: int, dt: float = 0.01) -> History:
     history = History()
     for k in range(steps):
         history.store(k, frame(k * dt))
     return history
 
 
-def test_what_is_kept_is_known_and_stays_as_it_was() -> None:
-    history = filled(5)
+def test_stored_frames_are_returned_and_not_overwritten() -> None:
+    history = filled_history(5)
     first = history.get(3)
     history.store(3, frame(99.0))
     assert history.get(3) is first
@@ -49,7 +49,7 @@ def test_what_is_kept_is_known_and_stays_as_it_was() -> None:
     assert (history.next_stored(2), history.next_stored(4)) == (3, None)
 
 
-def test_empty_history_has_nothing() -> None:
+def test_empty_history_has_no_frames_and_no_keyframes() -> None:
     history = History()
     assert (history.last_step, history.end_time, history.keyframe_steps, history.keyframe_times) == (0, 0.0, (), ())
     assert history.get(0) is None
@@ -62,36 +62,36 @@ def test_empty_history_has_nothing() -> None:
 @pytest.mark.parametrize(
     ("time", "step"), [(-1.0, 0), (0.0, 0), (0.014, 1), (0.016, 2), (0.03, 3), (0.04, 4), (99.0, 4)]
 )
-def test_nearest_state_is_found(time: float, step: int) -> None:
-    history = filled(5)
+def test_nearest_frame_by_time(time: float, step: int) -> None:
+    history = filled_history(5)
     found, state = history.nearest(time)
     assert found == step
     assert state is history.get(step)
 
 
 @given(st.integers(1, 40), st.integers(2, 400))
-def test_memory_stays_within_its_budget_and_first_and_last_stay(most: int, steps: int) -> None:
+def test_history_stays_within_its_budget_and_keeps_first_and_last_frame(max_frames: int, steps: int) -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "MAX_BYTES", most * (100 * BYTES_PER_BODY + BYTES_PER_FRAME))
+        patch.setattr(module, "MAX_BYTES", max_frames * (100 * BYTES_PER_BODY + BYTES_PER_FRAME))
         history = History()
         for k in range(steps):
             history.store(k, frame(float(k), 100))
             known = [j for j in range(k + 1) if history.get(j) is not None]
-            assert len(known) <= max(most, 2)
+            assert len(known) <= max(max_frames, 2)
             assert known[0] == 0
             assert known[-1] == k == history.last_step
 
 
-def test_what_was_long_ago_is_thinned_out_first(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_old_frames_are_thinned_first(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "MAX_BYTES", 64 * (BYTES_PER_BODY + BYTES_PER_FRAME))
-    history = filled(300)
+    history = filled_history(300)
     known = [k for k in range(300) if history.get(k) is not None]
     gaps = [b - a for a, b in pairwise(known)]
     assert gaps[0] > gaps[-1] == 1
     assert gaps == sorted(gaps, reverse=True)
 
 
-def test_hundred_thousand_bodies_keep_within_256_megabytes() -> None:
+def test_history_of_a_hundred_thousand_bodies_stays_within_256_megabytes() -> None:
     one = frame(0.0, 100_000)
     history = History()
     for k in range(200):
@@ -99,10 +99,10 @@ def test_hundred_thousand_bodies_keep_within_256_megabytes() -> None:
     assert sum(history.get(k) is not None for k in range(200)) * 100_000 * BYTES_PER_BODY <= module.MAX_BYTES
 
 
-def test_cut_forgets_what_came_later_and_makes_room_for_it() -> None:
-    history = filled(10)
+def test_truncate_discards_later_frames_and_keyframes() -> None:
+    history = filled_history(10)
     for step in (2, 5, 8):
-        history.add_keyframe(Keyframe(step, 0, point()))
+        history.add_keyframe(Keyframe(step, 0, checkpoint()))
     history.truncate(5)
     assert history.last_step == 5
     assert history.keyframe_steps == (2, 5)
@@ -113,44 +113,46 @@ def test_cut_forgets_what_came_later_and_makes_room_for_it() -> None:
     assert history.keyframe_steps == ()
 
 
-def test_checkpoints_stand_apart_and_are_found() -> None:
+def test_keyframes_keep_a_minimum_interval_and_are_found() -> None:
     history = History()
     for k in range(200):
         history.store(k, frame(float(k)))
         if history.wants_keyframe(k):
-            history.add_keyframe(Keyframe(k, 0, point()))
+            history.add_keyframe(Keyframe(k, 0, checkpoint()))
     assert len(history.keyframe_steps) >= 5
     assert all(b - a >= MIN_KEYFRAME_INTERVAL for a, b in pairwise((0, *history.keyframe_steps)))
     for step in (0, 40, 100, 199):
-        mark = history.keyframe_before(step)
-        assert (mark.step if mark else None) == max((m for m in history.keyframe_steps if m <= step), default=None)
+        keyframe = history.keyframe_before(step)
+        assert (keyframe.step if keyframe else None) == max(
+            (m for m in history.keyframe_steps if m <= step), default=None
+        )
 
 
-def test_checkpoints_are_no_more_than_there_may_be_and_go_on_over_all_time() -> None:
+def test_keyframes_are_limited_in_number_and_span_all_time() -> None:
     history = History()
     for k in range(0, 10_000, 10):
-        history.add_keyframe(Keyframe(k, 0, point_of_nothing))
+        history.add_keyframe(Keyframe(k, 0, empty_checkpoint))
     assert len(history.keyframe_steps) <= MAX_KEYFRAMES
     assert list(history.keyframe_steps) == sorted(history.keyframe_steps)
     assert history.keyframe_steps[0] == 0
     assert history.keyframe_steps[-1] == 9990
 
 
-point_of_nothing = point()
+empty_checkpoint = checkpoint()
 
 
-def test_distrust_is_for_good() -> None:
-    history = filled(100)
-    history.add_keyframe(Keyframe(50, 0, point()))
+def test_disabled_checkpoints_stay_disabled() -> None:
+    history = filled_history(100)
+    history.add_keyframe(Keyframe(50, 0, checkpoint()))
     history.disable_checkpoints()
     assert history.keyframe_steps == ()
     assert not history.wants_keyframe(99)
 
 
-def test_action_that_is_put_in_counts_for_its_step_and_all_later() -> None:
-    history = filled(100)
+def test_inserted_action_is_counted_by_keyframes_from_its_step_on() -> None:
+    history = filled_history(100)
     for step, actions in ((10, 1), (40, 2), (70, 2)):
-        history.add_keyframe(Keyframe(step, actions, point()))
+        history.add_keyframe(Keyframe(step, actions, checkpoint()))
     history.count_inserted_action(40)
     found = [history.keyframe_before(step) for step in (10, 40, 70)]
-    assert [mark.actions for mark in found if mark is not None] == [1, 3, 3]
+    assert [keyframe.actions for keyframe in found if keyframe is not None] == [1, 3, 3]

@@ -1,4 +1,4 @@
-"""Live: a session driven by real time; and stored runs, which are driven alike but cannot be changed."""
+"""Views driven by real time: live sessions, and stored runs, which cannot be changed."""
 
 from typing import Any
 
@@ -15,7 +15,6 @@ from sandbox.scene.description.discs import Ball
 from sandbox.scene.files.load import from_document, load
 from sandbox.scene.files.shipped_scenes import find
 from sandbox.trajectory import Trajectory
-from sandbox.window.playback import live as journey
 from sandbox.window.playback import live as module
 from sandbox.window.playback.live import LiveView
 from sandbox.window.playback.recorded import RecordedRun, RecordedView
@@ -27,8 +26,8 @@ ALL = frozenset({"shapes", "trails", "contacts"})
 
 
 @pytest.fixture(autouse=True)
-def patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No test depends on how fast the machine is."""
+def no_step_budget(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Remove the time budget of steps, so that no test depends on the speed of the machine."""
     monkeypatch.setattr(module, "MIN_STEP_BUDGET", 1e9)
     monkeypatch.setattr(module, "MAX_STEP_BUDGET", 1e9)
 
@@ -41,254 +40,254 @@ def live(name: str = "bounce", engine: str = "pymunk") -> LiveView:
     return LiveView(Session(load(find(name)), engine))
 
 
-def arrived(show: LiveView) -> LiveView:
-    while show.busy is not None:
-        show.update(1 / 60, paused=True)
-    return show
+def wait_for_seek(view: LiveView) -> LiveView:
+    while view.busy is not None:
+        view.update(1 / 60, paused=True)
+    return view
 
 
-def test_real_time_makes_steps() -> None:
-    show = live()
+def test_steps_follow_real_time() -> None:
+    view = live()
     for k in range(1, 61):
-        show.update(1 / 60, paused=False)
-        assert show.session.time == pytest.approx(k / 60, abs=0.001)  # up to a step
-    frame = show.snapshot(ALL).frame
-    assert show.session.previous.time <= frame.time <= show.session.time
-    assert frame.time == pytest.approx(show.session.time - 0.001 + 0.001 * show.alpha, abs=1e-12)  # rounding
+        view.update(1 / 60, paused=False)
+        assert view.session.time == pytest.approx(k / 60, abs=0.001)  # up to a step
+    frame = view.snapshot(ALL).frame
+    assert view.session.previous.time <= frame.time <= view.session.time
+    assert frame.time == pytest.approx(view.session.time - 0.001 + 0.001 * view.alpha, abs=1e-12)  # rounding
 
 
-def test_pause_stands_still_and_a_step_is_one_step() -> None:
-    show = live()
-    show.update(0.05, paused=False)
-    step = show.step_number
-    show.update(9.0, paused=True)
-    assert show.step_number == step
-    show.step()
-    assert show.step_number == step + 1
-    show.step_back()
-    arrived(show)
-    assert show.step_number == step
-    show.update(9.0, paused=False)
-    assert show.step_number <= step + 100  # 0.1 s at most after a pause of the machine
-    assert show.step_number >= step + 99
+def test_pause_makes_no_steps_and_single_steps_make_one() -> None:
+    view = live()
+    view.update(0.05, paused=False)
+    step = view.step_number
+    view.update(9.0, paused=True)
+    assert view.step_number == step
+    view.step()
+    assert view.step_number == step + 1
+    view.step_back()
+    wait_for_seek(view)
+    assert view.step_number == step
+    view.update(9.0, paused=False)
+    assert view.step_number <= step + 100  # at most 0.1 s per update
+    assert view.step_number >= step + 99
 
 
 def test_slow_motion_makes_fewer_steps() -> None:
-    show = live()
+    view = live()
     for _ in range(10):
-        show.clock.slower()
+        view.clock.slower()
     for _ in range(60):
-        show.update(1 / 60, paused=False)
-    assert show.session.time == pytest.approx(0.1, abs=0.001)  # up to a step
+        view.update(1 / 60, paused=False)
+    assert view.session.time == pytest.approx(0.1, abs=0.001)  # up to a step
 
 
-def test_machine_that_is_too_slow_drops_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MIN_STEP_BUDGET", -1.0)  # one step is made, then it is late already
+def test_steps_beyond_the_time_budget_are_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MIN_STEP_BUDGET", -1.0)  # the budget is exceeded after one step
     monkeypatch.setattr(module, "MAX_STEP_BUDGET", -1.0)
-    show = live()
+    view = live()
     for _ in range(20):
-        before = show.step_number
-        show.update(0.05, paused=False)
-        assert 1 <= show.step_number - before <= 2
-    assert show.clock.real_speed < 0.1
+        before = view.step_number
+        view.update(0.05, paused=False)
+        assert 1 <= view.step_number - before <= 2
+    assert view.clock.real_speed < 0.1
 
 
-def test_recorded_part_ends_in_a_pause_once() -> None:
+def test_end_of_a_recording_requests_a_pause_once() -> None:
     first = Session(bounce())
     first.advance(100)
     first.apply(Impulse(time=0.0, body="ball", impulse=(1.0, 0.0)))
     first.advance(50)
     recording = first.recording()
-    show = LiveView(Session(bounce(), actions=recording.actions), until=recording.duration)
+    view = LiveView(Session(bounce(), actions=recording.actions), until=recording.duration)
     for _ in range(9):
-        show.update(0.03, paused=False)
-        if show.wants_pause:
+        view.update(0.03, paused=False)
+        if view.wants_pause:
             break
-    assert show.wants_pause
-    assert show.session.simulation.state_hash() == recording.state_hash
-    show.wants_pause = False
-    show.update(0.03, paused=False)
-    assert not show.wants_pause
-    assert show.step_number > 150
-    assert len(show.notifications) == 1
+    assert view.wants_pause
+    assert view.session.simulation.state_hash() == recording.state_hash
+    view.wants_pause = False
+    view.update(0.03, paused=False)
+    assert not view.wants_pause
+    assert view.step_number > 150
+    assert len(view.notifications) == 1
 
 
-def test_scrub_looks_and_settle_goes_there() -> None:
-    show = live()
+def test_scrub_shows_a_frame_and_commit_moves_the_session_there() -> None:
+    view = live()
     for _ in range(150):
-        show.step()
-    here = show.session.frame
-    show.scrub(0.0504)
-    assert show.step_number == 50
-    assert show.frame.time == pytest.approx(0.05, rel=1e-12)  # rounding
-    assert show.session.frame is here
-    assert show.snapshot(ALL).frame is show.frame
-    show.scrub(-9.0)
-    assert show.step_number == 0
-    show.scrub(99.0)
-    assert show.step_number == 150
-    show.commit_scrub()
-    assert show.busy is None
-    show.scrub(0.07)
-    seen = show.frame.state_hash()
-    show.commit_scrub()
-    arrived(show)
-    assert (show.session.step_number, show.session.frame.state_hash()) == (70, seen)
-    show.commit_scrub()
-    assert show.end_time == pytest.approx(0.15, rel=1e-12)  # rounding
+        view.step()
+    current = view.session.frame
+    view.scrub(0.0504)
+    assert view.step_number == 50
+    assert view.frame.time == pytest.approx(0.05, rel=1e-12)  # rounding
+    assert view.session.frame is current
+    assert view.snapshot(ALL).frame is view.frame
+    view.scrub(-9.0)
+    assert view.step_number == 0
+    view.scrub(99.0)
+    assert view.step_number == 150
+    view.commit_scrub()
+    assert view.busy is None
+    view.scrub(0.07)
+    scrubbed = view.frame.state_hash()
+    view.commit_scrub()
+    wait_for_seek(view)
+    assert (view.session.step_number, view.session.frame.state_hash()) == (70, scrubbed)
+    view.commit_scrub()
+    assert view.end_time == pytest.approx(0.15, rel=1e-12)  # rounding
 
 
-def test_scrub_shows_walls_as_they_were_then() -> None:
-    """Also while the session stands before or behind that time; and each time is one scene, which is drawn once."""
+def test_scrub_shows_walls_of_that_time() -> None:
+    """The session may be before or after that time; equal times share one scene object, so that it is cached."""
     shelf = {"name": "shelf", "points": [[-1, 0], [1, 0]]}
     ball = {"name": "ball", "position": [0, 5.0], "radius": 0.1}
-    show = LiveView(Session(from_document({"ball": [ball], "wall": [shelf]}), "pymunk"))
-    courses = [((-1.0, 0.0), (1.0, 0.0))]
+    view = LiveView(Session(from_document({"ball": [ball], "wall": [shelf]}), "pymunk"))
+    outlines = [((-1.0, 0.0), (1.0, 0.0))]
     for k in (1.0, 2.0):
-        show.step()
-        courses.append(((-1.0, k), (1.0, k)))
-        show.apply(Reshape(time=0.0, thing="shelf", points=courses[-1]))
-        show.apply(Toggle(time=0.0, thing="shelf", solid=k == 2.0))
-    show.step()
-    dt = show.settings.dt
-    for stand in (3, 0, 2):
-        show.seek(stand)
-        arrived(show)
-        seen = []
+        view.step()
+        outlines.append(((-1.0, k), (1.0, k)))
+        view.apply(Reshape(time=0.0, thing="shelf", points=outlines[-1]))
+        view.apply(Toggle(time=0.0, thing="shelf", solid=k == 2.0))
+    view.step()
+    dt = view.settings.dt
+    for session_step in (3, 0, 2):
+        view.seek(session_step)
+        wait_for_seek(view)
+        scenes = []
         for step in (0, 1, 2, 3, 0):
-            show.scrub(step * dt)
-            seen.append(show.snapshot(ALL).scene)
-            assert (seen[-1].walls[0].points, seen[-1].walls[0].solid) == (courses[min(step, 2)], step != 1)
-        assert seen[0] is seen[-1]
-        assert show.snapshot(ALL).scene is seen[0]
-    show.commit_scrub()
-    arrived(show)
-    assert show.snapshot(ALL).scene is show.scene
+            view.scrub(step * dt)
+            scenes.append(view.snapshot(ALL).scene)
+            assert (scenes[-1].walls[0].points, scenes[-1].walls[0].solid) == (outlines[min(step, 2)], step != 1)
+        assert scenes[0] is scenes[-1]
+        assert view.snapshot(ALL).scene is scenes[0]
+    view.commit_scrub()
+    wait_for_seek(view)
+    assert view.snapshot(ALL).scene is view.scene
 
 
-def test_scrub_shows_bodies_that_have_not_come_yet() -> None:
-    """The session has gone back to before they were added; what came later was seen all the same."""
-    show = live()
+def test_scrub_shows_bodies_spawned_later_than_the_session_time() -> None:
+    """The session has been set back to before they were added; later frames are still in the history."""
+    view = live()
     for k in range(3):
-        show.step()
-        show.apply(Spawn(time=0.0, ball=Ball(position=(3.0 * k + 3.0, 5.0), radius=0.25, mass=2.0)))
-    show.step()
-    show.seek(1)
-    arrived(show)
-    assert (len(show.bodies), show.bodies.names) == (2, ("ball", "spawned-2"))
+        view.step()
+        view.apply(Spawn(time=0.0, ball=Ball(position=(3.0 * k + 3.0, 5.0), radius=0.25, mass=2.0)))
+    view.step()
+    view.seek(1)
+    wait_for_seek(view)
+    assert (len(view.bodies), view.bodies.names) == (2, ("ball", "spawned-2"))
     for time, count in ((1.0, 4), (0.002, 3), (0.0, 1), (1.0, 4)):
-        show.scrub(time)
-        sight = show.snapshot(ALL)
-        assert len(sight.frame.position) == count
-        assert len(sight.bodies) >= count
-        assert sight.bodies.radius[1:].tolist() == [0.25] * (len(sight.bodies) - 1)
-        assert all(np.isfinite(show.energy()))
-    show.commit_scrub()
-    arrived(show)
-    assert len(show.session.bodies) == 4
+        view.scrub(time)
+        snapshot = view.snapshot(ALL)
+        assert len(snapshot.frame.position) == count
+        assert len(snapshot.bodies) >= count
+        assert snapshot.bodies.radius[1:].tolist() == [0.25] * (len(snapshot.bodies) - 1)
+        assert all(np.isfinite(view.energy()))
+    view.commit_scrub()
+    wait_for_seek(view)
+    assert len(view.session.bodies) == 4
 
 
-def test_on_the_way_nothing_can_be_done(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(journey, "SEEK_BUDGET", -1.0)  # no part of the way at once
-    show = live("gas")
+def test_actions_during_a_seek_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "SEEK_BUDGET", -1.0)  # the seek makes no progress within a call
+    view = live("gas")
     for _ in range(100):
-        show.step()
-    show.seek(50)
-    assert show.busy == "replaying 0%"
+        view.step()
+    view.seek(50)
+    assert view.busy == "replaying 0%"
     for _ in range(2):
         with pytest.raises(ActionError, match="wait"):
-            show.apply(Remove(time=0.0, body="atom-1"))
+            view.apply(Remove(time=0.0, body="atom-1"))
         with pytest.raises(ActionError, match="wait"):
-            show.switch_engine("exact")
-        show.step_back()  # is not heard
-    show.seek(20)  # another one before the first is done
-    show.seek(99)
-    monkeypatch.setattr(journey, "SEEK_BUDGET", 1e9)
-    show.update(1.0, paused=False)
-    assert show.busy is None
-    assert show.step_number == 99
-    show.apply(Remove(time=0.0, body="atom-1"))
+            view.switch_engine("exact")
+        view.step_back()  # ignored
+    view.seek(20)  # a second seek before the first is finished
+    view.seek(99)
+    monkeypatch.setattr(module, "SEEK_BUDGET", 1e9)
+    view.update(1.0, paused=False)
+    assert view.busy is None
+    assert view.step_number == 99
+    view.apply(Remove(time=0.0, body="atom-1"))
 
 
-def test_session_that_ended_says_so_once_and_again_after_going_back() -> None:
+def test_end_of_a_session_is_notified_once_and_again_after_seeking_back() -> None:
     ball = {"name": "a", "position": [9.9e15, 0], "radius": 1, "velocity": [1e12, 0]}
-    show = LiveView(Session(from_document({"ball": [ball], "solver": {"dt": 10.0}}), "reference"))
-    show.session.advance(9010)
+    view = LiveView(Session(from_document({"ball": [ball], "solver": {"dt": 10.0}}), "reference"))
+    view.session.advance(9010)
     for _ in range(3):
-        show.step()
-    assert [level for level, _ in show.notifications] == ["error"]
-    show.update(1.0, paused=False)
-    assert show.step_number == 9011
-    show.notifications.clear()
-    show.step_back()
-    arrived(show)
-    assert show.step_number == 9010
-    show.step()
-    assert [level for level, _ in show.notifications] == ["error"]
-    show.seek(9999)
-    arrived(show)
-    assert show.step_number == 9011
-    show.seek(0)
-    arrived(show)
-    assert show.session.ended is None
+        view.step()
+    assert [level for level, _ in view.notifications] == ["error"]
+    view.update(1.0, paused=False)
+    assert view.step_number == 9011
+    view.notifications.clear()
+    view.step_back()
+    wait_for_seek(view)
+    assert view.step_number == 9010
+    view.step()
+    assert [level for level, _ in view.notifications] == ["error"]
+    view.seek(9999)
+    wait_for_seek(view)
+    assert view.step_number == 9011
+    view.seek(0)
+    wait_for_seek(view)
+    assert view.session.ended is None
 
 
-def test_way_that_leads_elsewhere_is_left_while_playing() -> None:
-    """A checkpoint of `exact` rounds otherwise: what is seen then is what was seen before all the same."""
-    show = live("newtons_cradle", "exact")
+def test_replay_from_a_checkpoint_shows_the_recorded_frames() -> None:
+    """A checkpoint of `exact` rounds differently; the recorded frames are shown nevertheless."""
+    view = live("newtons_cradle", "exact")
     for _ in range(200):
-        show.step()
-    seen = {k: show.session.history.get(k) for k in range(201)}
-    for step in show.session.history.keyframe_steps or (60,):
-        show.seek(step)
-        arrived(show)
-        while show.step_number < min(step + 20, 200):
-            show.step()
-            arrived(show)
-            known = seen[show.step_number]
+        view.step()
+    frames = {k: view.session.history.get(k) for k in range(201)}
+    for step in view.session.history.keyframe_steps or (60,):
+        view.seek(step)
+        wait_for_seek(view)
+        while view.step_number < min(step + 20, 200):
+            view.step()
+            wait_for_seek(view)
+            known = frames[view.step_number]
             assert known is not None
-            assert show.frame.state_hash() == known.state_hash()
+            assert view.frame.state_hash() == known.state_hash()
 
 
-def test_relaunch_is_another_firework_each_time_and_can_be_replayed() -> None:
-    show, places = live("fireworks"), []
-    begin = show.frame.velocity.copy()
+def test_relaunch_differs_each_time_and_replays() -> None:
+    view, velocities = live("fireworks"), []
+    begin = view.frame.velocity.copy()
     for _ in range(3):
         for _ in range(5):
-            show.step()
-        show.relaunch("spark")
-        places.append(show.frame.velocity.copy())
-        assert not np.array_equal(places[-1], begin)
-    assert not np.array_equal(places[0], places[1])
-    recording = show.session.recording()
+            view.step()
+        view.relaunch("spark")
+        velocities.append(view.frame.velocity.copy())
+        assert not np.array_equal(velocities[-1], begin)
+    assert not np.array_equal(velocities[0], velocities[1])
+    recording = view.session.recording()
     assert rerun(recording).info["state_hash"] == recording.state_hash
     with pytest.raises(ActionError, match="no generator"):
-        show.relaunch("zzz")
+        view.relaunch("zzz")
 
 
-def test_switch_while_pulling_goes_on_pulling() -> None:
-    show = LiveView(Session(from_document({"ball": [{"name": "a", "position": [0, 0], "radius": 1}]})))
-    show.apply(Pull(time=0.0, body="a", target=(2.0, 0.0)))
+def test_engine_switch_keeps_an_active_pull() -> None:
+    view = LiveView(Session(from_document({"ball": [{"name": "a", "position": [0, 0], "radius": 1}]})))
+    view.apply(Pull(time=0.0, body="a", target=(2.0, 0.0)))
     for engine in ("exact", "reference", "pymunk"):
-        show.step()
-        assert show.switch_engine(engine) is None
-        assert show.engine == engine
+        view.step()
+        assert view.switch_engine(engine) is None
+        assert view.engine == engine
     for _ in range(150):
-        show.step()
-    assert show.frame.position[0] == pytest.approx([2.0, 0.0], abs=1e-9)  # (1 + ωt)·e^{−ωt}
+        view.step()
+    assert view.frame.position[0] == pytest.approx([2.0, 0.0], abs=1e-9)  # (1 + ωt)·e^{−ωt}
 
 
-def test_overlap_colours_are_those_of_the_scene_that_asks_for_them() -> None:
-    show = live("circle_half_plane")
-    assert show.snapshot(ALL).overlapping is not None
-    show.apply(Move(time=0.0, body="circle", position=(0.0, 0.5)))
-    over = show.snapshot(ALL).overlapping
-    assert over is not None
-    assert over.tolist() == [True]
+def test_overlaps_are_computed_only_for_scenes_that_request_them() -> None:
+    view = live("circle_half_plane")
+    assert view.snapshot(ALL).overlapping is not None
+    view.apply(Move(time=0.0, body="circle", position=(0.0, 0.5)))
+    overlapping = view.snapshot(ALL).overlapping
+    assert overlapping is not None
+    assert overlapping.tolist() == [True]
     assert live().snapshot(ALL).overlapping is None
 
 
-ODD: list[dict[str, Any]] = [
+EDGE_CASES: list[dict[str, Any]] = [
     {"title": "empty"},
     {"plane": [{"point": [0, 0], "normal": [0, 1]}]},
     {"ball": [{"name": "a", "position": [0, 0], "radius": 1, "fixed": True}]},
@@ -299,7 +298,7 @@ ODD: list[dict[str, Any]] = [
     {"ball": [{"name": "a", "position": [0, 0], "radius": 1}], "solver": {"dt": 10.0}, "world": {"duration": 0.1}},
 ]
 
-moves = st.one_of(
+operations = st.one_of(
     st.tuples(st.just("go"), st.floats(0.0, 0.2)),
     st.tuples(
         st.sampled_from(["step", "step_back", "commit_scrub", "slower", "faster", "ghost", "trust"]), st.just(0.0)
@@ -308,7 +307,7 @@ moves = st.one_of(
     st.tuples(st.just("act"), st.floats(0.0, 4.9)),
     st.tuples(st.just("switch"), st.floats(0.0, 2.9)),
 )
-DEEDS: list[Action] = [
+ACTIONS: list[Action] = [
     Impulse(time=0.0, body="a", impulse=(0.1, 0.4)),
     Pull(time=0.0, body="a", target=(0.5, 0.5)),
     Pull(time=0.0, body="a"),
@@ -317,125 +316,127 @@ DEEDS: list[Action] = [
 ]
 
 
-@pytest.mark.parametrize("which", range(len(ODD)))
-@given(plan=st.lists(moves, max_size=15), engine=st.sampled_from(["pymunk", "reference", "exact"]))
+@pytest.mark.parametrize("index", range(len(EDGE_CASES)))
+@given(plan=st.lists(operations, max_size=15), engine=st.sampled_from(["pymunk", "reference", "exact"]))
 @settings(max_examples=30)
-def test_odd_scenes_can_be_played_in_any_order(which: int, plan: list[tuple[str, float]], engine: str) -> None:
-    show = LiveView(Session(from_document(ODD[which]), engine))
+def test_edge_case_scenes_support_any_order_of_operations(
+    index: int, plan: list[tuple[str, float]], engine: str
+) -> None:
+    view = LiveView(Session(from_document(EDGE_CASES[index]), engine))
     for kind, number in plan:
         try:
             match kind:
                 case "go":
-                    show.update(number, paused=False)
+                    view.update(number, paused=False)
                 case "step" | "step_back" | "commit_scrub":
-                    getattr(show, kind)()
+                    getattr(view, kind)()
                 case "slower" | "faster":
-                    getattr(show.clock, kind)()
+                    getattr(view.clock, kind)()
                 case "ghost":
-                    show.diagnostics.show_ghost(not show.diagnostics.has_ghost)
+                    view.diagnostics.show_ghost(not view.diagnostics.has_ghost)
                 case "trust":
-                    show.diagnostics.watch_divergence(show.diagnostics.divergence is None)
+                    view.diagnostics.watch_divergence(view.diagnostics.divergence is None)
                 case "scrub":
-                    show.scrub(number)
+                    view.scrub(number)
                 case "seek":
-                    show.seek(int(number * 20))
+                    view.seek(int(number * 20))
                 case "switch":
-                    show.switch_engine(("pymunk", "reference", "exact")[int(number)])
+                    view.switch_engine(("pymunk", "reference", "exact")[int(number)])
                 case _:
-                    show.apply(DEEDS[int(number)])
+                    view.apply(ACTIONS[int(number)])
         except ActionError as error:
             assert str(error)
-        sight = show.snapshot(ALL)
-        assert len(sight.frame.position) <= len(show.bodies) or show.session.frame is not show.frame
-        assert np.isfinite(sight.frame.position).all()
-        assert all(np.isfinite(show.energy()))
-    arrived(show)
-    recording = show.session.recording()
+        snapshot = view.snapshot(ALL)
+        assert len(snapshot.frame.position) <= len(view.bodies) or view.session.frame is not view.frame
+        assert np.isfinite(snapshot.frame.position).all()
+        assert all(np.isfinite(view.energy()))
+    wait_for_seek(view)
+    recording = view.session.recording()
     assert rerun(recording, audit=False).info["state_hash"] == recording.state_hash
-    show.close()
+    view.close()
 
 
-# Stored runs.
+# Stored runs
 
 
-def stored(**more: Any) -> RecordedView:
+def recorded_view(**more: Any) -> RecordedView:
     return RecordedView(
         RecordedRun(run(bounce().model_copy(update={"world": bounce().world}), "pymunk", dt=0.01, **more))
     )
 
 
-def test_stored_run_is_gone_through_by_frames() -> None:
-    show = stored()
-    assert (show.start_time, show.end_time, show.step_number) == (0.0, 6.0, 0)
-    show.step_back()
-    assert show.step_number == 0
+def test_stored_run_is_stepped_and_scrubbed_by_frames() -> None:
+    view = recorded_view()
+    assert (view.start_time, view.end_time, view.step_number) == (0.0, 6.0, 0)
+    view.step_back()
+    assert view.step_number == 0
     for k in range(1, 5):
-        show.step()
-        assert show.step_number == k
-        assert show.frame.position[0].tolist() == show.run.trajectory.position[k, 0].tolist()
-    show.step_back()
-    assert show.step_number == 3
-    show.scrub(0.034)
-    assert show.step_number == 3
-    show.step_back()  # to the frame that was just passed
-    assert show.frame.time == show.run.trajectory.time[3]
-    show.scrub(-5.0)
-    assert show.frame.time == 0.0
-    show.scrub(99.0)
-    show.commit_scrub()
-    assert (show.frame.time, show.step_number) == (6.0, 600)
-    show.step()
-    show.update(1.0, paused=False)
-    assert show.frame.time == 6.0
+        view.step()
+        assert view.step_number == k
+        assert view.frame.position[0].tolist() == view.run.trajectory.position[k, 0].tolist()
+    view.step_back()
+    assert view.step_number == 3
+    view.scrub(0.034)
+    assert view.step_number == 3
+    view.step_back()  # to the frame before the current time
+    assert view.frame.time == view.run.trajectory.time[3]
+    view.scrub(-5.0)
+    assert view.frame.time == 0.0
+    view.scrub(99.0)
+    view.commit_scrub()
+    assert (view.frame.time, view.step_number) == (6.0, 600)
+    view.step()
+    view.update(1.0, paused=False)
+    assert view.frame.time == 6.0
 
 
-def test_stored_run_goes_on_by_real_time_and_its_speed() -> None:
-    show = stored()
-    show.update(0.05, paused=False)
-    assert show.frame.time == pytest.approx(0.05, rel=1e-12)  # rounding
-    show.update(0.05, paused=True)
-    show.clock.faster()
-    show.update(0.05, paused=False)
-    assert show.frame.time == pytest.approx(0.05 * (1.0 + 10**0.1), rel=1e-12)  # rounding
-    assert show.engine == "pymunk"
-    assert show.missed_contacts == 0
-    assert show.keyframe_times == ()
-    assert sum(show.energy()[:2]) == pytest.approx(show.energy()[2], rel=1e-12)  # rounding
-    show.close()
+def test_stored_run_plays_in_real_time_times_its_speed() -> None:
+    view = recorded_view()
+    view.update(0.05, paused=False)
+    assert view.frame.time == pytest.approx(0.05, rel=1e-12)  # rounding
+    view.update(0.05, paused=True)
+    view.clock.faster()
+    view.update(0.05, paused=False)
+    assert view.frame.time == pytest.approx(0.05 * (1.0 + 10**0.1), rel=1e-12)  # rounding
+    assert view.engine == "pymunk"
+    assert view.missed_contacts == 0
+    assert view.keyframe_times == ()
+    assert sum(view.energy()[:2]) == pytest.approx(view.energy()[2], rel=1e-12)  # rounding
+    view.close()
 
 
-def test_stored_run_of_one_frame_stands_still() -> None:
+def test_stored_run_of_one_frame_stays_at_its_start() -> None:
     session = Session(bounce())
-    show = RecordedView(RecordedRun(first_frame(session)))
-    show.step()
-    show.step_back()
-    show.update(1.0, paused=False)
-    assert show.step_number == 0
-    assert show.start_time == show.end_time == 0.0
-    assert show.snapshot(ALL).frame.position.tolist() == [[0.0, 5.5]]
+    view = RecordedView(RecordedRun(first_frame(session)))
+    view.step()
+    view.step_back()
+    view.update(1.0, paused=False)
+    assert view.step_number == 0
+    assert view.start_time == view.end_time == 0.0
+    assert view.snapshot(ALL).frame.position.tolist() == [[0.0, 5.5]]
 
 
 def first_frame(session: Session) -> Trajectory:
     return run(session.scene, "pymunk", audit=False).at([0])
 
 
-def test_way_back_knows_what_was_solid_then() -> None:
+def test_seeking_back_restores_the_solidity_of_walls() -> None:
     shelf = {"name": "shelf", "points": [[-1, 0], [1, 0]]}
     ball = {"name": "ball", "position": [0, 0.1], "radius": 0.1}
     scene = from_document({"world": {"gravity": [0, -9.81], "duration": 5}, "ball": [ball], "wall": [shelf]})
-    show = LiveView(Session(scene, "pymunk"))
+    view = LiveView(Session(scene, "pymunk"))
     for _ in range(60):
-        show.update(1 / 60, paused=False)
-    show.apply(Toggle(time=0.0, thing="shelf", solid=False))
+        view.update(1 / 60, paused=False)
+    view.apply(Toggle(time=0.0, thing="shelf", solid=False))
     for _ in range(60):
-        show.update(1 / 60, paused=False)
-    fell, then = show.session.frame, show.session.step_number
+        view.update(1 / 60, paused=False)
+    fell, then = view.session.frame, view.session.step_number
     assert fell.position[0, 1] < -3.0
-    show.seek(then // 4)
-    arrived(show)
-    assert show.scene.walls[0].solid
-    assert show.session.frame.position[0, 1] == pytest.approx(0.1, abs=0.01)  # slop
-    show.seek(then)
-    arrived(show)
-    assert not show.scene.walls[0].solid
-    assert np.array_equal(show.session.frame.position, fell.position)
+    view.seek(then // 4)
+    wait_for_seek(view)
+    assert view.scene.walls[0].solid
+    assert view.session.frame.position[0, 1] == pytest.approx(0.1, abs=0.01)  # slop
+    view.seek(then)
+    wait_for_seek(view)
+    assert not view.scene.walls[0].solid
+    assert np.array_equal(view.session.frame.position, fell.position)

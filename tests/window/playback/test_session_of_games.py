@@ -1,4 +1,4 @@
-"""Sessions of games: rules go back and forth in time with the state, and a recording leads to the same game."""
+"""Sessions of games: seeking restores the rules with the state, and a recording replays the same game."""
 
 from typing import Any
 
@@ -23,18 +23,18 @@ def toy_rules(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(registry.RULES, "landing", Toy)
 
 
-def go(session: Session, step: int) -> None:
+def seek(session: Session, step: int) -> None:
     for _ in session.seek(step):
         pass
 
 
-def on(session: Session, steps: int) -> None:
-    """Make steps as the window does, which finds the way where a checkpoint has led astray."""
+def advance_or_reseek(session: Session, steps: int) -> None:
+    """Advance as the window does, which seeks again after the mismatch of a checkpoint."""
     try:
         session.advance(steps)
     except ReplayMismatchError:
         session.history.disable_checkpoints()
-        go(session, session.step_number)
+        seek(session, session.step_number)
 
 
 def rules_of(session: Session) -> Toy:
@@ -44,7 +44,7 @@ def rules_of(session: Session) -> Toy:
     return rules
 
 
-def told(session: Session) -> tuple[Any, ...]:
+def full_state(session: Session) -> tuple[Any, ...]:
     rules = rules_of(session)
     return rules.score, tuple(rules.display_lines()), session.frame.state_hash(), session.game and session.game.presses
 
@@ -54,14 +54,14 @@ def session_of(engine: str = "pymunk") -> Session:
     return Session(scene, engine, game=toy_game(scene))
 
 
-def again(recording: Recording, engine: str | None = None) -> Session:
+def new_session(recording: Recording, engine: str | None = None) -> Session:
     session = recording if engine is None else recording.on(engine)
     game = GameSession(Toy(session.scene, session.scene.bodies), session.presses)
     return Session(session.scene, session.engine, session.settings, session.actions, game, session.duration)
 
 
 def assert_replays(session: Session) -> None:
-    """Assert that state and score at its end are the same without a window, and in another one."""
+    """Assert that state and score at the end are equal in a headless replay and in another session."""
     recording = Recording.from_json(session.recording().to_json())
     if recording.at is None:
         assert recording.score == rules_of(session).score
@@ -71,15 +71,15 @@ def assert_replays(session: Session) -> None:
     assert run.info["state_hash"] == recording.state_hash
     assert run.info["game"]["score"] == recording.score
     assert run.info["game"]["otherwise"] is None
-    other = again(recording)
-    go(other, round(recording.duration / other.scene.solver.dt))
+    other = new_session(recording)
+    seek(other, round(recording.duration / other.scene.solver.dt))
     assert other.recording() == recording
     assert other.game is not None
     assert other.game.diverged_at is None
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
-def test_rules_act_and_are_recorded(engine: str) -> None:
+def test_actions_of_rules_are_recorded(engine: str) -> None:
     session = session_of(engine)
     session.advance(300)
     assert rules_of(session).score >= 3
@@ -96,33 +96,33 @@ def test_presses_without_actions_are_part_of_the_session() -> None:
     session.advance(20)
     (kick,) = session.press("kick", 1.0)
     assert isinstance(kick, Impulse)
-    assert kick.impulse == (0.0, 3.0)  # by the aim that nothing in the actions tells of
+    assert kick.impulse == (0.0, 3.0)  # depends on the aim, which is not in the actions
     assert kick.time == session.time
     session.advance(40)
     assert rules_of(session).score >= 0.5
     assert_replays(session)
 
 
-def test_way_back_restores_the_rules() -> None:
+def test_seeking_restores_the_rules() -> None:
     session = session_of()
-    seen = {0: told(session)}
+    states = {0: full_state(session)}
     for k in range(1, 241):
         if k == 50:
             session.press("aim", 0.9)
         if k == 80:
             session.press("kick", 1.0)
         session.advance()
-        seen[k] = told(session)
+        states[k] = full_state(session)
     for step in (239, 120, 60, 79, 80, 50, 49, 0, 200, 240):
-        go(session, step)
-        # What was pressed after a step is pressed there again on the way, as it belongs to the time it was pressed at.
+        seek(session, step)
+        # A press is repeated at its time, so a seek to steps 49 and 79 includes the press made after that step.
         if step not in (49, 79):
-            assert told(session) == seen[step], step
+            assert full_state(session) == states[step], step
     assert_replays(session)
 
 
 def test_checkpoints_hold_the_game() -> None:
-    scene = toy_scene(gravity=[0.0, -0.5])  # a long fall: nothing touches, so checkpoints are made
+    scene = toy_scene(gravity=[0.0, -0.5])  # a long fall without contacts, so checkpoints are made
     session = Session(scene, "pymunk", game=toy_game(scene))
     session.press("aim", 0.25)
     for _ in range(150):
@@ -130,21 +130,21 @@ def test_checkpoints_hold_the_game() -> None:
     assert session.history.keyframe_steps
     session.press("kick", 1.0)
     session.advance(5)
-    go(session, 149)
+    seek(session, 149)
     assert ("aim", "0.25") in rules_of(session).display_lines()
-    session.press("kick", 1.0)  # another way
+    session.press("kick", 1.0)  # a different continuation
     session.advance(100)
     assert rules_of(session).score == 0.5
     assert_replays(session)
 
 
-def test_who_acts_in_the_past_forgets_what_was_pressed_later() -> None:
+def test_press_in_the_past_discards_later_presses() -> None:
     session = session_of()
     session.advance(30)
     session.press("kick", 1.0)
     session.advance(30)
     session.press("kick", 1.0)
-    go(session, 40)
+    seek(session, 40)
     session.press("aim", 0.1)
     session.advance(60)
     assert session.game is not None
@@ -152,10 +152,10 @@ def test_who_acts_in_the_past_forgets_what_was_pressed_later() -> None:
     assert_replays(session)
 
 
-def test_hands_and_engines_are_part_of_a_game() -> None:
+def test_user_actions_and_engine_switches_are_part_of_a_game() -> None:
     session = session_of()
     session.advance(30)
-    session.apply(Impulse(time=0.0, body="a", impulse=(0.0, 1.0)))  # what a hand does
+    session.apply(Impulse(time=0.0, body="a", impulse=(0.0, 1.0)))  # an action of the user
     session.advance(30)
     session.apply(Switch(time=0.0, engine="reference"))
     session.advance(60)
@@ -164,10 +164,10 @@ def test_hands_and_engines_are_part_of_a_game() -> None:
     assert_replays(session)
 
 
-def test_game_that_is_over_stays_so() -> None:
+def test_game_that_is_over_ignores_presses() -> None:
     session = session_of()
     rules_of(session).ends_at = 1.0
-    # The copy that a way back begins from has the same end.
+    # A seek starts from this copy, which needs the same end.
     assert session._initial_game is not None
     session._initial_game.rules.ends_at = 1.0  # type: ignore[attr-defined]
     session.advance(150)
@@ -176,7 +176,7 @@ def test_game_that_is_over_stays_so() -> None:
     score = rules_of(session).score
     session.advance(100)
     assert rules_of(session).score == score
-    go(session, 10)
+    seek(session, 10)
     assert rules_of(session).game_over is None
 
 
@@ -188,9 +188,9 @@ def test_refused_press_changes_nothing(steps: int, monkeypatch: pytest.MonkeyPat
     session.press("kick", 1.0)
     session.advance(90)
     session.press("aim", 0.7)  # at the same time as the refused one
-    go(session, 90)
-    go(session, 120 - steps)  # 0: the present; 40: with presses and actions later than now
-    before = told(session), session.actions, session.has_future, session.game and session.game.all_presses
+    seek(session, 90)
+    seek(session, 120 - steps)  # 0: at the end; 40: with later presses and actions
+    before = full_state(session), session.actions, session.has_future, session.game and session.game.all_presses
     recording = session.recording()
     engine_applies = type(session.simulation).apply
 
@@ -206,7 +206,7 @@ def test_refused_press_changes_nothing(steps: int, monkeypatch: pytest.MonkeyPat
     with monkeypatch.context() as patch:
         patch.setattr(SwitchableSimulation, "apply", refuse)
         rules_before = Toy.on_input
-        # Only the press below asks for the refused action: presses repeated in the replay are as they were.
+        # Only the press below requests the refused action; repeated presses are unchanged.
         patch.setattr(
             Toy,
             "on_input",
@@ -216,14 +216,19 @@ def test_refused_press_changes_nothing(steps: int, monkeypatch: pytest.MonkeyPat
         )
         with pytest.raises(ActionError, match="refused"):
             session.press("kick", 5.0)
-    assert (told(session), session.actions, session.has_future, session.game and session.game.all_presses) == before
+    assert (
+        full_state(session),
+        session.actions,
+        session.has_future,
+        session.game and session.game.all_presses,
+    ) == before
     assert session.recording() == recording
     assert_replays(session)
-    on(session, 60)
+    advance_or_reseek(session, 60)
     assert_replays(session)
 
 
-def test_press_copies_no_game(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_press_does_not_copy_the_game(monkeypatch: pytest.MonkeyPatch) -> None:
     session = session_of()
     session.advance(10)
     monkeypatch.setattr(GameSession, "copy", lambda _: pytest.fail("copied"))
@@ -231,7 +236,7 @@ def test_press_copies_no_game(monkeypatch: pytest.MonkeyPatch) -> None:
     session.press("kick", 1.0)
 
 
-def test_press_that_cannot_be_done_was_not_pressed() -> None:
+def test_failed_press_is_not_recorded() -> None:
     session = session_of()
     session.apply(Remove(time=0.0, body="a"))
     with pytest.raises(ActionError):
@@ -241,7 +246,7 @@ def test_press_that_cannot_be_done_was_not_pressed() -> None:
     assert_replays(session)
 
 
-def test_other_engine_sees_the_same_presses() -> None:
+def test_replay_on_another_engine_has_the_same_presses() -> None:
     session = session_of()
     session.advance(20)
     session.press("kick", 1.0)
@@ -252,19 +257,19 @@ def test_other_engine_sees_the_same_presses() -> None:
     assert run.status == "ok"
 
 
-def test_recording_that_the_rules_would_not_have_made_is_told() -> None:
+def test_forged_action_of_a_recording_is_detected() -> None:
     session = session_of()
     session.advance(150)
     recording = session.recording()
     first = next(action for action in recording.actions if action.kind == "impulse")
     forged = first.model_copy(update={"impulse": (9.0, 9.0)})
     actions = tuple(forged if action is first else action for action in recording.actions)
-    faked = Recording.from_json(recording.to_json())
-    object.__setattr__(faked, "actions", actions)
-    assert rerun(faked, audit=False).info["game"]["otherwise"] == first.time
+    forged_recording = Recording.from_json(recording.to_json())
+    object.__setattr__(forged_recording, "actions", actions)
+    assert rerun(forged_recording, audit=False).info["game"]["otherwise"] == first.time
 
 
-DEEDS = st.lists(
+OPERATIONS = st.lists(
     st.one_of(
         st.tuples(st.just("advance"), st.integers(1, 60)),
         st.tuples(st.just("kick"), st.sampled_from([0.0, 1.0])),
@@ -277,16 +282,16 @@ DEEDS = st.lists(
 
 @pytest.mark.slow
 @settings(max_examples=25, deadline=None)
-@given(deeds=DEEDS)
-def test_whatever_is_done_replays(deeds: list[tuple[str, Any]]) -> None:
+@given(operations=OPERATIONS)
+def test_any_order_of_operations_replays(operations: list[tuple[str, Any]]) -> None:
     session = session_of()
-    for what, value in deeds:
-        if what == "advance":
-            on(session, value)
-        elif what == "go":
-            go(session, value)
+    for kind, value in operations:
+        if kind == "advance":
+            advance_or_reseek(session, value)
+        elif kind == "go":
+            seek(session, value)
         else:
-            session.press(what, value)
+            session.press(kind, value)
     assert_replays(session)
 
 
@@ -300,7 +305,7 @@ def test_retract_removes_the_inputs_since_the_action() -> None:
     session.press("kick", 0.0)
     assert session.game is not None
     kick = next(k for k, action in enumerate(session.actions) if action.time == pytest.approx(0.1))
-    go(session, session.retract(kick))
+    seek(session, session.retract(kick))
     assert [(press.control, press.value) for press in session.game.all_presses] == [("aim", 0.25)]
     assert not session.has_future
     assert (session.step_number, dict(rules_of(session).display_lines())["aim"]) == (10, "0.25")
@@ -315,10 +320,10 @@ def test_retract_keeps_the_stated_inputs() -> None:
     session.press("kick", 1.0)
     session.advance(5)
     kick = next(k for k, action in enumerate(session.actions) if action.time == pytest.approx(0.1))
-    go(session, session.retract(kick, 1))
+    seek(session, session.retract(kick, 1))
     assert session.game is not None
     assert [press.control for press in session.game.all_presses] == ["aim"]
     assert (session.step_number, dict(rules_of(session).display_lines())["aim"]) == (10, "0.75")
-    assert session.game.future_presses == ()  # it is repeated, though no action follows
+    assert session.game.future_presses == ()  # the press is repeated although no action follows
     session.advance(40)
     assert_replays(session)

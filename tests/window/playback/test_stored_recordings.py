@@ -1,6 +1,6 @@
-"""Sessions that were recorded by an earlier version, in the window and by key presses, still replay to the same state.
+"""Sessions recorded in the window by an earlier version still replay to the same state.
 
-A recording must be replaced if engine versions change its state; then with one of the version before the change.
+If a new engine version changes the state, replace the recording by one of the version before the change.
 """
 
 from pathlib import Path
@@ -15,7 +15,7 @@ FOLDER = Path(__file__).parent / "recordings"
 FILES = sorted(FOLDER.glob("*.json"))
 
 
-def test_there_are_recordings_of_every_kind() -> None:
+def test_recordings_exist_for_every_kind() -> None:
     assert {file.stem for file in FILES} == {"9-ball", "curling", "duel", "landing", "pile", "pinball"}
 
 

@@ -1,4 +1,4 @@
-"""Zones in a session: the way back and forth leads through the same visits, and a recording to the same end."""
+"""Zones in a session: seeking reproduces the same visits, and a recording replays to the same end."""
 
 from typing import Any
 
@@ -21,7 +21,7 @@ HOLES: list[dict[str, Any]] = [
 ]
 
 
-def played(scene: Scene, steps: int, kick: int | None = None) -> Session:
+def run_session(scene: Scene, steps: int, kick: int | None = None) -> Session:
     session = Session(scene)
     while session.step_number < steps:
         session.advance()
@@ -36,9 +36,9 @@ def course() -> Scene:
 
 
 @pytest.mark.parametrize("name", ["holes", "overpass"])
-def test_way_back_and_forth_leads_through_the_same_visits(name: str) -> None:
-    """Long enough that checkpoints are made, in zones too; each state that is passed is held against the first."""
-    session = played(course() if name == "holes" else load(find(name)), 320, kick=200)
+def test_seeking_back_and_forth_reproduces_the_same_visits(name: str) -> None:
+    """The run is long enough for checkpoints, also inside zones; each state is compared with the first pass."""
+    session = run_session(course() if name == "holes" else load(find(name)), 320, kick=200)
     known = {k: session.history.get(k) for k in range(321)}
     assert session.history.keyframe_steps
     assert {int(mark) for frame in known.values() if frame is not None for mark in np.unique(frame.visits)} >= {0, 1}
@@ -48,12 +48,12 @@ def test_way_back_and_forth_leads_through_the_same_visits(name: str) -> None:
         assert session.frame.state_hash() == known[step].state_hash()
         assert np.array_equal(session.frame.visits, known[step].visits)
         assert np.array_equal(session.frame.layer, known[step].layer)
-    assert session.history.checkpoints_enabled  # no checkpoint has led elsewhere
+    assert session.history.checkpoints_enabled  # no checkpoint replayed differently
 
 
-def test_recording_leads_to_the_same_end() -> None:
-    session = played(course(), 260, kick=200)
+def test_recording_replays_to_the_same_end() -> None:
+    session = run_session(course(), 260, kick=200)
     assert any(frame.visits[0, 2] == HELD for k in range(200) if (frame := session.history.get(k)) is not None)
     recording = session.recording()
-    again = Recording.from_json(recording.to_json())
-    assert rerun(again, audit=False).info["state_hash"] == recording.state_hash
+    copy = Recording.from_json(recording.to_json())
+    assert rerun(copy, audit=False).info["state_hash"] == recording.state_hash

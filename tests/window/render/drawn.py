@@ -1,4 +1,4 @@
-"""Small scenes, and what a picture of them holds."""
+"""Small scenes, their snapshots and frames, and queries of their pictures."""
 
 from collections.abc import Sequence
 
@@ -15,7 +15,7 @@ from sandbox.window.render.renderer import Renderer
 
 SIZE = (200, 120)
 CAMERA = Camera((0.0, 0.0), 20.0, SIZE)
-"""10 m wide and 6 m high, the origin in the middle"""
+"""10 m wide and 6 m high, with the origin at the centre."""
 
 
 def scene(*, balls: Sequence[dict] = (), **tables: object) -> Scene:
@@ -26,8 +26,8 @@ def ball(x: float, y: float, radius: float = 1.0, **more: object) -> dict:
     return {"position": [x, y], "radius": radius, **more}
 
 
-def frame(which: Scene, **changed: object) -> Frame:
-    bodies = which.bodies
+def frame(model: Scene, **changes: object) -> Frame:
+    bodies = model.bodies
     arrays = {
         "time": 0.0,
         "position": bodies.position.copy(),
@@ -36,12 +36,12 @@ def frame(which: Scene, **changed: object) -> Frame:
         "angular_velocity": bodies.angular_velocity.copy(),
         "present": np.ones(len(bodies), np.bool_),
     }
-    return Frame(**(arrays | changed))
+    return Frame(**(arrays | changes))
 
 
-def sight(which: Scene, *overlays: str, shapes: bool = True, **more: object) -> Snapshot:
+def snapshot(model: Scene, *overlays: str, shapes: bool = True, **more: object) -> Snapshot:
     shown = {"shapes", *overlays} if shapes else set(overlays)
-    return Snapshot(which, **({"bodies": which.bodies, "frame": frame(which), "overlays": frozenset(shown)} | more))
+    return Snapshot(model, **({"bodies": model.bodies, "frame": frame(model), "overlays": frozenset(shown)} | more))
 
 
 def contact(pair: tuple[int, int], point: tuple, normal: tuple, impulse: tuple = (0.0, 0.0)) -> Contacts:
@@ -50,19 +50,21 @@ def contact(pair: tuple[int, int], point: tuple, normal: tuple, impulse: tuple =
     )
 
 
-def drawn(what: Snapshot, camera: Camera = CAMERA, *, picture: Renderer | None = None, **how: object) -> np.ndarray:
-    """Return the picture of a sight as colours (W, H, 3)."""
+def render(
+    shown: Snapshot, camera: Camera = CAMERA, *, renderer: Renderer | None = None, **options: object
+) -> np.ndarray:
+    """Return the picture of a snapshot as colours, (W, H, 3)."""
     surface = pygame.Surface(camera.size)
-    (picture or Renderer()).draw(surface, camera, what, **how)
+    (renderer or Renderer()).draw(surface, camera, shown, **options)
     return pygame.surfarray.array3d(surface)
 
 
-def at(picture: np.ndarray, x: float, y: float, camera: Camera = CAMERA) -> RgbColour:
-    """Return the colour of the pixel that shows a place, m."""
+def colour_at(picture: np.ndarray, x: float, y: float, camera: Camera = CAMERA) -> RgbColour:
+    """Return the colour of the pixel at a point, m."""
     column, row = np.floor(camera.to_screen(np.asarray((x, y)))).astype(int)
     return tuple(int(channel) for channel in picture[column, row])
 
 
-def changed(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def changed_pixels(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return which pixels differ, (W, H)."""
     return (a != b).any(axis=2)

@@ -1,4 +1,4 @@
-"""Artillery as it is drawn: ground and craters, dirt in the air, tanks and guns; and in the window."""
+"""Drawing of artillery: terrain, craters, falling dirt, tanks, explosions and wind; and play in the window."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -27,7 +27,7 @@ from sandbox.window.playback.recorded import RecordedRun
 from sandbox.window.playback.snapshot import Snapshot
 from sandbox.window.render.renderer import Renderer
 from tests.window.pressing import key, key_up
-from tests.window.windowed import turned, window_on
+from tests.window.windowed import open_window, run_frame
 
 SIZE = (400, 240)
 AIM_TIME = 0.05
@@ -57,19 +57,19 @@ position = 80.0
 bot = 1.0
 """
 CAMERA = Camera((50.0, 20.0), 4.0, SIZE)
-"""100 m wide and 60 m high, from −10 m up"""
+"""100 m wide and 60 m high, from −10 m upwards."""
 
 
 def duel(edges: str = "open") -> Scene:
     return loads(TEXT.format(edges=edges))
 
 
-def drawn(scene: Scene, gunnery: ArtilleryViewState | None = None, camera: Camera = CAMERA) -> np.ndarray:
+def render(scene: Scene, view_state: ArtilleryViewState | None = None, camera: Camera = CAMERA) -> np.ndarray:
     bodies = scene.bodies
     columns = bodies.position, bodies.velocity, bodies.angle, bodies.angular_velocity
     frame = Frame(0.0, *(each.copy() for each in columns), np.ones(len(bodies), np.bool_))
     surface = offscreen(SIZE)
-    Renderer().draw(surface, camera, Snapshot(scene, bodies, frame, game=gunnery))
+    Renderer().draw(surface, camera, Snapshot(scene, bodies, frame, game=view_state))
     return pygame.surfarray.array3d(surface).astype(int)
 
 
@@ -78,65 +78,65 @@ def pixel(x: float, y: float) -> tuple[int, int]:
     return int(across), int(down)
 
 
-def test_ground_is_below_its_surface_and_sky_above() -> None:
-    picture, above = drawn(duel()), pygame.surfarray.array3d(sky_image(SIZE)).astype(int)
+def test_terrain_is_drawn_below_its_surface_and_sky_above() -> None:
+    picture, above = render(duel()), pygame.surfarray.array3d(sky_image(SIZE)).astype(int)
     for x in (35.0, 50.0, 65.0):
         assert (picture[pixel(x, 16.0)] == above[pixel(x, 16.0)]).all()
         red, _, blue = picture[pixel(x, 8.5)].tolist()
         assert red > blue  # soil, under a blue sky
-        assert picture[pixel(x, 2.0)].sum() < picture[pixel(x, 8.5)].sum()  # darker the deeper
+        assert picture[pixel(x, 2.0)].sum() < picture[pixel(x, 8.5)].sum()  # darker with depth
 
 
-def test_a_crater_shows_the_sky_behind_it() -> None:
+def test_crater_shows_the_sky_behind_it() -> None:
     scene = duel()
     heights = [12.0] * 100
     heights[45:55] = [2.0] * 10
     wall = scene.walls[0].model_copy(update={"points": course_of(heights, 100.0)})
-    picture = drawn(scene.model_copy(update={"walls": (wall,)}))
+    picture = render(scene.model_copy(update={"walls": (wall,)}))
     above = pygame.surfarray.array3d(sky_image(SIZE)).astype(int)
     assert (picture[pixel(50.0, 6.0)] == above[pixel(50.0, 6.0)]).all()
     assert (picture[pixel(40.0, 6.0)] != above[pixel(40.0, 6.0)]).any()
 
 
 @pytest.mark.parametrize("edges", ["rubber", "wrap"])
-def test_sides_that_hold_shells_are_seen(edges: str) -> None:
-    at = int(CAMERA.to_screen(np.array([100.0, 0.0]))[0])
-    columns = slice(at - 3, min(at + 3, SIZE[0]))
-    rest = slice(0, 100)  # above the ground
-    assert (drawn(duel(edges))[columns, rest] != drawn(duel())[columns, rest]).any()
+def test_closed_side_edges_are_drawn(edges: str) -> None:
+    edge = int(CAMERA.to_screen(np.array([100.0, 0.0]))[0])
+    columns = slice(edge - 3, min(edge + 3, SIZE[0]))
+    rows = slice(0, 100)  # above the ground
+    assert (render(duel(edges))[columns, rows] != render(duel())[columns, rows]).any()
 
 
-def test_dirt_in_the_air_hangs_over_sky() -> None:
+def test_falling_dirt_is_drawn_in_the_air() -> None:
     scene = duel()
     rules = ArtilleryRules(scene, scene.bodies)
     plain = rules.view_state(0.0)
     clod = FallingDirt(left=48.0, right=52.0, bottom=22.0, top=26.0, floor=8.0)
     falling = ArtilleryViewState(plain.guns, plain.size, 0.0, clods=(clod,))
-    picture, above = drawn(scene, falling), pygame.surfarray.array3d(sky_image(SIZE)).astype(int)
+    picture, above = render(scene, falling), pygame.surfarray.array3d(sky_image(SIZE)).astype(int)
     red, _, blue = picture[pixel(50.0, 23.0)].tolist()
     assert red > blue
-    assert (picture[pixel(50.0, 9.0)] == above[pixel(50.0, 9.0)]).all()  # where it is to lie, it does not lie yet
+    assert (picture[pixel(50.0, 9.0)] == above[pixel(50.0, 9.0)]).all()  # its final position is still empty
 
 
-def test_tanks_guns_blasts_and_wind_are_drawn_where_they_are() -> None:
+def test_tanks_and_explosions_are_drawn_at_their_positions() -> None:
     scene = duel()
     rules = ArtilleryRules(scene, scene.bodies)
     run_to_aim(rules, scene)
-    gunnery = rules.view_state(AIM_TIME)
-    assert [gun.name for gun in gunnery.guns] == ["Red", "Blue"]
-    assert [gun.aiming for gun in gunnery.guns] == [True, False]
-    assert gunnery.tracer is not None
-    plain = drawn(scene)
-    picture = drawn(scene, gunnery)
+    view_state = rules.view_state(AIM_TIME)
+    assert [gun.name for gun in view_state.guns] == ["Red", "Blue"]
+    assert [gun.aiming for gun in view_state.guns] == [True, False]
+    assert view_state.tracer is not None
+    plain = render(scene)
+    picture = render(scene, view_state)
     for x in (20.0, 80.0):
         i, j = pixel(x, float(scene.bodies.position[0, 1]) + 2.0)
         assert (picture[i - 12 : i + 12, j - 10 : j + 20] != plain[i - 12 : i + 12, j - 10 : j + 20]).any()
     burst = ExplosionView(0.1, (50.0, 30.0), 6.0, dirt=False)
-    bright = drawn(scene, ArtilleryViewState((), gunnery.size, 0.0, bursts=(burst,)))[pixel(50.0, 30.0)]
+    bright = render(scene, ArtilleryViewState((), view_state.size, 0.0, bursts=(burst,)))[pixel(50.0, 30.0)]
     assert bright.sum() > plain[pixel(50.0, 30.0)].sum()
 
 
-def test_of_the_past_guns_alone_are_known() -> None:
+def test_view_state_of_the_past_has_only_guns() -> None:
     scene = duel()
     rules = ArtilleryRules(scene, scene.bodies)
     run_to_aim(rules, scene)
@@ -154,61 +154,61 @@ def run_to_aim(rules: ArtilleryRules, scene: Scene) -> None:
 
 @pytest.mark.parametrize("scale", [1e-9, 1e-3, 1e3, 1e9])
 @pytest.mark.parametrize("centre", [(50.0, 10.0), (-1e9, 1e9), (1e15, 0.0)])
-def test_no_camera_is_too_far_or_too_near(centre: tuple[float, float], scale: float) -> None:
+def test_any_camera_draws_without_an_error(centre: tuple[float, float], scale: float) -> None:
     scene = duel("rubber")
     rules = ArtilleryRules(scene, scene.bodies)
     run_to_aim(rules, scene)
     clods = (FallingDirt(48.0, 52.0, 22.0, 26.0, 8.0),)
-    way = np.array([[20.0, 12.0], [1e9, 1e9], [60.0, 12.0]])
-    told = rules.view_state(AIM_TIME)
-    wild = ArtilleryViewState(
-        told.guns, told.size, 900.0, (way,), (0,), (ExplosionView(0.2, (50.0, 1e12), 5.0, True),), clods, way
+    path = np.array([[20.0, 12.0], [1e9, 1e9], [60.0, 12.0]])
+    state = rules.view_state(AIM_TIME)
+    extreme = ArtilleryViewState(
+        state.guns, state.size, 900.0, (path,), (0,), (ExplosionView(0.2, (50.0, 1e12), 5.0, True),), clods, path
     )
-    drawn(scene, wild, Camera(centre, scale, SIZE))
+    render(scene, extreme, Camera(centre, scale, SIZE))
 
 
-def test_the_sky_goes_from_its_first_tone_to_its_last() -> None:
+def test_sky_tone_reaches_its_first_and_last_colour() -> None:
     assert (sky_tone(0.0), sky_tone(2.0)) == ((13, 17, 34), (240, 186, 140))
 
 
-def test_films_show_the_ground_as_it_was() -> None:
+def test_film_shows_the_terrain_of_its_time() -> None:
     scene = duel()
     pit = Reshape(time=1.0, thing="terrain", points=course_of([2.0] * 100, 100.0))
     film = RecordedRun(run(scene, actions=[pit]))
     before, after = film.snapshot(0.5, frozenset()).scene, film.snapshot(1.5, frozenset()).scene
     assert before.walls == scene.walls
     assert after.walls[0].points == pit.points
-    assert film.snapshot(1.6, frozenset()).scene is after  # one object, so that its picture is kept
+    assert film.snapshot(1.6, frozenset()).scene is after  # the same object, so that its picture stays cached
 
 
 @pytest.fixture
 def window(tmp_path: Path) -> Iterator[App]:
-    with window_on(TEXT.format(edges="open"), tmp_path, (640, 400)) as opened:
-        yield opened
+    with open_window(TEXT.format(edges="open"), tmp_path, (640, 400)) as window:
+        yield window
 
 
-def turn(window: App, *events: pygame.event.Event) -> ArtilleryRules:
-    turned(window, *events)
+def frame_rules(window: App, *events: pygame.event.Event) -> ArtilleryRules:
+    run_frame(window, *events)
     assert window.app_state.host is not None
     rules = window.app_state.host.rules
     assert isinstance(rules, ArtilleryRules)
     return rules
 
 
-def test_keys_aim_and_fire_and_going_back_takes_back(window: App, tmp_path: Path) -> None:
-    rules = turn(window)
+def test_keys_aim_and_fire_and_seeking_back_undoes_the_shot(window: App, tmp_path: Path) -> None:
+    rules = frame_rules(window)
     red = rules.shooter
     angle, power = red.angle, red.power
-    turn(window, key(pygame.K_LEFT))
-    turn(window, key_up(pygame.K_LEFT), key(pygame.K_UP))
-    rules = turn(window, key_up(pygame.K_UP), key(pygame.K_w))
+    frame_rules(window, key(pygame.K_LEFT))
+    frame_rules(window, key_up(pygame.K_LEFT), key(pygame.K_UP))
+    rules = frame_rules(window, key_up(pygame.K_UP), key(pygame.K_w))
     red = rules.shooter
     assert red.angle > angle
     assert red.power > power
     assert red.weapon == 1
-    fired = window.app_state.view.step_number if window.app_state.view is not None else 0
-    turn(window, key_up(pygame.K_w), key(pygame.K_SPACE))
-    while (rules := turn(window)).phase == "fly":
+    fire_step = window.app_state.view.step_number if window.app_state.view is not None else 0
+    frame_rules(window, key_up(pygame.K_w), key(pygame.K_SPACE))
+    while (rules := frame_rules(window)).phase == "fly":
         pass
     live = window.app_state.view
     assert isinstance(live, LiveView)
@@ -217,12 +217,12 @@ def test_keys_aim_and_fire_and_going_back_takes_back(window: App, tmp_path: Path
     assert rules.field.ground.points == crater
     assert any("shell: landed at" in text for _, text in window.app_state.messages.visible())
     recording = tmp_path / "duel.json"
-    kept = live.session.recording()
-    kept.save(recording)
-    assert kept.score == rules.score
-    assert Recording.load(recording).presses == kept.presses
-    live.seek(fired)
+    session = live.session.recording()
+    session.save(recording)
+    assert session.score == rules.score
+    assert Recording.load(recording).presses == session.presses
+    live.seek(fire_step)
     live.finish_seek()
-    rules = turn(window)
+    rules = frame_rules(window)
     assert rules.shots == []
     assert live.scene.walls[0].points != crater

@@ -1,4 +1,4 @@
-"""Outlines of rubber, from the walls, jaws and facings of tables."""
+"""Outlines of cushions, from the walls, jaws and facings of tables."""
 
 import math
 
@@ -21,7 +21,7 @@ def table(name: str) -> Scene:
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_every_cushion_is_found_and_lies_between_area_and_wood(name: str) -> None:
+def test_every_cushion_is_found_between_playing_area_and_rail(name: str) -> None:
     scene = table(name)
     area = scene.play.area
     assert area is not None
@@ -31,13 +31,13 @@ def test_every_cushion_is_found_and_lies_between_area_and_wood(name: str) -> Non
     depth = DEPTH * shorter_side(area)
     for each in found:
         for x, y in each.outline:
-            # A facing may end behind the line of the wood, where its hole is.
+            # A facing may end behind the edge of the rail, at its pocket.
             out = max(left - x, x - right, bottom - y, y - top)
             assert -1e-9 < out < max(depth, 0.1)
     assert area_bounds(area)[0][0] < left - depth
 
 
-def test_noses_with_jaws_are_tangent_to_them() -> None:
+def test_cushion_noses_are_tangent_to_the_jaws() -> None:
     scene = table("pool-9ft")
     assert scene.play.area is not None
     jaws = [(post.position, post.radius) for post in scene.posts]
@@ -45,20 +45,20 @@ def test_noses_with_jaws_are_tangent_to_them() -> None:
         on_jaws = [
             point
             for point in each.nose
-            if any(abs(math.dist(point, at) - radius) < 1e-9 for at, radius in jaws)  # rounding
+            if any(abs(math.dist(point, centre) - radius) < 1e-9 for centre, radius in jaws)  # rounding
         ]
         assert len(on_jaws) >= 8
         assert len(each.nose) - len(on_jaws) == 2  # the far ends of the facings
 
 
-def test_cushions_without_jaws_meet_in_a_mitre() -> None:
+def test_cushions_without_jaws_share_their_corners() -> None:
     scene = table("carom-10ft")
     assert scene.play.area is not None
     corners = {point for each in cushion_outlines(scene, scene.play.area) for point in each.outline[2:]}
     assert len({(round(x, 9), round(y, 9)) for x, y in corners}) == 4
 
 
-def test_walls_elsewhere_are_no_cushions() -> None:
+def test_other_walls_are_not_cushions() -> None:
     scene = loads(
         """
 title = "t"
@@ -77,7 +77,7 @@ height = 0.037
 
 
 @pytest.mark.parametrize("name", TABLES)
-def test_tables_have_nothing_else(name: str) -> None:
+def test_tables_have_no_other_walls(name: str) -> None:
     scene = table(name)
     assert scene.play.area is not None
     assert other_walls(scene, scene.play.area) == ((), ())

@@ -27,27 +27,27 @@ def disc(
 
 @pytest.mark.parametrize("radius", [3.0, 4.7, 10.0, 33.3, LARGEST, 120.0])
 @pytest.mark.parametrize("offset", [0.0, 0.25, 0.4])
-def test_antialiased_area_is_that_of_the_disc(radius, offset):
+def test_antialiased_area_equals_the_area_of_the_disc(radius, offset):
     area = disc(150.0 + offset, 150.0 - offset, radius).sum()
     assert area == pytest.approx(math.pi * radius**2, rel=0.01)  # pixels have 8 bits, radii 1/128 px
 
 
 @pytest.mark.parametrize("radius", [10.0, 33.3, 120.0])
-def test_plain_area_is_about_that_of_the_disc(radius):
+def test_area_without_antialiasing_is_close_to_the_disc(radius):
     picture = disc(150.0, 150.0, radius, CircleStyle(0.0, antialias=False))
     assert set(np.unique(picture)) == {0.0, 1.0}
     assert picture.sum() == pytest.approx(math.pi * radius**2, abs=2 * math.pi * radius * 0.5)  # half a px at the edge
 
 
 @pytest.mark.parametrize("radius", [5.0, 40.0, 110.0])
-def test_middle_of_area_is_the_centre(radius):
+def test_centroid_of_the_pixels_is_the_centre(radius):
     picture = disc(140.25, 120.75, radius)
     along = np.arange(300) + 0.5
     assert (picture.sum(1) * along).sum() / picture.sum() == pytest.approx(140.25, abs=0.02)  # 8 bits a pixel
     assert (picture.sum(0) * along).sum() / picture.sum() == pytest.approx(120.75, abs=0.02)  # the same
 
 
-def test_a_rim_is_darker_than_the_filling():
+def test_rim_is_darker_than_the_filling():
     surface = pygame.Surface((100, 100))
     colour = (200, 100, 40)
     CircleRenderer().draw(
@@ -65,29 +65,30 @@ def test_a_ring_is_hollow():
 
 
 @pytest.mark.parametrize("radius", [1e3, 1e5, 1e8, 1e11, 1e13, 1e14])
-def test_a_disc_of_any_size_reaches_to_its_edge_and_no_farther(radius):
+def test_disc_of_any_size_ends_at_its_edge(radius):
     picture = disc(150.0 - radius, 150.0, radius)
     assert (picture[:148, 150] == 1.0).all()
     assert (picture[152:, 150] == 0.0).all()
 
 
 @pytest.mark.parametrize("radius", [200.0, 1e4, 1e9, 1e15])
-def test_a_picture_within_a_disc_is_filled(radius):
+def test_picture_inside_a_disc_is_filled(radius):
     assert (disc(150.0, 140.0, max(radius, 220.0)) == 1.0).all()
 
 
-def test_discs_far_outside_change_nothing():
+def test_discs_outside_change_no_pixel():
     for x, y, radius in ((-2e9, 0.0, 1e9), (1e18, -1e18, 1e6), (500.0, 150.0, 199.0), (150.0, -200.0, 150.0)):
         assert not disc(x, y, radius).any()
 
 
-def test_sprites_are_bounded():
+def test_sprite_cache_is_bounded():
     discs, surface = CircleRenderer(), pygame.Surface((100, 100))
     for k in range(400):
         radius = np.asarray([95.0 - k / 20])
         discs.draw(surface, np.asarray([(50.0, 50.0)]), radius, np.full((1, 3), 9, np.uint8), PLAIN)
     kept = [sprite for sprites in discs._sprites.values() for sprite in sprites.values()]
-    assert sum(s.get_width() * s.get_height() for s in kept) <= SPRITE_BUDGET + 200**2  # and what one picture added
+    pixels = sum(s.get_width() * s.get_height() for s in kept)
+    assert pixels <= SPRITE_BUDGET + 200**2  # plus the sprites of one picture
     assert len(kept) < 400
 
 
@@ -100,7 +101,7 @@ def test_many_large_discs_are_still_drawn():
 
 @pytest.mark.parametrize("angle", [0.0, math.pi / 2, 2.5, -1.0])
 @pytest.mark.parametrize(("radius", "antialias"), [(10.0, True), (10.0, False), (40.0, True), (40.0, False)])
-def test_a_spoke_points_where_the_angle_says_with_y_up(angle, radius, antialias):
+def test_spoke_points_along_the_angle_with_y_up(angle, radius, antialias):
     surface = pygame.Surface((100, 100))
     surface.fill(WHITE)
     tint = np.full((1, 3), 255, np.uint8)
@@ -114,7 +115,7 @@ def test_a_spoke_points_where_the_angle_says_with_y_up(angle, radius, antialias)
     assert inked[50, 50] == 0.0
 
 
-def test_a_spoke_at_nan_is_left_out():
+def test_spoke_with_a_nan_angle_is_omitted():
     surface = pygame.Surface((100, 100))
     draw_rotation_marks(
         surface, np.asarray([(50.0, 50.0)]), np.asarray([30.0]), np.asarray([math.nan]), np.ones((1, 3), np.uint8), True

@@ -8,7 +8,7 @@ from sandbox.window.render.text import draw_text, font_file, text_size
 WHITE = (255, 255, 255)
 
 
-def inked(surface: pygame.Surface) -> pygame.Rect:
+def ink_rect(surface: pygame.Surface) -> pygame.Rect:
     return (
         pygame.mask.from_threshold(surface, WHITE, (200, 200, 200))
         .get_bounding_rects()[0]
@@ -17,14 +17,14 @@ def inked(surface: pygame.Surface) -> pygame.Rect:
 
 
 @pytest.mark.parametrize("anchor", ["topleft", "midright", "center", "bottomright", "midbottom"])
-def test_the_anchor_lies_where_it_was_asked_for(anchor):
+def test_text_is_placed_by_its_anchor(anchor):
     surface = pygame.Surface((300, 200))
     rect = draw_text(surface, "Hällo μ", (150.0, 100.0), 20, WHITE, anchor)
     assert getattr(rect, anchor) == (150, 100)
-    assert rect.contains(inked(surface))
+    assert rect.contains(ink_rect(surface))
 
 
-def test_measure_says_what_write_covers():
+def test_text_size_equals_the_drawn_rectangle():
     surface = pygame.Surface((300, 200))
     for bold in (False, True):
         for mono in (False, True):
@@ -32,33 +32,33 @@ def test_measure_says_what_write_covers():
             assert rect.size == text_size("0.123 m/s", 17, bold, mono)
 
 
-def test_figures_are_equally_wide_in_mono():
+def test_digits_are_equally_wide_in_the_mono_font():
     assert text_size("1111", 16, mono=True) == text_size("8888", 16, mono=True)
 
 
 @pytest.mark.parametrize("text", ["", "\0", "a\nb", "\ud800", "\u200b", "x" * 100_000, "🎱"])
-def test_any_text_can_be_written(text):
+def test_any_text_can_be_drawn(text):
     surface = pygame.Surface((50, 50))
     assert draw_text(surface, text, (10, 10), 12, WHITE).topleft == (10, 10)
 
 
-@pytest.mark.parametrize("at", [(math.nan, 0.0), (0.0, math.inf), (1e30, 0.0), (0.0, -1e300)])
-def test_nothing_is_written_nowhere(at):
+@pytest.mark.parametrize("position", [(math.nan, 0.0), (0.0, math.inf), (1e30, 0.0), (0.0, -1e300)])
+def test_text_at_an_invalid_position_is_omitted(position):
     surface = pygame.Surface((50, 50))
-    assert draw_text(surface, "words", at, 12, WHITE).size == (0, 0)
+    assert draw_text(surface, "words", position, 12, WHITE).size == (0, 0)
     assert not pygame.surfarray.array3d(surface).any()
 
 
 @pytest.mark.parametrize("size", [0.0, -5.0, math.nan, math.inf, 1e9])
-def test_any_size_is_brought_into_range(size):
+def test_any_text_size_is_clamped(size):
     assert 0 < text_size("word", size)[1] < 500
 
 
-def test_fonts_are_found_again_after_pygame_was_quit():
+def test_fonts_are_reloaded_after_pygame_quit():
     before = text_size("word", 16)
     pygame.quit()
     assert text_size("word", 16) == before
 
 
-def test_the_font_is_an_installed_file():
+def test_font_is_an_installed_file():
     assert font_file(bold=True, mono=True).name == "DejaVuSansMono-Bold.ttf"

@@ -11,10 +11,10 @@ from sandbox.window.camera import Camera
 from sandbox.window.render.grid import NARROWEST, draw_grid, draw_scale, step_of
 from sandbox.window.render.palette import BACKGROUND, FAINT, GRID, GRID_STRONG, SOLID, SURFACE
 from sandbox.window.render.static_geometry import draw_static_bodies
-from tests.window.render.drawn import CAMERA, SIZE, at, changed, drawn, scene, sight
+from tests.window.render.drawn import CAMERA, SIZE, changed_pixels, colour_at, render, scene, snapshot
 
 
-def fixtures(camera=CAMERA, *, antialias=True, **tables) -> np.ndarray:
+def render_static(camera=CAMERA, *, antialias=True, **tables) -> np.ndarray:
     surface = pygame.Surface(camera.size)
     surface.fill(BACKGROUND)
     draw_static_bodies(surface, camera, scene(**tables), antialias=antialias)
@@ -29,7 +29,7 @@ def plane(x, y, nx, ny, **more):
 @pytest.mark.parametrize("degrees", range(0, 360, 30))
 def test_a_plane_is_solid_behind_its_normal(degrees, antialias):
     nx, ny = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
-    picture = fixtures(plane=[plane(0.5, 0.3, 7 * nx, 7 * ny)], antialias=antialias)
+    picture = render_static(plane=[plane(0.5, 0.3, 7 * nx, 7 * ny)], antialias=antialias)
     column, row = np.meshgrid(np.arange(SIZE[0]) + 0.5, np.arange(SIZE[1]) + 0.5, indexing="ij")
     x, y = (column - SIZE[0] / 2) / CAMERA.scale, (SIZE[1] / 2 - row) / CAMERA.scale
     height = ((x - 0.5) * nx + (y - 0.3) * ny) * CAMERA.scale  # px
@@ -39,30 +39,30 @@ def test_a_plane_is_solid_behind_its_normal(degrees, antialias):
 
 
 @given(x=st.floats(-1e16, 1e16), y=st.floats(-1e16, 1e16), turn=st.floats(0, 7), power=st.floats(-14, 12))
-def test_no_plane_is_too_far(x, y, turn, power):
+def test_plane_at_any_distance_is_drawn_correctly(x, y, turn, power):
     camera = Camera((0.0, 0.0), 10.0**power, (40, 30))
     nx, ny = math.cos(turn), math.sin(turn)
-    picture = fixtures(camera, plane=[plane(x, y, nx, ny)])
+    picture = render_static(camera, plane=[plane(x, y, nx, ny)])
     height = -(x * nx + y * ny) * camera.scale
-    if abs(height) > 50.0:  # px: the picture lies on one side of it
+    if abs(height) > 50.0:  # px: the picture is on one side of the plane
         assert (picture == (BACKGROUND if height > 0 else SOLID)).all()
 
 
-def test_a_plane_has_its_own_colour():
-    own = fixtures(plane=[plane(0, 0, 0, 1, colour="#ff0000")])
+def test_plane_is_drawn_in_its_own_colour():
+    own = render_static(plane=[plane(0, 0, 0, 1, colour="#ff0000")])
     assert tuple(own[100, 61]) == (255, 0, 0)  # the edge is 2 px below the surface
     red, green, _ = (int(channel) for channel in own[100, 110])
     assert red > 2 * green
 
 
-def test_a_wall_is_as_wide_as_it_is_thick():
-    picture = fixtures(wall=[{"points": [[-2, 0], [2, 0]], "thickness": 1.0}])
-    solid = changed(picture, np.full_like(picture, BACKGROUND)).sum(1)
+def test_width_of_a_wall_is_its_thickness():
+    picture = render_static(wall=[{"points": [[-2, 0], [2, 0]], "thickness": 1.0}])
+    solid = changed_pixels(picture, np.full_like(picture, BACKGROUND)).sum(1)
     assert (solid[60:140] == 20).all()
     assert solid.sum() == pytest.approx(80 * 20 + math.pi * 10**2, rel=0.02)  # pixels at the rim count in full
-    assert at(picture, 0.0, 0.0) == SOLID
-    assert at(picture, 2.4, 0.0) != BACKGROUND, "ends are round"
-    assert at(picture, 2.4, 0.4) == BACKGROUND, "ends are round"
+    assert colour_at(picture, 0.0, 0.0) == SOLID
+    assert colour_at(picture, 2.4, 0.0) != BACKGROUND, "ends are round"
+    assert colour_at(picture, 2.4, 0.4) == BACKGROUND, "ends are round"
 
 
 @pytest.mark.parametrize(("unit", "width"), [(1.0, 2), (2.0, 4)])
@@ -73,24 +73,24 @@ def test_a_wall_without_thickness_is_a_line(unit, width):
     assert covered.sum() == pytest.approx(width, abs=0.02)  # 8 bits a pixel
 
 
-def test_a_closed_wall_returns_to_its_start():
+def test_closed_wall_is_drawn_back_to_its_start():
     corners = [[-2, -2], [2, -2], [2, 2], [-2, 2]]
-    assert at(fixtures(wall=[{"points": corners, "closed": True}]), -2.0, 0.0) == SURFACE
-    assert at(fixtures(wall=[{"points": corners}]), -2.0, 0.0) == BACKGROUND
+    assert colour_at(render_static(wall=[{"points": corners, "closed": True}]), -2.0, 0.0) == SURFACE
+    assert colour_at(render_static(wall=[{"points": corners}]), -2.0, 0.0) == BACKGROUND
 
 
-def test_no_outline_shows_inside_the_corner_of_a_thick_wall():
-    picture = fixtures(wall=[{"points": [[-3, 0], [0, 0], [0, -3]], "thickness": 1.0}])
+def test_thick_wall_has_no_outline_inside_its_corner():
+    picture = render_static(wall=[{"points": [[-3, 0], [0, 0], [0, -3]], "thickness": 1.0}])
     for k in range(-7, 8):
-        assert at(picture, 0.03 * k, 0.03 * k) == SOLID
+        assert colour_at(picture, 0.03 * k, 0.03 * k) == SOLID
 
 
 def test_a_wall_of_many_points_is_drawn():
     turn = np.linspace(0, 2 * math.pi, 5000)
     points = np.stack((2 * np.cos(turn), 2 * np.sin(turn)), 1).tolist()
-    picture = fixtures(wall=[{"points": points, "thickness": 0.3}])
-    assert at(picture, 0.0, 2.0) != BACKGROUND
-    assert at(picture, 0.0, 0.0) == BACKGROUND
+    picture = render_static(wall=[{"points": points, "thickness": 0.3}])
+    assert colour_at(picture, 0.0, 2.0) != BACKGROUND
+    assert colour_at(picture, 0.0, 0.0) == BACKGROUND
 
 
 @given(
@@ -98,55 +98,58 @@ def test_a_wall_of_many_points_is_drawn():
     thickness=st.floats(0, 1e9),
     power=st.floats(-14, 12),
 )
-def test_no_wall_or_post_is_too_far(points, thickness, power):
+def test_walls_and_posts_at_any_distance_draw_without_an_error(points, thickness, power):
     camera = Camera(points[0], 10.0**power, (40, 30))
     surface = pygame.Surface(camera.size)
-    assume(all(math.dist(a, b) >= 1e-9 for a, b in pairwise(points)))  # m; nearer ones are no wall
+    assume(all(math.dist(a, b) >= 1e-9 for a, b in pairwise(points)))  # m: the shortest valid segment of a wall
     wall = {"points": [list(p) for p in points], "thickness": thickness}
     post = {"position": list(points[1]), "radius": max(thickness, 1e-9)}
     for more in ({}, {"solid": False}, {"one_way": True}):
-        there = {key: value for key, value in more.items() if key == "solid"}
-        draw_static_bodies(surface, camera, scene(wall=[{**wall, **more}], post=[{**post, **there}]))
+        post_keys = {key: value for key, value in more.items() if key == "solid"}
+        draw_static_bodies(surface, camera, scene(wall=[{**wall, **more}], post=[{**post, **post_keys}]))
     assert surface.get_size() == camera.size
 
 
-def test_what_is_not_solid_is_fainter_and_leaves_the_background_free():
-    there = {"wall": [{"points": [[-2, 1], [2, 1]], "thickness": 0.5}], "post": [{"position": [1, -1], "radius": 0.6}]}
-    gone = {kind: [{**each, "solid": False} for each in those] for kind, those in there.items()}
-    solid, faint = fixtures(**there), fixtures(**gone)
-    drawn_of = [changed(each, np.full_like(each, BACKGROUND)) for each in (solid, faint)]
-    assert 0 < drawn_of[1].sum() < 0.3 * drawn_of[0].sum()
-    assert at(faint, 1.0, -1.0) == BACKGROUND
+def test_walls_and_posts_that_are_not_solid_are_faint_outlines():
+    solid_items = {
+        "wall": [{"points": [[-2, 1], [2, 1]], "thickness": 0.5}],
+        "post": [{"position": [1, -1], "radius": 0.6}],
+    }
+    faint_items = {kind: [{**each, "solid": False} for each in items] for kind, items in solid_items.items()}
+    solid, faint = render_static(**solid_items), render_static(**faint_items)
+    pixels = [changed_pixels(each, np.full_like(each, BACKGROUND)) for each in (solid, faint)]
+    assert 0 < pixels[1].sum() < 0.3 * pixels[0].sum()
+    assert colour_at(faint, 1.0, -1.0) == BACKGROUND
     assert faint.max() < solid.max()
 
 
-@pytest.mark.parametrize("way", [1, -1])
-def test_arrows_tell_which_way_a_gate_lets_pass(way):
-    gate = {"points": [[0, -2 * way], [0, 2 * way]], "thickness": 0.1}
-    arrows = changed(fixtures(wall=[{**gate, "one_way": True}]), fixtures(wall=[gate]))
+@pytest.mark.parametrize("direction", [1, -1])
+def test_arrows_show_the_passing_direction_of_a_one_way_wall(direction):
+    gate = {"points": [[0, -2 * direction], [0, 2 * direction]], "thickness": 0.1}
+    arrows = changed_pixels(render_static(wall=[{**gate, "one_way": True}]), render_static(wall=[gate]))
     column, _ = np.nonzero(arrows)
     assert len(column) > 10
-    assert ((column - SIZE[0] / 2) * way <= 0).all()  # left of its direction
+    assert ((column - SIZE[0] / 2) * direction <= 0).all()  # on the left side of its direction
 
 
-def test_a_post_that_kicks_has_a_ring():
+def test_post_with_a_kick_has_a_ring():
     post = {"position": [0, 0], "radius": 1.0}
-    ring = changed(fixtures(post=[{**post, "kick": {"speed": 1}}]), fixtures(post=[post]))
+    ring = changed_pixels(render_static(post=[{**post, "kick": {"speed": 1}}]), render_static(post=[post]))
     column, row = np.nonzero(ring)
-    away = np.hypot(column + 0.5 - SIZE[0] / 2, row + 0.5 - SIZE[1] / 2) / CAMERA.scale
-    assert 0.55 < away.max() < 0.65
+    distance = np.hypot(column + 0.5 - SIZE[0] / 2, row + 0.5 - SIZE[1] / 2) / CAMERA.scale
+    assert 0.55 < distance.max() < 0.65
 
 
 def test_a_post_is_a_filled_circle():
-    picture = fixtures(post=[{"position": [1, 1], "radius": 0.5}])
-    area = changed(picture, np.full_like(picture, BACKGROUND)).sum()
+    picture = render_static(post=[{"position": [1, 1], "radius": 0.5}])
+    area = changed_pixels(picture, np.full_like(picture, BACKGROUND)).sum()
     assert area == pytest.approx(math.pi * 10**2, rel=0.15)  # pixels at the rim count in full
-    assert at(picture, 1.0, 1.0) != BACKGROUND
+    assert colour_at(picture, 1.0, 1.0) != BACKGROUND
 
 
-def test_bounds_are_dashed_and_shown_when_asked_for():
+def test_bounds_overlay_draws_a_dashed_rectangle():
     box = scene(world={"bounds": [[-4, -2], [4, 2]]})
-    differ = changed(drawn(sight(box)), drawn(sight(box, "bounds")))
+    differ = changed_pixels(render(snapshot(box)), render(snapshot(box, "bounds")))
     column, row = np.nonzero(differ)
     assert (column.min(), column.max()) == pytest.approx((20, 180), abs=1)  # a line's width
     assert (row.min(), row.max()) == pytest.approx((20, 100), abs=1)  # the same
@@ -155,7 +158,7 @@ def test_bounds_are_dashed_and_shown_when_asked_for():
 
 
 @given(power=st.floats(-14.0, 12.0), unit=st.sampled_from([1.0, 2.0]))
-def test_steps_are_1_2_or_5_and_wide_enough(power, unit):
+def test_grid_step_is_1_2_or_5_times_a_power_of_ten_and_wide_enough(power, unit):
     step = step_of(Camera((0.0, 0.0), 10.0**power, SIZE), unit)
     assert f"{step:.0e}"[0] in "125"
     assert step == pytest.approx(float(f"{step:.0e}"))
@@ -168,12 +171,12 @@ def test_grid_lines_lie_at_multiples_of_the_step():
     step = step_of(CAMERA)
     picture = pygame.surfarray.array3d(surface)
     assert step == 5.0
-    assert at(picture, 0.0, 1.3) == GRID_STRONG
-    assert at(picture, step - 1e-9, 1.3) == (0, 0, 0)
-    assert at(picture, -step, 1.3) == GRID
+    assert colour_at(picture, 0.0, 1.3) == GRID_STRONG
+    assert colour_at(picture, step - 1e-9, 1.3) == (0, 0, 0)
+    assert colour_at(picture, -step, 1.3) == GRID
 
 
-def test_the_bar_is_one_step_long():
+def test_scale_bar_is_one_grid_step_long():
     surface = pygame.Surface((400, 200))
     camera = Camera((0.0, 0.0), 70.0, (400, 200))
     draw_scale(surface, camera, foot=30.0)

@@ -1,4 +1,4 @@
-"""The inset of a picture: what a scene asks to be shown larger, where the picture shows it small."""
+"""Inset: an enlarged view of a region that the scene states, while the main view shows it small."""
 
 import numpy as np
 import pygame
@@ -22,53 +22,53 @@ def scene(inset: list[list[float]] | None) -> Scene:
     return from_document({"ball": [ball], "play": play})
 
 
-def drawn(of: Scene, camera: Camera) -> tuple[np.ndarray, np.ndarray, pygame.Rect | None]:
-    """Return the pixels before and after, and where the inset is."""
-    surface, sight = pygame.Surface(SIZE), Snapshot(of, of.bodies, frame(of))
-    Renderer().draw(surface, camera, sight)
+def render(model: Scene, camera: Camera) -> tuple[np.ndarray, np.ndarray, pygame.Rect | None]:
+    """Return the pixels before and after, and the rectangle of the inset."""
+    surface, snapshot = pygame.Surface(SIZE), Snapshot(model, model.bodies, frame(model))
+    Renderer().draw(surface, camera, snapshot)
     before = pygame.surfarray.array3d(surface)
-    place = InsetRenderer().draw(surface, camera, sight, FREE)
-    return before, pygame.surfarray.array3d(surface), place
+    rect = InsetRenderer().draw(surface, camera, snapshot, FREE)
+    return before, pygame.surfarray.array3d(surface), rect
 
 
-def far(box: tuple[tuple[float, float], tuple[float, float]] = ((-10.0, -1.0), (10.0, 1.0))) -> Camera:
+def wide_camera(box: tuple[tuple[float, float], tuple[float, float]] = ((-10.0, -1.0), (10.0, 1.0))) -> Camera:
     return Camera.fitting(box, SIZE)
 
 
-def test_what_is_small_is_seen_larger_in_the_corner() -> None:
-    before, after, place = drawn(scene([[8.0, -0.5], [10.0, 0.5]]), far())
-    assert place is not None
-    assert FREE.contains(place)
-    assert place.width <= WIDE * FREE.width + 1
-    assert place.height <= HIGH * FREE.height + 1
-    assert abs(place.width - 2 * place.height) <= 2  # px: it has the shape of what it is of
+def test_inset_shows_its_region_enlarged_in_the_corner() -> None:
+    before, after, rect = render(scene([[8.0, -0.5], [10.0, 0.5]]), wide_camera())
+    assert rect is not None
+    assert FREE.contains(rect)
+    assert rect.width <= WIDE * FREE.width + 1
+    assert rect.height <= HIGH * FREE.height + 1
+    assert abs(rect.width - 2 * rect.height) <= 2  # px: it has the aspect ratio of its region
     red = np.array(hex_colour(COLOUR))
-    inside = after[place.left : place.right, place.top : place.bottom]
-    where = np.argwhere((np.abs(inside.astype(int) - red) < 90).all(axis=2))
-    middle = where.mean(axis=0)
-    assert np.abs(middle - [0.5 * place.width, 0.5 * place.height]).max() < 2.0  # px; the ball is in its middle
-    scale = place.width / 2.0
+    inside = after[rect.left : rect.right, rect.top : rect.bottom]
+    ball_pixels = np.argwhere((np.abs(inside.astype(int) - red) < 90).all(axis=2))
+    middle = ball_pixels.mean(axis=0)
+    assert np.abs(middle - [0.5 * rect.width, 0.5 * rect.height]).max() < 2.0  # px: the ball is at its centre
+    scale = rect.width / 2.0
     area = np.pi * (0.1 * scale) ** 2
-    assert 0.6 * area < len(where) < 1.1 * area  # its edge is darker
+    assert 0.6 * area < len(ball_pixels) < 1.1 * area  # its edge is darker
     assert not np.array_equal(before, after)
 
 
-def test_no_inset_where_none_is_stated_or_the_picture_is_as_near() -> None:
-    for of, camera in (
-        (scene(None), far()),
-        (scene([[8.0, -0.5], [10.0, 0.5]]), far(((8.0, -0.5), (10.0, 0.5)))),
+def test_no_inset_without_a_region_or_when_the_view_is_as_close() -> None:
+    for model, camera in (
+        (scene(None), wide_camera()),
+        (scene([[8.0, -0.5], [10.0, 0.5]]), wide_camera(((8.0, -0.5), (10.0, 0.5)))),
         (scene([[8.0, -0.5], [10.0, 0.5]]), Camera((0.0, 0.0), 20.0, SIZE, turned=True)),
     ):
-        before, after, place = drawn(of, camera)
-        assert place is None
+        before, after, rect = render(model, camera)
+        assert rect is None
         assert np.array_equal(before, after)
 
 
-def test_room_is_left_for_what_else_is_in_the_corner() -> None:
-    of, camera, surface = scene([[8.0, -0.5], [10.0, 0.5]]), far(), pygame.Surface(SIZE)
-    sight = Snapshot(of, of.bodies, frame(of))
-    place = InsetRenderer().draw(surface, camera, sight, FREE, aside=300)
-    assert place is not None
-    assert place.right <= FREE.right - 300
-    assert place.left >= 0
-    assert InsetRenderer().draw(surface, camera, sight, pygame.Rect(0, 0, 1, 1)) is None
+def test_inset_leaves_space_for_other_widgets_in_the_corner() -> None:
+    model, camera, surface = scene([[8.0, -0.5], [10.0, 0.5]]), wide_camera(), pygame.Surface(SIZE)
+    snapshot = Snapshot(model, model.bodies, frame(model))
+    rect = InsetRenderer().draw(surface, camera, snapshot, FREE, aside=300)
+    assert rect is not None
+    assert rect.right <= FREE.right - 300
+    assert rect.left >= 0
+    assert InsetRenderer().draw(surface, camera, snapshot, pygame.Rect(0, 0, 1, 1)) is None

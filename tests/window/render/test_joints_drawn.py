@@ -1,4 +1,4 @@
-"""Joints: what is drawn of each kind, where, and when."""
+"""Drawing of joints of each kind, with and without the overlay."""
 
 import math
 
@@ -8,12 +8,12 @@ import pytest
 
 from sandbox.engines.common import kernel
 from sandbox.scene.compile.scene import Scene
-from sandbox.window.render import kernels as wires
+from sandbox.window.render import kernels
 from sandbox.window.render import lines as module
 from sandbox.window.render.joints import COILED, SHADES, JointSegments, strain
 from sandbox.window.render.lines import draw_thin_lines
 from sandbox.window.render.palette import ORANGE, SKY
-from tests.window.render.drawn import CAMERA, ball, changed, drawn, frame, scene, sight
+from tests.window.render.drawn import CAMERA, ball, changed_pixels, frame, render, scene, snapshot
 
 TWO = [ball(-3, 0, 0.3, name="a", angle=0.1), ball(3, 0, 0.3, name="b", angle=0.1)]
 PAIR = {"between": ["a", "b"]}
@@ -28,80 +28,80 @@ KINDS = {
     "spring": PAIR | {"kind": "spring", "stiffness": 1.0},
     "rotary_spring": PAIR | {"kind": "rotary_spring", "stiffness": 1.0},
 }
-QUIET = {"rod", "slide", "spring"}
+WITHOUT_OVERLAY = {"rod", "slide", "spring"}
 
 
-def joined(*joints: dict) -> Scene:
+def scene_with(*joints: dict) -> Scene:
     return scene(balls=TWO, joint=list(joints))
 
 
-def shown(which: Scene, *overlays: str, **more: object) -> np.ndarray:
-    """Return which pixels joints change."""
-    return changed(drawn(sight(scene(balls=TWO)), **more), drawn(sight(which, *overlays), **more))
+def joint_pixels(model: Scene, *overlays: str, **more: object) -> np.ndarray:
+    """Return which pixels change by drawing the joints."""
+    return changed_pixels(render(snapshot(scene(balls=TWO)), **more), render(snapshot(model, *overlays), **more))
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_carries_the_picture_is_seen_without_the_overlay(kind):
-    assert shown(joined(KINDS[kind])).any() == (kind in QUIET)
+def test_rods_slides_and_springs_are_drawn_without_the_overlay(kind):
+    assert joint_pixels(scene_with(KINDS[kind])).any() == (kind in WITHOUT_OVERLAY)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_is_broken_is_not_drawn(kind):
-    bare = drawn(sight(scene(balls=TWO), "joints"))
-    assert not changed(bare, drawn(sight(joined(KINDS[kind]), "joints", broken=[0]))).any()
+def test_broken_joints_are_not_drawn(kind):
+    bare = render(snapshot(scene(balls=TWO), "joints"))
+    assert not changed_pixels(bare, render(snapshot(scene_with(KINDS[kind]), "joints", broken=[0]))).any()
 
 
 @pytest.mark.parametrize("antialias", [True, False])
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_has_its_mark_in_the_overlay(kind, antialias):
-    without = drawn(sight(joined(KINDS[kind])), antialias=antialias)
-    differ = changed(without, drawn(sight(joined(KINDS[kind]), "joints"), antialias=antialias))
+def test_every_kind_has_a_mark_in_the_overlay(kind, antialias):
+    without = render(snapshot(scene_with(KINDS[kind])), antialias=antialias)
+    differ = changed_pixels(without, render(snapshot(scene_with(KINDS[kind]), "joints"), antialias=antialias))
     assert differ.sum() > 10
 
 
-def test_kinds_are_told_apart_by_more_than_colour():
-    marks = [shown(joined(joint), "joints") for joint in KINDS.values()]
+def test_kinds_of_joints_differ_in_shape():
+    marks = [joint_pixels(scene_with(joint), "joints") for joint in KINDS.values()]
     for k, one in enumerate(marks):
         assert all((one != other).sum() > 10 for other in marks[:k])
 
 
 def test_a_rod_is_a_line_between_its_anchors():
-    which = joined(PAIR | {"kind": "rod", "anchors": [[0.0, 0.2], [0.0, 0.2]]})
-    differ = shown(which)
+    model = scene_with(PAIR | {"kind": "rod", "anchors": [[0.0, 0.2], [0.0, 0.2]]})
+    differ = joint_pixels(model)
     assert differ[60:140, 60 - 4].all()
     assert not differ[60:140, :50].any()
     assert not differ[:30].any()
 
 
-def test_a_rod_to_the_world_reaches_its_place():
-    which = joined({"kind": "rod", "between": ["a"], "anchors": [[0, 0], [-3, 2]]})
-    differ = shown(which)
+def test_rod_to_the_world_reaches_its_anchor():
+    model = scene_with({"kind": "rod", "between": ["a"], "anchors": [[0, 0], [-3, 2]]})
+    differ = joint_pixels(model)
     assert differ[38:43, 20:50].any(axis=0).all()
     assert not differ[70:].any()
 
 
-def test_a_joint_of_a_body_that_is_gone_is_gone():
-    which = joined(KINDS["rod"])
-    there = np.asarray([True, False])
-    gone = drawn(sight(which, "joints", frame=frame(which, present=there)))
-    alone = scene(balls=TWO)
-    assert not changed(gone, drawn(sight(alone, frame=frame(alone, present=there)))).any()
+def test_joint_of_an_absent_body_is_not_drawn():
+    model = scene_with(KINDS["rod"])
+    present = np.asarray([True, False])
+    picture = render(snapshot(model, "joints", frame=frame(model, present=present)))
+    unjoined = scene(balls=TWO)
+    assert not changed_pixels(picture, render(snapshot(unjoined, frame=frame(unjoined, present=present)))).any()
 
 
-@pytest.mark.parametrize("place", [math.nan, math.inf, 1e300])
-def test_a_joint_that_leads_nowhere_is_left_out(place):
-    def picture(which: Scene) -> np.ndarray:
-        return drawn(sight(which, "joints", frame=frame(which, position=np.asarray([[-3.0, 0.0], [place, 0.0]]))))
+@pytest.mark.parametrize("point", [math.nan, math.inf, 1e300])
+def test_joint_to_an_invalid_position_is_omitted(point):
+    def picture(model: Scene) -> np.ndarray:
+        return render(snapshot(model, "joints", frame=frame(model, position=np.asarray([[-3.0, 0.0], [point, 0.0]]))))
 
     without = picture(scene(balls=TWO))
     for kind, joint in KINDS.items():
-        differ = changed(picture(joined(joint)), without)
-        # The line to a body that is merely far goes to the right, from a mark of 4 pixels at column 40.
-        assert not (differ[:36] if math.isfinite(place) else differ).any(), kind
+        differ = changed_pixels(picture(scene_with(joint)), without)
+        # The line to a distant body goes to the right, from a mark of 4 pixels at column 40.
+        assert not (differ[:36] if math.isfinite(point) else differ).any(), kind
 
 
-def test_a_spring_is_a_zigzag_as_long_as_it_is():
-    column, row = np.nonzero(shown(joined(KINDS["spring"])))
+def test_spring_is_a_zigzag_between_its_ends():
+    column, row = np.nonzero(joint_pixels(scene_with(KINDS["spring"])))
     assert column.min() >= 40
     assert column.max() <= 160
     assert row.max() - row.min() > 6, "not a line"
@@ -110,20 +110,21 @@ def test_a_spring_is_a_zigzag_as_long_as_it_is():
 def test_a_spring_narrows_as_it_stretches():
     width = []
     for rest in (10.0, 6.0, 3.0):
-        _, row = np.nonzero(shown(joined(KINDS["spring"] | {"rest_length": rest})))
+        _, row = np.nonzero(joint_pixels(scene_with(KINDS["spring"] | {"rest_length": rest})))
         width.append(row.max() - row.min())
     assert width == sorted(width, reverse=True)
     assert width[0] > width[2]
 
 
-def test_strain_is_blue_grey_orange():
-    which = joined(*(KINDS["spring"] | {"rest_length": rest} for rest in (60.0, 6.0, 0.06, 0.0)))
-    held = JointSegments(which.links, np.tile((0.0, 0.0, 6.0 * CAMERA.scale, 0.0), (4, 1)))
+def test_strain_colours_go_from_blue_over_grey_to_orange():
+    model = scene_with(*(KINDS["spring"] | {"rest_length": rest} for rest in (60.0, 6.0, 0.06, 0.0)))
+    held = JointSegments(model.links, np.tile((0.0, 0.0, 6.0 * CAMERA.scale, 0.0), (4, 1)))
     short, rest, long, none = SHADES[strain(held, CAMERA.scale)].astype(int)
-    assert np.abs(short - SKY).max() <= 20  # nine tenths of the way
+    assert np.abs(short - SKY).max() <= 20  # nine tenths of the range
     assert (rest == SHADES[32]).all()
-    assert np.abs(long - ORANGE).max() <= 8  # all but the whole way
-    assert (none == SHADES[61]).all() or np.abs(none - ORANGE).max() <= 20  # of no length at rest: as if twice as long
+    assert np.abs(long - ORANGE).max() <= 8  # nearly the whole range
+    # Zero rest length is coloured as stretched to twice the length.
+    assert (none == SHADES[61]).all() or np.abs(none - ORANGE).max() <= 20
 
 
 def cloth(columns: int, rows: int) -> Scene:
@@ -138,19 +139,20 @@ def cloth(columns: int, rows: int) -> Scene:
 
 
 def test_springs_of_a_cloth_are_lines():
-    which = cloth(20, 16)
-    assert len(which.links) > COILED
-    picture = drawn(sight(which))
-    differ = changed(picture, drawn(sight(scene(world={}))))
+    model = cloth(20, 16)
+    assert len(model.links) > COILED
+    picture = render(snapshot(model))
+    differ = changed_pixels(picture, render(snapshot(scene(world={}))))
     assert differ[21:170, 68].all(), "a row of it, from its left to its right"
     tone = SHADES[32].astype(int)
-    assert np.abs(picture[50, 66:71].astype(int) - tone).max(axis=1).min() < 60  # two rows of pixels share a line
+    # A line may cover parts of two rows of pixels.
+    assert np.abs(picture[50, 66:71].astype(int) - tone).max(axis=1).min() < 60
 
 
-assert wires.rasterise_lines, "imported before a test says that there is numba"
+assert kernels.rasterise_lines, "imported before a test patches COMPILED"
 
 
-def threads(ends: list, compiled: bool) -> np.ndarray:
+def line_coverage(ends: list, compiled: bool) -> np.ndarray:
     surface = pygame.Surface((200, 120), 0, 32)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(kernel, "COMPILED", True)  # without numba the same pass runs as plain Python
@@ -161,18 +163,17 @@ def threads(ends: list, compiled: bool) -> np.ndarray:
 
 @pytest.mark.parametrize("compiled", [True, False])
 @pytest.mark.parametrize("ends", [(10, 20, 110, 20), (10, 20, 90, 80), (90, 110, 60, 10), (150, 90, 20, 85)])
-def test_a_thread_has_the_ink_of_its_longer_way(ends, compiled):
-    ink = threads([ends], compiled).sum()
-    assert ink == pytest.approx(
-        max(abs(ends[2] - ends[0]), abs(ends[3] - ends[1])), abs=2.5
-    )  # whole pixels at its ends
+def test_coverage_of_a_thin_line_is_its_longer_extent(ends, compiled):
+    ink = line_coverage([ends], compiled).sum()
+    extent = max(abs(ends[2] - ends[0]), abs(ends[3] - ends[1]))
+    assert ink == pytest.approx(extent, abs=2.5)  # whole pixels at its ends
 
 
 @pytest.mark.parametrize("compiled", [True, False])
-def test_threads_are_cut_where_the_picture_ends(compiled):
-    far = threads([(-1e9, 60.0, 1e9, 60.0), (100.0, -1e7, 100.0, 1e7)], compiled)
+def test_thin_lines_are_clipped_to_the_picture(compiled):
+    far = line_coverage([(-1e9, 60.0, 1e9, 60.0), (100.0, -1e7, 100.0, 1e7)], compiled)
     assert (far[:, 58:62].sum(axis=1) > 0.9).all()  # eight bits a pixel
     assert (far[98:102].sum(axis=0) > 0.9).all()  # the same
     none = [(math.nan, 0, 9, 9), (0, 0, math.inf, 3), (-50, -50, -3, 400), (0, 500, 200, 500), (1e300, 1, -1e300, 2)]
-    assert threads([*none[:4]], compiled).sum() == 0.0
-    threads(none, compiled)
+    assert line_coverage([*none[:4]], compiled).sum() == 0.0
+    line_coverage(none, compiled)

@@ -7,107 +7,107 @@ from sandbox.trajectory import Contacts
 from sandbox.window.playback.snapshot import MissedContactMarker
 from sandbox.window.render.palette import ORANGE, YELLOW
 from sandbox.window.render.vectors import HEAT
-from tests.window.render.drawn import CAMERA, at, ball, changed, contact, drawn, frame, scene, sight
+from tests.window.render.drawn import CAMERA, ball, changed_pixels, colour_at, contact, frame, render, scene, snapshot
 
 ONE = scene(balls=[ball(0, 0, velocity=[5.0, 0.0])])
 WEIGHT = 9.81
 HEAVY = scene(balls=[ball(0, 0)], world={"gravity": [0.0, -WEIGHT]}, plane=[{"point": [0, -1], "normal": [0, 1]}])
 
 
-def box(differ: np.ndarray) -> tuple[int, int, int, int]:
-    """Return left, top, right, bottom of the pixels that differ, in px; the last two are beyond them."""
+def pixel_box(differ: np.ndarray) -> tuple[int, int, int, int]:
+    """Return left, top, right and bottom of the differing pixels, px; right and bottom are exclusive."""
     column, row = np.nonzero(differ)
     return int(column.min()), int(row.min()), int(column.max()) + 1, int(row.max()) + 1
 
 
-def effect(which, *overlays, camera=CAMERA, **more) -> np.ndarray:
-    """Return which pixels overlays change."""
-    return changed(drawn(sight(which), camera), drawn(sight(which, *overlays, **more), camera))
+def overlay_pixels(model, *overlays, camera=CAMERA, **more) -> np.ndarray:
+    """Return which pixels change by overlays."""
+    return changed_pixels(render(snapshot(model), camera), render(snapshot(model, *overlays, **more), camera))
 
 
-def test_velocity_is_shown_as_the_way_of_a_tenth_of_a_second():
+def test_velocity_arrow_is_the_displacement_in_a_tenth_of_a_second():
     for velocity, tip in (([20.0, 0.0], (140, 60)), ([0.0, 15.0], (100, 30)), ([-20.0, 0.0], (60, 60))):
-        which = scene(balls=[ball(0, 0, 0.2, velocity=velocity)])
-        left, top, right, bottom = box(effect(which, "velocities"))
+        model = scene(balls=[ball(0, 0, 0.2, velocity=velocity)])
+        left, top, right, bottom = pixel_box(overlay_pixels(model, "velocities"))
         reached = left if tip[0] < 100 else right if tip[0] > 100 else top
         assert reached == pytest.approx(tip[1] if tip[0] == 100 else tip[0], abs=2)  # the edge of the arrow's head
         assert left >= min(tip[0], 100) - 8
         assert bottom <= 68
 
 
-def test_velocities_have_a_colour_that_no_force_has():
-    which = scene(balls=[ball(0, 0, 0.2, velocity=[20.0, 0.0])])
-    assert at(drawn(sight(which, "velocities")), 1.0, 0.0) == ORANGE
+def test_colour_of_velocities_differs_from_the_colours_of_forces():
+    model = scene(balls=[ball(0, 0, 0.2, velocity=[20.0, 0.0])])
+    assert colour_at(render(snapshot(model, "velocities")), 1.0, 0.0) == ORANGE
     assert min(sum(abs(a - b) for a, b in zip(heat, ORANGE, strict=True)) for heat in HEAT) > 100
 
 
 def test_a_body_at_rest_has_no_arrow():
-    assert not effect(scene(balls=[ball(0, 0)]), "velocities").any()
+    assert not overlay_pixels(scene(balls=[ball(0, 0)]), "velocities").any()
 
 
-def test_a_fast_body_has_an_arrow_that_ends_in_the_picture():
-    left, _, right, _ = box(effect(scene(balls=[ball(0, 0, velocity=[1e9, 0.0])]), "velocities"))
+def test_arrow_of_a_fast_body_is_limited_in_length():
+    left, _, right, _ = pixel_box(overlay_pixels(scene(balls=[ball(0, 0, velocity=[1e9, 0.0])]), "velocities"))
     assert left >= 90
     assert right == pytest.approx(100 + 120 / 3, abs=2)  # the edge of the arrow's head
 
 
 @pytest.mark.parametrize("overlay", ["joints", "energy"])
-def test_what_is_drawn_elsewhere_changes_nothing(overlay):
-    assert not effect(ONE, overlay).any()
+def test_overlays_without_content_change_no_pixel(overlay):
+    assert not overlay_pixels(ONE, overlay).any()
 
 
-def test_contacts_are_shown_where_the_body_is_now():
+def test_contacts_are_drawn_at_the_current_position_of_the_body():
     stale = contact((0, -1), (-4.0, -1.0), (0.0, -1.0))
-    left, top, right, bottom = box(effect(HEAVY, "contacts", contacts=stale))
+    left, top, right, bottom = pixel_box(overlay_pixels(HEAVY, "contacts", contacts=stale))
     assert left >= 95
     assert right <= 105
     assert top >= 76
     assert bottom == pytest.approx(80 + 16, abs=2)  # the normal is 16 px long
 
 
-def test_contacts_of_two_balls_lie_between_them():
+def test_contact_of_two_balls_is_drawn_between_them():
     pair = scene(balls=[ball(-1, 0), ball(1, 0)])
     wrong = contact((0, 1), (9.0, 9.0), (0.0, 1.0))
-    left, top, right, bottom = box(effect(pair, "contacts", contacts=wrong))
+    left, top, right, bottom = pixel_box(overlay_pixels(pair, "contacts", contacts=wrong))
     assert 94 <= left < right <= 118
     assert 54 <= top < bottom <= 66
 
 
-def test_contacts_around_a_post_turn_with_the_ball():
-    which = scene(balls=[ball(0, 1.5)], post=[{"position": [0.0, 0.0], "radius": 0.5}])
+def test_contact_with_a_post_is_drawn_towards_the_ball():
+    model = scene(balls=[ball(0, 1.5)], post=[{"position": [0.0, 0.0], "radius": 0.5}])
     stale = contact((0, -1), (0.5, 0.0), (-1.0, 0.0))
-    left, _, right, bottom = box(effect(which, "contacts", contacts=stale))
+    left, _, right, bottom = pixel_box(overlay_pixels(model, "contacts", contacts=stale))
     assert 94 <= left < right <= 106
     assert bottom == pytest.approx(60 - 10 + 16, abs=2)  # the normal is 16 px long
 
 
-def test_contacts_around_the_end_of_a_wall_turn_with_the_ball():
-    which = scene(balls=[ball(0, 1.5)], wall=[{"points": [[0.0, 0.0], [4.0, 0.0]], "thickness": 1.0}])
+def test_contact_with_the_end_of_a_wall_is_drawn_towards_the_ball():
+    model = scene(balls=[ball(0, 1.5)], wall=[{"points": [[0.0, 0.0], [4.0, 0.0]], "thickness": 1.0}])
     stale = contact((0, -1), (0.5, 0.0), (-1.0, 0.0))
-    left, _, right, _ = box(effect(which, "contacts", contacts=stale))
+    left, _, right, _ = pixel_box(overlay_pixels(model, "contacts", contacts=stale))
     assert 94 <= left < right <= 106
 
 
-def force(newtons: float, which=HEAVY, seconds=0.01) -> np.ndarray:
+def force(newtons: float, model=HEAVY, seconds=0.01) -> np.ndarray:
     row = contact((0, -1), (0.0, -1.0), (0.0, -1.0), (0.0, -newtons * seconds))
-    return effect(which, "impulses", contacts=row, seconds=seconds)
+    return overlay_pixels(model, "impulses", contacts=row, seconds=seconds)
 
 
-def test_impulses_are_measured_by_weights():
+def test_impulse_arrows_are_scaled_by_the_weight():
     lengths = []
     for weights in (1.0, 2.0, 3.0):
         differ = force(weights * WEIGHT)[96:104]
-        lengths.append(box(differ)[3] - box(differ)[1])
+        lengths.append(pixel_box(differ)[3] - pixel_box(differ)[1])
     assert lengths == pytest.approx([26, 52, 78], abs=2.5)  # smooth ends
 
 
-def test_a_large_impulse_stays_in_the_picture():
+def test_arrow_of_a_large_impulse_is_limited_in_length():
     differ = force(1e9)[96:104]
-    assert box(differ)[3] - box(differ)[1] == pytest.approx(80, abs=2.5)  # smooth ends
+    assert pixel_box(differ)[3] - pixel_box(differ)[1] == pytest.approx(80, abs=2.5)  # smooth ends
 
 
-def test_impulses_without_gravity_are_measured_by_the_largest():
-    which = scene(balls=[ball(-3, 0), ball(3, 0)], plane=[{"point": [0, -1], "normal": [0, 1]}])
+def test_impulse_arrows_without_gravity_are_scaled_by_the_largest():
+    model = scene(balls=[ball(-3, 0), ball(3, 0)], plane=[{"point": [0, -1], "normal": [0, 1]}])
     rows = Contacts(
         np.zeros(2),
         np.asarray([(0, -1), (1, -1)]),
@@ -115,43 +115,44 @@ def test_impulses_without_gravity_are_measured_by_the_largest():
         np.asarray([(0.0, -1.0), (0.0, -1.0)]),
         np.asarray([(0.0, -4e-7), (0.0, -2e-7)]),
     )
-    differ = effect(which, "impulses", contacts=rows, seconds=0.1)
-    left, right = box(differ[36:44]), box(differ[156:164])
+    differ = overlay_pixels(model, "impulses", contacts=rows, seconds=0.1)
+    left, right = pixel_box(differ[36:44]), pixel_box(differ[156:164])
     assert (left[3] - left[1]) / (right[3] - right[1]) == pytest.approx(2.0, abs=0.15)  # smooth ends
 
 
-def test_impulses_in_no_time_are_not_shown():
+def test_impulses_of_zero_duration_are_not_drawn():
     assert not force(1.0, seconds=0.0).any()
 
 
 def test_bounds_surround_each_body():
-    left, top, right, bottom = box(effect(ONE, "bounds"))
+    left, top, right, bottom = pixel_box(overlay_pixels(ONE, "bounds"))
     assert (left, top, right, bottom) == pytest.approx((80, 40, 120, 80), abs=1)  # a line's width
 
 
 def test_centres_are_marked():
-    left, top, right, bottom = box(effect(ONE, "centres"))
+    left, top, right, bottom = pixel_box(overlay_pixels(ONE, "centres"))
     assert (left + right) / 2 == pytest.approx(100, abs=1)  # whole pixels
     assert (top + bottom) / 2 == pytest.approx(60, abs=1)  # the same
-    assert effect(scene(balls=[ball(0, 0, 0.001)]), "centres").any()
+    assert overlay_pixels(scene(balls=[ball(0, 0, 0.001)]), "centres").any()
 
 
 def test_names_are_written_above():
-    which = scene(balls=[ball(0, -1, 1.0, name="cue")])
-    left, top, right, bottom = box(effect(which, "names"))
+    model = scene(balls=[ball(0, -1, 1.0, name="cue")])
+    left, top, right, bottom = pixel_box(overlay_pixels(model, "names"))
     assert left < 100 < right
     assert bottom <= 60 + 1, "above the ball, whose top is at 0"
     assert bottom - top < 16
 
 
-def test_names_that_would_cover_each_other_are_left_out():
+def test_overlapping_names_are_omitted():
     apart = scene(balls=[ball(-3, 0, 0.3, name="left"), ball(3, 0, 0.3, name="right")])
     near = scene(balls=[ball(-0.1, 0, 0.3, name="left"), ball(0.1, 0, 0.3, name="right", collides="none")])
     alone = scene(balls=[ball(-0.1, 0, 0.3, name="left")])
-    both = effect(apart, "names").any(1)
+    both = overlay_pixels(apart, "names").any(1)
     assert both[:100].any()
     assert both[100:].any()
-    assert (effect(near, "names").sum() <= effect(alone, "names").sum() * 1.2).all()  # over other colours below
+    # The factor allows for different colours below the names.
+    assert (overlay_pixels(near, "names").sum() <= overlay_pixels(alone, "names").sum() * 1.2).all()
 
 
 def trail(count: int = 20) -> tuple[np.ndarray, ...]:
@@ -159,85 +160,87 @@ def trail(count: int = 20) -> tuple[np.ndarray, ...]:
     return (np.stack((x, np.zeros(count)), 1)[:, None, :],)
 
 
-def test_trails_lead_to_the_body_and_fade():
-    differ = effect(ONE, "trails", trails=trail())
-    left, top, right, bottom = box(differ)
+def test_trails_end_at_the_body_and_fade():
+    differ = overlay_pixels(ONE, "trails", trails=trail())
+    left, top, right, bottom = pixel_box(differ)
     assert left == pytest.approx(20, abs=1)  # a line's width
     assert right <= 80 + 2
     assert bottom - top <= 3
-    picture = drawn(sight(ONE, "trails", trails=trail()))
-    assert picture[30, 58:62].sum() < picture[75, 58:62].sum(), "the older, the fainter"
+    picture = render(snapshot(ONE, "trails", trails=trail()))
+    assert picture[30, 58:62].sum() < picture[75, 58:62].sum(), "older parts are fainter"
 
 
-def test_trails_in_pieces_are_those_of_the_whole():
+def test_trails_in_pieces_equal_the_whole_trail():
     (whole,) = trail()
     pieces = whole[:7], whole[7:8], whole[8:]
-    assert not changed(drawn(sight(ONE, "trails", trails=(whole,))), drawn(sight(ONE, "trails", trails=pieces))).any()
+    assert not changed_pixels(
+        render(snapshot(ONE, "trails", trails=(whole,))), render(snapshot(ONE, "trails", trails=pieces))
+    ).any()
 
 
-def test_trails_break_where_a_body_was_nowhere():
+def test_trails_have_gaps_at_invalid_positions():
     (whole,) = trail()
     whole[8:12] = math.nan
-    row = effect(ONE, "trails", trails=(whole,)).any(1)
+    row = overlay_pixels(ONE, "trails", trails=(whole,)).any(1)
     assert row[22:50].all()
     assert not row[55:68].any()
 
 
 def test_trails_of_a_crowd_are_points():
     grid = {"origin": [-4.0, -2.0], "columns": 40, "rows": 20, "spacing": [0.2, 0.2], "radius": 0.05}
-    which = scene(grid=[grid])
-    past = which.bodies.position[None] + np.linspace(-0.1, 0.0, 5)[:, None, None]
-    assert effect(which, "trails", trails=(past,)).any()
+    model = scene(grid=[grid])
+    past = model.bodies.position[None] + np.linspace(-0.1, 0.0, 5)[:, None, None]
+    assert overlay_pixels(model, "trails", trails=(past,)).any()
 
 
-def test_a_ghost_is_hollow_and_joined_to_its_body():
+def test_ghost_is_hollow_and_connected_to_its_body():
     ghost = frame(ONE, position=np.asarray([[3.0, 0.0]]))
-    differ = effect(ONE, ghost=ghost)
+    differ = overlay_pixels(ONE, ghost=ghost)
     assert differ[160 + 19, 60], "its rim"
     assert not differ[160 + 6, 60 + 6], "its inside"
-    assert differ[130, 58:62].any(), "the line that joins them"
+    assert differ[130, 58:62].any(), "the connecting line"
 
 
-def test_a_ghost_that_agrees_has_no_line():
+def test_ghost_close_to_its_body_has_no_line():
     ghost = frame(ONE, position=np.asarray([[0.1, 0.0]]))
-    assert not effect(ONE, ghost=ghost)[95:105, 55:65].any()
+    assert not overlay_pixels(ONE, ghost=ghost)[95:105, 55:65].any()
 
 
-def test_what_never_moves_has_no_ghost():
-    which = scene(balls=[ball(0, 0, fixed=True)])
-    assert not effect(which, ghost=frame(which)).any()
+def test_fixed_body_has_no_ghost():
+    model = scene(balls=[ball(0, 0, fixed=True)])
+    assert not overlay_pixels(model, ghost=frame(model)).any()
 
 
-def test_a_ghost_may_know_fewer_bodies():
+def test_ghost_with_fewer_bodies_is_drawn():
     two = scene(balls=[ball(0, 0, velocity=[5.0, 0.0]), ball(4, 0, 0.5)])
     ghost = frame(ONE, position=np.asarray([[0.0, 1.0]]))
-    assert effect(two, ghost=ghost).any()
+    assert overlay_pixels(two, ghost=ghost).any()
 
 
-def test_a_missed_contact_flashes_grows_and_fades():
-    widths, brightness, without = [], [], drawn(sight(ONE)).astype(int)
+def test_marker_of_a_missed_contact_grows_and_fades():
+    widths, brightness, without = [], [], render(snapshot(ONE)).astype(int)
     for age in (0.0, 0.5, 1.0, 1.4):
-        picture = drawn(sight(ONE, flashes=(MissedContactMarker((0.0, 0.0), age),)))
-        left, _, right, _ = box(changed(without, picture))
+        picture = render(snapshot(ONE, flashes=(MissedContactMarker((0.0, 0.0), age),)))
+        left, _, right, _ = pixel_box(changed_pixels(without, picture))
         widths.append(right - left)
         brightness.append(int((picture - without)[..., 0].max()))
     assert widths == sorted(set(widths))
     assert brightness == sorted(set(brightness), reverse=True)
     assert brightness[0] > 100
-    assert not effect(ONE, flashes=(MissedContactMarker((0.0, 0.0), 1.5),)).any()
+    assert not overlay_pixels(ONE, flashes=(MissedContactMarker((0.0, 0.0), 1.5),)).any()
 
 
-def test_the_hand_is_joined_to_the_body():
-    differ = effect(ONE, pull=((0.0, 0.0), (4.0, 0.0)))
-    left, _, right, _ = box(differ)
+def test_pull_is_drawn_as_a_line_from_body_to_mouse():
+    differ = overlay_pixels(ONE, pull=((0.0, 0.0), (4.0, 0.0)))
+    left, _, right, _ = pixel_box(differ)
     assert left == pytest.approx(97, abs=1)  # a dot of 3 px
     assert right == pytest.approx(186, abs=1)  # one of 6 px
     assert differ[97:186].any(1).all()
-    assert at(drawn(sight(ONE, pull=((0.0, 0.0), (4.0, 0.0)))), 4.0, 0.0) == YELLOW
+    assert colour_at(render(snapshot(ONE, pull=((0.0, 0.0), (4.0, 0.0)))), 4.0, 0.0) == YELLOW
 
 
-def test_the_picked_body_has_a_ring():
-    differ = effect(ONE, picked=0)
-    assert box(differ) == pytest.approx((76, 36, 124, 84), abs=1)  # smooth edges
+def test_picked_body_has_a_ring():
+    differ = overlay_pixels(ONE, picked=0)
+    assert pixel_box(differ) == pytest.approx((76, 36, 124, 84), abs=1)  # smooth edges
     assert not differ[85:115, 45:75].any()
-    assert not effect(ONE, picked=5).any()
+    assert not overlay_pixels(ONE, picked=5).any()

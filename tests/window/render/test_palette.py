@@ -8,12 +8,12 @@ from tests.window.render.drawn import ball, scene
 SPARKS = {"position": [0.0, 0.0], "velocity_min": [-1.0, 0.0], "velocity_max": [1.0, 1.0]}
 
 
-def test_own_colour_outranks_the_cycle():
+def test_stated_colour_overrides_the_colour_cycle():
     bodies = scene(balls=[ball(0, 0, colour="#102030"), ball(3, 0)]).bodies
     assert colour_of(bodies).tolist() == [[16, 32, 48], list(ACCENTS[1])]
 
 
-def test_few_balls_have_colours_of_their_own():
+def test_seven_balls_have_distinct_colours():
     bodies = scene(balls=[ball(3 * k, 0) for k in range(7)]).bodies
     assert len({tuple(colour) for colour in colour_of(bodies).tolist()}) == 7
 
@@ -23,14 +23,14 @@ def test_fixed_balls_are_neutral():
     assert colour_of(bodies).tolist() == [list(NEUTRAL), [255, 0, 0]]
 
 
-def test_generators_are_tinted_and_small_ones_coloured_each():
+def test_large_generators_share_shades_and_small_ones_use_the_cycle():
     few = colour_of(scene(emitter=[{**SPARKS, "count": 3}]).bodies)
     many = colour_of(scene(emitter=[{**SPARKS, "count": 1000}]).bodies)
     assert [tuple(colour) for colour in few.tolist()] == list(ACCENTS[:3])
-    assert 3 <= len(np.unique(many, axis=0)) <= 8  # few enough to share sprites, enough to be lively
+    assert 3 <= len(np.unique(many, axis=0)) <= 8  # few enough to share sprites, and more than one shade
 
 
-def test_a_body_that_joins_leaves_the_other_colours_as_they_are():
+def test_spawned_bodies_do_not_change_the_colours_of_others():
     bodies = scene(balls=[ball(0, 0), ball(3, 0)], emitter=[{**SPARKS, "count": 20}]).bodies
     grown = bodies
     for k in range(20):
@@ -47,12 +47,12 @@ def test_hex_colour(text, colour):
     assert hex_colour(text) == colour
 
 
-def test_mixed_reaches_both_ends():
+def test_mix_colours_reaches_both_ends():
     assert mix_colours((0, 10, 20), (100, 110, 120), 0.0) == (0, 10, 20)
     assert mix_colours((0, 10, 20), (100, 110, 120), 1.0) == (100, 110, 120)
 
 
-def test_fixed_things_have_their_own_colour_where_stated():
+def test_static_bodies_use_their_stated_colour():
     plane, other = scene(
         plane=[
             {"point": [0, 0], "normal": [0, 1], "colour": "#010203"},

@@ -9,20 +9,20 @@ from sandbox.trajectory import Contacts
 from sandbox.window.camera import Camera
 from sandbox.window.playback.snapshot import OVERLAYS, MissedContactMarker
 from sandbox.window.render.renderer import Renderer
-from tests.window.render.drawn import ball, contact, drawn, frame, scene, sight
+from tests.window.render.drawn import ball, contact, frame, render, scene, snapshot
 
 pytestmark = pytest.mark.full  # property tests with many examples
 
 ANY = st.floats(allow_nan=True, allow_infinity=True)
 FAR = st.floats(-1e16, 1e16)
-WHICH = scene(
+MODEL = scene(
     balls=[ball(0, 0), ball(3, 0, 1e-9), ball(5, 0, 1e9, collides="none"), ball(-3, 0, 0.3, angle=1.0)],
     plane=[{"point": [0.0, -2.0], "normal": [0.3, 1.0]}],
     wall=[{"points": [[-1e16, 1e16], [1e16, -1e15], [0.0, 3.0]], "thickness": 0.2}],
     post=[{"position": [2.0, 2.0], "radius": 0.4}],
     world={"gravity": [0.0, -9.81], "bounds": [[-1e15, -9.0], [9.0, 1e16]]},
 )
-COUNT = len(WHICH.bodies)
+COUNT = len(MODEL.bodies)
 
 
 def arrays(*shape):
@@ -30,10 +30,10 @@ def arrays(*shape):
 
 
 @st.composite
-def sights(draw):
+def snapshots(draw):
     position = draw(arrays(COUNT, 2) | st_numpy.arrays(np.float64, (COUNT, 2), elements=FAR))
-    moment = frame(
-        WHICH,
+    state = frame(
+        MODEL,
         position=position,
         velocity=draw(arrays(COUNT, 2)),
         angle=draw(arrays(COUNT)),
@@ -47,11 +47,11 @@ def sights(draw):
         draw(arrays(3, 2)),
         draw(arrays(3, 2)),
     )
-    ghost = frame(WHICH, position=draw(arrays(COUNT, 2)))
-    return sight(
-        WHICH,
+    ghost = frame(MODEL, position=draw(arrays(COUNT, 2)))
+    return snapshot(
+        MODEL,
         *OVERLAYS,
-        frame=moment,
+        frame=state,
         contacts=contacts,
         seconds=draw(st.sampled_from([0.0, 0.01, np.nan, np.inf])),
         ghost=draw(st.sampled_from([None, ghost])),
@@ -66,44 +66,44 @@ def sights(draw):
 
 
 @given(
-    what=sights(),
+    shown=snapshots(),
     centre=st.tuples(FAR, FAR),
     power=st.floats(-14.0, 12.0),
     size=st.sampled_from([(1, 1), (2, 1), (1, 50), (90, 70)]),
     antialias=st.booleans(),
     unit=st.sampled_from([1.0, 2.0]),
 )
-def test_nothing_raises_whatever_is_drawn(what, centre, power, size, antialias, unit):
+def test_any_snapshot_is_drawn_by_any_camera(shown, centre, power, size, antialias, unit):
     camera = Camera(centre, 10.0**power, size)
-    assert drawn(what, camera, antialias=antialias, unit=unit).shape == (*size, 3)
+    assert render(shown, camera, antialias=antialias, unit=unit).shape == (*size, 3)
 
 
-@given(what=sights(), power=st.floats(-3.0, 4.0), antialias=st.booleans())
+@given(shown=snapshots(), power=st.floats(-3.0, 4.0), antialias=st.booleans())
 @example(
-    what=sight(WHICH, *OVERLAYS, contacts=contact((COUNT, -5), (0.0, 0.0), (1e308, 0.0))), power=4.0, antialias=True
+    shown=snapshot(MODEL, *OVERLAYS, contacts=contact((COUNT, -5), (0.0, 0.0), (1e308, 0.0))), power=4.0, antialias=True
 )
 @example(
-    what=sight(WHICH, ghost=frame(WHICH), frame=frame(WHICH, position=np.full((COUNT, 2), 1e307))),
+    shown=snapshot(MODEL, ghost=frame(MODEL), frame=frame(MODEL, position=np.full((COUNT, 2), 1e307))),
     power=4.0,
     antialias=True,
 )
-def test_nothing_raises_near_the_origin(what, power, antialias):
-    assert drawn(what, Camera((0.0, 0.0), 10.0**power, (90, 70)), antialias=antialias).any()
+def test_any_snapshot_is_drawn_near_the_origin(shown, power, antialias):
+    assert render(shown, Camera((0.0, 0.0), 10.0**power, (90, 70)), antialias=antialias).any()
 
 
 @pytest.mark.parametrize("size", [(1, 1), (3, 2), (200, 100)])
 @pytest.mark.parametrize("power", [-14, 0, 12])
 def test_an_empty_scene_is_drawn(size, power):
     camera = Camera((0.0, 0.0), 10.0**power, size)
-    assert drawn(sight(scene(world={}), *OVERLAYS), camera).any()
+    assert render(snapshot(scene(world={}), *OVERLAYS), camera).any()
 
 
-def test_a_frame_that_knows_fewer_bodies_is_drawn():
+def test_frame_with_fewer_bodies_is_drawn():
     few = scene(balls=[ball(0, 0)])
-    assert drawn(sight(WHICH, *OVERLAYS, frame=frame(few))).any()
+    assert render(snapshot(MODEL, *OVERLAYS, frame=frame(few))).any()
 
 
-def test_a_surface_without_pixels_is_left_alone():
+def test_surface_without_pixels_is_accepted():
     surface = pygame.Surface((0, 0))
-    Renderer().draw(surface, Camera((0.0, 0.0), 1.0, (0, 0)), sight(WHICH, *OVERLAYS))
+    Renderer().draw(surface, Camera((0.0, 0.0), 1.0, (0, 0)), snapshot(MODEL, *OVERLAYS))
     assert surface.get_size() == (0, 0)

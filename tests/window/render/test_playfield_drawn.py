@@ -1,4 +1,4 @@
-"""Playfields: markings below everything, lamps, shadows and caps; polygons cut to the picture."""
+"""Drawing of playfields: markings, shadows, lamps and caps; clipping of polygons."""
 
 from typing import Any
 
@@ -14,33 +14,33 @@ from sandbox.window.capture.image_files import offscreen
 from sandbox.window.render.lines import clip_polygon
 from sandbox.window.render.palette import BACKGROUND
 from sandbox.window.render.renderer import Renderer
-from tests.window.render.drawn import SIZE, at, ball, drawn, scene, sight
+from tests.window.render.drawn import SIZE, ball, colour_at, render, scene, snapshot
 
 BED: dict[str, Any] = {"points": [[-4, -2], [4, -2], [4, 2], [-4, 2]], "colour": "#102030"}
 SPOT: dict[str, Any] = {"position": [2, 0], "radius": 1, "colour": "#405060"}
 FAR = [ball(90, 90)]
 
 
-def painted(*markings: dict[str, Any], **tables: Any) -> np.ndarray[Any, Any]:
+def render_playfield(*markings: dict[str, Any], **tables: Any) -> np.ndarray[Any, Any]:
     play = {"ground": "playfield", "marking": list(markings), **tables.pop("play", {})}
-    return drawn(sight(scene(balls=tables.pop("balls", FAR), play=play, **tables)))
+    return render(snapshot(scene(balls=tables.pop("balls", FAR), play=play, **tables)))
 
 
-def test_markings_are_laid_one_over_the_other_and_nothing_beside_it() -> None:
-    picture = painted(BED, SPOT)
-    assert at(picture, 0.0, 0.0) == (16, 32, 48)
-    assert at(picture, 2.0, 0.0) == (64, 80, 96)
-    assert at(picture, 4.5, 0.0) == BACKGROUND  # and no grid
+def test_markings_are_drawn_in_order_and_without_a_grid() -> None:
+    picture = render_playfield(BED, SPOT)
+    assert colour_at(picture, 0.0, 0.0) == (16, 32, 48)
+    assert colour_at(picture, 2.0, 0.0) == (64, 80, 96)
+    assert colour_at(picture, 4.5, 0.0) == BACKGROUND  # no grid
 
 
-def test_markings_lie_below_bodies_and_what_is_fixed() -> None:
+def test_markings_are_drawn_below_bodies_and_posts() -> None:
     post = {"position": [-2, 0], "radius": 0.5, "colour": "#ff0000"}
-    picture = painted(BED, balls=[ball(0, 0, 1.0, colour="#123456")], post=[post])
-    assert at(picture, 0.0, 0.0) == (18, 52, 86)
-    assert at(picture, -2.0, 0.0)[0] > 100
+    picture = render_playfield(BED, balls=[ball(0, 0, 1.0, colour="#123456")], post=[post])
+    assert colour_at(picture, 0.0, 0.0) == (18, 52, 86)
+    assert colour_at(picture, -2.0, 0.0)[0] > 100
 
 
-def test_what_stands_casts_a_shadow_once_and_what_lets_pass_none() -> None:
+def test_solid_walls_cast_one_shadow_and_others_none() -> None:
     close = Camera((0.0, 0.0), 10_000.0, SIZE)  # a shadow is some millimetres long
     bed = {**BED, "points": [[-1, -1], [1, -1], [1, 1], [-1, 1]], "colour": "#808080"}
     dark = {}
@@ -50,9 +50,9 @@ def test_what_stands_casts_a_shadow_once_and_what_lets_pass_none() -> None:
         ("two", [{"points": [[-1, 0], [1, 0]], "thickness": 0.002}] * 2),
         ("passed", [{"points": [[-1, 0], [1, 0]], "thickness": 0.002, "solid": False}]),
     ):
-        which = sight(scene(balls=FAR, play={"ground": "playfield", "marking": [bed]}, wall=walls))
+        model = snapshot(scene(balls=FAR, play={"ground": "playfield", "marking": [bed]}, wall=walls))
         surface = offscreen(SIZE)
-        Renderer().draw(surface, close, which)
+        Renderer().draw(surface, close, model)
         dark[name] = tuple(surface.get_at((100, 60 + 50)))[:3]  # 5 mm below the wall
     assert dark["none"] == dark["passed"] == (128, 128, 128)
     assert dark["one"] == dark["two"] < (110, 110, 110)
@@ -63,42 +63,42 @@ def test_parts_with_a_light_have_a_lamp() -> None:
     post = {"position": [3, 1], "radius": 0.2}
     close = Camera((0.0, 0.0), 5_000.0, SIZE)
     lit, dark = (
-        sight(scene(balls=FAR, play={"ground": "playfield", "marking": [BED], "part": parts}, post=[post]))
+        snapshot(scene(balls=FAR, play={"ground": "playfield", "marking": [BED], "part": parts}, post=[post]))
         for parts in ([part], [])
     )
-    seen = []
-    for which in (lit, dark):
+    colours = []
+    for model in (lit, dark):
         surface = offscreen(SIZE)
-        Renderer().draw(surface, close, which)
-        seen.append(tuple(surface.get_at((100, 60)))[:3])
-    assert seen[1] == (16, 32, 48)
-    assert seen[0][0] > seen[1][0] + 30
+        Renderer().draw(surface, close, model)
+        colours.append(tuple(surface.get_at((100, 60)))[:3])
+    assert colours[1] == (16, 32, 48)
+    assert colours[0][0] > colours[1][0] + 30
 
 
-def test_posts_that_kick_wear_a_cap() -> None:
+def test_posts_with_a_kick_have_a_cap() -> None:
     kick = {"position": [0, 0], "radius": 1.0, "colour": "#ff0000", "kick": {"speed": 1.0}}
     plain = {key: value for key, value in kick.items() if key != "kick"}
-    assert at(painted(BED, post=[kick]), 0.0, 0.0) == (255, 0, 0)
-    assert at(painted(BED, post=[plain]), 0.0, 0.0) != (255, 0, 0)
+    assert colour_at(render_playfield(BED, post=[kick]), 0.0, 0.0) == (255, 0, 0)
+    assert colour_at(render_playfield(BED, post=[plain]), 0.0, 0.0) != (255, 0, 0)
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1e3, 1e9])
 def test_playfield_is_drawn_at_any_scale(scale: float) -> None:
     surface = offscreen(SIZE)
     wall, post = {"points": [[-1, 0], [1, 0]], "thickness": 0.5}, {"position": [0, 1], "radius": 0.3}
-    which = sight(scene(balls=FAR, play={"ground": "playfield", "marking": [BED, SPOT]}, wall=[wall], post=[post]))
-    Renderer().draw(surface, Camera((-3.0, -1.5), scale, SIZE), which)
+    model = snapshot(scene(balls=FAR, play={"ground": "playfield", "marking": [BED, SPOT]}, wall=[wall], post=[post]))
+    Renderer().draw(surface, Camera((-3.0, -1.5), scale, SIZE), model)
     middle = tuple(surface.get_at((SIZE[0] // 2, SIZE[1] // 2)))[:3]
     assert (middle == (16, 32, 48)) == (scale > 1.0)
 
 
 @given(st.lists(st.tuples(st.floats(-500, 500), st.floats(-500, 500)), min_size=3, max_size=8))
-def test_cut_polygon_has_the_area_of_what_is_in_the_picture(corners: list[tuple[float, float]]) -> None:
+def test_clipped_polygon_has_the_area_of_the_intersection(corners: list[tuple[float, float]]) -> None:
     area = pygame.Rect(0, 0, *SIZE)
     whole = shapely.Polygon(corners)
     if not whole.is_valid or whole.area < 1.0:
         return
-    within = whole.intersection(shapely.box(-2.0, -2.0, SIZE[0] + 2.0, SIZE[1] + 2.0))  # it leaves a margin
+    within = whole.intersection(shapely.box(-2.0, -2.0, SIZE[0] + 2.0, SIZE[1] + 2.0))  # with a margin of 2 px
     kept = clip_polygon(corners, area)
     assert (shapely.Polygon(kept).area if kept else 0.0) == pytest.approx(within.area, abs=1e-6)
     assert all(-2.001 <= x <= SIZE[0] + 2.001 and -2.001 <= y <= SIZE[1] + 2.001 for x, y in kept)

@@ -1,4 +1,4 @@
-"""Bodies that are no lone discs: where they are filled, where their edges are, and that all ways of drawing agree."""
+"""Bodies of other shapes than discs: filling, edges, and agreement of the compiled and the pygame renderer."""
 
 import math
 
@@ -8,12 +8,12 @@ import pytest
 
 from sandbox.engines.common import kernel
 from sandbox.scene.compile.scene import Scene
-from sandbox.window.render import kernels as stencil
+from sandbox.window.render import kernels
 from sandbox.window.render import polygons as module
 from sandbox.window.render.circles import CircleStyle, darken
 from sandbox.window.render.palette import ACCENTS, NEUTRAL, YELLOW
 from sandbox.window.render.polygons import PolygonRenderer
-from tests.window.render.drawn import CAMERA, at, ball, changed, drawn, frame, scene, sight
+from tests.window.render.drawn import CAMERA, ball, changed_pixels, colour_at, frame, render, scene, snapshot
 
 STAR = [
     [math.cos(k * math.pi / 5) * (1.0 if k % 2 else 2.5), math.sin(k * math.pi / 5) * (1.0 if k % 2 else 2.5)]
@@ -52,38 +52,43 @@ PERIMETERS = {
     "hammer": 13.0,
     "abutting": 12.0,
 }
-assert stencil.rasterise_polygons, "imported before a test says that there is numba"
+assert kernels.rasterise_polygons, "imported before a test patches COMPILED"
 
 
-def white(which: Scene, *, few: int, antialias: bool = True, hollow: bool = False, scale: float = 20.0) -> np.ndarray:
-    """Return a body drawn white without a rim, on black: how much of each pixel it covers."""
-    surface, bodies = pygame.Surface((240, 240), 0, 32), which.bodies
-    who = np.arange(len(bodies))
+def coverage(
+    model: Scene, *, few: int, antialias: bool = True, hollow: bool = False, scale: float = 20.0
+) -> np.ndarray:
+    """Return the coverage of each pixel by a body, drawn white on black without a rim."""
+    surface, bodies = pygame.Surface((240, 240), 0, 32), model.bodies
+    indices = np.arange(len(bodies))
     style = CircleStyle(2.0 if hollow else 0.0, hollow, antialias)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "FEW_POLYGONS", few)
         patch.setattr(kernel, "COMPILED", True)  # without numba the same pass runs as plain Python
         if few:
             patch.setattr(module, "_in_one_pass", lambda *_: False)
-        tint = np.full((len(who), 3), 255, np.uint8)
-        PolygonRenderer().draw(surface, bodies, who, np.full((len(who), 2), 120.3), bodies.angle, scale, tint, style)
+        tint = np.full((len(indices), 3), 255, np.uint8)
+        PolygonRenderer().draw(
+            surface, bodies, indices, np.full((len(indices), 2), 120.3), bodies.angle, scale, tint, style
+        )
     return pygame.surfarray.array3d(surface)[..., 0] / 255.0
 
 
 @pytest.mark.parametrize("shape", AREAS)
-def test_area_is_that_of_the_shape(shape):
-    assert white(scene(**SHAPES[shape]), few=0).sum() == pytest.approx(AREAS[shape] * 400, rel=0.012)  # 8 bits a pixel
+def test_drawn_area_equals_the_area_of_the_shape(shape):
+    area = coverage(scene(**SHAPES[shape]), few=0).sum()
+    assert area == pytest.approx(AREAS[shape] * 400, rel=0.012)  # 8 bits a pixel
 
 
 @pytest.mark.parametrize("shape", AREAS)
 def test_area_by_pygame_differs_by_less_than_a_pixel_along_the_edge(shape):
-    assert abs(white(scene(**SHAPES[shape]), few=100).sum() - AREAS[shape] * 400) < PERIMETERS[shape] * 20
+    assert abs(coverage(scene(**SHAPES[shape]), few=100).sum() - AREAS[shape] * 400) < PERIMETERS[shape] * 20
 
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("antialias", [True, False])
-def test_both_ways_of_drawing_differ_at_edges_only(shape, antialias):
-    one, other = (white(scene(**SHAPES[shape]), few=few, antialias=antialias) for few in (0, 100))
+def test_compiled_and_pygame_filling_differ_only_at_edges(shape, antialias):
+    one, other = (coverage(scene(**SHAPES[shape]), few=few, antialias=antialias) for few in (0, 100))
     for a, b in ((one, other), (other, one)):
         near = np.stack([np.roll(a, (x, y), (0, 1)) for x in (-1, 0, 1) for y in (-1, 0, 1)])
         assert (b[near.min(axis=0) == 1.0] > 0.8).all()
@@ -92,17 +97,17 @@ def test_both_ways_of_drawing_differ_at_edges_only(shape, antialias):
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("antialias", [True, False])
-def test_both_ways_draw_the_same_rims_of_hollow_bodies(shape, antialias):
-    one, other = (white(scene(**SHAPES[shape]), few=few, antialias=antialias, hollow=True) for few in (0, 100))
+def test_compiled_and_pygame_rims_of_hollow_bodies_agree(shape, antialias):
+    one, other = (coverage(scene(**SHAPES[shape]), few=few, antialias=antialias, hollow=True) for few in (0, 100))
     differ = np.abs(one - other)
     if antialias:
         assert differ.max() < 0.02  # a colour is rounded once or twice
     else:
-        assert (differ > 0.02).sum() <= 4  # a pixel's middle may lie on the edge but for rounding
+        assert (differ > 0.02).sum() <= 4  # the centre of a pixel may be on the edge within rounding
 
 
 @pytest.mark.parametrize("few", [0, 100])
-def test_the_rim_of_a_compound_body_lies_inside_its_edge_and_not_along_its_seams(few, monkeypatch):
+def test_rim_of_a_compound_body_follows_its_outline_and_not_its_seams(few, monkeypatch):
     monkeypatch.setattr(module, "FEW_POLYGONS", few)
     monkeypatch.setattr(kernel, "COMPILED", True)
     if few:
@@ -110,122 +115,125 @@ def test_the_rim_of_a_compound_body_lies_inside_its_edge_and_not_along_its_seams
     boxes = [
         {"size": [4, 3], "position": [-2, 0]},
         {"size": [4, 3], "position": [2, 0]},
-        {"size": [4, 3], "position": [1, 3]},  # like a brick on both
+        {"size": [4, 3], "position": [1, 3]},  # like a brick on the two others
     ]
-    picture = drawn(sight(scene(body=[{"position": [0, 0], "box": boxes}])))
+    picture = render(snapshot(scene(body=[{"position": [0, 0], "box": boxes}])))
     for seam in ((0.0, 0.0), (0.0, -1.2), (0.0, 1.5), (1.0, 1.5), (2.5, 1.5)):
-        assert at(picture, *seam) == ACCENTS[0]
+        assert colour_at(picture, *seam) == ACCENTS[0]
     for edge in ((-2.0, 1.46), (3.5, 1.46), (0.0, -1.46), (-0.96, 3.0)):
-        assert at(picture, *edge) == pytest.approx(darken(ACCENTS[0]), abs=2)  # rounded twice
+        assert colour_at(picture, *edge) == pytest.approx(darken(ACCENTS[0]), abs=2)  # rounded twice
     for outside in ((-2.0, 1.58), (0.0, -1.58), (-1.08, 3.0)):
-        assert at(picture, *outside) == at(drawn(sight(scene(world={}))), *outside)
+        assert colour_at(picture, *outside) == colour_at(render(snapshot(scene(world={}))), *outside)
 
 
 @pytest.mark.parametrize("antialias", [True, False])
-def test_a_crowd_without_numba_is_drawn_where_it_is(antialias, monkeypatch):
+def test_many_boxes_without_numba_are_drawn_at_their_positions(antialias, monkeypatch):
     monkeypatch.setattr(module, "_in_one_pass", lambda *_: False)
     rows = [{"position": [x, y], "size": [0.8, 0.4], "angle": 0.5} for x in (-4, -2, 0, 2, 4) for y in (-1, 0.5, 2)]
-    picture = drawn(sight(scene(box=rows)), antialias=antialias)
+    picture = render(snapshot(scene(box=rows)), antialias=antialias)
     for k, row in enumerate(rows):
-        assert at(picture, *row["position"]) == ACCENTS[k % len(ACCENTS)]
-    assert not changed(picture, drawn(sight(scene(world={})), antialias=antialias))[115:125].any(), "between them"
+        assert colour_at(picture, *row["position"]) == ACCENTS[k % len(ACCENTS)]
+    assert not changed_pixels(picture, render(snapshot(scene(world={})), antialias=antialias))[115:125].any(), (
+        "between them"
+    )
 
 
 @pytest.mark.parametrize("few", [0, 100])
 @pytest.mark.parametrize(("body", "inside"), [(ABUTTING, (0.0, 0.5)), (HAMMER, (1.5, 0.0)), (FLUSH, (0.5, 0.3))])
-def test_no_edge_shows_within_a_body(body, inside, few):
-    which = scene(body=[body])
-    assert (white(which, few=few)[100:140, 118:122] == 1.0).all()
-    hollow = white(which, few=few, hollow=True)
-    x, y = (np.asarray(inside) - which.bodies.position[0]) * (20, -20) + 120.3
+def test_compound_body_has_no_inner_edges(body, inside, few):
+    model = scene(body=[body])
+    assert (coverage(model, few=few)[100:140, 118:122] == 1.0).all()
+    hollow = coverage(model, few=few, hollow=True)
+    x, y = (np.asarray(inside) - model.bodies.position[0]) * (20, -20) + 120.3
     assert hollow[round(x) - 3 : round(x) + 3, round(y) - 2 : round(y) + 2].max() == 0.0
 
 
 @pytest.mark.parametrize("few", [0, 100])
-def test_flush_edges_of_two_pieces_are_still_seen(few):
-    hollow = white(scene(body=[FLUSH]), few=few, hollow=True)
+def test_flush_outer_edges_of_two_pieces_are_drawn(few):
+    hollow = coverage(scene(body=[FLUSH]), few=few, hollow=True)
     rows = hollow[75:165].max(axis=1)
-    assert rows.min() > 0.9  # 5 m long, 100 px; of a line 2 px wide some pixel is all but covered
+    assert rows.min() > 0.9  # 5 m, 100 px; a line 2 px wide nearly covers one pixel of each row
 
 
-def test_a_polygon_has_its_colour_and_a_darker_rim():
-    picture = drawn(sight(scene(box=[{"position": [0, 0], "size": [4, 3]}])))
-    assert at(picture, 0.0, 0.0) == ACCENTS[0]
-    assert at(picture, 0.0, 1.46) == darken(ACCENTS[0])
-    assert at(picture, 0.0, 1.6) != darken(ACCENTS[0])
+def test_polygon_has_its_colour_and_a_darker_rim():
+    picture = render(snapshot(scene(box=[{"position": [0, 0], "size": [4, 3]}])))
+    assert colour_at(picture, 0.0, 0.0) == ACCENTS[0]
+    assert colour_at(picture, 0.0, 1.46) == darken(ACCENTS[0])
+    assert colour_at(picture, 0.0, 1.6) != darken(ACCENTS[0])
 
 
 def test_a_fixed_box_is_neutral():
-    assert at(drawn(sight(scene(box=[{"position": [0, 0], "size": [4, 3], "fixed": True}]))), 0.0, 0.0) == NEUTRAL
+    box = {"position": [0, 0], "size": [4, 3], "fixed": True}
+    assert colour_at(render(snapshot(scene(box=[box]))), 0.0, 0.0) == NEUTRAL
 
 
-def test_a_box_turns_with_y_up():
-    which = scene(box=[{"position": [0, 0], "size": [6, 0.6]}])
-    turned = drawn(sight(which, frame=frame(which, angle=np.asarray([math.pi / 4]))))
-    assert at(turned, 1.5, 1.5) == ACCENTS[0]
-    assert at(turned, 1.5, -1.5) != ACCENTS[0]
+def test_box_rotates_counterclockwise_with_y_up():
+    model = scene(box=[{"position": [0, 0], "size": [6, 0.6]}])
+    turned = render(snapshot(model, frame=frame(model, angle=np.asarray([math.pi / 4]))))
+    assert colour_at(turned, 1.5, 1.5) == ACCENTS[0]
+    assert colour_at(turned, 1.5, -1.5) != ACCENTS[0]
 
 
-def test_what_looks_round_has_a_spoke_and_what_does_not_has_none():
+def test_only_nearly_round_polygons_have_a_spoke():
     corners = [[math.cos(k * math.pi / 8), math.sin(k * math.pi / 8)] for k in range(16)]
     plane = [{"point": [0, -3], "normal": [0, 1]}]
     for points, has in ((corners, True), (corners[::4], False)):
-        which = scene(polygon=[{"position": [0, 0], "points": points}], plane=plane)
-        assert (at(drawn(sight(which)), 0.6, 0.0) != ACCENTS[0]) is has
+        model = scene(polygon=[{"position": [0, 0], "points": points}], plane=plane)
+        assert (colour_at(render(snapshot(model)), 0.6, 0.0) != ACCENTS[0]) is has
 
 
-def test_what_is_outside_changes_no_pixel():
+def test_boxes_outside_the_picture_change_no_pixel():
     inside = [{"position": [0, 0], "size": [1, 1]}]
     outside = [{"position": [x, y], "size": [1, 1]} for x, y in ((7, 0), (-6, 3), (0, 4), (1e12, -1e12), (0, -9))]
-    one, other = (drawn(sight(scene(box=boxes))) for boxes in (inside, inside + outside))
-    assert not changed(one, other).any()
+    one, other = (render(snapshot(scene(box=boxes))) for boxes in (inside, inside + outside))
+    assert not changed_pixels(one, other).any()
 
 
 @pytest.mark.parametrize("size", [1e3, 1e6, 1e9])
-def test_a_box_of_any_size_reaches_to_its_edge_and_no_farther(size):
-    picture = drawn(sight(scene(box=[{"position": [-size / 2, 0], "size": [size, size]}])))
-    assert at(picture, -2.0, 0.0) == ACCENTS[0]
-    assert at(picture, 0.2, 0.0) != ACCENTS[0]
+def test_box_of_any_size_ends_at_its_edge(size):
+    picture = render(snapshot(scene(box=[{"position": [-size / 2, 0], "size": [size, size]}])))
+    assert colour_at(picture, -2.0, 0.0) == ACCENTS[0]
+    assert colour_at(picture, 0.2, 0.0) != ACCENTS[0]
 
 
-def test_bodies_at_nan_are_left_out():
-    which = scene(box=[{"position": [0, 0], "size": [1, 1]}, {"position": [2, 0], "size": [1, 1]}])
-    broken = frame(which, position=np.asarray([[math.nan, 0.0], [2.0, 0.0]]), angle=np.asarray([0.0, math.nan]))
-    assert at(drawn(sight(which, frame=broken)), 2.0, 0.0) == ACCENTS[1]
+def test_bodies_with_nan_are_omitted():
+    model = scene(box=[{"position": [0, 0], "size": [1, 1]}, {"position": [2, 0], "size": [1, 1]}])
+    broken = frame(model, position=np.asarray([[math.nan, 0.0], [2.0, 0.0]]), angle=np.asarray([0.0, math.nan]))
+    assert colour_at(render(snapshot(model, frame=broken)), 2.0, 0.0) == ACCENTS[1]
 
 
-def test_discs_beside_boxes_are_those_without_boxes():
-    alone = drawn(sight(scene(balls=[ball(-3, 0), ball(-1, 1.5, 0.4, angle=1.0)])))
+def test_discs_are_drawn_equally_with_and_without_boxes():
+    alone = render(snapshot(scene(balls=[ball(-3, 0), ball(-1, 1.5, 0.4, angle=1.0)])))
     both = scene(balls=[ball(-3, 0), ball(-1, 1.5, 0.4, angle=1.0)], box=[{"position": [3, 0], "size": [2, 2]}])
-    assert not changed(alone, drawn(sight(both)))[:110].any()
+    assert not changed_pixels(alone, render(snapshot(both)))[:110].any()
 
 
-def test_bounds_of_a_turned_box_lie_about_it():
-    which = scene(box=[{"position": [0, 0], "size": [4, 2], "angle": math.pi / 2}])
-    column, row = np.nonzero(changed(drawn(sight(which)), drawn(sight(which, "bounds"))))
+def test_bounds_surround_a_rotated_box():
+    model = scene(box=[{"position": [0, 0], "size": [4, 2], "angle": math.pi / 2}])
+    column, row = np.nonzero(changed_pixels(render(snapshot(model)), render(snapshot(model, "bounds"))))
     assert (column.min(), row.min(), column.max() + 1, row.max() + 1) == pytest.approx(
         (80, 20, 120, 100), abs=1
     )  # 1 px
 
 
-def test_a_ghost_is_hollow():
-    which = scene(box=[{"position": [-2, 0], "size": [2, 2]}])
-    ghost = frame(which, position=np.asarray([[3.0, 0.0]]))
-    differ = changed(drawn(sight(which)), drawn(sight(which, ghost=ghost)))
+def test_ghost_of_a_box_is_hollow():
+    model = scene(box=[{"position": [-2, 0], "size": [2, 2]}])
+    ghost = frame(model, position=np.asarray([[3.0, 0.0]]))
+    differ = changed_pixels(render(snapshot(model)), render(snapshot(model, ghost=ghost)))
     column = int(CAMERA.to_screen(np.asarray((3.95, 0.0)))[0])
     assert differ[column, 55:65].all()
     assert not differ[165:170, 50:70].any()
 
 
-def test_the_picked_body_has_a_line_around_its_outline():
-    which = scene(box=[{"position": [0, 0], "size": [6, 1]}])
-    picture = drawn(sight(which, picked=0))
+def test_picked_box_has_a_line_around_its_outline():
+    model = scene(box=[{"position": [0, 0], "size": [6, 1]}])
+    picture = render(snapshot(model, picked=0))
     assert tuple(picture[100, 60 - 10 - 3]) == YELLOW
-    assert not changed(drawn(sight(which)), picture)[95:105, 10:40].any()
+    assert not changed_pixels(render(snapshot(model)), picture)[95:105, 10:40].any()
 
 
-def test_names_stand_above_the_outline():
-    which = scene(box=[{"position": [0, 0], "size": [8, 0.4], "name": "beam"}])
-    _, row = np.nonzero(changed(drawn(sight(which)), drawn(sight(which, "names"))))
+def test_names_are_drawn_above_the_outline():
+    model = scene(box=[{"position": [0, 0], "size": [8, 0.4], "name": "beam"}])
+    _, row = np.nonzero(changed_pixels(render(snapshot(model)), render(snapshot(model, "names"))))
     assert row.min() > 60 - 4 - 20
     assert row.max() < 60 - 4

@@ -10,19 +10,19 @@ from sandbox.window.render.lines import clip_segment, draw_arrow, draw_dashes, d
 
 AREA = pygame.Rect(10, 20, 200, 100)
 WHITE = (255, 255, 255)
-PLACE = st.tuples(st.floats(-1e5, 1e5), st.floats(-1e5, 1e5))
-ANYWHERE = st.tuples(*(st.floats(allow_nan=True, allow_infinity=True),) * 2)
+POINT = st.tuples(st.floats(-1e5, 1e5), st.floats(-1e5, 1e5))
+ANY_POINT = st.tuples(*(st.floats(allow_nan=True, allow_infinity=True),) * 2)
 
 
 def covered(surface: pygame.Surface) -> np.ndarray:
     return pygame.surfarray.array3d(surface)[..., 0] / 255.0
 
 
-@given(a=PLACE, b=PLACE, margin=st.floats(1.0, 50.0))
-def test_a_clipped_segment_is_what_lies_in_the_area(a, b, margin):
+@given(a=POINT, b=POINT, margin=st.floats(1.0, 50.0))
+def test_clipped_segment_is_the_part_inside_the_area(a, b, margin):
     part = clip_segment(a, b, AREA, margin)
-    share = np.linspace(0.0, 1.0, 2001)[:, None]
-    points = np.asarray(a) * (1 - share) + np.asarray(b) * share
+    fraction = np.linspace(0.0, 1.0, 2001)[:, None]
+    points = np.asarray(a) * (1 - fraction) + np.asarray(b) * fraction
     low, high = np.asarray(AREA.topleft) - margin, np.asarray(AREA.bottomright) + margin
     inside = ((points > low + 1e-6) & (points < high - 1e-6)).all(1)
     if part is None:
@@ -43,8 +43,8 @@ def test_a_clipped_segment_is_what_lies_in_the_area(a, b, margin):
         assert reach.max() <= math.dist(start, end) + 1e-6  # the same
 
 
-@given(a=ANYWHERE, b=ANYWHERE, width=st.sampled_from([1.0, 2.0, 9.0]), antialias=st.booleans())
-def test_no_line_is_too_long(a, b, width, antialias):
+@given(a=ANY_POINT, b=ANY_POINT, width=st.sampled_from([1.0, 2.0, 9.0]), antialias=st.booleans())
+def test_lines_of_any_length_draw_without_an_error(a, b, width, antialias):
     surface = pygame.Surface((30, 20))
     draw_line(surface, a, b, WHITE, width, antialias)
     draw_arrow(surface, a, b, WHITE, width, antialias, edge=(9, 9, 9))
@@ -54,7 +54,7 @@ def test_no_line_is_too_long(a, b, width, antialias):
 
 @pytest.mark.parametrize("width", [1.0, 2.0, 4.0, 7.0])
 @pytest.mark.parametrize("antialias", [True, False])
-def test_a_stroke_is_as_wide_as_asked(width, antialias):
+def test_line_has_the_requested_width(width, antialias):
     surface = pygame.Surface((60, 40))
     draw_line(surface, (5.0, 20.5), (55.0, 20.5), WHITE, width, antialias)
     assert covered(surface)[30].sum() == pytest.approx(width, abs=1.0)  # whole pixels at the two edges
@@ -62,7 +62,7 @@ def test_a_stroke_is_as_wide_as_asked(width, antialias):
     assert not covered(surface)[58:].any()
 
 
-def test_an_arrow_ends_at_its_tip_and_is_widest_at_its_head():
+def test_arrow_ends_at_its_tip_and_is_widest_at_its_head():
     surface = pygame.Surface((100, 60))
     draw_arrow(surface, (10.0, 30.5), (80.0, 30.5), WHITE, 2.0)
     across = covered(surface).sum(1)
@@ -71,11 +71,11 @@ def test_an_arrow_ends_at_its_tip_and_is_widest_at_its_head():
     assert across.max() > 3 * across[30]
 
 
-def test_dashes_keep_their_place_while_the_edge_of_the_picture_passes():
+def test_dashes_keep_their_phase_when_the_start_is_clipped():
     rows = []
-    for start in (-1003.25, -3.25):  # a whole number of dashes and gaps, of 5 px each, apart
+    for start in (-1003.25, -3.25):  # differ by a whole number of dashes and gaps of 5 px each
         surface = pygame.Surface((100, 20))
         draw_dashes(surface, [((start, 10.5), (300.0, 10.5))], WHITE, 5.0, antialias=False)
         rows.append(covered(surface)[:, 10])
     assert (rows[0] == rows[1]).all()
-    assert 0.4 < rows[0].mean() < 0.7  # as much gap as dash, whose ends are whole pixels
+    assert 0.4 < rows[0].mean() < 0.7  # dashes and gaps are equal; dashes end on whole pixels

@@ -1,4 +1,4 @@
-"""GUI: work that a frame must not repeat while nothing changes, counted by calls."""
+"""GUI: cached work that frames do not repeat while nothing changes, checked by the number of calls."""
 
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from sandbox.window.playback.parameters import SessionParameters
 from sandbox.window.ui import gui
 from sandbox.window.ui.panel import SidePanel
 from tests.window.pressing import press, release
-from tests.window.windowed import turned, window_on
+from tests.window.windowed import open_window, run_frame
 
 ROOM = """
 [world]
@@ -37,7 +37,7 @@ relaunch = "spark"
 
 
 def count_calls(monkeypatch: pytest.MonkeyPatch, owner: object, name: str) -> list[str]:
-    """Return a list that grows with every call."""
+    """Return a list that grows by one item with every call."""
     calls: list[str] = []
     original: Any = getattr(owner, name)
 
@@ -55,27 +55,27 @@ def open_game(name: str, folder: Path) -> App:
     return window
 
 
-def test_key_bindings_are_computed_once_a_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_key_bindings_are_computed_once_per_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = count_calls(monkeypatch, app_state, "key_bindings")
-    with window_on(ROOM, tmp_path) as window:
+    with open_window(ROOM, tmp_path) as window:
         for _ in range(3):
-            turned(window, press(100, 100), release(100, 100))
+            run_frame(window, press(100, 100), release(100, 100))
         assert len(calls) == 1
         assert window.app_state.key_bindings.pressed.keys() == {pygame.K_SPACE}
 
 
-def test_keys_are_announced_once_a_scene_and_not_by_a_restart(tmp_path: Path) -> None:
-    with window_on(ROOM, tmp_path) as window:
-        turned(window)
+def test_keys_are_announced_once_per_scene_and_not_after_a_restart(tmp_path: Path) -> None:
+    with open_window(ROOM, tmp_path) as window:
+        run_frame(window)
         assert window.app_state.messages.visible() == (("info", "Space: relaunch spark"),)
         window.app_state.messages = type(window.app_state.messages)()
-        turned(window)
+        run_frame(window)
         window.app_state.restart()
-        turned(window)
+        run_frame(window)
         assert window.app_state.messages.visible() == ()
 
 
-def test_score_panel_is_laid_out_once_for_what_it_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_score_panel_layout_is_cached(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = count_calls(monkeypatch, gui, "layout_score")
     window = open_game("duel", tmp_path)
     try:
@@ -83,40 +83,40 @@ def test_score_panel_is_laid_out_once_for_what_it_shows(tmp_path: Path, monkeypa
         calls.clear()
         window.run_frame(0.0)
         assert not calls
-        window.context.gui.panel.visible = False  # more room
+        window.context.gui.panel.visible = False  # changes the free width
         window.run_frame(0.0)
         assert len(calls) == 1
     finally:
         window.close()
 
 
-def test_parameters_are_asked_for_only_after_a_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    asked = count_calls(monkeypatch, SessionParameters, "of")
+def test_parameters_are_queried_only_after_a_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    queries = count_calls(monkeypatch, SessionParameters, "of")
     shown = count_calls(monkeypatch, SidePanel, "show")
-    with window_on(ROOM, tmp_path, (1280, 720)) as window:
-        turned(window)
-        asked.clear()
+    with open_window(ROOM, tmp_path, (1280, 720)) as window:
+        run_frame(window)
+        queries.clear()
         shown.clear()
-        turned(window)
-        turned(window)
-        assert (asked, shown) == ([], [])
-        window.app_state.paused = True  # another button
-        turned(window)
+        run_frame(window)
+        run_frame(window)
+        assert (queries, shown) == ([], [])
+        window.app_state.paused = True  # changes a button of the panel
+        run_frame(window)
         assert len(shown) == 1
         live = window.app_state.live
         assert live is not None
         window.app_state.set_parameter("gravity", -3.0)
-        turned(window)
-        assert len(asked) == 2
+        run_frame(window)
+        assert len(queries) == 2
         gravity = next(each for each in window.context.gui.panel.widgets if getattr(each, "parameter", None))
         assert gravity.parameter.value == -3.0  # type: ignore[attr-defined]  # it has a parameter
 
 
-def test_widget_shows_the_present_value_again_after_a_refused_change(tmp_path: Path) -> None:
-    with window_on(ROOM, tmp_path, (1280, 720)) as window:
-        turned(window)
+def test_widget_shows_the_current_value_after_a_refused_change(tmp_path: Path) -> None:
+    with open_window(ROOM, tmp_path, (1280, 720)) as window:
+        run_frame(window)
         window.context.gui.panel.on_change = lambda *_: None  # as if it were refused
         gravity = next(each for each in window.context.gui.panel.widgets if getattr(each, "parameter", None))
         x, y = gravity.rect.left + window.context.gui.area.width + 5, gravity.rect.centery
-        turned(window, press(x, y), release(x, y))
+        run_frame(window, press(x, y), release(x, y))
         assert gravity.value == gravity.parameter.value  # type: ignore[attr-defined]  # it has a parameter

@@ -1,4 +1,4 @@
-"""High-score dialog: when it opens, what its keys do, and that drawing reads no file."""
+"""High-score dialog: opening, keys, errors, and drawing without file access."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,8 +23,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @dataclass
-class Hosted:
-    """The part of a host that the dialog uses."""
+class FakeHost:
+    """Fake of the part of a host that the dialog uses."""
 
     game_over: str | None = "game over"
     score: int = 5_000
@@ -45,15 +45,15 @@ def press(dialog: HighScoreDialog, *keys: int | str) -> list[bool]:
     return found
 
 
-def ended(host: Hosted | None = None) -> HighScoreDialog:
-    """A dialog that has just been shown the end of a game."""
+def dialog_at_end(host: FakeHost | None = None) -> HighScoreDialog:
+    """Return a dialog after the end of a game."""
     dialog = HighScoreDialog()
-    dialog.update(host or Hosted())
+    dialog.update(host or FakeHost())
     return dialog
 
 
-def test_initials_are_asked_for_at_the_end_and_kept() -> None:
-    host, dialog = Hosted(game_over=None), HighScoreDialog()
+def test_initials_are_entered_at_the_end_of_a_game_and_saved() -> None:
+    host, dialog = FakeHost(game_over=None), HighScoreDialog()
     dialog.update(host)
     assert dialog.entry is None
     assert press(dialog, "a") == [False]
@@ -62,49 +62,49 @@ def test_initials_are_asked_for_at_the_end_and_kept() -> None:
     assert press(dialog, "a", "b", "*", "d", pygame.K_BACKSPACE, "c", "x", pygame.K_RETURN) == [True] * 8
     (best,) = opened().of(TABLE)
     assert (best.initials, best.score) == ("ABC", 5_000)
-    assert press(dialog, "r") == [False]  # the list still shows, but keys are the window's again
+    assert press(dialog, "r") == [False]  # the list is still shown, but other keys go to the window
     assert press(dialog, pygame.K_RETURN, pygame.K_RETURN) == [True, False]
     dialog.update(host)
-    assert dialog.entry is None  # one game is entered once
+    assert dialog.entry is None  # a game is entered only once
 
 
-def test_enter_without_letters_keeps_nothing() -> None:
-    dialog = ended()
+def test_enter_without_letters_saves_no_score() -> None:
+    dialog = dialog_at_end()
     assert press(dialog, pygame.K_RETURN) == [True]
     assert opened().of(TABLE) == ()
     assert dialog.entry is not None
 
 
-def test_escape_keeps_nothing() -> None:
-    dialog = ended()
+def test_escape_saves_no_score() -> None:
+    dialog = dialog_at_end()
     assert press(dialog, "a", pygame.K_ESCAPE, pygame.K_ESCAPE) == [True, True, False]
     assert opened().of(TABLE) == ()
 
 
-@pytest.mark.parametrize("host", [Hosted(score=0), Hosted(touched=False)], ids=["nothing scored", "a recording"])
-def test_who_has_not_earned_it_is_not_asked(host: Hosted) -> None:
-    assert ended(host).entry is None
+@pytest.mark.parametrize("host", [FakeHost(score=0), FakeHost(touched=False)], ids=["nothing scored", "a recording"])
+def test_dialog_does_not_open_without_points_or_for_a_recording(host: FakeHost) -> None:
+    assert dialog_at_end(host).entry is None
 
 
-def test_eleventh_is_not_asked() -> None:
+def test_dialog_does_not_open_for_the_eleventh_best_score() -> None:
     for k in range(10):
         opened().enter(TABLE, "abc", 6_000 + k)
-    assert ended().entry is None
+    assert dialog_at_end().entry is None
 
 
-def test_own_row_shows_where_it_will_stand() -> None:
+def test_new_row_is_shown_at_its_rank() -> None:
     for score in (9_000, 1_000):
         opened().enter(TABLE, "abc", score)
-    dialog = ended()
+    dialog = dialog_at_end()
     press(dialog, "x")
     entry = dialog.entry
     assert entry is not None
     assert [(each.initials, each.score) for each in entry.rows()] == [("ABC", 9_000), ("X__", 5_000), ("ABC", 1_000)]
 
 
-def test_going_back_asks_anew() -> None:
-    host = Hosted()
-    dialog = ended(host)
+def test_dialog_opens_again_after_seeking_back() -> None:
+    host = FakeHost()
+    dialog = dialog_at_end(host)
     host.game_over = None
     dialog.update(host)
     assert dialog.entry is None
@@ -113,17 +113,17 @@ def test_going_back_asks_anew() -> None:
     assert dialog.entry is not None
 
 
-def test_damage_is_told(folder: Path) -> None:
+def test_damaged_file_is_reported(folder: Path) -> None:
     (folder / FILE).write_text("{", encoding="utf-8")
     dialog = HighScoreDialog()
-    (note,) = dialog.update(Hosted())
+    (note,) = dialog.update(FakeHost())
     assert "damaged" in note
     assert dialog.entry is not None
 
 
-def test_file_that_cannot_be_written_is_told(folder: Path) -> None:
-    host = Hosted()
-    dialog = ended(host)
+def test_unwritable_file_is_reported(folder: Path) -> None:
+    host = FakeHost()
+    dialog = dialog_at_end(host)
     (folder / FILE).mkdir()
     press(dialog, "a", pygame.K_RETURN)
     (note,) = dialog.update(host)
@@ -131,30 +131,30 @@ def test_file_that_cannot_be_written_is_told(folder: Path) -> None:
     assert dialog.entry is None
 
 
-def test_hands_that_still_play_type_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_keys_during_the_initial_delay_are_ignored(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(high_score_dialog, "MIN_DELAY_S", 60.0)
-    dialog = ended()
+    dialog = dialog_at_end()
     assert press(dialog, "z", pygame.K_RETURN) == [True, True]
     assert dialog.entry is not None
     assert dialog.entry.letters == ""
 
 
-def test_list_is_drawn_and_marks_its_own_row() -> None:
+def test_list_is_drawn_and_highlights_the_new_row() -> None:
     for k in range(10):
         opened().enter(TABLE, "abc", 1_000 * (k + 1) ** 3)
-    dialog, surface = ended(), pygame.Surface((800, 600))
+    dialog, surface = dialog_at_end(), pygame.Surface((800, 600))
     press(dialog, "j", "l")
     dialog.draw(surface, surface.get_rect(), 1.0)
     shown = pygame.surfarray.array3d(surface).astype(int)
     assert (shown.sum(axis=2) > 0).mean() > 0.1
-    assert ((shown[..., 1] - shown[..., 0]) > 60).sum() > 100  # the green of the own row
+    assert ((shown[..., 1] - shown[..., 0]) > 60).sum() > 100  # the green of the new row
 
 
-def test_score_file_is_read_when_the_dialog_opens_and_not_when_it_is_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_score_file_is_read_on_opening_and_not_on_drawing(monkeypatch: pytest.MonkeyPatch) -> None:
     reads = []
     original = HighScores._read
     monkeypatch.setattr(HighScores, "_read", lambda self: reads.append(1) or original(self))
-    dialog, surface = ended(), pygame.Surface((800, 600))
+    dialog, surface = dialog_at_end(), pygame.Surface((800, 600))
     assert reads
     for _ in range(2):  # while initials are typed, and while the saved list is shown
         reads.clear()

@@ -1,4 +1,4 @@
-"""Head-up display: what is told and when, and that no status and no size breaks it or piles words up."""
+"""Head-up display: rows of a status, and layout without overlaps for any status and size."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from sandbox.window.playback.snapshot import HudStatus
 from sandbox.window.render.palette import VERMILION, WARNING
 from sandbox.window.ui.hud import draw_hud, hud_rows
 
-QUIET = HudStatus("Bounce", "pymunk", "dt 10 ms · 1 × 10", 1234, 12.34)
+MINIMAL = HudStatus("Bounce", "pymunk", "dt 10 ms · 1 × 10", 1234, 12.34)
 FULL = HudStatus(
     "Break",
     "pymunk",
@@ -39,12 +39,12 @@ def texts(status: HudStatus) -> list[str]:
     return [row.text for row in hud_rows(status)]
 
 
-def test_title_engine_settings_step_and_time_are_always_told() -> None:
-    assert texts(QUIET) == ["Bounce", "pymunk  ·  dt 10 ms · 1 × 10", "step 1,234   12.34 s"]
+def test_title_engine_settings_step_and_time_are_always_shown() -> None:
+    assert texts(MINIMAL) == ["Bounce", "pymunk  ·  dt 10 ms · 1 × 10", "step 1,234   12.34 s"]
 
 
-def test_pause_is_told_in_red_with_its_keys() -> None:
-    (row,) = [row for row in hud_rows(replace(QUIET, paused=True)) if "PAUSED" in row.text]
+def test_pause_is_shown_in_red_with_its_keys() -> None:
+    (row,) = [row for row in hud_rows(replace(MINIMAL, paused=True)) if "PAUSED" in row.text]
     assert row.text == "PAUSED  (P or Space)"
     assert row.colour == WARNING
 
@@ -54,27 +54,27 @@ def test_pause_of_a_window_without_focus_fits_beside_a_score_panel(unit: float) 
     free = pygame.Rect(0, 0, round(1920 * unit), round(1080 * unit))
     panel = pygame.Rect(hud.hud_width("exact  ·  dt 10 ms", unit), 0, 600, 60)
     for status in (
-        replace(QUIET, engine="exact", settings="dt 10 ms", **{how: True}) for how in ("paused", "unfocused")
+        replace(MINIMAL, engine="exact", settings="dt 10 ms", **{how: True}) for how in ("paused", "unfocused")
     ):
         (line,) = [text for row, text in hud.layout_rows(status, free, unit, [panel]).lines if row.mark == "bars"]
         assert line in texts(status)
 
 
 @pytest.mark.parametrize("stopped", [True, False])
-def test_end_is_told_with_its_reason_in_place_of_the_pause(stopped: bool) -> None:
-    status = replace(QUIET, paused=stopped, ended="at 3 s: it broke", real_speed=0.0)
+def test_end_is_shown_with_its_reason_instead_of_the_pause(stopped: bool) -> None:
+    status = replace(MINIMAL, paused=stopped, ended="at 3 s: it broke", real_speed=0.0)
     (row,) = hud_rows(status)[3:]
     assert (row.text, row.colour) == ("ENDED: at 3 s: it broke (R: restart)", WARNING)
-    (pause,) = [row for row in hud_rows(replace(QUIET, paused=True)) if "PAUSED" in row.text]
+    (pause,) = [row for row in hud_rows(replace(MINIMAL, paused=True)) if "PAUSED" in row.text]
     assert row.mark != pause.mark
 
 
-def test_pause_names_only_p_where_the_scene_claims_space() -> None:
-    assert "PAUSED  (P)" in texts(replace(QUIET, paused=True, claimed=(("Space", "shoot"),)))
+def test_pause_names_only_p_if_the_scene_claims_space() -> None:
+    assert "PAUSED  (P)" in texts(replace(MINIMAL, paused=True, claimed=(("Space", "shoot"),)))
 
 
 @pytest.mark.parametrize(
-    ("asked", "real", "told"),
+    ("speed", "real_speed", "expected"),
     [
         (1.0, 1.0, None),
         (1.0, 0.91, None),
@@ -84,96 +84,98 @@ def test_pause_names_only_p_where_the_scene_claims_space() -> None:
         (2.0, 2.3, "speed 200 %, running at 230 %"),
     ],
 )
-def test_real_speed_is_told_when_more_than_a_tenth_apart(asked: float, real: float, told: str | None) -> None:
-    found = [text for text in texts(replace(QUIET, speed=asked, real_speed=real)) if "speed" in text]
-    assert found == ([] if told is None else [told])
+def test_real_speed_is_shown_if_it_differs_by_more_than_a_tenth(
+    speed: float, real_speed: float, expected: str | None
+) -> None:
+    found = [text for text in texts(replace(MINIMAL, speed=speed, real_speed=real_speed)) if "speed" in text]
+    assert found == ([] if expected is None else [expected])
 
 
-def test_real_speed_is_not_told_while_paused() -> None:
-    assert not [text for text in texts(replace(QUIET, paused=True, real_speed=0.0)) if "speed" in text]
+def test_real_speed_is_not_shown_while_paused() -> None:
+    assert not [text for text in texts(replace(MINIMAL, paused=True, real_speed=0.0)) if "speed" in text]
 
 
-def test_trust_differs_in_word_and_shape() -> None:
-    (held,) = [row for row in hud_rows(replace(QUIET, trust="trusted")) if row.mark]
-    (lost,) = [row for row in hud_rows(replace(QUIET, trust="lost", horizon=3.2)) if row.mark]
-    assert (held.text, lost.text) == ("predictable", "no longer predictable (since 3.20 s)")
-    assert held.mark != lost.mark
-    assert not [row for row in hud_rows(replace(QUIET, trust="unknown")) if row.mark]
+def test_trust_states_differ_in_text_and_mark() -> None:
+    (trusted,) = [row for row in hud_rows(replace(MINIMAL, trust="trusted")) if row.mark]
+    (lost,) = [row for row in hud_rows(replace(MINIMAL, trust="lost", horizon=3.2)) if row.mark]
+    assert (trusted.text, lost.text) == ("predictable", "no longer predictable (since 3.20 s)")
+    assert trusted.mark != lost.mark
+    assert not [row for row in hud_rows(replace(MINIMAL, trust="unknown")) if row.mark]
 
 
-def test_ghost_tells_its_engine_and_how_far_it_is() -> None:
-    assert "ghost exact: 1.23 mm away" in texts(replace(QUIET, ghost="exact", distance=0.00123))
-    assert "ghost exact" in texts(replace(QUIET, ghost="exact"))
+def test_ghost_row_shows_engine_and_distance() -> None:
+    assert "ghost exact: 1.23 mm away" in texts(replace(MINIMAL, ghost="exact", distance=0.00123))
+    assert "ghost exact" in texts(replace(MINIMAL, ghost="exact"))
 
 
 @pytest.mark.parametrize(
     ("missed", "text"), [(0, "no missed contacts"), (1, "1 missed contact"), (7, "7 missed contacts")]
 )
-def test_missed_contacts_are_counted_and_warned_of(missed: int, text: str) -> None:
-    (row,) = [row for row in hud_rows(replace(QUIET, missed=missed)) if "missed" in row.text]
+def test_missed_contacts_are_counted_and_coloured_as_warning(missed: int, text: str) -> None:
+    (row,) = [row for row in hud_rows(replace(MINIMAL, missed=missed)) if "missed" in row.text]
     assert row.text == text
     assert (row.colour == VERMILION) == (missed > 0)
 
 
-def test_replay_recording_and_waiting_are_told() -> None:
-    found = texts(replace(QUIET, replay=True, recording="gif 1.0 s", busy="replaying 40 %"))
+def test_replay_recording_and_busy_state_are_shown() -> None:
+    found = texts(replace(MINIMAL, replay=True, recording="gif 1.0 s", busy="replaying 40 %"))
     assert found[0].endswith("replay")
     assert {"recording gif 1.0 s", "replaying 40 %"} <= set(found)
 
 
-def drawn(
+def draw_and_record(
     status: HudStatus, size: tuple[int, int], unit: float, right: int = 0
 ) -> tuple[list[pygame.Rect], pygame.Surface]:
-    """Return the plates that were laid, and the picture."""
-    laid: list[pygame.Rect] = []
+    """Draw a status; return the rectangles of its plates, and the picture."""
+    plates: list[pygame.Rect] = []
     original = hud.draw_box
 
-    def noted(surface: pygame.Surface, rect: pygame.Rect, *others: object, **named: object) -> None:
-        laid.append(rect.copy())
-        original(surface, rect, *others, **named)  # type: ignore[arg-type]  # passed on as they came
+    def record(surface: pygame.Surface, rect: pygame.Rect, *others: object, **named: object) -> None:
+        plates.append(rect.copy())
+        original(surface, rect, *others, **named)  # type: ignore[arg-type]  # forwarded unchanged
 
     surface = pygame.Surface(size)
-    hud.draw_box = noted
+    hud.draw_box = record
     try:
         draw_hud(surface, status, unit, right=right)
     finally:
         hud.draw_box = original
-    return laid, surface
+    return plates, surface
 
 
 SIZES = [(200, 150), (320, 240), (640, 480), (1280, 800), (3840, 2160)]
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_plates_stay_in_the_picture_and_apart(size: tuple[int, int]) -> None:
+def test_plates_stay_in_the_picture_and_do_not_overlap(size: tuple[int, int]) -> None:
     unit = 2.0 if size[0] > 2000 else 1.0
-    for status in (QUIET, FULL, replace(FULL, faults=("a.toml:3: ball: wrong",) * 30)):
-        laid, surface = drawn(status, size, unit)
-        assert laid
-        assert all(surface.get_rect().contains(rect) for rect in laid)
-        assert all(rect.collidelist(laid[k + 1 :]) < 0 for k, rect in enumerate(laid))
+    for status in (MINIMAL, FULL, replace(FULL, faults=("a.toml:3: ball: wrong",) * 30)):
+        plates, surface = draw_and_record(status, size, unit)
+        assert plates
+        assert all(surface.get_rect().contains(rect) for rect in plates)
+        assert all(rect.collidelist(plates[k + 1 :]) < 0 for k, rect in enumerate(plates))
 
 
-def test_nothing_is_written_below_the_panel() -> None:
-    _, surface = drawn(FULL, (640, 480), 1.0, right=264)
+def test_no_text_is_drawn_behind_the_panel() -> None:
+    _, surface = draw_and_record(FULL, (640, 480), 1.0, right=264)
     assert not pygame.surfarray.array3d(surface)[640 - 264 :].any()
 
 
 def test_newest_message_is_kept_in_a_tiny_window() -> None:
-    without, _ = drawn(replace(FULL, messages=()), (200, 150), 1.0)
-    laid, _ = drawn(FULL, (200, 150), 1.0)
-    assert any(rect.bottom > max(each.bottom for each in without) - 5 and rect.top > 90 for rect in laid)
+    without, _ = draw_and_record(replace(FULL, messages=()), (200, 150), 1.0)
+    plates, _ = draw_and_record(FULL, (200, 150), 1.0)
+    assert any(rect.bottom > max(each.bottom for each in without) - 5 and rect.top > 90 for rect in plates)
 
 
-def test_place_of_the_faults_is_told_where_there_are_any() -> None:
+def test_draw_hud_returns_the_rectangle_of_the_faults() -> None:
     surface = pygame.Surface((640, 480))
-    assert draw_hud(surface, QUIET, 1.0).size == (0, 0)
-    assert draw_hud(surface, replace(QUIET, faults=("a.toml:3: ball: wrong",)), 1.0).collidepoint(320, 260)
+    assert draw_hud(surface, MINIMAL, 1.0).size == (0, 0)
+    assert draw_hud(surface, replace(MINIMAL, faults=("a.toml:3: ball: wrong",)), 1.0).collidepoint(320, 260)
 
 
-def test_faults_change_the_middle_of_the_picture() -> None:
-    _, plain = drawn(QUIET, (640, 480), 1.0)
-    _, faulty = drawn(replace(QUIET, faults=("a.toml:3: ball: wrong",)), (640, 480), 1.0)
+def test_faults_are_drawn_at_the_centre() -> None:
+    _, plain = draw_and_record(MINIMAL, (640, 480), 1.0)
+    _, faulty = draw_and_record(replace(MINIMAL, faults=("a.toml:3: ball: wrong",)), (640, 480), 1.0)
     middle = np.s_[300:340, 240:300]
     assert not pygame.surfarray.array3d(plain)[middle].any()
     assert pygame.surfarray.array3d(faulty)[middle].any()
@@ -211,5 +213,5 @@ statuses = st.builds(
 @given(statuses, st.integers(1, 500), st.integers(1, 400), st.floats(0.25, 4), st.integers(0, 300))
 @settings(max_examples=150, deadline=None)
 def test_any_status_is_drawn_on_any_size(status: HudStatus, width: int, height: int, unit: float, right: int) -> None:
-    laid, surface = drawn(status, (width, height), unit, right)
-    assert all(surface.get_rect().contains(rect) for rect in laid if rect.size > (0, 0))
+    plates, surface = draw_and_record(status, (width, height), unit, right)
+    assert all(surface.get_rect().contains(rect) for rect in plates if rect.size > (0, 0))

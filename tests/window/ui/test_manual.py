@@ -1,4 +1,4 @@
-"""Manual: help lists every key, claims first, and fits any window."""
+"""Help overlay: it lists every key, keys of the scene first, and fits into any window."""
 
 import pygame
 import pytest
@@ -9,7 +9,7 @@ from sandbox.window.input.keymap import BINDINGS
 from sandbox.window.ui.help import SCENE_GROUP, HelpOverlay, help_groups
 from tests.window.pressing import key, press, wheel
 
-CLAIMS = (("S (hold)", "stroke"), ("Space", "shoot"), ("G", "ball in hand"))
+SCENE_KEYS = (("S (hold)", "stroke"), ("Space", "shoot"), ("G", "ball in hand"))
 
 
 def test_help_lists_every_binding() -> None:
@@ -17,15 +17,15 @@ def test_help_lists_every_binding() -> None:
     assert {(binding.label, binding.about) for binding in BINDINGS} <= listed
 
 
-def test_help_names_every_key_of_the_table() -> None:
-    named = {name for group in help_groups() for label, _ in group.lines for name in label.split(" or ")}
+def test_help_names_every_documented_key() -> None:
+    names = {name for group in help_groups() for label, _ in group.lines for name in label.split(" or ")}
     letters = {"P", "Space", "O", ".", ",", "R", "Backspace", "[", "]", "Ctrl+O", "-", "=", "E", "G", "Home", "Tab"}
-    assert letters <= named
-    assert {"F1", "H", "Ctrl+P", "Ctrl+R", "Ctrl+L", "Ctrl+S", "Esc", "T", "M", "B", "N", "Delete"} <= named
-    assert set("1234567890") <= named
+    assert letters <= names
+    assert {"F1", "H", "Ctrl+P", "Ctrl+R", "Ctrl+L", "Ctrl+S", "Esc", "T", "M", "B", "N", "Delete"} <= names
+    assert set("1234567890") <= names
 
 
-def test_help_tells_what_the_mouse_does() -> None:
+def test_help_lists_the_actions_of_the_mouse() -> None:
     mouse = dict(help_groups()[-1].lines)
     assert mouse["Wheel"] == "zoom at the cursor"
     assert mouse["Right-drag"] == "pan"
@@ -33,20 +33,20 @@ def test_help_tells_what_the_mouse_does() -> None:
     assert mouse["Left-drag, paused"] == "move a body"
 
 
-def test_claimed_keys_come_first_and_are_taken_from_ours() -> None:
-    found = help_groups(CLAIMS)
+def test_scene_keys_come_first_and_replace_keys_of_the_window() -> None:
+    found = help_groups(SCENE_KEYS)
     assert found[0].title == SCENE_GROUP
-    assert found[0].lines == CLAIMS
-    ours = {about: label for group in found[1:] for label, about in group.lines}
-    assert ours["pause / resume"] == "P"
-    assert ours["(ghost: another engine's run)"] == "G"
-    assert "ghost: another engine's run" not in ours
+    assert found[0].lines == SCENE_KEYS
+    window_keys = {about: label for group in found[1:] for label, about in group.lines}
+    assert window_keys["pause / resume"] == "P"
+    assert window_keys["(ghost: another engine's run)"] == "G"
+    assert "ghost: another engine's run" not in window_keys
 
 
 def test_gamepad_rows_are_listed_if_given() -> None:
     rows = (("A", "fire"),)
-    assert [group.lines for group in help_groups(CLAIMS, rows) if group.title == "Gamepad"] == [rows]
-    assert all(group.title != "Gamepad" for group in help_groups(CLAIMS))
+    assert [group.lines for group in help_groups(SCENE_KEYS, rows) if group.title == "Gamepad"] == [rows]
+    assert all(group.title != "Gamepad" for group in help_groups(SCENE_KEYS))
 
 
 def test_mouse_actions_of_a_game_replace_those_of_the_window() -> None:
@@ -54,59 +54,61 @@ def test_mouse_actions_of_a_game_replace_those_of_the_window() -> None:
     assert list(mouse) == ["Wheel", "Right-drag"]
 
 
-def test_claim_on_a_global_key_takes_nothing() -> None:
-    ours = {about: label for group in help_groups((("P", "x"), ("Esc", "y")))[1:] for label, about in group.lines}
-    assert ours["pause / resume"] == "P or Space"
-    assert ours["quit"] == "Esc"
+def test_claim_on_a_global_key_is_ignored() -> None:
+    window_keys = {
+        about: label for group in help_groups((("P", "x"), ("Esc", "y")))[1:] for label, about in group.lines
+    }
+    assert window_keys["pause / resume"] == "P or Space"
+    assert window_keys["quit"] == "Esc"
 
 
-def test_any_key_or_click_closes_and_is_used_up() -> None:
+def test_any_key_or_click_closes_help_and_is_consumed() -> None:
     for event in (key(pygame.K_p), key(pygame.K_F1), key(pygame.K_ESCAPE), press(5, 5)):
-        manual = HelpOverlay()
-        assert not manual.handle_event(event)
-        manual.open = True
-        assert manual.handle_event(event)
-        assert not manual.open
+        overlay = HelpOverlay()
+        assert not overlay.handle_event(event)
+        overlay.open = True
+        assert overlay.handle_event(event)
+        assert not overlay.open
 
 
-def test_wheel_scrolls_where_the_window_is_too_small() -> None:
-    manual = HelpOverlay()
-    manual.open = True
+def test_wheel_scrolls_help_in_a_small_window() -> None:
+    overlay = HelpOverlay()
+    overlay.open = True
     first, later = pygame.Surface((300, 200)), pygame.Surface((300, 200))
-    manual.draw(first, 1.0, CLAIMS)
-    assert manual.handle_event(wheel(-2))
-    assert manual.handle_event(press(5, 5, button=5))  # the same notch, told the old way
-    assert manual.open
-    manual.draw(later, 1.0, CLAIMS)
+    overlay.draw(first, 1.0, SCENE_KEYS)
+    assert overlay.handle_event(wheel(-2))
+    assert overlay.handle_event(press(5, 5, button=5))  # the same notch as a legacy button event
+    assert overlay.open
+    overlay.draw(later, 1.0, SCENE_KEYS)
     assert pygame.image.tobytes(first, "RGB") != pygame.image.tobytes(later, "RGB")
 
 
-def test_wheel_changes_nothing_where_all_is_seen() -> None:
-    manual = HelpOverlay()
-    manual.open = True
+def test_wheel_does_not_scroll_help_that_fits() -> None:
+    overlay = HelpOverlay()
+    overlay.open = True
     first, later = pygame.Surface((1280, 800)), pygame.Surface((1280, 800))
-    manual.draw(first, 1.0, CLAIMS)
-    manual.handle_event(wheel(-9))
-    manual.draw(later, 1.0, CLAIMS)
+    overlay.draw(first, 1.0, SCENE_KEYS)
+    overlay.handle_event(wheel(-9))
+    overlay.draw(later, 1.0, SCENE_KEYS)
     assert pygame.image.tobytes(first, "RGB") == pygame.image.tobytes(later, "RGB")
 
 
 @pytest.mark.parametrize(
     ("size", "unit"), [((640, 480), 1.0), ((1280, 800), 1.0), ((1920, 1080), 1.0), ((3840, 2160), 2.0)]
 )
-def test_help_is_whole_in_common_windows(size: tuple[int, int], unit: float) -> None:
+def test_help_fits_into_common_window_sizes(size: tuple[int, int], unit: float) -> None:
     surface = pygame.Surface(size)
     surface.fill((1, 2, 3))
     HelpOverlay().draw(surface, unit)
     edge = pygame.surfarray.array3d(surface)[:, [0, 1, -2, -1]]
-    assert len({tuple(colour) for colour in edge.reshape(-1, 3).tolist()}) == 1  # no words at the upper or lower edge
+    assert len({tuple(colour) for colour in edge.reshape(-1, 3).tolist()}) == 1  # no text at the upper or lower edge
 
 
 @given(
     st.integers(1, 700), st.integers(1, 500), st.floats(0.25, 4), st.lists(st.tuples(st.text(), st.text()), max_size=30)
 )
 @settings(max_examples=30, deadline=None)
-def test_help_is_drawn_on_any_size(width: int, height: int, unit: float, claimed: list[tuple[str, str]]) -> None:
+def test_help_is_drawn_on_any_size(width: int, height: int, unit: float, scene_keys: list[tuple[str, str]]) -> None:
     surface = pygame.Surface((width, height))
-    HelpOverlay().draw(surface, unit, claimed)
+    HelpOverlay().draw(surface, unit, scene_keys)
     assert surface.get_at((0, 0)) != (0, 0, 0)

@@ -1,4 +1,4 @@
-"""Panel: callbacks, what it consumes, scrolling, and that showing other things leaves nothing behind."""
+"""Side panel: callbacks, consumed events, scrolling, and release of replaced widgets."""
 
 import gc
 import weakref
@@ -17,7 +17,7 @@ from tests.window.pressing import FOCUS_LOST, move, press, release, wheel
 SIZE = (1280, 800)
 BUTTONS = ("play", "step", "back", "restart", "camera", "record", "save")
 TOGGLES = dict.fromkeys((*OVERLAYS, "ghost", "trust", "sound", "antialias"), False)
-KNOBS = (
+PARAMETERS = (
     Parameter("gravity", "gravity", -30, 30, -9.8, step=0.1, unit="m/s²", default=-9.8),
     Parameter("friction", "friction", 0, 2, 0.5, enabled=False, why="nothing rubs here"),
     Parameter("dt", "time step", 1e-4, 0.1, 0.01, log=True, step=0.1, unit="s"),
@@ -25,8 +25,8 @@ KNOBS = (
 )
 
 
-class Noted:
-    """A panel, and what it called back."""
+class RecordedPanel:
+    """A panel that records its callbacks."""
 
     def __init__(self, size: tuple[int, int] = SIZE, unit: float = 1.0) -> None:
         self.calls: list[tuple[object, ...]] = []
@@ -34,44 +34,44 @@ class Noted:
         self.panel.on_change = lambda key, value, final: self.calls.append(("change", key, value, final))
         self.panel.on_toggle = lambda name, on: self.calls.append(("toggle", name, on))
         self.panel.on_button = lambda name: self.calls.append(("button", name))
-        self.panel.show(KNOBS, TOGGLES, BUTTONS)
+        self.panel.show(PARAMETERS, TOGGLES, BUTTONS)
 
     def find(self, name: str) -> Widget:
         for widget in self.panel.widgets:
-            named = widget.name if isinstance(widget, Checkbox | PushButton) else widget.parameter.key  # type: ignore[attr-defined]  # the rest are dials
+            named = widget.name if isinstance(widget, Checkbox | PushButton) else widget.parameter.key  # type: ignore[attr-defined]  # the rest show parameters
             if named == name:
                 return widget
         raise AssertionError(name)
 
-    def middle(self, name: str) -> tuple[int, int]:
+    def centre(self, name: str) -> tuple[int, int]:
         x, y = self.find(name).rect.center
         return x + self.panel.size[0] - self.panel.width, y
 
 
-def test_click_within_one_frame_calls_back_once() -> None:
-    noted = Noted()
+def test_click_within_one_frame_makes_one_callback() -> None:
+    recorded = RecordedPanel()
     for name in ("play", "trails", "integrator"):
-        assert noted.panel.handle_event(press(*noted.middle(name)))
-        assert noted.panel.handle_event(release(*noted.middle(name)))
-    assert noted.calls == [("button", "play"), ("toggle", "trails", True), ("change", "integrator", "a", True)]
+        assert recorded.panel.handle_event(press(*recorded.centre(name)))
+        assert recorded.panel.handle_event(release(*recorded.centre(name)))
+    assert recorded.calls == [("button", "play"), ("toggle", "trails", True), ("change", "integrator", "a", True)]
 
 
 @pytest.mark.parametrize("name", [*BUTTONS, *TOGGLES])
-def test_every_button_and_switch_can_be_reached(name: str) -> None:
-    noted = Noted()
-    noted.panel.handle_event(press(*noted.middle(name)))
-    noted.panel.handle_event(release(*noted.middle(name)))
-    assert [call[1] for call in noted.calls] == [name]
+def test_every_button_and_checkbox_can_be_clicked(name: str) -> None:
+    recorded = RecordedPanel()
+    recorded.panel.handle_event(press(*recorded.centre(name)))
+    recorded.panel.handle_event(release(*recorded.centre(name)))
+    assert [call[1] for call in recorded.calls] == [name]
 
 
-def test_slider_holds_while_the_mouse_is_over_the_picture() -> None:
-    noted = Noted()
-    panel = noted.panel
-    x, y = noted.middle("gravity")
+def test_slider_stays_held_while_the_mouse_is_over_the_picture() -> None:
+    recorded = RecordedPanel()
+    panel = recorded.panel
+    x, y = recorded.centre("gravity")
     assert panel.handle_event(press(x, y))
     assert panel.handle_event(move(10, 10, held=True))
     assert panel.handle_event(release(10, 10))
-    assert noted.calls == [
+    assert recorded.calls == [
         ("change", "gravity", 0.0, False),
         ("change", "gravity", -30, False),
         ("change", "gravity", -30, True),
@@ -80,7 +80,7 @@ def test_slider_holds_while_the_mouse_is_over_the_picture() -> None:
 
 
 def test_drag_that_began_in_the_picture_is_not_consumed() -> None:
-    panel = Noted().panel
+    panel = RecordedPanel().panel
     inside = SIZE[0] - 40
     assert not panel.handle_event(press(100, 100))
     assert not panel.handle_event(move(inside, 100, held=True))
@@ -88,51 +88,53 @@ def test_drag_that_began_in_the_picture_is_not_consumed() -> None:
     assert panel.handle_event(move(inside, 100))
 
 
-def test_showing_values_calls_nobody_back_and_keeps_the_widgets() -> None:
-    noted = Noted()
-    before = noted.panel.widgets
-    noted.panel.show([*KNOBS[:2], Parameter("dt", "time step", 1e-3, 1, 0.5, log=True), KNOBS[3]], TOGGLES, BUTTONS)
-    noted.panel.show(KNOBS, {**TOGGLES, "trails": True}, ("pause", *BUTTONS[1:]))
-    assert noted.calls == []
-    assert noted.panel.widgets == before
-    trails = noted.find("trails")
+def test_show_makes_no_callbacks_and_keeps_the_widgets() -> None:
+    recorded = RecordedPanel()
+    before = recorded.panel.widgets
+    recorded.panel.show(
+        [*PARAMETERS[:2], Parameter("dt", "time step", 1e-3, 1, 0.5, log=True), PARAMETERS[3]], TOGGLES, BUTTONS
+    )
+    recorded.panel.show(PARAMETERS, {**TOGGLES, "trails": True}, ("pause", *BUTTONS[1:]))
+    assert recorded.calls == []
+    assert recorded.panel.widgets == before
+    trails = recorded.find("trails")
     assert isinstance(trails, Checkbox)
     assert trails.on
 
 
-def test_drag_survives_what_is_shown_meanwhile() -> None:
-    noted = Noted()
-    x, y = noted.middle("gravity")
-    noted.panel.handle_event(press(x, y))
-    noted.panel.show(KNOBS, TOGGLES, ("pause", *BUTTONS[1:]))
-    noted.panel.show(KNOBS[:3], {"trails": True}, ())  # another layout
-    assert noted.panel.handle_event(move(5000, y, held=True))
-    noted.panel.handle_event(release(5000, y))
-    assert noted.calls[-1] == ("change", "gravity", 30, True)
+def test_drag_continues_when_other_content_is_shown() -> None:
+    recorded = RecordedPanel()
+    x, y = recorded.centre("gravity")
+    recorded.panel.handle_event(press(x, y))
+    recorded.panel.show(PARAMETERS, TOGGLES, ("pause", *BUTTONS[1:]))
+    recorded.panel.show(PARAMETERS[:3], {"trails": True}, ())  # another layout
+    assert recorded.panel.handle_event(move(5000, y, held=True))
+    recorded.panel.handle_event(release(5000, y))
+    assert recorded.calls[-1] == ("change", "gravity", 30, True)
 
 
-def test_panels_leave_nothing_behind() -> None:
-    noted = Noted()
-    known = [weakref.ref(widget) for widget in noted.panel.widgets]
-    noted.panel.show((Parameter("gravity", "gravity", choices=("a", "b"), value="a"),), {}, ())
+def test_replaced_widgets_are_released() -> None:
+    recorded = RecordedPanel()
+    known = [weakref.ref(widget) for widget in recorded.panel.widgets]
+    recorded.panel.show((Parameter("gravity", "gravity", choices=("a", "b"), value="a"),), {}, ())
     gc.collect()
-    assert len(noted.panel.widgets) == 1
+    assert len(recorded.panel.widgets) == 1
     assert not any(ref() for ref in known)
 
 
-def test_lost_focus_and_hiding_end_a_drag_with_a_final_call() -> None:
+def test_lost_focus_and_hiding_end_a_drag_with_a_final_callback() -> None:
     for end in (lambda panel: panel.handle_event(FOCUS_LOST), lambda panel: setattr(panel, "visible", False)):
-        noted = Noted()
-        noted.panel.handle_event(press(*noted.middle("gravity")))
-        end(noted.panel)
-        assert noted.calls == [("change", "gravity", 0.0, False), ("change", "gravity", 0.0, True)]
-        noted.panel.visible = True
-        noted.panel.handle_event(move(10, 10))
-        assert len(noted.calls) == 2
+        recorded = RecordedPanel()
+        recorded.panel.handle_event(press(*recorded.centre("gravity")))
+        end(recorded.panel)
+        assert recorded.calls == [("change", "gravity", 0.0, False), ("change", "gravity", 0.0, True)]
+        recorded.panel.visible = True
+        recorded.panel.handle_event(move(10, 10))
+        assert len(recorded.calls) == 2
 
 
-def test_hidden_panel_covers_and_takes_nothing() -> None:
-    panel = Noted().panel
+def test_hidden_panel_draws_nothing_and_consumes_no_events() -> None:
+    panel = RecordedPanel().panel
     assert panel.width == 264
     panel.visible = False
     assert panel.width == 0
@@ -142,86 +144,86 @@ def test_hidden_panel_covers_and_takes_nothing() -> None:
     assert not pygame.surfarray.array3d(surface).any()
 
 
-def test_wheel_turns_the_slider_below_it_and_scrolls_elsewhere() -> None:
-    noted = Noted((640, 300))
-    panel = noted.panel
-    panel.handle_event(move(*noted.middle("gravity")))
+def test_wheel_changes_the_slider_below_it_and_scrolls_elsewhere() -> None:
+    recorded = RecordedPanel((640, 300))
+    panel = recorded.panel
+    panel.handle_event(move(*recorded.centre("gravity")))
     assert panel.handle_event(wheel(1))
-    assert noted.calls == [("change", "gravity", -9.7, True)]
-    top = noted.find("gravity").rect.top
+    assert recorded.calls == [("change", "gravity", -9.7, True)]
+    top = recorded.find("gravity").rect.top
     panel.handle_event(move(640 - panel.width + 3, 150))
     assert panel.handle_event(wheel(-1))
-    assert noted.find("gravity").rect.top < top
+    assert recorded.find("gravity").rect.top < top
     for _ in range(50):
         panel.handle_event(wheel(-1))
-    assert noted.find("antialias").rect.bottom <= 300
+    assert recorded.find("antialias").rect.bottom <= 300
     for _ in range(50):
         panel.handle_event(wheel(1))
-    assert noted.find("gravity").rect.top == top
+    assert recorded.find("gravity").rect.top == top
     panel.handle_event(move(10, 10))
     assert not panel.handle_event(wheel(-1))
 
 
-def test_bar_at_the_edge_scrolls() -> None:
-    noted = Noted((640, 300))
-    assert noted.panel.handle_event(press(637, 299))
-    assert noted.find("antialias").rect.bottom <= 300
-    assert noted.panel.handle_event(move(637, -50, held=True))
-    assert noted.panel.handle_event(release(637, -50))
-    assert noted.find("play").rect.top > 0
-    assert noted.calls == []
+def test_scroll_bar_at_the_edge_scrolls() -> None:
+    recorded = RecordedPanel((640, 300))
+    assert recorded.panel.handle_event(press(637, 299))
+    assert recorded.find("antialias").rect.bottom <= 300
+    assert recorded.panel.handle_event(move(637, -50, held=True))
+    assert recorded.panel.handle_event(release(637, -50))
+    assert recorded.find("play").rect.top > 0
+    assert recorded.calls == []
 
 
-def test_reason_is_shown_beside_a_disabled_knob() -> None:
-    noted = Noted()
+def test_reason_of_a_disabled_parameter_is_shown() -> None:
+    recorded = RecordedPanel()
     plain, hovered = pygame.Surface(SIZE), pygame.Surface(SIZE)
-    noted.panel.draw(plain)
-    noted.panel.handle_event(move(*noted.middle("friction")))
-    noted.panel.draw(hovered)
-    left = SIZE[0] - noted.panel.width
-    assert noted.find("friction").hint == "nothing rubs here"
+    recorded.panel.draw(plain)
+    recorded.panel.handle_event(move(*recorded.centre("friction")))
+    recorded.panel.draw(hovered)
+    left = SIZE[0] - recorded.panel.width
+    assert recorded.find("friction").hint == "nothing rubs here"
     assert pygame.image.tobytes(plain, "RGB") != pygame.image.tobytes(hovered, "RGB")
     assert not pygame.surfarray.array3d(plain)[:left].any()
 
 
 @pytest.mark.parametrize("change", ["hover", "knob", "toggle", "button", "scroll", "label"])
-def test_kept_picture_is_drawn_anew_when_something_changes(change: str) -> None:
-    noted = Noted((640, 420))  # lower than its content; the switches are partly in sight
-    panel = noted.panel
+def test_cached_picture_is_redrawn_after_a_change(change: str) -> None:
+    recorded = RecordedPanel((640, 420))  # lower than its content; the checkboxes are partly visible
+    panel = recorded.panel
     before, same, after = (pygame.Surface((640, 420)) for _ in range(3))
     panel.draw(before)
     panel.draw(same)
     assert pygame.image.tobytes(before, "RGB") == pygame.image.tobytes(same, "RGB")
     if change == "hover":
-        panel.handle_event(move(*noted.middle("gravity")))
+        panel.handle_event(move(*recorded.centre("gravity")))
     elif change == "scroll":
         panel.handle_event(press(637, 419))
     else:
         name = "height" if change == "label" else "gravity"
-        knob = Parameter("gravity", name, -30, 30, 5.0 if change == "knob" else -9.8, step=0.1, unit="m/s²")
+        parameter = Parameter("gravity", name, -30, 30, 5.0 if change == "knob" else -9.8, step=0.1, unit="m/s²")
         buttons = ("pause" if change == "button" else "play", *BUTTONS[1:])
-        panel.show((knob, *KNOBS[1:]), {**TOGGLES, "shapes": change == "toggle"}, buttons)
+        panel.show((parameter, *PARAMETERS[1:]), {**TOGGLES, "shapes": change == "toggle"}, buttons)
     panel.draw(after)
     assert pygame.image.tobytes(before, "RGB") != pygame.image.tobytes(after, "RGB")
 
 
-def test_callback_may_show_something_else() -> None:
-    noted = Noted()
-    noted.panel.on_button = lambda name: noted.panel.show((), {}, ())
-    noted.panel.handle_event(press(*noted.middle("play")))
-    noted.panel.handle_event(release(*noted.middle("play")))
-    assert noted.panel.widgets == ()
+def test_callback_may_replace_the_content() -> None:
+    recorded = RecordedPanel()
+    recorded.panel.on_button = lambda name: recorded.panel.show((), {}, ())
+    recorded.panel.handle_event(press(*recorded.centre("play")))
+    recorded.panel.handle_event(release(*recorded.centre("play")))
+    assert recorded.panel.widgets == ()
 
 
 def test_buttons_name_their_keys() -> None:
-    noted = Noted()
-    assert noted.find("play").hint == "Resume (P or Space)"
-    assert noted.find("camera").hint == "Screenshot (Ctrl+P)"
+    recorded = RecordedPanel()
+    assert recorded.find("play").hint == "Resume (P or Space)"
+    assert recorded.find("camera").hint == "Screenshot (Ctrl+P)"
 
 
 @pytest.mark.parametrize(("size", "unit"), [((640, 480), 1.0), ((1280, 800), 1.0), ((3840, 2160), 2.0)])
-def test_widgets_keep_apart_and_inside(size: tuple[int, int], unit: float) -> None:
-    panel = Noted(size, unit).panel
+def test_widgets_do_not_overlap_and_stay_inside(size: tuple[int, int], unit: float) -> None:
+    panel = RecordedPanel(size, unit).panel
     rects = [widget.row if isinstance(widget, ParameterSlider) else widget.rect for widget in panel.widgets]
     assert all(rect.collidelist(rects[k + 1 :]) < 0 for k, rect in enumerate(rects))
     assert all(rect.left >= 0 and rect.right <= panel.width for rect in rects)
@@ -231,8 +233,8 @@ def test_widgets_keep_apart_and_inside(size: tuple[int, int], unit: float) -> No
 @settings(max_examples=40, deadline=None)
 def test_panel_is_drawn_on_any_size(width: int, height: int, unit: float, count: int) -> None:
     panel = SidePanel((width, height), unit)
-    panel.visible = True  # a small window folds it away
-    panel.show(KNOBS[:count], TOGGLES, BUTTONS)
+    panel.visible = True  # a small window hides it
+    panel.show(PARAMETERS[:count], TOGGLES, BUTTONS)
     surface = pygame.Surface((width, height))
     panel.handle_event(move(width - 1, height // 2))
     panel.draw(surface)

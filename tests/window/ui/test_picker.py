@@ -1,4 +1,4 @@
-"""Picker: choosing by keys and mouse, filtering, faulty files, and one picture each time it is drawn."""
+"""Scene picker: selection by keys and mouse, filter, faulty files, and one thumbnail per frame."""
 
 from pathlib import Path
 
@@ -27,23 +27,23 @@ def files(tmp_path: Path) -> list[tuple[str, Path]]:
     return [*found, ("mine/bad", tmp_path / "bad.toml")]
 
 
-def drawn(files: list[tuple[str, Path]], size: tuple[int, int] = (900, 700), times: int = 40) -> SceneBrowser:
+def draw_picker(files: list[tuple[str, Path]], size: tuple[int, int] = (900, 700), times: int = 40) -> SceneBrowser:
     picker = SceneBrowser(files)
     for _ in range(times):
         picker.draw(pygame.Surface(size), 1.0)
     return picker
 
 
-def typed(picker: SceneBrowser, text: str) -> None:
+def type_text(picker: SceneBrowser, text: str) -> None:
     for letter in text:
         picker.handle_event(key(ord(letter), unicode=letter))
 
 
-def place(picker: SceneBrowser, number: int) -> tuple[int, int]:
-    return picker._rects[number][1].center
+def card_centre(picker: SceneBrowser, index: int) -> tuple[int, int]:
+    return picker._rects[index][1].center
 
 
-def test_one_file_is_read_or_pictured_each_time(files: list[tuple[str, Path]]) -> None:
+def test_one_file_is_read_or_drawn_per_frame(files: list[tuple[str, Path]]) -> None:
     picker = SceneBrowser(files)
     done = 0
     for _ in range(10):
@@ -53,32 +53,32 @@ def test_one_file_is_read_or_pictured_each_time(files: list[tuple[str, Path]]) -
         done = now
 
 
-def test_all_files_are_read_and_those_in_sight_pictured(files: list[tuple[str, Path]]) -> None:
-    picker = drawn(files)
+def test_all_files_are_read_and_only_visible_ones_drawn(files: list[tuple[str, Path]]) -> None:
+    picker = draw_picker(files)
     assert all(card.thumbnail is not None for card in picker.cards)
     assert picker.cards[0].image is not None
     assert picker.cards[-1].image is None
     assert (picker.cards[3].title, picker.cards[3].folder, picker.cards[3].about) == ("Scene 3", "mine", "odd")
 
 
-def test_faulty_file_tells_its_first_fault(files: list[tuple[str, Path]]) -> None:
+def test_faulty_file_shows_its_first_fault(files: list[tuple[str, Path]]) -> None:
     found = read_scene(files[-1][1])
     assert found.scene is None
     assert found.fault.startswith("line 3: ball[0].radius")
 
 
-def test_missing_file_tells_that(tmp_path: Path) -> None:
+def test_missing_file_is_a_fault(tmp_path: Path) -> None:
     assert "no file" in read_scene(tmp_path / "none.toml").fault
 
 
-def test_crowded_scatter_tells_that_it_does_not_fit(tmp_path: Path) -> None:
+def test_scatter_that_does_not_fit_is_a_fault(tmp_path: Path) -> None:
     path = tmp_path / "crowd.toml"
     path.write_text("[[scatter]]\ncount = 50\nlower = [0, 0]\nupper = [1, 1]\nradius = 0.5\n")
     assert read_scene(path).fault
 
 
-def test_arrows_and_enter_choose(files: list[tuple[str, Path]]) -> None:
-    picker = drawn(files)
+def test_arrows_and_enter_select_a_scene(files: list[tuple[str, Path]]) -> None:
+    picker = draw_picker(files)
     columns = picker._columns
     assert columns > 1
     picker.handle_event(key(pygame.K_RIGHT))
@@ -91,16 +91,16 @@ def test_arrows_and_enter_choose(files: list[tuple[str, Path]]) -> None:
     assert picker.handle_event(key(pygame.K_RETURN)) == files[-1][1]
 
 
-def test_chosen_card_is_scrolled_into_sight(files: list[tuple[str, Path]]) -> None:
-    picker = drawn(files, (400, 400))
+def test_selected_card_is_scrolled_into_view(files: list[tuple[str, Path]]) -> None:
+    picker = draw_picker(files, (400, 400))
     picker.handle_event(key(pygame.K_END))
     picker.draw(pygame.Surface((400, 400)), 1.0)
     assert picker._rects[-1][1].bottom <= 400
 
 
 def test_typing_filters_by_title_and_about(files: list[tuple[str, Path]]) -> None:
-    picker = drawn(files)
-    typed(picker, "ODD scene 1")
+    picker = draw_picker(files)
+    type_text(picker, "ODD scene 1")
     assert [card.title for card in picker.shown] == ["Scene 1", "Scene 11"]
     assert picker.handle_event(key(pygame.K_RETURN)) == files[1][1]
     picker.handle_event(key(pygame.K_BACKSPACE))
@@ -110,33 +110,33 @@ def test_typing_filters_by_title_and_about(files: list[tuple[str, Path]]) -> Non
 
 
 @pytest.mark.parametrize("text", ["s1", "Mine/S1", "scene 1"])
-def test_scene_that_is_called_as_typed_comes_first(files: list[tuple[str, Path]], text: str) -> None:
-    picker = drawn([files[10], files[11], files[1]])
-    typed(picker, text)
+def test_exact_match_of_name_or_title_comes_first(files: list[tuple[str, Path]], text: str) -> None:
+    picker = draw_picker([files[10], files[11], files[1]])
+    type_text(picker, text)
     assert [card.title for card in picker.shown] == ["Scene 1", "Scene 10", "Scene 11"]
     assert picker.handle_event(key(pygame.K_RETURN)) == files[1][1]
 
 
-def test_enter_chooses_nothing_where_nothing_fits(files: list[tuple[str, Path]]) -> None:
-    picker = drawn(files)
-    typed(picker, "teapot")
+def test_enter_without_matching_scenes_does_nothing(files: list[tuple[str, Path]]) -> None:
+    picker = draw_picker(files)
+    type_text(picker, "teapot")
     picker.draw(pygame.Surface((900, 700)), 1.0)
     assert picker.handle_event(key(pygame.K_RETURN)) is None
     assert not picker.closed
 
 
-def test_click_chooses_the_card_below(files: list[tuple[str, Path]]) -> None:
-    picker = drawn(files)
-    assert picker.handle_event(press(*place(picker, 2))) is None
-    assert picker.handle_event(release(*place(picker, 2))) == files[2][1]
-    picker.handle_event(press(*place(picker, 2)))
-    assert picker.handle_event(release(*place(picker, 3))) is None
-    picker.handle_event(move(*place(picker, 4)))
+def test_click_selects_the_card_below(files: list[tuple[str, Path]]) -> None:
+    picker = draw_picker(files)
+    assert picker.handle_event(press(*card_centre(picker, 2))) is None
+    assert picker.handle_event(release(*card_centre(picker, 2))) == files[2][1]
+    picker.handle_event(press(*card_centre(picker, 2)))
+    assert picker.handle_event(release(*card_centre(picker, 3))) is None
+    picker.handle_event(move(*card_centre(picker, 4)))
     assert picker.chosen == 4
 
 
 def test_wheel_scrolls(files: list[tuple[str, Path]]) -> None:
-    picker = drawn(files, (400, 400))
+    picker = draw_picker(files, (400, 400))
     top = picker._rects[0][1].top
     picker.handle_event(wheel(-1))
     picker.draw(pygame.Surface((400, 400)), 1.0)
@@ -144,7 +144,7 @@ def test_wheel_scrolls(files: list[tuple[str, Path]]) -> None:
 
 
 @pytest.mark.parametrize("event", [key(pygame.K_ESCAPE), key(pygame.K_o, pygame.KMOD_LCTRL)])
-def test_escape_and_its_own_key_close(files: list[tuple[str, Path]], event: pygame.event.Event) -> None:
+def test_escape_and_ctrl_o_close_the_picker(files: list[tuple[str, Path]], event: pygame.event.Event) -> None:
     picker = SceneBrowser(files)
     assert picker.handle_event(event) is None
     assert picker.closed
@@ -152,25 +152,25 @@ def test_escape_and_its_own_key_close(files: list[tuple[str, Path]], event: pyga
 
 @pytest.mark.parametrize("size", [(1, 1), (30, 20), (200, 150), (640, 480)])
 def test_picker_is_drawn_on_any_size(files: list[tuple[str, Path]], size: tuple[int, int]) -> None:
-    picker = drawn(files, size, 5)
+    picker = draw_picker(files, size, 5)
     assert picker.handle_event(key(pygame.K_DOWN)) is None
-    drawn([], size, 2)
+    draw_picker([], size, 2)
 
 
-def test_thumbnails_of_all_shipped_scenes_show_something() -> None:
+def test_thumbnails_of_all_shipped_scenes_are_not_empty() -> None:
     scenes = shipped()
     assert scenes
     for name, path in scenes:
         scene = read_scene(path).scene
         assert scene is not None, name
-        made = draw_thumbnail(scene, (200, 112), Renderer(), 0.7)
-        assert np.ptp(pygame.surfarray.array3d(made).astype(int), axis=(0, 1)).max() > 60, name
+        thumbnail = draw_thumbnail(scene, (200, 112), Renderer(), 0.7)
+        assert np.ptp(pygame.surfarray.array3d(thumbnail).astype(int), axis=(0, 1)).max() > 60, name
 
 
-def test_burst_is_shown_in_flight() -> None:
+def test_thumbnail_of_a_burst_shows_it_in_flight() -> None:
     burst = "[world]\nduration = 2\n[[emitter]]\nposition = [0, 0]\ncount = 200\nradius = 0.05\n"
     scene = loads(burst + "velocity_min = [-5, -5]\nvelocity_max = [5, 5]\n")
-    made = pygame.surfarray.array3d(draw_thumbnail(scene, (200, 200), Renderer(), 1.0)).astype(int)
-    away = np.abs(made - np.asarray(BACKGROUND)).max(axis=2) > 60
-    assert away[:80].any()
-    assert away[120:].any()
+    thumbnail = pygame.surfarray.array3d(draw_thumbnail(scene, (200, 200), Renderer(), 1.0)).astype(int)
+    differs = np.abs(thumbnail - np.asarray(BACKGROUND)).max(axis=2) > 60
+    assert differs[:80].any()
+    assert differs[120:].any()

@@ -35,63 +35,63 @@ class EventDrivenBodies(BodyStore):
         self.position_set.clear()
         self.scene_changed = self.walls_changed = False
 
-    def set_velocity(self, number: int, velocity: FloatArray) -> None:
+    def set_velocity(self, index: int, velocity: FloatArray) -> None:
         """Set the velocity of a body, m/s.
 
         Raises:
             ActionError: it is in a pocket.
         """
-        self._check_in_play(number)
-        super().set_velocity(number, velocity)
-        self.velocity_set.add(number)
+        self._check_in_play(index)
+        super().set_velocity(index, velocity)
+        self.velocity_set.add(index)
 
-    def set_spin(self, number: int, spin: float) -> None:
+    def set_spin(self, index: int, spin: float) -> None:
         """Set the angular velocity of a body, rad/s.
 
         Raises:
             ActionError: it is in a pocket.
         """
-        self._check_in_play(number)
-        super().set_spin(number, spin)
-        self.velocity_set.add(number)
+        self._check_in_play(index)
+        super().set_spin(index, spin)
+        self.velocity_set.add(index)
 
-    def set_constant_force(self, number: int, force: FloatArray, torque: float) -> None:
-        """Refuse a constant force: only uniform gravity has the closed forms of motion that events are found from.
+    def set_constant_force(self, index: int, force: FloatArray, torque: float) -> None:
+        """Refuse a constant force: events are found from closed forms of motion, which exist for uniform gravity only.
 
         Raises:
             ActionError: always, unless force and torque are zero.
         """
         if force.any() or torque:
             raise ActionError(
-                f"exact does not model a steady force on one body, here on {self.bodies.names[number]!r}; "
+                f"exact does not model a constant force on one body, here on {self.bodies.names[index]!r}; "
                 "pymunk and reference do"
             )
 
-    def move_body(self, number: int, position: FloatArray) -> None:
+    def move_body(self, index: int, position: FloatArray) -> None:
         """Set the position of a body, m.
 
         Raises:
-            ActionError: it would overlap something.
+            ActionError: it would overlap another object.
         """
-        others = np.arange(len(self.bodies)) != number
-        kind, fixed = int(self.collision_mask[number]), bool(self.bodies.fixed[number])
-        self._check_free(self.bodies.names[number], position, float(self.radius[number]), kind, fixed, others)
-        super().move_body(number, position)
-        self.position_set.add(number)
+        others = np.arange(len(self.bodies)) != index
+        kind, fixed = int(self.collision_mask[index]), bool(self.bodies.fixed[index])
+        self._check_free(self.bodies.names[index], position, float(self.radius[index]), kind, fixed, others)
+        super().move_body(index, position)
+        self.position_set.add(index)
 
     def change(self, setup: Setup, spawned: tuple[BodySource, ...] | None = None) -> None:
-        """Replace the scene by one that differs in gravity, coefficients, wall points or solid walls alone.
+        """Continue with a changed scene. Only gravity, coefficients, points of walls and solid flags may differ.
 
         Raises:
-            ActionError: it has drag, or gravity along a `[surface]`, or more surfaces than a scene may have; or a ball
-                overlaps a collider that becomes solid.
+            ActionError: the scene has drag, curl, gravity along a `[surface]`, or more different surfaces than
+                allowed; or a ball overlaps a collider that has moved or become solid.
         """
         scene = setup.scene
         if scene.world.linear_drag or scene.world.quadratic_drag:
             raise ActionError("exact does not model drag; pymunk and reference do")
-        checked = scene.world is self.scene.world and has_same_bodies(scene, self.scene)
-        if not checked and on_floor(setup) and (lacks := next(unsupported_on_surface(setup, self.bodies), None)):
-            raise ActionError(lacks)
+        is_checked = scene.world is self.scene.world and has_same_bodies(scene, self.scene)
+        if not is_checked and on_floor(setup) and (reason := next(unsupported_on_surface(setup, self.bodies), None)):
+            raise ActionError(reason)
         if curls(setup):
             raise ActionError("exact does not model curl; pymunk does")
         candidates = np.flatnonzero((self.collision_mask != NOTHING) & self.moving)
@@ -109,33 +109,33 @@ class EventDrivenBodies(BodyStore):
         """Add a validated body and return its index.
 
         Raises:
-            ActionError: it overlaps something, is not a ball, differs from the balls on a `[surface]`, or makes more
-                surfaces than a scene may have.
+            ActionError: it overlaps another object, is not a ball, is not supported on a `[surface]`, or the scene
+                would have more different surfaces than allowed.
         """
         if isinstance(single, Ball):
             others = np.ones(len(self.bodies), dtype=np.bool_)
             position, kind = np.asarray(single.position), COLLISION_MASKS[single.collides]
             self._check_free(name, position, single.radius, kind, single.fixed, others)
             if on_floor(self.setup) and (
-                lacks := next(unsupported_on_surface(self.setup, self.bodies.joined_by(single, name)), None)
+                reason := next(unsupported_on_surface(self.setup, self.bodies.joined_by(single, name)), None)
             ):
-                raise ActionError(lacks)
+                raise ActionError(reason)
         elif single.collides != "none":
             raise ActionError(f"exact does not model polygons, such as {name!r}; pymunk and reference do")
-        number = super().add(single, name)
+        index = super().add(single, name)
         self.scene_changed = True
-        return number
+        return index
 
-    def _check_in_play(self, number: int) -> None:
-        """Refuse to set a ball in motion that is in a pocket. A ball being moved there is not captured yet.
+    def _check_in_play(self, index: int) -> None:
+        """Refuse to set a ball in motion that is in a pocket. One that the same action has moved is not captured yet.
 
         Raises:
             ActionError: it is in a pocket.
         """
-        if number in self.position_set or self.collision_mask[number] == NOTHING:
+        if index in self.position_set or self.collision_mask[index] == NOTHING:
             return
-        if pockets_at(self.scene, self.position[number : number + 1])[0] >= 0:
-            raise ActionError(f"{self.bodies.names[number]!r} is in a pocket; move it back into play first")
+        if pockets_at(self.scene, self.position[index : index + 1])[0] >= 0:
+            raise ActionError(f"{self.bodies.names[index]!r} is in a pocket; move it back into play first")
 
     def _check_free(
         self, name: str, position: FloatArray, radius: float, kind: int, fixed: bool, others: BoolArray
@@ -143,23 +143,23 @@ class EventDrivenBodies(BodyStore):
         """Refuse a position at which a ball would overlap another or a static collider.
 
         Raises:
-            ActionError: it would.
+            ActionError: it would overlap.
         """
         if kind == NOTHING:
             return
-        still = self.bodies.fixed
+        is_fixed = self.bodies.fixed
         if pockets_at(self.scene, position[None, :])[0] >= 0:
             return
         others = others & (pockets_at(self.scene, self.position) < 0)  # captured balls do not collide
-        collides = others & (self.collision_mask == ALL) & ~still if kind == ALL else np.zeros_like(others)
-        collides |= others & (self.collision_mask == FIXED) & ~still if fixed and kind == ALL else False
-        collides |= others & (self.collision_mask == ALL) & still & (not fixed)
-        apart = self.position - position
-        depth = self.radius + radius - np.hypot(apart[:, 0], apart[:, 1])
-        here = np.broadcast_to(position, self.position.shape)
-        deep = np.flatnonzero(collides & (depth > touch_tolerance(self.position, here)))
-        if len(deep):
-            raise ActionError(overlap_message(name, self.bodies.names[deep[0]], float(depth[deep[0]])))
+        collides = others & (self.collision_mask == ALL) & ~is_fixed if kind == ALL else np.zeros_like(others)
+        collides |= others & (self.collision_mask == FIXED) & ~is_fixed if fixed and kind == ALL else False
+        collides |= others & (self.collision_mask == ALL) & is_fixed & (not fixed)
+        offset = self.position - position
+        depth = self.radius + radius - np.hypot(offset[:, 0], offset[:, 1])
+        positions = np.broadcast_to(position, self.position.shape)
+        overlapping = np.flatnonzero(collides & (depth > touch_tolerance(self.position, positions)))
+        if len(overlapping):
+            raise ActionError(overlap_message(name, self.bodies.names[overlapping[0]], float(depth[overlapping[0]])))
         if fixed:
             return
         found = overlapping_collider(position[None, :], np.array([radius]), self.fixtures)

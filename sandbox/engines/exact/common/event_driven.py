@@ -10,7 +10,7 @@ import numpy as np
 from sandbox.action import Action
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.actions import apply_action
-from sandbox.engines.common.base import BEYOND, BaseSimulation
+from sandbox.engines.common.base import BEYOND, SteppedSimulation
 from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 from sandbox.engines.common.contact_log import too_many_contacts
 from sandbox.engines.common.energy_balance import record_energy_change
@@ -52,7 +52,7 @@ class StateArrays(Protocol):
 Data = TypeVar("Data", bound=StateArrays)
 
 
-class EventDrivenSimulation(BaseSimulation, Generic[Data]):
+class EventDrivenSimulation(SteppedSimulation, Generic[Data]):
     """A simulation that advances from event to event in closed form.
 
     A kernel, the event loop, works on state arrays. Frames are evaluated between events and do not change these, so the
@@ -107,35 +107,6 @@ class EventDrivenSimulation(BaseSimulation, Generic[Data]):
             "pair_tests": int(counts[c.PAIR_TESTS]),
         }
 
-    def step(self) -> None:
-        """Advance by one dt.
-
-        Raises:
-            Divergence: a body is not finite or out of range. The state can still be read.
-            Exhaustion: too many events, contacts or pairs, or more time than `patience`.
-        """
-        with self._lock:
-            self._check_running()
-            self._advance((self._steps + 1) * self._settings.dt)
-            self._steps += 1
-            self._finish_step()
-
-    def finish(self, part: float) -> None:
-        """Advance by a last fraction of dt, 0 < part < 1.
-
-        Raises:
-            Divergence: as `step`.
-            Exhaustion: as `step`.
-            ValueError: the fraction is out of range.
-        """
-        self._check_part(part)
-        with self._lock:
-            self._check_running()
-            self._advance((self._steps + part) * self._settings.dt)
-            self._part = part
-            self._finish_step()
-            self._ended = True
-
     def apply(self, action: Action) -> None:
         """Apply an action now.
 
@@ -152,7 +123,7 @@ class EventDrivenSimulation(BaseSimulation, Generic[Data]):
                 self._remove(np.asarray([leaving]))
 
     def watch(self, observer: Observer) -> None:
-        """Do nothing: there are no substeps after which an observer could be called, and no contact is missed."""
+        """Do nothing: there are no substeps after which an observer could be called."""
 
     def frame(self) -> Frame:
         """Return the present state."""
@@ -224,27 +195,27 @@ class EventDrivenSimulation(BaseSimulation, Generic[Data]):
         """Return the angular velocity about x and y, (N, 2) rad/s, for scenes that have one."""
         return None
 
-    def _advance(self, until: float) -> None:
-        """Process all events up to a time, s; between calls of the event loop check the limits and grow the log."""
-        began, compiled = perf_counter(), COMPILE_CLOCK.seconds
-        tests, max_tests = self.work["pair_tests"], PAIRS.value
-        with np.errstate(all="ignore"):
-            while (status := self._call_event_loop(until)) != c.DONE:
-                waited = perf_counter() - began - (COMPILE_CLOCK.seconds - compiled)
-                if self.patience is not None and waited > self.patience:
-                    self._exhaust(f"a step of {self._settings.dt:g} s takes longer than {self.patience:g} s to compute")
-                if self.work["pair_tests"] - tests > max_tests:
-                    self._exhaust(
-                        f"a step of {self._settings.dt:g} s has more than {PAIRS.shown(max_tests)} pairs to test, "
-                        f"after {self.work['events']:,} events; {PAIRS.remedy(10 * max_tests)}"
-                    )
-                if status == c.FULL:
-                    rows = int(self._data.counts[c.LOG_ROWS])
-                    if rows > CONTACTS.value:
-                        self._exhaust(too_many_contacts(rows))
-                    self._double_log()
-                elif status != c.PAUSED:
-                    self._exhaust(self._too_many_events(status))
+    def _advance(self, part: float) -> None:
+        """Process all events in a fraction of dt; between calls of the event loop check the limits and grow the log."""
+        until = (self._steps + part) * self._settings.dt
+        start, compile_start = perf_counter(), COMPILE_CLOCK.seconds
+        tests_before, max_tests = self.work["pair_tests"], PAIRS.value
+        while (status := self._call_event_loop(until)) != c.DONE:
+            elapsed = perf_counter() - start - (COMPILE_CLOCK.seconds - compile_start)
+            if self.patience is not None and elapsed > self.patience:
+                self._exhaust(f"a step of {self._settings.dt:g} s takes longer than {self.patience:g} s to compute")
+            if self.work["pair_tests"] - tests_before > max_tests:
+                self._exhaust(
+                    f"a step of {self._settings.dt:g} s has more than {PAIRS.shown(max_tests)} pairs to test, "
+                    f"after {self.work['events']:,} events; {PAIRS.remedy(10 * max_tests)}"
+                )
+            if status == c.FULL:
+                rows = int(self._data.counts[c.LOG_ROWS])
+                if rows > CONTACTS.value:
+                    self._exhaust(too_many_contacts(rows))
+                self._double_log()
+            elif status != c.PAUSED:
+                self._exhaust(self._too_many_events(status))
 
     def _exhaust(self, reason: str) -> NoReturn:
         """End the simulation at the time of the last event."""
@@ -256,10 +227,10 @@ class EventDrivenSimulation(BaseSimulation, Generic[Data]):
     def _finish_step(self) -> None:
         """Evaluate the state, check that it is finite and in range, and remove expired bodies."""
         self._evaluate()
-        beyond = self._store.beyond()
-        if beyond is not None:
+        diverged = self._store.beyond()
+        if diverged is not None:
             self._ended = True
-            raise Divergence(self.time, self.bodies.names[beyond], BEYOND)
+            raise Divergence(self.time, self.bodies.names[diverged], BEYOND)
         expired = self._store.expired(self.time)
         if len(expired):
             self._remove(expired)

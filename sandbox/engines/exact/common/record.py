@@ -42,16 +42,16 @@ def add_row(data: EventState, first: int, second: int, px: float, py: float, nx:
 
 
 @kernel
-def open_support_row(data: EventState, i: int, which: int) -> None:
-    """Add a log row for a support; two supports that are sides of one collider share a row."""
-    f = data.tags[i, c.SUPPORT + which]
-    other = data.tags[i, c.SUPPORT + 1 - which]
+def open_support_row(data: EventState, i: int, slot: int) -> None:
+    """Add a log row for the support in a slot; two supports that are sides of one collider share a row."""
+    f = data.tags[i, c.SUPPORT + slot]
+    other = data.tags[i, c.SUPPORT + 1 - slot]
     if other >= 0 and data.line_tags[other, c.COLLIDER] == data.line_tags[f, c.COLLIDER]:
-        data.tags[i, c.LOG_ROW + which] = data.tags[i, c.LOG_ROW + 1 - which]
+        data.tags[i, c.LOG_ROW + slot] = data.tags[i, c.LOG_ROW + 1 - slot]
         return
     nx, ny, r = data.lines[f, c.NX], data.lines[f, c.NY], data.state[i, c.RADIUS]
     x, y = data.state[i, c.X], data.state[i, c.Y]
-    data.tags[i, c.LOG_ROW + which] = add_row(
+    data.tags[i, c.LOG_ROW + slot] = add_row(
         data, i, -1 - data.line_tags[f, c.COLLIDER], x - r * nx, y - r * ny, -nx, -ny
     )
 
@@ -69,11 +69,11 @@ def log_support(state: FloatArray, tags: IntArray, log: FloatArray, i: int, t: f
     """Add the impulses of a ball on its supports since `LOGGED_UNTIL` to the log, up to a time, s."""
     span = t - state[i, c.LOGGED_UNTIL]
     state[i, c.LOGGED_UNTIL] = t
-    for which in range(2):
-        row = tags[i, c.LOG_ROW + which]
+    for slot in range(2):
+        row = tags[i, c.LOG_ROW + slot]
         if row >= 0 and span > 0.0:
-            log[row, 5] -= state[i, c.SUPPORT_FORCE + 2 * which] * span
-            log[row, 6] -= state[i, c.SUPPORT_FORCE + 2 * which + 1] * span
+            log[row, 5] -= state[i, c.SUPPORT_FORCE + 2 * slot] * span
+            log[row, 6] -= state[i, c.SUPPORT_FORCE + 2 * slot + 1] * span
 
 
 @kernel
@@ -86,8 +86,8 @@ def log_supports(data: EventState, t: float) -> None:
 def with_log_rows(data: EventState, rows: int) -> EventState:
     """Return the state with room for the given number of log rows."""
     log, pair = np.empty((rows, 7)), np.empty((rows, 2), np.int64)
-    held = int(data.counts[c.LOG_ROWS])
-    log[:held], pair[:held] = data.log[:held], data.log_pair[:held]
+    used = int(data.counts[c.LOG_ROWS])
+    log[:used], pair[:used] = data.log[:used], data.log_pair[:used]
     return data._replace(log=log, log_pair=pair)
 
 
@@ -95,13 +95,13 @@ def drain_log(data: EventState) -> Contacts:
     """Return all logged contacts and clear the log; rows of active supports stay, with zero impulse."""
     rows = int(data.counts[c.LOG_ROWS])
     log, pair = data.log[:rows].copy(), data.log_pair[:rows].copy()
-    held = data.tags[:, c.LOG_ROW : c.LOG_ROW + 2]
-    still_open = np.unique(held[held >= 0])
-    held[held >= 0] = np.searchsorted(still_open, held[held >= 0])
-    kept = len(still_open)
-    data.log[:kept], data.log_pair[:kept] = log[still_open], pair[still_open]
-    data.log[:kept, 5:] = 0.0
-    data.counts[c.LOG_ROWS] = kept
+    support_rows = data.tags[:, c.LOG_ROW : c.LOG_ROW + 2]
+    still_open = np.unique(support_rows[support_rows >= 0])
+    support_rows[support_rows >= 0] = np.searchsorted(still_open, support_rows[support_rows >= 0])
+    open_count = len(still_open)
+    data.log[:open_count], data.log_pair[:open_count] = log[still_open], pair[still_open]
+    data.log[:open_count, 5:] = 0.0
+    data.counts[c.LOG_ROWS] = open_count
     return Contacts(log[:, 0].copy(), pair, log[:, 1:3].copy(), log[:, 3:5].copy(), log[:, 5:7].copy())
 
 
@@ -116,7 +116,7 @@ def account_energy(world: FloatArray, column: int, energy: float) -> None:
 
 @kernel
 def account_contact(world: FloatArray, along: float, across: float) -> None:
-    """Add the energy changes of a collision along its normal and its tangent, J, as `EnergyLedger.touch` does."""
+    """Add the energy changes of a collision along its normal and tangent, J, as `EnergyLedger.add_contacts` does."""
     both = along + across
     if both > 0.0:
         world[c.BY_PHANTOM] += both
@@ -186,10 +186,10 @@ def account_fixed_hit(
         kick: energy from the kick, J.
     """
     state, world = data.state, data.world
-    out = state[i, c.VX] * nx + state[i, c.VY] * ny
+    normal_velocity = state[i, c.VX] * nx + state[i, c.VY] * ny
     slip = state[i, c.VY] * nx - state[i, c.VX] * ny - rim_speed(state, i)
-    took = across * (slip - 0.5 * across * inverse_mass_at_rim(state, i))
-    account_contact(world, normal * (out - 0.5 * normal * state[i, c.INVERSE_MASS]) - kick, took)
+    tangential_work = across * (slip - 0.5 * across * inverse_mass_at_rim(state, i))
+    account_contact(world, normal * (normal_velocity - 0.5 * normal * state[i, c.INVERSE_MASS]) - kick, tangential_work)
     world[c.BY_KICKS] += kick
 
 
@@ -227,21 +227,21 @@ def account_slip(data: EventState, i: int, t: float, residual: float) -> None:
     if span <= 0.0:
         return
     middle = begin + 0.5 * span
-    for which in range(2):
-        f = data.tags[i, c.SUPPORT + which]
+    for slot in range(2):
+        f = data.tags[i, c.SUPPORT + slot]
         if f < 0:
             continue
         tx, ty = -data.lines[f, c.NY], data.lines[f, c.NX]
-        force = state[i, c.SUPPORT_FORCE + 2 * which] * tx + state[i, c.SUPPORT_FORCE + 2 * which + 1] * ty
+        force = state[i, c.SUPPORT_FORCE + 2 * slot] * tx + state[i, c.SUPPORT_FORCE + 2 * slot + 1] * ty
         vx, vy = state[i, c.VX] + state[i, c.AX] * middle, state[i, c.VY] + state[i, c.AY] * middle
-        turning = 0.0
+        rotation_speed = 0.0
         if state[i, c.INVERSE_INERTIA] > 0.0:
-            turning = (state[i, c.SPIN] + state[i, c.ALPHA] * middle) * state[i, c.RADIUS]
-        account_energy(data.world, c.BY_FRICTION, force * (vx * tx + vy * ty - turning) * span)
+            rotation_speed = (state[i, c.SPIN] + state[i, c.ALPHA] * middle) * state[i, c.RADIUS]
+        account_energy(data.world, c.BY_FRICTION, force * (vx * tx + vy * ty - rotation_speed) * span)
 
 
 @kernel
 def account_slips(data: EventState, t: float, residual: float) -> None:
-    """Do so for all balls."""
+    """Add the work of sliding friction on all balls up to time t + residual to the ledger."""
     for k in range(len(data.moving_balls)):
         account_slip(data, data.moving_balls[k], t, residual)

@@ -1,4 +1,4 @@
-"""Requirements of the exact engine: supported demands and settings, number of pairs, and no overlap at the start.
+"""Requirements of the exact engine: demands, settings, number of pairs, and no overlap at the start.
 
 This module imports no kernels, because every validation of a scene for this engine uses it.
 """
@@ -62,13 +62,13 @@ def overlapping_balls(
     found: list[tuple[int, int, float]] = []
     for a, b in near_pairs(position[chosen], 2.0 * float(radius[chosen].max()) * (1.0 + 1e-9)):
         i, j = chosen[np.minimum(a, b)], chosen[np.maximum(a, b)]
-        apart = position[j] - position[i]
-        depth = radius[i] + radius[j] - np.hypot(apart[:, 0], apart[:, 1])
+        offset = position[j] - position[i]
+        depth = radius[i] + radius[j] - np.hypot(offset[:, 0], offset[:, 1])
         collides = (to_all[i] & to_all[j] & ~(fixed[i] & fixed[j])) | (to_all[i] & fixed[i] & ~fixed[j])
         collides |= to_all[j] & fixed[j] & ~fixed[i]
-        deep = np.flatnonzero(collides & (depth > touch_tolerance(position[i], position[j])))
-        if len(deep):
-            first = deep[np.lexsort((j[deep], i[deep]))[0]]
+        overlapping = np.flatnonzero(collides & (depth > touch_tolerance(position[i], position[j])))
+        if len(overlapping):
+            first = overlapping[np.lexsort((j[overlapping], i[overlapping]))[0]]
             found.append((int(i[first]), int(j[first]), float(depth[first])))
     return min(found, default=None)
 
@@ -88,36 +88,38 @@ def overlapping_collider(
     for (px, py, nx, ny), collider in zip(fixtures.planes, fixtures.plane_collider.tolist(), strict=True):
         gap = (position[:, 0] - px) * nx + (position[:, 1] - py) * ny
         point = np.broadcast_to(np.array([px, py]), position.shape)
-        deep = np.flatnonzero(radius - gap > touch_tolerance(position, point))
-        if len(deep):
-            return int(deep[0]), collider, float(radius[deep[0]] - gap[deep[0]])
-    for k, near in _near_segments(position, float(radius.max()), fixtures):
-        gap = _gap(position[near], fixtures.segments[k])
-        ends = np.broadcast_to(fixtures.segments[k, :4], (len(near), 4))
-        deep = np.flatnonzero(radius[near] - gap > touch_tolerance(position[near], ends))
-        if len(deep):
-            ball = int(near[deep[0]])
-            return ball, int(fixtures.segment_collider[k]), float(radius[ball] - gap[deep[0]])
+        overlapping = np.flatnonzero(radius - gap > touch_tolerance(position, point))
+        if len(overlapping):
+            return int(overlapping[0]), collider, float(radius[overlapping[0]] - gap[overlapping[0]])
+    for k, candidates in _near_segments(position, float(radius.max()), fixtures):
+        gap = _gap(position[candidates], fixtures.segments[k])
+        ends = np.broadcast_to(fixtures.segments[k, :4], (len(candidates), 4))
+        overlapping = np.flatnonzero(radius[candidates] - gap > touch_tolerance(position[candidates], ends))
+        if len(overlapping):
+            ball = int(candidates[overlapping[0]])
+            return ball, int(fixtures.segment_collider[k]), float(radius[ball] - gap[overlapping[0]])
     return None
 
 
-def _near_segments(position: FloatArray, widest: float, fixtures: StaticColliders) -> Iterator[tuple[int, IntArray]]:
+def _near_segments(
+    position: FloatArray, max_radius: float, fixtures: StaticColliders
+) -> Iterator[tuple[int, IntArray]]:
     """Yield each segment with the indices, ascending, of the balls near it in x, or in y if those are fewer.
 
     Args:
         position: (N, 2) m.
-        widest: largest radius, m.
+        max_radius: largest radius, m.
         fixtures: static colliders.
     """
-    ends, extent = fixtures.segments[:, :4].reshape(-1, 2, 2), fixtures.segments[:, 4:] + widest
+    ends, extent = fixtures.segments[:, :4].reshape(-1, 2, 2), fixtures.segments[:, 4:] + max_radius
     slack = 1e-9 + 8.0 * ROUNDING * np.abs(ends).max(axis=(1, 2), initial=0.0)[:, None]
     low, high = ends.min(axis=1) - extent - slack, ends.max(axis=1) + extent + slack
     orders = [np.argsort(position[:, axis], kind="stable") for axis in range(2)]
-    along = [position[order, axis] for axis, order in enumerate(orders)]
-    first = np.column_stack([np.searchsorted(along[axis], low[:, axis], "left") for axis in range(2)])
-    last = np.column_stack([np.searchsorted(along[axis], high[:, axis], "right") for axis in range(2)])
-    fewer = np.argmin(last - first, axis=1)
-    for k, axis in enumerate(fewer.tolist()):
+    coordinates = [position[order, axis] for axis, order in enumerate(orders)]
+    first = np.column_stack([np.searchsorted(coordinates[axis], low[:, axis], "left") for axis in range(2)])
+    last = np.column_stack([np.searchsorted(coordinates[axis], high[:, axis], "right") for axis in range(2)])
+    axes = np.argmin(last - first, axis=1)
+    for k, axis in enumerate(axes.tolist()):
         begin, end = int(first[k, axis]), int(last[k, axis])
         if begin < end:
             yield k, np.sort(orders[axis][begin:end])
@@ -137,20 +139,20 @@ def overlap_message(first: str, second: str, depth: float) -> str:
 
 
 def unsupported(setup: Setup, settings: Settings) -> tuple[str, ...]:
-    """Return what a scene and its settings require and the engine does not support."""
+    """Return each demand and setting of a scene that the engine does not support."""
     missing = unmodelled(setup, CAPABILITIES)
     for key in STEPS + OVERLAP + SPRINGS:
         stated = getattr(settings, key)
         if stated is not None:
-            why = "uses no time steps" if key in STEPS else "allows no overlap"
-            missing.append(f"{key} {stated!r} is not supported (it {why}; remove it)")
+            reason = "uses no time steps" if key in STEPS else "allows no overlap"
+            missing.append(f"{key} {stated!r} is not supported (it {reason}; remove it)")
     if settings.half_kick:
         missing.append("half_kick is not supported (it uses no time steps; remove it)")
     if on_floor(setup):
         missing += unsupported_on_surface(setup)
-    overload = too_many_pairs(setup)
-    if overload is not None:
-        return (*missing, overload)
+    too_many = too_many_pairs(setup)
+    if too_many is not None:
+        return (*missing, too_many)
     overlap = overlap_of(setup, setup.bodies.position)
     return (*missing, overlap) if overlap else tuple(missing)
 

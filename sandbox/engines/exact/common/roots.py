@@ -63,18 +63,18 @@ def pair_entry(dx: float, dy: float, vx: float, vy: float, radius_sum: float, sp
     closing = dx * vx + dy * vy
     if closing >= 0.0:
         return math.inf
-    square = vx * vx + vy * vy
+    speed_squared = vx * vx + vy * vy
     cross = dx * vy - dy * vx
-    discriminant = square * radius_sum * radius_sum - cross * cross
+    discriminant = speed_squared * radius_sum * radius_sum - cross * cross
     if discriminant <= 0.0:
         return math.inf
-    distance = dx * dx + dy * dy
-    if -closing <= NOISE * speed * math.sqrt(distance):
+    distance_squared = dx * dx + dy * dy
+    if -closing <= NOISE * speed * math.sqrt(distance_squared):
         return math.inf
-    gap = distance - radius_sum * radius_sum
-    if gap <= 0.0:
+    square_difference = distance_squared - radius_sum * radius_sum
+    if square_difference <= 0.0:
         return 0.0
-    return gap / (math.sqrt(discriminant) - closing)
+    return square_difference / (math.sqrt(discriminant) - closing)
 
 
 MAX_BISECTIONS = 200
@@ -226,19 +226,25 @@ def curved_entry(
         separating: whether they have just collided; they touch then, and a speed of approach is rounding error.
         limit: s; later times need not be found.
     """
-    distance = dx * dx + dy * dy
+    distance_squared = dx * dx + dy * dy
     closing = dx * vx + dy * vy
-    speed, pull = vx * vx + vy * vy, ax * ax + ay * ay
-    c0 = distance - radius_sum * radius_sum
+    speed_squared, acceleration_squared = vx * vx + vy * vy, ax * ax + ay * ay
+    c0 = distance_squared - radius_sum * radius_sum
     c1 = 2.0 * closing
     if separating:
         c0, c1 = 0.0, max(c1, 0.0)
-    elif c0 <= 0.0 and abs(closing) <= 2.0**-49 * math.sqrt(distance * speed):
+    elif c0 <= 0.0 and abs(closing) <= 2.0**-49 * math.sqrt(distance_squared * speed_squared):
         c1 = 0.0
-    v, a = math.sqrt(speed), math.sqrt(pull)
+    speed, acceleration = math.sqrt(speed_squared), math.sqrt(acceleration_squared)
     # After this time a t²/2 exceeds all other terms: they cannot touch any more.
-    until = min(limit, (v + math.sqrt(v * v + 2.0 * a * (math.sqrt(distance) + radius_sum))) / a)
-    t = first_downward_root(c0, c1, speed + dx * ax + dy * ay, vx * ax + vy * ay, 0.25 * pull, until)
+    until = min(
+        limit,
+        (speed + math.sqrt(speed * speed + 2.0 * acceleration * (math.sqrt(distance_squared) + radius_sum)))
+        / acceleration,
+    )
+    t = first_downward_root(
+        c0, c1, speed_squared + dx * ax + dy * ay, vx * ax + vy * ay, 0.25 * acceleration_squared, until
+    )
     if c0 <= 0.0 or t == math.inf:
         return t
     for _ in range(2):  # Newton on the gap itself: the coefficients of a distant pair have lost digits
@@ -258,7 +264,7 @@ MAX_OVERLAP = 1e-9
 """m: a ball that overlaps a line by no more touches it; with a larger overlap it lies beside the end of the line."""
 
 CREEP_SPEED, CREEP_ACCELERATION = 1e-11, 1e-12
-"""m/s and m/s²: a pair in contact that approaches more slowly and is pressed less stays as it is, because both are
+"""m/s and m/s²: a pair in contact that approaches more slowly and is pressed together less does not collide: both are
 rounding error."""
 
 MAX_STEPS = 60

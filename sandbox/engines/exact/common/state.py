@@ -216,7 +216,7 @@ def with_new_walls(data: EventState, store: BodyStore) -> EventState:
 
     No ball may have a support: the indices of lines change.
     """
-    data.tags[:, LAST_KIND] = NONE  # its partner may be a line that is gone
+    data.tags[:, LAST_KIND] = NONE  # its partner may be a line that no longer exists
     return data._replace(**_collider_arrays(store.scene))
 
 
@@ -257,21 +257,27 @@ def _set_solid_and_kicks(data: EventState, scene: Scene) -> None:
     for k, collider in enumerate(colliders[planes:], planes):
         if isinstance(collider, Plane) or collider.kick is None:
             continue
-        middle, mine = collider.kick.profile == "middle", data.line_tags[:, COLLIDER] == k
+        middle, own_lines = collider.kick.profile == "middle", data.line_tags[:, COLLIDER] == k
         if isinstance(collider, Wall):
-            parts = np.repeat(segment_fractions(straightened(collider)), 2, axis=0)  # each segment has two sides
-            lines[mine, WALL_BEGIN], lines[mine, WALL_SPAN] = parts[:, 0], parts[:, 1] - parts[:, 0]
-        lines[mine, KICK_SPEED], lines[mine, KICK_THRESHOLD] = collider.kick.speed, collider.kick.threshold
-        lines[mine, KICK_PROFILE] = middle
-        lines[mine, KICK_TO_APPROACH] = to_approach = collider.kick.adds_to == "approach"
-        for each in np.flatnonzero(data.vertex_tags[:, COLLIDER] == k).tolist():
+            fractions = np.repeat(segment_fractions(straightened(collider)), 2, axis=0)  # each segment has two sides
+            lines[own_lines, WALL_BEGIN], lines[own_lines, WALL_SPAN] = (
+                fractions[:, 0],
+                fractions[:, 1] - fractions[:, 0],
+            )
+        lines[own_lines, KICK_SPEED], lines[own_lines, KICK_THRESHOLD] = collider.kick.speed, collider.kick.threshold
+        lines[own_lines, KICK_PROFILE] = middle
+        lines[own_lines, KICK_TO_APPROACH] = to_approach = collider.kick.adds_to == "approach"
+        for vertex in np.flatnonzero(data.vertex_tags[:, COLLIDER] == k).tolist():
             fraction = 0.5
             if middle:
-                ends = np.flatnonzero(mine & (data.line_tags[:, ENDS : ENDS + 2] == each).any(axis=1))
-                first = data.line_tags[ends[0], ENDS] == each
+                ends = np.flatnonzero(own_lines & (data.line_tags[:, ENDS : ENDS + 2] == vertex).any(axis=1))
+                first = data.line_tags[ends[0], ENDS] == vertex
                 fraction = float(lines[ends[0], WALL_BEGIN] + (0.0 if first else lines[ends[0], WALL_SPAN]))
-            vertices[each, VERTEX_KICK] = kicked(collider.kick.speed, 0.0, middle, fraction, 1.0)
-            vertices[each, VERTEX_THRESHOLD], vertices[each, VERTEX_TO_APPROACH] = collider.kick.threshold, to_approach
+            vertices[vertex, VERTEX_KICK] = kicked(collider.kick.speed, 0.0, middle, fraction, 1.0)
+            vertices[vertex, VERTEX_THRESHOLD], vertices[vertex, VERTEX_TO_APPROACH] = (
+                collider.kick.threshold,
+                to_approach,
+            )
 
 
 def _vertices(fixtures: StaticColliders) -> tuple[FloatArray, IntArray, dict[tuple[float, float, float, int], int]]:

@@ -36,8 +36,8 @@ def is_translating(data: TabletopState, i: int) -> bool:
 @kernel
 def is_over_line(line: FloatArray, x: float, y: float) -> bool:
     """Return whether the projection of a point on a line lies between the ends of the line."""
-    along = (x - line[c.PX]) * line[c.UX] + (y - line[c.PY]) * line[c.UY]
-    return bool(0.0 <= along <= line[c.LENGTH] or line[c.LENGTH] == math.inf)
+    foot = (x - line[c.PX]) * line[c.UX] + (y - line[c.PY]) * line[c.UY]
+    return bool(0.0 <= foot <= line[c.LENGTH] or line[c.LENGTH] == math.inf)
 
 
 @kernel
@@ -45,8 +45,8 @@ def find_own_event(data: TabletopState, i: int, now: float) -> None:
     """Find the next event of a ball without another ball; its row must be at `now`."""
     state = data.state
     data.counts[c.PREDICTIONS] += 1
-    best, kind, partner = state[i, c.PHASE_END], c.PHASE_CHANGE, 0
-    if best == math.inf:
+    earliest, kind, partner = state[i, c.PHASE_END], c.PHASE_CHANGE, 0
+    if earliest == math.inf:
         kind = c.NONE
     if is_translating(data, i) and data.tags[i, c.COLLISION_MASK] != NOTHING:
         x, y, vx, vy, ax, ay = (
@@ -69,23 +69,23 @@ def find_own_event(data: TabletopState, i: int, now: float) -> None:
             # At large coordinates and speeds, rounding lets a ball in contact overlap by more than MAX_OVERLAP.
             overlaps = -radius < gap < -MAX_OVERLAP and is_over_line(line, x, y)
             dt = return_time(rate, half) if overlaps else gap_zero_time(gap, rate, half)
-            if now + dt < best:
+            if now + dt < earliest:
                 px, py = x + (vx + 0.5 * ax * dt) * dt, y + (vy + 0.5 * ay * dt) * dt
                 if is_over_line(line, px, py):
-                    best, kind, partner = now + dt, c.LINE, k
+                    earliest, kind, partner = now + dt, c.LINE, k
         for k in range(len(data.vertices)):
             vertex = data.vertices[k]
-            dx, dy, reach = x - vertex[c.CENTRE_X], y - vertex[c.CENTRE_Y], radius + vertex[c.CIRCLE_RADIUS]
-            dt = first_touch(dx, dy, vx, vy, ax, ay, reach, best - now)
-            if now + dt < best:
-                best, kind, partner = now + dt, c.VERTEX, k
+            dx, dy, radius_sum = x - vertex[c.CENTRE_X], y - vertex[c.CENTRE_Y], radius + vertex[c.CIRCLE_RADIUS]
+            dt = first_touch(dx, dy, vx, vy, ax, ay, radius_sum, earliest - now)
+            if now + dt < earliest:
+                earliest, kind, partner = now + dt, c.VERTEX, k
         for k in range(len(data.pockets)):
             pocket = data.pockets[k]
             dx, dy = x - pocket[c.CENTRE_X], y - pocket[c.CENTRE_Y]
-            dt = first_touch(dx, dy, vx, vy, ax, ay, pocket[c.CIRCLE_RADIUS], best - now)
-            if now + dt < best:
-                best, kind, partner = now + dt, c.POCKET, k
-    data.own_time[i], data.own_event[i, 0], data.own_event[i, 1] = best, kind, partner
+            dt = first_touch(dx, dy, vx, vy, ax, ay, pocket[c.CIRCLE_RADIUS], earliest - now)
+            if now + dt < earliest:
+                earliest, kind, partner = now + dt, c.POCKET, k
+    data.own_time[i], data.own_event[i, 0], data.own_event[i, 1] = earliest, kind, partner
 
 
 @kernel
@@ -101,47 +101,49 @@ def pair_time_of(data: TabletopState, i: int, k: int, now: float) -> float:
         or tags[k, c.PHASE] == CAPTURED
     ):
         return math.inf
-    mine, theirs = tags[i, c.COLLISION_MASK], tags[k, c.COLLISION_MASK]
-    if not (mine == ALL and theirs == ALL):
-        fixed = (theirs == ALL and state[k, c.INVERSE_MASS] == 0.0) or (mine == ALL and state[i, c.INVERSE_MASS] == 0.0)
-        if mine == NOTHING or theirs == NOTHING or not fixed:
+    mask_i, mask_k = tags[i, c.COLLISION_MASK], tags[k, c.COLLISION_MASK]
+    if not (mask_i == ALL and mask_k == ALL):
+        one_is_fixed = (mask_k == ALL and state[k, c.INVERSE_MASS] == 0.0) or (
+            mask_i == ALL and state[i, c.INVERSE_MASS] == 0.0
+        )
+        if mask_i == NOTHING or mask_k == NOTHING or not one_is_fixed:
             return math.inf
     dt = now - state[k, c.T]
     ax, ay = state[k, c.AX], state[k, c.AY]
     x, y = state[k, c.X] + (state[k, c.VX] + 0.5 * ax * dt) * dt, state[k, c.Y] + (state[k, c.VY] + 0.5 * ay * dt) * dt
     vx, vy = state[k, c.VX] + ax * dt, state[k, c.VY] + ay * dt
     limit = min(data.own_time[i], data.own_time[k]) - now
-    found = first_touch(
+    time_to_impact = first_touch(
         x - state[i, c.X], y - state[i, c.Y], vx - state[i, c.VX], vy - state[i, c.VY],
         ax - state[i, c.AX], ay - state[i, c.AY],
         state[i, c.RADIUS] + state[k, c.RADIUS], limit,
     )  # fmt: skip
-    return now + found
+    return now + time_to_impact
 
 
 @kernel
 def find_earliest_pair(data: TabletopState, i: int) -> None:
     """Find the earliest time of impact in a ball's row of the matrix."""
     times = data.pair_time[i]
-    best, partner = math.inf, 0
+    earliest, partner = math.inf, 0
     for k in range(len(times)):
-        if times[k] < best:
-            best, partner = times[k], k
-    data.pair_best[i], data.pair_partner[i] = best, partner
+        if times[k] < earliest:
+            earliest, partner = times[k], k
+    data.pair_best[i], data.pair_partner[i] = earliest, partner
 
 
 @kernel
 def find_pair_times(data: TabletopState, i: int, now: float) -> None:
     """Compute the times of impact of a ball with all others; its own event must be known."""
-    times, best, partner = data.pair_time, data.pair_best, data.pair_partner
+    times, earliest, partner = data.pair_time, data.pair_best, data.pair_partner
     data.counts[c.PAIR_TESTS] += len(times) - 1
     for k in range(len(times)):
         if k == i:
             continue
         t = pair_time_of(data, i, k, now)
         times[i, k] = times[k, i] = t
-        if t < best[k]:
-            best[k], partner[k] = t, i
+        if t < earliest[k]:
+            earliest[k], partner[k] = t, i
         elif partner[k] == i:
             find_earliest_pair(data, k)
     find_earliest_pair(data, i)
@@ -178,7 +180,7 @@ def rebuild_all(data: TabletopState, t: float) -> None:
     for i in range(len(state)):
         if state[i, c.INVERSE_MASS] == 0.0:
             continue
-        inside = -1
+        pocket_index = -1
         for k in range(len(data.pockets)):
             pocket = data.pockets[k]
             dx, dy, radius = (
@@ -186,16 +188,19 @@ def rebuild_all(data: TabletopState, t: float) -> None:
                 state[i, c.Y] - pocket[c.CENTRE_Y],
                 pocket[c.CIRCLE_RADIUS],
             )
-            if (inside < 0 or (dx == 0.0 and dy == 0.0)) and dx * dx + dy * dy < radius * radius:
-                inside = k
-        if inside < 0 or tags[i, c.COLLISION_MASK] == NOTHING:
+            if (pocket_index < 0 or (dx == 0.0 and dy == 0.0)) and dx * dx + dy * dy < radius * radius:
+                pocket_index = k
+        if pocket_index < 0 or tags[i, c.COLLISION_MASK] == NOTHING:
             start_phase(data, i)
         elif tags[i, c.PHASE] != CAPTURED:
-            capture(data, i, inside, data.counts[c.COLLIDERS])
+            capture(data, i, pocket_index, data.counts[c.COLLIDERS])
             if data.counts[c.RECORDING] != 0:
                 data.log[data.counts[c.LOG_ROWS] - 1, c.EVENT_TIME] = t
         else:
-            state[i, c.X], state[i, c.Y] = data.pockets[inside, c.CENTRE_X], data.pockets[inside, c.CENTRE_Y]
+            state[i, c.X], state[i, c.Y] = (
+                data.pockets[pocket_index, c.CENTRE_X],
+                data.pockets[pocket_index, c.CENTRE_Y],
+            )
     find_all_events(data, t)
 
 

@@ -20,7 +20,7 @@ from sandbox.engines.tabletop.motion import (
     ROLLING,
     SLIDING,
     SPINNING,
-    fallen,
+    decayed_spin,
     phase_of,
     rates,
 )
@@ -48,7 +48,7 @@ def move_to(state: FloatArray, i: int, t: float) -> None:
     state[i, c.VY] += ay * dt
     state[i, c.WX] += state[i, c.ROLL_RATE_X] * dt
     state[i, c.WY] += state[i, c.ROLL_RATE_Y] * dt
-    state[i, c.WZ] = fallen(state[i, c.WZ], state[i, c.SPIN_DECAY] * dt)
+    state[i, c.WZ] = decayed_spin(state[i, c.WZ], state[i, c.SPIN_DECAY] * dt)
     state[i, c.T] = t
 
 
@@ -69,12 +69,12 @@ def set_phase(data: TabletopState, i: int, phase: int) -> None:
     """Continue a ball in a phase from the time of its row on."""
     state, tags, counts = data.state, data.tags, data.counts
     vx, vy, wx, wy, wz = motion_of(state, i)
-    ax, ay, bx, by, lasts = rates(phase, vx, vy, wx, wy, wz, state[i, c.RADIUS], data.floor)
+    ax, ay, bx, by, duration = rates(phase, vx, vy, wx, wy, wz, state[i, c.RADIUS], data.floor)
     state[i, c.AX], state[i, c.AY], state[i, c.ROLL_RATE_X], state[i, c.ROLL_RATE_Y] = ax, ay, bx, by
-    state[i, c.PHASE_END] = state[i, c.T] + lasts
-    was, now = tags[i, c.PHASE], phase
+    state[i, c.PHASE_END] = state[i, c.T] + duration
+    old_phase, new_phase = tags[i, c.PHASE], phase
     # int, because uncompiled these are numpy bools, which cannot be subtracted.
-    counts[c.MOVING] += int(now not in (RESTING, CAPTURED)) - int(was not in (RESTING, CAPTURED))
+    counts[c.MOVING] += int(new_phase not in (RESTING, CAPTURED)) - int(old_phase not in (RESTING, CAPTURED))
     tags[i, c.PHASE] = phase
 
 
@@ -137,7 +137,7 @@ def evaluate(
             state[i, c.WX] + state[i, c.ROLL_RATE_X] * dt,
             state[i, c.WY] + state[i, c.ROLL_RATE_Y] * dt,
         )
-        angle[i], spin[i] = angle_at(state, i, t), fallen(state[i, c.WZ], state[i, c.SPIN_DECAY] * dt)
+        angle[i], spin[i] = angle_at(state, i, t), decayed_spin(state[i, c.WZ], state[i, c.SPIN_DECAY] * dt)
 
 
 @kernel
@@ -148,35 +148,37 @@ def energy_change(data: TabletopState, i: int, before: Five, nx: float, ny: floa
         return 0.0, 0.0
     vx, vy, wx, wy, wz = before
     mass, inertia = state[i, c.MASS], data.floor.inertia * state[i, c.MASS] * state[i, c.RADIUS] ** 2
-    out, was = state[i, c.VX] * nx + state[i, c.VY] * ny, vx * nx + vy * ny
-    left, had = state[i, c.VY] * nx - state[i, c.VX] * ny, vy * nx - vx * ny
-    turning = (
+    normal_after, normal_before = state[i, c.VX] * nx + state[i, c.VY] * ny, vx * nx + vy * ny
+    tangential_after, tangential_before = state[i, c.VY] * nx - state[i, c.VX] * ny, vy * nx - vx * ny
+    spin_squares = (
         (state[i, c.WX] - wx) * (state[i, c.WX] + wx)
         + (state[i, c.WY] - wy) * (state[i, c.WY] + wy)
         + (state[i, c.WZ] - wz) * (state[i, c.WZ] + wz)
     )
-    return 0.5 * mass * (out - was) * (out + was), 0.5 * mass * (left - had) * (left + had) + 0.5 * inertia * turning
+    return 0.5 * mass * (normal_after - normal_before) * (normal_after + normal_before), 0.5 * mass * (
+        tangential_after - tangential_before
+    ) * (tangential_after + tangential_before) + 0.5 * inertia * spin_squares
 
 
 @kernel
-def account_hit(data: TabletopState, i: int, mine: Five, k: int, theirs: Five, nx: float, ny: float) -> None:
+def account_hit(data: TabletopState, i: int, before: Five, k: int, other_before: Five, nx: float, ny: float) -> None:
     """Add the energy change of a collision to the ledger.
 
     Args:
         data: state arrays after the collision.
         i: ball.
-        mine: its motion before.
+        before: its motion before.
         k: other ball, −1 for a static collider.
-        theirs: motion of the other ball before.
+        other_before: motion of the other ball before.
         nx: normal.
         ny: likewise.
     """
     if data.counts[c.ACCOUNTING] == 0:
         return
-    along, across = energy_change(data, i, mine, nx, ny)
+    along, across = energy_change(data, i, before, nx, ny)
     if k >= 0:
-        more, rubbed = energy_change(data, k, theirs, nx, ny)
-        along, across = along + more, across + rubbed
+        other_along, other_across = energy_change(data, k, other_before, nx, ny)
+        along, across = along + other_along, across + other_across
     account_contact(data.world, along, across)
 
 
@@ -198,20 +200,20 @@ def floor_work(data: TabletopState, i: int, t: float) -> float:
     begin, end = state[i, c.ENERGY_UNTIL] - state[i, c.T], t - state[i, c.T]
     middle, span = 0.5 * (begin + end), end - begin
     mass, radius = state[i, c.MASS], state[i, c.RADIUS]
-    took = 0.0
+    loss = 0.0
     phase = data.tags[i, c.PHASE]
     if phase == SLIDING:
         ux, uy = state[i, c.VX] - radius * state[i, c.WY], state[i, c.VY] + radius * state[i, c.WX]
-        took = mass * floor.sliding * ((ux * ux + uy * uy) ** 0.5 - 3.5 * floor.sliding * middle) * span
+        loss = mass * floor.sliding * ((ux * ux + uy * uy) ** 0.5 - 3.5 * floor.sliding * middle) * span
     elif phase == ROLLING:
         speed = (state[i, c.VX] ** 2 + state[i, c.VY] ** 2) ** 0.5
-        took = 1.4 * mass * floor.rolling * (speed - floor.rolling * middle) * span
+        loss = 1.4 * mass * floor.rolling * (speed - floor.rolling * middle) * span
     elif phase == GLIDING:
         speed = (state[i, c.VX] ** 2 + state[i, c.VY] ** 2) ** 0.5
-        took = mass * floor.sliding * (speed - floor.sliding * middle) * span
+        loss = mass * floor.sliding * (speed - floor.sliding * middle) * span
     fall = floor.spinning / radius
-    first, last = fallen(state[i, c.WZ], fall * begin), fallen(state[i, c.WZ], fall * end)
-    return float(-took - 0.5 * floor.inertia * mass * radius * radius * (first - last) * (first + last))
+    first, last = decayed_spin(state[i, c.WZ], fall * begin), decayed_spin(state[i, c.WZ], fall * end)
+    return float(-loss - 0.5 * floor.inertia * mass * radius * radius * (first - last) * (first + last))
 
 
 @kernel
@@ -226,7 +228,7 @@ def advance_to(data: TabletopState, i: int, t: float) -> None:
 
 @kernel
 def advance_all_to(data: TabletopState, t: float) -> None:
-    """Do so for all balls; none may have an event before that time."""
+    """Advance all balls to a time as `advance_to`; none may have an event before that time."""
     for i in range(len(data.state)):
         advance_to(data, i, t)
 
@@ -240,11 +242,11 @@ def account_floor(data: TabletopState, t: float) -> None:
         data.state[i, c.ENERGY_UNTIL] = t
 
 
-CUT = 1e-3
+ELASTIC_SPEED = 1e-3
 """m/s: slower collisions are elastic, so that cascades in clusters end."""
 
-REST = 1e-4
-"""m/s: a ball whose centre and rim are both slower than this after such a slow collision is stopped. It would else
+STOP_SPEED = 1e-4
+"""m/s: a ball whose centre and rim are both slower than this after such a slow collision is stopped. Otherwise it would
 roll 5e-8 m."""
 
 MICRO_BOUNCE = 1e-3
@@ -272,7 +274,7 @@ def log_event(
 
 
 @kernel
-def speed_to_gain(data: TabletopState, i: int, nx: float, ny: float) -> float:
+def speed_gain_until_rolling(data: TabletopState, i: int, nx: float, ny: float) -> float:
     """Return the speed along n that a sliding ball gains until it rolls, m/s: −2/7 of its slip."""
     state = data.state
     if data.tags[i, c.PHASE] != SLIDING or data.floor.sliding == 0.0:
@@ -289,32 +291,32 @@ def stop_if_slow(data: TabletopState, i: int, closing: float) -> None:
     Its energy is accounted to the surface.
     """
     state = data.state
-    slows = data.floor.sliding if data.floor.pucks else data.floor.rolling
-    if closing > CUT or state[i, c.INVERSE_MASS] == 0.0 or slows == 0.0:
+    deceleration = data.floor.sliding if data.floor.pucks else data.floor.rolling
+    if closing > ELASTIC_SPEED or state[i, c.INVERSE_MASS] == 0.0 or deceleration == 0.0:
         return
-    moving = state[i, c.VX] ** 2 + state[i, c.VY] ** 2
-    rolling = (state[i, c.WX] ** 2 + state[i, c.WY] ** 2) * state[i, c.RADIUS] ** 2
-    if moving < REST * REST and rolling < REST * REST:
-        data.world[c.BY_FLOOR] -= 0.5 * state[i, c.MASS] * (moving + 0.4 * rolling)
+    speed_squared = state[i, c.VX] ** 2 + state[i, c.VY] ** 2
+    rim_speed_squared = (state[i, c.WX] ** 2 + state[i, c.WY] ** 2) * state[i, c.RADIUS] ** 2
+    if speed_squared < STOP_SPEED * STOP_SPEED and rim_speed_squared < STOP_SPEED * STOP_SPEED:
+        data.world[c.BY_FLOOR] -= 0.5 * state[i, c.MASS] * (speed_squared + 0.4 * rim_speed_squared)
         state[i, c.VX], state[i, c.VY], state[i, c.WX], state[i, c.WY] = 0.0, 0.0, 0.0, 0.0
 
 
 @kernel
-def would_return(separation: float, driven: float, pressed: float, lasts: float) -> bool:
-    """Return whether a separating pair would collide again at once, repeatedly, so that it needs a micro-bounce.
+def needs_micro_bounce(separation: float, reduction: float, reduction_rate: float, duration: float) -> bool:
+    """Return whether a separating pair needs a micro-bounce, because it would collide again at once, repeatedly.
 
     That is so if the surface, by turning sliding into rolling, reduces the speed of separation by more than its value.
     A collision alone does not cause it: of the slip that it creates, less comes back than it separates the two by.
 
     Args:
         separation: speed of separation, m/s.
-        driven: reduction of that speed until both roll, m/s.
-        pressed: present rate of reduction, m/s².
-        lasts: duration of that rate, s.
+        reduction: reduction of that speed until both roll, m/s.
+        reduction_rate: present rate of reduction, m/s².
+        duration: duration of that rate, s.
     """
-    if separation >= MICRO_BOUNCE or pressed <= 2.0 * CREEP_ACCELERATION:
+    if separation >= MICRO_BOUNCE or reduction_rate <= 2.0 * CREEP_ACCELERATION:
         return False
-    return driven >= separation or pressed * lasts > separation
+    return reduction >= separation or reduction_rate * duration > separation
 
 
 @kernel
@@ -324,44 +326,58 @@ def hit_ball(data: TabletopState, i: int, k: int) -> None:
     dx, dy = state[k, c.X] - state[i, c.X], state[k, c.Y] - state[i, c.Y]
     distance = math.sqrt(dx * dx + dy * dy)
     nx, ny = dx / distance, dy / distance
-    li, lk = state[i, c.INVERSE_MASS], state[k, c.INVERSE_MASS]
-    mine, theirs = motion_of(state, i), motion_of(state, k)
+    inverse_mass_i, inverse_mass_k = state[i, c.INVERSE_MASS], state[k, c.INVERSE_MASS]
+    before, other_before = motion_of(state, i), motion_of(state, k)
     closing = (state[i, c.VX] - state[k, c.VX]) * nx + (state[i, c.VY] - state[k, c.VY]) * ny
     if closing > 0.0:
-        restitution = data.coefficients[0, tags[i, c.SURFACE], tags[k, c.SURFACE]] if closing > CUT else 1.0
+        restitution = data.coefficients[0, tags[i, c.SURFACE], tags[k, c.SURFACE]] if closing > ELASTIC_SPEED else 1.0
         if data.floor.pucks:
             friction = data.coefficients[1, tags[i, c.SURFACE], tags[k, c.SURFACE]]
             radii = state[i, c.RADIUS], state[k, c.RADIUS]
-            a, b = collide_pucks(restitution, friction, mine, theirs, (li, lk), radii, nx, ny)
-        else:
-            a, b = collide_balls(
-                data.counts[c.BALL_MODEL], restitution, mine, theirs, (li, lk), state[i, c.RADIUS], nx, ny
+            after, other_after = collide_pucks(
+                restitution, friction, before, other_before, (inverse_mass_i, inverse_mass_k), radii, nx, ny
             )
-        set_motion(state, i, a)
-        set_motion(state, k, b)
-        account_hit(data, i, mine, k, theirs, nx, ny)
+        else:
+            after, other_after = collide_balls(
+                data.counts[c.BALL_MODEL],
+                restitution,
+                before,
+                other_before,
+                (inverse_mass_i, inverse_mass_k),
+                state[i, c.RADIUS],
+                nx,
+                ny,
+            )
+        set_motion(state, i, after)
+        set_motion(state, k, other_after)
+        account_hit(data, i, before, k, other_before, nx, ny)
         stop_if_slow(data, i, closing)
         stop_if_slow(data, k, closing)
     start_phase(data, i)
     start_phase(data, k)
     separation = (state[k, c.VX] - state[i, c.VX]) * nx + (state[k, c.VY] - state[i, c.VY]) * ny
-    pressed = (state[i, c.AX] - state[k, c.AX]) * nx + (state[i, c.AY] - state[k, c.AY]) * ny
-    driven = speed_to_gain(data, i, nx, ny) - speed_to_gain(data, k, nx, ny)
-    if would_return(separation, driven, pressed, min(state[i, c.PHASE_END], state[k, c.PHASE_END]) - state[i, c.T]):
-        impulse = (MICRO_BOUNCE - separation) / (li + lk)
+    reduction_rate = (state[i, c.AX] - state[k, c.AX]) * nx + (state[i, c.AY] - state[k, c.AY]) * ny
+    reduction = speed_gain_until_rolling(data, i, nx, ny) - speed_gain_until_rolling(data, k, nx, ny)
+    if needs_micro_bounce(
+        separation, reduction, reduction_rate, min(state[i, c.PHASE_END], state[k, c.PHASE_END]) - state[i, c.T]
+    ):
+        impulse = (MICRO_BOUNCE - separation) / (inverse_mass_i + inverse_mass_k)
         account_micro_bounce(data, impulse, separation, MICRO_BOUNCE)
-        state[i, c.VX] -= impulse * li * nx
-        state[i, c.VY] -= impulse * li * ny
-        state[k, c.VX] += impulse * lk * nx
-        state[k, c.VY] += impulse * lk * ny
+        state[i, c.VX] -= impulse * inverse_mass_i * nx
+        state[i, c.VY] -= impulse * inverse_mass_i * ny
+        state[k, c.VX] += impulse * inverse_mass_k * nx
+        state[k, c.VY] += impulse * inverse_mass_k * ny
         start_phase(data, i)
         start_phase(data, k)
     if data.counts[c.RECORDING] != 0:
-        jx, jy = state[i, c.MASS] * (mine[0] - state[i, c.VX]), state[i, c.MASS] * (mine[1] - state[i, c.VY])
-        if li == 0.0:  # a fixed ball has no change of velocity
-            jx, jy = state[k, c.MASS] * (state[k, c.VX] - theirs[0]), state[k, c.MASS] * (state[k, c.VY] - theirs[1])
-        reach = state[i, c.RADIUS]
-        x, y = state[i, c.X] + reach * nx, state[i, c.Y] + reach * ny
+        jx, jy = state[i, c.MASS] * (before[0] - state[i, c.VX]), state[i, c.MASS] * (before[1] - state[i, c.VY])
+        if inverse_mass_i == 0.0:  # a fixed ball has no change of velocity
+            jx, jy = (
+                state[k, c.MASS] * (state[k, c.VX] - other_before[0]),
+                state[k, c.MASS] * (state[k, c.VY] - other_before[1]),
+            )
+        radius = state[i, c.RADIUS]
+        x, y = state[i, c.X] + radius * nx, state[i, c.Y] + radius * ny
         if i < k:
             log_event(data, c.BALL, i, k, x, y, nx, ny, jx, jy)
         else:
@@ -412,7 +428,7 @@ def hit_cushion(
     height = nose if nose > 0.0 else radius
     closing = before_x * nx + before_y * ny
     if closing > 0.0:
-        restitution = data.coefficients[0, surface, collider_surface] if closing > CUT else 1.0
+        restitution = data.coefficients[0, surface, collider_surface] if closing > ELASTIC_SPEED else 1.0
         friction = data.coefficients[1, surface, collider_surface]
         before = motion_of(state, i)
         model, grip = data.counts[c.CUSHION_MODEL], data.floor.grip
@@ -427,8 +443,10 @@ def hit_cushion(
         stop_if_slow(data, i, closing)
     start_phase(data, i)
     separation = -(state[i, c.VX] * nx + state[i, c.VY] * ny)
-    pressed = state[i, c.AX] * nx + state[i, c.AY] * ny
-    if would_return(separation, speed_to_gain(data, i, nx, ny), pressed, state[i, c.PHASE_END] - state[i, c.T]):
+    reduction_rate = state[i, c.AX] * nx + state[i, c.AY] * ny
+    if needs_micro_bounce(
+        separation, speed_gain_until_rolling(data, i, nx, ny), reduction_rate, state[i, c.PHASE_END] - state[i, c.T]
+    ):
         account_micro_bounce(data, (MICRO_BOUNCE - separation) * state[i, c.MASS], separation, MICRO_BOUNCE)
         state[i, c.VX] -= (MICRO_BOUNCE - separation) * nx
         state[i, c.VY] -= (MICRO_BOUNCE - separation) * ny
@@ -442,8 +460,8 @@ def hit_cushion(
 
 
 @kernel
-def capture(data: TabletopState, i: int, k: int, solid: int) -> None:
-    """Capture a ball in pocket k, at whose centre it lies from then on; `solid` is the number of static colliders."""
+def capture(data: TabletopState, i: int, k: int, collider_count: int) -> None:
+    """Capture a ball in pocket k: from then on it lies at the centre. `collider_count`: number of static colliders."""
     state, pocket = data.state, data.pockets[k]
     x, y, vx, vy, mass = state[i, c.X], state[i, c.Y], state[i, c.VX], state[i, c.VY], state[i, c.MASS]
     state[i, c.X], state[i, c.Y] = pocket[c.CENTRE_X], pocket[c.CENTRE_Y]
@@ -454,4 +472,4 @@ def capture(data: TabletopState, i: int, k: int, solid: int) -> None:
     set_phase(data, i, CAPTURED)
     if data.counts[c.RECORDING] != 0:
         nx, ny = (pocket[c.CENTRE_X] - x) / pocket[c.CIRCLE_RADIUS], (pocket[c.CENTRE_Y] - y) / pocket[c.CIRCLE_RADIUS]
-        log_event(data, c.POCKET, i, -1 - solid - k, x, y, nx, ny, mass * vx, mass * vy)
+        log_event(data, c.POCKET, i, -1 - collider_count - k, x, y, nx, ny, mass * vx, mass * vy)

@@ -85,7 +85,7 @@ class ShotResult(HtmlRepr):
     def pocketed(self) -> Mapping[str, str]:
         """Pocket of each ball that was pocketed, by the name of the ball, in order of time."""
         pocketed = self.what[self.what[:, 0] == c.POCKET]
-        return {self.names[ball]: self.fixed_names[-1 - hole] for _, ball, hole in pocketed.tolist()}
+        return {self.names[ball]: self.fixed_names[-1 - pocket] for _, ball, pocket in pocketed.tolist()}
 
     @property
     def events(self) -> list[ShotEvent]:
@@ -119,14 +119,14 @@ class ShotResult(HtmlRepr):
         Raises:
             ValueError: paths were not recorded.
         """
-        path, owner = self._ways()
+        path, owner = self._recorded_paths()
         times = np.maximum(np.asarray(times, dtype=np.float64), 0.0)
         positions = np.empty((len(times), len(self.names), 2))
-        for number in range(len(self.names)):
-            segments = path[owner == number]
+        for ball in range(len(self.names)):
+            segments = path[owner == ball]
             segment = segments[np.maximum(np.searchsorted(segments[:, c.T], times, side="right") - 1, 0)]
             elapsed = (times - segment[:, c.T])[:, None]
-            positions[:, number] = (
+            positions[:, ball] = (
                 segment[:, c.X : c.Y + 1]
                 + (segment[:, c.VX : c.VY + 1] + 0.5 * segment[:, c.AX : c.AY + 1] * elapsed) * elapsed
             )
@@ -143,27 +143,27 @@ class ShotResult(HtmlRepr):
             KeyError: no ball has that name.
             ValueError: paths were not recorded, or the spacing is not positive.
         """
-        path, owner = self._ways()
+        path, owner = self._recorded_paths()
         if ball not in self.names:
             raise KeyError(ball)
         if not spacing > 0.0:
             raise ValueError(f"a spacing of {spacing:g} m is not possible; more than 0")
-        number = self.names.index(ball)
-        segments = path[owner == number]
+        index = self.names.index(ball)
+        segments = path[owner == index]
         ends = np.append(segments[1:, c.T], max(self.duration, float(segments[-1, c.T])))
         parts = []
         for segment, end in zip(segments, ends.tolist(), strict=True):
             span = end - segment[c.T]
-            far = float(np.hypot(segment[c.VX], segment[c.VY])) * span
-            elapsed = np.linspace(0.0, 1.0, max(2, min(int(far / spacing) + 2, 1000)))[:, None] * span
+            length = float(np.hypot(segment[c.VX], segment[c.VY])) * span
+            elapsed = np.linspace(0.0, 1.0, max(2, min(int(length / spacing) + 2, 1000)))[:, None] * span
             parts.append(
                 segment[c.X : c.Y + 1] + (segment[c.VX : c.VY + 1] + 0.5 * segment[c.AX : c.AY + 1] * elapsed) * elapsed
             )
-        parts.append(self.position[number][None])
+        parts.append(self.position[index][None])
         points = np.concatenate(parts)
         return np.asarray(points[np.append(True, np.any(np.diff(points, axis=0) != 0.0, axis=1))])
 
-    def _ways(self) -> tuple[FloatArray, IntArray]:
+    def _recorded_paths(self) -> tuple[FloatArray, IntArray]:
         """Return the path segments, (M, 12), and their balls, (M,)."""
         if self.path is None or self.path_ball is None:
             raise ValueError("paths were not recorded; call shoot(…, ways=True)")

@@ -116,7 +116,7 @@ def shoot_many(
     balls: IntArray,
     motions: FloatArray,
     until: float,
-    rest: FloatArray,
+    final_position: FloatArray,
     pocket: IntArray,
     ends: FloatArray,
     events: IntArray,
@@ -131,7 +131,7 @@ def shoot_many(
         balls: (M,) index of each struck ball.
         motions: (M, 5) as in `shoot`.
         until: as in `shoot`.
-        rest: (M, N, 2) final positions, m; written.
+        final_position: (M, N, 2) final positions, m; written.
         pocket: (M, N) index of the pocket that captured each ball, −1 for none; written.
         ends: (M,) time of the last event, s; written.
         events: (M,) number of events; written.
@@ -141,7 +141,7 @@ def shoot_many(
         status[m] = shoot(data, state, tags, balls[m], motions[m], until)
         ends[m], events[m] = data.world[c.NOW], data.counts[c.EVENTS]
         for i in range(len(state)):
-            rest[m, i, 0], rest[m, i, 1] = data.state[i, c.X], data.state[i, c.Y]
+            final_position[m, i, 0], final_position[m, i, 1] = data.state[i, c.X], data.state[i, c.Y]
             pocket[m, i] = -1
             if data.tags[i, c.PHASE] == CAPTURED:  # it lies exactly at the centre
                 for k in range(len(data.pockets)):
@@ -150,7 +150,7 @@ def shoot_many(
 
 
 UNTIL = 120.0
-"""s, default limit of the duration of a shot"""
+"""s, default time limit of a shot"""
 
 BATCH = 256
 """Shots after which Python can handle signals: some 1/100 s."""
@@ -189,7 +189,7 @@ class Table:
         self.scene = scene
         self.names = scene.bodies.names
         self._fixed_names = scene.fixed_names
-        self._number = {name: k for k, name in enumerate(self.names)}
+        self._index_of = {name: k for k, name in enumerate(self.names)}
         simulation = TabletopSimulation(Setup.of(scene), scene.solver)
         count = len(scene.bodies)
         data = with_path_rows(
@@ -226,9 +226,9 @@ class Table:
         """
         if stroke is None:
             return self._play(NO_BALL, NO_MOTION, until, ways)
-        number = self._free(ball)
-        velocity, spin = struck(stroke, self._mass[number], self._radius[number])
-        return self._play(number, (*velocity, *spin), until, ways)
+        index = self._strikable_index(ball)
+        velocity, spin = struck(stroke, self._mass[index], self._radius[index])
+        return self._play(index, (*velocity, *spin), until, ways)
 
     def send(
         self,
@@ -256,7 +256,7 @@ class Table:
         motion = (*velocity, *spin)
         if len(motion) != 5 or not all(map(isfinite, motion)):
             raise ValueError(f"{motion} is not a velocity and a spin: two and three finite numbers")
-        return self._play(self._free(ball), motion, until, ways)
+        return self._play(self._strikable_index(ball), motion, until, ways)
 
     def fan(self, strokes: Sequence[Stroke], ball: str = "cue", *, threads: int = 1, until: float = UNTIL) -> ShotBatch:
         """Play many independent shots from the present positions.
@@ -274,11 +274,11 @@ class Table:
             KeyError: no ball has that name.
             ValueError: as `shoot`.
         """
-        number = self._free(ball)
-        figures = self._mass[number], self._radius[number]
+        index = self._strikable_index(ball)
+        mass_and_radius = self._mass[index], self._radius[index]
         motions = np.empty((len(strokes), 5))
         for k, stroke in enumerate(strokes):
-            velocity, spin = struck(stroke, *figures)
+            velocity, spin = struck(stroke, *mass_and_radius)
             motions[k] = (*velocity, *spin)
         return self.fan_of(motions, ball, threads=threads, until=until)
 
@@ -295,7 +295,7 @@ class Table:
             KeyError: no ball has that name.
             ValueError: as `shoot`, or `motions` does not have five finite numbers in each row.
         """
-        number = self._free(ball)
+        index = self._strikable_index(ball)
         _check_time(until)
         motions = np.ascontiguousarray(motions, dtype=np.float64)
         if motions.ndim != 2 or motions.shape[1] != 5 or not np.isfinite(motions).all():
@@ -303,34 +303,34 @@ class Table:
                 f"an array {motions.shape} of motions is invalid; it needs five finite numbers in each row"
             )
         count, balls = len(motions), len(self.names)
-        numbers = np.full(count, number, dtype=np.int64)
-        rest, pocket = np.empty((count, balls, 2)), np.empty((count, balls), np.int64)
+        ball_indices = np.full(count, index, dtype=np.int64)
+        final_position, pocket = np.empty((count, balls, 2)), np.empty((count, balls), np.int64)
         ends, events, status = np.empty(count), np.empty(count, np.int64), np.empty(count, np.int64)
 
-        stopped = Event()
+        is_stopped = Event()
 
-        def part(low: int, high: int) -> None:
-            own = self._own()
+        def play_range(low: int, high: int) -> None:
+            data = self._thread_data()
             for first in range(low, high, BATCH):
-                if stopped.is_set():
+                if is_stopped.is_set():
                     return
-                some = slice(first, min(first + BATCH, high))
+                rows = slice(first, min(first + BATCH, high))
                 shoot_many(
-                    own, self._state, self._tags, numbers[some], motions[some], until,
-                    rest[some], pocket[some], ends[some], events[some], status[some],
+                    data, self._state, self._tags, ball_indices[rows], motions[rows], until,
+                    final_position[rows], pocket[rows], ends[rows], events[rows], status[rows],
                 )  # fmt: skip
 
         bounds = np.linspace(0, count, min(max(threads, 1), max(count, 1)) + 1).astype(int).tolist()
-        parts = list(pairwise(bounds))
-        if len(parts) == 1:
-            part(*parts[0])
+        ranges = list(pairwise(bounds))
+        if len(ranges) == 1:
+            play_range(*ranges[0])
         else:
-            with ThreadPoolExecutor(len(parts)) as pool:
+            with ThreadPoolExecutor(len(ranges)) as pool:
                 try:
-                    list(pool.map(lambda each: part(*each), parts))
+                    list(pool.map(lambda each: play_range(*each), ranges))
                 finally:
-                    stopped.set()  # after an interrupt do not wait for the other threads
-        return ShotBatch(rest, pocket, ends, events, status == DONE)
+                    is_stopped.set()  # after an interrupt do not wait for the other threads
+        return ShotBatch(final_position, pocket, ends, events, status == DONE)
 
     def with_balls(self, position: dict[str, tuple[float, float]]) -> Self:
         """Return a table with some balls at rest at other positions. A ball placed inside a pocket is captured.
@@ -343,12 +343,12 @@ class Table:
             ValueError: a position is not finite, or a ball overlaps another object there.
         """
         other = self._copy()
-        down = pockets_at(self.scene, np.array(list(position.values()), dtype=float).reshape(-1, 2)) >= 0
-        for (name, place), inside in zip(position.items(), down.tolist(), strict=True):
-            number = self._number[name]
-            other._state[number, c.X : c.Y + 1] = place
-            other._state[number, c.VX : c.WZ + 1] = 0.0
-            other._tags[number, c.PHASE] = CAPTURED if inside else RESTING
+        is_in_pocket = pockets_at(self.scene, np.array(list(position.values()), dtype=float).reshape(-1, 2)) >= 0
+        for (name, point), captured in zip(position.items(), is_in_pocket.tolist(), strict=True):
+            index = self._index_of[name]
+            other._state[index, c.X : c.Y + 1] = point
+            other._state[index, c.VX : c.WZ + 1] = 0.0
+            other._tags[index, c.PHASE] = CAPTURED if captured else RESTING
         if not np.isfinite(other._state[:, c.X : c.Y + 1]).all():
             raise ValueError("a position must be finite")
         overlap = overlap_of(self.scene, other.position)
@@ -388,33 +388,33 @@ class Table:
             setattr(self, name, value)
         self._lock = Lock()
 
-    def _free(self, ball: str) -> int:
+    def _strikable_index(self, ball: str) -> int:
         """Return the index of a ball that can be struck."""
-        number = self._number[ball]
-        if self._fixed[number]:
+        index = self._index_of[ball]
+        if self._fixed[index]:
             raise ValueError(f"{ball!r} is fixed and cannot move")
-        if self._tags[number, c.PHASE] == CAPTURED:
+        if self._tags[index, c.PHASE] == CAPTURED:
             raise ValueError(f"{ball!r} is in a pocket; move it first")
-        return number
+        return index
 
-    def _own(self) -> TabletopState:
+    def _thread_data(self) -> TabletopState:
         """Return state arrays for another thread, which record nothing."""
         with self._lock:
-            own: TabletopState = deepcopy(self._data)
-        own.counts[c.RECORDING] = own.counts[c.RECORDING_PATHS] = 0
-        return own
+            data: TabletopState = deepcopy(self._data)
+        data.counts[c.RECORDING] = data.counts[c.RECORDING_PATHS] = 0
+        return data
 
-    def _play(self, number: int, motion: tuple[float, ...], until: float, ways: bool) -> ShotResult:
+    def _play(self, index: int, motion: tuple[float, ...], until: float, ways: bool) -> ShotResult:
         _check_time(until)
         with self._lock:  # copies of a table share its state arrays
-            if number != NO_BALL:
+            if index != NO_BALL:
                 self._motion[:] = motion
-            return self._played(number, until, ways)
+            return self._play_locked(index, until, ways)
 
-    def _played(self, number: int, until: float, ways: bool) -> ShotResult:
+    def _play_locked(self, index: int, until: float, ways: bool) -> ShotResult:
         data, motion = self._data, self._motion
         data.counts[c.RECORDING_PATHS] = ways
-        while (status := shoot(data, self._state, self._tags, number, motion, until)) == FULL:
+        while (status := shoot(data, self._state, self._tags, index, motion, until)) == FULL:
             if ways and data.counts[c.PATH_ROWS] + 2 > len(data.path):
                 data = with_path_rows(data, 2 * len(data.path))
             else:
@@ -423,7 +423,7 @@ class Table:
         if status == TOO_MANY:
             reason = too_many_events(data, self.names, self.scene.fixed_names)
             raise Exhaustion(f"{reason}; {EVENT_LIMIT.remedy(2 * int(data.counts[c.MAX_EVENTS]))}")
-        rows, steps = int(data.counts[c.LOG_ROWS]), int(data.counts[c.PATH_ROWS])
+        rows, path_rows = int(data.counts[c.LOG_ROWS]), int(data.counts[c.PATH_ROWS])
         return ShotResult(
             self.names,
             self._fixed_names,
@@ -432,8 +432,8 @@ class Table:
             data.state.copy(),
             data.tags[:, c.PHASE].copy(),
             status == DONE,
-            data.path[:steps].copy() if ways else None,
-            data.path_tags[:steps, 0].copy() if ways else None,
+            data.path[:path_rows].copy() if ways else None,
+            data.path_tags[:path_rows, 0].copy() if ways else None,
             self.scene,
         )
 

@@ -53,21 +53,21 @@ RECORDING, LOG_ROWS, EVENTS, PREDICTIONS = discs.RECORDING, discs.LOG_ROWS, disc
 PAIR_TESTS, MAX_EVENTS, ACCOUNTING = discs.PAIR_TESTS, discs.MAX_EVENTS, discs.ACCOUNTING
 EVENT_BODY, EVENT_KIND, EVENT_PARTNER = discs.EVENT_BODY, discs.EVENT_KIND, discs.EVENT_PARTNER
 RECORDING_PATHS, PATH_ROWS, MOVING, BALL_MODEL, CUSHION_MODEL, COLLIDERS = range(10, 16)
-"""Indices of `counts`. Those of `exact.state` have the same meaning; PAIR_TESTS counts pockets too, MAX_EVENTS holds
-for the whole run. RECORDING_PATHS: 1 while paths are recorded. PATH_ROWS: their segments so far. MOVING: balls that
-move or spin. BALL_MODEL, CUSHION_MODEL: models of contacts. COLLIDERS: number of static colliders; pockets are counted
-on from it."""
+"""Indices of `counts`. Those of `exact.common.state` have the same meaning, but PAIR_TESTS counts pockets too, and
+MAX_EVENTS holds for the whole run. RECORDING_PATHS: 1 while paths are recorded. PATH_ROWS: their segments so far.
+MOVING: balls that move or spin. BALL_MODEL, CUSHION_MODEL: models of contacts. COLLIDERS: number of static colliders;
+in contacts, pocket k is collider COLLIDERS + k."""
 
 BY_FLOOR, BY_MICRO_BOUNCES, BY_CAPTURE = range(3)
 NOW, BY_NORMAL, BY_FRICTION, BY_PHANTOM = discs.NOW, discs.BY_NORMAL, discs.BY_FRICTION, discs.BY_PHANTOM
 """Indices of `world`: energy, J, of friction on the surface, of micro-bounces, and lost by capture; the others as in
-`exact.state`."""
+`exact.common.state`."""
 
 EVENT_TIME, POINT_X, POINT_Y, NORMAL_X, NORMAL_Y, IMPULSE_X, IMPULSE_Y, EVENT_WIDTH = range(8)
 """Columns of `log`: time, s; position, m; normal; impulse of the first body on the second, N·s."""
 
 
-WITHIN = 1e-12
+INSIDE_TOLERANCE = 1e-12
 """m: tolerance for a vertex inside a larger one; the end of a wall at a post lies on the post's rim up to rounding."""
 
 
@@ -210,12 +210,12 @@ def contacts_of(log: FloatArray, tags: IntArray) -> Contacts:
 
 def exposed_vertices(vertices: FloatArray) -> IntArray:
     """Return the indices of the vertices (K, 4) that can be touched: not inside another, and one of equal ones."""
-    kept: list[int] = []
+    exposed: list[int] = []
     for k in np.argsort(-vertices[:, CIRCLE_RADIUS], kind="stable").tolist():
-        apart = np.hypot(*(vertices[kept, :2] - vertices[k, :2]).T)
-        if not (apart + vertices[k, CIRCLE_RADIUS] <= vertices[kept, CIRCLE_RADIUS] + WITHIN).any():
-            kept.append(k)
-    return np.sort(np.asarray(kept, dtype=np.int64))
+        distance = np.hypot(*(vertices[exposed, :2] - vertices[k, :2]).T)
+        if not (distance + vertices[k, CIRCLE_RADIUS] <= vertices[exposed, CIRCLE_RADIUS] + INSIDE_TOLERANCE).any():
+            exposed.append(k)
+    return np.sort(np.asarray(exposed, dtype=np.int64))
 
 
 def _nose_heights(scene: Scene) -> FloatArray:

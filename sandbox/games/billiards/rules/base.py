@@ -75,10 +75,10 @@ def summarise(
         GameError: an event names a ball that is not on the table.
     """
     ordered = tuple(sorted(events, key=lambda each: each.time))
-    here = {cue, *table}
+    on_table_balls = {cue, *table}
     named = {each.ball for each in ordered} | {each.other for each in ordered if each.kind == "ball"}
-    if not named <= here:
-        raise GameError(f"not on the table: {', '.join(sorted(named - here))}")
+    if not named <= on_table_balls:
+        raise GameError(f"not on the table: {', '.join(sorted(named - on_table_balls))}")
     touches = [(each.time, touched) for each in ordered if (touched := balls_touched_by(cue, each)) is not None]
     start = touches[0][0] if touches else float("inf")
     first = tuple(dict.fromkeys(ball for time, ball in touches if time == start))
@@ -145,7 +145,7 @@ class ShotChoices:
         Raises:
             GameError: the call cannot be made now; the message names every reason.
         """
-        wrong = [
+        faults = [
             *(
                 [f"{call.ball!r} cannot be called now{_list_choices(self.balls)}"]
                 if call.ball not in (None, *self.balls)
@@ -155,8 +155,8 @@ class ShotChoices:
             *(["no safety can be called now"] if call.safety and not self.safety else []),
             *(["no push-out can be called now"] if call.push_out and not self.push_out else []),
         ]
-        if wrong:
-            raise GameError("; ".join(wrong))
+        if faults:
+            raise GameError("; ".join(faults))
 
 
 def _list_choices(balls: Iterable[str]) -> str:

@@ -29,7 +29,7 @@ from sandbox.games.billiards.rules.base import (
     player_name,
 )
 
-DRIVEN = 4
+MIN_DRIVEN_BALLS = 4
 """number of object balls that a break must drive to a cushion if none is pocketed (WPA 2.3, 3.3)"""
 
 
@@ -65,8 +65,8 @@ def standard(shot: ShotSummary, targets: frozenset[str]) -> tuple[str, ...]:
 
 
 def broke(shot: ShotSummary) -> bool:
-    """Return whether a break was legal: a ball pocketed, or `DRIVEN` balls driven to a cushion."""
-    return bool(shot.down) or len(shot.driven - {shot.cue}) >= DRIVEN
+    """Return whether a break was legal: a ball pocketed, or `MIN_DRIVEN_BALLS` balls driven to a cushion."""
+    return bool(shot.down) or len(shot.driven - {shot.cue}) >= MIN_DRIVEN_BALLS
 
 
 def at_foot(ball: str) -> Respot:
@@ -142,21 +142,23 @@ class EightBall(Ruleset[EightBallState]):
             text = f"foul: {fouls[0]}; {player_name(state.other)} has the ball in hand"
             after = replace(after, turn=state.other, in_hand="anywhere")
             return Ruling(after, fouls=fouls, messages=(text,))
-        made = self._called_ball_pocketed(state, call, shot)
-        if made is None or call.safety:
+        pocketed = self._called_ball_pocketed(state, call, shot)
+        if pocketed is None or call.safety:
             return Ruling(replace(after, turn=state.other))
         if state.groups[state.turn] is not None:
             return Ruling(after, continues=True)
-        own_group: Group = "solids" if made in GROUPS["solids"] else "stripes"
-        its: Group = "stripes" if own_group == "solids" else "solids"
-        after = replace(after, groups=tuple(own_group if each == state.turn else its for each in range(state.players)))
+        own_group: Group = "solids" if pocketed in GROUPS["solids"] else "stripes"
+        other_group: Group = "stripes" if own_group == "solids" else "solids"
+        after = replace(
+            after, groups=tuple(own_group if each == state.turn else other_group for each in range(state.players))
+        )
         return Ruling(after, continues=True, messages=(f"{player_name(state.turn)} plays {own_group}",))
 
     def _called_ball_pocketed(self, state: EightBallState, call: ShotCall, shot: ShotSummary) -> str | None:
         """Return the pocketed ball that counts, the called one, else the first ball on; None if there is none."""
-        able = (call.ball,) if call.ball is not None else tuple(self.legal_targets(state))
+        countable = (call.ball,) if call.ball is not None else tuple(self.legal_targets(state))
         for ball in shot.down:
-            if ball in able and call.pocket in (None, shot.pocket_of(ball)):
+            if ball in countable and call.pocket in (None, shot.pocket_of(ball)):
                 return ball
         return None
 
@@ -176,8 +178,8 @@ class EightBall(Ruleset[EightBallState]):
         if fouls and not scratch(shot):  # (h)
             offered = (*(offered or ("play",)), "in hand")
         after = replace(after, turn=state.turn if continues else state.other, decisions=offered)
-        why = [f"foul: {each}" for each in fouls] + (["illegal break"] if weak else [])
-        messages = why + (["the 8 was pocketed on the break and is spotted"] if respot else [])
+        reasons = [f"foul: {each}" for each in fouls] + (["illegal break"] if weak else [])
+        messages = reasons + (["the 8 was pocketed on the break and is spotted"] if respot else [])
         return Ruling(after, fouls=fouls, respot=respot, continues=continues, messages=tuple(messages))
 
     def _eight(
@@ -259,19 +261,19 @@ class NineBall(Ruleset[NineBallState]):
         fair = not fouls and not call.push_out
         table = state.without(shot.down if fair else tuple(ball for ball in shot.down if ball != NINE))
         respot = (at_foot(NINE),) if NINE in shot.down and not fair else ()
-        row = tuple(
+        consecutive = tuple(
             (count + 1 if fouls else 0) if each == state.turn else count for each, count in enumerate(state.fouls)
         )
-        made = len(shot.down) if fair else 0
-        points = tuple(made if each == state.turn else 0 for each in range(state.players))
+        pocketed = len(shot.down) if fair else 0
+        points = tuple(pocketed if each == state.turn else 0 for each in range(state.players))
         after = replace(
             state,
             table=table,
             opening=False,
             in_hand=None,
-            fouls=row,
+            fouls=consecutive,
             push_out=state.opening and not fouls,
-            scores=state.scored(state.turn, made),
+            scores=state.scored(state.turn, pocketed),
         )
         if fouls:
             return replace(_foul(after, fouls), respot=respot, points=points)
@@ -299,8 +301,8 @@ class NineBall(Ruleset[NineBallState]):
 
 def _foul(after: NineBallState, fouls: tuple[str, ...]) -> Ruling[NineBallState]:
     """Return the result of a foul: ball in hand for the other player, or the end of the frame."""
-    row, shooter = after.fouls[after.turn], player_name(after.turn)
-    if row >= MAX_CONSECUTIVE_FOULS:
+    consecutive, shooter = after.fouls[after.turn], player_name(after.turn)
+    if consecutive >= MAX_CONSECUTIVE_FOULS:
         winner = after.opponent
         ends = f"{player_name(winner)} wins" if winner is not None else "the rack is lost"
         lost = replace(after, over=True, winner=winner)
@@ -310,8 +312,8 @@ def _foul(after: NineBallState, fouls: tuple[str, ...]) -> Ruling[NineBallState]
             messages=(f"foul: {fouls[0]}", f"{shooter} fouled {MAX_CONSECUTIVE_FOULS} times in a row", ends),
         )
     messages = [f"foul: {fouls[0]}; {player_name(after.other)} has the ball in hand"]
-    if row == MAX_CONSECUTIVE_FOULS - 1:  # WPA 6.14: the player must be warned
-        messages.append(f"{shooter} is on {row} fouls; one more loses the rack")
+    if consecutive == MAX_CONSECUTIVE_FOULS - 1:  # WPA 6.14: the player must be warned
+        messages.append(f"{shooter} is on {consecutive} fouls; one more loses the rack")
     return Ruling(replace(after, turn=after.other, in_hand="anywhere"), fouls, messages=tuple(messages))
 
 
@@ -326,6 +328,7 @@ class FreePlayState(RulesState):
 
 
 ALWAYS: tuple[Decision, ...] = ("play", "in hand", "rerack")
+"""decisions before every shot of free play"""
 
 
 class FreePlay(Ruleset[FreePlayState]):
@@ -362,13 +365,13 @@ class FreePlay(Ruleset[FreePlayState]):
         return frozenset() if state.over else frozenset(state.table)
 
     def _judge(self, state: FreePlayState, call: ShotCall, shot: ShotSummary) -> Ruling[FreePlayState]:  # noqa: ARG002
-        table, made = state.without(shot.down), len(shot.down)
-        continues = made > 0 and not shot.scratched
-        points = tuple(made if each == state.turn else 0 for each in range(state.players))
+        table, pocketed = state.without(shot.down), len(shot.down)
+        continues = pocketed > 0 and not shot.scratched
+        points = tuple(pocketed if each == state.turn else 0 for each in range(state.players))
         after = replace(
             state,
             turn=state.turn if continues else state.other,
-            scores=state.scored(state.turn, made),
+            scores=state.scored(state.turn, pocketed),
             table=table,
             opening=False,
             in_hand="anywhere" if shot.scratched else None,

@@ -91,23 +91,23 @@ class SnookerShot:
     @property
     def fouls(self) -> tuple[tuple[int, str], ...]:
         """Fouls with their points (Penalties): the value of the ball on or concerned, at least 4."""
-        shot, least = self.shot, max(MIN_FOUL_POINTS, self.worth)
+        shot, min_points = self.shot, max(MIN_FOUL_POINTS, self.worth)
         found: list[tuple[int, str]] = []
         if shot.scratched:
-            found.append((least, "in-off"))
+            found.append((min_points, "in-off"))
         if not self.hit:
             if not shot.first:
-                found.append((least, "the cue ball hit no ball"))
+                found.append((min_points, "the cue ball hit no ball"))
             else:
-                most = max(least, *(self.value(ball) for ball in shot.first))
-                found.append((most, f"{first_ball_hit(shot)} hit first"))
+                points_hit = max(min_points, *(self.value(ball) for ball in shot.first))
+                found.append((points_hit, f"{first_ball_hit(shot)} hit first"))
         found += [
-            (max(least, self.value(ball)), f"the {ball} was potted but not on")
+            (max(min_points, self.value(ball)), f"the {ball} was potted but not on")
             for ball in shot.down
             if ball not in self.fair
         ]
         if found and not self.on:  # Penalties: a foul after a red before a colour was nominated
-            found = [(VALUES["black"], why) for _, why in found]
+            found = [(VALUES["black"], reason) for _, reason in found]
         return tuple(found)
 
     @property
@@ -138,10 +138,10 @@ def snooker_shot(
     if on != "colour":
         return SnookerShot(shot, frozenset((on,)), value(on), named if free else None, touching)
     plain = colours(shot.first) if len(shot.first) == 1 else ()
-    meant = (named,) if named is not None else plain or colours(touching)
-    if len(meant) != 1 or meant[0] not in COLOURS:
+    nominated = (named,) if named is not None else plain or colours(touching)
+    if len(nominated) != 1 or nominated[0] not in COLOURS:
         return SnookerShot(shot, frozenset(), 1, None, touching)
-    return SnookerShot(shot, frozenset(meant), value(meant[0]), None, touching)
+    return SnookerShot(shot, frozenset(nominated), value(nominated[0]), None, touching)
 
 
 On = Literal["red", "colour", "yellow", "green", "brown", "blue", "pink", "black"]
@@ -172,8 +172,8 @@ class SnookerState(RulesState):
 def remaining(state: SnookerState) -> int:
     """Return the points that can still be made without fouls and free balls, with a black after each red."""
     black = VALUES["black"]
-    left = sum(value(ball) for ball in colours(state.table)) + (1 + black) * len(reds(state.table))
-    return left + (black if state.on == "colour" else 0)
+    points = sum(value(ball) for ball in colours(state.table)) + (1 + black) * len(reds(state.table))
+    return points + (black if state.on == "colour" else 0)
 
 
 class Snooker(Ruleset[SnookerState]):
@@ -219,12 +219,12 @@ class Snooker(Ruleset[SnookerState]):
             return Ruling(after)
         if state.freed is not None and state.freed in situation.by and set(state.table) != {"pink", "black"}:
             penalty = max(MIN_FOUL_POINTS, VALUES.get(state.on, 1))
-            why = f"the free ball, {state.freed}, snookers the opponent"
+            reason = f"the free ball, {state.freed}, snookers the opponent"
             points = tuple(penalty * (each == state.turn) for each in range(state.players))
             scores = state.scored(state.turn if state.players == 2 else None, penalty)
-            after = replace(after, scores=scores, fouled=True, free=True, decisions=_answers(state, False))
-            messages = (f"foul: {why}; {penalty} points", "free ball")
-            return Ruling(after, (why,), points if state.players == 2 else (0,), messages=messages)
+            after = replace(after, scores=scores, fouled=True, free=True, decisions=_replies(state, False))
+            messages = (f"foul: {reason}; {penalty} points", "free ball")
+            return Ruling(after, (reason,), points if state.players == 2 else (0,), messages=messages)
         if not state.fouled:
             return Ruling(after)
         return Ruling(replace(after, free=True), messages=("free ball",))
@@ -248,40 +248,40 @@ class Snooker(Ruleset[SnookerState]):
         """Return the result of a fair stroke."""
         down, points = played.shot.down, played.points
         last = state.on not in ("red", "colour")
-        gone = tuple(ball for ball in down if ball not in VALUES or (last and ball == state.on))
-        back = tuple(ball for ball in down if ball not in gone)
-        table = state.without(gone)
+        removed = tuple(ball for ball in down if ball not in VALUES or (last and ball == state.on))
+        respotted = tuple(ball for ball in down if ball not in removed)
+        table = state.without(removed)
         gained = tuple(points * (each == state.turn) for each in range(state.players))
         after = replace(state, table=table, scores=state.scored(state.turn, points), run=state.run + points)
         if not points:
-            after = replace(after, turn=state.other, on=_next(table), run=0, freed=played.free)
+            after = replace(after, turn=state.other, on=_next_ball_on(table), run=0, freed=played.free)
             return Ruling(_claimable(after), points=gained)
         if not table:
             return replace(_ended(after), points=gained)
-        after = replace(after, on="colour" if state.on == "red" else _next(table))
-        return Ruling(_claimable(after), points=gained, respot=respots(back), continues=True)
+        after = replace(after, on="colour" if state.on == "red" else _next_ball_on(table))
+        return Ruling(_claimable(after), points=gained, respot=respots(respotted), continues=True)
 
     def _foul(
         self, state: SnookerState, clean: SnookerState, played: SnookerShot, fouls: tuple[tuple[int, str], ...]
     ) -> Ruling[SnookerState]:
         """Return the result of a foul: the highest penalty counts, reds stay down, colours are respotted (Fouls)."""
         penalty, down = max(fouls)[0], played.shot.down
-        why = tuple(each for _, each in fouls)
+        reasons = tuple(each for _, each in fouls)
         table = state.without(reds(down))
         after = replace(clean, table=table, scores=state.scored(state.opponent, penalty), run=0, fouled=True)
         gained = tuple(penalty * (each == state.opponent) for each in range(state.players))
-        text = f"foul: {why[0]}; {penalty} points"
+        text = f"foul: {reasons[0]}; {penalty} points"
         if state.table == ("black",):  # End of Frame: the first score or foul ends the frame
             ended = _ended(after)
-            return replace(ended, fouls=why, points=gained, messages=(text, *ended.messages))
-        after = replace(after, turn=state.other, on=_next(table))
+            return replace(ended, fouls=reasons, points=gained, messages=(text, *ended.messages))
+        after = replace(after, turn=state.other, on=_next_ball_on(table))
         missed = state.misses and not played.hit and not _needed(state) and not _needed(after)
         after = replace(
-            after, decisions=_answers(after, missed), before=replace(state, before=None) if missed else None
+            after, decisions=_replies(after, missed), before=replace(state, before=None) if missed else None
         )
         messages = (text, "foul and a miss: the shot may be replayed from the same position") if missed else (text,)
         colours_down = tuple(ball for ball in down if ball in VALUES)
-        return Ruling(after, why, gained, respot=respots(colours_down), messages=messages)
+        return Ruling(after, reasons, gained, respot=respots(colours_down), messages=messages)
 
     def _decide(self, state: SnookerState, decision: Decision) -> Ruling[SnookerState]:
         after = replace(state, before=None)
@@ -301,13 +301,13 @@ def balls_on(state: SnookerState) -> frozenset[str]:
     return frozenset(colours(state.table) if state.on == "colour" else (state.on,))
 
 
-def _next(table: tuple[str, ...]) -> On:
+def _next_ball_on(table: tuple[str, ...]) -> On:
     """Return the ball on at the start of a turn: red, else the lowest colour."""
-    left: tuple[On, ...] = ("yellow", "green", "brown", "blue", "pink", "black")
-    return "red" if reds(table) else next(ball for ball in left if ball in table)
+    order: tuple[On, ...] = ("yellow", "green", "brown", "blue", "pink", "black")
+    return "red" if reds(table) else next(ball for ball in order if ball in table)
 
 
-def _answers(state: SnookerState, missed: bool) -> tuple[Decision, ...]:
+def _replies(state: SnookerState, missed: bool) -> tuple[Decision, ...]:
     """Return the decisions of the other player after a foul."""
     if state.players == 1:
         return ()

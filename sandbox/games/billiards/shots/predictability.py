@@ -66,10 +66,12 @@ class ShotSeparation:
         """
         one, other = self._shots
         found = np.hypot(*np.moveaxis(one.at(times) - other.at(times), -1, 0))
-        fallen = np.flatnonzero(np.isfinite(self._until))
-        if len(fallen):
-            last = np.hypot(*np.moveaxis(one.at(self._until[fallen]) - other.at(self._until[fallen]), -1, 0))
-            for k, number in enumerate(fallen.tolist()):
+        fallen_balls = np.flatnonzero(np.isfinite(self._until))
+        if len(fallen_balls):
+            last = np.hypot(
+                *np.moveaxis(one.at(self._until[fallen_balls]) - other.at(self._until[fallen_balls]), -1, 0)
+            )
+            for k, number in enumerate(fallen_balls.tolist()):
                 found[times > self._until[number], number] = last[k, number]
         return np.asarray(found)
 

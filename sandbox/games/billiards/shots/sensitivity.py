@@ -199,15 +199,15 @@ class _Slopes:
 
 def _extrapolate(pairs: list[_ShotPair], number: int) -> tuple[FloatArray, float, float]:
     """Return the limit of the central differences of a ball, its estimated error, and the smallest step used."""
-    row = [(pair.above.position[number] - pair.below.position[number]) / (2.0 * pair.step) for pair in pairs]
-    best, least, step = row[-1], float("inf"), pairs[-1].step
+    estimates = [(pair.above.position[number] - pair.below.position[number]) / (2.0 * pair.step) for pair in pairs]
+    best, min_error, step = estimates[-1], float("inf"), pairs[-1].step
     order = 1.0
-    while len(row) > 1:
+    while len(estimates) > 1:
         order *= 4.0  # errors are of order h², h⁴, …
-        better = [(order * b - a) / (order - 1.0) for a, b in pairwise(row)]
-        for k, each in enumerate(better):
-            error = max(float(np.hypot(*(each - row[k]))), float(np.hypot(*(each - row[k + 1]))))
-            if error < least:
-                best, least, step = each, error, pairs[k + len(pairs) - len(better)].step
-        row = better
-    return best, least, step
+        improved = [(order * b - a) / (order - 1.0) for a, b in pairwise(estimates)]
+        for k, each in enumerate(improved):
+            error = max(float(np.hypot(*(each - estimates[k]))), float(np.hypot(*(each - estimates[k + 1]))))
+            if error < min_error:
+                best, min_error, step = each, error, pairs[k + len(pairs) - len(improved)].step
+        estimates = improved
+    return best, min_error, step

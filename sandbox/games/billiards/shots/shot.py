@@ -60,7 +60,7 @@ def perturb_stroke(stroke: Stroke, errors: FloatArray) -> Sequence[Stroke | None
     """
     made: list[Stroke | None] = []
     for aim, speed, side, height in errors.tolist():
-        one: Stroke = stroke.model_copy(
+        perturbed: Stroke = stroke.model_copy(
             update={
                 "aim": stroke.aim + aim,
                 "speed": stroke.speed * (1.0 + speed),
@@ -68,7 +68,7 @@ def perturb_stroke(stroke: Stroke, errors: FloatArray) -> Sequence[Stroke | None
                 "height": stroke.height + height,
             }
         )
-        made.append(None if miscues(one) or one.speed <= 0.0 else one)
+        made.append(None if miscues(perturbed) or perturbed.speed <= 0.0 else perturbed)
     return made
 
 

@@ -48,7 +48,7 @@ class ShotStudy:
         nominal = self.odds.nominal
         positions = zip(nominal.names, nominal.position.tolist(), strict=True)
         final = {name: FinalState((x, y), nominal.pocketed.get(name)) for name, (x, y) in positions}
-        found: dict[str, Any] = to_json(
+        results: dict[str, Any] = to_json(
             StudyDocument(
                 title=self.shot.table.scene.title,
                 shot=self.shot.document(),
@@ -59,7 +59,7 @@ class ShotStudy:
                 horizon=None if self.horizon is None else self.horizon.document(),
             )
         )
-        return found
+        return results
 
 
 @dataclass(frozen=True)
@@ -130,9 +130,9 @@ def study_shot(
         Exhaustion: a shot has too many events.
         NoSuchShotError: no ball or pocket has that name.
     """
-    found = odds(shot, spread=spread, count=count, seed=seed, threads=threads, on_progress=on_progress)
-    if found.interrupted:
-        return ShotStudy(shot, found, None, (), None, True)
+    results = odds(shot, spread=spread, count=count, seed=seed, threads=threads, on_progress=on_progress)
+    if results.interrupted:
+        return ShotStudy(shot, results, None, (), None, True)
     slope, aim_windows, until, interrupted = None, list[Windows](), None, False
     try:
         slope = sensitivity(shot) if slopes else None
@@ -141,7 +141,7 @@ def study_shot(
         until = horizon(shot, nudge=nudge, by=by, tolerance=tolerance, spread=spread) if foretold else None
     except KeyboardInterrupt:
         interrupted = True
-    return ShotStudy(shot, found, slope, tuple(aim_windows), until, interrupted)
+    return ShotStudy(shot, results, slope, tuple(aim_windows), until, interrupted)
 
 
 def pot_of(shot: ShotSetup, text: str) -> tuple[str, str]:

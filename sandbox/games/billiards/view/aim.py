@@ -24,15 +24,15 @@ from sandbox.window.render.palette import (
 )
 from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
 
-FADE = 3.0
+FADE_LENGTH = 3.0
 """m along a path over which its brightness halves"""
-FAINTEST = 0.16
+MIN_BRIGHTNESS = 0.16
 """least brightness of a path, as a fraction"""
-LENGTH = 1.47
-"""m: length of a cue for balls of radius `BALL`; it scales with the ball"""
-BALL = 0.028575
+CUE_LENGTH = 1.47
+"""m: length of a cue for balls of radius `REFERENCE_RADIUS`; it scales with the ball"""
+REFERENCE_RADIUS = 0.028575
 """m: ball radius for which the dimensions of the cue are given"""
-PARTS: tuple[tuple[float, float, float, RgbColour], ...] = (
+CUE_PARTS: tuple[tuple[float, float, float, RgbColour], ...] = (
     (0.000, 0.008, 0.0064, (64, 128, 190)),
     (0.008, 0.030, 0.0066, (238, 234, 222)),
     (0.030, 0.740, 0.0068, (214, 176, 120)),
@@ -42,7 +42,7 @@ PARTS: tuple[tuple[float, float, float, RgbColour], ...] = (
     (1.420, 1.470, 0.0146, (22, 20, 22)),
 )
 """Parts of the cue from tip to butt: start, end, half width at the start, m, and colour. Widths change linearly."""
-BUTT = 0.0148
+BUTT_HALF_WIDTH = 0.0148
 """m: half width at the butt"""
 
 
@@ -69,7 +69,7 @@ def _draw_path(view: DrawContext, points: FloatArray, colour: RgbColour, width: 
     """Draw a path that fades along its length."""
     pixels = view.camera.to_screen(points).tolist()
     steps = np.hypot(*np.diff(points, axis=0).T)
-    bright = np.maximum(0.5 ** (np.cumsum(steps) / FADE), FAINTEST).tolist()
+    bright = np.maximum(0.5 ** (np.cumsum(steps) / FADE_LENGTH), MIN_BRIGHTNESS).tolist()
     for (a, b), opacity in zip(pairwise(pixels), bright, strict=True):
         draw_line(view.surface, a, b, _faded(view, colour, opacity), width * view.ui_scale, view.antialias)
 
@@ -87,8 +87,8 @@ def _draw_ring(
     (x, y), size = view.camera.to_screen(at).tolist(), radius * view.camera.scale
     side = math.ceil(size) + 3
     within = pygame.Rect(math.floor(x) - side, math.floor(y) - side, 2 * side + 1, 2 * side + 1)
-    look = ShapeStyle(None, colour, line * view.ui_scale, opacity, antialias=view.antialias)
-    draw_sdf(view.surface, disc_distance(x, y, size), look, within)
+    style = ShapeStyle(None, colour, line * view.ui_scale, opacity, antialias=view.antialias)
+    draw_sdf(view.surface, disc_distance(x, y, size), style, within)
 
 
 def draw_aim(view: DrawContext, aim: CueAim) -> None:
@@ -118,29 +118,29 @@ def _draw_line_of_aim(view: DrawContext, aim: CueAim) -> None:
 
 def _draw_cue(view: DrawContext, aim: CueAim, radius: float) -> None:
     """Draw the cue behind the ball, and its shadow."""
-    size = radius / BALL
+    size = radius / REFERENCE_RADIUS
     x, y = aim.place
     cos, sin = math.cos(aim.angle), math.sin(aim.angle)
     # `side` is positive to the right as seen along the cue.
     start = x + sin * aim.side * radius, y - cos * aim.side * radius
-    off = math.sqrt(max(1.0 - aim.side**2, 0.0)) * radius + 0.006 * size + aim.back
+    tip_distance = math.sqrt(max(1.0 - aim.side**2, 0.0)) * radius + 0.006 * size + aim.back
 
     def at(along: float, across: float) -> tuple[float, float]:
-        back = off + along * size
+        back = tip_distance + along * size
         return start[0] - cos * back - sin * across * size, start[1] - sin * back + cos * across * size
 
-    def corners(first: float, last: float, wide: float, wider: float, shift: Pixel) -> list[Pixel]:
-        world = np.asarray([at(first, wide), at(last, wider), at(last, -wider), at(first, -wide)])
+    def corners(first: float, last: float, half_start: float, half_end: float, shift: Pixel) -> list[Pixel]:
+        world = np.asarray([at(first, half_start), at(last, half_end), at(last, -half_end), at(first, -half_start)])
         return [(px + shift[0], py + shift[1]) for px, py in view.camera.to_screen(world).tolist()]
 
-    far = 0.012 * size * view.camera.scale
-    shade = corners(0.0, LENGTH, PARTS[0][2], BUTT, (0.8 * far, far))
+    shadow_offset = 0.012 * size * view.camera.scale
+    shade = corners(0.0, CUE_LENGTH, CUE_PARTS[0][2], BUTT_HALF_WIDTH, (0.8 * shadow_offset, shadow_offset))
     _dim(view, shade)
-    ends = [*(part[2] for part in PARTS[1:]), BUTT]
+    ends = [*(part[2] for part in CUE_PARTS[1:]), BUTT_HALF_WIDTH]
     scale = view.camera.scale * size
-    for (first, last, wide, colour), wider in zip(PARTS, ends, strict=True):
+    for (first, last, half_start, colour), half_end in zip(CUE_PARTS, ends, strict=True):
         a, b = view.camera.to_screen(np.asarray([at(first, 0.0), at(last, 0.0)])).tolist()
-        thin, thick = (max(half * scale, 0.8 * view.ui_scale) for half in (wide, wider))
+        thin, thick = (max(half * scale, 0.8 * view.ui_scale) for half in (half_start, half_end))
         _taper(view, a, b, (thin, thick), colour)
         if thin > 2.0:
             _taper(view, a, b, (0.3 * thin, 0.3 * thick), mix_colours(colour, INK, 0.12))
@@ -162,18 +162,18 @@ def _taper(view: DrawContext, a: Pixel, b: Pixel, halves: tuple[float, float], c
 
     reach = math.ceil(max(halves)) + 2
     left, top = math.floor(min(a[0], b[0])) - reach, math.floor(min(a[1], b[1])) - reach
-    wide, high = abs(b[0] - a[0]) + 2 * reach + 1, abs(b[1] - a[1]) + 2 * reach + 1
-    within = pygame.Rect(left, top, math.ceil(wide), math.ceil(high))
+    width, height = abs(b[0] - a[0]) + 2 * reach + 1, abs(b[1] - a[1]) + 2 * reach + 1
+    within = pygame.Rect(left, top, math.ceil(width), math.ceil(height))
     draw_sdf(view.surface, distance, ShapeStyle(colour, colour, 0.0, antialias=view.antialias), within)
 
 
 def _dim(view: DrawContext, corners: list[Pixel]) -> None:
     """Darken a polygon."""
     xs, ys = [x for x, _ in corners], [y for _, y in corners]
-    seen = view.surface.get_rect()
+    window_rect = view.surface.get_rect()
     rect = pygame.Rect(math.floor(min(xs)), math.floor(min(ys)), 1, 1)
     rect.width, rect.height = math.ceil(max(xs)) - rect.left + 1, math.ceil(max(ys)) - rect.top + 1
-    rect = rect.clip(seen)
+    rect = rect.clip(window_rect)
     if not rect.width or not rect.height:
         return
     layer = pygame.Surface(rect.size, pygame.SRCALPHA)

@@ -26,15 +26,15 @@ TextureKind = Literal["plain", "solid", "stripe", "spots"]
 IVORY: RgbColour = hex_colour(WHITE)
 RED: RgbColour = (196, 44, 40)
 DARK: RgbColour = (24, 24, 28)
-STRIPE = 0.58
+STRIPE_HALF_WIDTH = 0.58
 """half width of a stripe, in ball radii"""
-DISC = 0.46
+DISC_RADIUS = 0.46
 """radius of the disc under a number, in ball radii"""
-SPOT = 0.17
+SPOT_RADIUS = 0.17
 """radius of a spot, in ball radii"""
-BRIGHT = 350
+BRIGHT_SUM = 350
 """sum of red, green and blue, 0 to 765, above which a ball has red spots; darker balls have ivory spots"""
-STRUCK = ("cue", "white", "yellow")
+CUE_BALL_NAMES = ("cue", "white", "yellow")
 """Names of cue balls; `yellow` is one only on a table with a `white`."""
 
 
@@ -65,34 +65,34 @@ def texture_of(name: str, colour: RgbColour, struck: bool) -> BallTexture:
     return BallTexture("stripe", full if colour == hex_colour(POOL.colours[name]) else colour, name)
 
 
-def paint_texture(coat: BallTexture, ball: FloatArray, radius: float) -> FloatArray:
+def paint_texture(texture: BallTexture, ball: FloatArray, radius: float) -> FloatArray:
     """Return the colours at points of the unit sphere, (P, 3), 0 to 255.
 
     Args:
-        coat: texture of the ball.
+        texture: texture of the ball.
         ball: (P, 3) points in the body frame.
         radius: radius of the drawn ball, px; edges are antialiased over a pixel.
     """
-    own, soft = np.asarray(coat.colour, np.float64), max(radius, 1.0)
-    if coat.kind == "plain":
+    own, soft = np.asarray(texture.colour, np.float64), max(radius, 1.0)
+    if texture.kind == "plain":
         return np.broadcast_to(own, ball.shape)
-    if coat.kind == "spots":
+    if texture.kind == "spots":
         off = 1.0 - np.abs(ball).max(axis=1)  # 1 − cos of the angle to the nearest axis; the chord is √(2·off)
-        coverage = np.clip((SPOT - np.sqrt(2.0 * off)) * soft + 0.5, 0.0, 1.0)
-        spot = RED if sum(coat.colour) > BRIGHT else IVORY
+        coverage = np.clip((SPOT_RADIUS - np.sqrt(2.0 * off)) * soft + 0.5, 0.0, 1.0)
+        spot = RED if sum(texture.colour) > BRIGHT_SUM else IVORY
         return np.asarray(own + (np.asarray(spot) - own) * coverage[:, None])
     colours = np.broadcast_to(own, ball.shape)
-    if coat.kind == "stripe":
-        white = np.clip((np.abs(ball[:, 1]) - STRIPE) * soft + 0.5, 0.0, 1.0)
+    if texture.kind == "stripe":
+        white = np.clip((np.abs(ball[:, 1]) - STRIPE_HALF_WIDTH) * soft + 0.5, 0.0, 1.0)
         colours = own + (np.asarray(IVORY) - own) * white[:, None]
     x, y = ball[:, 0] * np.where(ball[:, 2] < 0.0, -1.0, 1.0), ball[:, 1]
-    disc = np.clip((DISC - np.hypot(x, y)) * soft + 0.5, 0.0, 1.0)
+    disc = np.clip((DISC_RADIUS - np.hypot(x, y)) * soft + 0.5, 0.0, 1.0)
     colours = colours + (np.asarray(IVORY) - colours) * disc[:, None]
-    side = int(min(max(round(2.0 * DISC * soft), 5), 64))
-    figure = _figure(coat.label, side)
-    column = np.clip(((x / DISC + 1.0) * 0.5 * side).astype(np.intp), 0, side - 1)
-    row = np.clip(((1.0 - y / DISC) * 0.5 * side).astype(np.intp), 0, side - 1)
-    ink = figure[column, row] * (np.hypot(x, y) < DISC)
+    side = int(min(max(round(2.0 * DISC_RADIUS * soft), 5), 64))
+    figure = _figure(texture.label, side)
+    column = np.clip(((x / DISC_RADIUS + 1.0) * 0.5 * side).astype(np.intp), 0, side - 1)
+    row = np.clip(((1.0 - y / DISC_RADIUS) * 0.5 * side).astype(np.intp), 0, side - 1)
+    ink = figure[column, row] * (np.hypot(x, y) < DISC_RADIUS)
     return colours + (np.asarray(DARK) - colours) * ink[:, None]
 
 
@@ -168,15 +168,15 @@ def _orthonormalised(matrices: FloatArray) -> FloatArray:
     return np.stack((x, np.cross(z, x), z), 2)
 
 
-FINEST, LARGEST = 48.0, 160.0
+MAX_MOVING_RADIUS, MAX_RESTING_RADIUS = 48.0, 160.0
 """px: largest radius at which sprites of moving and of resting balls are shaded; larger balls are scaled up"""
 OFFSETS = 4
 """subpixel positions of a sprite along each axis, so that slow balls move smoothly"""
-DROP = 0.18
+SINK_TIME = 0.18
 """s: duration of the animation of a pocketed ball"""
-LIGHT = (-0.42, 0.50, 0.757)
+LIGHT_DIRECTION = (-0.42, 0.50, 0.757)
 """unit vector towards the light, x to the right and y up as seen"""
-SHADOW = 150
+SHADOW_ALPHA = 150
 """greatest opacity of a shadow, of 255"""
 
 
@@ -212,15 +212,15 @@ class BallRenderer:
         self._update_bodies(view)
         self._rolling.advance(frame)
         sinking = self._sinking(view)
-        seen = [k for k, number in enumerate(view.shown.tolist()) if sinking.get(number, 0.0) < 1.0]
-        places = [(k, int(view.shown[k]), *view.centre[k].tolist(), float(view.radius[k])) for k in seen]
-        for _, number, x, y, radius in places:
+        visible = [k for k, number in enumerate(view.shown.tolist()) if sinking.get(number, 0.0) < 1.0]
+        discs = [(k, int(view.shown[k]), *view.centre[k].tolist(), float(view.radius[k])) for k in visible]
+        for _, number, x, y, radius in discs:
             if number not in sinking and radius >= 2.0:
                 shadow = _shadow(round(radius * 2.0))
                 half = shadow.get_width() / 2.0
                 view.surface.blit(shadow, (round(x + 0.20 * radius - half), round(y + 0.26 * radius - half)))
         moving = (frame.velocity != 0.0).any(axis=1) | (frame.angular_velocity != 0.0)
-        for _, number, x, y, radius in places:
+        for _, number, x, y, radius in discs:
             depth = sinking.get(number, 0.0)
             size = radius * (1.0 - 0.35 * depth)
             if not bodies.round[number]:
@@ -235,7 +235,7 @@ class BallRenderer:
             self._rolling, self._fall_times = BallOrientations(), {}
         self._bodies = bodies
         self._sprites.clear()
-        struck = {name for name in STRUCK if name != "yellow" or "white" in bodies.names}
+        struck = {name for name in CUE_BALL_NAMES if name != "yellow" or "white" in bodies.names}
         if view.snapshot.scene.play.game is None:  # no game, a study of spin: spots on all balls
             struck = set(bodies.names)
         colours = dict(zip(view.shown.tolist(), view.colours.tolist(), strict=True))
@@ -255,7 +255,7 @@ class BallRenderer:
             for number in np.flatnonzero(within).tolist():
                 # A ball that was pocketed before the first drawn frame, or during a jump in time, is not animated.
                 since = self._fall_times.setdefault(number, frame.time if self._rolling.is_continuous else -math.inf)
-                found[number] = min((frame.time - since) / DROP, 1.0)
+                found[number] = min((frame.time - since) / SINK_TIME, 1.0)
         for number in [each for each in self._fall_times if each not in found or self._fall_times[each] > frame.time]:
             del self._fall_times[number]
         return found
@@ -263,36 +263,36 @@ class BallRenderer:
     def _ball(
         self, view: DrawContext, number: int, centre: tuple[float, float], radius: float, moving: bool, bright: float
     ) -> None:
-        finest = FINEST if moving else LARGEST
+        finest = MAX_MOVING_RADIUS if moving else MAX_RESTING_RADIUS
         size = max(round(min(radius, finest) * 8.0), 4)
-        larger = radius / finest if radius > finest else 1.0
-        place = [math.floor(each * OFFSETS + 0.5) for each in centre]
-        offset = (place[0] % OFFSETS, place[1] % OFFSETS) if larger == 1.0 else (0, 0)
-        key = (size, larger, offset, int(self._rolling.version[number]), view.camera.turned, bright)
-        known = self._sprites.get(number)
-        if known is None or known[0] != key:
-            turned = self._rolling.turned[number]
-            sprite = _sprite(self._textures[number], turned, size, offset, view.camera, bright)
-            if larger != 1.0:
-                side = round(sprite.get_width() * larger)
+        scale = radius / finest if radius > finest else 1.0
+        subpixel = [math.floor(each * OFFSETS + 0.5) for each in centre]
+        offset = (subpixel[0] % OFFSETS, subpixel[1] % OFFSETS) if scale == 1.0 else (0, 0)
+        key = (size, scale, offset, int(self._rolling.version[number]), view.camera.turned, bright)
+        cached = self._sprites.get(number)
+        if cached is None or cached[0] != key:
+            rotation = self._rolling.turned[number]
+            sprite = _sprite(self._textures[number], rotation, size, offset, view.camera, bright)
+            if scale != 1.0:
+                side = round(sprite.get_width() * scale)
                 sprite = pygame.transform.smoothscale(sprite, (side, side))
-            self._sprites[number] = known = (key, sprite)
+            self._sprites[number] = cached = (key, sprite)
         half = math.ceil(size / 8.0) + 1
-        if larger != 1.0:
-            corner = centre[0] - half * larger, centre[1] - half * larger
+        if scale != 1.0:
+            corner = centre[0] - half * scale, centre[1] - half * scale
         else:
-            corner = place[0] // OFFSETS - half, place[1] // OFFSETS - half
-        view.surface.blit(known[1], (round(corner[0]), round(corner[1])))
+            corner = subpixel[0] // OFFSETS - half, subpixel[1] // OFFSETS - half
+        view.surface.blit(cached[1], (round(corner[0]), round(corner[1])))
 
 
 def _sprite(
-    coat: BallTexture, turned: FloatArray, size: int, offset: tuple[int, int], camera: Camera, bright: float
+    texture: BallTexture, rotation: FloatArray, size: int, offset: tuple[int, int], camera: Camera, bright: float
 ) -> pygame.Surface:
     globe = _globe(size, offset)
     normal = globe.normal
     if camera.turned:  # +y is to the right, −x is up
         normal = np.stack((-normal[:, 1], normal[:, 0], normal[:, 2]), 1)
-    colours = paint_texture(coat, normal @ turned, size / 8.0)
+    colours = paint_texture(texture, normal @ rotation, size / 8.0)
     lit = np.clip((colours * globe.shade + globe.shine) * bright, 0.0, 255.0)
     parts = np.rint(lit).astype(np.uint32)
     pixels = np.zeros((globe.side, globe.side), np.uint32)
@@ -315,16 +315,16 @@ def _globe(size: int, offset: tuple[int, int]) -> ShadedBall:
     along = np.arange(side) + 0.5
     x = (along[:, None] - half - offset[0] / OFFSETS) / radius
     y = -(along[None, :] - half - offset[1] / OFFSETS) / radius
-    away = np.hypot(x, y)
-    cover = np.clip((1.0 - away) * radius + 0.5, 0.0, 1.0)
+    distance = np.hypot(x, y)
+    cover = np.clip((1.0 - distance) * radius + 0.5, 0.0, 1.0)
     inside = cover > 0.0
-    shrunk = np.minimum(1.0, 0.999 / np.maximum(away, 1e-9))
-    x, y = (np.broadcast_to(each, away.shape)[inside] * shrunk[inside] for each in (x, y))
+    shrink = np.minimum(1.0, 0.999 / np.maximum(distance, 1e-9))
+    x, y = (np.broadcast_to(each, distance.shape)[inside] * shrink[inside] for each in (x, y))
     z = np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))
     normal = np.stack((x, y, z), 1)
-    toward = normal @ np.asarray(LIGHT)
+    toward = normal @ np.asarray(LIGHT_DIRECTION)
     shade = 0.50 + 0.52 * np.clip(0.25 + 0.75 * toward, 0.0, 1.0) - 0.16 * (1.0 - z) ** 2
-    half_way = np.asarray(LIGHT) + np.asarray((0.0, 0.0, 1.0))
+    half_way = np.asarray(LIGHT_DIRECTION) + np.asarray((0.0, 0.0, 1.0))
     mirror = np.clip(normal @ (half_way / np.linalg.norm(half_way)), 0.0, 1.0)
     shine = 150.0 * mirror**70 + 26.0 * mirror**8
     return ShadedBall(side, inside, normal, cover[inside], shade[:, None], shine[:, None])
@@ -335,9 +335,9 @@ def _shadow(diameter: int) -> pygame.Surface:
     radius = diameter / 2.0
     half = math.ceil(radius * 1.35) + 1
     along = np.arange(2 * half) + 0.5 - half
-    away = np.hypot(along[:, None], along[None, :]) / radius
-    depth = np.clip((1.3 - away) / 0.6, 0.0, 1.0)
-    dark = np.rint(SHADOW * depth * depth * (3.0 - 2.0 * depth)).astype(np.uint32)
+    distance = np.hypot(along[:, None], along[None, :]) / radius
+    depth = np.clip((1.3 - distance) / 0.6, 0.0, 1.0)
+    dark = np.rint(SHADOW_ALPHA * depth * depth * (3.0 - 2.0 * depth)).astype(np.uint32)
     return sdf_surface(np.asarray(dark << 24, np.uint32), encoded=False)
 
 

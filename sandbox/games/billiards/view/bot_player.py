@@ -11,7 +11,7 @@ from sandbox.games.billiards.rules.base import Decision
 from sandbox.games.billiards.view.prediction import CueState
 from sandbox.scene.description.surface import Stroke
 
-TURNING, DRAWING = 0.9, 0.45
+AIM_TIME, DRAW_TIME = 0.9, 0.45
 """s, duration of the aiming and of the draw-back animation"""
 DRAW_BACK = 0.02
 """m of draw-back per m/s of cue speed"""
@@ -35,7 +35,7 @@ class BotPlayer:
         self._future: Future[BotTurn] | None = None
         self._match: Match | None = None
         self._since = -1.0
-        self._from: tuple[float, float, float] = (0.0, 0.0, 0.0)
+        self._start: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def search(self, match: Match) -> BotTurn | None:
         """Return the result of the search for a match; None while it runs. The first call starts it."""
@@ -50,26 +50,26 @@ class BotPlayer:
         decision: Decision | None = None
         if match.choices.decisions and match.rules.name != "free":
             decision = self._bot.decide(match)
-            after = match.decide(decision)
-            if after.over or after.turn != match.turn:
+            outcome = match.decide(decision)
+            if outcome.over or outcome.turn != match.turn:
                 return BotTurn(decision, None)
-            match = after
+            match = outcome
         return BotTurn(decision, self._bot.plan(match))
 
     def animate(self, cue: CueState, stroke: Stroke, elapsed: float) -> bool:
         """Move the cue towards a stroke by some real time, s; return whether the animation is complete."""
         if self._since < 0.0:
-            self._since, self._from = 0.0, (cue.aim, cue.side, cue.height)
+            self._since, self._start = 0.0, (cue.aim, cue.side, cue.height)
         self._since += elapsed
-        progress = min(self._since / TURNING, 1.0)
+        progress = min(self._since / AIM_TIME, 1.0)
         progress = progress * progress * (3.0 - 2.0 * progress)
-        aim, side, height = self._from
+        aim, side, height = self._start
         cue.aim = aim + math.remainder(stroke.aim - aim, math.tau) * progress
         cue.tip_at(side + (stroke.side - side) * progress, height + (stroke.height - height) * progress)
         cue.speed = stroke.speed
-        drawn = min(max(self._since - TURNING, 0.0) / DRAWING, 1.0)
+        drawn = min(max(self._since - AIM_TIME, 0.0) / DRAW_TIME, 1.0)
         cue.back = DRAW_BACK * stroke.speed * drawn
-        return self._since > TURNING + 1.15 * DRAWING
+        return self._since > AIM_TIME + 1.15 * DRAW_TIME
 
     def reset(self) -> None:
         """Discard the result of the search, and the animation."""

@@ -30,13 +30,13 @@ FINE = 0.08
 """factor of mouse movements with Shift"""
 ROOM = 0.5
 """m, greatest draw-back of the cue"""
-DRAWN = 0.015
+MIN_DRAW_BACK = 0.015
 """m, least draw-back for a stroke"""
-RECENT = 0.07
+SPEED_WINDOW = 0.07
 """s over which the speed of a stroke is measured"""
 DIAL = 90.0
 """px at unit 1 of mouse movement from the centre of the ball to its edge, and for half of the power"""
-NEAR = 1.5
+MIN_AIM_DISTANCE = 1.5
 """distance of the pointer from the cue ball, in radii, below which it does not aim"""
 
 
@@ -89,7 +89,7 @@ class CueControls:
 
     def _aim(self, before: Point, now: Point, fine: bool) -> None:
         player, cue, (x, y) = self.player, self.player.cue, self.player.place
-        if math.dist((x, y), now) < NEAR * player.match.layout.radius[player.ball]:
+        if math.dist((x, y), now) < MIN_AIM_DISTANCE * player.match.layout.radius[player.ball]:
             return
         angle = math.atan2(now[1] - y, now[0] - x)
         if self._offset is None or self._strokes != player.strokes:
@@ -99,30 +99,30 @@ class CueControls:
             self._offset = math.remainder(cue.aim + FINE * turned - angle, math.tau)
         cue.aim = angle + self._offset
 
-    def turn(self, by: float) -> None:
+    def turn(self, change: float) -> None:
         """Turn the cue by an angle, rad."""
         if self.player.is_own_turn:
-            self.player.cue.aim += by
-            self._offset = (self._offset or 0.0) + by
+            self.player.cue.aim += change
+            self._offset = (self._offset or 0.0) + change
 
-    def change_power(self, by: float) -> None:
+    def change_power(self, change: float) -> None:
         """Change the power by a fraction of the greatest."""
         if self.player.is_own_turn:
-            self.player.cue.power += by
+            self.player.cue.power += change
 
     def _push(self, forward: float, time: float) -> None:
         """Move the cue along its direction, m; reaching the ball after a draw-back is a stroke."""
         self._drawn = min(self._drawn - forward, ROOM)
         self._deepest = max(self._deepest, self._drawn)
         self._recent.append((time, forward))
-        while self._recent and self._recent[0][0] < time - RECENT:
+        while self._recent and self._recent[0][0] < time - SPEED_WINDOW:
             self._recent.popleft()
         cue = self.player.cue
         cue.back = max(self._drawn, 0.0)
         if self.mode == "draw":
             cue.power = min(cue.back / ROOM, 1.0)
-        elif self._drawn <= 0.0 and self._deepest >= DRAWN:
-            speed = sum(each for _, each in self._recent) / RECENT
+        elif self._drawn <= 0.0 and self._deepest >= MIN_DRAW_BACK:
+            speed = sum(each for _, each in self._recent) / SPEED_WINDOW
             self.end()
             self.player.shoot(min(max(speed, MIN_CUE_SPEED), MAX_CUE_SPEED))
         self._drawn = max(self._drawn, 0.0)
@@ -166,7 +166,7 @@ class CueControls:
         elif self.mode == "draw":
             drawn = player.cue.back
             self.end()
-            if drawn >= DRAWN:
+            if drawn >= MIN_DRAW_BACK:
                 player.shoot()
             elif not moved:
                 self._call_pocket(at)
@@ -190,7 +190,7 @@ class CueControls:
             self.player.call_shot(replace(call, ball=None if name == call.ball else name))
 
 
-TURN, FINER = 0.002, 0.0001
+TURN_STEP, FINE_TURN_STEP = 0.002, 0.0001
 """rad by which an arrow key turns the cue, without and with Shift"""
 POWER_STEP = 0.02
 """fraction of the greatest power by which an arrow key changes it"""
@@ -239,7 +239,7 @@ def cue_bindings(cue: CueControls) -> ControlBindings:
 
 
 def _angle_step() -> float:
-    return FINER if pygame.key.get_mods() & pygame.KMOD_SHIFT else TURN
+    return FINE_TURN_STEP if pygame.key.get_mods() & pygame.KMOD_SHIFT else TURN_STEP
 
 
 class BilliardsControls:

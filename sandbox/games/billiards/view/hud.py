@@ -58,7 +58,7 @@ class ScoreboardLayout(NamedTuple):
 
 
 def layout_scoreboard(
-    player: BilliardsPlayer, free: pygame.Rect, left: int, unit: float, aside: int = 0
+    player: BilliardsPlayer, free: pygame.Rect, left: int, unit: float, occupied: int = 0
 ) -> ScoreboardLayout:
     """Return the layout of the scoreboard: at the top of the free area, or at the bottom if the top is too narrow.
 
@@ -67,27 +67,27 @@ def layout_scoreboard(
         free: free area, px.
         left: right edge of the status plate at the upper left, px.
         unit: UI scale, 1 on a display of 1080 lines.
-        aside: occupied width at the bottom right, px.
+        occupied: occupied width at the bottom right, px.
     """
     size, pad, margin = 13.0 * unit, round(9 * unit), round(10 * unit)
     right = free.right - round(RIGHT * unit)
-    above = right - left >= MIN_SCOREBOARD_WIDTH * unit
-    if not above:
-        left, right = free.left + margin, free.right - max(margin, aside)
+    at_top = right - left >= MIN_SCOREBOARD_WIDTH * unit
+    if not at_top:
+        left, right = free.left + margin, free.right - max(margin, occupied)
     width = min(right - left, round(MAX_SCOREBOARD_WIDTH * unit))
     lines = wrap_text(status_line(player), size, width - 2 * pad - 1.3 * size, 2)
     rows = 1 + len(lines) + bool(_pocketed(player.match)) + bool(_offered(player))
     rect = pygame.Rect((left + right - width) // 2, free.top + margin, width, rows * round(1.5 * size) + 2 * pad)
-    if not above:
+    if not at_top:
         rect.bottomleft = left, free.bottom - margin
     return ScoreboardLayout(rect, lines)
 
 
 def draw_scoreboard(
-    surface: pygame.Surface, player: BilliardsPlayer, free: pygame.Rect, left: int, unit: float, aside: int = 0
+    surface: pygame.Surface, player: BilliardsPlayer, free: pygame.Rect, left: int, unit: float, occupied: int = 0
 ) -> ScoreboardText:
     """Draw the scoreboard; the arguments are those of `layout_scoreboard`."""
-    rect, lines = layout_scoreboard(player, free, left, unit, aside)
+    rect, lines = layout_scoreboard(player, free, left, unit, occupied)
     size, pad, match = 13.0 * unit, round(9 * unit), player.match
     line, choices, down = round(1.5 * size), _offered(player), _pocketed(match)
     draw_box(surface, rect, 8 * unit)
@@ -175,16 +175,16 @@ def _pocketed(match: Match) -> tuple[str, ...]:
     """Return the pocketed balls, in the order of the bodies."""
     if not match.layout.pockets:
         return ()
-    here = {*match.state.table, match.cue}
-    return tuple(name for name in match.layout.names if name not in here)
+    on_table = {*match.state.table, match.cue}
+    return tuple(name for name in match.layout.names if name not in on_table)
 
 
 def _draw_ball_row(
     surface: pygame.Surface, match: Match, down: tuple[str, ...], rect: pygame.Rect, y: float, size: float
 ) -> None:
-    room = int((rect.width - 1.4 * size) / (1.35 * size))
+    max_balls = int((rect.width - 1.4 * size) / (1.35 * size))
     colours = {ball.name: ball.colour for ball in match.scene.balls}
-    for k, name in enumerate(down[-room:]):
+    for k, name in enumerate(down[-max_balls:]):
         colour = hex_colour(colours.get(name) or "#808080")
         at = rect.left + 1.3 * size + k * 1.35 * size, y
         sprite = _ball_icon(texture_of(name, colour, struck=False), round(1.16 * size))
@@ -194,23 +194,23 @@ def _draw_ball_row(
 @lru_cache(maxsize=128)
 def _ball_icon(coat: BallTexture, side: int) -> pygame.Surface:
     """Return a small flat icon of a ball, `side` px wide."""
-    over = 4
-    large = pygame.Surface((side * over, side * over), pygame.SRCALPHA)
-    middle, radius = (side * over // 2, side * over // 2), side * over // 2 - over // 2
+    oversampling = 4
+    large = pygame.Surface((side * oversampling, side * oversampling), pygame.SRCALPHA)
+    middle, radius = (side * oversampling // 2, side * oversampling // 2), side * oversampling // 2 - oversampling // 2
     pygame.draw.circle(large, IVORY if coat.kind == "stripe" else coat.colour, middle, radius)
     if coat.kind == "stripe":
         band = pygame.Surface(large.get_size(), pygame.SRCALPHA)
         pygame.draw.circle(band, coat.colour, middle, radius)
         high = round(0.44 * radius)
-        band.fill((0, 0, 0, 0), (0, 0, side * over, middle[1] - high - over))
-        band.fill((0, 0, 0, 0), (0, middle[1] + high + over, side * over, side * over))
+        band.fill((0, 0, 0, 0), (0, 0, side * oversampling, middle[1] - high - oversampling))
+        band.fill((0, 0, 0, 0), (0, middle[1] + high + oversampling, side * oversampling, side * oversampling))
         large.blit(band, (0, 0))
     if coat.label:
         pygame.draw.circle(large, IVORY, middle, round(0.58 * radius))
         draw_text(
             large,
             coat.label,
-            (middle[0], middle[1] + over / 2),
+            (middle[0], middle[1] + oversampling / 2),
             (0.8 if len(coat.label) == 1 else 0.62) * radius,
             (20, 20, 24),
             "center",
@@ -253,9 +253,9 @@ def _draw_choices(
     return tuple(found)
 
 
-TIP = 0.22
+TIP_RADIUS = 0.22
 """radius of the tip's mark, in ball radii"""
-MARKS = 5
+POWER_MARKS = 5
 """number of intervals on the scale of the power bar"""
 
 
@@ -273,7 +273,7 @@ def draw_tip(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, unit: fl
             points = [(x + MISCUE * radius * math.cos(t), y + MISCUE * radius * math.sin(t)) for t in turns]
             pygame.draw.aalines(surface, mix_colours(IVORY, VERMILION, 0.75), False, points)
     at = x + cue.side * radius, y - cue.height * radius
-    _disc(surface, at, TIP * radius, ShapeStyle(SKY, mix_colours(SKY, PANEL, 0.6), 1.5 * unit, opacity=0.95))
+    _disc(surface, at, TIP_RADIUS * radius, ShapeStyle(SKY, mix_colours(SKY, PANEL, 0.6), 1.5 * unit, opacity=0.95))
     if cue.side or cue.height:
         text = f"{format_signed(cue.side, 2)}  {format_signed(cue.height, 2)}"
         draw_text(surface, text, (rect.left - 5 * unit, rect.top - 8 * unit), 11 * unit, FAINT, "bottomleft", mono=True)
@@ -287,22 +287,22 @@ def tip_box(rect: pygame.Rect, unit: float) -> pygame.Rect:
 def draw_power(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, unit: float) -> None:
     """Draw the power as a bar, with the speed of the cue above it."""
     draw_box(surface, tip_box(rect, unit), 10 * unit, opacity=170)
-    round_off = round(0.3 * rect.width)
-    pygame.draw.rect(surface, LINE, rect, border_radius=round_off)
+    rounding = round(0.3 * rect.width)
+    pygame.draw.rect(surface, LINE, rect, border_radius=rounding)
     high = max(round(rect.height * cue.power), 2)
     full = pygame.Rect(rect.left, rect.bottom - high, rect.width, high)
-    pygame.draw.rect(surface, mix_colours(SKY, ORANGE, cue.power), full, border_radius=min(round_off, high // 2))
-    for k in range(1, MARKS):
-        level = rect.bottom - rect.height * k / MARKS
+    pygame.draw.rect(surface, mix_colours(SKY, ORANGE, cue.power), full, border_radius=min(rounding, high // 2))
+    for k in range(1, POWER_MARKS):
+        level = rect.bottom - rect.height * k / POWER_MARKS
         pygame.draw.line(surface, PANEL, (rect.left, level), (rect.left + rect.width // 3, level))
     shown = f"{cue.power * MAX_CUE_SPEED:.1f} m/s"
     draw_text(surface, shown, (rect.right + 5 * unit, rect.top - 8 * unit), 11 * unit, INK, "bottomright", mono=True)
 
 
-def _disc(surface: pygame.Surface, at: tuple[float, float], radius: float, look: ShapeStyle) -> None:
+def _disc(surface: pygame.Surface, at: tuple[float, float], radius: float, style: ShapeStyle) -> None:
     side = math.ceil(radius) + 2
     within = pygame.Rect(math.floor(at[0]) - side, math.floor(at[1]) - side, 2 * side + 1, 2 * side + 1)
-    draw_sdf(surface, disc_distance(*at, radius), look, within)
+    draw_sdf(surface, disc_distance(*at, radius), style, within)
 
 
 SIDE, GAP = 92.0, 14.0
@@ -330,7 +330,7 @@ class BilliardsHud:
         if free.width < MIN_HUD[0] * unit or free.height < MIN_HUD[1] * unit:
             return
         scale = _scale(free, unit)
-        board = draw_scoreboard(surface, player, free, left, scale, _aside(scale))
+        board = draw_scoreboard(surface, player, free, left, scale, _dials_width(scale))
         self._choices, self._board = board.choices, board.rect
         if not player.can_shoot:
             return
@@ -343,7 +343,7 @@ class BilliardsHud:
         if free.width < MIN_HUD[0] * unit or free.height < MIN_HUD[1] * unit:
             return []
         scale = _scale(free, unit)
-        board = layout_scoreboard(self._player, free, left, scale, _aside(scale)).rect
+        board = layout_scoreboard(self._player, free, left, scale, _dials_width(scale)).rect
         return [board, *(tip_box(dial, scale) for dial in _dials(free, scale))]
 
     def plates(self, free: pygame.Rect, unit: float) -> dict[str, pygame.Rect]:
@@ -395,6 +395,6 @@ def _dials(free: pygame.Rect, scale: float) -> tuple[pygame.Rect, pygame.Rect]:
     return pygame.Rect(power.left - gap - side, power.top, side, side), power
 
 
-def _aside(scale: float) -> int:
+def _dials_width(scale: float) -> int:
     """Return the width of the dials at the right, px."""
     return round(SIDE * scale) + round(POWER_BAR * scale) + 3 * round(GAP * scale)

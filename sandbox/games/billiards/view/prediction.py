@@ -130,9 +130,9 @@ class ShotPredictor:
                 break
         if hit is not None:
             x, y = event.point
-            own, its = (float(self._scene.bodies.radius[each]) for each in (ball, hit))
+            own_radius, other_radius = (float(self._scene.bodies.radius[each]) for each in (ball, hit))
             bx, by = position[hit]  # it has not moved yet
-            ratio = own / its  # in which the contact point divides the line of centres
+            ratio = own_radius / other_radius  # in which the contact point divides the line of centres
             ghost = x + (x - bx) * ratio, y + (y - by) * ratio
         return ShotPrediction(
             outcome.way(name, SPACING),

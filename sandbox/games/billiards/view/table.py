@@ -26,7 +26,7 @@ DEPTH = 0.036
 """width of a cushion from the nose to the wood, as a fraction of the table width"""
 TOUCH = 1e-6
 """m: objects whose distance is smaller touch"""
-ARC = math.radians(6.0)
+ARC_STEP = math.radians(6.0)
 """rad between consecutive points of a jaw"""
 
 
@@ -44,17 +44,17 @@ class CushionOutline(NamedTuple):
 def cushion_outlines(scene: Scene, area: ViewBox) -> tuple[CushionOutline, ...]:
     """Return the cushions among the walls of a scene."""
     depth = DEPTH * shorter_side(area)
-    noses = {k: out for k, wall in enumerate(scene.walls) if (out := _out(wall, area)) is not None}
+    noses = {k: out for k, wall in enumerate(scene.walls) if (out := _outward(wall, area)) is not None}
     facings = [wall for k, wall in enumerate(scene.walls) if k not in noses and len(wall.points) == 2]
     return tuple(_cushion(scene.walls[k], out, scene, facings, depth) for k, out in noses.items())
 
 
 def other_walls(scene: Scene, area: ViewBox) -> tuple[tuple[Wall, ...], tuple[Post, ...]]:
     """Return the walls and posts that are not part of a cushion."""
-    noses = [(wall, out) for wall in scene.walls if (out := _out(wall, area)) is not None]
+    noses = [(wall, out) for wall in scene.walls if (out := _outward(wall, area)) is not None]
     jaws = [jaw for wall, out in noses for end in wall.points if (jaw := _jaw(end, out, scene)) is not None]
     known = [wall for wall, _ in noses] + [
-        wall for wall in scene.walls if len(wall.points) == 2 and any(_from_jaw(wall, jaw) for jaw in jaws)
+        wall for wall in scene.walls if len(wall.points) == 2 and any(_facing_ends(wall, jaw) for jaw in jaws)
     ]
     walls = tuple(wall for wall in scene.walls if not any(wall is each for each in known))
     return walls, tuple(post for post in scene.posts if not any(post is each for each in jaws))
@@ -65,7 +65,7 @@ def _jaw(end: Point, out: Vector, scene: Scene) -> Post | None:
     return next((post for post in scene.posts if math.dist(post.position, _moved(end, out, post.radius)) < TOUCH), None)
 
 
-def _out(wall: Wall, area: ViewBox) -> Vector | None:
+def _outward(wall: Wall, area: ViewBox) -> Vector | None:
     """Return the outward unit vector of a wall along an edge of the area; None for other walls."""
     if len(wall.points) != 2 or wall.closed:
         return None
@@ -103,14 +103,14 @@ def _end(end: Point, along: Vector, out: Vector, scene: Scene, facings: list[Wal
     jaw = _jaw(end, out, scene)
     if jaw is None:
         return (end,)
-    facing = next((ends for wall in facings if (ends := _from_jaw(wall, jaw)) is not None), None)
+    facing = next((ends for wall in facings if (ends := _facing_ends(wall, jaw)) is not None), None)
     if facing is not None:
         x, y = facing[0][0] - jaw.position[0], facing[0][1] - jaw.position[1]
         turn = math.atan2(x * along[0] + y * along[1], -(x * out[0] + y * out[1]))
     else:
         turn = math.acos(max(1.0 - depth / jaw.radius, 0.0))
     points = [end]
-    count = max(math.ceil(turn / ARC), 1)
+    count = max(math.ceil(turn / ARC_STEP), 1)
     for k in range(1, count + 1):
         cos, sin = math.cos(turn * k / count), math.sin(turn * k / count)
         here = _moved(_moved(jaw.position, out, -jaw.radius * cos), along, jaw.radius * sin)
@@ -120,13 +120,13 @@ def _end(end: Point, along: Vector, out: Vector, scene: Scene, facings: list[Wal
     return (*points, facing[1]) if facing is not None else tuple(points)
 
 
-def _from_jaw(wall: Wall, jaw: Post) -> tuple[Point, Point] | None:
+def _facing_ends(wall: Wall, jaw: Post) -> tuple[Point, Point] | None:
     """Return the ends of a wall that leaves a jaw tangentially, the end on the jaw first; None for other walls."""
-    for near, far in (wall.points, wall.points[::-1]):
-        x, y = near[0] - jaw.position[0], near[1] - jaw.position[1]
-        leaves = abs(x * (far[0] - near[0]) + y * (far[1] - near[1])) < TOUCH
+    for first_end, far in (wall.points, wall.points[::-1]):
+        x, y = first_end[0] - jaw.position[0], first_end[1] - jaw.position[1]
+        leaves = abs(x * (far[0] - first_end[0]) + y * (far[1] - first_end[1])) < TOUCH
         if leaves and abs(math.hypot(x, y) - jaw.radius) < TOUCH:
-            return near, far
+            return first_end, far
     return None
 
 
@@ -141,7 +141,7 @@ IRON: RgbColour = (26, 24, 26)
 HOLE: RgbColour = (8, 8, 10)
 PEARL: RgbColour = (206, 200, 184)
 CHALK: RgbColour = (226, 236, 232)
-LIT, UNLIT = 1.12, 0.80
+CENTRE_BRIGHTNESS, CORNER_BRIGHTNESS = 1.12, 0.80
 """brightness of the cloth in the middle and at the corners, as a factor"""
 
 
@@ -180,16 +180,16 @@ def draw_table(
     felt = felt_of(scene)
     pen = _TablePen(surface, camera, unit, antialias)
     rubber, width = cushion_outlines(scene, area), shorter_side(area)
-    _wood(pen, area, width)
+    _draw_rails(pen, area, width)
     for hole in scene.pockets:
         pen.disc(hole.position, hole.radius + 0.016 * width, IRON, rim=mix_colours(IRON, PEARL, 0.25), line=1.0)
     pen.box(area, felt.bed)
     for hole in scene.pockets:
-        _throat(pen, hole.position, hole.radius, rubber, area, felt.bed)
-    _light(surface, camera, area)
-    _marks(pen, scene, area, felt)
+        _draw_pocket_mouth(pen, hole.position, hole.radius, rubber, area, felt.bed)
+    _draw_light(surface, camera, area)
+    _draw_marks(pen, scene, area, felt)
     for cushion in rubber:
-        _shadow(pen, cushion, felt, 0.010 * width)
+        _draw_shadow(pen, cushion, felt, 0.010 * width)
     for cushion in rubber:
         pen.polygon(cushion.outline, felt.rubber)
         pen.line(cushion.nose, felt.edge, 1.6 * unit)
@@ -199,7 +199,7 @@ def draw_table(
             pen.line((corner, end), mix_colours(felt.rubber, HOLE, 0.3), 1.0 * unit)
     for hole in scene.pockets:
         pen.disc(hole.position, hole.radius, HOLE, rim=mix_colours(IRON, HOLE, 0.5), line=3.0)
-    _diamonds(pen, scene, area, width)
+    _draw_diamonds(pen, scene, area, width)
     walls, posts = other_walls(scene, area)
     if walls or posts or scene.planes:
         draw_static_bodies(surface, camera, scene.model_copy(update={"walls": walls, "posts": posts}), unit, antialias)
@@ -227,8 +227,8 @@ class _TablePen:
         pygame.draw.rect(self.surface, colour, rect, border_radius=round(rounding * self.camera.scale))
 
     def line(self, points: tuple[Point, ...], colour: RgbColour, width: float) -> None:
-        places = self.at(points)
-        for a, b in pairwise(places):
+        positions = self.at(points)
+        for a, b in pairwise(positions):
             draw_line(self.surface, a, b, colour, width, self.antialias)
 
     def disc(
@@ -238,8 +238,8 @@ class _TablePen:
         if clip_segment((x, y), (x, y), self.surface.get_rect(), r + 4.0) is None:
             return
         within = pygame.Rect(math.floor(x - r) - 2, math.floor(y - r) - 2, math.ceil(2 * r) + 5, math.ceil(2 * r) + 5)
-        look = ShapeStyle(colour, rim or colour, line * self.unit, antialias=self.antialias)
-        draw_sdf(self.surface, disc_distance(x, y, r), look, within)
+        style = ShapeStyle(colour, rim or colour, line * self.unit, antialias=self.antialias)
+        draw_sdf(self.surface, disc_distance(x, y, r), style, within)
 
 
 def _corners(camera: Camera, box: ViewBox) -> tuple[Pixel, Pixel]:
@@ -248,7 +248,7 @@ def _corners(camera: Camera, box: ViewBox) -> tuple[Pixel, Pixel]:
     return (min(ax, bx), min(ay, by)), (max(ax, bx), max(ay, by))
 
 
-def _wood(pen: _TablePen, area: ViewBox, width: float) -> None:
+def _draw_rails(pen: _TablePen, area: ViewBox, width: float) -> None:
     """Draw the rails as nested boxes: a dark outer edge, a light bevel, the wood, and a dark inner edge."""
     rim, depth = RAIL * width, DEPTH * width
     for out, colour in (
@@ -262,7 +262,7 @@ def _wood(pen: _TablePen, area: ViewBox, width: float) -> None:
         pen.box(((left - out, bottom - out), (right + out, top + out)), colour, rounding)
 
 
-def _throat(
+def _draw_pocket_mouth(
     pen: _TablePen, hole: Point, radius: float, rubber: tuple[CushionOutline, ...], area: ViewBox, colour: RgbColour
 ) -> None:
     """Draw the cloth in the mouth of a pocket, between the ends of its two cushions."""
@@ -275,22 +275,22 @@ def _throat(
         pen.polygon((hole, *a, *reversed(b)), colour)
 
 
-def _light(surface: pygame.Surface, camera: Camera, area: ViewBox) -> None:
+def _draw_light(surface: pygame.Surface, camera: Camera, area: ViewBox) -> None:
     """Brighten the middle of the bed and darken its corners."""
     (left, top), (right, bottom) = _corners(camera, area)
     depth = DEPTH * shorter_side(area) * camera.scale
-    seen = surface.get_rect()
+    window_rect = surface.get_rect()
     rect = pygame.Rect(0, 0, 0, 0)
     rect.left, rect.top = max(math.floor(left - depth), 0), max(math.floor(top - depth), 0)
-    rect.width = min(math.ceil(right + depth), seen.right) - rect.left
-    rect.height = min(math.ceil(bottom + depth), seen.bottom) - rect.top
-    if rect.width < 2 or rect.height < 2 or not seen.contains(rect):
+    rect.width = min(math.ceil(right + depth), window_rect.right) - rect.left
+    rect.height = min(math.ceil(bottom + depth), window_rect.bottom) - rect.top
+    if rect.width < 2 or rect.height < 2 or not window_rect.contains(rect):
         return
     grain = min(96, rect.width), min(96, rect.height)
     x = (rect.left + (np.arange(grain[0]) + 0.5) * rect.width / grain[0] - (left + right) / 2) / (right - left)
     y = (rect.top + (np.arange(grain[1]) + 0.5) * rect.height / grain[1] - (top + bottom) / 2) / (bottom - top)
     far = np.clip((x[:, None] ** 2 + y[None, :] ** 2) / 0.5, 0.0, 1.0)
-    bright = LIT + (UNLIT - LIT) * far
+    bright = CENTRE_BRIGHTNESS + (CORNER_BRIGHTNESS - CENTRE_BRIGHTNESS) * far
     # SDL cannot multiply by more than 1; the excess is added.
     dimmed, added = np.clip(bright, 0.0, 1.0) * 255.0, np.clip(bright - 1.0, 0.0, 1.0) * 110.0
     for tone, flag in ((dimmed, pygame.BLEND_RGB_MULT), (added, pygame.BLEND_RGB_ADD)):
@@ -298,7 +298,7 @@ def _light(surface: pygame.Surface, camera: Camera, area: ViewBox) -> None:
         surface.blit(pygame.transform.smoothscale(layer, rect.size), rect, special_flags=flag)
 
 
-def _marks(pen: _TablePen, scene: Scene, area: ViewBox, felt: ClothColours) -> None:
+def _draw_marks(pen: _TablePen, scene: Scene, area: ViewBox, felt: ClothColours) -> None:
     """Draw the head string or baulk line, the D, and the spots."""
     spots = {spot.name: spot.position for spot in scene.play.spots}
     faint, (left, bottom), (right, top) = mix_colours(felt.bed, CHALK, 0.32), *area
@@ -319,7 +319,7 @@ def _marks(pen: _TablePen, scene: Scene, area: ViewBox, felt: ClothColours) -> N
         pen.disc(place, max(size, 1.2 * pen.unit / pen.camera.scale), mix_colours(felt.bed, CHALK, 0.5))
 
 
-def _shadow(pen: _TablePen, cushion: CushionOutline, felt: ClothColours, reach: float) -> None:
+def _draw_shadow(pen: _TablePen, cushion: CushionOutline, felt: ClothColours, reach: float) -> None:
     """Draw the shadow of a nose on the cloth, up to `reach` m."""
     for fraction, dark in ((1.0, 0.10), (0.62, 0.20), (0.3, 0.32)):
         by = reach * fraction
@@ -327,16 +327,20 @@ def _shadow(pen: _TablePen, cushion: CushionOutline, felt: ClothColours, reach: 
         pen.polygon((*moved, *cushion.nose[::-1]), mix_colours(felt.bed, HOLE, dark))
 
 
-def _diamonds(pen: _TablePen, scene: Scene, area: ViewBox, width: float) -> None:
+def _draw_diamonds(pen: _TablePen, scene: Scene, area: ViewBox, width: float) -> None:
     """Draw the diamonds on the rails; snooker tables have none."""
     if scene.play.game == "snooker" or not scene.play.spots or any(s.name == "brown" for s in scene.play.spots):
         return
     (left, bottom), (right, top) = area
     tall = top - bottom > right - left
-    off, size = (RAIL + DEPTH) / 2.0 * width, 0.0062 * width
-    wide, high = (4, 8) if tall else (8, 4)
-    places = [(left + (right - left) * k / wide, y) for k in range(1, wide) for y in (bottom - off, top + off)]
-    places += [(x, bottom + (top - bottom) * k / high) for k in range(1, high) for x in (left - off, right + off)]
-    for place in places:
+    offset, size = (RAIL + DEPTH) / 2.0 * width, 0.0062 * width
+    columns, rows = (4, 8) if tall else (8, 4)
+    positions = [
+        (left + (right - left) * k / columns, y) for k in range(1, columns) for y in (bottom - offset, top + offset)
+    ]
+    positions += [
+        (x, bottom + (top - bottom) * k / rows) for k in range(1, rows) for x in (left - offset, right + offset)
+    ]
+    for place in positions:
         if all(math.dist(place, hole.position) > hole.radius + 0.03 * width for hole in scene.pockets):
             pen.disc(place, size, PEARL, rim=mix_colours(WOOD, BACKGROUND, 0.6), line=0.8)

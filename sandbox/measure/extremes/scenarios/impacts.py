@@ -12,7 +12,7 @@ from sandbox.trajectory import Trajectory
 DROP_RADIUS, HEIGHT, G = 0.1, 1.0, 9.81  # m, m, m/s²
 FALL_HEIGHT, FLOOR_THICKNESS = 0.2, 0.05  # m, onto the thin floor
 COUNT = 6
-"""Number of balls of the drop: each from its own height, and so with its own phase of the step at the impact."""
+"""Number of balls of the drop: each falls from another height, so that the impact is at another phase of the step."""
 MAX_BOUNCE_GAIN = 0.1
 """A bounce higher than the drop by a tenth is visible."""
 
@@ -95,7 +95,7 @@ GRAVITIES = (0.0, 1.0, G, 100.0, 1e3, 1e4)
 FALL_AXES = (
     Axis(
         "dt",
-        "time step of a frame, balls falling onto a thin floor",
+        "time step, balls falling onto a thin floor",
         "s",
         DROP,
         "dt",
@@ -108,7 +108,7 @@ FALL_AXES = (
     Axis(
         "restitution", "of a ball on a plane", "", BOUNCE, "restitution", RESTITUTIONS, (0.0, 0.5, 1.0), scale="linear"
     ),
-    Axis("gravity", "that a ball bounces under", "m/s²", BOUNCE, "gravity", GRAVITIES, (0.0, G, 1e4)),
+    Axis("gravity", "of a bouncing ball", "m/s²", BOUNCE, "gravity", GRAVITIES, (0.0, G, 1e4)),
 )
 FALL_PAIRS = (
     AxisPair(BOUNCE, PairSide("gravity", (1.0, 10.0, 100.0, 1e3, 1e4)), PairSide("dt", (1e-3, 1 / 240, 1 / 60, 0.1))),
@@ -224,8 +224,8 @@ def _velocity_error(scene: Scene, run: Trajectory) -> float:
 
 def _position_error(scene: Scene, run: Trajectory) -> float:
     """Return the error of the final positions as a fraction of the larger radius."""
-    way = SPEED * scene.world.duration - GAP  # distance after the impact at the speed before it
-    truth = np.asarray([GAP, 0.0]) + _after(scene) * way / SPEED
+    distance = SPEED * scene.world.duration - GAP  # distance after the impact at the speed before it
+    truth = np.asarray([GAP, 0.0]) + _after(scene) * distance / SPEED
     moved = run.position[-1, :, 0] - run.position[0, :, 0]
     return float(np.abs(moved - truth).max() / scene.bodies.radius.max())
 
@@ -240,7 +240,7 @@ HEAD_ON = Scenario(
     "the speed before",
     fail_above=0.1,
 )
-FAR = Scenario(
+FAR_OUT = Scenario(
     "far out",
     "a ball hits another at rest, far from the origin",
     {"mass_ratio": 1.0, "size_ratio": 1.0, "offset": 0.0},
@@ -255,7 +255,7 @@ RATIOS = (1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6)
 OFFSETS = (0.0, 1e3, 1e6, 1e9, 1e12, 1e15)
 
 HEAD_ON_AXES = (
-    Axis("size_ratio", "of two balls that meet", "", HEAD_ON, "size_ratio", RATIOS, (1.0, 1e3, 1e6)),
+    Axis("size_ratio", "of two colliding balls", "", HEAD_ON, "size_ratio", RATIOS, (1.0, 1e3, 1e6)),
     Axis("heavy_hits_light", "mass ratio of two balls", "", HEAD_ON, "mass_ratio", RATIOS, (1.0, 1e3, 1e6)),
     Axis(
         "light_hits_heavy",
@@ -270,7 +270,7 @@ HEAD_ON_AXES = (
         "offset",
         "distance from the origin of two colliding balls, r = 1 m",
         "m",
-        FAR,
+        FAR_OUT,
         "offset",
         OFFSETS,
         (0.0, 1e9, 1e15),
@@ -282,5 +282,5 @@ HEAD_ON_PAIRS = (
     AxisPair(
         HEAD_ON, PairSide("mass_ratio", (1e-6, 1e-3, 1.0, 1e3, 1e6)), PairSide("size_ratio", (1.0, 10.0, 1e3, 1e6))
     ),
-    AxisPair(FAR, PairSide("offset", (0.0, 1e6, 1e9, 1e12)), PairSide("size_ratio", (1.0, 10.0, 1e3, 1e6))),
+    AxisPair(FAR_OUT, PairSide("offset", (0.0, 1e6, 1e9, 1e12)), PairSide("size_ratio", (1.0, 10.0, 1e3, 1e6))),
 )

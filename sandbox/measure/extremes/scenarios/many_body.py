@@ -61,14 +61,14 @@ def _pile(p: Parameters) -> JsonObject:
 
 def _rack(p: Parameters) -> JsonObject:
     radius = 0.0286
-    rows = [[1.0 + row * math.sqrt(3.0) * radius, (2.0 * k - row) * radius] for row in range(5) for k in range(row + 1)]
+    rack = [[1.0 + row * math.sqrt(3.0) * radius, (2.0 * k - row) * radius] for row in range(5) for k in range(row + 1)]
     ball = {"radius": radius, "mass": 0.17, "restitution": math.sqrt(0.95)}  # restitutions multiply
     return {
         "world": {"duration": 0.3},
         "solver": {"dt": p["dt"], "iterations": p["iterations"]},
         "ball": [
             {"name": "cue", "position": [0.5, 0.001], "velocity": [10.0, 0.0], **ball},
-            *({"position": place, **ball} for place in rows),
+            *({"position": position, **ball} for position in rack),
         ],
     }
 

@@ -7,16 +7,21 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.trajectory import Trajectory
 
 FRICTION, G = 0.5, 9.81
-LIGHT, HEAVY = 0.5, 1.0  # m, sides
-BOX = 1.0  # m, side of those of a tower
+SMALL_SIDE, LARGE_SIDE = 0.5, 1.0  # m, sides
+TOWER_SIDE = 1.0  # m, side of a box of a tower
 
 FLOOR = {"point": [0.0, 0.0], "normal": [0.0, 1.0], "friction": 1.0}
 
 
 def _two(p: Parameters) -> JsonObject:
     boxes = [
-        {"position": [0.0, 0.5 * LIGHT], "size": [LIGHT, LIGHT], "mass": 1.0, "friction": FRICTION},
-        {"position": [0.0, LIGHT + 0.5 * HEAVY], "size": [HEAVY, HEAVY], "mass": p["mass_ratio"], "friction": FRICTION},
+        {"position": [0.0, 0.5 * SMALL_SIDE], "size": [SMALL_SIDE, SMALL_SIDE], "mass": 1.0, "friction": FRICTION},
+        {
+            "position": [0.0, SMALL_SIDE + 0.5 * LARGE_SIDE],
+            "size": [LARGE_SIDE, LARGE_SIDE],
+            "mass": p["mass_ratio"],
+            "friction": FRICTION,
+        },
     ]
     return {
         "world": {"gravity": [0.0, -G], "duration": 5.0},
@@ -27,7 +32,13 @@ def _two(p: Parameters) -> JsonObject:
 
 
 def _tower(p: Parameters) -> JsonObject:
-    stack = {"base": [0.0, 0.0], "size": [BOX, BOX], "columns": 1, "rows": p["rows"], "friction": FRICTION}
+    stack = {
+        "base": [0.0, 0.0],
+        "size": [TOWER_SIDE, TOWER_SIDE],
+        "columns": 1,
+        "rows": p["rows"],
+        "friction": FRICTION,
+    }
     return {
         "world": {"gravity": [0.0, -G], "duration": 5.0},
         "solver": {"dt": p["dt"], "iterations": p["iterations"]},
@@ -125,7 +136,7 @@ STACK_PAIRS = (
 
 OVERLAP_RADIUS = 0.5
 MOVED_FRACTION = 1e-9
-"""Fraction of its width from which on a ball has moved."""
+"""Displacement, as a fraction of its width, beyond which a ball has moved."""
 
 
 def _pair(p: Parameters) -> JsonObject:
@@ -142,7 +153,7 @@ def _pair(p: Parameters) -> JsonObject:
 
 
 def _separation_energy(scene: Scene) -> float:
-    """Return the energy of balls that separate by their own width per second, J: at the start they have none."""
+    """Return the energy of balls that separate by their own width per second, J: their initial energy is 0."""
     return 0.5 * float(scene.bodies.mass.sum()) * (2.0 * OVERLAP_RADIUS) ** 2
 
 

@@ -17,14 +17,14 @@ def ball(name: str, x: float, y: float, **more: Any) -> Document:
 
 
 def table(
-    *balls: Document, rubs: bool = True, cushions: bool = True, e: float = 0.95, dt: float = 0.01, **more: Any
+    *balls: Document, friction: bool = True, cushions: bool = True, e: float = 0.95, dt: float = 0.01, **more: Any
 ) -> Scene:
-    """Return a table of 7 ft without pockets, its lower left corner at the origin; or the open cloth alone."""
+    """Return a 7 ft table without pockets, its lower left corner at the origin, or a surface without cushions."""
     document: Document = {
         "world": {"duration": 20.0},
         "solver": {"dt": dt},
         "surface": {"sliding_friction": SLIDING, "rolling_friction": ROLLING, "spinning_friction": SPINNING},
-        "contact_models": {"ball_ball": "frictional", "cushion": "han2005"} if rubs else {},
+        "contact_models": {"ball_ball": "frictional", "cushion": "han2005"} if friction else {},
         "material": [{"name": "phenolic"}, {"name": "rubber"}],
         "pair": [
             {"between": ["phenolic", "phenolic"], "restitution": e},
@@ -41,7 +41,7 @@ def table(
 
 
 def rack(rows: int, x: float, y: float, gap: float = 0.0) -> list[Document]:
-    """Return a triangle of balls, its apex below, whose neighbours are so far apart, m."""
+    """Return a triangle of balls with its apex at the bottom; `gap` is the distance between neighbours, m."""
     pitch = 2.0 * R + gap
-    places = [(x + (c - r / 2.0) * pitch, y + r * pitch * 0.75**0.5) for r in range(rows) for c in range(r + 1)]
-    return [ball(str(k + 1), *place) for k, place in enumerate(places)]
+    positions = [(x + (c - r / 2.0) * pitch, y + r * pitch * 0.75**0.5) for r in range(rows) for c in range(r + 1)]
+    return [ball(str(k + 1), *position) for k, position in enumerate(positions)]

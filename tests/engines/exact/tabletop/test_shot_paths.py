@@ -1,4 +1,4 @@
-"""Where balls were on their ways: evaluated at any time, and points along them."""
+"""Recorded paths of a shot, evaluated at any time."""
 
 from pathlib import Path
 
@@ -19,15 +19,15 @@ def scene(name: str) -> Scene:
 
 
 @pytest.mark.parametrize("name", ["draw", "swerve", "pot", "row", "three_cushions", "rattle"])
-def test_places_at_any_time_are_those_of_a_run(name: str) -> None:
-    played = scene(name)
-    frames = run(played, "exact")
-    outcome = Table(played).shoot(ways=True)
-    apart = np.abs(outcome.at(frames.time) - frames.position)
-    assert apart.max() < 1e-12  # m: the same parabolas, added up in another order
+def test_positions_at_any_time_match_a_run(name: str) -> None:
+    shot = scene(name)
+    frames = run(shot, "exact")
+    outcome = Table(shot).shoot(ways=True)
+    difference = np.abs(outcome.at(frames.time) - frames.position)
+    assert difference.max() < 1e-12  # m: the same parabolas, summed in another order
 
 
-def test_places_are_those_of_rest_after_the_end_and_in_any_order() -> None:
+def test_positions_can_be_evaluated_in_any_order_and_rest_after_the_end() -> None:
     outcome = Table(scene("three_cushions")).shoot(ways=True)
     end = outcome.duration
     late, early, middle = outcome.at(np.array([end + 5.0, 0.0, end / 2.0]))
@@ -36,17 +36,17 @@ def test_places_are_those_of_rest_after_the_end_and_in_any_order() -> None:
     assert middle == pytest.approx(outcome.at(np.array([end / 2.0]))[0], abs=0.0)
 
 
-def test_a_captured_ball_lies_at_its_pocket() -> None:
-    played = scene("pot")
-    outcome = Table(played).shoot(ways=True)
+def test_pocketed_ball_is_at_the_centre_of_its_pocket() -> None:
+    shot = scene("pot")
+    outcome = Table(shot).shoot(ways=True)
     time = next(event.time for event in outcome.events if event.kind == "pocket" and event.ball == "object")
     before, after = outcome.at(np.array([np.nextafter(time, 0.0), time]))[:, 1]
-    centre, radius = np.asarray(played.pockets[5].position), played.pockets[5].radius
-    assert np.hypot(*(before - centre)) == pytest.approx(radius, abs=1e-12)  # m: it comes in over the rim
+    centre, radius = np.asarray(shot.pockets[5].position), shot.pockets[5].radius
+    assert np.hypot(*(before - centre)) == pytest.approx(radius, abs=1e-12)  # m: it enters over the rim
     assert after == pytest.approx(centre, abs=0.0)
 
 
-def test_ways_are_kept_from_the_first_shot_on() -> None:
+def test_paths_are_recorded_from_the_first_shot() -> None:
     table = Table(scene("nine_ball_break"))
     stroke = Stroke(aim=1.57, speed=3.0)
     first, second = table.shoot(stroke, ways=True), table.shoot(stroke, ways=True)
@@ -55,6 +55,6 @@ def test_ways_are_kept_from_the_first_shot_on() -> None:
     assert first.at(np.array([0.0]))[0] == pytest.approx(table.position, abs=0.0)
 
 
-def test_places_are_not_told_where_ways_were_not_kept() -> None:
+def test_positions_are_refused_if_paths_were_not_recorded() -> None:
     with pytest.raises(ValueError, match="not recorded"):
         Table(scene("draw")).shoot().at(np.array([1.0]))

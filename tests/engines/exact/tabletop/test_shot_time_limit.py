@@ -1,4 +1,4 @@
-"""Shots that do not come to rest in time, or have too many events: they are told as such, where they are then."""
+"""Shots with a time limit or too many events: they are reported as incomplete."""
 
 from pathlib import Path
 
@@ -14,18 +14,18 @@ CASES = Path(__file__).parent / "cases"
 
 
 @pytest.mark.parametrize("until", [0.05, 0.4, 1.0])
-def test_a_cut_shot_is_where_the_whole_one_is_then(until: float) -> None:
+def test_truncated_shot_matches_the_complete_shot_at_that_time(until: float) -> None:
     table = Table(load(CASES / "three_cushions.toml"))
-    whole, cut = table.shoot(ways=True), table.shoot(until=until)
-    assert whole.complete
-    assert not cut.complete
-    assert cut.position == pytest.approx(whole.at(np.array([until]))[0], abs=1e-14)  # the same parabola
-    on = table.after(cut).shoot()
-    assert on.complete
-    assert on.position == pytest.approx(whole.position, abs=1e-9)  # m: rounding, after the hits that are left
+    full, truncated = table.shoot(ways=True), table.shoot(until=until)
+    assert full.complete
+    assert not truncated.complete
+    assert truncated.position == pytest.approx(full.at(np.array([until]))[0], abs=1e-14)  # the same parabola
+    continued = table.after(truncated).shoot()
+    assert continued.complete
+    assert continued.position == pytest.approx(full.position, abs=1e-9)  # m: rounding, after the remaining collisions
 
 
-def test_fans_tell_which_shots_were_cut() -> None:
+def test_fan_reports_which_shots_are_incomplete() -> None:
     table = Table(load(CASES / "draw.toml"))
     strokes = [Stroke(aim=1.0, speed=speed) for speed in (0.05, 3.0)]
     fan = table.fan(strokes, until=2.0)
@@ -33,7 +33,7 @@ def test_fans_tell_which_shots_were_cut() -> None:
     assert fan.position[1] == pytest.approx(table.shoot(strokes[1], until=2.0).position, abs=0.0)
 
 
-def test_a_ball_that_nothing_slows_never_completes() -> None:
+def test_shot_without_friction_never_completes() -> None:
     ball = '[[ball]]\nname = "cue"\nposition = [0, 0]\nvelocity = [1, 0]\nradius = 0.03\n'
     scene = loads(f"[surface]\nspinning_friction = 0.01\n{ball}")
     outcome = Table(scene).shoot(until=3.0)
@@ -41,9 +41,9 @@ def test_a_ball_that_nothing_slows_never_completes() -> None:
     assert outcome.position[0] == pytest.approx([3.0, 0.0], abs=1e-14)  # rounding
 
 
-@pytest.mark.parametrize("most", [7, 20_000])
-def test_too_many_events_are_told_wherever_the_limit_lies(most: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SANDBOX_MAX_EVENTS", str(most))  # 20,000 is where kernels pause
+@pytest.mark.parametrize("limit", [7, 20_000])
+def test_too_many_events_are_reported_at_any_limit(limit: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SANDBOX_MAX_EVENTS", str(limit))  # kernels return after 20,000 events
     walls = "[[wall]]\npoints = [[-0.1, -1], [-0.1, 1]]\nrestitution = 1\n[[wall]]\npoints = [[0.1, -1], [0.1, 1]]\n"
     ball = '[[ball]]\nname = "cue"\nposition = [0, 0]\nvelocity = [100, 0]\nradius = 0.03\n'
     scene = loads(f"[surface]\nspinning_friction = 0.01\n{walls}restitution = 1\n{ball}")

@@ -1,4 +1,4 @@
-"""A table with its balls elsewhere: shots from there, and who lies in a pocket meets nobody."""
+"""`Table.with_balls`: shots from moved balls; a ball placed in a pocket collides with nothing."""
 
 import numpy as np
 
@@ -30,19 +30,19 @@ SCENE = loads(
 SHOT = Stroke(aim=0.0, speed=1.0)
 
 
-def test_shot_goes_from_where_the_balls_were_put() -> None:
+def test_shot_starts_from_the_moved_balls() -> None:
     table = Table(SCENE)
     moved = table.with_balls({"a": (0.5, 0.2)})
     assert next(event.kind for event in table.shoot(SHOT).events if event.kind in ("ball", "pocket")) == "ball"
     assert moved.shoot(SHOT).pocketed == {"cue": "hole"}
-    assert np.array_equal(table.position, [[0.0, 0.0], [0.5, 0.0]])  # the first is as it was
+    assert np.array_equal(table.position, [[0.0, 0.0], [0.5, 0.0]])  # the original table is unchanged
 
 
-def test_ball_that_was_put_into_a_pocket_lies_in_it() -> None:
+def test_ball_placed_in_a_pocket_is_pocketed() -> None:
     table = Table(SCENE).with_balls({"a": (1.0, 0.0)})
     outcome = table.shoot(SHOT)
     assert outcome.pocketed == {"cue": "hole"}
     assert not [event for event in outcome.events if event.kind == "ball"]
     assert table.fan([SHOT]).pocket.tolist() == [[0, 0]]
-    back = table.with_balls({"a": (0.5, 0.0)})
-    assert next(event.kind for event in back.shoot(SHOT).events if event.kind in ("ball", "pocket")) == "ball"
+    restored = table.with_balls({"a": (0.5, 0.0)})
+    assert next(event.kind for event in restored.shoot(SHOT).events if event.kind in ("ball", "pocket")) == "ball"

@@ -1,4 +1,4 @@
-"""Shots on a floor against those of an independent simulator, stored in `cases`."""
+"""Shots on a surface against results of an independent simulator, stored in `cases`."""
 
 import json
 from pathlib import Path
@@ -16,8 +16,14 @@ pytestmark = pytest.mark.full  # long runs and sweeps
 
 CASES = Path(__file__).parent / "cases"
 NAMES = sorted(path.stem for path in CASES.glob("*.json"))
-ROUND = {"slide_roll": "rolls", "roll_spin": "spins", "roll_stop": "rests", "spin_stop": "rests", "slide_stop": "rests"}
-ROUND |= {"slide_spin": "spins", "ball_ball": "ball", "pocket": "pocket"}
+EVENT_KINDS = {
+    "slide_roll": "rolls",
+    "roll_spin": "spins",
+    "roll_stop": "rests",
+    "spin_stop": "rests",
+    "slide_stop": "rests",
+}
+EVENT_KINDS |= {"slide_spin": "spins", "ball_ball": "ball", "pocket": "pocket"}
 
 
 def case(name: str) -> dict[str, Any]:
@@ -25,29 +31,29 @@ def case(name: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_positions_and_velocities_are_those_of_the_oracle(name: str) -> None:
+def test_positions_and_velocities_match_the_oracle(name: str) -> None:
     stored, scene = case(name), load(CASES / f"{name}.toml")
     trajectory = run(scene, "exact")
     frames = stored["frames"]
-    # m: how well the stored shot is known, and no less than rounding after some twenty impacts
-    off = max(1e-9, 4.0 * stored["position_error"])
-    np.testing.assert_allclose(trajectory.position[frames], stored["position"], atol=off)
-    # m/s and rad/s: what such a place is worth within a second, and over a ball's radius
-    np.testing.assert_allclose(trajectory.velocity[frames], stored["velocity"], atol=10.0 * off)
-    np.testing.assert_allclose(trajectory.spin[frames], stored["spin"], atol=400.0 * off)
+    # m: accuracy of the stored shot, at least rounding after about twenty impacts
+    tolerance = max(1e-9, 4.0 * stored["position_error"])
+    np.testing.assert_allclose(trajectory.position[frames], stored["position"], atol=tolerance)
+    # m/s and rad/s: the position error over a fraction of a second, and that divided by the radius of a ball
+    np.testing.assert_allclose(trajectory.velocity[frames], stored["velocity"], atol=10.0 * tolerance)
+    np.testing.assert_allclose(trajectory.spin[frames], stored["spin"], atol=400.0 * tolerance)
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_events_are_those_of_the_oracle_in_order(name: str) -> None:
+def test_events_match_the_oracle_in_order(name: str) -> None:
     stored, scene = case(name), load(CASES / f"{name}.toml")
     until = stored["trusted_until"]
     outcome: ShotResult = Table(scene).shoot(until=until)
-    ours = [key(event) for event in outcome.events]
-    theirs = [(ROUND.get(e["kind"], "cushion"), tuple(e["names"]), e["time"]) for e in stored["events"]]
-    theirs = [each for each in theirs if each[2] <= until]
-    assert [each[:2] for each in ours] == [each[:2] for each in theirs]
-    # s: nothing here is slower at an event than some mm/s, and known to less than 1e-9 m
-    np.testing.assert_allclose([each[2] for each in ours], [each[2] for each in theirs], atol=1e-6)
+    found = [key(event) for event in outcome.events]
+    expected = [(EVENT_KINDS.get(e["kind"], "cushion"), tuple(e["names"]), e["time"]) for e in stored["events"]]
+    expected = [each for each in expected if each[2] <= until]
+    assert [each[:2] for each in found] == [each[:2] for each in expected]
+    # s: balls move at some mm/s or more at an event, and positions are known to 1e-9 m
+    np.testing.assert_allclose([each[2] for each in found], [each[2] for each in expected], atol=1e-6)
 
 
 def key(event: ShotEvent) -> tuple[str, tuple[str, ...], float]:

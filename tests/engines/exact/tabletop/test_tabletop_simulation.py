@@ -1,4 +1,4 @@
-"""A running scene of rolling balls: what is done to it, what falls into pockets, what it refuses."""
+"""Simulation of balls on a surface: actions, pockets and refusals."""
 
 import math
 from typing import Any
@@ -17,68 +17,68 @@ from sandbox.scene.description.discs import Ball
 from tests.engines.exact.tabletop.small_tables import MASS, SLIDING, G, R, ball, rack, table
 
 HOLE = {"name": "hole", "position": [0.5, 1.5], "radius": 0.06}
-UP = 0.5 * math.pi
+UPWARDS = 0.5 * math.pi
 
 
-def simulation(*balls: dict[str, Any], steps: int = 0, **more: Any) -> SwitchableSimulation:
-    running = start(table(*balls, **more), "exact")
+def advanced_simulation(*balls: dict[str, Any], steps: int = 0, **more: Any) -> SwitchableSimulation:
+    simulation = start(table(*balls, **more), "exact")
     for _ in range(steps):
-        running.step()
-    return running
+        simulation.step()
+    return simulation
 
 
-def holed(*balls: dict[str, Any], **more: Any) -> Scene:
+def table_with_pocket(*balls: dict[str, Any], **more: Any) -> Scene:
     return table(*balls, cushions=False, pocket=[HOLE], **more)
 
 
-def test_ball_that_falls_lies_at_the_centre_and_is_told_of() -> None:
-    trajectory = run(holed(ball("a", 0.5, 1.0, velocity=[0.0, 1.0])), "exact", account=True)
+def test_pocketed_ball_lies_at_the_centre_and_is_recorded() -> None:
+    trajectory = run(table_with_pocket(ball("a", 0.5, 1.0, velocity=[0.0, 1.0])), "exact", account=True)
     assert trajectory.position[-1, 0].tolist() == HOLE["position"]
     assert not trajectory.velocity[-1].any()
     assert not trajectory.spin[-1].any()
     assert trajectory.contact_pair.tolist() == [[0, -1]]
-    assert np.isnan(trajectory.retired_time[0])  # it is still there
-    at = float(np.hypot(*(trajectory.contact_point[0] - HOLE["position"])))
-    assert at == pytest.approx(HOLE["radius"], abs=1e-12)  # m: as near as a root is found
+    assert np.isnan(trajectory.retired_time[0])  # it is not retired
+    distance = float(np.hypot(*(trajectory.contact_point[0] - HOLE["position"])))
+    assert distance == pytest.approx(HOLE["radius"], abs=1e-12)  # m: accuracy of the root
     causes = dict(zip(trajectory.info["causes"], trajectory.account[-1], strict=True))
     assert causes["retired"] < 0.0
     assert causes["retired"] + causes["friction"] == pytest.approx(-trajectory.energy[0], rel=1e-14)
 
 
-def test_two_balls_may_lie_in_one_pocket_and_nobody_meets_them() -> None:
+def test_two_balls_in_one_pocket_collide_with_nothing() -> None:
     balls = [ball("a", 0.5, 1.0, velocity=[0.0, 1.0]), ball("b", 0.5, 0.9, velocity=[0.0, 1.0])]
-    trajectory = run(holed(*balls, ball("c", 0.5, 1.6, velocity=[0.0, -1.0])), "exact")
+    trajectory = run(table_with_pocket(*balls, ball("c", 0.5, 1.6, velocity=[0.0, -1.0])), "exact")
     assert (trajectory.position[-1] == HOLE["position"]).all()
     assert sorted(trajectory.contact_pair[:, 0].tolist()) == [0, 1, 2]
 
 
 def test_ball_that_starts_in_a_pocket_is_captured_at_once() -> None:
-    running = start(holed(ball("a", 0.52, 1.5, velocity=[1.0, 0.0])), "exact")
-    assert running.frame().position[0].tolist() == HOLE["position"]
-    assert not running.frame().velocity.any()
+    simulation = start(table_with_pocket(ball("a", 0.52, 1.5, velocity=[1.0, 0.0])), "exact")
+    assert simulation.frame().position[0].tolist() == HOLE["position"]
+    assert not simulation.frame().velocity.any()
 
 
-def test_captured_ball_comes_back_by_a_move() -> None:
-    running = start(holed(ball("a", 0.5, 1.4, velocity=[0.0, 1.0]), ball("b", 0.9, 1.0)), "exact")
+def test_move_returns_a_pocketed_ball() -> None:
+    simulation = start(table_with_pocket(ball("a", 0.5, 1.4, velocity=[0.0, 1.0]), ball("b", 0.9, 1.0)), "exact")
     for _ in range(50):
-        running.step()
-    assert running.frame().position[0].tolist() == HOLE["position"]
-    running.apply(Move(time=running.time, body="a", position=(0.9, 0.5)))
-    running.apply(Strike(time=running.time, ball="a", aim=UP, speed=1.0))
+        simulation.step()
+    assert simulation.frame().position[0].tolist() == HOLE["position"]
+    simulation.apply(Move(time=simulation.time, body="a", position=(0.9, 0.5)))
+    simulation.apply(Strike(time=simulation.time, ball="a", aim=UPWARDS, speed=1.0))
     for _ in range(100):
-        running.step()
-    assert running.frame().position[1, 1] > 1.0  # it was met
+        simulation.step()
+    assert simulation.frame().position[1, 1] > 1.0  # the other ball was hit
 
 
-def test_strike_is_the_shot_of_a_scene() -> None:
+def test_strike_equals_the_shot_of_a_scene() -> None:
     shot = {"aim": 1.2, "speed": 2.0, "side": 0.2, "height": -0.1}
-    written = run(table(ball("cue", 0.5, 0.5), shot=[shot]), "exact").position
-    struck = run(table(ball("cue", 0.5, 0.5)), "exact", actions=(Strike(time=0.0, ball="cue", **shot),)).position
-    assert (written == struck).all()
+    from_scene = run(table(ball("cue", 0.5, 0.5), shot=[shot]), "exact").position
+    from_strike = run(table(ball("cue", 0.5, 0.5)), "exact", actions=(Strike(time=0.0, ball="cue", **shot),)).position
+    assert (from_scene == from_strike).all()
 
 
 @pytest.mark.parametrize(
-    ("action", "words"),
+    ("action", "reason"),
     [
         (Strike(time=0.0, ball="nobody", aim=0.0, speed=1.0), "no body is named"),
         (Strike(time=0.0, ball="a", aim=0.0, speed=1.0, side=0.4, height=0.4), "slips"),
@@ -87,18 +87,18 @@ def test_strike_is_the_shot_of_a_scene() -> None:
         (Spawn(time=0.0, ball=Ball(position=(0.7, 1.0), radius=R)), "overlap"),
     ],
 )
-def test_action_that_cannot_be_done_changes_nothing(action: Action, words: str) -> None:
-    running = simulation(ball("a", 0.5, 0.5, velocity=[1.0, 0.3]), ball("b", 0.7, 1.0), steps=3)
-    before = running.state_hash()
-    with pytest.raises(ActionError, match=words):
-        running.apply(action)
-    assert running.state_hash() == before
+def test_invalid_action_changes_nothing(action: Action, reason: str) -> None:
+    simulation = advanced_simulation(ball("a", 0.5, 0.5, velocity=[1.0, 0.3]), ball("b", 0.7, 1.0), steps=3)
+    before = simulation.state_hash()
+    with pytest.raises(ActionError, match=reason):
+        simulation.apply(action)
+    assert simulation.state_hash() == before
 
 
-def test_account_books_what_is_done_from_outside() -> None:
-    running = simulation(ball("a", 0.5, 0.5), ball("b", 0.7, 1.0, velocity=[0.0, 1.0]))
-    running.account()
-    energy = total_energy(running)
+def test_ledger_books_the_energy_of_actions() -> None:
+    simulation = advanced_simulation(ball("a", 0.5, 0.5), ball("b", 0.7, 1.0, velocity=[0.0, 1.0]))
+    simulation.account()
+    energy = total_energy(simulation)
     for action in (
         Impulse(time=0.0, body="a", impulse=(0.05, 0.0), angular=1e-4),
         Spawn(time=0.0, ball=Ball(position=(0.3, 0.3), radius=R, velocity=(1.0, 0.0))),
@@ -107,24 +107,26 @@ def test_account_books_what_is_done_from_outside() -> None:
         Remove(time=0.0, body="b"),
     ):
         for _ in range(7):
-            running.step()
-        running.apply(action)
-    running.step()
-    brought = sum(running.account().values())
-    assert total_energy(running) - energy == pytest.approx(brought, abs=1e-15)  # J: rounding of some mJ
-    assert not running.frame().present[1]
+            simulation.step()
+        simulation.apply(action)
+    simulation.step()
+    booked = sum(simulation.account().values())
+    assert total_energy(simulation) - energy == pytest.approx(booked, abs=1e-15)  # J: rounding of some mJ
+    assert not simulation.frame().present[1]
 
 
-def test_spawned_ball_is_met() -> None:
-    running = simulation(ball("a", 0.5, 0.5, velocity=[0.0, 2.0]), steps=5)
-    running.apply(Spawn(time=running.time, ball=Ball(position=(0.5, 0.9), radius=R, mass=MASS, material="phenolic")))
+def test_spawned_ball_is_hit() -> None:
+    simulation = advanced_simulation(ball("a", 0.5, 0.5, velocity=[0.0, 2.0]), steps=5)
+    simulation.apply(
+        Spawn(time=simulation.time, ball=Ball(position=(0.5, 0.9), radius=R, mass=MASS, material="phenolic"))
+    )
     for _ in range(60):
-        running.step()
-    assert running.frame().velocity[1, 1] > 0.5
-    assert running.frame().roll is not None
+        simulation.step()
+    assert simulation.frame().velocity[1, 1] > 0.5
+    assert simulation.frame().roll is not None
 
 
-def test_balls_leave_the_bounds() -> None:
+def test_ball_that_leaves_the_bounds_is_retired() -> None:
     scene = table(
         ball("a", 0.5, 0.5, velocity=[2.0, 0.0]),
         cushions=False,
@@ -135,30 +137,30 @@ def test_balls_leave_the_bounds() -> None:
     assert not trajectory.spin[-1].any()
 
 
-def test_last_part_of_a_step_is_where_the_next_frame_would_pass() -> None:
-    part, whole = (simulation(ball("a", 0.5, 0.5, velocity=[0.3, 2.0]), dt=dt) for dt in (0.01, 0.005))
-    part.finish(0.5)
-    whole.step()
-    assert (part.frame().position == whole.frame().position).all()
+def test_half_step_equals_a_step_of_half_the_size() -> None:
+    partial, full = (advanced_simulation(ball("a", 0.5, 0.5, velocity=[0.3, 2.0]), dt=dt) for dt in (0.01, 0.005))
+    partial.finish(0.5)
+    full.step()
+    assert (partial.frame().position == full.frame().position).all()
 
 
-def test_relay_goes_on_from_any_state() -> None:
+def test_simulation_resumes_from_a_checkpoint() -> None:
     scene = table(ball("cue", 0.5, 0.5), *rack(3, 0.49, 1.2, 1e-4), pocket=[HOLE], cushions=False)
-    struck = Strike(time=0.0, ball="cue", aim=UP, speed=4.0, height=0.2)
-    through, halted = start(scene, "exact"), start(scene, "exact")
-    for running in (through, halted):
-        running.apply(struck)
+    strike = Strike(time=0.0, ball="cue", aim=UPWARDS, speed=4.0, height=0.2)
+    uninterrupted, resumed = start(scene, "exact"), start(scene, "exact")
+    for simulation in (uninterrupted, resumed):
+        simulation.apply(strike)
     for step in range(300):
-        through.step()
-        halted.step()
+        uninterrupted.step()
+        resumed.step()
         if step == 40:
-            halted = SwitchableSimulation.resumed(halted.checkpoint())
-    # m: what the last digits of a state at rest in them grow to over some dozen hits
-    np.testing.assert_allclose(through.frame().position, halted.frame().position, atol=1e-9)
+            resumed = SwitchableSimulation.resumed(resumed.checkpoint())
+    # m: rounding of the state, amplified by some dozen collisions
+    np.testing.assert_allclose(uninterrupted.frame().position, resumed.frame().position, atol=1e-9)
 
 
 @pytest.mark.parametrize(
-    ("more", "words"),
+    ("more", "reason"),
     [
         ({"world": {"gravity": [0.0, -0.1]}}, "world.gravity in the plane"),
         ({"ball": [ball("a", 0.5, 0.5), {**ball("b", 0.7, 0.5), "radius": 0.03}]}, "different radii"),
@@ -166,21 +168,21 @@ def test_relay_goes_on_from_any_state() -> None:
         ({"world": {"linear_drag": 0.1}}, "drag"),
     ],
 )
-def test_what_has_no_closed_form_is_refused(more: dict[str, Any], words: str) -> None:
-    with pytest.raises(Refusal, match=words):
+def test_scene_without_a_closed_form_is_refused(more: dict[str, Any], reason: str) -> None:
+    with pytest.raises(Refusal, match=reason):
         ENGINES["exact"].start(table(ball("a", 0.5, 0.5, velocity=[1.0, 0.0]), **more))
 
 
-def test_too_many_events_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SANDBOX_MAX_EVENTS", "30")  # a tenth of it in a second
-    running = simulation(ball("a", 0.5, 0.5, velocity=[5.0, 3.0]), *rack(3, 0.5, 1.2))
+def test_too_many_events_end_the_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SANDBOX_MAX_EVENTS", "30")  # a tenth of it is allowed per second
+    simulation = advanced_simulation(ball("a", 0.5, 0.5, velocity=[5.0, 3.0]), *rack(3, 0.5, 1.2))
     with pytest.raises(Exhaustion, match="events, more than allowed, last of"):
         for _ in range(1000):
-            running.step()
-    assert np.isfinite(running.frame().position).all()
+            simulation.step()
+    assert np.isfinite(simulation.frame().position).all()
 
 
-def test_who_cannot_meet_does_not() -> None:
+def test_non_colliding_ball_is_not_hit() -> None:
     ghost = ball("ghost", 0.5, 0.9, collides="fixed")
     trajectory = run(table(ball("a", 0.5, 0.5, velocity=[0.0, 2.0]), ghost), "exact")
     assert (trajectory.position[:, 1] == (0.5, 0.9)).all()
@@ -188,15 +190,15 @@ def test_who_cannot_meet_does_not() -> None:
 
 
 @pytest.mark.parametrize("first", ["fixed", "moving"])
-def test_impulse_on_a_fixed_ball_is_told_whoever_has_the_lower_number(first: str) -> None:
+def test_impulse_on_a_fixed_ball_is_recorded_in_either_body_order(first: str) -> None:
     balls = [ball("moving", 0.5, 0.5, velocity=[0.0, 2.0]), ball("fixed", 0.5, 0.9, fixed=True)]
-    trajectory = run(table(*sorted(balls, key=lambda each: each["name"] != first), rubs=False, e=1.0), "exact")
-    speed = math.sqrt(4.0 - 2.0 * G * SLIDING * (0.4 - 2.0 * R))  # it slides up to there
+    trajectory = run(table(*sorted(balls, key=lambda each: each["name"] != first), friction=False, e=1.0), "exact")
+    speed = math.sqrt(4.0 - 2.0 * G * SLIDING * (0.4 - 2.0 * R))  # it slides up to the impact
     sign = 1.0 if first == "moving" else -1.0
     assert trajectory.contact_impulse[0, 1] == pytest.approx(sign * 2.0 * MASS * speed, rel=1e-12)  # rounding
 
 
-def test_fixed_ball_is_a_post_that_rubs() -> None:
+def test_fixed_ball_acts_as_a_post_with_friction() -> None:
     trajectory = run(table(ball("a", 0.5, 0.5, velocity=[0.0, 2.0]), ball("b", 0.51, 0.9, fixed=True)), "exact")
     assert (trajectory.position[:, 1] == (0.51, 0.9)).all()
     assert trajectory.contact_pair[0].tolist() == [0, 1]

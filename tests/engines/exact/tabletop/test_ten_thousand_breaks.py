@@ -1,4 +1,4 @@
-"""Breaks by the thousand: nothing fails, nothing leaves the table."""
+"""Thousands of breaks: none fails, and no ball leaves the table."""
 
 from dataclasses import dataclass
 
@@ -15,7 +15,7 @@ from sandbox.scene.files.shipped_scenes import find
 pytestmark = pytest.mark.full  # long runs and sweeps
 
 NAMES = ["billiards/8-ball", "billiards/9-ball", "billiards/snooker", "billiards/three-cushion"]
-DEEP = 1e-9  # m: what touches may stand so deep
+MAX_OVERLAP = 1e-9  # m: contact tolerance
 
 
 @dataclass
@@ -25,8 +25,8 @@ class Break:
     pocket: FloatArray
 
 
-def played(name: str, seed: int, count: int) -> Break:
-    """Play breaks of one rack, their aim, strength and spin drawn anew for each."""
+def play_breaks(name: str, seed: int, count: int) -> Break:
+    """Play breaks of one rack with random aim, speed and spin."""
     scene = load(find(name), [f"world.seed={seed}", f"billiards.gap={(0.0, 1e-5, 3e-4)[seed % 3]}"])
     shot = scene.shots[0]
     random = np.random.default_rng(seed)
@@ -46,10 +46,10 @@ def played(name: str, seed: int, count: int) -> Break:
     return Break(scene, fan.position, fan.pocket)
 
 
-def check(breaks: Break) -> None:
-    """Every ball lies in a pocket, or on the cloth, clear of the cushions and of every other."""
+def check_final_positions(breaks: Break) -> None:
+    """Assert that every ball is in a pocket or on the table, clear of the cushions and of every other ball."""
     scene, radius = breaks.scene, breaks.scene.bodies.radius
-    fell = breaks.pocket >= 0
+    pocketed = breaks.pocket >= 0
     lower, upper = np.asarray(scene.play.area)
     segments = np.asarray(
         [(*a, *b) for wall in scene.walls for a, b in zip(wall.points, wall.points[1:], strict=False)]
@@ -57,16 +57,16 @@ def check(breaks: Break) -> None:
     for a, b in zip(segments[:, :2], segments[:, 2:], strict=True):
         along = np.clip(((breaks.position - a) @ (b - a)) / ((b - a) @ (b - a)), 0.0, 1.0)
         gap = np.hypot(*np.moveaxis(breaks.position - a - along[..., None] * (b - a), -1, 0)) - radius
-        assert gap[~fell].min() >= -DEEP
+        assert gap[~pocketed].min() >= -MAX_OVERLAP
     for post in scene.posts:
         gap = np.hypot(*np.moveaxis(breaks.position - np.asarray(post.position), -1, 0)) - radius - post.radius
-        assert gap[~fell].min() >= -DEEP
-    on = (breaks.position >= lower + radius[:, None] - 0.15) & (breaks.position <= upper - radius[:, None] + 0.15)
-    assert on.all(axis=2)[~fell].all()  # in the mouth of a pocket at most, 0.15 m deep
+        assert gap[~pocketed].min() >= -MAX_OVERLAP
+    on_table = (breaks.position >= lower + radius[:, None] - 0.15) & (breaks.position <= upper - radius[:, None] + 0.15)
+    assert on_table.all(axis=2)[~pocketed].all()  # at most in the mouth of a pocket, 0.15 m deep
     for i in range(len(radius)):
         for k in range(i):
-            apart = np.hypot(*(breaks.position[:, i] - breaks.position[:, k]).T) - radius[i] - radius[k]
-            assert apart[~fell[:, i] & ~fell[:, k]].min(initial=1.0) >= -DEEP
+            gap = np.hypot(*(breaks.position[:, i] - breaks.position[:, k]).T) - radius[i] - radius[k]
+            assert gap[~pocketed[:, i] & ~pocketed[:, k]].min(initial=1.0) >= -MAX_OVERLAP
 
 
 @pytest.mark.parametrize(
@@ -74,11 +74,13 @@ def check(breaks: Break) -> None:
 )
 def test_hundreds_of_breaks_end_on_the_table(name: str) -> None:
     for seed in range(3):
-        check(played(name, seed, 40 if COMPILED else 4))  # as plain Python, a break takes some tenths of a second
+        check_final_positions(
+            play_breaks(name, seed, 40 if COMPILED else 4)
+        )  # uncompiled, a break takes some tenths of a second
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(100))
 def test_ten_thousand_breaks_end_on_the_table(seed: int) -> None:
     for name in NAMES:
-        check(played(name, seed, 25))
+        check_final_positions(play_breaks(name, seed, 25))

@@ -1,4 +1,4 @@
-"""Floors with a shot whose outcome is known on paper: balls without rubbing, pockets without jaws."""
+"""Tables with a shot whose outcome has a closed form: balls without friction, pockets without jaws."""
 
 import sandbox
 from sandbox.scene.compile.scene import Scene
@@ -29,8 +29,8 @@ restitution = 1.0
 
 def ball(name: str, x: float, y: float = 0.0) -> str:
     """Return a ball at rest."""
-    figures = f'radius = {R}\nmass = 0.17\nmaterial = "phenolic"'
-    return f'\n[[ball]]\nname = "{name}"\nposition = [{x!r}, {y!r}]\n{figures}\n'
+    properties = f'radius = {R}\nmass = 0.17\nmaterial = "phenolic"'
+    return f'\n[[ball]]\nname = "{name}"\nposition = [{x!r}, {y!r}]\n{properties}\n'
 
 
 def pocket(name: str, x: float, y: float = 0.0, radius: float = 0.06) -> str:
@@ -43,11 +43,11 @@ def shot(aim: float = 0.0, speed: float = 2.0, side: float = 0.0, height: float 
     return f'\n[[shot]]\nname = "it"\naim = {aim!r}\nspeed = {speed!r}\nside = {side!r}\nheight = {height!r}\n'
 
 
-def floor(*parts: str) -> Scene:
+def scene_with(*parts: str) -> Scene:
     """Return a scene with a cue ball at the origin."""
     return sandbox.loads(FLOOR + ball("cue", 0.0) + "".join(parts))
 
 
 def straight_pot(d: float, far: float, speed: float = 2.0, aim: float = 0.0) -> Scene:
-    """Return a shot at a ball in line with a pocket: d between the balls' centres, `far` from there to the pocket."""
-    return floor(ball("object", d), pocket("hole", d + far), shot(aim, speed))
+    """Return a straight pot: distance `d` between the centres of the balls, `far` from the ball to the pocket."""
+    return scene_with(ball("object", d), pocket("hole", d + far), shot(aim, speed))

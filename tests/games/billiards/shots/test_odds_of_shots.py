@@ -1,4 +1,4 @@
-"""Ensembles: probabilities against the window's closed form, rests against known spreads, the same on all threads."""
+"""Shot ensembles: probabilities against closed forms, spreads of rest positions, independence of threads."""
 
 import math
 from statistics import NormalDist
@@ -12,12 +12,12 @@ from sandbox.games.billiards.shots.monte_carlo import odds, wilson
 from sandbox.games.billiards.shots.shot import NoSuchShotError, Spread
 from sandbox.jsonable import to_json
 from sandbox.scene.description.surface import Stroke, struck
-from tests.games.billiards.shots.shots_by_hand import R, ball, floor, pocket, shot, straight_pot
+from tests.games.billiards.shots.shots_by_hand import R, ball, pocket, scene_with, shot, straight_pot
 
 pytestmark = pytest.mark.full  # long runs and sweeps
 
-SURE = 4.0
-"""Deviations that one in 16,000 draws exceeds; the seed is fixed besides."""
+SIGMAS = 4.0
+"""Standard deviations that one in 16,000 draws exceeds; besides, the seed is fixed."""
 
 
 @pytest.mark.parametrize("aim", [0.0, 0.004, 0.009])
@@ -28,14 +28,14 @@ def test_probability_is_that_of_the_window_under_a_normal_error(aim: float) -> N
     known = error.cdf(window.high) - error.cdf(window.low)
     found = odds(scene, spread=Spread(aim=sigma, speed=0.0), count=1600)
     chance = found.chance("object", "hole")
-    low, high = wilson(chance.hits, chance.trials, SURE)
+    low, high = wilson(chance.hits, chance.trials, SIGMAS)
     assert low < known < high
     assert found.chance("object").hits == chance.hits
     assert found.miscues == found.unfinished == 0
 
 
-def test_scratch_and_pot_are_told_apart() -> None:
-    follow = floor(ball("object", 0.3), pocket("hole", 0.8), shot(0.0, 3.0, 0.0, 0.4))
+def test_scratch_and_pot_are_counted_separately() -> None:
+    follow = scene_with(ball("object", 0.3), pocket("hole", 0.8), shot(0.0, 3.0, 0.0, 0.4))
     nothing = Spread(0.0, 0.0)
     both = odds(follow, spread=nothing, count=5)
     assert (both.chance("object").hits, both.scratch.hits, both.any_pot.hits) == (5, 5, 0)
@@ -44,19 +44,19 @@ def test_scratch_and_pot_are_told_apart() -> None:
     assert (stun.chance("object").hits, stun.scratch.hits, stun.any_pot.hits) == (5, 0, 5)
 
 
-def test_rest_of_a_lone_ball_spreads_as_its_speed_does() -> None:
-    found = odds(floor(shot(0.0, 1.0)), spread=Spread(aim=0.01, speed=0.02), count=1600)
+def test_spread_of_the_rest_position_of_a_single_ball_is_the_closed_form() -> None:
+    found = odds(scene_with(shot(0.0, 1.0)), spread=Spread(aim=0.01, speed=0.02), count=1600)
     v = math.hypot(*struck(Stroke(aim=0.0, speed=1.0), 0.17, R)[0])
-    far = 12.0 * v**2 / (49.0 * 0.2 * 9.81) + (5.0 * v / 7.0) ** 2 / (2.0 * 0.01 * 9.81)
+    distance = 12.0 * v**2 / (49.0 * 0.2 * 9.81) + (5.0 * v / 7.0) ** 2 / (2.0 * 0.01 * 9.81)
     rest = found.rest("cue")
     assert rest is not None and rest.count == 1600
-    off = SURE / math.sqrt(1600.0)
-    assert rest.mean[0] == pytest.approx(far * (1.0 + 0.02**2 - 0.5 * 0.01**2), abs=off * 0.04 * far)
-    # Spreads: of v² to first order, and far · angle; the next order is 1e-3 of it.
-    assert rest.spread == pytest.approx((0.04 * far, 0.01 * far), rel=off + 2e-3)
+    off = SIGMAS / math.sqrt(1600.0)
+    assert rest.mean[0] == pytest.approx(distance * (1.0 + 0.02**2 - 0.5 * 0.01**2), abs=off * 0.04 * distance)
+    # Spreads: of v² to first order, and distance times angle; the next order is 1e-3 of them.
+    assert rest.spread == pytest.approx((0.04 * distance, 0.01 * distance), rel=off + 2e-3)
 
 
-def test_odds_are_the_same_bit_for_bit_on_any_number_of_threads_and_the_first_of_many_those_of_few() -> None:
+def test_odds_are_bit_identical_on_any_number_of_threads_and_extend_smaller_ensembles() -> None:
     scene = straight_pot(0.5, 1.0)
     every = Spread(0.004, 0.05, 0.05, 0.05)
     one, five = (odds(scene, spread=every, count=301, threads=n) for n in (1, 5))
@@ -70,17 +70,17 @@ def test_odds_are_the_same_bit_for_bit_on_any_number_of_threads_and_the_first_of
     assert other.errors.tobytes() != one.errors.tobytes()
 
 
-def test_stated_errors_are_played_as_they_are() -> None:
+def test_given_errors_are_used_unchanged() -> None:
     scene = straight_pot(0.5, 1.0)
     errors = np.array([[0.0, 0.0, 0.0, 0.0], [0.003, -0.1, 0.1, -0.2]])
     found = odds(scene, errors=errors)
     one = Table(scene).shoot(Stroke(aim=0.003, speed=1.8, side=0.1, height=-0.2))
     assert found.count == 2
     assert found.batch.position[0] == pytest.approx(found.nominal.position, abs=0.0)
-    assert found.batch.position[1] == pytest.approx(one.position, abs=1e-9)  # m: 0.9 · 2 is 1.8 but for rounding
+    assert found.batch.position[1] == pytest.approx(one.position, abs=1e-9)  # m: 0.9 · 2 differs from 1.8 by rounding
 
 
-def test_miscues_are_counted_and_pot_nothing() -> None:
+def test_miscues_are_counted_as_trials_without_a_pot() -> None:
     scene = straight_pot(0.3, 0.5)
     errors = np.array([[0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.4, 0.4], [0.0, -1.5, 0.0, 0.0]])
     found = odds(scene, errors=errors)
@@ -88,7 +88,7 @@ def test_miscues_are_counted_and_pot_nothing() -> None:
     assert (found.chance("object").hits, found.chance("object").trials) == (1, 3)
 
 
-def test_document_has_all_of_it() -> None:
+def test_document_has_every_field() -> None:
     found = to_json(odds(straight_pot(0.5, 1.0), count=50).document())
     figures = {"count", "seed", "spread", "miscues", "unfinished", "interrupted"}
     assert set(found) == {*figures, "scratch", "any_pot", "balls"}
@@ -98,11 +98,11 @@ def test_document_has_all_of_it() -> None:
 
 
 @pytest.mark.parametrize("wrong", [-0.1, math.nan, math.inf])
-def test_what_is_no_spread_is_refused(wrong: float) -> None:
+def test_invalid_spread_is_refused(wrong: float) -> None:
     with pytest.raises(ValueError, match="is not a standard deviation"):
         Spread(aim=wrong)
 
 
-def test_a_scene_without_a_shot_says_so() -> None:
+def test_a_scene_without_a_shot_is_refused() -> None:
     with pytest.raises(NoSuchShotError, match=r"the scene has no \[\[shot\]\]"):
-        odds(floor())
+        odds(scene_with())

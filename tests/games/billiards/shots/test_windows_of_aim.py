@@ -1,4 +1,4 @@
-"""Between which aims a ball falls, against what geometry says of balls that do not rub and pockets without jaws."""
+"""Aim windows of pots, against the geometry of balls without friction and pockets without jaws."""
 
 import math
 
@@ -7,27 +7,27 @@ from scipy.optimize import brentq
 
 from sandbox.games.billiards.shots.aim_windows import END_ACCURACY, windows
 from sandbox.games.billiards.shots.shot import NoSuchShotError
-from tests.games.billiards.shots.shots_by_hand import R, ball, floor, pocket, shot, straight_pot
+from tests.games.billiards.shots.shots_by_hand import R, ball, pocket, scene_with, shot, straight_pot
 
 pytestmark = pytest.mark.full  # long runs and sweeps
 
 
-def leaving(aim: float, d: float) -> float:
-    """Where the object ball goes, rad: along the line of centres when the cue ball is 2R away from it."""
+def object_heading(aim: float, d: float) -> float:
+    """Return the heading of the object ball, rad: the line of centres when the cue ball is 2R away from it."""
     return aim - math.asin(d * math.sin(aim) / (2.0 * R))
 
 
 @pytest.mark.parametrize(("d", "far"), [(0.2, 0.4), (0.5, 1.0), (1.0, 0.3)])
 def test_window_of_a_straight_pot_is_the_closed_form(d: float, far: float) -> None:
-    allowed = math.asin(0.06 / far)  # the ball's centre has to come over the rim
-    edge = brentq(lambda aim: abs(leaving(aim, d)) - allowed, 0.0, math.asin(2.0 * R / d) - 1e-12, xtol=1e-15)
+    allowed = math.asin(0.06 / far)  # the centre of the ball must pass the rim
+    edge = brentq(lambda aim: abs(object_heading(aim, d)) - allowed, 0.0, math.asin(2.0 * R / d) - 1e-12, xtol=1e-15)
     found = windows(straight_pot(d, far, speed=3.0), "object", "hole", reach=0.2, shots=801)
     (window,) = found.found
     assert (window.low, window.high) == pytest.approx((-edge, edge), abs=2.0 * END_ACCURACY)
     assert window.centre == pytest.approx(0.0, abs=2.0 * END_ACCURACY)
     assert window.half == pytest.approx(edge, abs=2.0 * END_ACCURACY)
     assert found.nearest is window
-    # Nearly as players reckon: the pocket's angle over what a hit makes of an error.
+    # The approximation of players: the angle of the pocket over the amplification of an error by the hit.
     assert window.half == pytest.approx(allowed / (d / (2.0 * R) - 1.0), rel=0.1)  # angles of up to 0.2 are not small
 
 
@@ -36,27 +36,29 @@ def test_window_of_a_cut_is_the_closed_form() -> None:
     hole = pocket("hole", d + far * math.cos(cut), -far * math.sin(cut))
     allowed = math.asin(0.06 / far)
     limits = [
-        brentq(lambda aim, to=to: leaving(aim, d) - to, 0.0, math.asin(2.0 * R / d), xtol=1e-15)
+        brentq(lambda aim, to=to: object_heading(aim, d) - to, 0.0, math.asin(2.0 * R / d), xtol=1e-15)
         for to in (-cut + allowed, -cut - allowed)
     ]
     aim = 0.5 * sum(limits) + 0.001
-    found = windows(floor(ball("object", d), hole, shot(aim, 3.0)), "object", "hole", reach=0.02, shots=401)
+    found = windows(scene_with(ball("object", d), hole, shot(aim, 3.0)), "object", "hole", reach=0.02, shots=401)
     (window,) = found.found
     assert [window.low, window.high] == pytest.approx(limits, abs=2.0 * END_ACCURACY)
     assert aim in window
 
 
-def test_a_window_beyond_the_range_is_followed() -> None:
+def test_a_window_beyond_the_searched_range_is_extended() -> None:
     scene = straight_pot(0.2, 0.1, speed=3.0)
     narrow = windows(scene, "object", "hole", reach=0.01, shots=101)
     (window,) = narrow.found
     assert narrow.reach > 0.01
-    edge = brentq(lambda aim: abs(leaving(aim, 0.2)) - math.asin(0.6), 0.0, math.asin(R / 0.1) - 1e-12, xtol=1e-15)
+    edge = brentq(
+        lambda aim: abs(object_heading(aim, 0.2)) - math.asin(0.6), 0.0, math.asin(R / 0.1) - 1e-12, xtol=1e-15
+    )
     assert window.half == pytest.approx(edge, abs=2.0 * END_ACCURACY)
 
 
-def test_there_is_no_window_where_nothing_leads() -> None:
-    found = windows(floor(ball("object", 0.5), pocket("hole", -0.5, 0.5), shot()), "object", "hole", shots=101)
+def test_no_window_where_no_aim_pots_the_ball() -> None:
+    found = windows(scene_with(ball("object", 0.5), pocket("hole", -0.5, 0.5), shot()), "object", "hole", shots=101)
     assert found.found == ()
     assert found.nearest is None
     assert found.document().within is False
