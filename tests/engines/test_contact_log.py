@@ -39,7 +39,7 @@ def record_contacts(script: list[Interval], joints: bool, impulses_only: bool) -
         for k in range(substeps):
             time += 0.25
             impulse = np.asarray([impulses[n] * (k + 1.0) / 3.0 for n in pairs], np.complex128)
-            if impulses_only and k and log.steady:
+            if impulses_only and k and log.has_distinct_rows:
                 log.add_impulses(impulse)
             else:
                 log.record(time, ContactBatch(a, b, impulse, points + 1.0, points))

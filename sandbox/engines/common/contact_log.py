@@ -126,14 +126,14 @@ class ContactLog:
         self._sign: npt.NDArray[np.floating[Any]] = np.empty(0)  # sign of the impulse of each present contact
         self._unflushed: ComplexArray | None = None  # impulses of the present contacts that are not yet in their rows
         self._order: IntArray | None = None  # order in which the present contacts are entered
-        self.steady = False
+        self.has_distinct_rows = False
         """Each present contact has a row of its own. While the same contacts last, `add_impulses` may be called. If two
         share a row, the order of summation affects the last digit, so they cannot be summed beside the rows."""
 
     def record(self, time: float, batch: ContactBatch) -> None:
         """Add the contacts at a time, s."""
         self._flush()
-        self._order, self.steady = None, True
+        self._order, self.has_distinct_rows = None, True
         if self.can_repeat_pairs and len(batch.a) > 1:
             self._order = _order(batch)
             k = self._order
@@ -160,7 +160,7 @@ class ContactLog:
             self._geometry[rows, 0], self._geometry[rows, 1] = batch.point[leader], -sign[leader] * batch.normal[leader]
         self._rows.keep(row)
         self._row, self._sign = row, sign
-        self.steady = not self.can_repeat_pairs or len(row) < 2 or len(np.unique(row)) == len(row)
+        self.has_distinct_rows = not self.can_repeat_pairs or len(row) < 2 or len(np.unique(row)) == len(row)
         self._enter(signed_impulse)
 
     def add_impulses(self, impulse: ComplexArray) -> None:
@@ -168,7 +168,7 @@ class ContactLog:
         if not len(impulse):
             return
         signed_impulse = (impulse if self._order is None else impulse[self._order]) * self._sign
-        if not self.steady:
+        if not self.has_distinct_rows:
             self._flush()
             self._enter(signed_impulse)
         elif self._unflushed is None:  # from now on summed beside the rows, so that the rows are looked up only once
@@ -182,7 +182,7 @@ class ContactLog:
             self._impulse[self._row], self._unflushed = self._unflushed, None
 
     def _enter(self, impulse: ComplexArray) -> None:
-        if self.can_repeat_pairs and not self.steady:
+        if self.can_repeat_pairs and not self.has_distinct_rows:
             np.add.at(self._impulse, self._row, impulse)
         else:
             self._impulse[self._row] += impulse

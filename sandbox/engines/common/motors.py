@@ -95,7 +95,7 @@ class HingeState(NamedTuple):
     """N·m, torque that presses it there; signed as angular velocities are"""
     torque: float
     """N·m, of the drive at the end of the substep, positive in its direction"""
-    steady: bool
+    is_steady: bool
     """whether the torque was at its target throughout the substep"""
 
 
@@ -127,13 +127,13 @@ class HingeDrive:
         sense, end = self.sense, self._end
         position, speed, signed_weight_torque = sense * (angle - self.rest), sense * spin, sense * weight_torque
         count = self._pieces(position, speed, signed_weight_torque, h)
-        piece, steady = h / count, True
+        piece, is_steady = h / count, True
         for _ in range(count):
             if not self.drive.ramp:
                 torque = self._target_torque(level, position)
             predicted = position + piece * (speed + 0.5 * piece * (torque + signed_weight_torque) / self.moment)
             target = self._target_torque(level, min(max(predicted, 0.0), end))
-            steady = steady and torque == target
+            is_steady = is_steady and torque == target
             torque, mean_torque = self._ramp(torque, target, piece)
             position, speed, stop = advance_between_stops(
                 position, speed, piece, (mean_torque + signed_weight_torque) / self.moment, end, self.drive.bounce
@@ -145,7 +145,7 @@ class HingeDrive:
             stop,
             sense * (mean_torque + signed_weight_torque) if stop else 0.0,
             torque,
-            steady,
+            is_steady,
         )
 
     def _pieces(self, position: float, speed: float, weight_torque: float, h: float) -> int:

@@ -38,7 +38,7 @@ class EventRecorder:
         """Record contacts and zone entries at a time, s; at the opening, zone entries stay for the next call."""
         tabletop, zone_tracker, log = self._population.tabletop, self._population.zone_tracker, self._log
         entries = None if zone_tracker is None else zone_tracker.drain_entries(repeat=opening)
-        impulses_suffice = log.steady and entries is None
+        impulses_suffice = log.has_distinct_rows and entries is None
         contacts = (
             self._population.space_bodies.touching(impulses_suffice) if tabletop is None else tabletop.drain_contacts()
         )
@@ -49,7 +49,7 @@ class EventRecorder:
             log.add_impulses(contacts)
             self.contacts += len(contacts)
         if entries is not None:
-            log.steady = False  # a zone entry does not last: the next contacts are different ones
+            log.has_distinct_rows = False  # a zone entry does not last: the next contacts are different ones
 
     def rebuild(self) -> None:
         """Update after an action: a spawned body may have several shapes."""

@@ -67,9 +67,10 @@ class StepEnergyLedger:
         breaks[list(store.broken)] = -np.inf
         self._potential = Potential(store.setup, store.bodies, breaks=breaks)
         self._no_spin: FloatArray = np.zeros(len(moving))
-        steady = bool(store.force.any() or store.torque.any() or self._zone_weight.any())
         u = self._forces
-        self._has_work = u.has_drag or u.damped_forces or steady or self._field.thrusting or self._penalty is not None
+        has_constant_forces = store.force.any() or store.torque.any() or self._zone_weight.any()
+        has_varying_forces = u.has_drag or u.damped_forces or self._field.thrusting or self._penalty is not None
+        self._has_work = bool(has_constant_forces or has_varying_forces)
         self._compliant = self._joints is not None and self._joints.method == "xpbd"
 
     @contextmanager

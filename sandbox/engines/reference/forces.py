@@ -162,7 +162,7 @@ def forces_on(store: BodyStore, field: ForceField, joints: JointSolver | None, c
     """Return the forces on the bodies of a body store.
 
     Args:
-        store: the bodies, and the steady forces on them.
+        store: the bodies, and the constant forces on them.
         field: attractions and thrusts.
         joints: solver of the joints, if there are any.
         coordinates: D of a state: 2, or 3 if a body turns.
@@ -172,16 +172,16 @@ def forces_on(store: BodyStore, field: ForceField, joints: JointSolver | None, c
     if store.mounts:  # their drives apply the forces on them
         moving = moving.copy()
         moving[list(store.mounts)] = False
-    steady: FloatArray = np.zeros((len(moving), coordinates))
-    steady[:, :2] = np.where(moving, store.gravity, 0.0) + store.force * store.inverse_mass[:, None]
+    constant: FloatArray = np.zeros((len(moving), coordinates))
+    constant[:, :2] = np.where(moving, store.gravity, 0.0) + store.force * store.inverse_mass[:, None]
     if coordinates == 3:
-        steady[:, 2] = store.torque * store.inverse_moment
+        constant[:, 2] = store.torque * store.inverse_moment
     forces: list[Callable[[float, State], FloatArray]] = [] if field.empty else [field]
     springs = store.setup.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)
     if joints is not None and joints.method != "xpbd" and len(springs):
         forces.append(lambda _, x: joints.forces(x))
     return Inputs(
-        steady,
+        constant,
         world.linear_drag,
         world.quadratic_drag,
         world.wind,

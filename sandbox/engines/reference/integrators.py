@@ -32,8 +32,8 @@ _ALL = np.ones((1, 1))
 class Inputs(NamedTuple):
     """u: the forces on N bodies during one substep."""
 
-    steady: FloatArray
-    """(N, D) acceleration by gravity, steady forces and torques, m/s² and rad/s²; 0 for fixed bodies"""
+    constant: FloatArray
+    """(N, D) acceleration by gravity, constant forces and torques, m/s² and rad/s²; 0 for fixed bodies"""
     linear_drag: float = 0.0
     """1/s"""
     quadratic_drag: float = 0.0
@@ -77,7 +77,7 @@ def transition(t: float, x: State, u: Inputs) -> State:
     """
     derivative = np.empty_like(x)
     derivative[0] = x[1]
-    derivative[1] = u.steady
+    derivative[1] = u.constant
     if u.has_drag:
         wind = x[1, :, :2] - u.wind
         rate = u.linear_drag + u.quadratic_drag * np.sqrt(wind[:, :1] ** 2 + wind[:, 1:] ** 2)

@@ -192,7 +192,7 @@ class PenaltyContacts:
         """Return the state after h, s, and the contacts that acted as forces within it."""
         count = x.shape[1]
         fastest = float(np.sqrt((x[1, :, :2] ** 2).sum(axis=1)).max(initial=0.0))
-        strongest = float(np.abs(u.steady[:, :2]).max(initial=0.0))
+        strongest = float(np.abs(u.constant[:, :2]).max(initial=0.0))
         margin = 4.0 * h * (fastest + h * strongest)
         pairs = self._pipeline.candidates(x[0], margin)
         self._keys = self._pipeline.manifolds(x[0], pairs, margin).key.copy()
@@ -212,7 +212,7 @@ class PenaltyContacts:
         extended = np.concatenate((x, np.zeros((2, rows, x.shape[2]))), axis=1)
         no_forces = np.zeros((rows, x.shape[2]))
         mobile = np.concatenate((np.broadcast_to(u.mobile, (count, 1)), np.zeros((rows, 1))))
-        extended_u = u._replace(steady=np.concatenate((u.steady, no_forces)), mobile=mobile, contacts=forces)
+        extended_u = u._replace(constant=np.concatenate((u.constant, no_forces)), mobile=mobile, contacts=forces)
         extended = step(transition, t, extended, extended_u, h)
         self.last = self._active_contacts(extended[0, :count], extended[1, count:, :2], pairs, 3.0 * margin)
         return np.ascontiguousarray(extended[:, :count]), self.last

@@ -290,7 +290,7 @@ class WorldState:
 
     def resting_speed(self, h: float) -> float:
         """Return the closing speed, m/s, caused by the forces of two substeps; slower contacts are resting."""
-        return 2.0 * h * float(np.abs(self.forces.steady[:, :2]).max(initial=0.0))
+        return 2.0 * h * float(np.abs(self.forces.constant[:, :2]).max(initial=0.0))
 
     def closing_speed(self, contacts: Manifolds, x: State) -> FloatArray:
         """Return the closing speed of each contact in a state, (K,) m/s."""
