@@ -139,7 +139,7 @@ def table() -> sandbox.Table:
 
 
 def test_shot_shows_a_replay_paths_and_figures(table: sandbox.Table) -> None:
-    shot = table.shoot(sandbox.Stroke(aim=0.0, speed=2.0), ways=True)
+    shot = table.shoot(sandbox.Stroke(aim=0.0, speed=2.0), record_paths=True)
     assert shot.pocketed["<b>bold</b>"] == "<i>hole</i>"
     text = shot._repr_html_()
     document = document_in(text)
@@ -156,11 +156,11 @@ def test_shot_without_recorded_paths_shows_its_end_and_a_hint(table: sandbox.Tab
     document = document_in(shot._repr_html_())
     assert "<canvas" not in document
     assert 'class="paths"' in document
-    assert "ways=True" in document
+    assert "record_paths=True" in document
 
 
 def test_shot_that_moves_nothing_is_displayed(table: sandbox.Table) -> None:
-    document = document_in(table.shoot(None, ways=True)._repr_html_())
+    document = document_in(table.shoot(None, record_paths=True)._repr_html_())
     assert "3, of which 0 moved" in document
     assert "all balls at rest" in document
 
@@ -168,7 +168,7 @@ def test_shot_that_moves_nothing_is_displayed(table: sandbox.Table) -> None:
 def test_display_of_a_shot_beyond_the_size_limit_has_no_replay(
     table: sandbox.Table, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    shot = table.shoot(sandbox.Stroke(aim=0.0, speed=2.0), ways=True)
+    shot = table.shoot(sandbox.Stroke(aim=0.0, speed=2.0), record_paths=True)
     monkeypatch.setattr("sandbox.notebook.MAX_CHARACTERS", 1000)
     document = document_in(shot._repr_html_())
     assert "<canvas" not in document

@@ -8,7 +8,7 @@ import pytest
 from sandbox.engines.registry import ENGINES
 from sandbox.measure.metrics.energy import energies
 from sandbox.scene.files.load import from_document
-from tests.laws.ways import IMPULSE_CONFIGS, INTEGRATORS, PENALTY, EngineConfig, drop, each_config
+from tests.laws.engine_configs import IMPULSE_CONFIGS, INTEGRATORS, PENALTY, EngineConfig, drop, each_config
 
 G = 9.81
 FIRST_ORDER = {"explicit_euler": 0.5, "semi_implicit_euler": -0.5}

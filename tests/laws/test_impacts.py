@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.laws.ways import IMPULSE_CONFIGS, PENALTY, EngineConfig, each_config, pair
+from tests.laws.engine_configs import IMPULSE_CONFIGS, PENALTY, EngineConfig, each_config, pair
 
 ROUNDING = 1e-11  # 60 rounding errors of 1e-16, amplified by mass ratios up to 1e3
 speeds = st.floats(0.2, 3.0)

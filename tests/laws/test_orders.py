@@ -8,7 +8,7 @@ from sandbox.engines.reference.integrators import INTEGRATORS as TABLE
 from sandbox.measure.analytic import bounces
 from sandbox.measure.analytic.trajectory import solved_run
 from sandbox.scene.files.load import from_document
-from tests.laws.ways import INTEGRATORS, EngineConfig, drop
+from tests.laws.engine_configs import INTEGRATORS, EngineConfig, drop
 
 STEPS = np.array([0.04, 0.02, 0.01, 0.005])
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sandbox.scene.files.load import from_document
-from tests.laws.ways import EngineConfig, each_config
+from tests.laws.engine_configs import EngineConfig, each_config
 
 pytestmark = pytest.mark.full  # long runs and sweeps
 

@@ -8,7 +8,7 @@ from scipy.special import ellipk
 
 from sandbox.measure.metrics.energy import energies
 from sandbox.scene.files.load import from_document
-from tests.laws.ways import EngineConfig, each_config
+from tests.laws.engine_configs import EngineConfig, each_config
 
 pytestmark = pytest.mark.full  # long runs and sweeps
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sandbox.scene.files.load import from_document
-from tests.laws.ways import IMPULSE_CONFIGS, PENALTY, each_config
+from tests.laws.engine_configs import IMPULSE_CONFIGS, PENALTY, each_config
 
 TOLERANCE = 1e-12  # m and m/s: rounding of 1e-16, amplified by less than 1e3 in the impacts
 

@@ -242,17 +242,27 @@ class BodyStore:
 
     def beyond(self) -> int | None:
         """Return the index of a body that is not finite or out of bounds; None if there is none."""
-        index = first_beyond(self.position, self.velocity, self.angle, self.angular_velocity)
+        index = first_beyond(self.position, self.velocity, self.angle, self.angular_velocity, self.roll)
         return None if index < 0 else index
 
 
 @kernel
-def first_beyond(position: FloatArray, velocity: FloatArray, angle: FloatArray, spin: FloatArray) -> int:
-    """Return the index of the first of N bodies that is not finite or out of bounds; −1 if there is none."""
+def first_beyond(
+    position: FloatArray, velocity: FloatArray, angle: FloatArray, spin: FloatArray, roll: FloatArray
+) -> int:
+    """Return the index of the first of N bodies that is not finite or out of bounds; −1 if there is none.
+
+    Args:
+        position: (N, 2) m, at most `FARTHEST` from the origin.
+        velocity: (N, 2) m/s, at most `FASTEST`.
+        angle: (N,) rad.
+        spin: (N,) rad/s.
+        roll: (N, 2) rad/s, about x and y.
+    """
     for i in range(len(position)):
-        # Comparisons with nan are false, so a nan anywhere makes `good` false.
+        # Comparisons with nan are false, so a nan anywhere makes `is_valid` false.
         is_valid = position[i, 0] ** 2 + position[i, 1] ** 2 <= FARTHEST * FARTHEST
         is_valid = is_valid and velocity[i, 0] ** 2 + velocity[i, 1] ** 2 <= FASTEST * FASTEST
-        if not (is_valid and abs(spin[i]) < math.inf and abs(angle[i]) < math.inf):
+        if not (is_valid and abs(spin[i]) + abs(angle[i]) + abs(roll[i, 0]) + abs(roll[i, 1]) < math.inf):
             return i
     return -1

@@ -124,7 +124,7 @@ REST_FRACTION = 8.0 * 2.0**-52
 ABSORBED_SPEED = 1e-3
 """m/s: a collision that drives a supported ball into its support more slowly than this leaves it supported."""
 
-TOUCH_GAP = 1e-9
+JOIN_GAP = 1e-9
 """m: largest distance between the ends of two lines for a ball to roll from one to the other."""
 
 
@@ -288,12 +288,12 @@ def pass_line_end(data: EventState, i: int) -> None:
     """Move a ball at the end of its line to the next parallel line, or release it."""
     state, lines, f = data.state, data.lines, data.tags[i, c.SUPPORT]
     # At a convex joint the centre reaches the end of one line before it is above the next.
-    tolerance = TOUCH_GAP + PARALLEL_ANGLE * state[i, c.RADIUS]
+    tolerance = JOIN_GAP + PARALLEL_ANGLE * state[i, c.RADIUS]
     for g in range(len(lines)):
         if g == f or not are_parallel(lines, f, g):
             continue
         x, y = state[i, c.X] - lines[g, c.PX], state[i, c.Y] - lines[g, c.PY]
-        if abs(x * lines[g, c.NX] + y * lines[g, c.NY] - data.state[i, c.RADIUS]) > TOUCH_GAP:
+        if abs(x * lines[g, c.NX] + y * lines[g, c.NY] - data.state[i, c.RADIUS]) > JOIN_GAP:
             continue
         foot, v = (
             x * lines[g, c.UX] + y * lines[g, c.UY],

@@ -88,7 +88,7 @@ class PymunkZoneHost:
 UNCORRECTED = 1e9
 """m of overlap that pymunk leaves uncorrected on a surface, where the tabletop stepper corrects it."""
 
-MAX_OVERLAPS = 100
+MAX_OVERLAPPED_BODIES = 100
 """Number of bodies that a new body may overlap: pymunk takes minutes to separate a thousand at one point."""
 
 MAX_CANDIDATES = 1000
@@ -114,10 +114,11 @@ def check_overlaps(
     is_near = np.hypot(*(position - centre).T) < bodies.radius + radius
     overlapping = bodies.element[is_near & present]
     kinds = [bodies.elements[element].collides for element in overlapping.tolist()]
-    if collides == "all" and kinds.count("all") >= MAX_OVERLAPS:
-        raise ActionError(f"it would overlap {kinds.count('all')} bodies; pymunk can separate at most {MAX_OVERLAPS}")
-    if len(kinds) - kinds.count("none") >= MAX_CANDIDATES:
-        raise ActionError(f"it would overlap {len(kinds) - kinds.count('none')} bodies; the limit is {MAX_CANDIDATES}")
+    colliding, candidates = kinds.count("all"), len(kinds) - kinds.count("none")
+    if collides == "all" and colliding >= MAX_OVERLAPPED_BODIES:
+        raise ActionError(f"it would overlap {colliding} bodies; pymunk can separate at most {MAX_OVERLAPPED_BODIES}")
+    if candidates >= MAX_CANDIDATES:
+        raise ActionError(f"it would overlap {candidates} bodies; the limit is {MAX_CANDIDATES}")
 
 
 class PymunkBodies:
@@ -415,8 +416,7 @@ class PymunkBodies:
         """
         if self.tabletop is None:
             return False
-        if self.is_in_pocket(index):
-            raise ActionError(f"{self.bodies.names[index]!r} is in a pocket; move it back into play first")
+        self.tabletop.check_in_play(index, self.bodies.names[index])
         return True
 
     def set_constant_force(self, index: int, force: FloatArray, torque: float) -> None:

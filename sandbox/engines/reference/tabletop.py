@@ -49,22 +49,13 @@ class TabletopBodyStore(BodyStore):
         for index in np.flatnonzero(self.force.any(axis=1) | (self.torque != 0.0)).tolist():
             yield index, (self.force[index], float(self.torque[index]))
 
-    def _check_in_play(self, index: int) -> None:
-        """Refuse a body that lies in a pocket.
-
-        Raises:
-            ActionError: it lies in a pocket.
-        """
-        if self.stepper.pocket[index] >= 0:
-            raise ActionError(f"{self.bodies.names[index]!r} is in a pocket; move it back into play first")
-
     def set_velocity(self, index: int, velocity: FloatArray) -> None:
         """Set the velocity of a body, m/s.
 
         Raises:
             ActionError: it lies in a pocket.
         """
-        self._check_in_play(index)
+        self.stepper.check_in_play(index, self.bodies.names[index])
         super().set_velocity(index, velocity)
 
     def set_spin(self, index: int, spin: float) -> None:
@@ -73,7 +64,7 @@ class TabletopBodyStore(BodyStore):
         Raises:
             ActionError: it lies in a pocket.
         """
-        self._check_in_play(index)
+        self.stepper.check_in_play(index, self.bodies.names[index])
         super().set_spin(index, spin)
 
     def set_constant_force(self, index: int, force: FloatArray, torque: float) -> None:
@@ -82,7 +73,7 @@ class TabletopBodyStore(BodyStore):
         Raises:
             ActionError: it lies in a pocket.
         """
-        self._check_in_play(index)
+        self.stepper.check_in_play(index, self.bodies.names[index])
         super().set_constant_force(index, force, torque)
 
     def move_body(self, index: int, position: FloatArray) -> None:

@@ -323,16 +323,3 @@ def find_in_pockets(balls: TabletopBalls, pockets: FloatArray, pocket_index: Int
                 pocket_index[i] = k
                 count += 1
     return count
-
-
-@kernel
-def first_beyond(balls: TabletopBalls, farthest: float, fastest: float) -> int:
-    """Return the first ball that is not finite, or beyond a distance, m, or a speed, m/s; −1 for none."""
-    for i in range(len(balls.in_play)):
-        x, y = balls.position[i, 0], balls.position[i, 1]
-        vx, vy, wx, wy, wz = motion_of(balls, i)
-        # Comparisons with nan are false, so a nan anywhere makes `good` false.
-        is_valid = x * x + y * y <= farthest * farthest and vx * vx + vy * vy <= fastest * fastest
-        if not (is_valid and abs(wx) + abs(wy) + abs(wz) + abs(balls.angle[i]) < math.inf):
-            return i
-    return -1

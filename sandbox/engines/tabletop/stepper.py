@@ -14,9 +14,10 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from sandbox.action import ActionError
 from sandbox.arrays import BoolArray, ComplexArray, FloatArray, IntArray
-from sandbox.engines.common.base import BEYOND, FARTHEST, FASTEST
-from sandbox.engines.common.body_store import COLLISION_MASKS, NOTHING
+from sandbox.engines.common.base import BEYOND
+from sandbox.engines.common.body_store import COLLISION_MASKS, NOTHING, first_beyond
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, join_batches
 from sandbox.engines.contract import Exhaustion
 from sandbox.engines.energy_ledger import Cause, EnergyLedger
@@ -32,7 +33,7 @@ from sandbox.engines.tabletop.contacts import (
     cushions_of,
     resolve,
 )
-from sandbox.engines.tabletop.motion import TabletopBalls, advance_all, figures_of, find_in_pockets, first_beyond
+from sandbox.engines.tabletop.motion import TabletopBalls, advance_all, figures_of, find_in_pockets
 from sandbox.resource_limits import PAIRS
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix
@@ -140,6 +141,15 @@ class TabletopStepper:
         assert self._balls is not None
         return self._balls
 
+    def check_in_play(self, index: int, name: str) -> None:
+        """Refuse to set a ball in motion that is in a pocket.
+
+        Raises:
+            ActionError: it is in a pocket.
+        """
+        if self.pocket[index] >= 0:
+            raise ActionError(f"{name!r} is in a pocket; move it back into play first")
+
     def return_to_play(self, index: int) -> None:
         """Return a ball from its pocket to play."""
         self.pocket[index] = -1
@@ -236,7 +246,8 @@ class TabletopStepper:
 
     def beyond(self) -> tuple[int, str] | None:
         """Return a ball that is not finite or out of bounds, and a description; else None."""
-        index = first_beyond(self.balls, FARTHEST, FASTEST)
+        balls = self.balls
+        index = first_beyond(balls.position, balls.velocity, balls.angle, balls.spin, balls.roll)
         return None if index < 0 else (index, BEYOND)
 
     def _energy(self) -> float:

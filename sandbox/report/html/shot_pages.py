@@ -53,7 +53,7 @@ BALLS = (
     HtmlColumn("pocket"),
 )
 NOT_RECORDED = (
-    "Paths were not recorded, so the picture shows the balls at the end only; shoot(…, ways=True) records them."
+    "Paths were not recorded, so the picture shows the balls at the end only; shoot(…, record_paths=True) records them."
 )
 
 
@@ -124,7 +124,7 @@ def _picture(shot: ShotResult, moved: Sequence[int]) -> Markup:
     for k, (name, radius) in enumerate(zip(shot.names, radii, strict=True)):
         colour = colours.get(k, "var(--faint)")
         if shot.path is not None and k in colours:
-            path = frame.at(shot.way(name, SPACING / frame.scale))
+            path = frame.at(shot.path_of(name, SPACING / frame.scale))
             curve = {"fill": "none", "stroke": colour, "stroke-width": 1.6, "stroke-linejoin": "round"}
             lines.append(line(path, curve))
             ring = {"fill": "var(--paper)", "stroke": colour, "stroke-width": 1.4}
@@ -165,7 +165,7 @@ def _balls(shot: ShotResult, events: Sequence[ShotEvent], moved: Sequence[int]) 
     rows: list[list[Content]] = []
     for k in moved[:MAX_LISTED]:
         name = shot.names[k]
-        length = None if shot.path is None else _length(shot.way(name))
+        length = None if shot.path is None else _length(shot.path_of(name))
         pocket = shot.pocketed.get(name)
         end = [UNKNOWN, UNKNOWN] if pocket else [f"{value:.3f}" for value in shot.position[k].tolist()]
         cells: list[Content] = [format_number(length), f"{collisions[name]:,}", f"{cushions[name]:,}", *end]

@@ -29,7 +29,7 @@ ball = [{ name = "cue", position = [0.5, 0.5], radius = 0.03 }, { name = "b", po
 
 
 def shot() -> ShotResult:
-    return sandbox.Table(sandbox.loads(BALL_ON_TABLE)).shoot(sandbox.Stroke(aim=0.02, speed=1.0), ways=True)
+    return sandbox.Table(sandbox.loads(BALL_ON_TABLE)).shoot(sandbox.Stroke(aim=0.02, speed=1.0), record_paths=True)
 
 
 def run_with_an_added_body() -> sandbox.Trajectory:

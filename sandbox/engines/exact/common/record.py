@@ -5,6 +5,8 @@ where it acts. The mean is the velocity after it minus half of the change. The k
 collision and never write to `state`, except for the two columns `ENERGY_UNTIL` and `ENERGY_RESIDUAL`.
 """
 
+from typing import TypeVar
+
 import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
@@ -12,6 +14,8 @@ from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.exact.common import state as c
 from sandbox.engines.exact.common.state import EventState
 from sandbox.trajectory import Contacts
+
+Rows = TypeVar("Rows", FloatArray, IntArray)
 
 ROWS_PER_EVENT = 16
 """Upper bound of the log rows that one event adds."""
@@ -83,12 +87,17 @@ def log_supports(data: EventState, t: float) -> None:
         log_support(data.state, data.tags, data.log, data.moving_balls[k], t)
 
 
+def resize_rows(array: Rows, used: int, rows: int) -> Rows:
+    """Return an array with another number of rows and the same first `used` rows; the other rows are not set."""
+    resized: Rows = np.empty((rows, *array.shape[1:]), array.dtype)
+    resized[:used] = array[:used]
+    return resized
+
+
 def with_log_rows(data: EventState, rows: int) -> EventState:
     """Return the state with room for the given number of log rows."""
-    log, pair = np.empty((rows, 7)), np.empty((rows, 2), np.int64)
     used = int(data.counts[c.LOG_ROWS])
-    log[:used], pair[:used] = data.log[:used], data.log_pair[:used]
-    return data._replace(log=log, log_pair=pair)
+    return data._replace(log=resize_rows(data.log, used, rows), log_pair=resize_rows(data.log_pair, used, rows))
 
 
 def drain_log(data: EventState) -> Contacts:

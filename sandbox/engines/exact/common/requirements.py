@@ -30,7 +30,7 @@ OVERLAP = ("slop", "bias", "persistence")
 SPRINGS = ("stiffness", "damping")
 """Settings of penalty springs."""
 
-TOUCH_GAP = 1e-9
+TOUCH_OVERLAP = 1e-9
 """m: bodies that overlap by no more than this touch."""
 
 
@@ -41,7 +41,7 @@ ROUNDING = 4.0 * 2.0**-52
 def touch_tolerance(*coordinates: FloatArray) -> FloatArray:
     """Return the overlap, m, (K,), that counts as contact at positions (K, 2), m."""
     largest = np.max([np.abs(each).max(axis=-1) for each in coordinates], axis=0)
-    return np.asarray(TOUCH_GAP + ROUNDING * largest)
+    return np.asarray(TOUCH_OVERLAP + ROUNDING * largest)
 
 
 def overlapping_balls(

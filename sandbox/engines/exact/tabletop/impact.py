@@ -249,7 +249,7 @@ STOP_SPEED = 1e-4
 """m/s: a ball whose centre and rim are both slower than this after such a slow collision is stopped. Otherwise it would
 roll 5e-8 m."""
 
-MICRO_BOUNCE = 1e-3
+MICRO_BOUNCE_SPEED = 1e-3
 """m/s: smallest speed of separation of balls that spin presses together, which prevents an endless series of collisions
 (Zeno behaviour). Between two balls it adds up to m·MICRO_BOUNCE²/4 each time, some 4e-8 J, and a distance of 3e-7 m."""
 
@@ -314,7 +314,7 @@ def needs_micro_bounce(separation: float, reduction: float, reduction_rate: floa
         reduction_rate: present rate of reduction, m/s².
         duration: duration of that rate, s.
     """
-    if separation >= MICRO_BOUNCE or reduction_rate <= 2.0 * CREEP_ACCELERATION:
+    if separation >= MICRO_BOUNCE_SPEED or reduction_rate <= 2.0 * CREEP_ACCELERATION:
         return False
     return reduction >= separation or reduction_rate * duration > separation
 
@@ -361,8 +361,8 @@ def hit_ball(data: TabletopState, i: int, k: int) -> None:
     if needs_micro_bounce(
         separation, reduction, reduction_rate, min(state[i, c.PHASE_END], state[k, c.PHASE_END]) - state[i, c.T]
     ):
-        impulse = (MICRO_BOUNCE - separation) / (inverse_mass_i + inverse_mass_k)
-        account_micro_bounce(data, impulse, separation, MICRO_BOUNCE)
+        impulse = (MICRO_BOUNCE_SPEED - separation) / (inverse_mass_i + inverse_mass_k)
+        account_micro_bounce(data, impulse, separation, MICRO_BOUNCE_SPEED)
         state[i, c.VX] -= impulse * inverse_mass_i * nx
         state[i, c.VY] -= impulse * inverse_mass_i * ny
         state[k, c.VX] += impulse * inverse_mass_k * nx
@@ -447,9 +447,9 @@ def hit_cushion(
     if needs_micro_bounce(
         separation, speed_gain_until_rolling(data, i, nx, ny), reduction_rate, state[i, c.PHASE_END] - state[i, c.T]
     ):
-        account_micro_bounce(data, (MICRO_BOUNCE - separation) * state[i, c.MASS], separation, MICRO_BOUNCE)
-        state[i, c.VX] -= (MICRO_BOUNCE - separation) * nx
-        state[i, c.VY] -= (MICRO_BOUNCE - separation) * ny
+        account_micro_bounce(data, (MICRO_BOUNCE_SPEED - separation) * state[i, c.MASS], separation, MICRO_BOUNCE_SPEED)
+        state[i, c.VX] -= (MICRO_BOUNCE_SPEED - separation) * nx
+        state[i, c.VY] -= (MICRO_BOUNCE_SPEED - separation) * ny
         start_phase(data, i)
     if data.counts[c.RECORDING] != 0:
         mass = state[i, c.MASS]

@@ -132,7 +132,7 @@ class ShotResult(HtmlRepr):
             )
         return positions
 
-    def way(self, ball: str, spacing: float = 0.01) -> FloatArray:
+    def path_of(self, ball: str, spacing: float = 0.01) -> FloatArray:
         """Return points along the path of a ball, (K, 2) m, including its corners.
 
         Args:
@@ -166,5 +166,5 @@ class ShotResult(HtmlRepr):
     def _recorded_paths(self) -> tuple[FloatArray, IntArray]:
         """Return the path segments, (M, 12), and their balls, (M,)."""
         if self.path is None or self.path_ball is None:
-            raise ValueError("paths were not recorded; call shoot(…, ways=True)")
+            raise ValueError("paths were not recorded; call shoot(…, record_paths=True)")
         return self.path, self.path_ball

@@ -209,7 +209,7 @@ class Table:
         return self._state[:, c.X : c.Y + 1].copy()
 
     def shoot(
-        self, stroke: Stroke | None = None, ball: str = "cue", *, until: float = UNTIL, ways: bool = False
+        self, stroke: Stroke | None = None, ball: str = "cue", *, until: float = UNTIL, record_paths: bool = False
     ) -> ShotResult:
         """Play a shot until all balls are at rest. The table does not change.
 
@@ -217,7 +217,7 @@ class Table:
             stroke: stroke of the cue; None lets the balls continue from their present state.
             ball: name of the struck ball.
             until: largest duration, s.
-            ways: record the paths of all balls, for `ShotResult.at` and `ShotResult.way`.
+            record_paths: record the paths of all balls, for `ShotResult.at` and `ShotResult.path_of`.
 
         Raises:
             KeyError: no ball has that name.
@@ -225,10 +225,10 @@ class Table:
             Exhaustion: the shot has more events than the limit.
         """
         if stroke is None:
-            return self._play(NO_BALL, NO_MOTION, until, ways)
+            return self._play(NO_BALL, NO_MOTION, until, record_paths)
         index = self._strikable_index(ball)
         velocity, spin = struck(stroke, self._mass[index], self._radius[index])
-        return self._play(index, (*velocity, *spin), until, ways)
+        return self._play(index, (*velocity, *spin), until, record_paths)
 
     def send(
         self,
@@ -237,7 +237,7 @@ class Table:
         ball: str = "cue",
         *,
         until: float = UNTIL,
-        ways: bool = False,
+        record_paths: bool = False,
     ) -> ShotResult:
         """Play a shot from the velocity and spin of a ball directly after the stroke.
 
@@ -246,7 +246,7 @@ class Table:
             spin: (x, y, z), rad/s, right-handed, z up.
             ball: name of the struck ball.
             until: largest duration, s.
-            ways: record the paths of all balls.
+            record_paths: record the paths of all balls.
 
         Raises:
             KeyError: no ball has that name.
@@ -256,7 +256,7 @@ class Table:
         motion = (*velocity, *spin)
         if len(motion) != 5 or not all(map(isfinite, motion)):
             raise ValueError(f"{motion} is not a velocity and a spin: two and three finite numbers")
-        return self._play(self._strikable_index(ball), motion, until, ways)
+        return self._play(self._strikable_index(ball), motion, until, record_paths)
 
     def fan(self, strokes: Sequence[Stroke], ball: str = "cue", *, threads: int = 1, until: float = UNTIL) -> ShotBatch:
         """Play many independent shots from the present positions.
@@ -404,18 +404,18 @@ class Table:
         data.counts[c.RECORDING] = data.counts[c.RECORDING_PATHS] = 0
         return data
 
-    def _play(self, index: int, motion: tuple[float, ...], until: float, ways: bool) -> ShotResult:
+    def _play(self, index: int, motion: tuple[float, ...], until: float, record_paths: bool) -> ShotResult:
         _check_time(until)
         with self._lock:  # copies of a table share its state arrays
             if index != NO_BALL:
                 self._motion[:] = motion
-            return self._play_locked(index, until, ways)
+            return self._play_locked(index, until, record_paths)
 
-    def _play_locked(self, index: int, until: float, ways: bool) -> ShotResult:
+    def _play_locked(self, index: int, until: float, record_paths: bool) -> ShotResult:
         data, motion = self._data, self._motion
-        data.counts[c.RECORDING_PATHS] = ways
+        data.counts[c.RECORDING_PATHS] = record_paths
         while (status := shoot(data, self._state, self._tags, index, motion, until)) == FULL:
-            if ways and data.counts[c.PATH_ROWS] + 2 > len(data.path):
+            if record_paths and data.counts[c.PATH_ROWS] + 2 > len(data.path):
                 data = with_path_rows(data, 2 * len(data.path))
             else:
                 data = with_log_rows(data, 2 * len(data.log))
@@ -432,8 +432,8 @@ class Table:
             data.state.copy(),
             data.tags[:, c.PHASE].copy(),
             status == DONE,
-            data.path[:path_rows].copy() if ways else None,
-            data.path_tags[:path_rows, 0].copy() if ways else None,
+            data.path[:path_rows].copy() if record_paths else None,
+            data.path_tags[:path_rows, 0].copy() if record_paths else None,
             self.scene,
         )
 

@@ -10,6 +10,7 @@ from sandbox.engines.common.energy_balance import record_energy_change
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.exact.common.bodies import EventDrivenBodies
 from sandbox.engines.exact.common.event_driven import FIRST_LOG_ROWS, EventDrivenSimulation, last_event_bodies
+from sandbox.engines.exact.common.record import resize_rows
 from sandbox.engines.exact.tabletop import state as c
 from sandbox.engines.exact.tabletop.events import advance, rebuild_all
 from sandbox.engines.exact.tabletop.impact import account_floor, advance_all_to, evaluate
@@ -22,18 +23,14 @@ from sandbox.trajectory import Contacts
 
 def with_log_rows(data: TabletopState, rows: int) -> TabletopState:
     """Return the state with room for the given number of log rows."""
-    log, tags = np.empty((rows, c.EVENT_WIDTH)), np.empty((rows, 3), np.int64)
     used = int(data.counts[c.LOG_ROWS])
-    log[:used], tags[:used] = data.log[:used], data.log_tags[:used]
-    return data._replace(log=log, log_tags=tags)
+    return data._replace(log=resize_rows(data.log, used, rows), log_tags=resize_rows(data.log_tags, used, rows))
 
 
 def with_path_rows(data: TabletopState, rows: int) -> TabletopState:
     """Return the state with room for the given number of path segments."""
-    path, tags = np.empty((rows, c.PATH_WIDTH)), np.empty((rows, 2), np.int64)
     used = int(data.counts[c.PATH_ROWS])
-    path[:used], tags[:used] = data.path[:used], data.path_tags[:used]
-    return data._replace(path=path, path_tags=tags)
+    return data._replace(path=resize_rows(data.path, used, rows), path_tags=resize_rows(data.path_tags, used, rows))
 
 
 def drain_log(data: TabletopState) -> Contacts:

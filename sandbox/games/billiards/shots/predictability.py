@@ -237,7 +237,7 @@ def horizon(
     if not (nudge > 0.0 and tolerance > 0.0):
         raise ValueError(f"a nudge of {nudge:g} and a tolerance of {tolerance:g} m; both must be greater than 0")
     setup = shot_setup(scene, shot)
-    nominal = setup.simulate(ways=True)
+    nominal = setup.simulate(record_paths=True)
     others = _perturb_aim(setup, nudge) if by == "aim" else _perturb_position(setup, nudge)
     pairs = [ShotSeparation(nominal, each) for each in others]
     levels = []
@@ -263,7 +263,7 @@ def horizon(
 
 def _perturb_aim(setup: ShotSetup, amount: float) -> list[ShotResult]:
     """Return the shots with the aim changed to both sides by an amount, rad."""
-    return [setup.simulate(setup.changed("aim", change), ways=True) for change in (-amount, amount)]
+    return [setup.simulate(setup.changed("aim", change), record_paths=True) for change in (-amount, amount)]
 
 
 def _perturb_position(setup: ShotSetup, amount: float) -> list[ShotResult]:
@@ -275,7 +275,7 @@ def _perturb_position(setup: ShotSetup, amount: float) -> list[ShotResult]:
         position = table.position
         position[number] = moved
         if overlap_of(table.scene, position) is None:
-            found.append(table.with_balls({setup.ball: moved}).shoot(setup.stroke, setup.ball, ways=True))
+            found.append(table.with_balls({setup.ball: moved}).shoot(setup.stroke, setup.ball, record_paths=True))
     if not found:
         raise ValueError(f"{setup.ball!r} has no room to be moved by {amount:g} m")
     return found
@@ -285,7 +285,7 @@ def _perturb_as_player(setup: ShotSetup, spread: Spread) -> list[ShotResult]:
     """Return the shots with one variable of the stroke off by one standard deviation, to both sides."""
     deviations = np.diag([spread.aim, spread.speed, spread.side, spread.height])
     strokes, _ = without_miscues(perturb_stroke(setup.stroke, np.concatenate((-deviations, deviations))))
-    return [setup.simulate(stroke, ways=True) for stroke in strokes]
+    return [setup.simulate(stroke, record_paths=True) for stroke in strokes]
 
 
 def _first_separation(

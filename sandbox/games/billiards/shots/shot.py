@@ -131,13 +131,13 @@ class ShotSetup:
         changed: Stroke = self.stroke.model_copy(update={variable: getattr(self.stroke, variable) + by})
         return changed
 
-    def simulate(self, stroke: Stroke | None = None, ways: bool = False) -> ShotResult:
+    def simulate(self, stroke: Stroke | None = None, record_paths: bool = False) -> ShotResult:
         """Play a stroke; default: the intended stroke.
 
         Raises:
             Exhaustion: as `Table.shoot`.
         """
-        return self.table.shoot(self.stroke if stroke is None else stroke, self.ball, ways=ways)
+        return self.table.shoot(self.stroke if stroke is None else stroke, self.ball, record_paths=record_paths)
 
     def simulate_batch(self, strokes: Sequence[Stroke], threads: int = 1) -> ShotBatch:
         """Play many independent strokes."""

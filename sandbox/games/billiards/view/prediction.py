@@ -118,7 +118,7 @@ class ShotPredictor:
                 self._table = Table(self._scene)
             names = self._table.names
             table = self._table.with_balls(dict(zip(names, position, strict=False)))
-            outcome = table.shoot(stroke, names[ball], ways=True)
+            outcome = table.shoot(stroke, names[ball], record_paths=True)
         except (Refusal, Exhaustion) as error:
             self._refused = isinstance(error, Refusal)
             return None
@@ -135,10 +135,10 @@ class ShotPredictor:
             ratio = own_radius / other_radius  # in which the contact point divides the line of centres
             ghost = x + (x - bx) * ratio, y + (y - by) * ratio
         return ShotPrediction(
-            outcome.way(name, SPACING),
+            outcome.path_of(name, SPACING),
             ghost,
             hit,
-            outcome.way(names[hit], SPACING) if hit is not None else None,
+            outcome.path_of(names[hit], SPACING) if hit is not None else None,
             tuple(k for k in (ball, hit) if k is not None and names[k] in outcome.pocketed),
         )
 

@@ -16,7 +16,7 @@ CASES = Path(__file__).parent / "cases"
 @pytest.mark.parametrize("until", [0.05, 0.4, 1.0])
 def test_truncated_shot_matches_the_complete_shot_at_that_time(until: float) -> None:
     table = Table(load(CASES / "three_cushions.toml"))
-    full, truncated = table.shoot(ways=True), table.shoot(until=until)
+    full, truncated = table.shoot(record_paths=True), table.shoot(until=until)
     assert full.complete
     assert not truncated.complete
     assert truncated.position == pytest.approx(full.at(np.array([until]))[0], abs=1e-14)  # the same parabola

@@ -43,7 +43,7 @@ def table_with_pocket() -> Table:
         (lambda t: t.with_balls({"a": (0.5, 1.01)}), "'cue' and 'a' overlap"),
         (lambda t: t.with_balls({"a": (0.0, 1.0)}), "'a' and 'rail' overlap"),
         (lambda t: t.after(Table(table(ball("other", 0.5, 1.0))).shoot()), "other balls"),
-        (lambda t: t.shoot(UPWARDS, ways=True).way("cue", 0.0), "spacing"),
+        (lambda t: t.shoot(UPWARDS, record_paths=True).path_of("cue", 0.0), "spacing"),
     ],
 )
 def test_invalid_shot_is_refused(play: Callable[[Table], object], reason: str) -> None:
@@ -56,7 +56,7 @@ def test_unknown_ball_is_refused_by_name() -> None:
         lambda t: t.shoot(UPWARDS, "nobody"),
         lambda t: t.fan([UPWARDS], "nobody"),
         lambda t: t.with_balls({"nobody": (0.5, 0.5)}),
-        lambda t: t.shoot(UPWARDS, ways=True).way("nobody"),
+        lambda t: t.shoot(UPWARDS, record_paths=True).path_of("nobody"),
     ]
     for play in unknown:
         with pytest.raises(KeyError, match="nobody"):
@@ -88,9 +88,9 @@ def test_fan_does_not_depend_on_batches_and_threads() -> None:
 def test_table_can_be_pickled_and_used_from_many_threads() -> None:
     played_table = pickle.loads(pickle.dumps(table_with_pocket()))
     tables = played_table, played_table.with_balls({"a": (0.3, 1.2)})
-    expected = [each.shoot(UPWARDS, ways=True).log for each in tables]
+    expected = [each.shoot(UPWARDS, record_paths=True).log for each in tables]
     with ThreadPoolExecutor(4) as pool:
-        logs = list(pool.map(lambda k: tables[k % 2].shoot(UPWARDS, ways=True).log, range(100)))
+        logs = list(pool.map(lambda k: tables[k % 2].shoot(UPWARDS, record_paths=True).log, range(100)))
     assert all((log == expected[k % 2]).all() for k, log in enumerate(logs))
 
 
@@ -106,7 +106,7 @@ def test_no_ball_passes_a_cushion_far_from_the_origin(offset: float) -> None:
     corners = [[offset, 0.0], [offset + 4.0, 0.0], [offset + 4.0, 4.0], [offset, 4.0]]
     wall = {"points": corners, "closed": True, "restitution": 1.0, "height": 0.03}
     scene = from_document({"surface": {"spinning_friction": 0.01}, "ball": balls, "wall": [wall]})
-    played_table = Table(scene).shoot(until=300.0, ways=True)
+    played_table = Table(scene).shoot(until=300.0, record_paths=True)
     positions = played_table.at(np.linspace(0.0, 300.0, 3001)) - [offset, 0.0]
     assert len(played_table.events) > 200
     assert (np.abs(positions - 2.0) < 2.0).all()

@@ -57,9 +57,9 @@ def test_mirrored_shots_stay_mirrored_until_chaos(stroke: Stroke) -> None:
 @settings(max_examples=25, deadline=None)
 @given(stroke=strokes)
 def test_balls_stay_on_the_table_without_overlap(stroke: Stroke) -> None:
-    shot = Table(cluster()).shoot(stroke, ways=True)
+    shot = Table(cluster()).shoot(stroke, record_paths=True)
     for name in shot.names:
-        path = shot.way(name, 0.002)
+        path = shot.path_of(name, 0.002)
         assert path.min() >= R - 1e-9  # m: contact tolerance
         assert (path <= np.asarray([WIDTH, LENGTH]) - R + 1e-9).all()
     distance = np.hypot(*(shot.position[:, None] - shot.position[None]).transpose(2, 0, 1))

@@ -17,7 +17,10 @@ def test_perturbation_grows_by_gap_over_diameter_at_each_hit() -> None:
     hits = 4
     scene = scene_with(*(ball(str(k), d * k) for k in range(1, hits + 1)), shot(0.0, 4.0))
     attempt = shot_setup(scene)
-    nominal, perturbed = attempt.simulate(ways=True), attempt.simulate(attempt.changed("aim", nudge), ways=True)
+    nominal, perturbed = (
+        attempt.simulate(record_paths=True),
+        attempt.simulate(attempt.changed("aim", nudge), record_paths=True),
+    )
     pair = ShotSeparation(nominal, perturbed)
     times = [event.time for event in nominal.events if event.kind == "ball"]
     assert len(times) == hits
@@ -52,7 +55,7 @@ def test_single_ball_separates_when_distance_times_angle_reaches_the_tolerance()
     attempt = shot_setup(scene)
     found = horizon(scene, nudge=1e-3, tolerance=1e-3, ladder=(1e-3, 1e-4)).separation
     assert found.time is not None
-    (position,) = attempt.simulate(ways=True).at(np.array([found.time]))[:, 0]
+    (position,) = attempt.simulate(record_paths=True).at(np.array([found.time]))[:, 0]
     assert math.hypot(*position) * 1e-3 == pytest.approx(1e-3, rel=1e-6)  # chord 2 sin(a/2) against the arc a
     assert (found.ball, found.hits, found.growth_per_hit) == ("cue", 0, None)
 
@@ -75,7 +78,7 @@ def test_position_can_be_perturbed_instead_of_the_aim() -> None:
     # All shots differ by 1e-4 m from the start; after the hit the ball is off by that over 2R for each metre travelled.
     assert found.separation.ball == "a"
     assert found.separation.time is not None
-    (position,) = shot_setup(scene).simulate(ways=True).at(np.array([found.separation.time]))[:, 1]
+    (position,) = shot_setup(scene).simulate(record_paths=True).at(np.array([found.separation.time]))[:, 1]
     # 1e-2: the position of the hit is off by 1e-4 / 2R, too
     assert (position[0] - 0.3) * 1e-4 / (2.0 * R) == pytest.approx(1e-3, rel=1e-2)
 
@@ -87,7 +90,9 @@ def test_potting_the_same_ball_slightly_later_is_no_separation() -> None:
     assert found.separation.farthest < 1e-6  # m: a perturbation of 1e-9, multiplied by 4 at the hit, over half a metre
     assert found.by_a_radius.time is None
     attempt = shot_setup(scene)
-    pair = ShotSeparation(attempt.simulate(ways=True), attempt.simulate(attempt.changed("speed", 1e-6), ways=True))
+    pair = ShotSeparation(
+        attempt.simulate(record_paths=True), attempt.simulate(attempt.changed("speed", 1e-6), record_paths=True)
+    )
     # m: the potted ball does not jump to the pocket's centre
     assert pair.distances(np.linspace(0.0, pair.end, 20_000)).max() < 1e-4
 
