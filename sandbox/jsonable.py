@@ -29,7 +29,7 @@ def in_json(
     Args:
         key: key in the document; default: the name of the field.
         omit: leave the field out of the document.
-        inline: merge the value, an object, into the object of the dataclass.
+        inline: merge the value, an object, into the object of the dataclass; None adds nothing.
         optional: leave the field out of a document in which its value is None.
     """
     return {"json": JsonField(key, omit, inline, optional)}
@@ -90,7 +90,7 @@ def _object(value: Any) -> dict[str, Any]:
     for each in fields(value):
         key, omit, inline, optional = _options(each)
         own = getattr(value, each.name)
-        if omit or (optional and own is None):
+        if omit or (own is None and (optional or inline)):
             continue
         if inline:
             found |= to_json(own)
@@ -126,10 +126,10 @@ def _object_schema(cls: type, definitions: dict[str, Any]) -> dict[str, Any]:
         if not inline:
             properties[str(key)] = _schema(hints[name], definitions)
             required += [] if optional else [str(key)]
-        elif is_dataclass(hints[name]):
-            inner = _object_schema(hints[name], definitions)
+        elif isinstance(inlined := _without_none(hints[name]), type) and is_dataclass(inlined):
+            inner = _object_schema(inlined, definitions)
             properties |= inner["properties"]
-            required += inner["required"]
+            required += inner["required"] if inlined is hints[name] else []
             is_open |= inner["additionalProperties"]
         else:
             is_open = True  # the keys of a mapping are not known
@@ -137,6 +137,12 @@ def _object_schema(cls: type, definitions: dict[str, Any]) -> dict[str, Any]:
         properties[name] = _schema(get_type_hints(getattr(cls, name).fget)["return"], definitions)
         required.append(name)
     return {"type": "object", "properties": properties, "required": required, "additionalProperties": is_open}
+
+
+def _without_none(hint: Any) -> Any:
+    """Return the type T of a hint `T | None`; any other hint unchanged."""
+    others = [each for each in get_args(hint) if each is not NoneType]
+    return others[0] if get_origin(hint) in (Union, UnionType) and len(others) == 1 else hint
 
 
 def _members(cls: Any) -> list[tuple[str, JsonField]]:

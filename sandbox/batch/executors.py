@@ -21,9 +21,9 @@ from typing import Protocol
 
 from sandbox.batch.job import RunOptions, RunRecord, record_failure, run_or_fetch
 from sandbox.batch.plan import Job
+from sandbox.batch.run_row import RunRow
 from sandbox.batch.store import Notice, Store, StoreError
 from sandbox.batch.worker import INTERRUPT_INTERVAL, SHUTDOWN_TIME, WorkerMessage, serve
-from sandbox.jsonable import JsonObject
 from sandbox.resource_limits import TooLargeError
 from sandbox.scene.errors import SceneError
 from sandbox.signals import defer_interrupt
@@ -51,7 +51,7 @@ class Result:
 
     index: int
     """of the job, in the order of submission, from 0"""
-    row: JsonObject
+    row: RunRow
     record: RunRecord | None = None
     """the run with its trajectory; None if it was made in another process"""
 
@@ -231,7 +231,7 @@ class ProcessExecutor:
         remedy = "; if memory is the cause, use fewer workers" if "SIGKILL" in cause else ""
         done(Result(index, self._failed_row(index, f"{cause}, in the last of {ATTEMPTS} attempts{remedy}")))
 
-    def _failed_row(self, index: int, reason: str) -> JsonObject:
+    def _failed_row(self, index: int, reason: str) -> RunRow:
         """Return the row of a run that no worker could make, and store it.
 
         Raises:

@@ -1,4 +1,4 @@
-"""One job: run it, or fetch its stored run, and describe the run as a row of JSON."""
+"""One job: run it, or fetch its stored run, and describe the run as a row."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,11 +7,12 @@ from typing import Any
 
 from sandbox.action import actions_to_json, in_order
 from sandbox.batch.plan import Job
+from sandbox.batch.run_row import FinalState, GameResult, ReplayResult, RunLedger, RunRow
 from sandbox.batch.store import Store, StoreError, run_id
 from sandbox.engines.registry import engine_named
-from sandbox.jsonable import JsonObject, finite, to_json
+from sandbox.jsonable import finite
 from sandbox.measure.metrics.contacts import collisions, first_collision
-from sandbox.measure.metrics.energy import ledger_of
+from sandbox.measure.metrics.energy import LedgerDocument, ledger_of
 from sandbox.measure.run.runner import run, run_without_frames
 from sandbox.progress import Progress
 from sandbox.provenance import versions
@@ -22,7 +23,7 @@ from sandbox.signals import defer_interrupt, reraise_interrupt
 from sandbox.trajectory import Trajectory
 
 GAME = ("score", "over", "player", "otherwise")
-"""Keys of a row that describe a game."""
+"""Keys of `info["game"]` in a stored run, in the order of the fields of `GameResult`."""
 
 
 @dataclass(frozen=True)
@@ -70,81 +71,71 @@ class RunRecord:
         """Final score of the game; None if none was played."""
         return self._game.get("score")
 
-    def row(self, final: bool = True, ledger: bool = False) -> JsonObject:
-        """Return the run as one JSON object; numbers that are not finite are null.
+    def row(self, final: bool = True, ledger: bool = False) -> RunRow:
+        """Return the figures of the run.
 
         Args:
             final: include the final state.
-            ledger: include the energy ledger, null if none was kept.
+            ledger: include the energy ledger.
         """
         run, info = self.trajectory, self.trajectory.info
         seconds, steps = info["seconds"], info["steps"]
         simulated = float(run.time[-1]) if len(run.time) else 0.0
-        return {
-            "id": self.id,
-            "scene": self.job.label,
-            "title": self.job.scene.title,
-            "engine": self.job.engine,
-            "settings": info["settings"],
-            "seed": info["seed"],
-            "set": dict(self.job.point),
-            "status": run.status,
-            "reason": run.reason,
-            "seconds": finite(seconds),
-            "steps": steps,
-            "steps_per_second": finite(steps / seconds if seconds else None),
-            "work": info.get("work", {}),
-            "realtime_factor": finite(simulated / seconds if seconds else None),
-            "energy_start": finite(info["energy_start"]),
-            "energy_end": finite(info["energy_end"]),
-            "joint_error": finite(info.get("joint_error")),
-            "broken_joints": info.get("broken", 0),
-            "contacts": collisions(run),
-            "first_contact": first_collision(run),
-            "missed_contacts": run.missed_contacts,
-            "retired": {
+        return RunRow(
+            id=self.id,
+            scene=self.job.label,
+            title=self.job.scene.title,
+            engine=self.job.engine,
+            settings=info["settings"],
+            seed=info["seed"],
+            set=dict(self.job.point),
+            status=run.status,
+            reason=run.reason,
+            seconds=finite(seconds),
+            steps=steps,
+            steps_per_second=finite(steps / seconds if seconds else None),
+            work=info.get("work", {}),
+            realtime_factor=finite(simulated / seconds if seconds else None),
+            energy_start=finite(info["energy_start"]),
+            energy_end=finite(info["energy_end"]),
+            joint_error=finite(info.get("joint_error")),
+            broken_joints=info.get("broken", 0),
+            contacts=collisions(run),
+            first_contact=first_collision(run),
+            missed_contacts=run.missed_contacts,
+            retired={
                 str(name): time for name, time in zip(run.names, run.retired_time.tolist(), strict=True) if time == time
             },
-            "pocketed": self._pocketed(),
-            "state_hash": info.get("state_hash"),
-            **({"replayed": self.replayed} if self.job.recorded else {}),
-            **({key: self._game.get(key) for key in GAME} if self.job.player is not None else {}),
-            **({"ledger": self._ledger()} if ledger else {}),
-            **({"final": self._final()} if final else {}),
-            "path": None if self.path is None else str(self.path),
-            "repeated": self.repeated,
-            **({} if self.damaged is None else {"damaged": self.damaged}),
-        }
+            pocketed=self._pocketed(),
+            state_hash=info.get("state_hash"),
+            replay=ReplayResult(self.replayed) if self.job.recorded else None,
+            game=GameResult(*map(self._game.get, GAME)) if self.job.player is not None else None,
+            account=RunLedger(self._ledger()) if ledger else None,
+            final=self._final() if final else None,
+            path=None if self.path is None else str(self.path),
+            repeated=self.repeated,
+            damaged=self.damaged,
+        )
 
-    def _ledger(self) -> dict[str, Any] | None:
+    def _ledger(self) -> LedgerDocument | None:
         if not len(self.trajectory.energy):
             return None
-        found: dict[str, Any] = to_json(ledger_of(self.trajectory, self.job.scene).document())
-        return found
+        return ledger_of(self.trajectory, self.job.scene).document()
 
-    def _final(self) -> dict[str, Any]:
+    def _final(self) -> dict[str, FinalState]:
         run = self.trajectory
         if not len(run.time):
             return {}
-        columns = zip(
-            run.names.tolist(),
-            run.position[-1].tolist(),
-            run.velocity[-1].tolist(),
+        spins = map(tuple, run.spin[-1].tolist()) if len(run.spin) else [None] * len(run.names)
+        states = zip(
+            map(tuple, run.position[-1].tolist()),
+            map(tuple, run.velocity[-1].tolist()),
             run.angle[-1].tolist(),
             run.angular_velocity[-1].tolist(),
-            run.spin[-1].tolist() if len(run.spin) else [None] * len(run.names),
+            spins,
             strict=True,
         )
-        return {
-            name: {
-                "position": [finite(x) for x in position],
-                "velocity": [finite(v) for v in velocity],
-                "angle": finite(angle),
-                "angular_velocity": finite(rate),
-                **({} if spin is None else {"spin": [finite(w) for w in spin]}),
-            }
-            for name, position, velocity, angle, rate, spin in columns
-        }
+        return {name: FinalState(*state) for name, state in zip(run.names.tolist(), states, strict=True)}
 
     def _pocketed(self) -> dict[str, str]:
         """Return the pocket of each captured ball, which lies exactly at the centre of the pocket."""

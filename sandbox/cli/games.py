@@ -1,8 +1,8 @@
 """Commands `match` and `miss`."""
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,10 +26,11 @@ from sandbox.echo import MAX_NAMED, shorten
 from sandbox.engines.contract import Refusal
 from sandbox.engines.registry import UnknownEngineError, able, engine_named
 from sandbox.games.billiards.bot import parse_bots
-from sandbox.games.billiards.headless import MAX_TURNS, FrameRecord, FrameTurn, play_frame
+from sandbox.games.billiards.headless import MAX_TURNS, FrameDocument, FrameRecord, FrameTurn, play_frame
 from sandbox.games.billiards.match import Match
 from sandbox.games.billiards.rules.base import GameError
 from sandbox.games.billiards.rules.registry import RULESETS
+from sandbox.jsonable import in_json, to_json
 from sandbox.progress import Progress, ProgressCallback
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import Fault, SceneError
@@ -73,30 +74,56 @@ class _Options(OutputOptions):
         return distance | ({"misses": True} if self.misses else {})
 
 
+@dataclass(frozen=True)
+class MatchFrame:
+    """A frame of a match."""
+
+    frame: FrameDocument = field(metadata=in_json(inline=True))
+    seed: int
+    seats: tuple[int, ...]
+    """player at each seat; seat 0 breaks"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MatchDocument:
+    """JSON document of `match`."""
+
+    scene: str
+    players: Sequence[str]
+    """as the user named them"""
+    wins: Sequence[int]
+    """frames that each player won"""
+    unfinished: int
+    """frames that were abandoned"""
+    frames: Sequence[MatchFrame]
+    """complete frames"""
+    interrupted: bool
+    """whether an interrupt ended the match early"""
+
+
 @dataclass
 class _MatchScore:
     """Frames played so far."""
 
     wins: list[int]
     """by player"""
-    rows: list[dict[str, Any]] = field(default_factory=list)
-    """JSON documents of the frames"""
+    frames: list[MatchFrame] = field(default_factory=list)
     status: int = 0
     """exit status: 1 a frame was abandoned, 2 a session cannot be saved, 130 interrupted"""
 
     @property
     def unfinished(self) -> int:
         """Number of abandoned frames."""
-        return sum(row["unfinished"] is not None for row in self.rows)
+        return sum(each.frame.unfinished is not None for each in self.frames)
 
     def text(self, names: list[str]) -> str:
         """Return the result of all frames as one line."""
         players = enumerate(zip(names, self.wins, strict=True), 1)
         wins_text = ", ".join(f"player {number} ({name}) {won}" for number, (name, won) in players)
-        drawn = len(self.rows) - sum(self.wins) - self.unfinished
+        drawn = len(self.frames) - sum(self.wins) - self.unfinished
         counts = ((drawn, "drawn"), (self.unfinished, "abandoned"))
         other_counts = "".join(f", {outcome} {count}" for count, outcome in counts if count)
-        return f"{len(self.rows)} frames: {wins_text}{other_counts}"
+        return f"{len(self.frames)} frames: {wins_text}{other_counts}"
 
 
 @click.command(name="match")
@@ -168,11 +195,17 @@ def match_command(**given: Any) -> int:
         _play_frames(options, scene.world.seed if options.seed is None else options.seed, score)
     except KeyboardInterrupt:
         score.status = 130
-        click.echo(f"interrupted: {len(score.rows):,} of {options.frames:,} frames are complete", err=True)
+        click.echo(f"interrupted: {len(score.frames):,} of {options.frames:,} frames are complete", err=True)
     if options.as_json:
-        played = {"wins": score.wins, "unfinished": score.unfinished, "frames": score.rows}
-        is_interrupted = score.status == 130
-        print_json({"scene": options.scene, "players": options.names, **played, "interrupted": is_interrupted})
+        document = MatchDocument(
+            scene=options.scene,
+            players=options.names,
+            wins=score.wins,
+            unfinished=score.unfinished,
+            frames=score.frames,
+            interrupted=score.status == 130,
+        )
+        print_json(to_json(document))
     elif options.frames > 1 or options.quiet:
         click.echo(score.text(options.names))
     return score.status
@@ -224,7 +257,8 @@ def _play_frames(options: _Options, first_seed: int, score: _MatchScore) -> None
         winner = None if winning_seat is None else seats[winning_seat]
         if winner is not None:
             score.wins[winner] += 1
-        score.rows.append({**frame.document(), "seed": first_seed + k, "seats": seats, "winner": winner})
+        document = replace(frame.document(), winner=winner)
+        score.frames.append(MatchFrame(document, first_seed + k, tuple(seats)))
         if frame.unfinished is not None:
             score.status = 1
             click.echo(f"frame {k + 1}: abandoned: {frame.unfinished}", err=True)

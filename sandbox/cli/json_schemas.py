@@ -9,6 +9,8 @@ DOCUMENTS = {
     "check": "sandbox.cli.check:CheckDocument",
     "compare": "sandbox.measure.compare.result:ComparisonDocument",
     "extremes": "sandbox.measure.extremes.runner:ExtremesDocument",
+    "match": "sandbox.cli.games:MatchDocument",
+    "run": "sandbox.cli.run_tables:RunsDocument",
     "shots": "sandbox.games.billiards.shots.study:StudyDocument",
     "tradeoff": "sandbox.measure.tradeoff.result:TradeoffDocument",
 }

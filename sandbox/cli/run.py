@@ -13,6 +13,7 @@ from sandbox.action import Spawn
 from sandbox.batch.executors import Executor, ExecutorError, InProcessExecutor, JobError, ProcessExecutor, Result
 from sandbox.batch.job import RunOptions, RunRecord
 from sandbox.batch.plan import Job, plan
+from sandbox.batch.run_row import RunRow
 from sandbox.batch.store import Store, StoreError
 from sandbox.batch.sweep import parse_sweep, repeated_keys
 from sandbox.cli.common import (
@@ -41,12 +42,12 @@ from sandbox.cli.options import (
     workers_option,
 )
 from sandbox.cli.progress import progress_bars, status_line
-from sandbox.cli.run_tables import print_ledgers, print_runs, print_scores, score_rows
+from sandbox.cli.run_tables import RunsDocument, print_ledgers, print_runs, print_scores, score_rows
 from sandbox.cli.streams import print_json
 from sandbox.echo import short_repr
 from sandbox.engines.registry import able
 from sandbox.games.players import PlayerSpec
-from sandbox.jsonable import JsonObject
+from sandbox.jsonable import to_json
 from sandbox.measure.run.recorder import TooLargeError, require_memory
 from sandbox.measure.seeds import same_random_state
 from sandbox.scene.errors import Fault, SceneError
@@ -80,7 +81,7 @@ class _Batch:
     """Runs of the command: jobs and completed runs."""
 
     jobs: list[Job]
-    rows: dict[int, JsonObject] = field(default_factory=dict)
+    rows: dict[int, RunRow] = field(default_factory=dict)
     """rows of completed runs by the index of their job"""
     single: RunRecord | None = None
     """the run, if there is only one and it was made in this process"""
@@ -94,7 +95,7 @@ class _Batch:
             self.single = result.record
 
     @property
-    def ordered_rows(self) -> list[JsonObject]:
+    def ordered_rows(self) -> list[RunRow]:
         """Rows of completed runs in the order of the jobs."""
         return [self.rows[index] for index in sorted(self.rows)]
 
@@ -229,19 +230,20 @@ def _report_problems(batch: _Batch, is_engine_chosen: bool) -> int:
     """Print a line for each failed or repeated run, and return the exit status."""
     status = batch.status
     for index, row in sorted(batch.rows.items()):
-        if row["status"] != "ok":
+        if row.status != "ok":
             status = status or 1
-            advice = engine_advice(batch.jobs[index].scene, is_engine_chosen) if row["status"] == "refused" else ""
-            click.echo(f"{row['scene']}: {row['status']}: {row['reason']}{advice}", err=True)
-        if "damaged" in row:
-            click.echo(f"{row['damaged']}; the run was repeated", err=True)
-        if row.get("replayed") is False:
+            advice = engine_advice(batch.jobs[index].scene, is_engine_chosen) if row.status == "refused" else ""
+            click.echo(f"{row.scene}: {row.status}: {row.reason}{advice}", err=True)
+        if row.damaged is not None:
+            click.echo(f"{row.damaged}; the run was repeated", err=True)
+        if row.replay is not None and row.replay.replayed is False:
             status = status or 1
-            subject = "state" if row.get("otherwise") is None else f"game, from {row['otherwise']:g} s on,"
+            otherwise = None if row.game is None else row.game.otherwise
+            subject = "state" if otherwise is None else f"game, from {otherwise:g} s on,"
             message = (
                 f"ended in a different {subject} than the session; a possible cause is another version of an engine"
             )
-            click.echo(f"{row['scene']}: {message}", err=True)
+            click.echo(f"{row.scene}: {message}", err=True)
     return status
 
 
@@ -249,9 +251,8 @@ def _print_results(batch: _Batch, options: _Options, status: int) -> None:
     """Print the JSON document, or the tables."""
     rows = batch.ordered_rows
     if options.as_json:
-        score_documents = score_rows(rows) if options.seeds is not None else []
-        scores = {"scores": score_documents} if score_documents else {}
-        print_json({"runs": rows, **scores, "interrupted": batch.status == 130})
+        scores = score_rows(rows) if options.seeds is not None else []
+        print_json(to_json(RunsDocument(runs=rows, scores=scores or None, interrupted=batch.status == 130)))
     elif not options.quiet and rows:
         print_runs(rows, options.verbose)
         if batch.single is not None:
@@ -264,7 +265,7 @@ def _print_results(batch: _Batch, options: _Options, status: int) -> None:
             click.echo(f"stored: {options.out}")
         is_plain = not (options.overrides or options.sweeps or options.plot or options.out or options.verbose)
         if len(rows) == 1 and is_plain and not status:
-            _suggest_next(rows[0]["scene"])
+            _suggest_next(rows[0].scene)
 
 
 def _draw(batch: _Batch, options: _Options, status: int) -> int:

@@ -1,16 +1,20 @@
 """Tables of `run` and `match`: runs, energy ledgers, score histograms."""
 
 import json
+import math
 import sys
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
+from sandbox.batch.run_row import RunRow
 from sandbox.cli.tables import add_columns, heads_of, new_table, print_legend, print_line, print_table
 from sandbox.engines.energy_ledger import Cause
-from sandbox.games.scores import QUANTILES, Scores
-from sandbox.jsonable import JsonObject
+from sandbox.games.scores import QUANTILES, Scores, ScoreStatistics
+from sandbox.jsonable import finite, in_json
+from sandbox.measure.metrics.energy import LedgerDocument
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -47,7 +51,31 @@ LEGEND = {
 """Columns of the table and their meaning, for `--verbose`."""
 
 
-def print_runs(rows: Sequence[JsonObject], verbose: bool = False) -> None:
+@dataclass(frozen=True, kw_only=True)
+class ScoresDocument:
+    """Distribution of the scores of games that differ only in their seed."""
+
+    scene: str
+    engine: str
+    player: str | None
+    set: Mapping[str, object]
+    """values that the command set, without the seed"""
+    distribution: ScoreStatistics = field(metadata=in_json(inline=True))
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunsDocument:
+    """JSON document of `run`."""
+
+    runs: Sequence[RunRow]
+    """completed runs, in the order of the table"""
+    scores: Sequence[ScoresDocument] | None = field(metadata=in_json(optional=True))
+    """distributions of scores over the seeds; None if there are none"""
+    interrupted: bool
+    """whether an interrupt ended the runs early"""
+
+
+def print_runs(rows: Sequence[RunRow], verbose: bool = False) -> None:
     """Print a table with a line for each run.
 
     Args:
@@ -77,14 +105,14 @@ def print_runs(rows: Sequence[JsonObject], verbose: bool = False) -> None:
 
     # A single scene is printed above its runs, because a long path would take the space of the numbers. With several
     # scenes, only their names fold.
-    foldable = max(Text(row["scene"]).cell_len for row in rows) - MIN_NAME_WIDTH if show.scenes else 0
+    foldable = max(Text(row.scene).cell_len for row in rows) - MIN_NAME_WIDTH if show.scenes else 0
     if not show.scenes:
-        print_line(rows[0]["scene"])
+        print_line(rows[0].scene)
     print_table(table, max(foldable, 0))
-    if len(rows) == 1 and rows[0]["first_contact"] is not None and not show.games:
+    if len(rows) == 1 and rows[0].first_contact is not None and not show.games:
         position = _final_position(rows[0])
         final = f"; final position {position} m" if position else ""
-        print_line(f"first contact at {_number(rows[0]['first_contact'], 6)} s{final}")
+        print_line(f"first contact at {_number(rows[0].first_contact, 6)} s{final}")
     if verbose:
         meanings = {key: f"setting `solver.{key}`" for key in show.differing}
         meanings |= {key: f"value of {key!r}" for key in show.swept}
@@ -111,63 +139,63 @@ class _Columns(NamedTuple):
     pocketed: bool
 
     @classmethod
-    def of(cls, rows: Sequence[JsonObject]) -> "_Columns":
+    def of(cls, rows: Sequence[RunRow]) -> "_Columns":
         """Return the columns that are not empty or constant."""
-        swept = [key for key in rows[0]["set"] if key != "world.seed" and not key.startswith("solver.")]
-        scenes = len({row["scene"] for row in rows}) > 1
-        games = any("score" in row for row in rows)
+        swept = [key for key in rows[0].set if key != "world.seed" and not key.startswith("solver.")]
+        scenes = len({row.scene for row in rows}) > 1
+        games = any(row.game is not None for row in rows)
         # Scores are the results of games, and runs of several scenes are not compared with each other.
         is_small = 1 < len(rows) <= MAX_TIMED and not games and not scenes
-        is_timed = is_small and all(row["first_contact"] is not None for row in rows)
+        is_timed = is_small and all(row.first_contact is not None for row in rows)
         return cls(
             scenes=scenes,
-            swept=[key for key in swept if len({str(row["set"][key]) for row in rows}) > 1],
-            differing=[key for key in rows[0]["settings"] if key not in STEP and _differs(rows, key)],
-            substeps=any(row["settings"]["substeps"] > 1 for row in rows),
-            seeds=len({row["seed"] for row in rows}) > 1,
-            joint_errors=any(row["joint_error"] is not None for row in rows),
-            broken_joints=any(row["broken_joints"] for row in rows),
+            swept=[key for key in swept if len({str(row.set[key]) for row in rows}) > 1],
+            differing=[key for key in rows[0].settings if key not in STEP and _differs(rows, key)],
+            substeps=any(row.settings["substeps"] > 1 for row in rows),
+            seeds=len({row.seed for row in rows}) > 1,
+            joint_errors=any(row.joint_error is not None for row in rows),
+            broken_joints=any(row.broken_joints for row in rows),
             first_contacts=is_timed or _first_contacts_differ(rows),
             positions=is_small and len({_final_position(row) for row in rows} - {""}) > 1,
             games=games,
-            pocketed=any(row["pocketed"] for row in rows),
+            pocketed=any(row.pocketed for row in rows),
         )
 
 
-def _cells(row: JsonObject, show: _Columns) -> "Iterator[str | Text]":
+def _cells(row: RunRow, show: _Columns) -> "Iterator[str | Text]":
     """Yield the cells of a run."""
     from rich.text import Text
 
-    settings = row["settings"]
+    settings = row.settings
     if show.scenes:
-        yield Text(row["scene"])
-    yield row["engine"]
+        yield Text(row.scene)
+    yield row.engine
     yield f"{settings['dt']:.4g}" + (f" × {settings['substeps']}" if show.substeps else "")
-    yield from (_setting(row["set"][key]) for key in show.swept)
+    yield from (_setting(row.set[key]) for key in show.swept)
     yield from (_setting(settings[key]) for key in show.differing)
     if show.seeds:
-        yield str(row["seed"])
-    status = Text(row["status"], style="green" if row["status"] == "ok" else "bold red")
-    yield status.append(" stored", style="dim") if row["repeated"] else status
-    yield _number(row["realtime_factor"], 3)
-    start, end = row["energy_start"], row["energy_end"]
+        yield str(row.seed)
+    status = Text(row.status, style="green" if row.status == "ok" else "bold red")
+    yield status.append(" stored", style="dim") if row.repeated else status
+    yield _number(row.realtime_factor, 3)
+    start, end = row.energy_start, row.energy_end
     yield "–" if start is None else f"{_number(start)} → {_number(end)}"
     if show.joint_errors:
-        yield _percent_error(row["joint_error"])
+        yield _percent_error(row.joint_error)
     if show.broken_joints:
-        yield f"{row['broken_joints']:,}"
+        yield f"{row.broken_joints:,}"
     if show.first_contacts:
-        yield _number(row["first_contact"], 6)
+        yield _number(row.first_contact, 6)
     if show.positions:
         yield _final_position(row) or "–"
-    is_refused, missed = row["status"] == "refused", row["missed_contacts"]
-    yield "–" if is_refused else f"{row['contacts']:,}"
+    is_refused, missed = row.status == "refused", row.missed_contacts
+    yield "–" if is_refused else f"{row.contacts:,}"
     yield "–" if is_refused else "?" if missed is None else f"{missed:,}"
     if show.games:
-        yield _number(row.get("score"))
+        yield _number(row.score)
         yield Text(_game_end(row))
     if show.pocketed:
-        yield Text(", ".join(f"{ball}: {pocket}" for ball, pocket in row["pocketed"].items()))
+        yield Text(", ".join(f"{ball}: {pocket}" for ball, pocket in row.pocketed.items()))
 
 
 def _legend(show: _Columns) -> Iterator[str]:
@@ -182,37 +210,36 @@ def _legend(show: _Columns) -> Iterator[str]:
     yield "-v explains every column"
 
 
-def _final_position(row: JsonObject) -> str:
+def _final_position(row: RunRow) -> str:
     """Return the position of the only body at the end, m; "" if the run has no body or several."""
-    final = row.get("final") or {}
-    if len(final) != 1:
+    if row.final is None or len(row.final) != 1:
         return ""
-    (body,) = final.values()
-    return f"({', '.join('–' if x is None else f'{x:.4g}' for x in body['position'])})"
+    (body,) = row.final.values()
+    return f"({', '.join(f'{x:.4g}' if math.isfinite(x) else '–' for x in body.position)})"
 
 
-def _first_contacts_differ(rows: Sequence[JsonObject]) -> bool:
+def _first_contacts_differ(rows: Sequence[RunRow]) -> bool:
     """Return whether the first contact of one scene and seed differs between engines or settings.
 
     If energies and counts are equal, only the first contact shows the effect of a setting.
     """
     times: dict[tuple[str, int], set[float | None]] = {}
     for row in rows:
-        if row["status"] != "refused":
-            times.setdefault((row["scene"], row["seed"]), set()).add(row["first_contact"])
+        if row.status != "refused":
+            times.setdefault((row.scene, row.seed), set()).add(row.first_contact)
     return any(len(each) > 1 for each in times.values())
 
 
-def _game_end(row: JsonObject) -> str:
+def _game_end(row: RunRow) -> str:
     """Return how a game ended; a dash if none was played."""
-    return "–" if row.get("score") is None else row.get("over") or "in progress"
+    return "–" if row.game is None or row.game.score is None else row.game.over or "in progress"
 
 
-def _differs(rows: Sequence[JsonObject], key: str) -> bool:
+def _differs(rows: Sequence[RunRow], key: str) -> bool:
     """Return whether a setting differs between runs of one scene; between scenes, defaults of engines differ anyway."""
     values: dict[str, set[str]] = {}
     for row in rows:
-        values.setdefault(row["scene"], set()).add(str(row["settings"][key]))
+        values.setdefault(row.scene, set()).add(str(row.settings[key]))
     return any(len(each) > 1 for each in values.values())
 
 
@@ -238,74 +265,77 @@ ROUNDING = 1e-12
 precision are exact to about that."""
 
 
-def print_ledgers(rows: Sequence[JsonObject]) -> None:
+def print_ledgers(rows: Sequence[RunRow]) -> None:
     """Print the energy ledgers of runs, those of one scene side by side."""
     from rich.text import Text
 
-    kept = [row for row in rows if row["ledger"] is not None]
-    for group in _groups(kept):
+    for group in _groups([row for row in rows if _ledger(row) is not None]):
         table = new_table()
-        table.add_column(Text(f"energy of {group[0]['scene']}, J"), overflow="fold")
+        table.add_column(Text(f"energy of {group[0].scene}, J"), overflow="fold")
         for row in group:
             table.add_column(Text(_label(row, group)), justify="right", no_wrap=True)
             table.add_column("", justify="right", style="dim", no_wrap=True)
-        ledgers = [row["ledger"] for row in group]
-        table.add_row("start", *_ledger_cells(ledgers, [each["start"] for each in ledgers], fractions=False))
-        for cause in ledgers[0]["causes"]:
-            values = [each["causes"].get(cause) for each in ledgers]
+        ledgers = [ledger for row in group if (ledger := _ledger(row)) is not None]
+        table.add_row("start", *_ledger_cells(ledgers, [each.start for each in ledgers], fractions=False))
+        for cause in ledgers[0].causes:
+            values = [each.causes.get(cause, math.nan) for each in ledgers]
             if cause == Cause.PHANTOM or any(map(_is_significant, ledgers, values)):
                 table.add_row(f"  {cause}", *_ledger_cells(ledgers, values))
-        table.add_row("sum", *_ledger_cells(ledgers, [_sum(each) for each in ledgers]))
-        table.add_row("end", *_ledger_cells(ledgers, [each["end"] for each in ledgers], fractions=False))
-        table.add_row("residual", *_ledger_cells(ledgers, [each["residual"] for each in ledgers], threshold=0.0))
+        table.add_row("sum", *_ledger_cells(ledgers, [sum(each.causes.values()) for each in ledgers]))
+        table.add_row("end", *_ledger_cells(ledgers, [each.end for each in ledgers], fractions=False))
+        table.add_row("residual", *_ledger_cells(ledgers, [each.residual for each in ledgers], threshold=0.0))
         click.echo()
         print_table(table)
-    if kept:
+    if any(_ledger(row) is not None for row in rows):
         print_line("%: of the largest kinetic energy or the largest entry, whichever is greater", "dim", fold=True)
 
 
-def _groups(rows: Sequence[JsonObject]) -> Iterator[list[JsonObject]]:
+def _ledger(row: RunRow) -> LedgerDocument | None:
+    return None if row.account is None else row.account.ledger
+
+
+def _groups(rows: Sequence[RunRow]) -> Iterator[list[RunRow]]:
     """Yield the runs of each scene, at most `MAX_LEDGERS` at a time."""
-    for scene in dict.fromkeys(row["scene"] for row in rows):
-        scene_rows = [row for row in rows if row["scene"] == scene]
+    for scene in dict.fromkeys(row.scene for row in rows):
+        scene_rows = [row for row in rows if row.scene == scene]
         for first in range(0, len(scene_rows), MAX_LEDGERS):
             yield scene_rows[first : first + MAX_LEDGERS]
 
 
-def _label(row: JsonObject, group: Sequence[JsonObject]) -> str:
+def _label(row: RunRow, group: Sequence[RunRow]) -> str:
     """Return the engine of a run, and the values in which it differs from the others of its group."""
-    differing = [key for key in row["set"] if len({str(other["set"].get(key)) for other in group}) > 1]
-    values = (f"{key.rpartition('.')[2]}={row['set'][key]}" for key in differing)
-    return " ".join((row["engine"], *values))
+    differing = [key for key in row.set if len({str(other.set.get(key)) for other in group}) > 1]
+    values = (f"{key.rpartition('.')[2]}={row.set[key]}" for key in differing)
+    return " ".join((row.engine, *values))
 
 
 def _ledger_cells(
-    ledgers: Sequence[dict[str, Any]],
-    values: Sequence[float | None],
+    ledgers: Sequence[LedgerDocument],
+    values: Sequence[float],
     fractions: bool = True,
     threshold: float = ROUNDING,
 ) -> Iterator[str]:
-    """Yield, for each run, a value and its fraction of the largest energy."""
+    """Yield, for each run, a value and its fraction of the largest energy; a value that is not finite is unknown."""
     for ledger, value in zip(ledgers, values, strict=True):
-        if value is None or (fractions and not _is_significant(ledger, value, threshold)):
-            yield from ("?" if value is None else "0", "")
+        if not math.isfinite(value) or (fractions and not _is_significant(ledger, value, threshold)):
+            yield from ("0" if math.isfinite(value) else "?", "")
         else:
             yield f"{value:.5g}"
-            yield _percent(value / ledger["scale"]) if fractions and ledger["scale"] else ""
+            yield _percent(value / ledger.scale) if fractions and _scale(ledger) else ""
+
+
+def _scale(ledger: LedgerDocument) -> float:
+    """Return the largest energy of a ledger, J; 0 if it is unknown."""
+    return finite(ledger.scale) or 0.0
 
 
 def _percent(fraction: float) -> str:
     return f"{100.0 * fraction:.1f} %" if abs(fraction) >= 0.001 else f"{100.0 * fraction:.1g} %"
 
 
-def _is_significant(ledger: dict[str, Any], value: float | None, threshold: float = ROUNDING) -> bool:
+def _is_significant(ledger: LedgerDocument, value: float, threshold: float = ROUNDING) -> bool:
     """Return whether an entry is unknown, or larger than rounding errors."""
-    return value is None or abs(value) > threshold * (ledger["scale"] or 0.0)
-
-
-def _sum(ledger: dict[str, Any]) -> float | None:
-    values = list(ledger["causes"].values())
-    return None if None in values else sum(values)
+    return not abs(value) <= threshold * _scale(ledger)
 
 
 BAR = 40
@@ -314,31 +344,42 @@ EIGHTHS = " ▏▎▍▌▋▊▉█"
 """Block characters by their width in eighths of a character."""
 
 
-def score_rows(rows: Sequence[JsonObject]) -> list[dict[str, Any]]:
+def score_rows(rows: Sequence[RunRow]) -> list[ScoresDocument]:
     """Return the distribution of scores over games that differ only in their seed, in the order of the rows.
 
     Games that diverged or failed are left out; groups of fewer than two games have no entry.
     """
-    found: dict[str, tuple[dict[str, Any], list[float]]] = {}
+    found: dict[str, tuple[RunRow, Mapping[str, object], list[float]]] = {}
     for row in rows:
-        if row.get("score") is None or row["status"] != "ok":
+        if row.game is None or row.game.score is None or row.status != "ok":
             continue
-        point = {key: value for key, value in row["set"].items() if key != "world.seed"}
-        group = {"scene": row["scene"], "engine": row["engine"], "player": row["player"], "set": point}
-        found.setdefault(json.dumps(group, default=str), (group, []))[1].append(float(row["score"]))
-    return [group | Scores.of(scores).document() for group, scores in found.values() if len(scores) > 1]
+        point = {key: value for key, value in row.set.items() if key != "world.seed"}
+        key = json.dumps([row.scene, row.engine, row.game.player, point], default=str)
+        found.setdefault(key, (row, point, []))[2].append(float(row.game.score))
+    return [
+        ScoresDocument(
+            scene=row.scene,
+            engine=row.engine,
+            player=None if row.game is None else row.game.player,
+            set=point,
+            distribution=Scores.of(scores).document(),
+        )
+        for row, point, scores in found.values()
+        if len(scores) > 1
+    ]
 
 
-def print_scores(rows: Sequence[dict[str, Any]]) -> None:
+def print_scores(rows: Sequence[ScoresDocument]) -> None:
     """Print the distributions of `score_rows`."""
     for row in rows:
-        swept = "".join(f", {key} = {value}" for key, value in row["set"].items())
-        click.echo(f"\nscores of {row['scene']}, {row['engine']}{swept}: {row['count']} games, player {row['player']}")
-        click.echo(f"  mean {_score(row['mean'])} ± {_score(row['deviation'])} per game")
+        scores = row.distribution
+        swept = "".join(f", {key} = {value}" for key, value in row.set.items())
+        click.echo(f"\nscores of {row.scene}, {row.engine}{swept}: {scores.count} games, player {row.player}")
+        click.echo(f"  mean {_score(scores.mean)} ± {_score(scores.deviation)} per game")
         names = {0.0: "min", 0.5: "median", 1.0: "max"}
-        values = ((names.get(q, f"{q:.0%}"), row["quantiles"][f"{q:g}"]) for q in QUANTILES)
+        values = ((names.get(q, f"{q:.0%}"), scores.quantiles[f"{q:g}"]) for q in QUANTILES)
         click.echo(f"  {' · '.join(f'{name} {_score(value)}' for name, value in values)}")
-        _print_histogram(row["histogram"]["edges"], row["histogram"]["counts"])
+        _print_histogram(scores.histogram.edges, scores.histogram.counts)
 
 
 def _score(value: float) -> str:

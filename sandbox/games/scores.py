@@ -1,9 +1,8 @@
 """Statistics of the scores of many games: mean, standard deviation, quantiles and histogram."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -50,15 +49,38 @@ class Scores:
             counts=tuple(counts.tolist()),
         )
 
-    def document(self) -> dict[str, Any]:
-        """Return the statistics as JSON values."""
-        return {
-            "count": self.count,
-            "mean": self.mean,
-            "deviation": self.deviation,
-            "quantiles": {f"{fraction:g}": value for fraction, value in zip(QUANTILES, self.quantiles, strict=True)},
-            "histogram": {"edges": list(self.edges), "counts": list(self.counts)},
-        }
+    def document(self) -> "ScoreStatistics":
+        """Return the statistics as they appear in JSON documents."""
+        return ScoreStatistics(
+            self.count,
+            self.mean,
+            self.deviation,
+            {f"{fraction:g}": value for fraction, value in zip(QUANTILES, self.quantiles, strict=True)},
+            Histogram(self.edges, self.counts),
+        )
+
+
+@dataclass(frozen=True)
+class Histogram:
+    """Histogram of scores."""
+
+    edges: Sequence[float]
+    """bounds of the bins; a bin includes its lower edge"""
+    counts: Sequence[int]
+    """number of games in each bin"""
+
+
+@dataclass(frozen=True)
+class ScoreStatistics:
+    """JSON document of the statistics of scores."""
+
+    count: int
+    mean: float
+    deviation: float
+    """sample standard deviation"""
+    quantiles: Mapping[str, float]
+    """by probability"""
+    histogram: Histogram
 
 
 def _edges(scores: FloatArray) -> list[float]:

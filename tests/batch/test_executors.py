@@ -6,6 +6,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
@@ -17,8 +18,8 @@ from sandbox.batch import executors, worker
 from sandbox.batch.executors import Executor, ExecutorError, InProcessExecutor, JobError, ProcessExecutor, Result
 from sandbox.batch.job import RunOptions, RunRecord, run_or_fetch
 from sandbox.batch.plan import Job
+from sandbox.batch.run_row import RunRow
 from sandbox.batch.store import Store
-from sandbox.jsonable import JsonObject
 from sandbox.scene.files.load import loads
 
 DROP = """
@@ -30,9 +31,6 @@ name = "a"
 position = [0, {height}]
 radius = 1
 """
-TIMES = ("seconds", "steps_per_second", "realtime_factor")
-"""Keys of a row that depend on the machine."""
-
 LARGE = 50_000_000
 """Bytes of a row, far more than the buffer of a pipe: sending it takes about 10 ms."""
 
@@ -50,8 +48,9 @@ def results_of(executor: Executor, submitted: list[Job]) -> dict[int, Result]:
     return {result.index: result for result in found}
 
 
-def without_times(row: JsonObject) -> JsonObject:
-    return {key: value for key, value in row.items() if key not in TIMES}
+def reproducible(row: RunRow) -> RunRow:
+    """Return a row without the figures that depend on the machine, and without the folder of its store."""
+    return replace(row, seconds=None, steps_per_second=None, realtime_factor=None, path=None)
 
 
 def test_all_executors_yield_the_same_rows(tmp_path: Path) -> None:
@@ -59,12 +58,11 @@ def test_all_executors_yield_the_same_rows(tmp_path: Path) -> None:
         in_process = results_of(InProcessExecutor(RunOptions(tmp_path / "one"), store), jobs(4))
     in_workers = results_of(ProcessExecutor(RunOptions(tmp_path / "two"), 2), jobs(4))
     for index, result in in_process.items():
-        assert result.row["scene"] == f"drop {index}"
+        assert result.row.scene == f"drop {index}"
         assert result.record is not None and result.record.trajectory.status == "ok"
         assert in_workers[index].record is None
-        mine, theirs = ({**without_times(each[index].row), "path": None} for each in (in_process, in_workers))
-        assert mine == theirs
-        assert Path(in_workers[index].row["path"]).is_file()
+        assert reproducible(in_workers[index].row) == reproducible(result.row)
+        assert Path(in_workers[index].row.path or "").is_file()
 
 
 def test_jobs_options_and_results_can_be_pickled() -> None:
@@ -113,7 +111,7 @@ def test_run_of_a_worker_killed_while_sending_its_row_is_repeated(
     monkeypatch.setattr(executors, "serve", partial(serve_large_rows, tmp_path / "killed"))
     found = results_of(ProcessExecutor(RunOptions(), 2), jobs(3))
     assert (tmp_path / "killed").exists()
-    assert [len(found[index].row["reason"]) for index in range(3)] == [LARGE] * 3
+    assert [len(found[index].row.reason or "") for index in range(3)] == [LARGE] * 3
 
 
 def serve_large_rows(mark: Path, pipe: Any, options: RunOptions) -> None:

@@ -137,3 +137,24 @@ def test_shots_satisfy_their_schema(capsys: pytest.CaptureFixture[str]) -> None:
 def test_extremes_satisfy_their_schema(capsys: pytest.CaptureFixture[str]) -> None:
     call(["extremes", "--quick", "--axes", "speed", "--engines", "pymunk", "--json"])
     assert_valid_document("extremes", json.loads(capsys.readouterr().out))
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("bounce", "--engines", "pymunk,exact", "--ledger"),
+        ("newtons_cradle", "pendulum_5", "--engines", "exact,pymunk", "--set", "world.duration=0.2"),  # one is refused
+        ("pinball/classic", "--player", "random", "--seeds", "3", "--set", "world.duration=1"),
+        ("9-ball", "--engine", "exact"),
+    ],
+)
+def test_runs_satisfy_their_schema(arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    call(["run", *arguments, "--json"])
+    assert_valid_document("run", json.loads(capsys.readouterr().out))
+
+
+def test_match_satisfies_its_schema(capsys: pytest.CaptureFixture[str]) -> None:
+    call(["match", "9-ball", "--turns", "4", "--json"])
+    document = json.loads(capsys.readouterr().out)
+    assert len(document["frames"]) == 1
+    assert_valid_document("match", document)

@@ -4,10 +4,10 @@
 only during shots, and each player receives the `Match` at its turn.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any, Protocol
+from typing import Protocol
 
 from pydantic import TypeAdapter
 
@@ -97,21 +97,41 @@ class FrameRecord:
         script = FrameScript(self.turns)
         return play_frame(self.first, (script, script), self.session.engine, most=len(self.turns))
 
-    def document(self) -> dict[str, Any]:
-        """Return the frame as a JSON object, without the session."""
-        plain: list[dict[str, Any]] = _TURNS.dump_python(self.turns, mode="json", exclude_defaults=True)
+    def document(self) -> "FrameDocument":
+        """Return the frame as it appears in JSON documents, without the session."""
+        plain: list[dict[str, object]] = _TURNS.dump_python(self.turns, mode="json", exclude_defaults=True)
         state = self.match.state
-        return {
-            "game": self.match.rules.name,
-            "winner": state.winner,
-            "over": state.over,
-            "unfinished": self.unfinished,
-            "scores": list(state.scores),
-            "shots": len(self.shots),
-            "duration": self.session.duration,
-            "state_hash": self.session.state_hash,
-            "turns": plain,
-        }
+        return FrameDocument(
+            game=self.match.rules.name,
+            winner=state.winner,
+            over=state.over,
+            unfinished=self.unfinished,
+            scores=state.scores,
+            shots=len(self.shots),
+            duration=self.session.duration,
+            state_hash=self.session.state_hash,
+            turns=plain,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrameDocument:
+    """JSON document of a frame."""
+
+    game: str
+    winner: int | None
+    """seat, or player in a match of several frames"""
+    over: bool
+    unfinished: str | None
+    """why the frame was abandoned"""
+    scores: Sequence[int]
+    """by seat"""
+    shots: int
+    duration: float
+    """s"""
+    state_hash: str | None
+    turns: Sequence[Mapping[str, object]]
+    """every decision and shot, without default values"""
 
 
 class FrameScript:

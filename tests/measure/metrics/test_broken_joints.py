@@ -141,7 +141,7 @@ def test_replay_breaks_the_same_joints_at_the_same_times(engine: str) -> None:
 
 def test_row_counts_broken_joints() -> None:
     record = run_or_fetch(Job("apart", scene(), "pymunk"))
-    assert record.row()["broken_joints"] == 2
+    assert record.row().broken_joints == 2
     refused = run_or_fetch(Job("apart", scene(), "exact"))
     assert refused.trajectory.status == "refused"
-    assert refused.row()["broken_joints"] == 0
+    assert refused.row().broken_joints == 0
