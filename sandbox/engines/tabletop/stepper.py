@@ -95,6 +95,7 @@ class TabletopStepper:
         """energy ledger; None while accounting is off"""
         self._balls: TabletopBalls | None = None
         self._captures: ContactBatch = NO_CONTACTS
+        self._max_tests = TESTS_PER_PAIR * PAIRS.value
 
     def rebuild(self, scene: Scene, matrix: ContactMatrix) -> None:
         """Update after a change of the scene's coefficients or surfaces."""
@@ -187,9 +188,7 @@ class TabletopStepper:
         rows, work = np.zeros((len(pairs), WIDTH)), np.zeros(3)
         if count:
             initial_count = count
-            count = resolve(
-                balls, self._cushions, self._parameters, pairs, rows, work, count, TESTS_PER_PAIR * PAIRS.value
-            )
+            count = resolve(balls, self._cushions, self._parameters, pairs, rows, work, count, self._max_tests)
             if count < 0:
                 remedy = PAIRS.remedy(10 * PAIRS.value)
                 raise Exhaustion(f"a substep with {initial_count:,} pairs of balls in contact takes too long; {remedy}")

@@ -75,6 +75,7 @@ class EventDrivenSimulation(SteppedSimulation, Generic[Data]):
         self._data: Data = data
         self._stopped: float | None = None
         self._ledger: EnergyLedger | None = None
+        self._max_pair_tests = PAIRS.value
         warn_if_uncompiled(len(store.bodies))
 
     @property
@@ -199,15 +200,15 @@ class EventDrivenSimulation(SteppedSimulation, Generic[Data]):
         """Process all events in a fraction of dt; between calls of the event loop check the limits and grow the log."""
         until = (self._steps + part) * self._settings.dt
         start, compile_start = perf_counter(), COMPILE_CLOCK.seconds
-        tests_before, max_tests = self.work["pair_tests"], PAIRS.value
+        tests_before = int(self._data.counts[c.PAIR_TESTS])
         while (status := self._call_event_loop(until)) != c.DONE:
             elapsed = perf_counter() - start - (COMPILE_CLOCK.seconds - compile_start)
             if self.patience is not None and elapsed > self.patience:
                 self._exhaust(f"a step of {self._settings.dt:g} s takes longer than {self.patience:g} s to compute")
-            if self.work["pair_tests"] - tests_before > max_tests:
+            if int(self._data.counts[c.PAIR_TESTS]) - tests_before > self._max_pair_tests:
                 self._exhaust(
-                    f"a step of {self._settings.dt:g} s has more than {PAIRS.shown(max_tests)} pairs to test, "
-                    f"after {self.work['events']:,} events; {PAIRS.remedy(10 * max_tests)}"
+                    f"a step of {self._settings.dt:g} s has more than {PAIRS.shown(self._max_pair_tests)} pairs to "
+                    f"test, after {self.work['events']:,} events; {PAIRS.remedy(10 * self._max_pair_tests)}"
                 )
             if status == c.FULL:
                 rows = int(self._data.counts[c.LOG_ROWS])

@@ -70,6 +70,7 @@ class TabletopSimulation(EventDrivenSimulation[TabletopState]):
     def __init__(self, setup: Setup, settings: Settings) -> None:
         store = EventDrivenBodies(setup, settings.dt)
         super().__init__(settings, make_tabletop_state(store), store)
+        self._events_per_second = int(PER_SECOND * EVENT_LIMIT.value)
         with np.errstate(all="ignore"):
             self._rebuild_rows(0.0)
 
@@ -86,7 +87,7 @@ class TabletopSimulation(EventDrivenSimulation[TabletopState]):
         return drain_log(self._data)
 
     def _call_event_loop(self, until: float) -> int:
-        self._data.counts[c.MAX_EVENTS] = int(PER_SECOND * EVENT_LIMIT.value) * (1 + int(until))
+        self._data.counts[c.MAX_EVENTS] = self._events_per_second * (1 + int(until))
         return advance(self._data, until)
 
     def _too_many_events(self, status: int) -> str:  # noqa: ARG002, there is only one limit
