@@ -7,7 +7,7 @@ from typing import Any
 
 from sandbox.action import actions_to_json, in_order
 from sandbox.batch.plan import Job
-from sandbox.batch.run_row import FinalState, GameResult, ReplayResult, RunLedger, RunRow
+from sandbox.batch.run_row import FinalBodyState, GameResult, ReplayResult, RunLedger, RunRow
 from sandbox.batch.store import Store, StoreError, run_id
 from sandbox.engines.registry import engine_named
 from sandbox.jsonable import finite
@@ -122,7 +122,7 @@ class RunRecord:
             return None
         return ledger_of(self.trajectory, self.job.scene).document()
 
-    def _final(self) -> dict[str, FinalState]:
+    def _final(self) -> dict[str, FinalBodyState]:
         run = self.trajectory
         if not len(run.time):
             return {}
@@ -135,7 +135,7 @@ class RunRecord:
             spins,
             strict=True,
         )
-        return {name: FinalState(*state) for name, state in zip(run.names.tolist(), states, strict=True)}
+        return {name: FinalBodyState(*state) for name, state in zip(run.names.tolist(), states, strict=True)}
 
     def _pocketed(self) -> dict[str, str]:
         """Return the pocket of each captured ball, which lies exactly at the centre of the pocket."""

@@ -9,7 +9,7 @@ from sandbox.measure.metrics.energy import LedgerDocument
 
 
 @dataclass(frozen=True)
-class FinalState:
+class FinalBodyState:
     """State of a body at the end of a run."""
 
     position: tuple[float, ...]
@@ -106,7 +106,7 @@ class RunRow:
     """None if no game was played"""
     account: RunLedger | None = field(metadata=in_json(inline=True))
     """None if the ledger was not asked for"""
-    final: Mapping[str, FinalState] | None = field(metadata=in_json(optional=True))
+    final: Mapping[str, FinalBodyState] | None = field(metadata=in_json(optional=True))
     """state of each body at the end, by name; None if it was not asked for"""
     path: str | None
     """of the stored arrays"""

@@ -53,6 +53,7 @@ def reproducible(row: RunRow) -> RunRow:
     return replace(row, seconds=None, steps_per_second=None, realtime_factor=None, path=None)
 
 
+@pytest.mark.full
 def test_all_executors_yield_the_same_rows(tmp_path: Path) -> None:
     with Store(tmp_path / "one") as store:
         in_process = results_of(InProcessExecutor(RunOptions(tmp_path / "one"), store), jobs(4))
@@ -104,6 +105,7 @@ def test_process_that_cannot_be_started_raises_executor_error(monkeypatch: pytes
         executor.wait(lambda _: None)
 
 
+@pytest.mark.full
 @pytest.mark.skipif(sys.platform != "linux", reason="needs /proc/self/task/*/syscall")
 def test_run_of_a_worker_killed_while_sending_its_row_is_repeated(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -42,6 +42,7 @@ def test_scenes_too_large_for_memory_are_rejected_at_the_first(scene: tuple[str,
     assert plan([scene], None, seeds=1_000_000)[0].seeds == 1_000_000  # one run, because nothing is random
 
 
+@pytest.mark.full
 def test_number_of_reported_faults_is_limited(scene: tuple[str, str]) -> None:
     with pytest.raises(SceneError) as error:
         plan([scene], None, sweeps=["solver.dt=-1:-2:1000000"])

@@ -70,6 +70,7 @@ def test_every_command_has_an_example() -> None:
     assert set(EXAMPLES) | WITH_WINDOW == set(COMMANDS)
 
 
+@pytest.mark.full
 @pytest.mark.timeout(1200)  # the first run compiles kernels
 @pytest.mark.parametrize("command", EXAMPLES)
 def test_example_of_a_command_succeeds(

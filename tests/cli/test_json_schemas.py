@@ -139,6 +139,7 @@ def test_extremes_satisfy_their_schema(capsys: pytest.CaptureFixture[str]) -> No
     assert_valid_document("extremes", json.loads(capsys.readouterr().out))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "arguments",
     [

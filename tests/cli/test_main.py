@@ -109,6 +109,7 @@ print(status, *heavy, file=sys.stderr)
 """
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("arguments", "unneeded"),
     [
@@ -132,6 +133,7 @@ def test_command_does_not_import_modules_it_does_not_need(arguments: tuple[str, 
     assert done.stderr == "0\n"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "arguments", [("scenes",), ("schema",), ("check", "pile"), ("run", "drop.toml"), ("run", "drop.toml", "--json")]
 )

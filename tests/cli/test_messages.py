@@ -149,6 +149,7 @@ def test_json_of_a_run_has_its_overrides(tmp_path: Path, capfd: pytest.CaptureFi
     ]
 
 
+@pytest.mark.full
 def test_detections_differ_in_their_first_contact(capfd: pytest.CaptureFixture[str]) -> None:
     """The ball reaches the plane at 0.045 s, within the first step of 0.1 s."""
     arguments = ("fast_ball", "--engine", "reference", "--sweep", "solver.detection=discrete,bisect,swept")

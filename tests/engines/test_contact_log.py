@@ -48,6 +48,7 @@ def record_contacts(script: list[Interval], joints: bool, impulses_only: bool) -
     return [*found, log.take()]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("joints", [False, True])
 @settings(max_examples=200)
 @given(intervals())

@@ -116,6 +116,7 @@ def test_stroke_is_as_fast_as_in_visual_pinball(start):
     assert down == pytest.approx(returning[0], rel=0.01)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("moment", [MOMENT, 3.0 * MOMENT])
 @pytest.mark.parametrize(("hold_ratio", "within"), [(0.75, 6.0), (0.2, 6.0), (0.2, 12.0), (0.5, 3.0), (1.0, 0.0)])
 @pytest.mark.parametrize(("ramp", "return_ratio"), [(0.0, 0.058), (0.03, 0.058), (0.01, 0.15)])

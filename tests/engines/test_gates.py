@@ -128,6 +128,7 @@ def test_box_passes_without_contact(engine: str) -> None:
     assert simulation.frame().angular_velocity[0] == 2.0
 
 
+@pytest.mark.full
 @every_engine
 @settings(max_examples=25, deadline=None)
 @given(st.floats(-1.2, 1.2), st.floats(-0.5, 0.5), st.floats(0.2, 20.0))

@@ -102,6 +102,7 @@ def test_pulled_body_converges_to_the_critically_damped_oscillator_at_first_orde
     assert errors[-1] < 0.01 * d  # ω·dt is 0.0024, and the first-order error is about that fraction of d
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("dt", [1e-4, 1e-3, 0.01, 1 / 60, 0.1, 0.5])
 @pytest.mark.parametrize("mass", [1e-9, 1.0, 1e12])

@@ -32,6 +32,7 @@ def ball(name: str, x: float, y: float, **more: Any) -> dict[str, Any]:
 FLOOR = {"point": [0, 0], "normal": [0, 1]}
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("name", "steps"),
     [
@@ -61,6 +62,7 @@ def test_ledger_of_a_shipped_scene_closes(name: str, steps: int) -> None:
     assert all(np.isfinite(list(account.values())))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "joints",
     [

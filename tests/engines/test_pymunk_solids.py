@@ -108,6 +108,7 @@ def test_compound_pendulum_has_the_closed_form_period() -> None:
     )  # a step of 2.5e-4 s in a half period of 0.7 s
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("degrees", "published"), [(5, 2.0070219), (90, 2.3678419), (170, 4.8935243)])
 def test_rod_pendulum_keeps_its_period(degrees: float, published: float) -> None:
     theta = math.radians(degrees)
@@ -219,6 +220,7 @@ def orbit(dt: float, **more: Any) -> Scene:
     return scene(dt=dt, gravity=0, duration=1, ball=[planet], attraction=[{"toward": [0, 0], "strength": 1.0}])
 
 
+@pytest.mark.full
 def test_attraction_is_symplectic() -> None:
     simulation = start(orbit(2 * math.pi / 2000))
     energy, spin = [], []

@@ -328,6 +328,7 @@ def test_ledger_books_kicks_as_a_separate_cause() -> None:
     assert account.entries()[Cause.PHANTOM] == 0.0
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("engine", ENGINES)
 @settings(max_examples=10, deadline=None)
 @given(x=st.floats(-0.2, 0.2), vx=st.floats(-2, 2), vy=st.floats(-2, 2), g=st.floats(0, 2))

@@ -142,6 +142,7 @@ def test_ball_inside_a_wall_that_becomes_solid_is_pushed_out_or_refused() -> Non
     assert advance(on_pymunk, 900) == pytest.approx(1.0 + R, abs=2e-3)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     "how",
     [

@@ -72,6 +72,7 @@ def test_entry_is_recorded_in_the_substep_in_which_the_centre_enters(engine: str
     assert run.contact_point[0].tolist() == pytest.approx([speed * time, 0.0], abs=1e-9)  # sums of v·h
 
 
+@pytest.mark.full
 @every_engine
 @given(
     angle=st.floats(0.0, 2.0 * math.pi),

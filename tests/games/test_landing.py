@@ -78,6 +78,7 @@ def test_bot_lands_on_every_engine(engine: str) -> None:
     assert game.trajectory.status == "ok"
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("seed", range(2, 5))
 def test_bot_lands_from_the_start_of_any_seed(seed: int) -> None:
     scene = load(find("landing"), [("world.seed", seed)])

@@ -21,6 +21,7 @@ def play(seed: int, skill: float) -> PlayedGame:
     return play_out(load(find("landing"), [("world.seed", seed)]), LandingBot(seed, skill))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("seed", range(1, 5))
 def test_bot_lands_with_fuel_left(seed: int) -> None:
     game = play(seed, 1.0)

@@ -45,6 +45,7 @@ def test_flight_through_air_converges_at_the_order_of_its_scheme(config):
     assert fitted_order(errors) == pytest.approx(order, abs=0.2)  # a fit over three halvings
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("settings", "order"),
     [({"detection": "swept"}, 2), ({"detection": "discrete"}, 1)],
@@ -62,6 +63,7 @@ def test_bounce_converges_at_the_order_of_its_detection(settings, order):
     assert fitted_order(errors) == pytest.approx(order, abs=0.3)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("detection", ["bisect", "swept"])
 @pytest.mark.parametrize(("e", "h"), [(0.8, 0.007), (0.8, 0.0035), (0.9, 0.007)])
 def test_explicit_euler_with_exact_impacts_never_stops_bouncing(detection, e, h):
@@ -109,6 +111,7 @@ SMOOTH = [
 ]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("document", "config", "order"),
     SMOOTH,

@@ -124,6 +124,7 @@ def test_heading_names_the_truth() -> None:
     assert "truth: closed form" in text
 
 
+@pytest.mark.full
 def test_files_are_written_completely_and_reproducibly(tmp_path: Path) -> None:
     paths = plot_comparison(PROJECTILES, tmp_path)
     assert [path.name for path in paths] == ["trajectories.png", "error.png", "energy.png"]

@@ -140,6 +140,7 @@ def beyond(value: float, direction: float) -> float:
     return math.nextafter(value, direction)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("kind", "path", "value", "direction"), BOUNDS)
 def test_value_at_a_bound_is_accepted_and_the_next_refused(
     kind: str, path: str, value: float, direction: float

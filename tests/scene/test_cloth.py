@@ -135,6 +135,7 @@ def test_large_cloth_is_one_element_with_arrays_of_nodes_and_links() -> None:
     assert len(set(scene.links.names)) == len(scene.links)
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
 def test_cloth_in_wind_hangs_along_the_sum_of_drag_and_weight(engine: str) -> None:
     scene = load(

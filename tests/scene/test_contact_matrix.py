@@ -19,6 +19,7 @@ from tests.scene.touching import (
 )
 
 
+@pytest.mark.full
 @settings(max_examples=200)
 @given(touching_scenes())
 def test_contact_matrix_equals_a_brute_force_search_over_pairs(scene: Scene) -> None:

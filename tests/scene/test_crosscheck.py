@@ -208,6 +208,7 @@ def test_more_than_a_million_bodies_in_total_are_refused() -> None:
     assert_only_fault({"grid": [{**GRID, "columns": 10**6, "rows": 10**6}]}, "grid[0]", "1,000,000,000,000 bodies")
 
 
+@pytest.mark.full
 def test_million_balls_at_one_point_are_refused() -> None:
     grid = {**GRID, "columns": 1000, "rows": 1000, "spacing": [0, 0]}
     assert_only_fault({"grid": [grid]}, "grid[0]", "overlapping pairs")

@@ -28,6 +28,7 @@ print(*sorted(name for name in sys.modules if name.startswith("sandbox.games."))
 """
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(
     ("scene", "folders"),
     [

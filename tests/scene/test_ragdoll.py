@@ -175,6 +175,7 @@ def test_segments_have_the_material_and_colour_of_the_ragdoll() -> None:
     assert len({element.colour for element in scene_of().elements}) == 2
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
 def test_ragdoll_stays_joined_when_falling_down_stairs(engine: str) -> None:
     scene = load(find("ragdoll_stairs"))

@@ -252,6 +252,7 @@ def test_every_case_has_a_scene() -> None:
     assert sorted({case.number for case in CASES}) == list(range(1, 21))
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("case", CASES, ids=[f"{c.number}-{c.scene}-{k}" for k, c in enumerate(CASES)])
 def test_ground_truth_has_the_known_values(case: Case) -> None:
     scene, truth = truth_for(case)

@@ -23,6 +23,7 @@ def test_names_of_rows_are_unique() -> None:
     assert len({bench.name for bench in BENCHES}) == len(BENCHES)
 
 
+@pytest.mark.full
 def test_sides_take_turns_and_the_first_alternates() -> None:
     order: list[str] = []
 

@@ -282,6 +282,7 @@ for document, steps in json.loads(sys.stdin.read()):
 """
 
 
+@pytest.mark.full
 def test_compiled_and_plain_kernels_agree_bit_for_bit():
     import json
 

@@ -47,6 +47,7 @@ def contact_columns(finder, position, margin=0.0):
     return [column.tolist() for column in contacts]
 
 
+@pytest.mark.full
 @given(crowds())
 def test_all_broad_phases_find_the_same_manifolds(balls):
     store = body_store_of(scene_of(*balls))
@@ -95,6 +96,7 @@ def touching_within_rounding(count):
             count -= 1
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", BROAD_PHASES)
 def test_overlaps_below_rounding_far_from_the_origin_are_found(name):
     for x, a, other, b in touching_within_rounding(300):

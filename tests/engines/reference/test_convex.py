@@ -349,6 +349,7 @@ print(digest.hexdigest())
 """
 
 
+@pytest.mark.full
 def test_results_are_bit_identical_with_and_without_compiled_kernels():
     digests = set()
     for disabled in ("0", "1"):

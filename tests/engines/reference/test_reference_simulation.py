@@ -64,6 +64,7 @@ def test_every_combination_runs_or_refuses_with_a_reason(integrator, detection, 
     assert frame.position[3].tolist() == [1.5, 0.4]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 @pytest.mark.parametrize("detection", DETECTIONS)
 def test_runs_are_bit_identical_and_queries_change_nothing(integrator, detection):
@@ -76,6 +77,7 @@ def test_runs_are_bit_identical_and_queries_change_nothing(integrator, detection
     assert queried.state_hash() == unqueried.state_hash()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("settings", [{}, {"detection": "swept"}, {"detection": "bisect"}, {"response": "penalty"}])
 def test_contacts_queried_every_step_sum_to_those_queried_once(settings):
     often, once = simulation_of(mixed_scene(), **settings), simulation_of(mixed_scene(), **settings)

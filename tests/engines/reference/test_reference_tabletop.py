@@ -43,6 +43,7 @@ def test_sliding_ball_rolls_at_five_sevenths_of_its_speed() -> None:
     assert frame.roll[0, 1] * R == pytest.approx(frame.velocity[0, 0], abs=1e-12)  # likewise
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("speed", [3.0, 300.0])
 def test_no_ball_tunnels_through_another(speed: float) -> None:
     """At 300 m/s a ball moves 25 diameters in a step."""

@@ -72,6 +72,7 @@ def test_balls_leave_a_table_only_into_a_pocket(name: str) -> None:
     assert np.minimum(np.abs(touched - reach), rim).max() < 3.0 * FINE  # polygons of discs, and FINE itself
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", POCKETED)
 def test_every_straight_path_ends_at_a_cushion_or_in_a_pocket(name: str) -> None:
     area, walls, far = TABLES[name], unary_union(cushions(name)), 10.0  # type: ignore[index]

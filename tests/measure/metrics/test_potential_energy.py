@@ -115,6 +115,7 @@ def test_attraction_between_two_moving_bodies_counts_once() -> None:
     assert [energies(trajectory, scene, body=n).potential[0] for n in range(2)] == [-2.0, -2.0]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])
 @pytest.mark.parametrize(
     ("text", "band"),

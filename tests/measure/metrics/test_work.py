@@ -51,6 +51,7 @@ def work_of(name: str, seconds: float, engine: str) -> Mapping[str, int]:
     return found.info["work"]
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("name", ["two_balls", "pendulum_90", "newtons_cradle"])
 def test_engines_use_common_names_of_counters(name: str) -> None:
     counted = {"pymunk": {"substeps", "contacts", "contact_iterations", "joint_iterations"}}
@@ -80,6 +81,7 @@ def test_impact_through_five_balls_is_four_events_with_two_predictions_each() ->
     assert work_of("newtons_cradle", 0.5, "exact") == {"events": 4, "predictions": 5 + 2 * 4, "pair_tests": 13 * 5}
 
 
+@pytest.mark.full
 def test_joint_is_solved_once_per_iteration_and_twice_by_rattle() -> None:
     for engine in ("pymunk", "reference"):
         assert work_of("pendulum_90", 0.5, engine)["joint_iterations"] == 500 * 10
@@ -108,6 +110,7 @@ def test_pymunk_counts_contacts_only_after_they_are_requested() -> None:
     assert simulation.work["contact_iterations"] == simulation.work["contacts"] * scene.solver.iterations > 0
 
 
+@pytest.mark.full
 @pytest.mark.parametrize(("name", "seconds", "engine"), EXPECTED_WORK, ids=str)
 def test_work_is_within_the_expected_amount(name: str, seconds: float, engine: str) -> None:
     found = work_of(name, seconds, engine)
@@ -123,6 +126,7 @@ def test_work_is_the_same_in_every_run(engine: str) -> None:
     assert run(scene, engine, audit=False).info["work"] == work_of("gas", 0.5, engine)
 
 
+@pytest.mark.full
 def test_work_does_not_depend_on_compilation() -> None:
     code = """
         import json

@@ -137,6 +137,7 @@ def test_duration_far_below_a_step_is_a_partial_step() -> None:
     )  # part of a step, 1e-10, times a rounding of 1e-16
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("duration", [0.8, 0.804, 0.8099])
 @pytest.mark.parametrize("every", [2, 3, 7, 79, 80, 81, 1000])
 def test_thinned_frames_are_a_subset_of_the_full_run(duration: float, every: int) -> None:
@@ -189,6 +190,7 @@ def digest(result: Trajectory) -> str:
     return content.hexdigest()
 
 
+@pytest.mark.full
 @pytest.mark.parametrize("hash_seed", ["0", "12345"])
 def test_run_in_another_process_is_identical_to_the_bit(hash_seed: str) -> None:
     process = subprocess.run(

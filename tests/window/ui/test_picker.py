@@ -157,6 +157,7 @@ def test_picker_is_drawn_on_any_size(files: list[tuple[str, Path]], size: tuple[
     draw_picker([], size, 2)
 
 
+@pytest.mark.full
 def test_thumbnails_of_all_shipped_scenes_are_not_empty() -> None:
     scenes = shipped()
     assert scenes
