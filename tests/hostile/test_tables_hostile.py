@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given, reject, settings
 from hypothesis import strategies as st
 
 from sandbox.action import Action, ActionError, Drive, Impulse, Remove, Reshape, Spawn, Switch, Toggle
@@ -125,7 +125,7 @@ def test_energy_account_closes_with_any_elements_and_actions(r: random.Random) -
         play(running, actions)
         running.finish(0.6)
     except Divergence:  # a ball is squeezed between a kinematic body and the floor
-        return
+        reject()  # a property that almost always diverges fails
     account = running.account()
     turnover = max(1.0, *(abs(energy) for energy in account.values()))
     assert abs(total_energy(running) - initial - sum(account.values())) < 1e-10 * turnover  # sums of rounding

@@ -149,11 +149,14 @@ def draw_velocities(view: DrawContext) -> None:
 
 
 def _visible_contacts(view: DrawContext, max_count: int) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return the visible contacts: indices (K,), positions (K, 2) px and normals (K, 2), y down."""
+    """Return the visible contacts without zone entries: indices (K,), positions (K, 2) px, normals (K, 2), y down."""
     point, normal = contact_points(view)
     with np.errstate(invalid="ignore", over="ignore"):
         pixels = view.camera.to_screen(point)
     visible = view.inside(pixels, 20.0 * view.ui_scale)
+    scene = view.snapshot.scene
+    solid_count = len(scene.fixed) + len(scene.pockets)  # zones follow in the numbering of static things
+    visible = visible[view.snapshot.contacts.pair[visible, 1] >= -solid_count]
     if len(visible) > max_count:
         visible = visible[np.linspace(0, len(visible) - 1, max_count).astype(np.intp)]
     with np.errstate(over="ignore"):  # a recorded normal may have any length

@@ -108,9 +108,8 @@ def test_single_ball_on_a_slope_agrees(vx, vy, spin, e, mu, mass, tilt):
     slope = {"point": [0, 0], "normal": [math.sin(tilt), math.cos(tilt)], "friction": mu}
     thrown = ball(0, 1.0, velocity=[vx, vy], angular_velocity=spin, restitution=e, mass=mass)
     scene = scene_of(thrown, world=EARTH, plane=[slope], solver={"dt": 0.01})
-    # pymunk's plane is a segment of about 1e4 m: its normal has an error of 1e-13, and a contact may begin a step off
-    differences = [difference(*both) for both in side_by_side(scene, 40)]
-    assert np.median(differences) < 1e-9
+    # pymunk's plane is a segment of about 1e4 m, with an error of 1e-13 in its normal
+    assert max(difference(*both) for both in side_by_side(scene, 40)) < 1e-9
 
 
 @given(st.floats(-0.4, 0.4), st.floats(1, 5), st.floats(0, 1), st.floats(0, 1), st.floats(0.01, 100))

@@ -44,12 +44,30 @@ def test_clipped_segment_is_the_part_inside_the_area(a, b, margin):
 
 
 @given(a=ANY_POINT, b=ANY_POINT, width=st.sampled_from([1.0, 2.0, 9.0]), antialias=st.booleans())
-def test_lines_of_any_length_draw_without_an_error(a, b, width, antialias):
+def test_lines_that_miss_the_picture_or_are_not_finite_draw_nothing(a, b, width, antialias):
     surface = pygame.Surface((30, 20))
     draw_line(surface, a, b, WHITE, width, antialias)
     draw_arrow(surface, a, b, WHITE, width, antialias, edge=(9, 9, 9))
     draw_dashes(surface, [(a, b)], WHITE, 4.0, antialias)
-    assert surface.get_size() == (30, 20)
+    reach = 10.0 * width  # px, more than the head of an arrow
+    if not np.isfinite((*a, *b)).all() or clip_segment(a, b, surface.get_rect(), reach) is None:
+        assert not covered(surface).any()
+
+
+@given(angle=st.floats(0.0, 2.0 * math.pi), length=st.floats(20.0, 1e9), antialias=st.booleans())
+def test_lines_through_the_picture_are_drawn(angle, length, antialias):
+    step = np.asarray((math.cos(angle), math.sin(angle))) * 0.5 * length
+    for draw in (draw_line, draw_arrow):
+        surface = pygame.Surface((30, 20))
+        draw(
+            surface,
+            tuple(np.asarray((15.5, 10.5)) - step),
+            tuple(np.asarray((15.5, 10.5)) + step),
+            WHITE,
+            2.0,
+            antialias,
+        )
+        assert covered(surface)[13:18, 8:13].any()  # px, around the middle of the line
 
 
 @pytest.mark.parametrize("width", [1.0, 2.0, 4.0, 7.0])
