@@ -180,20 +180,20 @@ class GameParameter(NamedTuple):
 class GameHud(Protocol):
     """Head-up display of a game in place of the score panel. Lengths are in px; `free` is the free area, a `Rect`."""
 
-    def draw(self, surface: Any, free: Any, left: int, unit: float) -> None:
+    def draw(self, surface: Any, free: Any, left: int, ui_scale: float) -> None:
         """Draw it.
 
         Args:
             surface: target.
             free: free area.
             left: right edge of the status plate at the upper left.
-            unit: UI scale, 1 on a display of 1080 lines.
+            ui_scale: UI scale, 1 on a display of 1080 lines.
         """
 
-    def reserved(self, free: Any, left: int, unit: float) -> list[Any]:
+    def reserved(self, free: Any, left: int, ui_scale: float) -> list[Any]:
         """Return the rectangles of its plates, also of those that are hidden now; arguments as for `draw`."""
 
-    def plates(self, free: Any, unit: float) -> dict[str, Any]:
+    def plates(self, free: Any, ui_scale: float) -> dict[str, Any]:
         """Return the rectangles of its plates as last drawn, by name."""
 
     def handle_event(self, event: Any, run: Callable[[Callable[[], object]], bool]) -> bool:

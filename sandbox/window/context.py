@@ -35,7 +35,7 @@ class WindowContext:
     def __init__(
         self,
         surface: pygame.Surface,
-        unit: float,
+        ui_scale: float,
         app_state: AppState,
         folder: Path,
         film: str,
@@ -45,7 +45,7 @@ class WindowContext:
 
         Args:
             surface: surface of the window.
-            unit: UI scale, 1 on a display of 1080 lines.
+            ui_scale: UI scale, 1 on a display of 1080 lines.
             app_state: the open scene and its operations.
             folder: folder for screenshots, films and sessions.
             film: format of films, `.gif` or `.mp4`.
@@ -53,7 +53,7 @@ class WindowContext:
         """
         self.surface, self.app_state, self._print_line = surface, app_state, say
         self.capture = CaptureController(folder, film, self.notify)
-        self.gui = Gui(surface.get_size(), unit)
+        self.gui = Gui(surface.get_size(), ui_scale)
         self.camera = Camera((0.0, 0.0), 100.0, surface.get_size())
         self.is_fitted = True
         """whether the camera shows the whole scene; if so, it is fitted again to a new scene or window size"""
@@ -101,7 +101,9 @@ class WindowContext:
         camera = Camera.fitting(
             view_bounds(scene), size, inset=self.gui.panel.width, foot=self.gui.bottom_margin, turned=turned
         )
-        Renderer().draw(image, camera, Snapshot(scene, scene.bodies, frame_in_flight(scene)), unit=self.gui.ui_scale)
+        Renderer().draw(
+            image, camera, Snapshot(scene, scene.bodies, frame_in_flight(scene)), ui_scale=self.gui.ui_scale
+        )
         self.gui.panel.draw(image)
         return image
 

@@ -115,8 +115,8 @@ class MouseController:
 
     def _move_controls(self, before: tuple[int, int], now: tuple[int, int]) -> None:
         """Pass a mouse motion between two pixels to the controls of the game."""
-        camera, unit = self._context.camera, self._context.gui.ui_scale
-        pixels = (now[0] - before[0]) / unit, (now[1] - before[1]) / unit
+        camera, ui_scale = self._context.camera, self._context.gui.ui_scale
+        pixels = (now[0] - before[0]) / ui_scale, (now[1] - before[1]) / ui_scale
         fine = bool(pygame.key.get_mods() & pygame.KMOD_SHIFT)
         time = pygame.time.get_ticks() / 1000.0
 

@@ -46,8 +46,8 @@ def open_scene(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> App:
     return window
 
 
-def resize(window: App, width: int, height: int, unit: float) -> None:
-    window.context.gui.ui_scale = unit
+def resize(window: App, width: int, height: int, ui_scale: float) -> None:
+    window.context.gui.ui_scale = ui_scale
     surface = pygame.display.set_mode((width, height), pygame.RESIZABLE)
     pygame.event.clear()
     window.context.resize(surface)
@@ -65,11 +65,11 @@ def test_no_two_plates_overlap(name: str, tmp_path: Path, monkeypatch: pytest.Mo
         window.app_state.body_tools.picked = 0
         window.app_state.messages.add("a message that is long enough to need more than one line of a small window")
         window.app_state.messages.add("another one", "warning")
-        for width, height, unit in SIZES:
-            resize(window, width, height, unit)
-            assert overlaps(window) == [], (width, height, unit)
+        for width, height, ui_scale in SIZES:
+            resize(window, width, height, ui_scale)
+            assert overlaps(window) == [], (width, height, ui_scale)
             free = window.context.gui.area
-            assert 2 * free.width * free.height > width * height, (width, height, unit)
+            assert 2 * free.width * free.height > width * height, (width, height, ui_scale)
     finally:
         window.close()
 
@@ -98,15 +98,15 @@ def test_plates_leave_the_field_free(name: str, tmp_path: Path, monkeypatch: pyt
     try:
         scene = window.app_state.view.scene if window.app_state.view is not None else None
         assert scene is not None
-        for width, height, unit in SIZES[1:]:  # 400 × 300 is too small for both
-            resize(window, width, height, unit)
+        for width, height, ui_scale in SIZES[1:]:  # 400 × 300 is too small for both
+            resize(window, width, height, ui_scale)
             corners = window.context.camera.to_screen(np.asarray(view_bounds(scene)))
             (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
             field = pygame.Rect(math.ceil(left), math.ceil(top), int(right - left), int(bottom - top))
             covering = {
                 k: r for k, r in window.context.gui.plates.items() if not k.startswith(("message", "rate", "inset"))
             }
-            assert [k for k, rect in covering.items() if rect.colliderect(field)] == [], (width, height, unit)
+            assert [k for k, rect in covering.items() if rect.colliderect(field)] == [], (width, height, ui_scale)
             assert field.width * field.height > 0.08 * width * height  # the field is not reduced to a corner either
     finally:
         window.close()

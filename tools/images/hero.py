@@ -127,7 +127,9 @@ def _draw_panel(surface: pygame.Surface, run: Run, time: float, truth: "sandbox.
     camera = Camera.fitting(((-0.03, -0.03), (WIDTH + 0.03, HEIGHT)), surface.get_size(), margin=0.0)
     panel = offscreen(surface.get_size())
     snapshot = run.film.snapshot(time, frozenset({"shapes"}), ghost=truth)
-    _RENDERERS.setdefault(run.engine, Renderer()).draw(panel, camera, snapshot, unit=float(SUPERSAMPLING), scale=False)
+    _RENDERERS.setdefault(run.engine, Renderer()).draw(
+        panel, camera, snapshot, ui_scale=float(SUPERSAMPLING), scale=False
+    )
     _draw_trails(panel, camera, run, time)
     surface.blit(panel, (0, 0))
 

@@ -24,7 +24,7 @@ from sandbox.games.artillery.view_state import (
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.fixed import Wall
 from sandbox.scene.description.game_tables import table_of
-from sandbox.window.camera import Camera
+from sandbox.window.render.canvas import Canvas
 from sandbox.window.render.draw_context import DrawContext
 from sandbox.window.render.lines import SDL_COORDINATE_LIMIT, Pixel, draw_arrow, draw_dashes, draw_line, fill_polygon
 from sandbox.window.render.palette import (
@@ -259,44 +259,42 @@ def soil_of(scene: Scene) -> RgbColour:
     return SOIL if wall is None or wall.colour is None else hex_colour(wall.colour)
 
 
-def draw_land(surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True) -> None:
+def draw_land(canvas: Canvas, scene: Scene) -> None:
     """Draw sky, terrain, its ends, and other static bodies."""
-    surface.blit(sky_image(surface.get_size()), (0, 0))
+    canvas.surface.blit(sky_image(canvas.surface.get_size()), (0, 0))
     others = tuple(wall for wall in scene.walls if wall.name != GROUND)
     for wall in scene.walls:
         if wall.name == GROUND:
-            _draw_ground(surface, camera, wall, soil_of(scene), unit, antialias)
-            _draw_sides(surface, camera, scene, wall, unit, antialias)
-    draw_static_bodies(surface, camera, scene.model_copy(update={"walls": others}), unit, antialias)
+            _draw_ground(canvas, wall, soil_of(scene))
+            _draw_sides(canvas, scene, wall)
+    draw_static_bodies(canvas, scene.model_copy(update={"walls": others}))
 
 
-def _draw_ground(
-    surface: pygame.Surface, camera: Camera, wall: Wall, soil: RgbColour, unit: float, antialias: bool
-) -> None:
+def _draw_ground(canvas: Canvas, wall: Wall, soil: RgbColour) -> None:
     """Fill the area below a wall by pixel columns, each copied from one strip, and draw its edge."""
-    pixels = camera.to_screen(np.asarray(wall.points))
-    width, height = surface.get_size()
+    pixels = canvas.camera.to_screen(np.asarray(wall.points))
+    width, height = canvas.surface.get_size()
     left, right = max(int(np.ceil(pixels[0, 0])), 0), min(int(np.ceil(pixels[-1, 0])), width)
     if left >= right:
         return
     tops = np.interp(np.arange(left, right) + 0.5, pixels[:, 0], pixels[:, 1])
-    strip = terrain_strip(soil, camera.scale, height, surface)
+    strip = terrain_strip(soil, canvas.camera.scale, height, canvas.surface)
     first = np.clip(np.floor(tops), -height, height).astype(np.int64).tolist()
-    surface.blits([(strip, (x, top)) for x, top in zip(range(left, right), first, strict=True)], doreturn=False)
+    canvas.surface.blits([(strip, (x, top)) for x, top in zip(range(left, right), first, strict=True)], doreturn=False)
     edge = mix_colours(GRASS, soil, 0.35)
     visible = np.flatnonzero((pixels[:, 0] >= -50.0) & (pixels[:, 0] <= width + 50.0))
     if len(visible) > 1:
         shown = pixels[max(int(visible[0]) - 1, 0) : int(visible[-1]) + 2]
         shown = np.column_stack((np.clip(shown[:, 0], -1e4, 1e4), np.clip(shown[:, 1], -1e4, 1e4)))
         corners = shown.tolist()
-        for shift, colour in ((1.5 * unit, mix_colours(edge, soil, 0.5)), (0.0, edge)):
+        for shift, colour in ((1.5 * canvas.ui_scale, mix_colours(edge, soil, 0.5)), (0.0, edge)):
             moved = [(x, y + shift) for x, y in corners]
-            if antialias:
-                pygame.draw.aalines(surface, colour, False, moved)
-            pygame.draw.lines(surface, colour, False, moved, max(round(1.6 * unit), 1))
-        if antialias:
+            if canvas.antialias:
+                pygame.draw.aalines(canvas.surface, colour, False, moved)
+            pygame.draw.lines(canvas.surface, colour, False, moved, max(round(1.6 * canvas.ui_scale), 1))
+        if canvas.antialias:
             pygame.draw.aalines(
-                surface, mix_colours(edge, (255, 255, 240), 0.35), False, [(x, y - 1.0) for x, y in corners]
+                canvas.surface, mix_colours(edge, (255, 255, 240), 0.35), False, [(x, y - 1.0) for x, y in corners]
             )
 
 
@@ -311,21 +309,20 @@ def terrain_strip(soil: RgbColour, scale: float, height: int, like: pygame.Surfa
     return strip
 
 
-def _draw_sides(
-    surface: pygame.Surface, camera: Camera, scene: Scene, wall: Wall, unit: float, antialias: bool
-) -> None:
+def _draw_sides(canvas: Canvas, scene: Scene, wall: Wall) -> None:
     """Draw the ends of the terrain: solid lines if shells rebound, dashed ones if they reappear at the other end."""
     artillery = table_of(scene, Artillery)
     if artillery is None or artillery.edges == "open":
         return
     rubber = artillery.edges == "rubber"
     for x in (wall.points[0][0], wall.points[-1][0]):
-        px, foot = float(camera.to_screen(np.array((x, 0.0)))[0]), surface.get_height() + 1.0  # terrain reaches it
+        px = float(canvas.camera.to_screen(np.array((x, 0.0)))[0])
+        foot = canvas.surface.get_height() + 1.0  # terrain reaches it
         if rubber:
-            draw_line(surface, (px, foot), (px, -1.0), (58, 62, 92), 5.0 * unit, antialias)
-            draw_line(surface, (px, foot), (px, -1.0), FAINT, 1.5 * unit, antialias)
+            draw_line(canvas.surface, (px, foot), (px, -1.0), (58, 62, 92), 5.0 * canvas.ui_scale, canvas.antialias)
+            draw_line(canvas.surface, (px, foot), (px, -1.0), FAINT, 1.5 * canvas.ui_scale, canvas.antialias)
         else:
-            draw_dashes(surface, [((px, foot), (px, -1.0))], FAINT, 9.0 * unit, antialias)
+            draw_dashes(canvas.surface, [((px, foot), (px, -1.0))], FAINT, 9.0 * canvas.ui_scale, canvas.antialias)
 
 
 SMOKE: RgbColour = (214, 206, 200)
@@ -451,7 +448,7 @@ class ArtilleryView:
 
     def background(self, ctx: DrawContext) -> bool:
         """Draw sky, terrain and static bodies."""
-        draw_land(ctx.surface, ctx.camera, ctx.snapshot.scene, ctx.ui_scale, ctx.antialias)
+        draw_land(ctx, ctx.snapshot.scene)
         return True
 
     def below(self, ctx: DrawContext) -> None:

@@ -9,7 +9,7 @@ from sandbox.arrays import IntArray
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import GROUND
 from sandbox.scene.description.fixed import Post
-from sandbox.window.camera import Camera
+from sandbox.window.render.canvas import Canvas
 from sandbox.window.render.draw_context import DrawContext
 from sandbox.window.render.lamps import draw_lamps, draw_spot
 from sandbox.window.render.lines import Pixel, clip_segment, draw_line
@@ -28,18 +28,16 @@ CAP_RADIUS = 0.62
 """radius of the cap of a bumper, as a fraction of the radius of the post"""
 
 
-def draw_playfield(
-    surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True
-) -> None:
+def draw_playfield(canvas: Canvas, scene: Scene) -> None:
     """Draw a playfield: markings, shadows, lamps, zones and static bodies, as far as they are visible."""
-    draw_markings(surface, camera, scene, unit, antialias)
-    _draw_shadows(surface, camera, scene)
-    draw_lamps(surface, camera, scene, unit, antialias)
-    draw_zones(surface, camera, _with_coloured_zones(scene), unit, antialias)
-    draw_static_bodies(surface, camera, on_layer(scene, 0), unit, antialias)
+    draw_markings(canvas, scene)
+    _draw_shadows(canvas, scene)
+    draw_lamps(canvas, scene)
+    draw_zones(canvas, _with_coloured_zones(scene))
+    draw_static_bodies(canvas, on_layer(scene, 0))
     for post in scene.posts:
         if post.kick is not None:
-            _draw_cap(surface, camera, post, unit, antialias)
+            _draw_cap(canvas, post)
 
 
 def _with_coloured_zones(scene: Scene) -> Scene:
@@ -47,7 +45,7 @@ def _with_coloured_zones(scene: Scene) -> Scene:
     return scene.model_copy(update={"zones": tuple(zone for zone in scene.zones if zone.colour is not None)})
 
 
-def _draw_cap(surface: pygame.Surface, camera: Camera, post: Post, unit: float, antialias: bool) -> None:
+def _draw_cap(canvas: Canvas, post: Post) -> None:
     """Draw the cap of a bumper: a bright ring, a lid in its colour, and a highlight."""
     colour = colour_of_fixed(post)
     for fraction, inner, rim in (
@@ -56,15 +54,18 @@ def _draw_cap(surface: pygame.Surface, camera: Camera, post: Post, unit: float, 
         (CAP_RADIUS, colour, mix_colours(colour, DARK, 0.35)),
     ):
         draw_spot(
-            surface, camera, post.position, fraction * post.radius, ShapeStyle(inner, rim, 1.5 * unit, 1.0, antialias)
+            canvas,
+            post.position,
+            fraction * post.radius,
+            ShapeStyle(inner, rim, 1.5 * canvas.ui_scale, 1.0, canvas.antialias),
         )
     glint = post.position[0] - 0.2 * post.radius, post.position[1] + 0.22 * post.radius
-    draw_spot(surface, camera, glint, 0.2 * post.radius, ShapeStyle(INK, INK, 0.0, 0.35, antialias))
+    draw_spot(canvas, glint, 0.2 * post.radius, ShapeStyle(INK, INK, 0.0, 0.35, canvas.antialias))
 
 
-def _draw_shadows(surface: pygame.Surface, camera: Camera, scene: Scene) -> None:
+def _draw_shadows(canvas: Canvas, scene: Scene) -> None:
     """Draw the shadows of static bodies; overlapping shadows darken the ground only once."""
-    layer = pygame.Surface(surface.get_size(), 0, surface)
+    layer = pygame.Surface(canvas.surface.get_size(), 0, canvas.surface)
     layer.fill(TRANSPARENT)
     layer.set_colorkey(TRANSPARENT)
     layer.set_alpha(SHADOW_ALPHA)
@@ -72,18 +73,18 @@ def _draw_shadows(surface: pygame.Surface, camera: Camera, scene: Scene) -> None
         if not wall.solid or GROUND not in wall.layers:
             continue
         points = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points) + SHADOW
-        half = max(0.5 * wall.thickness * camera.scale, 1.0)
-        ends: list[Pixel] = [(x, y) for x, y in camera.to_screen(points).tolist()]
+        half = max(0.5 * wall.thickness * canvas.camera.scale, 1.0)
+        ends: list[Pixel] = [(x, y) for x, y in canvas.camera.to_screen(points).tolist()]
         for a, b in pairwise(ends):
             draw_line(layer, a, b, DARK, 2.0 * half, antialias=False)
         if 1.0 < half < LARGE_DISC:
             for end in ends:
                 _draw_dark_disc(layer, end, half)
     for post in scene.posts:
-        x, y = camera.to_screen(np.asarray(post.position) + SHADOW).tolist()
-        if post.solid and GROUND in post.layers and post.radius * camera.scale < LARGE_DISC:
-            _draw_dark_disc(layer, (x, y), post.radius * camera.scale)
-    surface.blit(layer, (0, 0))
+        x, y = canvas.camera.to_screen(np.asarray(post.position) + SHADOW).tolist()
+        if post.solid and GROUND in post.layers and post.radius * canvas.camera.scale < LARGE_DISC:
+            _draw_dark_disc(layer, (x, y), post.radius * canvas.camera.scale)
+    canvas.surface.blit(layer, (0, 0))
 
 
 def _draw_dark_disc(layer: pygame.Surface, at: Pixel, radius: float) -> None:
@@ -96,7 +97,7 @@ class PinballView:
 
     def background(self, ctx: DrawContext) -> bool:
         """Draw the playfield."""
-        draw_playfield(ctx.surface, ctx.camera, ctx.snapshot.scene, ctx.ui_scale, ctx.antialias)
+        draw_playfield(ctx, ctx.snapshot.scene)
         return True
 
     def below(self, ctx: DrawContext) -> None:

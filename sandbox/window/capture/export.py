@@ -68,23 +68,23 @@ class RunRenderer:
             speed: playback speed, relative to real time.
             caption: write title, engine and time into the upper left corner, if the surface is wide enough.
         """
-        unit = ui_scale_of(surface.get_size())
+        ui_scale = ui_scale_of(surface.get_size())
         snapshot = self.run.snapshot(time, overlays, speed)
-        self._renderer.draw(surface, camera, snapshot, unit=unit)
-        self._inset.draw(surface, camera, snapshot, surface.get_rect(), unit=unit)
+        self._renderer.draw(surface, camera, snapshot, ui_scale=ui_scale)
+        self._inset.draw(surface, camera, snapshot, surface.get_rect(), ui_scale=ui_scale)
         if "energy" in overlays:
-            self._graph.draw(surface, time, unit)
+            self._graph.draw(surface, time, ui_scale)
         if caption and surface.get_width() >= MIN_CAPTION_WIDTH:
-            self._write_caption(surface, time, unit)
+            self._write_caption(surface, time, ui_scale)
 
-    def _write_caption(self, surface: pygame.Surface, time: float, unit: float) -> None:
-        left, size = 14.0 * unit, 17.0 * unit
+    def _write_caption(self, surface: pygame.Surface, time: float, ui_scale: float) -> None:
+        left, size = 14.0 * ui_scale, 17.0 * ui_scale
         title = self.run.scene.title or "untitled"
-        draw_text(surface, title, (left, 12.0 * unit), size, INK, bold=True)
+        draw_text(surface, title, (left, 12.0 * ui_scale), size, INK, bold=True)
         digits = max(2, len(f"{self.run.duration:.2f}"))
         text = f"{self.run.trajectory.info['engine']}   {time:{digits}.2f} s"
         height = text_size(title, size, bold=True)[1]
-        draw_text(surface, text, (left, 12.0 * unit + 1.15 * height), 14.0 * unit, FAINT, mono=True)
+        draw_text(surface, text, (left, 12.0 * ui_scale + 1.15 * height), 14.0 * ui_scale, FAINT, mono=True)
 
 
 def ui_scale_of(size: tuple[int, int]) -> float:

@@ -166,11 +166,11 @@ def draw_pull(view: DrawContext, discs: CircleRenderer) -> None:
         length = math.hypot(bx - ax, by - ay)
     if not length < SDL_COORDINATE_LIMIT or not (abs(ax) < SDL_COORDINATE_LIMIT and abs(ay) < SDL_COORDINATE_LIMIT):
         return
-    unit = view.ui_scale
-    if length > 30.0 * unit:
+    ui_scale = view.ui_scale
+    if length > 30.0 * ui_scale:
         ux, uy = (bx - ax) / length, (by - ay) / length
         half_windings = 12
-        width = min(8.0 * unit, 1200.0 * unit * unit / length)
+        width = min(8.0 * ui_scale, 1200.0 * ui_scale * ui_scale / length)
         straight_fraction = 0.12
         points = [(ax, ay)]
         for k in range(half_windings + 1):
@@ -181,13 +181,13 @@ def draw_pull(view: DrawContext, discs: CircleRenderer) -> None:
     else:
         points = [(ax, ay), (bx, by)]
     for a, b in pairwise(points):
-        draw_line(view.surface, a, b, INK, 1.5 * unit, view.antialias)
+        draw_line(view.surface, a, b, INK, 1.5 * ui_scale, view.antialias)
     for (x, y), size in (((ax, ay), 3.0), ((bx, by), 6.0)):
         tint = np.asarray([YELLOW], np.uint8)
         discs.draw(
             view.surface,
             np.asarray([(x, y)]),
-            np.asarray([size * unit]),
+            np.asarray([size * ui_scale]),
             tint,
             CircleStyle(0.0, antialias=view.antialias),
         )

@@ -3,25 +3,19 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pygame
 
 from sandbox.arrays import FloatArray, IntArray
-from sandbox.window.camera import Camera
 from sandbox.window.playback.snapshot import Snapshot
+from sandbox.window.render.canvas import Canvas
 from sandbox.window.render.circles import CircleStyle
 from sandbox.window.render.palette import ColourArray
 
 
-@dataclass(frozen=True, eq=False)
-class DrawContext:
-    """Target, camera, snapshot and style of a frame, passed to all drawing functions."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DrawContext(Canvas):
+    """A canvas with the snapshot of the frame being drawn and its visible bodies, passed to all drawing functions."""
 
-    surface: pygame.Surface
-    camera: Camera
     snapshot: Snapshot
-    ui_scale: float
-    """px, width of a line that is one pixel wide on a 1080p display"""
-    antialias: bool
     shown: IntArray
     """(K,) indices of the bodies that are present and visible"""
     centre: FloatArray

@@ -144,16 +144,16 @@ def _draw_rods(view: DrawContext, rods: JointSegments, colour: tuple[int, int, i
 
 def _draw_coil(view: DrawContext, a: Pixel, b: Pixel, rest: float, colour: tuple[int, int, int]) -> None:
     """Draw a spring as a zigzag of constant wire length: stretching widens the pitch and narrows the coil."""
-    length, unit = float(np.hypot(b[0] - a[0], b[1] - a[1])), view.ui_scale
+    length, ui_scale = float(np.hypot(b[0] - a[0], b[1] - a[1])), view.ui_scale
     reach = 4.0 * max(view.camera.size)
     is_far = max(map(abs, (*a, *b))) > reach
-    if not MIN_COIL_LENGTH * unit <= length or is_far:
-        draw_line(view.surface, a, b, colour, 1.4 * unit, view.antialias)
+    if not MIN_COIL_LENGTH * ui_scale <= length or is_far:
+        draw_line(view.surface, a, b, colour, 1.4 * ui_scale, view.antialias)
         return
     ux, uy = (b[0] - a[0]) / length, (b[1] - a[1]) / length
-    straight_end = min(0.1 * length, 14.0 * unit)
+    straight_end = min(0.1 * length, 14.0 * ui_scale)
     pitch = (length - 2.0 * straight_end) / HALF_WINDINGS
-    widest = min(max(0.09 * rest, 3.0 * unit), 9.0 * unit)
+    widest = min(max(0.09 * rest, 3.0 * ui_scale), 9.0 * ui_scale)
     wire = np.hypot(2.0 * widest, 0.8 * rest / HALF_WINDINGS)
     width = min(max(0.5 * float(np.sqrt(max(wire**2 - pitch**2, 0.0))), 0.35 * widest), 1.3 * widest)
     points = [a]
@@ -162,11 +162,11 @@ def _draw_coil(view: DrawContext, a: Pixel, b: Pixel, rest: float, colour: tuple
         points.append((a[0] + ux * along - uy * side, a[1] + uy * along + ux * side))
     points.append(b)
     if view.antialias:
-        for shift in (-0.75, -0.25) if unit < 1.5 else (-1.0, -0.5, 0.0):
+        for shift in (-0.75, -0.25) if ui_scale < 1.5 else (-1.0, -0.5, 0.0):
             pygame.draw.aalines(view.surface, colour, False, [(x + shift, y + shift) for x, y in points])
         return
     for p, q in pairwise(points):
-        draw_line(view.surface, p, q, colour, 1.5 * unit, antialias=False)
+        draw_line(view.surface, p, q, colour, 1.5 * ui_scale, antialias=False)
 
 
 MAX_SYMBOLS = 600
@@ -263,16 +263,16 @@ def _draw_gears(view: DrawContext, gears: JointSegments) -> None:
 
 def _draw_slides(view: DrawContext, slides: JointSegments) -> None:
     """Draw strings as dashed lines with a tick at each end, brighter if the string is taut."""
-    scale, unit = view.camera.scale, view.ui_scale
+    scale, ui_scale = view.camera.scale, view.ui_scale
     rows = zip(slides.ends.tolist(), slides.links.figures.tolist(), slides.length.tolist(), strict=True)
     for (ax, ay, bx, by), (min_length, max_length, _), length in rows:
         taut = length >= 0.998 * max_length * scale or length <= 1.002 * min_length * scale
         colour = INK if taut else SKY
-        draw_dashes(view.surface, [((ax, ay), (bx, by))], colour, 6.0 * unit, view.antialias)
+        draw_dashes(view.surface, [((ax, ay), (bx, by))], colour, 6.0 * ui_scale, view.antialias)
         if length > 0.0:
-            x, y = -(by - ay) / length * 6.0 * unit, (bx - ax) / length * 6.0 * unit
+            x, y = -(by - ay) / length * 6.0 * ui_scale, (bx - ax) / length * 6.0 * ui_scale
             for px, py in ((ax, ay), (bx, by)):
-                draw_line(view.surface, (px - x, py - y), (px + x, py + y), colour, 1.6 * unit, view.antialias)
+                draw_line(view.surface, (px - x, py - y), (px + x, py + y), colour, 1.6 * ui_scale, view.antialias)
 
 
 def _draw_grooves(view: DrawContext, grooves: JointSegments) -> None:

@@ -11,7 +11,7 @@ import pygame
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.play import PlayPart
-from sandbox.window.camera import Camera
+from sandbox.window.render.canvas import Canvas
 from sandbox.window.render.lines import clip_segment
 from sandbox.window.render.palette import BACKGROUND, RgbColour, hex_colour, mix_colours
 from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
@@ -37,29 +37,31 @@ class LampSprite(NamedTuple):
     """blended over the glow"""
 
 
-def draw_lamps(
-    surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True
-) -> None:
+def draw_lamps(canvas: Canvas, scene: Scene) -> None:
     """Draw all lamps of a scene unlit."""
     for part in scene.play.parts:
         if part.light is not None:
             colour = _colour(part)
             look = ShapeStyle(
-                mix_colours(BACKGROUND, colour, 0.35), mix_colours(BACKGROUND, colour, 0.7), 1.2 * unit, 1.0, antialias
+                mix_colours(BACKGROUND, colour, 0.35),
+                mix_colours(BACKGROUND, colour, 0.7),
+                1.2 * canvas.ui_scale,
+                1.0,
+                canvas.antialias,
             )
-            draw_spot(surface, camera, part.light, RADIUS, look)
+            draw_spot(canvas, part.light, RADIUS, look)
 
 
-def draw_spot(surface: pygame.Surface, camera: Camera, at: Point, radius: float, look: ShapeStyle) -> None:
+def draw_spot(canvas: Canvas, at: Point, radius: float, look: ShapeStyle) -> None:
     """Draw the visible part of a disc on the ground; position and radius in m."""
-    ((x, y),), size = camera.to_screen(np.asarray([at])).tolist(), radius * camera.scale
-    if clip_segment((x, y), (x, y), surface.get_clip(), size + 4.0) is None:
+    ((x, y),), size = canvas.camera.to_screen(np.asarray([at])).tolist(), radius * canvas.camera.scale
+    if clip_segment((x, y), (x, y), canvas.surface.get_clip(), size + 4.0) is None:
         return
     reach = min(size, 1e6)
     low, high = (min(max(v - reach, -1e6), 1e6) for v in (x, y)), (min(max(v + reach, -1e6), 1e6) for v in (x, y))
     (left, top), (right, bottom) = low, high
     within = pygame.Rect(int(left) - 3, int(top) - 3, int(right - left) + 7, int(bottom - top) + 7)
-    draw_sdf(surface, disc_distance(x, y, size), look, within)
+    draw_sdf(canvas.surface, disc_distance(x, y, size), look, within)
 
 
 class LampRenderer:
@@ -68,20 +70,20 @@ class LampRenderer:
     def __init__(self) -> None:
         self._sprites: dict[tuple[RgbColour, float], LampSprite] = {}
 
-    def draw(self, surface: pygame.Surface, camera: Camera, scene: Scene, lit: frozenset[str]) -> None:
+    def draw(self, canvas: Canvas, scene: Scene, lit: frozenset[str]) -> None:
         """Draw the lamps of the parts named in `lit`."""
-        radius = max(RADIUS * camera.scale, 1.0)
+        radius = max(RADIUS * canvas.camera.scale, 1.0)
         if not lit or radius > MAX_LAMP_RADIUS:
             return
         for part in scene.play.parts:
             if part.light is None or part.name not in lit:
                 continue
-            x, y = camera.to_screen(np.asarray(part.light)).tolist()
-            if clip_segment((x, y), (x, y), surface.get_clip(), GLOW * radius + 2.0) is None:
+            x, y = canvas.camera.to_screen(np.asarray(part.light)).tolist()
+            if clip_segment((x, y), (x, y), canvas.surface.get_clip(), GLOW * radius + 2.0) is None:
                 continue
             glow, bulb = self._sprite(_colour(part), radius)
-            surface.blit(glow, glow.get_rect(center=(round(x), round(y))), special_flags=pygame.BLEND_RGB_ADD)
-            surface.blit(bulb, bulb.get_rect(center=(round(x), round(y))))
+            canvas.surface.blit(glow, glow.get_rect(center=(round(x), round(y))), special_flags=pygame.BLEND_RGB_ADD)
+            canvas.surface.blit(bulb, bulb.get_rect(center=(round(x), round(y))))
 
     def _sprite(self, colour: RgbColour, radius: float) -> LampSprite:
         known = self._sprites.get((colour, radius))

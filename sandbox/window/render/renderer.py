@@ -3,6 +3,7 @@
 Only visible bodies are drawn. Static content is cached until the scene or the camera changes.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
 from sandbox.window.camera import Camera, ViewBox
 from sandbox.window.playback.snapshot import Snapshot
+from sandbox.window.render.canvas import Canvas
 from sandbox.window.render.circles import CircleRenderer, draw_rotation_marks
 from sandbox.window.render.draw_context import DrawContext
 from sandbox.window.render.game_view import GameViews, HasHud
@@ -48,7 +50,7 @@ class CachedBackground(NamedTuple):
     camera: Camera
     bounds: bool
     antialias: bool
-    unit: float
+    ui_scale: float
     format: tuple[object, ...]
 
 
@@ -57,7 +59,7 @@ class BodySizes(NamedTuple):
 
     bodies: Bodies
     scale: float
-    unit: float
+    ui_scale: float
     tiny: BoolArray
     """(N,) whether a body is drawn as a point"""
     all_tiny: bool
@@ -93,7 +95,7 @@ class Renderer:
         snapshot: Snapshot,
         *,
         antialias: bool = True,
-        unit: float = 1.0,
+        ui_scale: float = 1.0,
         foot: float = 0.0,
         scale: bool = True,
         hud: bool = True,
@@ -105,21 +107,22 @@ class Renderer:
             camera: the view.
             snapshot: the snapshot. Bodies at nan or inf, and absent bodies, are skipped.
             antialias: whether edges are smooth; without it, drawing takes about half the time.
-            unit: px, width of a line that is one pixel wide on a 1080p display; line widths and text scale with it.
+            ui_scale: px, width of a line that is one pixel wide on a 1080p display; line widths and text scale with it.
             foot: px at the lower edge that will be covered.
             scale: whether to draw the scale bar.
             hud: whether the view of a game may draw its HUD.
         """
-        self._blit_background(surface, camera, snapshot, antialias, unit)
+        canvas = Canvas(surface, camera, ui_scale, antialias)
+        self._blit_background(canvas, snapshot)
         if snapshot.lit:
-            self._lamps.draw(surface, camera, snapshot.scene, snapshot.lit)
+            self._lamps.draw(canvas, snapshot.scene, snapshot.lit)
         self._update_bodies(snapshot)
-        sizes = self._body_sizes(snapshot.bodies, camera.scale, unit)
+        sizes = self._body_sizes(snapshot.bodies, camera.scale, ui_scale)
         colours, ageing = self._colours, self._ageing
         if snapshot.overlapping is not None:
             colours, ageing = _contact_colours(snapshot.overlapping, len(snapshot.bodies)), None
         if "shapes" in snapshot.overlays and sizes.side:
-            self._draw_points(surface, camera, snapshot, sizes, colours, ageing)
+            self._draw_points(canvas, snapshot, sizes, colours, ageing)
 
         shown = _visible_bodies(camera, snapshot, None if self._overlays.need_bodies(snapshot) else sizes.large)
         tint = colours[shown] if ageing is None else ageing.over(colours[shown], shown, snapshot.frame.time)
@@ -127,7 +130,7 @@ class Renderer:
             surface=surface,
             camera=camera,
             snapshot=snapshot,
-            ui_scale=unit,
+            ui_scale=ui_scale,
             antialias=antialias,
             shown=shown,
             centre=camera.to_screen(snapshot.frame.position[shown]),
@@ -152,7 +155,7 @@ class Renderer:
         if game is not None:
             game.above(view)
         if scale:
-            draw_scale(surface, camera, unit, foot)
+            draw_scale(canvas, foot)
         if hud and isinstance(game, HasHud):
             game.hud(view)
 
@@ -166,7 +169,7 @@ class Renderer:
         layer = layers_among(view.snapshot.frame, view.shown[which])
         for k in range(len(scene.layers)):
             if k > 0:
-                self._layers.draw(view.surface, view.camera, scene, k, view.ui_scale, view.antialias)
+                self._layers.draw(view, scene, k)
             self._draw_bodies(view, which[layer == k])
 
     def _draw_bodies(self, view: DrawContext, which: IntArray | None) -> None:
@@ -205,14 +208,14 @@ class Renderer:
 
     def _draw_points(
         self,
-        surface: pygame.Surface,
-        camera: Camera,
+        canvas: Canvas,
         snapshot: Snapshot,
         sizes: "BodySizes",
         colours: ColourArray,
         ageing: LifetimeColours | None,
     ) -> None:
         """Draw the bodies that are too small for discs; fading ones in the colour of their age."""
+        surface = canvas.surface
         pixel_format = (surface.get_masks(), surface.get_bytesize())
         if self._tones is None or self._tones[0] is not colours or self._tones[1] != pixel_format:
             self._tones = colours, pixel_format, packed_pixels(colours, surface)
@@ -221,20 +224,23 @@ class Renderer:
         frame = snapshot.frame
         count = min(len(frame.position), len(colours))
         indices = None if sizes.all_tiny and frame.present.all() else frame.present[:count] & sizes.tiny[:count]
-        self._points.draw(surface, camera, frame.position[:count], self._tones[2][:count], indices, sizes.side)
+        position, tones = frame.position[:count], self._tones[2][:count]
+        self._points.draw(surface, canvas.camera, position, tones, indices, sizes.side)
 
-    def _body_sizes(self, bodies: Bodies, scale: float, unit: float) -> "BodySizes":
+    def _body_sizes(self, bodies: Bodies, scale: float, ui_scale: float) -> "BodySizes":
         """Return the classification of bodies at a scale, cached for the last arguments."""
         sizes = self._sizes
-        if sizes is None or sizes.bodies is not bodies or sizes.scale != scale or sizes.unit != unit:
-            tiny = bodies.radius * scale < MAX_POINT_RADIUS * max(unit, 1.0)
+        if sizes is None or sizes.bodies is not bodies or sizes.scale != scale or sizes.ui_scale != ui_scale:
+            tiny = bodies.radius * scale < MAX_POINT_RADIUS * max(ui_scale, 1.0)
             side = 0
             if tiny.any():
                 diameter = 2.0 * float(np.median(bodies.radius[tiny])) * scale
                 # In a crowd the gaps are more visible than the points: round down.
                 side = int(diameter) if len(tiny) > CROWD_COUNT else round(diameter)
-                side = min(max(side, round(unit), 1), MAX_POINT_SIZE)
-            self._sizes = sizes = BodySizes(bodies, scale, unit, tiny, bool(tiny.all()), np.flatnonzero(~tiny), side)
+                side = min(max(side, round(ui_scale), 1), MAX_POINT_SIZE)
+            self._sizes = sizes = BodySizes(
+                bodies, scale, ui_scale, tiny, bool(tiny.all()), np.flatnonzero(~tiny), side
+            )
         return sizes
 
     def _update_bodies(self, snapshot: Snapshot) -> None:
@@ -248,25 +254,23 @@ class Renderer:
         has_rotated = (bodies.angle != 0.0) | (bodies.angular_velocity != 0.0)
         self._can_rotate = has_rotated | contact_matrix(snapshot.setup or scene, bodies).turnable
 
-    def _blit_background(
-        self, surface: pygame.Surface, camera: Camera, snapshot: Snapshot, antialias: bool, unit: float
-    ) -> None:
+    def _blit_background(self, canvas: Canvas, snapshot: Snapshot) -> None:
+        surface, scene, has_bounds = canvas.surface, snapshot.scene, "bounds" in snapshot.overlays
         surface_format = (surface.get_size(), surface.get_masks(), surface.get_bytesize())
-        key = CachedBackground(snapshot.scene, camera, "bounds" in snapshot.overlays, antialias, unit, surface_format)
+        key = CachedBackground(scene, canvas.camera, has_bounds, canvas.antialias, canvas.ui_scale, surface_format)
         cached = self._background
         if cached is None or cached[0].scene is not key.scene or cached[0][1:] != key[1:]:
             drawn = pygame.Surface(surface.get_size(), 0, surface)
             drawn.fill(BACKGROUND)
-            game = self._games.view_of(snapshot.scene)
-            if game is None or not game.background(_background_context(drawn, camera, snapshot, antialias, unit)):
-                draw_grid(drawn, camera, unit)
-                draw_markings(drawn, camera, snapshot.scene, unit, antialias)
-                draw_lamps(drawn, camera, snapshot.scene, unit, antialias)
-                draw_zones(drawn, camera, snapshot.scene, unit, antialias)
-                ground = snapshot.scene if len(snapshot.scene.layers) == 1 else on_layer(snapshot.scene, 0)
-                draw_static_bodies(drawn, camera, ground, unit, antialias)
-            if key.bounds:
-                draw_bounds(drawn, camera, snapshot.scene.world.bounds, unit, antialias)
+            target, game = replace(canvas, surface=drawn), self._games.view_of(scene)
+            if game is None or not game.background(_background_context(target, snapshot)):
+                draw_grid(target)
+                draw_markings(target, scene)
+                draw_lamps(target, scene)
+                draw_zones(target, scene)
+                draw_static_bodies(target, scene if len(scene.layers) == 1 else on_layer(scene, 0))
+            if has_bounds:
+                draw_bounds(target, scene.world.bounds)
             self._background = cached = (key, drawn)
         surface.blit(cached[1], (0, 0))
 
@@ -286,17 +290,15 @@ def _visible_bodies(camera: Camera, snapshot: Snapshot, among: IntArray | None) 
     return visible if among is None else among[visible]
 
 
-def _background_context(
-    surface: pygame.Surface, camera: Camera, snapshot: Snapshot, antialias: bool, unit: float
-) -> DrawContext:
+def _background_context(canvas: Canvas, snapshot: Snapshot) -> DrawContext:
     """Return a context without bodies, for the cached background."""
     none = np.empty((0, 3), np.uint8)
     return DrawContext(
-        surface=surface,
-        camera=camera,
+        surface=canvas.surface,
+        camera=canvas.camera,
+        ui_scale=canvas.ui_scale,
+        antialias=canvas.antialias,
         snapshot=snapshot,
-        ui_scale=unit,
-        antialias=antialias,
         shown=np.empty(0, np.int64),
         centre=np.empty((0, 2)),
         radius=np.empty(0),
@@ -336,7 +338,7 @@ class InsetRenderer:
         free: pygame.Rect,
         *,
         antialias: bool = True,
-        unit: float = 1.0,
+        ui_scale: float = 1.0,
         aside: int = 0,
     ) -> pygame.Rect | None:
         """Draw the inset in the lower right corner and outline its region; return its rectangle, or None if not drawn.
@@ -347,23 +349,23 @@ class InsetRenderer:
             snapshot: the snapshot.
             free: area not covered by other elements.
             antialias: whether edges are smooth.
-            unit: px, width of a line that is one pixel wide on a 1080p display.
+            ui_scale: px, width of a line that is one pixel wide on a 1080p display.
             aside: px at the lower right that are occupied.
         """
         box = snapshot.scene.play.inset
         if box is None:
             return None
-        rect = _inset_rect(box, free, round(MARGIN * unit), aside)
+        rect = _inset_rect(box, free, round(MARGIN * ui_scale), aside)
         inset_camera = Camera.fitting(box, rect.size, margin=0.0)
         if min(rect.size) < 1 or inset_camera.scale < MIN_MAGNIFICATION * camera.scale or camera.turned:
             return None
         if self._surface is None or self._surface.get_size() != rect.size:
             self._surface = pygame.Surface(rect.size, 0, surface)
         self._picture.draw(
-            self._surface, inset_camera, snapshot, antialias=antialias, unit=unit, scale=False, hud=False
+            self._surface, inset_camera, snapshot, antialias=antialias, ui_scale=ui_scale, scale=False, hud=False
         )
         surface.blit(self._surface, rect)
-        width = max(round(1.5 * unit), 1)
+        width = max(round(1.5 * ui_scale), 1)
         pygame.draw.rect(surface, EDGE_COLOUR, rect, width)
         (left, bottom), (right, top) = camera.to_screen(np.asarray(box)).tolist()
         region = pygame.Rect(round(left), round(top), round(right - left), round(bottom - top)).clip(surface.get_rect())

@@ -1,6 +1,7 @@
 """Static geometry: planes, walls, posts, bounds, markings, zones and raised layers."""
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -14,6 +15,7 @@ from sandbox.scene.description.fixed import Plane, Post, Wall, Zone, mask_of
 from sandbox.scene.description.play import Marking
 from sandbox.trajectory import Frame
 from sandbox.window.camera import Camera, ViewBox
+from sandbox.window.render.canvas import Canvas
 from sandbox.window.render.lines import (
     SDL_COORDINATE_LIMIT,
     Pixel,
@@ -58,24 +60,20 @@ MAX_ROUND_WALLS = 300
 """Number of visible segments of a wall up to which they have round ends and a rim; above it, they are plain lines."""
 
 
-def draw_static_bodies(
-    surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True
-) -> None:
+def draw_static_bodies(canvas: Canvas, scene: Scene) -> None:
     """Draw the visible planes, walls and posts of a scene."""
     for plane in scene.planes:
-        _draw_plane(surface, camera, plane, unit, antialias)
+        _draw_plane(canvas, plane)
     for wall in scene.walls:
-        _draw_wall(surface, camera, wall, unit, antialias)
+        _draw_wall(canvas, wall)
     for post in scene.posts:
-        _draw_post(surface, camera, post, unit, antialias)
+        _draw_post(canvas, post)
 
 
-def draw_bounds(
-    surface: pygame.Surface, camera: Camera, bounds: ViewBox | None, unit: float = 1.0, antialias: bool = True
-) -> None:
+def draw_bounds(canvas: Canvas, bounds: ViewBox | None) -> None:
     """Draw the box outside which bodies are retired, dashed."""
     if bounds is not None:
-        draw_dashes(surface, outline(camera, bounds), FAINT, 8.0 * unit, antialias)
+        draw_dashes(canvas.surface, outline(canvas.camera, bounds), FAINT, 8.0 * canvas.ui_scale, canvas.antialias)
 
 
 def outline(camera: Camera, box: ViewBox) -> list[tuple[Pixel, Pixel]]:
@@ -85,7 +83,8 @@ def outline(camera: Camera, box: ViewBox) -> list[tuple[Pixel, Pixel]]:
     return list(pairwise((x, y) for x, y in camera.to_screen(world).tolist()))
 
 
-def _draw_plane(surface: pygame.Surface, camera: Camera, plane: Plane, unit: float, antialias: bool) -> None:
+def _draw_plane(canvas: Canvas, plane: Plane) -> None:
+    camera, ui_scale = canvas.camera, canvas.ui_scale
     length = math.hypot(*plane.normal)
     nx, ny = plane.normal[0] / length, plane.normal[1] / length
     middle = camera.size[0] / 2.0, camera.size[1] / 2.0
@@ -96,7 +95,11 @@ def _draw_plane(surface: pygame.Surface, camera: Camera, plane: Plane, unit: flo
     offset = height - middle[0] * down[0] - middle[1] * down[1]
     edge = colour_of_fixed(plane, SURFACE)
     filling = SOLID if plane.colour is None else mix_colours(BACKGROUND, edge, 0.25)
-    draw_sdf(surface, line_distance(offset, down), ShapeStyle(filling, edge, 2.0 * unit, antialias=antialias))
+    draw_sdf(
+        canvas.surface,
+        line_distance(offset, down),
+        ShapeStyle(filling, edge, 2.0 * ui_scale, antialias=canvas.antialias),
+    )
 
     nearest = middle[0] - height * down[0], middle[1] - height * down[1]
     along = -down[1], down[0]
@@ -105,61 +108,70 @@ def _draw_plane(surface: pygame.Surface, camera: Camera, plane: Plane, unit: flo
         phase = math.fmod(
             ((plane.point[0] - camera.centre[0]) * along[0] - (plane.point[1] - camera.centre[1]) * along[1])
             * camera.scale,
-            HATCH_SPACING * unit,
+            HATCH_SPACING * ui_scale,
         )
-        _draw_hatch(surface, nearest, along, down, phase, reach, mix_colours(filling, edge, 0.3), unit, antialias)
+        _draw_hatch(canvas, nearest, along, down, phase, reach, mix_colours(filling, edge, 0.3))
 
 
 def _draw_hatch(
-    surface: pygame.Surface,
+    canvas: Canvas,
     nearest: Pixel,
     along: Pixel,
     out: Pixel,
     phase: float,
     reach: float,
     colour: RgbColour,
-    unit: float,
-    antialias: bool,
 ) -> None:
     """Draw short slanted lines behind the edge of a plane; they are fixed to the point of the plane."""
+    ui_scale = canvas.ui_scale
     ends = (
         (nearest[0] - along[0] * reach, nearest[1] - along[1] * reach),
         (nearest[0] + along[0] * reach, nearest[1] + along[1] * reach),
     )
-    clipped = clip_segment(*ends, surface.get_clip(), 20.0 * unit)
+    clipped = clip_segment(*ends, canvas.surface.get_clip(), 20.0 * ui_scale)
     if clipped is None:
         return
-    step = HATCH_SPACING * unit
+    step = HATCH_SPACING * ui_scale
     low, high = sorted((p[0] - nearest[0]) * along[0] + (p[1] - nearest[1]) * along[1] for p in clipped)
     first = math.ceil((low - phase) / step)
     for k in range(first, min(math.floor((high - phase) / step) + 1, first + MAX_HATCHES)):
         s = phase + k * step
-        x, y = nearest[0] + along[0] * s - out[0] * 3.0 * unit, nearest[1] + along[1] * s - out[1] * 3.0 * unit
-        stroke = (along[0] - out[0]) * 6.0 * unit, (along[1] - out[1]) * 6.0 * unit
-        draw_line(surface, (x, y), (x + stroke[0], y + stroke[1]), colour, 1.0, antialias)
+        x, y = (
+            nearest[0] + along[0] * s - out[0] * 3.0 * ui_scale,
+            nearest[1] + along[1] * s - out[1] * 3.0 * ui_scale,
+        )
+        stroke = (along[0] - out[0]) * 6.0 * ui_scale, (along[1] - out[1]) * 6.0 * ui_scale
+        draw_line(canvas.surface, (x, y), (x + stroke[0], y + stroke[1]), colour, 1.0, canvas.antialias)
 
 
-def _draw_wall(surface: pygame.Surface, camera: Camera, wall: Wall, unit: float, antialias: bool) -> None:
+def _draw_wall(canvas: Canvas, wall: Wall) -> None:
+    surface, ui_scale, antialias = canvas.surface, canvas.ui_scale, canvas.antialias
     points = np.asarray((*wall.points, wall.points[0]) if wall.closed else wall.points)
-    half = wall.thickness / 2.0 * camera.scale
-    is_thin = half <= 1.0 * unit
-    half = max(half, 1.0 * unit)
+    half = wall.thickness / 2.0 * canvas.camera.scale
+    is_thin = half <= 1.0 * ui_scale
+    half = max(half, 1.0 * ui_scale)
     edge = colour_of_fixed(wall, SURFACE)
     filling = edge if is_thin else SOLID if wall.colour is None else mix_colours(BACKGROUND, edge, 0.4)
     area = surface.get_clip()
-    pixels = camera.to_screen(points).tolist()
+    pixels = canvas.camera.to_screen(points).tolist()
     segments = [
         segment for a, b in pairwise(pixels) if (segment := clip_segment((a[0], a[1]), (b[0], b[1]), area, half + 4.0))
     ]
     if not wall.solid:
         ends = (((a[0], a[1]), (b[0], b[1])) for a, b in pairwise(pixels))
-        draw_dashes(surface, ends, mix_colours(BACKGROUND, edge, ABSENT_FRACTION), 5.0 * unit, antialias)
+        draw_dashes(
+            surface,
+            ends,
+            mix_colours(BACKGROUND, edge, ABSENT_FRACTION),
+            5.0 * ui_scale,
+            antialias,
+        )
         return
     if wall.one_way:
         for a, b in pairwise(pixels):
-            _draw_passing_arrows(surface, (a[0], a[1]), (b[0], b[1]), half, edge, unit, antialias)
+            _draw_passing_arrows(canvas, (a[0], a[1]), (b[0], b[1]), half, edge)
     has_plain_lines = len(segments) > MAX_ROUND_WALLS
-    rim = 0.0 if is_thin else min(1.5 * unit, half)
+    rim = 0.0 if is_thin else min(1.5 * ui_scale, half)
     # All outlines first, then all fills, so that no outline shows inside a corner.
     for inset, colour in ((0.0, edge), (rim, filling)) if rim else ((0.0, edge),):
         for a, b in segments:
@@ -170,25 +182,27 @@ def _draw_wall(surface: pygame.Surface, camera: Camera, wall: Wall, unit: float,
                 draw_sdf(surface, capsule_distance(a, b, half - inset), style, _surrounding_rect(a, b, half, area))
 
 
-def _draw_passing_arrows(
-    surface: pygame.Surface, a: Pixel, b: Pixel, half: float, colour: RgbColour, unit: float, antialias: bool
-) -> None:
+def _draw_passing_arrows(canvas: Canvas, a: Pixel, b: Pixel, half: float, colour: RgbColour) -> None:
     """Draw small arrows on the left side of a wall, in its passing direction, at fixed points of the wall."""
-    clipped, length = clip_segment(a, b, surface.get_clip(), half + 12.0 * unit), math.dist(a, b)
+    ui_scale = canvas.ui_scale
+    clipped, length = clip_segment(a, b, canvas.surface.get_clip(), half + 12.0 * ui_scale), math.dist(a, b)
     if clipped is None or length < 2.0:
         return
     ux, uy = (b[0] - a[0]) / length, (b[1] - a[1]) / length
     out = uy, -ux  # left of the direction a → b, with y down
-    step = length / max(1, round(length / (ARROW_SPACING * unit)))
+    step = length / max(1, round(length / (ARROW_SPACING * ui_scale)))
     first = math.floor(math.dist(a, clipped[0]) / step)
     for k in range(first, min(math.ceil(math.dist(a, clipped[1]) / step), first + MAX_HATCHES)):
         s = (k + 0.5) * step
         x, y = a[0] + s * ux + half * out[0], a[1] + s * uy + half * out[1]
-        tip = x + 10.0 * unit * out[0], y + 10.0 * unit * out[1]
-        draw_line(surface, (x, y), tip, colour, 1.5 * unit, antialias)
-        for side in (-4.0 * unit, 4.0 * unit):
-            barb = tip[0] - 4.0 * unit * out[0] + side * ux, tip[1] - 4.0 * unit * out[1] + side * uy
-            draw_line(surface, tip, barb, colour, 1.5 * unit, antialias)
+        tip = x + 10.0 * ui_scale * out[0], y + 10.0 * ui_scale * out[1]
+        draw_line(canvas.surface, (x, y), tip, colour, 1.5 * ui_scale, canvas.antialias)
+        for side in (-4.0 * ui_scale, 4.0 * ui_scale):
+            barb = (
+                tip[0] - 4.0 * ui_scale * out[0] + side * ux,
+                tip[1] - 4.0 * ui_scale * out[1] + side * uy,
+            )
+            draw_line(canvas.surface, tip, barb, colour, 1.5 * ui_scale, canvas.antialias)
 
 
 def _surrounding_rect(a: Pixel, b: Pixel, reach: float, area: pygame.Rect) -> pygame.Rect:
@@ -200,25 +214,29 @@ def _surrounding_rect(a: Pixel, b: Pixel, reach: float, area: pygame.Rect) -> py
     return pygame.Rect(int(left), int(top), math.ceil(right) - int(left), math.ceil(bottom) - int(top))
 
 
-def _draw_post(surface: pygame.Surface, camera: Camera, post: Post, unit: float, antialias: bool) -> None:
+def _draw_post(canvas: Canvas, post: Post) -> None:
+    ui_scale, antialias = canvas.ui_scale, canvas.antialias
     position = np.asarray([post.position])
-    radius = max(post.radius * camera.scale, 1.0 * unit)
-    if not camera.in_sight(position, radius / camera.scale)[0]:
+    radius = max(post.radius * canvas.camera.scale, 1.0 * ui_scale)
+    if not canvas.camera.in_sight(position, radius / canvas.camera.scale)[0]:
         return
-    x, y = camera.to_screen(position)[0].tolist()
+    x, y = canvas.camera.to_screen(position)[0].tolist()
     edge = colour_of_fixed(post, NEUTRAL)
-    rect = _surrounding_rect((x, y), (x, y), radius, surface.get_clip())
+    rect = _surrounding_rect((x, y), (x, y), radius, canvas.surface.get_clip())
     if not post.solid:
         faint = mix_colours(BACKGROUND, edge, ABSENT_FRACTION)
         draw_sdf(
-            surface, disc_distance(x, y, radius), ShapeStyle(BACKGROUND, faint, 1.0 * unit, antialias=antialias), rect
+            canvas.surface,
+            disc_distance(x, y, radius),
+            ShapeStyle(BACKGROUND, faint, 1.0 * ui_scale, antialias=antialias),
+            rect,
         )
         return
-    style = ShapeStyle(mix_colours(BACKGROUND, edge, 0.55), edge, min(1.5 * unit, radius), antialias=antialias)
-    draw_sdf(surface, disc_distance(x, y, radius), style, rect)
-    if post.kick is not None and radius > MIN_RING_RADIUS * unit:  # ring of a bumper
-        ring = ShapeStyle(mix_colours(BACKGROUND, edge, 0.3), edge, 1.5 * unit, antialias=antialias)
-        draw_sdf(surface, disc_distance(x, y, 0.6 * radius), ring, rect)
+    style = ShapeStyle(mix_colours(BACKGROUND, edge, 0.55), edge, min(1.5 * ui_scale, radius), antialias=antialias)
+    draw_sdf(canvas.surface, disc_distance(x, y, radius), style, rect)
+    if post.kick is not None and radius > MIN_RING_RADIUS * ui_scale:  # ring of a bumper
+        ring = ShapeStyle(mix_colours(BACKGROUND, edge, 0.3), edge, 1.5 * ui_scale, antialias=antialias)
+        draw_sdf(canvas.surface, disc_distance(x, y, 0.6 * radius), ring, rect)
 
 
 OPACITY = 165
@@ -267,30 +285,29 @@ class LayerRenderer:
         self._layers: tuple[Scene, ...] = ()
         self._drawn: dict[int, _DrawnLayer] = {}
 
-    def draw(
-        self, surface: pygame.Surface, camera: Camera, scene: Scene, layer: int, unit: float, antialias: bool
-    ) -> None:
+    def draw(self, canvas: Canvas, scene: Scene, layer: int) -> None:
         """Draw the walls and posts of a layer, translucent, over a surface."""
         if self._scene is not scene:  # a new scene may keep its raised layers
             self._scene = scene
             self._layers = tuple(on_layer(scene, k) for k in range(len(scene.layers)))
         layer_scene = self._layers[layer]
-        key = layer_scene.walls, layer_scene.posts, camera, unit, antialias
+        key = layer_scene.walls, layer_scene.posts, canvas.camera, canvas.ui_scale, canvas.antialias
         cached = self._drawn.get(layer)
         if cached is None or cached.key != key:
-            self._drawn[layer] = cached = _DrawnLayer(key, _layer_sprite(surface, camera, layer_scene, unit, antialias))
+            self._drawn[layer] = cached = _DrawnLayer(key, _layer_sprite(canvas, layer_scene))
         if cached.picture is not None:
-            surface.blit(*cached.picture)
+            canvas.surface.blit(*cached.picture)
 
 
-def _layer_sprite(surface: pygame.Surface, camera: Camera, scene: Scene, unit: float, antialias: bool) -> Sprite | None:
+def _layer_sprite(canvas: Canvas, scene: Scene) -> Sprite | None:
     """Return a translucent sprite of a layer; overlapping parts do not add up in opacity. None if not visible."""
+    surface = canvas.surface
     discs = [(point, wall.thickness / 2.0) for wall in scene.walls for point in wall.points]
     discs += [(post.position, post.radius) for post in scene.posts]
     if not discs:
         return None
-    pixels = np.asarray(camera.to_screen(np.asarray([position for position, _ in discs])))
-    reach = np.asarray([[size * camera.scale] for _, size in discs]) + MARGIN * unit
+    pixels = np.asarray(canvas.camera.to_screen(np.asarray([position for position, _ in discs])))
+    reach = np.asarray([[size * canvas.camera.scale] for _, size in discs]) + MARGIN * canvas.ui_scale
     low, high = (
         (pixels - reach).min(axis=0).clip(-SDL_COORDINATE_LIMIT, SDL_COORDINATE_LIMIT),
         (pixels + reach).max(axis=0).clip(-SDL_COORDINATE_LIMIT, SDL_COORDINATE_LIMIT),
@@ -303,7 +320,7 @@ def _layer_sprite(surface: pygame.Surface, camera: Camera, scene: Scene, unit: f
     for ground, colour in ((dark, (0, 0, 0)), (light, (255, 255, 255))):
         ground.fill(colour)
         ground.set_clip(box)
-        draw_static_bodies(ground, camera, scene, unit, antialias)
+        draw_static_bodies(replace(canvas, surface=ground), scene)
     black, white = (pygame.surfarray.array3d(each.subsurface(box)).astype(np.int32) for each in (dark, light))
     cover = (255 - (white - black).mean(axis=2)).clip(0, 255)
     picture = pygame.Surface(box.size, pygame.SRCALPHA, 32)
@@ -313,48 +330,43 @@ def _layer_sprite(surface: pygame.Surface, camera: Camera, scene: Scene, unit: f
     return picture, box.topleft
 
 
-def draw_markings(
-    surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True
-) -> None:
+def draw_markings(canvas: Canvas, scene: Scene) -> None:
     """Draw the visible markings of a scene."""
     for marking in scene.play.markings:
         colour = hex_colour(marking.colour)
         if marking.position is not None and marking.radius is not None:
-            _draw_circle(surface, camera, marking, (marking.position, marking.radius), colour, unit, antialias)
+            _draw_circle(canvas, marking, (marking.position, marking.radius), colour)
         elif marking.filled:
-            corners = camera.to_screen(np.asarray(marking.points)).tolist()
-            kept = clip_polygon([(x, y) for x, y in corners], surface.get_clip())
+            corners = canvas.camera.to_screen(np.asarray(marking.points)).tolist()
+            kept = clip_polygon([(x, y) for x, y in corners], canvas.surface.get_clip())
             if kept:
-                fill_polygon(surface, kept, colour, antialias)
+                fill_polygon(canvas.surface, kept, colour, canvas.antialias)
         else:
-            pixels: list[Pixel] = [(x, y) for x, y in camera.to_screen(np.asarray(marking.points)).tolist()]
-            width = min(max(marking.width * camera.scale, unit), SDL_COORDINATE_LIMIT)
+            pixels: list[Pixel] = [(x, y) for x, y in canvas.camera.to_screen(np.asarray(marking.points)).tolist()]
+            width = min(max(marking.width * canvas.camera.scale, canvas.ui_scale), SDL_COORDINATE_LIMIT)
             for a, b in pairwise(pixels):
-                draw_line(surface, a, b, colour, width, antialias)
+                draw_line(canvas.surface, a, b, colour, width, canvas.antialias)
 
 
 def _draw_circle(
-    surface: pygame.Surface,
-    camera: Camera,
+    canvas: Canvas,
     marking: Marking,
     circle: tuple[Point, float],
     colour: RgbColour,
-    unit: float,
-    antialias: bool,
 ) -> None:
     position = np.asarray([circle[0]])
-    line_width = 0.0 if marking.filled else max(marking.width * camera.scale, unit)
-    radius = max(circle[1] * camera.scale, unit) + 0.5 * line_width
-    if not camera.in_sight(position, np.asarray([radius / camera.scale]))[0]:
+    line_width = 0.0 if marking.filled else max(marking.width * canvas.camera.scale, canvas.ui_scale)
+    radius = max(circle[1] * canvas.camera.scale, canvas.ui_scale) + 0.5 * line_width
+    if not canvas.camera.in_sight(position, np.asarray([radius / canvas.camera.scale]))[0]:
         return
-    x, y = camera.to_screen(position)[0].tolist()
-    area = surface.get_clip()
+    x, y = canvas.camera.to_screen(position)[0].tolist()
+    area = canvas.surface.get_clip()
     left, top = max(x - radius - 2.0, area.left), max(y - radius - 2.0, area.top)
     right, bottom = min(x + radius + 2.0, area.right), min(y + radius + 2.0, area.bottom)
     if left < right and top < bottom:
         rect = pygame.Rect(int(left), int(top), math.ceil(right) - int(left), math.ceil(bottom) - int(top))
-        look = ShapeStyle(colour if marking.filled else None, colour, line_width, antialias=antialias)
-        draw_sdf(surface, disc_distance(x, y, radius), look, rect)
+        look = ShapeStyle(colour if marking.filled else None, colour, line_width, antialias=canvas.antialias)
+        draw_sdf(canvas.surface, disc_distance(x, y, radius), look, rect)
 
 
 FILLED, LINED = 0.13, 0.55
@@ -363,16 +375,15 @@ LINE = 1.5
 """px, width of the outline"""
 
 
-def draw_zones(
-    surface: pygame.Surface, camera: Camera, scene: Scene, unit: float = 1.0, antialias: bool = True
-) -> None:
+def draw_zones(canvas: Canvas, scene: Scene) -> None:
     """Draw the visible zones of a scene."""
+    antialias = canvas.antialias
     for zone in scene.zones:
-        distance, within = _distance(zone, camera)
-        box = within.inflate(4, 4).clip(surface.get_clip())
+        distance, within = _distance(zone, canvas.camera)
+        box = within.inflate(4, 4).clip(canvas.surface.get_clip())
         colour = colour_of_zone(zone)
-        draw_sdf(surface, distance, ShapeStyle(colour, colour, 0.0, FILLED, antialias), box)
-        draw_sdf(surface, distance, ShapeStyle(None, colour, LINE * unit, LINED, antialias), box)
+        draw_sdf(canvas.surface, distance, ShapeStyle(colour, colour, 0.0, FILLED, antialias), box)
+        draw_sdf(canvas.surface, distance, ShapeStyle(None, colour, LINE * canvas.ui_scale, LINED, antialias), box)
 
 
 def colour_of_zone(zone: Zone) -> RgbColour:

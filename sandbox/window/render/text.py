@@ -185,16 +185,16 @@ def wrap_text(
     return tuple(lines)
 
 
-def draw_hint(surface: pygame.Surface, text: str, pointer: tuple[int, int], unit: float) -> None:
+def draw_hint(surface: pygame.Surface, text: str, pointer: tuple[int, int], ui_scale: float) -> None:
     """Draw a tooltip below the pointer, kept inside the surface."""
-    size = 12 * unit
-    lines = wrap_text(text, size, min(280 * unit, 0.9 * surface.get_width()), 4)
+    size = 12 * ui_scale
+    lines = wrap_text(text, size, min(280 * ui_scale, 0.9 * surface.get_width()), 4)
     wide = max((text_size(line, size)[0] for line in lines), default=0)
     step = round(1.4 * size)
     box = pygame.Rect(0, 0, wide + round(1.4 * size), len(lines) * step + round(0.8 * size))
-    box.topright = pointer[0], pointer[1] + round(20 * unit)
+    box.topright = pointer[0], pointer[1] + round(20 * ui_scale)
     box.clamp_ip(surface.get_rect())
-    draw_box(surface, box, 4 * unit, opacity=246)
+    draw_box(surface, box, 4 * ui_scale, opacity=246)
     for k, line in enumerate(lines):
         at = box.left + 0.7 * size, box.top + 0.4 * size + (k + 0.5) * step
         draw_text(surface, line, at, size, INK, "midleft")

@@ -349,11 +349,11 @@ class Gui:
         top, bottom = self.score_margins(app_state)
         antialias, ui_scale = self.antialias, self.ui_scale
         foot = self._scale_foot(app_state)
-        self._renderer.draw(surface, camera, snapshot, antialias=antialias, unit=ui_scale, foot=foot)
+        self._renderer.draw(surface, camera, snapshot, antialias=antialias, ui_scale=ui_scale, foot=foot)
         area = self.area
         area = pygame.Rect(area.left, area.top + top, area.width, max(area.height - top - bottom, 0))
         aside = round(GRAPH_SIZE[0] * ui_scale) if "energy" in self.overlays else 0
-        inset = self._inset.draw(surface, camera, snapshot, area, antialias=antialias, unit=ui_scale, aside=aside)
+        inset = self._inset.draw(surface, camera, snapshot, area, antialias=antialias, ui_scale=ui_scale, aside=aside)
         if inset is not None:
             plates["inset"] = inset
 

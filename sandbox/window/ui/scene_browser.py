@@ -66,7 +66,7 @@ def draw_thumbnail(scene: Scene, size: tuple[int, int], renderer: Renderer, ui_s
     ghost = _preview_frame(scene) if has_motion and 0 < len(scene.bodies) <= MAX_PREVIEW_BODIES else None
     frame = frame_in_flight(scene, BURST_TIME_FRACTION * scene.world.duration if is_burst else 0.0)
     camera = Camera.fitting(box, size, margin=0.08, turned=should_rotate(scene, size))
-    renderer.draw(surface, camera, Snapshot(scene, scene.bodies, frame, ghost=ghost), unit=ui_scale)
+    renderer.draw(surface, camera, Snapshot(scene, scene.bodies, frame, ghost=ghost), ui_scale=ui_scale)
     return surface
 
 

@@ -8,6 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from sandbox.window.camera import Camera
+from sandbox.window.render.canvas import Canvas
 from sandbox.window.render.grid import NARROWEST, draw_grid, draw_scale, step_of
 from sandbox.window.render.palette import BACKGROUND, FAINT, GRID, GRID_STRONG, SOLID, SURFACE
 from sandbox.window.render.static_geometry import draw_static_bodies
@@ -17,7 +18,7 @@ from tests.window.render.drawn import CAMERA, SIZE, changed_pixels, colour_at, r
 def render_static(camera=CAMERA, *, antialias=True, **tables) -> np.ndarray:
     surface = pygame.Surface(camera.size)
     surface.fill(BACKGROUND)
-    draw_static_bodies(surface, camera, scene(**tables), antialias=antialias)
+    draw_static_bodies(Canvas(surface, camera, antialias=antialias), scene(**tables))
     return pygame.surfarray.array3d(surface)
 
 
@@ -65,10 +66,10 @@ def test_width_of_a_wall_is_its_thickness():
     assert colour_at(picture, 2.4, 0.4) == BACKGROUND, "ends are round"
 
 
-@pytest.mark.parametrize(("unit", "width"), [(1.0, 2), (2.0, 4)])
-def test_a_wall_without_thickness_is_a_line(unit, width):
+@pytest.mark.parametrize(("ui_scale", "width"), [(1.0, 2), (2.0, 4)])
+def test_a_wall_without_thickness_is_a_line(ui_scale, width):
     surface = pygame.Surface(SIZE)
-    draw_static_bodies(surface, CAMERA, scene(wall=[{"points": [[0, -2], [0, 2]]}]), unit)
+    draw_static_bodies(Canvas(surface, CAMERA, ui_scale), scene(wall=[{"points": [[0, -2], [0, 2]]}]))
     covered = pygame.surfarray.array3d(surface)[:, 60].sum(1) / sum(SURFACE)
     assert covered.sum() == pytest.approx(width, abs=0.02)  # 8 bits a pixel
 
@@ -106,10 +107,10 @@ def test_walls_and_posts_at_any_distance_are_drawn(points, thickness, power):
     post = {"position": list(points[1]), "radius": max(thickness, 1e-9)}
     for more in ({}, {"solid": False}, {"one_way": True}):
         post_keys = {key: value for key, value in more.items() if key == "solid"}
-        draw_static_bodies(surface, camera, scene(wall=[{**wall, **more}], post=[{**post, **post_keys}]))
+        draw_static_bodies(Canvas(surface, camera), scene(wall=[{**wall, **more}], post=[{**post, **post_keys}]))
     if thickness * camera.scale > 10.0:  # px: the first point of the wall is in the middle of the picture
         surface.fill(BACKGROUND)
-        draw_static_bodies(surface, camera, scene(wall=[wall]))
+        draw_static_bodies(Canvas(surface, camera), scene(wall=[wall]))
         assert surface.get_at((20, 15))[:3] == SOLID
 
 
@@ -160,17 +161,19 @@ def test_bounds_overlay_draws_a_dashed_rectangle():
     assert 0.3 < along.mean() < 0.7, "as much gap as dash"
 
 
-@given(power=st.floats(-14.0, 12.0), unit=st.sampled_from([1.0, 2.0]))
-def test_grid_step_is_1_2_or_5_times_a_power_of_ten_and_wide_enough(power, unit):
-    step = step_of(Camera((0.0, 0.0), 10.0**power, SIZE), unit)
+@given(power=st.floats(-14.0, 12.0), ui_scale=st.sampled_from([1.0, 2.0]))
+def test_grid_step_is_1_2_or_5_times_a_power_of_ten_and_wide_enough(power, ui_scale):
+    step = step_of(Camera((0.0, 0.0), 10.0**power, SIZE), ui_scale)
     assert f"{step:.0e}"[0] in "125"
     assert step == pytest.approx(float(f"{step:.0e}"))
-    assert NARROWEST * unit * (1 - 1e-9) <= step * 10.0**power <= 2.5 * NARROWEST * unit * (1 + 1e-9)  # rounding
+    assert (
+        NARROWEST * ui_scale * (1 - 1e-9) <= step * 10.0**power <= 2.5 * NARROWEST * ui_scale * (1 + 1e-9)
+    )  # rounding
 
 
 def test_grid_lines_lie_at_multiples_of_the_step():
     surface = pygame.Surface(SIZE)
-    draw_grid(surface, CAMERA)
+    draw_grid(Canvas(surface, CAMERA))
     step = step_of(CAMERA)
     picture = pygame.surfarray.array3d(surface)
     assert step == 5.0

@@ -113,7 +113,7 @@ def test_scale_bar_is_drawn_over_the_bodies():
 
 def test_unit_scales_the_marks():
     shown = snapshot(scene(balls=[ball(0, 0)], plane=FLOOR))
-    assert changed_pixels(render(shown), render(shown, unit=2.0)).any()
+    assert changed_pixels(render(shown), render(shown, ui_scale=2.0)).any()
 
 
 def test_a_spawned_body_is_drawn():

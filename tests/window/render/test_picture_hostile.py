@@ -71,11 +71,11 @@ def snapshots(draw):
     power=st.floats(-14.0, 12.0),
     size=st.sampled_from([(1, 1), (2, 1), (1, 50), (90, 70)]),
     antialias=st.booleans(),
-    unit=st.sampled_from([1.0, 2.0]),
+    ui_scale=st.sampled_from([1.0, 2.0]),
 )
-def test_any_snapshot_is_drawn_by_any_camera(shown, centre, power, size, antialias, unit):
+def test_any_snapshot_is_drawn_by_any_camera(shown, centre, power, size, antialias, ui_scale):
     camera = Camera(centre, 10.0**power, size)
-    assert render(shown, camera, antialias=antialias, unit=unit).shape == (*size, 3)
+    assert render(shown, camera, antialias=antialias, ui_scale=ui_scale).shape == (*size, 3)
 
 
 @given(shown=snapshots(), power=st.floats(-3.0, 4.0), antialias=st.booleans())

@@ -49,14 +49,14 @@ def test_pause_is_shown_in_red_with_its_keys() -> None:
     assert row.colour == WARNING
 
 
-@pytest.mark.parametrize("unit", [0.7, 1.0, 2.0])
-def test_pause_of_a_window_without_focus_fits_beside_a_score_panel(unit: float) -> None:
-    free = pygame.Rect(0, 0, round(1920 * unit), round(1080 * unit))
-    panel = pygame.Rect(hud.hud_width("exact  ·  dt 10 ms", unit), 0, 600, 60)
+@pytest.mark.parametrize("ui_scale", [0.7, 1.0, 2.0])
+def test_pause_of_a_window_without_focus_fits_beside_a_score_panel(ui_scale: float) -> None:
+    free = pygame.Rect(0, 0, round(1920 * ui_scale), round(1080 * ui_scale))
+    panel = pygame.Rect(hud.hud_width("exact  ·  dt 10 ms", ui_scale), 0, 600, 60)
     for status in (
         replace(MINIMAL, engine="exact", settings="dt 10 ms", **{how: True}) for how in ("paused", "unfocused")
     ):
-        (line,) = [text for row, text in hud.layout_rows(status, free, unit, [panel]).lines if row.mark == "bars"]
+        (line,) = [text for row, text in hud.layout_rows(status, free, ui_scale, [panel]).lines if row.mark == "bars"]
         assert line in texts(status)
 
 
@@ -124,7 +124,7 @@ def test_replay_recording_and_busy_state_are_shown() -> None:
 
 
 def draw_and_record(
-    status: HudStatus, size: tuple[int, int], unit: float, right: int = 0
+    status: HudStatus, size: tuple[int, int], ui_scale: float, right: int = 0
 ) -> tuple[list[pygame.Rect], pygame.Surface]:
     """Draw a status; return the rectangles of its plates, and the picture."""
     plates: list[pygame.Rect] = []
@@ -137,7 +137,7 @@ def draw_and_record(
     surface = pygame.Surface(size)
     hud.draw_box = record
     try:
-        draw_hud(surface, status, unit, right=right)
+        draw_hud(surface, status, ui_scale, right=right)
     finally:
         hud.draw_box = original
     return plates, surface
@@ -148,9 +148,9 @@ SIZES = [(200, 150), (320, 240), (640, 480), (1280, 800), (3840, 2160)]
 
 @pytest.mark.parametrize("size", SIZES)
 def test_plates_stay_in_the_picture_and_do_not_overlap(size: tuple[int, int]) -> None:
-    unit = 2.0 if size[0] > 2000 else 1.0
+    ui_scale = 2.0 if size[0] > 2000 else 1.0
     for status in (MINIMAL, FULL, replace(FULL, faults=("a.toml:3: ball: wrong",) * 30)):
-        plates, surface = draw_and_record(status, size, unit)
+        plates, surface = draw_and_record(status, size, ui_scale)
         assert plates
         assert all(surface.get_rect().contains(rect) for rect in plates)
         assert all(rect.collidelist(plates[k + 1 :]) < 0 for k, rect in enumerate(plates))
@@ -212,6 +212,8 @@ statuses = st.builds(
 
 @given(statuses, st.integers(1, 500), st.integers(1, 400), st.floats(0.25, 4), st.integers(0, 300))
 @settings(max_examples=150, deadline=None)
-def test_any_status_is_drawn_on_any_size(status: HudStatus, width: int, height: int, unit: float, right: int) -> None:
-    plates, surface = draw_and_record(status, (width, height), unit, right)
+def test_any_status_is_drawn_on_any_size(
+    status: HudStatus, width: int, height: int, ui_scale: float, right: int
+) -> None:
+    plates, surface = draw_and_record(status, (width, height), ui_scale, right)
     assert all(surface.get_rect().contains(rect) for rect in plates if rect.size > (0, 0))

@@ -94,12 +94,12 @@ def test_wheel_does_not_scroll_help_that_fits() -> None:
 
 
 @pytest.mark.parametrize(
-    ("size", "unit"), [((640, 480), 1.0), ((1280, 800), 1.0), ((1920, 1080), 1.0), ((3840, 2160), 2.0)]
+    ("size", "ui_scale"), [((640, 480), 1.0), ((1280, 800), 1.0), ((1920, 1080), 1.0), ((3840, 2160), 2.0)]
 )
-def test_help_fits_into_common_window_sizes(size: tuple[int, int], unit: float) -> None:
+def test_help_fits_into_common_window_sizes(size: tuple[int, int], ui_scale: float) -> None:
     surface = pygame.Surface(size)
     surface.fill((1, 2, 3))
-    HelpOverlay().draw(surface, unit)
+    HelpOverlay().draw(surface, ui_scale)
     edge = pygame.surfarray.array3d(surface)[:, [0, 1, -2, -1]]
     assert len({tuple(colour) for colour in edge.reshape(-1, 3).tolist()}) == 1  # no text at the upper or lower edge
 
@@ -108,7 +108,7 @@ def test_help_fits_into_common_window_sizes(size: tuple[int, int], unit: float) 
     st.integers(1, 700), st.integers(1, 500), st.floats(0.25, 4), st.lists(st.tuples(st.text(), st.text()), max_size=30)
 )
 @settings(max_examples=30, deadline=None)
-def test_help_is_drawn_on_any_size(width: int, height: int, unit: float, scene_keys: list[tuple[str, str]]) -> None:
+def test_help_is_drawn_on_any_size(width: int, height: int, ui_scale: float, scene_keys: list[tuple[str, str]]) -> None:
     surface = pygame.Surface((width, height))
-    HelpOverlay().draw(surface, unit, scene_keys)
+    HelpOverlay().draw(surface, ui_scale, scene_keys)
     assert surface.get_at((0, 0)) != (0, 0, 0)

@@ -34,11 +34,11 @@ from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
 from sandbox.window.render.text import draw_box, draw_text, text_size, wrap_text
 
 MAX_SCOREBOARD_WIDTH = 470.0
-"""px at unit 1"""
+"""px at a UI scale of 1"""
 MIN_SCOREBOARD_WIDTH = 300.0
-"""px at unit 1; if the top has less room, the scoreboard is at the bottom"""
+"""px at a UI scale of 1; if the top has less room, the scoreboard is at the bottom"""
 RIGHT = 66.0
-"""px at unit 1: free width to its right, for the frame rate"""
+"""px at a UI scale of 1: free width to its right, for the frame rate"""
 
 
 class ScoreboardText(NamedTuple):
@@ -58,7 +58,7 @@ class ScoreboardLayout(NamedTuple):
 
 
 def layout_scoreboard(
-    player: BilliardsPlayer, free: pygame.Rect, left: int, unit: float, occupied: int = 0
+    player: BilliardsPlayer, free: pygame.Rect, left: int, ui_scale: float, occupied: int = 0
 ) -> ScoreboardLayout:
     """Return the layout of the scoreboard: at the top of the free area, or at the bottom if the top is too narrow.
 
@@ -66,15 +66,15 @@ def layout_scoreboard(
         player: player at the window.
         free: free area, px.
         left: right edge of the status plate at the upper left, px.
-        unit: UI scale, 1 on a display of 1080 lines.
+        ui_scale: UI scale, 1 on a display of 1080 lines.
         occupied: occupied width at the bottom right, px.
     """
-    size, pad, margin = 13.0 * unit, round(9 * unit), round(10 * unit)
-    right = free.right - round(RIGHT * unit)
-    at_top = right - left >= MIN_SCOREBOARD_WIDTH * unit
+    size, pad, margin = 13.0 * ui_scale, round(9 * ui_scale), round(10 * ui_scale)
+    right = free.right - round(RIGHT * ui_scale)
+    at_top = right - left >= MIN_SCOREBOARD_WIDTH * ui_scale
     if not at_top:
         left, right = free.left + margin, free.right - max(margin, occupied)
-    width = min(right - left, round(MAX_SCOREBOARD_WIDTH * unit))
+    width = min(right - left, round(MAX_SCOREBOARD_WIDTH * ui_scale))
     lines = wrap_text(status_line(player), size, width - 2 * pad - 1.3 * size, 2)
     rows = 1 + len(lines) + bool(_pocketed(player.match)) + bool(_offered(player))
     rect = pygame.Rect((left + right - width) // 2, free.top + margin, width, rows * round(1.5 * size) + 2 * pad)
@@ -84,13 +84,13 @@ def layout_scoreboard(
 
 
 def draw_scoreboard(
-    surface: pygame.Surface, player: BilliardsPlayer, free: pygame.Rect, left: int, unit: float, occupied: int = 0
+    surface: pygame.Surface, player: BilliardsPlayer, free: pygame.Rect, left: int, ui_scale: float, occupied: int = 0
 ) -> ScoreboardText:
     """Draw the scoreboard; the arguments are those of `layout_scoreboard`."""
-    rect, lines = layout_scoreboard(player, free, left, unit, occupied)
-    size, pad, match = 13.0 * unit, round(9 * unit), player.match
+    rect, lines = layout_scoreboard(player, free, left, ui_scale, occupied)
+    size, pad, match = 13.0 * ui_scale, round(9 * ui_scale), player.match
     line, choices, down = round(1.5 * size), _offered(player), _pocketed(match)
-    draw_box(surface, rect, 8 * unit)
+    draw_box(surface, rect, 8 * ui_scale)
     y = rect.top + pad + line / 2
     _draw_players(surface, player, rect, y, size)
     y += line
@@ -259,11 +259,11 @@ POWER_MARKS = 5
 """number of intervals on the scale of the power bar"""
 
 
-def draw_tip(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, unit: float) -> None:
+def draw_tip(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, ui_scale: float) -> None:
     """Draw the english dial: the ball, the miscue limit, and the contact point of the tip."""
     (x, y), radius = (rect.centerx, rect.centery), rect.width / 2.0
-    draw_box(surface, tip_box(rect, unit), 10 * unit, opacity=170)
-    _disc(surface, (x, y), radius, ShapeStyle(IVORY, mix_colours(IVORY, PANEL, 0.45), 1.5 * unit))
+    draw_box(surface, tip_box(rect, ui_scale), 10 * ui_scale, opacity=170)
+    _disc(surface, (x, y), radius, ShapeStyle(IVORY, mix_colours(IVORY, PANEL, 0.45), 1.5 * ui_scale))
     faint = mix_colours(IVORY, PANEL, 0.28)
     for a, b in (((x - radius, y), (x + radius, y)), ((x, y - radius), (x, y + radius))):
         pygame.draw.line(surface, faint, a, b)
@@ -273,20 +273,28 @@ def draw_tip(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, unit: fl
             points = [(x + MISCUE * radius * math.cos(t), y + MISCUE * radius * math.sin(t)) for t in turns]
             pygame.draw.aalines(surface, mix_colours(IVORY, VERMILION, 0.75), False, points)
     at = x + cue.side * radius, y - cue.height * radius
-    _disc(surface, at, TIP_RADIUS * radius, ShapeStyle(SKY, mix_colours(SKY, PANEL, 0.6), 1.5 * unit, opacity=0.95))
+    _disc(surface, at, TIP_RADIUS * radius, ShapeStyle(SKY, mix_colours(SKY, PANEL, 0.6), 1.5 * ui_scale, opacity=0.95))
     if cue.side or cue.height:
         text = f"{format_signed(cue.side, 2)}  {format_signed(cue.height, 2)}"
-        draw_text(surface, text, (rect.left - 5 * unit, rect.top - 8 * unit), 11 * unit, FAINT, "bottomleft", mono=True)
+        draw_text(
+            surface,
+            text,
+            (rect.left - 5 * ui_scale, rect.top - 8 * ui_scale),
+            11 * ui_scale,
+            FAINT,
+            "bottomleft",
+            mono=True,
+        )
 
 
-def tip_box(rect: pygame.Rect, unit: float) -> pygame.Rect:
+def tip_box(rect: pygame.Rect, ui_scale: float) -> pygame.Rect:
     """Return the rectangle of a dial with its background, px."""
-    return rect.inflate(round(10 * unit), round(10 * unit))
+    return rect.inflate(round(10 * ui_scale), round(10 * ui_scale))
 
 
-def draw_power(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, unit: float) -> None:
+def draw_power(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, ui_scale: float) -> None:
     """Draw the power as a bar, with the speed of the cue above it."""
-    draw_box(surface, tip_box(rect, unit), 10 * unit, opacity=170)
+    draw_box(surface, tip_box(rect, ui_scale), 10 * ui_scale, opacity=170)
     rounding = round(0.3 * rect.width)
     pygame.draw.rect(surface, LINE, rect, border_radius=rounding)
     high = max(round(rect.height * cue.power), 2)
@@ -296,7 +304,15 @@ def draw_power(surface: pygame.Surface, rect: pygame.Rect, cue: CueState, unit: 
         level = rect.bottom - rect.height * k / POWER_MARKS
         pygame.draw.line(surface, PANEL, (rect.left, level), (rect.left + rect.width // 3, level))
     shown = f"{cue.power * MAX_CUE_SPEED:.1f} m/s"
-    draw_text(surface, shown, (rect.right + 5 * unit, rect.top - 8 * unit), 11 * unit, INK, "bottomright", mono=True)
+    draw_text(
+        surface,
+        shown,
+        (rect.right + 5 * ui_scale, rect.top - 8 * ui_scale),
+        11 * ui_scale,
+        INK,
+        "bottomright",
+        mono=True,
+    )
 
 
 def _disc(surface: pygame.Surface, at: tuple[float, float], radius: float, style: ShapeStyle) -> None:
@@ -306,11 +322,11 @@ def _disc(surface: pygame.Surface, at: tuple[float, float], radius: float, style
 
 
 SIDE, GAP = 92.0, 14.0
-"""px at unit 1: side of the english dial, and gap between dials"""
+"""px at a UI scale of 1: side of the english dial, and gap between dials"""
 POWER_BAR = 18.0
-"""px at unit 1: width of the power bar"""
+"""px at a UI scale of 1: width of the power bar"""
 MIN_HUD = 420, 300
-"""px at unit 1: width and height of the free area below which no HUD is drawn"""
+"""px at a UI scale of 1: width and height of the free area below which no HUD is drawn"""
 
 
 class BilliardsHud:
@@ -322,14 +338,14 @@ class BilliardsHud:
         self._choices: tuple[tuple[pygame.Rect, Decision], ...] = ()
         self._held = ""
 
-    def draw(self, surface: pygame.Surface, free: pygame.Rect, left: int, unit: float) -> None:
+    def draw(self, surface: pygame.Surface, free: pygame.Rect, left: int, ui_scale: float) -> None:
         """Draw the HUD; see `GameHud`."""
         player = self._player
         self._tip = self._power = self._board = pygame.Rect(0, 0, 0, 0)
         self._choices = ()
-        if free.width < MIN_HUD[0] * unit or free.height < MIN_HUD[1] * unit:
+        if free.width < MIN_HUD[0] * ui_scale or free.height < MIN_HUD[1] * ui_scale:
             return
-        scale = _scale(free, unit)
+        scale = _scale(free, ui_scale)
         board = draw_scoreboard(surface, player, free, left, scale, _dials_width(scale))
         self._choices, self._board = board.choices, board.rect
         if not player.can_shoot:
@@ -338,17 +354,17 @@ class BilliardsHud:
         draw_power(surface, self._power, player.cue, scale)
         draw_tip(surface, self._tip, player.cue, scale)
 
-    def reserved(self, free: pygame.Rect, left: int, unit: float) -> list[pygame.Rect]:
+    def reserved(self, free: pygame.Rect, left: int, ui_scale: float) -> list[pygame.Rect]:
         """Return the rectangles of the HUD, px, with the dials even if they are hidden now."""
-        if free.width < MIN_HUD[0] * unit or free.height < MIN_HUD[1] * unit:
+        if free.width < MIN_HUD[0] * ui_scale or free.height < MIN_HUD[1] * ui_scale:
             return []
-        scale = _scale(free, unit)
+        scale = _scale(free, ui_scale)
         board = layout_scoreboard(self._player, free, left, scale, _dials_width(scale)).rect
         return [board, *(tip_box(dial, scale) for dial in _dials(free, scale))]
 
-    def plates(self, free: pygame.Rect, unit: float) -> dict[str, pygame.Rect]:
+    def plates(self, free: pygame.Rect, ui_scale: float) -> dict[str, pygame.Rect]:
         """Return the rectangles of the elements as last drawn, by name, px."""
-        scale = _scale(free, unit)
+        scale = _scale(free, ui_scale)
         return {"score": self._board} | {name: tip_box(rect, scale) for name, rect in self.dials.items() if rect.width}
 
     @property
@@ -384,8 +400,8 @@ class BilliardsHud:
             cue.power = (self._power.bottom - at[1]) / self._power.height
 
 
-def _scale(free: pygame.Rect, unit: float) -> float:
-    return unit * min(1.0, free.width / (640.0 * unit), free.height / (520.0 * unit))
+def _scale(free: pygame.Rect, ui_scale: float) -> float:
+    return ui_scale * min(1.0, free.width / (640.0 * ui_scale), free.height / (520.0 * ui_scale))
 
 
 def _dials(free: pygame.Rect, scale: float) -> tuple[pygame.Rect, pygame.Rect]:

@@ -16,6 +16,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point, Vector
 from sandbox.scene.description.fixed import Post, Wall
 from sandbox.window.camera import Camera, ViewBox
+from sandbox.window.render.canvas import Canvas
 from sandbox.window.render.lines import Pixel, clip_segment, draw_line, fill_polygon
 from sandbox.window.render.palette import BACKGROUND, RgbColour, mix_colours
 from sandbox.window.render.sdf import ShapeStyle, disc_distance, draw_sdf
@@ -164,21 +165,16 @@ def felt_of(scene: Scene) -> ClothColours:
     return FELTS.get(scene.play.game or "free", POOL)
 
 
-def draw_table(
-    surface: pygame.Surface, camera: Camera, scene: Scene, area: ViewBox, unit: float = 1.0, antialias: bool = True
-) -> None:
+def draw_table(canvas: Canvas, scene: Scene, area: ViewBox) -> None:
     """Draw the visible part of a table.
 
     Args:
-        surface: target.
-        camera: transform from m to px.
+        canvas: target and transform from m to px.
         scene: table.
         area: playing area, m.
-        unit: UI scale, 1 on a display of 1080 lines.
-        antialias: whether edges are antialiased.
     """
     felt = felt_of(scene)
-    pen = _TablePen(surface, camera, unit, antialias)
+    pen = _TablePen(canvas)
     rubber, width = cushion_outlines(scene, area), shorter_side(area)
     _draw_rails(pen, area, width)
     for hole in scene.pockets:
@@ -186,60 +182,60 @@ def draw_table(
     pen.box(area, felt.bed)
     for hole in scene.pockets:
         _draw_pocket_mouth(pen, hole.position, hole.radius, rubber, area, felt.bed)
-    _draw_light(surface, camera, area)
+    _draw_light(canvas, area)
     _draw_marks(pen, scene, area, felt)
     for cushion in rubber:
         _draw_shadow(pen, cushion, felt, 0.010 * width)
     for cushion in rubber:
         pen.polygon(cushion.outline, felt.rubber)
-        pen.line(cushion.nose, felt.edge, 1.6 * unit)
+        pen.line(cushion.nose, felt.edge, 1.6 * canvas.ui_scale)
         outer = cushion.outline[len(cushion.nose) :]
-        pen.line(outer, mix_colours(felt.rubber, HOLE, 0.55), 1.4 * unit)
+        pen.line(outer, mix_colours(felt.rubber, HOLE, 0.55), 1.4 * canvas.ui_scale)
         for corner, end in zip(outer, (cushion.nose[-1], cushion.nose[0]), strict=True):
-            pen.line((corner, end), mix_colours(felt.rubber, HOLE, 0.3), 1.0 * unit)
+            pen.line((corner, end), mix_colours(felt.rubber, HOLE, 0.3), 1.0 * canvas.ui_scale)
     for hole in scene.pockets:
         pen.disc(hole.position, hole.radius, HOLE, rim=mix_colours(IRON, HOLE, 0.5), line=3.0)
     _draw_diamonds(pen, scene, area, width)
     walls, posts = other_walls(scene, area)
     if walls or posts or scene.planes:
-        draw_static_bodies(surface, camera, scene.model_copy(update={"walls": walls, "posts": posts}), unit, antialias)
+        draw_static_bodies(canvas, scene.model_copy(update={"walls": walls, "posts": posts}))
 
 
 class _TablePen:
     """Drawing functions that take coordinates in metres."""
 
-    def __init__(self, surface: pygame.Surface, camera: Camera, unit: float, antialias: bool) -> None:
-        self.surface, self.camera, self.unit, self.antialias = surface, camera, unit, antialias
+    def __init__(self, canvas: Canvas) -> None:
+        self.canvas = canvas
 
     def at(self, points: tuple[Point, ...]) -> list[Pixel]:
-        return [(x, y) for x, y in self.camera.to_screen(np.asarray(points)).tolist()]
+        return [(x, y) for x, y in self.canvas.camera.to_screen(np.asarray(points)).tolist()]
 
     def polygon(self, points: tuple[Point, ...], colour: RgbColour) -> None:
-        fill_polygon(self.surface, self.at(points), colour, self.antialias)
+        fill_polygon(self.canvas.surface, self.at(points), colour, self.canvas.antialias)
 
     def box(self, box: ViewBox, colour: RgbColour, rounding: float = 0.0) -> None:
         """Fill a box, with its sides rounded to whole pixels so that they are sharp."""
-        (left, top), (right, bottom) = _corners(self.camera, box)
-        area = self.surface.get_rect().inflate(400, 400)
+        (left, top), (right, bottom) = _corners(self.canvas.camera, box)
+        area = self.canvas.surface.get_rect().inflate(400, 400)
         left, right = (min(max(x, area.left), area.right) for x in (left, right))
         top, bottom = (min(max(y, area.top), area.bottom) for y in (top, bottom))
         rect = pygame.Rect(round(left), round(top), round(right) - round(left), round(bottom) - round(top))
-        pygame.draw.rect(self.surface, colour, rect, border_radius=round(rounding * self.camera.scale))
+        pygame.draw.rect(self.canvas.surface, colour, rect, border_radius=round(rounding * self.canvas.camera.scale))
 
     def line(self, points: tuple[Point, ...], colour: RgbColour, width: float) -> None:
         positions = self.at(points)
         for a, b in pairwise(positions):
-            draw_line(self.surface, a, b, colour, width, self.antialias)
+            draw_line(self.canvas.surface, a, b, colour, width, self.canvas.antialias)
 
     def disc(
         self, at: Point, radius: float, colour: RgbColour, rim: RgbColour | None = None, line: float = 0.0
     ) -> None:
-        ((x, y),), r = self.at((at,)), radius * self.camera.scale
-        if clip_segment((x, y), (x, y), self.surface.get_rect(), r + 4.0) is None:
+        ((x, y),), r = self.at((at,)), radius * self.canvas.camera.scale
+        if clip_segment((x, y), (x, y), self.canvas.surface.get_rect(), r + 4.0) is None:
             return
         within = pygame.Rect(math.floor(x - r) - 2, math.floor(y - r) - 2, math.ceil(2 * r) + 5, math.ceil(2 * r) + 5)
-        style = ShapeStyle(colour, rim or colour, line * self.unit, antialias=self.antialias)
-        draw_sdf(self.surface, disc_distance(x, y, r), style, within)
+        style = ShapeStyle(colour, rim or colour, line * self.canvas.ui_scale, antialias=self.canvas.antialias)
+        draw_sdf(self.canvas.surface, disc_distance(x, y, r), style, within)
 
 
 def _corners(camera: Camera, box: ViewBox) -> tuple[Pixel, Pixel]:
@@ -275,11 +271,11 @@ def _draw_pocket_mouth(
         pen.polygon((hole, *a, *reversed(b)), colour)
 
 
-def _draw_light(surface: pygame.Surface, camera: Camera, area: ViewBox) -> None:
+def _draw_light(canvas: Canvas, area: ViewBox) -> None:
     """Brighten the middle of the bed and darken its corners."""
-    (left, top), (right, bottom) = _corners(camera, area)
-    depth = DEPTH * shorter_side(area) * camera.scale
-    window_rect = surface.get_rect()
+    (left, top), (right, bottom) = _corners(canvas.camera, area)
+    depth = DEPTH * shorter_side(area) * canvas.camera.scale
+    window_rect = canvas.surface.get_rect()
     rect = pygame.Rect(0, 0, 0, 0)
     rect.left, rect.top = max(math.floor(left - depth), 0), max(math.floor(top - depth), 0)
     rect.width = min(math.ceil(right + depth), window_rect.right) - rect.left
@@ -295,14 +291,14 @@ def _draw_light(surface: pygame.Surface, camera: Camera, area: ViewBox) -> None:
     dimmed, added = np.clip(bright, 0.0, 1.0) * 255.0, np.clip(bright - 1.0, 0.0, 1.0) * 110.0
     for tone, flag in ((dimmed, pygame.BLEND_RGB_MULT), (added, pygame.BLEND_RGB_ADD)):
         layer = pygame.surfarray.make_surface(np.repeat(np.rint(tone)[:, :, None], 3, 2).astype(np.uint8))
-        surface.blit(pygame.transform.smoothscale(layer, rect.size), rect, special_flags=flag)
+        canvas.surface.blit(pygame.transform.smoothscale(layer, rect.size), rect, special_flags=flag)
 
 
 def _draw_marks(pen: _TablePen, scene: Scene, area: ViewBox, felt: ClothColours) -> None:
     """Draw the head string or baulk line, the D, and the spots."""
     spots = {spot.name: spot.position for spot in scene.play.spots}
     faint, (left, bottom), (right, top) = mix_colours(felt.bed, CHALK, 0.32), *area
-    tall, thin = top - bottom > right - left, 1.2 * pen.unit
+    tall, thin = top - bottom > right - left, 1.2 * pen.canvas.ui_scale
     if {"yellow", "green", "brown"} <= spots.keys():
         (x, y), (gx, gy) = spots["brown"], spots["green"]
         radius = math.dist((x, y), (gx, gy))
@@ -316,7 +312,9 @@ def _draw_marks(pen: _TablePen, scene: Scene, area: ViewBox, felt: ClothColours)
         pen.line(((left, y), (right, y)) if tall else ((x, bottom), (x, top)), mix_colours(felt.bed, CHALK, 0.2), thin)
     size = 0.0042 * shorter_side(area)
     for place in spots.values():
-        pen.disc(place, max(size, 1.2 * pen.unit / pen.camera.scale), mix_colours(felt.bed, CHALK, 0.5))
+        pen.disc(
+            place, max(size, 1.2 * pen.canvas.ui_scale / pen.canvas.camera.scale), mix_colours(felt.bed, CHALK, 0.5)
+        )
 
 
 def _draw_shadow(pen: _TablePen, cushion: CushionOutline, felt: ClothColours, reach: float) -> None:

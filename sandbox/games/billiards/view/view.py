@@ -21,7 +21,7 @@ class BilliardsView:
         scene = ctx.snapshot.scene
         if scene.play.area is None:
             return False
-        draw_table(ctx.surface, ctx.camera, scene, scene.play.area, ctx.ui_scale, ctx.antialias)
+        draw_table(ctx, scene, scene.play.area)
         return True
 
     def below(self, ctx: DrawContext) -> None:
