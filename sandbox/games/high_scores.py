@@ -62,7 +62,7 @@ class HighScores:
     """High-score file."""
 
     path: Path
-    told: str | None = None
+    notice: str | None = None
     """message for the user that a damaged file was renamed; None if the file was valid"""
 
     def of(self, table: str) -> tuple[Entry, ...]:
@@ -116,7 +116,7 @@ class HighScores:
 
 
 def opened(path: Path | None = None) -> HighScores:
-    """Open the high scores. A damaged file is renamed to a new name, and `HighScores.told` states so.
+    """Open the high scores. A damaged file is renamed to a new name, and `HighScores.notice` states so.
 
     Args:
         path: path of the file; default: in the data folder.

@@ -68,7 +68,7 @@ HighScores(pathlib.Path({str(scores.path)!r})).enter("a", "new", 500)
     assert len(list(scores.path.parent.iterdir())) == 2  # half a file was written
     assert scores.path.read_bytes() == before
     again = opened(scores.path)
-    assert (again.told, again.of("a")[0].score) == (None, 100)
+    assert (again.notice, again.of("a")[0].score) == (None, 100)
 
 
 DAMAGE = {
@@ -91,12 +91,12 @@ def test_damaged_file_is_reported_and_renamed(tmp_path: Path, damage: str) -> No
         path.write_bytes(DAMAGE[damage])
         scores = opened(path)
         renamed = tmp_path / f"high-scores-damaged-{k}.json"
-        assert scores.told is not None
-        assert str(renamed) in scores.told
-        assert "\n" not in scores.told
+        assert scores.notice is not None
+        assert str(renamed) in scores.notice
+        assert "\n" not in scores.notice
         assert renamed.read_bytes() == DAMAGE[damage]
         scores.enter("a", "abc", 5)
-        assert opened(path).told is None
+        assert opened(path).notice is None
 
 
 def test_unreadable_file_is_not_treated_as_damaged(tmp_path: Path) -> None:

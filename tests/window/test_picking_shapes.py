@@ -205,9 +205,17 @@ def test_contact_point_of_a_box_is_drawn_at_its_current_position(angle: float) -
         np.zeros(1), np.asarray([(0, -1)]), np.asarray([(-3.0, 0.0)]), np.asarray([(0.0, -1.0)]), np.zeros((1, 2))
     )
     camera = Camera((0.0, 0.0), 10.0, (100, 100))
-    no_bodies = np.empty(0, np.int64)
     sight = Snapshot(shape_scene, shape_scene.bodies, start(shape_scene), contacts=stale)
-    view = DrawContext(pygame.Surface((100, 100)), camera, sight, 1.0, True, no_bodies, *(np.empty((0, 2)),) * 4)
+    view = DrawContext(
+        pygame.Surface((100, 100)),
+        camera,
+        snapshot=sight,
+        shown=np.empty(0, np.int64),
+        centre=np.empty((0, 2)),
+        radius=np.empty(0),
+        colours=np.empty((0, 3), np.uint8),
+        body_colours=np.empty((0, 3), np.uint8),
+    )
     (point,), _ = contact_points(view)
     corners = [(5 + x * math.cos(angle) - y * math.sin(angle), x * math.sin(angle)) for x, y in ((-2, -1), (2, -1))]
     lowest = min(corners, key=lambda corner: corner[1])[0] if angle else 5.0

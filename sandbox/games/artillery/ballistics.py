@@ -104,8 +104,8 @@ class Flight:
     def at(self, time: float) -> tuple[FloatArray, FloatArray]:
         """Return position, m, and velocity, m/s, (2,) each, at a time ≥ 0, s."""
         if not self._world.quadratic_drag:
-            place, velocity = free_flight(np.array([time]), *self._start, self._world)
-            return place[0], velocity[0]
+            position, velocity = free_flight(np.array([time]), *self._start, self._world)
+            return position[0], velocity[0]
         count = int(time / INTEGRATION_STEP)
         while len(self._knots) <= count:
             self._knots.append(rk4(self._world, self._knots[-1], INTEGRATION_STEP))
@@ -130,7 +130,7 @@ class ShellImpact(NamedTuple):
 
     time: float
     """s, time of flight"""
-    place: tuple[float, float]
+    position: tuple[float, float]
     """m"""
 
 
@@ -155,29 +155,29 @@ def landing(
         edges: behaviour at the left and right end of the terrain.
         discs: (M, 3) m, centres and radii of other targets.
     """
-    began, place, speed = 0.0, position, velocity
+    began, position, speed = 0.0, position, velocity
     while began < MAX_FLIGHT:
-        flight = Flight(world, place, speed)
+        flight = Flight(world, position, speed)
         crossed = _first_event(flight, ground, edges, discs, MAX_FLIGHT - began)
         if crossed is None:
             return None
         time, side = crossed
-        place, speed = flight.at(time)
+        position, speed = flight.at(time)
         began += time
         if side == 0:
-            return ShellImpact(began, (float(place[0]), float(place[1])))
-        place, speed = state_past_edge(place, speed, side, ground.width, edges)
+            return ShellImpact(began, (float(position[0]), float(position[1])))
+        position, speed = state_past_edge(position, speed, side, ground.width, edges)
     return None
 
 
 def state_past_edge(
-    place: FloatArray, velocity: FloatArray, side: int, width: float, edges: Edges
+    position: FloatArray, velocity: FloatArray, side: int, width: float, edges: Edges
 ) -> tuple[FloatArray, FloatArray]:
     """Return position and velocity of a shell after it has reached or passed the left (−1) or right (1) end."""
     wall = width if side > 0 else 0.0
     if edges == "wrap":
-        return np.array([place[0] - side * width, place[1]]), velocity
-    return np.array([2.0 * wall - place[0], place[1]]), np.array([-velocity[0], velocity[1]])
+        return np.array([position[0] - side * width, position[1]]), velocity
+    return np.array([2.0 * wall - position[0], position[1]]), np.array([-velocity[0], velocity[1]])
 
 
 def _first_event(
@@ -257,8 +257,8 @@ def _ground_impact_time(flight: Flight, ground: Ground, begin: float, end: float
     """Return the time, s, at which a trajectory enters the terrain, given the crossing of the chord of the step."""
 
     def gap(time: float) -> float:
-        place = flight.at(time)[0]
-        return float(place[1] - ground.surface(place[0]))
+        position = flight.at(time)[0]
+        return float(position[1] - ground.surface(position[0]))
 
     for low, high in ((found.before, found.after), (0.0, 1.0)):
         since, until = begin + low * (end - begin), begin + high * (end - begin)

@@ -97,7 +97,7 @@ class Tank:
     weapon: int = 0
     health: float = FULL_HEALTH
     points: int = 0
-    place: Point = (0.0, 0.0)
+    position: Point = (0.0, 0.0)
     """m, of its centre"""
 
     @property
@@ -138,14 +138,14 @@ class Tanks:
     @property
     def discs(self) -> FloatArray:
         """(M, 3) m, centres and radii of the tanks that are alive."""
-        return np.array([(*tank.place, self.radius) for tank in self.alive]).reshape(-1, 3)
+        return np.array([(*tank.position, self.radius) for tank in self.alive]).reshape(-1, 3)
 
     def update(self, frame: Frame) -> None:
         """Update the positions of the tanks."""
         for tank in self.every:
             if frame.present[tank.number]:
                 x, y = frame.position[tank.number].tolist()
-                tank.place = (x, y)
+                tank.position = (x, y)
 
     def at_rest(self, frame: Frame, speed: float) -> bool:
         """Return whether no tank that is alive moves faster than a speed, m/s."""
@@ -154,13 +154,13 @@ class Tanks:
 
     def muzzle(self, tank: Tank) -> Muzzle:
         """Return the muzzle of a tank."""
-        return Muzzle(tank.place, BARREL * self.size[0])
+        return Muzzle(tank.position, BARREL * self.size[0])
 
-    def blast(self, shooter: Tank, place: Point, weapon: Weapon) -> list[Tank]:
+    def blast(self, shooter: Tank, position: Point, weapon: Weapon) -> list[Tank]:
         """Damage the tanks near an explosion, and reward the shooter; return the damaged tanks."""
         hurt = []
         for tank in self.alive:
-            distance = max(math.dist(tank.place, place) - self.radius, 0.0)
+            distance = max(math.dist(tank.position, position) - self.radius, 0.0)
             fraction = 1.0 - distance / (2.0 * weapon.radius)
             if fraction > 0.0 and weapon.damage > 0.0:
                 self.hurt(tank, weapon.damage * fraction, shooter)
@@ -191,7 +191,7 @@ class Explosion(NamedTuple):
 
     time: float
     """s"""
-    place: Point
+    position: Point
     """m"""
     radius: float
     """m"""
@@ -226,14 +226,14 @@ class Battlefield:
         self._since = 0.0
         self._heights_before: dict[str, float] = {}  # height of each tank at the start of settling, m
 
-    def blast(self, time: float, shooter: Tank, place: Point, weapon: Weapon) -> list[Action]:
+    def blast(self, time: float, shooter: Tank, position: Point, weapon: Weapon) -> list[Action]:
         """Apply an explosion: carve or add terrain, and damage tanks in range; destroyed tanks explode in turn."""
         dirt = weapon.kind == "dirt"
-        change = (self.ground.with_heap if dirt else self.ground.without)(place, weapon.radius)
+        change = (self.ground.with_heap if dirt else self.ground.without)(position, weapon.radius)
         self.cues.append("dirt" if dirt else "blast")
-        self.blasts.append(Explosion(time, place, weapon.radius, dirt))
+        self.blasts.append(Explosion(time, position, weapon.radius, dirt))
         actions = self._replace_terrain(time, change)
-        hurt = self.tanks.blast(shooter, place, weapon)
+        hurt = self.tanks.blast(shooter, position, weapon)
         return actions + self._remove_destroyed(time, [tank for tank in hurt if not tank.alive])
 
     def _remove_destroyed(self, time: float, destroyed: Sequence[Tank]) -> list[Action]:
@@ -241,7 +241,7 @@ class Battlefield:
         actions: list[Action] = []
         for tank in destroyed:
             actions.append(Remove(time=time, body=tank.name))
-            actions += self.blast(time, tank, tank.place, WRECK)
+            actions += self.blast(time, tank, tank.position, WRECK)
         return actions
 
     def _replace_terrain(self, time: float, change: Crater) -> list[Action]:
@@ -255,17 +255,17 @@ class Battlefield:
         """Place buried tanks on the terrain."""
         actions: list[Action] = []
         for tank in self.tanks.alive:
-            x, y = tank.place
+            x, y = tank.position
             if 0.0 <= x <= self.ground.width and y < self.ground.surface(x):
                 width, height = self.tanks.size
-                tank.place = (x, self.ground.under(x, 0.5 * width) + 0.5 * height + LIFT)
-                actions.append(Move(time=time, body=tank.name, position=tank.place, velocity=(0.0, 0.0)))
+                tank.position = (x, self.ground.under(x, 0.5 * width) + 0.5 * height + LIFT)
+                actions.append(Move(time=time, body=tank.name, position=tank.position, velocity=(0.0, 0.0)))
         return actions
 
     def start_settling(self, time: float) -> None:
         """Start settling: record the heights from which tanks may fall."""
         self._since = time
-        self._heights_before = {tank.name: tank.place[1] for tank in self.tanks.alive}
+        self._heights_before = {tank.name: tank.position[1] for tank in self.tanks.alive}
 
     def settle(self, info: StepInfo, shooter: Tank) -> tuple[bool, list[Action]]:
         """Wait until dirt and tanks are at rest, then apply falls; return whether settling is done, and the actions.
@@ -282,8 +282,8 @@ class Battlefield:
         self.falling.clear()
         destroyed = []
         for tank in self.tanks.alive:
-            fall = self._heights_before.get(tank.name, tank.place[1]) - tank.place[1]
-            beside = not 0.0 <= tank.place[0] <= self.ground.width
+            fall = self._heights_before.get(tank.name, tank.position[1]) - tank.position[1]
+            beside = not 0.0 <= tank.position[0] <= self.ground.width
             if beside or fall > SAFE_FALL:
                 self.tanks.hurt(tank, math.inf if beside else FALL_DAMAGE * (fall - SAFE_FALL), shooter)
                 destroyed += [] if tank.alive else [tank]

@@ -32,7 +32,7 @@ def turn_generator(seed: int, turn: int) -> np.random.Generator:
 def choose_shot(tanks: Tanks, shooter: Tank, random: np.random.Generator) -> tuple[Tank, int]:
     """Return the target, the weakest tank or among equals the nearest, and the index of the weapon."""
     others = [tank for tank in tanks.alive if tank is not shooter]
-    target = min(others, key=lambda tank: (tank.health, math.dist(tank.place, shooter.place)))
+    target = min(others, key=lambda tank: (tank.health, math.dist(tank.position, shooter.position)))
     affordable = [k for k, weapon in enumerate(WEAPONS) if weapon.kind == "shell" and 0 < weapon.cost <= shooter.money]
     big = bool(random.uniform() < BIG_WEAPON_PROBABILITY)
     return target, affordable[-1] if affordable and big and target.health > WEAPONS[0].damage else 0
@@ -64,7 +64,7 @@ class BotPlanner:
                 ground=field.ground,
                 edges=field.artillery.edges,
                 full_speed=self._full_speed,
-                at=target.place[0],
+                at=target.position[0],
                 tolerance=EQUAL_MISS_FRACTION * WEAPONS[self.weapon].radius,
             )
         )

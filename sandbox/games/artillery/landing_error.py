@@ -102,10 +102,10 @@ def landing_error_table(
         except KeyboardInterrupt:
             interrupted = True
             break
-        x, time = impact.place[0], impact.time
-        rows.append(LandingError(engine, integrator, dt, x, time, x - exact.place[0], time - exact.time))
+        x, time = impact.position[0], impact.time
+        rows.append(LandingError(engine, integrator, dt, x, time, x - exact.position[0], time - exact.time))
     reasons = dict.fromkeys((engine, reason) for (engine, _), reason in refused.items())
-    return LandingErrorTable(exact.place[0], exact.time, tuple(rows), tuple(reasons), interrupted)
+    return LandingErrorTable(exact.position[0], exact.time, tuple(rows), tuple(reasons), interrupted)
 
 
 def _engine_integrators() -> Iterator[tuple[str, str | None]]:
@@ -122,7 +122,7 @@ def exact_landing(world: World, velocity: FloatArray) -> ShellImpact:
     """
     approximate = _landing_on_level_ground(MAX_RANGE, world, velocity)
     return _landing_on_level_ground(
-        1.0 + 2.0 * abs(approximate.place[0]), world, velocity
+        1.0 + 2.0 * abs(approximate.position[0]), world, velocity
     )  # a smaller offset has smaller rounding errors
 
 
@@ -135,7 +135,7 @@ def _landing_on_level_ground(half_width: float, world: World, velocity: FloatArr
     impact = landing(world, np.array([half_width, 0.0]), velocity, Ground(np.zeros(2), 2.0 * half_width))
     if impact is None:
         raise ValueError(f"the shot does not come down within {MAX_FLIGHT:g} s and {MAX_RANGE:g} m")
-    return impact._replace(place=(impact.place[0] - half_width, impact.place[1]))
+    return impact._replace(position=(impact.position[0] - half_width, impact.position[1]))
 
 
 @reraise_interrupt()

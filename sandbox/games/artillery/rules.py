@@ -187,7 +187,7 @@ class ArtilleryRules:
     @property
     def log(self) -> Sequence[tuple[float, str]]:
         """Time, s, and result of each shot."""
-        return [(shot.time, f"{shot.shooter}, {shot.weapon}: {shot.told}") for shot in self.shots]
+        return [(shot.time, f"{shot.shooter}, {shot.weapon}: {shot.description}") for shot in self.shots]
 
     def speed(self, tank: Tank) -> float:
         """Return the muzzle speed at the present setting of a tank, m/s."""
@@ -250,7 +250,8 @@ class ArtilleryRules:
 
     def observation(self) -> Sequence[tuple[str, float]]:
         """Return turn, wind, state of every tank and its gun, last impact, and terrain heights."""
-        field, last = self.field, next((shot.place for shot in reversed(self.shots) if shot.place is not None), None)
+        field, impacts = self.field, [shot.position for shot in self.shots if shot.position is not None]
+        last = impacts[-1] if impacts else None
         person = self.phase == "aim" and self.shooter.player.bot is None
         found = [("turn", float(self.turn)), ("shooter", self._shooter_index), ("may fire", person)]
         found += [("wind", self.world.wind[0]), ("shells", len(self.barrage.shells))]
@@ -284,16 +285,16 @@ class ArtilleryRules:
             ),
             size=tanks.size,
             wind=self.world.wind[0],
-            ways=tuple(np.asarray(way) for way in self.barrage.ways.values() if len(way) > 1),
+            paths=tuple(np.asarray(path) for path in self.barrage.paths.values() if len(path) > 1),
             flying=tuple(shell.number for shell in self.barrage.shells if shell.number is not None),
             bursts=tuple(
-                ExplosionView(max(time - each.time, 0.0), each.place, each.radius, each.dirt)
+                ExplosionView(max(time - each.time, 0.0), each.position, each.radius, each.dirt)
                 for each in self.field.blasts
                 if time - each.time <= EXPLOSION_DURATION
             ),
             clods=self._falling_dirt(time),
             tracer=self._tracer() if aiming and self.artillery.tracer else None,
-            landed=None if shot is None or shot.place is None or shot.exact is None else (shot.place, shot.exact),
+            landed=None if shot is None or shot.position is None or shot.exact is None else (shot.position, shot.exact),
         )
 
     def _falling_dirt(self, time: float) -> tuple[FallingDirt, ...]:

@@ -47,7 +47,7 @@ class Shell:
     name: str
     shooter: Tank
     weapon: Weapon
-    place: FloatArray
+    position: FloatArray
     """(2,) m, position in the last frame"""
     velocity: FloatArray
     """(2,) m/s"""
@@ -101,8 +101,8 @@ class FlightSegment:
             return None
 
         def gap(fraction: float) -> float:
-            place = self.at(fraction)
-            return float(place[1] - ground.surface(place[0]))
+            position = self.at(fraction)
+            return float(position[1] - ground.surface(position[0]))
 
         return self._root(gap, found.before * until, found.here * until, found.after * until), None
 
@@ -117,12 +117,12 @@ class FlightSegment:
 
 
 def past_edge(
-    place: FloatArray, velocity: FloatArray, ground: Ground, edges: Edges
+    position: FloatArray, velocity: FloatArray, ground: Ground, edges: Edges
 ) -> tuple[FloatArray, FloatArray] | None:
     """Return position and velocity of a shell after it has passed an end; None if it is inside, or may leave."""
-    if edges == "open" or 0.0 <= place[0] <= ground.width:
+    if edges == "open" or 0.0 <= position[0] <= ground.width:
         return None
-    return state_past_edge(place, velocity, 1 if place[0] > 0.0 else -1, ground.width, edges)
+    return state_past_edge(position, velocity, 1 if position[0] > 0.0 else -1, ground.width, edges)
 
 
 class ArtilleryShot(NamedTuple):
@@ -130,7 +130,7 @@ class ArtilleryShot(NamedTuple):
 
     shooter: str
     weapon: str
-    place: Point | None
+    position: Point | None
     """m, impact; None if the shell left the terrain"""
     exact: Point | None
     """m, impact of the exact trajectory; None if it leaves the terrain, or after a change of air or gravity"""
@@ -144,25 +144,25 @@ class ArtilleryShot(NamedTuple):
     @property
     def off(self) -> float | None:
         """Distance between impact and exact impact, m; None unless both exist."""
-        return None if self.place is None or self.exact is None else math.dist(self.place, self.exact)
+        return None if self.position is None or self.exact is None else math.dist(self.position, self.exact)
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         """Text for the log: x of the impact, and its deviation from the exact solution in x and y."""
-        return self.brief if self.place is None else f"landed at {self.brief}"
+        return self.brief if self.position is None else f"landed at {self.brief}"
 
     @property
     def brief(self) -> str:
         """Shorter text for the score panel."""
-        landed = "out of bounds" if self.place is None else f"{self.place[0]:.2f} m"
+        landed = "out of bounds" if self.position is None else f"{self.position[0]:.2f} m"
         if self.disturbed:
             return f"{landed}; wind or gravity changed during the flight"
         if self.exact is None:
-            return landed if self.place is None else f"{landed}, exact solution out of bounds"
+            return landed if self.position is None else f"{landed}, exact solution out of bounds"
         exact = f"{landed}, exact solution {self.exact[0]:.2f} m"
-        if self.place is None:
+        if self.position is None:
             return exact
-        across, up = (format_deviation(abs(a - b)) for a, b in zip(self.place, self.exact, strict=True))
+        across, up = (format_deviation(abs(a - b)) for a, b in zip(self.position, self.exact, strict=True))
         return f"{exact} (Δx {across}" + (")" if up == BELOW_RESOLUTION else f", Δy {up})")
 
 
@@ -190,7 +190,7 @@ class Projectiles:
         self.shells: list[Shell] = []
         self.shots: list[ArtilleryShot] = []
         """results of all shots of the game"""
-        self.ways: dict[str, list[tuple[float, float]]] = {}
+        self.paths: dict[str, list[tuple[float, float]]] = {}
         """m, positions at all frames of each shell of the last shot, by name"""
         self._fired = 0
 
@@ -205,13 +205,13 @@ class Projectiles:
             speed: m/s, at the muzzle.
         """
         field = self._field
-        place = field.tanks.muzzle(tank).at(np.array([tank.angle]))[0]
+        position = field.tanks.muzzle(tank).at(np.array([tank.angle]))[0]
         velocity = speed * np.array([math.cos(tank.angle), math.sin(tank.angle)])
         field.cues.append("fire")
         field.blasts.clear()
-        self.ways.clear()
-        action = self._spawn_shell(time, tank, weapon, place, velocity)
-        exact = landing(world, place, velocity, field.ground, self._edges, field.tanks.discs)
+        self.paths.clear()
+        action = self._spawn_shell(time, tank, weapon, position, velocity)
+        exact = landing(world, position, velocity, field.ground, self._edges, field.tanks.discs)
         self.shells[-1].exact = exact
         return [action]
 
@@ -242,35 +242,35 @@ class Projectiles:
             if not info.frame.present[number]:  # bodies beyond the bounds of the world are removed
                 self._lose(shell, info.time)
                 continue
-            before = shell.place, shell.velocity
-            shell.place, shell.velocity = info.frame.position[number].copy(), info.frame.velocity[number].copy()
+            before = shell.position, shell.velocity
+            shell.position, shell.velocity = info.frame.position[number].copy(), info.frame.velocity[number].copy()
             if shell.rolling is not None:
                 actions += self._roll(shell, info.time)
             else:
                 actions += self._fly(shell, before, info.time, passed)
-            x, y = shell.place.tolist()
-            self.ways[shell.name].append((x, y))
+            x, y = shell.position.tolist()
+            self.paths[shell.name].append((x, y))
         return actions
 
     def _fly(self, shell: Shell, before: tuple[FloatArray, FloatArray], time: float, passed: float) -> list[Action]:
         """Update a shell in flight: detect impacts, split clusters, and apply the ends of the terrain."""
-        field, place = self._field, shell.place
-        step = FlightSegment(before, (place, shell.velocity), passed)
-        beyond = past_edge(place, shell.velocity, field.ground, self._edges)
+        field, position = self._field, shell.position
+        step = FlightSegment(before, (position, shell.velocity), passed)
+        beyond = past_edge(position, shell.velocity, field.ground, self._edges)
         until = 1.0
         if beyond is not None:
-            wall = field.ground.width if place[0] > 0.0 else 0.0
-            until = min(max(float((wall - before[0][0]) / (place[0] - before[0][0])), 0.0), 1.0)
+            wall = field.ground.width if position[0] > 0.0 else 0.0
+            until = min(max(float((wall - before[0][0]) / (position[0] - before[0][0])), 0.0), 1.0)
         found = step.meets(field.ground, field.tanks.discs, until)
         if found is not None:
             return self._land(shell, step, *found, time, passed)
         if shell.weapon.kind == "cluster" and shell.is_whole and before[1][1] > 0.0 >= shell.velocity[1]:
             return self._split(shell, time)
         if beyond is not None:
-            shell.place, shell.velocity = beyond
+            shell.position, shell.velocity = beyond
             (x, y), (vx, vy) = (each.tolist() for each in beyond)
             return [Move(time=time, body=shell.name, position=(x, y), velocity=(vx, vy))]
-        if place[1] < -1.0 and not 0.0 <= place[0] <= field.ground.width:
+        if position[1] < -1.0 and not 0.0 <= position[0] <= field.ground.width:
             return self._remove_lost(shell, time)
         return []
 
@@ -279,7 +279,7 @@ class Projectiles:
     ) -> list[Action]:
         """Explode a shell at its impact, at a fraction of the last step, or let a roller start there."""
         x, y = step.at(fraction).tolist()
-        shell.place = np.array([x, y])
+        shell.position = np.array([x, y])
         self._record_result(shell, (x, y), time - (1.0 - fraction) * passed)
         if shell.weapon.kind != "roller" or struck is not None:
             return self._explode(shell, (x, y), time)
@@ -287,41 +287,41 @@ class Projectiles:
         low, high = max(x - 0.5, 0.0), min(x + 0.5, ground.width)
         along = np.array([high - low, float(ground.surface(high) - ground.surface(low))])
         along /= np.hypot(*along)
-        place = np.array([x, y]) + (ROLLER_RADIUS + LIFT) * np.array([-along[1], along[0]])
+        position = np.array([x, y]) + (ROLLER_RADIUS + LIFT) * np.array([-along[1], along[0]])
         velocity = float(step.velocity(fraction) @ along) * along
         self.shells.remove(shell)
-        rolling = self._spawn_shell(time, shell.shooter, shell.weapon, place, velocity, rolls=True)
+        rolling = self._spawn_shell(time, shell.shooter, shell.weapon, position, velocity, rolls=True)
         return [Remove(time=time, body=shell.name), rolling]
 
     def _roll(self, shell: Shell, time: float) -> list[Action]:
         """Explode a roller that touches a tank, comes to rest, or has rolled for `MAX_ROLL_TIME`."""
         assert shell.rolling is not None
         discs = self._field.tanks.discs
-        is_near = np.hypot(*(discs[:, :2] - shell.place).T) <= discs[:, 2] + ROLLER_RADIUS
+        is_near = np.hypot(*(discs[:, :2] - shell.position).T) <= discs[:, 2] + ROLLER_RADIUS
         if float(np.hypot(*shell.velocity)) > REST_LIMIT:
             shell.slow = None
         elif shell.slow is None:
             shell.slow = time
         still = shell.slow is not None and time - shell.slow >= REST_LIMIT
         if is_near.any() or still or time - shell.rolling > MAX_ROLL_TIME:
-            x, y = shell.place.tolist()
+            x, y = shell.position.tolist()
             return self._explode(shell, (x, y - ROLLER_RADIUS), time)
-        if 0.0 <= shell.place[0] <= self._field.ground.width:
+        if 0.0 <= shell.position[0] <= self._field.ground.width:
             return []
         return self._remove_lost(shell, time) if self._edges == "open" else self._roll_past(shell, time)
 
     def _roll_past(self, shell: Shell, time: float) -> list[Action]:
         """Move a roller that has passed an end of the terrain back inside; it explodes if it is then underground."""
         ground = self._field.ground
-        beyond = past_edge(shell.place, shell.velocity, ground, self._edges)
+        beyond = past_edge(shell.position, shell.velocity, ground, self._edges)
         assert beyond is not None
         (x, y), (vx, vy) = (each.tolist() for each in beyond)
         surface = float(ground.surface(x))
         if y < surface:
             return self._explode(shell, (x, y), time)
-        place = x, max(y, surface + ROLLER_RADIUS)
-        shell.place, shell.velocity = np.array(place), beyond[1]
-        return [Move(time=time, body=shell.name, position=place, velocity=(vx, vy))]
+        position = x, max(y, surface + ROLLER_RADIUS)
+        shell.position, shell.velocity = np.array(position), beyond[1]
+        return [Move(time=time, body=shell.name, position=position, velocity=(vx, vy))]
 
     def _split(self, shell: Shell, time: float) -> list[Action]:
         """Split a cluster into fragments with different horizontal velocities, whose mean is that of the cluster."""
@@ -329,16 +329,17 @@ class Projectiles:
         actions: list[Action] = [Remove(time=time, body=shell.name)]
         for k in range(FRAGMENTS):
             offset = np.array([SPREAD * (k - 0.5 * (FRAGMENTS - 1)), 0.0])
-            actions.append(self._spawn_shell(time, shell.shooter, shell.weapon, shell.place, shell.velocity + offset))
+            velocity = shell.velocity + offset
+            actions.append(self._spawn_shell(time, shell.shooter, shell.weapon, shell.position, velocity))
             self.shells[-1].is_whole = False
         self._field.cues.append("split")
         return actions
 
-    def _explode(self, shell: Shell, place: tuple[float, float], time: float) -> list[Action]:
+    def _explode(self, shell: Shell, position: tuple[float, float], time: float) -> list[Action]:
         self.shells.remove(shell)
         return [
             Remove(time=time, body=shell.name),
-            *self._field.blast(time, shell.shooter, place, shell.weapon),
+            *self._field.blast(time, shell.shooter, position, shell.weapon),
         ]
 
     def _remove_lost(self, shell: Shell, time: float) -> list[Action]:
@@ -349,24 +350,24 @@ class Projectiles:
         self.shells.remove(shell)
         self._record_result(shell, None, time)
 
-    def _record_result(self, shell: Shell, place: tuple[float, float] | None, time: float) -> None:
+    def _record_result(self, shell: Shell, position: tuple[float, float] | None, time: float) -> None:
         """Record the result of a shot; fragments, and explosions of rollers, are not recorded."""
         if shell.is_whole and shell.rolling is None:
-            exact = None if shell.exact is None else shell.exact.place
+            exact = None if shell.exact is None else shell.exact.position
             flown = time - shell.fired
             self.shots.append(
-                ArtilleryShot(shell.shooter.name, shell.weapon.name, place, exact, flown, time, shell.disturbed)
+                ArtilleryShot(shell.shooter.name, shell.weapon.name, position, exact, flown, time, shell.disturbed)
             )
 
     def _spawn_shell(
-        self, time: float, tank: Tank, weapon: Weapon, place: FloatArray, velocity: FloatArray, rolls: bool = False
+        self, time: float, tank: Tank, weapon: Weapon, position: FloatArray, velocity: FloatArray, rolls: bool = False
     ) -> Spawn:
         self._fired += 1
-        shell = Shell(f"shell {self._fired}", tank, weapon, place, velocity, fired=time)
+        shell = Shell(f"shell {self._fired}", tank, weapon, position, velocity, fired=time)
         shell.rolling = time if rolls else None
         self.shells.append(shell)
-        (x, y), (vx, vy) = place.tolist(), velocity.tolist()
-        self.ways[shell.name] = [(x, y)]
+        (x, y), (vx, vy) = position.tolist(), velocity.tolist()
+        self.paths[shell.name] = [(x, y)]
         ball = Ball(
             name=shell.name,
             position=(x, y),

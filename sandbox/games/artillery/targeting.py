@@ -51,7 +51,7 @@ class TrialShots:
             h: step, s.
         """
         self._world, self._ground, self._edges, self._h = world, ground, edges, h
-        self.place = np.full(len(position), np.nan)
+        self.landing_x = np.full(len(position), np.nan)
         """(K,) m, x of each impact; nan without one"""
         self.when = np.full(len(position), np.nan)
         """(K,) s, time of each impact; nan without one"""
@@ -60,7 +60,7 @@ class TrialShots:
         self._state = np.stack((position, velocity))
         self._gap = self._state[0, :, 1] - ground.surface(self._state[0, :, 0])
         below = self._gap < 0.0
-        self.place[below], self.when[below] = position[below, 0], 0.0
+        self.landing_x[below], self.when[below] = position[below, 0], 0.0
         self._keep_flying(~below)
 
     @property
@@ -86,7 +86,7 @@ class TrialShots:
         landed = (now <= 0.0) & np.isfinite(now)
         fraction = gap[landed] / (gap[landed] - now[landed])
         fraction[~np.isfinite(fraction)] = 1.0  # through a side of the terrain
-        self.place[self._indices[landed]] = x_before[landed] + fraction * (x[landed] - x_before[landed])
+        self.landing_x[self._indices[landed]] = x_before[landed] + fraction * (x[landed] - x_before[landed])
         self.when[self._indices[landed]] = (self._k + fraction) * self._h
         self._k += 1
         if is_open:
@@ -176,7 +176,7 @@ class TargetingProblem(NamedTuple):
         muzzle = self.muzzle.at(np.array([aim.angle]))[0]
         velocity = aim.speed * np.array([math.cos(aim.angle), math.sin(aim.angle)])
         landed = landing(self.world, muzzle, velocity, self.ground, self.edges)
-        return aim._replace(miss=math.inf if landed is None else landed.place[0] - self.at)
+        return aim._replace(miss=math.inf if landed is None else landed.position[0] - self.at)
 
 
 class AimSolver:
@@ -224,7 +224,7 @@ class AimSolver:
     def _choose_brackets(self) -> None:
         """Choose brackets from the coarse grid: those with the closest impacts and the shortest flights first."""
         trial_shots, angle, speed = self._trials, self._angle, self._speed
-        miss = trial_shots.place - self._range.at
+        miss = trial_shots.landing_x - self._range.at
         at = np.flatnonzero((miss[1:] * miss[:-1] <= 0.0) & (speed[1:] == speed[:-1]))
         jump = np.abs(miss[at + 1] - miss[at])
         at = at[np.argsort(jump + 0.5 * trial_shots.when[at], kind="stable")][:MAX_BRACKETS]
@@ -248,7 +248,7 @@ class AimSolver:
         """Replace each bracket by its part with the change of sign; after the last subdivision, do the secant step."""
         row = np.arange(len(self._brackets))
         fan = self._angle.reshape(len(row), -1)
-        miss = (self._trials.place - self._range.at).reshape(fan.shape)
+        miss = (self._trials.landing_x - self._range.at).reshape(fan.shape)
         jump = np.abs(miss[:, 1:] - miss[:, :-1])
         jump[~(miss[:, 1:] * miss[:, :-1] <= 0.0)] = np.inf
         k = np.argmin(jump, axis=1)
@@ -271,7 +271,7 @@ class AimSolver:
     def _order_candidates(self) -> None:
         """Order the candidates for the checks."""
         trial_shots, tolerance, count = self._trials, self._range.tolerance, len(self._brackets)
-        perturbed = (trial_shots.place - self._range.at).reshape(3, -1)
+        perturbed = (trial_shots.landing_x - self._range.at).reshape(3, -1)
         miss, when, speed = perturbed[0], trial_shots.when[:count], self._speed[:count]
         is_sensitive = ~(
             np.abs(perturbed).max(axis=0, initial=0.0) <= INSENSITIVE_FACTOR * tolerance

@@ -338,7 +338,7 @@ def draw_below(view: DrawContext, gunnery: ArtilleryViewState) -> None:
     """Draw the layer behind the tanks: falling dirt, paths of shells, and the tracer."""
     for clod in gunnery.clods:
         _draw_falling_dirt(view, clod)
-    for path in gunnery.ways:
+    for path in gunnery.paths:
         _draw_path(view, path, bool(gunnery.flying))
     if gunnery.tracer is not None:
         for x, y in view.camera.to_screen(gunnery.tracer[::4]).tolist():
@@ -396,7 +396,7 @@ def _draw_falling_dirt(view: DrawContext, clod: FallingDirt) -> None:
 def _draw_explosion(view: DrawContext, burst: ExplosionView) -> None:
     """Draw an explosion: a disc that grows, changes colour, and fades."""
     fraction = min(burst.age / EXPLOSION_DURATION, 1.0)
-    x, y = view.camera.to_screen(np.asarray(burst.place)).tolist()
+    x, y = view.camera.to_screen(np.asarray(burst.position)).tolist()
     radius = burst.radius * view.camera.scale * (0.35 + 0.75 * fraction**0.4)
     tones = ((150, 118, 84), (120, 94, 70), (96, 78, 62), (80, 70, 62)) if burst.dirt else FLAME
     tone_position = fraction * (len(tones) - 1)

@@ -32,7 +32,7 @@ class ExplosionView:
 
     age: float
     """s since its start"""
-    place: Point
+    position: Point
     """m, centre"""
     radius: float
     """m"""
@@ -66,7 +66,7 @@ class ArtilleryViewState:
     """m, width and height of a tank"""
     wind: float | None
     """m/s, positive to the right; None if unknown"""
-    ways: tuple[FloatArray, ...] = ()
+    paths: tuple[FloatArray, ...] = ()
     """(P, 2) m, paths of the shells of the last shot"""
     flying: tuple[int, ...] = ()
     """indices of the bodies of shells in flight and rollers"""

@@ -85,7 +85,7 @@ class CurlingBot:
         if not len(others):
             return math.inf
         fractions = np.linspace(1.0, 0.0, PATH_POINTS)
-        path = np.asarray([RELEASE + self._ice.way(delivery, fraction) for fraction in fractions.tolist()])
+        path = np.asarray([RELEASE + self._ice.displacement(delivery, fraction) for fraction in fractions.tolist()])
         if target is not None:
             path = path[path.real < target[0] - 2.0 * STONE]
         return float(np.abs(path[:, None] - others).min(initial=math.inf)) - 2.0 * STONE

@@ -54,7 +54,7 @@ class Ice(NamedTuple):
         """Return the ice of a surface."""
         return cls(floor.sliding_friction * floor.gravity, floor.curl)
 
-    def way(self, delivery: Delivery, fraction: float) -> complex:
+    def displacement(self, delivery: Delivery, fraction: float) -> complex:
         """Return the displacement from the release, m, at a remaining fraction of the speed: x + iy."""
         power = 2.0 - 1j * self.curl * delivery.turn
         gone = 1.0 - (cmath.exp(power * math.log(fraction)) if fraction > 0.0 else 0.0)
@@ -78,12 +78,12 @@ class Ice(NamedTuple):
         """Return the delivery with a speed, m/s, that passes a position, m; if it is too slow, as `to_rest`."""
         target_offset = complex(target[0] - RELEASE, target[1])
         straight = Delivery(speed, 0.0, turn)
-        if abs(self.way(straight, 0.0)) <= abs(target_offset):
+        if abs(self.displacement(straight, 0.0)) <= abs(target_offset):
             return self.to_rest(target, turn)
         low, high = 0.0, 1.0  # the distance increases as the fraction decreases
         while high - low > FRACTION_TOLERANCE:
             middle = 0.5 * (low + high)
-            if abs(self.way(straight, middle)) > abs(target_offset):
+            if abs(self.displacement(straight, middle)) > abs(target_offset):
                 low = middle
             else:
                 high = middle
@@ -91,7 +91,7 @@ class Ice(NamedTuple):
 
     def _with_heading(self, delivery: Delivery, target_offset: complex, fraction: float) -> Delivery:
         """Return a delivery with the heading that leads in the direction of a target, at a fraction of the speed."""
-        displacement = self.way(delivery, fraction)
+        displacement = self.displacement(delivery, fraction)
         # not `cmath.phase`, which raises where an angle is too small for a float
         heading = math.atan2(target_offset.imag, target_offset.real) - math.atan2(displacement.imag, displacement.real)
         return delivery._replace(heading=heading)

@@ -105,6 +105,6 @@ def _is_in_reach(flipper: PlayfieldElement, ball: int, info: StepInfo, rules: Pi
     up = rules.board.up
     if vx * up[0] + vy * up[1] > 0.1:  # the ball already moves upwards
         return False
-    ahead = (x + vx * LEAD - flipper.where[0], y + vy * LEAD - flipper.where[1])
+    ahead = (x + vx * LEAD - flipper.position[0], y + vy * LEAD - flipper.position[1])
     above = ahead[0] * up[0] + ahead[1] * up[1]
     return math.hypot(*ahead) < flipper.span + rules.board.radius and above < 1.2 * rules.board.radius + 0.02

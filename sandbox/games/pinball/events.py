@@ -111,7 +111,9 @@ class Switches:
             touch = now.get(key) or self._open.get(key) or OpenContact(0, 0.0, False)
             given = touch.impulse + (impulse[0] * normal[0] + impulse[1] * normal[1]) / mass
             closes = (
-                not touch.is_reported and touch.steps < IMPACT_STEPS and (not element.least or given > element.least)
+                not touch.is_reported
+                and touch.steps < IMPACT_STEPS
+                and (not element.min_closing_speed or given > element.min_closing_speed)
             )
             now[key] = OpenContact(touch.steps + 1, given, touch.is_reported or closes)
             if closes:

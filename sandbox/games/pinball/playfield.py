@@ -42,11 +42,11 @@ class PlayfieldElement:
     group: str | None
     step: int
     score: int
-    where: Point
+    position: Point
     """m, centre"""
     out: Vector
     """m/s, velocity at which it releases a ball"""
-    least: float = 0.0
+    min_closing_speed: float = 0.0
     """m/s, normal impulse over the mass of the ball above which its switch closes"""
     outline: tuple[Point, ...] = ()
     """m, corners of a wall"""
@@ -144,7 +144,7 @@ class Playfield:
         return tuple(
             each
             for each in self.of_role("flipper")
-            if side == (each.group or ("left" if each.where[0] < middle else "right"))
+            if side == (each.group or ("left" if each.position[0] < middle else "right"))
         )
 
     def height(self, x: float, y: float) -> float:
@@ -188,19 +188,19 @@ def _elements(scene: Scene, bodies: Bodies, ball: int) -> Iterator[PlayfieldElem
     indices = {name: k for k, name in enumerate(bodies.names)}
     for part in (each for each in scene.play.parts if each.role != "ball"):
         element, body = fixed_bodies.get(part.name), indices.get(part.name)
-        where, span = part.at or _centre(element), 0.0
+        position, span = part.at or _centre(element), 0.0
         if body is not None:
             (x, y), span = bodies.position[body].tolist(), float(bodies.radius[body])
-            where = part.at or (x, y)
+            position = part.at or (x, y)
         yield PlayfieldElement(
             name=part.name,
             role=part.role,
             group=part.group,
             step=part.step,
             score=part.score,
-            where=where,
-            out=part.out or _eject_velocity(where, middle),
-            least=thresholds.get(part.name, 0.0),
+            position=position,
+            out=part.out or _eject_velocity(position, middle),
+            min_closing_speed=thresholds.get(part.name, 0.0),
             outline=_outline(element) if isinstance(element, Wall) else (),
             reach=element.thickness / 2.0 if isinstance(element, Wall) else 0.0,
             span=span,

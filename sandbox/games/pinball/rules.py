@@ -165,7 +165,7 @@ class PinballRules:
         self.flow.devices = self.devices
         self.up: set[str] = set()
         """sides whose flippers are up"""
-        self.said = ("", 0.0)
+        self.message = ("", 0.0)
         """last message, and the time until which it is shown, s"""
         self._cues: list[str] = []
         self._now: StepContext | None = None
@@ -218,7 +218,7 @@ class PinballRules:
     def display_lines(self) -> Sequence[tuple[str, str]]:
         """Return the lines of the score panel."""
         flow, time = self.flow, 0.0 if self._now is None else self._now.time
-        message, until = self.said
+        message, until = self.message
         if self.nudge.tilted:
             message, until = "TILT!", time + MESSAGE_TIME
         return display_lines(flow.sheets, flow.turn, self.modes, self._saved(time), message if time < until else "")
@@ -315,7 +315,7 @@ class PinballRules:
                 case PlaySound():
                     self._cues.append(effect.name)
                 case ShowMessage():
-                    self.said = (effect.text, now.time + MESSAGE_TIME)
+                    self.message = (effect.text, now.time + MESSAGE_TIME)
                 case RemoveBall():
                     actions += self._apply(self.flow.remove_ball(effect.ball, now), now)
                 case ServeBalls():
@@ -326,7 +326,7 @@ class PinballRules:
                 case ExtraBall():
                     if self.flow.award_extra_ball(effect.reason):
                         self._cues.append("extra ball")
-                        self.said = ("shoot again", now.time + MESSAGE_TIME)
+                        self.message = ("shoot again", now.time + MESSAGE_TIME)
                 case _:
                     actions.append(effect)
         return actions

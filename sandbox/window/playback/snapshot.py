@@ -77,9 +77,9 @@ class ThrusterFlame(NamedTuple):
 
     body: int
     """index"""
-    place: tuple[float, float]
+    origin: tuple[float, float]
     """origin relative to the centre of mass, in the body frame, m"""
-    way: tuple[float, float]
+    direction: tuple[float, float]
     """vector from the origin to the tip, in the body frame, m"""
 
 

@@ -83,8 +83,8 @@ class HighScoreDialog:
     def _new_entry(self, host: GameHost) -> HighScoreEntry | None:
         try:
             scores = opened()
-            if scores.told is not None:
-                self._notes.append(scores.told)
+            if scores.notice is not None:
+                self._notes.append(scores.notice)
             table, score = table_of(host.live.scene), host.rules.score
             rank = scores.rank(table, score)
             return None if rank is None else HighScoreEntry(scores, table, score, rank, scores.of(table))

@@ -59,8 +59,8 @@ def assert_hit(
     velocity = aim.speed * np.array([math.cos(aim.angle), math.sin(aim.angle)])
     found = landing(air, muzzle.at(np.array([aim.angle]))[0], velocity, ground, edges)
     assert found is not None
-    assert abs(found.place[0] - target) == pytest.approx(abs(aim.miss), abs=1e-9)
-    assert abs(found.place[0] - target) <= RADIUS
+    assert abs(found.position[0] - target) == pytest.approx(abs(aim.miss), abs=1e-9)
+    assert abs(found.position[0] - target) <= RADIUS
     assert 0.0 < aim.speed <= 75.0
 
 
@@ -86,7 +86,7 @@ def battlefield(bot: float) -> Battlefield:
     field = Battlefield(scene, scene.bodies)
     for tank in field.tanks.every:
         x, y = scene.bodies.position[tank.number].tolist()
-        tank.place = (x, y)
+        tank.position = (x, y)
     return field
 
 

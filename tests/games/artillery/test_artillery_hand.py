@@ -34,8 +34,8 @@ def test_full_skill_hits_by_key_presses() -> None:
     shots = [shot for shot in rules.shots if shot.shooter == "Red"]
     assert shots
     first, blue = shots[0], loads(FIELD).bodies.position[1].tolist()
-    assert first.place is not None
-    assert math.dist(first.place, blue) <= WEAPONS[0].radius
+    assert first.position is not None
+    assert math.dist(first.position, blue) <= WEAPONS[0].radius
     assert rules.score > 0
     replayed, replayed_bout, replayed_state = play(ScriptedInput(bout.presses))
     assert (replayed.score, replayed_bout.presses, replayed_state) == (rules.score, bout.presses, state)

@@ -93,8 +93,8 @@ def test_a_perfect_bot_hits_with_its_first_shot(seed: int) -> None:
     rules = play(scene, engine="reference", **RK4)[0]
     first = rules.shots[0]
     x, y = 190.0, float(scene.bodies.position[1, 1])
-    assert first.place is not None
-    assert math.dist(first.place, (x, y)) <= WEAPONS[0].radius
+    assert first.position is not None
+    assert math.dist(first.position, (x, y)) <= WEAPONS[0].radius
     assert first.off is not None
     assert first.off < 1e-5  # errors of Runge–Kutta and of the cubic interpolation at 20 ms
     assert rules.field.tanks.every[1].health < 100.0
@@ -102,9 +102,9 @@ def test_a_perfect_bot_hits_with_its_first_shot(seed: int) -> None:
 
 def test_error_of_a_shot_is_reported_for_each_axis() -> None:
     shot = ArtilleryShot("Red", "shell", (172.07, 3.06), (171.94, 3.131), 6.0)
-    assert shot.told == "landed at 172.07 m, exact solution 171.94 m (Δx 130 mm, Δy 71.0 mm)"
+    assert shot.description == "landed at 172.07 m, exact solution 171.94 m (Δx 130 mm, Δy 71.0 mm)"
     level = ArtilleryShot("Red", "shell", (172.07, 3.0), (171.94, 3.0), 6.0)
-    assert level.told == "landed at 172.07 m, exact solution 171.94 m (Δx 130 mm)"
+    assert level.description == "landed at 172.07 m, exact solution 171.94 m (Δx 130 mm)"
 
 
 @pytest.mark.slow
@@ -113,7 +113,7 @@ def test_seeds_give_different_games() -> None:
     scene = loads(BOTS, overrides=["world.duration=12", "artillery.player.Red.bot=0.5"])
     rules = [play(with_seed(scene, seed))[0] for seed in range(6)]
     assert len({each.field.ground.points for each in rules}) == 6
-    assert len({each.shots[0].place for each in rules}) == 6
+    assert len({each.shots[0].position for each in rules}) == 6
 
 
 @pytest.mark.parametrize("edges", ["open", "rubber", "wrap"])
@@ -128,7 +128,7 @@ def test_shells_at_the_edges_follow_the_exact_path(edges: str) -> None:
     run(scene, "reference", bout=HeadlessGame(rules, ScriptedInput(presses), "script"), **RK4)
     assert len(rules.shots) == 2
     for shot in rules.shots:
-        assert (shot.place is None) == (shot.exact is None) == (edges == "open")
+        assert (shot.position is None) == (shot.exact is None) == (edges == "open")
         if shot.off is not None:
             assert shot.off < 1e-5  # at 20 ms: in still air both cross the edges exactly
 
@@ -183,7 +183,7 @@ def test_changes_of_gravity_and_drag_apply_to_the_exact_flight(time: float, dist
     assert shot.disturbed == disturbed
     if disturbed:
         assert (shot.exact, shot.off) == (None, None)
-        assert shot.told.endswith("; wind or gravity changed during the flight")
+        assert shot.description.endswith("; wind or gravity changed during the flight")
     else:
         assert shot.off == pytest.approx(0.0, abs=1e-5)  # error of rk4 at 20 ms, and rounding
 
@@ -285,7 +285,7 @@ def test_rollers_cross_the_edges_as_shells_do(
         assert not rules.field.blasts
     else:
         (blast,) = rules.field.blasts
-        assert interval[0] < blast.place[0] < interval[1]
+        assert interval[0] < blast.position[0] < interval[1]
 
 
 def test_keys_move_only_the_gun_of_the_player_in_turn() -> None:

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.full  # property tests with many examples
 def range_and_time(air: World, velocity: np.ndarray) -> tuple[float, float]:
     """Return the range, m, and the time of flight, s, of a shot over level ground."""
     found = exact_landing(air, velocity)
-    return found.place[0], found.time
+    return found.position[0], found.time
 
 
 def test_scalar_rk4_equals_that_of_the_reference_engine() -> None:
@@ -106,10 +106,9 @@ def test_shell_lands_on_the_surface_and_was_above_it_before(
     found = landing(air, start, shot(speed, degrees), ground)
     if found is None:
         return
-    assert found.place[1] == pytest.approx(float(ground.surface(found.place[0])), abs=1e-7) or found.place[0] in (
-        pytest.approx(0.0, abs=1e-6),
-        pytest.approx(300.0, abs=1e-6),
-    )
+    x, y = found.position
+    is_at_an_end = x == pytest.approx(0.0, abs=1e-6) or x == pytest.approx(300.0, abs=1e-6)  # rounding
+    assert is_at_an_end or y == pytest.approx(float(ground.surface(x)), abs=1e-7)  # rounding
     flight = Flight(air, start, shot(speed, degrees))
     for time in np.linspace(0.0, found.time, 50)[:-1]:
         x, y = flight.at(float(time))[0]
@@ -124,9 +123,9 @@ def test_rubber_edges_mirror_the_flight() -> None:
         bounced = landing(air, np.array([60.0, 0.0]), shot(55.0, 50.0), ground, "rubber")
         assert free is not None
         assert bounced is not None
-        beyond = 60.0 + free.place[0] - 1000.0
+        beyond = 60.0 + free.position[0] - 1000.0
         mirrored = 200.0 - abs(200.0 - beyond) if beyond < 400.0 else beyond - 400.0
-        assert bounced.place[0] == pytest.approx(mirrored, abs=1e-7)  # quadratic drag: other steps after the bounce
+        assert bounced.position[0] == pytest.approx(mirrored, abs=1e-7)  # quadratic drag: other steps after the bounce
         assert bounced.time == pytest.approx(free.time, abs=1e-8)
 
 
@@ -136,7 +135,7 @@ def test_wrapped_ground_is_periodic_and_open_ground_ends() -> None:
     wrapped = landing(world(0.1, 0.0, 7.0), np.array([70.0, 0.0]), shot(60.0, 60.0), ground, "wrap")
     assert free is not None
     assert wrapped is not None
-    assert wrapped.place[0] == pytest.approx((70.0 + free.place[0] - 1000.0) % 100.0, abs=1e-8)
+    assert wrapped.position[0] == pytest.approx((70.0 + free.position[0] - 1000.0) % 100.0, abs=1e-8)
     assert landing(world(), np.array([50.0, 0.0]), shot(60.0, 45.0), ground, "open") is None
 
 
@@ -144,7 +143,7 @@ def test_discs_are_hit_before_the_ground_behind_them() -> None:
     ground, discs = flat(0.0), np.array([[252.0, 7.0, 2.0], [100.0, 30.0, 1.0]])
     found = landing(world(), np.array([100.0, 0.5]), shot(40.0, 40.0), ground, discs=discs)
     assert found is not None
-    assert math.dist(found.place, (252.0, 7.0)) == pytest.approx(2.0, abs=1e-9)
+    assert math.dist(found.position, (252.0, 7.0)) == pytest.approx(2.0, abs=1e-9)
     assert first_strike(discs, np.array([90.0, 30.0]), np.array([110.0, 30.0])) == (pytest.approx(0.45), 1)
     # From inside: the segment has no entry.
     assert first_strike(discs, np.array([100.0, 30.0]), np.array([110.0, 30.0])) is None

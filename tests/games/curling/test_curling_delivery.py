@@ -26,20 +26,20 @@ TURN = st.sampled_from([1, -1])
 def test_closed_form_path_is_that_of_the_engine(speed: float, heading: float, turn: int, fraction: float) -> None:
     delivery = Delivery(speed, heading, turn)
     x, y, _, _ = curled(*delivery.velocity, ICE.slowing, turn * ICE.curl, (1.0 - fraction) * speed / ICE.slowing)
-    offset = ICE.way(delivery, fraction)
+    offset = ICE.displacement(delivery, fraction)
     assert (offset.real, offset.imag) == pytest.approx((x, y), abs=1e-11)  # rounding of 80 m; 1 − s^(2−iκ) cancels
 
 
 @given(x=st.floats(-5, 2), y=st.floats(-2, 2), turn=TURN)
 def test_a_draw_comes_to_rest_at_its_target(x: float, y: float, turn: int) -> None:
-    offset = ICE.way(ICE.to_rest((x, y), turn), 0.0)
+    offset = ICE.displacement(ICE.to_rest((x, y), turn), 0.0)
     assert (RELEASE + offset.real, offset.imag) == pytest.approx((x, y), abs=1e-12)  # rounding of 28 m
 
 
 @given(x=st.floats(-5, 2), y=st.floats(-2, 2), turn=TURN, speed=st.floats(1.0, 5.0))
 def test_a_takeout_passes_or_just_reaches_its_target(x: float, y: float, turn: int, speed: float) -> None:
     delivery = ICE.through((x, y), turn, speed)
-    path = np.asarray([RELEASE + ICE.way(delivery, k / 2000) - complex(x, y) for k in range(2001)])
+    path = np.asarray([RELEASE + ICE.displacement(delivery, k / 2000) - complex(x, y) for k in range(2001)])
     steps = np.diff(path)
     along = np.clip(-(path[:-1] * steps.conj()).real / np.abs(steps) ** 2, 0.0, 1.0)
     # Chords are 13 cm at most. The radius is 2/κ times the remaining path, so the chords get shorter towards its end.

@@ -31,7 +31,7 @@ def ball_at_flipper(velocity: tuple[float, float] = (0.0, -0.1)) -> Table:
     game = Table(table())
     game.play()
     (flipper,) = game.game.board.flippers("left")
-    game.put(0, flipper.where, velocity)
+    game.put(0, flipper.position, velocity)
     return game
 
 

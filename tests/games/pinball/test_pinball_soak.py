@@ -102,8 +102,8 @@ def play(scene: Scene, policy: Policy, seconds: float, audit: bool = False) -> G
             for control, value in policy.decide(referee.step_info, rules)
             for action in referee.press(simulation.time, control, value)
         ]
-        if not messages or messages[-1][1] != rules.said[0]:
-            messages.append((simulation.time, rules.said[0]))
+        if not messages or messages[-1][1] != rules.message[0]:
+            messages.append((simulation.time, rules.message[0]))
         referee.note_actions(pressed)
         for action in (*own, *pressed):
             simulation.apply(action)
@@ -175,7 +175,7 @@ def test_multiball_of_the_full_table_launches_all_balls() -> None:
             assert np.array_equal(frame.position[rules.board.balls[1]], stored)  # the other balls have not moved
             rules.sheet.locked, rules.sheet.lit = 2, True
             hole = next(each for each in rules.board.of_role("kicker") if each.group == "lock")
-            simulation.apply(Move(time=1.0, body="ball", position=hole.where, velocity=(0.0, 0.0)))
+            simulation.apply(Move(time=1.0, body="ball", position=hole.position, velocity=(0.0, 0.0)))
         simulation.step()
         max_balls = max(max_balls, len(rules.trough.flown))
     assert rules.sheet.score >= 10_000

@@ -35,7 +35,9 @@ def test_threshold_depends_on_kick_and_falloff_of_the_element() -> None:
     scene = table().model_copy(update={"posts": tuple(_kicking(post) for post in table().posts)})
     board = Playfield.of(scene, scene.bodies)
     bumper = next(each for each in board.elements if each.name == "bumper a")
-    assert bumper.least == pytest.approx(0.2 * (1.0 + 0.5 / (1.0 + 3.0 * 0.2)), rel=1e-15)  # rounding of three factors
+    assert bumper.min_closing_speed == pytest.approx(
+        0.2 * (1.0 + 0.5 / (1.0 + 3.0 * 0.2)), rel=1e-15
+    )  # rounding of three factors
 
 
 def _kicking(post):

@@ -48,15 +48,15 @@ def test_flame_of_a_throttled_thrust_scales_with_its_level() -> None:
     assert active_thrusters(SCENE, SCENE.bodies, throttle(0.0), 0.0) == ()
     (flame,) = active_thrusters(SCENE, SCENE.bodies, throttle(0.25), 0.0)
     assert flame.body == 0
-    assert flame.place == pytest.approx((-1.0, 0.0))  # relative to the centre of mass
+    assert flame.origin == pytest.approx((-1.0, 0.0))  # relative to the centre of mass
     # Against the force; the length is proportional to the square root of 0.25.
-    assert flame.way == pytest.approx((-0.5 * LONG * REACH, 0.0))
+    assert flame.direction == pytest.approx((-0.5 * LONG * REACH, 0.0))
 
 
 def test_timed_thrust_has_a_flame_only_in_its_interval() -> None:
     assert [len(active_thrusters(SCENE, SCENE.bodies, {}, time)) for time in (0.99, 1.0, 1.99, 2.0)] == [0, 1, 1, 0]
     (flame,) = active_thrusters(SCENE, SCENE.bodies, {}, 1.0)
-    assert flame.way == pytest.approx((0.0, -0.5 * LONG * REACH))  # a quarter of the strongest force
+    assert flame.direction == pytest.approx((0.0, -0.5 * LONG * REACH))  # a quarter of the strongest force
 
 
 def test_snapshot_of_a_live_view_contains_active_flames() -> None:
@@ -64,7 +64,7 @@ def test_snapshot_of_a_live_view_contains_active_flames() -> None:
     assert live.snapshot(frozenset({"shapes"})).flames == ()
     live.apply(Throttle(time=0.0, thrust="main", level=1.0))
     (flame,) = live.snapshot(frozenset({"shapes"})).flames
-    assert flame.way == pytest.approx((-LONG * REACH, 0.0))
+    assert flame.direction == pytest.approx((-LONG * REACH, 0.0))
     live.close()
 
 

@@ -185,6 +185,6 @@ def test_grid_lines_lie_at_multiples_of_the_step():
 def test_scale_bar_is_one_grid_step_long():
     surface = pygame.Surface((400, 200))
     camera = Camera((0.0, 0.0), 70.0, (400, 200))
-    draw_scale(surface, camera, foot=30.0)
+    draw_scale(Canvas(surface, camera), foot=30.0)
     row = (pygame.surfarray.array3d(surface)[:, 200 - 30 - 18 - 1] == FAINT).all(1)
     assert row.sum() == round(step_of(camera) * 70.0)
