@@ -21,7 +21,7 @@ def short_repr(value: object) -> str:
 
 
 def printable(text: str) -> str:
-    """Return a text in one line: what is not printable is escaped."""
+    """Return a text in one line, with unprintable characters escaped."""
     return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
 
 

@@ -59,7 +59,7 @@ def _sources() -> Iterator[str]:
 
 @cache
 def machine() -> dict[str, str | int]:
-    """Return what is worth knowing of the machine."""
+    """Return the processor, its cores and the operating system."""
     return {
         "cpu": _processor(),
         "cores": os.cpu_count() or 1,
@@ -69,7 +69,7 @@ def machine() -> dict[str, str | int]:
 
 
 def _processor() -> str:
-    """Return the processor's model: Linux tells it in a file, other systems tell Python; else the architecture."""
+    """Return the processor's model, from a file on Linux and from Python elsewhere; else the architecture."""
     try:
         with Path("/proc/cpuinfo").open(encoding="utf-8", errors="replace") as lines:
             named = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]

@@ -211,7 +211,7 @@ def check_environment() -> None:
 
 
 def free_memory() -> int:
-    """Return the bytes that this process may still allocate: what is free, within its limit of address space."""
+    """Return the bytes that this process may still allocate: the free memory, within its limit of address space."""
     return max(int(min(_free_in_system(), _free_in_address_space())), 0)
 
 

@@ -1,4 +1,4 @@
-"""Run table: one row per stored run, with the values by which the runs differ and what was measured.
+"""Run table: one row per stored run, with the values by which the runs differ and the measured figures.
 
 with sandbox.Store("study") as store:
 rows = sandbox.run_table(store)          # dicts; pandas.DataFrame(rows) is a table

@@ -48,7 +48,7 @@ class JointData(NamedTuple):
     anchor: FloatArray
     """(K, 4) m, anchors ax, ay, bx, by in the frames of the bodies; for the world, a point in space"""
     figures: FloatArray
-    """(K, 3) as `LinkKind` says"""
+    """(K, 3), as defined by `LinkKind`"""
     max_force: FloatArray
     """(K,) N or N·m"""
 

@@ -254,7 +254,7 @@ class Diagnostics:
         """Start.
 
         Args:
-            session: what is observed.
+            session: the observed session.
             recorded: a recorded run that is the ghost, instead of another engine.
         """
         self._session, self._recorded = session, recorded

@@ -385,7 +385,7 @@ class Session:
     # --- Actions -------------------------------------------------------------------------------------------------
 
     def apply(self, action: Action) -> Action:
-        """Apply an action now, whatever its time says, and log it; later actions are discarded.
+        """Apply an action now, regardless of its time, and log it; later actions are discarded.
 
         Returns:
             The action with its time.

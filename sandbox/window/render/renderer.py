@@ -244,7 +244,7 @@ class Renderer:
         return sizes
 
     def _update_bodies(self, snapshot: Snapshot) -> None:
-        """Compute what is constant for given bodies: their colours, and which can rotate."""
+        """Compute the constant properties of the bodies: their colours, and which can rotate."""
         bodies, scene = snapshot.bodies, snapshot.scene
         if self._known is not None and self._known[0] is bodies and self._known[1] is scene:
             return
