@@ -78,7 +78,7 @@ def run(
     """
     setup = scene if isinstance(scene, Setup) else Setup.of(as_scene(scene))
     scene = setup.scene
-    chosen = engine_named(engine)
+    engine_named(engine)
     wanted = scene.solver.replace(**settings) if settings else scene.solver
     actions = in_order(tuple(actions))
     stretches = _schedule(scene, wanted, actions)
@@ -86,7 +86,7 @@ def run(
         simulation = start(setup, engine, wanted)
     except Refusal as refusal:
         return run_without_frames(setup, engine, wanted, actions, "refused", str(refusal))
-    resolved = chosen.resolve(setup, wanted)
+    resolved = simulation.settings
     bodies = len(setup.bodies) + sum(isinstance(action, Spawn) for action in actions)
     recorder = Recorder(scene, resolved, bodies, actions, _energy_reader(simulation) if account else None, len(Cause))
     timed_audit = TimedAudit(setup, simulation) if audit else None

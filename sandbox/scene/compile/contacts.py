@@ -17,6 +17,7 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.derived import derived_once
 from sandbox.scene.compile.drives import is_driven
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
@@ -245,8 +246,17 @@ def contact_matrix(start: Scene | Setup, bodies: Bodies | None = None) -> Contac
         start: scene or setup.
         bodies: bodies after some were added; default: those of `start`.
     """
-    setup = Setup.of(start)
-    scene, bodies = setup.scene, setup.bodies if bodies is None else bodies
+    return _start_matrix(start) if bodies is None or bodies is start.bodies else _matrix(Setup.of(start), bodies)
+
+
+@derived_once
+def _start_matrix(setup: Setup) -> ContactMatrix:
+    return _matrix(setup, setup.bodies)
+
+
+def _matrix(setup: Setup, bodies: Bodies) -> ContactMatrix:
+    """Derive the contact matrix of a setup with given bodies."""
+    scene = setup.scene
     surfaces = pair_table(scene, bodies)
     reached = reachable_layers(scene, bodies)
     kinds = _kinds(bodies, surfaces, reached)

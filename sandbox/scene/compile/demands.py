@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
+from sandbox.scene.compile.derived import derived_once
 from sandbox.scene.compile.joint_arrays import LinkKind
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
@@ -106,9 +107,10 @@ class Item(NamedTuple):
     why: str
 
 
-def demands(start: Scene | Setup) -> frozenset[Demand]:
+@derived_once
+def demands(setup: Setup) -> frozenset[Demand]:
     """Return the demands of a scene or setup: the physics that an engine must model to run it."""
-    return frozenset(item.demand for item in bill(start) if item.on)
+    return frozenset(demand for demand, on, _ in _items(setup) if on)
 
 
 def bill(start: Scene | Setup) -> tuple[Item, ...]:
@@ -231,14 +233,16 @@ def _count(n: int, one: str, many: str, none: str) -> str:
     return none if n == 0 else f"{n:,} {one if n == 1 else many}"
 
 
-def on_floor(start: Scene | Setup) -> bool:
+@derived_once
+def on_floor(setup: Setup) -> bool:
     """Return whether a scene has a demand of `FLOOR`."""
-    return any(on and demand in FLOOR for demand, on, _ in _floor(Setup.of(start)))
+    return any(on and demand in FLOOR for demand, on, _ in _floor(setup))
 
 
-def curls(start: Scene | Setup) -> bool:
+@derived_once
+def curls(setup: Setup) -> bool:
     """Return whether a scene has a surface on which pucks curl."""
-    return any(on and demand is Demand.CURL for demand, on, _ in _floor(Setup.of(start)))
+    return any(on and demand is Demand.CURL for demand, on, _ in _floor(setup))
 
 
 def unmodelled(start: Scene | Setup, capabilities: frozenset[Demand]) -> list[str]:

@@ -144,7 +144,7 @@ class JointArrays:
 
     def of(self, *kinds: LinkKind) -> Self:
         """Return the joints of some kinds."""
-        return self.some(np.isin(self.kind, kinds))
+        return self if not len(self) else self.some(np.isin(self.kind, kinds))
 
     @property
     def turns(self) -> BoolArray:
@@ -171,7 +171,7 @@ class JointArrays:
     def apart(self) -> IntArray:
         """Return the distinct pairs of bodies (K, 2) that joints exclude from collision, the lower index first."""
         pair = np.column_stack((self.a, self.b))[~self.collide & (self.a >= 0)]
-        return np.unique(np.sort(pair, axis=1), axis=0)
+        return pair if not len(pair) else np.unique(np.sort(pair, axis=1), axis=0)
 
     def ends(self, position: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the first and second anchor of each joint in the world, (J, 2) or (T, J, 2) m each.
