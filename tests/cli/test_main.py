@@ -115,11 +115,11 @@ print(status, *heavy, file=sys.stderr)
     [
         (("--help",), "numpy,pydantic,pymunk,matplotlib,rich"),
         (("scenes",), "numpy,pydantic,pymunk,matplotlib,rich"),
-        (("check", "bounce"), "matplotlib,rich,sqlite3,tomlkit"),
+        (("check", "bounce"), "numba,matplotlib,rich,sqlite3,tomlkit"),
         (("check", "bounce", "--no-trial"), "numba,pymunk,matplotlib,rich,sqlite3,tomlkit"),
         (("schema",), "numba,numpy,pymunk,matplotlib,rich"),
         (("engines",), "numba,pymunk,matplotlib,rich"),
-        (("run", "bounce", "--set", "world.duration=0.01", "--json"), "matplotlib,rich,pygame"),
+        (("run", "bounce", "--set", "world.duration=0.01", "--json"), "numba,matplotlib,rich,pygame"),
     ],
 )
 def test_command_does_not_import_modules_it_does_not_need(arguments: tuple[str, ...], unneeded: str) -> None:

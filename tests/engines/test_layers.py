@@ -1,10 +1,11 @@
 """Layers: bodies without a common layer do not affect each other, bit for bit."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 import sandbox
@@ -59,6 +60,8 @@ def test_each_layer_runs_as_if_alone(engine: str, seed: float, jitter: int) -> N
     """The random numbers of generators depend on their order in the file, so the compared generator comes first."""
     world = {"duration": 0.6, "gravity": [0.0, -4.0], "seed": jitter}
     alone = run_on(engine, scene_of(scatter("ground", seed), wall=[FRAME], world=world))
+    # pymunk solves contacts that share a body in the order of its tree, which depends on all bodies.
+    assume(engine != "pymunk" or not has_contacts_that_share_a_body(alone))
     post = {"position": [0.0, 0.0], "radius": 0.3, "layers": ["one", "two"]}
     others = (scatter("one", -seed), scatter("two", seed / 2.0))
     full = scene_of(scatter("ground", seed), *others, wall=[FRAME], post=[post], world=world)
@@ -71,6 +74,17 @@ def test_each_layer_runs_as_if_alone(engine: str, seed: float, jitter: int) -> N
     for a, b in (*mixed.contact_pair.tolist(), *missed.tolist()):
         assert layer[a] == layer[b] if b >= 0 else not (layer[a] == 0 and full.fixed_names[-1 - b] == "post-1")
     assert np.array_equal(missed[missed[:, 0] < count], alone.missed_pair)
+
+
+def has_contacts_that_share_a_body(run: Trajectory) -> bool:
+    """Return whether two contacts of a body begin within two steps."""
+    starts: dict[int, list[float]] = {}
+    for time, pair in zip(run.contact_time.tolist(), run.contact_pair.tolist(), strict=True):
+        for body in pair:
+            if body >= 0:
+                starts.setdefault(body, []).append(time)
+    step = float(run.time[1] - run.time[0])
+    return any(b - a < 2.5 * step for times in starts.values() for a, b in pairwise(sorted(times)))
 
 
 @every_engine

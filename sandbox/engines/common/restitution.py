@@ -14,7 +14,6 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
-from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.scene.description.base import Point
 from sandbox.scene.geometry.vectors import nearest_fraction
 
@@ -55,10 +54,6 @@ def kick_gain(restitution: float, falloff: float, kick: float, to_approach: bool
         return kick
     increased = closing + kick
     return restitution / (1.0 + falloff * increased) * increased - restitution / (1.0 + falloff * closing) * closing
-
-
-compiled_rebound, compiled_kicked, compiled_kick_gain = kernel(rebound), kernel(kicked), kernel(kick_gain)
-"""The same for kernels. For one contact at a time, compiling takes longer than it saves."""
 
 
 def segment_fractions(points: Sequence[Point]) -> list[tuple[float, float]]:

@@ -8,7 +8,7 @@ import math
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.kernel import bare_kernel as kernel
-from sandbox.engines.common.restitution import compiled_kick_gain, compiled_kicked, compiled_rebound
+from sandbox.engines.common.restitution_kernels import compiled_kick_gain, compiled_kicked, compiled_rebound
 from sandbox.engines.exact.common import state as c
 from sandbox.engines.exact.common.record import account_fixed_hit, add_impulse, add_row, log_support
 from sandbox.engines.exact.common.roots import NOISE

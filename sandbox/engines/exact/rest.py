@@ -10,7 +10,7 @@ import math
 
 from sandbox.arrays import FloatArray
 from sandbox.engines.common.kernel import bare_kernel as kernel
-from sandbox.engines.common.restitution import compiled_kick_gain, compiled_kicked, compiled_rebound
+from sandbox.engines.common.restitution_kernels import compiled_kick_gain, compiled_kicked, compiled_rebound
 from sandbox.engines.exact.common import state as c
 from sandbox.engines.exact.common.record import account_spin, account_velocity, add_impulse, add_row, open_support_row
 from sandbox.engines.exact.common.roots import NOISE

@@ -6,6 +6,7 @@ the same scheme. A body joins the space when something that it can touch appears
 
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,15 +17,16 @@ from sandbox.engines.common.lifetimes import NO_BODIES
 from sandbox.engines.common.zones import ZoneTracker
 from sandbox.engines.pymunk_adapter.particles import Particles
 from sandbox.engines.pymunk_adapter.space import SpaceBodies
-from sandbox.engines.tabletop.contacts import SKIN
 from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_steppers
-from sandbox.engines.tabletop.stepper import BallArrays, TabletopStepper
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource, BodySpec, Collides, Point
 from sandbox.scene.description.world import Settings
+
+if TYPE_CHECKING:
+    from sandbox.engines.tabletop.stepper import TabletopStepper
 
 
 class PymunkZoneHost:
@@ -121,6 +123,16 @@ def check_overlaps(
         raise ActionError(f"it would overlap {candidates} bodies; the limit is {MAX_CANDIDATES}")
 
 
+def _solvers(setup: Setup, settings: Settings) -> "tuple[TabletopStepper | None, SpaceBodies]":
+    """Return the stepper of balls on a surface, None without a surface, and the bodies in the pymunk space."""
+    if not on_floor(setup):
+        return None, SpaceBodies(setup, settings)
+    from sandbox.engines.tabletop.contacts import SKIN  # only scenes with a surface load kernels and their compiler
+    from sandbox.engines.tabletop.stepper import TabletopStepper
+
+    return TabletopStepper(setup.scene, settings), SpaceBodies(setup, settings.replace(slop=UNCORRECTED), SKIN)
+
+
 class PymunkBodies:
     """State of all bodies of a running scene as arrays in scene order, and the space and particles that advance it."""
 
@@ -137,10 +149,7 @@ class PymunkBodies:
         self.velocity[~self.bodies.fixed] += self.ahead
         self.roll = self.bodies.roll.copy()
         self.layer, self.visits = self.bodies.layer.copy(), self.bodies.visits.copy()
-        self.tabletop = TabletopStepper(scene, settings) if on_floor(setup) else None
-        """stepper of balls on a surface; None without a surface"""
-        tabletop_arguments = settings.replace(slop=UNCORRECTED), SKIN
-        self.space_bodies = SpaceBodies(setup, *(tabletop_arguments if self.tabletop is not None else (settings,)))
+        self.tabletop, self.space_bodies = _solvers(setup, settings)
         self.particles = Particles(scene.world, settings.h, self.space_bodies.field)
         self._zone_host = PymunkZoneHost(self.space_bodies)
         self.zone_tracker = ZoneTracker(scene, self._zone_host) if scene.zones else None
@@ -183,6 +192,8 @@ class PymunkBodies:
                 self.position, self.velocity, self.angular_velocity, self.layer, self.visits
             )
         if self.tabletop is not None:
+            from sandbox.engines.tabletop.stepper import BallArrays
+
             state = BallArrays(self.position, self.velocity, self.roll, self.angular_velocity, self.angle)
             self.tabletop.rebuild_arrays(state, self.bodies, self.present)
 

@@ -11,118 +11,9 @@ import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.base import BEYOND, FARTHEST, FASTEST
-from sandbox.engines.common.kernel import COMPILED, bare_kernel
 from sandbox.engines.pymunk_adapter.forces import SpaceForceField, acceleration, has_drag, mean_fraction, rates
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.description.base import Point
 from sandbox.scene.description.world import World
-
-TILE = 256
-"""Number of coordinates processed at once: they fit into the L1 cache, and the kick is stored for each of them."""
-
-
-def tile_of(vector: Point | FloatArray) -> FloatArray:
-    """Return a vector (2,), repeated to fill a tile, (TILE,)."""
-    return np.tile(np.asarray(vector, dtype=np.float64), TILE // 2)
-
-
-@bare_kernel
-def fall(position: FloatArray, velocity: FloatArray, runs: IntArray, h: float, kick: FloatArray, substeps: int) -> None:
-    """Advance bodies under the same kick for all: positions by the old velocity, then velocities.
-
-    Coordinates are processed in memory order, x and y in turn, so that the loop is vectorised; four substeps at a time.
-
-    Args:
-        position: (2N,) m.
-        velocity: (2N,) m/s.
-        runs: (K, 2) first index, and the index after the last, of runs of particles.
-        h: substep, s.
-        kick: (TILE,) m/s, as from `tile_of`.
-        substeps: number of substeps.
-    """
-    for k in range(len(runs)):
-        end = 2 * runs[k, 1]
-        for first in range(2 * runs[k, 0], end, TILE):
-            # Slices: indexed from 0 to their length, the compiler can omit bounds and wrap-around handling.
-            x, v = position[first : min(first + TILE, end)], velocity[first : min(first + TILE, end)]
-            for _ in range(substeps // 4):
-                for i in range(len(x)):
-                    coordinate, speed, kick_value = x[i], v[i], kick[i]
-                    coordinate += speed * h
-                    speed += kick_value
-                    coordinate += speed * h
-                    speed += kick_value
-                    coordinate += speed * h
-                    speed += kick_value
-                    x[i] = coordinate + speed * h
-                    v[i] = speed + kick_value
-            for _ in range(substeps % 4):
-                for i in range(len(x)):
-                    speed = v[i]
-                    x[i] += speed * h
-                    v[i] = speed + kick[i]
-
-
-@bare_kernel
-def drift(
-    position: FloatArray,
-    velocity: FloatArray,
-    runs: IntArray,
-    h: float,
-    mass: FloatArray,
-    gravity: FloatArray,
-    wind: FloatArray,
-    rate: float,
-    fraction: float,
-    substeps: int,
-) -> None:
-    """Advance bodies under gravity and linear drag, as `forces.acceleration` does.
-
-    Args:
-        position: (2N,) m.
-        velocity: (2N,) m/s.
-        runs: as of `fall`.
-        h: substep, s.
-        mass: (2N,) kg, each twice.
-        gravity: (TILE,) m/s².
-        wind: (TILE,) m/s.
-        rate: of drag, 1/s.
-        fraction: mean acceleration of a substep as a fraction of its first.
-        substeps: number of substeps.
-    """
-    for k in range(len(runs)):
-        end = 2 * runs[k, 1]
-        for first in range(2 * runs[k, 0], end, TILE):
-            last = min(first + TILE, end)
-            x, v, m = position[first:last], velocity[first:last], mass[first:last]
-            for _ in range(substeps):
-                for i in range(len(x)):
-                    speed = v[i]
-                    x[i] += speed * h
-                    force = m[i] * ((gravity[i] - rate * (speed - wind[i])) * fraction)
-                    v[i] = speed + force * (1.0 / m[i]) * h
-
-
-@bare_kernel
-def turn(angle: FloatArray, spin: FloatArray, runs: IntArray, h: float, substeps: int) -> None:
-    """Advance the angles of bodies (N,), rad, by their spins, rad/s."""
-    for k in range(len(runs)):
-        for i in range(runs[k, 0], runs[k, 1]):
-            a, w = angle[i], spin[i]
-            for _ in range(substeps):
-                a += w * h
-            angle[i] = a
-
-
-@bare_kernel
-def all_within(values: FloatArray, runs: IntArray, limit: float) -> bool:
-    """Return whether the coordinates (2N,) of all particles are within ± a limit, and not nan."""
-    out_of_range = 0
-    for k in range(len(runs)):
-        coordinates = values[2 * runs[k, 0] : 2 * runs[k, 1]]
-        for i in range(len(coordinates)):
-            out_of_range += 0 if abs(coordinates[i]) <= limit else 1  # no early exit, so that the loop is vectorised
-    return out_of_range == 0
 
 
 def runs_of(indices: IntArray) -> IntArray:
@@ -139,7 +30,7 @@ BLOCK = 16_384
 """Rows that numpy processes at once, so that they stay in the cache: half the time at 100,000 bodies."""
 
 MIN_COMPILED = 200
-"""Number of bodies from which on the compiled loop is used; below it numpy does the same."""
+"""Number of bodies from which on the compiled loop is used; below it numpy does the same, and no compiler is loaded."""
 
 SCATTERED = 16
 """Number of runs of consecutive indices from which on numpy gathers bodies instead of processing run by run."""
@@ -212,8 +103,13 @@ class Particles:
         self._has_torque = any(torque for _, torque in self._forces.values())
         self._has_drag = has_drag(world)
         self.can_turn = bool(self._spin[self.indices].any()) or self._has_torque
-        self._kick = tile_of((np.asarray(world.gravity) + 0.0) * self._h)
-        if self._has_drag and self._compiled:
+        self._kick: FloatArray = (np.asarray(world.gravity) + 0.0) * self._h
+        if not self._compiled:
+            return
+        from sandbox.engines.pymunk_adapter.particle_kernels import tile_of
+
+        self._kick_tile = tile_of(self._kick)
+        if self._has_drag:
             fraction = float(mean_fraction(np.asarray([world.linear_drag]), self._h)[0])
             self._air = np.repeat(self._mass, 2), tile_of(world.gravity), tile_of(world.wind)
             self._drag = world.linear_drag, fraction
@@ -250,6 +146,8 @@ class Particles:
             return None
         # Quick test: if both coordinates are below half a bound, the length is below the bound.
         if self._compiled and not self._has_torque:
+            from sandbox.engines.pymunk_adapter.particle_kernels import all_within
+
             position, speed = self._flat
             if all_within(position, self._runs, 0.5 * FARTHEST) and all_within(speed, self._runs, 0.5 * FASTEST):
                 return None
@@ -259,33 +157,45 @@ class Particles:
 
     @property
     def _compiled(self) -> bool:
-        return COMPILED and len(self.indices) >= MIN_COMPILED
+        if len(self.indices) < MIN_COMPILED:
+            return False
+        from sandbox.engines.common.kernel import COMPILED
+
+        return COMPILED
 
     def step(self, substeps: int = 1) -> None:
         """Advance by some substeps: in each, positions by the old velocity, then velocities."""
         if not len(self.indices):
             return
-        world, compiled = self.world, self._compiled
-        has_forces = self._has_force or self._field is not None or world.quadratic_drag > 0
-        if compiled and not has_forces and not self._has_drag:
-            fall(*self._flat, self._runs, self._h, self._kick, substeps)
-        elif compiled and not has_forces:
-            mass, gravity, wind = self._air
-            drift(*self._flat, self._runs, self._h, mass, gravity, wind, *self._drag, substeps)
+        compiled = self._compiled
+        has_forces = self._has_force or self._field is not None or self.world.quadratic_drag > 0
+        if compiled and not has_forces:
+            self._step_compiled(substeps)
         else:
             self._step_with_numpy(substeps, has_forces or self._has_drag)
         if self._has_torque:
             for _ in range(substeps):
                 self._turn_with_torques()
         elif self.can_turn and compiled:
+            from sandbox.engines.pymunk_adapter.particle_kernels import turn
+
             turn(self._angle, self._spin, self._runs, self._h, substeps)
         elif self.can_turn:
             for piece in self._pieces():
                 for _ in range(substeps):
                     self._angle[piece] += self._spin[piece] * self._h
 
+    def _step_compiled(self, substeps: int) -> None:
+        from sandbox.engines.pymunk_adapter.particle_kernels import drift, fall
+
+        if not self._has_drag:
+            fall(*self._flat, self._runs, self._h, self._kick_tile, substeps)
+        else:
+            mass, gravity, wind = self._air
+            drift(*self._flat, self._runs, self._h, mass, gravity, wind, *self._drag, substeps)
+
     def _step_with_numpy(self, substeps: int, has_forces: bool) -> None:
-        uniform_kick = self._kick[:2]
+        uniform_kick = self._kick
         forces = self._force_array() if self._has_force else None
         for piece in self._pieces():
             position, velocity = self._position[piece], self._velocity[piece]

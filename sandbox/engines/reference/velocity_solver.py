@@ -14,7 +14,8 @@ import numpy as np
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.kernel import kernel
-from sandbox.engines.common.restitution import compiled_rebound, fraction_at, kick_gain, kicked, segment_fractions
+from sandbox.engines.common.restitution import fraction_at, kick_gain, kicked, segment_fractions
+from sandbox.engines.common.restitution_kernels import compiled_rebound
 from sandbox.engines.contract import Exhaustion
 from sandbox.engines.reference.collision import CollisionPipeline
 from sandbox.engines.reference.integrators import INTEGRATORS, Inputs, State, Step, transition
