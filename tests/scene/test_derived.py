@@ -58,8 +58,16 @@ def test_value_is_derived_once_for_a_scene_and_the_setups_of_its_start() -> None
 def test_value_of_a_later_state_is_its_own() -> None:
     names = derived_once(lambda setup: setup.bodies.names)
     setup = Setup.of(loads(TEXT))
-    later = setup.placed(replace(setup.bodies, names=("c", "d")))
-    assert (names(setup), names(later), names(setup)) == (("a", "b"), ("c", "d"), ("a", "b"))
+    bodies = replace(setup.bodies, names=("c", "d"))
+    for later in (setup.placed(bodies), replace(setup, bodies=bodies)):
+        assert (names(setup), names(later), names(setup)) == (("a", "b"), ("c", "d"), ("a", "b"))
+
+
+def test_value_of_a_changed_setup_does_not_compile_its_scene() -> None:
+    setup = Setup.of(loads(TEXT))
+    changed = setup.with_scene(setup.scene.model_copy(update={"title": "changed"}))
+    derived_once(lambda setup: setup.time)(changed)
+    assert "bodies" not in vars(changed.scene)  # cached properties that were not read
 
 
 def test_value_is_released_with_its_scene() -> None:

@@ -22,9 +22,7 @@ def derived_once(derive: Callable[[Setup], Derived]) -> Callable[[Scene | Setup]
 
     @wraps(derive)
     def derived(start: Scene | Setup) -> Derived:
-        source: Scene | Setup = start
-        if isinstance(start, Setup) and start.bodies is start.scene.bodies and start.links is start.scene.links:
-            source = start.scene
+        source = start.scene if isinstance(start, Setup) and start.is_start else start
         key = id(source)
         found = known.get(key)
         if found is not None and found[0]() is source:

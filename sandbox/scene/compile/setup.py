@@ -1,7 +1,7 @@
 """Setup: the compiled state from which an engine starts a scene, at its beginning or in the middle of a session."""
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Self, Union
 
 from sandbox.arrays import FloatArray
@@ -33,11 +33,17 @@ class Setup:
     """pairs of a body and a one-way wall that it is passing"""
     plane_reach: PlaneReach | None = None
     """extent of half-planes; None leaves it to the engine"""
+    is_start: bool = field(default=False, init=False)
+    """whether it is the state in which the scene starts; false for every copy with changes"""
 
     @classmethod
     def of(cls, start: Union[Scene, "Setup"]) -> "Setup":
         """Return the start state of a scene, or a setup as it is."""
-        return start if isinstance(start, Setup) else cls(start, start.bodies, start.links, initial_drive_states(start))
+        if isinstance(start, Setup):
+            return start
+        setup = cls(start, start.bodies, start.links, initial_drive_states(start))
+        object.__setattr__(setup, "is_start", True)
+        return setup
 
     def placed(
         self,
@@ -75,4 +81,5 @@ class Setup:
             scene: scene with as many elements as this one, such as from `change_value`.
         """
         spawned = self.bodies.elements[len(self.scene.elements) :]
-        return replace(self, scene=scene, bodies=replace(self.bodies, elements=(*scene.elements, *spawned)))
+        bodies = replace(self.bodies, elements=(*scene.elements, *spawned))
+        return replace(self, scene=scene, bodies=bodies)
