@@ -123,8 +123,8 @@ def interrupt_in(function: str) -> Iterator[list[str]]:
 
 
 def test_interrupt_within_numpy_ends_a_run() -> None:
-    scene = load(find("bounce"), ["world.duration=0.05"])
-    # numpy calls it when it compares rows, from C code that swallows exceptions.
+    scene = load(find("double_pendulum"), ["world.duration=0.05"])
+    # numpy calls it when it compares rows (pairs of jointed bodies), from C code that swallows exceptions.
     with interrupt_in("_promote_fields") as interrupted, pytest.raises(KeyboardInterrupt):
         run(scene)
     assert interrupted
@@ -143,7 +143,7 @@ def test_interrupt_while_a_space_is_freed_is_raised_and_not_printed(monkeypatch:
 
 def test_command_interrupted_within_numpy_exits_with_status_130(capfd: pytest.CaptureFixture[str]) -> None:
     with interrupt_in("_promote_fields") as interrupted:
-        status = call(["run", "bounce", "--quiet"])
+        status = call(["run", "double_pendulum", "--quiet"])
     assert interrupted
     assert (status, capfd.readouterr().err) == (130, "interrupted: 0 of 1 runs are complete and kept\n")
 

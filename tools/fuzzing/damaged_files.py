@@ -320,11 +320,11 @@ def _scores(_: str, path: str) -> int:
     except OSError:
         return 2  # the path is a folder, which the window reports
     scores.enter("landing: Pad", "abc", 10)
-    if scores.told is not None and len(scores.told) > MAX_LINE:
-        raise Violation("length", scores.told[:1000])
-    if opened(Path(path).absolute()).told is not None:
+    if scores.notice is not None and len(scores.notice) > MAX_LINE:
+        raise Violation("length", scores.notice[:1000])
+    if opened(Path(path).absolute()).notice is not None:
         raise Violation("scores", "the file is damaged again")
-    return 0 if scores.told is None else 1
+    return 0 if scores.notice is None else 1
 
 
 COMMANDS: dict[str, Callable[[str, str], int]] = {
