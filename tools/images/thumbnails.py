@@ -132,7 +132,7 @@ def thumbnail(name: str, moment: Moment) -> Image.Image:
     renderer, surface, combined = Renderer(), offscreen(size), None
     for k in range(moment.strobe + 1):
         time = film.duration * (1.0 - k / max(moment.strobe, 1))
-        renderer.draw(surface, camera, film.snapshot(time, overlays, moment.trail or 1.0), unit=LINES, scale=False)
+        renderer.draw(surface, camera, film.snapshot(time, overlays, moment.trail or 1.0), ui_scale=LINES, scale=False)
         image = image_of(surface)
         faint = Image.blend(Image.new("RGB", size, BACKGROUND), image, FAINT)
         combined = image if combined is None else ImageChops.lighter(combined, faint)
