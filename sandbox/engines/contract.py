@@ -15,6 +15,7 @@ if TYPE_CHECKING:  # importing an engine must stay cheap
     from sandbox.action import Action
     from sandbox.arrays import FloatArray, IntArray
     from sandbox.engines.energy_ledger import Cause
+    from sandbox.frame_table import FrameTable
     from sandbox.scene.compile.bodies import Bodies
     from sandbox.scene.compile.demands import Demand
     from sandbox.scene.compile.scene import Scene
@@ -127,6 +128,20 @@ class Simulation(Protocol):
         Raises:
             Divergence: the state is not finite, or exceeds the bounds.
             Exhaustion: the step needs more memory or work than its limit.
+        """
+
+    def advance(self, steps: int, frames: FrameTable) -> None:
+        """Advance by at most so many time steps dt, and record the frames that are due.
+
+        Frames, contacts and all other results are those of as many calls of `step`, bit for bit. It may return early,
+        after at least one step; `frames.steps` has the number of steps made, also after an exception.
+
+        Args:
+            steps: largest number of steps, at least 1.
+            frames: table with a row for each frame that becomes due, and with columns for all bodies.
+
+        Raises:
+            Divergence, Exhaustion: as `step`; the step that raised is not counted, and has no frame.
         """
 
     def finish(self, part: float) -> None:

@@ -17,6 +17,7 @@ from pydantic import ValidationError
 from sandbox.action import Action, ActionError, Force, Launch, Pull, Remove, SetParameter, Spawn, Switch, Throttle
 from sandbox.arrays import BoolArray
 from sandbox.echo import MAX_MESSAGE, MAX_NAMED, shorten
+from sandbox.engines.common.base import step_and_record
 from sandbox.engines.common.energy_balance import LedgerHandover
 from sandbox.engines.contract import Divergence, Exhaustion, Observer, Refusal
 from sandbox.engines.energy_ledger import Cause
@@ -24,6 +25,7 @@ from sandbox.engines.mouse_joint import MouseJoints
 from sandbox.engines.registry import UnknownEngineError
 from sandbox.engines.registry import start as start_engine
 from sandbox.engines.segment import Checkpoint, Segment, start_segment
+from sandbox.frame_table import FrameTable
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.generators import GeneratorError, count_of, layout_of
 from sandbox.scene.compile.scene import Scene
@@ -305,6 +307,30 @@ class SwitchableSimulation:
             Exhaustion: the step needs more memory or work than its limit.
         """
         self._advance(1.0, self._segment.simulation.step)
+
+    def advance(self, steps: int, frames: FrameTable) -> None:
+        """Advance by at most so many time steps, and record the frames that are due, as `Simulation.advance`.
+
+        Args:
+            steps: largest number of steps.
+            frames: table of the frames.
+
+        Raises:
+            Divergence, Exhaustion: as `step`.
+        """
+        segment, before = self._segment, frames.steps
+        if self._pulls.any or segment.before is not None:  # mouse joints act in each step; frames need other indices
+            step_and_record(self, steps, frames)
+            return
+        try:
+            segment.simulation.advance(steps, frames)
+        except Divergence as divergence:
+            segment.steps += frames.steps - before + 1
+            raise Divergence(self.time, divergence.body, divergence.what) from None
+        except BaseException:
+            segment.steps += frames.steps - before
+            raise
+        segment.steps += frames.steps - before
 
     def finish(self, part: float) -> None:
         """Advance by a last fraction of dt. No step can follow.

@@ -3,12 +3,15 @@
 import math
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import NoReturn
+from collections.abc import Mapping, Sequence
+from typing import NoReturn, Protocol
 
 import numpy as np
 
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.contract import Observer
 from sandbox.engines.energy_ledger import Cause
+from sandbox.frame_table import FrameTable
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.fixed import PlaneReach
@@ -94,6 +97,17 @@ class BaseSimulation(ABC):
         """Return the present state."""
 
     @abstractmethod
+    def step(self) -> None:
+        """Advance by one time step dt."""
+
+    def advance(self, steps: int, frames: FrameTable) -> None:
+        """Advance by at most so many time steps, and record the frames that are due, as `Simulation.advance`.
+
+        Engines override this method where they have a faster way to the same results.
+        """
+        step_and_record(self, steps, frames)
+
+    @abstractmethod
     def account(self) -> Mapping[Cause, float]:
         """Return the energy change, J, by each cause since the first call."""
 
@@ -120,6 +134,43 @@ class BaseSimulation(ABC):
     def _check_part(part: float) -> None:
         if not 0.0 < part < 1.0:
             raise ValueError(f"a last part of {part} steps; it must be greater than 0 and less than 1")
+
+
+class Stepping(Protocol):
+    """A simulation that can be stepped and read."""
+
+    def step(self) -> None:
+        """Advance by one time step dt."""
+
+    def frame(self) -> Frame:
+        """Return the present state."""
+
+
+def step_and_record(simulation: Stepping, steps: int, frames: FrameTable) -> None:
+    """Step a simulation, and record each frame that is due."""
+    for _ in range(steps):
+        simulation.step()
+        frames.steps += 1
+        if frames.is_due():
+            frames.record(simulation.frame())
+
+
+def observe_path(
+    observer: Observer, times: FloatArray, path: FloatArray, pairs: Sequence[tuple[int, IntArray]]
+) -> None:
+    """Call an observer for each of B substeps, in order.
+
+    Args:
+        observer: the observer.
+        times: (B,) s, start of each substep.
+        path: (B + 1, N, 2) m, centres before the first substep and after each.
+        pairs: pairs (K, 2) of substeps, with the number of the substep after the last that has them.
+    """
+    begin = 0
+    for end, touching in pairs:
+        for k in range(begin, end):
+            observer(float(times[k]), path[k], path[k + 1], touching)
+        begin = end
 
 
 class SteppedSimulation(BaseSimulation):

@@ -11,7 +11,7 @@ from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.actions import derive_contacts, has_same_bodies
 from sandbox.engines.common.base import FARTHEST, FASTEST
 from sandbox.engines.common.colliders import StaticColliders, static_colliders
-from sandbox.engines.common.kernel import kernel
+from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.common.lifetimes import Lifetimes
 from sandbox.engines.common.motors import rate_after_level_change
 from sandbox.scene.compile.bodies import Bodies
@@ -235,6 +235,11 @@ class BodyStore:
         self.held_by_zone[indices] = False
         self._retired |= dict.fromkeys(indices.tolist(), time)
         self._rebuild(self.setup, self.bodies, self.contact_matrix)
+
+    @property
+    def can_expire(self) -> bool:
+        """Whether bodies can leave `world.bounds` or reach the end of a lifetime."""
+        return self.scene.world.bounds is not None or self._lifetimes.any_left
 
     def expired(self, time: float) -> IntArray:
         """Return the indices of the bodies to be removed at a time, s: by their lifetime or by world.bounds, (K,)."""

@@ -176,6 +176,19 @@ class ContactLog:
         else:
             self._unflushed += signed_impulse
 
+    def add_impulse_rows(self, impulses: ComplexArray) -> None:
+        """Add impulses (S, K), N·s, of S substeps, each as `add_impulses` does. Each contact must have its own row."""
+        if not impulses.size:
+            return
+        signed_impulses = (impulses if self._order is None else impulses[:, self._order]) * self._sign
+        first = self._impulse[self._row] if self._unflushed is None else self._unflushed
+        # Accumulated and not reduced: a reduction may sum in another order.
+        self._unflushed = np.add.accumulate(np.vstack((first, signed_impulses)), axis=0)[-1].copy()
+
+    def can_hold(self, contacts: int) -> bool:
+        """Return whether so many more contacts can be recorded with certainty."""
+        return self._count + contacts <= self._max_rows
+
     def _flush(self) -> None:
         """Write impulses summed beside the rows into the rows."""
         if self._unflushed is not None:

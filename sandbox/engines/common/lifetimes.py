@@ -40,6 +40,11 @@ class Lifetimes:
         self._ended = 0
         self._next = self._first_end()
 
+    @property
+    def any_left(self) -> bool:
+        """Whether a lifetime is still to end."""
+        return self._next < math.inf
+
     def due(self, time: float) -> IntArray:
         """Return the indices, ascending, of the bodies whose lifetime has ended by a time of the run, s.
 

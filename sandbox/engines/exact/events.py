@@ -6,10 +6,11 @@ it comes up (lazy invalidation, as in event-driven molecular dynamics: Lubachevs
 """
 
 from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.common.body_store import first_beyond
 from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.exact.common import state as c
 from sandbox.engines.exact.common.record import ROWS_PER_EVENT, account_hit, account_slip
-from sandbox.engines.exact.common.state import EventState, is_supported
+from sandbox.engines.exact.common.state import EventState, FrameRows, is_supported
 from sandbox.engines.exact.impact import angle_at, hit_ball, hit_vertex, log_hit, move_to, position_at
 from sandbox.engines.exact.prediction import predict_next_event
 from sandbox.engines.exact.rest import (
@@ -194,3 +195,51 @@ def evaluate(
         if state[i, c.INVERSE_MASS] > 0.0:
             position[i, 0], position[i, 1], velocity[i, 0], velocity[i, 1] = position_at(state, i, t, 0.0)
             angle[i], spin[i] = angle_at(state, i, t, 0.0)
+
+
+@kernel
+def advance_frames(
+    data: EventState,
+    rows: FrameRows,
+    position: FloatArray,
+    velocity: FloatArray,
+    roll: FloatArray,
+    angle: FloatArray,
+    spin: FloatArray,
+) -> tuple[int, int, int, int]:
+    """Make steps, and write the frames that are due.
+
+    Args:
+        data: state arrays.
+        rows: of the frames.
+        position: (N, 2), set to the present state, as the following ones.
+        velocity: (N, 2).
+        roll: (N, 2), always 0.
+        angle: (N,).
+        spin: (N,).
+
+    Returns:
+        Number of whole steps; number of frames; `DONE`, `BEYOND` with the state of the step after them, or another
+        return code of `advance`; `PAIR_TESTS` at the start of a step that is not complete.
+    """
+    written, tests = 0, 0
+    last_prediction = data.counts[c.PREDICTIONS] + EVENTS_PER_CALL
+    for k in range(rows.steps):
+        until = (rows.begin + k + 1.0) * rows.dt
+        tests = data.counts[c.PAIR_TESTS]
+        status = advance(data, until)
+        if status != c.DONE:
+            return k, written, status, tests
+        evaluate(data, until, position, velocity, angle, spin)
+        if first_beyond(position, velocity, angle, spin, roll) >= 0:
+            return k, written, c.BEYOND, tests
+        if (rows.phase + k + 1) % rows.every == 0:
+            rows.time[written] = until
+            for i in range(len(angle)):
+                rows.position[written, i, 0], rows.position[written, i, 1] = position[i, 0], position[i, 1]
+                rows.velocity[written, i, 0], rows.velocity[written, i, 1] = velocity[i, 0], velocity[i, 1]
+                rows.angle[written, i], rows.angular_velocity[written, i] = angle[i], spin[i]
+            written += 1
+        if data.counts[c.PREDICTIONS] > last_prediction:  # so that Python can handle signals
+            return k + 1, written, c.DONE, tests
+    return rows.steps, written, c.DONE, tests

@@ -19,6 +19,7 @@ from sandbox.engines.exact.events import (
     TOO_DENSE,
     TOO_FAST,
     advance,
+    advance_frames,
     advance_to,
     evaluate,
     predict_all,
@@ -76,6 +77,12 @@ class ExactSimulation(EventDrivenSimulation[EventState]):
 
     def _call_event_loop(self, until: float) -> int:
         return advance(self._data, until)
+
+    def _advance_frames(self, rows: c.FrameRows) -> tuple[int, int, int, int]:
+        store = self._store
+        return advance_frames(
+            self._data, rows, store.position, store.velocity, store.roll, store.angle, store.angular_velocity
+        )
 
     def _too_many_events(self, status: int) -> str:
         """Return the message for an exceeded event limit, with the time, the limit and the bodies of the last event."""

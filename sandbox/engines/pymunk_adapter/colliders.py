@@ -378,6 +378,11 @@ class StaticShapes:
         """Return which values of states (R, 6), x, y, angle, vx, vy, ω, are within bounds; nan is not."""
         return np.asarray(np.abs(state - self._middle) <= self._limit)
 
+    @property
+    def quick_bound(self) -> float:
+        """Norm below which a state (R, 6) is within bounds, as a vector of numbers."""
+        return (min(self.reach, FARTHEST, FASTEST) - float(np.hypot(*self._middle[0:2]))) * (1.0 - 1e-9)
+
     def reaches(self, position: FloatArray) -> bool:
         """Return whether half-planes can be extended to a position; always true without planes."""
         return math.isinf(self.reach) or bool((np.abs(position - self._middle[0:2]) <= LONGEST_REACH).all())

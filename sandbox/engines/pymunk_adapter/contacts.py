@@ -24,7 +24,19 @@ from sandbox.arrays import ComplexArray, FloatArray, IntArray
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, PairIndex
 from sandbox.engines.pymunk_adapter.callbacks import PairCallbacks, kick_works
 from sandbox.engines.pymunk_adapter.joint_impulses import JointImpulses
-from sandbox.engines.pymunk_adapter.reader import ARMS, IMPULSES, WIDTH, SpaceReader, address_of, impulses_of, points_of
+from sandbox.engines.pymunk_adapter.reader import (
+    ARMS,
+    IMPULSES,
+    WIDTH,
+    WORD,
+    SpaceReader,
+    address_of,
+    impulses_of,
+    points_of,
+)
+
+WarmStart = tuple[IntArray, FloatArray]
+"""Ids (K, 2) of two bodies each, and the impulses (K, 2), N·s, on the first with which their contacts began."""
 
 
 class WarmStartCorrection:
@@ -57,8 +69,8 @@ class WarmStartCorrection:
         """Whether impulses have been collected."""
         return bool(self._ids)
 
-    def take(self) -> tuple[IntArray, FloatArray]:
-        """Return and clear the ids (K, 2) of the bodies, and the impulses (K, 2) on the first of each, N·s."""
+    def take(self) -> WarmStart:
+        """Return and clear the impulses."""
         ids, impulses = np.asarray(self._ids, np.int64).reshape(-1, 2), np.asarray(self._impulses).reshape(-1, 2)
         self._ids, self._impulses = [], []
         return ids, impulses
@@ -88,6 +100,8 @@ def subtract_impulses(touching: ContactBatch, pair: IntArray, impulse: FloatArra
         pair, impulse_vector = pair[~found], impulse_vector[~found]  # some may be listed in the other order
     return touching._replace(impulse=corrected)
 
+
+NO_IMPULSES: ComplexArray = np.empty((0, 0), np.complex128)
 
 NOT_TOUCHING = 2
 """cpArbiterState from which on shapes are not in contact: ignored, cached, invalidated."""
@@ -247,6 +261,51 @@ def _pair(a: int, b: int) -> ColliderPair:
     return (a, b) if a < b else (b, a)
 
 
+class ContactLists:
+    """Contacts at the end of each of B substeps, as Munk2D lists them."""
+
+    def __init__(
+        self, words: Any, word_ends: list[int], vectors: ComplexArray, width: int, warm_starts: dict[int, WarmStart]
+    ) -> None:
+        """Take over the lists.
+
+        Args:
+            words: memory of all integers.
+            word_ends: (B,) number of integers up to the end of each substep.
+            vectors: of all contacts.
+            width: number of vectors of a contact.
+            warm_starts: impulses with which contacts began, by substep.
+        """
+        self._words, self._vectors, self.width = words, vectors, width
+        self._byte_ends = [0, *(end * WORD for end in word_ends)]
+        self._vector_ends = [0, *(end // 3 * width for end in word_ends)]
+        self.warm_starts = warm_starts
+        """impulses with which contacts began, by substep"""
+
+    def __len__(self) -> int:
+        return len(self._byte_ends) - 1
+
+    def words(self, k: int) -> bytes:
+        """Return the integers of a substep: two ids and the number of points of each contact."""
+        return self._words[self._byte_ends[k] : self._byte_ends[k + 1]]  # type: ignore[no-any-return]
+
+    def vectors(self, k: int) -> ComplexArray:
+        """Return the vectors of a substep."""
+        return self._vectors[self._vector_ends[k] : self._vector_ends[k + 1]]
+
+    def stack(self, begin: int, end: int) -> ComplexArray:
+        """Return the vectors of substeps whose integers are equal, one row each."""
+        return self._vectors[self._vector_ends[begin] : self._vector_ends[end]].reshape(end - begin, -1)
+
+    def end_of_same(self, k: int) -> int:
+        """Return the first substep after k whose integers differ from those of k, or that has warm starts."""
+        words, ends, last = self._words, self._byte_ends, self.words(k)
+        end = k + 1
+        while end < len(self) and words[ends[end] : ends[end + 1]] == last and end not in self.warm_starts:
+            end += 1
+        return end
+
+
 class ContactReader:
     """Contacts of a space. Nothing is read before the first call."""
 
@@ -271,7 +330,46 @@ class ContactReader:
             single: whether two bodies have at most one contact.
             impulses_suffice: whether impulses alone suffice if the contacts are those of the last call, in that order.
         """
-        same = self._reader.read_contacts(polygons)
+        return self._corrected(self._reader.read_contacts(polygons), single, impulses_suffice, self.take_warm_start())
+
+    def take_warm_start(self) -> WarmStart | None:
+        """Return and clear the impulses with which contacts of the last substep began; None if there are none."""
+        warm_start = self._warm_start
+        return warm_start.take() if warm_start is not None and warm_start.pairs and warm_start.found else None
+
+    @property
+    def has_warm_starts(self) -> bool:
+        """Whether impulses with which contacts begin are collected by callbacks."""
+        return self._warm_start is not None and self._warm_start.pairs
+
+    @property
+    def is_started(self) -> bool:
+        """Whether contacts have been read, so that the kind of correction is known."""
+        return self.has_warm_starts or self._cached_correction is not None
+
+    def touching_in(
+        self, lists: ContactLists, k: int, polygons: bool, single: bool, impulses_suffice: bool
+    ) -> ContactBatch | ComplexArray:
+        """Return the contacts of a substep of a batch, as `touching` would have done after it."""
+        same = self._reader.use_list(lists.words(k), lists.vectors(k), polygons)
+        return self._corrected(same, single, impulses_suffice, lists.warm_starts.get(k))
+
+    def impulses_in(self, lists: ContactLists, begin: int, polygons: bool) -> ComplexArray:
+        """Return the impulses (S, K), N·s, of substeps from `begin` on with the same contacts as the last one read.
+
+        S is 0 if the contacts of the first of them differ, or need a correction.
+        """
+        reader = self._reader
+        if begin in lists.warm_starts or lists.words(begin) != reader.id_words:
+            return NO_IMPULSES
+        end = lists.end_of_same(begin)
+        reader.use_list(reader.id_words, lists.vectors(end - 1), polygons)
+        return lists.stack(begin, end)[:, reader.impulse_columns()]
+
+    def _corrected(
+        self, same: bool, single: bool, impulses_suffice: bool, warm_start: WarmStart | None
+    ) -> ContactBatch | ComplexArray:
+        """Return the contacts of the present list of the reader; `same` as `SpaceReader.read_contacts` returns."""
         if single and self._are_listings_enough():
             if same and impulses_suffice and self._cached_correction is not None:
                 return self._reader.impulses()
@@ -281,13 +379,15 @@ class ContactReader:
             elif same:
                 return found
             return self._cached_correction.correct(found)
-        warm_start = self._warm_start or self._start_warm_start_correction()
-        if same and impulses_suffice and warm_start.pairs and not warm_start.found:
+        if same and impulses_suffice and self.has_warm_starts and warm_start is None:
             return self._reader.impulses()
-        warm_start.pairs = True
+        self._start_warm_start_correction().pairs = True
         found = self._reader.touching()
-        ids, impulses = warm_start.take()
-        return subtract_impulses(found, self._reader.indices(ids), impulses) if len(ids) else found
+        return (
+            found
+            if warm_start is None
+            else subtract_impulses(found, self._reader.indices(warm_start[0]), warm_start[1])
+        )
 
     def _are_listings_enough(self) -> bool:
         """Return whether listings suffice: no pair was cached before the first, and no callback is in use."""

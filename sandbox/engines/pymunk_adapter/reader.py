@@ -66,6 +66,11 @@ SECOND = TOUCH | ArbiterFields.POINT_A_2 | ArbiterFields.POINT_B_2
 
 TOUCH_FLAGS, SECOND_FLAGS = TOUCH.value, SECOND.value
 
+VECTORS, VECTORS_OF_TWO_POINTS = 4, 6
+"""Vectors of a contact in a list: impulse, normal, and two for each point."""
+
+NO_VECTORS: ComplexArray = np.empty(0, np.complex128)
+
 WORD = ffi.sizeof("uintptr_t")
 """bytes of an integer in a buffer"""
 
@@ -85,13 +90,16 @@ class SpaceReader:
     def __init__(self, space: pymunk.Space) -> None:
         self._space = space
         self._bodies, self._arbiters, self._forces = Buffer(), Buffer(), Buffer()
-        self._listing = _listing(self._arbiters)
+        self._listing = listing_into(self._arbiters)
         self.keep_last = False
-        """whether the vectors of the previous `read_contacts` are kept; set once, after a `read_contacts`"""
-        self._last: tuple[Buffer, Any, IntArray] | None = None  # previous listing: buffer, listing, rows
+        """whether the vectors of the previous list of contacts are kept; set once, after a `read_contacts`"""
+        self._spare: tuple[Buffer, Any] | None = None  # buffer and listing of the list before the present one
+        # vectors of the previous list, and the first vector of each of its contacts
+        self._last: tuple[ComplexArray, IntArray] = NO_VECTORS, np.empty(0, np.int64)
+        self._vectors = NO_VECTORS  # of the present list
         self._index_of = IdTable({})
         self._moving: IntArray = np.empty(0, np.int64)
-        self._id_words, self._width = b"", 4  # ids of the last reading, and number of vectors of a contact
+        self._id_words, self._width = b"", VECTORS  # ids of the present list, and number of vectors of a contact
         self._touching_rows: IntArray = np.empty(0, np.int64)
         self._first_vectors = self._touching_rows  # first vector of each
         self._is_order_stale, self._moving_come_first, self._body_count = True, True, 0
@@ -179,29 +187,64 @@ class SpaceReader:
         self._arbiters.clear()
         self._listing.fields = SECOND_FLAGS if polygons else TOUCH_FLAGS
         lib.cpSpaceEachCachedArbiter(self._space._space, LIST, self._listing)
-        self._width = 6 if polygons else 4
         int_array = self._arbiters._int_arr  # the memory behind `int_buf`
-        words = ffi.buffer(int_array.arr, int_array.num * WORD)[:] if int_array.num else b""
-        same = words == self._id_words
+        if not int_array.num:
+            return self.use_list(b"", NO_VECTORS, polygons)
+        words = ffi.buffer(int_array.arr, int_array.num * WORD)[:]
+        return self.use_list(words, np.frombuffer(self._arbiters.float_buf(), np.complex128), polygons)
+
+    def use_list(self, words: bytes, vectors: ComplexArray, polygons: bool) -> bool:
+        """Take a list of contacts as the present one; return as `read_contacts` does.
+
+        Args:
+            words: two ids and the number of points of each contact.
+            vectors: of all contacts. They must stay as they are until the next list but one.
+            polygons: whether contacts have up to two points.
+        """
+        self._last = self._vectors, self._first_vectors
+        self._vectors = vectors
+        width = VECTORS_OF_TWO_POINTS if polygons else VECTORS
+        same = words == self._id_words and width == self._width
         if not same:
-            self._id_words = words
+            self._id_words, self._width = words, width
             # An ended contact stays cached for a while, with no points.
             self._touching_rows = np.flatnonzero(np.frombuffer(words, np.int64)[2::3])
             self._first_vectors = self._touching_rows * self._width
         return same
 
+    @property
+    def body_count(self) -> int:
+        """Number of bodies in the space."""
+        if self._is_order_stale:
+            self._read_order()
+        return self._body_count
+
+    @property
+    def moving_rows(self) -> slice | IntArray:
+        """Rows of the moving bodies in a list of all bodies."""
+        return slice(0, len(self._rows)) if self._moving_come_first else self._rows
+
+    @property
+    def id_words(self) -> bytes:
+        """The ids of the present list."""
+        return self._id_words
+
+    def own_list(self) -> None:
+        """Copy the present list, so that its memory may change."""
+        self._vectors = self._vectors.copy()
+
     def _swap_buffers(self) -> None:
-        """Keep the present listing as the previous one, and reuse the buffers of the one before it."""
-        spare = Buffer() if self._last is None else self._last[0]
-        listing = _listing(spare) if self._last is None else self._last[1]
-        self._last = self._arbiters, self._listing, self._first_vectors
+        """Reuse the buffer of the previous list, and keep that of the present one."""
+        if self._spare is None:
+            spare = Buffer()
+            self._spare = spare, listing_into(spare)
+        spare, listing = self._spare
+        self._spare = self._arbiters, self._listing
         self._arbiters, self._listing = spare, listing
 
     def last_vectors(self, rows: IntArray) -> tuple[ComplexArray, ComplexArray]:
-        """Return the impulses, N·s, and normals (K,) of some rows of the previous reading."""
-        assert self._last is not None
-        arbiters, _, firsts = self._last
-        vectors = np.frombuffer(arbiters.float_buf(), np.complex128)
+        """Return the impulses, N·s, and normals (K,) of some rows of the previous list."""
+        vectors, firsts = self._last
         return vectors[firsts[rows]], vectors[firsts[rows] + 1]
 
     def cached(self) -> IntArray:
@@ -214,8 +257,11 @@ class SpaceReader:
         """Return the impulses (K,), N·s, of the present contacts, on the first body of each."""
         if not len(self._touching_rows):
             return NO_CONTACTS.impulse
-        vectors = np.frombuffer(self._arbiters.float_buf(), np.complex128)
-        return vectors.take(self._first_vectors)
+        return self._vectors.take(self._first_vectors)
+
+    def impulse_columns(self) -> IntArray:
+        """Return the positions (K,) of the impulses of the present contacts among the vectors of the list."""
+        return self._first_vectors
 
     def touching(self) -> ContactBatch:
         """Return the present contacts as new arrays."""
@@ -224,7 +270,7 @@ class SpaceReader:
             return NO_CONTACTS
         words = np.frombuffer(self._id_words, np.int64).reshape(-1, 3)
         a, b = (self._index_of.indices(words[:, k].take(rows)) for k in (0, 1))
-        vectors = np.frombuffer(self._arbiters.float_buf(), np.complex128).reshape(-1, self._width).take(rows, axis=0)
+        vectors = self._vectors.reshape(-1, self._width).take(rows, axis=0)
         point = (vectors[:, 2] + vectors[:, 3]) * 0.5
         if self._width > 4:
             twice = words[:, 2].take(rows) > 1
@@ -232,10 +278,10 @@ class SpaceReader:
         return ContactBatch(a, b, vectors[:, 0], vectors[:, 1], point)
 
 
-def _listing(arbiters: Buffer) -> Any:
-    """Return the struct that listing arbiters writes to; `get_space_arbiters` creates one at each call."""
+def listing_into(buffer: Buffer) -> Any:
+    """Return the struct by which Munk2D lists into a buffer; pymunk's own functions create one at each call."""
     listing = ffi.new("pmBatchedData *")
-    listing.floatArray, listing.intArray = arbiters._float_arr, arbiters._int_arr
+    listing.floatArray, listing.intArray = buffer._float_arr, buffer._int_arr
     return listing
 
 

@@ -8,19 +8,24 @@ import numpy as np
 from sandbox.action import Action
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.actions import apply_action
-from sandbox.engines.common.base import BaseSimulation
+from sandbox.engines.common.base import BaseSimulation, observe_path
 from sandbox.engines.common.contact_log import ContactBatch, ContactLog, join_batches
 from sandbox.engines.common.energy_balance import record_energy_change
 from sandbox.engines.common.lifetimes import Lifetimes
 from sandbox.engines.contract import Divergence, Exhaustion, Observer
 from sandbox.engines.energy_ledger import Cause, EnergyLedger
+from sandbox.engines.pymunk_adapter.batch_reader import MAX_CONTACTS
 from sandbox.engines.pymunk_adapter.bodies import PymunkBodies
+from sandbox.engines.pymunk_adapter.contacts import ContactLists
 from sandbox.engines.pymunk_adapter.energy import PymunkEnergyLedger
+from sandbox.frame_table import FrameTable
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.fixed import PlaneReach
 from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Contacts, Frame
+
+NO_POSITIONS: FloatArray = np.empty((0, 2))
 
 
 class EventRecorder:
@@ -50,6 +55,27 @@ class EventRecorder:
             self.contacts += len(contacts)
         if entries is not None:
             log.has_distinct_rows = False  # a zone entry does not last: the next contacts are different ones
+
+    def record_lists(self, lists: ContactLists, times: FloatArray) -> list[tuple[int, IntArray]]:
+        """Record the contacts of a batch of substeps.
+
+        Args:
+            lists: the contacts.
+            times: (B,) s, end of each substep.
+
+        Returns:
+            The pairs (K, 2) of the substeps, with the number of the substep after the last that has them.
+        """
+        pairs = []
+        for end, count in self._population.space_bodies.read_batch(lists, self._log, times):
+            self.contacts += count
+            pairs.append((end, self._log.pairs()))
+        return pairs
+
+    @property
+    def can_batch(self) -> bool:
+        """Whether a batch of substeps can be recorded: contacts have been read before, and there is space for more."""
+        return self._population.space_bodies.contact_reader.is_started and self._log.can_hold(MAX_CONTACTS)
 
     def rebuild(self) -> None:
         """Update after an action: a spawned body may have several shapes."""
@@ -149,6 +175,87 @@ class PymunkSimulation(BaseSimulation):
             self._steps += 1
             self._check_state()
             self._retire()
+
+    def advance(self, steps: int, frames: FrameTable) -> None:
+        """Advance by at most so many time steps, and record the frames that are due, as `Simulation.advance`.
+
+        Where nothing has to be done between two substeps, Munk2D makes many of them before Python reads the results.
+
+        Raises:
+            Divergence: as `step`.
+        """
+        if not self._can_batch:
+            super().advance(steps, frames)
+            return
+        with self._lock:
+            self._check_running()
+            frames.prepare(steps, len(self.bodies))
+            end = frames.steps + steps
+            while frames.steps < end and self._can_batch:
+                self._advance_batch(end - frames.steps, frames)
+
+    @property
+    def _can_batch(self) -> bool:
+        """Whether a batch of substeps gives the same results as one substep after the other."""
+        population = self._population
+        return (
+            population.space_bodies.can_batch
+            and population.tabletop is None
+            and not len(population.particles)
+            and self._ledger is None
+            and population.scene.world.bounds is None
+            and not self._lifetimes.any_left
+            and (self._recorder is None or self._recorder.can_batch)
+        )
+
+    def _advance_batch(self, steps: int, frames: FrameTable) -> None:
+        """Make at most so many steps in one batch."""
+        population, observed = self._population, self._observer is not None
+        space_bodies, substeps, h = population.space_bodies, self._settings.substeps, self._h
+        steps = min(steps, space_bodies.batch_steps(substeps, observed))
+        start = self._state()[0].copy() if observed else NO_POSITIONS
+        batch = space_bodies.step_batch(steps, substeps, observed, self._recorder is not None)
+        # The time of a substep is that of `_advance`: counted from the start of its step.
+        step_index, k = np.divmod(np.arange(batch.steps * substeps), substeps)
+        starts = (self._steps + step_index) * self._settings.dt + k * h
+        if self._recorder is not None and batch.contacts is not None:
+            pairs = self._recorder.record_lists(batch.contacts, starts + h)
+            if self._observer is not None:
+                path = np.empty((len(starts) + 1, *start.shape))
+                path[:] = start
+                space_bodies.write_positions(batch.states, path[1:])
+                observe_path(self._observer, starts, path, pairs)
+        if space_bodies.joints.count:
+            self._joint_iterations += space_bodies.solved_joint_count * self._settings.iterations * len(starts)
+        self._record_states(batch.states[substeps - 1 :: substeps] if observed else batch.states, frames)
+        self._steps += batch.steps
+        population.invalidate()
+        self._shared_angles = None
+        if batch.has_failed:
+            frames.steps -= 1
+            self._check_state()
+
+    def _record_states(self, states: FloatArray, frames: FrameTable) -> None:
+        """Count steps, and record the frames that are due, by the states (S, R, 6) after each step."""
+        population, first = self._population, frames.steps + 1
+        frames.steps += len(states)
+        due = np.flatnonzero(np.arange(first, first + len(states)) % frames.every == 0)
+        if not len(due):
+            return
+        rows, n = slice(frames.count, frames.count + len(due)), len(self.bodies)
+        frames.time[rows] = (self._steps + 1 + due) * self._settings.dt
+        columns = [
+            array[rows, :n] for array in (frames.position, frames.velocity, frames.angle, frames.angular_velocity)
+        ]
+        fixed = (population.position, population.velocity, population.angle, population.angular_velocity)
+        for column, values in zip(columns, fixed, strict=True):
+            column[:] = values
+        population.space_bodies.write_states(states[due], *columns)
+        if self._settings.half_kick:
+            columns[1][:, population.moving] -= population.ahead
+        if len(population.scene.layers) > 1:
+            frames.layer_rows()[rows, :n] = population.layer
+        frames.finish_rows(len(due), n)
 
     def finish(self, part: float) -> None:
         """Advance by a last fraction of dt. No step can follow.

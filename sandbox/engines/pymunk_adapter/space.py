@@ -10,7 +10,8 @@ from pymunk._chipmunk_cffi import ffi, lib
 
 from sandbox.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from sandbox.engines.common.base import BEYOND, FARTHEST
-from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch
+from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, ContactLog
+from sandbox.engines.pymunk_adapter.batch_reader import Batch, BatchReader
 from sandbox.engines.pymunk_adapter.colliders import (
     StaticShapes,
     SurfaceSetter,
@@ -21,7 +22,7 @@ from sandbox.engines.pymunk_adapter.colliders import (
     new_space,
     shuffled,
 )
-from sandbox.engines.pymunk_adapter.contacts import ContactReader
+from sandbox.engines.pymunk_adapter.contacts import NO_IMPULSES, ContactLists, ContactReader
 from sandbox.engines.pymunk_adapter.drives import SpaceDrives
 from sandbox.engines.pymunk_adapter.forces import SpaceForceField, acceleration, has_drag, mean_fraction, rates
 from sandbox.engines.pymunk_adapter.joints import SpaceJoints, spring_forces
@@ -131,6 +132,9 @@ class ConstantForces:
     def __iter__(self) -> Iterator[int]:
         return iter(self._total)
 
+    def __len__(self) -> int:
+        return len(self._total)
+
     def items(self) -> list[tuple[int, tuple[FloatArray, float]]]:
         """Return index, and force and torque, of each body that has some."""
         return list(self._total.items())
@@ -236,7 +240,7 @@ class SpaceBodies(SpaceBodyTable):
         self._setup, self._scene, self._settings, self._skin = setup, scene, settings, skin
         self._h, self._dragged = settings.h, has_drag(scene.world)
         super().__init__(new_space(scene, settings))
-        self._reader = SpaceReader(self._space)
+        self._reader, self._batch_reader = SpaceReader(self._space), BatchReader(self._space)
         self._surface_setter = SurfaceSetter(self._space, settings.h)
         self._static_shapes = StaticShapes(self._space, self._surface_setter)
         self._surface_of: IntArray = np.empty(0, np.int64)
@@ -458,6 +462,103 @@ class SpaceBodies(SpaceBodyTable):
         else:
             self._space.step(self._h)
         self._state = None
+
+    @property
+    def can_batch(self) -> bool:
+        """Whether nothing has to be done between two substeps, so that `step_batch` can make many."""
+        return not (
+            not self._moving
+            or self._dragged
+            or len(self.constant_forces)
+            or self.field.kicks
+            or self.drives.driven_bodies
+            or self._scene.zones
+            or self._surface_setter.one_way_walls.walls
+            or self.joints.has_breakable
+        )
+
+    def batch_steps(self, substeps: int, lists_substeps: bool) -> int:
+        """Return the largest number of steps of `step_batch`."""
+        rows = self._batch_reader.max_rows(self._reader.body_count)
+        return max(rows // substeps, 1) if lists_substeps else rows
+
+    def step_batch(self, steps: int, substeps: int, lists_substeps: bool, lists_contacts: bool) -> Batch:
+        """Make at most so many steps, while states are within bounds.
+
+        Args:
+            steps: largest number of steps, at most `batch_steps`.
+            substeps: substeps of a step.
+            lists_substeps: whether states are listed after every substep, not only after every step.
+            lists_contacts: whether contacts are listed, after every substep.
+        """
+        contacts = self.contact_reader
+
+        def is_valid() -> bool:
+            self._state = None
+            return self.beyond() is None
+
+        batch = self._batch_reader.step(
+            self._h,
+            steps,
+            substeps,
+            self._reader.body_count,
+            self._reader.moving_rows,
+            lists_substeps=lists_substeps,
+            lists_contacts=lists_contacts,
+            polygons=self._polygons,
+            warm_start=contacts.take_warm_start if contacts.has_warm_starts else None,
+            quick_bound=self._static_shapes.quick_bound,
+            is_valid=is_valid,
+        )
+        self._state = None
+        return batch
+
+    def write_states(
+        self,
+        states: FloatArray,
+        position: FloatArray,
+        velocity: FloatArray,
+        angle: FloatArray,
+        angular_velocity: FloatArray,
+    ) -> None:
+        """Write states (S, R, 6) of a batch into arrays of S frames, in scene order."""
+        slots = self._reader.slots
+        position[:, slots], velocity[:, slots] = states[..., 0:2], states[..., 3:5]
+        angle[:, slots], angular_velocity[:, slots] = states[..., 2], states[..., 5]
+
+    def write_positions(self, states: FloatArray, position: FloatArray) -> None:
+        """Write positions of states (S, R, 6) of a batch into an array (S, N, 2) in scene order."""
+        position[:, self._reader.slots] = states[..., 0:2]
+
+    def read_batch(self, lists: ContactLists, log: ContactLog, times: FloatArray) -> Iterator[tuple[int, int]]:
+        """Enter the contacts of a batch into a log, as if they had been read after each substep.
+
+        Args:
+            lists: the contacts.
+            log: the log.
+            times: (B,) s, end of each substep.
+
+        Yields:
+            After each substep, or after several with the same pairs: the number of the next substep, and of contacts.
+        """
+        reader, polygons, single = self.contact_reader, self._polygons, self._has_single_contacts
+        k = 0
+        while k < len(lists):
+            impulses = reader.impulses_in(lists, k, polygons) if log.has_distinct_rows else NO_IMPULSES
+            if len(impulses):
+                log.add_impulse_rows(impulses)
+                k, count = k + len(impulses), impulses.size
+            else:
+                contacts = reader.touching_in(lists, k, polygons, single, log.has_distinct_rows)
+                if isinstance(contacts, ContactBatch):
+                    log.record(float(times[k]), contacts)
+                    count = len(contacts.a)
+                else:
+                    log.add_impulses(contacts)
+                    count = len(contacts)
+                k += 1
+            yield k, count
+        self._reader.own_list()
 
     def _apply_drag(self, indices: IntArray, state: FloatArray) -> None:
         """Set the forces of the next substep on bodies (R,) of a state (R, 6), in a scene with drag."""

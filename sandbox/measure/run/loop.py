@@ -1,8 +1,7 @@
 """Step loop of a run: step, apply actions and record frames, to the end or to the failure that ends the run early."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import chain, repeat
+from collections.abc import Callable, Mapping, Sequence
 from time import perf_counter
 from typing import NamedTuple
 
@@ -13,6 +12,7 @@ from sandbox.engines.contract import Divergence, Exhaustion, Simulation
 from sandbox.games.session import HeadlessGame
 from sandbox.measure.run.recorder import Recorder
 from sandbox.progress import Progress, ProgressCallback
+from sandbox.scene.description.base import MAX_STEPS
 from sandbox.schedule import ROUNDING, Stretch
 from sandbox.trajectory import Contacts, Frame
 
@@ -21,6 +21,15 @@ WorkCallback = Callable[[int, Mapping[str, int]], None]
 
 REPORT_INTERVAL = 0.1
 """s between two calls of the callbacks."""
+
+CALL_DURATION = 0.02
+"""s that a call of `Simulation.advance` should take, so that progress and Ctrl-C are prompt."""
+
+FIRST_STEPS = 16
+"""Steps of the first call of `Simulation.advance`, of which nothing is known."""
+
+MIN_ELAPSED = 1e-6
+"""s, resolution of the clock."""
 
 MAX_PENDING_CONTACTS = 1024
 """Steps of a game whose contacts are kept separately before they are merged, which bounds memory."""
@@ -76,14 +85,14 @@ def run_loop(
         loop.finish()
     except Divergence as divergence:
         status, reason = "diverged", str(divergence)
-        recorder.record(simulation.frame(), divergence.time)
+        recorder.record(simulation.frame())
     except ActionError as error:
         status, reason = "failed", f"at {simulation.time:g} s: {error}"
         recorder.record_unless_recorded(simulation.frame())
     except Exhaustion as error:  # within a step, which has no frame
         status, reason = "failed", f"at {simulation.time:g} s: {error}"
     loop.report(1.0)
-    return RunEnd(status, reason, loop.step, loop.queue.contacts(), loop.queue.done)
+    return RunEnd(status, reason, recorder.steps, loop.queue.contacts(), loop.queue.done)
 
 
 class _StepLoop:
@@ -99,8 +108,6 @@ class _StepLoop:
         game: HeadlessGame | None,
         callbacks: RunCallbacks,
     ) -> None:
-        self.step = 0
-        """steps made"""
         self.queue = queue
         self._duration, self._simulation, self._stretches = duration, simulation, stretches
         self._recorder, self._game, self._callbacks = recorder, game, callbacks
@@ -108,32 +115,54 @@ class _StepLoop:
         self._part = stretches[-1].part
         """length of the last, incomplete step as a fraction of dt"""
         self._reported = perf_counter()
+        self._has_callbacks = any(each is not None for each in self._callbacks)
+        self._steps_per_call = FIRST_STEPS
         simulation.contacts()
-        recorder.record(simulation.frame(), 0.0)
+        recorder.record(simulation.frame())
 
     def step_all(self) -> None:
         """Make all whole steps; a game can end them."""
-        simulation, recorder, queue = self._simulation, self._recorder, self.queue
-        has_callbacks = any(each is not None for each in self._callbacks)
-        for dt in self._step_sizes():
-            now = simulation.time + ROUNDING * dt
-            if now >= queue.next:
-                queue.apply_due(now)
-                if self._is_game_over():
-                    return
-            simulation.step()
-            self.step += 1
-            is_last = self.step == self._count and self._part == 0.0
-            queue.frame = None
-            if recorder.is_due(self.step, is_last):
-                queue.frame = simulation.frame()
-                recorder.record(queue.frame, self._duration if is_last else simulation.time)
-            if has_callbacks and perf_counter() - self._reported > REPORT_INTERVAL:
-                self._reported = perf_counter()
-                self.report(self.step / (self._count + self._part))
+        # A game has a turn after every step, and energies are read at every frame.
+        one_by_one = self._game is not None or self._recorder.has_energy
+        for stretch in self._stretches:
+            end = self._recorder.steps + stretch.steps
+            while (left := end - self._recorder.steps) > 0:
+                now = self._simulation.time + ROUNDING * stretch.dt
+                if now >= self.queue.next:
+                    self.queue.apply_due(now)
+                    if self._is_game_over():
+                        return
+                if one_by_one:
+                    self._step()
+                else:
+                    self._advance(min(left, _steps_before(self.queue.next, now, stretch.dt)))
+                if self._has_callbacks and perf_counter() - self._reported > REPORT_INTERVAL:
+                    self._reported = perf_counter()
+                    self.report(self._recorder.steps / (self._count + self._part))
+        if self._part == 0.0:
+            self.queue.frame = self._simulation.frame()
+            self._recorder.record_unless_recorded(self.queue.frame)
+            self._recorder.end_time = self._duration
 
-    def _step_sizes(self) -> Iterator[float]:
-        return chain.from_iterable(repeat(stretch.dt, stretch.steps) for stretch in self._stretches)
+    def _step(self) -> None:
+        """Make one step, and record its frame if it is due."""
+        self._simulation.step()
+        self._recorder.steps += 1
+        self.queue.frame = None
+        if self._recorder.is_due():
+            self.queue.frame = self._simulation.frame()
+            self._recorder.record(self.queue.frame)
+
+    def _advance(self, steps: int) -> None:
+        """Make at most so many steps in one call, and adapt the length of the next call to the time that it took."""
+        steps = min(steps, self._steps_per_call)
+        start = perf_counter()
+        self._simulation.advance(steps, self._recorder)
+        elapsed = perf_counter() - start
+        if elapsed > CALL_DURATION:
+            self._steps_per_call = max(int(steps * CALL_DURATION / elapsed), 1)
+        elif steps == self._steps_per_call:
+            self._steps_per_call = min(2 * steps, int(steps * CALL_DURATION / max(elapsed, MIN_ELAPSED)))
 
     def _is_game_over(self) -> bool:
         return self._game is not None and self._game.finished
@@ -148,7 +177,8 @@ class _StepLoop:
             self.queue.apply_due(now)
             simulation.finish(self._part)
             self.queue.frame = simulation.frame()
-            recorder.record(self.queue.frame, self._duration)
+            recorder.record(self.queue.frame)
+            recorder.end_time = self._duration
             self.queue.notify_end()
         elif self.queue.apply_due(now, is_last=True):
             recorder.replace_last(simulation.frame())
@@ -156,9 +186,18 @@ class _StepLoop:
     def report(self, fraction: float) -> None:
         """Call the callbacks."""
         if self._callbacks.on_work is not None:
-            self._callbacks.on_work(self.step, self._simulation.work)
+            self._callbacks.on_work(self._recorder.steps, self._simulation.work)
         if self._callbacks.on_progress is not None:
             self._callbacks.on_progress(Progress(fraction=fraction))
+
+
+def _steps_before(time: float, now: float, dt: float) -> int:
+    """Return the number of steps of dt that can be made from `now` on before a time, s; at least one.
+
+    It is one fewer than possible, so that rounding does not matter: the last steps are made one by one.
+    """
+    steps = (time - now) / dt
+    return max(int(steps) - 1, 1) if steps < MAX_STEPS else int(MAX_STEPS)
 
 
 class _ActionQueue:

@@ -7,6 +7,7 @@ import numpy as np
 from sandbox.action import Action
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.contract import Exhaustion
+from sandbox.frame_table import FrameTable
 from sandbox.resource_limits import FREE_FRACTION, TooLargeError, free_memory
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
@@ -74,8 +75,8 @@ def require_memory(
     )
 
 
-class Recorder:
-    """Recorded frames of a run: every n-th, and the last."""
+class Recorder(FrameTable):
+    """Recorded frames of a run: every n-th, and the last; with the energy account of each if it is wanted."""
 
     def __init__(
         self,
@@ -100,88 +101,58 @@ class Recorder:
             TooLargeError: the frames would not fit into memory.
         """
         frames = require_memory(scene, settings, bodies, actions, causes if read_energy else 0)
+        super().__init__(frames, bodies, settings.record_every)
         self._scene = scene
-        self._every = settings.record_every
-        self._count = 0
-        self._last = -1.0
-        """s, time of the simulation at the last recorded frame; its recorded time can be the exact duration of the run
-        """
-        self.time: FloatArray = np.empty(frames)
-        # Not filled: a run that ends early takes no memory for the frames that it never recorded.
-        self.position, self.velocity = (np.empty((frames, bodies, 2)) for _ in range(2))
-        self.angle, self.angular_velocity = (np.empty((frames, bodies)) for _ in range(2))
-        self.spin: FloatArray | None = None
-        """(T, N, 3) rad/s, if the first frame has rolling spheres"""
-        self.layer: IntArray | None = None
-        """(T, N), if the first frame has layers; −1 for a body that has not been added yet"""
+        self.end_time: float | None = None
+        """s, exact duration of a run that has reached it, which the sum of its steps misses by rounding"""
         self._read_energy = read_energy
         self._energy: FloatArray = np.empty(frames if read_energy else 0)
         self._account: FloatArray = np.empty((frames, causes) if read_energy else (0, 0))
 
-    def is_due(self, step: int, is_last: bool) -> bool:
-        """Return whether the frame after a number of steps is recorded."""
-        return is_last or step % self._every == 0
+    @property
+    def has_energy(self) -> bool:
+        """Whether energies are recorded, which are read at the moment at which a frame is recorded."""
+        return self._read_energy is not None
 
-    def record(self, frame: Frame, time: float) -> None:
-        """Record a frame with a time, s."""
-        k, n = self._count, len(frame.position)
-        if n > self.angle.shape[1]:
-            self._widen(n)
-        self.time[k], self._last = time, frame.time
-        self.position[k, :n], self.velocity[k, :n] = frame.position, frame.velocity
-        self.angle[k, :n], self.angular_velocity[k, :n] = frame.angle, frame.angular_velocity
-        for values in (self.position, self.velocity, self.angle, self.angular_velocity):
-            values[k, n:] = np.nan  # bodies that have not been added yet
-        spin = frame.spin
-        if spin is not None:
-            if self.spin is None:
-                self.spin = np.empty((*self.angle.shape, 3))
-            self.spin[k, :n], self.spin[k, n:] = spin, np.nan
-        if frame.layer is not None:
-            if self.layer is None:
-                self.layer = np.empty(self.angle.shape, np.int16)
-            self.layer[k, :n], self.layer[k, n:] = frame.layer, -1
+    def record(self, frame: Frame) -> None:
+        """Record a frame."""
+        super().record(frame)
         if self._read_energy is not None:
-            self._energy[k], self._account[k] = self._read_energy()
-        self._count += 1
+            self._energy[self.count - 1], self._account[self.count - 1] = self._read_energy()
 
     def record_unless_recorded(self, frame: Frame) -> None:
-        """Record the frame at which a run ends early, unless it is the last recorded one."""
-        if frame.time != self._last:
-            self.record(frame, frame.time)
+        """Record a frame unless the last recorded one has its time."""
+        if frame.time != self.time[self.count - 1]:
+            self.record(frame)
 
     def replace_last(self, frame: Frame) -> None:
-        """Replace the last recorded frame, with its time."""
-        self._count -= 1
-        self.record(frame, float(self.time[self._count]))
+        """Replace the last recorded frame by one of the same time, which actions have changed since."""
+        self.count -= 1
+        self.record(frame)
 
     def record_end(self, frame: Frame) -> None:
-        """Record a frame as the last one; replace a frame of the same time, which actions have changed since."""
-        if frame.time == self._last:
+        """Record a frame as the last one, or replace a frame of the same time."""
+        if frame.time == self.time[self.count - 1]:
             self.replace_last(frame)
         else:
-            self.record(frame, frame.time)
+            self.record(frame)
 
     def _widen(self, bodies: int) -> None:
-        """Enlarge the arrays for unexpected bodies, such as those that the rules of a game add."""
         wide = bodies + bodies // 2  # more bodies are likely to follow
         if len(self.time) * bytes_per_frame(self._scene, wide, self._account.shape[1]) > free_memory() * FREE_FRACTION:
             raise Exhaustion(f"the frames of {bodies:,} bodies do not fit into memory; use solver.record_every")
-        for name in ("position", "velocity", "angle", "angular_velocity", "spin", "layer"):
-            old = getattr(self, name)
-            if old is not None:
-                new = np.full((len(old), wide, *old.shape[2:]), -1 if name == "layer" else np.nan, old.dtype)
-                new[: self._count, : old.shape[1]] = old[: self._count]
-                setattr(self, name, new)
+        self._resize_columns(wide)
 
     def layers(self, bodies: int) -> IntArray:
         """Return the layers of the first bodies, (T, n); (0, 0) if there is a single layer."""
-        return np.empty((0, 0), np.int16) if self.layer is None else self.layer[: self._count, :bodies]
+        return np.empty((0, 0), np.int16) if self.layer is None else self.layer[: self.count, :bodies]
 
     def arrays(self, bodies: int) -> dict[str, FloatArray]:
         """Return the recorded arrays of the first bodies, by their names in `Trajectory`."""
+        if self.end_time is not None:
+            self.time[self.count - 1] = self.end_time
         names = ("position", "velocity", "angle", "angular_velocity")
-        kept = {name: getattr(self, name)[: self._count, :bodies] for name in names}
-        account = {"energy": self._energy[: self._count], "account": self._account[: self._count]}
-        spin = np.empty((0, 0, 3)) if self.spin is None else self.spin[: self._count, :bodies]
-        return {"time": self.time[: self._count], "spin": spin, **kept, **account}
+        kept = {name: getattr(self, name)[: self.count, :bodies] for name in names}
+        account = {"energy": self._energy[: self.count], "account": self._account[: self.count]}
+        spin = np.empty((0, 0, 3)) if self.spin is None else self.spin[: self.count, :bodies]
+        return {"time": self.time[: self.count], "spin": spin, **kept, **account}

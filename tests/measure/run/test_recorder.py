@@ -122,9 +122,13 @@ def frame_at(time: float, bodies: int) -> Frame:
 
 def test_recorder_records_every_nth_and_the_last_frame() -> None:
     recording = Recorder(scene_of(0.05), Settings(record_every=2), 1)
-    assert [recording.is_due(k, k == 5) for k in range(1, 6)] == [False, True, False, True, True]
-    for time in (0.0, 0.02, 0.04, 0.05):
-        recording.record(frame_at(time, 1), time)
+    recording.record(frame_at(0.0, 1))
+    for step in range(1, 6):
+        recording.steps = step
+        assert recording.is_due() == (step in (2, 4))
+        if recording.is_due():
+            recording.record(frame_at(step * 0.01, 1))
+    recording.record_unless_recorded(frame_at(0.05, 1))
     arrays = recording.arrays(1)
     assert arrays["time"].tolist() == [0.0, 0.02, 0.04, 0.05]
     assert arrays["position"].shape == (4, 1, 2)
@@ -132,7 +136,7 @@ def test_recorder_records_every_nth_and_the_last_frame() -> None:
 
 def test_frame_at_an_early_end_is_recorded_once() -> None:
     recording = Recorder(scene_of(0.05), Settings(), 1)
-    recording.record(frame_at(0.0, 1), 0.0)
+    recording.record(frame_at(0.0, 1))
     for time in (0.0, 0.01, 0.01):
         recording.record_unless_recorded(frame_at(time, 1))
     assert recording.arrays(1)["time"].tolist() == [0.0, 0.01]
@@ -140,8 +144,8 @@ def test_frame_at_an_early_end_is_recorded_once() -> None:
 
 def test_bodies_added_later_are_nan_before() -> None:
     recording = Recorder(scene_of(0.02), Settings(), 3)
-    recording.record(frame_at(0.0, 1), 0.0)
-    recording.record(frame_at(0.01, 2), 0.01)
+    recording.record(frame_at(0.0, 1))
+    recording.record(frame_at(0.01, 2))
     arrays = recording.arrays(2)
     assert arrays["angle"].shape == (2, 2)
     assert np.isnan(arrays["angle"]).tolist() == [[False, True], [False, False]]
@@ -149,16 +153,16 @@ def test_bodies_added_later_are_nan_before() -> None:
 
 def test_scene_without_bodies_has_frames() -> None:
     recording = Recorder(loads('title = "Nobody"'), Settings(), 0)
-    recording.record(frame_at(0.0, 0), 0.0)
+    recording.record(frame_at(0.0, 0))
     assert recording.arrays(0)["position"].shape == (1, 0, 2)
 
 
 def test_recorder_grows_for_added_bodies_until_memory_is_exhausted(monkeypatch: pytest.MonkeyPatch) -> None:
     recording = Recorder(scene_of(0.05), Settings(), 1)
     for k, count in enumerate((1, 1, 5, 6)):
-        recording.record(frame_at(0.01 * k, count), 0.01 * k)
+        recording.record(frame_at(0.01 * k, count))
     arrays = recording.arrays(6)
     assert (~np.isnan(arrays["angle"])).sum(axis=1).tolist() == [1, 1, 5, 6]
     monkeypatch.setattr(recorder, "free_memory", lambda: 100)
     with pytest.raises(Exhaustion, match="frames of 60 bodies do not fit into memory"):
-        recording.record(frame_at(0.04, 60), 0.04)
+        recording.record(frame_at(0.04, 60))

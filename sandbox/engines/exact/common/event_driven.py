@@ -10,7 +10,7 @@ import numpy as np
 from sandbox.action import Action
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.actions import apply_action
-from sandbox.engines.common.base import BEYOND, SteppedSimulation
+from sandbox.engines.common.base import BEYOND, SteppedSimulation, step_and_record
 from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 from sandbox.engines.common.contact_log import too_many_contacts
 from sandbox.engines.common.energy_balance import record_energy_change
@@ -19,6 +19,7 @@ from sandbox.engines.contract import Divergence, Exhaustion, Observer
 from sandbox.engines.energy_ledger import Cause, EnergyLedger
 from sandbox.engines.exact.common import state as c
 from sandbox.engines.exact.common.bodies import EventDrivenBodies
+from sandbox.frame_table import FrameTable
 from sandbox.resource_limits import CONTACTS, PAIRS
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.setup import Setup
@@ -27,6 +28,9 @@ from sandbox.trajectory import Contacts, Frame
 
 FIRST_LOG_ROWS = 1024
 """Initial number of rows of the contact log."""
+
+
+NO_SPIN: FloatArray = np.empty((0, 0, 3))
 
 
 class StateArrays(Protocol):
@@ -76,6 +80,7 @@ class EventDrivenSimulation(SteppedSimulation, Generic[Data]):
         self._stopped: float | None = None
         self._ledger: EnergyLedger | None = None
         self._max_pair_tests = PAIRS.value
+        self._tests_before: int | None = None  # `PAIR_TESTS` at the start of a step that a kernel has begun
         warn_if_uncompiled(len(store.bodies))
 
     @property
@@ -123,6 +128,52 @@ class EventDrivenSimulation(SteppedSimulation, Generic[Data]):
             if leaving is not None:
                 self._remove(np.asarray([leaving]))
 
+    def advance(self, steps: int, frames: FrameTable) -> None:
+        """Advance by at most so many time steps, and record the frames that are due, as `Simulation.advance`.
+
+        One call of a kernel makes all steps, up to one that needs a larger log, or that the kernel interrupts.
+
+        Raises:
+            Divergence: the state of a body is not finite, or exceeds the bounds. It can still be read.
+            Exhaustion: a step exceeds a resource limit.
+        """
+        if self.patience is not None or self._store.can_expire:
+            step_and_record(self, steps, frames)
+            return
+        with self._lock, np.errstate(all="ignore"):
+            self._check_running()
+            made, status, tests = self._make_steps(steps, frames)
+            frames.steps += made
+            self._steps += made
+            if status == c.BEYOND:
+                self._steps += 1
+                self._check_bounds()
+        if status != c.DONE:
+            self._tests_before = tests
+            step_and_record(self, 1, frames)
+
+    def _make_steps(self, steps: int, frames: FrameTable) -> tuple[int, int, int]:
+        """Make steps and frames by the kernel; return the number of steps, the status and `PAIR_TESTS`, as it does."""
+        spin = self._roll() is not None
+        free, bodies = slice(frames.count, None), len(self.bodies)
+        frames.prepare(steps, bodies)
+        rows = c.FrameRows(
+            self._settings.dt,
+            self._steps,
+            steps,
+            frames.every,
+            frames.steps % frames.every,
+            frames.time[free],
+            frames.position[free],
+            frames.velocity[free],
+            frames.angle[free],
+            frames.angular_velocity[free],
+            frames.spin_rows()[free] if spin else NO_SPIN,
+        )
+        made, written, status, tests = self._advance_frames(rows)
+        frames.finish_rows(written, bodies)
+        return made, status, tests
+
     def watch(self, observer: Observer) -> None:
         """Do nothing: there are no substeps after which an observer could be called."""
 
@@ -165,6 +216,10 @@ class EventDrivenSimulation(SteppedSimulation, Generic[Data]):
         """Process events up to a time, s; return `DONE`, `PAUSED`, `FULL` or the code of an exceeded limit."""
 
     @abstractmethod
+    def _advance_frames(self, rows: c.FrameRows) -> tuple[int, int, int, int]:
+        """Make steps and frames as the kernel `advance_frames` does."""
+
+    @abstractmethod
     def _too_many_events(self, status: int) -> str:
         """Return the message for an exceeded event limit."""
 
@@ -200,7 +255,8 @@ class EventDrivenSimulation(SteppedSimulation, Generic[Data]):
         """Process all events in a fraction of dt; between calls of the event loop check the limits and grow the log."""
         until = (self._steps + part) * self._settings.dt
         start, compile_start = perf_counter(), COMPILE_CLOCK.seconds
-        tests_before = int(self._data.counts[c.PAIR_TESTS])
+        tests_before = int(self._data.counts[c.PAIR_TESTS]) if self._tests_before is None else self._tests_before
+        self._tests_before = None
         while (status := self._call_event_loop(until)) != c.DONE:
             elapsed = perf_counter() - start - (COMPILE_CLOCK.seconds - compile_start)
             if self.patience is not None and elapsed > self.patience:
@@ -228,13 +284,17 @@ class EventDrivenSimulation(SteppedSimulation, Generic[Data]):
     def _finish_step(self) -> None:
         """Evaluate the state, check that it is finite and in range, and remove expired bodies."""
         self._evaluate()
+        self._check_bounds()
+        expired = self._store.expired(self.time)
+        if len(expired):
+            self._remove(expired)
+
+    def _check_bounds(self) -> None:
+        """Check that the evaluated state is finite and in range."""
         diverged = self._store.beyond()
         if diverged is not None:
             self._ended = True
             raise Divergence(self.time, self.bodies.names[diverged], BEYOND)
-        expired = self._store.expired(self.time)
-        if len(expired):
-            self._remove(expired)
 
 
 def last_event_bodies(

@@ -108,6 +108,9 @@ EVENT_BODY, EVENT_KIND, EVENT_PARTNER, IN_SECOND, IN_INSTANT, IN_BATCH = range(7
 - IN_SECOND, IN_INSTANT, IN_BATCH: events in the present second, instant and batch.
 """
 
+BEYOND = -1
+"""Return code of `advance_frames`: a ball is not finite or out of bounds."""
+
 DONE, PAUSED, FULL, TOO_MANY = range(4)
 """Return codes of the event loops: reached the time; returned so that Python can handle signals; a log is full; more
 events than `MAX_EVENTS`. Any further code is another limit on the number of events."""
@@ -115,6 +118,33 @@ events than `MAX_EVENTS`. Any further code is another limit on the number of eve
 MICRO_BOUNCE_TIME, MAX_MICRO_BOUNCE = 5e-5, 5e-4
 """s and m/s: the speed of a micro-bounce is g·MICRO_BOUNCE_TIME, at most MAX_MICRO_BOUNCE. Balls do not rest on balls
 or on vertices: they bounce for 1e-4 s, under earth's gravity 1.2e-8 m high."""
+
+
+class FrameRows(NamedTuple):
+    """Rows of a frame table for S steps, from the first that is not written yet, and the steps to which they belong."""
+
+    dt: float
+    """step, s"""
+    begin: int
+    """steps made before"""
+    steps: int
+    """S, largest number of steps"""
+    every: int
+    """number of steps between two frames"""
+    phase: int
+    """steps since the last frame that was due"""
+    time: FloatArray
+    """(T,) s"""
+    position: FloatArray
+    """(T, N, 2) m"""
+    velocity: FloatArray
+    """(T, N, 2) m/s"""
+    angle: FloatArray
+    """(T, N) rad"""
+    angular_velocity: FloatArray
+    """(T, N) rad/s"""
+    spin: FloatArray
+    """(T, N, 3) rad/s; (0, 0, 3) without a surface"""
 
 
 class EventState(NamedTuple):

@@ -7,15 +7,16 @@ pocket. The times of impact of all pairs are kept in a matrix; an event updates 
 import math
 
 from sandbox.arrays import FloatArray
-from sandbox.engines.common.body_store import ALL, NOTHING
+from sandbox.engines.common.body_store import ALL, NOTHING, first_beyond
 from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.exact.common.roots import MAX_OVERLAP, first_touch, gap_zero_time, return_time
-from sandbox.engines.exact.common.state import DONE, FULL, PAUSED, TOO_MANY
+from sandbox.engines.exact.common.state import BEYOND, DONE, FULL, PAUSED, TOO_MANY, FrameRows
 from sandbox.engines.exact.tabletop import state as c
 from sandbox.engines.exact.tabletop.impact import (
     advance_to,
     capture,
     end_phase,
+    evaluate,
     hit_ball,
     hit_line,
     hit_vertex,
@@ -273,3 +274,56 @@ def advance(data: TabletopState, until: float) -> int:
         data.world[c.NOW] = t
         process_event(data, i, kind, partner, t)
     return PAUSED
+
+
+@kernel
+def advance_frames(
+    data: TabletopState,
+    rows: FrameRows,
+    events_per_second: int,
+    position: FloatArray,
+    velocity: FloatArray,
+    roll: FloatArray,
+    angle: FloatArray,
+    spin: FloatArray,
+) -> tuple[int, int, int, int]:
+    """Make steps, and write the frames that are due.
+
+    Args:
+        data: state arrays.
+        rows: of the frames.
+        events_per_second: events that each simulated second adds to the limit.
+        position: (N, 2), set to the present state, as the following ones.
+        velocity: (N, 2).
+        roll: (N, 2).
+        angle: (N,).
+        spin: (N,).
+
+    Returns:
+        Number of whole steps; number of frames; `DONE`, `BEYOND` with the state of the step after them, or another
+        return code of `advance`; `PAIR_TESTS` at the start of a step that is not complete.
+    """
+    written, tests = 0, 0
+    last_prediction = data.counts[c.PREDICTIONS] + EVENTS_PER_CALL
+    for k in range(rows.steps):
+        until = (rows.begin + k + 1.0) * rows.dt
+        tests = data.counts[c.PAIR_TESTS]
+        data.counts[c.MAX_EVENTS] = events_per_second * (1 + int(until))
+        status = advance(data, until)
+        if status != DONE:
+            return k, written, status, tests
+        evaluate(data, until, position, velocity, roll, angle, spin)
+        if first_beyond(position, velocity, angle, spin, roll) >= 0:
+            return k, written, BEYOND, tests
+        if (rows.phase + k + 1) % rows.every == 0:
+            rows.time[written] = until
+            for i in range(len(angle)):
+                rows.position[written, i, 0], rows.position[written, i, 1] = position[i, 0], position[i, 1]
+                rows.velocity[written, i, 0], rows.velocity[written, i, 1] = velocity[i, 0], velocity[i, 1]
+                rows.angle[written, i], rows.angular_velocity[written, i] = angle[i], spin[i]
+                rows.spin[written, i, 0], rows.spin[written, i, 1] = roll[i, 0], roll[i, 1]
+                rows.spin[written, i, 2] = spin[i]
+            written += 1
+        if data.counts[c.PREDICTIONS] > last_prediction:  # so that Python can handle signals
+            return k + 1, written, DONE, tests
+    return rows.steps, written, DONE, tests

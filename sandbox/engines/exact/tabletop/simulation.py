@@ -11,8 +11,9 @@ from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.exact.common.bodies import EventDrivenBodies
 from sandbox.engines.exact.common.event_driven import FIRST_LOG_ROWS, EventDrivenSimulation, last_event_bodies
 from sandbox.engines.exact.common.record import resize_rows
+from sandbox.engines.exact.common.state import FrameRows
 from sandbox.engines.exact.tabletop import state as c
-from sandbox.engines.exact.tabletop.events import advance, rebuild_all
+from sandbox.engines.exact.tabletop.events import advance, advance_frames, rebuild_all
 from sandbox.engines.exact.tabletop.impact import account_floor, advance_all_to, evaluate
 from sandbox.engines.exact.tabletop.state import TabletopState, contacts_of, make_tabletop_state, rebuild
 from sandbox.resource_limits import EVENTS as EVENT_LIMIT
@@ -89,6 +90,11 @@ class TabletopSimulation(EventDrivenSimulation[TabletopState]):
     def _call_event_loop(self, until: float) -> int:
         self._data.counts[c.MAX_EVENTS] = self._events_per_second * (1 + int(until))
         return advance(self._data, until)
+
+    def _advance_frames(self, rows: FrameRows) -> tuple[int, int, int, int]:
+        store = self._store
+        state = store.position, store.velocity, store.roll, store.angle, store.angular_velocity
+        return advance_frames(self._data, rows, self._events_per_second, *state)
 
     def _too_many_events(self, status: int) -> str:  # noqa: ARG002, there is only one limit
         reason = too_many_events(self._data, self.bodies.names, self.scene.fixed_names)

@@ -1,0 +1,153 @@
+"""Batches of substeps: Munk2D lists bodies and contacts after each into memory, and Python reads them all at once.
+
+Reading a space takes longer than a substep of a few bodies. A loop of three calls of Munk2D a substep, whose results
+are read as arrays afterwards, takes a tenth of the time of reading after each.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import pymunk
+from pymunk._chipmunk_cffi import ffi, lib
+from pymunk.batch import Buffer
+
+from sandbox.arrays import FloatArray
+from sandbox.engines.pymunk_adapter.contacts import ContactLists, WarmStart
+from sandbox.engines.pymunk_adapter.reader import (
+    LIST,
+    SECOND_FLAGS,
+    STATE,
+    STATE_WIDTH,
+    TOUCH_FLAGS,
+    VECTORS,
+    VECTORS_OF_TWO_POINTS,
+    WORD,
+    listing_into,
+)
+
+MAX_ROWS = 4096
+"""Largest number of lists of bodies in a batch."""
+
+MAX_VALUES = 1 << 17
+"""Numbers in the lists of bodies of a batch: 1 MB."""
+
+MAX_WORDS = 3 << 16
+"""Integers in the lists of contacts, three a contact, after which a batch ends."""
+
+MAX_CONTACTS = (MAX_WORDS // 3) * 2
+"""Upper bound of the contacts in a batch, while a substep has no more than half of them."""
+
+LIST_BODY = ffi.addressof(lib, "pmSpaceBodyGetIteratorFuncBatched")
+"""Function that writes the state of a body into a buffer."""
+
+
+class Batch(NamedTuple):
+    """Substeps that have been made, with the states that were listed."""
+
+    steps: int
+    """number of whole steps"""
+    states: FloatArray
+    """(S, R, 6) x, y, angle, vx, vy, ω of the moving bodies, in the order of the reader; valid until the next batch"""
+    contacts: ContactLists | None
+    """contacts of every substep; None unless they were listed. Valid until the next batch"""
+    has_failed: bool
+    """whether `is_valid` was false after the last step"""
+
+
+class BatchReader:
+    """Makes many substeps of a space, and lists its bodies and contacts."""
+
+    def __init__(self, space: pymunk.Space) -> None:
+        self._space = space
+        # A buffer leaks its first memory, and its memory moves when it grows: there is one of each kind, and that of
+        # the bodies is owned by numpy and never grows.
+        self._bodies, self._arbiters = Buffer(), Buffer()
+        self._states: FloatArray = np.empty(0)
+        self._body_list, self._contact_list = listing_into(self._bodies), listing_into(self._arbiters)
+        self._body_list.fields = STATE.value
+
+    def max_rows(self, bodies: int) -> int:
+        """Return how many lists of a number of bodies fit into a batch, at least 1."""
+        return max(min(MAX_ROWS, MAX_VALUES // (STATE_WIDTH * bodies)), 1)
+
+    def step(
+        self,
+        h: float,
+        steps: int,
+        substeps: int,
+        bodies: int,
+        moving: slice | Any,
+        *,
+        lists_substeps: bool,
+        lists_contacts: bool,
+        polygons: bool,
+        warm_start: Callable[[], WarmStart | None] | None,
+        quick_bound: float,
+        is_valid: Callable[[], bool],
+    ) -> Batch:
+        """Make at most so many steps.
+
+        Args:
+            h: substep, s.
+            steps: largest number of steps; their lists must fit, see `max_rows`.
+            substeps: substeps of a step.
+            bodies: number of bodies in the space.
+            moving: rows of the moving bodies in a list.
+            lists_substeps: whether bodies are listed after every substep, not only after every step.
+            lists_contacts: whether contacts are listed, after every substep.
+            polygons: whether contacts have up to two points.
+            warm_start: returns the impulses with which contacts of the last substep began, if there are any.
+            quick_bound: a state whose norm is below it is valid, whatever its units.
+            is_valid: returns whether the present state is valid; if it is not, the batch ends.
+        """
+        width = STATE_WIDTH * bodies
+        rows = self._prepare(steps * (substeps if lists_substeps else 1), width)
+        arbiters = self._arbiters
+        arbiters.clear()
+        self._contact_list.fields = SECOND_FLAGS if polygons else TOUCH_FLAGS
+        words, ends, warm_starts = arbiters._int_arr, [], {}
+        each_body, each_contact, step = lib.cpSpaceEachBody, lib.cpSpaceEachCachedArbiter, lib.cpSpaceStep
+        space, body_list, contact_list = self._space._space, self._body_list, self._contact_list
+        largest_square = quick_bound * quick_bound if quick_bound > 0.0 else -1.0
+        row = made = substep = 0
+        has_failed = False
+        while made < steps and not has_failed:
+            for k in range(substeps):
+                if substep:
+                    step(space, h)
+                else:  # checks bodies that are new
+                    self._space.step(h)
+                if lists_substeps or k == substeps - 1:
+                    each_body(space, LIST_BODY, body_list)
+                    row += 1
+                if lists_contacts:
+                    each_contact(space, LIST, contact_list)
+                    ends.append(words.num)
+                    if warm_start is not None and (found := warm_start()) is not None:
+                        warm_starts[substep] = found
+                substep += 1
+            made += 1
+            state = rows[row - 1]
+            has_failed = not state.dot(state) <= largest_square and not is_valid()  # nan compares false
+            if words.num > MAX_WORDS:
+                break
+        contacts = None
+        if lists_contacts:
+            contacts = ContactLists(
+                ffi.buffer(words.arr, words.num * WORD) if words.num else b"",
+                ends,
+                np.frombuffer(arbiters.float_buf(), np.complex128) if words.num else np.empty(0, np.complex128),
+                VECTORS_OF_TWO_POINTS if polygons else VECTORS,
+                warm_starts,
+            )
+        return Batch(made, rows[:row].reshape(row, bodies, STATE_WIDTH)[:, moving], contacts, has_failed)
+
+    def _prepare(self, rows: int, width: int) -> FloatArray:
+        """Return memory for lists of bodies, (rows, width), into which they will be written."""
+        size = (rows + 1) * width  # one row more than needed: a full array would grow
+        if len(self._states) < size:
+            self._states = np.empty(size)
+        self._bodies.set_float_buf(self._states)
+        self._bodies.clear()
+        return self._states[: rows * width].reshape(rows, width)

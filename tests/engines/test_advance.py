@@ -1,0 +1,209 @@
+"""`advance` makes the same steps as `step`, bit for bit, on every engine, in every scene, for every split."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sandbox.engines.contract import Divergence, Exhaustion, Refusal, Simulation
+from sandbox.engines.registry import ENGINES
+from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.frame_table import FrameTable
+from sandbox.measure.missed_contacts import Audit
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.files.load import load, loads
+from sandbox.scene.files.shipped_scenes import find, shipped
+from sandbox.trajectory import Contacts
+
+BOX = """
+[[plane]]
+point = [0, 0]
+normal = [0, 1]
+
+[[plane]]
+point = [-1, 0]
+normal = [1, 0]
+
+[[plane]]
+point = [1, 0]
+normal = [-1, 0]
+"""
+
+SCENES = {
+    "one ball": BOX + "[[ball]]\nposition = [0.1, 1.0]\nvelocity = [2.0, 0.0]\nradius = 0.1\n",
+    "balls that settle": BOX + "[[grid]]\nradius = 0.1\norigin = [-0.5, 0.2]\ncolumns = 4\nrows = 3\n"
+    "spacing = [0.21, 0.21]\njitter = 0.005\nrestitution = 0.3\nfriction = 0.4\n",
+    "elastic gas": "[world]\ngravity = [0, 0]\n" + BOX + "[[plane]]\npoint = [0, 2]\nnormal = [0, -1]\n"
+    "[[grid]]\nradius = 0.05\norigin = [-0.8, 0.2]\ncolumns = 5\nrows = 5\nspacing = [0.3, 0.3]\n"
+    "velocity_jitter = 3.0\nrestitution = 1.0\nfriction = 0.0\n",
+    "boxes": BOX + "[[box]]\nposition = [0, 0.3]\nsize = [0.4, 0.4]\nangle = 0.2\n"
+    "[[box]]\nposition = [0.05, 0.9]\nsize = [0.4, 0.4]\nangle = -0.3\n",
+    "no bodies": BOX,
+    "bounds and lifetimes": "[world]\nbounds = [[-3, -3], [3, 3]]\n"
+    "[[ball]]\nposition = [0, 0]\nvelocity = [9, 0]\nradius = 0.1\n[[ball]]\nposition = [0, 1]\nradius = 0.1\n"
+    "[[emitter]]\nposition = [0, 2]\ncount = 5\nlifetime = 0.17\nvelocity_min = [-1, -1]\n"
+    "velocity_max = [1, 1]\ncollides = 'none'\n",
+    "particles beside a ball": BOX + "[[ball]]\nposition = [0, 0.5]\nradius = 0.1\n"
+    "[[ball]]\nposition = [0.5, 0.5]\nradius = 0.1\ncollides = 'none'\n",
+    "spring": "[[ball]]\nname = 'mass'\nposition = [1.1, 0]\nradius = 0.1\n"
+    "[[joint]]\nkind = 'spring'\nbetween = ['mass']\nrest_length = 1.0\nstiffness = 40\n",
+}
+"""Scenes of the kinds for which an engine has a path of its own."""
+
+
+def small_scene(name: str) -> Scene:
+    return loads(SCENES[name])
+
+
+def started(scene: Scene, engine: str, **changes: object) -> SwitchableSimulation:
+    """Return a simulation that records contacts; skip the test if the engine refuses the scene."""
+    try:
+        simulation = start(scene, engine, scene.solver.replace(**changes))
+    except Refusal as refusal:
+        pytest.skip(str(refusal))
+    return simulation
+
+
+def outcome(simulation: Simulation, made: int, error: Exception | None, contacts: Sequence[Contacts]) -> list[object]:
+    """Return everything that a caller can observe at the end."""
+    joined = Contacts.joined(list(contacts))
+    arrays = [joined.time, joined.pair, joined.point, joined.normal, joined.impulse]
+    return [
+        made,
+        repr(error),
+        simulation.time,
+        simulation.state_hash(),
+        dict(simulation.work),
+        dict(simulation.retired),
+        dict(simulation.broken),
+        simulation.plane_reach,
+        *[array.tobytes() for array in arrays],
+    ]
+
+
+def stepped(simulation: SwitchableSimulation, splits: Sequence[int], every: int) -> tuple[FrameTable, list[object]]:
+    """Step a simulation, and read its contacts after each split."""
+    table = FrameTable(sum(splits) + 1, len(simulation.bodies), every)
+    table.record(simulation.frame())
+    contacts, error = [simulation.contacts()], None
+    for steps in splits:
+        try:
+            for _ in range(steps):
+                simulation.step()
+                table.steps += 1
+                if table.is_due():
+                    table.record(simulation.frame())
+        except (Divergence, Exhaustion) as caught:
+            error = caught
+            break
+        contacts.append(simulation.contacts())
+    return table, outcome(simulation, table.steps, error, contacts)
+
+
+def advanced(simulation: SwitchableSimulation, splits: Sequence[int], every: int) -> tuple[FrameTable, list[object]]:
+    """Advance a simulation by the same splits."""
+    table = FrameTable(sum(splits) + 1, len(simulation.bodies), every)
+    table.record(simulation.frame())
+    contacts, error = [simulation.contacts()], None
+    for steps in splits:
+        end = table.steps + steps
+        try:
+            while table.steps < end:
+                before = table.steps
+                simulation.advance(end - table.steps, table)
+                assert table.steps > before
+        except (Divergence, Exhaustion) as caught:
+            error = caught
+            break
+        contacts.append(simulation.contacts())
+    return table, outcome(simulation, table.steps, error, contacts)
+
+
+def assert_same(one: FrameTable, other: FrameTable) -> None:
+    assert one.count == other.count
+    for key in ("time", "position", "velocity", "angle", "angular_velocity", "spin", "layer"):
+        a, b = getattr(one, key), getattr(other, key)
+        assert (a is None) == (b is None), key
+        if a is not None:
+            assert a[: one.count].tobytes() == b[: one.count].tobytes(), key
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("name", SCENES)
+@settings(max_examples=8)
+@given(
+    splits=st.lists(st.integers(1, 40), min_size=1, max_size=4),
+    every=st.integers(1, 5),
+    substeps=st.integers(1, 4),
+    audited=st.booleans(),
+)
+def test_advance_equals_steps(
+    name: str, engine: str, splits: list[int], every: int, substeps: int, audited: bool
+) -> None:
+    scene = small_scene(name)
+    changes = {"substeps": substeps} if engine != "exact" else {}
+    results = []
+    for way in (stepped, advanced):
+        simulation = started(scene, engine, **changes)
+        audit = Audit(simulation.setup)
+        if audited:
+            simulation.watch(audit)
+        table, observed = way(simulation, splits, every)
+        results.append((table, [*observed, *(array.tobytes() for array in audit.missed())]))
+    (one, seen), (other, seen_other) = results
+    assert seen == seen_other
+    assert_same(one, other)
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("name", [scene.name for scene in shipped()])
+def test_advance_equals_steps_in_shipped_scenes(name: str, engine: str) -> None:
+    scene = load(find(name))
+    if len(scene.bodies) > 5000:
+        pytest.skip("takes long, and has particles only, as the small scenes")
+    splits = [1, 7, 40, 30]
+    one, seen = stepped(started(scene, engine), splits, 2)
+    other, seen_other = advanced(started(scene, engine), splits, 2)
+    assert seen == seen_other
+    assert_same(one, other)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_table_without_rows_is_refused(engine: str) -> None:
+    simulation = started(small_scene("one ball"), engine)
+    table = FrameTable(3, 1)
+    with pytest.raises((ValueError, IndexError)):
+        simulation.advance(5, table)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_table_is_widened_for_bodies_that_were_added(engine: str) -> None:
+    simulation = started(small_scene("one ball"), engine)
+    table = FrameTable(3, 0)
+    simulation.advance(3, table)
+    assert table.position.shape[1] >= 1
+    np.testing.assert_array_equal(table.position[2, 0], simulation.frame().position[0])
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_divergence_within_an_advance(engine: str) -> None:
+    # From 1e12 m/s, 1e10 m/s faster each step: beyond the bound of 1e13 m/s within 900 steps.
+    text = "[world]\ngravity = [0, -1e9]\n[solver]\ndt = 10\n"
+    scene = loads(
+        text + "[[ball]]\nposition = [0, 0]\nvelocity = [0, -1e12]\nradius = 0.1\n"
+        "[[ball]]\nposition = [9, 0]\nvelocity = [0, -1e12]\nradius = 0.1\n"
+    )  # pymunk has no bound for particles
+    one, seen = stepped(started(scene, engine), [1000], 7)
+    other, seen_other = advanced(started(scene, engine), [1000], 7)
+    assert "Divergence" in str(seen[1])
+    assert 800 < one.steps < 1000
+    assert seen == seen_other
+    assert_same(one, other)
+    simulation = started(scene, engine)
+    with pytest.raises(Divergence):
+        simulation.advance(1000, FrameTable(1001, 1))
+    with pytest.raises(RuntimeError, match="has ended"):
+        simulation.advance(1, FrameTable(1, 1))
