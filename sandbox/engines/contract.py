@@ -8,8 +8,8 @@ A new engine is one folder that implements these two protocols, and one line in 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
 
 if TYPE_CHECKING:  # importing an engine must stay cheap
     from sandbox.action import Action
@@ -67,6 +67,24 @@ class Exhaustion(Exception):  # noqa: N818, as above
 Observer: TypeAlias = "Callable[[float, FloatArray, FloatArray, IntArray], None]"
 """Callback after each substep: its start time (s), the centres of mass (N, 2) at its start and end, and the pairs (K,
 2) that the engine found in contact at its end, with the indices of `Contacts`."""
+
+
+@runtime_checkable
+class PathObserver(Protocol):
+    """Observer that can also take many substeps at once."""
+
+    def __call__(self, time: float, start: FloatArray, end: FloatArray, touching: IntArray) -> None:
+        """Take one substep, as `Observer`."""
+
+    def observe_path(self, times: FloatArray, path: FloatArray, pairs: Sequence[tuple[int, IntArray]]) -> None:
+        """Take B substeps, during which no action was applied.
+
+        Args:
+            times: (B,) s, start of each.
+            path: (B + 1, N, 2) m, centres before the first and after each.
+            pairs: pairs (K, 2) in contact at the end of substeps, with the number of the substep after the last that
+                has them.
+        """
 
 
 class Simulation(Protocol):

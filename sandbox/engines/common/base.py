@@ -9,7 +9,7 @@ from typing import NoReturn, Protocol
 import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
-from sandbox.engines.contract import Observer
+from sandbox.engines.contract import Observer, PathObserver
 from sandbox.engines.energy_ledger import Cause
 from sandbox.frame_table import FrameTable
 from sandbox.scene.compile.scene import Scene
@@ -158,7 +158,7 @@ def step_and_record(simulation: Stepping, steps: int, frames: FrameTable) -> Non
 def observe_path(
     observer: Observer, times: FloatArray, path: FloatArray, pairs: Sequence[tuple[int, IntArray]]
 ) -> None:
-    """Call an observer for each of B substeps, in order.
+    """Pass B substeps to an observer, at once if it can take them so, else one by one.
 
     Args:
         observer: the observer.
@@ -166,6 +166,9 @@ def observe_path(
         path: (B + 1, N, 2) m, centres before the first substep and after each.
         pairs: pairs (K, 2) of substeps, with the number of the substep after the last that has them.
     """
+    if isinstance(observer, PathObserver):
+        observer.observe_path(times, path, pairs)
+        return
     begin = 0
     for end, touching in pairs:
         for k in range(begin, end):

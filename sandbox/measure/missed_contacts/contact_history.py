@@ -1,5 +1,7 @@
 """Contact history: the pairs that an engine found in contact at the end of each substep."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from sandbox.arrays import BoolArray, IntArray
@@ -20,6 +22,10 @@ class ContactHistory:
     def add(self, pairs: IntArray) -> None:
         """Append the pairs of one more substep."""
         self._pairs.append(pairs.copy())
+
+    def extend(self, pairs: Sequence[IntArray]) -> None:
+        """Append the pairs of each of some more substeps; the arrays must not change."""
+        self._pairs += pairs
 
     def forget(self) -> None:
         """Drop all but the last substep."""

@@ -4,6 +4,7 @@ A fixed-step engine tests for overlap at the end of each substep only. A contact
 is lost. A body that has reached the far side of an obstacle is pushed out on that side.
 """
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -21,6 +22,9 @@ MAX_BATCH = 32
 """Largest number of substeps that are examined together, which spreads the cost of numpy calls."""
 BATCH_ROWS = 1 << 14
 """Centres in a batch of several substeps, so that they stay in the cache."""
+
+MAX_PATH_BATCH = 1024
+"""Largest number of substeps of a path that are examined together."""
 
 CHUNK = 1 << 13
 """Encounters that are examined together, so that they stay in the cache."""
@@ -180,13 +184,56 @@ class Audit:
         self._end = np.empty_like(self._start)
         self._layer_bits = np.zeros((0, 0), np.int64)
 
+    def observe_path(
+        self, times: FloatArray, path: FloatArray, pairs: Sequence[tuple[int, IntArray]], on: IntArray | None = None
+    ) -> None:
+        """Record many substeps at once; as if each had been recorded by a call.
+
+        Args:
+            times: (B,) s, start of each substep.
+            path: (B + 1, N, 2) m, centres before the first substep and after each.
+            pairs: pairs (K, 2) in contact at the end of substeps, with the number of the substep after the last that
+                has them.
+            on: layer of each body throughout all of them as a bit, (N,), if there are several layers.
+
+        Raises:
+            ValueError: N is not the number of bodies; `joined` adds bodies.
+        """
+        if path.shape[1] != self._body_count:
+            raise ValueError(f"{path.shape[1]} bodies, where the audit knows of {self._body_count}")
+        if not len(self._core):
+            return
+        self._examine()
+        path, on = path[:, self._part], None if on is None else on[self._part]
+        with np.errstate(invalid="ignore", over="ignore"):  # as in `_examine_substeps`
+            is_fast: BoolArray = np.any(_squared_lengths(path[:-1], path[1:]) >= self._smallest_squared, axis=1)
+        touching = [each for begin, (end, each) in zip(_begins(pairs), pairs, strict=True) for _ in range(begin, end)]
+        batch = max(1, min(MAX_PATH_BATCH, BATCH_ROWS // len(self._core)))
+        for begin in range(0, len(times), batch):
+            rows = slice(begin, min(begin + batch, len(times)))
+            self._history.extend(touching[rows])
+            if is_fast[rows].any():  # in most substeps nothing moves fast enough to miss a contact
+                start, end = path[rows].copy(), path[rows.start + 1 : rows.stop + 1].copy()
+                bits = np.zeros((0, 0), np.int64) if on is None else np.tile(on, (len(start), 1))
+                self._examine_substeps(times[rows], start, end, bits)
+            self._history.forget()
+
     def _examine(self) -> None:
         """Examine the recorded substeps."""
-        start, end = self._start[: len(self._time)], self._end[: len(self._time)]
+        count = len(self._time)
+        if count:
+            bits = self._layer_bits[:count]
+            self._examine_substeps(np.asarray(self._time), self._start[:count], self._end[:count], bits)
+        self._time.clear()
+        self._history.forget()
+
+    def _examine_substeps(self, times: FloatArray, start: FloatArray, end: FloatArray, layer_bits: IntArray) -> None:
+        """Examine substeps, of which the history has the pairs: their start and end, (B, M, 2) m, may be changed.
+
+        `layer_bits` are those of the bodies in each, (B, M), or empty.
+        """
         with np.errstate(invalid="ignore", over="ignore"):  # diverging bodies reach inf and are left out here
-            move = end - start
-            move *= move
-            length2 = move[..., 0] + move[..., 1]
+            length2 = _squared_lengths(start, end)
         fast = length2 >= self._smallest_squared
         if fast.any():
             is_diverging = ~(length2 < MAX_COORDINATE**2)
@@ -197,20 +244,20 @@ class Audit:
                 length2[is_diverging] = 0.0
                 fast &= ~is_diverging
             nearing = 2 * float(np.sqrt(length2.max()))
-            found = self._balls(start, end, fast, nearing), self._fixed(start, end, fast)
+            found = self._balls(start, end, fast, nearing, layer_bits), self._fixed(start, end, fast, layer_bits)
             when = np.concatenate([when for when, _ in found])
             pairs = np.concatenate([pairs for _, pairs in found])
             if len(when):
                 order = np.lexsort((pairs[:, 1], pairs[:, 0], when))
-                self._times.append(np.asarray(self._time)[when[order]])
+                self._times.append(times[when[order]])
                 self._pairs.append(pairs[order])
-        self._time.clear()
-        self._history.forget()
 
-    def _fixed(self, start: FloatArray, end: FloatArray, fast: BoolArray) -> tuple[IntArray, IntArray]:
+    def _fixed(
+        self, start: FloatArray, end: FloatArray, fast: BoolArray, layer_bits: IntArray
+    ) -> tuple[IntArray, IntArray]:
         """Return substeps (M,) and pairs (M, 2) of a body and a static object that missed a contact."""
         when, body = np.nonzero(fast & self._hits_static)
-        on = self._layer_bits[when, body] if len(self._layer_bits) else None
+        on = layer_bits[when, body] if len(layer_bits) else None
         paths = SweptCircles(when, body + self._offset, start[when, body], end[when, body], self._core[body], on)
         return self._static_geometry.missed(paths, self._history)
 
@@ -226,14 +273,16 @@ class Audit:
             able &= ~np.isin(pair, pair_keys(*self._apart.T))
         return np.asarray(able)
 
-    def _balls(self, start: FloatArray, end: FloatArray, fast: BoolArray, nearing: float) -> tuple[IntArray, IntArray]:
+    def _balls(
+        self, start: FloatArray, end: FloatArray, fast: BoolArray, nearing: float, layer_bits: IntArray
+    ) -> tuple[IntArray, IntArray]:
         """Return substeps (M,) and pairs (M, 2) of bodies that missed a contact.
 
         No pair approaches by more than `nearing`, m.
         """
         when, i, j = self._verlet_list.encounters(start, end, fast)
-        if len(self._layer_bits):
-            same_layer = (self._layer_bits[when, i] & self._layer_bits[when, j]) != 0
+        if len(layer_bits):
+            same_layer = (layer_bits[when, i] & layer_bits[when, j]) != 0
             when, i, j = when[same_layer], i[same_layer], j[same_layer]
         parts = len(when) // CHUNK + 1
         deep = np.concatenate(
@@ -262,6 +311,18 @@ class Audit:
         able = (dot(gap, move) < 0) & (dot(move, move) >= (JUMP * contact) ** 2)
         able &= closest_to_origin(gap, move) < (DEEP * contact) ** 2
         return at[able]
+
+
+def _squared_lengths(start: FloatArray, end: FloatArray) -> FloatArray:
+    """Return the squares of the displacements from start to end, both (B, N, 2) m, (B, N) m²."""
+    move = end - start
+    move *= move
+    return np.asarray(move[..., 0] + move[..., 1])
+
+
+def _begins(pairs: Sequence[tuple[int, IntArray]]) -> list[int]:
+    """Return the first substep of each entry of pairs."""
+    return [0, *(end for end, _ in pairs[:-1])]
 
 
 def _offset(position: FloatArray, when: IntArray, i: IntArray, j: IntArray) -> FloatArray:

@@ -60,19 +60,29 @@ class VerletList:
         Returns:
             Substep, lower and higher index of each pair, (K,) each, without duplicates.
         """
+        found: list[Encounters] = []
+        begin = 0
+        while begin < len(start):
+            lasting, (when, first, second) = self._first_encounters(start[begin:], end[begin:], fast[begin:])
+            found.append((when + begin, first, second))
+            begin += lasting
+        if len(found) == 1:
+            return found[0]
+        when, first, second = map(np.concatenate, zip(*found, strict=True))
+        return when, first, second
+
+    def _first_encounters(self, start: FloatArray, end: FloatArray, fast: BoolArray) -> tuple[int, Encounters]:
+        """Return the encounters of the first substeps, for which one list lasts, and their number."""
         moved_beyond_skin = self._moved_beyond_skin(start, end)
         if np.count_nonzero(moved_beyond_skin) > self._max_renewed:
             typical = self._typical_displacement(start[0], end[0])
             skin = min(max(TARGET_LIFETIME * typical, MIN_SKIN * self._typical), self._typical)
             lasting = max(1, int(skin / typical)) if typical > 0 else len(start)
             if lasting < len(start):
-                early = self.encounters(start[:lasting], end[:lasting], fast[:lasting])
-                when, first, second = self.encounters(start[lasting:], end[lasting:], fast[lasting:])
-                late = when + lasting, first, second
-                when, first, second = map(np.concatenate, zip(early, late, strict=True))
-                return when, first, second
+                _, encounters = self._first_encounters(start[:lasting], end[:lasting], fast[:lasting])
+                return lasting, encounters
             if typical > skin:
-                return self._swept(start[0], end[0], fast[0])
+                return len(start), self._swept(start[0], end[0], fast[0])
             self._build(start[0], skin)
             moved_beyond_skin = self._moved_beyond_skin(start, end)
         if moved_beyond_skin.any():
@@ -81,7 +91,7 @@ class VerletList:
         listed = np.flatnonzero(ever[self._first] | ever[self._second])
         first, second = self._first[listed], self._second[listed]
         when, at = np.nonzero(fast[:, first] | fast[:, second])
-        return when, first[at], second[at]
+        return len(start), (when, first[at], second[at])
 
     def _moved_beyond_skin(self, start: FloatArray, end: FloatArray) -> BoolArray:
         """Return which bodies leave their half of the common skin or had a larger skin, (N,)."""

@@ -220,15 +220,26 @@ class TimedAudit:
     def __call__(self, time: float, start: FloatArray, end: FloatArray, touching: IntArray) -> None:
         """Audit one substep."""
         began = perf_counter()
+        self._update(len(end))
+        self._audit(time, start, end, touching, self._shared_layers())
+        self.seconds += perf_counter() - began
+
+    def observe_path(self, times: FloatArray, path: FloatArray, pairs: Sequence[tuple[int, IntArray]]) -> None:
+        """Audit many substeps, as `Audit.observe_path`; bodies that change their layer are not passed in this way."""
+        began = perf_counter()
+        self._update(path.shape[1])
+        self._audit.observe_path(times, path, pairs, self._shared_layers())
+        self.seconds += perf_counter() - began
+
+    def _update(self, bodies: int) -> None:
+        """Include changes of the scene since the last substep, and bodies that were added."""
         if (now := self._simulation.scene) is not self._scene:
             if now.fixed != self._scene.fixed:
                 self._audit.changed(now, self._simulation.bodies)
             self._scene = now
-        if len(end) != self._known:
+        if bodies != self._known:
             self._audit.joined(self._simulation.bodies)
-            self._known = len(end)
-        self._audit(time, start, end, touching, self._shared_layers())
-        self.seconds += perf_counter() - began
+            self._known = bodies
 
     def _layers(self) -> IntArray:
         """Return the layer of each body as a bit, (N,)."""
