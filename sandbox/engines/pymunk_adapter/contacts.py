@@ -277,8 +277,9 @@ class ContactLists:
             warm_starts: impulses with which contacts began, by substep.
         """
         self._words, self._vectors, self.width = words, vectors, width
-        self._byte_ends = [0, *(end * WORD for end in word_ends)]
-        self._vector_ends = [0, *(end // 3 * width for end in word_ends)]
+        ends = np.array([0, *word_ends], np.int64)
+        self._byte_ends: list[int] = (ends * WORD).tolist()
+        self._vector_ends: list[int] = (ends // 3 * width).tolist()
         self.warm_starts = warm_starts
         """impulses with which contacts began, by substep"""
 
@@ -299,9 +300,11 @@ class ContactLists:
 
     def end_of_same(self, k: int) -> int:
         """Return the first substep after k whose integers differ from those of k, or that has warm starts."""
-        words, ends, last = self._words, self._byte_ends, self.words(k)
+        words, ends, last, count = self._words, self._byte_ends, self.words(k), len(self)
+        if not self.warm_starts and words[ends[k] :] == last * (count - k):
+            return count
         end = k + 1
-        while end < len(self) and words[ends[end] : ends[end + 1]] == last and end not in self.warm_starts:
+        while end < count and words[ends[end] : ends[end + 1]] == last and end not in self.warm_starts:
             end += 1
         return end
 

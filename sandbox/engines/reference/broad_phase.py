@@ -6,7 +6,8 @@ BROAD_PHASES is the table of broad phases. Each is a kernel (order, position, ra
 most, keys) -> (found, tests). It writes the keys of candidate pairs into `keys` (C,), each once, in any order, up to
 its capacity. It returns the number of candidates found and the number of cheap tests, or `EXCEEDED` if it stopped after
 `max_tests` tests. Every pair nearer than the margin is found, so all broad phases agree after the narrow phase. `order`
-is the broad phase's own order of the balls that can collide with anything; it is kept from step to step.
+is the broad phase's own memory, kept from step to step: for `sweep` the order of the balls that can collide with
+anything.
 
 - `grid` sorts balls into square cells as wide as the largest ball and tests neighbouring cells only. It is O(N) for
   balls of equal size. One huge ball among small ones makes all cells huge; then `sweep` is faster.
@@ -25,7 +26,7 @@ import numpy as np
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.body_store import ALL, FIXED, NOTHING
 from sandbox.engines.common.colliders import StaticColliders
-from sandbox.engines.common.kernel import bare_kernel, kernel
+from sandbox.engines.common.kernel import bare_kernel
 
 FIRST = 30
 """Number of bits below the first index in the key of a pair: a scene has fewer than 2³⁰ bodies and segments"""
@@ -72,7 +73,7 @@ def can_collide(mask_a: int, moves_a: bool, mask_b: int, moves_b: bool) -> bool:
     return moves_b and mask_b >= FIXED and mask_a == ALL
 
 
-@kernel
+@bare_kernel
 def all_pairs(
     order: IntArray,  # noqa: ARG001, all broad phases are called alike
     position: FloatArray,
@@ -96,7 +97,7 @@ def all_pairs(
     return found, 0
 
 
-@kernel
+@bare_kernel
 def circles(
     order: IntArray,  # noqa: ARG001, all broad phases are called alike
     position: FloatArray,
@@ -131,7 +132,7 @@ LOW = 2**31 - 1
 """Mask of the low bits of a cell number: more than any table has slots"""
 
 
-@kernel
+@bare_kernel
 def cell_of(coordinate: float, width: float) -> int:
     """Return the number of the cell that a coordinate lies in."""
     if math.isnan(coordinate):  # a body that has diverged touches nothing; the step ends with a Divergence
@@ -139,14 +140,19 @@ def cell_of(coordinate: float, width: float) -> int:
     return math.floor(min(max(coordinate / width, -MAX_CELL), MAX_CELL))
 
 
-@kernel
+@bare_kernel
 def slot_of(column: int, row: int, mask: int) -> int:
     """Return the slot of a cell in a table of mask + 1 slots (Teschner et al. 2003, their two primes)."""
     # From the low bits only, so that no product overflows. The low bits of a product depend on nothing else.
     return int((((column & LOW) * 73856093) ^ ((row & LOW) * 19349663)) & mask)
 
 
-@kernel
+def grid_memory(count: int) -> int:
+    """Return the number of integers of scratch memory that `grid` needs for a number of balls."""
+    return 8 * count + 8
+
+
+@bare_kernel
 def grid(
     order: IntArray,
     position: FloatArray,
@@ -157,7 +163,10 @@ def grid(
     max_tests: int,
     keys: IntArray,
 ) -> tuple[int, int]:
-    """Write the pairs whose bounding circles, widened by the margin, overlap; `order` (N,) is scratch memory."""
+    """Write the pairs whose bounding circles, widened by the margin, overlap.
+
+    `order` is scratch memory of `grid_memory(N)` integers.
+    """
     count, max_radius = len(position), 0.0
     for i in range(count):
         if collision_mask[i] > 0:
@@ -170,9 +179,10 @@ def grid(
         mask *= 2
     mask -= 1
 
-    # Counting sort: `begin[s]` … `begin[s + 1]` are the rows in `order` of the balls of slot s.
-    column, row, slot = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count, np.int64)
-    begin = np.zeros(mask + 3, np.int64)
+    # Counting sort: `begin[s]` … `begin[s + 1]` are the rows in `member` of the balls of slot s.
+    column, row, slot = order[:count], order[count : 2 * count], order[2 * count : 3 * count]
+    member, begin = order[3 * count : 4 * count], order[4 * count : 4 * count + mask + 3]
+    begin[:] = 0
     for i in range(count):
         if collision_mask[i] > 0:
             column[i], row[i] = cell_of(position[i, 0], width), cell_of(position[i, 1], width)
@@ -182,7 +192,7 @@ def grid(
         begin[s] += begin[s - 1]
     for i in range(count):
         if collision_mask[i] > 0:
-            order[begin[slot[i] + 1]] = i
+            member[begin[slot[i] + 1]] = i
             begin[slot[i] + 1] += 1
 
     found, tests, visited = 0, 0, 0
@@ -198,7 +208,7 @@ def grid(
                 s = slot_of(across, up, mask)
                 visited += begin[s + 1] - begin[s]
                 for slot_index in range(begin[s], begin[s + 1]):
-                    j = order[slot_index]
+                    j = member[slot_index]
                     # Another cell may share the slot.
                     if j <= i or column[j] != across or row[j] != up:
                         continue
@@ -217,7 +227,7 @@ MEAN_SHIFTS = 100
 """Mean number of positions that a box may move in the order before sorting is faster than insertion"""
 
 
-@kernel
+@bare_kernel
 def sweep(
     order: IntArray,
     position: FloatArray,

@@ -21,6 +21,7 @@ from sandbox.engines.reference.broad_phase import (
     UNSORTED,
     CandidatePairs,
     SegmentBoxes,
+    grid_memory,
     near_segments,
 )
 from sandbox.engines.reference.filtering import CollisionFilter
@@ -65,10 +66,11 @@ class CollisionPipeline(ABC):
 
     def __init__(self, store: BodyStore, broad_phase: str, work: Counter[str] | None = None) -> None:
         self._store, self._broad_phase = store, BROAD_PHASES[broad_phase]
-        self._is_sweep, self._tests_all_pairs = broad_phase == "sweep", broad_phase in ("all_pairs", "circles")
+        self._is_sweep, self._is_grid = broad_phase == "sweep", broad_phase == "grid"
+        self._tests_all_pairs = broad_phase in ("all_pairs", "circles")
         self._max_pairs = resource_limits.PAIRS.value
         self._ball_keys, self._segment_keys = np.empty(64, np.int64), np.empty(64, np.int64)
-        self._out, self._wall_out = _empty_manifolds(64), _empty_manifolds(64)
+        self._out, self._wall_out = empty_manifolds(64), empty_manifolds(64)
         """buffers of the contacts, and of the overlaps with one-way walls"""
         self._no_contacts = self._out.of(slice(0))
         self.work: Counter[str] = Counter(dict.fromkeys(WORK, 0)) if work is None else work
@@ -89,6 +91,26 @@ class CollisionPipeline(ABC):
         alone = not (store.contact_matrix.ball_ball or self._plane_count or len(self._boxes))
         self.min_radius = np.inf if alone else float(touching.min(initial=np.inf))
         """m; smallest radius of moving bodies that can touch anything"""
+
+    @property
+    def segment_boxes(self) -> SegmentBoxes:
+        """Boxes of the segments."""
+        return self._boxes
+
+    @property
+    def moves(self) -> BoolArray:
+        """(N,) bodies that are present and not fixed."""
+        return self._moves
+
+    @property
+    def max_pairs(self) -> int:
+        """Largest number of pairs that a broad phase may test."""
+        return self._max_pairs
+
+    @property
+    def plane_tests(self) -> int:
+        """Number of pairs of a body and a plane, all of which are tested."""
+        return self._plane_tests
 
     @abstractmethod
     def candidates(self, position: FloatArray, margin: float = 0.0, segments_only: bool = False) -> CandidatePairs:
@@ -137,7 +159,9 @@ class CollisionPipeline(ABC):
         return keys
 
     def _initial_order(self, middle: FloatArray, radius: FloatArray, collision_mask: IntArray) -> IntArray:
-        """Return the discs that can collide with anything, in the order of a sweep along the axis with fewer overlaps.
+        """Return the memory of the broad phase.
+
+        For a sweep, these are the discs that can collide with anything, in order along the axis with fewer overlaps.
 
         Raises:
             Exhaustion: there are too many pairs to list.
@@ -147,6 +171,8 @@ class CollisionPipeline(ABC):
             subject = f"broad_phase 'all_pairs' or 'circles' of {len(some):,} discs tests this many pairs:"
             _raise_refusal(resource_limits.PAIRS.refusal(subject, 0.5 * len(some) * len(collision_mask)))
         self._swaps_axes = False
+        if self._is_grid:
+            return np.empty(grid_memory(len(middle)), np.int64)
         if self._is_sweep:
             low = middle[some, :2] - radius[some, None]
             if len(some) > MIN_BOXES_FOR_AXIS_CHOICE:
@@ -195,7 +221,7 @@ class CollisionPipeline(ABC):
         size = self._write_manifolds(position, pairs, max_separation)
         if size > len(self._out.key):
             _raise_refusal(resource_limits.MEMORY.refusal(f"{size:,} contacts take", size * BYTES_PER_CONTACT))
-            self._out = _empty_manifolds(2 * size)
+            self._out = empty_manifolds(2 * size)
             self._write_manifolds(position, pairs, max_separation)
         self.work["pair_tests"] += len(pairs.balls) + len(pairs.segments) + self._plane_tests
         self.work["contacts"] += size
@@ -247,7 +273,7 @@ def _count_overlapping(low: FloatArray, width: FloatArray) -> int:
     return int((np.searchsorted(begin, begin + width[order], side="right") - np.arange(1, len(low) + 1)).sum())
 
 
-def _empty_manifolds(size: int) -> Manifolds:
+def empty_manifolds(size: int) -> Manifolds:
     """Return a buffer of uninitialised manifolds."""
     return Manifolds(
         key=np.empty(size, np.int64),
@@ -309,6 +335,17 @@ class CirclePipeline(CollisionPipeline):
                 pairs.segments, position, radius, surface, *walls, store.friction, max_separation, self._out, size
             )
         return size
+
+    def broad_phase_memory(self, position: FloatArray) -> IntArray:
+        """Return the memory of the broad phase, which its next call changes; positions (N, ≥ 2) m.
+
+        Raises:
+            Exhaustion: there are too many pairs to list.
+        """
+        if self._order is None:
+            store = self._store
+            self._order = self._initial_order(position, store.radius, store.collision_mask)
+        return self._order
 
     def max_displacement(self, start: FloatArray, end: FloatArray) -> float:
         """Return the largest displacement, m, of bodies that can touch anything, between centres (N, ≥ 2)."""

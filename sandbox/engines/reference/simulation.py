@@ -8,18 +8,29 @@ import numpy as np
 from sandbox.action import Action, ActionError, Impulse, Spawn
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.actions import apply_action
-from sandbox.engines.common.base import BEYOND, SteppedSimulation
+from sandbox.engines.common.base import BEYOND, SteppedSimulation, observe_path
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, ContactLog, join_batches
-from sandbox.engines.common.kernel import warn_if_uncompiled
+from sandbox.engines.common.kernel import COMPILED, warn_if_uncompiled
 from sandbox.engines.contract import Divergence, Exhaustion, Observer
 from sandbox.engines.energy_ledger import Cause
+from sandbox.engines.reference.ball_steps import BEYOND as BALLS_BEYOND
+from sandbox.engines.reference.ball_steps import (
+    CAPACITY,
+    ROUNDING,
+    STOPPED,
+    BallFrames,
+    BallStepper,
+    BallSteps,
+    record_contacts,
+)
 from sandbox.engines.reference.continuous import DETECTIONS
 from sandbox.engines.reference.energy import StepEnergyLedger
 from sandbox.engines.reference.joints import JointBreaker
 from sandbox.engines.reference.manifold import Manifolds
 from sandbox.engines.reference.step import StepRecord, WorldState
 from sandbox.engines.reference.zones import ZonedBodyStore
+from sandbox.frame_table import FrameTable
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import surface_parts
 from sandbox.scene.compile.scene import Scene
@@ -29,8 +40,7 @@ from sandbox.scene.description.discs import Disc
 from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Contacts, Frame
 
-ROUNDING = 1e-12
-"""Overlap as a fraction of the contact distance, and change of velocity as a fraction of the speed, that is rounding"""
+NO_PATH: FloatArray = np.empty((0, 0, 2))
 
 
 class ReferenceSimulation(SteppedSimulation):
@@ -60,6 +70,7 @@ class ReferenceSimulation(SteppedSimulation):
         self._h = settings.h
         self._log: ContactLog | None = None
         self._observer: Observer | None = None
+        self._balls: BallStepper | None = None
         self._last_contacts = NO_CONTACTS  # contacts of the last record
         self._initial_entries: ContactBatch | None = None  # zone entries before the recording began
         self._world.pipeline.check_limits(self._world.x[0])  # exceeding a limit raises before the run begins
@@ -89,6 +100,92 @@ class ReferenceSimulation(SteppedSimulation):
     def work(self) -> Mapping[str, int]:
         """Work counters since the start: all those of the contract but events and predictions."""
         return {"substeps": self.substeps, **self._world.work}
+
+    def advance(self, steps: int, frames: FrameTable) -> None:
+        """Advance by at most so many time steps, and record the frames that are due, as `Simulation.advance`.
+
+        A world of balls makes many steps in one compiled call.
+
+        Raises:
+            Divergence: the state of a body is not finite, or exceeds the bounds. It can still be read.
+            Exhaustion: a step exceeds a resource limit.
+        """
+        end = frames.steps + steps
+        frames.prepare(steps, len(self.bodies))
+        while frames.steps < end:
+            if not self._can_batch():
+                super().advance(end - frames.steps, frames)
+                return
+            with self._lock, np.errstate(all="ignore"):
+                self._check_running()
+                self._advance_balls(end - frames.steps, frames)
+
+    def _can_batch(self) -> bool:
+        """Whether nothing has to be done between two substeps, so that `BallStepper` can make many."""
+        return (
+            COMPILED
+            and self._zoned is None
+            and not self._removes
+            and (self._log is None or self._log.can_hold(CAPACITY))
+            and BallStepper.is_suitable(self._world, self._store, self._settings)
+        )
+
+    def _advance_balls(self, steps: int, frames: FrameTable) -> None:
+        """Make at most so many steps by `BallStepper`, and those substeps that it cannot make."""
+        if self._balls is None or self._balls.forces is not self._world.forces:
+            self._balls = BallStepper(self._world, self._store, self._settings)
+        observed, n = self._observer is not None, len(self.bodies)
+        steps = min(steps, self._balls.max_steps(observed=observed))
+        free = slice(frames.count, None)
+        rows = BallFrames(
+            frames.every,
+            frames.steps % frames.every,
+            frames.time[free],
+            frames.position[free],
+            frames.velocity[free],
+            frames.angle[free],
+            frames.angular_velocity[free],
+            NO_PATH,
+        )
+        result = self._balls.advance(self._steps, steps, rows, records=self._log is not None, observed=observed)
+        if self._world.x.shape[2] == 2:
+            written = slice(frames.count, frames.count + result.frames)
+            frames.angle[written, :n], frames.angular_velocity[written, :n] = (
+                self._store.angle,
+                self._store.angular_velocity,
+            )
+        frames.finish_rows(result.frames, n)
+        self._record_balls(result)
+        self._steps += result.steps
+        frames.steps += result.steps
+        if result.code == BALLS_BEYOND or (result.code == STOPPED and result.steps < steps):
+            first = result.substeps if result.code == STOPPED else self._settings.substeps
+            self._finish_substeps(first)
+            frames.steps += 1
+            if frames.is_due():
+                frames.record(self.frame())
+        else:
+            self._world.write_state()
+
+    def _finish_substeps(self, first: int) -> None:
+        """Complete a step from a substep on."""
+        begin, h = self._steps * self._settings.dt, self._h
+        for k in range(first, self._settings.substeps):
+            start = begin + k * h
+            self._substep(start, h)
+            self._end_substep(h, self._after(k + 1), start + h)
+        self._steps += 1
+        self._finish_step()
+
+    def _record_balls(self, result: BallSteps) -> None:
+        """Log the contacts of substeps, and call the observer."""
+        if self._log is None:
+            return
+        step, k = np.divmod(np.arange(len(result.log.same)), self._settings.substeps)
+        starts = (self._steps + step) * self._settings.dt + k * self._h
+        pairs = record_contacts(self._log, result.log, starts + self._h)
+        if self._observer is not None:
+            observe_path(self._observer, starts, result.path, pairs)
 
     def _advance(self, part: float) -> None:
         """Advance by the whole substeps in a fraction of dt, then by a shorter one."""

@@ -324,8 +324,7 @@ class ImpulseSolver:
         memory.key, memory.impulse, memory.h = contacts.key, solution.impulse, h
         if len(contacts.key):
             memory.key = contacts.key.copy()
-            # A substep corrects a fraction of the overlap beyond the slop.
-            target = -(1.0 - self._bias**h) / h * np.minimum(contacts.separation + self._slop, 0.0)
+            target = self.correction_rate(h) * np.minimum(contacts.separation + self._slop, 0.0)
             memory.has_pseudo_velocity = bool(target.any())
             if memory.has_pseudo_velocity:
                 self._work["contact_iterations"] += contacts.size * self._iterations
@@ -333,6 +332,21 @@ class ImpulseSolver:
                 solve_overlaps(
                     contacts, target, memory.pseudo_velocity, *self._inverse_overlap, total, self._iterations
                 )
+
+    def correction_rate(self, h: float) -> float:
+        """Return the factor, 1/s, from a (negative) separation to the rate at which a substep of h, s, corrects it."""
+        return float(-(1.0 - self._bias**h) / h)
+
+    @property
+    def max_contacts(self) -> int:
+        """Largest number of contacts in a substep: with more it takes too long."""
+        return self._max_work // self._iterations
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether there are only contacts of constant restitution without kicks, by Newton's law of impact."""
+        is_constrained = self._velocity_joints is not None or self._position_joints is not None
+        return not (is_constrained or self._has_constraints or self._dissipative) and self._rebound_model is None
 
     def finish(self, after: State) -> State:
         """Return the state with which the next step begins."""

@@ -121,6 +121,8 @@ class JointArrays:
 
     def some(self, which: BoolArray | IntArray) -> Self:
         """Return a selection, by mask or by indices."""
+        if not len(self):
+            return self
         indices = np.arange(len(self))[which]
         columns = {f.name: getattr(self, f.name)[indices] for f in fields(self) if f.name != "names"}
         return replace(self, names=tuple(self.names[k] for k in indices.tolist()), **columns)
