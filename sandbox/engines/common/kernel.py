@@ -57,6 +57,38 @@ def bare_kernel(function: Callable[P, R]) -> Callable[P, R]:
     return _compiled(function, {"_nrt": False, "nogil": True}) if COMPILED else function
 
 
+class OptionalKernel:
+    """Decides whether a kernel is worth its compilation that only saves time: without it, results are the same.
+
+    It is, if its compiled code is in memory or on disk, or once the time spent without it exceeds the time to compile
+    it. So a first short run does not wait, and a long session does not stay slow.
+    """
+
+    def __init__(self, function: Callable[..., object], compile_time: float) -> None:
+        """Watch a kernel that takes `compile_time`, s, to compile."""
+        self._function, self._compile_time = function, compile_time
+        self.spent = 0.0
+        """s, time spent without the kernel"""
+        self._is_ready = False
+
+    @property
+    def is_worthwhile(self) -> bool:
+        """Whether to use the kernel."""
+        if not (COMPILED and not self._is_ready):
+            return COMPILED
+        dispatcher: Any = self._function
+        self._is_ready = self.spent > self._compile_time or bool(dispatcher.signatures) or _is_on_disk(dispatcher)
+        return self._is_ready
+
+
+def _is_on_disk(dispatcher: Any) -> bool:
+    """Return whether there is compiled code of a kernel in the cache."""
+    cache_file = getattr(
+        dispatcher._cache, "_cache_file", None
+    )  # numba has no public way to ask; without a cache, None
+    return cache_file is not None and Path(cache_file._index_path).is_file()
+
+
 def _compiled(function: Callable[P, R], options: dict[str, bool]) -> Callable[P, R]:
     config: Any = numba.config
     numba_folder, folder = config.CACHE_DIR, cache_folder()

@@ -6,7 +6,7 @@ needs more memory or another path; the readable step then makes it. Tests compar
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from sandbox.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from sandbox.engines.common.base import FARTHEST, FASTEST
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.contact_log import ContactBatch, ContactLog
-from sandbox.engines.common.kernel import bare_kernel
+from sandbox.engines.common.kernel import OptionalKernel, bare_kernel
 from sandbox.engines.reference.broad_phase import EXCEEDED, all_pairs, grid, near_segments
 from sandbox.engines.reference.collision import CirclePipeline, empty_manifolds
 from sandbox.engines.reference.integrators import INTEGRATORS
@@ -261,6 +261,10 @@ def advance_balls(
             write_frame(state.x, frames, written)
             written += 1
     return steps, 0, written, DONE
+
+
+KERNEL = OptionalKernel(advance_balls, compile_time=10.0)
+"""Decides whether `advance_balls` is used; its time to compile was measured"""
 
 
 @bare_kernel
@@ -616,27 +620,29 @@ class BallStepper:
         if forces.constant.shape[1] == 3:
             turning = forces.constant[:, 2]
         self._store = store
-        self._arrays = BallArrays(
-            constant=np.column_stack((forces.constant[:, :2], turning)),
-            mobile=np.broadcast_to(forces.mobile[:, 0], len(store.radius)).copy(),
-            radius=store.radius,
-            surface=store.surface,
-            mask=store.collision_mask,
-            moves=pipeline.moves,
-            can_touch=pipeline.can_touch,
-            inverse_mass=store.inverse_mass,
-            inverse_moment=store.inverse_moment,
-            friction=store.friction,
-            restitution=store.restitution.ravel(),
-            planes=fixtures.planes,
-            plane_collider=fixtures.plane_collider,
-            collider_surface=store.fixed_surface,
-            segments=fixtures.segments,
-            segment_joints=fixtures.joints,
-            segment_collider=fixtures.segment_collider,
-            segment_box=boxes.box,
-            segment_index=boxes.index,
-        )
+        given: dict[str, Any] = {
+            "constant": np.column_stack((forces.constant[:, :2], turning)),
+            "mobile": np.broadcast_to(forces.mobile[:, 0], len(store.radius)),
+            "radius": store.radius,
+            "surface": store.surface,
+            "mask": store.collision_mask,
+            "moves": pipeline.moves,
+            "can_touch": pipeline.can_touch,
+            "inverse_mass": store.inverse_mass,
+            "inverse_moment": store.inverse_moment,
+            "friction": store.friction,
+            "restitution": store.restitution.ravel(),
+            "planes": fixtures.planes,
+            "plane_collider": fixtures.plane_collider,
+            "collider_surface": store.fixed_surface,
+            "segments": fixtures.segments,
+            "segment_joints": fixtures.joints,
+            "segment_collider": fixtures.segment_collider,
+            "segment_box": boxes.box,
+            "segment_index": boxes.index,
+        }
+        # Copied, so that the kernel is compiled for one kind of arrays: not for read-only or strided ones too.
+        self._arrays = BallArrays(**{name: np.array(array, order="C") for name, array in given.items()})
         self._allocate(64)
 
     @staticmethod

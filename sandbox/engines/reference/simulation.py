@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from contextlib import AbstractContextManager, nullcontext
+from time import perf_counter
 
 import numpy as np
 
@@ -11,12 +12,13 @@ from sandbox.engines.common.actions import apply_action
 from sandbox.engines.common.base import BEYOND, SteppedSimulation, observe_path
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, ContactLog, join_batches
-from sandbox.engines.common.kernel import COMPILED, warn_if_uncompiled
+from sandbox.engines.common.kernel import warn_if_uncompiled
 from sandbox.engines.contract import Divergence, Exhaustion, Observer
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.reference.ball_steps import BEYOND as BALLS_BEYOND
 from sandbox.engines.reference.ball_steps import (
     CAPACITY,
+    KERNEL,
     ROUNDING,
     STOPPED,
     BallFrames,
@@ -116,6 +118,11 @@ class ReferenceSimulation(SteppedSimulation):
             if not self._can_batch():
                 super().advance(end - frames.steps, frames)
                 return
+            if not KERNEL.is_worthwhile:
+                began = perf_counter()
+                super().advance(end - frames.steps, frames)
+                KERNEL.spent += perf_counter() - began
+                return
             with self._lock, np.errstate(all="ignore"):
                 self._check_running()
                 self._advance_balls(end - frames.steps, frames)
@@ -123,8 +130,7 @@ class ReferenceSimulation(SteppedSimulation):
     def _can_batch(self) -> bool:
         """Whether nothing has to be done between two substeps, so that `BallStepper` can make many."""
         return (
-            COMPILED
-            and self._zoned is None
+            self._zoned is None
             and not self._removes
             and (self._log is None or self._log.can_hold(CAPACITY))
             and BallStepper.is_suitable(self._world, self._store, self._settings)

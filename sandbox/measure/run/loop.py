@@ -28,6 +28,9 @@ CALL_DURATION = 0.02
 FIRST_STEPS = 16
 """Steps of the first call of `Simulation.advance`, of which nothing is known."""
 
+MAX_GROWTH = 8
+"""Largest factor from one call to the next; the first steps of a scene may be faster than the later ones."""
+
 MIN_ELAPSED = 1e-6
 """s, resolution of the clock."""
 
@@ -162,7 +165,7 @@ class _StepLoop:
         if elapsed > CALL_DURATION:
             self._steps_per_call = max(int(steps * CALL_DURATION / elapsed), 1)
         elif steps == self._steps_per_call:
-            self._steps_per_call = min(2 * steps, int(steps * CALL_DURATION / max(elapsed, MIN_ELAPSED)))
+            self._steps_per_call = min(MAX_GROWTH * steps, int(steps * CALL_DURATION / max(elapsed, MIN_ELAPSED)))
 
     def _is_game_over(self) -> bool:
         return self._game is not None and self._game.finished
