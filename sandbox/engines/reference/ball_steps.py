@@ -6,6 +6,7 @@ needs more memory or another path; the readable step then makes it. Tests compar
 """
 
 import math
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -773,7 +774,7 @@ def record_contacts(target: ContactLog, log: BallLog, times: FloatArray) -> list
         one = slice(row[k], row[k + 1])
         target.record(float(times[k]), ContactBatch(a[one], b[one], impulse[one], normal[one], point[one]))
 
-    for begin, end in zip(begins, [*begins[1:], len(log.same)], strict=True):
+    for begin, end in pairwise([*begins, len(log.same)]):
         record(begin)
         if target.has_distinct_rows and end > begin + 1:
             lasting = impulse[row[begin + 1] : row[end]]
