@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
+from sandbox.scene.compile.derived import derived_once
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import Point
 from sandbox.scene.description.fixed import Plane, Wall
@@ -94,7 +95,14 @@ def _in_line(a: Point, b: Point, c: Point) -> bool:
 
 
 def static_colliders(scene: Scene, everything: bool = False) -> StaticColliders:
-    """Return a scene's static colliders as arrays: the solid ones, or all with `everything`."""
+    """Return a scene's static colliders as arrays: the solid ones, or all with `everything`.
+
+    They are derived once a scene and shared, so that their arrays must not be changed.
+    """
+    return _all_colliders(scene) if everything else _solid_colliders(scene)
+
+
+def _collect(scene: Scene, everything: bool) -> StaticColliders:
     planes, segments, joints = [], [], []
     for k, collider in enumerate(scene.fixed):
         if not (isinstance(collider, Plane) or collider.solid or everything):
@@ -121,3 +129,7 @@ def static_colliders(scene: Scene, everything: bool = False) -> StaticColliders:
         segment_rows[:, 0].astype(np.int64),
         np.asarray(joints, dtype=np.float64).reshape(-1, 4),
     )
+
+
+_solid_colliders = derived_once(lambda setup: _collect(setup.scene, everything=False))
+_all_colliders = derived_once(lambda setup: _collect(setup.scene, everything=True))

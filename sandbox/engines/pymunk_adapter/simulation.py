@@ -227,12 +227,12 @@ class PymunkSimulation(BaseSimulation):
                 observe_path(self._observer, starts, path, pairs)
         if space_bodies.joints.count:
             self._joint_iterations += space_bodies.solved_joint_count * self._settings.iterations * len(starts)
-        self._record_states(batch.states[substeps - 1 :: substeps] if observed else batch.states, frames)
+        states = batch.states[substeps - 1 :: substeps] if observed else batch.states
+        self._record_states(states[:-1] if batch.has_failed else states, frames)
         self._steps += batch.steps
         population.invalidate()
         self._shared_angles = None
         if batch.has_failed:
-            frames.steps -= 1
             self._check_state()
 
     def _record_states(self, states: FloatArray, frames: FrameTable) -> None:

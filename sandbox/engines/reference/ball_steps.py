@@ -101,7 +101,7 @@ class BallConstants(NamedTuple):
     """pairs of a ball and a plane"""
 
 
-class BallArrays(NamedTuple):
+class BallColumns(NamedTuple):
     """Arrays that do not change from step to step, of N balls, S surfaces, P planes and G segments."""
 
     constant: FloatArray
@@ -168,7 +168,7 @@ class BallScratch(NamedTuple):
     """(C,)"""
 
 
-class BallFrames(NamedTuple):
+class BallFrameRows(NamedTuple):
     """Rows of a frame table, from the first free one on, and the path of the balls."""
 
     every: int
@@ -205,10 +205,10 @@ is not finite or out of bounds after the last step."""
 @bare_kernel
 def advance_balls(
     number: BallConstants,
-    arrays: BallArrays,
+    arrays: BallColumns,
     state: BallState,
     scratch: BallScratch,
-    frames: BallFrames,
+    frames: BallFrameRows,
     log: BallLog,
     steps_before: int,
     steps: int,
@@ -269,7 +269,7 @@ KERNEL = OptionalKernel(advance_balls, compile_time=10.0)
 
 
 @bare_kernel
-def acceleration(number: BallConstants, arrays: BallArrays, i: int, vx: float, vy: float) -> tuple[float, float]:
+def acceleration(number: BallConstants, arrays: BallColumns, i: int, vx: float, vy: float) -> tuple[float, float]:
     """Return the acceleration of a ball at a velocity, as `integrators.transition`."""
     ax, ay = arrays.constant[i, 0], arrays.constant[i, 1]
     if number.linear_drag > 0.0 or number.quadratic_drag > 0.0:
@@ -281,7 +281,7 @@ def acceleration(number: BallConstants, arrays: BallArrays, i: int, vx: float, v
 
 
 @bare_kernel
-def move_balls(number: BallConstants, arrays: BallArrays, state: BallState, scratch: BallScratch) -> None:
+def move_balls(number: BallConstants, arrays: BallColumns, state: BallState, scratch: BallScratch) -> None:
     """Write the motion over h without contacts into `placed`, with the overlap of the last substep corrected.
 
     The integrators are those of `integrators`, with the same operations in the same order.
@@ -359,7 +359,7 @@ def sort_keys(keys: IntArray, count: int) -> None:
 
 @bare_kernel
 def find_contacts(
-    number: BallConstants, arrays: BallArrays, state: BallState, scratch: BallScratch
+    number: BallConstants, arrays: BallColumns, state: BallState, scratch: BallScratch
 ) -> tuple[int, int, int]:
     """Write the contacts of `placed`; return their number and those of cheap and exact tests.
 
@@ -432,7 +432,7 @@ def find_contacts(
 
 @bare_kernel
 def solve_contacts(
-    number: BallConstants, arrays: BallArrays, state: BallState, scratch: BallScratch, size: int, warm_start: float
+    number: BallConstants, arrays: BallColumns, state: BallState, scratch: BallScratch, size: int, warm_start: float
 ) -> None:
     """Write the state at the end of a substep, with contacts that act through it, as `ImpulseSolver.solve`."""
     placed, after = scratch.placed, scratch.after
@@ -477,7 +477,7 @@ def solve_contacts(
 
 @bare_kernel
 def correct_overlap(
-    number: BallConstants, arrays: BallArrays, state: BallState, scratch: BallScratch, size: int
+    number: BallConstants, arrays: BallColumns, state: BallState, scratch: BallScratch, size: int
 ) -> None:
     """Find the velocities that correct overlap in the next substep, as `ImpulseSolver.correct`; store impulses."""
     if state.counts[HAS_PSEUDO_VELOCITY] != 0:
@@ -534,7 +534,7 @@ def is_within(x: FloatArray) -> bool:
 
 
 @bare_kernel
-def write_frame(x: FloatArray, frames: BallFrames, row: int) -> None:
+def write_frame(x: FloatArray, frames: BallFrameRows, row: int) -> None:
     """Write a state into a row of a frame table."""
     for i in range(x.shape[1]):
         frames.position[row, i, 0], frames.position[row, i, 1] = x[0, i, 0], x[0, i, 1]
@@ -543,7 +543,7 @@ def write_frame(x: FloatArray, frames: BallFrames, row: int) -> None:
 
 
 @bare_kernel
-def log_contacts(arrays: BallArrays, scratch: BallScratch, log: BallLog, size: int, substep: int) -> None:
+def log_contacts(arrays: BallColumns, scratch: BallScratch, log: BallLog, size: int, substep: int) -> None:
     """Write the contacts of a substep, without those that are rounding, as `ReferenceSimulation` logs them."""
     out, rates, inverse_mass, impulse = scratch.out, scratch.after[1], arrays.inverse_mass, scratch.impulse
     begin = log.end[substep]
@@ -643,7 +643,7 @@ class BallStepper:
             "segment_index": boxes.index,
         }
         # Copied, so that the kernel is compiled for one kind of arrays: not for read-only or strided ones too.
-        self._arrays = BallArrays(**{name: np.array(array, order="C") for name, array in given.items()})
+        self._arrays = BallColumns(**{name: np.array(array, order="C") for name, array in given.items()})
         self._allocate(64)
 
     @staticmethod
@@ -685,7 +685,7 @@ class BallStepper:
         substeps = min(MAX_SUBSTEPS, MAX_PATH // len(self._arrays.radius)) if observed else MAX_SUBSTEPS
         return max(substeps // self._substeps, 1)
 
-    def advance(self, begin: int, steps: int, frames: BallFrames, *, records: bool, observed: bool) -> BallSteps:
+    def advance(self, begin: int, steps: int, frames: BallFrameRows, *, records: bool, observed: bool) -> BallSteps:
         """Make at most so many steps; the state of the world is that after them, and after the substeps beyond.
 
         Args:

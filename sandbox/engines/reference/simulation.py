@@ -21,7 +21,7 @@ from sandbox.engines.reference.ball_steps import (
     KERNEL,
     ROUNDING,
     STOPPED,
-    BallFrames,
+    BallFrameRows,
     BallStepper,
     BallSteps,
     record_contacts,
@@ -143,7 +143,7 @@ class ReferenceSimulation(SteppedSimulation):
         observed, n = self._observer is not None, len(self.bodies)
         steps = min(steps, self._balls.max_steps(observed=observed))
         free = slice(frames.count, None)
-        rows = BallFrames(
+        rows = BallFrameRows(
             frames.every,
             frames.steps % frames.every,
             frames.time[free],

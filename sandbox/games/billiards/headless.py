@@ -184,7 +184,7 @@ def play_frame(
     """
     if len(players) != match.state.players:
         raise GameError(f"the match has {match.state.players} players, not {len(players)}")
-    table = FrameTable(match, engine)
+    table = MatchTable(match, engine)
     first, turns = match, list[FrameTurn]()
     unfinished: str | None = None
     start_time = perf_counter()
@@ -219,7 +219,7 @@ def play_frame(
     return FrameRecord(first, table.match, tuple(turns), recording, unfinished)
 
 
-class FrameTable:
+class MatchTable:
     """Simulation of a table with its game. Time advances only while a shot is in progress."""
 
     def __init__(self, match: Match, engine: str) -> None:

@@ -15,6 +15,7 @@ from sandbox.measure.missed_contacts.static_geometry import StaticGeometry, Swep
 from sandbox.measure.missed_contacts.swept_geometry import CLEAR, DEEP, JUMP, approaching, closest_to_origin, dot
 from sandbox.measure.missed_contacts.verlet_list import VerletList
 from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.derived import derived_once
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 
@@ -66,7 +67,7 @@ class Audit:
     def __init__(self, start: Scene | Setup, bodies: Bodies | None = None) -> None:
         setup = Setup.of(start)
         scene = setup.scene
-        self._static_geometry = StaticGeometry.of(scene)
+        self._static_geometry = _static_geometry(setup)
         self._apart = setup.links.apart()
         self._kinematic = frozenset(drive.body for drive in scene.drives if drive.kind != "torque")
         self._times: list[FloatArray] = []
@@ -311,6 +312,9 @@ class Audit:
         able = (dot(gap, move) < 0) & (dot(move, move) >= (JUMP * contact) ** 2)
         able &= closest_to_origin(gap, move) < (DEEP * contact) ** 2
         return at[able]
+
+
+_static_geometry = derived_once(lambda setup: StaticGeometry.of(setup.scene))
 
 
 def _squared_lengths(start: FloatArray, end: FloatArray) -> FloatArray:

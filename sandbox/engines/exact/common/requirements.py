@@ -12,6 +12,7 @@ from sandbox.engines.common.colliders import StaticColliders, static_colliders
 from sandbox.engines.tabletop.requirements import pockets_at, unsupported_on_surface
 from sandbox.resource_limits import MEMORY, PAIRS
 from sandbox.scene.compile.demands import BALLS, FLOOR, SURFACES, Demand, on_floor, unmodelled
+from sandbox.scene.compile.derived import derived_once
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
@@ -153,7 +154,7 @@ def unsupported(setup: Setup, settings: Settings) -> tuple[str, ...]:
     too_many = too_many_pairs(setup)
     if too_many is not None:
         return (*missing, too_many)
-    overlap = overlap_of(setup, setup.bodies.position)
+    overlap = _overlap_at_start(setup)
     return (*missing, overlap) if overlap else tuple(missing)
 
 
@@ -171,6 +172,11 @@ def too_many_pairs(setup: Setup) -> str | None:
     return PAIRS.refusal(
         f"the number of pairs of {moving:,} moving balls with {balls + fixed:,} balls and surfaces is", pairs
     )
+
+
+@derived_once
+def _overlap_at_start(setup: Setup) -> str | None:
+    return overlap_of(setup, setup.bodies.position)
 
 
 def overlap_of(start: Scene | Setup, position: FloatArray) -> str | None:

@@ -20,7 +20,9 @@ from sandbox.engines.common.body_store import ALL, NOTHING, BodyStore
 from sandbox.engines.common.colliders import StaticColliders, static_colliders, straightened
 from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.common.restitution import kicked, segment_fractions
+from sandbox.scene.compile.derived import derived_once
 from sandbox.scene.compile.scene import Scene
+from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.fixed import Plane, Wall
 
 T, X, Y, VX, VY, AX, AY, RADIUS, TIME_RESIDUAL, ANGLE, SPIN, ALPHA, SLIP_END_TIME, LOGGED_UNTIL = range(14)
@@ -229,7 +231,19 @@ def make_state(store: BodyStore) -> EventState:
 
 
 def _collider_arrays(scene: Scene) -> dict[str, Any]:
-    """Return the arrays of all static colliders, solid or not."""
+    """Return new arrays of all static colliders, solid or not."""
+    return {name: array.copy() for name, array in _derived_collider_arrays(scene).items()}
+
+
+def vertices_of(scene: Scene) -> FloatArray:
+    """Return the vertices (K, 7) of all static colliders, as in `EventState`; the array must not be changed."""
+    vertices: FloatArray = _derived_collider_arrays(scene)["vertices"]
+    return vertices
+
+
+@derived_once
+def _derived_collider_arrays(setup: Setup) -> dict[str, Any]:
+    scene = setup.scene
     fixtures = static_colliders(scene, everything=True)
     vertices, vertex_collider, ends = _vertices(fixtures)
     lines, line_collider, line_vertices = _lines(fixtures, ends)

@@ -16,7 +16,9 @@ from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.exact.common import state as discs
 from sandbox.engines.tabletop.collisions import BALL_BALL, CUSHION
 from sandbox.engines.tabletop.motion import RESTING, SurfaceFriction, figures_of
+from sandbox.scene.compile.derived import derived_once
 from sandbox.scene.compile.scene import Scene
+from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.fixed import Post, Wall
 from sandbox.trajectory import Contacts
 
@@ -123,10 +125,8 @@ def make_tabletop_state(store: BodyStore) -> TabletopState:
     count, scene = len(store.bodies), store.scene
     plain = discs.make_state(store)
     heights = _nose_heights(scene)
-    vertices = np.column_stack(
-        (plain.vertices[:, :3], heights[plain.vertex_tags[:, 0]] if len(plain.vertices) else np.empty((0,)))
-    )
-    exposed = exposed_vertices(vertices)
+    vertices = _with_heights(plain, heights)
+    exposed = _exposed_of(scene)
     lines = plain.lines[:, : discs.HALF_THICKNESS + 1].copy()
     lines[:, LINE_NOSE] = heights[plain.line_tags[:, 0]]
     state = np.zeros((count, STATE_COLUMNS))
@@ -216,6 +216,17 @@ def exposed_vertices(vertices: FloatArray) -> IntArray:
         if not (distance + vertices[k, CIRCLE_RADIUS] <= vertices[exposed, CIRCLE_RADIUS] + INSIDE_TOLERANCE).any():
             exposed.append(k)
     return np.sort(np.asarray(exposed, dtype=np.int64))
+
+
+@derived_once
+def _exposed_of(setup: Setup) -> IntArray:
+    """Return the exposed vertices of a scene."""
+    return exposed_vertices(discs.vertices_of(setup.scene))
+
+
+def _with_heights(plain: discs.EventState, heights: FloatArray) -> FloatArray:
+    """Return the vertices (K, 4) with the heights of their colliders (F,), m."""
+    return np.column_stack((plain.vertices[:, :3], heights[plain.vertex_tags[:, 0]] if len(plain.vertices) else []))
 
 
 def _nose_heights(scene: Scene) -> FloatArray:
