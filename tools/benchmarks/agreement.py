@@ -28,6 +28,17 @@ def pile(scene: Scene) -> None:
     assert {frozenset(pair) for pair in pairs.tolist()} == {frozenset(map(int, row[1:3])) for row in contacts}
 
 
+def balls(scene: Scene) -> None:
+    """Check balls that fall onto a plane against the pymunk loop, and other engines until they touch it."""
+    short = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": 0.6})})
+    frames, found = peers.attribute_frames(short), run(short, audit=False)
+    assert np.allclose(found.position, frames[:, :, :2], rtol=0.0, atol=1e-9)  # as in `pile`
+    for engine in ("reference", "exact"):
+        other = run(short, engine, audit=False)
+        height = 0.5 * 9.81 * 0.3 * 0.01  # error of explicit Euler after 0.3 s
+        assert np.abs(other.position[30] - found.position[30]).max() <= 1.001 * height, engine
+
+
 def audited(scene: Scene) -> None:
     """Check that the audit does not change the positions."""
     short = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": 0.25})})

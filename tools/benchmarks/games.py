@@ -3,7 +3,7 @@
 from sandbox.scene.files.load import load
 from tools.benchmarks import agreement, drawing, pooltool_shots
 from tools.benchmarks.row import Bench
-from tools.benchmarks.workloads import fanning, playing, scene, setting, shooting, simulated, stepping
+from tools.benchmarks.workloads import fanning, playing, running, scene, setting, shooting, simulated, stepping
 
 GAMES = (
     *(
@@ -12,10 +12,18 @@ GAMES = (
             "a full shot to rest, events kept, exact engine / the same shot by pooltool as it is installed",
             lambda name=name: shooting(load(pooltool_shots.path(name))),
             lambda name=name: pooltool_shots.peer(name),
-            1.0 / (100.0 if name == "three_cushions" else 300.0),
+            1.0 / (300.0 if name == "three_cushions" else 1000.0),
             missing=pooltool_shots.missing,
         )
         for name in pooltool_shots.NAMES
+    ),
+    Bench(
+        "run-break",
+        "sandbox.run of the 9-ball break, 2,001 frames, exact engine / pooltool's search for its events, no frames",
+        lambda: running(load(pooltool_shots.path("nine_ball_break")), engine="exact"),
+        lambda: pooltool_shots.peer("nine_ball_break"),
+        1.0 / 20.0,
+        missing=pooltool_shots.missing,
     ),
     *(
         Bench(

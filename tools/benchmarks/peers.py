@@ -43,17 +43,12 @@ def pile_loop(scene: Scene) -> Callable[[], float]:
     return work
 
 
-def pile_arrays(scene: Scene) -> tuple[FloatArray, FloatArray]:
-    """Run a pile of equal balls and return its frames (T, N, 6) and its contacts (C, 9).
-
-    A frame has position, angle, velocity and angular velocity of each ball; a contact has time, two indices, normal,
-    point and impulse.
-    """
+def pile_space(scene: Scene) -> tuple[pymunk.Space, list[pymunk.Body]]:
+    """Return a pymunk space with equal balls and planes of one material, and the bodies of both."""
     radius, mass = float(scene.bodies.radius[0]), float(scene.bodies.mass[0])
     (pair,) = scene.pairs
     # pymunk multiplies the coefficients of two shapes
     friction, restitution = pair.friction**0.5, pair.restitution**0.5
-    dt, steps = scene.solver.dt, round(scene.world.duration / scene.solver.dt)
     space = pymunk.Space()
     space.gravity = scene.world.gravity
     space.iterations = scene.solver.iterations
@@ -77,7 +72,56 @@ def pile_arrays(scene: Scene) -> tuple[FloatArray, FloatArray]:
         shape.elasticity, shape.friction = restitution, friction
         space.add(body, shape)
         bodies.append(body)
+    return space, bodies
 
+
+def attribute_loop(scene: Scene) -> Callable[[], float]:
+    """Return a workload that runs equal balls with a pymunk loop as most programs have it; seconds.
+
+    It keeps position, angle, velocity and angular velocity of each ball, read by their attributes. No contacts.
+    """
+
+    def work() -> float:
+        start_time = time.perf_counter()
+        attribute_frames(scene)
+        return time.perf_counter() - start_time
+
+    return work
+
+
+def started_loops(scene: Scene, runs: int = 50) -> Callable[[], float]:
+    """Return a workload of such loops of one step; runs per second."""
+    short = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": scene.solver.dt})})
+
+    def work() -> float:
+        start_time = time.perf_counter()
+        for _ in range(runs):
+            attribute_frames(short)
+        return runs / (time.perf_counter() - start_time)
+
+    return work
+
+
+def attribute_frames(scene: Scene) -> FloatArray:
+    """Run equal balls and return their frames, (T, N, 6): x, y, angle, vx, vy, ω."""
+    dt, steps = scene.solver.dt, round(scene.world.duration / scene.solver.dt)
+    space, bodies = pile_space(scene)
+    balls = bodies[: len(scene.bodies)]
+    frames = [[(*b.position, b.angle, *b.velocity, b.angular_velocity) for b in balls]]
+    for _ in range(steps):
+        space.step(dt)
+        frames.append([(*b.position, b.angle, *b.velocity, b.angular_velocity) for b in balls])
+    return np.array(frames)
+
+
+def pile_arrays(scene: Scene) -> tuple[FloatArray, FloatArray]:
+    """Run a pile of equal balls and return its frames (T, N, 6) and its contacts (C, 9).
+
+    A frame has position, angle, velocity and angular velocity of each ball; a contact has time, two indices, normal,
+    point and impulse.
+    """
+    dt, steps = scene.solver.dt, round(scene.world.duration / scene.solver.dt)
+    space, bodies = pile_space(scene)
     count, ids = len(scene.bodies), np.array([body.id for body in bodies])
     order = np.argsort(ids)
     ids = ids[order]

@@ -4,7 +4,18 @@ from tools.benchmarks import agreement, connected, drawing, peers
 from tools.benchmarks.games import GAMES
 from tools.benchmarks.row import Bench
 from tools.benchmarks.turning import turns
-from tools.benchmarks.workloads import command, events, flying, rolling, running, scene, staged, stepping
+from tools.benchmarks.workloads import (
+    balls_on_plane,
+    command,
+    events,
+    flying,
+    rolling,
+    running,
+    scene,
+    staged,
+    starting,
+    stepping,
+)
 
 SPARKS = ("world.duration=1.0", "solver.record_every=1")
 PILE = scene("benchmark/pile")
@@ -12,6 +23,16 @@ TOWER = scene("benchmark/tower")
 SETTLED = scene("benchmark/pile", "world.duration=1.0")
 BOUNCE = scene("tutorial/bounce")
 LOW = scene("tutorial/bounce", "ball.ball.position=[0, 0.55]", "world.duration=0.25")
+
+BALL = balls_on_plane(1, 1000)
+
+SMALL = (
+    (1, 1000, 1.0, 0.5, 0.5),
+    (9, 1000, 0.3, 0.15, 0.15),
+    (100, 500, 0.2, 0.4, 0.05),
+    (1024, 100, 0.45, 0.1, 0.1),
+)
+"""Balls on a plane: number, steps, and target ratios of pymunk, exact and reference."""
 
 BENCHES = (
     Bench(
@@ -28,6 +49,38 @@ BENCHES = (
         lambda: running(PILE),
         lambda: running(PILE, audit=False),
         same=lambda: agreement.audited(PILE),
+    ),
+    Bench(
+        "pile-reference",
+        "sandbox.run on the 1,000-ball pile on the reference, audited / the hand-written pymunk loop",
+        lambda: running(PILE, engine="reference"),
+        lambda: peers.pile_loop(PILE),
+        0.6,
+    ),
+    *(
+        Bench(
+            f"balls-{count}-{engine}",
+            f"sandbox.run, audited, of {count:,} ball{'s' * (count > 1)} on a plane, {steps:,} steps, on {engine} / a "
+            "pymunk loop that keeps its bodies' attributes",
+            lambda count=count, steps=steps, engine=engine: running(balls_on_plane(count, steps), engine=engine),
+            lambda count=count, steps=steps: peers.attribute_loop(balls_on_plane(count, steps)),
+            target,
+            same=lambda count=count, steps=steps: agreement.balls(balls_on_plane(count, steps)),
+        )
+        for count, steps, *targets in SMALL
+        for engine, target in zip(("pymunk", "exact", "reference"), targets, strict=True)
+    ),
+    *(
+        Bench(
+            f"run-start-{engine}",
+            f"runs a second of one ball for one step, on {engine} / runs of the pymunk loop",
+            lambda engine=engine: starting(BALL, engine),
+            lambda: peers.started_loops(BALL),
+            1000.0,
+            "runs/s",
+            rate=True,
+        )
+        for engine in ("pymunk", "exact", "reference")
     ),
     *(
         Bench(

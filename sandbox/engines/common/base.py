@@ -166,6 +166,8 @@ def observe_path(
         path: (B + 1, N, 2) m, centres before the first substep and after each.
         pairs: pairs (K, 2) of substeps, with the number of the substep after the last that has them.
     """
+    if not len(times):
+        return
     if isinstance(observer, PathObserver):
         observer.observe_path(times, path, pairs)
         return

@@ -56,12 +56,13 @@ class EventRecorder:
         if entries is not None:
             log.has_distinct_rows = False  # a zone entry does not last: the next contacts are different ones
 
-    def record_lists(self, lists: ContactLists, times: FloatArray) -> list[tuple[int, IntArray]]:
+    def record_lists(self, lists: ContactLists, times: FloatArray, wants_pairs: bool) -> list[tuple[int, IntArray]]:
         """Record the contacts of a batch of substeps.
 
         Args:
             lists: the contacts.
             times: (B,) s, end of each substep.
+            wants_pairs: whether to return the pairs.
 
         Returns:
             The pairs (K, 2) of the substeps, with the number of the substep after the last that has them.
@@ -69,7 +70,8 @@ class EventRecorder:
         pairs = []
         for end, count in self._population.space_bodies.read_batch(lists, self._log, times):
             self.contacts += count
-            pairs.append((end, self._log.pairs()))
+            if wants_pairs:
+                pairs.append((end, self._log.pairs()))
         return pairs
 
     @property
@@ -219,7 +221,7 @@ class PymunkSimulation(BaseSimulation):
         step_index, k = np.divmod(np.arange(batch.steps * substeps), substeps)
         starts = (self._steps + step_index) * self._settings.dt + k * h
         if self._recorder is not None and batch.contacts is not None:
-            pairs = self._recorder.record_lists(batch.contacts, starts + h)
+            pairs = self._recorder.record_lists(batch.contacts, starts + h, observed)
             if self._observer is not None:
                 path = np.empty((len(starts) + 1, *start.shape))
                 path[:] = start

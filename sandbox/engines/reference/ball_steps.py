@@ -583,6 +583,7 @@ class BallSteps(NamedTuple):
     code: int
     """`DONE`, `STOPPED` or `BEYOND`"""
     log: BallLog
+    """valid until the next call"""
     path: FloatArray
     """(B + 1, N, 2)"""
 
@@ -644,6 +645,12 @@ class BallStepper:
         }
         # Copied, so that the kernel is compiled for one kind of arrays: not for read-only or strided ones too.
         self._arrays = BallColumns(**{name: np.array(array, order="C") for name, array in given.items()})
+        self._log = BallLog(
+            np.zeros(MAX_SUBSTEPS + self._substeps + 1, np.int64),
+            np.empty(MAX_SUBSTEPS + self._substeps, np.bool_),
+            np.empty((CAPACITY, 2), np.int64),
+            np.empty((CAPACITY, 6)),
+        )
         self._allocate(64)
 
     @staticmethod
@@ -710,13 +717,7 @@ class BallStepper:
         order = pipeline.broad_phase_memory(x[0]) if numbers.broad_phase != NO_PAIRS else NO_ORDER
         counts = np.array([known, memory.has_pseudo_velocity, 0, 0, 0, 0], np.int64)
         state = BallState(x, key, impulse, memory.pseudo_velocity, order, counts)
-        rows = CAPACITY if records else 0
-        log = BallLog(
-            np.zeros(substeps + 1 if records else 0, np.int64),
-            np.empty(substeps if records else 0, np.bool_),
-            np.empty((rows, 2), np.int64),
-            np.empty((rows, 6)),
-        )
+        log = self._log if records else NO_LOG
         path = np.empty((substeps + 1, count, 2) if observed else (0, 0, 2))
         if observed:
             path[0] = x[0, :, :2]
@@ -738,6 +739,8 @@ class BallStepper:
         return BallSteps(made, rest, written, code, _first(log, substeps), path[: substeps + 1])
 
 
+NO_LOG = BallLog(np.zeros(0, np.int64), np.empty(0, np.bool_), np.empty((0, 2), np.int64), np.empty((0, 6)))
+
 MAX_CAPACITY = CAPACITY
 """Contacts of a substep beyond which the readable step is used; it costs little beside so many contacts"""
 
@@ -752,13 +755,16 @@ def _first(log: BallLog, substeps: int) -> BallLog:
     return BallLog(log.end[: substeps + 1], log.same[:substeps], log.pair[:rows], log.vectors[:rows])
 
 
-def record_contacts(target: ContactLog, log: BallLog, times: FloatArray) -> list[tuple[int, IntArray]]:
+def record_contacts(
+    target: ContactLog, log: BallLog, times: FloatArray, wants_pairs: bool
+) -> list[tuple[int, IntArray]]:
     """Enter the contacts of many substeps into a contact log, as if each had been recorded after its substep.
 
     Args:
         target: the contact log.
         log: the contacts.
         times: (B,) s, end of each substep.
+        wants_pairs: whether to return the pairs.
 
     Returns:
         The pairs (K, 2) of the substeps, with the number of the substep after the last that has them.
@@ -782,7 +788,8 @@ def record_contacts(target: ContactLog, log: BallLog, times: FloatArray) -> list
         else:
             for k in range(begin + 1, end):
                 record(k)
-        pairs.append((end, target.pairs()))
+        if wants_pairs:
+            pairs.append((end, target.pairs()))
     return pairs
 
 

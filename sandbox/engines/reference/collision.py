@@ -93,6 +93,11 @@ class CollisionPipeline(ABC):
         """m; smallest radius of moving bodies that can touch anything"""
 
     @property
+    def can_repeat_pairs(self) -> bool:
+        """Whether two bodies, or a body and a static collider, can have several contacts at once."""
+        return True
+
+    @property
     def segment_boxes(self) -> SegmentBoxes:
         """Boxes of the segments."""
         return self._boxes
@@ -297,6 +302,12 @@ class CirclePipeline(CollisionPipeline):
         super().rebuild()
         self._excluded: IntArray = excluded_pair_keys(self._store.links)
         self._owner = np.arange(len(self._store.position))  # each ball is its own body
+
+    @property
+    def can_repeat_pairs(self) -> bool:
+        """Whether a ball can have several contacts at once with one static collider: with a wall of several segments."""
+        colliders = self._store.fixtures.segment_collider
+        return len(np.unique(colliders)) < len(colliders)
 
     def candidates(self, position: FloatArray, margin: float = 0.0, segments_only: bool = False) -> CandidatePairs:
         """Return the candidate pairs at (N, ≥ 2) positions, m: at least all that are nearer than the margin, m."""

@@ -189,7 +189,7 @@ class ReferenceSimulation(SteppedSimulation):
             return
         step, k = np.divmod(np.arange(len(result.log.same)), self._settings.substeps)
         starts = (self._steps + step) * self._settings.dt + k * self._h
-        pairs = record_contacts(self._log, result.log, starts + self._h)
+        pairs = record_contacts(self._log, result.log, starts + self._h, self._observer is not None)
         if self._observer is not None:
             observe_path(self._observer, starts, result.path, pairs)
 
@@ -262,6 +262,13 @@ class ReferenceSimulation(SteppedSimulation):
         self._world.rebuild()
         if self._energy is not None:
             self._energy.rebuild()
+        if self._log is not None:
+            self._log.can_repeat_pairs = self._can_repeat_pairs
+
+    @property
+    def _can_repeat_pairs(self) -> bool:
+        """Whether one record can contain several contacts of a pair: of its shapes, or before and at an impact."""
+        return self._settings.detection != "discrete" or self._world.pipeline.can_repeat_pairs
 
     def _attributed(self, cause: Cause) -> AbstractContextManager[None]:
         """Attribute the change of energy by changes of the body store within the context to one cause."""
@@ -325,7 +332,7 @@ class ReferenceSimulation(SteppedSimulation):
     def contacts(self) -> Contacts:
         """Return the contacts since the last call; the first call starts the recording."""
         if self._log is None:
-            self._log = ContactLog(len(self._store.scene.fixed_names), can_repeat_pairs=True)
+            self._log = ContactLog(len(self._store.scene.fixed_names), self._can_repeat_pairs)
             overlaps = self._world.present_contacts()
             now = _contact_batch(overlaps, np.zeros((overlaps.size, 2)))
             if self._zoned is not None:  # entries are logged now and again with the first substep

@@ -137,7 +137,7 @@ class WorldState:
         self.records_joint_load = self.records_work = False
         """whether step records contain `joint_load`, and `work`"""
         self.time = 0.0
-        self.rebuild()
+        self._rebuild(is_start=True)
 
     def _new_pipeline(self, work: Counter[str]) -> CollisionPipeline:
         assert self._settings.broad_phase
@@ -160,6 +160,9 @@ class WorldState:
 
     def rebuild(self) -> None:
         """Update state, forces, collision data and solver after a change of the body store."""
+        self._rebuild(is_start=False)
+
+    def _rebuild(self, is_start: bool) -> None:
         store = self._store
         self.x = self._stored_state()
         if self.filter is not None:
@@ -175,7 +178,8 @@ class WorldState:
         if store.fixtures is not self._fixtures:  # keys may mean other segments now
             self._fixtures = store.fixtures
             self.memory.forget(self._settings.h)
-        self.pipeline.rebuild()
+        if not is_start:  # a new pipeline is up to date
+            self.pipeline.rebuild()
         self._choose_solver()
         if self.walls is not None:
             overlaps = self.pipeline.at_one_way_walls(self.x[0])
