@@ -11,6 +11,8 @@ the coefficient of the pair. Where no such factors exist, the remaining pairs ar
 import math
 from collections.abc import Iterator
 from functools import cache
+from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import pymunk
@@ -199,6 +201,36 @@ def half_plane_ends(plane: Plane, centre: FloatArray, reach: float) -> tuple[Poi
     return (float(a[0]), float(a[1])), (float(b[0]), float(b[1]))
 
 
+class SurfaceFactors(NamedTuple):
+    """Factors of S surfaces, by which pymunk computes the coefficients of their pairs."""
+
+    elasticity: list[float]
+    friction: list[float]
+    unfactored: frozenset[tuple[int, int]]
+    """pairs that no factors can represent"""
+
+
+_KNOWN_FACTORS: "WeakKeyDictionary[ContactMatrix, SurfaceFactors]" = WeakKeyDictionary()
+"""Factors of contact matrices, which do not change"""
+
+
+def _surface_factors(matrix: ContactMatrix) -> SurfaceFactors:
+    """Return the factors of each surface, and the pairs that no factors can represent."""
+    known = _KNOWN_FACTORS.get(matrix)
+    if known is not None:
+        return known
+    surfaces, touching = matrix.surfaces, matrix.touching
+    elasticity = factors(surfaces.restitution, touching, [each.restitution for each in surfaces.surfaces])
+    friction = factors(surfaces.friction, touching, [each.friction for each in surfaces.surfaces])
+    unfactored = {
+        *wrong_pairs(surfaces.restitution, touching, elasticity),
+        *wrong_pairs(surfaces.friction, touching, friction),
+        *_pairs(touching & ~(surfaces.fixed_coefficients & ~(surfaces.one_way | surfaces.one_way[:, None]))),
+    }
+    known = _KNOWN_FACTORS[matrix] = SurfaceFactors(elasticity, friction, frozenset(unfactored))
+    return known
+
+
 class SurfaceSetter:
     """Sets elasticity and friction of shapes, so that every pair has exactly its coefficients."""
 
@@ -218,17 +250,10 @@ class SurfaceSetter:
             jointed: surfaces of walls of several segments.
         """
         surfaces, touching = matrix.surfaces, matrix.touching
-        stated = [(s.restitution, s.friction) for s in surfaces.surfaces]
-        self._elasticity = factors(surfaces.restitution, touching, [e for e, _ in stated])
-        self._friction = factors(surfaces.friction, touching, [mu for _, mu in stated])
-        unfactored = {
-            *wrong_pairs(surfaces.restitution, touching, self._elasticity),
-            *wrong_pairs(surfaces.friction, touching, self._friction),
-            *_pairs(touching & ~(surfaces.fixed_coefficients & ~(surfaces.one_way | surfaces.one_way[:, None]))),
-        }
+        self._elasticity, self._friction, unfactored = _surface_factors(matrix)
         solid = matrix.solid
         corrected = {(a, b) for a, b in _pairs(touching) if (a in jointed and solid[b]) or (b in jointed and solid[a])}
-        self.pair_callbacks.rebuild(surfaces, unfactored, corrected)
+        self.pair_callbacks.rebuild(surfaces, set(unfactored), corrected)
         if surfaces.one_way.any():
             self.one_way_walls.rebuild(surfaces, touching)
 

@@ -239,6 +239,6 @@ class SpaceJoints:
         breakable = links.some(np.isfinite(links.strength))
         kinds = LinkKind.SPRING, LinkKind.ROTARY_SPRING
         self._breakable_springs, self._breakable_rotary = breakable.of(kinds[0]), breakable.of(kinds[1])
-        self._breakable_joints = breakable.some(~np.isin(breakable.kind, kinds))
+        self._breakable_joints = breakable.some(~np.isin(breakable.kind, kinds)) if len(breakable) else breakable
         self.has_breakable = len(breakable) > 0
         """whether a present joint can break"""

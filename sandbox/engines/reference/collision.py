@@ -305,7 +305,7 @@ class CirclePipeline(CollisionPipeline):
 
     @property
     def can_repeat_pairs(self) -> bool:
-        """Whether a ball can have several contacts at once with one static collider: with a wall of several segments."""
+        """Whether a ball can have several contacts at once with one collider: a wall of several segments."""
         colliders = self._store.fixtures.segment_collider
         return len(np.unique(colliders)) < len(colliders)
 

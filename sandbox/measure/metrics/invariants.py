@@ -163,7 +163,7 @@ def joint_error(trajectory: Trajectory, start: Scene | Setup) -> float | None:
     """
     setup = Setup.of(start)
     links = setup.links
-    if not np.isin(links.kind, CONSTRAINT_KINDS).any() or not len(trajectory.time):
+    if not len(links) or not np.isin(links.kind, CONSTRAINT_KINDS).any() or not len(trajectory.time):
         return None
     errors = joint_errors(trajectory, setup) / joint_scales(links, setup.bodies)
     known = errors[~np.isnan(errors)]
