@@ -9,12 +9,13 @@ A new engine is one folder that implements these two protocols, and one line in 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol, TypeAlias, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
 
 if TYPE_CHECKING:  # importing an engine must stay cheap
     from sandbox.action import Action
     from sandbox.arrays import FloatArray, IntArray
     from sandbox.engines.energy_ledger import Cause
+    from sandbox.engines.snapshot import StateSnapshot
     from sandbox.frame_table import FrameTable
     from sandbox.scene.compile.bodies import Bodies
     from sandbox.scene.compile.demands import Demand
@@ -62,6 +63,10 @@ class Divergence(Exception):  # noqa: N818, a result of the physics, not an erro
 
 class Exhaustion(Exception):  # noqa: N818, as above
     """A step needs more memory or work than its limit. The simulation can still be read, but not stepped."""
+
+
+class SnapshotError(TypeError):
+    """The engine cannot copy its state."""
 
 
 Observer: TypeAlias = "Callable[[float, FloatArray, FloatArray, IntArray], None]"
@@ -206,6 +211,23 @@ class Simulation(Protocol):
 
     def state_hash(self) -> str:
         """Return a hash of the time and of the exact state of every body."""
+
+    def snapshot(self) -> StateSnapshot[Any]:
+        """Return a copy of the whole state, also of contacts, contact log and energy account, but not of the observer.
+
+        Raises:
+            SnapshotError: the engine cannot copy its state.
+        """
+
+    def restore(self, snapshot: StateSnapshot[Any]) -> None:
+        """Return to the state of a snapshot, from which the simulation continues as it did then, bit for bit.
+
+        Args:
+            snapshot: of this simulation, or of another one of the same engine; it can be restored any number of times.
+
+        Raises:
+            ValueError: the snapshot is that of another engine.
+        """
 
     def close(self) -> None:
         """Release the resources of the engine."""

@@ -4,12 +4,13 @@ Each segment is a simulation of its own that starts from the last state of the s
 continue. Other engine state, such as the impulses of lasting contacts, is reset.
 """
 
+import copy
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from pydantic import ValidationError
@@ -25,6 +26,7 @@ from sandbox.engines.mouse_joint import MouseJoints
 from sandbox.engines.registry import UnknownEngineError
 from sandbox.engines.registry import start as start_engine
 from sandbox.engines.segment import Checkpoint, Segment, start_segment
+from sandbox.engines.snapshot import StateSnapshot
 from sandbox.frame_table import FrameTable
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.generators import GeneratorError, count_of, layout_of
@@ -176,6 +178,46 @@ class SwitchableSimulation:
         title = f" of {shorten(self.scene.title)!r}" if self.scene.title else ""
         bodies = "1 body" if len(self.bodies) == 1 else f"{len(self.bodies):,} bodies"
         return f"<Simulation{title} on {self.engine} at {self.time:g} s, {bodies}>"
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Return an independent simulation in the same state, without the observer.
+
+        Raises:
+            SnapshotError: the engine cannot copy its state.
+        """
+        memo[id(self)] = copied = type(self).__new__(type(self))
+        memo[id(self.wanted)] = self.wanted
+        state = {key: value for key, value in self.__dict__.items() if key != "_observer"}
+        copied.__dict__ = {**copy.deepcopy(state, memo), "_observer": None}
+        return copied
+
+    def snapshot(self) -> StateSnapshot[Self]:
+        """Return a copy of the whole state, also of contacts, contact log and energy account, but not of the observer.
+
+        Raises:
+            SnapshotError: the engine cannot copy its state.
+        """
+        return StateSnapshot(self)
+
+    def restore(self, snapshot: StateSnapshot[Self]) -> None:
+        """Return to the state of a snapshot, from which the simulation continues as it did then, bit for bit.
+
+        Engine, settings, bodies and scene become those of that time.
+
+        Args:
+            snapshot: of this or another simulation; it can be restored any number of times.
+
+        Raises:
+            ValueError: it is a snapshot of something else.
+        """
+        resumed = snapshot.resumed()
+        if type(resumed) is not type(self):
+            raise ValueError(f"{snapshot!r} is not a snapshot of a {type(self).__name__}")
+        observer, replaced = self._observer, self._segment.simulation
+        self.__dict__ = resumed.__dict__
+        replaced.close()
+        if observer is not None:
+            self.watch(observer)
 
     def checkpoint(self) -> Checkpoint:
         """Return a checkpoint, from which `resumed` continues."""

@@ -10,7 +10,7 @@ import pytest
 
 from sandbox.cli.main import call
 from sandbox.engines.contract import Divergence, Exhaustion
-from sandbox.games.billiards.headless import FrameRecord, FrameTable, NoRestError, play_frame
+from sandbox.games.billiards.headless import FrameRecord, MatchTable, NoRestError, play_frame
 from sandbox.games.billiards.match import Match
 from tests.cli.calling import json_of, lines_of
 
@@ -100,7 +100,7 @@ def test_failed_shot_abandons_the_frame(
     def failing(*_: object) -> None:
         raise error
 
-    monkeypatch.setattr(FrameTable, "play", failing)
+    monkeypatch.setattr(MatchTable, "play", failing)
     status, document, (line,) = json_of(capfd, *QUICK)
     assert (status, document["unfinished"]) == (1, 1)
     assert str(error) in document["frames"][0]["unfinished"]

@@ -1,16 +1,18 @@
 """Base class of simulations: clock, lock, end of the run, and the bounds of a valid state."""
 
+import copy
 import math
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import NoReturn, Protocol
+from typing import Any, ClassVar, NoReturn, Protocol, Self
 
 import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
-from sandbox.engines.contract import Observer, PathObserver
+from sandbox.engines.contract import Observer, PathObserver, SnapshotError
 from sandbox.engines.energy_ledger import Cause
+from sandbox.engines.snapshot import StateSnapshot
 from sandbox.frame_table import FrameTable
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
@@ -45,17 +47,53 @@ class StepLock:
 class BaseSimulation(ABC):
     """Simulation that advances by time steps dt until it ends. One thread at a time may use it."""
 
+    uncopied: ClassVar[str | None] = None
+    """reason why the state cannot be copied; None if it can"""
+
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
         self._lock = StepLock()
+        self._observer: Observer | None = None
         self._steps, self._part = 0, 0.0
         self._ended = False
         self.patience: float | None = None
         """s, largest computing time of a step; engines check it where they can. None: unlimited"""
 
     def __reduce__(self) -> NoReturn:
-        """Refuse copying and pickling: a copied pymunk space silently computes other contacts than the original."""
-        raise TypeError("a running simulation cannot be copied; start its scene again and repeat its actions")
+        """Refuse pickling and shallow copies, which would share arrays with the original."""
+        raise TypeError("a running simulation cannot be pickled; use `snapshot`, or start its scene again")
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Return an independent simulation in the same state, without the observer.
+
+        Raises:
+            SnapshotError: the engine cannot copy its state.
+        """
+        if self.uncopied is not None:
+            raise SnapshotError(self.uncopied)
+        with self._lock:
+            memo[id(self)] = copied = type(self).__new__(type(self))
+            memo[id(self._settings)] = self._settings
+            state = {key: value for key, value in self.__dict__.items() if key not in ("_lock", "_observer")}
+            copied.__dict__ = {**copy.deepcopy(state, memo), "_lock": StepLock(), "_observer": None}
+            return copied
+
+    def snapshot(self) -> StateSnapshot[Self]:
+        """Return a copy of the whole state, as `Simulation.snapshot`."""
+        return StateSnapshot(self)
+
+    def restore(self, snapshot: StateSnapshot[Self]) -> None:
+        """Return to the state of a snapshot, as `Simulation.restore`.
+
+        Raises:
+            ValueError: the snapshot is that of another engine.
+        """
+        resumed = snapshot.resumed()
+        if type(resumed) is not type(self):
+            raise ValueError(f"{snapshot!r} is not a snapshot of a {type(self).__name__}")
+        with self._lock:
+            kept = {"_lock": self._lock, "_observer": self._observer}
+            self.__dict__ = {**resumed.__dict__, **kept}
 
     @property
     @abstractmethod

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import ClassVar
 
 import numpy as np
 
@@ -106,12 +107,16 @@ class PymunkSimulation(BaseSimulation):
     resolved at the time of impact.
     """
 
+    uncopied: ClassVar[str | None] = (
+        "pymunk keeps the impulses of contacts and the order of its collision tree inside its space; a copied space "
+        "computes other contacts than the original. Simulations on exact and reference can be copied"
+    )
+
     def __init__(self, setup: Setup, settings: Settings) -> None:
         super().__init__(settings)
         self._population = PymunkBodies(setup, settings)
         self._h = settings.h
         self._recorder: EventRecorder | None = None
-        self._observer: Observer | None = None
         self._ledger: PymunkEnergyLedger | None = None
         self._retired: dict[int, float] = {}
         self._broken: dict[int, float] = {}

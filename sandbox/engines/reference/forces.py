@@ -179,7 +179,7 @@ def forces_on(store: BodyStore, field: ForceField, joints: JointSolver | None, c
     forces: list[Callable[[float, State], FloatArray]] = [] if field.empty else [field]
     springs = store.setup.links.of(LinkKind.SPRING, LinkKind.ROTARY_SPRING)
     if joints is not None and joints.method != "xpbd" and len(springs):
-        forces.append(lambda _, x: joints.forces(x))
+        forces.append(joints.forces_at)
     return Inputs(
         constant,
         world.linear_drag,

@@ -135,6 +135,10 @@ class JointSolver:
             add_spring_forces(self._springs, x[0], x[1], self.inverse_mass, self.inverse_moment, out)
         return out
 
+    def forces_at(self, _: float, x: State) -> FloatArray:
+        """Return the accelerations by springs, which do not depend on time, in a state, as one of `Inputs.forces`."""
+        return self.forces(x)
+
     def prepare(self, pose: FloatArray, h: float) -> VelocityConstraints:
         """Update the rows for poses (N, 3) and a step h, s; return them, for callers that also solve contacts."""
         prepare(self.rows, self._constraints, pose, h, self._h, self._bias, self.inverse_mass, self.inverse_moment)

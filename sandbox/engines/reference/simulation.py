@@ -71,7 +71,6 @@ class ReferenceSimulation(SteppedSimulation):
         """whether bodies can leave the bounds or have a lifetime; bodies added later have no lifetime"""
         self._h = settings.h
         self._log: ContactLog | None = None
-        self._observer: Observer | None = None
         self._balls: BallStepper | None = None
         self._last_contacts = NO_CONTACTS  # contacts of the last record
         self._initial_entries: ContactBatch | None = None  # zone entries before the recording began

@@ -160,7 +160,6 @@ class ReferenceTabletopSimulation(SteppedSimulation):
         self._stepper, self._h = self._store.stepper, settings.h
         self._finder = CirclePairFinder(self._store, settings)
         self._log: ContactLog | None = None
-        self._observer: Observer | None = None
         self._stepper.capture()
         self._finder.pipeline.check_limits(self._store.position)
         warn_if_uncompiled(len(setup.bodies))

@@ -8,7 +8,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -213,6 +213,10 @@ class Bodies:
     """whether balls are spheres, as on a surface, and not discs"""
     layers: tuple[str, ...] = (GROUND,)
     """collision layers of the scene"""
+
+    def __deepcopy__(self, _: dict[int, Any]) -> Self:
+        """Return itself: it never changes, so that copies of a simulation can share it."""
+        return self
 
     def __len__(self) -> int:
         return len(self.names)

@@ -11,7 +11,7 @@ that the values of two sides add. Kicks and one-way walls belong to one side.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -64,6 +64,10 @@ class PairTable:
     """(S, S) of each pair, symmetric"""
     falloff: FloatArray
     """(S, S) s/m, of each pair, symmetric"""
+
+    def __deepcopy__(self, _: dict[int, Any]) -> Self:
+        """Return itself: it never changes, so that copies of a simulation can share it."""
+        return self
 
     @property
     def kicks(self) -> BoolArray:
@@ -196,6 +200,10 @@ class ContactMatrix:
     """whether a ball can touch a plane, a wall, a post"""
     touching: BoolArray
     """(S, S) surfaces of which some pair can touch, symmetric"""
+
+    def __deepcopy__(self, _: dict[int, Any]) -> Self:
+        """Return itself: it never changes, so that copies of a simulation can share it."""
+        return self
 
     @property
     def solids(self) -> bool:

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, fields, replace
 from enum import IntEnum
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -68,6 +68,10 @@ class JointArrays:
     """(J,) index of each among the joints of the whole scene; 0 to J − 1 unless this is a selection"""
     names: tuple[str, ...]
     """(J,)"""
+
+    def __deepcopy__(self, _: dict[int, Any]) -> Self:
+        """Return itself: it never changes, so that copies of a simulation can share it."""
+        return self
 
     def __len__(self) -> int:
         return len(self.kind)

@@ -2,7 +2,7 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass, field, replace
-from typing import Self, Union
+from typing import Any, Self, Union
 
 from sandbox.arrays import FloatArray
 from sandbox.scene.compile.bodies import Bodies
@@ -35,6 +35,10 @@ class Setup:
     """extent of half-planes; None leaves it to the engine"""
     is_start: bool = field(default=False, init=False)
     """whether it is the state in which the scene starts; false for every copy with changes"""
+
+    def __deepcopy__(self, _: dict[int, Any]) -> Self:
+        """Return itself: it never changes, so that copies of a simulation can share it."""
+        return self
 
     @classmethod
     def of(cls, start: Union[Scene, "Setup"]) -> "Setup":

@@ -8,7 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.arrays import FloatArray
+from sandbox.engines.contract import SnapshotError
 from sandbox.engines.segment import Checkpoint
+from sandbox.engines.snapshot import StateSnapshot
 from sandbox.engines.switching import SwitchableSimulation
 from sandbox.games.session import GameSession
 from sandbox.scene.description.world import Settings
@@ -24,14 +26,46 @@ MAX_KEYFRAMES = 64
 
 
 class Keyframe(NamedTuple):
-    """A checkpoint of a session."""
+    """A state of a session from which it can continue."""
 
     step: int
     actions: int
     """how many had been applied"""
-    point: Checkpoint
+    state: StateSnapshot[SwitchableSimulation] | Checkpoint
+    """a snapshot, or a checkpoint on engines that cannot make snapshots"""
     game: GameSession | None = None
     """a copy"""
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+        return self.state.time if isinstance(self.state, StateSnapshot) else self.state.frame.time
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the session continues from it as it did, bit for bit, with certainty."""
+        return isinstance(self.state, StateSnapshot)
+
+    def resumed(self) -> SwitchableSimulation:
+        """Return a new simulation that continues from the state.
+
+        Raises:
+            Refusal: the engine cannot start from a checkpoint.
+            ActionError: the engine cannot take over a constant force of a checkpoint.
+        """
+        return (
+            self.state.resumed() if isinstance(self.state, StateSnapshot) else SwitchableSimulation.resumed(self.state)
+        )
+
+
+def keyframe_state(
+    simulation: SwitchableSimulation, can_checkpoint: bool
+) -> StateSnapshot[SwitchableSimulation] | Checkpoint | None:
+    """Return a snapshot of a simulation; where its engine makes none a checkpoint, and None if that is not possible."""
+    try:
+        return simulation.snapshot()
+    except SnapshotError:
+        return simulation.checkpoint() if can_checkpoint else None
 
 
 class History:
@@ -67,7 +101,7 @@ class History:
     @property
     def keyframe_times(self) -> tuple[float, ...]:
         """Times of the checkpoints, s."""
-        return tuple(keyframe.point.frame.time for keyframe in self._keyframes)
+        return tuple(keyframe.time for keyframe in self._keyframes)
 
     def store(self, step: int, frame: Frame) -> None:
         """Store the state after a step, unless there is one already."""

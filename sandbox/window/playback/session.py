@@ -1,10 +1,10 @@
 """Interactive simulation with undo: steps an engine, logs actions, and seeks to any step by replay.
 
-A session is its scene and its actions. Seeking backwards restores a checkpoint and replays the steps and actions from
-there. A checkpoint is shorter than a replay from the start, but it does not hold the contacts that an engine caches.
-So checkpoints are taken only after some time without contact, and wherever a state was seen before, the state hash of
-the replayed one must be the same. If it differs, checkpoints are disabled and the session is replayed from the start,
-which leads to the same states every time.
+A session is its scene and its actions. Seeking backwards restores a keyframe and replays the steps and actions from
+there. On engines that can copy their state, keyframes are snapshots, from which a session continues exactly. On others
+they are checkpoints, which do not hold the contacts that an engine caches. So checkpoints are taken only after some
+time without contact, and wherever a state was seen before, the state hash of the replayed one must be the same. If it
+differs, checkpoints are disabled and the session is replayed from the start, which leads to the same states every time.
 
 States that were not seen before cannot be checked so. If new steps follow a replay from a checkpoint, the restoring of
 that checkpoint therefore becomes an action of the session: a switch that changes no setting. A replay of the recording
@@ -27,7 +27,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Contacts, Frame
 from sandbox.window.playback.action_log import TIME_ROUNDING, ActionLog, SceneHistory, insert_switch
-from sandbox.window.playback.history import BreakTimes, ContactFreeTimer, History, Keyframe
+from sandbox.window.playback.history import BreakTimes, ContactFreeTimer, History, Keyframe, keyframe_state
 
 STEP_TIMEOUT = 2.0
 """s that one step may take to compute, on engines that can interrupt a step"""
@@ -228,7 +228,7 @@ class Session:
         # Mouse pulls are released at the end: in a replay no mouse would ever release them.
         actions += tuple(Pull(time=self.simulation.time, body=name) for name in self.simulation.pulls)
         if origin is not None and self._unconfirmed:
-            actions = insert_switch(actions, origin.actions, origin.point.frame.time)
+            actions = insert_switch(actions, origin.actions, origin.time)
         scene, engine, settings = self._start
         return Recording(
             scene=scene,
@@ -353,10 +353,12 @@ class Session:
         if self._origin is not None and self.history.get(self._step) is None:
             self._unconfirmed.append(self._step)
         self.history.store(self._step, self._frame)
-        exact = self._contact_free.allows_checkpoint(self.simulation, self._frame)
-        if exact and self.ended is None and self.history.wants_keyframe(self._step):
-            game = None if self.game is None else self.game.copy()
-            self.history.add_keyframe(Keyframe(self._step, self._log.done, self.simulation.checkpoint(), game))
+        if self.ended is None and self.history.wants_keyframe(self._step):
+            can_checkpoint = self._contact_free.allows_checkpoint(self.simulation, self._frame)
+            state = keyframe_state(self.simulation, can_checkpoint)
+            if state is not None:
+                game = None if self.game is None else self.game.copy()
+                self.history.add_keyframe(Keyframe(self._step, self._log.done, state, game))
 
     def _contacts_of_step(self) -> Contacts:
         """Return the contacts since the last call, with those that the rules have been shown."""
@@ -379,7 +381,7 @@ class Session:
         """Make the restoring of the checkpoint an action of the session: the steps that follow are new."""
         origin, self._origin = self._origin, None
         self._unconfirmed.clear()
-        if origin is not None and self._log.insert_switch(origin.actions, origin.point.frame.time):
+        if origin is not None and self._log.insert_switch(origin.actions, origin.time):
             self.history.count_inserted_action(origin.step)
 
     # --- Actions -------------------------------------------------------------------------------------------------
@@ -522,7 +524,7 @@ class Session:
         restored = self._load(keyframe)
         if keyframe is not None and not restored:
             self.history.disable_checkpoints()
-        self._origin = keyframe if restored else None
+        self._origin = keyframe if restored and keyframe is not None and not keyframe.is_exact else None
         self._unconfirmed.clear()
         self._off_track = False
         self._contact_free = ContactFreeTimer()
@@ -535,7 +537,7 @@ class Session:
         simulation = None
         if keyframe is not None:
             try:
-                simulation = SwitchableSimulation.resumed(keyframe.point)
+                simulation = keyframe.resumed()
             except (Refusal, ActionError):
                 keyframe = None
         self.simulation.close()

@@ -1,0 +1,156 @@
+"""A simulation that returns to a snapshot continues as it did then, bit for bit, also in the midst of contacts."""
+
+import copy
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sandbox.action import Action, Impulse, Move, Remove, SetParameter, Spawn, Switch
+from sandbox.engines.contract import Simulation, SnapshotError
+from sandbox.engines.registry import ENGINES
+from sandbox.engines.switching import SwitchableSimulation, start
+from sandbox.scene.description.discs import Ball
+from sandbox.scene.files.load import load
+from sandbox.scene.files.shipped_scenes import find, shipped
+from tests.engines.test_advance import SCENES, small_scene, supporting
+
+COPYING = ("exact", "reference")
+CASES = [(name, engine) for name in SCENES for engine in supporting(small_scene(name)) if engine in COPYING]
+
+
+def continued(simulation: Simulation, steps: int) -> list[object]:
+    """Step a simulation, and return everything that a caller can observe."""
+    seen: list[object] = []
+    for _ in range(steps):
+        simulation.step()
+        contacts = simulation.contacts()
+        arrays = (contacts.time, contacts.pair, contacts.point, contacts.normal, contacts.impulse)
+        seen += [simulation.time, simulation.state_hash(), *(array.tobytes() for array in arrays)]
+    return [
+        *seen,
+        dict(simulation.work),
+        dict(simulation.account()),
+        dict(simulation.retired),
+        dict(simulation.broken),
+        simulation.bodies.names,
+    ]
+
+
+@pytest.mark.parametrize(("name", "engine"), CASES)
+@settings(max_examples=5)
+@given(before=st.integers(0, 60), after=st.integers(1, 40), with_energy=st.booleans())
+def test_restored_simulation_repeats_itself(name: str, engine: str, before: int, after: int, with_energy: bool) -> None:
+    simulation = start(small_scene(name), engine)
+    simulation.contacts()
+    if with_energy:
+        simulation.account()
+    for _ in range(before):
+        simulation.step()
+    snapshot = simulation.snapshot()
+    assert snapshot.time == simulation.time
+    first = continued(simulation, after)
+    for _ in range(2):
+        simulation.restore(snapshot)
+        assert simulation.time == snapshot.time
+        assert continued(simulation, after) == first
+    assert continued(snapshot.resumed(), after) == first
+    assert continued(copy.deepcopy(snapshot.resumed()), after) == first
+
+
+@pytest.mark.full
+@pytest.mark.parametrize("name", [scene.name for scene in shipped()])
+def test_shipped_scenes_repeat_themselves(name: str) -> None:
+    scene = load(find(name))
+    steps = 40 if len(scene.bodies) < 1000 else 3  # exact cannot compute a pile for long
+    for engine in supporting(scene):
+        if engine not in COPYING:
+            continue
+        simulation = start(scene, engine)
+        simulation.contacts()
+        for _ in range(2 * steps):
+            simulation.step()
+        snapshot = simulation.snapshot()
+        first = continued(simulation, steps)
+        simulation.restore(snapshot)
+        assert continued(simulation, steps) == first, engine
+
+
+ACTIONS: tuple[Action, ...] = (
+    Impulse(time=0.0, body="ball-1", impulse=(0.3, 1.0)),
+    Move(time=0.0, body="ball-1", position=(0.4, 1.2)),
+    SetParameter(time=0.0, path="world.gravity", value=[0.0, -3.0]),
+    Spawn(time=0.0, ball=Ball(name="new", position=(-0.5, 1.5), radius=0.1)),
+    Remove(time=0.0, body="ball-1"),
+)
+
+
+@pytest.mark.parametrize("action", ACTIONS, ids=lambda action: type(action).__name__)
+@pytest.mark.parametrize("engine", COPYING)
+def test_actions_after_a_snapshot_are_undone(engine: str, action: Action) -> None:
+    simulation = start(small_scene("one ball"), engine)
+    simulation.contacts()
+    for _ in range(50):
+        simulation.step()
+    snapshot, scene = simulation.snapshot(), simulation.scene
+    first = continued(simulation, 30)
+    simulation.restore(snapshot)
+    simulation.apply(action)
+    assert continued(simulation, 30) != first
+    simulation.restore(snapshot)
+    assert simulation.scene is scene
+    assert continued(simulation, 30) == first
+
+
+def test_switch_of_the_engine_is_undone() -> None:
+    simulation = start(small_scene("balls that settle"), "exact")
+    simulation.contacts()
+    for _ in range(30):
+        simulation.step()
+    snapshot = simulation.snapshot()
+    first = continued(simulation, 20)
+    for engine in ("reference", "pymunk"):
+        simulation.restore(snapshot)
+        simulation.apply(Switch(time=0.0, engine=engine))
+        for _ in range(10):
+            simulation.step()
+        assert simulation.engine == engine
+        simulation.restore(snapshot)
+        assert simulation.engine == "exact"
+        assert continued(simulation, 20) == first
+
+
+def test_observer_stays_after_a_restoration() -> None:
+    simulation = start(small_scene("one ball"), "reference")
+    times: list[float] = []
+    simulation.watch(lambda time, *_: times.append(time))
+    snapshot = simulation.snapshot()
+    for _ in range(2):
+        simulation.restore(snapshot)
+        for _ in range(3):
+            simulation.step()
+    assert times == [0.0, 0.01, 0.02] * 2
+
+
+def test_pymunk_says_that_it_cannot_be_copied() -> None:
+    simulation = start(small_scene("one ball"), "pymunk")
+    for attempt in (simulation.snapshot, lambda: copy.deepcopy(simulation)):
+        with pytest.raises(SnapshotError, match=r"inside its space.* exact and reference"):
+            attempt()
+    simulation.step()  # it is not affected
+
+
+def test_snapshot_of_another_engine_is_refused() -> None:
+    exact, reference = (ENGINES[name].start(small_scene("one ball")) for name in COPYING)
+    with pytest.raises(ValueError, match="not a snapshot of a ReferenceSimulation"):
+        reference.restore(exact.snapshot())
+
+
+def test_snapshot_does_not_change_with_its_simulation() -> None:
+    simulation = start(small_scene("elastic gas"), "reference")
+    snapshot = simulation.snapshot()
+    before = snapshot.resumed().state_hash()
+    for _ in range(20):
+        simulation.step()
+    assert snapshot.resumed().state_hash() == before
+    assert isinstance(snapshot.resumed(), SwitchableSimulation)
