@@ -28,9 +28,9 @@ BALL = balls_on_plane(1, 1000)
 
 SMALL = (
     (1, 1000, 1.0, 0.5, 0.5),
-    (9, 1000, 0.3, 0.15, 0.15),
+    (10, 1000, 0.3, 0.15, 0.15),
     (100, 500, 0.2, 0.4, 0.05),
-    (1024, 100, 0.45, 0.1, 0.1),
+    (1000, 100, 0.45, 0.1, 0.1),
 )
 """Balls on a plane: number, steps, and target ratios of pymunk, exact and reference."""
 

@@ -53,11 +53,10 @@ def starting(which: Scene, engine: str, runs: int = 50) -> Timed:
 
 
 def balls_on_plane(count: int, steps: int) -> Scene:
-    """Return a scene of equal balls that fall onto a plane and bounce, at 100 frames per second."""
-    columns = math.ceil(math.sqrt(count))
+    """Return a scene of a row of equal balls that fall onto a plane and bounce, at 100 frames per second."""
     return from_document(
         {
-            "world": {"duration": steps * 0.01, "seed": 1},
+            "world": {"gravity": [0, -9.81], "duration": steps * 0.01, "seed": 1},
             "solver": {"dt": 0.01},
             "material": [{"name": "rubber"}],
             "pair": [{"between": ["rubber", "rubber"], "restitution": 0.5, "friction": 0.5}],
@@ -65,8 +64,8 @@ def balls_on_plane(count: int, steps: int) -> Scene:
             "grid": [
                 {
                     "origin": [0, 1],
-                    "columns": columns,
-                    "rows": math.ceil(count / columns),
+                    "columns": count,
+                    "rows": 1,
                     "spacing": [0.3, 0.3],
                     "jitter": 0.01,
                     "radius": 0.1,

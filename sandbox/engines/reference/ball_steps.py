@@ -269,14 +269,14 @@ KERNEL = OptionalKernel(advance_balls, compile_time=10.0)
 
 
 @bare_kernel
-def acceleration(number: BallConstants, arrays: BallColumns, i: int, vx: float, vy: float) -> tuple[float, float]:
-    """Return the acceleration of a ball at a velocity, as `integrators.transition`."""
-    ax, ay = arrays.constant[i, 0], arrays.constant[i, 1]
-    if number.linear_drag > 0.0 or number.quadratic_drag > 0.0:
-        wx, wy = vx - number.wind_x, vy - number.wind_y
-        rate = number.linear_drag + number.quadratic_drag * math.sqrt(wx * wx + wy * wy)
-        ax -= arrays.mobile[i] * rate * wx
-        ay -= arrays.mobile[i] * rate * wy
+def acceleration(
+    ax: float, ay: float, vx: float, vy: float, linear: float, quadratic: float, wind_x: float, wind_y: float
+) -> tuple[float, float]:
+    """Return the acceleration of a ball with drag at a velocity, as `integrators.transition`; (ax, ay) without drag."""
+    if linear > 0.0 or quadratic > 0.0:
+        wx, wy = vx - wind_x, vy - wind_y
+        rate = linear + quadratic * math.sqrt(wx * wx + wy * wy)
+        return ax - rate * wx, ay - rate * wy
     return ax, ay
 
 
@@ -288,9 +288,13 @@ def move_balls(number: BallConstants, arrays: BallColumns, state: BallState, scr
     """
     h, method, x, placed = number.h, number.integrator, state.x, scratch.placed
     damped = number.linear_drag > 0.0 or number.quadratic_drag > 0.0
+    wind_x, wind_y = number.wind_x, number.wind_y
     for i in range(len(arrays.radius)):
         px, py, vx, vy = x[0, i, 0], x[0, i, 1], x[1, i, 0], x[1, i, 1]
-        ax, ay = acceleration(number, arrays, i, vx, vy)
+        gx, gy, linear, quadratic = arrays.constant[i, 0], arrays.constant[i, 1], 0.0, 0.0
+        if arrays.mobile[i] != 0.0:
+            linear, quadratic = number.linear_drag, number.quadratic_drag
+        ax, ay = acceleration(gx, gy, vx, vy, linear, quadratic, wind_x, wind_y)
         if method == EXPLICIT_EULER:
             px, py, vx, vy = px + h * vx, py + h * vy, vx + h * ax, vy + h * ay
         elif method == SEMI_IMPLICIT_EULER:
@@ -298,21 +302,23 @@ def move_balls(number: BallConstants, arrays: BallColumns, state: BallState, scr
             px, py = px + h * vx, py + h * vy
         elif method == VELOCITY_VERLET:
             px, py = px + h * (vx + (0.5 * h) * ax), py + h * (vy + (0.5 * h) * ay)
-            bx, by = acceleration(number, arrays, i, vx + h * ax, vy + h * ay)
+            bx, by = acceleration(gx, gy, vx + h * ax, vy + h * ay, linear, quadratic, wind_x, wind_y)
             vx, vy = vx + (0.5 * h) * (ax + bx), vy + (0.5 * h) * (ay + by)
         elif method == LEAPFROG:
             px, py = px + (0.5 * h) * vx, py + (0.5 * h) * vy
             if damped:
-                ax, ay = acceleration(number, arrays, i, vx + (0.5 * h) * ax, vy + (0.5 * h) * ay)
+                ax, ay = acceleration(
+                    gx, gy, vx + (0.5 * h) * ax, vy + (0.5 * h) * ay, linear, quadratic, wind_x, wind_y
+                )
             vx, vy = vx + h * ax, vy + h * ay
             px, py = px + (0.5 * h) * vx, py + (0.5 * h) * vy
         else:
             v2x, v2y = vx + h * (0.5 * ax), vy + h * (0.5 * ay)
-            bx, by = acceleration(number, arrays, i, v2x, v2y)
+            bx, by = acceleration(gx, gy, v2x, v2y, linear, quadratic, wind_x, wind_y)
             v3x, v3y = vx + h * (0.5 * bx), vy + h * (0.5 * by)
-            cx, cy = acceleration(number, arrays, i, v3x, v3y)
+            cx, cy = acceleration(gx, gy, v3x, v3y, linear, quadratic, wind_x, wind_y)
             v4x, v4y = vx + h * cx, vy + h * cy
-            dx, dy = acceleration(number, arrays, i, v4x, v4y)
+            dx, dy = acceleration(gx, gy, v4x, v4y, linear, quadratic, wind_x, wind_y)
             sixth, third = 1 / 6, 1 / 3
             px += h * (sixth * vx + third * v2x + third * v3x + sixth * v4x)
             py += h * (sixth * vy + third * v2y + third * v3y + sixth * v4y)

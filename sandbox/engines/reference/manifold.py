@@ -68,6 +68,9 @@ def circle_segment(
     return separation, 1.0, 0.0
 
 
+CLEARLY_APART = 1e-9
+"""Relative distance beyond a limit at which rounding, 1e-16, does not matter"""
+
 KIND = 60
 """Number of bits below the kind of a pair in its key: 0 ball-ball, 1 ball-plane, 2 ball-segment"""
 
@@ -171,6 +174,10 @@ def find_ball_contacts(
     """Write the contacts of pairs of balls from row `row` on; return the next free row."""
     for k in range(len(keys)):
         i, j = keys[k] >> FIRST, keys[k] & SECOND
+        x, y = position[j, 0] - position[i, 0], position[j, 1] - position[i, 1]
+        reach = (radius[i] + radius[j] + max_separation) * (1.0 + CLEARLY_APART)
+        if x * x + y * y > reach * reach:  # saves the square root
+            continue
         separation, nx, ny = circle_circle(
             position[i, 0], position[i, 1], radius[i], position[j, 0], position[j, 1], radius[j]
         )

@@ -79,11 +79,12 @@ def solve_velocities(
         inverse_mass: (N,) 1/kg.
         inverse_moment: (N,) 1/(kg·m²).
         impulse: (K, 2) N·s along the normal and along the normal turned left: initial, then accumulated.
-        iterations: passes over all contacts.
+        iterations: passes over all contacts. After one that changes nothing, further ones would not either.
     """
     warm_start_contacts(contacts, velocity, spin, inverse_mass, inverse_moment, impulse)
     for _ in range(iterations):
-        solve_contacts_once(contacts, bounce, velocity, spin, inverse_mass, inverse_moment, impulse)
+        if not solve_contacts_once(contacts, bounce, velocity, spin, inverse_mass, inverse_moment, impulse):
+            break
 
 
 @bare_kernel
@@ -109,8 +110,9 @@ def solve_contacts_once(
     inverse_mass: FloatArray,
     inverse_moment: FloatArray,
     impulse: FloatArray,
-) -> None:
-    """Pass over all contacts once; the arguments are those of `solve_velocities`."""
+) -> bool:
+    """Pass over all contacts once; the arguments are those of `solve_velocities`. Return whether an impulse changed."""
+    has_changed = False
     for k in range(len(contacts.key)):
         i, j = contacts.first[k], contacts.second[k]
         nx, ny = contacts.normal[k, 0], contacts.normal[k, 1]
@@ -138,7 +140,9 @@ def solve_contacts_once(
         across = -(vy * nx - vx * ny + slip_of_spin) / across_mass
         impulse[k, 1] = min(max(old_tangent + across, -max_friction), max_friction)
         normal, tangent = impulse[k, 0] - old_normal, impulse[k, 1] - old_tangent
+        has_changed = has_changed or normal != 0.0 or tangent != 0.0
         _apply_impulse(contacts, k, normal, tangent, velocity, spin, inverse_mass, inverse_moment)
+    return has_changed
 
 
 @bare_kernel
@@ -224,9 +228,10 @@ def solve_overlaps(
         inverse_mass: (N,) 1/kg.
         inverse_moment: (N,) 1/(kg·m²).
         total: (K,) accumulated impulse of each contact, kg·m/s; initially 0.
-        iterations: passes over all contacts.
+        iterations: passes over all contacts, as in `solve_velocities`.
     """
     for _ in range(iterations):
+        has_changed = False
         for k in range(len(contacts.key)):
             i, j = contacts.first[k], contacts.second[k]
             nx, ny = contacts.normal[k, 0], contacts.normal[k, 1]
@@ -243,6 +248,7 @@ def solve_overlaps(
             old = total[k]
             total[k] = max(old + (target[k] - (vx * nx + vy * ny) - turn) / mass, 0.0)
             change = total[k] - old
+            has_changed = has_changed or change != 0.0
             pseudo_velocity[i, 0] -= inverse_mass[i] * change * nx
             pseudo_velocity[i, 1] -= inverse_mass[i] * change * ny
             pseudo_velocity[i, 2] += inverse_moment[i] * change * a_off
@@ -250,6 +256,8 @@ def solve_overlaps(
                 pseudo_velocity[j, 0] += inverse_mass[j] * change * nx
                 pseudo_velocity[j, 1] += inverse_mass[j] * change * ny
                 pseudo_velocity[j, 2] -= inverse_moment[j] * change * b_off
+        if not has_changed:
+            break
 
 
 TURNOVER_ROUNDING = 1e-13

@@ -209,13 +209,31 @@ def test_seek_from_a_checkpoint_makes_fewer_steps() -> None:
     assert session.simulation.work["substeps"] < 60
 
 
+@pytest.mark.parametrize("engine", ["exact", "reference"])
+def test_snapshots_are_taken_in_the_midst_of_contacts(engine: str) -> None:
+    floor, world = [{"point": [0, 0], "normal": [0, 1]}], {"gravity": [0, -10]}
+    scene = scene_of(ball("a", 0, 0.25), ball("b", 0.6, 0.4, restitution=0.5), plane=floor, world=world)
+    session = step_times(Session(scene, engine), 200)
+    expected = hashes(session)
+    assert len(session.history.keyframe_steps) >= 5
+    for step in (150, 40, 199):
+        seek(session, step)
+        assert session.frame.state_hash() == expected[step]
+    seek(session, 100)
+    session.apply(Impulse(time=0.0, body="b", impulse=(0.0, 1.0)))
+    step_times(session, 50)
+    # A continuation from a snapshot is the session itself: no restart has to be recorded.
+    assert [type(action) for action in session.recording().actions] == [Impulse]
+    assert_replays(session)
+
+
 def perturbed(keyframe: Keyframe) -> Keyframe:
     """Return a keyframe that replays differently: its bodies are slightly faster."""
-    frame = keyframe.point.frame
+    frame = keyframe.state.frame
     faster = Frame(
         frame.time, frame.position, frame.velocity * 1.001, frame.angle, frame.angular_velocity, frame.present
     )
-    return keyframe._replace(point=replace(keyframe.point, frame=faster))
+    return keyframe._replace(state=replace(keyframe.state, frame=faster))
 
 
 def test_checkpoint_that_replays_differently_disables_checkpoints() -> None:
