@@ -40,9 +40,11 @@ if TYPE_CHECKING:
     from sandbox.engines.reference.integrators import INTEGRATORS
     from sandbox.engines.registry import ENGINES, UnknownEngineError
     from sandbox.engines.switching import start
+    from sandbox.frame_table import FrameTable
     from sandbox.games.billiards.shots import horizon, odds, sensitivity, windows
     from sandbox.games.billiards.shots.shot import Spread
     from sandbox.measure.compare import compare
+    from sandbox.measure.run.ensemble import Ensemble, ensemble
     from sandbox.measure.run.runner import run
     from sandbox.measure.run.sessions import play_out
     from sandbox.measure.tradeoff import tradeoff
@@ -69,9 +71,11 @@ __all__ = [
     "Contacts",
     "Divergence",
     "Drive",
+    "Ensemble",
     "Fault",
     "Force",
     "Frame",
+    "FrameTable",
     "Impulse",
     "IntegrationResult",
     "Launch",
@@ -102,6 +106,7 @@ __all__ = [
     "compare",
     "demands",
     "dumps",
+    "ensemble",
     "horizon",
     "integrate",
     "load",
@@ -127,9 +132,11 @@ _HOMES = {
     "Contacts": "sandbox.trajectory",
     "Divergence": "sandbox.engines.contract",
     "Drive": "sandbox.action",
+    "Ensemble": "sandbox.measure.run.ensemble",
     "Fault": "sandbox.scene.errors",
     "Force": "sandbox.action",
     "Frame": "sandbox.trajectory",
+    "FrameTable": "sandbox.frame_table",
     "Impulse": "sandbox.action",
     "IntegrationResult": "sandbox.engines.reference.integrate",
     "Launch": "sandbox.action",
@@ -160,6 +167,7 @@ _HOMES = {
     "compare": "sandbox.measure.compare",
     "demands": "sandbox.scene.compile.demands",
     "dumps": "sandbox.scene.files.load",
+    "ensemble": "sandbox.measure.run.ensemble",
     "horizon": "sandbox.games.billiards.shots",
     "integrate": "sandbox.engines.reference.integrate",
     "load": "sandbox.scene.files.load",

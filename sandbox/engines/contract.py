@@ -9,11 +9,11 @@ A new engine is one folder that implements these two protocols, and one line in 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, runtime_checkable
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 if TYPE_CHECKING:  # importing an engine must stay cheap
     from sandbox.action import Action
-    from sandbox.arrays import FloatArray, IntArray
+    from sandbox.arrays import BoolArray, FloatArray, IntArray
     from sandbox.engines.energy_ledger import Cause
     from sandbox.engines.snapshot import StateSnapshot
     from sandbox.frame_table import FrameTable
@@ -89,6 +89,39 @@ class PathObserver(Protocol):
             path: (B + 1, N, 2) m, centres before the first and after each.
             pairs: pairs (K, 2) in contact at the end of substeps, with the number of the substep after the last that
                 has them.
+        """
+
+
+class Members(NamedTuple):
+    """States of M independent runs of a scene with N bodies."""
+
+    position: FloatArray
+    """(M, N, 2) m, centres of mass"""
+    velocity: FloatArray
+    """(M, N, 2) m/s"""
+    angle: FloatArray
+    """(M, N) rad"""
+    angular_velocity: FloatArray
+    """(M, N) rad/s"""
+
+
+@runtime_checkable
+class MemberRunner(Protocol):
+    """Simulation that can run its scene from many starts, faster than one after the other."""
+
+    def run_members(self, members: Members, steps: float, is_stopped: Callable[[], bool]) -> BoolArray:
+        """Run the scene from each start, and write the end states in their place. The simulation is not changed.
+
+        It must be at its start. Several threads may call it at once.
+
+        Args:
+            members: start states; replaced by those at the end.
+            steps: duration in time steps dt; may end with a fraction of one.
+            is_stopped: called at intervals; once it is true, the runs that are left are not computed.
+
+        Returns:
+            (M,) whether each was computed; of the others, the states are the start states. They need an ordinary run,
+            which may also refuse the start or fail.
         """
 
 

@@ -51,6 +51,8 @@ class Stream(Enum):
     """errors of a skilled pilot in landing"""
     LANDING = 0x6C616E64
     """start position of a ship"""
+    ENSEMBLE = 0x656E7365
+    """variations of the starts of an ensemble, by the varied quantity"""
     KEYS = 0x706C6179
     """keys of a random player"""
 

@@ -5,6 +5,7 @@ import pymunk
 
 import sandbox
 from sandbox.engines.registry import start
+from sandbox.measure.run.ensemble import ensemble
 from sandbox.measure.run.runner import run
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
@@ -37,6 +38,15 @@ def balls(scene: Scene) -> None:
         other = run(short, engine, audit=False)
         height = 0.5 * 9.81 * 0.3 * 0.01  # error of explicit Euler after 0.3 s
         assert np.abs(other.position[30] - found.position[30]).max() <= 1.001 * height, engine
+
+
+def members(scene: Scene, engine: str) -> None:
+    """Check that runs of an ensemble end as ordinary runs do, bit for bit."""
+    vary = {"ball.*.velocity": 0.01}
+    compiled = ensemble(scene, 3, vary=vary, engine=engine)
+    ordinary = ensemble(scene, 3, vary=vary, engine=engine, keep="contacts")
+    assert compiled.compiled.all() and not ordinary.compiled.any()
+    assert np.array_equal(compiled.position, ordinary.position)
 
 
 def audited(scene: Scene) -> None:

@@ -102,6 +102,12 @@ def started_loops(scene: Scene, runs: int = 50) -> Callable[[], float]:
     return work
 
 
+def looped(scene: Scene) -> Callable[[], float]:
+    """Return a workload of such a loop; runs per second."""
+    once = attribute_loop(scene)
+    return lambda: 1.0 / once()
+
+
 def attribute_frames(scene: Scene) -> FloatArray:
     """Run equal balls and return their frames, (T, N, 6): x, y, angle, vx, vy, ω."""
     dt, steps = scene.solver.dt, round(scene.world.duration / scene.solver.dt)

@@ -15,6 +15,7 @@ from tools.benchmarks.workloads import (
     staged,
     starting,
     stepping,
+    varying,
 )
 
 SPARKS = ("world.duration=1.0", "solver.record_every=1")
@@ -69,6 +70,20 @@ BENCHES = (
         )
         for count, steps, *targets in SMALL
         for engine, target in zip(("pymunk", "exact", "reference"), targets, strict=True)
+    ),
+    *(
+        Bench(
+            f"ensemble-{engine}",
+            f"runs a second of ten balls on a plane for 1,000 steps, in an ensemble on one thread, on {engine} / runs of "
+            "the pymunk loop",
+            lambda engine=engine: varying(balls_on_plane(10, 1000), engine),
+            lambda: peers.looped(balls_on_plane(10, 1000)),
+            target,
+            "runs/s",
+            rate=True,
+            same=lambda engine=engine: agreement.members(balls_on_plane(10, 1000), engine),
+        )
+        for engine, target in (("exact", 1 / 150e-6), ("reference", 1 / 350e-6))
     ),
     *(
         Bench(

@@ -52,6 +52,12 @@ def starting(which: Scene, engine: str, runs: int = 50) -> Timed:
     return lambda: runs / timed(lambda: [run(short, engine) for _ in range(runs)])
 
 
+def varying(which: Scene, engine: str, runs: int = 200) -> Timed:
+    """Return a workload of an ensemble on one thread; runs per second."""
+    vary = {"ball.*.velocity": 0.01}
+    return lambda: runs / timed(lambda: sandbox.ensemble(which, runs, vary=vary, engine=engine))
+
+
 def balls_on_plane(count: int, steps: int) -> Scene:
     """Return a scene of a row of equal balls that fall onto a plane and bounce, at 100 frames per second."""
     return from_document(

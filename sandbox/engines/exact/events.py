@@ -5,11 +5,15 @@ motion of its partner has changed since (other `VERSION`), the stored time is a 
 it comes up (lazy invalidation, as in event-driven molecular dynamics: Lubachevsky, J. Comput. Phys. 94, 1991).
 """
 
-from sandbox.arrays import FloatArray, IntArray
+import math
+
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.engines.common.base import FARTHEST, FASTEST
 from sandbox.engines.common.body_store import first_beyond
 from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.exact.common import state as c
 from sandbox.engines.exact.common.record import ROWS_PER_EVENT, account_hit, account_slip
+from sandbox.engines.exact.common.requirements import TOUCH_OVERLAP
 from sandbox.engines.exact.common.state import EventState, FrameRows, is_supported
 from sandbox.engines.exact.impact import angle_at, hit_ball, hit_vertex, log_hit, move_to, position_at
 from sandbox.engines.exact.prediction import predict_next_event
@@ -243,3 +247,103 @@ def advance_frames(
         if data.counts[c.PREDICTIONS] > last_prediction:  # so that Python can handle signals
             return k + 1, written, c.DONE, tests
     return rows.steps, written, c.DONE, tests
+
+
+@kernel
+def may_overlap(data: EventState) -> bool:
+    """Return whether a ball overlaps another object by more than `TOUCH_OVERLAP`; the exact test has a larger limit."""
+    state, lines, vertices = data.state, data.lines, data.vertices
+    for k in range(len(data.moving_balls)):
+        i = data.moving_balls[k]
+        x, y, radius = state[i, c.X], state[i, c.Y], state[i, c.RADIUS] - TOUCH_OVERLAP
+        for m in range(len(data.targets)):
+            j = data.targets[m]
+            dx, dy, reach = state[j, c.X] - x, state[j, c.Y] - y, radius + state[j, c.RADIUS]
+            if j != i and dx * dx + dy * dy < reach * reach:
+                return True
+        for f in range(len(lines)):
+            dx, dy = x - lines[f, c.PX], y - lines[f, c.PY]
+            foot = dx * lines[f, c.UX] + dy * lines[f, c.UY]
+            height = dx * lines[f, c.NX] + dy * lines[f, c.NY]
+            if lines[f, c.LENGTH] == math.inf:
+                if height < radius:
+                    return True
+            elif 0.0 <= foot <= lines[f, c.LENGTH] and abs(height + lines[f, c.HALF_THICKNESS]) < (
+                radius + lines[f, c.HALF_THICKNESS]
+            ):
+                return True
+        for m in range(len(vertices)):
+            dx, dy = x - vertices[m, c.CENTRE_X], y - vertices[m, c.CENTRE_Y]
+            reach = radius + vertices[m, c.CIRCLE_RADIUS]
+            if vertices[m, c.SOLID] != 0.0 and dx * dx + dy * dy < reach * reach:
+                return True
+    return False
+
+
+@kernel
+def run_start(
+    data: EventState, until: float, position: FloatArray, velocity: FloatArray, angle: FloatArray, spin: FloatArray
+) -> bool:
+    """Run all balls from a start at time 0; write the state at a time, s, into the arrays of the start.
+
+    Return false without writing, if balls may overlap at the start, or the run may have failed.
+    """
+    state = data.state
+    for i in range(len(state)):
+        state[i, c.X], state[i, c.Y], state[i, c.VX], state[i, c.VY] = (
+            position[i, 0],
+            position[i, 1],
+            velocity[i, 0],
+            velocity[i, 1],
+        )
+        state[i, c.ANGLE], state[i, c.SPIN] = angle[i], spin[i]
+    if may_overlap(data):
+        return False
+    rebuild_all(data)
+    status = c.PAUSED
+    while status == c.PAUSED:
+        status = advance(data, until)
+    if status != c.DONE:
+        return False
+    for i in range(len(state)):
+        x, y, vx, vy = position_at(state, i, until, 0.0)
+        # Comparisons with nan are false.
+        if not (x * x + y * y <= FARTHEST * FARTHEST and vx * vx + vy * vy <= FASTEST * FASTEST):
+            return False
+    evaluate(data, until, position, velocity, angle, spin)
+    return True
+
+
+@kernel
+def run_starts(
+    data: EventState,
+    start: EventState,
+    until: float,
+    position: FloatArray,
+    velocity: FloatArray,
+    angle: FloatArray,
+    spin: FloatArray,
+    is_done: BoolArray,
+) -> None:
+    """Run all balls from each of M starts, as `run_start`.
+
+    Args:
+        data: state arrays, which are changed.
+        start: state arrays before anything was predicted.
+        until: end of the runs, s.
+        position: (M, N, 2) m, replaced by the state at the end, as the following ones.
+        velocity: (M, N, 2) m/s.
+        angle: (M, N) rad.
+        spin: (M, N) rad/s.
+        is_done: (M,) set to the result of each run.
+    """
+    for m in range(len(is_done)):
+        for i in range(len(start.state)):
+            for column in range(c.STATE_COLUMNS):
+                data.state[i, column] = start.state[i, column]
+            for column in range(c.TAG_COLUMNS):
+                data.tags[i, column] = start.tags[i, column]
+            data.next_time[i] = start.next_time[i]
+        for k in range(len(start.world)):
+            data.world[k], data.counts[k] = start.world[k], start.counts[k]
+        is_done[m] = run_start(data, until, position[m], velocity[m], angle[m], spin[m])

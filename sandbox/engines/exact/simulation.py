@@ -1,12 +1,13 @@
 """Event-driven simulation of discs among planes, walls and posts."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import ClassVar
 
 import numpy as np
 
-from sandbox.arrays import IntArray
+from sandbox.arrays import BoolArray, IntArray
 from sandbox.engines.common.energy_balance import record_energy_change
+from sandbox.engines.contract import Members
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.exact.common import state as c
 from sandbox.engines.exact.common.bodies import EventDrivenBodies
@@ -26,12 +27,16 @@ from sandbox.engines.exact.events import (
     rebuild_all,
     rebuild_ball,
     rebuild_from,
+    run_starts,
 )
 from sandbox.engines.exact.prediction import predict_next_event
 from sandbox.engines.exact.rest import recheck_supports, release_supports
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Contacts
+
+MEMBERS_PER_CALL = 64
+"""Runs of an ensemble in one call of a kernel, so that Python can handle signals in between."""
 
 PER_SECOND, PER_SECOND_AND_BALL = 1_000_000, 1_000
 """Largest number of events in one simulated second: the first, or the second for each ball if that is more."""
@@ -77,6 +82,30 @@ class ExactSimulation(EventDrivenSimulation[EventState]):
 
     def _call_event_loop(self, until: float) -> int:
         return advance(self._data, until)
+
+    def run_members(self, members: Members, steps: float, is_stopped: Callable[[], bool]) -> BoolArray:
+        """Run the scene from each start, and write the end states in their place, as `MemberRunner.run_members`."""
+        is_done = np.zeros(len(members.position), np.bool_)
+        if self._store.can_expire:
+            return is_done
+        data, start = make_state(self._store), make_state(self._store)
+        for each in (data, start):
+            each.counts[c.MAX_EVENTS] = self._data.counts[c.MAX_EVENTS]
+        for begin in range(0, len(is_done), MEMBERS_PER_CALL):
+            if is_stopped():
+                break
+            rows = slice(begin, begin + MEMBERS_PER_CALL)
+            run_starts(
+                data,
+                start,
+                steps * self._settings.dt,
+                members.position[rows],
+                members.velocity[rows],
+                members.angle[rows],
+                members.angular_velocity[rows],
+                is_done[rows],
+            )
+        return is_done
 
     def _advance_frames(self, rows: c.FrameRows) -> tuple[int, int, int, int]:
         store = self._store

@@ -693,6 +693,11 @@ class BallStepper:
             total=np.empty(contacts),
         )
 
+    @property
+    def is_full(self) -> bool:
+        """Whether there is memory for no more contacts, so that the readable step has to be used."""
+        return self._capacity >= MAX_CAPACITY
+
     def max_steps(self, *, observed: bool) -> int:
         """Return the largest number of steps of a call, at least 1."""
         substeps = min(MAX_SUBSTEPS, MAX_PATH // len(self._arrays.radius)) if observed else MAX_SUBSTEPS
@@ -802,3 +807,50 @@ def record_contacts(
 def _complex(vectors: FloatArray) -> ComplexArray:
     """Return rows (K, 2) as complex numbers (K,)."""
     return np.asarray(vectors[:, 0] + 1j * vectors[:, 1])  # with the sign of zero that the readable step gets
+
+
+class MemberStepper:
+    """Runs one world of balls from many starts."""
+
+    def __init__(self, store: BodyStore, settings: Settings) -> None:
+        """Take over a body store, which no other simulation may use."""
+        self._store, self._settings = store, settings
+        self._world = WorldState(store, settings)
+        self._stepper = BallStepper(self._world, store, settings)
+        self._frames = BallFrameRows(
+            MAX_SUBSTEPS + 1,
+            0,
+            np.empty(0),
+            np.empty((0, 0, 2)),
+            np.empty((0, 0, 2)),
+            np.empty((0, 0)),
+            np.empty((0, 0)),
+            np.empty((0, 0, 2)),
+        )
+
+    def run(
+        self, position: FloatArray, velocity: FloatArray, angle: FloatArray, angular_velocity: FloatArray, *, steps: int
+    ) -> bool:
+        """Run the world from a start, (N, …) each, and write the end state in its place.
+
+        Return false without writing if the compiled steps cannot make the run.
+        """
+        store = self._store
+        state = store.position, store.velocity, store.angle, store.angular_velocity
+        start = position, velocity, angle, angular_velocity
+        for own, given in zip(state, start, strict=True):
+            own[:] = given
+        if not self._world.restart():
+            self._world.rebuild()
+            self._stepper = BallStepper(self._world, store, self._settings)
+        stepper, made = self._stepper, 0
+        while made < steps:
+            count = min(steps - made, stepper.max_steps(observed=False))
+            result = stepper.advance(made, count, self._frames, records=False, observed=False)
+            made += result.steps
+            if result.code == BEYOND or result.substeps or (result.code == STOPPED and stepper.is_full):
+                return False
+        self._world.write_state()
+        for own, given in zip(state, start, strict=True):
+            given[:] = own
+        return True

@@ -1,19 +1,20 @@
 """ReferenceSimulation: a scene running on the hand-written solvers, one fixed step after the other."""
 
-from collections.abc import Mapping
+import copy
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from time import perf_counter
 
 import numpy as np
 
 from sandbox.action import Action, ActionError, Impulse, Spawn
-from sandbox.arrays import FloatArray, IntArray
+from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.actions import apply_action
 from sandbox.engines.common.base import BEYOND, SteppedSimulation, observe_path
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, ContactLog, join_batches
 from sandbox.engines.common.kernel import warn_if_uncompiled
-from sandbox.engines.contract import Divergence, Exhaustion, Observer
+from sandbox.engines.contract import Divergence, Exhaustion, Members, Observer
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.reference.ball_steps import BEYOND as BALLS_BEYOND
 from sandbox.engines.reference.ball_steps import (
@@ -24,6 +25,7 @@ from sandbox.engines.reference.ball_steps import (
     BallFrameRows,
     BallStepper,
     BallSteps,
+    MemberStepper,
     record_contacts,
 )
 from sandbox.engines.reference.continuous import DETECTIONS
@@ -125,6 +127,20 @@ class ReferenceSimulation(SteppedSimulation):
             with self._lock, np.errstate(all="ignore"):
                 self._check_running()
                 self._advance_balls(end - frames.steps, frames)
+
+    def run_members(self, members: Members, steps: float, is_stopped: Callable[[], bool]) -> BoolArray:
+        """Run the scene from each start, and write the end states in their place, as `MemberRunner.run_members`."""
+        is_done = np.zeros(len(members.position), np.bool_)
+        if not (self._can_batch() and KERNEL.is_worthwhile) or steps % 1.0:
+            return is_done
+        with self._lock:
+            own = copy.deepcopy(self._store)  # a world of its own, as several threads may run at once
+        stepper = MemberStepper(own, self._settings)
+        for m in range(len(is_done)):
+            if is_stopped():
+                break
+            is_done[m] = stepper.run(*(array[m] for array in members), steps=int(steps))
+        return is_done
 
     def _can_batch(self) -> bool:
         """Whether nothing has to be done between two substeps, so that `BallStepper` can make many."""

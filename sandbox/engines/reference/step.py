@@ -226,6 +226,19 @@ class WorldState:
             self.drives.use_hinges(self.x)
         return True
 
+    def restart(self) -> bool:
+        """Return to time 0 with the state in the body store, which has changed in no other way.
+
+        Return false if `rebuild` is needed too, because angles now matter, or no longer do.
+        """
+        self.time = 0.0
+        self.memory.forget(self._settings.h)
+        self.memory.pseudo_velocity[:] = 0.0
+        self.memory.has_pseudo_velocity = False
+        turns = self.x.shape[2] == 3
+        self.x = self._stored_state()
+        return bool(self._turns() == turns)
+
     def write_state(self) -> None:
         """Write the state into the body store."""
         store = self._store
