@@ -74,7 +74,7 @@ BENCHES = (
     *(
         Bench(
             f"ensemble-{engine}",
-            f"runs a second of ten balls on a plane for 1,000 steps, in an ensemble on one thread, on {engine} / runs of "
+            f"runs a second of ten balls on a plane for 1,000 steps, in an ensemble on {engine}, one thread / runs of "
             "the pymunk loop",
             lambda engine=engine: varying(balls_on_plane(10, 1000), engine),
             lambda: peers.looped(balls_on_plane(10, 1000)),
