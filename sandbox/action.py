@@ -4,6 +4,7 @@ A session is a scene and its actions. It can be stored, and replayed on the same
 """
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
@@ -259,7 +260,12 @@ Action = Annotated[
     Field(discriminator="kind"),
 ]
 
-_ACTIONS: TypeAdapter[tuple[Action, ...]] = TypeAdapter(tuple[Action, ...])
+
+@cache
+def _actions() -> TypeAdapter[tuple[Action, ...]]:
+    """Return the validator of actions; building it takes longer than importing this module."""
+    return TypeAdapter(tuple[Action, ...])
+
 
 _SETTABLE = (
     "world.gravity",
@@ -286,7 +292,7 @@ def actions_from_json(text: str) -> tuple[Action, ...]:
         ActionError: an action is invalid; the message has one line for each fault.
     """
     try:
-        return _ACTIONS.validate_json(text, strict=True)
+        return _actions().validate_json(text, strict=True)
     except ValidationError as error:
         lines = [f"{'.'.join(map(str, e['loc']))}: {shorten(e['msg'], MAX_NAMED)}" for e in error.errors()]
         raise ActionError("\n".join(lines)) from None
@@ -294,7 +300,7 @@ def actions_from_json(text: str) -> tuple[Action, ...]:
 
 def actions_to_json(actions: tuple[Action, ...]) -> Any:
     """Return actions as JSON values, the inverse of `actions_from_json`."""
-    return _ACTIONS.dump_python(actions, mode="json")
+    return _actions().dump_python(actions, mode="json") if actions else []
 
 
 def heading_of(element: Any) -> str:

@@ -17,6 +17,7 @@ import sys
 import zipfile
 import zlib
 from collections.abc import Mapping
+from functools import cache
 from math import prod
 from pathlib import Path
 from typing import IO, Annotated, Any, Literal, NamedTuple
@@ -144,7 +145,10 @@ class Info(StoredPart):
     game: GameInfo | None = None
 
 
-_NAMES: TypeAdapter[list[Name]] = TypeAdapter(list[Name])
+@cache
+def _names() -> TypeAdapter[list[Name]]:
+    """Return the validator of names, which is built when it is first needed."""
+    return TypeAdapter(list[Name])
 
 
 class _Header(NamedTuple):
@@ -398,7 +402,7 @@ def _check_contents(arrays: Mapping[str, Array], scene: Scene) -> None:
         raise ValueError(f"layer: a number is not one of the scene's {len(scene.layers)} layers")
     names = arrays["names"].tolist()
     try:
-        _NAMES.validate_python(names)
+        _names().validate_python(names)
     except ValidationError as error:
         raise ValueError(f"names: a name is invalid: {error.errors()[0]['msg']}") from None
     if len(set(names)) < len(names) or tuple(names[: len(scene.bodies)]) != tuple(scene.bodies.names):

@@ -1,6 +1,7 @@
 """Workloads of the benches: each function sets one up and returns a function that does it and returns its measure."""
 
 import math
+import os
 import subprocess
 import sys
 import time
@@ -195,9 +196,10 @@ def simulated(which: Scene, seconds: float) -> Timed:
 
 
 def command(*arguments: str) -> Timed:
-    """Return a workload of a Python process from start to end; seconds."""
+    """Return a workload of a Python process from start to end; seconds. Byte code may be cached, as users have it."""
     line = [sys.executable, *arguments]
-    return lambda: timed(lambda: subprocess.run(line, check=True, capture_output=True))
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONDONTWRITEBYTECODE"}
+    return lambda: timed(lambda: subprocess.run(line, check=True, capture_output=True, env=environment))
 
 
 def events(count: int) -> Timed:

@@ -84,7 +84,7 @@ class BatchReader:
         polygons: bool,
         warm_start: Callable[[], WarmStart | None] | None,
         quick_bound: float,
-        is_valid: Callable[[], bool],
+        is_valid: Callable[[FloatArray], bool],
     ) -> Batch:
         """Make at most so many steps.
 
@@ -99,7 +99,8 @@ class BatchReader:
             polygons: whether contacts have up to two points.
             warm_start: returns the impulses with which contacts of the last substep began, if there are any.
             quick_bound: a state whose norm is below it is valid, whatever its units.
-            is_valid: returns whether the present state is valid; if it is not, the batch ends.
+            is_valid: returns whether the present state is valid, given the list of it (6·bodies,); if it is not, the
+                batch ends.
         """
         width = STATE_WIDTH * bodies
         rows = self._prepare(steps * (substeps if lists_substeps else 1), width)
@@ -129,7 +130,7 @@ class BatchReader:
                 substep += 1
             made += 1
             state = rows[row - 1]
-            has_failed = not state.dot(state) <= largest_square and not is_valid()  # nan compares false
+            has_failed = not state.dot(state) <= largest_square and not is_valid(state)  # nan compares false
             if words.num > MAX_WORDS:
                 break
         contacts = None

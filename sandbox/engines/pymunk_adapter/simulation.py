@@ -229,7 +229,7 @@ class PymunkSimulation(BaseSimulation):
             pairs = self._recorder.record_lists(batch.contacts, starts + h, observed)
             if self._observer is not None:
                 path = np.empty((len(starts) + 1, *start.shape))
-                path[:] = start
+                path[: None if len(space_bodies) < len(start) else 1] = start
                 space_bodies.write_positions(batch.states, path[1:])
                 observe_path(self._observer, starts, path, pairs)
         if space_bodies.joints.count:
@@ -255,9 +255,10 @@ class PymunkSimulation(BaseSimulation):
             array[rows, :n] for array in (frames.position, frames.velocity, frames.angle, frames.angular_velocity)
         ]
         fixed = (population.position, population.velocity, population.angle, population.angular_velocity)
-        for column, values in zip(columns, fixed, strict=True):
-            column[:] = values
-        population.space_bodies.write_states(states[due], *columns)
+        if len(population.space_bodies) < n:  # without those in the space that move
+            for column, values in zip(columns, fixed, strict=True):
+                column[:] = values
+        population.space_bodies.write_states(states if len(due) == len(states) else states[due], *columns)
         if self._settings.half_kick:
             columns[1][:, population.moving] -= population.ahead
         if len(population.scene.layers) > 1:

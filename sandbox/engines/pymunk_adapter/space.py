@@ -26,7 +26,7 @@ from sandbox.engines.pymunk_adapter.contacts import NO_IMPULSES, ContactLists, C
 from sandbox.engines.pymunk_adapter.drives import SpaceDrives
 from sandbox.engines.pymunk_adapter.forces import SpaceForceField, acceleration, has_drag, mean_fraction, rates
 from sandbox.engines.pymunk_adapter.joints import SpaceJoints, spring_forces
-from sandbox.engines.pymunk_adapter.reader import SpaceReader
+from sandbox.engines.pymunk_adapter.reader import STATE_WIDTH, SpaceReader
 from sandbox.engines.pymunk_adapter.zones import ZoneSensors
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import ContactMatrix
@@ -491,9 +491,11 @@ class SpaceBodies(SpaceBodyTable):
             lists_substeps: whether states are listed after every substep, not only after every step.
             lists_contacts: whether contacts are listed, after every substep.
         """
-        contacts = self.contact_reader
+        contacts, moving = self.contact_reader, self._reader.moving_rows
 
-        def is_valid() -> bool:
+        def is_valid(state: FloatArray) -> bool:
+            if self._static_shapes.within(state.reshape(-1, STATE_WIDTH)[moving]).all():
+                return True
             self._state = None
             return self.beyond() is None
 
@@ -502,7 +504,7 @@ class SpaceBodies(SpaceBodyTable):
             steps,
             substeps,
             self._reader.body_count,
-            self._reader.moving_rows,
+            moving,
             lists_substeps=lists_substeps,
             lists_contacts=lists_contacts,
             polygons=self._polygons,

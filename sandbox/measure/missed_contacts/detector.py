@@ -26,6 +26,8 @@ BATCH_ROWS = 1 << 14
 
 MAX_PATH_BATCH = 1024
 """Largest number of substeps of a path that are examined together."""
+PATH_ROWS = 1 << 15
+"""Centres in such a part of a path."""
 
 CHUNK = 1 << 13
 """Encounters that are examined together, so that they stay in the cache."""
@@ -209,9 +211,10 @@ class Audit:
         with np.errstate(invalid="ignore", over="ignore"):  # as in `_examine_substeps`
             is_fast: BoolArray = np.any(_squared_lengths(path[:-1], path[1:]) >= self._smallest_squared, axis=1)
         touching = [each for begin, (end, each) in zip(_begins(pairs), pairs, strict=True) for _ in range(begin, end)]
-        batch = max(1, min(MAX_PATH_BATCH, BATCH_ROWS // len(self._core)))
-        for begin in range(0, len(times), batch):
-            rows = slice(begin, min(begin + batch, len(times)))
+        batch = max(1, min(MAX_PATH_BATCH, PATH_ROWS // len(self._core)))
+        parts = -(-len(times) // batch)
+        for begin, end in pairwise(np.linspace(0, len(times), parts + 1, dtype=np.int64).tolist()):
+            rows = slice(begin, end)
             self._history.extend(touching[rows])
             if is_fast[rows].any():  # in most substeps nothing moves fast enough to miss a contact
                 start, end = path[rows].copy(), path[rows.start + 1 : rows.stop + 1].copy()

@@ -153,7 +153,7 @@ def count_overlaps(
     owner = np.arange(len(radius)) if owner is None else owner
     position, radius, owner = position[radius > 0.0], radius[radius > 0.0], owner[radius > 0.0]
     octave = np.floor(np.log2(radius))
-    present = np.unique(octave).tolist()
+    present = sorted(set(octave.tolist()))
     within_octaves = 0
     for each in present if len(present) > 1 else ():
         in_octave = octave == each
