@@ -62,7 +62,8 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
     Reward: increase of the score. An episode is terminated when the game is over. It is truncated at the scene's
     duration, or if the physics fails; `info["failed"]` then has the reason.
 
-    An environment can be pickled and copied before its first episode.
+    An environment can be pickled and copied before its first episode. During an episode it can be copied
+    (`copy.deepcopy`) on engines that make snapshots, `reference` and `exact`; the copy continues alike, bit for bit.
 
     Args:
         scene: scene, path of a scene file, or name of a shipped scene.

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from sandbox.engines.contract import Refusal
+from sandbox.engines.contract import Refusal, SnapshotError
 from sandbox.games import registry
 from sandbox.games.contract import Control, UnsuitableSceneError
 from sandbox.games.registry import RULES
@@ -252,10 +252,38 @@ def test_environment_is_pickled_and_copied_before_an_episode() -> None:
     episode = play_episode(SandboxEnv("landing", every=20), 4)
     assert play_episode(pickle.loads(pickle.dumps(env)), 4) == play_episode(copy.deepcopy(env), 4) == episode
     env.reset()
-    with pytest.raises(TypeError, match="a running simulation cannot be copied"):
+    with pytest.raises(TypeError, match="a running simulation cannot be pickled"):
         pickle.dumps(env)
     env.close()
     assert play_episode(pickle.loads(pickle.dumps(env)), 4) == episode
+
+
+@pytest.mark.parametrize(("scene", "engine"), [("landing", "reference"), ("9-ball", "exact")])
+def test_copy_of_an_environment_in_an_episode_continues_alike(scene: str, engine: str) -> None:
+    env = SandboxEnv(scene, engine=engine, every=5)
+    env.action_space.seed(2)
+    env.reset(seed=3)
+    actions = [env.action_space.sample() for _ in range(40)]
+    for action in actions[:20]:
+        env.step(action)
+    copied = copy.deepcopy(env)
+    for action in actions[20:]:
+        one, other = env.step(action), copied.step(action)
+        assert one[0].tobytes() == other[0].tobytes()
+        assert one[1:] == other[1:]
+        if one[2] or one[3]:
+            break
+    assert env.recording().actions == copied.recording().actions
+    env.close()
+    copied.close()
+
+
+def test_copy_of_an_environment_on_pymunk_in_an_episode_is_refused() -> None:
+    env = SandboxEnv("landing")
+    env.reset()
+    with pytest.raises(SnapshotError, match="pymunk"):
+        copy.deepcopy(env)
+    env.close()
 
 
 def test_invalid_scene_option_or_engine_raises() -> None:

@@ -154,9 +154,10 @@ def assert_same(one: FrameTable, other: FrameTable) -> None:
     every=st.integers(1, 5),
     substeps=st.integers(1, 4),
     audited=st.booleans(),
+    with_energy=st.booleans(),
 )
 def test_advance_equals_steps(
-    name: str, engine: str, splits: list[int], every: int, substeps: int, audited: bool
+    name: str, engine: str, splits: list[int], every: int, substeps: int, audited: bool, with_energy: bool
 ) -> None:
     scene = small_scene(name)
     changes = {"substeps": substeps} if engine != "exact" else {}
@@ -166,8 +167,11 @@ def test_advance_equals_steps(
         audit = Audit(simulation.setup)
         if audited:
             simulation.watch(audit)
+        if with_energy:
+            simulation.account()
         table, observed = way(simulation, splits, every)
-        results.append((table, [*observed, *(array.tobytes() for array in audit.missed())]))
+        energy = dict(simulation.account()) if with_energy else {}
+        results.append((table, [*observed, energy, *(array.tobytes() for array in audit.missed())]))
     (one, seen), (other, seen_other) = results
     assert seen == seen_other
     assert_same(one, other)

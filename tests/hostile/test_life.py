@@ -89,7 +89,7 @@ simulation = pile()
 steps(simulation, 20)
 report([raised(copy.copy, simulation), raised(copy.deepcopy, simulation), raised(pickle.dumps, simulation)])
 """
-    assert run_isolated(SETTING + code, flags) == ["TypeError"] * 3
+    assert run_isolated(SETTING + code, flags) == ["TypeError", "SnapshotError", "TypeError"]
 
 
 @INTERPRETER_FLAGS

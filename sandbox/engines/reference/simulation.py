@@ -4,6 +4,7 @@ import copy
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from time import perf_counter
+from typing import Any, Self
 
 import numpy as np
 
@@ -79,6 +80,11 @@ class ReferenceSimulation(SteppedSimulation):
         self._world.pipeline.check_limits(self._world.x[0])  # exceeding a limit raises before the run begins
         warn_if_uncompiled(len(setup.bodies))
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Return an independent simulation in the same state, without the memory of compiled steps."""
+        self._balls = None
+        return super().__deepcopy__(memo)
+
     @property
     def setup(self) -> Setup:
         """State from which the simulation started, with the changes that actions have made to its scene."""
@@ -133,9 +139,9 @@ class ReferenceSimulation(SteppedSimulation):
         is_done = np.zeros(len(members.position), np.bool_)
         if not (self._can_batch() and KERNEL.is_worthwhile) or steps % 1.0:
             return is_done
-        with self._lock:
-            own = copy.deepcopy(self._store)  # a world of its own, as several threads may run at once
-        stepper = MemberStepper(own, self._settings)
+        stepper = MemberStepper(
+            copy.deepcopy(self._store), self._settings
+        )  # its own, as several threads may run at once
         for m in range(len(is_done)):
             if is_stopped():
                 break
@@ -146,6 +152,7 @@ class ReferenceSimulation(SteppedSimulation):
         """Whether nothing has to be done between two substeps, so that `BallStepper` can make many."""
         return (
             self._zoned is None
+            and self._energy is None
             and not self._removes
             and (self._log is None or self._log.can_hold(CAPACITY))
             and BallStepper.is_suitable(self._world, self._store, self._settings)
