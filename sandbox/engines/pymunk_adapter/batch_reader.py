@@ -113,26 +113,28 @@ class BatchReader:
         largest_square = quick_bound * quick_bound if quick_bound > 0.0 else -1.0
         row = made = substep = 0
         has_failed = False
-        while made < steps and not has_failed:
-            for k in range(substeps):
-                if substep:
-                    step(space, h)
-                else:  # checks bodies that are new
-                    self._space.step(h)
-                if lists_substeps or k == substeps - 1:
-                    each_body(space, LIST_BODY, body_list)
-                    row += 1
-                if lists_contacts:
-                    each_contact(space, LIST, contact_list)
-                    ends.append(words.num)
-                    if warm_start is not None and (found := warm_start()) is not None:
-                        warm_starts[substep] = found
-                substep += 1
-            made += 1
-            state = rows[row - 1]
-            has_failed = not state.dot(state) <= largest_square and not is_valid(state)  # nan compares false
-            if words.num > MAX_WORDS:
-                break
+        with np.errstate(over="ignore", invalid="ignore"):  # of states that are not valid
+            while made < steps and not has_failed:
+                for k in range(substeps):
+                    if substep:
+                        step(space, h)
+                    else:  # checks bodies that are new
+                        self._space.step(h)
+                    if lists_substeps or k == substeps - 1:
+                        each_body(space, LIST_BODY, body_list)
+                        row += 1
+                    if lists_contacts:
+                        each_contact(space, LIST, contact_list)
+                        ends.append(words.num)
+                        if warm_start is not None and (found := warm_start()) is not None:
+                            warm_starts[substep] = found
+                    substep += 1
+                made += 1
+                state = rows[row - 1]
+                # Comparisons with nan are false.
+                has_failed = not state.dot(state) <= largest_square and not is_valid(state)
+                if words.num > MAX_WORDS:
+                    break
         contacts = None
         if lists_contacts:
             contacts = ContactLists(

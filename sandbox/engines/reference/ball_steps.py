@@ -672,6 +672,7 @@ class BallStepper:
             and world.joints is None
             and not world.forces.forces
             and settings.broad_phase in BROAD_PHASE_CODES
+            and settings.integrator in INTEGRATOR_CODES
             and not (world.records_work or world.records_joint_load)
             and len(store.radius) > 0
         )
