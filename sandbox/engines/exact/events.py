@@ -10,11 +10,12 @@ import math
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.base import FARTHEST, FASTEST
 from sandbox.engines.common.body_store import first_beyond
+from sandbox.engines.common.frame_rows import FrameRows, is_due, write_row
 from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.exact.common import state as c
 from sandbox.engines.exact.common.record import ROWS_PER_EVENT, account_hit, account_slip
 from sandbox.engines.exact.common.requirements import TOUCH_OVERLAP
-from sandbox.engines.exact.common.state import EventState, FrameRows, is_supported
+from sandbox.engines.exact.common.state import EventState, is_supported
 from sandbox.engines.exact.impact import angle_at, hit_ball, hit_vertex, log_hit, move_to, position_at
 from sandbox.engines.exact.prediction import predict_next_event
 from sandbox.engines.exact.rest import (
@@ -205,6 +206,9 @@ def evaluate(
 def advance_frames(
     data: EventState,
     rows: FrameRows,
+    dt: float,
+    steps_before: int,
+    steps: int,
     position: FloatArray,
     velocity: FloatArray,
     roll: FloatArray,
@@ -216,6 +220,9 @@ def advance_frames(
     Args:
         data: state arrays.
         rows: of the frames.
+        dt: step, s.
+        steps_before: number of steps made before.
+        steps: largest number of steps.
         position: (N, 2), set to the present state, as the following ones.
         velocity: (N, 2).
         roll: (N, 2), always 0.
@@ -228,8 +235,8 @@ def advance_frames(
     """
     written, tests = 0, 0
     last_prediction = data.counts[c.PREDICTIONS] + EVENTS_PER_CALL
-    for k in range(rows.steps):
-        until = (rows.begin + k + 1.0) * rows.dt
+    for k in range(steps):
+        until = (steps_before + k + 1.0) * dt
         tests = data.counts[c.PAIR_TESTS]
         status = advance(data, until)
         if status != c.DONE:
@@ -237,16 +244,12 @@ def advance_frames(
         evaluate(data, until, position, velocity, angle, spin)
         if first_beyond(position, velocity, angle, spin, roll) >= 0:
             return k, written, c.BEYOND, tests
-        if (rows.phase + k + 1) % rows.every == 0:
-            rows.time[written] = until
-            for i in range(len(angle)):
-                rows.position[written, i, 0], rows.position[written, i, 1] = position[i, 0], position[i, 1]
-                rows.velocity[written, i, 0], rows.velocity[written, i, 1] = velocity[i, 0], velocity[i, 1]
-                rows.angle[written, i], rows.angular_velocity[written, i] = angle[i], spin[i]
+        if is_due(rows, k + 1):
+            write_row(rows, written, until, position, velocity, angle, spin)
             written += 1
         if data.counts[c.PREDICTIONS] > last_prediction:  # so that Python can handle signals
             return k + 1, written, c.DONE, tests
-    return rows.steps, written, c.DONE, tests
+    return steps, written, c.DONE, tests
 
 
 @kernel

@@ -7,6 +7,7 @@ import numpy as np
 
 from sandbox.arrays import BoolArray, IntArray
 from sandbox.engines.common.energy_balance import record_energy_change
+from sandbox.engines.common.frame_rows import FrameRows
 from sandbox.engines.contract import Members
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.exact.common import state as c
@@ -107,11 +108,10 @@ class ExactSimulation(EventDrivenSimulation[EventState]):
             )
         return is_done
 
-    def _advance_frames(self, rows: c.FrameRows) -> tuple[int, int, int, int]:
+    def _advance_frames(self, rows: FrameRows, steps: int) -> tuple[int, int, int, int]:
         store = self._store
-        return advance_frames(
-            self._data, rows, store.position, store.velocity, store.roll, store.angle, store.angular_velocity
-        )
+        state = store.position, store.velocity, store.roll, store.angle, store.angular_velocity
+        return advance_frames(self._data, rows, self._settings.dt, self._steps, steps, *state)
 
     def _too_many_events(self, status: int) -> str:
         """Return the message for an exceeded event limit, with the time, the limit and the bodies of the last event."""

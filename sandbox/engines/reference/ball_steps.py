@@ -15,6 +15,7 @@ from sandbox.arrays import BoolArray, ComplexArray, FloatArray, IntArray
 from sandbox.engines.common.base import FARTHEST, FASTEST
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.contact_log import ContactBatch, ContactLog
+from sandbox.engines.common.frame_rows import FrameRows, is_due, no_rows, write_row
 from sandbox.engines.common.kernel import OptionalKernel, bare_kernel
 from sandbox.engines.reference.broad_phase import EXCEEDED, all_pairs, grid, near_segments
 from sandbox.engines.reference.collision import CirclePipeline, empty_manifolds
@@ -168,22 +169,6 @@ class BallScratch(NamedTuple):
     """(C,)"""
 
 
-class BallFrameRows(NamedTuple):
-    """Rows of a frame table, from the first free one on, and the path of the balls."""
-
-    every: int
-    """number of steps between two frames"""
-    phase: int
-    """steps since the last frame that was due"""
-    time: FloatArray
-    position: FloatArray
-    velocity: FloatArray
-    angle: FloatArray
-    angular_velocity: FloatArray
-    path: FloatArray
-    """(B + 1, N, 2) m, centres before the first substep and after each; (0, 0, 2) if nobody observes"""
-
-
 class BallLog(NamedTuple):
     """Contacts of the substeps of a call."""
 
@@ -208,7 +193,8 @@ def advance_balls(
     arrays: BallColumns,
     state: BallState,
     scratch: BallScratch,
-    frames: BallFrameRows,
+    frames: FrameRows,
+    path: FloatArray,
     log: BallLog,
     steps_before: int,
     steps: int,
@@ -222,6 +208,7 @@ def advance_balls(
         state: the state.
         scratch: memory.
         frames: rows for the frames.
+        path: (B + 1, N, 2) m, for the centres after each substep from row 1 on; (0, 0, 2) if nobody observes.
         log: rows for the contacts.
         steps_before: number of steps made before.
         steps: largest number of steps.
@@ -230,8 +217,8 @@ def advance_balls(
     Returns:
         Whole steps; substeps of the step that is not complete; frames; return code.
     """
-    written, last_size = 0, 0
-    records, observes = len(log.end) > 0, len(frames.path) > 0
+    written, last_size, out = 0, 0, scratch.out
+    records, observes = len(log.end) > 0, len(path) > 0
     for k in range(steps):
         begin = k * number.substeps
         if records and log.end[begin] + number.substeps * (2 * last_size + 64) > len(log.pair):
@@ -244,8 +231,21 @@ def advance_balls(
             state.counts[BROAD_TESTS] += broad_tests
             state.counts[PAIR_TESTS] += pair_tests
             state.counts[CONTACTS] += size
-            solve_contacts(number, arrays, state, scratch, size, warm_start)
-            correct_overlap(number, arrays, state, scratch, size)
+            # Written out, because a kernel that creates no arrays cannot return any.
+            contacts = Manifolds(
+                out.key[:size],
+                out.first[:size],
+                out.second[:size],
+                out.normal[:size],
+                out.separation[:size],
+                out.point[:size],
+                out.anchor[:size],
+                out.offset[:size],
+                out.friction[:size],
+                out.surface_pair[:size],
+            )
+            solve_contacts(number, arrays, state, scratch, contacts, warm_start)
+            correct_overlap(number, arrays, state, scratch, contacts)
             copy_state(scratch.after, state.x)
             warm_start = 1.0
             if records:
@@ -253,13 +253,13 @@ def advance_balls(
                 log_contacts(arrays, scratch, log, size, begin + s)
             if observes:
                 for i in range(len(arrays.radius)):
-                    frames.path[begin + s + 1, i, 0] = state.x[0, i, 0]
-                    frames.path[begin + s + 1, i, 1] = state.x[0, i, 1]
+                    path[begin + s + 1, i, 0] = state.x[0, i, 0]
+                    path[begin + s + 1, i, 1] = state.x[0, i, 1]
         if not is_within(state.x):
             return k, 0, written, BEYOND
-        if (frames.phase + k + 1) % frames.every == 0:
-            frames.time[written] = (steps_before + k + 1) * number.dt
-            write_frame(state.x, frames, written)
+        if is_due(frames, k + 1):
+            pose, rate = state.x[0], state.x[1]
+            write_row(frames, written, (steps_before + k + 1) * number.dt, pose, rate, pose[:, 2], rate[:, 2])
             written += 1
     return steps, 0, written, DONE
 
@@ -438,27 +438,19 @@ def find_contacts(
 
 @bare_kernel
 def solve_contacts(
-    number: BallConstants, arrays: BallColumns, state: BallState, scratch: BallScratch, size: int, warm_start: float
+    number: BallConstants,
+    arrays: BallColumns,
+    state: BallState,
+    scratch: BallScratch,
+    contacts: Manifolds,
+    warm_start: float,
 ) -> None:
     """Write the state at the end of a substep, with contacts that act through it, as `ImpulseSolver.solve`."""
-    placed, after = scratch.placed, scratch.after
+    placed, after, size = scratch.placed, scratch.after, len(contacts.key)
     copy_state(placed, after)
     if size == 0:
         return
-    out, bounce, impulse = scratch.out, scratch.bounce[:size], scratch.impulse[:size]
-    # Written out here and below: a kernel that creates no arrays cannot return any.
-    contacts = Manifolds(
-        out.key[:size],
-        out.first[:size],
-        out.second[:size],
-        out.normal[:size],
-        out.separation[:size],
-        out.point[:size],
-        out.anchor[:size],
-        out.offset[:size],
-        out.friction[:size],
-        out.surface_pair[:size],
-    )
+    bounce, impulse = scratch.bounce[:size], scratch.impulse[:size]
     start, velocity = state.x[1], after[1]
     rebound_speeds(contacts, start, start[:, 2], arrays.restitution, bounce)
     impulse[:] = 0.0
@@ -483,38 +475,26 @@ def solve_contacts(
 
 @bare_kernel
 def correct_overlap(
-    number: BallConstants, arrays: BallColumns, state: BallState, scratch: BallScratch, size: int
+    number: BallConstants, arrays: BallColumns, state: BallState, scratch: BallScratch, contacts: Manifolds
 ) -> None:
     """Find the velocities that correct overlap in the next substep, as `ImpulseSolver.correct`; store impulses."""
     if state.counts[HAS_PSEUDO_VELOCITY] != 0:
         state.counts[HAS_PSEUDO_VELOCITY] = 0
         state.pseudo_velocity[:] = 0.0
-    state.counts[KEYS] = size
+    state.counts[KEYS] = size = len(contacts.key)
     if size == 0:
         return
-    out, target, total, overlaps = scratch.out, scratch.target[:size], scratch.total[:size], False
+    target, total, overlaps = scratch.target[:size], scratch.total[:size], False
     for k in range(size):
-        state.key[k] = out.key[k]
+        state.key[k] = contacts.key[k]
         state.impulse[k, 0], state.impulse[k, 1] = scratch.impulse[k, 0], scratch.impulse[k, 1]
-        target[k] = number.correction * min(out.separation[k] + number.slop, 0.0)
+        target[k] = number.correction * min(contacts.separation[k] + number.slop, 0.0)
         total[k] = 0.0
         overlaps = overlaps or target[k] != 0.0
     if overlaps:
         state.counts[HAS_PSEUDO_VELOCITY] = 1
         state.counts[CONTACT_ITERATIONS] += size * number.iterations
         inverse = arrays.inverse_mass, arrays.inverse_moment
-        contacts = Manifolds(
-            out.key[:size],
-            out.first[:size],
-            out.second[:size],
-            out.normal[:size],
-            out.separation[:size],
-            out.point[:size],
-            out.anchor[:size],
-            out.offset[:size],
-            out.friction[:size],
-            out.surface_pair[:size],
-        )
         solve_overlaps(contacts, target, state.pseudo_velocity, *inverse, total, number.iterations)
 
 
@@ -537,15 +517,6 @@ def is_within(x: FloatArray) -> bool:
         if not (is_valid and abs(x[0, i, 2]) + abs(x[1, i, 2]) < math.inf):
             return False
     return True
-
-
-@bare_kernel
-def write_frame(x: FloatArray, frames: BallFrameRows, row: int) -> None:
-    """Write a state into a row of a frame table."""
-    for i in range(x.shape[1]):
-        frames.position[row, i, 0], frames.position[row, i, 1] = x[0, i, 0], x[0, i, 1]
-        frames.velocity[row, i, 0], frames.velocity[row, i, 1] = x[1, i, 0], x[1, i, 1]
-        frames.angle[row, i], frames.angular_velocity[row, i] = x[0, i, 2], x[1, i, 2]
 
 
 @bare_kernel
@@ -704,7 +675,7 @@ class BallStepper:
         substeps = min(MAX_SUBSTEPS, MAX_PATH // len(self._arrays.radius)) if observed else MAX_SUBSTEPS
         return max(substeps // self._substeps, 1)
 
-    def advance(self, begin: int, steps: int, frames: BallFrameRows, *, records: bool, observed: bool) -> BallSteps:
+    def advance(self, begin: int, steps: int, frames: FrameRows, *, records: bool, observed: bool) -> BallSteps:
         """Make at most so many steps; the state of the world is that after them, and after the substeps beyond.
 
         Args:
@@ -733,10 +704,9 @@ class BallStepper:
         path = np.empty((substeps + 1, count, 2) if observed else (0, 0, 2))
         if observed:
             path[0] = x[0, :, :2]
-        frames = frames._replace(path=path)
         warm_start = min(numbers.h / memory.h, 1.0)
         made, rest, written, code = advance_balls(
-            numbers, self._arrays, state, self._scratch, frames, log, begin, steps, warm_start
+            numbers, self._arrays, state, self._scratch, frames, path, log, begin, steps, warm_start
         )
         substeps = (made + (code == BEYOND)) * numbers.substeps + rest
         if substeps:
@@ -818,16 +788,7 @@ class MemberStepper:
         self._store, self._settings = store, settings
         self._world = WorldState(store, settings)
         self._stepper = BallStepper(self._world, store, settings)
-        self._frames = BallFrameRows(
-            MAX_SUBSTEPS + 1,
-            0,
-            np.empty(0),
-            np.empty((0, 0, 2)),
-            np.empty((0, 0, 2)),
-            np.empty((0, 0)),
-            np.empty((0, 0)),
-            np.empty((0, 0, 2)),
-        )
+        self._frames = no_rows()
 
     def run(
         self, position: FloatArray, velocity: FloatArray, angle: FloatArray, angular_velocity: FloatArray, *, steps: int

@@ -14,6 +14,7 @@ from sandbox.engines.common.actions import apply_action
 from sandbox.engines.common.base import BEYOND, SteppedSimulation, observe_path
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, ContactLog, join_batches
+from sandbox.engines.common.frame_rows import free_rows
 from sandbox.engines.common.kernel import warn_if_uncompiled
 from sandbox.engines.contract import Divergence, Exhaustion, Members, Observer
 from sandbox.engines.energy_ledger import Cause
@@ -23,7 +24,6 @@ from sandbox.engines.reference.ball_steps import (
     KERNEL,
     ROUNDING,
     STOPPED,
-    BallFrameRows,
     BallStepper,
     BallSteps,
     MemberStepper,
@@ -44,8 +44,6 @@ from sandbox.scene.description.base import BodySpec
 from sandbox.scene.description.discs import Disc
 from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Contacts, Frame
-
-NO_PATH: FloatArray = np.empty((0, 0, 2))
 
 
 class ReferenceSimulation(SteppedSimulation):
@@ -164,17 +162,7 @@ class ReferenceSimulation(SteppedSimulation):
             self._balls = BallStepper(self._world, self._store, self._settings)
         observed, n = self._observer is not None, len(self.bodies)
         steps = min(steps, self._balls.max_steps(observed=observed))
-        free = slice(frames.count, None)
-        rows = BallFrameRows(
-            frames.every,
-            frames.steps % frames.every,
-            frames.time[free],
-            frames.position[free],
-            frames.velocity[free],
-            frames.angle[free],
-            frames.angular_velocity[free],
-            NO_PATH,
-        )
+        rows = free_rows(frames)
         result = self._balls.advance(self._steps, steps, rows, records=self._log is not None, observed=observed)
         if self._world.x.shape[2] == 2:
             written = slice(frames.count, frames.count + result.frames)

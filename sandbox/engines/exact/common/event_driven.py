@@ -14,6 +14,7 @@ from sandbox.engines.common.base import BEYOND, SteppedSimulation, step_and_reco
 from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 from sandbox.engines.common.contact_log import too_many_contacts
 from sandbox.engines.common.energy_balance import record_energy_change
+from sandbox.engines.common.frame_rows import FrameRows, free_rows
 from sandbox.engines.common.kernel import warn_if_uncompiled
 from sandbox.engines.contract import Divergence, Exhaustion, Observer
 from sandbox.engines.energy_ledger import Cause, EnergyLedger
@@ -28,9 +29,6 @@ from sandbox.trajectory import Contacts, Frame
 
 FIRST_LOG_ROWS = 1024
 """Initial number of rows of the contact log."""
-
-
-NO_SPIN: FloatArray = np.empty((0, 0, 3))
 
 
 class StateArrays(Protocol):
@@ -154,23 +152,10 @@ class EventDrivenSimulation(SteppedSimulation, Generic[Data]):
 
     def _make_steps(self, steps: int, frames: FrameTable) -> tuple[int, int, int]:
         """Make steps and frames by the kernel; return the number of steps, the status and `PAIR_TESTS`, as it does."""
-        spin = self._roll() is not None
-        free, bodies = slice(frames.count, None), len(self.bodies)
+        bodies = len(self.bodies)
         frames.prepare(steps, bodies)
-        rows = c.FrameRows(
-            self._settings.dt,
-            self._steps,
-            steps,
-            frames.every,
-            frames.steps % frames.every,
-            frames.time[free],
-            frames.position[free],
-            frames.velocity[free],
-            frames.angle[free],
-            frames.angular_velocity[free],
-            frames.spin_rows()[free] if spin else NO_SPIN,
-        )
-        made, written, status, tests = self._advance_frames(rows)
+        rows = free_rows(frames, has_spin=self._roll() is not None)
+        made, written, status, tests = self._advance_frames(rows, steps)
         frames.finish_rows(written, bodies)
         return made, status, tests
 
@@ -216,7 +201,7 @@ class EventDrivenSimulation(SteppedSimulation, Generic[Data]):
         """Process events up to a time, s; return `DONE`, `PAUSED`, `FULL` or the code of an exceeded limit."""
 
     @abstractmethod
-    def _advance_frames(self, rows: c.FrameRows) -> tuple[int, int, int, int]:
+    def _advance_frames(self, rows: FrameRows, steps: int) -> tuple[int, int, int, int]:
         """Make steps and frames as the kernel `advance_frames` does."""
 
     @abstractmethod

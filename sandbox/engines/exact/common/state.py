@@ -122,33 +122,6 @@ MICRO_BOUNCE_TIME, MAX_MICRO_BOUNCE = 5e-5, 5e-4
 or on vertices: they bounce for 1e-4 s, under earth's gravity 1.2e-8 m high."""
 
 
-class FrameRows(NamedTuple):
-    """Rows of a frame table for S steps, from the first that is not written yet, and the steps to which they belong."""
-
-    dt: float
-    """step, s"""
-    begin: int
-    """steps made before"""
-    steps: int
-    """S, largest number of steps"""
-    every: int
-    """number of steps between two frames"""
-    phase: int
-    """steps since the last frame that was due"""
-    time: FloatArray
-    """(T,) s"""
-    position: FloatArray
-    """(T, N, 2) m"""
-    velocity: FloatArray
-    """(T, N, 2) m/s"""
-    angle: FloatArray
-    """(T, N) rad"""
-    angular_velocity: FloatArray
-    """(T, N) rad/s"""
-    spin: FloatArray
-    """(T, N, 3) rad/s; (0, 0, 3) without a surface"""
-
-
 class EventState(NamedTuple):
     """State of N bodies, F lines, K vertices and S surfaces.
 

@@ -8,9 +8,10 @@ import math
 
 from sandbox.arrays import FloatArray
 from sandbox.engines.common.body_store import ALL, NOTHING, first_beyond
+from sandbox.engines.common.frame_rows import FrameRows, is_due, write_row
 from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.exact.common.roots import MAX_OVERLAP, first_touch, gap_zero_time, return_time
-from sandbox.engines.exact.common.state import BEYOND, DONE, FULL, PAUSED, TOO_MANY, FrameRows
+from sandbox.engines.exact.common.state import BEYOND, DONE, FULL, PAUSED, TOO_MANY
 from sandbox.engines.exact.tabletop import state as c
 from sandbox.engines.exact.tabletop.impact import (
     advance_to,
@@ -280,6 +281,9 @@ def advance(data: TabletopState, until: float) -> int:
 def advance_frames(
     data: TabletopState,
     rows: FrameRows,
+    dt: float,
+    steps_before: int,
+    steps: int,
     events_per_second: int,
     position: FloatArray,
     velocity: FloatArray,
@@ -292,6 +296,9 @@ def advance_frames(
     Args:
         data: state arrays.
         rows: of the frames.
+        dt: step, s.
+        steps_before: number of steps made before.
+        steps: largest number of steps.
         events_per_second: events that each simulated second adds to the limit.
         position: (N, 2), set to the present state, as the following ones.
         velocity: (N, 2).
@@ -305,8 +312,8 @@ def advance_frames(
     """
     written, tests = 0, 0
     last_prediction = data.counts[c.PREDICTIONS] + EVENTS_PER_CALL
-    for k in range(rows.steps):
-        until = (rows.begin + k + 1.0) * rows.dt
+    for k in range(steps):
+        until = (steps_before + k + 1.0) * dt
         tests = data.counts[c.PAIR_TESTS]
         data.counts[c.MAX_EVENTS] = events_per_second * (1 + int(until))
         status = advance(data, until)
@@ -315,15 +322,12 @@ def advance_frames(
         evaluate(data, until, position, velocity, roll, angle, spin)
         if first_beyond(position, velocity, angle, spin, roll) >= 0:
             return k, written, BEYOND, tests
-        if (rows.phase + k + 1) % rows.every == 0:
-            rows.time[written] = until
+        if is_due(rows, k + 1):
+            write_row(rows, written, until, position, velocity, angle, spin)
             for i in range(len(angle)):
-                rows.position[written, i, 0], rows.position[written, i, 1] = position[i, 0], position[i, 1]
-                rows.velocity[written, i, 0], rows.velocity[written, i, 1] = velocity[i, 0], velocity[i, 1]
-                rows.angle[written, i], rows.angular_velocity[written, i] = angle[i], spin[i]
                 rows.spin[written, i, 0], rows.spin[written, i, 1] = roll[i, 0], roll[i, 1]
                 rows.spin[written, i, 2] = spin[i]
             written += 1
         if data.counts[c.PREDICTIONS] > last_prediction:  # so that Python can handle signals
             return k + 1, written, DONE, tests
-    return rows.steps, written, DONE, tests
+    return steps, written, DONE, tests

@@ -7,11 +7,11 @@ import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.energy_balance import record_energy_change
+from sandbox.engines.common.frame_rows import FrameRows
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.exact.common.bodies import EventDrivenBodies
 from sandbox.engines.exact.common.event_driven import FIRST_LOG_ROWS, EventDrivenSimulation, last_event_bodies
 from sandbox.engines.exact.common.record import resize_rows
-from sandbox.engines.exact.common.state import FrameRows
 from sandbox.engines.exact.tabletop import state as c
 from sandbox.engines.exact.tabletop.events import advance, advance_frames, rebuild_all
 from sandbox.engines.exact.tabletop.impact import account_floor, advance_all_to, evaluate
@@ -91,10 +91,11 @@ class TabletopSimulation(EventDrivenSimulation[TabletopState]):
         self._data.counts[c.MAX_EVENTS] = self._events_per_second * (1 + int(until))
         return advance(self._data, until)
 
-    def _advance_frames(self, rows: FrameRows) -> tuple[int, int, int, int]:
+    def _advance_frames(self, rows: FrameRows, steps: int) -> tuple[int, int, int, int]:
         store = self._store
         state = store.position, store.velocity, store.roll, store.angle, store.angular_velocity
-        return advance_frames(self._data, rows, self._events_per_second, *state)
+        numbers = self._settings.dt, self._steps, steps, self._events_per_second
+        return advance_frames(self._data, rows, *numbers, *state)
 
     def _too_many_events(self, status: int) -> str:  # noqa: ARG002, there is only one limit
         reason = too_many_events(self._data, self.bodies.names, self.scene.fixed_names)
