@@ -95,7 +95,9 @@ class Ensemble:
         if well.any() and self.names:
             deviation = self.position[well].std(axis=0)
             spread = f", largest spread at the end {float(np.hypot(*deviation.T).max()):.3g} m"
-        return f"<Ensemble: {len(self):,} runs of {len(self.names):,} bodies, {int(well.sum()):,} ok{spread}>"
+        runs = "1 run" if len(self) == 1 else f"{len(self):,} runs"
+        bodies = "1 body" if len(self.names) == 1 else f"{len(self.names):,} bodies"
+        return f"<Ensemble: {runs} of {bodies}, {int(well.sum()):,} ok{spread}>"
 
 
 @reraise_interrupt()
