@@ -8,14 +8,14 @@ A new engine is one folder that implements these two protocols, and one line in 
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeAlias, TypeVar, runtime_checkable
 
 if TYPE_CHECKING:  # importing an engine must stay cheap
     from sandbox.action import Action
     from sandbox.arrays import BoolArray, FloatArray, IntArray
     from sandbox.engines.energy_ledger import Cause
-    from sandbox.engines.snapshot import StateSnapshot
     from sandbox.frame_table import FrameTable
     from sandbox.scene.compile.bodies import Bodies
     from sandbox.scene.compile.demands import Demand
@@ -69,9 +69,46 @@ class SnapshotError(TypeError):
     """The engine cannot copy its state."""
 
 
+class Timekeeper(Protocol):
+    """Has a simulated time."""
+
+    @property
+    def time(self) -> float:
+        """Simulated time, s."""
+
+
+Running = TypeVar("Running", bound=Timekeeper)
+
+
+class StateSnapshot(Generic[Running]):
+    """State of a simulation at one time. It does not change, and can be continued any number of times."""
+
+    def __init__(self, simulation: Running) -> None:
+        """Copy a simulation.
+
+        Raises:
+            SnapshotError: the engine cannot copy its state.
+        """
+        self._copy = copy.deepcopy(simulation)
+        self.time = simulation.time
+        """s, simulated time"""
+
+    def __repr__(self) -> str:
+        return f"<StateSnapshot at {self.time:g} s of {self._copy!r}>"
+
+    def resumed(self) -> Running:
+        """Return a new simulation that continues from the state, without an observer."""
+        return copy.deepcopy(self._copy)
+
+
 Observer: TypeAlias = "Callable[[float, FloatArray, FloatArray, IntArray], None]"
 """Callback after each substep: its start time (s), the centres of mass (N, 2) at its start and end, and the pairs (K,
 2) that the engine found in contact at its end, with the indices of `Contacts`."""
+
+
+PairRuns: TypeAlias = "Sequence[tuple[int, IntArray]]"
+"""Pairs (K, 2) in contact at the end of successive substeps. Each entry has the pairs of one or more of them, and the
+number of the substep after the last that has them."""
 
 
 @runtime_checkable
@@ -81,14 +118,13 @@ class PathObserver(Protocol):
     def __call__(self, time: float, start: FloatArray, end: FloatArray, touching: IntArray) -> None:
         """Take one substep, as `Observer`."""
 
-    def observe_path(self, times: FloatArray, path: FloatArray, pairs: Sequence[tuple[int, IntArray]]) -> None:
+    def observe_path(self, times: FloatArray, path: FloatArray, pairs: PairRuns) -> None:
         """Take B substeps, during which no action was applied.
 
         Args:
             times: (B,) s, start of each.
             path: (B + 1, N, 2) m, centres before the first and after each.
-            pairs: pairs (K, 2) in contact at the end of substeps, with the number of the substep after the last that
-                has them.
+            pairs: pairs in contact at the end of each.
         """
 
 

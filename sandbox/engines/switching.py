@@ -20,13 +20,12 @@ from sandbox.arrays import BoolArray
 from sandbox.echo import MAX_MESSAGE, MAX_NAMED, shorten
 from sandbox.engines.common.base import step_and_record
 from sandbox.engines.common.energy_balance import LedgerHandover
-from sandbox.engines.contract import Divergence, Exhaustion, Observer, Refusal
+from sandbox.engines.contract import Divergence, Exhaustion, Observer, Refusal, StateSnapshot
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.mouse_joint import MouseJoints
 from sandbox.engines.registry import UnknownEngineError
 from sandbox.engines.registry import start as start_engine
 from sandbox.engines.segment import Checkpoint, Segment, start_segment
-from sandbox.engines.snapshot import StateSnapshot
 from sandbox.frame_table import FrameTable
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.generators import GeneratorError, count_of, layout_of

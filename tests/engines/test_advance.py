@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sandbox.engines.contract import Divergence, Exhaustion, Simulation
-from sandbox.engines.reference import ball_steps
-from sandbox.engines.reference.ball_steps import KERNEL
+from sandbox.engines.reference import ball_stepper
+from sandbox.engines.reference.ball_kernels import KERNEL
 from sandbox.engines.reference.integrators import INTEGRATORS
 from sandbox.engines.registry import ENGINES
 from sandbox.engines.switching import SwitchableSimulation, start
@@ -198,8 +198,8 @@ def test_compiled_steps_of_the_reference(integrator: str, broad_phase: str) -> N
 def test_methods_without_compiled_code_use_the_readable_step(codes: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = small_scene("balls that settle")
     one, seen = advanced(started(scene, "reference"), [50], 1)
-    monkeypatch.setattr(ball_steps, codes, {})
-    monkeypatch.setattr(ball_steps, "advance_balls", None)  # must not be called
+    monkeypatch.setattr(ball_stepper, codes, {})
+    monkeypatch.setattr(ball_stepper, "advance_balls", None)  # must not be called
     other, seen_other = advanced(started(scene, "reference"), [50], 1)
     assert seen == seen_other
     assert_same(one, other)

@@ -13,7 +13,7 @@ import numpy as np
 import sandbox
 from sandbox.action import SetParameter
 from sandbox.engines.common.body_store import BodyStore
-from sandbox.engines.reference.ball_steps import KERNEL
+from sandbox.engines.reference.ball_kernels import KERNEL
 from sandbox.engines.reference.engine import ReferenceEngine
 from sandbox.engines.reference.step import WorldState
 from sandbox.engines.registry import start

@@ -4,15 +4,14 @@ import copy
 import math
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, ClassVar, NoReturn, Protocol, Self
 
 import numpy as np
 
-from sandbox.arrays import FloatArray, IntArray
-from sandbox.engines.contract import Observer, PathObserver, SnapshotError
+from sandbox.arrays import FloatArray
+from sandbox.engines.contract import Observer, PairRuns, PathObserver, SnapshotError, StateSnapshot
 from sandbox.engines.energy_ledger import Cause
-from sandbox.engines.snapshot import StateSnapshot
 from sandbox.frame_table import FrameTable
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
@@ -193,16 +192,14 @@ def step_and_record(simulation: Stepping, steps: int, frames: FrameTable) -> Non
             frames.record(simulation.frame())
 
 
-def observe_path(
-    observer: Observer, times: FloatArray, path: FloatArray, pairs: Sequence[tuple[int, IntArray]]
-) -> None:
+def observe_path(observer: Observer, times: FloatArray, path: FloatArray, pairs: PairRuns) -> None:
     """Pass B substeps to an observer, at once if it can take them so, else one by one.
 
     Args:
         observer: the observer.
         times: (B,) s, start of each substep.
         path: (B + 1, N, 2) m, centres before the first substep and after each.
-        pairs: pairs (K, 2) of substeps, with the number of the substep after the last that has them.
+        pairs: pairs in contact at the end of each.
     """
     if not len(times):
         return

@@ -74,18 +74,16 @@ class OptionalKernel:
     @property
     def is_worthwhile(self) -> bool:
         """Whether to use the kernel."""
-        if not (COMPILED and not self._is_ready):
-            return COMPILED
-        dispatcher: Any = self._function
-        self._is_ready = self.spent > self._compile_time or bool(dispatcher.signatures) or _is_on_disk(dispatcher)
+        if COMPILED and not self._is_ready:
+            dispatcher: Any = self._function
+            self._is_ready = self.spent > self._compile_time or bool(dispatcher.signatures) or _is_on_disk(dispatcher)
         return self._is_ready
 
 
 def _is_on_disk(dispatcher: Any) -> bool:
     """Return whether there is compiled code of a kernel in the cache."""
-    cache_file = getattr(
-        dispatcher._cache, "_cache_file", None
-    )  # numba has no public way to ask; without a cache, None
+    # numba has no public way to ask. Without a writable folder there is no cache file.
+    cache_file = getattr(dispatcher._cache, "_cache_file", None)
     return cache_file is not None and Path(cache_file._index_path).is_file()
 
 

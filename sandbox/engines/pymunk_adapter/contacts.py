@@ -288,7 +288,8 @@ class ContactLists:
 
     def words(self, k: int) -> bytes:
         """Return the integers of a substep: two ids and the number of points of each contact."""
-        return self._words[self._byte_ends[k] : self._byte_ends[k + 1]]  # type: ignore[no-any-return]
+        words: bytes = self._words[self._byte_ends[k] : self._byte_ends[k + 1]]
+        return words
 
     def vectors(self, k: int) -> ComplexArray:
         """Return the vectors of a substep."""

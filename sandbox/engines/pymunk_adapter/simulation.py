@@ -13,7 +13,7 @@ from sandbox.engines.common.base import BaseSimulation, observe_path
 from sandbox.engines.common.contact_log import ContactBatch, ContactLog, join_batches
 from sandbox.engines.common.energy_balance import record_energy_change
 from sandbox.engines.common.lifetimes import Lifetimes
-from sandbox.engines.contract import Divergence, Exhaustion, Observer
+from sandbox.engines.contract import Divergence, Exhaustion, Observer, PairRuns
 from sandbox.engines.energy_ledger import Cause, EnergyLedger
 from sandbox.engines.pymunk_adapter.batch_reader import MAX_CONTACTS
 from sandbox.engines.pymunk_adapter.bodies import PymunkBodies
@@ -57,7 +57,7 @@ class EventRecorder:
         if entries is not None:
             log.has_distinct_rows = False  # a zone entry does not last: the next contacts are different ones
 
-    def record_lists(self, lists: ContactLists, times: FloatArray, wants_pairs: bool) -> list[tuple[int, IntArray]]:
+    def record_lists(self, lists: ContactLists, times: FloatArray, wants_pairs: bool) -> PairRuns:
         """Record the contacts of a batch of substeps.
 
         Args:
@@ -66,7 +66,7 @@ class EventRecorder:
             wants_pairs: whether to return the pairs.
 
         Returns:
-            The pairs (K, 2) of the substeps, with the number of the substep after the last that has them.
+            The pairs of the substeps; none unless they are wanted.
         """
         pairs = []
         for end, count in self._population.space_bodies.read_batch(lists, self._log, times):

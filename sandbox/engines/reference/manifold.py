@@ -71,6 +71,9 @@ def circle_segment(
 CLEARLY_APART = 1e-9
 """Relative distance beyond a limit at which rounding, 1e-16, does not matter"""
 
+CONTACT_ROUNDING = 1e-12
+"""Overlap as a fraction of the contact distance, and change of velocity as a fraction of the speed, that is rounding"""
+
 KIND = 60
 """Number of bits below the kind of a pair in its key: 0 ball-ball, 1 ball-plane, 2 ball-segment"""
 

@@ -18,12 +18,10 @@ from sandbox.engines.common.frame_rows import free_rows
 from sandbox.engines.common.kernel import warn_if_uncompiled
 from sandbox.engines.contract import Divergence, Exhaustion, Members, Observer
 from sandbox.engines.energy_ledger import Cause
-from sandbox.engines.reference.ball_steps import BEYOND as BALLS_BEYOND
-from sandbox.engines.reference.ball_steps import (
+from sandbox.engines.reference.ball_kernels import BEYOND as BALLS_BEYOND
+from sandbox.engines.reference.ball_kernels import KERNEL, STOPPED
+from sandbox.engines.reference.ball_stepper import (
     CAPACITY,
-    KERNEL,
-    ROUNDING,
-    STOPPED,
     BallStepper,
     BallSteps,
     MemberStepper,
@@ -32,7 +30,7 @@ from sandbox.engines.reference.ball_steps import (
 from sandbox.engines.reference.continuous import DETECTIONS
 from sandbox.engines.reference.energy import StepEnergyLedger
 from sandbox.engines.reference.joints import JointBreaker
-from sandbox.engines.reference.manifold import Manifolds
+from sandbox.engines.reference.manifold import CONTACT_ROUNDING, Manifolds
 from sandbox.engines.reference.step import StepRecord, WorldState
 from sandbox.engines.reference.zones import ZonedBodyStore
 from sandbox.frame_table import FrameTable
@@ -68,8 +66,6 @@ class ReferenceSimulation(SteppedSimulation):
         self._breaker = JointBreaker(setup.links) if np.isfinite(setup.links.strength).any() else None
         """finds the joints that break; None if no joint can break any more"""
         self._world.records_joint_load = self._breaker is not None
-        self._removes = setup.scene.world.bounds is not None or bool(np.isfinite(setup.bodies.lifetime).any())
-        """whether bodies can leave the bounds or have a lifetime; bodies added later have no lifetime"""
         self._h = settings.h
         self._log: ContactLog | None = None
         self._balls: BallStepper | None = None
@@ -151,7 +147,7 @@ class ReferenceSimulation(SteppedSimulation):
         return (
             self._zoned is None
             and self._energy is None
-            and not self._removes
+            and not self._store.can_expire
             and (self._log is None or self._log.can_hold(CAPACITY))
             and BallStepper.is_suitable(self._world, self._store, self._settings)
         )
@@ -291,7 +287,7 @@ class ReferenceSimulation(SteppedSimulation):
         if beyond is not None:
             self._ended = True
             raise Divergence(self.time, self.bodies.names[beyond], BEYOND)
-        if self._removes:
+        if self._store.can_expire:
             expired = self._store.expired(self.time)
             if len(expired):
                 self._remove_bodies(expired)
@@ -398,8 +394,8 @@ def _drop_rounding(
     # A static collider has no row; that of the first body is used for it.
     other = np.where(second >= 0, second, first)
     kick = np.hypot(impulse[:, 0], impulse[:, 1]) * np.maximum(inverse_mass[first], inverse_mass[other])
-    real = contacts.separation < -ROUNDING * contacts.anchor.sum(axis=1)
-    real |= kick > ROUNDING * (speed[first] + speed[other])
+    real = contacts.separation < -CONTACT_ROUNDING * contacts.anchor.sum(axis=1)
+    real |= kick > CONTACT_ROUNDING * (speed[first] + speed[other])
     return (contacts, impulse) if real.all() else (contacts.of(real), impulse[real])
 
 

@@ -4,12 +4,12 @@ A fixed-step engine tests for overlap at the end of each substep only. A contact
 is lost. A body that has reached the far side of an obstacle is pushed out on that side.
 """
 
-from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.engines.contract import PairRuns
 from sandbox.measure.missed_contacts.contact_history import ContactHistory, pair_keys
 from sandbox.measure.missed_contacts.static_geometry import StaticGeometry, SweptCircles
 from sandbox.measure.missed_contacts.swept_geometry import CLEAR, DEEP, JUMP, approaching, closest_to_origin, dot
@@ -187,16 +187,13 @@ class Audit:
         self._end = np.empty_like(self._start)
         self._layer_bits = np.zeros((0, 0), np.int64)
 
-    def observe_path(
-        self, times: FloatArray, path: FloatArray, pairs: Sequence[tuple[int, IntArray]], on: IntArray | None = None
-    ) -> None:
+    def observe_path(self, times: FloatArray, path: FloatArray, pairs: PairRuns, on: IntArray | None = None) -> None:
         """Record many substeps at once; as if each had been recorded by a call.
 
         Args:
             times: (B,) s, start of each substep.
             path: (B + 1, N, 2) m, centres before the first substep and after each.
-            pairs: pairs (K, 2) in contact at the end of substeps, with the number of the substep after the last that
-                has them.
+            pairs: pairs in contact at the end of each.
             on: layer of each body throughout all of them as a bit, (N,), if there are several layers.
 
         Raises:
@@ -327,7 +324,7 @@ def _squared_lengths(start: FloatArray, end: FloatArray) -> FloatArray:
     return np.asarray(move[..., 0] + move[..., 1])
 
 
-def _begins(pairs: Sequence[tuple[int, IntArray]]) -> list[int]:
+def _begins(pairs: PairRuns) -> list[int]:
     """Return the first substep of each entry of pairs."""
     return [0, *(end for end, _ in pairs[:-1])]
 

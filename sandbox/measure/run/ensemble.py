@@ -14,7 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from threading import Event
+from threading import Event, Lock
 from typing import Any, Literal
 
 import numpy as np
@@ -149,16 +149,11 @@ def ensemble(
     wanted = setup.scene.solver.replace(**settings) if settings else setup.scene.solver
     _check_memory(setup, wanted, n, keep)
     seed = setup.scene.world.seed if seed is None else seed
-    starts = varied_starts(setup, n, vary, seed)
-    ends = Members(*(array.copy() for array in starts))
-    stop = Event()
-    report = _Reporter(n, on_progress)
-    is_done = np.zeros(n, np.bool_)
+    runs = _Runs(setup, engine, wanted, varied_starts(setup, n, vary, seed), threads, on_progress)
     if keep == "end":
-        is_done = _run_compiled(setup, engine, wanted, ends, threads, stop, report)
-    status = np.full(n, "ok", dtype="<U8")
-    runs = _run_rest(setup, engine, wanted, starts, ends, is_done, status, threads, stop, report, keep)
-    return _collected(setup, starts, ends, status, is_done, runs, keep)
+        runs.compute_compiled()
+    runs.compute_rest(keep)
+    return runs.collected(keep)
 
 
 def varied_starts(start: Scene | Setup, n: int, vary: Mapping[str, float], seed: int) -> Members:
@@ -250,132 +245,117 @@ def _check_memory(setup: Setup, settings: Settings, n: int, keep: Keep) -> None:
         raise TooLargeError(f"{n:,} runs take {size / 1e9:.3g} GB, but only {free / 1e9:.3g} GB are available")
 
 
-class _Reporter:
-    """Reports how many runs have been computed."""
+class _Runs:
+    """The runs of an ensemble, while they are computed."""
 
-    def __init__(self, count: int, on_progress: ProgressCallback | None) -> None:
-        self._count, self._on_progress, self._done = count, on_progress, 0
+    def __init__(
+        self,
+        setup: Setup,
+        engine: str,
+        settings: Settings,
+        starts: Members,
+        threads: int,
+        on_progress: ProgressCallback | None,
+    ) -> None:
+        self._setup, self._engine, self._settings, self._starts = setup, engine, settings, starts
+        self._threads, self._on_progress = threads, on_progress
+        count = len(starts.position)
+        self._ends = Members(*(array.copy() for array in starts))
+        self._compiled = np.zeros(count, np.bool_)
+        self._status = np.full(count, "ok", dtype="<U8")
+        self._trajectories: dict[int, Trajectory] = {}
+        """ordinary runs, if more than their ends is kept"""
+        self._computed, self._lock = 0, Lock()
 
-    def add(self, runs: int) -> None:
-        self._done += runs
-        if self._on_progress is not None:
-            self._on_progress(Progress(fraction=self._done / self._count))
+    def compute_compiled(self) -> None:
+        """Compute those runs that the engine has compiled code for."""
+        try:
+            simulation = start_engine(self._setup, self._engine, self._settings)
+        except Refusal:  # of the scene's own start; each varied one is tried
+            return
+        if isinstance(simulation, MemberRunner) and not self._setup.time:
+            runner, duration = simulation, sum(frame_count(self._setup.scene, simulation.settings))
+
+            def compute(begin: int, end: int, stop: Event) -> None:
+                rows = slice(begin, end)
+                members = Members(*(array[rows] for array in self._ends))
+                self._compiled[rows] = runner.run_members(members, duration, stop.is_set)
+                self._report(int(self._compiled[rows].sum()))
+
+            _in_threads(compute, len(self._compiled), self._threads)
+        simulation.close()
+
+    def compute_rest(self, keep: Keep) -> None:
+        """Compute the other runs one by one."""
+        rest, settings = np.flatnonzero(~self._compiled).tolist(), self._settings
+        if keep != "frames":  # only the first and the last frame of each
+            settings = settings.replace(record_every=max(frame_count(self._setup.scene, settings)[0], 1))
+
+        def compute(begin: int, end: int, stop: Event) -> None:
+            for m in rest[begin:end]:
+                if stop.is_set():
+                    return
+                columns = {name: getattr(self._starts, name)[m] for name in FIELDS}
+                varied = replace(self._setup, bodies=replace(self._setup.bodies, **columns))
+                found = run(varied, self._engine, audit=False, **settings.model_dump())
+                self._status[m] = found.status
+                if keep != "end":
+                    self._trajectories[m] = found
+                for name in FIELDS:
+                    getattr(self._ends, name)[m] = getattr(found, name)[-1] if found.status == "ok" else np.nan
+                self._report(1)
+
+        if rest:
+            _in_threads(compute, len(rest), self._threads)
+
+    def _report(self, runs: int) -> None:
+        with self._lock:  # threads report too
+            self._computed += runs
+            if self._on_progress is not None:
+                self._on_progress(Progress(fraction=self._computed / len(self._status)))
+
+    def collected(self, keep: Keep) -> Ensemble:
+        """Return the ensemble of all runs."""
+        runs = sorted(self._trajectories.items())
+        time, frames = np.empty(0), np.empty((0, 0, 0, 2))
+        if keep == "frames":
+            time = next((found.time for _, found in runs if found.status == "ok"), time)
+            frames = np.full((len(self._status), len(time), len(self._setup.bodies), 2), np.nan)
+            for m, found in runs:
+                if found.status == "ok":
+                    frames[m] = found.position
+        contacts = runs if keep == "contacts" else []
+        numbers = [np.full(len(found.contact_time), m) for m, found in contacts]
+        return Ensemble(
+            names=tuple(self._setup.bodies.names),
+            status=self._status,
+            start_position=self._starts.position,
+            start_velocity=self._starts.velocity,
+            position=self._ends.position,
+            velocity=self._ends.velocity,
+            angle=self._ends.angle,
+            angular_velocity=self._ends.angular_velocity,
+            time=time,
+            frames=frames,
+            contact_run=np.concatenate([np.empty(0, np.int64), *numbers]),
+            contact_time=np.concatenate([np.empty(0), *(found.contact_time for _, found in contacts)]),
+            contact_pair=np.concatenate([np.empty((0, 2), np.int64), *(found.contact_pair for _, found in contacts)]),
+            contact_impulse=np.concatenate([np.empty((0, 2)), *(found.contact_impulse for _, found in contacts)]),
+            compiled=self._compiled,
+        )
 
 
-def _run_compiled(
-    setup: Setup, engine: str, settings: Settings, members: Members, threads: int, stop: Event, report: _Reporter
-) -> BoolArray:
-    """Compute those runs that the engine has compiled code for; replace their starts by their ends."""
-    is_done = np.zeros(len(members.position), np.bool_)
-    try:
-        simulation = start_engine(setup, engine, settings)
-    except Refusal:  # of the scene's own start; each varied one is tried
-        return is_done
-    if isinstance(simulation, MemberRunner) and not setup.time:
-        steps, part = frame_count(setup.scene, simulation.settings)
-
-        def compute(begin: int, end: int) -> None:
-            rows = slice(begin, end)
-            part_of = Members(*(array[rows] for array in members))
-            is_done[rows] = simulation.run_members(part_of, steps + part, stop.is_set)
-            report.add(int(is_done[rows].sum()))
-
-        _in_threads(compute, len(is_done), threads, stop)
-    simulation.close()
-    return is_done
-
-
-def _in_threads(compute: Callable[[int, int], None], count: int, threads: int, stop: Event) -> None:
-    """Call a function for ranges of runs, on several threads."""
+def _in_threads(compute: Callable[[int, int, Event], None], count: int, threads: int) -> None:
+    """Call a function for ranges of runs, on several threads. The event is set once they must end early."""
+    stop = Event()
     bounds = np.linspace(0, count, min(threads, count) + 1).astype(int).tolist()
     if len(bounds) == 2:
-        compute(0, count)
+        compute(0, count, stop)
         return
     with ThreadPoolExecutor(len(bounds) - 1) as pool:
-        futures = [pool.submit(compute, begin, end) for begin, end in pairwise(bounds)]
+        futures = [pool.submit(compute, begin, end, stop) for begin, end in pairwise(bounds)]
         try:
             for future in futures:
                 future.result()
         finally:  # also on Ctrl-C: threads that are waited for must end
             stop.set()
-
-
-def _run_rest(
-    setup: Setup,
-    engine: str,
-    settings: Settings,
-    starts: Members,
-    ends: Members,
-    is_done: BoolArray,
-    status: npt.NDArray[np.str_],
-    threads: int,
-    stop: Event,
-    report: _Reporter,
-    keep: Keep,
-) -> dict[int, Trajectory]:
-    """Compute the other runs one by one, and set their ends and status; return them if more of them is kept."""
-    rest, kept = np.flatnonzero(~is_done).tolist(), {}
-    stop.clear()
-    own = settings if keep == "frames" else settings.replace(record_every=_all_steps(setup.scene, settings))
-
-    def compute(begin: int, end: int) -> None:
-        for m in rest[begin:end]:
-            if stop.is_set():
-                return
-            columns = {name: getattr(starts, name)[m] for name in FIELDS}
-            varied = replace(setup, bodies=replace(setup.bodies, **columns))
-            result = run(varied, engine, audit=False, **own.model_dump())
-            status[m] = result.status
-            if keep != "end":
-                kept[m] = result
-            for name in FIELDS:
-                getattr(ends, name)[m] = getattr(result, name)[-1] if result.status == "ok" else np.nan
-            report.add(1)
-
-    if rest:
-        _in_threads(compute, len(rest), threads, stop)
-    return kept
-
-
-def _all_steps(scene: Scene, settings: Settings) -> int:
-    """Return an interval of recorded steps at which only the first and the last frame are recorded."""
-    return max(frame_count(scene, settings)[0], 1)
-
-
-def _collected(
-    setup: Setup,
-    starts: Members,
-    ends: Members,
-    status: npt.NDArray[np.str_],
-    compiled: BoolArray,
-    runs: Mapping[int, Trajectory],
-    keep: Keep,
-) -> Ensemble:
-    """Return the ensemble of all runs."""
-    whole = [runs[m] for m in sorted(runs) if runs[m].status == "ok"] if keep == "frames" else []
-    time = whole[0].time if whole else np.empty(0)
-    count = len(setup.bodies)
-    frames = np.full((len(status), len(time), count, 2), np.nan) if whole else np.empty((0, 0, 0, 2))
-    contacts: list[tuple[int, Trajectory]] = []
-    for m in sorted(runs):
-        if whole and runs[m].status == "ok":
-            frames[m] = runs[m].position
-        if keep == "contacts":
-            contacts.append((m, runs[m]))
-    return Ensemble(
-        names=tuple(setup.bodies.names),
-        status=status,
-        start_position=starts.position,
-        start_velocity=starts.velocity,
-        position=ends.position,
-        velocity=ends.velocity,
-        angle=ends.angle,
-        angular_velocity=ends.angular_velocity,
-        time=time,
-        frames=frames,
-        contact_run=np.concatenate([np.empty(0, np.int64), *(np.full(len(t.contact_time), m) for m, t in contacts)]),
-        contact_time=np.concatenate([np.empty(0), *(t.contact_time for _, t in contacts)]),
-        contact_pair=np.concatenate([np.empty((0, 2), np.int64), *(t.contact_pair for _, t in contacts)]),
-        contact_impulse=np.concatenate([np.empty((0, 2)), *(t.contact_impulse for _, t in contacts)]),
-        compiled=compiled,
-    )

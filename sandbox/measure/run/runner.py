@@ -11,7 +11,7 @@ from sandbox.action import Action, Spawn, actions_to_json, in_order
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.compile_clock import COMPILE_CLOCK
 from sandbox.engines.common.energy_balance import total_energy
-from sandbox.engines.contract import Refusal, Simulation
+from sandbox.engines.contract import PairRuns, Refusal, Simulation
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.registry import engine_named
 from sandbox.engines.switching import SwitchableSimulation, start
@@ -224,7 +224,7 @@ class TimedAudit:
         self._audit(time, start, end, touching, self._shared_layers())
         self.seconds += perf_counter() - began
 
-    def observe_path(self, times: FloatArray, path: FloatArray, pairs: Sequence[tuple[int, IntArray]]) -> None:
+    def observe_path(self, times: FloatArray, path: FloatArray, pairs: PairRuns) -> None:
         """Audit many substeps, as `Audit.observe_path`; bodies that change their layer are not passed in this way."""
         began = perf_counter()
         self._update(path.shape[1])

@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.arrays import FloatArray
-from sandbox.engines.contract import SnapshotError
+from sandbox.engines.contract import SnapshotError, StateSnapshot
 from sandbox.engines.segment import Checkpoint
-from sandbox.engines.snapshot import StateSnapshot
 from sandbox.engines.switching import SwitchableSimulation
 from sandbox.games.session import GameSession
 from sandbox.scene.description.world import Settings

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import sandbox
 from sandbox.engines.common.kernel import COMPILED
-from sandbox.engines.reference.ball_steps import KERNEL
+from sandbox.engines.reference.ball_kernels import KERNEL
 from sandbox.measure.run.ensemble import FIELDS, varied_starts
 from sandbox.resource_limits import TooLargeError
 from sandbox.scene.compile.scene import Scene

@@ -1,26 +1,21 @@
-"""Many steps of a world of balls in one compiled call.
+"""Compiled steps of a world of balls.
 
 `advance_balls` makes the steps that `step.step` defines, by the same kernels in the same order, for worlds that need
 nothing between two substeps: balls under gravity and drag, discrete detection, impulses. It stops before a substep that
-needs more memory or another path; the readable step then makes it. Tests compare the two, bit for bit.
+needs more memory or another path; the readable step then makes it. Tests compare the two, bit for bit. `ball_stepper`
+prepares the arrays.
 """
 
 import math
-from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
-
-from sandbox.arrays import BoolArray, ComplexArray, FloatArray, IntArray
+from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.base import FARTHEST, FASTEST
-from sandbox.engines.common.body_store import BodyStore
-from sandbox.engines.common.contact_log import ContactBatch, ContactLog
-from sandbox.engines.common.frame_rows import FrameRows, is_due, no_rows, write_row
+from sandbox.engines.common.frame_rows import FrameRows, is_due, write_row
 from sandbox.engines.common.kernel import OptionalKernel, bare_kernel
 from sandbox.engines.reference.broad_phase import EXCEEDED, all_pairs, grid, near_segments
-from sandbox.engines.reference.collision import CirclePipeline, empty_manifolds
-from sandbox.engines.reference.integrators import INTEGRATORS
 from sandbox.engines.reference.manifold import (
+    CONTACT_ROUNDING,
     Manifolds,
     find_ball_contacts,
     find_plane_contacts,
@@ -33,12 +28,6 @@ from sandbox.engines.reference.sequential_impulses import (
     solve_overlaps,
     solve_velocities,
 )
-from sandbox.engines.reference.step import WorldState
-from sandbox.engines.reference.velocity_solver import ImpulseSolver
-from sandbox.scene.description.world import Settings
-
-ROUNDING = 1e-12
-"""Overlap as a fraction of the contact distance, and change of velocity as a fraction of the speed, that is rounding"""
 
 EXPLICIT_EULER, SEMI_IMPLICIT_EULER, VELOCITY_VERLET, LEAPFROG, RK4 = range(5)
 INTEGRATOR_CODES = {
@@ -55,15 +44,6 @@ BROAD_PHASE_CODES = {"all_pairs": ALL_PAIRS, "grid": GRID}
 
 KEYS, HAS_PSEUDO_VELOCITY, BROAD_TESTS, PAIR_TESTS, CONTACTS, CONTACT_ITERATIONS = range(6)
 """Indices of `BallState.counts`: number of warm-start impulses; 1 if a pseudo-velocity is not 0; work counters."""
-
-CAPACITY = 1 << 15
-"""Contacts in the log of a call"""
-
-MAX_SUBSTEPS = 1 << 14
-"""Substeps of a call"""
-
-MAX_PATH = 1 << 17
-"""Centres in the path of a call, for an observer"""
 
 
 class BallConstants(NamedTuple):
@@ -208,7 +188,7 @@ def advance_balls(
         state: the state.
         scratch: memory.
         frames: rows for the frames.
-        path: (B + 1, N, 2) m, for the centres after each substep from row 1 on; (0, 0, 2) if nobody observes.
+        path: (B + 1, N, 2) m, for the centres after each substep from row 1 on; (0, 0, 2) without an observer.
         log: rows for the contacts.
         steps_before: number of steps made before.
         steps: largest number of steps.
@@ -530,8 +510,8 @@ def log_contacts(arrays: BallColumns, scratch: BallScratch, log: BallLog, size: 
         other = second if second >= 0 else first
         speed = math.hypot(rates[first, 0], rates[first, 1]) + math.hypot(rates[other, 0], rates[other, 1])
         kick = math.hypot(impulse[k, 0], impulse[k, 1]) * max(inverse_mass[first], inverse_mass[other])
-        overlap = -ROUNDING * (out.anchor[k, 0] + out.anchor[k, 1])
-        if not (out.separation[k] < overlap or kick > ROUNDING * speed):
+        overlap = -CONTACT_ROUNDING * (out.anchor[k, 0] + out.anchor[k, 1])
+        if not (out.separation[k] < overlap or kick > CONTACT_ROUNDING * speed):
             continue
         log.pair[row, 0], log.pair[row, 1] = first, second
         log.vectors[row, 0], log.vectors[row, 1] = impulse[k, 0], impulse[k, 1]
@@ -546,273 +526,3 @@ def log_contacts(arrays: BallColumns, scratch: BallScratch, log: BallLog, size: 
             same = same and log.pair[begin + k, 0] == log.pair[previous + k, 0]
             same = same and log.pair[begin + k, 1] == log.pair[previous + k, 1]
     log.same[substep] = same
-
-
-class BallSteps(NamedTuple):
-    """Result of a call."""
-
-    steps: int
-    """whole steps"""
-    substeps: int
-    """substeps made of a step that is not complete"""
-    frames: int
-    """frames written"""
-    code: int
-    """`DONE`, `STOPPED` or `BEYOND`"""
-    log: BallLog
-    """valid until the next call"""
-    path: FloatArray
-    """(B + 1, N, 2)"""
-
-
-class BallStepper:
-    """Advances a world of balls by `advance_balls`, as long as its forces and solver stay the same."""
-
-    def __init__(self, world: WorldState, store: BodyStore, settings: Settings) -> None:
-        """Prepare the arrays of a world for which `is_suitable` is true."""
-        pipeline, solver = world.pipeline, world.impulses
-        assert isinstance(pipeline, CirclePipeline)
-        assert settings.integrator and settings.broad_phase and settings.slop is not None and settings.bias is not None
-        self._world, self._pipeline, self.forces = world, pipeline, world.forces
-        self._substeps = settings.substeps
-        h, forces, boxes = settings.h, world.forces, pipeline.segment_boxes
-        self._numbers = BallConstants(
-            h=h,
-            dt=settings.dt,
-            substeps=settings.substeps,
-            iterations=settings.iterations,
-            integrator=INTEGRATOR_CODES[settings.integrator],
-            fraction=INTEGRATORS[settings.integrator].fraction,
-            slop=settings.slop,
-            correction=solver.correction_rate(h),
-            linear_drag=forces.linear_drag,
-            quadratic_drag=forces.quadratic_drag,
-            wind_x=forces.wind[0],
-            wind_y=forces.wind[1],
-            broad_phase=BROAD_PHASE_CODES[settings.broad_phase] if store.contact_matrix.ball_ball else NO_PAIRS,
-            max_tests=pipeline.max_pairs,
-            max_contacts=solver.max_contacts,
-            segment_width=boxes.max_width,
-            plane_tests=pipeline.plane_tests,
-        )
-        fixtures, turning = store.fixtures, np.zeros(len(store.radius))
-        if forces.constant.shape[1] == 3:
-            turning = forces.constant[:, 2]
-        self._store = store
-        given: dict[str, Any] = {
-            "constant": np.column_stack((forces.constant[:, :2], turning)),
-            "mobile": np.broadcast_to(forces.mobile[:, 0], len(store.radius)),
-            "radius": store.radius,
-            "surface": store.surface,
-            "mask": store.collision_mask,
-            "moves": pipeline.moves,
-            "can_touch": pipeline.can_touch,
-            "inverse_mass": store.inverse_mass,
-            "inverse_moment": store.inverse_moment,
-            "friction": store.friction,
-            "restitution": store.restitution.ravel(),
-            "planes": fixtures.planes,
-            "plane_collider": fixtures.plane_collider,
-            "collider_surface": store.fixed_surface,
-            "segments": fixtures.segments,
-            "segment_joints": fixtures.joints,
-            "segment_collider": fixtures.segment_collider,
-            "segment_box": boxes.box,
-            "segment_index": boxes.index,
-        }
-        # Copied, so that the kernel is compiled for one kind of arrays: not for read-only or strided ones too.
-        self._arrays = BallColumns(**{name: np.array(array, order="C") for name, array in given.items()})
-        self._log = BallLog(
-            np.zeros(MAX_SUBSTEPS + self._substeps + 1, np.int64),
-            np.empty(MAX_SUBSTEPS + self._substeps, np.bool_),
-            np.empty((CAPACITY, 2), np.int64),
-            np.empty((CAPACITY, 6)),
-        )
-        self._allocate(64)
-
-    @staticmethod
-    def is_suitable(world: WorldState, store: BodyStore, settings: Settings) -> bool:
-        """Return whether a world needs nothing that `advance_balls` lacks."""
-        solver = world.solver
-        return (
-            settings.detection == "discrete"
-            and type(solver) is ImpulseSolver
-            and solver.is_plain
-            and isinstance(world.pipeline, CirclePipeline)
-            and world.pipeline.filter is None
-            and world.joints is None
-            and not world.forces.forces
-            and settings.broad_phase in BROAD_PHASE_CODES
-            and settings.integrator in INTEGRATOR_CODES
-            and not (world.records_work or world.records_joint_load)
-            and len(store.radius) > 0
-        )
-
-    def _allocate(self, contacts: int) -> None:
-        """Allocate memory for a number of contacts in a substep."""
-        shape = (2, len(self._arrays.radius), 3)
-        self._capacity = contacts
-        self._scratch = BallScratch(
-            placed=np.empty(shape),
-            after=np.empty(shape),
-            change=np.empty(shape[1:]),
-            ball_keys=np.empty(4 * contacts, np.int64),
-            segment_keys=np.empty(4 * contacts, np.int64),
-            out=empty_manifolds(contacts),
-            bounce=np.empty(contacts),
-            impulse=np.empty((contacts, 2)),
-            target=np.empty(contacts),
-            total=np.empty(contacts),
-        )
-
-    @property
-    def is_full(self) -> bool:
-        """Whether there is memory for no more contacts, so that the readable step has to be used."""
-        return self._capacity >= MAX_CAPACITY
-
-    def max_steps(self, *, observed: bool) -> int:
-        """Return the largest number of steps of a call, at least 1."""
-        substeps = min(MAX_SUBSTEPS, MAX_PATH // len(self._arrays.radius)) if observed else MAX_SUBSTEPS
-        return max(substeps // self._substeps, 1)
-
-    def advance(self, begin: int, steps: int, frames: FrameRows, *, records: bool, observed: bool) -> BallSteps:
-        """Make at most so many steps; the state of the world is that after them, and after the substeps beyond.
-
-        Args:
-            begin: number of steps made before.
-            steps: largest number of steps, at most `max_steps`.
-            frames: rows for the frames.
-            records: whether to record contacts.
-            observed: whether to record the path of the balls.
-        """
-        world, memory, pipeline, numbers = self._world, self._world.memory, self._pipeline, self._numbers
-        known, substeps = len(memory.key), steps * numbers.substeps
-        if known > self._capacity:
-            self._allocate(2 * known)
-        # The kernel computes angles even if nothing turns; they do not change then.
-        turns, count, capacity = world.x.shape[2] == 3, world.x.shape[1], self._capacity
-        x = np.empty((2, count, 3))
-        x[:, :, : world.x.shape[2]] = world.x
-        if not turns:
-            x[0, :, 2], x[1, :, 2] = self._store.angle, 0.0
-        key, impulse = np.empty(capacity, np.int64), np.empty((capacity, 2))
-        key[:known], impulse[:known] = memory.key, memory.impulse
-        order = pipeline.broad_phase_memory(x[0]) if numbers.broad_phase != NO_PAIRS else NO_ORDER
-        counts = np.array([known, memory.has_pseudo_velocity, 0, 0, 0, 0], np.int64)
-        state = BallState(x, key, impulse, memory.pseudo_velocity, order, counts)
-        log = self._log if records else NO_LOG
-        path = np.empty((substeps + 1, count, 2) if observed else (0, 0, 2))
-        if observed:
-            path[0] = x[0, :, :2]
-        warm_start = min(numbers.h / memory.h, 1.0)
-        made, rest, written, code = advance_balls(
-            numbers, self._arrays, state, self._scratch, frames, path, log, begin, steps, warm_start
-        )
-        substeps = (made + (code == BEYOND)) * numbers.substeps + rest
-        if substeps:
-            world.x = x if turns else x[:, :, :2].copy()
-            memory.key, memory.impulse = key[: counts[KEYS]].copy(), impulse[: counts[KEYS]].copy()
-            memory.has_pseudo_velocity, memory.h = bool(counts[HAS_PSEUDO_VELOCITY]), numbers.h
-            names = "broad_tests", "pair_tests", "contacts", "contact_iterations"
-            for name, amount in zip(names, counts[BROAD_TESTS:].tolist(), strict=True):
-                world.work[name] += amount
-        if code == STOPPED and capacity < MAX_CAPACITY:
-            self._allocate(4 * capacity)
-        return BallSteps(made, rest, written, code, _first(log, substeps), path[: substeps + 1])
-
-
-NO_LOG = BallLog(np.zeros(0, np.int64), np.empty(0, np.bool_), np.empty((0, 2), np.int64), np.empty((0, 6)))
-
-MAX_CAPACITY = CAPACITY
-"""Contacts of a substep beyond which the readable step is used; it costs little beside so many contacts"""
-
-NO_ORDER: IntArray = np.empty(0, np.int64)
-
-
-def _first(log: BallLog, substeps: int) -> BallLog:
-    """Return the used rows of a log."""
-    if not len(log.end):
-        return log
-    rows = int(log.end[substeps])
-    return BallLog(log.end[: substeps + 1], log.same[:substeps], log.pair[:rows], log.vectors[:rows])
-
-
-def record_contacts(
-    target: ContactLog, log: BallLog, times: FloatArray, wants_pairs: bool
-) -> list[tuple[int, IntArray]]:
-    """Enter the contacts of many substeps into a contact log, as if each had been recorded after its substep.
-
-    Args:
-        target: the contact log.
-        log: the contacts.
-        times: (B,) s, end of each substep.
-        wants_pairs: whether to return the pairs.
-
-    Returns:
-        The pairs (K, 2) of the substeps, with the number of the substep after the last that has them.
-    """
-    impulse, normal, point = (_complex(log.vectors[:, k : k + 2]) for k in (0, 2, 4))
-    impulse = -(normal * impulse)
-    a, b = np.ascontiguousarray(log.pair[:, 0]), np.ascontiguousarray(log.pair[:, 1])
-    row: list[int] = log.end.tolist()
-    begins = np.flatnonzero(~log.same).tolist()
-    pairs = []
-
-    def record(k: int) -> None:
-        one = slice(row[k], row[k + 1])
-        target.record(float(times[k]), ContactBatch(a[one], b[one], impulse[one], normal[one], point[one]))
-
-    for begin, end in pairwise([*begins, len(log.same)]):
-        record(begin)
-        if target.has_distinct_rows and end > begin + 1:
-            lasting = impulse[row[begin + 1] : row[end]]
-            target.add_impulse_rows(lasting.reshape(end - begin - 1, -1))
-        else:
-            for k in range(begin + 1, end):
-                record(k)
-        if wants_pairs:
-            pairs.append((end, target.pairs()))
-    return pairs
-
-
-def _complex(vectors: FloatArray) -> ComplexArray:
-    """Return rows (K, 2) as complex numbers (K,)."""
-    return np.asarray(vectors[:, 0] + 1j * vectors[:, 1])  # with the sign of zero that the readable step gets
-
-
-class MemberStepper:
-    """Runs one world of balls from many starts."""
-
-    def __init__(self, store: BodyStore, settings: Settings) -> None:
-        """Take over a body store, which no other simulation may use."""
-        self._store, self._settings = store, settings
-        self._world = WorldState(store, settings)
-        self._stepper = BallStepper(self._world, store, settings)
-        self._frames = no_rows()
-
-    def run(
-        self, position: FloatArray, velocity: FloatArray, angle: FloatArray, angular_velocity: FloatArray, *, steps: int
-    ) -> bool:
-        """Run the world from a start, (N, …) each, and write the end state in its place.
-
-        Return false without writing if the compiled steps cannot make the run.
-        """
-        store = self._store
-        state = store.position, store.velocity, store.angle, store.angular_velocity
-        start = position, velocity, angle, angular_velocity
-        for own, given in zip(state, start, strict=True):
-            own[:] = given
-        if not self._world.restart():
-            self._world.rebuild()
-            self._stepper = BallStepper(self._world, store, self._settings)
-        stepper, made = self._stepper, 0
-        while made < steps:
-            count = min(steps - made, stepper.max_steps(observed=False))
-            result = stepper.advance(made, count, self._frames, records=False, observed=False)
-            made += result.steps
-            if result.code == BEYOND or result.substeps or (result.code == STOPPED and stepper.is_full):
-                return False
-        self._world.write_state()
-        for own, given in zip(state, start, strict=True):
-            given[:] = own
-        return True
