@@ -5,7 +5,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from sandbox.arrays import FloatArray, IntArray
+from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.trajectory import Frame
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -82,6 +82,24 @@ class FrameTable:
             raise ValueError(f"{due:,} more frames, after {self.count:,}, in a table of {len(self.time):,}")
         if bodies > self.angle.shape[1]:
             self._widen(bodies)
+
+    def clear(self) -> None:
+        """Forget all steps and frames; the arrays are written again from the first row on."""
+        self.steps = self.count = 0
+
+    def frame(self, row: int, present: BoolArray) -> Frame:
+        """Return a recorded frame, of a scene without zones, drives and one-way walls.
+
+        Args:
+            row: of the frame.
+            present: (N,) whether each body was in the scene; the table does not contain it.
+        """
+        n = len(present)
+        roll = None if self.spin is None else self.spin[row, :n, 0:2].copy()
+        layer = None if self.layer is None else self.layer[row, :n].astype(np.int64)
+        position, velocity = self.position[row, :n].copy(), self.velocity[row, :n].copy()
+        angle, spin = self.angle[row, :n].copy(), self.angular_velocity[row, :n].copy()
+        return Frame(float(self.time[row]), position, velocity, angle, spin, present, roll, layer)
 
     def spin_rows(self) -> FloatArray:
         """Return `spin`, allocated at the first call."""

@@ -10,6 +10,7 @@ game, the reward is the increase of the score. `recording()` returns the episode
 the window. This is the only module that imports gymnasium.
 """
 
+import math
 import operator
 from collections.abc import Sequence
 from pathlib import Path
@@ -24,7 +25,6 @@ except ImportError:
     raise ImportError("sandbox.gym needs gymnasium: pip install -e '.[gym]'") from None
 
 from sandbox.action import ActionError
-from sandbox.arrays import FloatArray
 from sandbox.engines.contract import Divergence, Exhaustion, Refusal
 from sandbox.engines.registry import able, engine_named
 from sandbox.game_names import environments
@@ -99,8 +99,11 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
             raise Refusal(engine, missing, able(self.scene))
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"unknown render mode {render_mode!r}; use 'rgb_array'")
-        self._observed_bodies = _body_indices(self.scene, bodies)
-        states = [f"{self.scene.bodies.names[index]} {state}" for index in self._observed_bodies for state in STATES]
+        self._observed_bodies = np.asarray(_body_indices(self.scene, bodies), np.int64)
+        self._has_observation = isinstance(rules, HasObservation)
+        states = [
+            f"{self.scene.bodies.names[index]} {state}" for index in self._observed_bodies.tolist() for state in STATES
+        ]
         self.observed: tuple[str, ...] = (*states, *(name for name, _ in _rules_observation(rules)), "time", "score")
         """name of each number of an observation"""
         count = len(self.controls)
@@ -159,10 +162,7 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         before, failed = episode.rules.score, None
         try:
             episode.press(levels)
-            for _ in range(self.every):
-                episode.step()
-                if episode.ended:
-                    break
+            episode.advance(self.every)
         except (Divergence, Exhaustion, ActionError) as error:
             failed = str(error)
         info = self._info() | ({} if failed is None else {"failed": failed})
@@ -191,22 +191,26 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
             levels = np.asarray(action, dtype=np.float64)
         except (TypeError, ValueError):
             levels = np.empty(0)
-        sound = levels.shape == (len(self.controls),) and np.isfinite(levels).all()
-        if not sound or not (self.analogue or np.isin(levels, (0.0, 1.0)).all()):
+        found: list[float] | None = levels.tolist() if levels.shape == (len(self.controls),) else None
+        is_valid = math.isfinite if self.analogue else (0.0, 1.0).__contains__
+        if found is None or not all(map(is_valid, found)):
             names, each = ", ".join(control.name for control in self.controls), "0 to 1" if self.analogue else "0 or 1"
             raise ValueError(f"an action is {len(self.controls)} numbers, {each}, for {names}; not {action!r}")
-        found: list[float] = np.clip(levels, 0.0, 1.0).tolist()
-        return found
+        return [min(max(level, 0.0), 1.0) for level in found]
 
     def _observation(self) -> Observation:
         episode = self._current_episode()
         frame, some = episode.frame(), self._observed_bodies
-        columns: list[FloatArray] = [frame.position[some], frame.velocity[some]]
-        columns += [each[some, None] for each in (frame.angle, frame.angular_velocity, frame.present.astype(float))]
-        others = [*(value for _, value in _rules_observation(episode.rules)), episode.time, float(episode.rules.score)]
-        state = np.concatenate((np.hstack(columns).ravel(), others))
-        bounded = np.clip(np.nan_to_num(state, posinf=LIMIT, neginf=-LIMIT), -LIMIT, LIMIT)
-        return np.asarray(bounded, np.float32)
+        values = np.empty(len(self.observed))
+        states = values[: len(STATES) * len(some)].reshape(len(some), len(STATES))
+        states[:, 0:2], states[:, 2:4] = frame.position[some], frame.velocity[some]
+        states[:, 4], states[:, 5] = frame.angle[some], frame.angular_velocity[some]
+        states[:, 6] = frame.present[some]
+        numbers = [value for _, value in _rules_observation(episode.rules)] if self._has_observation else []
+        values[states.size :] = [*numbers, episode.time, episode.rules.score]
+        if not values.dot(values) < LIMIT * LIMIT:  # rarely: a number is out of bounds, or is not finite
+            values = np.nan_to_num(values, posinf=LIMIT, neginf=-LIMIT).clip(-LIMIT, LIMIT)
+        return values.astype(np.float32)
 
     def _info(self) -> dict[str, Any]:
         episode = self._current_episode()
@@ -215,9 +219,12 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
             "time": episode.time,
             "score": rules.score,
             "over": rules.game_over,
-            "lines": dict(rules.display_lines()),
             "seed": episode.scene.world.seed,
         }
+
+    def display_lines(self) -> dict[str, str]:
+        """Return the lines of the score panel, texts by label."""
+        return dict(self._current_episode().rules.display_lines())
 
     def recording(self) -> Recording:
         """Return the episode so far as a recording, for `sandbox replay`."""

@@ -13,6 +13,7 @@ from gymnasium.utils.env_checker import check_env
 from sandbox.engines.contract import Refusal, SnapshotError
 from sandbox.games import registry
 from sandbox.games.contract import Control, UnsuitableSceneError
+from sandbox.games.landing import rules as landing
 from sandbox.games.registry import RULES
 from sandbox.gym import GAMES, STATES, SandboxEnv
 from sandbox.measure.run.sessions import rerun
@@ -197,15 +198,69 @@ def test_step_after_the_end_raises_until_reset() -> None:
     assert play_episode(env, 3) == episode  # a reset starts another episode
 
 
+def held(levels: tuple[float, float, float], steps: int = 1000) -> list[tuple[float, float, float]]:
+    return [levels] * steps
+
+
+EPISODES = {
+    "crash": (held((0.0, 0.0, 0.0)), "crashed outside the pad"),
+    "leaves the bounds": (held((0.6, 0.0, 0.2)), "lost in space"),
+    "empty tank": (held((1.0, 0.3, 0.0)), "crashed outside the pad"),
+}
+"""Actions in `Landing`, and how the episode ends."""
+
+
+@pytest.mark.parametrize("engine", ["pymunk", "reference"])
+@pytest.mark.parametrize("every", [1, 7, 100])
+@pytest.mark.parametrize("name", [*EPISODES, "random"])
+def test_steps_that_the_rules_do_not_see_change_nothing(
+    name: str, every: int, engine: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All numbers of an episode equal those of an episode whose rules are called after every step."""
+    if name == "empty tank":
+        monkeypatch.setattr(landing, "TANK", 5.0)
+    quiet, called = (SandboxEnv("landing", engine, every=every) for _ in range(2))
+    quiet.action_space.seed(4)
+    actions, end = EPISODES.get(name) or ([quiet.action_space.sample() for _ in range(1000)], None)
+    observed = [env.reset(seed=9)[0].tobytes() for env in (quiet, called)]
+    assert observed[0] == observed[1]
+    episode = called._episode
+    assert episode is not None
+    monkeypatch.setattr(episode, "_quiet_rules", None)
+    for action in actions:
+        one, other = quiet.step(action), called.step(action)
+        assert (one[0].tobytes(), *one[1:]) == (other[0].tobytes(), *other[1:])
+        assert quiet.display_lines() == called.display_lines()
+        if one[2] or one[3]:
+            break
+    assert quiet.recording() == called.recording()
+    assert end is None or one[4]["over"] == end
+    if name == "empty tank":
+        assert quiet.display_lines()["fuel"] == "0 %"
+
+
+def test_quiet_rules_that_act_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rules that announce quiet steps and then return an action for one of them are wrong."""
+    env = SandboxEnv("landing", every=100)
+    env.reset(seed=9)
+    episode = env._episode
+    assert episode is not None
+    act = episode.rules.on_input("engine", 1.0)
+    monkeypatch.setattr(episode.rules, "on_step", lambda info: act)
+    with pytest.raises(RuntimeError, match="quiet"):
+        for _ in range(100):
+            env.step([0.0, 0.0, 0.0])
+
+
 def observed_value(env: SandboxEnv, observation: np.ndarray, name: str) -> float:
     return float(observation[env.observed.index(name)])
 
 
 def test_duel_observes_barrel_weapon_wind_and_terrain() -> None:
     env = SandboxEnv("duel", every=10)
-    first, info = env.reset(seed=2)
+    first, _ = env.reset(seed=2)
     assert observed_value(env, first, "may fire") == 1.0
-    assert info["lines"]["wind"].startswith(f"{abs(observed_value(env, first, 'wind')):.1f} m/s")
+    assert env.display_lines()["wind"].startswith(f"{abs(observed_value(env, first, 'wind')):.1f} m/s")
     turned, *_ = env.step([1, 0, 0, 0, 1, 0])
     assert observed_value(env, turned, "Red barrel") > observed_value(env, first, "Red barrel")
     assert observed_value(env, turned, "Red weapon") == 1.0

@@ -222,7 +222,7 @@ class Simulation(Protocol):
             Exhaustion: the step needs more memory or work than its limit.
         """
 
-    def advance(self, steps: int, frames: FrameTable) -> None:
+    def advance(self, steps: int, frames: FrameTable, *, until_event: bool = False) -> None:
         """Advance by at most so many time steps dt, and record the frames that are due.
 
         Frames, contacts and all other results are those of as many calls of `step`, bit for bit. It may return early,
@@ -231,6 +231,8 @@ class Simulation(Protocol):
         Args:
             steps: largest number of steps, at least 1.
             frames: table with a row for each frame that becomes due, and with columns for all bodies.
+            until_event: whether no step but the last may have contacts or remove bodies. An engine that cannot look
+                ahead makes one step.
 
         Raises:
             Divergence, Exhaustion: as `step`; the step that raised is not counted, and has no frame.

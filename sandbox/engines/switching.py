@@ -349,22 +349,23 @@ class SwitchableSimulation:
         """
         self._advance(1.0, self._segment.simulation.step)
 
-    def advance(self, steps: int, frames: FrameTable) -> None:
+    def advance(self, steps: int, frames: FrameTable, *, until_event: bool = False) -> None:
         """Advance by at most so many time steps, and record the frames that are due, as `Simulation.advance`.
 
         Args:
             steps: largest number of steps.
             frames: table of the frames.
+            until_event: whether no step but the last may have contacts or remove bodies.
 
         Raises:
             Divergence, Exhaustion: as `step`.
         """
         segment, before = self._segment, frames.steps
         if self._pulls.any or segment.before is not None:  # mouse joints act in each step; frames need other indices
-            step_and_record(self, steps, frames)
+            step_and_record(self, 1 if until_event else steps, frames)
             return
         try:
-            segment.simulation.advance(steps, frames)
+            segment.simulation.advance(steps, frames, until_event=until_event)
         except Divergence as divergence:
             segment.steps += frames.steps - before + 1
             raise Divergence(self.time, divergence.body, divergence.what) from None

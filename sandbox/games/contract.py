@@ -11,7 +11,8 @@ the next step. Once `game_over` is not None, the actions of the last `on_step` a
 any more. Rules must support `copy.deepcopy`, because undo restores a copy. They are deterministic: all random numbers
 derive from the seed of the scene.
 
-Optional members, each with a protocol: `log`, `observation()`, `lit_lamps()`, `waiting`, `view_state(time)`.
+Optional members, each with a protocol: `log`, `observation()`, `lit_lamps()`, `waiting`, `quiet_steps(dt)`,
+`view_state(time)`.
 
 `GameControls` is the input of a game in the window, where keys that set controls do not suffice. It acts on the game
 through its `GameHost`. Its pygame surfaces, rectangles and events are `Any` here, so that runs without a window do
@@ -36,6 +37,7 @@ __all__ = [
     "HasLamps",
     "HasLog",
     "HasObservation",
+    "HasQuietSteps",
     "HasViewState",
     "HasWaiting",
     "Policy",
@@ -143,6 +145,21 @@ class HasWaiting(Protocol):
     @property
     def waiting(self) -> bool:
         """Whether the host makes no step until an input or an action of the player."""
+
+
+@runtime_checkable
+class HasQuietSteps(Protocol):
+    """Rules that need not see every step in which nothing happens.
+
+    A host may then leave out calls of `on_step`. State and actions of the rules must not depend on that.
+    """
+
+    def quiet_steps(self, dt: float) -> int:
+        """Return the number of next steps of dt, s, of which only the last must be passed to `on_step`.
+
+        This holds as long as nothing touches and no body leaves the scene. A step in which that happens is passed to
+        `on_step`, and so is the one before it.
+        """
 
 
 @runtime_checkable

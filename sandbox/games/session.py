@@ -197,8 +197,8 @@ class GameSession:
         self.diverged_at = time if self.diverged_at is None else self.diverged_at
 
 
-def _timed(actions: Iterable[Action], time: float) -> tuple[Action, ...]:
-    return tuple(action.model_copy(update={"time": time}) for action in actions)
+def _timed(actions: Sequence[Action], time: float) -> tuple[Action, ...]:
+    return tuple([action.at(time) for action in actions]) if actions else ()
 
 
 class HeadlessGame:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from sandbox.measure.missed_contacts import Audit
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import load, loads
 from sandbox.scene.files.shipped_scenes import find, shipped
-from sandbox.trajectory import Contacts
+from sandbox.trajectory import Contacts, Frame
 
 BOX = """
 [[plane]]
@@ -227,6 +228,36 @@ def test_advance_equals_steps_in_shipped_scenes(name: str) -> None:
         other, seen_other = advanced(started(scene, engine), splits, 2)
         assert seen == seen_other, engine
         assert_same(one, other)
+
+
+EVENTFUL = [case for case in CASES if case[0] != "no bodies"]
+
+
+@pytest.mark.parametrize(("name", "engine"), EVENTFUL)
+@settings(max_examples=5)
+@given(steps=st.integers(1, 60), substeps=st.integers(1, 3))
+def test_only_the_last_step_until_an_event_has_one(name: str, engine: str, steps: int, substeps: int) -> None:
+    """With `until_event`, contacts and removals belong to the last step, and the states are those of `step`."""
+    one, other = (started(small_scene(name), engine, dt=0.01, substeps=substeps) for _ in range(2))
+    assert len(one.contacts()) == len(other.contacts())
+    while steps > 0:
+        table, gone = FrameTable(steps, len(one.bodies)), set(other.retired)
+        one.advance(steps, table, until_event=True)
+        for k in range(table.steps):
+            other.step()
+            contacts = other.contacts()
+            if k < table.steps - 1:
+                assert not len(contacts)
+                assert set(other.retired) == gone
+            assert table.frame(k, other.frame().present).state_hash() == _without_visits(other).state_hash()
+        assert one.contacts().pair.tolist() == contacts.pair.tolist()
+        assert one.state_hash() == other.state_hash()
+        steps -= table.steps
+
+
+def _without_visits(simulation: SwitchableSimulation) -> Frame:
+    """Return the frame with what a frame table keeps."""
+    return replace(simulation.frame(), visits=None, drives=None, passing=None)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -1,6 +1,7 @@
 """The rows of the benchmarks: engines, pictures and commands, followed by those of games."""
 
 from tools.benchmarks import agreement, connected, drawing, peers
+from tools.benchmarks.environments import ENVIRONMENTS
 from tools.benchmarks.games import GAMES
 from tools.benchmarks.row import Bench
 from tools.benchmarks.turning import turns
@@ -322,4 +323,5 @@ BENCHES = (
         rate=True,
     ),
     *GAMES,
+    *ENVIRONMENTS,
 )

@@ -279,6 +279,11 @@ def reshape(action: Reshape, target: ActionTarget) -> None:
     target.change(target.setup.with_scene(scene.model_copy(update={"walls": walls})))
 
 
+def sets_level(action: Action) -> bool:
+    """Return whether an action sets a level only: the state of the bodies, and what can touch, stay as they are."""
+    return isinstance(action, (Throttle, Drive))
+
+
 ENVIRONMENT_FIELDS = {"world", "surface"}
 """Fields of a scene that define neither bodies nor static colliders."""
 

@@ -137,12 +137,12 @@ class BaseSimulation(ABC):
     def step(self) -> None:
         """Advance by one time step dt."""
 
-    def advance(self, steps: int, frames: FrameTable) -> None:
+    def advance(self, steps: int, frames: FrameTable, *, until_event: bool = False) -> None:
         """Advance by at most so many time steps, and record the frames that are due, as `Simulation.advance`.
 
         Engines override this method where they have a faster way to the same results.
         """
-        step_and_record(self, steps, frames)
+        step_and_record(self, 1 if until_event else steps, frames)
 
     @abstractmethod
     def account(self) -> Mapping[Cause, float]:

@@ -103,6 +103,9 @@ NO_CONTACTS = ContactBatch(
 )
 
 
+NONE = Contacts.none()
+
+
 class ContactLog:
     """Contacts since the last `take`. A lasting contact is one row with the sum of its impulses."""
 
@@ -185,6 +188,11 @@ class ContactLog:
         # Accumulated and not reduced: a reduction may sum in another order.
         self._unflushed = np.add.accumulate(np.vstack((first, signed_impulses)), axis=0)[-1].copy()
 
+    @property
+    def is_open(self) -> bool:
+        """Whether there were contacts at the last record."""
+        return len(self._row) > 0
+
     def can_hold(self, contacts: int) -> bool:
         """Return whether so many more contacts can be recorded with certainty."""
         return self._count + contacts <= self._max_rows
@@ -223,7 +231,7 @@ class ContactLog:
         self._flush()
         n = self._count
         if not n:
-            return Contacts.none()
+            return NONE
         vectors = (self._geometry[:n, 0], self._geometry[:n, 1], self._impulse[:n])
         taken = Contacts(self._time[:n].copy(), self._pair[:n].copy(), *(_to_rows(vector) for vector in vectors))
         open_rows = self._row if len(self._row) < 2 else np.unique(self._row)

@@ -51,8 +51,8 @@ class Batch(NamedTuple):
     """(S, R, 6) x, y, angle, vx, vy, ω of the moving bodies, in the order of the reader; valid until the next batch"""
     contacts: ContactLists | None
     """contacts of every substep; None unless they were listed. Valid until the next batch"""
-    has_failed: bool
-    """whether `is_valid` was false after the last step"""
+    needs_check: bool
+    """whether the state after the last step has to be checked: a body may be out of bounds"""
 
 
 class BatchReader:
@@ -82,11 +82,12 @@ class BatchReader:
         lists_substeps: bool,
         lists_contacts: bool,
         polygons: bool,
+        until_contact: bool,
         warm_start: Callable[[], WarmStart | None] | None,
-        quick_bound: float,
-        is_valid: Callable[[FloatArray], bool],
+        before_substep: Callable[[int, int], None] | None,
+        needs_check: Callable[[FloatArray], bool],
     ) -> Batch:
-        """Make at most so many steps.
+        """Make at most so many steps, until one whose state has to be checked.
 
         Args:
             h: substep, s.
@@ -97,10 +98,11 @@ class BatchReader:
             lists_substeps: whether bodies are listed after every substep, not only after every step.
             lists_contacts: whether contacts are listed, after every substep.
             polygons: whether contacts have up to two points.
+            until_contact: whether the batch ends after a step for which contacts were listed, open ones or ended ones
+                that Munk2D still keeps.
             warm_start: returns the impulses with which contacts of the last substep began, if there are any.
-            quick_bound: a state whose norm is below it is valid, whatever its units.
-            is_valid: returns whether the present state is valid, given the list of it (6·bodies,); if it is not, the
-                batch ends.
+            before_substep: is called before each substep, with the index of its step and its index in that step.
+            needs_check: returns whether the batch ends with the present state, given the list of it (6·bodies,).
         """
         width = STATE_WIDTH * bodies
         rows = self._prepare(steps * (substeps if lists_substeps else 1), width)
@@ -110,12 +112,13 @@ class BatchReader:
         words, ends, warm_starts = arbiters._int_arr, [], {}
         each_body, each_contact, step = lib.cpSpaceEachBody, lib.cpSpaceEachCachedArbiter, lib.cpSpaceStep
         space, body_list, contact_list = self._space._space, self._body_list, self._contact_list
-        largest_square = quick_bound * quick_bound if quick_bound > 0.0 else -1.0
         row = made = substep = 0
-        has_failed = False
+        is_checked = False
         with np.errstate(over="ignore", invalid="ignore"):  # of states that are not valid
-            while made < steps and not has_failed:
+            while made < steps and not is_checked:
                 for k in range(substeps):
+                    if before_substep is not None:
+                        before_substep(made, k)
                     if substep:
                         step(space, h)
                     else:  # checks bodies that are new
@@ -130,10 +133,8 @@ class BatchReader:
                             warm_starts[substep] = found
                     substep += 1
                 made += 1
-                state = rows[row - 1]
-                # Comparisons with nan are false.
-                has_failed = not state.dot(state) <= largest_square and not is_valid(state)
-                if words.num > MAX_WORDS:
+                is_checked = needs_check(rows[row - 1])
+                if words.num > (0 if until_contact else MAX_WORDS):
                     break
         contacts = None
         if lists_contacts:
@@ -144,7 +145,7 @@ class BatchReader:
                 VECTORS_OF_TWO_POINTS if polygons else VECTORS,
                 warm_starts,
             )
-        return Batch(made, rows[:row].reshape(row, bodies, STATE_WIDTH)[:, moving], contacts, has_failed)
+        return Batch(made, rows[:row].reshape(row, bodies, STATE_WIDTH)[:, moving], contacts, is_checked)
 
     def _prepare(self, rows: int, width: int) -> FloatArray:
         """Return memory for lists of bodies, (rows, width), into which they will be written."""

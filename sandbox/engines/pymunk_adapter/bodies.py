@@ -275,13 +275,13 @@ class PymunkBodies:
     @property
     def _driven(self) -> BoolArray:
         """(N,) bodies that only the space can move: with thrusts or drives; all if bodies attract, or on a surface."""
-        field, drives = self.space_bodies.field, self.scene.drives
-        if field.between_bodies or self.tabletop is not None:
+        space_bodies, scene = self.space_bodies, self.scene
+        if space_bodies.field.between_bodies or self.tabletop is not None:
             return np.ones(len(self.bodies), dtype=np.bool_)
-        if not (field.level or drives):
+        if not (scene.thrusts or scene.drives):
             return np.zeros(len(self.bodies), dtype=np.bool_)
-        driven = self.space_bodies.drives.holds
-        return np.asarray([field.has_thrust(name) or driven(name) for name in self.bodies.names], dtype=np.bool_)
+        has_thrust, is_driven = space_bodies.thrusts.acts_on, space_bodies.drives.holds
+        return np.asarray([has_thrust(k) or is_driven(name) for k, name in enumerate(self.bodies.names)], np.bool_)
 
     def change(self, setup: Setup, spawned: tuple[BodySource, ...] | None = None) -> None:
         """Continue with a changed scene. Only air, gravity, coefficients, points of walls and solid flags may differ.
@@ -471,7 +471,7 @@ class PymunkBodies:
 
     def throttle(self, index: int, level: float) -> None:
         """Set the level of a thrust, by its index in the scene: the fraction of its force that acts."""
-        self.space_bodies.field.level[index] = level
+        self.space_bodies.thrusts.set_level(index, level)
 
     def drive(self, index: int, level: float) -> None:
         """Set the level of a drive, by its index in the scene."""

@@ -149,6 +149,11 @@ class ConstantForces:
             each.pop(index, None)
         self._prepared = None
 
+    @property
+    def total(self) -> Mapping[int, tuple[FloatArray, float]]:
+        """Force and torque on each body that has some, by body index."""
+        return self._total
+
     def apply(self, members: Mapping[int, SpaceBody]) -> None:
         """Set forces and torques for the next step, in a scene without drag."""
         if self._prepared is None:
@@ -164,6 +169,7 @@ class ConstantForces:
     def apply_with_drag(
         self,
         members: Mapping[int, SpaceBody],
+        loads: Mapping[int, tuple[float, float, float]],
         reader: SpaceReader,
         state: tuple[IntArray, FloatArray],
         springs: FloatArray | None,
@@ -174,6 +180,7 @@ class ConstantForces:
 
         Args:
             members: bodies by index.
+            loads: force (x, y), N, and torque, N·m, of thrusts, by body index.
             reader: of the space; it sets the forces on all bodies at once.
             state: body indices (R,), and position, angle, velocity, spin (R, 6).
             springs: (R, 2) N, which pymunk itself adds in that step, or None. Drag reduces their effect.
@@ -185,8 +192,10 @@ class ConstantForces:
         mass[np.isinf(mass)] = 0.0  # of bodies moved by a drive or held by a zone: no force affects them
         applied = np.zeros((len(indices), 2))
         for row, index in enumerate(indices.tolist()):
-            if index in self._total and mass[row]:
-                applied[row] = self._total[index][0] * (1.0 / mass[row])
+            if mass[row] and (index in self._total or index in loads):
+                constant = self._total[index][0] if index in self._total else 0.0
+                thrust = loads[index][0:2] if index in loads else 0.0
+                applied[row] = np.add(constant, thrust) * (1.0 / mass[row])
         if springs is None:
             reader.set_forces(mass * acceleration(world, values[:, 3:5], applied, h))
         else:
@@ -194,8 +203,8 @@ class ConstantForces:
             reader.set_forces(
                 mass * (acceleration(world, values[:, 3:5], applied + spring_acceleration, h) - spring_acceleration)
             )
-        self._set_torques(members)
-
-    def _set_torques(self, members: Mapping[int, SpaceBody]) -> None:
-        for index, (_, torque) in self._total.items():
+        torques = {index: torque for index, (_, torque) in self._total.items()}
+        for index, load in loads.items():
+            torques[index] = torques.get(index, 0.0) + load[2]
+        for index, torque in torques.items():
             members[index].body.torque = torque

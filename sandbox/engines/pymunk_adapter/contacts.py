@@ -277,9 +277,10 @@ class ContactLists:
             warm_starts: impulses with which contacts began, by substep.
         """
         self._words, self._vectors, self.width = words, vectors, width
-        ends = np.array([0, *word_ends], np.int64)
-        self._byte_ends: list[int] = (ends * WORD).tolist()
-        self._vector_ends: list[int] = (ends // 3 * width).tolist()
+        self.count = word_ends[-1] // 3
+        """number of all contacts, with those that have ended and that Munk2D still keeps"""
+        self._byte_ends = [0, *(end * WORD for end in word_ends)]
+        self._vector_ends = [0, *(end // 3 * width for end in word_ends)]
         self.warm_starts = warm_starts
         """impulses with which contacts began, by substep"""
 
@@ -345,6 +346,11 @@ class ContactReader:
     def has_warm_starts(self) -> bool:
         """Whether impulses with which contacts begin are collected by callbacks."""
         return self._warm_start is not None and self._warm_start.pairs
+
+    @property
+    def is_listed(self) -> bool:
+        """Whether the last list had contacts, open ones or ended ones that Munk2D still keeps."""
+        return bool(self._reader.id_words)
 
     @property
     def is_started(self) -> bool:

@@ -49,7 +49,7 @@ def applied_impulses(
     bodies, world = population.bodies, population.scene.world
     mass = np.where(included, bodies.mass, 0.0)[:, None]
     constant, torque = _constant_forces(population)
-    attraction, thrust, thrust_torque = _field(population)
+    attraction, (thrust, thrust_torque) = _attraction(population), _thrusts(population)
     drag = np.zeros_like(before)
     if has_drag(world):
         applied = (constant + thrust + (0.0 if springs is None else springs)) / bodies.mass[:, None] + attraction
@@ -69,19 +69,24 @@ def _constant_forces(population: PymunkBodies) -> tuple[FloatArray, FloatArray]:
     return force, torque
 
 
-def _field(population: PymunkBodies) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the attraction (N, 2), m/s², on all bodies, and the thrusts, (N, 2) N and (N,) N·m."""
-    field, particles, names = population.space_bodies.field, population.particles.indices, population.bodies.names
-    attraction, thrust = np.zeros_like(population.position), np.zeros_like(population.position)
-    thrust_torque = np.zeros(len(attraction))
+def _attraction(population: PymunkBodies) -> FloatArray:
+    """Return the attraction on all bodies, (N, 2) m/s²."""
+    field, particles = population.space_bodies.field, population.particles.indices
+    attraction = np.zeros_like(population.position)
     if field.attracts:
         attraction[particles] = field.at(population.position[particles])
     if field.applied:
-        index = {name: k for k, name in enumerate(names)}
-        rows = [index[name] for name in field.applied]
-        applied = np.asarray(list(field.applied.values()))
-        attraction[rows], thrust[rows], thrust_torque[rows] = applied[:, 0:2], applied[:, 2:4], applied[:, 4]
-    return attraction, thrust, thrust_torque
+        number_of = population.bodies.number_of
+        attraction[[number_of[name] for name in field.applied]] = np.asarray(list(field.applied.values()))
+    return attraction
+
+
+def _thrusts(population: PymunkBodies) -> tuple[FloatArray, FloatArray]:
+    """Return the thrusts (N, 2), N, and their torques (N,), N·m, in the last substep."""
+    force, torque = np.zeros_like(population.position), np.zeros(len(population.position))
+    for index, (x, y, turning) in population.space_bodies.thrusts.loads.items():
+        force[index], torque[index] = (x, y), turning
+    return force, torque
 
 
 class EnergyState(NamedTuple):

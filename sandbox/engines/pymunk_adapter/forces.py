@@ -1,8 +1,11 @@
-"""Drag, attraction and thrust in pymunk's velocity update.
+"""Drag, attraction and thrust on bodies in the space.
 
-`SpaceForceField` evaluates attraction and thrusts in the velocity update, after positions have moved. A force that
-depends on position must act there: set on `body.force` before a step it would be that of the old positions, which is
-explicit Euler and gains energy. In the velocity update the scheme is semi-implicit, whose energy does not drift.
+`AttractionField` evaluates attraction in pymunk's velocity update, after positions have moved. A force that depends on
+position must act there: set on `body.force` before a step it would be that of the old positions, which is explicit
+Euler and gains energy. In the velocity update the scheme is semi-implicit, whose energy does not drift.
+
+`Thrusts` evaluates thrusts before a step, at the angle to which the step turns the body. The same direction would
+result in the velocity update, but for overlap corrections; a callback from Munk2D takes ten times as long.
 
 Drag is the acceleration of one explicit step. With a drag rate κ, a force F adds φ·(F/m)·h to the velocity of a mass m,
 φ = (1 − e^(−κh))/(κh), and not (F/m)·h. So forces that balance each other, springs, thrusts and attraction among them,
@@ -11,9 +14,11 @@ a torque, as on a lever held by a rotary spring, the two differ by the factor φ
 """
 
 import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pymunk
+from pymunk._chipmunk_cffi import lib
 
 from sandbox.arrays import FloatArray
 from sandbox.scene.compile.setup import Setup
@@ -21,33 +26,18 @@ from sandbox.scene.description.base import Point
 from sandbox.scene.description.forces import Attraction, Thrust
 from sandbox.scene.description.world import World
 from sandbox.scene.geometry.shapes import geometry_of
-from sandbox.scene.geometry.vectors import rotate
 
 
-class SpaceForceField:
-    """Attraction and thrusts on the bodies of a scene."""
+class AttractionField:
+    """Attraction by points and by bodies of a scene."""
 
     def __init__(self, setup: Setup) -> None:
-        scene, bodies = setup.scene, setup.bodies
+        scene = setup.scene
         self.fractions: dict[str, float] = {}
-        """fraction of the field's accelerations that acts on each body in the coming substep: below 1 with drag. The
-        velocities that determine it cannot be read in the velocity update, because springs have changed them by
-        then."""
-        self.time = 0.0
-        """s, start of the present substep"""
-        self._began = setup.time
-        self.level = [0.0 if thrust.key else 1.0 for thrust in scene.thrusts]
-        """level of each thrust"""
-        self.applied: dict[str, tuple[float, float, float, float, float]] | None = None
-        """last acceleration and thrust of each body in the space: attraction, m/s², thrusts, N and N·m; recorded if it
-        is a dict"""
-        self._thrusts: dict[str, list[tuple[int, Thrust, Point]]] = {}
-        for k, thrust in enumerate(scene.thrusts):
-            if thrust.body not in bodies.number_of:  # it left the scene on an earlier engine
-                continue
-            x, y = geometry_of(bodies.elements[bodies.element[bodies.number_of[thrust.body]]]).centre
-            arm = thrust.point[0] - x, thrust.point[1] - y
-            self._thrusts.setdefault(thrust.body, []).append((k, thrust, arm))
+        """fraction of the accelerations that acts on each body in the coming substep: below 1 with drag. The velocities
+        that determine it cannot be read in the velocity update, because springs have changed them by then."""
+        self.applied: dict[str, Point] | None = None
+        """last acceleration, m/s², of each body in the space; recorded if it is a dict"""
         self._attracting_points = [a for a in scene.attractions if not isinstance(a.toward, str)]
         self._attracting_bodies = [a for a in scene.attractions if isinstance(a.toward, str)]
 
@@ -60,15 +50,6 @@ class SpaceForceField:
     def attracts(self) -> bool:
         """Whether there is attraction."""
         return bool(self._attracting_points or self._attracting_bodies)
-
-    @property
-    def kicks(self) -> bool:
-        """Whether the field acts on some body."""
-        return self.attracts or bool(self._thrusts)
-
-    def has_thrust(self, name: str) -> bool:
-        """Return whether a body carries a thrust."""
-        return name in self._thrusts
 
     def at(self, position: FloatArray) -> FloatArray:
         """Return the acceleration (N, 2), m/s², towards the attracting points, at positions (N, 2), m."""
@@ -86,37 +67,18 @@ class SpaceForceField:
 
     def apply_to(self, name: str, body: pymunk.Body, bodies: dict[str, pymunk.Body]) -> None:
         """Apply the field to a body from now on; `bodies`: those in the space by name, kept up to date."""
-        thrusts = self._thrusts.get(name, [])
 
         def update_velocity(body: pymunk.Body, gravity: tuple[float, float], damping: float, dt: float) -> None:
             x, y = body.position
-            ax, ay = self._attraction(name, x, y, body.mass, bodies) if self.attracts else (0.0, 0.0)
-            attraction, thrust, torque = (ax, ay), (0.0, 0.0), 0.0
-            if thrusts:
-                cos, sin = body.rotation_vector  # math.cos would raise if the angle is not finite
-                fx, fy, torque = self._thrust(thrusts)
-                thrust = rotate(fx, fy, cos, sin)
-                ax += thrust[0] / body.mass
-                ay += thrust[1] / body.mass
-                body.torque += torque
+            ax, ay = self._attraction(name, x, y, body.mass, bodies)
             if self.applied is not None:
-                self.applied[name] = (*attraction, *thrust, torque)
+                self.applied[name] = ax, ay
             if self.fractions:
                 fraction = self.fractions[name]
                 ax, ay = ax * fraction, ay * fraction
             pymunk.Body.update_velocity(body, (gravity[0] + ax, gravity[1] + ay), damping, dt)
 
         body.velocity_func = update_velocity
-
-    def _thrust(self, thrusts: list[tuple[int, Thrust, Point]]) -> tuple[float, float, float]:
-        """Return the force and torque of thrusts in the body's frame, N and N·m."""
-        x = y = torque = 0.0
-        for k, thrust, arm in thrusts:
-            time = self._began + self.time
-            if self.level[k] and thrust.begin <= time and (thrust.end is None or time < thrust.end):
-                fx, fy = thrust.force[0] * self.level[k], thrust.force[1] * self.level[k]
-                x, y, torque = x + fx, y + fy, torque + arm[0] * fy - arm[1] * fx
-        return x, y, torque
 
     def _attraction(self, name: str, x: float, y: float, mass: float, bodies: dict[str, pymunk.Body]) -> Point:
         ax, ay = 0.0, 0.0
@@ -150,6 +112,118 @@ def _rate(attraction: Attraction, dx: float, dy: float) -> float:
     square = dx * dx + dy * dy
     denominator = (square + attraction.softening**2) * math.sqrt(square)
     return attraction.strength / denominator if denominator > 0.0 else 0.0
+
+
+class BodyThrusts:
+    """Thrusts on one body."""
+
+    def __init__(self, thrusts: list[tuple[int, Thrust, Point]], body: pymunk.Body) -> None:
+        """Apply thrusts, each with its index and its arm in the body's frame, m, to a body in the space."""
+        self._thrusts, self.record = thrusts, body._body
+        self._is_timed = any(thrust.begin > 0.0 or thrust.end is not None for _, thrust, _ in thrusts)
+        self._constant: tuple[float, float, float] | None = None
+
+    def invalidate(self) -> None:
+        """Record that a level has changed."""
+        self._constant = None
+
+    def load(self, levels: Sequence[float], time: float, h: float) -> tuple[float, float, float]:
+        """Return the force (x, y), N, and torque, N·m, in a substep.
+
+        Args:
+            levels: of all thrusts.
+            time: of the scene at the start of the substep, s.
+            h: substep, s.
+        """
+        load = self._constant
+        if load is None:
+            load = self._sum(levels, time)
+            if not self._is_timed:
+                self._constant = load
+        x, y, torque = load
+        if not (x or y):  # a torque is the same in every frame
+            return load
+        record = self.record
+        angle = lib.cpBodyGetAngle(record) + lib.cpBodyGetAngularVelocity(record) * h
+        if not math.isfinite(angle):  # math.cos would raise; the step is found to have diverged
+            return load
+        cos, sin = math.cos(angle), math.sin(angle)
+        return x * cos - y * sin, x * sin + y * cos, torque
+
+    def _sum(self, levels: Sequence[float], time: float) -> tuple[float, float, float]:
+        """Return force and torque in the body's frame."""
+        x = y = torque = 0.0
+        for k, thrust, arm in self._thrusts:
+            level = levels[k]
+            if level and thrust.begin <= time and (thrust.end is None or time < thrust.end):
+                fx, fy = thrust.force[0] * level, thrust.force[1] * level
+                x, y, torque = x + fx, y + fy, torque + arm[0] * fy - arm[1] * fx
+        return x, y, torque
+
+
+class Thrusts:
+    """Thrusts on bodies in the space."""
+
+    def __init__(self, setup: Setup) -> None:
+        scene, bodies = setup.scene, setup.bodies
+        self._levels = [0.0 if thrust.key else 1.0 for thrust in scene.thrusts]
+        self._began = setup.time
+        self._of_body: dict[int, list[tuple[int, Thrust, Point]]] = {}
+        for k, thrust in enumerate(scene.thrusts):
+            index = bodies.number_of.get(thrust.body)
+            if index is None:  # it left the scene on an earlier engine
+                continue
+            x, y = geometry_of(bodies.elements[bodies.element[index]]).centre
+            arm = thrust.point[0] - x, thrust.point[1] - y
+            self._of_body.setdefault(index, []).append((k, thrust, arm))
+        self._in_space: dict[int, BodyThrusts] = {}
+        self.loads: dict[int, tuple[float, float, float]] = {}
+        """force (x, y), N, and torque, N·m, on each body in the last substep, by body index"""
+
+    def __len__(self) -> int:
+        """Return the number of bodies in the space that carry thrusts."""
+        return len(self._in_space)
+
+    def acts_on(self, index: int) -> bool:
+        """Return whether a body carries a thrust."""
+        return index in self._of_body
+
+    def join(self, index: int, body: pymunk.Body) -> None:
+        """Apply the thrusts to a body in the space from now on."""
+        self._in_space[index] = BodyThrusts(self._of_body[index], body)
+
+    def leave(self, index: int) -> None:
+        """Stop: a body leaves the space."""
+        self._in_space.pop(index, None)
+        self.loads.pop(index, None)
+
+    def set_level(self, index: int, level: float) -> None:
+        """Set the level of a thrust, by its index in the scene."""
+        self._levels[index] = level
+        for each in self._in_space.values():
+            each.invalidate()
+
+    def apply(self, time: float, h: float, constant: Mapping[int, tuple[FloatArray, float]]) -> None:
+        """Set the forces and torques of a substep.
+
+        Args:
+            time: start of the substep, s.
+            h: substep, s.
+            constant: other forces, N, and torques, N·m, to add, by body index.
+        """
+        self.update_loads(time, h)
+        for index, (x, y, torque) in self.loads.items():
+            if index in constant:
+                force, constant_torque = constant[index]
+                x, y, torque = x + force[0], y + force[1], torque + constant_torque
+            if x or y or torque:  # pymunk resets them to 0 after each step
+                lib.cpBodySetForce(self._in_space[index].record, (x, y))
+                lib.cpBodySetTorque(self._in_space[index].record, torque)
+
+    def update_loads(self, time: float, h: float) -> None:
+        """Update `loads` to those of a substep of h, s, that starts at a time, s."""
+        for index, each in self._in_space.items():
+            self.loads[index] = each.load(self._levels, self._began + time, h)
 
 
 def acceleration(world: World, velocity: FloatArray, applied: FloatArray | None, h: float) -> FloatArray:

@@ -11,7 +11,7 @@ import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.base import BEYOND, FARTHEST, FASTEST
-from sandbox.engines.pymunk_adapter.forces import SpaceForceField, acceleration, has_drag, mean_fraction, rates
+from sandbox.engines.pymunk_adapter.forces import AttractionField, acceleration, has_drag, mean_fraction, rates
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.description.world import World
 
@@ -39,7 +39,7 @@ SCATTERED = 16
 class Particles:
     """M bodies in free flight, which are rows of the arrays of all N: nothing is copied."""
 
-    def __init__(self, world: World, h: float, field: SpaceForceField | None = None) -> None:
+    def __init__(self, world: World, h: float, field: AttractionField | None = None) -> None:
         self._field = field if field is not None and field.attracts else None
         self.indices: IntArray = np.empty(0, np.int64)
         """(M,) body indices of the particles, ascending"""

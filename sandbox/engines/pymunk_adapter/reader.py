@@ -220,6 +220,11 @@ class SpaceReader:
         return self._body_count
 
     @property
+    def moving_indices(self) -> IntArray:
+        """Indices of the moving bodies, in the order of the rows of `state`."""
+        return self._indices
+
+    @property
     def moving_rows(self) -> slice | IntArray:
         """Rows of the moving bodies in a list of all bodies."""
         return slice(0, len(self._rows)) if self._moving_come_first else self._rows

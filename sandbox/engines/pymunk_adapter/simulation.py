@@ -8,14 +8,14 @@ import numpy as np
 
 from sandbox.action import Action
 from sandbox.arrays import FloatArray, IntArray
-from sandbox.engines.common.actions import apply_action
+from sandbox.engines.common.actions import apply_action, sets_level
 from sandbox.engines.common.base import BaseSimulation, observe_path
 from sandbox.engines.common.contact_log import ContactBatch, ContactLog, join_batches
 from sandbox.engines.common.energy_balance import record_energy_change
 from sandbox.engines.common.lifetimes import Lifetimes
 from sandbox.engines.contract import Divergence, Exhaustion, Observer, PairRuns
 from sandbox.engines.energy_ledger import Cause, EnergyLedger
-from sandbox.engines.pymunk_adapter.batch_reader import MAX_CONTACTS
+from sandbox.engines.pymunk_adapter.batch_reader import MAX_CONTACTS, Batch
 from sandbox.engines.pymunk_adapter.bodies import PymunkBodies
 from sandbox.engines.pymunk_adapter.contacts import ContactLists
 from sandbox.engines.pymunk_adapter.energy import PymunkEnergyLedger
@@ -74,6 +74,11 @@ class EventRecorder:
             if wants_pairs:
                 pairs.append((end, self._log.pairs()))
         return pairs
+
+    def is_idle(self, batch: Batch) -> bool:
+        """Return whether there is nothing to record: no contacts before a batch, and none in it."""
+        is_empty = batch.contacts is None or not batch.contacts.count
+        return is_empty and not self._population.space_bodies.contact_reader.is_listed and not self._log.is_open
 
     @property
     def can_batch(self) -> bool:
@@ -183,7 +188,7 @@ class PymunkSimulation(BaseSimulation):
             self._check_state()
             self._retire()
 
-    def advance(self, steps: int, frames: FrameTable) -> None:
+    def advance(self, steps: int, frames: FrameTable, *, until_event: bool = False) -> None:
         """Advance by at most so many time steps, and record the frames that are due, as `Simulation.advance`.
 
         Where nothing has to be done between two substeps, Munk2D makes many of them before Python reads the results.
@@ -191,15 +196,16 @@ class PymunkSimulation(BaseSimulation):
         Raises:
             Divergence: as `step`.
         """
-        if not self._can_batch:
-            super().advance(steps, frames)
+        if not self._can_batch or (until_event and self._recorder is None):
+            super().advance(steps, frames, until_event=until_event)
             return
         with self._lock:
             self._check_running()
             frames.prepare(steps, len(self.bodies))
-            end = frames.steps + steps
-            while frames.steps < end and self._can_batch:
-                self._advance_batch(end - frames.steps, frames)
+            end, is_over = frames.steps + steps, False
+            while frames.steps < end and self._can_batch and not is_over:
+                self._advance_batch(end - frames.steps, frames, until_event)
+                is_over = until_event
 
     @property
     def _can_batch(self) -> bool:
@@ -210,22 +216,32 @@ class PymunkSimulation(BaseSimulation):
             and population.tabletop is None
             and not len(population.particles)
             and self._ledger is None
-            and population.scene.world.bounds is None
             and not self._lifetimes.any_left
             and (self._recorder is None or self._recorder.can_batch)
         )
 
-    def _advance_batch(self, steps: int, frames: FrameTable) -> None:
-        """Make at most so many steps in one batch."""
+    def _advance_batch(self, steps: int, frames: FrameTable, until_contact: bool) -> None:
+        """Make at most so many steps in one batch, which ends when a body leaves or, if wanted, has a contact."""
         population, observed = self._population, self._observer is not None
         space_bodies, substeps, h = population.space_bodies, self._settings.substeps, self._h
         steps = min(steps, space_bodies.batch_steps(substeps, observed))
         start = self._state()[0].copy() if observed else NO_POSITIONS
-        batch = space_bodies.step_batch(steps, substeps, observed, self._recorder is not None)
-        # The time of a substep is that of `_advance`: counted from the start of its step.
-        step_index, k = np.divmod(np.arange(batch.steps * substeps), substeps)
-        starts = (self._steps + step_index) * self._settings.dt + k * h
-        if self._recorder is not None and batch.contacts is not None:
+        batch = space_bodies.step_batch(
+            self._steps,
+            steps,
+            substeps,
+            lists_substeps=observed,
+            lists_contacts=self._recorder is not None,
+            until_contact=until_contact,
+        )
+        if (
+            self._recorder is not None
+            and batch.contacts is not None
+            and (observed or not self._recorder.is_idle(batch))
+        ):
+            # The time of a substep is that of `_advance`: counted from the start of its step.
+            step_index, k = np.divmod(np.arange(batch.steps * substeps), substeps)
+            starts = (self._steps + step_index) * self._settings.dt + k * h
             pairs = self._recorder.record_lists(batch.contacts, starts + h, observed)
             if self._observer is not None:
                 path = np.empty((len(starts) + 1, *start.shape))
@@ -233,24 +249,30 @@ class PymunkSimulation(BaseSimulation):
                 space_bodies.write_positions(batch.states, path[1:])
                 observe_path(self._observer, starts, path, pairs)
         if space_bodies.joints.count:
-            self._joint_iterations += space_bodies.solved_joint_count * self._settings.iterations * len(starts)
+            count = space_bodies.solved_joint_count * self._settings.iterations
+            self._joint_iterations += count * batch.steps * substeps
         states = batch.states[substeps - 1 :: substeps] if observed else batch.states
-        self._record_states(states[:-1] if batch.has_failed else states, frames)
+        self._record_states(states[:-1] if batch.needs_check else states, frames)
         self._steps += batch.steps
         population.invalidate()
         self._shared_angles = None
-        if batch.has_failed:
+        if batch.needs_check:
             self._check_state()
+            self._retire()
+            frames.steps += 1
+            if frames.is_due():
+                frames.record(self.frame())
 
     def _record_states(self, states: FloatArray, frames: FrameTable) -> None:
         """Count steps, and record the frames that are due, by the states (S, R, 6) after each step."""
-        population, first = self._population, frames.steps + 1
+        population, every, first_due = self._population, frames.every, frames.every - frames.steps % frames.every
         frames.steps += len(states)
-        due = np.flatnonzero(np.arange(first, first + len(states)) % frames.every == 0)
-        if not len(due):
+        states = states[first_due - 1 :: every]
+        if not len(states):
             return
-        rows, n = slice(frames.count, frames.count + len(due)), len(self.bodies)
-        frames.time[rows] = (self._steps + 1 + due) * self._settings.dt
+        rows, n = slice(frames.count, frames.count + len(states)), len(self.bodies)
+        due = np.arange(self._steps + first_due, self._steps + first_due + every * len(states), every)
+        frames.time[rows] = due * self._settings.dt
         columns = [
             array[rows, :n] for array in (frames.position, frames.velocity, frames.angle, frames.angular_velocity)
         ]
@@ -258,12 +280,12 @@ class PymunkSimulation(BaseSimulation):
         if len(population.space_bodies) < n:  # without those in the space that move
             for column, values in zip(columns, fixed, strict=True):
                 column[:] = values
-        population.space_bodies.write_states(states if len(due) == len(states) else states[due], *columns)
+        population.space_bodies.write_states(states, *columns)
         if self._settings.half_kick:
             columns[1][:, population.moving] -= population.ahead
         if len(population.scene.layers) > 1:
             frames.layer_rows()[rows, :n] = population.layer
-        frames.finish_rows(len(due), n)
+        frames.finish_rows(len(states), n)
 
     def finish(self, part: float) -> None:
         """Advance by a last fraction of dt. No step can follow.
@@ -312,6 +334,9 @@ class PymunkSimulation(BaseSimulation):
         """
         with self._lock:
             self._check_running()
+            if sets_level(action):
+                apply_action(action, self._population)
+                return
             self._shared_angles = None
             with record_energy_change(self._action_ledger, Cause.ACTIONS, self):
                 leaving = apply_action(action, self._population)

@@ -1,7 +1,7 @@
 """Bodies in the pymunk space: their creation, steps and state."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pymunk
@@ -23,7 +23,7 @@ from sandbox.engines.pymunk_adapter.colliders import (
 )
 from sandbox.engines.pymunk_adapter.contacts import NO_IMPULSES, ContactLists, ContactReader
 from sandbox.engines.pymunk_adapter.drives import SpaceDrives
-from sandbox.engines.pymunk_adapter.forces import SpaceForceField, has_drag, mean_fraction, rates
+from sandbox.engines.pymunk_adapter.forces import AttractionField, Thrusts, has_drag, mean_fraction, rates
 from sandbox.engines.pymunk_adapter.joints import SpaceJoints, spring_forces
 from sandbox.engines.pymunk_adapter.reader import STATE_WIDTH, SpaceReader
 from sandbox.engines.pymunk_adapter.zones import ZoneSensors
@@ -70,12 +70,13 @@ class SpaceBodies(SpaceBodyTable):
             self._space, self._reader, self._surface_setter.pair_callbacks, len(scene.fixed_names)
         )
         """reads the contacts of the space"""
-        self.field = SpaceForceField(setup)
+        self.field, self.thrusts = AttractionField(setup), Thrusts(setup)
         self.drives = SpaceDrives(setup, self._space, settings.h)
         self.drives.set_gravity(scene.world.gravity, gravity_of(scene))
         self._surface_of_fixed: IntArray = np.empty(0, np.int64)
         self.constant_forces = ConstantForces()
         self._moving = 0
+        self._needs_check: Callable[[FloatArray], bool] | None = None
 
     def __len__(self) -> int:
         return self._moving
@@ -151,8 +152,11 @@ class SpaceBodies(SpaceBodyTable):
         self._by_name[name], self._name_of[index] = body, name
         if driven:
             self.drives.join(name, index, body, state)
-        elif not fixed and (self.field.attracts or self.field.has_thrust(name)):
-            self.field.apply_to(name, body, self._by_name)
+        elif not fixed:
+            if self.field.attracts:
+                self.field.apply_to(name, body, self._by_name)
+            if self.thrusts.acts_on(index):
+                self.thrusts.join(index, body)
 
     def _add_shapes(self, index: int, bodies: Bodies) -> None:
         """Add the shapes of a body in the space."""
@@ -187,6 +191,7 @@ class SpaceBodies(SpaceBodyTable):
                 self._add_shapes(index, bodies)
 
     def _register(self) -> None:
+        self._needs_check = None
         moving = {m.body.id: index for index, m in self._members.items() if m.moves}
         self._reader.records = {self._members[index].body._body: index for index in moving.values()}
         static = {m.body.id: index for index, m in self._members.items() if not m.moves}
@@ -207,8 +212,9 @@ class SpaceBodies(SpaceBodyTable):
             self._space.remove(*(shape for _, shape in member.shapes), member.body)
             del self._by_name[self._name_of.pop(index)]  # in place: the force field holds a reference
             self.constant_forces.drop(index)
+            self.thrusts.leave(index)
         self._reader.invalidate_order()
-        self._state = None
+        self._state = self._needs_check = None
 
     def link(self, links: JointArrays) -> None:
         """Add the scene's joints, once; jointed bodies are always in the space."""
@@ -248,7 +254,7 @@ class SpaceBodies(SpaceBodyTable):
 
     def rebuild_world(self, scene: Scene) -> None:
         """Update after a change of the scene's gravity, drag or wind."""
-        self._scene = scene
+        self._scene, self._needs_check = scene, None
         self._dragged = has_drag(scene.world)
         self.field.fractions.clear()
         self._space.gravity = gravity_of(scene)
@@ -259,11 +265,7 @@ class SpaceBodies(SpaceBodyTable):
         """Advance by one substep, from a time, s."""
         if not self._moving:
             return
-        self.field.time = time
-        if self._dragged:
-            self._apply_drag(*self._read())
-        else:
-            self.constant_forces.apply(self._members)
+        self._set_forces(time)
         if self._surface_setter.one_way_walls.walls:
             self._surface_setter.one_way_walls.tick += 1
         if self.drives.driven_bodies:
@@ -274,14 +276,24 @@ class SpaceBodies(SpaceBodyTable):
             self._space.step(self._h)
         self._state = None
 
+    def _set_forces(self, time: float) -> None:
+        """Set the forces of a substep that starts at a time, s: constant forces, thrusts and drag."""
+        if self._dragged:
+            self.thrusts.update_loads(time, self._h)
+            self._apply_drag(*self._read())
+            return
+        if self.constant_forces:
+            self.constant_forces.apply(self._members)
+        if self.thrusts:
+            self.thrusts.apply(time, self._h, self.constant_forces.total)
+
     @property
     def can_batch(self) -> bool:
         """Whether nothing has to be done between two substeps, so that `step_batch` can make many."""
         return not (
             not self._moving
             or self._dragged
-            or len(self.constant_forces)
-            or self.field.kicks
+            or self.field.attracts
             or self.drives.driven_bodies
             or self._scene.zones
             or self._surface_setter.one_way_walls.walls
@@ -293,38 +305,85 @@ class SpaceBodies(SpaceBodyTable):
         rows = self._batch_reader.max_rows(self._reader.body_count)
         return max(rows // substeps, 1) if lists_substeps else rows
 
-    def step_batch(self, steps: int, substeps: int, lists_substeps: bool, lists_contacts: bool) -> Batch:
-        """Make at most so many steps, while states are within bounds.
+    def step_batch(
+        self,
+        first: int,
+        steps: int,
+        substeps: int,
+        *,
+        lists_substeps: bool,
+        lists_contacts: bool,
+        until_contact: bool,
+    ) -> Batch:
+        """Make at most so many steps, until one whose state has to be checked.
 
         Args:
+            first: number of steps made before.
             steps: largest number of steps, at most `batch_steps`.
             substeps: substeps of a step.
             lists_substeps: whether states are listed after every substep, not only after every step.
             lists_contacts: whether contacts are listed, after every substep.
+            until_contact: whether the batch ends after the first step with contacts.
         """
-        contacts, moving = self.contact_reader, self._reader.moving_rows
+        contacts, dt = self.contact_reader, self._settings.dt
+        self._state = None
 
-        def is_valid(state: FloatArray) -> bool:
-            if self._static_shapes.within(state.reshape(-1, STATE_WIDTH)[moving]).all():
-                return True
-            self._state = None
-            return self.beyond() is None
+        def before_substep(step: int, k: int) -> None:
+            self._set_forces((first + step) * dt + k * self._h)
 
         batch = self._batch_reader.step(
             self._h,
             steps,
             substeps,
             self._reader.body_count,
-            moving,
+            self._reader.moving_rows,
             lists_substeps=lists_substeps,
             lists_contacts=lists_contacts,
             polygons=self._polygons,
+            until_contact=until_contact,
             warm_start=contacts.take_warm_start if contacts.has_warm_starts else None,
-            quick_bound=self._static_shapes.quick_bound,
-            is_valid=is_valid,
+            before_substep=before_substep if self.thrusts or self.constant_forces else None,
+            needs_check=self._state_check(),
         )
-        self._state = None
+        # The states are valid until the next batch, like those that the reader returns.
+        self._state = self._reader.moving_indices, batch.states[-1]
         return batch
+
+    def _state_check(self) -> Callable[[FloatArray], bool]:
+        """Return a function of a list of all bodies (6·R,): whether one may have left `world.bounds` or diverged.
+
+        It is kept until bodies or bounds change. It decides most states by the product of one vector with itself.
+        """
+        if self._needs_check is not None:
+            return self._needs_check
+        moving, within, bounds = self._reader.moving_rows, self._static_shapes.within, self._scene.world.bounds
+        bound = self._static_shapes.quick_bound
+
+        def is_within(state: FloatArray) -> bool:
+            return bool(within(state.reshape(-1, STATE_WIDTH)[moving]).all())
+
+        if bounds is None:
+            square = bound * bound if bound > 0.0 else -1.0
+            self._needs_check = lambda state: not state.dot(state) <= square and not is_within(state)  # nan: not within
+            return self._needs_check
+        low, high = np.asarray(bounds)
+        # An ellipsoid within all bounds, of the states of all moving bodies.
+        centre, scale = np.zeros((2, self._reader.body_count, STATE_WIDTH))
+        is_inside = bound > float(np.hypot(*np.maximum(np.abs(low), np.abs(high))))
+        centre[moving, 0:2] = 0.5 * (low + high)
+        # slightly larger scale: rounding must not accept a state outside
+        scale[moving] = (*(2.0 * (1.0 + 1e-9) / (high - low)), *([1.0 / bound] * 4)) if is_inside else math.inf
+        centre, scale = centre.reshape(-1), scale.reshape(-1)
+
+        def needs_check(state: FloatArray) -> bool:
+            offset = (state - centre) * scale
+            if offset.dot(offset) <= 1.0:
+                return False
+            position = state.reshape(-1, STATE_WIDTH)[moving, 0:2]
+            return not ((position >= low).all() and (position <= high).all() and is_within(state))
+
+        self._needs_check = needs_check
+        return needs_check
 
     def write_states(
         self,
@@ -375,9 +434,11 @@ class SpaceBodies(SpaceBodyTable):
 
     def _apply_drag(self, indices: IntArray, state: FloatArray) -> None:
         """Set the forces of the next substep on bodies (R,) of a state (R, 6), in a scene with drag."""
-        world, springs = self._scene.world, self._springs(indices, state)
-        self.constant_forces.apply_with_drag(self._members, self._reader, (indices, state), springs, world, self._h)
-        if self.field.kicks:
+        world, springs, loads = self._scene.world, self._springs(indices, state), self.thrusts.loads
+        self.constant_forces.apply_with_drag(
+            self._members, loads, self._reader, (indices, state), springs, world, self._h
+        )
+        if self.field.attracts:
             fractions = mean_fraction(rates(world, state[:, 3:5]), self._h).tolist()
             self.field.fractions = {self._name_of[n]: each for n, each in zip(indices.tolist(), fractions, strict=True)}
 
@@ -467,6 +528,7 @@ class SpaceBodies(SpaceBodyTable):
         """Extend half-planes to the bodies in the space."""
         if self._moving and math.isfinite(self._static_shapes.reach):
             self._static_shapes.extend(self._read()[1][:, 0:2])
+            self._needs_check = None
 
     def set_constant_force(self, index: int, force: FloatArray, torque: float) -> None:
         """Apply a constant force (N) and torque (N·m) to a body from now on."""

@@ -104,7 +104,7 @@ class ReferenceSimulation(SteppedSimulation):
         """Work counters since the start: all those of the contract but events and predictions."""
         return {"substeps": self.substeps, **self._world.work}
 
-    def advance(self, steps: int, frames: FrameTable) -> None:
+    def advance(self, steps: int, frames: FrameTable, *, until_event: bool = False) -> None:
         """Advance by at most so many time steps, and record the frames that are due, as `Simulation.advance`.
 
         A world of balls makes many steps in one compiled call.
@@ -113,6 +113,9 @@ class ReferenceSimulation(SteppedSimulation):
             Divergence: the state of a body is not finite, or exceeds the bounds. It can still be read.
             Exhaustion: a step exceeds a resource limit.
         """
+        if until_event:
+            super().advance(steps, frames, until_event=True)
+            return
         end = frames.steps + steps
         frames.prepare(steps, len(self.bodies))
         while frames.steps < end:

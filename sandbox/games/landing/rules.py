@@ -44,6 +44,8 @@ FOR_A_CRASH, CRASH_DISTANCE, CRASH_SPEED = 50, 50.0, 15.0
 """points for a crash; they decrease linearly to 0 at a distance from the pad, m, and at a speed, m/s"""
 ELSEWHERE, FASTER = 18.0, 3.0
 """m and m/s, bounds of the random change of the initial horizontal position and velocity"""
+MAX_QUIET_STEPS = 1_000_000
+"""number of `quiet_steps` where no fuel can be burnt"""
 GAMEPAD_INPUTS = {"up": "a rt up", "left": "left -leftx", "right": "right +leftx"}
 """gamepad inputs by the key of a thrust"""
 
@@ -83,6 +85,9 @@ class Landing:
         self._corners = [(x, y, piece.radius) for piece in form.pieces for x, y in piece.corners]
         self._tank = self._full = TANK * self.mass
         self._levels = dict.fromkeys(self.thrusts, 0.0)
+        self._forces = {name: math.hypot(*thrust.force) for name, thrust in self.thrusts.items()}
+        self._burn_rate = 0.0  # N·s per s, since the last change of a level
+        self._changed, self._tank_then = 0.0, self._tank  # time and fuel at that change
         self._start = _start(scene, bodies, self.ship)
         self._time, self._rest_time = 0.0, 0.0
         self._previous_frame: Frame | None = None
@@ -100,8 +105,8 @@ class Landing:
             self._frame = info.frame
             return (self._start,)
         self._previous_frame, self._frame = self._frame, info.frame
-        elapsed, self._time = info.time - self._time, info.time
-        stopped = self._burn(info, elapsed)
+        before, self._time = self._time, info.time
+        elapsed, stopped = info.time - before, self._burn(info, before)
         self.game_over = self._end_reason(info, elapsed)
         if self.game_over is not None:
             self.score = self.score or self._crash_points()
@@ -109,19 +114,36 @@ class Landing:
             return tuple(Throttle(time=0.0, thrust=name, level=0.0) for name, level in self._levels.items() if level)
         return stopped
 
-    def _burn(self, info: StepInfo, elapsed: float) -> Sequence[Action]:
-        """Consume the fuel of the last step; return the actions that stop all engines when the tank becomes empty."""
-        for action in info.actions:
-            if isinstance(action, Throttle) and action.thrust in self._levels:
-                self._levels[action.thrust] = action.level
-        burnt = math.fsum(level * math.hypot(*self.thrusts[name].force) for name, level in self._levels.items())
-        tank_before, self._tank = self._tank, max(self._tank - burnt * elapsed, 0.0)
+    def quiet_steps(self, dt: float) -> int:
+        """Return the number of steps of dt, s, in which the tank cannot become empty, as `HasQuietSteps`."""
+        burnt = math.fsum(self._forces.values()) * dt  # at most, in a step
+        return max(int(self._tank / burnt), 1) if burnt and self._tank else MAX_QUIET_STEPS
+
+    def _burn(self, info: StepInfo, before: float) -> Sequence[Action]:
+        """Consume fuel since a time, s; return the actions that stop all engines when the tank becomes empty.
+
+        The fuel follows from the time since the last change of a level, so that it does not depend on how many steps
+        lie between two calls.
+        """
+        levels = {
+            action.thrust: action.level
+            for action in info.actions
+            if isinstance(action, Throttle) and action.thrust in self._levels
+        }
+        if levels:
+            self._set_levels(self._levels | levels, before)
+        tank_before, self._tank = self._tank, max(self._tank_then - self._burn_rate * (info.time - self._changed), 0.0)
         if self._tank > 0.0 or tank_before == 0.0:
             return ()
         self._cues.append("empty")
         open_thrusts = [name for name, level in self._levels.items() if level > 0.0]
-        self._levels = dict.fromkeys(self._levels, 0.0)
+        self._set_levels(dict.fromkeys(self._levels, 0.0), info.time)
         return tuple(Throttle(time=0.0, thrust=name, level=0.0) for name in open_thrusts)
+
+    def _set_levels(self, levels: dict[str, float], time: float) -> None:
+        """Set the levels of the thrusts from a time, s, on."""
+        self._levels, self._changed, self._tank_then = levels, time, self._tank
+        self._burn_rate = math.fsum(level * self._forces[name] for name, level in levels.items())
 
     def _end_reason(self, info: StepInfo, elapsed: float) -> str | None:
         """Return the reason why the game is over, and set the score of a landing; None while it runs."""

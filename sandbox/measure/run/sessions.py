@@ -1,6 +1,7 @@
 """Sessions without a window: replays of recordings, games played by a policy, episodes of an environment."""
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,8 @@ from pydantic import ValidationError
 from sandbox.action import Action, Switch, actions_from_json
 from sandbox.engines.registry import UnknownEngineError, engine_named
 from sandbox.engines.switching import SwitchableSimulation, start
-from sandbox.games.contract import Control, Policy, Press, Rules
+from sandbox.frame_table import FrameTable
+from sandbox.games.contract import Control, HasQuietSteps, Policy, Press, Rules
 from sandbox.games.players import RECORDED, PlayerSpec
 from sandbox.games.registry import required_rules, rules_of
 from sandbox.games.session import GameSession, HeadlessGame
@@ -157,6 +159,10 @@ def _recording(
     )
 
 
+MAX_QUIET_STEPS = 64
+"""Largest number of steps that an `Episode` makes at once."""
+
+
 class Episode:
     """Scene with a game that runs step by step, for environments."""
 
@@ -173,6 +179,9 @@ class Episode:
         """the running simulation"""
         self.simulation.contacts()
         self._done: list[Action] = []
+        self._state: Frame | None = None  # present state, until an action or step changes it
+        self._table = FrameTable(MAX_QUIET_STEPS, len(self.simulation.bodies))
+        self._quiet_rules = self.rules if isinstance(self.rules, HasQuietSteps) else None
         self._levels = [0.0] * len(self.rules.controls)
         self._update_rules(Contacts.none())
 
@@ -198,7 +207,9 @@ class Episode:
 
     def frame(self) -> Frame:
         """Return the present state."""
-        return self.simulation.frame()
+        if self._state is None:
+            self._state = self.simulation.frame()
+        return self._state
 
     def press(self, levels: Sequence[float]) -> None:
         """Set each control to a level from 0 to 1; a digital control is on above one half.
@@ -206,23 +217,59 @@ class Episode:
         Raises:
             ActionError: an action of the game is invalid.
         """
+        time = self.simulation.time
         for k, (control, level) in enumerate(zip(self.rules.controls, levels, strict=True)):
             value = _value(control, level)
             if value != self._levels[k]:
                 self._levels[k] = value
-                acts = self._session.press(self.simulation.time, control.name, value)
+                acts = self._session.press(time, control.name, value)
                 self._apply(acts)
                 self._session.note_actions(acts)
 
-    def step(self) -> None:
-        """Advance by one dt and apply the actions of the rules.
+    def advance(self, steps: int) -> None:
+        """Advance by a number of steps dt, or to the end, and apply the actions of the rules after each.
+
+        Steps in which nothing happens that concerns the rules are made at once; see `HasQuietSteps`.
 
         Raises:
             Divergence, Exhaustion: the engine cannot continue.
             ActionError: an action of the rules is invalid.
         """
-        self.simulation.step()
-        self._update_rules(self.simulation.contacts())
+        while steps and not self.ended:
+            quiet = 1
+            if steps > 1 and self._quiet_rules is not None:
+                quiet = self._quiet_rules.quiet_steps(self.simulation.settings.dt)
+                quiet = min(quiet, self._steps_left, steps, MAX_QUIET_STEPS)
+            if quiet > 1:
+                steps -= self._advance_quietly(quiet)
+            else:
+                self._state = None
+                self.simulation.step()
+                self._update_rules(self.simulation.contacts())
+                steps -= 1
+
+    def _advance_quietly(self, steps: int) -> int:
+        """Make at most so many steps, of which the rules see only the last, and the one before if something happens."""
+        simulation, table, retired = self.simulation, self._table, self.simulation.retired
+        table.clear()
+        self._state = None
+        simulation.advance(steps, table, until_event=True)
+        contacts = simulation.contacts()
+        removed = simulation.retired.keys() - retired.keys()
+        if table.steps > 1 and (len(contacts) or removed):
+            present = self.frame().present.copy()
+            present[list(removed)] = True
+            before = table.frame(table.count - 2, present)
+            if self._session.on_step(before.time, before, Contacts.none()):
+                raise RuntimeError(f"the rules of {self.scene.play.game!r} acted in a step announced as quiet")
+        self._update_rules(contacts)
+        return table.steps
+
+    @property
+    def _steps_left(self) -> int:
+        """Number of steps to the duration of the scene."""
+        dt = self.scene.solver.dt
+        return math.ceil((self.scene.world.duration - self.simulation.time) / dt - 0.5)
 
     def recording(self) -> Recording:
         """Return the session so far as a recording."""
@@ -243,10 +290,11 @@ class Episode:
 
     def _update_rules(self, contacts: Contacts) -> None:
         """Pass the present state to the rules, and apply their actions."""
-        self._apply(self._session.on_step(self.simulation.time, self.simulation.frame(), contacts))
+        self._apply(self._session.on_step(self.simulation.time, self.frame(), contacts))
 
     def _apply(self, acts: Sequence[Action]) -> None:
         for action in acts:
+            self._state = None
             self.simulation.apply(action)
             self._done.append(action)
 

@@ -126,7 +126,7 @@ class EventDrivenSimulation(SteppedSimulation, Generic[Data]):
             if leaving is not None:
                 self._remove(np.asarray([leaving]))
 
-    def advance(self, steps: int, frames: FrameTable) -> None:
+    def advance(self, steps: int, frames: FrameTable, *, until_event: bool = False) -> None:
         """Advance by at most so many time steps, and record the frames that are due, as `Simulation.advance`.
 
         One call of a kernel makes all steps, up to one that needs a larger log, or that the kernel interrupts.
@@ -135,8 +135,8 @@ class EventDrivenSimulation(SteppedSimulation, Generic[Data]):
             Divergence: the state of a body is not finite, or exceeds the bounds. It can still be read.
             Exhaustion: a step exceeds a resource limit.
         """
-        if self.patience is not None or self._store.can_expire:
-            step_and_record(self, steps, frames)
+        if until_event or self.patience is not None or self._store.can_expire:
+            step_and_record(self, 1 if until_event else steps, frames)
             return
         with self._lock, np.errstate(all="ignore"):
             self._check_running()

@@ -1,0 +1,54 @@
+"""Rows of Gymnasium environments, against LunarLander-v3."""
+
+import importlib.util
+import time
+
+from tools.benchmarks.row import Bench
+from tools.benchmarks.workloads import Timed
+
+STEPS = 400
+SEED = 5
+
+
+def missing() -> str | None:
+    """Return the reason why LunarLander is not available, or None."""
+    needed = ("gymnasium", "Box2D")
+    absent = [name for name in needed if importlib.util.find_spec(name) is None]
+    return f"{' and '.join(absent)} not installed here: pip install 'gymnasium[box2d]'" if absent else None
+
+
+def env_steps(name: str) -> Timed:
+    """Return a workload that makes steps of an environment with random actions; its resets are not timed."""
+    import gymnasium
+
+    import sandbox.gym  # noqa: F401, registers the environments
+
+    env = gymnasium.make(name).unwrapped
+    env.action_space.seed(SEED)
+    actions = [env.action_space.sample() for _ in range(STEPS)]
+
+    def work() -> float:
+        env.reset(seed=SEED)
+        seconds = 0.0
+        for action in actions:
+            begin = time.perf_counter()
+            _, _, terminated, truncated, _ = env.step(action)
+            seconds += time.perf_counter() - begin
+            if terminated or truncated:
+                env.reset(seed=SEED)
+        return seconds
+
+    return work
+
+
+ENVIRONMENTS = tuple(
+    Bench(
+        f"env-{name.lower()}",
+        f"{STEPS} steps of sandbox/{name}-v0 with random actions / of LunarLander-v3",
+        lambda name=name: env_steps(f"sandbox/{name}-v0"),
+        lambda: env_steps("LunarLander-v3"),
+        target,
+        missing=missing,
+    )
+    for name, target in (("Landing", 2.0), ("PinballFull", None))
+)
