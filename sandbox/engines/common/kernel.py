@@ -57,6 +57,15 @@ def bare_kernel(function: Callable[P, R]) -> Callable[P, R]:
     return _compiled(function, {"_nrt": False, "nogil": True}) if COMPILED else function
 
 
+def inline_kernel(function: Callable[P, R]) -> Callable[P, R]:
+    """Return a function compiled as by `bare_kernel` that is always expanded in the kernels that call it.
+
+    For functions with a tuple of many arrays as argument, of which a call copies a hundred words: that took half the
+    time of an event. Each further call in a kernel makes its code longer.
+    """
+    return _compiled(function, {"_nrt": False, "nogil": True, "forceinline": True}) if COMPILED else function
+
+
 class OptionalKernel:
     """Decides whether a kernel is worth its compilation that only saves time: without it, results are the same.
 

@@ -12,6 +12,7 @@ from sandbox.engines.common.base import FARTHEST, FASTEST
 from sandbox.engines.common.body_store import first_beyond
 from sandbox.engines.common.frame_rows import FrameRows, is_due, write_row
 from sandbox.engines.common.kernel import bare_kernel as kernel
+from sandbox.engines.common.kernel import inline_kernel
 from sandbox.engines.exact.common import state as c
 from sandbox.engines.exact.common.record import ROWS_PER_EVENT, account_hit, account_slip
 from sandbox.engines.exact.common.requirements import TOUCH_OVERLAP
@@ -57,7 +58,7 @@ def rebuild_all(data: EventState) -> None:
     predict_all(data)
 
 
-@kernel
+@inline_kernel
 def advance_to(data: EventState, i: int, t: float, residual: float) -> None:
     """Advance a ball to a time, and add the work of its sliding until then to the ledger."""
     if data.counts[c.ACCOUNTING] != 0:
@@ -83,7 +84,7 @@ def rebuild_from(data: EventState, t: float) -> None:
     rebuild_all(data)
 
 
-@kernel
+@inline_kernel
 def rebuild_ball(data: EventState, i: int) -> None:
     """Recompute the accelerations of a ball after a change, and increment its `VERSION`."""
     if is_supported(data.tags, i):
@@ -130,7 +131,7 @@ def check_limits(counts: IntArray, world: FloatArray, balls: int, t: float) -> i
     return c.DONE
 
 
-@kernel
+@inline_kernel
 def process_event(data: EventState, i: int, kind: int, partner: int, t: float, residual: float) -> None:
     """Process the event of a ball and predict the next events of the balls involved.
 

@@ -9,6 +9,7 @@ import math
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.body_store import ALL
 from sandbox.engines.common.kernel import bare_kernel as kernel
+from sandbox.engines.common.kernel import inline_kernel
 from sandbox.engines.exact.common import state as c
 from sandbox.engines.exact.common.roots import NOISE, curved_entry, line_entry, pair_entry
 from sandbox.engines.exact.common.state import EventState
@@ -181,7 +182,7 @@ def line_end_time(lines: FloatArray, f: int, x: float, y: float, vx: float, vy: 
     return min(line_entry(foot, v, a), line_entry(length - foot, -v, -a))
 
 
-@kernel
+@inline_kernel
 def predict_next_event(data: EventState, i: int, now: float, residual: float) -> None:
     """Predict and store the earliest event of a ball after `now`."""
     data.counts[c.PREDICTIONS] += 1
@@ -200,7 +201,7 @@ def predict_next_event(data: EventState, i: int, now: float, residual: float) ->
     )
 
 
-@kernel
+@inline_kernel
 def find_next_event(
     state: FloatArray,
     tags: IntArray,

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.base import FARTHEST, FASTEST
 from sandbox.engines.common.frame_rows import FrameRows, is_due, write_row
-from sandbox.engines.common.kernel import OptionalKernel, bare_kernel
+from sandbox.engines.common.kernel import OptionalKernel, bare_kernel, inline_kernel
 from sandbox.engines.reference.broad_phase import EXCEEDED, all_pairs, grid, near_segments
 from sandbox.engines.reference.manifold import (
     CONTACT_ROUNDING,
@@ -260,7 +260,7 @@ def acceleration(
     return ax, ay
 
 
-@bare_kernel
+@inline_kernel
 def move_balls(number: BallConstants, arrays: BallColumns, state: BallState, scratch: BallScratch) -> None:
     """Write the motion over h without contacts into `placed`, with the overlap of the last substep corrected.
 
@@ -332,7 +332,7 @@ def turned(method: int, angle: float, spin: float, alpha: float, h: float) -> tu
     return angle, spin + h * (sixth * alpha + third * alpha + third * alpha + sixth * alpha)
 
 
-@bare_kernel
+@inline_kernel
 def sort_keys(keys: IntArray, count: int) -> None:
     """Sort the first keys of a buffer by insertion; those of the broad phases are nearly in order."""
     for k in range(1, count):
@@ -343,7 +343,7 @@ def sort_keys(keys: IntArray, count: int) -> None:
         keys[target] = key
 
 
-@bare_kernel
+@inline_kernel
 def find_contacts(
     number: BallConstants, arrays: BallColumns, state: BallState, scratch: BallScratch
 ) -> tuple[int, int, int]:
@@ -416,7 +416,7 @@ def find_contacts(
     return (-1 if size > len(out.key) or size > number.max_contacts else size), broad_tests, pair_tests
 
 
-@bare_kernel
+@inline_kernel
 def solve_contacts(
     number: BallConstants,
     arrays: BallColumns,
@@ -453,7 +453,7 @@ def solve_contacts(
             contacts.separation[k] += part * bounce[k]
 
 
-@bare_kernel
+@inline_kernel
 def correct_overlap(
     number: BallConstants, arrays: BallColumns, state: BallState, scratch: BallScratch, contacts: Manifolds
 ) -> None:
@@ -478,7 +478,7 @@ def correct_overlap(
         solve_overlaps(contacts, target, state.pseudo_velocity, *inverse, total, number.iterations)
 
 
-@bare_kernel
+@inline_kernel
 def copy_state(source: FloatArray, target: FloatArray) -> None:
     """Copy a state (2, N, 3)."""
     for order in range(2):
@@ -487,7 +487,7 @@ def copy_state(source: FloatArray, target: FloatArray) -> None:
                 target[order, i, axis] = source[order, i, axis]
 
 
-@bare_kernel
+@inline_kernel
 def is_within(x: FloatArray) -> bool:
     """Return whether all balls are finite and within the bounds of position and speed."""
     for i in range(x.shape[1]):
@@ -499,7 +499,7 @@ def is_within(x: FloatArray) -> bool:
     return True
 
 
-@bare_kernel
+@inline_kernel
 def log_contacts(arrays: BallColumns, scratch: BallScratch, log: BallLog, size: int, substep: int) -> None:
     """Write the contacts of a substep, without those that are rounding, as `ReferenceSimulation` logs them."""
     out, rates, inverse_mass, impulse = scratch.out, scratch.after[1], arrays.inverse_mass, scratch.impulse

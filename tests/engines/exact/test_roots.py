@@ -8,7 +8,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.engines.exact.common.roots import curved_entry, first_downward_root, polynomial, quadratic_roots
+from sandbox.engines.exact.common.roots import (
+    curved_entry,
+    first_downward_root,
+    first_touch,
+    polynomial,
+    quadratic_roots,
+)
+from sandbox.engines.exact.tabletop.events import path_box
 
 small = st.floats(-10, 10).map(lambda x: round(x, 3))
 
@@ -84,3 +91,48 @@ def test_touching_circles_are_judged_by_their_relative_motion():
     assert curved_entry(0.0, -1.0, 0.0, 0.0, 0.0, 9.81, 1.0, False, math.inf) == 0.0  # pressed together
     returning = curved_entry(0.0, -1.0, 0.0, -2.0, 0.0, 9.81, 1.0, True, math.inf)
     assert returning == pytest.approx(4 / 9.81, rel=1e-13)  # thrown up from the top of a post, and down again
+
+
+@given(
+    st.floats(0.6, 8),
+    st.floats(0, 2 * math.pi),
+    st.tuples(small, small, small, small),
+    st.floats(0.05, 0.5),
+    st.floats(0.01, 5),
+)
+def test_touch_within_a_limit_is_found_and_no_other(distance, direction, motion, radius, limit):
+    """The quick tests of `first_touch`, which exclude most pairs, never exclude a touch within the limit."""
+    dx, dy = distance * math.cos(direction), distance * math.sin(direction)
+    vx, vy, ax, ay = motion
+    coefficients = [
+        dx * dx + dy * dy - radius * radius,
+        2.0 * (dx * vx + dy * vy),
+        vx * vx + vy * vy + dx * ax + dy * ay,
+        vx * ax + vy * ay,
+        0.25 * (ax * ax + ay * ay),
+    ]
+    expected = first_downward_root_by_mpmath(coefficients, math.inf)
+    found = first_touch(dx, dy, vx, vy, ax, ay, radius, limit)
+    if found < math.inf:
+        x, y = dx + (vx + 0.5 * ax * found) * found, dy + (vy + 0.5 * ay * found) * found
+        assert found <= limit
+        assert abs(math.hypot(x, y) - radius) <= 1e-9  # it is a touch
+        assert found == pytest.approx(expected, rel=1e-6, abs=1e-6)  # a grazing one is badly conditioned
+    elif expected <= limit * (1.0 - 1e-9):
+        # Only a graze, whose closest distance is the radius up to rounding, may be found by one and not by the other.
+        times = np.linspace(0.0, limit, 20_001)
+        x, y = dx + (vx + 0.5 * ax * times) * times, dy + (vy + 0.5 * ay * times) * times
+        assert np.hypot(x, y).min() >= radius * (1.0 - 1e-6)
+
+
+@given(st.tuples(small, small, small, small, small, small), st.one_of(st.floats(0, 20), st.just(math.inf)))
+def test_box_of_a_path_contains_it(motion, span):
+    x, y, vx, vy, ax, ay = motion
+    left, bottom, right, top = path_box(x, y, vx, vy, ax, ay, span)
+    for t in np.linspace(0.0, min(span, 100.0), 101):
+        assert left <= x + (vx + 0.5 * ax * t) * t <= right
+        assert bottom <= y + (vy + 0.5 * ay * t) * t <= top
+    if math.isfinite(span):
+        times = np.linspace(0.0, span, 2001)
+        # No larger than needed: the samples miss an apex by a·dt²/8.
+        assert right - left <= np.ptp(x + (vx + 0.5 * ax * times) * times) + abs(ax) * (span / 2000) ** 2 + 1e-5

@@ -10,6 +10,7 @@ from sandbox.arrays import FloatArray
 from sandbox.engines.common.body_store import ALL, NOTHING, first_beyond
 from sandbox.engines.common.frame_rows import FrameRows, is_due, write_row
 from sandbox.engines.common.kernel import bare_kernel as kernel
+from sandbox.engines.common.kernel import inline_kernel
 from sandbox.engines.exact.common.roots import MAX_OVERLAP, first_touch, gap_zero_time, return_time
 from sandbox.engines.exact.common.state import BEYOND, DONE, FULL, PAUSED, TOO_MANY
 from sandbox.engines.exact.tabletop import state as c
@@ -28,6 +29,9 @@ from sandbox.engines.exact.tabletop.impact import (
 from sandbox.engines.exact.tabletop.state import TabletopState
 from sandbox.engines.tabletop.motion import CAPTURED, GLIDING, ROLLING, SLIDING
 
+SLACK = 1e-9
+"""Fraction of lengths by which the box of a path is enlarged; rounding errors are smaller"""
+
 
 @kernel
 def is_translating(data: TabletopState, i: int) -> bool:
@@ -43,6 +47,30 @@ def is_over_line(line: FloatArray, x: float, y: float) -> bool:
 
 
 @kernel
+def displacement_range(v: float, a: float, span: float) -> tuple[float, float]:
+    """Return the least and the greatest of v t + a t²/2 for t from 0 to a span, which may be infinite."""
+    if span == math.inf:
+        return -math.inf, math.inf
+    end = (v + 0.5 * a * span) * span
+    low, high = min(end, 0.0), max(end, 0.0)
+    if v * a < 0.0 and abs(v) < abs(a) * span:
+        apex = -0.5 * v * v / a
+        low, high = min(low, apex), max(high, apex)
+    return low, high
+
+
+@kernel
+def path_box(
+    x: float, y: float, vx: float, vy: float, ax: float, ay: float, span: float
+) -> tuple[float, float, float, float]:
+    """Return the left, bottom, right and top bounds of a path from (x, y) within a span, s, enlarged by rounding."""
+    left, right = displacement_range(vx, ax, span)
+    bottom, top = displacement_range(vy, ay, span)
+    slack = MAX_OVERLAP + SLACK * (abs(x) + abs(y) + right - left + top - bottom)
+    return x + left - slack, y + bottom - slack, x + right + slack, y + top + slack
+
+
+@inline_kernel
 def find_own_event(data: TabletopState, i: int, now: float) -> None:
     """Find the next event of a ball without another ball; its row must be at `now`."""
     state = data.state
@@ -61,8 +89,17 @@ def find_own_event(data: TabletopState, i: int, now: float) -> None:
         )
         radius = state[i, c.RADIUS]
         data.counts[c.PAIR_TESTS] += len(data.lines) + len(data.vertices) + len(data.pockets)
+        # Only what the path up to the earliest event comes near has to be examined.
+        left, bottom, right, top = path_box(x, y, vx, vy, ax, ay, earliest - now)
         for k in range(len(data.lines)):
             line = data.lines[k]
+            if (
+                line[c.LEFT] > right + radius
+                or line[c.RIGHT] < left - radius
+                or line[c.BOTTOM] > top + radius
+                or line[c.TOP] < bottom - radius
+            ):
+                continue
             nx, ny = line[c.NX], line[c.NY]
             gap = (x - line[c.PX]) * nx + (y - line[c.PY]) * ny - radius
             rate, half = vx * nx + vy * ny, 0.5 * (ax * nx + ay * ny)
@@ -75,22 +112,29 @@ def find_own_event(data: TabletopState, i: int, now: float) -> None:
                 px, py = x + (vx + 0.5 * ax * dt) * dt, y + (vy + 0.5 * ay * dt) * dt
                 if is_over_line(line, px, py):
                     earliest, kind, partner = now + dt, c.LINE, k
+                    left, bottom, right, top = path_box(x, y, vx, vy, ax, ay, dt)
         for k in range(len(data.vertices)):
             vertex = data.vertices[k]
-            dx, dy, radius_sum = x - vertex[c.CENTRE_X], y - vertex[c.CENTRE_Y], radius + vertex[c.CIRCLE_RADIUS]
+            px, py, radius_sum = vertex[c.CENTRE_X], vertex[c.CENTRE_Y], radius + vertex[c.CIRCLE_RADIUS]
+            if px - radius_sum > right or px + radius_sum < left or py - radius_sum > top or py + radius_sum < bottom:
+                continue
+            dx, dy = x - px, y - py
             dt = first_touch(dx, dy, vx, vy, ax, ay, radius_sum, earliest - now)
             if now + dt < earliest:
                 earliest, kind, partner = now + dt, c.VERTEX, k
         for k in range(len(data.pockets)):
             pocket = data.pockets[k]
-            dx, dy = x - pocket[c.CENTRE_X], y - pocket[c.CENTRE_Y]
-            dt = first_touch(dx, dy, vx, vy, ax, ay, pocket[c.CIRCLE_RADIUS], earliest - now)
+            px, py, rim = pocket[c.CENTRE_X], pocket[c.CENTRE_Y], pocket[c.CIRCLE_RADIUS]
+            if px - rim > right or px + rim < left or py - rim > top or py + rim < bottom:
+                continue
+            dx, dy = x - px, y - py
+            dt = first_touch(dx, dy, vx, vy, ax, ay, rim, earliest - now)
             if now + dt < earliest:
                 earliest, kind, partner = now + dt, c.POCKET, k
     data.own_time[i], data.own_event[i, 0], data.own_event[i, 1] = earliest, kind, partner
 
 
-@kernel
+@inline_kernel
 def pair_time_of(data: TabletopState, i: int, k: int, now: float) -> float:
     """Return the time of impact of two balls, s, or infinity if another event of either is earlier.
 
@@ -123,7 +167,7 @@ def pair_time_of(data: TabletopState, i: int, k: int, now: float) -> float:
     return now + time_to_impact
 
 
-@kernel
+@inline_kernel
 def find_earliest_pair(data: TabletopState, i: int) -> None:
     """Find the earliest time of impact in a ball's row of the matrix."""
     times = data.pair_time[i]
@@ -134,7 +178,7 @@ def find_earliest_pair(data: TabletopState, i: int) -> None:
     data.pair_best[i], data.pair_partner[i] = earliest, partner
 
 
-@kernel
+@inline_kernel
 def find_pair_times(data: TabletopState, i: int, now: float) -> None:
     """Compute the times of impact of a ball with all others; its own event must be known."""
     times, earliest, partner = data.pair_time, data.pair_best, data.pair_partner
@@ -206,7 +250,7 @@ def rebuild_all(data: TabletopState, t: float) -> None:
     find_all_events(data, t)
 
 
-@kernel
+@inline_kernel
 def process_event(data: TabletopState, i: int, kind: int, partner: int, t: float) -> None:
     """Process the event of a ball and predict the next events of the balls involved."""
     row, recording = data.counts[c.LOG_ROWS], data.counts[c.RECORDING] != 0

@@ -37,9 +37,9 @@ PHASE, COLLISION_MASK, SURFACE, TAG_COLUMNS = range(4)
 """Columns of `tags`: phase of the motion; collision mask as in `BodyStore.collision_mask`; row of the material in
 `coefficients`."""
 
-PX, PY, NX, NY, UX, UY, LENGTH, LINE_NOSE = range(8)
+PX, PY, NX, NY, UX, UY, LENGTH, LINE_NOSE, LEFT, BOTTOM, RIGHT, TOP = range(12)
 """Columns of `lines`: a point of the surface, m; outward normal; direction along the line; extent from the point, m;
-height of the cushion's nose, m, nan for none."""
+height of the cushion's nose, m, nan for none; bounds, m, infinite for half-planes."""
 
 CENTRE_X, CENTRE_Y, CIRCLE_RADIUS, VERTEX_NOSE = range(4)
 """Columns of `vertices`: centre and radius, m; height of the nose, m, nan for none. The first three are those of
@@ -96,7 +96,7 @@ class TabletopState(NamedTuple):
     coefficients: FloatArray
     """(2, S, S) restitution and friction of each pair of surfaces"""
     lines: FloatArray
-    """(L, 8)"""
+    """(L, 12)"""
     line_tags: IntArray
     """(L, 2)"""
     vertices: FloatArray
@@ -127,8 +127,10 @@ def make_tabletop_state(store: BodyStore) -> TabletopState:
     heights = _nose_heights(scene)
     vertices = _with_heights(plain, heights)
     exposed = _exposed_of(scene)
-    lines = plain.lines[:, : discs.HALF_THICKNESS + 1].copy()
+    lines = np.empty((len(plain.lines), TOP + 1))
+    lines[:, :LINE_NOSE] = plain.lines[:, :LINE_NOSE]
     lines[:, LINE_NOSE] = heights[plain.line_tags[:, 0]]
+    lines[:, LEFT:] = _line_boxes(lines)
     state = np.zeros((count, STATE_COLUMNS))
     state[:, X : Y + 1], state[:, VX : VY + 1] = store.position, store.velocity
     state[:, WX : WY + 1], state[:, WZ], state[:, ANGLE] = store.roll, store.angular_velocity, store.angle
@@ -206,6 +208,16 @@ def contacts_of(log: FloatArray, tags: IntArray) -> Contacts:
         log[:, NORMAL_X : NORMAL_X + 2].copy(),
         log[:, IMPULSE_X : IMPULSE_X + 2].copy(),
     )
+
+
+def _line_boxes(lines: FloatArray) -> FloatArray:
+    """Return the left, bottom, right and top bounds of lines (L, 4), m; infinite for half-planes."""
+    begin, extent = lines[:, PX : PY + 1], lines[:, LENGTH, None]
+    with np.errstate(invalid="ignore"):  # 0 · ∞
+        end = begin + lines[:, UX : UY + 1] * extent
+    low, high = np.minimum(begin, end), np.maximum(begin, end)
+    is_infinite = np.isinf(extent)
+    return np.column_stack((np.where(is_infinite, -np.inf, low), np.where(is_infinite, np.inf, high)))
 
 
 def exposed_vertices(vertices: FloatArray) -> IntArray:
