@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sandbox.engines.contract import Divergence, Exhaustion, Simulation
-from sandbox.engines.reference import ball_stepper
-from sandbox.engines.reference.ball_kernels import KERNEL
+from sandbox.engines.reference import compiled_stepper
+from sandbox.engines.reference.compiled_stepper import OPTIONAL_KERNELS
 from sandbox.engines.reference.integrators import INTEGRATORS
 from sandbox.engines.registry import ENGINES
 from sandbox.engines.switching import SwitchableSimulation, start
@@ -45,6 +45,25 @@ SCENES = {
     "velocity_jitter = 3.0\nrestitution = 1.0\nfriction = 0.0\n",
     "boxes": BOX + "[[box]]\nposition = [0, 0.3]\nsize = [0.4, 0.4]\nangle = 0.2\n"
     "[[box]]\nposition = [0.05, 0.9]\nsize = [0.4, 0.4]\nangle = -0.3\n",
+    "boxes and walls": "[world]\nlinear_drag = 0.1\nbounds = [[-2, -1], [2, 3]]\n"
+    + BOX
+    + "[[wall]]\npoints = [[-0.9, 0.5], [0, 0.3], [0.8, 0.6]]\nthickness = 0.05\n"
+    "[[box]]\nposition = [-0.6, 1.2]\nsize = [0.3, 0.2]\nangular_velocity = 3.0\nrestitution = 0.4\n"
+    "[[capsule]]\nposition = [0.4, 1.0]\nlength = 0.3\nradius = 0.05\nangle = 1.0\nrestitution = 0.4\n"
+    "[[ball]]\nposition = [0.1, 1.4]\nradius = 0.1\nvelocity = [0.5, 0]\n"
+    "[[body]]\nposition = [0.0, 1.9]\nrestitution = 0.4\n[[body.polygon]]\npoints = [[0, 0], [0.2, 0], [0.1, 0.2]]\n"
+    "[[body.ball]]\nposition = [-0.1, 0]\nradius = 0.06\n",
+    "boxes that leave": "[world]\nbounds = [[-1, -1], [1, 1]]\n[[box]]\nposition = [0, 0]\nsize = [0.2, 0.1]\n"
+    "velocity = [4, 2]\nangular_velocity = 5\n[[box]]\nposition = [0.5, 0]\nsize = [0.1, 0.1]\nvelocity = [-1, 0]\n",
+    "thrusts": "[world]\nbounds = [[-4, -4], [4, 4]]\nlinear_drag = 0.2\n"
+    + BOX
+    + "[[box]]\nname = 'ship'\nposition = [0, 1]\nsize = [0.3, 0.2]\n"
+    "[[ball]]\nname = 'rocket'\nposition = [0.6, 1]\nradius = 0.1\n"
+    "[[thrust]]\nbody = 'ship'\nforce = [0.1, 0.9]\npoint = [0.05, -0.1]\n"
+    "[[thrust]]\nbody = 'ship'\nforce = [0.3, 0.0]\npoint = [0.0, 0.1]\nbegin = 0.1\nend = 0.25\n"
+    "[[thrust]]\nbody = 'rocket'\nforce = [0.0, 0.5]\npoint = [0.02, 0.0]\nbegin = 0.05\n",
+    "thrust on a ball": "[[ball]]\nname = 'rocket'\nposition = [0.6, 1]\nradius = 0.1\n"
+    "[[thrust]]\nbody = 'rocket'\nforce = [0.0, 0.5]\npoint = [0.02, 0.0]\nend = 0.3\n",
     "no bodies": BOX,
     "bounds and lifetimes": "[world]\nbounds = [[-3, -3], [3, 3]]\n"
     "[[ball]]\nposition = [0, 0]\nvelocity = [9, 0]\nradius = 0.1\n[[ball]]\nposition = [0, 1]\nradius = 0.1\n"
@@ -65,8 +84,9 @@ SCENES = {
 
 @pytest.fixture(autouse=True)
 def _compiled_steps() -> None:
-    """Compile `advance_balls` at once; it is otherwise compiled only after a while."""
-    KERNEL.spent = math.inf
+    """Compile the optional kernels at once; they are otherwise compiled only after a while."""
+    for kernel in OPTIONAL_KERNELS:
+        kernel.spent = math.inf
 
 
 def small_scene(name: str) -> Scene:
@@ -199,8 +219,8 @@ def test_compiled_steps_of_the_reference(integrator: str, broad_phase: str) -> N
 def test_methods_without_compiled_code_use_the_readable_step(codes: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = small_scene("balls that settle")
     one, seen = advanced(started(scene, "reference"), [50], 1)
-    monkeypatch.setattr(ball_stepper, codes, {})
-    monkeypatch.setattr(ball_stepper, "advance_balls", None)  # must not be called
+    monkeypatch.setattr(compiled_stepper, codes, {})
+    monkeypatch.setattr(compiled_stepper, "advance_balls", None)  # must not be called
     other, seen_other = advanced(started(scene, "reference"), [50], 1)
     assert seen == seen_other
     assert_same(one, other)

@@ -237,6 +237,11 @@ class BodyStore:
         self._rebuild(self.setup, self.bodies, self.contact_matrix)
 
     @property
+    def has_lifetimes(self) -> bool:
+        """Whether lifetimes are still to end."""
+        return self._lifetimes.any_left
+
+    @property
     def can_expire(self) -> bool:
         """Whether bodies can leave `world.bounds` or reach the end of a lifetime."""
         return self.scene.world.bounds is not None or self._lifetimes.any_left

@@ -256,6 +256,10 @@ class CollisionPipeline(ABC):
     def max_displacement(self, start: FloatArray, end: FloatArray) -> float:
         """Return the largest displacement, m, of any point of bodies that can touch anything, between two poses."""
 
+    @abstractmethod
+    def broad_phase_memory(self, position: FloatArray) -> IntArray:
+        """Return the memory of the broad phase, which its next call changes."""
+
     def overlaps(self, position: FloatArray) -> Manifolds:
         """Return all contacts at (N, ≥ 2) positions, m. They are valid until the next detection."""
         return self.manifolds(position, self.candidates(position))
@@ -407,6 +411,19 @@ class ConvexPipeline(CollisionPipeline):
         touching = store.bodies.thin[self.can_touch]
         if np.isfinite(self.min_radius):
             self.min_radius = float(touching.min(initial=np.inf))
+
+    @property
+    def pieces(self) -> WorldPieces:
+        """The pieces, at the poses of the last detection."""
+        return self._pieces
+
+    def broad_phase_memory(self, position: FloatArray) -> IntArray:
+        """Return the memory of the broad phase, as `CirclePipeline`; poses (N, ≥ 2)."""
+        if self._order is None:
+            self._update_pieces(position)
+            pieces = self._pieces
+            self._order = self._initial_order(pieces.middle, pieces.bounding_radius, pieces.collision_mask)
+        return self._order
 
     def _update_pieces(self, position: FloatArray) -> None:
         angle = position[:, 2] if position.shape[1] == 3 else self._store.angle

@@ -108,19 +108,19 @@ class ForceField:
         self._position: FloatArray = np.asarray(positions, np.float64).reshape(-1, 2)
         self._strength: FloatArray = np.asarray([a.strength for a in attractions], np.float64)
         self._softening: FloatArray = np.asarray([a.softening for a in attractions], np.float64)
-        self._thrust: IntArray = np.asarray(which, np.int64)
-        self._body: IntArray = np.asarray([number[t.body] for t in thrusts], np.int64)
-        centres = [geometry_of(bodies.elements[bodies.element[n]]).centre for n in self._body.tolist()]
+        self.thrust_indices: IntArray = np.asarray(which, np.int64)
+        self.thrust_bodies: IntArray = np.asarray([number[t.body] for t in thrusts], np.int64)
+        centres = [geometry_of(bodies.elements[bodies.element[n]]).centre for n in self.thrust_bodies.tolist()]
         points = [(t.point[0] - c[0], t.point[1] - c[1]) for t, c in zip(thrusts, centres, strict=True)]
-        self._point: FloatArray = np.asarray(points, np.float64).reshape(-1, 2)
-        self._force: FloatArray = np.asarray([t.force for t in thrusts], np.float64).reshape(-1, 2)
-        self._begin: FloatArray = np.asarray([t.begin for t in thrusts], np.float64)
-        self._end: FloatArray = np.asarray([math.inf if t.end is None else t.end for t in thrusts], np.float64)
+        self.thrust_points: FloatArray = np.asarray(points, np.float64).reshape(-1, 2)
+        self.thrust_forces: FloatArray = np.asarray([t.force for t in thrusts], np.float64).reshape(-1, 2)
+        self.thrust_begins: FloatArray = np.asarray([t.begin for t in thrusts], np.float64)
+        self.thrust_ends: FloatArray = np.asarray([math.inf if t.end is None else t.end for t in thrusts], np.float64)
 
     @property
     def empty(self) -> bool:
         """Whether there are no attractions and no thrusts."""
-        return not (len(self._target) or len(self._body))
+        return not (len(self._target) or len(self.thrust_bodies))
 
     def __call__(self, time: float, x: State) -> FloatArray:
         """Return the accelerations (N, D) at a time, s, in a state (2, N, D), m/s² and rad/s²."""
@@ -139,9 +139,14 @@ class ForceField:
         return out
 
     @property
+    def attracting(self) -> bool:
+        """Whether there are attractions."""
+        return len(self._target) > 0
+
+    @property
     def thrusting(self) -> bool:
         """Whether there are thrusts."""
-        return len(self._body) > 0
+        return len(self.thrust_bodies) > 0
 
     def thrusts(self, time: float, x: State) -> FloatArray:
         """Return the accelerations (N, D) by thrusts alone, m/s² and rad/s²."""
@@ -153,9 +158,9 @@ class ForceField:
         """Add the accelerations by thrusts."""
         if self.thrusting:
             store, now = self._store, self._began + time
-            level = store.throttles[self._thrust] * ((self._begin <= now) & (now < self._end))
+            level = store.throttles[self.thrust_indices] * ((self.thrust_begins <= now) & (now < self.thrust_ends))
             inverse = store.inverse_mass, store.inverse_moment
-            add_thrust(x[0], self._body, self._point, self._force, level, *inverse, out)
+            add_thrust(x[0], self.thrust_bodies, self.thrust_points, self.thrust_forces, level, *inverse, out)
 
 
 def forces_on(store: BodyStore, field: ForceField, joints: JointSolver | None, coordinates: int) -> Inputs:

@@ -18,12 +18,10 @@ from sandbox.engines.common.frame_rows import free_rows
 from sandbox.engines.common.kernel import warn_if_uncompiled
 from sandbox.engines.contract import Divergence, Exhaustion, Members, Observer
 from sandbox.engines.energy_ledger import Cause
-from sandbox.engines.reference.ball_kernels import BEYOND as BALLS_BEYOND
-from sandbox.engines.reference.ball_kernels import KERNEL, STOPPED
-from sandbox.engines.reference.ball_stepper import (
+from sandbox.engines.reference.compiled_stepper import (
     CAPACITY,
-    BallStepper,
-    BallSteps,
+    CompiledStepper,
+    CompiledSteps,
     MemberStepper,
     record_contacts,
 )
@@ -32,6 +30,7 @@ from sandbox.engines.reference.energy import StepEnergyLedger
 from sandbox.engines.reference.joints import JointBreaker
 from sandbox.engines.reference.manifold import CONTACT_ROUNDING, Manifolds
 from sandbox.engines.reference.step import StepRecord, WorldState
+from sandbox.engines.reference.step_kernels import STOPPED, UNCHECKED
 from sandbox.engines.reference.zones import ZonedBodyStore
 from sandbox.frame_table import FrameTable
 from sandbox.scene.compile.bodies import Bodies
@@ -68,7 +67,7 @@ class ReferenceSimulation(SteppedSimulation):
         self._world.records_joint_load = self._breaker is not None
         self._h = settings.h
         self._log: ContactLog | None = None
-        self._balls: BallStepper | None = None
+        self._stepper: CompiledStepper | None = None
         self._last_contacts = NO_CONTACTS  # contacts of the last record
         self._initial_entries: ContactBatch | None = None  # zone entries before the recording began
         self._world.pipeline.check_limits(self._world.x[0])  # exceeding a limit raises before the run begins
@@ -76,7 +75,7 @@ class ReferenceSimulation(SteppedSimulation):
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Self:
         """Return an independent simulation in the same state, without the memory of compiled steps."""
-        self._balls = None
+        self._stepper = None
         return super().__deepcopy__(memo)
 
     @property
@@ -107,34 +106,35 @@ class ReferenceSimulation(SteppedSimulation):
     def advance(self, steps: int, frames: FrameTable, *, until_event: bool = False) -> None:
         """Advance by at most so many time steps, and record the frames that are due, as `Simulation.advance`.
 
-        A world of balls makes many steps in one compiled call.
+        Where nothing has to be done between two substeps, one compiled call makes many steps.
 
         Raises:
             Divergence: the state of a body is not finite, or exceeds the bounds. It can still be read.
             Exhaustion: a step exceeds a resource limit.
         """
-        if until_event:
-            super().advance(steps, frames, until_event=True)
-            return
-        end = frames.steps + steps
+        end, kernel, is_over = frames.steps + steps, CompiledStepper.kernel_for(self._world), False
         frames.prepare(steps, len(self.bodies))
-        while frames.steps < end:
-            if not self._can_batch():
-                super().advance(end - frames.steps, frames)
+        while frames.steps < end and not is_over:
+            # A contact that was open at the last call of `contacts` is in the next one too.
+            is_watched = until_event and (self._log is None or self._log.is_open)
+            if is_watched or not self._can_batch():
+                super().advance(end - frames.steps, frames, until_event=until_event)
                 return
-            if not KERNEL.is_worthwhile:
+            if not kernel.is_worthwhile:
                 began = perf_counter()
-                super().advance(end - frames.steps, frames)
-                KERNEL.spent += perf_counter() - began
+                super().advance(end - frames.steps, frames, until_event=until_event)
+                kernel.spent += perf_counter() - began
                 return
             with self._lock, np.errstate(all="ignore"):
                 self._check_running()
-                self._advance_balls(end - frames.steps, frames)
+                self._advance_compiled(end - frames.steps, frames, until_event)
+            is_over = until_event
 
     def run_members(self, members: Members, steps: float, is_stopped: Callable[[], bool]) -> BoolArray:
         """Run the scene from each start, and write the end states in their place, as `MemberRunner.run_members`."""
         is_done = np.zeros(len(members.position), np.bool_)
-        if not (self._can_batch() and KERNEL.is_worthwhile) or steps % 1.0:
+        is_compiled = self._can_batch() and CompiledStepper.kernel_for(self._world).is_worthwhile
+        if not is_compiled or self._store.can_expire or steps % 1.0:
             return is_done
         stepper = MemberStepper(
             copy.deepcopy(self._store), self._settings
@@ -146,23 +146,29 @@ class ReferenceSimulation(SteppedSimulation):
         return is_done
 
     def _can_batch(self) -> bool:
-        """Whether nothing has to be done between two substeps, so that `BallStepper` can make many."""
+        """Whether nothing has to be done between two substeps, so that `CompiledStepper` can make many."""
         return (
             self._zoned is None
             and self._energy is None
-            and not self._store.can_expire
+            and not self._store.has_lifetimes
             and (self._log is None or self._log.can_hold(CAPACITY))
-            and BallStepper.is_suitable(self._world, self._store, self._settings)
+            and CompiledStepper.is_suitable(self._world, self._store, self._settings)
         )
 
-    def _advance_balls(self, steps: int, frames: FrameTable) -> None:
-        """Make at most so many steps by `BallStepper`, and those substeps that it cannot make."""
-        if self._balls is None or self._balls.forces is not self._world.forces:
-            self._balls = BallStepper(self._world, self._store, self._settings)
+    def _advance_compiled(self, steps: int, frames: FrameTable, until_contact: bool) -> None:
+        """Make at most so many steps by `CompiledStepper`, and those substeps that it cannot make."""
+        if self._stepper is None or self._stepper.forces is not self._world.forces:
+            self._stepper = CompiledStepper(self._world, self._store, self._settings)
         observed, n = self._observer is not None, len(self.bodies)
-        steps = min(steps, self._balls.max_steps(observed=observed))
-        rows = free_rows(frames)
-        result = self._balls.advance(self._steps, steps, rows, records=self._log is not None, observed=observed)
+        steps = min(steps, self._stepper.max_steps(observed=observed))
+        result = self._stepper.advance(
+            self._steps,
+            steps,
+            free_rows(frames),
+            records=self._log is not None,
+            observed=observed,
+            until_contact=until_contact,
+        )
         if self._world.x.shape[2] == 2:
             written = slice(frames.count, frames.count + result.frames)
             frames.angle[written, :n], frames.angular_velocity[written, :n] = (
@@ -170,10 +176,10 @@ class ReferenceSimulation(SteppedSimulation):
                 self._store.angular_velocity,
             )
         frames.finish_rows(result.frames, n)
-        self._record_balls(result)
+        self._record_compiled(result)
         self._steps += result.steps
         frames.steps += result.steps
-        if result.code == BALLS_BEYOND or (result.code == STOPPED and result.steps < steps):
+        if result.code == UNCHECKED or (result.code == STOPPED and result.steps < steps):
             first = result.substeps if result.code == STOPPED else self._settings.substeps
             self._finish_substeps(first)
             frames.steps += 1
@@ -192,7 +198,7 @@ class ReferenceSimulation(SteppedSimulation):
         self._steps += 1
         self._finish_step()
 
-    def _record_balls(self, result: BallSteps) -> None:
+    def _record_compiled(self, result: CompiledSteps) -> None:
         """Log the contacts of substeps, and call the observer."""
         if self._log is None:
             return

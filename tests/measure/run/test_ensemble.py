@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import sandbox
 from sandbox.engines.common.kernel import COMPILED
-from sandbox.engines.reference.ball_kernels import KERNEL
+from sandbox.engines.reference.compiled_stepper import OPTIONAL_KERNELS
 from sandbox.measure.run.ensemble import FIELDS, varied_starts
 from sandbox.resource_limits import TooLargeError
 from sandbox.scene.compile.scene import Scene
@@ -37,7 +37,8 @@ PENDULUM = (
 
 @pytest.fixture(autouse=True)
 def _compiled_steps() -> None:
-    KERNEL.spent = math.inf
+    for kernel in OPTIONAL_KERNELS:
+        kernel.spent = math.inf
 
 
 def single_run(scene: Scene, engine: str, seed: int, vary: dict[str, float], m: int, **changes: object):

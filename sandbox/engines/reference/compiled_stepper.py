@@ -1,17 +1,26 @@
-"""Many steps of a world of balls by compiled steps: arrays in and out, contacts into the log, runs from many starts."""
+"""Many steps of a world by compiled steps: arrays in and out, contacts into the log, runs from many starts."""
 
+import math
+from collections.abc import Callable
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from sandbox.arrays import ComplexArray, FloatArray, IntArray
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.contact_log import ContactBatch, ContactLog
 from sandbox.engines.common.frame_rows import FrameRows, no_rows
+from sandbox.engines.common.kernel import OptionalKernel
 from sandbox.engines.contract import PairRuns
-from sandbox.engines.reference.ball_kernels import (
-    BEYOND,
+from sandbox.engines.reference.ball_kernels import BALL_KERNEL, BallColumns, advance_balls
+from sandbox.engines.reference.broad_phase import SegmentBoxes
+from sandbox.engines.reference.collision import CollisionPipeline, ConvexPipeline, empty_manifolds
+from sandbox.engines.reference.integrators import INTEGRATORS
+from sandbox.engines.reference.piece_kernels import PIECE_KERNEL, PieceColumns, advance_pieces
+from sandbox.engines.reference.step import WorldState
+from sandbox.engines.reference.step_kernels import (
     BROAD_PHASE_CODES,
     BROAD_TESTS,
     HAS_PSEUDO_VELOCITY,
@@ -19,18 +28,19 @@ from sandbox.engines.reference.ball_kernels import (
     KEYS,
     NO_PAIRS,
     STOPPED,
-    BallColumns,
-    BallConstants,
-    BallLog,
-    BallScratch,
-    BallState,
-    advance_balls,
+    UNCHECKED,
+    BodyColumns,
+    SolverState,
+    StepConstants,
+    StepLog,
+    StepScratch,
+    WallColumns,
 )
-from sandbox.engines.reference.collision import CirclePipeline, empty_manifolds
-from sandbox.engines.reference.integrators import INTEGRATORS
-from sandbox.engines.reference.step import WorldState
 from sandbox.engines.reference.velocity_solver import ImpulseSolver
 from sandbox.scene.description.world import Settings
+
+OPTIONAL_KERNELS = (BALL_KERNEL, PIECE_KERNEL)
+"""Kernels that are compiled only where that saves time"""
 
 CAPACITY = 1 << 15
 """Contacts in the log of a call"""
@@ -42,7 +52,7 @@ MAX_PATH = 1 << 17
 """Centres in the path of a call, for an observer"""
 
 
-class BallSteps(NamedTuple):
+class CompiledSteps(NamedTuple):
     """Result of a call."""
 
     steps: int
@@ -52,25 +62,28 @@ class BallSteps(NamedTuple):
     frames: int
     """frames written"""
     code: int
-    """`DONE`, `STOPPED` or `BEYOND`"""
-    log: BallLog
+    """`DONE`, `STOPPED` or `UNCHECKED`"""
+    log: StepLog
     """valid until the next call"""
     path: FloatArray
     """(B + 1, N, 2)"""
 
 
-class BallStepper:
-    """Advances a world of balls by `advance_balls`, as long as its forces and solver stay the same."""
+class CompiledStepper:
+    """Advances a world by compiled steps, as long as its forces and solver stay the same."""
 
     def __init__(self, world: WorldState, store: BodyStore, settings: Settings) -> None:
         """Prepare the arrays of a world for which `is_suitable` is true."""
         pipeline, solver = world.pipeline, world.impulses
-        assert isinstance(pipeline, CirclePipeline)
         assert settings.integrator and settings.broad_phase and settings.slop is not None and settings.bias is not None
-        self._world, self._pipeline, self.forces = world, pipeline, world.forces
+        self._world, self._pipeline, self.forces, self._store = world, pipeline, world.forces, store
         self._substeps = settings.substeps
-        h, forces, boxes = settings.h, world.forces, pipeline.segment_boxes
-        self._numbers = BallConstants(
+        h, forces, boxes, matrix = settings.h, world.forces, pipeline.segment_boxes, store.contact_matrix
+        bounds = store.scene.world.bounds
+        low, high = ((-math.inf, -math.inf), (math.inf, math.inf)) if bounds is None else bounds
+        has_pieces = isinstance(pipeline, ConvexPipeline)
+        has_pairs = matrix.mutual if has_pieces else matrix.ball_ball
+        self._numbers = StepConstants(
             h=h,
             dt=settings.dt,
             substeps=settings.substeps,
@@ -83,40 +96,25 @@ class BallStepper:
             quadratic_drag=forces.quadratic_drag,
             wind_x=forces.wind[0],
             wind_y=forces.wind[1],
-            broad_phase=BROAD_PHASE_CODES[settings.broad_phase] if store.contact_matrix.ball_ball else NO_PAIRS,
+            broad_phase=BROAD_PHASE_CODES[settings.broad_phase] if has_pairs else NO_PAIRS,
             max_tests=pipeline.max_pairs,
             max_contacts=solver.max_contacts,
             segment_width=boxes.max_width,
             plane_tests=pipeline.plane_tests,
+            began=store.setup.time,
+            left=float(low[0]),
+            bottom=float(low[1]),
+            right=float(high[0]),
+            top=float(high[1]),
         )
-        fixtures, turning = store.fixtures, np.zeros(len(store.radius))
-        if forces.constant.shape[1] == 3:
-            turning = forces.constant[:, 2]
-        self._store = store
-        given: dict[str, Any] = {
-            "constant": np.column_stack((forces.constant[:, :2], turning)),
-            "mobile": np.broadcast_to(forces.mobile[:, 0], len(store.radius)),
-            "radius": store.radius,
-            "surface": store.surface,
-            "mask": store.collision_mask,
-            "moves": pipeline.moves,
-            "can_touch": pipeline.can_touch,
-            "inverse_mass": store.inverse_mass,
-            "inverse_moment": store.inverse_moment,
-            "friction": store.friction,
-            "restitution": store.restitution.ravel(),
-            "planes": fixtures.planes,
-            "plane_collider": fixtures.plane_collider,
-            "collider_surface": store.fixed_surface,
-            "segments": fixtures.segments,
-            "segment_joints": fixtures.joints,
-            "segment_collider": fixtures.segment_collider,
-            "segment_box": boxes.box,
-            "segment_index": boxes.index,
-        }
-        # Copied, so that the kernel is compiled for one kind of arrays: not for read-only or strided ones too.
-        self._arrays = BallColumns(**{name: np.array(array, order="C") for name, array in given.items()})
-        self._log = BallLog(
+        self._bodies, self._walls = _body_columns(world, store), _wall_columns(store, pipeline.segment_boxes)
+        self._advance: Callable[..., tuple[int, int, int, int]] = advance_balls
+        self._shapes: BallColumns | PieceColumns
+        if isinstance(pipeline, ConvexPipeline):
+            self._advance, self._shapes = advance_pieces, _piece_columns(pipeline)
+        else:
+            self._shapes = _ball_columns(pipeline, store)
+        self._log = StepLog(
             np.zeros(MAX_SUBSTEPS + self._substeps + 1, np.int64),
             np.empty(MAX_SUBSTEPS + self._substeps, np.bool_),
             np.empty((CAPACITY, 2), np.int64),
@@ -126,31 +124,35 @@ class BallStepper:
 
     @staticmethod
     def is_suitable(world: WorldState, store: BodyStore, settings: Settings) -> bool:
-        """Return whether a world needs nothing that `advance_balls` lacks."""
+        """Return whether a world needs nothing that compiled steps lack."""
         solver = world.solver
         return (
             settings.detection == "discrete"
             and type(solver) is ImpulseSolver
             and solver.is_plain
-            and isinstance(world.pipeline, CirclePipeline)
             and world.pipeline.filter is None
             and world.joints is None
-            and not world.forces.forces
+            and not world.field.attracting
             and settings.broad_phase in BROAD_PHASE_CODES
             and settings.integrator in INTEGRATOR_CODES
             and not (world.records_work or world.records_joint_load)
             and len(store.radius) > 0
         )
 
+    @staticmethod
+    def kernel_for(world: WorldState) -> OptionalKernel:
+        """Return the kernel that a world uses."""
+        return PIECE_KERNEL if isinstance(world.pipeline, ConvexPipeline) else BALL_KERNEL
+
     def _allocate(self, contacts: int) -> None:
         """Allocate memory for a number of contacts in a substep."""
-        shape = (2, len(self._arrays.radius), 3)
+        shape = (2, len(self._bodies.mobile), 3)
         self._capacity = contacts
-        self._scratch = BallScratch(
+        self._scratch = StepScratch(
             placed=np.empty(shape),
             after=np.empty(shape),
             change=np.empty(shape[1:]),
-            ball_keys=np.empty(4 * contacts, np.int64),
+            pair_keys=np.empty(4 * contacts, np.int64),
             segment_keys=np.empty(4 * contacts, np.int64),
             out=empty_manifolds(contacts),
             bounce=np.empty(contacts),
@@ -166,10 +168,19 @@ class BallStepper:
 
     def max_steps(self, *, observed: bool) -> int:
         """Return the largest number of steps of a call, at least 1."""
-        substeps = min(MAX_SUBSTEPS, MAX_PATH // len(self._arrays.radius)) if observed else MAX_SUBSTEPS
+        substeps = min(MAX_SUBSTEPS, MAX_PATH // len(self._bodies.mobile)) if observed else MAX_SUBSTEPS
         return max(substeps // self._substeps, 1)
 
-    def advance(self, begin: int, steps: int, frames: FrameRows, *, records: bool, observed: bool) -> BallSteps:
+    def advance(
+        self,
+        begin: int,
+        steps: int,
+        frames: FrameRows,
+        *,
+        records: bool,
+        observed: bool,
+        until_contact: bool = False,
+    ) -> CompiledSteps:
         """Make at most so many steps; the state of the world is that after them, and after the substeps beyond.
 
         Args:
@@ -177,7 +188,8 @@ class BallStepper:
             steps: largest number of steps, at most `max_steps`.
             frames: rows for the frames.
             records: whether to record contacts.
-            observed: whether to record the path of the balls.
+            observed: whether to record the path of the bodies.
+            until_contact: whether the first step with contacts is the last one; only if they are recorded.
         """
         world, memory, pipeline, numbers = self._world, self._world.memory, self._pipeline, self._numbers
         known, substeps = len(memory.key), steps * numbers.substeps
@@ -193,16 +205,29 @@ class BallStepper:
         key[:known], impulse[:known] = memory.key, memory.impulse
         order = pipeline.broad_phase_memory(x[0]) if numbers.broad_phase != NO_PAIRS else NO_ORDER
         counts = np.array([known, memory.has_pseudo_velocity, 0, 0, 0, 0], np.int64)
-        state = BallState(x, key, impulse, memory.pseudo_velocity, order, counts)
+        level = self._store.throttles[world.field.thrust_indices]
+        state = SolverState(x, key, impulse, memory.pseudo_velocity, order, level, counts)
         log = self._log if records else NO_LOG
         path = np.empty((substeps + 1, count, 2) if observed else (0, 0, 2))
         if observed:
             path[0] = x[0, :, :2]
         warm_start = min(numbers.h / memory.h, 1.0)
-        made, rest, written, code = advance_balls(
-            numbers, self._arrays, state, self._scratch, frames, path, log, begin, steps, warm_start
+        made, rest, written, code = self._advance(
+            numbers,
+            self._bodies,
+            self._shapes,
+            self._walls,
+            state,
+            self._scratch,
+            frames,
+            path,
+            log,
+            begin,
+            steps,
+            warm_start,
+            until_contact,
         )
-        substeps = (made + (code == BEYOND)) * numbers.substeps + rest
+        substeps = (made + (code == UNCHECKED)) * numbers.substeps + rest
         if substeps:
             world.x = x if turns else x[:, :, :2].copy()
             memory.key, memory.impulse = key[: counts[KEYS]].copy(), impulse[: counts[KEYS]].copy()
@@ -212,10 +237,82 @@ class BallStepper:
                 world.work[name] += amount
         if code == STOPPED and capacity < MAX_CAPACITY:
             self._allocate(4 * capacity)
-        return BallSteps(made, rest, written, code, _first(log, substeps), path[: substeps + 1])
+        return CompiledSteps(made, rest, written, code, _first(log, substeps), path[: substeps + 1])
 
 
-NO_LOG = BallLog(np.zeros(0, np.int64), np.empty(0, np.bool_), np.empty((0, 2), np.int64), np.empty((0, 6)))
+Column = TypeVar("Column", bound=np.generic)
+
+
+def _own(array: npt.NDArray[Column]) -> npt.NDArray[Column]:
+    """Return a copy, so that kernels are compiled for one kind of arrays: not for read-only or strided ones too."""
+    return np.array(array, order="C")
+
+
+def _body_columns(world: WorldState, store: BodyStore) -> BodyColumns:
+    forces, thrusts = world.forces, world.field
+    turning = forces.constant[:, 2] if forces.constant.shape[1] == 3 else np.zeros(len(store.radius))
+    return BodyColumns(
+        constant=np.column_stack((forces.constant[:, :2], turning)),
+        mobile=_own(np.broadcast_to(forces.mobile[:, 0], len(store.radius))),
+        can_leave=store.present & ~store.bodies.fixed,
+        inverse_mass=_own(store.inverse_mass),
+        inverse_moment=_own(store.inverse_moment),
+        restitution=_own(store.restitution.ravel()),
+        friction=_own(store.friction),
+        thrust_body=_own(thrusts.thrust_bodies),
+        thrust_point=_own(thrusts.thrust_points),
+        thrust_force=_own(thrusts.thrust_forces),
+        thrust_begin=_own(thrusts.thrust_begins),
+        thrust_end=_own(thrusts.thrust_ends),
+    )
+
+
+def _wall_columns(store: BodyStore, boxes: SegmentBoxes) -> WallColumns:
+    fixtures = store.fixtures
+    return WallColumns(
+        planes=_own(fixtures.planes),
+        plane_collider=_own(fixtures.plane_collider),
+        collider_surface=_own(store.fixed_surface),
+        segments=_own(fixtures.segments),
+        segment_joints=_own(fixtures.joints),
+        segment_collider=_own(fixtures.segment_collider),
+        segment_box=_own(boxes.box),
+        segment_index=_own(boxes.index),
+    )
+
+
+def _ball_columns(pipeline: CollisionPipeline, store: BodyStore) -> BallColumns:
+    return BallColumns(
+        radius=_own(store.radius),
+        surface=_own(store.surface),
+        mask=_own(store.collision_mask),
+        moves=_own(pipeline.moves),
+        can_touch=_own(pipeline.can_touch),
+    )
+
+
+def _piece_columns(pipeline: ConvexPipeline) -> PieceColumns:
+    pieces = pipeline.pieces
+    return PieceColumns(
+        corner=_own(pieces.corner),
+        first=_own(pieces.first),
+        radius=_own(pieces.radius),
+        body=_own(pieces.body),
+        surface=_own(pieces.surface),
+        local=_own(pieces.local),
+        local_middle=_own(pieces.local_middle),
+        middle=_own(pieces.middle),
+        bounding_radius=_own(pieces.bounding_radius),
+        mask=_own(pieces.collision_mask),
+        moves=_own(pieces.moves),
+        can_touch=_own(pieces.can_touch),
+        excluded=_own(pieces.excluded),
+        group=_own(pieces.group),
+        points=np.empty((2, 6)),
+    )
+
+
+NO_LOG = StepLog(np.zeros(0, np.int64), np.empty(0, np.bool_), np.empty((0, 2), np.int64), np.empty((0, 6)))
 
 MAX_CAPACITY = CAPACITY
 """Contacts of a substep beyond which the readable step is used; it costs little beside so many contacts"""
@@ -223,15 +320,15 @@ MAX_CAPACITY = CAPACITY
 NO_ORDER: IntArray = np.empty(0, np.int64)
 
 
-def _first(log: BallLog, substeps: int) -> BallLog:
+def _first(log: StepLog, substeps: int) -> StepLog:
     """Return the used rows of a log."""
     if not len(log.end):
         return log
     rows = int(log.end[substeps])
-    return BallLog(log.end[: substeps + 1], log.same[:substeps], log.pair[:rows], log.vectors[:rows])
+    return StepLog(log.end[: substeps + 1], log.same[:substeps], log.pair[:rows], log.vectors[:rows])
 
 
-def record_contacts(target: ContactLog, log: BallLog, times: FloatArray, wants_pairs: bool) -> PairRuns:
+def record_contacts(target: ContactLog, log: StepLog, times: FloatArray, wants_pairs: bool) -> PairRuns:
     """Enter the contacts of many substeps into a contact log, as if each had been recorded after its substep.
 
     Args:
@@ -273,13 +370,13 @@ def _complex(vectors: FloatArray) -> ComplexArray:
 
 
 class MemberStepper:
-    """Runs one world of balls from many starts."""
+    """Runs one world from many starts."""
 
     def __init__(self, store: BodyStore, settings: Settings) -> None:
         """Take over a body store, which no other simulation may use."""
         self._store, self._settings = store, settings
         self._world = WorldState(store, settings)
-        self._stepper = BallStepper(self._world, store, settings)
+        self._stepper = CompiledStepper(self._world, store, settings)
         self._frames = no_rows()
 
     def run(
@@ -296,13 +393,13 @@ class MemberStepper:
             own[:] = given
         if not self._world.restart():
             self._world.rebuild()
-            self._stepper = BallStepper(self._world, store, self._settings)
+            self._stepper = CompiledStepper(self._world, store, self._settings)
         stepper, made = self._stepper, 0
         while made < steps:
             count = min(steps - made, stepper.max_steps(observed=False))
             result = stepper.advance(made, count, self._frames, records=False, observed=False)
             made += result.steps
-            if result.code == BEYOND or result.substeps or (result.code == STOPPED and stepper.is_full):
+            if result.code == UNCHECKED or result.substeps or (result.code == STOPPED and stepper.is_full):
                 return False
         self._world.write_state()
         for own, given in zip(state, start, strict=True):
