@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sandbox.engines.common.kernel import COMPILED
 from sandbox.engines.contract import Divergence, Exhaustion, Simulation
 from sandbox.engines.reference import compiled_stepper
 from sandbox.engines.reference.compiled_stepper import OPTIONAL_KERNELS
@@ -205,8 +206,9 @@ def test_advance_equals_steps(
 
 @pytest.mark.parametrize("broad_phase", ["all_pairs", "circles", "grid", "sweep"])
 @pytest.mark.parametrize("integrator", INTEGRATORS)
-def test_compiled_steps_of_the_reference(integrator: str, broad_phase: str) -> None:
-    scene = small_scene("drag, walls and posts")
+@pytest.mark.parametrize("name", ["drag, walls and posts", "boxes and walls", "thrusts", "thrust on a ball"])
+def test_compiled_steps_of_the_reference(name: str, integrator: str, broad_phase: str) -> None:
+    scene = small_scene(name)
     ways = [(stepped, [100]), (advanced, [37, 63])]
     changes = {"integrator": integrator, "broad_phase": broad_phase, "substeps": 2}
     (one, seen), (other, seen_other) = (way(started(scene, "reference", **changes), split, 1) for way, split in ways)
@@ -215,12 +217,25 @@ def test_compiled_steps_of_the_reference(integrator: str, broad_phase: str) -> N
     assert seen[:5] == seen_other[:5]
 
 
+@pytest.mark.parametrize(("name", "kernel"), [("balls that settle", "advance_balls"), ("boxes", "advance_pieces")])
+def test_compiled_steps_are_used(name: str, kernel: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = []
+    compiled = getattr(compiled_stepper, kernel)
+    monkeypatch.setattr(compiled_stepper, kernel, lambda *given: calls.append(1) or compiled(*given))
+    advanced(started(small_scene(name), "reference"), [50], 1)
+    assert bool(calls) == COMPILED
+
+
 @pytest.mark.parametrize("codes", ["INTEGRATOR_CODES", "BROAD_PHASE_CODES"])
-def test_methods_without_compiled_code_use_the_readable_step(codes: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    scene = small_scene("balls that settle")
+@pytest.mark.parametrize("name", ["balls that settle", "boxes"])
+def test_methods_without_compiled_code_use_the_readable_step(
+    name: str, codes: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = small_scene(name)
     one, seen = advanced(started(scene, "reference"), [50], 1)
     monkeypatch.setattr(compiled_stepper, codes, {})
-    monkeypatch.setattr(compiled_stepper, "advance_balls", None)  # must not be called
+    for kernel in ("advance_balls", "advance_pieces"):
+        monkeypatch.setattr(compiled_stepper, kernel, None)  # must not be called
     other, seen_other = advanced(started(scene, "reference"), [50], 1)
     assert seen == seen_other
     assert_same(one, other)

@@ -66,3 +66,34 @@ def test_lasting_contact_is_one_row_with_the_summed_impulse() -> None:
     assert found.pair.tolist() == [[0, -1], [0, 1]]
     # (1 + 2 + 3 + 4)/3 of the impulse, from the first of each pair to the second
     np.testing.assert_allclose(found.impulse, [[-10.0 / 3.0, -20.0 / 3.0]] * 2, rtol=1e-15)
+
+
+@given(
+    st.lists(st.integers(0, len(PAIRS) - 1), min_size=1, max_size=6),
+    st.integers(1, 5),
+    st.integers(0, 2**32 - 1),
+)
+def test_batches_of_repeated_pairs_are_bit_identical_to_records(pairs: list[int], substeps: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    a, b = (np.asarray([PAIRS[k][side] for k in pairs], np.int64) for side in (0, 1))
+
+    def contacts(count: int) -> ContactBatch:
+        vectors = (rng.normal(size=(len(a) * count, 2)) @ (1.0, 1j) for _ in range(3))
+        return ContactBatch(np.tile(a, count), np.tile(b, count), *vectors)
+
+    first, lasting, last = contacts(1), contacts(substeps), contacts(1)
+    found = []
+    for at_once in (False, True):
+        log = ContactLog(2, can_repeat_pairs=True)
+        log.record(0.0, first)
+        if at_once:
+            log.add_batches(lasting, substeps)
+        else:
+            for k in range(substeps):
+                some = slice(k * len(a), (k + 1) * len(a))
+                log.record(0.1 * (k + 1), ContactBatch(*(column[some] for column in lasting)))
+        log.add_impulses(last.impulse)
+        found.append(log.take())
+    one, other = found
+    for name in ("time", "pair", "point", "normal", "impulse"):
+        assert getattr(one, name).tobytes() == getattr(other, name).tobytes(), name

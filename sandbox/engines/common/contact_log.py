@@ -188,6 +188,23 @@ class ContactLog:
         # Accumulated and not reduced: a reduction may sum in another order.
         self._unflushed = np.add.accumulate(np.vstack((first, signed_impulses)), axis=0)[-1].copy()
 
+    def add_batches(self, batch: ContactBatch, substeps: int) -> None:
+        """Add the contacts of several substeps with the pairs of the last `record`, each as `record` does.
+
+        For pairs that have several contacts at once.
+
+        Args:
+            batch: (S·K,) contacts, K of each substep.
+            substeps: S.
+        """
+        self._flush()
+        count = len(batch.a) // substeps
+        substep = np.repeat(np.arange(substeps), count)
+        order = np.lexsort((batch.point.imag, batch.point.real, batch.b, batch.a, substep))
+        signed_impulse = batch.impulse[order] * np.tile(self._sign, substeps)
+        np.add.at(self._impulse, np.tile(self._row, substeps), signed_impulse)
+        self._order = order[-count:] - (substeps - 1) * count
+
     @property
     def is_open(self) -> bool:
         """Whether there were contacts at the last record."""

@@ -347,18 +347,17 @@ def record_contacts(target: ContactLog, log: StepLog, times: FloatArray, wants_p
     begins = np.flatnonzero(~log.same).tolist()
     pairs = []
 
-    def record(k: int) -> None:
-        one = slice(row[k], row[k + 1])
-        target.record(float(times[k]), ContactBatch(a[one], b[one], impulse[one], normal[one], point[one]))
+    def batch(begin: int, end: int) -> ContactBatch:
+        some = slice(row[begin], row[end])
+        return ContactBatch(a[some], b[some], impulse[some], normal[some], point[some])
 
     for begin, end in pairwise([*begins, len(log.same)]):
-        record(begin)
-        if target.has_distinct_rows and end > begin + 1:
-            lasting = impulse[row[begin + 1] : row[end]]
-            target.add_impulse_rows(lasting.reshape(end - begin - 1, -1))
-        else:
-            for k in range(begin + 1, end):
-                record(k)
+        target.record(float(times[begin]), batch(begin, begin + 1))
+        lasting, count = batch(begin + 1, end), end - begin - 1
+        if count and target.has_distinct_rows:
+            target.add_impulse_rows(lasting.impulse.reshape(count, -1))
+        elif count:
+            target.add_batches(lasting, count)
         if wants_pairs:
             pairs.append((end, target.pairs()))
     return pairs
