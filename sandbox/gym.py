@@ -206,8 +206,9 @@ class SandboxEnv(gymnasium.Env[Observation, Any]):
         states[:, 0:2], states[:, 2:4] = frame.position[some], frame.velocity[some]
         states[:, 4], states[:, 5] = frame.angle[some], frame.angular_velocity[some]
         states[:, 6] = frame.present[some]
-        numbers = [value for _, value in _rules_observation(episode.rules)] if self._has_observation else []
-        values[states.size :] = [*numbers, episode.time, episode.rules.score]
+        rules: Any = episode.rules
+        numbers = [value for _, value in rules.observation()] if self._has_observation else []
+        values[states.size :] = [*numbers, episode.time, rules.score]
         if not values.dot(values) < LIMIT * LIMIT:  # rarely: a number is out of bounds, or is not finite
             values = np.nan_to_num(values, posinf=LIMIT, neginf=-LIMIT).clip(-LIMIT, LIMIT)
         return values.astype(np.float32)

@@ -240,10 +240,10 @@ class CompiledStepper:
         return CompiledSteps(made, rest, written, code, _first(log, substeps), path[: substeps + 1])
 
 
-Column = TypeVar("Column", bound=np.generic)
+Cell = TypeVar("Cell", bound=np.generic)
 
 
-def _own(array: npt.NDArray[Column]) -> npt.NDArray[Column]:
+def _own(array: npt.NDArray[Cell]) -> npt.NDArray[Cell]:
     """Return a copy, so that kernels are compiled for one kind of arrays: not for read-only or strided ones too."""
     return np.array(array, order="C")
 

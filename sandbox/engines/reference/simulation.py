@@ -8,7 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from sandbox.action import Action, ActionError, Impulse, Spawn
+from sandbox.action import Action, ActionError, Impulse, Spawn, Throttle
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.actions import apply_action
 from sandbox.engines.common.base import BEYOND, SteppedSimulation, observe_path
@@ -202,6 +202,8 @@ class ReferenceSimulation(SteppedSimulation):
         """Log the contacts of substeps, and call the observer."""
         if self._log is None:
             return
+        if self._observer is None and not (len(result.log.pair) or self._log.is_open):
+            return
         step, k = np.divmod(np.arange(len(result.log.same)), self._settings.substeps)
         starts = (self._steps + step) * self._settings.dt + k * self._h
         pairs = record_contacts(self._log, result.log, starts + self._h, self._observer is not None)
@@ -314,6 +316,9 @@ class ReferenceSimulation(SteppedSimulation):
         """
         with self._lock:
             self._check_running()
+            if isinstance(action, Throttle):  # nothing is derived from the level of a thrust
+                apply_action(action, self._store)
+                return
             if isinstance(action, Spawn):
                 self._check_shape(action.single)
             with self._attributed(Cause.ACTIONS):

@@ -29,6 +29,12 @@ GAS = (
     "restitution = 0.9\nfriction = 0.2\n[[ball]]\nname = 'anchor'\nposition = [0.0, 2.0]\nradius = 0.1\nfixed = true\n"
 )
 FLIGHT = "[world]\ngravity = [0, -9.81]\nduration = 2.0\n[[ball]]\nname = 'shell'\nposition = [0, 0]\nradius = 0.1\n"
+BOXES = (
+    "[world]\ngravity = [0, -5]\nduration = 0.6\nlinear_drag = 0.1\n[solver]\ndt = 0.01\n" + BOX + "[[box]]\n"
+    "name = 'ship'\nposition = [0, 0.5]\nsize = [0.3, 0.2]\n[[box]]\nposition = [0.1, 1.2]\nsize = [0.2, 0.2]\n"
+    "[[capsule]]\nposition = [-0.4, 0.6]\nlength = 0.3\nradius = 0.05\n"
+    "[[thrust]]\nbody = 'ship'\nforce = [0.1, 0.2]\npoint = [0.0, -0.1]\nend = 0.3\n"
+)
 PENDULUM = (
     "[world]\ngravity = [0, -9.81]\nduration = 0.5\n[[ball]]\nname = 'bob'\nposition = [1, 0]\nradius = 0.1\n"
     "[[joint]]\nkind = 'rod'\nbetween = ['bob']\n"
@@ -65,6 +71,18 @@ def test_every_run_is_an_ordinary_run(engine: str, seed: int, duration: float) -
                 assert getattr(found, name)[m].tobytes() == getattr(expected, name)[-1].tobytes(), name
         else:
             assert np.isnan(found.position[m]).all()
+
+
+@settings(max_examples=5)
+@given(seed=st.integers(0, 2**40))
+def test_every_run_of_boxes_is_an_ordinary_run(seed: int) -> None:
+    scene, vary = loads(BOXES), {"*.*.velocity": 0.5, "*.*.angle": 0.2, "*.*.angular_velocity": 1.0}
+    found = sandbox.ensemble(scene, 3, vary=vary, engine="reference", seed=seed)
+    assert found.compiled.all() == COMPILED
+    for m in range(3):
+        expected = single_run(scene, "reference", seed, vary, m)
+        for name in FIELDS:
+            assert getattr(found, name)[m].tobytes() == getattr(expected, name)[-1].tobytes(), name
 
 
 @pytest.mark.parametrize("engine", ["exact", "reference"])
