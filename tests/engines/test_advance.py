@@ -65,6 +65,18 @@ SCENES = {
     "[[thrust]]\nbody = 'rocket'\nforce = [0.0, 0.5]\npoint = [0.02, 0.0]\nbegin = 0.05\n",
     "thrust on a ball": "[[ball]]\nname = 'rocket'\nposition = [0.6, 1]\nradius = 0.1\n"
     "[[thrust]]\nbody = 'rocket'\nforce = [0.0, 0.5]\npoint = [0.02, 0.0]\nend = 0.3\n",
+    "chain": BOX + "[[ball]]\nname = 'a'\nposition = [0.2, 2]\nradius = 0.08\n"
+    "[[ball]]\nname = 'b'\nposition = [0.4, 2]\nradius = 0.08\nvelocity = [0, 1]\n"
+    "[[ball]]\nname = 'c'\nposition = [0.6, 2]\nradius = 0.08\n"
+    "[[joint]]\nkind = 'rod'\nbetween = ['a']\n[[joint]]\nkind = 'pivot'\nbetween = ['a', 'b']\nat = [0.3, 2]\n"
+    "[[joint]]\nkind = 'slide'\nbetween = ['b', 'c']\nmost = 0.25\n",
+    "jointed boxes": "[world]\nbounds = [[-5, -5], [5, 5]]\n"
+    + BOX
+    + "[[box]]\nname = 'trunk'\nposition = [0, 1]\nsize = [0.2, 0.4]\nangular_velocity = 2\n"
+    "[[box]]\nname = 'arm'\nposition = [0.3, 1.15]\nsize = [0.4, 0.1]\n[[ball]]\nname = 'head'\nposition = [0, 1.3]\n"
+    "radius = 0.1\n[[joint]]\nkind = 'pivot'\nbetween = ['trunk', 'arm']\nat = [0.1, 1.15]\n"
+    "[[joint]]\nkind = 'pivot'\nbetween = ['trunk', 'head']\nat = [0, 1.2]\n"
+    "[[joint]]\nkind = 'rotary_limit'\nbetween = ['trunk', 'arm']\nleast = -0.5\nmost = 0.5\n",
     "no bodies": BOX,
     "bounds and lifetimes": "[world]\nbounds = [[-3, -3], [3, 3]]\n"
     "[[ball]]\nposition = [0, 0]\nvelocity = [9, 0]\nradius = 0.1\n[[ball]]\nposition = [0, 1]\nradius = 0.1\n"
@@ -206,7 +218,9 @@ def test_advance_equals_steps(
 
 @pytest.mark.parametrize("broad_phase", ["all_pairs", "circles", "grid", "sweep"])
 @pytest.mark.parametrize("integrator", INTEGRATORS)
-@pytest.mark.parametrize("name", ["drag, walls and posts", "boxes and walls", "thrusts", "thrust on a ball"])
+@pytest.mark.parametrize(
+    "name", ["drag, walls and posts", "boxes and walls", "thrusts", "thrust on a ball", "chain", "jointed boxes"]
+)
 def test_compiled_steps_of_the_reference(name: str, integrator: str, broad_phase: str) -> None:
     scene = small_scene(name)
     ways = [(stepped, [100]), (advanced, [37, 63])]

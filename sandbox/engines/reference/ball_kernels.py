@@ -7,6 +7,7 @@ from sandbox.engines.common.frame_rows import FrameRows
 from sandbox.engines.common.kernel import OptionalKernel, bare_kernel, inline_kernel
 from sandbox.engines.reference.broad_phase import EXCEEDED, all_pairs, grid, near_segments
 from sandbox.engines.reference.manifold import find_ball_contacts, find_plane_contacts, find_segment_contacts
+from sandbox.engines.reference.polygon_contacts import drop_excluded
 from sandbox.engines.reference.step_kernels import (
     ALL_PAIRS,
     DONE,
@@ -14,6 +15,7 @@ from sandbox.engines.reference.step_kernels import (
     STOPPED,
     UNCHECKED,
     BodyColumns,
+    Joints,
     SolverState,
     StepConstants,
     StepLog,
@@ -37,6 +39,11 @@ class BallColumns(NamedTuple):
     mask: IntArray
     moves: BoolArray
     can_touch: BoolArray
+    owner: IntArray
+    """(N,) index of each ball, the body that it belongs to"""
+    excluded: IntArray
+    """keys of pairs that joints exclude from collision"""
+    group: IntArray
 
 
 @bare_kernel
@@ -45,6 +52,7 @@ def advance_balls(
     bodies: BodyColumns,
     balls: BallColumns,
     walls: WallColumns,
+    joints: Joints,
     state: SolverState,
     scratch: StepScratch,
     frames: FrameRows,
@@ -62,6 +70,7 @@ def advance_balls(
         bodies: constant arrays.
         balls: likewise.
         walls: likewise.
+        joints: the joints.
         state: the state.
         scratch: memory.
         frames: rows for the frames.
@@ -86,7 +95,7 @@ def advance_balls(
             if size < 0 or not has_room(log, first + s, size):
                 return k, s, written, STOPPED
             tests = broad_tests, pair_tests
-            finish_substep(number, bodies, state, scratch, path, log, first + s, size, tests, warm_start)
+            finish_substep(number, bodies, joints, state, scratch, path, log, first + s, size, tests, warm_start)
             warm_start = 1.0
         if not is_within(number, bodies, state.x):
             return k, 0, written, UNCHECKED
@@ -124,9 +133,11 @@ def find_contacts(
         if tests == EXCEEDED or found > len(keys):
             return -1, 0, 0
         broad_tests += tests
-        pair_tests += found
         if found:
             sort_keys(keys, found)
+            if len(balls.excluded):
+                found = drop_excluded(keys[:found], balls.owner, balls.excluded, balls.group)
+            pair_tests += found
             size = find_ball_contacts(keys[:found], position, radius, balls.surface, bodies.friction, 0.0, out, size)
     if len(walls.planes) and number.plane_tests:
         size = find_plane_contacts(

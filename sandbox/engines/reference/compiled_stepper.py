@@ -18,7 +18,10 @@ from sandbox.engines.reference.ball_kernels import BALL_KERNEL, BallColumns, adv
 from sandbox.engines.reference.broad_phase import SegmentBoxes
 from sandbox.engines.reference.collision import CollisionPipeline, ConvexPipeline, empty_manifolds
 from sandbox.engines.reference.integrators import INTEGRATORS
+from sandbox.engines.reference.joint_data import select_joints
+from sandbox.engines.reference.joint_rows import make_velocity_constraints
 from sandbox.engines.reference.piece_kernels import PIECE_KERNEL, PieceColumns, advance_pieces
+from sandbox.engines.reference.polygon_contacts import excluded_pair_keys
 from sandbox.engines.reference.step import WorldState
 from sandbox.engines.reference.step_kernels import (
     BROAD_PHASE_CODES,
@@ -30,6 +33,7 @@ from sandbox.engines.reference.step_kernels import (
     STOPPED,
     UNCHECKED,
     BodyColumns,
+    Joints,
     SolverState,
     StepConstants,
     StepLog,
@@ -37,6 +41,7 @@ from sandbox.engines.reference.step_kernels import (
     WallColumns,
 )
 from sandbox.engines.reference.velocity_solver import ImpulseSolver
+from sandbox.scene.compile.joint_arrays import JointArrays
 from sandbox.scene.description.world import Settings
 
 OPTIONAL_KERNELS = (BALL_KERNEL, PIECE_KERNEL)
@@ -91,6 +96,7 @@ class CompiledStepper:
             integrator=INTEGRATOR_CODES[settings.integrator],
             fraction=INTEGRATORS[settings.integrator].fraction,
             slop=settings.slop,
+            bias=settings.bias,
             correction=solver.correction_rate(h),
             linear_drag=forces.linear_drag,
             quadratic_drag=forces.quadratic_drag,
@@ -131,7 +137,7 @@ class CompiledStepper:
             and type(solver) is ImpulseSolver
             and solver.is_plain
             and world.pipeline.filter is None
-            and world.joints is None
+            and (world.joints is None or not world.joints.has_forces)
             and not world.field.attracting
             and settings.broad_phase in BROAD_PHASE_CODES
             and settings.integrator in INTEGRATOR_CODES
@@ -144,6 +150,13 @@ class CompiledStepper:
         """Return the kernel that a world uses."""
         return PIECE_KERNEL if isinstance(world.pipeline, ConvexPipeline) else BALL_KERNEL
 
+    def _joints(self) -> Joints:
+        """Return the joints; a call changes the arrays of their rows."""
+        solver = self._world.joints
+        if solver is None:
+            return Joints(_NO_JOINTS, make_velocity_constraints(_NO_JOINTS), np.array([math.inf]))
+        return Joints(solver.constraints, solver.rows, np.array([solver.h]))
+
     def _allocate(self, contacts: int) -> None:
         """Allocate memory for a number of contacts in a substep."""
         shape = (2, len(self._bodies.mobile), 3)
@@ -152,6 +165,7 @@ class CompiledStepper:
             placed=np.empty(shape),
             after=np.empty(shape),
             change=np.empty(shape[1:]),
+            pose=np.empty(shape[1:]),
             pair_keys=np.empty(4 * contacts, np.int64),
             segment_keys=np.empty(4 * contacts, np.int64),
             out=empty_manifolds(contacts),
@@ -204,7 +218,7 @@ class CompiledStepper:
         key, impulse = np.empty(capacity, np.int64), np.empty((capacity, 2))
         key[:known], impulse[:known] = memory.key, memory.impulse
         order = pipeline.broad_phase_memory(x[0]) if numbers.broad_phase != NO_PAIRS else NO_ORDER
-        counts = np.array([known, memory.has_pseudo_velocity, 0, 0, 0, 0], np.int64)
+        counts = np.array([known, memory.has_pseudo_velocity, 0, 0, 0, 0, 0], np.int64)
         level = self._store.throttles[world.field.thrust_indices]
         state = SolverState(x, key, impulse, memory.pseudo_velocity, order, level, counts)
         log = self._log if records else NO_LOG
@@ -217,6 +231,7 @@ class CompiledStepper:
             self._bodies,
             self._shapes,
             self._walls,
+            self._joints(),
             state,
             self._scratch,
             frames,
@@ -232,13 +247,17 @@ class CompiledStepper:
             world.x = x if turns else x[:, :, :2].copy()
             memory.key, memory.impulse = key[: counts[KEYS]].copy(), impulse[: counts[KEYS]].copy()
             memory.has_pseudo_velocity, memory.h = bool(counts[HAS_PSEUDO_VELOCITY]), numbers.h
-            names = "broad_tests", "pair_tests", "contacts", "contact_iterations"
+            names = "broad_tests", "pair_tests", "contacts", "contact_iterations", "joint_iterations"
             for name, amount in zip(names, counts[BROAD_TESTS:].tolist(), strict=True):
                 world.work[name] += amount
+            if world.joints is not None:
+                world.joints.h = numbers.h
         if code == STOPPED and capacity < MAX_CAPACITY:
             self._allocate(4 * capacity)
         return CompiledSteps(made, rest, written, code, _first(log, substeps), path[: substeps + 1])
 
+
+_NO_JOINTS = select_joints(JointArrays.none())
 
 Cell = TypeVar("Cell", bound=np.generic)
 
@@ -288,6 +307,9 @@ def _ball_columns(pipeline: CollisionPipeline, store: BodyStore) -> BallColumns:
         mask=_own(store.collision_mask),
         moves=_own(pipeline.moves),
         can_touch=_own(pipeline.can_touch),
+        owner=np.arange(len(store.radius)),
+        excluded=_own(excluded_pair_keys(store.links)),
+        group=_own(store.bodies.group),
     )
 
 

@@ -98,7 +98,8 @@ class JointSolver:
             raise ValueError(f"method {method!r} does not support {unsupported or 'joints'}")
         self.links, self.method = links, method
         self._bias, self._iterations, self._max_stretch = bias, iterations, max_stretch
-        self._h = math.inf
+        self.h = math.inf
+        """s, step in which the present impulses were found"""
         self.rebuild(inverse_mass, inverse_moment, np.arange(len(links)))
 
     def rebuild(self, inverse_mass: FloatArray, inverse_moment: FloatArray, unbroken: IntArray) -> None:
@@ -110,23 +111,34 @@ class JointSolver:
             unbroken: indices of the intact joints.
         """
         memory = np.zeros((len(self.links), 2))
-        if math.isfinite(self._h):
-            memory[self._constraints.link] = self.rows.impulse
+        if math.isfinite(self.h):
+            memory[self.constraints.link] = self.rows.impulse
         self.inverse_mass, self.inverse_moment = inverse_mass, inverse_moment
         self._springs: JointData = select_joints(self.links, *SPRINGS, among=unbroken)
-        self._constraints: JointData = select_joints(
+        self.constraints: JointData = select_joints(
             self.links, *(CONSTRAINTS + SPRINGS if self.method == "xpbd" else CONSTRAINTS), among=unbroken
         )
+        """joints of the rows"""
         if self.method == "relaxation":
-            self._constraints = self._constraints.joined(stretch_limits(self._springs, self._max_stretch))
-        self.rows: VelocityConstraints = make_velocity_constraints(self._constraints)
-        self.rows.impulse[:] = memory[self._constraints.link]
+            self.constraints = self.constraints.joined(stretch_limits(self._springs, self._max_stretch))
+        self.rows: VelocityConstraints = make_velocity_constraints(self.constraints)
+        self.rows.impulse[:] = memory[self.constraints.link]
         self._impulse = np.zeros((len(self.links), 2))
+
+    def forget(self) -> None:
+        """Forget the impulses of the last step."""
+        self.h = math.inf
+        self.rows.impulse[:] = 0.0
+
+    @property
+    def has_forces(self) -> bool:
+        """Whether there are springs that are forces."""
+        return self.method != "xpbd" and len(self._springs.kind) > 0
 
     @property
     def visits_per_step(self) -> int:
         """Number of joints that a step visits, over all passes; RATTLE's second stage doubles it."""
-        return len(self._constraints.kind) * self._iterations * (2 if self.method == "rattle" else 1)
+        return len(self.constraints.kind) * self._iterations * (2 if self.method == "rattle" else 1)
 
     def forces(self, x: State) -> FloatArray:
         """Return the accelerations (N, 3) by springs in a state, m/s² and rad/s²; zeros with xpbd."""
@@ -141,8 +153,8 @@ class JointSolver:
 
     def prepare(self, pose: FloatArray, h: float) -> VelocityConstraints:
         """Update the rows for poses (N, 3) and a step h, s; return them, for callers that also solve contacts."""
-        prepare(self.rows, self._constraints, pose, h, self._h, self._bias, self.inverse_mass, self.inverse_moment)
-        self._h = h
+        prepare(self.rows, self.constraints, pose, h, self.h, self._bias, self.inverse_mass, self.inverse_moment)
+        self.h = h
         return self.rows
 
     def warm_start(self, velocity: FloatArray) -> None:
@@ -173,21 +185,21 @@ class JointSolver:
         shift, shake = np.empty_like(moved[0]), self.method == "rattle"
         inverse = self.inverse_mass, self.inverse_moment
         sums = self.rows.impulse, self.rows.normal
-        project(self._constraints, moved[0], start[0], h, self._iterations, shake, *inverse, shift, *sums)
+        project(self.constraints, moved[0], start[0], h, self._iterations, shake, *inverse, shift, *sums)
         self.rows.impulse[:] /= h
         moved[1] += shift / h
-        self._h = h
+        self.h = h
         if shake:
             self._align(moved)
 
     def _align(self, moved: State) -> None:
         """Remove the velocities that would separate the corrected anchors: the second stage of RATTLE."""
-        impulse, bound, h = self.rows.impulse.copy(), self.rows.bound, self._h
+        impulse, bound, h = self.rows.impulse.copy(), self.rows.bound, self.h
         # No bias: positions are already corrected. A row with an impulse is active, at whichever limit.
-        prepare(self.rows, self._constraints, moved[0], h, h, 1.0, self.inverse_mass, self.inverse_moment)
-        either = np.isin(self._constraints.kind, (LinkKind.ROD, LinkKind.PIVOT))
-        bound[:, 0] = np.where(either | (impulse[:, 0] < 0.0), -h * self._constraints.max_force, 0.0)
-        bound[:, 1] = np.where(either | (impulse[:, 0] > 0.0), h * self._constraints.max_force, 0.0)
+        prepare(self.rows, self.constraints, moved[0], h, h, 1.0, self.inverse_mass, self.inverse_moment)
+        either = np.isin(self.constraints.kind, (LinkKind.ROD, LinkKind.PIVOT))
+        bound[:, 0] = np.where(either | (impulse[:, 0] < 0.0), -h * self.constraints.max_force, 0.0)
+        bound[:, 1] = np.where(either | (impulse[:, 0] > 0.0), h * self.constraints.max_force, 0.0)
         self.rows.impulse[:], self.rows.target[:] = impulse, 0.0  # applied already, but part of the accumulated impulse
         for _ in range(self._iterations):
             self.solve_once(moved[1])
@@ -205,7 +217,7 @@ class JointSolver:
 
         Springs that are forces have zeros; see `load`.
         """
-        write_joint_impulses(self.rows, self._constraints, self._impulse)
+        write_joint_impulses(self.rows, self.constraints, self._impulse)
         return self._impulse
 
     def load(self, x: State) -> FloatArray:
@@ -217,7 +229,7 @@ class JointSolver:
         load: FloatArray = np.zeros((len(self.links), 2))
         if self.method != "xpbd":
             write_spring_loads(self._springs, x[0], x[1], load)
-        return load + self.impulse() / self._h
+        return load + self.impulse() / self.h
 
 
 class JointBreaker:

@@ -22,6 +22,7 @@ from sandbox.engines.reference.step_kernels import (
     STOPPED,
     UNCHECKED,
     BodyColumns,
+    Joints,
     SolverState,
     StepConstants,
     StepLog,
@@ -64,6 +65,7 @@ def advance_pieces(
     bodies: BodyColumns,
     pieces: PieceColumns,
     walls: WallColumns,
+    joints: Joints,
     state: SolverState,
     scratch: StepScratch,
     frames: FrameRows,
@@ -86,7 +88,7 @@ def advance_pieces(
             if size < 0 or not has_room(log, first + s, size):
                 return k, s, written, STOPPED
             tests = broad_tests, pair_tests
-            finish_substep(number, bodies, state, scratch, path, log, first + s, size, tests, warm_start)
+            finish_substep(number, bodies, joints, state, scratch, path, log, first + s, size, tests, warm_start)
             warm_start = 1.0
         if not is_within(number, bodies, state.x):
             return k, 0, written, UNCHECKED

@@ -235,6 +235,8 @@ class WorldState:
         self.memory.forget(self._settings.h)
         self.memory.pseudo_velocity[:] = 0.0
         self.memory.has_pseudo_velocity = False
+        if self.joints is not None:
+            self.joints.forget()
         turns = self.x.shape[2] == 3
         self.x = self._stored_state()
         return bool(self._turns() == turns)

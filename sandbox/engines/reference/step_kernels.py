@@ -1,9 +1,9 @@
 """Compiled steps: what worlds of balls and worlds of convex pieces have in common.
 
 `ball_kernels` and `piece_kernels` make the steps that `step.step` defines, by the same kernels in the same order, for
-worlds that need nothing between two substeps: gravity, drag and thrusts, discrete detection, impulses, no joints. They
-stop before a substep that needs more memory or another path; the readable step then makes it. Tests compare the two,
-bit for bit. `compiled_stepper` prepares the bodies.
+worlds that need nothing between two substeps: gravity, drag and thrusts, discrete detection, contacts and joints by
+impulses. They stop before a substep that needs more memory or another path; the readable step then makes it. Tests
+compare the two, bit for bit. `compiled_stepper` prepares the arrays.
 """
 
 import math
@@ -14,13 +14,17 @@ from sandbox.engines.common.base import FARTHEST, FASTEST
 from sandbox.engines.common.frame_rows import FrameRows, is_due, write_row
 from sandbox.engines.common.geometry import rotate
 from sandbox.engines.common.kernel import inline_kernel
+from sandbox.engines.reference.joint_data import JointData
+from sandbox.engines.reference.joint_rows import VelocityConstraints, prepare, solve_joints_once, warm_start_joints
 from sandbox.engines.reference.manifold import CONTACT_ROUNDING, Manifolds
 from sandbox.engines.reference.sequential_impulses import (
     approach,
     match_impulses,
     rebound_speeds,
+    solve_contacts_once,
     solve_overlaps,
     solve_velocities,
+    warm_start_contacts,
 )
 
 EXPLICIT_EULER, SEMI_IMPLICIT_EULER, VELOCITY_VERLET, LEAPFROG, RK4 = range(5)
@@ -36,7 +40,7 @@ NO_PAIRS, ALL_PAIRS, GRID = range(3)
 BROAD_PHASE_CODES = {"all_pairs": ALL_PAIRS, "grid": GRID}
 """The default broad phases. Each further one would take half a second longer to compile."""
 
-KEYS, HAS_PSEUDO_VELOCITY, BROAD_TESTS, PAIR_TESTS, CONTACTS, CONTACT_ITERATIONS = range(6)
+KEYS, HAS_PSEUDO_VELOCITY, BROAD_TESTS, PAIR_TESTS, CONTACTS, CONTACT_ITERATIONS, JOINT_ITERATIONS = range(7)
 """Indices of `SolverState.counts`: number of warm-start impulses; 1 if a pseudo-velocity is not 0; work counters."""
 
 
@@ -55,6 +59,8 @@ class StepConstants(NamedTuple):
     """`Integrator.fraction`"""
     slop: float
     """m"""
+    bias: float
+    """fraction of a joint's error that remains after one second"""
     correction: float
     """1/s, target separation rate for each metre of overlap beyond the slop, negative"""
     linear_drag: float
@@ -110,6 +116,16 @@ class BodyColumns(NamedTuple):
     """(T,) s"""
 
 
+class Joints(NamedTuple):
+    """Joints that are solved by impulses."""
+
+    data: JointData
+    rows: VelocityConstraints
+    """changed by every substep"""
+    h: FloatArray
+    """(1,) s, substep in which their impulses were found"""
+
+
 class WallColumns(NamedTuple):
     """Arrays of planes and segments, see `StaticColliders` and `SegmentBoxes`."""
 
@@ -139,7 +155,7 @@ class SolverState(NamedTuple):
     thrust_level: FloatArray
     """(T,) level of each thrust"""
     counts: IntArray
-    """(6,)"""
+    """(7,)"""
 
 
 class StepScratch(NamedTuple):
@@ -151,6 +167,8 @@ class StepScratch(NamedTuple):
     """(2, N, 3) state at its end"""
     change: FloatArray
     """(N, 3)"""
+    pose: FloatArray
+    """(N, 3) poses at which joints are prepared"""
     pair_keys: IntArray
     segment_keys: IntArray
     out: Manifolds
@@ -192,6 +210,7 @@ def has_room(log: StepLog, substep: int, contacts: int) -> bool:
 def finish_substep(
     number: StepConstants,
     bodies: BodyColumns,
+    joints: Joints,
     state: SolverState,
     scratch: StepScratch,
     path: FloatArray,
@@ -205,7 +224,8 @@ def finish_substep(
 
     Args:
         number: numbers.
-        bodies: constant bodies.
+        bodies: constant arrays.
+        joints: the joints.
         state: the state.
         scratch: with the contacts.
         path: as in `advance_balls`.
@@ -232,7 +252,7 @@ def finish_substep(
         out.friction[:size],
         out.surface_pair[:size],
     )
-    solve_contacts(number, bodies, state, scratch, contacts, warm_start)
+    solve_constraints(number, bodies, joints, state, scratch, contacts, warm_start)
     correct_overlap(number, bodies, state, scratch, contacts)
     copy_state(scratch.after, state.x)
     if len(log.end) > 0:
@@ -276,7 +296,7 @@ def acceleration(
 
     Args:
         number: numbers.
-        bodies: constant bodies.
+        bodies: constant arrays.
         level: (T,) of thrusts.
         i: index of the body.
         time: s, since the start of the run.
@@ -373,21 +393,31 @@ def sort_keys(keys: IntArray, count: int) -> None:
 
 
 @inline_kernel
-def solve_contacts(
+def solve_constraints(
     number: StepConstants,
     bodies: BodyColumns,
+    joints: Joints,
     state: SolverState,
     scratch: StepScratch,
     contacts: Manifolds,
     warm_start: float,
 ) -> None:
-    """Write the state at the end of a substep, with contacts that act through it, as `ImpulseSolver.solve`."""
-    placed, after, size = scratch.placed, scratch.after, len(contacts.key)
+    """Write the state at the end of a substep, with contacts and joints that act in it, as `ImpulseSolver.solve`."""
+    placed, after, size, rows = scratch.placed, scratch.after, len(contacts.key), joints.rows
     copy_state(placed, after)
-    if size == 0:
+    if size == 0 and len(rows.kind) == 0:
         return
     bounce, impulse = scratch.bounce[:size], scratch.impulse[:size]
-    start, velocity = state.x[1], after[1]
+    start, velocity, inverse = state.x[1], after[1], (bodies.inverse_mass, bodies.inverse_moment)
+    part = number.fraction * number.h
+    if len(rows.kind) > 0:
+        for i in range(len(bodies.mobile)):
+            for axis in range(3):
+                scratch.pose[i, axis] = placed[0, i, axis]
+                if number.fraction != 0.0:
+                    scratch.pose[i, axis] -= part * placed[1, i, axis]
+        prepare(rows, joints.data, scratch.pose, number.h, joints.h[0], number.bias, *inverse)
+        joints.h[0] = number.h
     rebound_speeds(contacts, start, start[:, 2], bodies.restitution, bounce)
     impulse[:] = 0.0
     known = state.counts[KEYS]
@@ -395,11 +425,18 @@ def solve_contacts(
     for k in range(size):
         impulse[k, 0] *= warm_start
         impulse[k, 1] *= warm_start
-    inverse = bodies.inverse_mass, bodies.inverse_moment
-    solve_velocities(contacts, bounce, velocity, velocity[:, 2], *inverse, impulse, number.iterations)
     state.counts[CONTACT_ITERATIONS] += size * number.iterations
+    if len(rows.kind) == 0:
+        solve_velocities(contacts, bounce, velocity, velocity[:, 2], *inverse, impulse, number.iterations)
+    else:  # as `solve_together` without stops
+        state.counts[JOINT_ITERATIONS] += len(rows.kind) * number.iterations
+        warm_start_contacts(contacts, velocity, velocity[:, 2], *inverse, impulse)
+        warm_start_joints(rows, velocity, *inverse)
+        for _ in range(number.iterations):
+            solve_contacts_once(contacts, bounce, velocity, velocity[:, 2], *inverse, impulse)
+            solve_joints_once(rows, velocity, *inverse)
     if number.fraction != 0.0:
-        change, part = scratch.change, number.fraction * number.h
+        change = scratch.change
         for i in range(len(bodies.mobile)):
             for axis in range(3):
                 change[i, axis] = after[1, i, axis] - placed[1, i, axis]

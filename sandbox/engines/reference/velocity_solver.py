@@ -344,9 +344,8 @@ class ImpulseSolver:
 
     @property
     def is_plain(self) -> bool:
-        """Whether there are only contacts of constant restitution without kicks, by Newton's law of impact."""
-        is_constrained = self._velocity_joints is not None or self._position_joints is not None
-        return not (is_constrained or self._has_constraints or self._dissipative) and self._rebound_model is None
+        """Whether there are only contacts by Newton's law of constant restitution, and joints by impulses."""
+        return not (self._position_joints is not None or self._dissipative) and self._rebound_model is None
 
     def finish(self, after: State) -> State:
         """Return the state with which the next step begins."""

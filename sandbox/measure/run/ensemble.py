@@ -3,9 +3,10 @@
     ends = sandbox.ensemble("billiards/break", 1000, vary={"ball.cue.velocity": 0.01}, engine="exact", threads=2)
     ends.position.std(axis=0)
 
-Without frames and contacts, `exact` computes runs of balls in compiled code, and `reference` those of all bodies without
-joints, drives and zones. That is many times faster than runs one after the other, with the same results bit for bit. Each start depends on the seed and on the number of the run
-only, so that neither threads nor the number of runs change a digit.
+Without frames and contacts, `exact` computes runs of balls in compiled code, and `reference` those of all bodies
+without drives, zones and springs. That is many times faster than runs one after the other, with the same results bit
+for bit. Each start depends on the seed and on the number of the run only, so that neither threads nor the number of
+runs change a digit.
 """
 
 import math

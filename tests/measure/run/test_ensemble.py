@@ -39,6 +39,7 @@ PENDULUM = (
     "[world]\ngravity = [0, -9.81]\nduration = 0.5\n[[ball]]\nname = 'bob'\nposition = [1, 0]\nradius = 0.1\n"
     "[[joint]]\nkind = 'rod'\nbetween = ['bob']\n"
 )
+SPRING = PENDULUM.replace("kind = 'rod'", "kind = 'spring'\nstiffness = 50")
 
 
 @pytest.fixture(autouse=True)
@@ -73,10 +74,11 @@ def test_every_run_is_an_ordinary_run(engine: str, seed: int, duration: float) -
             assert np.isnan(found.position[m]).all()
 
 
+@pytest.mark.parametrize("text", [BOXES, PENDULUM], ids=["boxes", "pendulum"])
 @settings(max_examples=5)
 @given(seed=st.integers(0, 2**40))
-def test_every_run_of_boxes_is_an_ordinary_run(seed: int) -> None:
-    scene, vary = loads(BOXES), {"*.*.velocity": 0.5, "*.*.angle": 0.2, "*.*.angular_velocity": 1.0}
+def test_every_run_of_boxes_and_joints_is_an_ordinary_run(text: str, seed: int) -> None:
+    scene, vary = loads(text), {"*.*.velocity": 0.5, "*.*.angle": 0.2, "*.*.angular_velocity": 1.0}
     found = sandbox.ensemble(scene, 3, vary=vary, engine="reference", seed=seed)
     assert found.compiled.all() == COMPILED
     for m in range(3):
@@ -90,7 +92,7 @@ def test_runs_of_balls_are_computed_by_compiled_code(engine: str) -> None:
     found = sandbox.ensemble(loads(GAS), 8, vary={"ball.*.velocity": 0.1}, engine=engine)
     assert found.compiled.all() == (COMPILED or engine == "exact")
     assert (found.status == "ok").all()
-    assert not sandbox.ensemble(loads(PENDULUM), 2, vary={"*.*.velocity": 0.1}, engine="reference").compiled.any()
+    assert not sandbox.ensemble(loads(SPRING), 2, vary={"*.*.velocity": 0.1}, engine="reference").compiled.any()
 
 
 @pytest.mark.parametrize("engine", ["exact", "reference", "pymunk"])
