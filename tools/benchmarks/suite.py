@@ -88,6 +88,19 @@ BENCHES = (
     ),
     *(
         Bench(
+            f"jointed-{name}",
+            f"sandbox.run, audited, of a second of {path} on the reference / on pymunk",
+            lambda path=path: running(scene(path, "world.duration=1.0"), engine="reference"),
+            lambda path=path: running(scene(path, "world.duration=1.0")),
+        )
+        for name, path in (
+            ("pendulum", "benchmark/pendulum_90"),
+            ("ragdoll", "joints/ragdoll_stairs"),
+            ("bridge", "joints/bridge"),
+        )
+    ),
+    *(
+        Bench(
             f"run-start-{engine}",
             f"runs a second of one ball for one step, on {engine} / runs of the pymunk loop",
             lambda engine=engine: starting(BALL, engine),

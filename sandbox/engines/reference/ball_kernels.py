@@ -105,7 +105,7 @@ def advance_balls(
     return steps, 0, written, DONE
 
 
-BALL_KERNEL = OptionalKernel(advance_balls, compile_time=10.0)
+BALL_KERNEL = OptionalKernel(advance_balls, compile_time=18.0)
 """Decides whether `advance_balls` is used; its time to compile was measured"""
 
 

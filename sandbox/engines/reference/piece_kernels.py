@@ -98,7 +98,7 @@ def advance_pieces(
     return steps, 0, written, DONE
 
 
-PIECE_KERNEL = OptionalKernel(advance_pieces, compile_time=15.0)
+PIECE_KERNEL = OptionalKernel(advance_pieces, compile_time=23.0)
 """Decides whether `advance_pieces` is used; its time to compile was measured"""
 
 

@@ -42,6 +42,9 @@ from sandbox.scene.description.discs import Disc
 from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Contacts, Frame
 
+MIN_FIRST_STEPS = 4
+"""Steps of a first call of `advance` from which on preparing compiled steps pays"""
+
 
 class ReferenceSimulation(SteppedSimulation):
     """A running scene. A substep applies forces, advances bodies, detects and resolves contacts; see `step.step`.
@@ -117,7 +120,8 @@ class ReferenceSimulation(SteppedSimulation):
         while frames.steps < end and not is_over:
             # A contact that was open at the last call of `contacts` is in the next one too.
             is_watched = until_event and (self._log is None or self._log.is_open)
-            if is_watched or not self._can_batch():
+            is_short = end - frames.steps < MIN_FIRST_STEPS and not self._steps
+            if is_short or is_watched or not self._can_batch():
                 super().advance(end - frames.steps, frames, until_event=until_event)
                 return
             if not kernel.is_worthwhile:
