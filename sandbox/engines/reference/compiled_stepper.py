@@ -33,7 +33,7 @@ from sandbox.engines.reference.step_kernels import (
     STOPPED,
     UNCHECKED,
     BodyColumns,
-    Joints,
+    CompiledJoints,
     SolverState,
     StepConstants,
     StepLog,
@@ -150,12 +150,12 @@ class CompiledStepper:
         """Return the kernel that a world uses."""
         return PIECE_KERNEL if isinstance(world.pipeline, ConvexPipeline) else BALL_KERNEL
 
-    def _joints(self) -> Joints:
+    def _joints(self) -> CompiledJoints:
         """Return the joints; a call changes the arrays of their rows."""
         solver = self._world.joints
         if solver is None:
-            return Joints(_NO_JOINTS, make_velocity_constraints(_NO_JOINTS), np.array([math.inf]))
-        return Joints(solver.constraints, solver.rows, np.array([solver.h]))
+            return CompiledJoints(_NO_JOINTS, make_velocity_constraints(_NO_JOINTS), np.array([math.inf]))
+        return CompiledJoints(solver.constraints, solver.rows, np.array([solver.h]))
 
     def _allocate(self, contacts: int) -> None:
         """Allocate memory for a number of contacts in a substep."""

@@ -116,7 +116,7 @@ class BodyColumns(NamedTuple):
     """(T,) s"""
 
 
-class Joints(NamedTuple):
+class CompiledJoints(NamedTuple):
     """Joints that are solved by impulses."""
 
     data: JointData
@@ -210,7 +210,7 @@ def has_room(log: StepLog, substep: int, contacts: int) -> bool:
 def finish_substep(
     number: StepConstants,
     bodies: BodyColumns,
-    joints: Joints,
+    joints: CompiledJoints,
     state: SolverState,
     scratch: StepScratch,
     path: FloatArray,
@@ -396,7 +396,7 @@ def sort_keys(keys: IntArray, count: int) -> None:
 def solve_constraints(
     number: StepConstants,
     bodies: BodyColumns,
-    joints: Joints,
+    joints: CompiledJoints,
     state: SolverState,
     scratch: StepScratch,
     contacts: Manifolds,

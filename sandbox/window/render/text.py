@@ -71,9 +71,10 @@ def renderable(text: str) -> str:
 
 @lru_cache(maxsize=512)
 def _rendered(text: str, size: int, colour: RgbColour, bold: bool, mono: bool) -> pygame.Surface:
-    if not text:
-        return pygame.Surface((0, _font(size, bold, mono).get_height()), pygame.SRCALPHA)
-    return _font(size, bold, mono).render(text, True, colour)
+    font = _font(size, bold, mono)
+    if not font.size(text)[0]:  # empty, or only characters without width, such as variation selectors
+        return pygame.Surface((0, font.get_height()), pygame.SRCALPHA)
+    return font.render(text, True, colour)
 
 
 @lru_cache(maxsize=64)

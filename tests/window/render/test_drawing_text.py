@@ -36,7 +36,7 @@ def test_digits_are_equally_wide_in_the_mono_font():
     assert text_size("1111", 16, mono=True) == text_size("8888", 16, mono=True)
 
 
-@pytest.mark.parametrize("text", ["", "\0", "a\nb", "\ud800", "\u200b", "x" * 100_000, "🎱"])
+@pytest.mark.parametrize("text", ["", "\0", "a\nb", "\ud800", "\u200b", "\U000e0100", "x" * 100_000, "🎱"])
 def test_any_text_can_be_drawn(text):
     surface = pygame.Surface((50, 50))
     assert draw_text(surface, text, (10, 10), 12, WHITE).topleft == (10, 10)
