@@ -267,6 +267,9 @@ CREEP_SPEED, CREEP_ACCELERATION = 1e-11, 1e-12
 """m/s and m/s²: a pair in contact that approaches more slowly and is pressed together less does not collide: both are
 rounding error."""
 
+LONGEST_SPAN = 1e50
+"""s, span of time from which on quick tests are omitted, whose products could overflow"""
+
 FAR = 1.0 + 1e-9
 """Factor of a squared distance above which a quick test may exclude a touch: rounding errors are smaller"""
 
@@ -316,15 +319,16 @@ def first_touch(dx: float, dy: float, vx: float, vy: float, ax: float, ay: float
         limit: s; later times need not be found.
     """
     hx, hy = 0.5 * ax, 0.5 * ay
-    # Most points are too far away: the first step below would end after the limit. This needs no root and no division.
-    distance_squared = dx * dx + dy * dy
-    closest = distance_squared + min(dx * vx + dy * vy, 0.0) * limit + min(dx * hx + dy * hy, 0.0) * limit * limit
-    if closest > 0.0 and closest * closest > FAR * radius * radius * distance_squared:  # false for an infinite limit
-        return math.inf
-    # Most others pass the origin: the component across the velocity stays larger than the radius.
-    across = abs(dx * vy - dy * vx) - abs(hx * vy - hy * vx) * limit * limit
-    if across > 0.0 and across * across > FAR * radius * radius * (vx * vx + vy * vy):
-        return math.inf
+    if limit < LONGEST_SPAN:
+        # Most points are too far away: the first step below would end after the limit. No root or division is needed.
+        distance_squared = dx * dx + dy * dy
+        closest = distance_squared + min(dx * vx + dy * vy, 0.0) * limit + min(dx * hx + dy * hy, 0.0) * limit * limit
+        if closest > 0.0 and closest * closest > FAR * radius * radius * distance_squared:
+            return math.inf
+        # Most others pass the origin: the component across the velocity stays larger than the radius.
+        across = abs(dx * vy - dy * vx) - abs(hx * vy - hy * vx) * limit * limit
+        if across > 0.0 and across * across > FAR * radius * radius * (vx * vx + vy * vy):
+            return math.inf
     t = 0.0
     for _ in range(MAX_STEPS):
         x, y = dx + (vx + hx * t) * t, dy + (vy + hy * t) * t

@@ -11,7 +11,7 @@ from sandbox.engines.common.body_store import ALL, NOTHING, first_beyond
 from sandbox.engines.common.frame_rows import FrameRows, is_due, write_row
 from sandbox.engines.common.kernel import bare_kernel as kernel
 from sandbox.engines.common.kernel import inline_kernel
-from sandbox.engines.exact.common.roots import MAX_OVERLAP, first_touch, gap_zero_time, return_time
+from sandbox.engines.exact.common.roots import LONGEST_SPAN, MAX_OVERLAP, first_touch, gap_zero_time, return_time
 from sandbox.engines.exact.common.state import BEYOND, DONE, FULL, PAUSED, TOO_MANY
 from sandbox.engines.exact.tabletop import state as c
 from sandbox.engines.exact.tabletop.impact import (
@@ -48,8 +48,8 @@ def is_over_line(line: FloatArray, x: float, y: float) -> bool:
 
 @kernel
 def displacement_range(v: float, a: float, span: float) -> tuple[float, float]:
-    """Return the least and the greatest of v t + a t²/2 for t from 0 to a span, which may be infinite."""
-    if span == math.inf:
+    """Return bounds of v t + a t²/2 for t from 0 to a span: its least and greatest value, or ±∞ for very long spans."""
+    if span >= LONGEST_SPAN:
         return -math.inf, math.inf
     end = (v + 0.5 * a * span) * span
     low, high = min(end, 0.0), max(end, 0.0)
