@@ -239,6 +239,29 @@ def test_steps_that_the_rules_do_not_see_change_nothing(
         assert quiet.display_lines()["fuel"] == "0 %"
 
 
+def test_divergence_among_steps_that_the_rules_do_not_see() -> None:
+    """Fuel and score are then those of the last step before it, as if the rules had seen every step."""
+    scene = load("landing", ["world.duration=60"])
+    strong = tuple(thrust.model_copy(update={"force": (0.0, 1e13)}) for thrust in scene.thrusts)  # 10¹³ m/s in 1 s
+    unbounded = scene.world.model_copy(update={"bounds": None})
+    scene = scene.model_copy(update={"world": unbounded, "thrusts": strong})
+    found = []
+    for every in (1, 150):
+        env = SandboxEnv(scene, every=every)
+        env.reset(seed=9)
+        rules = env._episode.rules
+        rules._tank = rules._tank_then = rules._full = 1e16  # N·s: the tank lasts until the physics fails
+        for _ in range(150):
+            observation, _, terminated, truncated, info = env.step([1.0, 0.0, 0.0])
+            if terminated or truncated:
+                break
+        assert truncated
+        assert "failed" in info
+        fuel = rules._tank
+        found.append((fuel, observation.tobytes(), info["time"], info["failed"]))
+    assert found[0] == found[1]
+
+
 def test_quiet_rules_that_act_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rules that announce quiet steps and then return an action for one of them are wrong."""
     env = SandboxEnv("landing", every=100)

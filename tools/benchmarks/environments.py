@@ -1,5 +1,6 @@
 """Rows of Gymnasium environments, against LunarLander-v3."""
 
+import importlib
 import importlib.util
 import time
 
@@ -21,8 +22,7 @@ def env_steps(name: str) -> Timed:
     """Return a workload that makes steps of an environment with random actions; its resets are not timed."""
     import gymnasium
 
-    import sandbox.gym  # noqa: F401, registers the environments
-
+    importlib.import_module("sandbox.gym")  # registers the environments
     env = gymnasium.make(name).unwrapped
     env.action_space.seed(SEED)
     actions = [env.action_space.sample() for _ in range(STEPS)]

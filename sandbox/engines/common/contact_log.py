@@ -103,7 +103,7 @@ NO_CONTACTS = ContactBatch(
 )
 
 
-NONE = Contacts.none()
+NOTHING_LOGGED = Contacts.none()
 
 
 class ContactLog:
@@ -248,7 +248,7 @@ class ContactLog:
         self._flush()
         n = self._count
         if not n:
-            return NONE
+            return NOTHING_LOGGED
         vectors = (self._geometry[:n, 0], self._geometry[:n, 1], self._impulse[:n])
         taken = Contacts(self._time[:n].copy(), self._pair[:n].copy(), *(_to_rows(vector) for vector in vectors))
         open_rows = self._row if len(self._row) < 2 else np.unique(self._row)

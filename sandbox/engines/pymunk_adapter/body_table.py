@@ -87,7 +87,7 @@ class SpaceBodyTable:
         body = self._members[index].body
         body.body_type = pymunk.Body.DYNAMIC
         body.mass, body.moment = self._resting.pop(index)
-        body.force, body.torque = (0.0, 0.0), 0.0  # thrusts have accumulated while it was held
+        body.force, body.torque = (0.0, 0.0), 0.0  # of thrusts, set while it was held
         self._state = None
 
 

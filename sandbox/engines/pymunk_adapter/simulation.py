@@ -15,7 +15,7 @@ from sandbox.engines.common.energy_balance import record_energy_change
 from sandbox.engines.common.lifetimes import Lifetimes
 from sandbox.engines.contract import Divergence, Exhaustion, Observer, PairRuns
 from sandbox.engines.energy_ledger import Cause, EnergyLedger
-from sandbox.engines.pymunk_adapter.batch_reader import MAX_CONTACTS, Batch
+from sandbox.engines.pymunk_adapter.batch_reader import MAX_CONTACTS
 from sandbox.engines.pymunk_adapter.bodies import PymunkBodies
 from sandbox.engines.pymunk_adapter.contacts import ContactLists
 from sandbox.engines.pymunk_adapter.energy import PymunkEnergyLedger
@@ -75,10 +75,14 @@ class EventRecorder:
                 pairs.append((end, self._log.pairs()))
         return pairs
 
-    def is_idle(self, batch: Batch) -> bool:
-        """Return whether there is nothing to record: no contacts before a batch, and none in it."""
-        is_empty = batch.contacts is None or not batch.contacts.count
-        return is_empty and not self._population.space_bodies.contact_reader.is_listed and not self._log.is_open
+    def has_new(self, lists: ContactLists) -> bool:
+        """Return whether there is something to record: contacts in the lists of a batch, or before it."""
+        return bool(lists.count) or self._population.space_bodies.contact_reader.is_listed or self.is_open
+
+    @property
+    def is_open(self) -> bool:
+        """Whether there were contacts at the last record."""
+        return self._log.is_open
 
     @property
     def can_batch(self) -> bool:
@@ -196,7 +200,9 @@ class PymunkSimulation(BaseSimulation):
         Raises:
             Divergence: as `step`.
         """
-        if not self._can_batch or (until_event and self._recorder is None):
+        # A contact that was open at the last call of `contacts` is in the next one too.
+        is_watched = until_event and (self._recorder is None or self._recorder.is_open)
+        if is_watched or not self._can_batch:
             super().advance(steps, frames, until_event=until_event)
             return
         with self._lock:
@@ -234,15 +240,12 @@ class PymunkSimulation(BaseSimulation):
             lists_contacts=self._recorder is not None,
             until_contact=until_contact,
         )
-        if (
-            self._recorder is not None
-            and batch.contacts is not None
-            and (observed or not self._recorder.is_idle(batch))
-        ):
+        recorder, lists = self._recorder, batch.contacts
+        if recorder is not None and lists is not None and (observed or recorder.has_new(lists)):
             # The time of a substep is that of `_advance`: counted from the start of its step.
             step_index, k = np.divmod(np.arange(batch.steps * substeps), substeps)
             starts = (self._steps + step_index) * self._settings.dt + k * h
-            pairs = self._recorder.record_lists(batch.contacts, starts + h, observed)
+            pairs = recorder.record_lists(lists, starts + h, observed)
             if self._observer is not None:
                 path = np.empty((len(starts) + 1, *start.shape))
                 path[: None if len(space_bodies) < len(start) else 1] = start

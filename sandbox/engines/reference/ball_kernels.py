@@ -5,13 +5,10 @@ from typing import NamedTuple
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.frame_rows import FrameRows
 from sandbox.engines.common.kernel import OptionalKernel, bare_kernel, inline_kernel
-from sandbox.engines.reference.broad_phase import EXCEEDED, all_pairs, grid, near_segments
 from sandbox.engines.reference.manifold import find_ball_contacts, find_plane_contacts, find_segment_contacts
 from sandbox.engines.reference.polygon_contacts import drop_excluded
 from sandbox.engines.reference.step_kernels import (
-    ALL_PAIRS,
     DONE,
-    NO_PAIRS,
     STOPPED,
     UNCHECKED,
     BodyColumns,
@@ -21,12 +18,13 @@ from sandbox.engines.reference.step_kernels import (
     StepLog,
     StepScratch,
     WallColumns,
+    find_near_pairs,
+    find_near_segments,
     finish_substep,
     has_contacts,
     has_room,
     is_within,
     move_bodies,
-    sort_keys,
     write_frame,
 )
 
@@ -122,23 +120,16 @@ def find_contacts(
 
     The number is −1 if there are more than fit, or if the broad phase has to be prepared anew.
     """
-    position, radius, out = scratch.placed[0], balls.radius, scratch.out
-    size, broad_tests, pair_tests = 0, 0, number.plane_tests
-    if number.broad_phase != NO_PAIRS:
-        keys, given = scratch.pair_keys, (position, radius, balls.mask, balls.moves)
-        if number.broad_phase == ALL_PAIRS:
-            found, tests = all_pairs(state.order, *given, 0.0, number.max_tests, keys)
-        else:
-            found, tests = grid(state.order, *given, 0.0, number.max_tests, keys)
-        if tests == EXCEEDED or found > len(keys):
-            return -1, 0, 0
-        broad_tests += tests
-        if found:
-            sort_keys(keys, found)
-            if len(balls.excluded):
-                found = drop_excluded(keys[:found], balls.owner, balls.excluded, balls.group)
-            pair_tests += found
-            size = find_ball_contacts(keys[:found], position, radius, balls.surface, bodies.friction, 0.0, out, size)
+    position, radius, size, out = scratch.placed[0], balls.radius, 0, scratch.out
+    keys, wall_keys = scratch.pair_keys, scratch.segment_keys
+    pairs, pair_tests = find_near_pairs(number, state, position, radius, balls.mask, balls.moves, keys)
+    near, wall_tests = find_near_segments(number, walls, position, radius, balls.can_touch, wall_keys)
+    if pairs < 0 or near < 0:
+        return -1, 0, 0
+    if pairs:
+        if len(balls.excluded):
+            pairs = drop_excluded(keys[:pairs], balls.owner, balls.excluded, balls.group)
+        size = find_ball_contacts(keys[:pairs], position, radius, balls.surface, bodies.friction, 0.0, out, size)
     if len(walls.planes) and number.plane_tests:
         size = find_plane_contacts(
             position,
@@ -153,37 +144,20 @@ def find_contacts(
             out,
             size,
         )
-    if len(walls.segment_index):
-        keys = scratch.segment_keys
-        found, tests = near_segments(
+    if near:
+        size = find_segment_contacts(
+            wall_keys[:near],
             position,
             radius,
-            balls.can_touch,
-            walls.segment_box,
-            walls.segment_index,
-            number.segment_width,
+            balls.surface,
+            walls.segments,
+            walls.segment_joints,
+            walls.segment_collider,
+            walls.collider_surface,
+            bodies.friction,
             0.0,
-            number.max_tests,
-            keys,
+            out,
+            size,
         )
-        if tests == EXCEEDED or found > len(keys):
-            return -1, 0, 0
-        broad_tests += tests
-        pair_tests += found
-        if found:
-            sort_keys(keys, found)
-            size = find_segment_contacts(
-                keys[:found],
-                position,
-                radius,
-                balls.surface,
-                walls.segments,
-                walls.segment_joints,
-                walls.segment_collider,
-                walls.collider_surface,
-                bodies.friction,
-                0.0,
-                out,
-                size,
-            )
-    return (-1 if size > len(out.key) or size > number.max_contacts else size), broad_tests, pair_tests
+    exact_tests = pairs + near + number.plane_tests
+    return (-1 if size > min(len(out.key), number.max_contacts) else size), pair_tests + wall_tests, exact_tests

@@ -5,7 +5,6 @@ from typing import NamedTuple
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.frame_rows import FrameRows
 from sandbox.engines.common.kernel import OptionalKernel, bare_kernel, inline_kernel
-from sandbox.engines.reference.broad_phase import EXCEEDED, all_pairs, grid, near_segments
 from sandbox.engines.reference.polygon_contacts import (
     ConvexHulls,
     NarrowPhaseInput,
@@ -16,9 +15,7 @@ from sandbox.engines.reference.polygon_contacts import (
     transform_pieces,
 )
 from sandbox.engines.reference.step_kernels import (
-    ALL_PAIRS,
     DONE,
-    NO_PAIRS,
     STOPPED,
     UNCHECKED,
     BodyColumns,
@@ -28,12 +25,13 @@ from sandbox.engines.reference.step_kernels import (
     StepLog,
     StepScratch,
     WallColumns,
+    find_near_pairs,
+    find_near_segments,
     finish_substep,
     has_contacts,
     has_room,
     is_within,
     move_bodies,
-    sort_keys,
     write_frame,
 )
 
@@ -115,8 +113,7 @@ def find_contacts(
 
     The number is −1 if there are more than fit, or if the broad phase has to be prepared anew.
     """
-    position, out = scratch.placed[0], scratch.out
-    size, broad_tests, pair_tests = 0, 0, number.plane_tests
+    position, size, out = scratch.placed[0], 0, scratch.out
     transform_pieces(
         pieces.body,
         pieces.first,
@@ -129,60 +126,19 @@ def find_contacts(
     )
     hulls = ConvexHulls(pieces.corner, pieces.first, pieces.radius, pieces.body, pieces.surface)
     query = NarrowPhaseInput(bodies.friction, 0.0, pieces.points)
-    if number.broad_phase != NO_PAIRS:
-        keys, given = scratch.pair_keys, (pieces.middle, pieces.bounding_radius, pieces.mask, pieces.moves)
-        if number.broad_phase == ALL_PAIRS:
-            found, tests = all_pairs(state.order, *given, 0.0, number.max_tests, keys)
-        else:
-            found, tests = grid(state.order, *given, 0.0, number.max_tests, keys)
-        if tests == EXCEEDED or found > len(keys):
-            return -1, 0, 0
-        broad_tests += tests
-        if found:
-            sort_keys(keys, found)
-            found = drop_excluded(keys[:found], pieces.body, pieces.excluded, pieces.group)
-            pair_tests += found
-            size = find_body_contacts(keys[:found], hulls, position, query, out, size)
+    middle, radius, keys, wall_keys = pieces.middle, pieces.bounding_radius, scratch.pair_keys, scratch.segment_keys
+    pairs, pair_tests = find_near_pairs(number, state, middle, radius, pieces.mask, pieces.moves, keys)
+    near, wall_tests = find_near_segments(number, walls, middle, radius, pieces.can_touch, wall_keys)
+    if pairs < 0 or near < 0:
+        return -1, 0, 0
+    if pairs:
+        pairs = drop_excluded(keys[:pairs], pieces.body, pieces.excluded, pieces.group)
+        size = find_body_contacts(keys[:pairs], hulls, position, query, out, size)
     if len(walls.planes) and number.plane_tests:
-        size = find_half_plane_contacts(
-            hulls,
-            pieces.can_touch,
-            position,
-            walls.planes,
-            walls.plane_collider,
-            walls.collider_surface,
-            query,
-            out,
-            size,
-        )
-    if len(walls.segment_index):
-        keys = scratch.segment_keys
-        found, tests = near_segments(
-            pieces.middle,
-            pieces.bounding_radius,
-            pieces.can_touch,
-            walls.segment_box,
-            walls.segment_index,
-            number.segment_width,
-            0.0,
-            number.max_tests,
-            keys,
-        )
-        if tests == EXCEEDED or found > len(keys):
-            return -1, 0, 0
-        broad_tests += tests
-        pair_tests += found
-        if found:
-            sort_keys(keys, found)
-            size = find_fixed_segment_contacts(
-                keys[:found],
-                hulls,
-                position,
-                walls.segment_joints,
-                walls.segment_collider,
-                walls.collider_surface,
-                query,
-                out,
-                size,
-            )
-    return (-1 if size > len(out.key) or size > number.max_contacts else size), broad_tests, pair_tests
+        planes = walls.planes, walls.plane_collider, walls.collider_surface
+        size = find_half_plane_contacts(hulls, pieces.can_touch, position, *planes, query, out, size)
+    if near:
+        joined = walls.segment_joints, walls.segment_collider, walls.collider_surface
+        size = find_fixed_segment_contacts(wall_keys[:near], hulls, position, *joined, query, out, size)
+    exact_tests = pairs + near + number.plane_tests
+    return (-1 if size > min(len(out.key), number.max_contacts) else size), pair_tests + wall_tests, exact_tests

@@ -14,6 +14,7 @@ from sandbox.engines.common.base import FARTHEST, FASTEST
 from sandbox.engines.common.frame_rows import FrameRows, is_due, write_row
 from sandbox.engines.common.geometry import rotate
 from sandbox.engines.common.kernel import inline_kernel
+from sandbox.engines.reference.broad_phase import EXCEEDED, all_pairs, grid, near_segments
 from sandbox.engines.reference.joint_data import JointData
 from sandbox.engines.reference.joint_rows import VelocityConstraints, prepare, solve_joints_once, warm_start_joints
 from sandbox.engines.reference.manifold import CONTACT_ROUNDING, Manifolds
@@ -390,6 +391,52 @@ def sort_keys(keys: IntArray, count: int) -> None:
             keys[target] = keys[target - 1]
             target -= 1
         keys[target] = key
+
+
+@inline_kernel
+def find_near_pairs(
+    number: StepConstants,
+    state: SolverState,
+    middle: FloatArray,
+    radius: FloatArray,
+    mask: IntArray,
+    moves: BoolArray,
+    keys: IntArray,
+) -> tuple[int, int]:
+    """Write the sorted keys of pairs of discs that may touch; return their number and that of tests.
+
+    The number is −1 if there are more than fit, or if the broad phase has to be prepared anew.
+    """
+    if number.broad_phase == NO_PAIRS:
+        return 0, 0
+    if number.broad_phase == ALL_PAIRS:
+        found, tests = all_pairs(state.order, middle, radius, mask, moves, 0.0, number.max_tests, keys)
+    else:
+        found, tests = grid(state.order, middle, radius, mask, moves, 0.0, number.max_tests, keys)
+    if tests == EXCEEDED or found > len(keys):
+        return -1, 0
+    sort_keys(keys, found)
+    return found, tests
+
+
+@inline_kernel
+def find_near_segments(
+    number: StepConstants,
+    walls: WallColumns,
+    middle: FloatArray,
+    radius: FloatArray,
+    can_touch: BoolArray,
+    keys: IntArray,
+) -> tuple[int, int]:
+    """Write the sorted keys of discs and segments that may touch; return as `find_near_pairs` does."""
+    if len(walls.segment_index) == 0:
+        return 0, 0
+    boxes = walls.segment_box, walls.segment_index, number.segment_width
+    found, tests = near_segments(middle, radius, can_touch, *boxes, 0.0, number.max_tests, keys)
+    if tests == EXCEEDED or found > len(keys):
+        return -1, 0
+    sort_keys(keys, found)
+    return found, tests
 
 
 @inline_kernel

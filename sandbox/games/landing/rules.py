@@ -44,7 +44,7 @@ FOR_A_CRASH, CRASH_DISTANCE, CRASH_SPEED = 50, 50.0, 15.0
 """points for a crash; they decrease linearly to 0 at a distance from the pad, m, and at a speed, m/s"""
 ELSEWHERE, FASTER = 18.0, 3.0
 """m and m/s, bounds of the random change of the initial horizontal position and velocity"""
-MAX_QUIET_STEPS = 1_000_000
+UNLIMITED_STEPS = 1_000_000
 """number of `quiet_steps` where no fuel can be burnt"""
 GAMEPAD_INPUTS = {"up": "a rt up", "left": "left -leftx", "right": "right +leftx"}
 """gamepad inputs by the key of a thrust"""
@@ -117,7 +117,7 @@ class Landing:
     def quiet_steps(self, dt: float) -> int:
         """Return the number of steps of dt, s, in which the tank cannot become empty, as `HasQuietSteps`."""
         burnt = math.fsum(self._forces.values()) * dt  # at most, in a step
-        return max(int(self._tank / burnt), 1) if burnt and self._tank else MAX_QUIET_STEPS
+        return max(int(self._tank / burnt), 1) if burnt and self._tank else UNLIMITED_STEPS
 
     def _burn(self, info: StepInfo, before: float) -> Sequence[Action]:
         """Consume fuel since a time, s; return the actions that stop all engines when the tank becomes empty.

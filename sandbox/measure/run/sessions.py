@@ -10,6 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from sandbox.action import Action, Switch, actions_from_json
+from sandbox.engines.contract import Divergence, Exhaustion
 from sandbox.engines.registry import UnknownEngineError, engine_named
 from sandbox.engines.switching import SwitchableSimulation, start
 from sandbox.frame_table import FrameTable
@@ -253,17 +254,25 @@ class Episode:
         simulation, table, retired = self.simulation, self._table, self.simulation.retired
         table.clear()
         self._state = None
-        simulation.advance(steps, table, until_event=True)
+        try:
+            simulation.advance(steps, table, until_event=True)
+        except (Divergence, Exhaustion):
+            if table.steps:
+                self._show_quiet_step(table.frame(table.count - 1, self.frame().present))
+            raise
         contacts = simulation.contacts()
         removed = simulation.retired.keys() - retired.keys()
         if table.steps > 1 and (len(contacts) or removed):
             present = self.frame().present.copy()
             present[list(removed)] = True
-            before = table.frame(table.count - 2, present)
-            if self._session.on_step(before.time, before, Contacts.none()):
-                raise RuntimeError(f"the rules of {self.scene.play.game!r} acted in a step announced as quiet")
+            self._show_quiet_step(table.frame(table.count - 2, present))
         self._update_rules(contacts)
         return table.steps
+
+    def _show_quiet_step(self, frame: Frame) -> None:
+        """Pass a step without contacts to the rules, after others have followed it."""
+        if self._session.on_step(frame.time, frame, Contacts.none()):
+            raise RuntimeError(f"the rules of {self.scene.play.game!r} acted in a step announced as quiet")
 
     @property
     def _steps_left(self) -> int:
