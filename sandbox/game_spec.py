@@ -23,6 +23,8 @@ class Environment:
     """number of steps per action"""
     engine: str = "pymunk"
     """name of the engine"""
+    is_vectorised: bool = False
+    """whether the game has `GameSpec.vector_rules`"""
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,8 @@ class GameSpec:
     """values of `[play] game`"""
     rules: str | None = None
     """`(scene, bodies) -> Rules`, a class or a function; it may raise `UnsuitableSceneError`"""
+    vector_rules: str | None = None
+    """`(scene, bodies, count) -> VectorRules`: rules of many games at once, for compiled vector environments"""
     tables: Mapping[str, str] = field(default_factory=dict)
     """tables of scene files: heading → `GameTable` or `Preset`; only for games of this package, others are refused"""
     bot: str | None = None

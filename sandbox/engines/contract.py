@@ -161,6 +161,64 @@ class MemberRunner(Protocol):
         """
 
 
+class WorldStates(NamedTuple):
+    """States of M independent worlds of a scene with N bodies and F static elements, as they are after their last step.
+
+    The arrays are those of the worlds, which the next call changes.
+    """
+
+    time: FloatArray
+    """(M,) s"""
+    previous_time: FloatArray
+    """(M,) s, before the last step"""
+    now: Members
+    previous: Members
+    """before the last step"""
+    present: BoolArray
+    """(M, N) whether each body is in the scene"""
+    touched: BoolArray
+    """(M, N, N + F) whether a body touched another body, or the static element numbered −1 − k in column N + k, in the
+    last step; a contact that was open before it counts too, as in `Simulation.contacts`"""
+    diverged: BoolArray
+    """(M,) whether the last step ended with a body that is not finite or out of bounds"""
+
+
+class WorldBatch(Protocol):
+    """Independent worlds of one scene, which one compiled call advances.
+
+    A world can be advanced until a body is removed or its state diverges. What happens in it is what happens in a
+    simulation of its own, bit for bit.
+    """
+
+    thrust_level: FloatArray
+    """(M, T) level of each thrust of the scene in each world; may be changed between two calls"""
+    states: WorldStates
+
+    def restart(self, worlds: IntArray, start: Members) -> None:
+        """Set worlds, by their (K,) indices, to time 0 and start states of K members."""
+
+    def advance(self, steps: IntArray) -> IntArray:
+        """Advance each world by at most so many steps, (M,); return the numbers made.
+
+        A step with a contact, a removed body or a divergence is the last one of its world.
+        """
+
+    def divergence(self, world: int) -> Divergence:
+        """Return the description of a diverged state."""
+
+
+@runtime_checkable
+class HasWorldBatch(Protocol):
+    """Simulation that can compute many worlds of its scene in one compiled call."""
+
+    def world_batch(self, count: int) -> WorldBatch | None:
+        """Return so many worlds, with thrusts at their initial levels; None if the scene needs more than they model.
+
+        Args:
+            count: number of worlds, at least 1.
+        """
+
+
 class Simulation(Protocol):
     """Running scene. Its state changes in place; the frames and contacts that it returns do not change."""
 

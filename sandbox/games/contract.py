@@ -25,6 +25,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 from sandbox.action import Action
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.contract import Members, WorldStates
 from sandbox.recording import Press
 from sandbox.trajectory import Contacts, Frame
 
@@ -45,6 +47,7 @@ __all__ = [
     "Rules",
     "StepInfo",
     "UnsuitableSceneError",
+    "VectorRules",
 ]
 
 
@@ -160,6 +163,42 @@ class HasQuietSteps(Protocol):
         This holds as long as nothing touches and no body leaves the scene. A step in which that happens is passed to
         `on_step`, and so is the one before it.
         """
+
+
+class VectorRules(Protocol):
+    """Rules of M independent games of one scene, as arrays: what `Rules` of each game would do, bit for bit.
+
+    Only games whose controls set levels of thrusts can have them. A host calls:
+
+        restart(games, seeds)                  start states of new games
+        set_controls(games, levels)            controls, between two steps
+        on_step(games, states)                 after at most `quiet_steps(dt)` steps, and after a step with contacts
+
+    A game in which a body is removed is over.
+    """
+
+    controls: tuple[Control, ...]
+    score: IntArray
+    """(M,)"""
+    game_over: list[str | None]
+    """reason why each game is over; None while it runs"""
+    thrust_level: FloatArray
+    """(M, T) level of each thrust of the scene, as the rules set it"""
+
+    def restart(self, games: IntArray, seeds: Sequence[int]) -> Members:
+        """Start games, by their (K,) indices, with K seeds; return the K start states of their bodies."""
+
+    def set_controls(self, games: IntArray, levels: FloatArray) -> None:
+        """Set the controls of K games to levels (K, C), from 0 to 1."""
+
+    def quiet_steps(self, dt: float) -> IntArray:
+        """Return for each game, (M,), what `HasQuietSteps.quiet_steps` returns."""
+
+    def on_step(self, games: IntArray, states: WorldStates) -> None:
+        """Update games, by their (K,) indices, after steps; the states are those of all M worlds."""
+
+    def observation(self) -> FloatArray:
+        """Return the values (M, O) of the observation of each game."""
 
 
 @runtime_checkable

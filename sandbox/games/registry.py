@@ -6,7 +6,7 @@ from pathlib import Path
 
 from sandbox.game_names import GAMES, game_specs, registered_games, spec_of
 from sandbox.game_spec import GameSpec, import_part
-from sandbox.games.contract import Rules, UnsuitableSceneError
+from sandbox.games.contract import Rules, UnsuitableSceneError, VectorRules
 from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.errors import Fault, Lines, SceneError
@@ -146,6 +146,19 @@ def required_rules(scene: Scene) -> Rules:
     rules = rules_of(scene, on_request=True)
     if rules is None:
         raise UnsuitableSceneError(f"the scene {scene.title!r} has no game with rules: state [play] game")
+    return rules
+
+
+def vector_rules_of(scene: Scene, count: int) -> VectorRules | None:
+    """Return the rules of many games of a scene at once; None if its game has none, or the scene names no game.
+
+    Raises:
+        UnsuitableSceneError: the scene lacks an element that the game needs.
+    """
+    spec = find_spec(scene.play.game)
+    if spec is None or spec.vector_rules is None:
+        return None
+    rules: VectorRules = import_part(spec.vector_rules)(scene, scene.bodies, count)
     return rules
 
 

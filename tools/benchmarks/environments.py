@@ -41,14 +41,46 @@ def env_steps(name: str) -> Timed:
     return work
 
 
-ENVIRONMENTS = tuple(
+EPISODES = 64
+"""number of episodes of the vector environment"""
+
+
+def vector_steps() -> Timed:
+    """Return a workload that makes steps of many episodes in compiled calls; its time is that of one episode."""
+    from sandbox.gym import SandboxVectorEnv
+
+    env = SandboxVectorEnv("landing", EPISODES, every=5)
+    env.action_space.seed(SEED)
+    actions = [env.action_space.sample() for _ in range(STEPS)]
+
+    def work() -> float:
+        env.reset(seed=SEED)
+        begin = time.perf_counter()
+        for action in actions:  # episodes that end begin anew, which is timed here
+            env.step(action)
+        return (time.perf_counter() - begin) / EPISODES
+
+    return work
+
+
+ENVIRONMENTS = (
+    *(
+        Bench(
+            f"env-{name.lower()}",
+            f"{STEPS} steps of sandbox/{name}-v0 with random actions / of LunarLander-v3",
+            lambda name=name: env_steps(f"sandbox/{name}-v0"),
+            lambda: env_steps("LunarLander-v3"),
+            target,
+            missing=missing,
+        )
+        for name, target in (("Landing", 2.0), ("PinballFull", None))
+    ),
     Bench(
-        f"env-{name.lower()}",
-        f"{STEPS} steps of sandbox/{name}-v0 with random actions / of LunarLander-v3",
-        lambda name=name: env_steps(f"sandbox/{name}-v0"),
+        "env-landing-vector",
+        f"{STEPS} steps of an episode, one of {EPISODES} in a SandboxVectorEnv of landing / of LunarLander-v3",
+        vector_steps,
         lambda: env_steps("LunarLander-v3"),
-        target,
+        2.0,
         missing=missing,
-    )
-    for name, target in (("Landing", 2.0), ("PinballFull", None))
+    ),
 )

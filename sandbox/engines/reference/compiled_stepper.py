@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from itertools import pairwise
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -159,21 +159,15 @@ class CompiledStepper:
 
     def _allocate(self, contacts: int) -> None:
         """Allocate memory for a number of contacts in a substep."""
-        shape = (2, len(self._bodies.mobile), 3)
-        self._capacity = contacts
-        self._scratch = StepScratch(
-            placed=np.empty(shape),
-            after=np.empty(shape),
-            change=np.empty(shape[1:]),
-            pose=np.empty(shape[1:]),
-            pair_keys=np.empty(4 * contacts, np.int64),
-            segment_keys=np.empty(4 * contacts, np.int64),
-            out=empty_manifolds(contacts),
-            bounce=np.empty(contacts),
-            impulse=np.empty((contacts, 2)),
-            target=np.empty(contacts),
-            total=np.empty(contacts),
-        )
+        self._capacity, self._scratch = contacts, step_scratch(len(self._bodies.mobile), contacts)
+
+    @property
+    def constants(self) -> tuple[StepConstants, BodyColumns, Any, WallColumns, CompiledJoints]:
+        """First arguments of the kernel: what does not change from step to step, and the joints.
+
+        The third are the `BallColumns` or `PieceColumns` that the kernel of the world takes.
+        """
+        return self._numbers, self._bodies, self._shapes, self._walls, self._joints()
 
     @property
     def is_full(self) -> bool:
@@ -227,11 +221,7 @@ class CompiledStepper:
             path[0] = x[0, :, :2]
         warm_start = min(numbers.h / memory.h, 1.0)
         made, rest, written, code = self._advance(
-            numbers,
-            self._bodies,
-            self._shapes,
-            self._walls,
-            self._joints(),
+            *self.constants,
             state,
             self._scratch,
             frames,
@@ -255,6 +245,24 @@ class CompiledStepper:
         if code == STOPPED and capacity < MAX_CAPACITY:
             self._allocate(4 * capacity)
         return CompiledSteps(made, rest, written, code, _first(log, substeps), path[: substeps + 1])
+
+
+def step_scratch(bodies: int, contacts: int) -> StepScratch:
+    """Return memory for a substep with so many bodies and contacts."""
+    shape = (2, bodies, 3)
+    return StepScratch(
+        placed=np.empty(shape),
+        after=np.empty(shape),
+        change=np.empty(shape[1:]),
+        pose=np.empty(shape[1:]),
+        pair_keys=np.empty(4 * contacts, np.int64),
+        segment_keys=np.empty(4 * contacts, np.int64),
+        out=empty_manifolds(contacts),
+        bounce=np.empty(contacts),
+        impulse=np.empty((contacts, 2)),
+        target=np.empty(contacts),
+        total=np.empty(contacts),
+    )
 
 
 _NO_JOINTS = select_joints(JointArrays.none())

@@ -31,6 +31,7 @@ from sandbox.engines.reference.joints import JointBreaker
 from sandbox.engines.reference.manifold import CONTACT_ROUNDING, Manifolds
 from sandbox.engines.reference.step import StepRecord, WorldState
 from sandbox.engines.reference.step_kernels import STOPPED, UNCHECKED
+from sandbox.engines.reference.world_batch import ConvexWorldBatch
 from sandbox.engines.reference.zones import ZonedBodyStore
 from sandbox.frame_table import FrameTable
 from sandbox.scene.compile.bodies import Bodies
@@ -148,6 +149,12 @@ class ReferenceSimulation(SteppedSimulation):
                 break
             is_done[m] = stepper.run(*(array[m] for array in members), steps=int(steps))
         return is_done
+
+    def world_batch(self, count: int) -> ConvexWorldBatch | None:
+        """Return many worlds of the scene, as `HasWorldBatch.world_batch`."""
+        if not (self._can_batch() and ConvexWorldBatch.is_suitable(self._world, self._store, self._settings)):
+            return None
+        return ConvexWorldBatch(copy.deepcopy(self._store), self._settings, count)
 
     def _can_batch(self) -> bool:
         """Whether nothing has to be done between two substeps, so that `CompiledStepper` can make many."""

@@ -5,7 +5,8 @@ from sandbox.game_spec import Environment, GameSpec
 GAME = GameSpec(
     names=("landing",),
     rules="sandbox.games.landing.rules:Landing",
+    vector_rules="sandbox.games.landing.vector_rules:VectorLanding",
     bot="sandbox.games.landing.bot:LandingBot",
-    environments=(Environment("Landing", "games/landing", 5),),
+    environments=(Environment("Landing", "games/landing", 5, is_vectorised=True),),
     real_time=True,
 )

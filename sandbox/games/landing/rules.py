@@ -12,10 +12,12 @@ pad and slow.
 
 import math
 from collections.abc import Sequence
+from typing import TypedDict
 
 import numpy as np
 
 from sandbox.action import Action, Move, Throttle
+from sandbox.arrays import FloatArray
 from sandbox.formatting import format_signed
 from sandbox.games.contract import Control, StepInfo, UnsuitableSceneError
 from sandbox.scene.compile.bodies import Bodies
@@ -29,7 +31,8 @@ from sandbox.scene.random_streams import Stream, draws
 from sandbox.trajectory import Frame
 
 SHIP, PAD = "ship", "pad"
-LANDED = "landed"
+LANDED, LOST = "landed", "lost in space"
+OUTSIDE_PAD, TIPPED_OVER = "crashed outside the pad", "tipped over"
 TANK = 45.0
 """N·s per kg of the ship, capacity of the tank: the change of velocity, m/s, in free space"""
 DOWN, ASIDE, TILT = 2.0, 1.0, math.radians(15.0)
@@ -48,6 +51,15 @@ UNLIMITED_STEPS = 1_000_000
 """number of `quiet_steps` where no fuel can be burnt"""
 GAMEPAD_INPUTS = {"up": "a rt up", "left": "left -leftx", "right": "right +leftx"}
 """gamepad inputs by the key of a thrust"""
+
+
+class Start(TypedDict):
+    """Initial position and velocity of the ship."""
+
+    position: Point
+    """m"""
+    velocity: Point
+    """m/s"""
 
 
 class Landing:
@@ -80,15 +92,20 @@ class Landing:
         """m/s², downwards"""
         self.pad = _pad_position(scene)
         """m, centre of the top of the pad"""
-        self._pad_index, self._static_count = -1 - scene.fixed_names.index(PAD), len(scene.fixed)
+        self.pad_index = -1 - scene.fixed_names.index(PAD)
+        """number of the pad in the pairs of contacts"""
+        self._static_count = len(scene.fixed)
         form = geometry_of(bodies.elements[int(bodies.element[self.ship])])
         self._corners = [(x, y, piece.radius) for piece in form.pieces for x, y in piece.corners]
-        self._tank = self._full = TANK * self.mass
+        self.full_tank = TANK * self.mass
+        """N·s"""
+        self.forces = {name: math.hypot(*thrust.force) for name, thrust in self.thrusts.items()}
+        """N, of each thrust at full level"""
+        self._tank = self.full_tank
         self._levels = dict.fromkeys(self.thrusts, 0.0)
-        self._forces = {name: math.hypot(*thrust.force) for name, thrust in self.thrusts.items()}
         self._burn_rate = 0.0  # N·s per s, since the last change of a level
         self._changed, self._tank_then = 0.0, self._tank  # time and fuel at that change
-        self._start = _start(scene, bodies, self.ship)
+        self._start = Move(time=0.0, body=SHIP, **self.random_start(scene.world.seed, bodies))
         self._time, self._rest_time = 0.0, 0.0
         self._previous_frame: Frame | None = None
         self._frame: Frame | None = None
@@ -109,14 +126,16 @@ class Landing:
         elapsed, stopped = info.time - before, self._burn(info, before)
         self.game_over = self._end_reason(info, elapsed)
         if self.game_over is not None:
-            self.score = self.score or self._crash_points()
+            if self.game_over != LANDED:
+                previous = self._previous_frame
+                self.score = self.crash_points(previous.position[self.ship], previous.velocity[self.ship])
             self._cues.append("win" if self.game_over == LANDED else "lose")
             return tuple(Throttle(time=0.0, thrust=name, level=0.0) for name, level in self._levels.items() if level)
         return stopped
 
     def quiet_steps(self, dt: float) -> int:
         """Return the number of steps of dt, s, in which the tank cannot become empty, as `HasQuietSteps`."""
-        burnt = math.fsum(self._forces.values()) * dt  # at most, in a step
+        burnt = sum(self.forces.values()) * dt  # at most, in a step
         return max(int(self._tank / burnt), 1) if burnt and self._tank else UNLIMITED_STEPS
 
     def _burn(self, info: StepInfo, before: float) -> Sequence[Action]:
@@ -143,64 +162,59 @@ class Landing:
     def _set_levels(self, levels: dict[str, float], time: float) -> None:
         """Set the levels of the thrusts from a time, s, on."""
         self._levels, self._changed, self._tank_then = levels, time, self._tank
-        self._burn_rate = math.fsum(level * self._forces[name] for name, level in levels.items())
+        self._burn_rate = 0.0
+        for name, level in levels.items():
+            self._burn_rate += level * self.forces[name]
 
     def _end_reason(self, info: StepInfo, elapsed: float) -> str | None:
         """Return the reason why the game is over, and set the score of a landing; None while it runs."""
         frame, ship = info.frame, self.ship
         if not frame.present[ship]:
-            return "lost in space"
+            return LOST
         touched = {int(pair[1]) if pair[0] == ship else int(pair[0]) for pair in info.contacts.pair if ship in pair}
-        if any(number >= -self._static_count for number in touched - {self._pad_index}):  # smaller numbers are zones
-            return "crashed outside the pad"
-        if self._pad_index not in touched:
+        if any(number >= -self._static_count for number in touched - {self.pad_index}):  # smaller numbers are zones
+            return OUTSIDE_PAD
+        if self.pad_index not in touched:
             self._rest_time = 0.0
             return None
         first, self._touched = not self._touched, True
         if first:
-            fault = self._crash_reason()
+            assert self._previous_frame is not None
+            fault = crash_reason(self._previous_frame.velocity[ship], float(self._previous_frame.angle[ship]))
             if fault is not None:
                 return fault
             self._cues.append("touch")
-        if abs(self.tilt(frame)) > TIPPED_OVER_ANGLE:
-            return "tipped over"
-        speed = float(np.hypot(*frame.velocity[ship]))
-        self._rest_time = self._rest_time + elapsed if speed < REST_SPEED else 0.0
+        if abs(tilt(float(frame.angle[ship]))) > TIPPED_OVER_ANGLE:
+            return TIPPED_OVER
+        self._rest_time = self._rest_time + elapsed if is_at_rest(frame.velocity[ship]) else 0.0
         if self._rest_time < REST_TIME:
             return None
-        self.score = FOR_LANDING + round(FOR_FUEL * self._tank / self._full)
+        self.score = self.landing_points(self._tank)
         return LANDED
 
-    def _crash_reason(self) -> str | None:
-        """Return the reason why the first touch is a crash, from the state before it; None if it is none."""
-        assert self._previous_frame is not None
-        sideways, up = self._previous_frame.velocity[self.ship].tolist()
-        if -up > DOWN:
-            return f"crashed: {-up:.1f} m/s down (limit {DOWN:g})"
-        if abs(sideways) > ASIDE:
-            return f"crashed: {abs(sideways):.1f} m/s sideways (limit {ASIDE:g})"
-        tilt = abs(self.tilt(self._previous_frame))
-        return (
-            f"crashed: tilted by {math.degrees(tilt):.0f}° (limit {math.degrees(TILT):.0f}°)" if tilt > TILT else None
-        )
+    def landing_points(self, tank: float) -> int:
+        """Return the points of a landing with fuel, N·s, left."""
+        return FOR_LANDING + round(FOR_FUEL * tank / self.full_tank)
 
-    def _crash_points(self) -> int:
-        """Return the points of a crash."""
-        assert self._previous_frame is not None
-        position, speed = (
-            self._previous_frame.position[self.ship],
-            float(np.hypot(*self._previous_frame.velocity[self.ship])),
-        )
+    def crash_points(self, position: FloatArray, velocity: FloatArray) -> int:
+        """Return the points of a crash, from the position, m, and the velocity, m/s, of the ship before it, (2,)."""
         proximity = max(1.0 - math.dist(position.tolist(), self.pad) / CRASH_DISTANCE, 0.0)
-        return round(FOR_A_CRASH * proximity * max(1.0 - speed / CRASH_SPEED, 0.0))
+        return round(FOR_A_CRASH * proximity * max(1.0 - float(np.hypot(*velocity)) / CRASH_SPEED, 0.0))
+
+    def random_start(self, seed: int, bodies: Bodies) -> Start:
+        """Return the random initial position and velocity of the ship."""
+        rng = draws(Stream.LANDING, seed)
+        (x, y), (vx, vy) = bodies.position[self.ship].tolist(), bodies.velocity[self.ship].tolist()
+        x, vx = x + rng.uniform(-ELSEWHERE, ELSEWHERE), vx + rng.uniform(-FASTER, FASTER)
+        return {"position": (x, y), "velocity": (vx, vy)}
 
     def tilt(self, frame: Frame) -> float:
         """Return the angle of the ship, rad, −π to π; positive if it leans to the left."""
-        return math.remainder(float(frame.angle[self.ship]), math.tau)
+        return tilt(float(frame.angle[self.ship]))
 
     def display_lines(self) -> Sequence[tuple[str, str]]:
         """Return fuel, height, speeds and tilt; values beyond the limits of a landing are marked by `!`."""
-        fuel = ("fuel", f"{100.0 * self._tank / self._full:.0f} %")
+        fuel = ("fuel", f"{100.0 * self._tank / self.full_tank:.0f} %")
         if self._frame is None or not self._frame.present[self.ship]:
             return (fuel,)
         sideways, up = self._frame.velocity[self.ship].tolist()
@@ -215,7 +229,7 @@ class Landing:
 
     def observation(self) -> Sequence[tuple[str, float]]:
         """Return the fuel as a fraction of a full tank."""
-        return (("fuel", self._tank / self._full),)
+        return (("fuel", self._tank / self.full_tank),)
 
     def height(self, frame: Frame) -> float:
         """Return the height of the lowest point of the ship above the pad, m."""
@@ -227,6 +241,32 @@ class Landing:
         """Return the names of the sounds since the last call."""
         cues, self._cues = self._cues, []
         return cues
+
+
+def crash_reason(velocity: FloatArray, angle: float) -> str | None:
+    """Return the reason why the first touch of the pad is a crash, from the state of the ship before it, or None.
+
+    Args:
+        velocity: (2,) m/s.
+        angle: rad.
+    """
+    sideways, up = velocity.tolist()
+    if -up > DOWN:
+        return f"crashed: {-up:.1f} m/s down (limit {DOWN:g})"
+    if abs(sideways) > ASIDE:
+        return f"crashed: {abs(sideways):.1f} m/s sideways (limit {ASIDE:g})"
+    lean = abs(tilt(angle))
+    return f"crashed: tilted by {math.degrees(lean):.0f}° (limit {math.degrees(TILT):.0f}°)" if lean > TILT else None
+
+
+def tilt(angle: float) -> float:
+    """Return an angle, rad, as one from −π to π."""
+    return math.remainder(angle, math.tau)
+
+
+def is_at_rest(velocity: FloatArray) -> bool:
+    """Return whether a velocity, (2,) m/s, is that of a ship at rest."""
+    return float(np.hypot(*velocity)) < REST_SPEED
 
 
 def _control(name: str, thrust: Thrust) -> Control:
@@ -250,14 +290,6 @@ def _pad_position(scene: Scene) -> Point:
         case Plane():
             return pad.point
     raise UnsuitableSceneError(f"landing needs a pad that is a plane, a wall or a post, called {PAD!r}")
-
-
-def _start(scene: Scene, bodies: Bodies, ship: int) -> Move:
-    """Return the action that sets the random initial position and velocity of the ship."""
-    rng = draws(Stream.LANDING, scene.world.seed)
-    (x, y), (vx, vy) = bodies.position[ship].tolist(), bodies.velocity[ship].tolist()
-    x, vx = x + rng.uniform(-ELSEWHERE, ELSEWHERE), vx + rng.uniform(-FASTER, FASTER)
-    return Move(time=0.0, body=SHIP, position=(x, y), velocity=(vx, vy))
 
 
 def _marked(text: str, beyond: bool) -> str:
