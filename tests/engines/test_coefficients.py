@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sandbox.engines.pymunk_adapter.colliders import TOLERANCE, factors, wrong_pairs
+from sandbox.engines.common.pair_factors import TOLERANCE, factors, wrong_pairs
 from sandbox.engines.registry import start
 from sandbox.scene.files.load import from_document
 

@@ -20,6 +20,8 @@ import pymunk
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.base import FARTHEST, FASTEST
 from sandbox.engines.common.colliders import straightened, wall_segments
+from sandbox.engines.common.collision_bits import collision_bits
+from sandbox.engines.common.pair_factors import factors, wrong_pairs
 from sandbox.engines.common.restitution import segment_fractions
 from sandbox.engines.pymunk_adapter.callbacks import PairCallbacks, SpaceOneWayWalls
 from sandbox.engines.pymunk_adapter.forces import has_drag
@@ -29,73 +31,6 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.base import BACKING, Collides, Point
 from sandbox.scene.description.fixed import Plane, PlaneReach, Post, Wall, mask_of
 from sandbox.scene.description.world import Settings
-
-TOLERANCE = 2.0**-51
-"""Relative; two roundings, of a square root or quotient and of the product."""
-
-
-def factors(target: FloatArray, touching: BoolArray, stated: list[float | None]) -> list[float]:
-    """Return a factor for each of S surfaces whose products best match the target coefficients.
-
-    The stated values are tried first, with 1 where none is stated. If a product is wrong then, the factors are solved
-    for: square roots on the diagonal, quotients along each further pair.
-
-    Args:
-        target: (S, S) coefficients, symmetric.
-        touching: (S, S) pairs that can touch; the others do not matter.
-        stated: value that each surface states itself.
-    """
-    stated_factors = [1.0 if value is None else value for value in stated]
-    if not wrong_pairs(target, touching, stated_factors):
-        return stated_factors
-    solved = _solve_factors(target, touching)
-    return min(stated_factors, solved, key=lambda f: len(wrong_pairs(target, touching, f)))
-
-
-def wrong_pairs(target: FloatArray, touching: BoolArray, factor: list[float]) -> list[tuple[int, int]]:
-    """Return the pairs that can touch and whose product of factors is not the target coefficient."""
-    with np.errstate(over="ignore"):  # a quotient by a tiny factor may overflow; then the pair is wrong
-        is_wrong = np.abs(np.outer(factor, factor) - target) > TOLERANCE * target
-    rows, columns = np.nonzero(np.triu(is_wrong & touching))
-    return list(zip(rows.tolist(), columns.tolist(), strict=True))
-
-
-def _solve_factors(target: FloatArray, touching: BoolArray) -> list[float]:
-    """Solve f_a·f_b = target over the pairs that can touch, as far as possible.
-
-    Factors of surfaces that can touch themselves are roots; from these, other factors follow pair by pair.
-    """
-    size = len(target)
-    factor: list[float | None] = [None] * size
-    self_touching = [a for a in range(size) if touching[a, a]]
-    for seed in (*self_touching, *range(size)):
-        if factor[seed] is not None:
-            continue
-        factor[seed] = math.sqrt(target[seed, seed]) if touching[seed, seed] else _free_factor(target, touching, seed)
-        queue = [seed]
-        while queue:
-            a = queue.pop()
-            base = factor[a]
-            for b in range(size):
-                if factor[b] is None and touching[a, b] and not touching[b, b] and base:
-                    quotient = float(target[a, b]) / base
-                    if math.isfinite(quotient):
-                        factor[b] = quotient
-                        queue.append(b)
-    return [0.0 if value is None else value for value in factor]
-
-
-def _free_factor(target: FloatArray, touching: BoolArray, surface: int) -> float:
-    """Return 1, or 0 for a surface whose pairs all have the coefficient 0."""
-    return 1.0 if (target[surface][touching[surface]] > 0).any() else 0.0
-
-
-STATIC, COLLIDES_ALL, COLLIDES_FIXED = 0b001, 0b010, 0b100
-"""Collision categories: static and fixed bodies; bodies that collide with everything; bodies that collide with the
-first category only."""
-
-CATEGORIES_PER_LAYER = 3
-"""number of categories on each layer: those of layer k are shifted by 3·k bits"""
 
 SHORTEST_REACH, LONGEST_REACH = 5e3, 5e6
 """m; pymunk's half-planes are segments, whose rounding error grows with their length: 3e-13 m at a reach of 5e3, a
@@ -123,16 +58,10 @@ def gravity_of(scene: Scene) -> tuple[float, float]:
 
 
 @cache
-def collision_filter(fixed: bool, collides: Collides, group: int = 0, layers: int = 1) -> pymunk.ShapeFilter:
+def shape_filter(fixed: bool, collides: Collides, group: int = 0, layers: int = 1) -> pymunk.ShapeFilter:
     """Return the filter of shapes on some layers, given as bits. Shapes of one group other than 0 do not collide."""
-    if fixed:
-        categories, mask = STATIC, COLLIDES_ALL | COLLIDES_FIXED if collides == "all" else 0
-    elif collides == "all":
-        categories, mask = COLLIDES_ALL, STATIC | COLLIDES_ALL
-    else:
-        categories, mask = COLLIDES_FIXED, STATIC
-    layer_bits = sum(1 << CATEGORIES_PER_LAYER * k for k in range(layers.bit_length()) if layers >> k & 1)
-    return pymunk.ShapeFilter(group, categories=categories * layer_bits, mask=mask * layer_bits)
+    categories, mask = collision_bits(fixed, collides, layers)
+    return pymunk.ShapeFilter(group, categories=categories, mask=mask)
 
 
 def reach_of(starts: FloatArray) -> tuple[FloatArray, float]:
@@ -383,11 +312,11 @@ class StaticShapes:
     def rebuild(self, scene: Scene, surface: IntArray) -> None:
         """Update the surfaces (F,) and filters of the static colliders."""
         for (_, shapes), collider, index in zip(self._colliders, scene.fixed, surface.tolist(), strict=False):
-            shape_filter = _filter(collider, scene)
+            chosen = _filter(collider, scene)
             for shape in shapes:
                 self._setter.set_surface(shape, index)
-                if shape.filter != shape_filter:
-                    shape.filter = shape_filter
+                if shape.filter != chosen:
+                    shape.filter = chosen
 
     @property
     def ids(self) -> dict[int, int]:
@@ -422,7 +351,7 @@ def jointed_surfaces(scene: Scene, surface: IntArray) -> set[int]:
 def _filter(collider: Plane | Wall | Post, scene: Scene) -> pymunk.ShapeFilter:
     """Return the collision filter of a static collider."""
     solid = isinstance(collider, Plane) or collider.solid
-    return collision_filter(True, "all" if solid else "none", layers=mask_of(collider.layers, scene.layers))
+    return shape_filter(True, "all" if solid else "none", layers=mask_of(collider.layers, scene.layers))
 
 
 def shuffled(count: int) -> list[int]:

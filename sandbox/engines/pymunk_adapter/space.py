@@ -15,10 +15,10 @@ from sandbox.engines.pymunk_adapter.colliders import (
     StaticShapes,
     SurfaceSetter,
     body_shapes,
-    collision_filter,
     gravity_of,
     jointed_surfaces,
     new_space,
+    shape_filter,
     shuffled,
 )
 from sandbox.engines.pymunk_adapter.contacts import NO_IMPULSES, ContactLists, ContactReader
@@ -172,7 +172,7 @@ class SpaceBodies(SpaceBodyTable):
     def _filter(self, index: int, bodies: Bodies) -> pymunk.ShapeFilter:
         collides = bodies.elements[bodies.element[index]].collides
         layers = 1 << int(self.layer[index])
-        return collision_filter(bool(bodies.fixed[index]), collides, int(bodies.group[index]), layers)
+        return shape_filter(bool(bodies.fixed[index]), collides, int(bodies.group[index]), layers)
 
     def set_layer(self, index: int, bodies: Bodies) -> None:
         """Apply a body's changed collision layer from now on. Its contacts on the old layer end."""

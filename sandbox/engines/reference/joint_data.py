@@ -14,7 +14,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
-from sandbox.engines.common.geometry import rotate
+from sandbox.engines.common.geometry import length_and_direction, rotate
 from sandbox.engines.common.kernel import bare_kernel
 from sandbox.engines.common.springs import spring_law
 from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
@@ -85,15 +85,6 @@ def anchor_separation(joints: JointData, k: int, pose: FloatArray) -> tuple[Anch
         cos, sin = math.cos(pose[i, 2]), math.sin(pose[i, 2])
         ax, ay = rotate(ax, ay, cos, sin)
     return (ax, ay, bx, by), pose[j, 0] + bx - (pose[i, 0] + ax), pose[j, 1] + by - (pose[i, 1] + ay)
-
-
-@bare_kernel
-def length_and_direction(x: float, y: float) -> tuple[float, float, float]:
-    """Return the length of a vector and its direction; both are 0 for a zero vector."""
-    length = math.sqrt(x * x + y * y)
-    if length == 0.0:
-        return 0.0, 0.0, 0.0
-    return length, x / length, y / length
 
 
 @bare_kernel

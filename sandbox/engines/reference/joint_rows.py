@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.common.geometry import length_and_direction
 from sandbox.engines.common.kernel import bare_kernel
 from sandbox.engines.reference.joint_data import (
     PIVOT,
@@ -23,7 +24,6 @@ from sandbox.engines.reference.joint_data import (
     effective_mass_matrix,
     inverse_effective_mass,
     inverse_effective_moment,
-    length_and_direction,
     relative_rotation,
     relative_velocity,
 )

@@ -15,6 +15,7 @@ The multipliers λ are sums over the iterations, N·s² or N·m·s²: λ/h² is 
 import math
 
 from sandbox.arrays import FloatArray
+from sandbox.engines.common.geometry import length_and_direction
 from sandbox.engines.common.kernel import bare_kernel
 from sandbox.engines.reference.joint_data import (
     PIVOT,
@@ -29,7 +30,6 @@ from sandbox.engines.reference.joint_data import (
     effective_mass_matrix,
     inverse_effective_mass,
     inverse_effective_moment,
-    length_and_direction,
     relative_rotation,
 )
 

@@ -18,10 +18,11 @@ import numpy as np
 
 from sandbox.arrays import FloatArray
 from sandbox.engines.common.body_store import BodyStore
+from sandbox.engines.common.force_field import ForceField
 from sandbox.engines.reference.collision import WORK, CollisionPipeline, is_suitable, make_pipeline
 from sandbox.engines.reference.drives import DrivenSolver, Drives, DriveWork
 from sandbox.engines.reference.filtering import CollisionFilter, OneWayWalls
-from sandbox.engines.reference.forces import ForceField, forces_on
+from sandbox.engines.reference.forces import forces_on
 from sandbox.engines.reference.integrators import INTEGRATORS, State
 from sandbox.engines.reference.joints import JointSolver
 from sandbox.engines.reference.manifold import Manifolds

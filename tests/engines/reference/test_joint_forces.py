@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from sandbox.engines.reference.forces import add_attraction, add_thrust
+from sandbox.engines.common.force_field import add_attraction, add_thrust
 from tests.engines.reference.joint_rig import Rig, compile_joints
 
 pytestmark = pytest.mark.full  # long runs and sweeps

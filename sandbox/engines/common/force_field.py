@@ -1,0 +1,159 @@
+"""Accelerations by attractions and thrusts, for engines that evaluate forces themselves."""
+
+import math
+
+import numpy as np
+
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.common.body_store import BodyStore
+from sandbox.engines.common.geometry import length_and_direction, rotate
+from sandbox.engines.common.kernel import bare_kernel
+from sandbox.scene.compile.joint_arrays import WORLD
+from sandbox.scene.geometry.shapes import geometry_of
+
+
+@bare_kernel
+def add_attraction(
+    pose: FloatArray,
+    target: IntArray,
+    position: FloatArray,
+    strength: FloatArray,
+    softening: FloatArray,
+    inverse_mass: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Add the accelerations of N bodies by A attractions, and of the attracting bodies by the reactions. Costs A·N.
+
+    A strength is G·M. The mass of the attracting body affects only its own acceleration, by the reaction. A body at the
+    position of its target gets no acceleration.
+
+    Args:
+        pose: (N, 2 or 3) m.
+        target: (A,) index of the attracting body, or −1 for a fixed position.
+        position: (A, 2) m, fixed positions; not read where there is a target body.
+        strength: (A,) m³/s².
+        softening: (A,) m.
+        inverse_mass: (N,) 1/kg; bodies with 0 are not accelerated.
+        out: (N, 2 or 3) m/s², added to.
+    """
+    for k in range(len(target)):
+        own = target[k]
+        x, y = (pose[own, 0], pose[own, 1]) if own >= 0 else (position[k, 0], position[k, 1])
+        for i in range(len(pose)):
+            if i == own or inverse_mass[i] == 0.0:
+                continue
+            distance, nx, ny = length_and_direction(x - pose[i, 0], y - pose[i, 1])
+            if distance == 0.0:
+                continue
+            pull = strength[k] / (distance * distance + softening[k] * softening[k])
+            out[i, 0] += pull * nx
+            out[i, 1] += pull * ny
+            if own >= 0:
+                answer = pull * (inverse_mass[own] / inverse_mass[i])
+                out[own, 0] -= answer * nx
+                out[own, 1] -= answer * ny
+
+
+@bare_kernel
+def add_thrust(
+    pose: FloatArray,
+    body: IntArray,
+    point: FloatArray,
+    force: FloatArray,
+    throttle: FloatArray,
+    inverse_mass: FloatArray,
+    inverse_moment: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Add the accelerations by T thrusts.
+
+    Args:
+        pose: (N, 3) m and rad.
+        body: (T,) index of the body that each thrust acts on.
+        point: (T, 2) m, point of application, in the body's frame about its centre of mass.
+        force: (T, 2) N, in that frame, at full throttle.
+        throttle: (T,) fraction of the force that acts.
+        inverse_mass: (N,) 1/kg.
+        inverse_moment: (N,) 1/(kg·m²).
+        out: (N, 3) m/s² and rad/s², added to.
+    """
+    for k in range(len(body)):
+        i = body[k]
+        x, y = throttle[k] * force[k, 0], throttle[k] * force[k, 1]
+        cos, sin = math.cos(pose[i, 2]), math.sin(pose[i, 2])
+        world_x, world_y = rotate(x, y, cos, sin)
+        out[i, 0] += inverse_mass[i] * world_x
+        out[i, 1] += inverse_mass[i] * world_y
+        out[i, 2] += inverse_moment[i] * (point[k, 0] * y - point[k, 1] * x)
+
+
+class ForceField:
+    """Attractions and thrusts of a running scene."""
+
+    def __init__(self, store: BodyStore) -> None:
+        self._store, self._began = store, store.setup.time
+        scene, bodies = store.scene, store.bodies
+        number = {name: k for k, name in enumerate(bodies.names)}
+        # Bodies that left the scene before an engine switch neither attract nor have thrusts.
+        attractions = [a for a in scene.attractions if not isinstance(a.toward, str) or a.toward in number]
+        which = [k for k, thrust in enumerate(scene.thrusts) if thrust.body in number]
+        thrusts = [scene.thrusts[k] for k in which]
+        toward = [a.toward for a in attractions]
+        self._target: IntArray = np.asarray([number[t] if isinstance(t, str) else WORLD for t in toward], np.int64)
+        positions = [(0.0, 0.0) if isinstance(t, str) else t for t in toward]
+        self._position: FloatArray = np.asarray(positions, np.float64).reshape(-1, 2)
+        self._strength: FloatArray = np.asarray([a.strength for a in attractions], np.float64)
+        self._softening: FloatArray = np.asarray([a.softening for a in attractions], np.float64)
+        self.thrust_indices: IntArray = np.asarray(which, np.int64)
+        self.thrust_bodies: IntArray = np.asarray([number[t.body] for t in thrusts], np.int64)
+        centres = [geometry_of(bodies.elements[bodies.element[n]]).centre for n in self.thrust_bodies.tolist()]
+        points = [(t.point[0] - c[0], t.point[1] - c[1]) for t, c in zip(thrusts, centres, strict=True)]
+        self.thrust_points: FloatArray = np.asarray(points, np.float64).reshape(-1, 2)
+        self.thrust_forces: FloatArray = np.asarray([t.force for t in thrusts], np.float64).reshape(-1, 2)
+        self.thrust_begins: FloatArray = np.asarray([t.begin for t in thrusts], np.float64)
+        self.thrust_ends: FloatArray = np.asarray([math.inf if t.end is None else t.end for t in thrusts], np.float64)
+
+    @property
+    def empty(self) -> bool:
+        """Whether there are no attractions and no thrusts."""
+        return not (len(self._target) or len(self.thrust_bodies))
+
+    def __call__(self, time: float, x: FloatArray) -> FloatArray:
+        """Return the accelerations (N, D) at a time, s, in a state (2, N, D), m/s² and rad/s²."""
+        store = self._store
+        out: FloatArray = np.zeros_like(x[1])
+        if len(self._target):
+            is_present = np.append(store.present, True)[self._target]  # the world, −1, finds the last
+            some = (
+                self._target[is_present],
+                self._position[is_present],
+                self._strength[is_present],
+                self._softening[is_present],
+            )
+            add_attraction(x[0], *some, store.inverse_mass, out[: len(store.inverse_mass)])
+        self._add_thrusts(time, x, out)
+        return out
+
+    @property
+    def attracting(self) -> bool:
+        """Whether there are attractions."""
+        return len(self._target) > 0
+
+    @property
+    def thrusting(self) -> bool:
+        """Whether there are thrusts."""
+        return len(self.thrust_bodies) > 0
+
+    def thrusts(self, time: float, x: FloatArray) -> FloatArray:
+        """Return the accelerations (N, D) by thrusts alone, m/s² and rad/s²."""
+        out: FloatArray = np.zeros_like(x[1])
+        self._add_thrusts(time, x, out)
+        return out
+
+    def _add_thrusts(self, time: float, x: FloatArray, out: FloatArray) -> None:
+        """Add the accelerations by thrusts."""
+        if self.thrusting:
+            store, now = self._store, self._began + time
+            level = store.throttles[self.thrust_indices] * ((self.thrust_begins <= now) & (now < self.thrust_ends))
+            inverse = store.inverse_mass, store.inverse_moment
+            add_thrust(x[0], self.thrust_bodies, self.thrust_points, self.thrust_forces, level, *inverse, out)
