@@ -21,7 +21,7 @@ def versions() -> dict[str, str]:
     another version.
     """
     found = {"python": platform.python_version()}
-    for package in ("sandbox2d", "pymunk", "numpy", "numba"):
+    for package in ("sandbox2d", "pymunk", "pyb2d3", "numpy", "numba"):
         try:
             found["sandbox" if package == "sandbox2d" else package] = version(package)
         except PackageNotFoundError:

@@ -375,9 +375,9 @@ def test_invalid_scene_option_or_engine_raises() -> None:
         SandboxEnv("landing", every=0)
     with pytest.raises(ValueError, match=r"a whole number"):
         SandboxEnv("landing", **{"every": 1.5})
-    with pytest.raises(ValueError, match="unknown engine 'box2d'; engines: pymunk, exact, reference"):
-        SandboxEnv("landing", engine="box2d")
-    with pytest.raises(Refusal, match=r"drag or polygons.*pymunk, reference"):
+    with pytest.raises(ValueError, match="unknown engine 'box3d'; engines: pymunk, box2d, exact, reference"):
+        SandboxEnv("landing", engine="box3d")
+    with pytest.raises(Refusal, match=r"drag or polygons.*pymunk, box2d, reference"):
         SandboxEnv("duel", engine="exact")
     assert SandboxEnv("landing", bodies="ship").observed == SandboxEnv("landing").observed
     with pytest.raises(gymnasium.error.ResetNeeded):

@@ -57,6 +57,7 @@ COMPANIONS: dict[str, dict[str, object]] = {
 
 VALUES: dict[str, object] = {
     "slop": 0.001, "bias": 0.01, "persistence": 1, "stiffness": 1e4, "damping": 0.5, "half_kick": True, "stretch": 0.1,
+    "continuous": True, "sleeping": True, "workers": 2,
 }  # fmt: skip
 """A value of each key that is no word."""
 

@@ -377,6 +377,10 @@ class Engine(Protocol):
     def capabilities(self) -> frozenset[Demand]:
         """Demands that the engine models."""
 
+    @property
+    def knows_impulses(self) -> bool:
+        """Whether contacts have impulses; if not, they are nan, and energy accounting is refused."""
+
     def missing(self, start: Scene | Setup, settings: Settings) -> tuple[str, ...]:
         """Return each demand and setting that the engine does not support; empty if it can run the scene."""
 

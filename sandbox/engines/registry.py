@@ -1,6 +1,8 @@
-"""ENGINES: every engine by name."""
+"""ENGINES: every engine that is installed, by name."""
 
 from sandbox.echo import short_repr
+from sandbox.engines.box2d_adapter.engine import Box2DEngine
+from sandbox.engines.box2d_adapter.requirements import is_installed
 from sandbox.engines.contract import Engine, Refusal, Simulation
 from sandbox.engines.exact.engine import ExactEngine
 from sandbox.engines.pymunk_adapter.engine import PymunkEngine
@@ -11,10 +13,14 @@ from sandbox.scene.description.world import Settings
 
 ENGINES: dict[str, Engine] = {
     "pymunk": PymunkEngine(),
+    **({"box2d": Box2DEngine()} if is_installed() else {}),
     "exact": ExactEngine(),
     "reference": ReferenceEngine(),
 }
 
+
+EXTRAS = {"box2d": "box2d"}
+"""extra of the package that installs an engine, by the name of the engine"""
 
 USUAL = "pymunk"
 """Default engine."""
@@ -33,6 +39,9 @@ def engine_named(name: str) -> Engine:
     try:
         return ENGINES[name]
     except KeyError:
+        if name in EXTRAS:
+            needed = f"pip install -e '.[{EXTRAS[name]}]'"
+            raise UnknownEngineError(f"the engine {name!r} is not installed; install it with: {needed}") from None
         raise UnknownEngineError(f"unknown engine {short_repr(name)}; engines: {', '.join(ENGINES)}") from None
 
 

@@ -468,6 +468,8 @@ class SwitchableSimulation:
         try:
             persistent, broken = self._active_actions().actions(), dict(self.broken)
             segment = start_segment(self.setup, engine, wanted, bodies, frame, persistent, broken, plane_reach)
+            if self._ledger.is_on:
+                segment.simulation.account()
         except (Refusal, UnknownEngineError) as refusal:
             raise ActionError(str(refusal)) from None
         with self._ledger.replacing(self, segment.simulation):

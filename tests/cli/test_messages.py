@@ -45,7 +45,7 @@ BALL = "[[ball]]\nposition = [0, 0]\nradius = 1\n"
         ),
         ("play bounce --set solver.integrator=rk4", 1, "engines that can: reference; add --engine reference"),
         ("match 8-ball --engine reference --set solver.response=penalty", 1, "response 'penalty'"),
-        ("run bounce --set solver.engine=box2d", 2, "the engine is not part of a scene"),
+        ("run bounce --set solver.engine=box3d", 2, "the engine is not part of a scene"),
         # values
         ("run bounce --set ball.ball.radius=-1", 2, "ball.ball.radius (set): must be greater than 0, is -1"),
         ("run bounce --set ball.ball.mass=0", 2, "ball.ball.mass (set): must be greater than 0, is 0"),
@@ -86,7 +86,7 @@ def test_mistake_is_reported_in_one_line_with_a_correction(
             "an array of 2 or 3, is",
         ),
         (SLINGSHOT, ":3: pinball.slingshot[0].points", "must be 3 corners"),
-        ('[solver]\nengine = "box2d"\n' + BALL, ":2: solver.engine", "choose it with --engine NAME"),
+        ('[solver]\nengine = "box3d"\n' + BALL, ":2: solver.engine", "choose it with --engine NAME"),
         ("dt = 0.1\n" + BALL, ":1: dt", "did you mean solver.dt?"),
         ("[world]\nsubsteps = 2\n" + BALL, ":2: world.substeps", "did you mean solver.substeps?"),
     ],

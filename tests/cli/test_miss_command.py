@@ -30,6 +30,7 @@ def test_document_has_one_row_per_engine_integrator_and_step(capfd: pytest.Captu
     assert status == 0
     assert {(row["engine"], row["integrator"]) for row in document["rows"]} == {
         ("pymunk", None),
+        ("box2d", None),
         *(("reference", name) for name in ("explicit_euler", "semi_implicit_euler", "velocity_verlet", "leapfrog")),
         ("reference", "rk4"),
     }

@@ -75,8 +75,8 @@ def test_e_switches_to_the_next_engine_and_keeps_the_state(drive: OpenWindow, tm
     session = window.session()
     assert session.engine == "pymunk"
     assert [(act.time, getattr(act, "engine", None)) for act in session.actions] == [
-        (0.02, "exact"),
-        (0.03, "reference"),
+        (0.02, "box2d"),
+        (0.03, "exact"),
     ]
 
 

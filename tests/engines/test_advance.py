@@ -202,10 +202,11 @@ def test_advance_equals_steps(
         audit = Audit(simulation.setup)
         if audited:
             simulation.watch(audit)
-        if with_energy:
+        is_accounted = with_energy and ENGINES[engine].knows_impulses
+        if is_accounted:
             simulation.account()
         table, observed = way(simulation, splits, every)
-        energy = list(simulation.account().values()) if with_energy else []
+        energy = list(simulation.account().values()) if is_accounted else []
         results.append((table, [*observed, *(array.tobytes() for array in audit.missed())], energy))
     (one, seen, energy), (other, seen_other, energy_other) = results
     assert seen == seen_other
@@ -329,11 +330,14 @@ def test_table_is_widened_for_bodies_that_were_added(engine: str) -> None:
 @pytest.mark.parametrize("every", [1, 7])
 @pytest.mark.parametrize("engine", ENGINES)
 def test_divergence_within_an_advance(engine: str, every: int) -> None:
-    # From 1e12 m/s, 1e10 m/s faster each step: beyond the bound of 1e13 m/s within 900 steps.
-    text = "[world]\ngravity = [0, -1e9]\n[solver]\ndt = 10\n"
+    # From 1e12 m/s, 1e10 m/s faster each step: beyond the bound of 1e13 m/s within 900 steps. Box2D's bound is that of
+    # positions, 10 km for this slop: from 1 km at 10 m/s it is reached after 900 steps.
+    begin, speed, more = (-1e3, -10.0, 0.0) if engine == "box2d" else (0.0, -1e12, -1e9)
+    dt = 1 if engine == "box2d" else 10
+    text = f"[world]\ngravity = [0, {more}]\n[solver]\ndt = {dt}\n"
     scene = loads(
-        text + "[[ball]]\nposition = [0, 0]\nvelocity = [0, -1e12]\nradius = 0.1\n"
-        "[[ball]]\nposition = [9, 0]\nvelocity = [0, -1e12]\nradius = 0.1\n"
+        text + f"[[ball]]\nposition = [0, {begin}]\nvelocity = [0, {speed}]\nradius = 0.1\n"
+        f"[[ball]]\nposition = [9, {begin}]\nvelocity = [0, {speed}]\nradius = 0.1\n"
     )  # pymunk has no bound for particles
     one, seen = stepped(started(scene, engine), [1000], every)
     other, seen_other = advanced(started(scene, engine), [1000], every)

@@ -114,10 +114,10 @@ def test_pulled_body_comes_to_rest_at_the_pointer_at_any_step_and_mass(engine: s
     frame = simulation.frame()
     decay = (1.0 + OMEGA * 0.6) * math.exp(-OMEGA * 0.6)  # 1.5e-11, at small steps
     implicit_decay = (1.0 + OMEGA * dt) ** -steps * steps  # implicit scheme: a double factor of 1/(1 + ω·dt) a step
-    assert (
-        float(np.hypot(*(frame.position[0] - (0.5, -0.25)))) <= 10.0 * (decay + implicit_decay) + 1e-12
-    )  # residue of a double root
-    assert float(np.hypot(*frame.velocity[0])) <= 10.0 * OMEGA * (decay + implicit_decay) + 1e-11  # as above
+    # Residue of a double root; in 32-bit numbers the last steps are too short to move the body.
+    residue = 1e-5 if engine == "box2d" else 1e-12
+    assert float(np.hypot(*(frame.position[0] - (0.5, -0.25)))) <= 10.0 * (decay + implicit_decay) + residue
+    assert float(np.hypot(*frame.velocity[0])) <= 10.0 * OMEGA * (decay + implicit_decay) + 10.0 * residue
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -126,9 +126,10 @@ def test_force_is_limited_to_a_hundred_times_the_weight(engine: str, gravity: fl
     simulation = simulation_of(engine, gravity=gravity, mass=3.0)
     simulation.apply(pull(1e6, 0.0))
     simulation.step()
-    assert simulation.frame().velocity[0, 0] == pytest.approx(100.0 * weight * 0.01, rel=1e-12)  # rounding
+    rounding = 1e-6 if engine == "box2d" else 1e-12  # 32-bit numbers
+    assert simulation.frame().velocity[0, 0] == pytest.approx(100.0 * weight * 0.01, rel=rounding)
     advance(simulation, 9)
-    assert simulation.frame().velocity[0, 0] == pytest.approx(100.0 * weight * 0.1, rel=1e-12)  # as above
+    assert simulation.frame().velocity[0, 0] == pytest.approx(100.0 * weight * 0.1, rel=rounding)
 
 
 def test_force_limit_follows_the_current_gravity() -> None:
@@ -150,7 +151,8 @@ def test_pull_off_the_centre_turns_the_body_and_at_the_centre_does_not(engine: s
     simulation.step()
     frame, moment = simulation.frame(), 0.5 * 2.0 * 0.5**2
     assert frame.angular_velocity[0] > 0.0
-    assert frame.angular_velocity[0] == pytest.approx(0.4 * 2.0 * frame.velocity[0, 1] / moment, rel=1e-12)  # rounding
+    rounding = 1e-6 if engine == "box2d" else 1e-12  # 32-bit numbers
+    assert frame.angular_velocity[0] == pytest.approx(0.4 * 2.0 * frame.velocity[0, 1] / moment, rel=rounding)
     advance(simulation, 400)
     frame = simulation.frame()
     cos, sin = math.cos(frame.angle[0]), math.sin(frame.angle[0])

@@ -85,7 +85,7 @@ def test_simulation_without_switches_is_bit_identical_to_the_plain_engine(name: 
         assert simulation.state_hash() == plain.state_hash()
     found = [simulation.contacts(), plain.contacts()]
     for column in ("time", "pair", "point", "normal", "impulse"):
-        assert np.array_equal(getattr(found[0], column), getattr(found[1], column))
+        assert np.array_equal(getattr(found[0], column), getattr(found[1], column), equal_nan=True)
     assert simulation.time == plain.time
     assert dict(simulation.work) == dict(plain.work)
     assert dict(simulation.retired) == dict(plain.retired)
@@ -120,10 +120,11 @@ def test_free_flight_follows_the_closed_form_through_changes_of_the_step(
         error += steps * dt
     frame = simulation.frame()
     assert frame.time == pytest.approx(elapsed, rel=1e-12)  # a few sums
-    assert frame.velocity[0] == pytest.approx([2.0, 1.0 - 9.81 * elapsed], abs=1e-11)  # rounding of up to 60 sums
-    bound = 0.5 * 9.81 * h * error + 1e-11  # the error of explicit Euler is g·h·T/2; other schemes have less
+    rounding = 1e-4 if engine == "box2d" else 1e-11  # of up to 60 sums; 32-bit numbers
+    assert frame.velocity[0] == pytest.approx([2.0, 1.0 - 9.81 * elapsed], abs=rounding)
+    bound = 0.5 * 9.81 * h * error + rounding  # the error of explicit Euler is g·h·T/2; other schemes have less
     assert abs(frame.position[0, 1] - (9.0 + elapsed - 0.5 * 9.81 * elapsed**2)) <= bound
-    assert frame.position[0, 0] == pytest.approx(2.0 * elapsed, abs=1e-11)  # as above
+    assert frame.position[0, 0] == pytest.approx(2.0 * elapsed, abs=rounding)  # as above
 
 
 @pytest.mark.parametrize(("first", "second"), ENGINE_PAIRS)

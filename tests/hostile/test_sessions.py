@@ -40,7 +40,7 @@ WRONG = {
     "unknown engine": (change("engine", "box2d" * 10**5), "engine: "),
     "engine of no text": (change("engine", 3), "`engine`"),
     "switch to no engine": (switch(engine=""), "actions: 0.switch.engine"),
-    "switch to an unknown engine": (switch(engine="box2d"), "actions[0].engine"),
+    "switch to an unknown engine": (switch(engine="box3d"), "actions[0].engine"),
     "switch to an unknown setting": (switch(settings={"self": 1}), "actions[0].settings.self"),
     "switch to a wrong setting": (switch(settings={"dt": -1}), "actions[0].settings.dt"),
     "setting of a long name": (change("settings", {"z" * 10**6: 1}), "settings.z"),

@@ -11,12 +11,32 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
 from sandbox.trajectory import Trajectory
 
+SINGLE_PRECISION = frozenset({"box2d"})
+"""engines that compute in 32-bit numbers"""
+
 
 class EngineConfig(NamedTuple):
     """An engine with settings."""
 
     engine: str
     settings: dict[str, Any]
+
+    def rounding(self, tolerance: float) -> float:
+        """Return a tolerance for rounding errors of 64-bit numbers, or 2²⁹ of it with 32-bit numbers."""
+        return tolerance * 2.0**29 if self.engine in SINGLE_PRECISION else tolerance
+
+    def impact_rounding(self, tolerance: float) -> float:
+        """Return a tolerance for results of impacts with an offset, relative to the speed of approach.
+
+        Box2D solves an impact with the normal at the start of a step and from a distance of four slops on, here 0.02 of
+        the contact distance: in a glancing impact it is turned by some percent.
+        """
+        return 0.1 if self.engine == "box2d" else tolerance
+
+    @property
+    def knows_impulses(self) -> bool:
+        """Whether contacts have impulses."""
+        return ENGINES[self.engine].knows_impulses
 
     def run(self, scene: Scene, **more: Any) -> Trajectory:
         """Run a scene; the run must end with status "ok"."""

@@ -22,7 +22,11 @@ FLIGHTS = [
 def error_of(config: EngineConfig) -> float:
     if config.engine == "exact":
         return 0.0
-    return FIRST_ORDER.get(config.settings.get("integrator", "explicit_euler"), 0.0)
+    return FIRST_ORDER.get(scheme_of(config), 0.0)
+
+
+def scheme_of(config: EngineConfig) -> str:
+    return config.settings.get("integrator", "semi_implicit_euler" if config.engine == "box2d" else "explicit_euler")
 
 
 @each_config(FLIGHTS)
@@ -38,8 +42,9 @@ def test_projectile_has_the_closed_form_and_the_error_of_its_scheme(config):
     t = result.time
     exact = np.column_stack((1 + 3 * t, 2 + 10 * t - 0.5 * G * t * t + error_of(config) * G * 0.01 * t))
     # 200 sums of numbers near 10, each rounded by 1e-15
-    np.testing.assert_allclose(result.position[:, 0], exact, atol=1e-12)
-    np.testing.assert_allclose(result.velocity[:, 0], np.column_stack((3 + 0 * t, 10 - G * t)), atol=1e-12)
+    tolerance = config.rounding(1e-12)
+    np.testing.assert_allclose(result.position[:, 0], exact, atol=tolerance)
+    np.testing.assert_allclose(result.velocity[:, 0], np.column_stack((3 + 0 * t, 10 - G * t)), atol=tolerance)
 
 
 @each_config(IMPULSE_CONFIGS)
@@ -70,9 +75,11 @@ def test_elastic_ball_keeps_its_energy_for_100_s(config):
     result = config.run(scene, record_every=10)
     energy = energies(result, scene).total
     change = float(np.abs(energy / energy[0] - 1).max())
-    scheme = config.settings.get("integrator", "explicit_euler")
+    scheme = scheme_of(config)
     if config.engine == "exact":
         assert change <= 1e-11  # 50 impacts, each with a few rounding errors
+    elif config.engine == "box2d":  # each impact begins at the start of a step: energy is lost, never gained
+        assert (energy <= energy[0] * (1.0 + 0.03)).all()  # within a flight as below
     elif FIRST_ORDER.get(scheme):
         # Within a flight the error is g·h·v/2 over g·5 m, 0.01 at 10 m/s; it does not accumulate over impacts.
         assert change <= 0.03
@@ -95,7 +102,7 @@ def test_ball_comes_to_rest_on_the_plane(config):
     assert -depth - 1e-6 <= height <= (G * h * h if config.engine == "reference" else 0.0) + 1e-6
     assert np.abs(result.velocity[-1]).max() <= 1e-3 * G * h  # bounces decay by 0.3 a step, springs by their dampers
     # The impulses of all contacts sum to the momentum of the weight, m g T.
-    assert result.contact_impulse[:, 1].sum() == pytest.approx(-G * 5.0, abs=1e-5)
+    assert not config.knows_impulses or result.contact_impulse[:, 1].sum() == pytest.approx(-G * 5.0, abs=1e-5)
 
 
 @each_config(IMPULSE_CONFIGS)
@@ -112,9 +119,12 @@ def test_newtons_cradle_ejects_as_many_balls_as_hit_it(config, swinging):
         {"world": {"duration": 2.0}, "material": [{"name": "s"}], "pair": [pair],
          "ball": [{**ball, "material": "s"} for ball in balls]}
     )  # fmt: skip
-    result = config.run(scene, dt=5e-4)  # v·h is half a gap: no two pairs collide within one step
+    # Box2D counts balls within 4 slops as touching, and solves them together.
+    close = {"slop": 1e-4} if config.engine == "box2d" else {}
+    result = config.run(scene, dt=5e-4, **close)  # v·h is half a gap: no two pairs collide within one step
     expected = [0.0] * (5 - swinging) + [1.0] * swinging
-    np.testing.assert_allclose(result.velocity[-1, :, 0], expected, atol=1e-12)  # rounding of ten impacts
+    # rounding of ten impacts
+    np.testing.assert_allclose(result.velocity[-1, :, 0], expected, atol=config.rounding(1e-12))
 
 
 @each_config(IMPULSE_CONFIGS)
@@ -143,6 +153,8 @@ def test_gas_conserves_energy_and_its_momentum_changes_by_wall_impulses(config):
     energy = energies(result, scene).total
     # Two hits within a step are solved together; the residual of ten iterations is 1e-6 of the energy.
     assert np.abs(energy / energy[0] - 1).max() <= (1e-12 if config.engine == "exact" else 1e-2)
+    if not config.knows_impulses:
+        return
     impulse_on_walls = result.contact_impulse[result.contact_pair[:, 1] < 0].sum(axis=0)
     change = (result.velocity[-1] - result.velocity[0]).sum(axis=0)
     np.testing.assert_allclose(-impulse_on_walls, change, atol=1e-11)  # rounding of about 200 impacts of 1 N·s

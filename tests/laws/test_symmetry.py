@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from sandbox.engines.contract import Refusal
 from sandbox.scene.files.load import from_document
-from tests.laws.engine_configs import IMPULSE_CONFIGS, PENALTY, each_config
+from tests.laws.engine_configs import IMPULSE_CONFIGS, PENALTY, SINGLE_PRECISION, each_config
 
 TOLERANCE = 1e-12  # m and m/s: rounding of 1e-16, amplified by less than 1e3 in the impacts
 
@@ -45,16 +46,16 @@ def test_result_does_not_depend_on_the_order_of_bodies_in_the_file(config):
     assert len(expected.contact_time) == 2
     for order in ((1, 0, 3, 2), (3, 2, 1, 0), (2, 0, 3, 1)):
         for actual, wanted in zip(state(config.run(four_balls(order)), order), state(expected), strict=True):
-            np.testing.assert_allclose(actual, wanted, atol=TOLERANCE, rtol=0)
+            np.testing.assert_allclose(actual, wanted, atol=config.rounding(TOLERANCE), rtol=0)
 
 
 @each_config([*IMPULSE_CONFIGS, PENALTY])
 def test_mirror_image_stays_a_mirror_image(config):
     position, velocity, spin = state(config.run(four_balls(gravity=-9.81)))
     mirrored_position, mirrored_velocity, mirrored_spin = state(config.run(four_balls(mirror=-1.0, gravity=-9.81)))
-    np.testing.assert_allclose(mirrored_position, position * [-1, 1], atol=TOLERANCE, rtol=0)
-    np.testing.assert_allclose(mirrored_velocity, velocity * [-1, 1], atol=TOLERANCE, rtol=0)
-    np.testing.assert_allclose(mirrored_spin, -spin, atol=TOLERANCE, rtol=0)
+    np.testing.assert_allclose(mirrored_position, position * [-1, 1], atol=config.rounding(TOLERANCE), rtol=0)
+    np.testing.assert_allclose(mirrored_velocity, velocity * [-1, 1], atol=config.rounding(TOLERANCE), rtol=0)
+    np.testing.assert_allclose(mirrored_spin, -spin, atol=config.rounding(TOLERANCE), rtol=0)
 
 
 @each_config(IMPULSE_CONFIGS)
@@ -64,16 +65,16 @@ def test_motion_is_the_same_in_a_moving_frame(config):
     position, velocity, spin = state(config.run(four_balls()))
     drifting_position, drifting_velocity, drifting_spin = state(config.run(four_balls(drift=tuple(drift))))
     # accuracy of the roots for times of impact
-    np.testing.assert_allclose(drifting_position, position + drift, atol=1e-10, rtol=0)
-    np.testing.assert_allclose(drifting_velocity, velocity + drift, atol=1e-10, rtol=0)
-    np.testing.assert_allclose(drifting_spin, spin, atol=1e-10, rtol=0)
+    np.testing.assert_allclose(drifting_position, position + drift, atol=config.rounding(1e-10), rtol=0)
+    np.testing.assert_allclose(drifting_velocity, velocity + drift, atol=config.rounding(1e-10), rtol=0)
+    np.testing.assert_allclose(drifting_spin, spin, atol=config.rounding(1e-10), rtol=0)
 
 
 @each_config([*IMPULSE_CONFIGS, PENALTY])
 def test_run_repeats_bit_for_bit(config):
     one, two = config.run(four_balls()), config.run(four_balls())
     assert np.array_equal(one.position, two.position)
-    assert np.array_equal(one.contact_impulse, two.contact_impulse)
+    assert np.array_equal(one.contact_impulse, two.contact_impulse, equal_nan=True)
 
 
 @each_config(IMPULSE_CONFIGS)
@@ -90,7 +91,12 @@ def test_motion_far_from_the_origin_is_the_same_up_to_rounding(config, origin):
             for ball in scene.balls
         ],
     }
-    far = config.run(from_document(document))
+    far_scene = from_document(document)
+    if config.engine in SINGLE_PRECISION and origin > 1e5:  # coordinates are rounded to 0.06 m
+        with pytest.raises(Refusal, match="32-bit"):
+            config.start(far_scene)
+        return
+    far = config.run(far_scene)
     # A coordinate is rounded to origin·1e-16, a normal to that over the contact distance; ten such errors.
-    tolerance = 1e-14 * origin
+    tolerance = config.rounding(1e-14) * origin
     np.testing.assert_allclose(far.position[-1] - [origin, 0.0], near.position[-1], atol=tolerance, rtol=0)

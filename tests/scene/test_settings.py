@@ -30,7 +30,8 @@ def test_replace_validates_as_strictly_as_a_file(changes: dict[str, object]) -> 
 def test_settings_left_to_the_engine_are_none() -> None:
     unset = {key for key, value in Settings().model_dump().items() if value is None}
     choices = {"integrator", "detection", "response", "impact", "broad_phase", "joints"}
-    assert unset == choices | {"slop", "bias", "persistence", "stiffness", "damping", "stretch"}
+    contacts = {"slop", "bias", "persistence", "stiffness", "damping", "stretch"}
+    assert unset == choices | contacts | {"continuous", "sleeping", "workers"}
 
 
 @pytest.mark.parametrize("engine", ["pymunk", "reference"])

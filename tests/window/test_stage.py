@@ -240,6 +240,8 @@ def test_next_engine_cycles_and_skips_engines_that_refuse_with_a_warning(folder:
     state.open_neighbour(1)
     assert live(state).engine == "pymunk"
     state.switch_to_next_engine()
+    assert live(state).engine == "box2d"
+    state.switch_to_next_engine()
     assert live(state).engine == "reference"
     assert "exact refuses" in messages(state, "warning")
 

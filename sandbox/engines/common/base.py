@@ -271,6 +271,14 @@ BIAS = (1.0 - 0.1) ** 60
 """pymunk's default: a tenth of an overlap is corrected in 1/60 s."""
 
 
+BOX2D_SETTINGS = "continuous", "sleeping", "workers"
+
+
+def box2d_settings_in(settings: Settings) -> list[str]:
+    """Return why the settings of Box2D that are stated are not supported, for the other engines."""
+    return [f"{key} applies to box2d only; remove it" for key in BOX2D_SETTINGS if getattr(settings, key) is not None]
+
+
 def slop_of(start: Scene | Setup) -> float:
     """Return the default slop, m: the overlap that is not corrected.
 

@@ -80,11 +80,16 @@ class LedgerHandover:
     def __init__(self) -> None:
         self._past: EnergyLedger | None = None  # sum of earlier simulations and of handovers
 
+    @property
+    def is_on(self) -> bool:
+        """Whether energy is accounted for."""
+        return self._past is not None
+
     def entries(self, present: Simulation) -> Mapping[Cause, float]:
         """Return the energy change by each cause since the first call, J, including the present simulation's ledger."""
+        present_entries = present.account()  # first: an engine may refuse
         if self._past is None:
             self._past = EnergyLedger()
-        present_entries = present.account()
         return {cause: energy + present_entries[cause] for cause, energy in self._past.entries().items()}
 
     @contextmanager

@@ -27,6 +27,7 @@ class ExactEngine:
     name: str = "exact"
     about: str = "event-driven: closed-form motion between events, next events from stable roots"
     capabilities: frozenset[Demand] = CAPABILITIES
+    knows_impulses: bool = True
 
     def missing(self, start: Scene | Setup, settings: Settings) -> tuple[str, ...]:
         """Return each demand and setting that this engine does not support."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from sandbox.engines.common.base import BIAS, slop_of
+from sandbox.engines.common.base import BIAS, box2d_settings_in, slop_of
 from sandbox.engines.common.workload import overload
 from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_steppers
 from sandbox.resource_limits import SPACE_SIZE
@@ -38,6 +38,7 @@ class PymunkEngine:
     name: str = "pymunk"
     about: str = "pymunk (Munk2D): fixed step, discrete contacts, sequential impulses"
     capabilities: frozenset[Demand] = BALLS | JOINTS | FLOOR | SURFACES | OWN | {Demand.CURL}
+    knows_impulses: bool = True
 
     def missing(self, start: Scene | Setup, settings: Settings) -> tuple[str, ...]:
         """Return each demand and setting that pymunk does not support."""
@@ -53,6 +54,7 @@ class PymunkEngine:
             for key in ("stiffness", "damping")
             if getattr(settings, key) is not None
         ]
+        missing += box2d_settings_in(settings)
         if settings.broad_phase is not None:
             missing.append(f"broad_phase {settings.broad_phase!r} is not supported (it always uses its own tree)")
         if settings.joints not in (None, "impulses"):

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from sandbox.engines.common.base import BIAS, slop_of
+from sandbox.engines.common.base import BIAS, box2d_settings_in, slop_of
 from sandbox.engines.common.workload import overload
 from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_steppers
 from sandbox.scene.compile.contacts import contact_matrix
@@ -92,6 +92,7 @@ class ReferenceEngine:
         Demand.ZONES,
         Demand.DRIVES,
     }
+    knows_impulses: bool = True
 
     def missing(self, start: Scene | Setup, settings: Settings) -> tuple[str, ...]:
         """Return the demands and settings that the engine does not support."""
@@ -99,7 +100,7 @@ class ReferenceEngine:
         wanted = demands(setup)
         if on_floor(setup):
             return (*_tabletop_faults(setup, settings), *overload(setup, settings))
-        missing = unmodelled(setup, self.capabilities)
+        missing = unmodelled(setup, self.capabilities) + box2d_settings_in(settings)
         missing += self._detection_faults(wanted, settings)
         if Demand.DRIVES in wanted:
             missing += _drive_faults(setup, wanted, settings)
@@ -201,7 +202,7 @@ class ReferenceEngine:
 
 def _tabletop_faults(setup: Setup, settings: Settings) -> list[str]:
     """Return the demands and settings of a scene with a surface that are not supported."""
-    missing = unmodelled(setup, TABLETOP)
+    missing = unmodelled(setup, TABLETOP) + box2d_settings_in(settings)
     missing += unsupported_by_steppers(setup)
     for key, method in TABLETOP_METHODS.items():
         if getattr(settings, key) not in (None, method):

@@ -84,6 +84,8 @@ def run(
     stretches = _schedule(scene, wanted, actions)
     try:
         simulation = start(setup, engine, wanted)
+        if account:
+            simulation.account()
     except Refusal as refusal:
         return run_without_frames(setup, engine, wanted, actions, "refused", str(refusal))
     resolved = simulation.settings

@@ -37,6 +37,7 @@ OPTIONS: dict[str, tuple[Any, ...]] = {
     "joints": get_args(Joints),
     "response": get_args(Response),
     "half_kick": (False, True),
+    "continuous": (True, False),
 }
 """Settings that choose a method, with their values. Broad phases are left out: all give the same result."""
 
@@ -207,7 +208,7 @@ class SearchSpace:
             yield replace(configuration, refinement=refinement / 2, substeps=substeps * 2)
         if refinement < 1 and substeps % 2 == 0:
             yield replace(configuration, refinement=refinement * 2, substeps=substeps // 2)
-        if self.has_coupling:
+        if self.uses_iterations(configuration.engine):
             yield replace(configuration, iterations=iterations * 2)
             if iterations > 1:
                 yield replace(configuration, iterations=iterations // 2)
@@ -217,7 +218,7 @@ class SearchSpace:
         for key, values in OPTIONS.items():
             if key == "joints" and not len(self.scene.links):
                 continue
-            if key in ("detection", "response") and not self.has_contacts:
+            if key in ("detection", "response", "continuous") and not self.has_contacts:
                 continue
             if key == "half_kick" and self.scene.world.gravity == (0.0, 0.0):
                 continue
@@ -229,6 +230,10 @@ class SearchSpace:
     def has_contacts(self) -> bool:
         """Whether any two objects can collide."""
         return bool(contact_matrix(self.scene).touches.any())
+
+    def uses_iterations(self, engine: str) -> bool:
+        """Return whether solver iterations can change the results of an engine; Box2D makes one in each substep."""
+        return self.has_coupling and engine != "box2d"
 
     @cached_property
     def has_coupling(self) -> bool:

@@ -212,10 +212,11 @@ class SettingsSearch:
 
     def _bisect_all(self) -> None:
         """Find the fewest substeps and iterations of each evaluation that meets the tolerance and is not dominated."""
-        for setting in ("substeps", "iterations") if self.space.has_coupling else ("substeps",):
+        for setting in ("substeps", "iterations"):
             accepted = [each for each in self.evaluations.values() if self._meets(each) and each.engine != "exact"]
             for each in accepted:
-                if self._is_promising(each):
+                is_used = setting == "substeps" or self.space.uses_iterations(each.engine)
+                if is_used and self._is_promising(each):
                     self._halve(setting, each)
 
     def _meets(self, evaluation: Evaluation) -> bool:

@@ -88,6 +88,12 @@ class Settings(Part):
     velocities (RATTLE)."""
     stretch: Annotated[float, Field(ge=0, le=1e3)] | None = None
     """Largest stretch of springs as a fraction of their rest length, with joints = "relaxation"."""
+    continuous: bool | None = None
+    """Stop bodies at static colliders that they would pass within a step; box2d only, which does so by default."""
+    sleeping: bool | None = None
+    """Stop computing groups of bodies that have come to rest; box2d only, default: false."""
+    workers: Annotated[int, Field(ge=1, le=64)] | None = None
+    """Number of threads of a step; box2d only."""
     record_every: Annotated[int, Field(ge=1, le=1_000_000_000)] = 1
     """Record every n-th frame, and always the last."""
 

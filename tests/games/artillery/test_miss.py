@@ -26,6 +26,9 @@ def test_euler_lands_one_step_late_or_early_in_vacuum() -> None:
         sign |= dict.fromkeys(("velocity_verlet", "leapfrog", "rk4"), 0.0)
         # The cubic through two frames uses Euler's velocities, off by g h/2: an error of at most 4/27 of h g h/2.
         euler = sign[row.integrator] != 0.0
+        if row.engine == "box2d":
+            assert row.late == pytest.approx(-row.dt, abs=1e-3)  # semi-implicit Euler; 32-bit numbers
+            continue
         tolerance = 2.0 * 4.0 / 27.0 * 0.5 * G * row.dt**2 / vx if euler else 1e-11
         assert row.late == pytest.approx(sign[row.integrator] * row.dt, abs=tolerance)
         assert row.off == pytest.approx(sign[row.integrator] * row.dt * vx, abs=vx * tolerance)

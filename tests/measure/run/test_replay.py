@@ -36,13 +36,13 @@ SCENE = from_document(
         "plane": [{"name": "floor", "point": [0, 0], "normal": [0, 1], "restitution": 1, "friction": 0.3}],
         "wall": [{"points": [[3, 0], [3, 3]], "restitution": 1}],
         "ball": [
-            {"name": "a", "position": [-2, 2], "velocity": [3, 0], "radius": 0.25, "restitution": 0.6, "friction": 0.5},
+            {"name": "a", "position": [-2, 2], "velocity": [3, 0], "radius": 0.25, "restitution": 0.6},
             {"name": "b", "position": [0, 0.6], "radius": 0.5, "mass": 3, "restitution": 0.6},
             {"name": "post", "position": [1.5, 3], "radius": 0.2, "fixed": True, "restitution": 1},
         ],
         "grid": [
             {"name": "g", "origin": [-1, 5], "columns": 3, "rows": 2, "spacing": [0.6, 0.6], "jitter": 0.02,
-             "radius": 0.2, "restitution": 0.5},
+             "radius": 0.2, "restitution": 0.6},
         ],
         "emitter": [{"name": "s", "position": [0, 0], "count": 5, "velocity_min": [-4, 1], "velocity_max": [4, 9]}],
     }
@@ -58,7 +58,7 @@ def actions() -> st.SearchStrategy[Action]:
     pairs = st.tuples(small, small)
     balls = st.builds(
         Ball, position=positions, radius=st.sampled_from([0.1, 0.3]), name=st.sampled_from([None, "new"]),
-        restitution=st.just(0.5), collides=st.sampled_from(["all", "none"]),
+        restitution=st.just(0.6), collides=st.sampled_from(["all", "none"]),
     )  # fmt: skip
     paths = st.sampled_from(["ball.*.restitution", "plane.floor.friction", "grid.g.restitution", "world.linear_drag"])
     values: dict[str, Any] = {"dt": st.sampled_from([0.005, 0.01, 1 / 60, 0.02]), "substeps": st.integers(1, 3)}
@@ -129,8 +129,8 @@ def test_session_with_every_kind_of_action_replays_on_every_engine(engine: str) 
         (20, None, Switch(time=0.0, engine="exact")),
         (5, None, Pull(time=0.0, body="b")),
         (5, 7, Move(time=0.0, body="a", position=(-4.0, 9.0), velocity=(0.0, 0.0))),
-        (1, None, Spawn(time=0.0, ball=Ball(position=(-6.0, 8.0), radius=0.2))),
-        (1, None, SetParameter(time=0.0, path="ball.*.restitution", value=0.4)),
+        (1, None, Spawn(time=0.0, ball=Ball(position=(-6.0, 8.0), radius=0.2, restitution=0.6))),
+        (1, None, SetParameter(time=0.0, path="plane.*.restitution", value=0.4)),
         (3, None, Switch(time=0.0, engine="reference", settings={"dt": 0.01})),
         (9, None, Remove(time=0.0, body="g-1")),
         (9, None, Launch(time=0.0, generator="s", seed=8)),

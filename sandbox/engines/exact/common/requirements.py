@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.engines.common.base import box2d_settings_in
 from sandbox.engines.common.colliders import StaticColliders, static_colliders
 from sandbox.engines.tabletop.requirements import pockets_at, unsupported_on_surface
 from sandbox.resource_limits import MEMORY, PAIRS
@@ -141,7 +142,7 @@ def overlap_message(first: str, second: str, depth: float) -> str:
 
 def unsupported(setup: Setup, settings: Settings) -> tuple[str, ...]:
     """Return each demand and setting of a scene that the engine does not support."""
-    missing = unmodelled(setup, CAPABILITIES)
+    missing = unmodelled(setup, CAPABILITIES) + box2d_settings_in(settings)
     for key in STEPS + OVERLAP + SPRINGS:
         stated = getattr(settings, key)
         if stated is not None:

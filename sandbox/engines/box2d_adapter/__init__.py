@@ -1,0 +1,1 @@
+"""Adapter onto Box2D, through its binding pyb2d3."""

@@ -1,0 +1,131 @@
+"""Box2DEngine: the demands that Box2D supports, and its defaults of settings. Only `start` imports the binding."""
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from sandbox.engines.box2d_adapter.limits import SLOP_LENGTHS
+from sandbox.engines.box2d_adapter.materials import unmixable
+from sandbox.engines.box2d_adapter.requirements import joint_faults, size_faults, surfaces_in_use
+from sandbox.engines.common.base import slop_of
+from sandbox.engines.common.workload import overload
+from sandbox.scene.compile.contacts import contact_matrix
+from sandbox.scene.compile.demands import BALLS, Demand, unmodelled
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.world import Settings
+
+if TYPE_CHECKING:
+    from sandbox.engines.box2d_adapter.simulation import Box2DSimulation
+
+FIXED_METHODS = {
+    "integrator": "semi_implicit_euler",
+    "detection": "discrete",
+    "response": "impulse",
+    "impact": "newton",
+    "joints": "impulses",
+}
+"""Settings that describe Box2D's methods, each with its only supported value"""
+
+ABSENT = {
+    "bias": "Box2D corrects overlaps by soft contacts",
+    "persistence": "Box2D keeps the impulses of contacts that touch",
+    "stiffness": "it has no penalty springs",
+    "damping": "it has no penalty springs",
+    "stretch": "it has no joints = 'relaxation'",
+    "broad_phase": "it always uses its own tree",
+}
+"""Settings that Box2D does not have, with the reason"""
+
+OWN = frozenset(
+    {
+        Demand.POLYGONS,
+        Demand.PASSABLE,
+        Demand.RODS,
+        Demand.PIVOTS,
+        Demand.SLIDES,
+        Demand.GROOVES,
+        Demand.ROTARY_LIMITS,
+        Demand.MOTORS,
+        Demand.SPRINGS,
+        Demand.ROTARY_SPRINGS,
+        Demand.ATTRACTION,
+        Demand.THRUST,
+        Demand.LAYERS,
+    }
+)
+
+
+@dataclass(frozen=True)
+class Box2DEngine:
+    """Box2D v3: fixed step, soft contacts solved in substeps, continuous collision with static colliders; 32-bit.
+
+    A step finds contacts once, then advances by its substeps: velocities by gravity and forces, constraints with
+    overlap correction, positions by the new velocities (semi-implicit Euler), constraints again without the
+    correction; restitution follows at the end. Springs, thrusts, attraction, quadratic drag and wind are forces that
+    are constant during a substep; with these, each substep is a step of Box2D.
+
+    Lengths are scaled so that Box2D's fixed slop, 0.005 of its units, is `slop`. `iterations` has no effect: Box2D
+    solves its constraints once in each substep.
+    """
+
+    name: str = "box2d"
+    about: str = "Box2D v3: fixed step, substeps with soft contacts, continuous collision, 32-bit numbers"
+    capabilities: frozenset[Demand] = BALLS | OWN
+    knows_impulses: bool = False
+
+    def missing(self, start: Scene | Setup, settings: Settings) -> tuple[str, ...]:
+        """Return each demand and setting that Box2D does not support."""
+        setup = Setup.of(start)
+        missing = unmodelled(setup, self.capabilities)
+        for key, method in FIXED_METHODS.items():
+            stated = getattr(settings, key)
+            if stated not in (None, method):
+                missing.append(f"{key} {stated!r} is not supported (only {method!r})")
+        missing += [
+            f"{key} {stated!r} is not supported ({reason})"
+            for key, reason in ABSENT.items()
+            if (stated := getattr(settings, key)) is not None
+        ]
+        if settings.half_kick:
+            missing.append("half_kick applies to pymunk only; remove it")
+        missing += joint_faults(setup.links)
+        matrix = contact_matrix(setup)
+        missing += unmixable(matrix, surfaces_in_use(setup.bodies, matrix))
+        missing += size_faults(setup, self.resolve(setup, settings))
+        return (*missing, *overload(setup, settings))
+
+    def resolve(self, start: Scene | Setup, settings: Settings) -> Settings:
+        """Return the settings with defaults for the slop and the values that describe Box2D.
+
+        The default slop is nearest to that of other engines among those for which lengths are scaled exactly, by a
+        power of 2.
+        """
+        setup = Setup.of(start)
+        exponent = round(math.log2(SLOP_LENGTHS / slop_of(setup)))
+        defaults: dict[str, object] = {"slop": SLOP_LENGTHS * 2.0**-exponent, **FIXED_METHODS}
+        defaults |= {"continuous": True, "sleeping": False, "workers": 1}
+        if not len(setup.links):
+            del defaults["joints"]
+        return settings.replace(**{k: v for k, v in defaults.items() if getattr(settings, k) is None})
+
+    def start(self, start: Scene | Setup, settings: Settings | None = None) -> "Box2DSimulation":
+        """Create a Box2D world with the bodies of a scene.
+
+        Raises:
+            Refusal: Box2D does not support something that the scene or a setting needs, or too many worlds exist.
+        """
+        from sandbox.engines.contract import Refusal
+
+        setup = Setup.of(start)
+        settings = setup.scene.solver if settings is None else settings
+        missing = self.missing(setup, settings)
+        if missing:
+            raise Refusal(self.name, missing, ())
+        from sandbox.engines.box2d_adapter.simulation import Box2DSimulation
+        from sandbox.engines.box2d_adapter.world import TooManyWorldsError
+
+        try:
+            return Box2DSimulation(setup, self.resolve(setup, settings))
+        except TooManyWorldsError as error:
+            raise Refusal(self.name, (str(error),), ()) from None

@@ -1,0 +1,158 @@
+"""Joints in a Box2D world, their breaking, and the forces of springs.
+
+Motors and rotary limits are part of the pivot between their two bodies. Springs are forces, constant during a substep.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+import pyb2d3 as box2d
+
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.box2d_adapter.requirements import MERGED
+from sandbox.engines.box2d_adapter.world import Box2DWorld
+from sandbox.engines.common.body_store import BodyStore
+from sandbox.engines.common.springs import anchors_in_world, spring_law
+from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
+
+SPRINGS = LinkKind.SPRING, LinkKind.ROTARY_SPRING
+
+UNLIMITED_TORQUE = 1e30
+"""N·m in Box2D's units, practically unlimited"""
+
+
+class WorldJoints:
+    """Joints of a scene in a world."""
+
+    def __init__(self, world: Box2DWorld, store: BodyStore) -> None:
+        self._world, self._store = world, store
+        self._joints: dict[int, Any] = {}  # by the index of the joint
+        links = store.setup.links
+        for k in store.linked().tolist():
+            if LinkKind(int(links.kind[k])) not in (*SPRINGS, *MERGED):
+                self._joints[k] = world.create_joint(self._definition(links, k))
+        self.has_springs = bool(np.isin(links.kind, SPRINGS).any())
+        self.has_breakable = bool(np.isfinite(links.strength).any())
+        """whether joints can break"""
+
+    @property
+    def solved_count(self) -> int:
+        """Number of joints that Box2D solves."""
+        return len(self._joints)
+
+    def _definition(self, links: JointArrays, k: int) -> Any:
+        """Return the definition of a joint that is neither a spring nor part of a pivot."""
+        x, y, _ = links.figures[k].tolist()
+        scale = self._world.scale
+        match LinkKind(int(links.kind[k])):
+            case LinkKind.ROD:
+                joint = box2d.DistanceJointDef()
+                joint.length = x * scale
+            case LinkKind.SLIDE:
+                joint = box2d.DistanceJointDef()
+                joint.length = y * scale
+                joint.enable_spring, joint.hertz = True, 0.0  # no spring, and not rigid: only the limits act
+                joint.enable_limit, joint.min_length, joint.max_length = True, x * scale, y * scale
+            case LinkKind.GROOVE:
+                joint = box2d.WheelJointDef()
+                along = links.figures[k, :2] - links.anchor_a[k]
+                length = float(np.hypot(*along))
+                joint.local_axis_a = tuple((along / length).tolist())
+                joint.enable_spring = False
+                joint.enable_limit, joint.lower_translation, joint.upper_translation = True, 0.0, length * scale
+            case _:
+                joint = self._pivot(links, k)
+        a, b = int(links.a[k]), int(links.b[k])
+        joint.body_a, joint.body_b = self._world.body(a), self._world.body(b)
+        joint.local_anchor_a = tuple((links.anchor_a[k] * scale).tolist())
+        joint.local_anchor_b = tuple((links.anchor_b[k] * scale).tolist())
+        joint.collide_connected = bool(links.collide[k])
+        return joint
+
+    def _pivot(self, links: JointArrays, k: int) -> Any:
+        """Return the definition of a pivot, with the motor and the rotary limit of its two bodies."""
+        joint, scale = box2d.RevoluteJointDef(), self._world.scale
+        intact = np.isin(np.arange(len(links)), self._store.linked())
+        between = np.flatnonzero((links.a == links.a[k]) & (links.b == links.b[k]) & intact)
+        for other in between.tolist():
+            low, high, _ = links.figures[other].tolist()
+            if links.kind[other] == LinkKind.MOTOR:
+                joint.enable_motor, joint.motor_speed = True, low
+                joint.max_motor_torque = min(float(links.most_force[other]) * scale**2, UNLIMITED_TORQUE)
+            elif links.kind[other] == LinkKind.ROTARY_LIMIT:
+                joint.reference_angle = math.remainder(0.5 * (low + high), math.tau)
+                joint.enable_limit, joint.lower_angle, joint.upper_angle = True, 0.5 * (low - high), 0.5 * (high - low)
+        return joint
+
+    def remove(self, broken: IntArray) -> None:
+        """Remove joints, by their indices; those of a body that was removed are gone already."""
+        for k in broken.tolist():
+            joint = self._joints.pop(k, None)
+            if joint is not None:
+                joint.destroy()
+
+    def forget(self) -> None:
+        """Forget joints whose bodies were removed with them."""
+        intact = set(self._store.linked().tolist())
+        self._joints = {k: joint for k, joint in self._joints.items() if k in intact}
+
+    def add_spring_forces(self, force: FloatArray, torque: FloatArray) -> None:
+        """Add the forces (N, 2), N, and torques (N,), N·m, of springs and their dampers in the present state."""
+        store = self._store
+        springs, rotary = store.links.of(LinkKind.SPRING), store.links.of(LinkKind.ROTARY_SPRING)
+        if len(springs):
+            arm_a, vector, along, size = self._spring_state(springs)
+            arm_b = anchors_in_world(springs.b, springs.anchor_b, store.position, store.angle)[0]
+            pull = vector / np.where(along > 0.0, along, 1.0)[:, None] * size[:, None]
+            for index, arm, sign in ((springs.b, arm_b, 1.0), (springs.a, arm_a, -1.0)):
+                free = index >= 0
+                np.add.at(force, index[free], sign * pull[free])
+                moment = arm[:, 0] * pull[:, 1] - arm[:, 1] * pull[:, 0]
+                np.add.at(torque, index[free], sign * moment[free])
+        if len(rotary):
+            moment = self._rotary_torque(rotary)
+            free = rotary.a >= 0
+            np.add.at(torque, rotary.b, moment)
+            np.add.at(torque, rotary.a[free], -moment[free])
+
+    def _spring_state(self, springs: JointArrays) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return first arms (K, 2) and displacements (K, 2), m, lengths (K,), m, and forces (K,), N, of springs."""
+        store = self._store
+        arm_a, point_a = anchors_in_world(springs.a, springs.anchor_a, store.position, store.angle)
+        arm_b, point_b = anchors_in_world(springs.b, springs.anchor_b, store.position, store.angle)
+        vector = point_b - point_a
+        length = np.hypot(vector[:, 0], vector[:, 1])
+        velocity = self._anchor_velocity(springs.b, arm_b) - self._anchor_velocity(springs.a, arm_a)
+        rate = np.einsum("kd,kd->k", vector, velocity) / np.where(length > 0.0, length, 1.0)
+        rest, stiffness, damping = springs.figures.T
+        return arm_a, vector, length, np.asarray(spring_law(rest, stiffness, damping, length, rate))
+
+    def _rotary_torque(self, rotary: JointArrays) -> FloatArray:
+        store, on_body = self._store, rotary.a >= 0
+        angle = store.angle[rotary.b] - np.where(on_body, store.angle[rotary.a], 0.0)
+        spin = store.angular_velocity[rotary.b] - np.where(on_body, store.angular_velocity[rotary.a], 0.0)
+        rest, stiffness, damping = rotary.figures.T
+        return np.asarray(spring_law(rest, stiffness, damping, angle, spin))
+
+    def _anchor_velocity(self, index: IntArray, arm: FloatArray) -> FloatArray:
+        """Return the velocities of anchors, (K, 2) m/s; 0 for the world."""
+        store = self._store
+        turning = np.column_stack((-arm[:, 1], arm[:, 0])) * store.angular_velocity[index][:, None]
+        return np.where((index >= 0)[:, None], store.velocity[index] + turning, 0.0)
+
+    def overloaded(self) -> IntArray:
+        """Return the indices of joints whose force exceeds their strength; of rigid ones, that of the last substep."""
+        links, found = self._store.setup.links, []
+        for k, joint in self._joints.items():
+            if math.isfinite(links.strength[k]):
+                force = joint.get_constraint_force()
+                if math.hypot(force.x, force.y) > links.strength[k] * self._world.scale:
+                    found.append(k)
+        intact = self._store.links
+        for kind in SPRINGS:
+            springs = intact.of(kind)
+            if len(springs):
+                size = self._spring_state(springs)[3] if kind == LinkKind.SPRING else self._rotary_torque(springs)
+                found += springs.number[np.abs(size) > springs.strength].tolist()
+        return np.asarray(sorted(found), np.int64)

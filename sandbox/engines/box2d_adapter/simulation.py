@@ -1,0 +1,459 @@
+"""Box2DSimulation: a scene running in a Box2D world."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from sandbox.action import Action, ActionError
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.box2d_adapter.joints import WorldJoints
+from sandbox.engines.box2d_adapter.limits import FARTHEST_LENGTHS, FASTEST_LENGTHS, MAX_TURN, scale_for
+from sandbox.engines.box2d_adapter.materials import unmixable
+from sandbox.engines.box2d_adapter.requirements import shape_faults, surfaces_in_use
+from sandbox.engines.box2d_adapter.world import Box2DWorld, StateRows
+from sandbox.engines.common.actions import apply_action, derive_contacts, sets_level
+from sandbox.engines.common.base import BEYOND, SteppedSimulation, observe_path
+from sandbox.engines.common.body_store import BodyStore
+from sandbox.engines.common.contact_log import ContactLog
+from sandbox.engines.common.force_field import ForceField
+from sandbox.engines.contract import Divergence, Observer, Refusal
+from sandbox.engines.energy_ledger import Cause
+from sandbox.frame_table import FrameTable
+from sandbox.scene.compile.bodies import Bodies
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.compile.setup import Setup
+from sandbox.scene.description.base import BodySource, BodySpec, Collides
+from sandbox.scene.description.fixed import Plane, PlaneReach, Post, Wall
+from sandbox.scene.description.world import Settings
+from sandbox.trajectory import Contacts, Frame
+
+MAX_BATCH = 256
+"""Steps that are made before their states are converted, which spreads the cost of numpy calls"""
+
+BATCH_ROWS = 1 << 16
+"""States of bodies in such a batch"""
+
+FASTEST = 0.7 * FASTEST_LENGTHS
+"""largest coordinate of a velocity, in Box2D's lengths, that is certainly below the speed to which it clamps"""
+
+SPIN_ROUNDING = 1e-5
+"""relative, rounding of Box2D's clamped spins"""
+
+
+class Box2DBodies(BodyStore):
+    """Body store that refuses changes which Box2D does not support."""
+
+    def __init__(self, setup: Setup, settings: Settings) -> None:
+        super().__init__(setup, settings.h)
+        self.scale = scale_for(settings)
+        """Box2D's lengths in a metre"""
+
+    def check_place(self, position: tuple[float, float], radius: float, collides: Collides) -> None:
+        """Refuse a position that is too far from the origin for 32-bit numbers.
+
+        Raises:
+            ActionError: it is.
+        """
+        del radius, collides
+        if not max(map(abs, position)) * self.scale <= FARTHEST_LENGTHS:
+            raise ActionError(f"{far_away(self.scale)}; the engine 'reference' has no such limit")
+
+    def change(self, setup: Setup, spawned: tuple[BodySource, ...] | None = None) -> None:
+        """Continue with a changed scene, as `BodyStore.change`.
+
+        Raises:
+            ActionError: Box2D cannot mix the coefficients of pairs, or the scene has too many different surfaces.
+        """
+        before, fixtures = (self.setup, self.bodies, self.contact_matrix), self.fixtures
+        super().change(setup, spawned)
+        reason = next(unmixable(self.contact_matrix, surfaces_in_use(self.bodies, self.contact_matrix)), None)
+        if reason is not None:
+            self.fixtures = fixtures
+            self._rebuild(*before)
+            raise ActionError(f"box2d: {reason}")
+
+    def add(self, single: BodySpec, name: str) -> int:
+        """Add a body and return its index, as `BodyStore.add`.
+
+        Raises:
+            ActionError: Box2D cannot represent its shape, or mix its coefficients with those of others.
+        """
+        bodies = self.bodies.joined_by(single, name)
+        matrix = derive_contacts(self.setup, bodies)
+        faults = [
+            *shape_faults(bodies, self.scale, len(bodies) - 1),
+            *unmixable(matrix, surfaces_in_use(bodies, matrix)),
+        ]
+        if faults:
+            raise ActionError(f"box2d: {faults[0]}")
+        return super().add(single, name)
+
+
+def far_away(scale: float) -> str:
+    """Return why a body is too far from the origin, for a number of Box2D's lengths in a metre."""
+    return f"farther than {FARTHEST_LENGTHS / scale:g} m from the origin 32-bit numbers do not resolve the slop"
+
+
+class Box2DSimulation(SteppedSimulation):
+    """A running scene. States are read from Box2D after every step; contacts come from its events.
+
+    A step finds contacts at its start and before anything moves. They are those at the end of the step before, to which
+    the time of the contact log refers.
+    """
+
+    uncopied: ClassVar[str | None] = (
+        "Box2D cannot copy the state of its solver; a snapshot needs the engine 'reference' or 'exact'"
+    )
+
+    def __init__(self, setup: Setup, settings: Settings) -> None:
+        """Start from a setup.
+
+        Raises:
+            TooManyWorldsError: Box2D has no room for another world.
+        """
+        super().__init__(settings)
+        self._store = Box2DBodies(setup, settings)
+        self._world = Box2DWorld(self._store, settings, setup.plane_reach)
+        self._joints = WorldJoints(self._world, self._store)
+        self._field = ForceField(self._store)
+        self._largest_spin = MAX_TURN * (1.0 - SPIN_ROUNDING) / settings.h
+        self._log: ContactLog | None = None
+        self._unobserved: tuple[float, FloatArray, FloatArray] | None = None
+        """start time of the last step, s, and positions before and after it, which the next step shows the observer"""
+        self._set_air(self._store.scene)
+
+    @property
+    def setup(self) -> Setup:
+        """State from which the simulation started, with the changes that actions have made to its scene."""
+        return self._store.setup
+
+    @property
+    def bodies(self) -> Bodies:
+        """Bodies at their start as arrays; spawned bodies are appended."""
+        return self._store.bodies
+
+    @property
+    def retired(self) -> Mapping[int, float]:
+        """Time in s, by body index, at which bodies were removed, left `world.bounds` or ended their lifetime."""
+        return self._store.retired
+
+    @property
+    def broken(self) -> Mapping[int, float]:
+        """Time in s, by index in `setup.links`, at which joints broke."""
+        return self._store.broken
+
+    @property
+    def plane_reach(self) -> PlaneReach | None:
+        """Present extent of half-planes as (x, y, distance), m; None without any."""
+        return self._world.plane_reach
+
+    @property
+    def work(self) -> Mapping[str, int]:
+        """Work counters since the start."""
+        return {"substeps": self.substeps}
+
+    def _set_air(self, scene: Scene) -> None:
+        """Apply gravity and drag of a scene; what Box2D does not model are forces, constant during a substep."""
+        air = scene.world
+        self._world.set_gravity(air.gravity)
+        self._world.set_damping(air.linear_drag)
+        self._has_wind = bool(air.quadratic_drag or (air.linear_drag and any(air.wind)))
+
+    @property
+    def _has_varying_forces(self) -> bool:
+        """Whether forces depend on the state, so that each substep has to be a step of Box2D."""
+        return self._has_wind or self._joints.has_springs or not self._field.empty
+
+    @property
+    def _has_forces(self) -> bool:
+        store = self._store
+        return self._has_varying_forces or bool(store.force.any() or store.torque.any())
+
+    def _apply_forces(self, time: float) -> None:
+        """Apply the forces of a step of Box2D that starts at a time, s.
+
+        They are constant forces, wind, quadratic drag, attraction, thrusts and springs.
+        """
+        store, air = self._store, self._store.scene.world
+        force, torque = store.force.copy(), store.torque.copy()
+        mass, moving = store.bodies.mass, store.moving
+        if self._has_wind:
+            relative = store.velocity - np.asarray(air.wind)
+            speed = np.hypot(relative[:, 0], relative[:, 1])[:, None]
+            drag = air.linear_drag * np.asarray(air.wind) - air.quadratic_drag * speed * relative
+            force += np.where(moving[:, None], mass[:, None] * drag, 0.0)
+        if not self._field.empty:
+            x = np.zeros((2, len(mass), 3))
+            x[0, :, :2], x[0, :, 2] = store.position, store.angle
+            acceleration = self._field(time, x)
+            force += np.where(moving[:, None], mass[:, None] * acceleration[:, :2], 0.0)
+            torque += np.where(moving, store.bodies.moment * acceleration[:, 2], 0.0)
+        if self._joints.has_springs:
+            self._joints.add_spring_forces(force, torque)
+        for index in np.flatnonzero((force.any(axis=1) | (torque != 0.0)) & moving).tolist():
+            self._world.push(index, force[index], float(torque[index]))
+
+    def _advance(self, part: float) -> None:
+        """Advance by a fraction of dt: in one step of Box2D, or in one for each substep if forces vary."""
+        substeps = self._settings.substeps
+        count = substeps if self._has_varying_forces else 1
+        length = part * self._settings.dt / count
+        for k in range(count):
+            self._step_world(self.time + k * length, length, substeps // count)
+        if self._joints.has_breakable:
+            self._break_joints((self._steps + part) * self._settings.dt)
+
+    def _step_world(self, time: float, length: float, substeps: int) -> None:
+        """Make one step of Box2D from a time, s, over a length, s; record its contacts and show it to the observer."""
+        store, world = self._store, self._world
+        start = store.position.copy() if self._observer is not None else None
+        if self._has_forces:
+            self._apply_forces(time)
+        rows = world.raw_rows(1)
+        changed = world.step(length, substeps, rows, 0)
+        world.read(rows, 1, length, substeps)
+        if self._log is not None and changed:
+            self._log.record(time, world.contact_batch())
+        if self._observer is not None and start is not None:
+            self._observe_last()
+            self._unobserved = time, start, store.position.copy()
+
+    def _observe_last(self) -> None:
+        """Show the observer the last step but one, with the contacts that were found at its end."""
+        if self._unobserved is not None and self._observer is not None and self._log is not None:
+            self._observer(*self._unobserved, self._log.pairs())
+
+    def advance(self, steps: int, frames: FrameTable, *, until_event: bool = False) -> None:
+        """Advance by at most so many time steps, and record the frames that are due, as `Simulation.advance`.
+
+        Where nothing has to be done between two steps, states are converted for many steps at once.
+
+        Raises:
+            Divergence: as `step`.
+        """
+        store, end = self._store, frames.steps + steps
+        frames.prepare(steps, len(self.bodies))
+        while frames.steps < end:
+            if until_event or self._has_forces or self._joints.has_breakable or store.can_expire:
+                super().advance(end - frames.steps, frames, until_event=until_event)
+                return
+            with self._lock, np.errstate(all="ignore"):
+                self._check_running()
+                self._advance_batch(end - frames.steps, frames)
+
+    def _advance_batch(self, steps: int, frames: FrameTable) -> None:
+        """Make at most so many steps, and record their frames."""
+        world, dt, substeps, first = self._world, self._settings.dt, self._settings.substeps, self._steps
+        count, observed = min(steps, MAX_BATCH, max(BATCH_ROWS // max(world.count, 1), 1)), self._observer is not None
+        rows, bound, pairs = world.raw_rows(count), world.quick_bound(self._largest_spin), []
+        made, is_within = 0, True
+        while made < count and is_within:
+            changed = world.step(dt, substeps, rows, made)
+            if self._log is not None and changed:
+                if observed:
+                    pairs.append((made, self._log.pairs()))
+                self._log.record((first + made) * dt, world.contact_batch())
+            is_within = world.is_quickly_within(rows, made, bound)
+            made += 1
+        path: FloatArray | None = np.tile(self._store.position, (made + 1, 1, 1)) if observed else None
+        states = world.read(rows, made, dt, substeps)
+        if path is not None and self._log is not None:
+            path[1:, world.indices] = states.position
+            self._observe_path(first, path, [*pairs, (made, self._log.pairs())])
+        complete = made if is_within else made - 1  # the last may be beyond the limits
+        self._record(states, complete, frames)
+        self._steps += complete
+        if not is_within:
+            self._steps += 1
+            self._finish_step()
+            frames.steps += 1
+            if frames.is_due():
+                frames.record(self.frame())
+
+    def _observe_path(self, first: int, path: FloatArray, pairs: list[tuple[int, IntArray]]) -> None:
+        """Show the observer the last step and the steps of a batch but its last one.
+
+        Args:
+            first: number of steps before the batch.
+            path: (B + 1, N, 2) m.
+            pairs: pairs found at the starts of the batch's steps: entries as in `PairRuns`.
+        """
+        observer, dt, made = self._observer, self._settings.dt, len(path) - 1
+        assert observer is not None
+        if self._unobserved is not None:
+            time, start, end = self._unobserved
+            observer(time, start, end, next(found for until, found in pairs if until > 0))
+        shifted = [(end - 1, found) for end, found in pairs if end > 1]  # those of a step's start are of the one before
+        times: FloatArray = np.arange(first, first + made - 1) * np.float64(dt)
+        observe_path(observer, times, path[:-1], shifted)
+        self._unobserved = (first + made - 1) * dt, path[-2].copy(), path[-1].copy()
+
+    def _record(self, states: StateRows, steps: int, frames: FrameTable) -> None:
+        """Count steps, and record the frames that are due by their states."""
+        every, n, store = frames.every, len(self._store.position), self._store
+        due = np.arange(every - frames.steps % every - 1, steps, every)
+        frames.steps += steps
+        if not len(due):
+            return
+        rows, moving = slice(frames.count, frames.count + len(due)), self._world.indices
+        frames.time[rows] = (self._steps + due + 1) * self._settings.dt
+        for column, fixed, values in (
+            (frames.position, store.position, states.position),
+            (frames.velocity, store.velocity, states.velocity),
+            (frames.angle, store.angle, states.angle),
+            (frames.angular_velocity, store.angular_velocity, states.spin),
+        ):
+            column[rows, :n] = fixed
+            column[rows, moving] = values[due]
+        if len(store.scene.layers) > 1:
+            frames.layer_rows()[rows, :n] = store.layer
+        frames.finish_rows(len(due), n)
+
+    def _break_joints(self, time: float) -> None:
+        broken = self._joints.overloaded()
+        if len(broken):
+            self._joints.remove(broken)
+            self._store.mark_broken(broken, time)
+
+    def _finish_step(self) -> None:
+        """Check that the state is finite and within Box2D's limits, and remove expired bodies."""
+        store = self._store
+        beyond, reason = store.beyond(), BEYOND
+        if beyond is None:
+            beyond, reason = self._beyond_limits()
+        if beyond is not None:
+            self.close()
+            raise Divergence(self.time, self.bodies.names[beyond], reason)
+        if store.can_expire:
+            expired = store.expired(self.time)
+            if len(expired):
+                self._remove_bodies(expired)
+        self._world.extend_planes()
+
+    def _beyond_limits(self) -> tuple[int | None, str]:
+        """Return the first body that Box2D slows down or cannot resolve, and the reason."""
+        store, scale = self._store, self._store.scale
+        position, velocity = (
+            np.abs(array).max(axis=1, initial=0.0) * scale for array in (store.position, store.velocity)
+        )
+        for values, limit, reason in (
+            (position, FARTHEST_LENGTHS, f"is too far away: {far_away(scale)}"),
+            (velocity, FASTEST, f"is faster than {FASTEST / scale:g} m/s, Box2D's limit"),
+            (
+                np.abs(store.angular_velocity),
+                self._largest_spin,
+                "turns by 45° in a substep, the limit of Box2D; use more substeps",
+            ),
+        ):
+            found = np.flatnonzero((values >= limit) & store.moving)
+            if len(found):
+                return int(found[0]), reason
+        return None, ""
+
+    def _remove_bodies(self, indices: IntArray) -> None:
+        self._store.remove_bodies(indices, self.time)
+        for index in indices.tolist():
+            self._world.remove(index)
+        self._joints.forget()
+        self._record_contacts()
+
+    def _record_contacts(self) -> None:
+        """Record the present contacts, after some have ended between two steps."""
+        if self._log is not None:
+            self._log.record(self.time, self._world.contact_batch())
+
+    def apply(self, action: Action) -> None:
+        """Apply an action at once.
+
+        Raises:
+            ActionError: the action cannot be applied. The simulation is left unchanged.
+        """
+        with self._lock:
+            self._check_running()
+            store = self._store
+            if sets_level(action):
+                apply_action(action, store)
+                return
+            before = store.position.copy(), store.velocity.copy(), store.angular_velocity.copy()
+            scene, matrix, inverse_moment = store.scene, store.contact_matrix, store.inverse_moment
+            leaving = apply_action(action, store)
+            if store.contact_matrix is not matrix or store.inverse_moment is not inverse_moment:
+                self._world.update_surfaces()  # first: new shapes need the new values
+            self._update_world(before, scene)
+            if store.scene is not scene or len(store.position) > len(before[0]):
+                self._set_air(store.scene)
+            if leaving is not None:
+                self._remove_bodies(np.asarray([leaving]))
+            self._world.extend_planes()
+
+    def _update_world(self, before: tuple[FloatArray, FloatArray, FloatArray], scene: Scene) -> None:
+        """Apply to the world what an action has changed in the body store.
+
+        Args:
+            before: position (N, 2), velocity (N, 2) and angular velocity (N,) before it.
+            scene: the scene before it.
+        """
+        store = self._store
+        position, velocity, spin = before
+        count = len(position)
+        if store.scene.fixed != scene.fixed:
+            pairs = enumerate(zip(scene.fixed, store.scene.fixed, strict=True))
+            self._world.update_static([k for k, (old, new) in pairs if _has_other_form(old, new)])
+            self._record_contacts()
+        for index in np.flatnonzero((store.position[:count] != position).any(axis=1)).tolist():
+            self._world.set_pose(index)
+        changed = (store.velocity[:count] != velocity).any(axis=1) | (store.angular_velocity[:count] != spin)
+        for index in np.flatnonzero(changed).tolist():
+            self._world.set_motion(index)
+        for index in range(count, len(store.position)):
+            self._world.add(index)
+
+    def frame(self) -> Frame:
+        """Return the present state."""
+        store = self._store
+        position, velocity, angle = store.position.copy(), store.velocity.copy(), store.angle.copy()
+        layer = store.layer.copy() if len(store.scene.layers) > 1 else None
+        present, spin = store.present.copy(), store.angular_velocity.copy()
+        return Frame(self.time, position, velocity, angle, spin, present, None, layer)
+
+    def contacts(self) -> Contacts:
+        """Return the contacts since the last call; their impulses are nan, as Box2D does not tell them."""
+        if self._log is None:
+            self._log = ContactLog(len(self._store.scene.fixed_names), can_repeat_pairs=False)
+            self._log.record(self.time, self._world.contact_batch())
+        taken = self._log.take()
+        return replace(taken, impulse=np.full_like(taken.impulse, np.nan)) if len(taken) else taken
+
+    def account(self) -> Mapping[Cause, float]:
+        """Refuse: without the impulses of contacts no energy account is possible.
+
+        Raises:
+            Refusal: always.
+        """
+        raise Refusal(
+            "box2d",
+            ("energy accounting: Box2D does not tell the impulses of contacts",),
+            ("pymunk", "reference", "exact"),
+        )
+
+    def watch(self, observer: Observer) -> None:
+        """Register an observer that is called for every step, one step later, when its contacts are known."""
+        if self._log is None:
+            self.contacts()
+        self._observer = observer
+
+    def close(self) -> None:
+        """End the simulation and destroy its world."""
+        super().close()
+        self._world.close()
+
+
+FORM = "points", "position", "radius", "thickness", "solid"
+"""fields of static colliders that actions can change, other than coefficients, and those that go with them"""
+
+
+def _has_other_form(old: Plane | Wall | Post, new: Plane | Wall | Post) -> bool:
+    """Return whether a static collider has other shapes than before."""
+    return any(getattr(old, key, None) != getattr(new, key, None) for key in FORM)
