@@ -340,7 +340,7 @@ class SandboxVectorEnv(gymnasium.vector.VectorEnv[Observation, Any, Any]):
             seed = self.scene.world.seed
         seeds = [None] * self.num_envs if seed is None else _seeds(seed, self.num_envs)
         if not self._generators:
-            self._generators = [np.random.default_rng()] * self.num_envs
+            self._generators = [np.random.default_rng() for _ in range(self.num_envs)]
         for k, number in enumerate(seeds):
             if number is not None and mask[k]:
                 self._generators[k], _ = gymnasium.utils.seeding.np_random(number)

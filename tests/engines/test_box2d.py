@@ -123,8 +123,7 @@ def test_polygons_that_box2d_would_change_are_refused() -> None:
 def test_worlds_are_limited_and_freed_by_close() -> None:
     scene, open_ones = scene_of(ball=[ball(0, 0)]), []
     with pytest.raises(Refusal, match="128 Box2D worlds"):
-        for _ in range(MAX_WORLDS + 1):
-            open_ones.append(start(scene, "box2d"))  # noqa: PERF401, kept if one is refused
+        open_ones.extend(start(scene, "box2d") for _ in range(MAX_WORLDS + 1))  # keeps those before the refusal
     open_ones[0].step()
     frame = open_ones[0].frame()
     for each in open_ones:
@@ -267,3 +266,28 @@ def test_divergence_is_a_divergence_for_a_single_step() -> None:
     simulation.apply(Move(time=0.0, body=simulation.bodies.names[0], position=(39_999.0, 0.0), velocity=(1e5, 0.0)))
     with pytest.raises(Divergence, match="32-bit"):
         simulation.step()
+
+
+def test_joints_last_when_a_coefficient_needs_other_shapes() -> None:
+    """With a rough floor, smooth boxes need separate shapes against it and each other, and Box2D's bodies are new."""
+    boxes = [{"name": name, "position": [x, 5.0], "size": [1.0, 0.2]} for name, x in (("a", 0.5), ("b", 1.5))]
+    joints = [
+        PIVOT | {"between": ["a"], "at": [0.0, 5.0], "strength": 1e6},
+        {"kind": "rod", "between": ["a", "b"]},
+    ]
+    simulation = start(scene_of(plane=[FLOOR], box=boxes, joint=joints), "box2d")
+    simulation.step()
+    simulation.apply(SetParameter(time=0.0, path="plane.*.friction", value=0.3))
+    for _ in range(50):
+        simulation.step()
+    frame = simulation.frame()
+    hinge = frame.position[0] - 0.5 * np.asarray([math.cos(frame.angle[0]), math.sin(frame.angle[0])])
+    assert hinge == pytest.approx([0.0, 5.0], abs=0.02)  # Box2D's joints are soft
+    assert math.dist(frame.position[0], frame.position[1]) == pytest.approx(1.0, abs=0.02)
+    assert not simulation.broken
+    simulation.close()
+
+
+def test_pivot_that_breaks_with_its_motor_is_refused() -> None:
+    motor = {"kind": "motor", "between": ["arm"], "rate": 1.5}
+    assert "breaks" in reason(jointed([PIVOT | {"strength": 5.0}, motor]))

@@ -36,11 +36,6 @@ class WorldJoints:
         self.has_breakable = bool(np.isfinite(links.strength).any())
         """whether joints can break"""
 
-    @property
-    def solved_count(self) -> int:
-        """Number of joints that Box2D solves."""
-        return len(self._joints)
-
     def _definition(self, links: JointArrays, k: int) -> Any:
         """Return the definition of a joint that is neither a spring nor part of a pivot."""
         x, y, _ = links.figures[k].tolist()
@@ -91,6 +86,13 @@ class WorldJoints:
             joint = self._joints.pop(k, None)
             if joint is not None:
                 joint.destroy()
+
+    def renew(self, replaced: set[int]) -> None:
+        """Create the joints of bodies, by their indices, that were replaced and have lost them."""
+        links = self._store.setup.links
+        for k in self._joints:
+            if not replaced.isdisjoint((int(links.a[k]), int(links.b[k]))):
+                self._joints[k] = self._world.create_joint(self._definition(links, k))
 
     def forget(self) -> None:
         """Forget joints whose bodies were removed with them."""

@@ -7,14 +7,14 @@ from sandbox.scene.description.world import Settings
 SLOP_LENGTHS = 0.005
 """overlap that Box2D does not correct, `B2_LINEAR_SLOP`"""
 
-SPECULATIVE_LENGTHS = 4.0 * SLOP_LENGTHS
-"""distance from which on Box2D counts bodies as touching, `B2_SPECULATIVE_DISTANCE`"""
-
 FARTHEST_LENGTHS = 4e4
 """distance from the origin at which the spacing of 32-bit numbers, 2⁻⁸, is about the slop"""
 
-FASTEST_LENGTHS = 1e9
+CLAMPED_LENGTHS = 1e9
 """per second, speed to which Box2D clamps; its default of 400 would slow bodies down"""
+
+FASTEST_LENGTHS = 7e8
+"""per second, largest coordinate of a velocity: the speed is then certainly below the clamp"""
 
 MAX_TURN = 0.25 * math.pi
 """rad, angle per substep to which Box2D clamps rotation, `B2_MAX_ROTATION`"""

@@ -55,10 +55,8 @@ def shape_materials(matrix: ContactMatrix, is_moving: BoolArray) -> ShapeMateria
         return ShapeMaterials(plain, plain, plain, is_split=False)
     mutual, with_static = _kinds_of_pairs(touching, is_moving)
     # Of moving and of static objects as if they were 2·S surfaces, of which only pairs across the halves touch.
-    size, across = (
-        len(touching),
-        np.block([[np.zeros_like(touching), with_static], [with_static.T, np.zeros_like(touching)]]),
-    )
+    size, none = len(touching), np.zeros_like(touching)
+    across = np.block([[none, with_static], [with_static.T, none]])
     both = _solve(np.tile(surfaces.friction, (2, 2)), np.tile(surfaces.restitution, (2, 2)), across)
     moving = Coefficients(both.friction[:size], both.restitution[:size])
     static = Coefficients(both.friction[size:], both.restitution[size:])
@@ -82,7 +80,7 @@ def unmixable(matrix: ContactMatrix, is_moving: BoolArray) -> Iterator[str]:
         rows, columns = np.nonzero(wrong[which])
         if len(rows):
             value = float(tables[which][rows[0], columns[0]])
-            yield (f"a {name} of {value:g} beside those of other pairs is not supported: Box2D mixes {name} as {rule}")
+            yield f"a {name} of {value:g} beside those of other pairs is not supported: Box2D mixes {name} as {rule}"
 
 
 def _kinds_of_pairs(touching: BoolArray, is_moving: BoolArray) -> tuple[BoolArray, BoolArray]:

@@ -44,14 +44,15 @@ def is_installed() -> bool:
 
 def joint_faults(links: JointArrays) -> Iterator[str]:
     """Yield why joints are not supported."""
-    pivots = list(zip(*(array.tolist() for array in (links.a, links.b)), links.kind.tolist(), strict=True))
+    pairs = list(zip(links.a.tolist(), links.b.tolist(), links.kind.tolist(), strict=True))
     for k, name in enumerate(links.names):
         kind, pair = LinkKind(int(links.kind[k])), (int(links.a[k]), int(links.b[k]))
         if kind in MERGED:
-            if pivots.count((*pair, LinkKind.PIVOT)) != 1 or pivots.count((*pair, kind)) != 1:
+            pivot = *pair, LinkKind.PIVOT
+            if pairs.count(pivot) != 1 or pairs.count((*pair, kind)) != 1:
                 yield f"{name}: Box2D has a {MERGED[kind]} as part of a pivot only, one of each between two bodies"
-            if math.isfinite(links.strength[k]):
-                yield f"{name}: a {MERGED[kind]} that breaks is not supported"
+            elif math.isfinite(links.strength[pairs.index(pivot)]) or math.isfinite(links.strength[k]):
+                yield f"{name}: a {MERGED[kind]} that breaks, or whose pivot breaks, is not supported"
         if kind == LinkKind.ROTARY_LIMIT and not links.figures[k, 1] - links.figures[k, 0] < 2.0 * math.pi:
             yield f"{name}: a range of a whole turn or more is not supported, as Box2D knows angles modulo 2π"
         if math.isfinite(links.most_force[k]) and kind != LinkKind.MOTOR:

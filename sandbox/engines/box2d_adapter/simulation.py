@@ -15,13 +15,12 @@ from sandbox.engines.box2d_adapter.requirements import shape_faults, surfaces_in
 from sandbox.engines.box2d_adapter.world import Box2DWorld, StateRows
 from sandbox.engines.common.actions import apply_action, derive_contacts, sets_level
 from sandbox.engines.common.base import BEYOND, SteppedSimulation, observe_path
-from sandbox.engines.common.body_store import BodyStore
+from sandbox.engines.common.body_store import BodyStore, HasBodyStore
 from sandbox.engines.common.contact_log import ContactLog
 from sandbox.engines.common.force_field import ForceField
 from sandbox.engines.contract import Divergence, Observer, Refusal
 from sandbox.engines.energy_ledger import Cause
 from sandbox.frame_table import FrameTable
-from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource, BodySpec, Collides
@@ -34,9 +33,6 @@ MAX_BATCH = 256
 
 BATCH_ROWS = 1 << 16
 """States of bodies in such a batch"""
-
-FASTEST = 0.7 * FASTEST_LENGTHS
-"""largest coordinate of a velocity, in Box2D's lengths, that is certainly below the speed to which it clamps"""
 
 SPIN_ROUNDING = 1e-5
 """relative, rounding of Box2D's clamped spins"""
@@ -96,7 +92,7 @@ def far_away(scale: float) -> str:
     return f"farther than {FARTHEST_LENGTHS / scale:g} m from the origin 32-bit numbers do not resolve the slop"
 
 
-class Box2DSimulation(SteppedSimulation):
+class Box2DSimulation(HasBodyStore, SteppedSimulation):
     """A running scene. States are read from Box2D after every step; contacts come from its events.
 
     A step finds contacts at its start and before anything moves. They are those at the end of the step before, to which
@@ -123,26 +119,6 @@ class Box2DSimulation(SteppedSimulation):
         self._unobserved: tuple[float, FloatArray, FloatArray] | None = None
         """start time of the last step, s, and positions before and after it, which the next step shows the observer"""
         self._set_air(self._store.scene)
-
-    @property
-    def setup(self) -> Setup:
-        """State from which the simulation started, with the changes that actions have made to its scene."""
-        return self._store.setup
-
-    @property
-    def bodies(self) -> Bodies:
-        """Bodies at their start as arrays; spawned bodies are appended."""
-        return self._store.bodies
-
-    @property
-    def retired(self) -> Mapping[int, float]:
-        """Time in s, by body index, at which bodies were removed, left `world.bounds` or ended their lifetime."""
-        return self._store.retired
-
-    @property
-    def broken(self) -> Mapping[int, float]:
-        """Time in s, by index in `setup.links`, at which joints broke."""
-        return self._store.broken
 
     @property
     def plane_reach(self) -> PlaneReach | None:
@@ -334,13 +310,13 @@ class Box2DSimulation(SteppedSimulation):
 
     def _beyond_limits(self) -> tuple[int | None, str]:
         """Return the first body that Box2D slows down or cannot resolve, and the reason."""
-        store, scale = self._store, self._store.scale
+        store, scale = self._store, self._world.scale
         position, velocity = (
             np.abs(array).max(axis=1, initial=0.0) * scale for array in (store.position, store.velocity)
         )
         for values, limit, reason in (
             (position, FARTHEST_LENGTHS, f"is too far away: {far_away(scale)}"),
-            (velocity, FASTEST, f"is faster than {FASTEST / scale:g} m/s, Box2D's limit"),
+            (velocity, FASTEST_LENGTHS, f"is faster than {FASTEST_LENGTHS / scale:g} m/s, Box2D's limit"),
             (
                 np.abs(store.angular_velocity),
                 self._largest_spin,
@@ -380,7 +356,7 @@ class Box2DSimulation(SteppedSimulation):
             scene, matrix, inverse_moment = store.scene, store.contact_matrix, store.inverse_moment
             leaving = apply_action(action, store)
             if store.contact_matrix is not matrix or store.inverse_moment is not inverse_moment:
-                self._world.update_surfaces()  # first: new shapes need the new values
+                self._joints.renew(self._world.update_surfaces())  # first: new shapes need the new values
             self._update_world(before, scene)
             if store.scene is not scene or len(store.position) > len(before[0]):
                 self._set_air(store.scene)

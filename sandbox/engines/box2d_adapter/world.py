@@ -20,7 +20,13 @@ import numpy.typing as npt
 import pyb2d3 as box2d
 
 from sandbox.arrays import ComplexArray, FloatArray, IntArray
-from sandbox.engines.box2d_adapter.limits import FARTHEST_LENGTHS, FASTEST_LENGTHS, MAX_WORLDS, scale_for
+from sandbox.engines.box2d_adapter.limits import (
+    CLAMPED_LENGTHS,
+    FARTHEST_LENGTHS,
+    FASTEST_LENGTHS,
+    MAX_WORLDS,
+    scale_for,
+)
 from sandbox.engines.box2d_adapter.materials import ShapeMaterials, shape_materials
 from sandbox.engines.box2d_adapter.requirements import surfaces_in_use
 from sandbox.engines.common.body_store import BodyStore
@@ -38,7 +44,8 @@ def _discard_leak_report() -> None:
     The binding keeps its types alive until the process ends, and reports that on standard error in dozens of lines. It
     has no setting for that.
     """
-    sys.stderr.flush()
+    if sys.stderr is not None:  # a program without a console has none
+        sys.stderr.flush()
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
 
 
@@ -113,7 +120,7 @@ class Box2DWorld:
         self._world = self._new_world(settings)
         self._world.sleeping_enabled = settings.sleeping
         self._world.continuous_enabled = settings.continuous
-        self.is_open = True
+        self._is_open = True
         self._first = len(store.scene.fixed)  # user data of shapes: index + number of static colliders
         self._bodies: dict[int, Any] = {}
         self._shapes: dict[int, list[tuple[ShapeRole, Any]]] = {}  # by the index of the body
@@ -139,7 +146,7 @@ class Box2DWorld:
         arguments: dict[str, Any] = {
             "gravity": self._vector(self._store.scene.world.gravity),
             "restitution_threshold": 0.0,
-            "maximum_linear_speed": FASTEST_LENGTHS,
+            "maximum_linear_speed": CLAMPED_LENGTHS,
         }
         if settings.workers is not None and settings.workers > 1:
             arguments["thread_pool"] = box2d.ThreadPool(settings.workers)
@@ -316,15 +323,20 @@ class Box2DWorld:
         self._remove_body(-1 - k)
         self._add_static(k)
 
-    def update_surfaces(self) -> None:
-        """Set the values of all shapes anew after a change of coefficients, bodies or the possible contacts."""
+    def update_surfaces(self) -> set[int]:
+        """Set the values of all shapes anew after a change of coefficients, bodies or the possible contacts.
+
+        Return the indices of bodies that had to be replaced, which end their joints.
+        """
+        replaced: set[int] = set()
         store, was_split = self._store, self._materials.is_split
         self._materials = self._shape_materials()
         surfaces = store.contact_matrix.surfaces
         for index in [n for n in self._shapes if n >= 0]:
             is_new = not self._shapes[index] and store.contact_matrix.touches[index]
             if is_new or (self._materials.is_split != was_split and not store.bodies.fixed[index]):
-                self._replace_shapes(index)
+                self._replace(index)
+                replaced.add(index)
         for index, shapes in self._shapes.items():
             if index < 0:
                 of_shapes = [int(surfaces.of_fixed[-1 - index])] * len(shapes)
@@ -337,9 +349,10 @@ class Box2DWorld:
             if index >= 0 and not store.bodies.fixed[index]:
                 self.set_mass(index)
         self._collect()
+        return replaced
 
-    def _replace_shapes(self, index: int) -> None:
-        """Replace a body by one with other shapes, in the same state."""
+    def _replace(self, index: int) -> None:
+        """Replace a body by one with other shapes, in the same state: the binding cannot remove shapes."""
         damping = self._bodies[index].linear_damping
         self._remove_body(index)
         self.add(index)
@@ -424,8 +437,8 @@ class Box2DWorld:
             largest_spin: rad/s.
         """
         reach = min(self._reach * self.scale, FARTHEST_LENGTHS) if self._store.scene.planes else FARTHEST_LENGTHS
-        distance = max(reach - float(np.abs(self._middle).max()) * self.scale, 0.0) if math.isfinite(reach) else reach
-        return 0.99 * distance**2, 0.49 * FASTEST_LENGTHS**2, 0.99 * largest_spin**2
+        distance = max(reach - float(np.abs(self._middle).max()) * self.scale, 0.0)
+        return 0.99 * distance**2, 0.99 * FASTEST_LENGTHS**2, 0.99 * largest_spin**2
 
     def is_quickly_within(self, rows: RawRows, row: int, bound: tuple[float, float, float]) -> bool:
         """Return whether all bodies are certainly within the limits, by one norm of all their coordinates."""
@@ -495,8 +508,8 @@ class Box2DWorld:
 
     def close(self) -> None:
         """Destroy the world; nothing of it may be used afterwards."""
-        if self.is_open:
-            self.is_open = False
+        if self._is_open:
+            self._is_open = False
             self._bodies.clear()
             self._shapes.clear()
             self._world.destroy()

@@ -256,6 +256,32 @@ class BodyStore:
         return None if index < 0 else index
 
 
+class HasBodyStore:
+    """Simulation whose bodies are in a body store."""
+
+    _store: BodyStore
+
+    @property
+    def setup(self) -> Setup:
+        """State from which the simulation started, with the changes that actions have made to its scene."""
+        return self._store.setup
+
+    @property
+    def bodies(self) -> Bodies:
+        """Bodies at their start as arrays; spawned bodies are appended."""
+        return self._store.bodies
+
+    @property
+    def retired(self) -> Mapping[int, float]:
+        """Time in s, by body index, at which bodies were removed, left `world.bounds` or ended their lifetime."""
+        return self._store.retired
+
+    @property
+    def broken(self) -> Mapping[int, float]:
+        """Time in s, by index in `setup.links`, at which joints broke."""
+        return self._store.broken
+
+
 @kernel
 def first_beyond(
     position: FloatArray, velocity: FloatArray, angle: FloatArray, spin: FloatArray, roll: FloatArray

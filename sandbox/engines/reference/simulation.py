@@ -12,7 +12,7 @@ from sandbox.action import Action, ActionError, Impulse, Spawn, Throttle
 from sandbox.arrays import BoolArray, FloatArray, IntArray
 from sandbox.engines.common.actions import apply_action
 from sandbox.engines.common.base import BEYOND, SteppedSimulation, observe_path
-from sandbox.engines.common.body_store import BodyStore
+from sandbox.engines.common.body_store import BodyStore, HasBodyStore
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, ContactLog, join_batches
 from sandbox.engines.common.frame_rows import free_rows
 from sandbox.engines.common.kernel import warn_if_uncompiled
@@ -34,7 +34,6 @@ from sandbox.engines.reference.step_kernels import STOPPED, UNCHECKED
 from sandbox.engines.reference.world_batch import ConvexWorldBatch
 from sandbox.engines.reference.zones import ZonedBodyStore
 from sandbox.frame_table import FrameTable
-from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.contacts import surface_parts
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
@@ -47,7 +46,7 @@ MIN_FIRST_STEPS = 4
 """Steps of a first call of `advance` from which on preparing compiled steps pays"""
 
 
-class ReferenceSimulation(SteppedSimulation):
+class ReferenceSimulation(HasBodyStore, SteppedSimulation):
     """A running scene. A substep applies forces, advances bodies, detects and resolves contacts; see `step.step`.
 
     Zones detect centres at the end of a substep, so that the delay of their effects depends only on the substep.
@@ -81,26 +80,6 @@ class ReferenceSimulation(SteppedSimulation):
         """Return an independent simulation in the same state, without the memory of compiled steps."""
         self._stepper = None
         return super().__deepcopy__(memo)
-
-    @property
-    def setup(self) -> Setup:
-        """State from which the simulation started, with the changes that actions have made to its scene."""
-        return self._store.setup
-
-    @property
-    def bodies(self) -> Bodies:
-        """Bodies at their start as arrays; spawned bodies are appended."""
-        return self._store.bodies
-
-    @property
-    def retired(self) -> Mapping[int, float]:
-        """Time in s, by body index, at which bodies were removed, left `world.bounds` or ended their lifetime."""
-        return self._store.retired
-
-    @property
-    def broken(self) -> Mapping[int, float]:
-        """Time in s, by index in `setup.links`, at which joints broke."""
-        return self._store.broken
 
     @property
     def work(self) -> Mapping[str, int]:

@@ -13,7 +13,7 @@ from sandbox.action import Action, ActionError
 from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.actions import apply_action
 from sandbox.engines.common.base import SteppedSimulation
-from sandbox.engines.common.body_store import NOTHING, BodyStore
+from sandbox.engines.common.body_store import NOTHING, BodyStore, HasBodyStore
 from sandbox.engines.common.contact_log import ContactLog
 from sandbox.engines.common.energy_balance import record_energy_change
 from sandbox.engines.common.kernel import warn_if_uncompiled
@@ -23,7 +23,6 @@ from sandbox.engines.reference.collision import CirclePipeline
 from sandbox.engines.tabletop.contacts import SKIN
 from sandbox.engines.tabletop.requirements import unsupported_by_steppers
 from sandbox.engines.tabletop.stepper import BallArrays, TabletopStepper
-from sandbox.scene.compile.bodies import Bodies
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.base import BodySource, BodySpec
 from sandbox.scene.description.world import Settings
@@ -146,8 +145,10 @@ class CirclePairFinder:
         """Set the position of a ball: it is in the arrays of the store already."""
 
 
-class ReferenceTabletopSimulation(SteppedSimulation):
+class ReferenceTabletopSimulation(HasBodyStore, SteppedSimulation):
     """A running scene of balls or pucks on a surface."""
+
+    _store: TabletopBodyStore
 
     def __init__(self, setup: Setup, settings: Settings) -> None:
         """Start from a setup.
@@ -163,21 +164,6 @@ class ReferenceTabletopSimulation(SteppedSimulation):
         self._stepper.capture()
         self._finder.pipeline.check_limits(self._store.position)
         warn_if_uncompiled(len(setup.bodies))
-
-    @property
-    def setup(self) -> Setup:
-        """State from which the simulation started, with the changes that actions have made to its scene."""
-        return self._store.setup
-
-    @property
-    def bodies(self) -> Bodies:
-        """Bodies at their start as arrays; spawned bodies are appended."""
-        return self._store.bodies
-
-    @property
-    def retired(self) -> Mapping[int, float]:
-        """Time in s, by body index, at which bodies were removed, left `world.bounds` or ended their lifetime."""
-        return self._store.retired
 
     @property
     def work(self) -> Mapping[str, int]:
