@@ -280,7 +280,7 @@ def _swing_boxes(scene: Scene, bodies: Bodies, start: Corners) -> list[Corners]:
     anchor, position = anchored.anchor_a, bodies.position[anchored.b]
     size = float((start[1] - start[0]).max())
     is_near = ((anchor >= start[0] - FAR * size) & (anchor <= start[1] + FAR * size)).all(axis=1)
-    points = [anchor[is_near]]
+    points = [anchor[is_near], links.of(LinkKind.PULLEY).wheels.reshape(-1, 2)]
     if scene.world.gravity[0] == 0.0 and scene.world.gravity[1] < 0.0:
         swing = is_near & np.isin(anchored.kind, (LinkKind.ROD, LinkKind.SLIDE)) & ~bodies.fixed[anchored.b]
         anchor, position, radius = anchor[swing], position[swing], bodies.radius[anchored.b[swing]][:, None]
@@ -340,4 +340,5 @@ def anchor_points(scene: Scene) -> FloatArray:
         points += [(x - r, y - r), (x + r, y + r)]
     links = scene.links.some((scene.links.a < 0) & np.isin(scene.links.kind, ANCHORED_KINDS))
     points += [(x, y) for x, y in links.anchor_a.tolist()]
+    points += [(x, y) for x, y in scene.links.of(LinkKind.PULLEY).wheels.reshape(-1, 2).tolist()]
     return np.asarray(points, np.float64).reshape(-1, 2)

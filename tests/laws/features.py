@@ -43,6 +43,7 @@ JOINTS: dict[str, Document] = {
     "gear": {"ratio": 2.0},
     "spring": {"stiffness": 10.0, "damping": 1.0},
     "rotary_spring": {"stiffness": 10.0},
+    "pulley": {"wheels": [[0.0, 6.0], [2.0, 6.0]]},
 }
 
 
@@ -124,7 +125,7 @@ FEATURES: dict[str, Document] = {
         "joint": [{"kind": "spring", "between": ["a", "b"], "stiffness": 1.0}],
         "zone": [{"position": [0.0, 2.9], "radius": 1.0, "holds": True}],
     },
-    **{f"{kind} to the world": {"joint": [_joint(kind, "a")]} for kind in JOINTS},
+    **{f"{kind} to the world": {"joint": [_joint(kind, "a")]} for kind in JOINTS if kind != "pulley"},
     **{f"{kind} between two": {"joint": [_joint(kind, "a", "b")]} for kind in JOINTS},
     **{f"weak {kind}": {"joint": [{**_joint(kind, "a", "b"), "strength": 1e-9}]} for kind in JOINTS},
 }

@@ -22,6 +22,8 @@ NAMED: dict[str, Any] = {**BALL, "name": "a"}
 NAMED_BOX = {"name": "a", "position": [0, 0], "size": [1, 1]}
 PLUNGER = {"kind": "plunger", "body": "a", "direction": [0, 1], "travel": 1, "speed": 1}
 STROKE = {"kind": "stroke", "body": "a", "pivot": [0, 0], "stops": [0, 1], "rate": 1}
+OTHER: dict[str, Any] = {**BALL, "name": "b", "position": [3, 0]}
+PULLEY = {"kind": "pulley", "between": ["a", "b"], "wheels": [[0, 2], [3, 2]]}
 OFF: dict[str, Any] = {"kind": "rod", "between": ["a"], "anchors": [[0, 1], [5, 5]]}
 JOINTED: dict[Demand, dict[str, Any]] = {
     Demand.RODS: {"kind": "rod", "anchors": [[0, 0], [5, 5]]},
@@ -127,6 +129,8 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
             (demand, False, {"ball": [NAMED]}, "none"),
         )
     ),
+    (Demand.PULLEYS, True, {"ball": [NAMED, OTHER], "joint": [PULLEY] * 2}, "2"),
+    (Demand.PULLEYS, False, {"ball": [NAMED]}, "none"),
     (Demand.ATTRACTION, True, {"ball": [BALL], "attraction": [{"toward": [0, 0], "strength": 1}]}, "1"),
     (Demand.ATTRACTION, False, {"ball": [BALL]}, "none"),
     (Demand.THRUST, True, {"ball": [NAMED], "thrust": [{"body": "a", "force": [1, 0]}]}, "1"),

@@ -37,7 +37,7 @@ class PymunkEngine:
 
     name: str = "pymunk"
     about: str = "pymunk (Munk2D): fixed step, discrete contacts, sequential impulses"
-    capabilities: frozenset[Demand] = BALLS | JOINTS | FLOOR | SURFACES | OWN | {Demand.CURL}
+    capabilities: frozenset[Demand] = BALLS | JOINTS - {Demand.PULLEYS} | FLOOR | SURFACES | OWN | {Demand.CURL}
     knows_impulses: bool = True
 
     def missing(self, start: Scene | Setup, settings: Settings) -> tuple[str, ...]:

@@ -54,6 +54,8 @@ def _new_constraint(links: JointArrays, k: int, a: pymunk.Body, b: pymunk.Body) 
             return pymunk.DampedSpring(a, b, anchor_a, anchor_b, x, y, z)
         case LinkKind.ROTARY_SPRING:
             return pymunk.DampedRotarySpring(a, b, -x, y, z)  # pymunk: angle of the first body relative to the second
+        case kind:
+            raise ValueError(f"pymunk has no {kind.name.lower()} joints")
 
 
 def spring_force_magnitude(

@@ -89,12 +89,13 @@ class StepEnergyLedger:
         assert record.work is not None  # this ledger has switched it on
         if self._joints is not None and self._joints.method == "impulses":
             self.account.add(Cause.JOINTS, record.work.joints)
+        self.account.add(Cause.DRIVES, record.work.motors)
         if impact is not None:
             at_impact = 0.5 * (record.end + record.after[1])
             self._enter_contacts(impact.contacts, impact.impulse, at_impact, impact.kick_energy)
         if self._drives is not None and record.work.drives is not None:
             self._enter_drives(self._drives, record.work.drives, record, mean)
-        self._enter_motion(record)
+        self._enter_motion(record, record.work.motors)
 
     def _enter_drives(self, drives: Drives, work: DriveWork, record: StepRecord, mean: FloatArray) -> None:
         """Enter the work of drives: the energy gain of driven bodies less the work of contacts and weight."""
@@ -114,8 +115,13 @@ class StepEnergyLedger:
             self.account.add_contacts(along - kicks, across)
             self.account.add(Cause.KICKS, kicks)
 
-    def _enter_motion(self, record: StepRecord) -> None:
-        """Enter forces, joints solved by positions, position correction, and the integrator."""
+    def _enter_motion(self, record: StepRecord, motors: float) -> None:
+        """Enter forces, joints solved by positions, position correction, and the integrator.
+
+        Args:
+            record: of the step.
+            motors: J, work of motors, which has been entered.
+        """
         h, after, end, motion = record.h, record.after, record.end, record.motion
         start, free, placed = motion.start, motion.free, motion.placed
         shift = 0.0 if motion.shift is None else motion.shift
@@ -147,7 +153,7 @@ class StepEnergyLedger:
         )
         if displaced:
             strain_after = self._spring_energy_change(followed, after[0])
-        joints = 0.5 * self._product(joint_change, start[1] + end)
+        joints = 0.5 * self._product(joint_change, start[1] + end) - (motors if displaced else 0.0)
         if self._compliant:  # springs are solved as joints are: their stored energy counts, except for damping
             joints += strain + strain_after - work[Cause.DAMPING]
         else:

@@ -7,7 +7,7 @@ from sandbox.engines.common.base import BIAS, box2d_settings_in, slop_of
 from sandbox.engines.common.workload import overload
 from sandbox.engines.tabletop.requirements import on_floor, unsupported_by_steppers
 from sandbox.scene.compile.contacts import contact_matrix
-from sandbox.scene.compile.demands import BALLS, FLOOR, SURFACES, Demand, demands, unmodelled
+from sandbox.scene.compile.demands import BALLS, FLOOR, JOINTS, SURFACES, Demand, demands, unmodelled
 from sandbox.scene.compile.drives import names_of
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
@@ -54,7 +54,7 @@ TABLETOP_METHODS = {**DEFAULT_METHODS, "impact": "newton", "persistence": 1}
 JOINT_INTEGRATORS = {"relaxation": "semi_implicit_euler", "xpbd": "semi_implicit_euler", "rattle": "velocity_verlet"}
 """Default integrators of position-based joint methods: they change velocities before positions are corrected."""
 
-CONSTRAINTS = {Demand.RODS, Demand.PIVOTS, Demand.SLIDES, Demand.ROTARY_LIMITS}
+CONSTRAINTS = JOINTS - {Demand.SPRINGS, Demand.ROTARY_SPRINGS}
 """Joints that are constraints; springs are forces"""
 
 MAX_ALL_PAIRS = 24
@@ -80,12 +80,7 @@ class ReferenceEngine:
         Demand.ONE_WAY,
         Demand.PASSABLE,
         Demand.POLYGONS,
-        Demand.RODS,
-        Demand.PIVOTS,
-        Demand.SLIDES,
-        Demand.ROTARY_LIMITS,
-        Demand.SPRINGS,
-        Demand.ROTARY_SPRINGS,
+        *JOINTS,
         Demand.ATTRACTION,
         Demand.THRUST,
         Demand.LAYERS,

@@ -1,4 +1,4 @@
-"""Joints as arrays: anchors, effective masses, spring forces and stretch limits.
+"""Joints as arrays: anchors, Jacobians, effective masses, spring forces and stretch limits.
 
 The axis of a joint points from its anchor on the first body to its anchor on the second. An impulse acts on the second
 body, and its opposite on the first.
@@ -21,11 +21,18 @@ from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
 
 # Plain integers: numba compares them faster than members of an enumeration.
 ROD, PIVOT, SLIDE = int(LinkKind.ROD), int(LinkKind.PIVOT), int(LinkKind.SLIDE)
-ROTARY_LIMIT = int(LinkKind.ROTARY_LIMIT)
+ROTARY_LIMIT, MOTOR, GEAR = int(LinkKind.ROTARY_LIMIT), int(LinkKind.MOTOR), int(LinkKind.GEAR)
+GROOVE, PULLEY = int(LinkKind.GROOVE), int(LinkKind.PULLEY)
 SPRING, ROTARY_SPRING = int(LinkKind.SPRING), int(LinkKind.ROTARY_SPRING)
 
 SPRINGS = (LinkKind.SPRING, LinkKind.ROTARY_SPRING)
-CONSTRAINTS = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.ROTARY_LIMIT)
+CONSTRAINTS = tuple(kind for kind in LinkKind if kind not in SPRINGS)
+
+GROOVE_ENDS = 1 + int(max(LinkKind))
+"""Second constraint of a groove, along it; that of the kind `GROOVE` is across it"""
+
+JACOBIAN_KINDS = (GROOVE, GROOVE_ENDS, GEAR, PULLEY)
+"""Kinds whose quantity and limits are those of `constrained_value` and `value_limits`"""
 
 _spring_law = bare_kernel(spring_law)
 
@@ -49,6 +56,8 @@ class JointData(NamedTuple):
     """(K, 4) m, anchors ax, ay, bx, by in the frames of the bodies; for the world, a point in space"""
     figures: FloatArray
     """(K, 3), as defined by `LinkKind`"""
+    wheel: FloatArray
+    """(K, 4) m, positions of both wheels of a pulley in the world: ax, ay, bx, by"""
     max_force: FloatArray
     """(K,) N or N·m"""
 
@@ -62,13 +71,21 @@ class JointData(NamedTuple):
 
 
 def select_joints(links: JointArrays, *kinds: LinkKind, among: IntArray | None = None) -> JointData:
-    """Return the joints of some kinds, in their order; with `among`, only those with these indices."""
+    """Return the joints of some kinds, in their order; with `among`, only those with these indices.
+
+    A groove is followed by its second constraint, `GROOVE_ENDS`.
+    """
     which = np.isin(links.kind, kinds)
     if among is not None:
         which &= np.isin(np.arange(len(links)), among)
     anchor = np.column_stack((links.anchor_a, links.anchor_b))
-    every = JointData(np.arange(len(links)), links.kind, links.a, links.b, anchor, links.figures, links.most_force)
-    return every.take(np.flatnonzero(which))
+    columns = links.kind, links.a, links.b, anchor, links.figures, links.wheels, links.most_force
+    found = JointData(np.arange(len(links)), *columns).take(np.flatnonzero(which))
+    if not (found.kind == GROOVE).any():
+        return found
+    found = found.take(np.repeat(np.arange(len(found.kind)), np.where(found.kind == GROOVE, 2, 1)))
+    found.kind[1:][(found.kind[1:] == GROOVE) & (found.link[1:] == found.link[:-1])] = GROOVE_ENDS
+    return found
 
 
 @bare_kernel
@@ -181,6 +198,100 @@ def effective_mass_matrix(
     if determinant == 0.0:
         return 0.0, 0.0, 0.0
     return yy / determinant, -xy / determinant, xx / determinant
+
+
+Jacobian: TypeAlias = tuple[float, float, float, float, float, float]
+"""Rate of a quantity per velocity x, y and spin of the first body, then of the second"""
+
+
+@bare_kernel
+def constrained_value(joints: JointData, k: int, pose: FloatArray) -> tuple[float, Jacobian]:
+    """Return the quantity that joint k, of one of `JACOBIAN_KINDS`, constrains, and its Jacobian.
+
+    It is the position of the second anchor across a groove, m, or along it; the angle of the second body relative to
+    that of a gear, rad; or the length of a pulley's rope, m. An impulse along the Jacobian acts on the second body as
+    an impulse along the groove's normal or axis, as an angular impulse, or along the rope.
+    """
+    i, j = joints.first[k], joints.second[k]
+    kind = joints.kind[k]
+    if kind == GEAR:
+        phase, ratio = joints.figures[k, 0], joints.figures[k, 1]
+        angle = pose[j, 2]
+        if i >= 0:
+            angle -= pose[i, 2] / ratio
+        return angle - phase / ratio, (0.0, 0.0, -1.0 / ratio, 0.0, 0.0, 1.0)
+    anchors, dx, dy = anchor_separation(joints, k, pose)
+    ax, ay, bx, by = anchors
+    if kind == PULLEY:
+        x, y = pose[i, 0] + ax, pose[i, 1] + ay
+        first, ux, uy = length_and_direction(x - joints.wheel[k, 0], y - joints.wheel[k, 1])
+        second, vx, vy = length_and_direction(x + dx - joints.wheel[k, 2], y + dy - joints.wheel[k, 3])
+        ratio = joints.figures[k, 1]
+        vx, vy = ratio * vx, ratio * vy
+        return first + ratio * second, (ux, uy, ax * uy - ay * ux, vx, vy, bx * vy - by * vx)
+    x, y = joints.figures[k, 0] - joints.anchor[k, 0], joints.figures[k, 1] - joints.anchor[k, 1]
+    _, nx, ny = length_and_direction(x, y)
+    if i >= 0:
+        nx, ny = rotate(nx, ny, math.cos(pose[i, 2]), math.sin(pose[i, 2]))
+    if kind == GROOVE:
+        nx, ny = -ny, nx
+    # The axis turns with the first body, so that its lever is that of the point which coincides with the second anchor.
+    lever = (ax + dx) * ny - (ay + dy) * nx
+    return nx * dx + ny * dy, (-nx, -ny, -lever, nx, ny, bx * ny - by * nx)
+
+
+@bare_kernel
+def value_limits(joints: JointData, k: int) -> tuple[float, float]:
+    """Return the smallest and largest value of the quantity that `constrained_value` returns."""
+    if joints.kind[k] == PULLEY:
+        return -math.inf, joints.figures[k, 0]
+    if joints.kind[k] == GROOVE_ENDS:
+        x, y = joints.figures[k, 0] - joints.anchor[k, 0], joints.figures[k, 1] - joints.anchor[k, 1]
+        return 0.0, math.sqrt(x * x + y * y)
+    return 0.0, 0.0
+
+
+@bare_kernel
+def jacobian_rate(i: int, j: int, jacobian: Jacobian, velocity: FloatArray) -> float:
+    """Return the rate of a quantity by its Jacobian, at velocities (N, 3)."""
+    ax, ay, aw, bx, by, bw = jacobian
+    rate: float = bx * velocity[j, 0] + by * velocity[j, 1] + bw * velocity[j, 2]
+    if i >= 0:
+        rate += ax * velocity[i, 0] + ay * velocity[i, 1] + aw * velocity[i, 2]
+    return rate
+
+
+@bare_kernel
+def apply_along_jacobian(
+    i: int,
+    j: int,
+    jacobian: Jacobian,
+    size: float,
+    inverse_mass: FloatArray,
+    inverse_moment: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Apply an impulse along a Jacobian to velocities (N, 3)."""
+    ax, ay, aw, bx, by, bw = jacobian
+    out[j, 0] += inverse_mass[j] * bx * size
+    out[j, 1] += inverse_mass[j] * by * size
+    out[j, 2] += inverse_moment[j] * bw * size
+    if i >= 0:
+        out[i, 0] += inverse_mass[i] * ax * size
+        out[i, 1] += inverse_mass[i] * ay * size
+        out[i, 2] += inverse_moment[i] * aw * size
+
+
+@bare_kernel
+def inverse_jacobian_mass(
+    i: int, j: int, jacobian: Jacobian, inverse_mass: FloatArray, inverse_moment: FloatArray
+) -> float:
+    """Return J M⁻¹ Jᵀ: the rate of a quantity per unit impulse along its Jacobian J."""
+    ax, ay, aw, bx, by, bw = jacobian
+    inverse: float = inverse_mass[j] * (bx * bx + by * by) + inverse_moment[j] * bw * bw
+    if i >= 0:
+        inverse += inverse_mass[i] * (ax * ax + ay * ay) + inverse_moment[i] * aw * aw
+    return inverse
 
 
 @bare_kernel

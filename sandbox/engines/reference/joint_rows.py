@@ -1,7 +1,9 @@
 """Velocity constraints of joints, and their sequential impulses.
 
-As in Munk2D (`cpPinJoint.c`, `cpPivotJoint.c`, `cpSlideJoint.c`, `cpRotaryLimitJoint.c`): the target velocity of a row
-corrects the fraction 1 − bias^h of the position error within a step. Unlike in Munk2D, that velocity is not bounded.
+As in Munk2D (`cpPinJoint.c`, `cpPivotJoint.c`, `cpSlideJoint.c`, `cpRotaryLimitJoint.c`, `cpGearJoint.c`,
+`cpSimpleMotor.c`): the target velocity of a row corrects the fraction 1 − bias^h of the position error within a step.
+Unlike in Munk2D, that velocity is not bounded. A groove has two rows, across it and along it, as Box2D's prismatic
+joint; Munk2D clamps the impulse of a point instead.
 """
 
 import math
@@ -13,30 +15,42 @@ from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.common.geometry import length_and_direction
 from sandbox.engines.common.kernel import bare_kernel
 from sandbox.engines.reference.joint_data import (
+    GEAR,
+    GROOVE_ENDS,
+    JACOBIAN_KINDS,
+    MOTOR,
     PIVOT,
+    PULLEY,
     ROD,
     ROTARY_LIMIT,
     ROTARY_SPRING,
+    Jacobian,
     JointData,
     anchor_separation,
+    apply_along_jacobian,
     apply_angular_impulse,
     apply_impulse,
+    constrained_value,
     effective_mass_matrix,
     inverse_effective_mass,
     inverse_effective_moment,
+    inverse_jacobian_mass,
+    jacobian_rate,
     relative_rotation,
     relative_velocity,
+    value_limits,
 )
 
-DISTANCE, POINT, ANGLE = 0, 1, 2
-"""Constrained quantity of a row: distance of the anchors along the axis, position in both directions, or angle"""
+DISTANCE, POINT, ANGLE, JACOBIAN = 0, 1, 2, 3
+"""Constrained quantity of a row: distance of the anchors along the axis, position in both directions, angle, or another
+quantity by its Jacobian"""
 
 
 class VelocityConstraints(NamedTuple):
-    """K rows, one for each joint. Impulses are those on the second body."""
+    """K rows, one for each joint, two for each groove. Impulses are those on the second body."""
 
     kind: IntArray
-    """(K,) `DISTANCE`, `POINT` or `ANGLE`"""
+    """(K,) `DISTANCE`, `POINT`, `ANGLE` or `JACOBIAN`"""
     first: IntArray
     """(K,) body index, or −1 for the world"""
     second: IntArray
@@ -44,7 +58,10 @@ class VelocityConstraints(NamedTuple):
     anchor: FloatArray
     """(K, 4) m, from the centres to the anchors: ax, ay, bx, by"""
     normal: FloatArray
-    """(K, 2) unit axis of a `DISTANCE` row, from the first anchor to the second"""
+    """(K, 2) unit axis of a `DISTANCE` row, from the first anchor to the second; of a `JACOBIAN` row the direction of
+    its impulse on the second body; 1, 0 if that is angular"""
+    jacobian: FloatArray
+    """(K, 6) of a `JACOBIAN` row"""
     mass: FloatArray
     """(K, 3) effective mass, kg or kg·m², in the first column; of `POINT` rows the matrix xx, xy, yy. 0 if immovable"""
     target: FloatArray
@@ -52,7 +69,7 @@ class VelocityConstraints(NamedTuple):
     bound: FloatArray
     """(K, 2) N·s or N·m·s, bounds of the accumulated impulse; 0, 0 if inactive"""
     impulse: FloatArray
-    """(K, 2) N·s or N·m·s, accumulated impulse: along the normal, or x and y, or angular"""
+    """(K, 2) N·s or N·m·s, accumulated impulse: along the normal or the Jacobian, or x and y, or angular"""
 
 
 def make_velocity_constraints(joints: JointData) -> VelocityConstraints:
@@ -60,7 +77,8 @@ def make_velocity_constraints(joints: JointData) -> VelocityConstraints:
     count = len(joints.kind)
     kind = np.full(count, DISTANCE)
     kind[joints.kind == PIVOT] = POINT
-    kind[np.isin(joints.kind, (ROTARY_LIMIT, ROTARY_SPRING))] = ANGLE
+    kind[np.isin(joints.kind, (ROTARY_LIMIT, ROTARY_SPRING, MOTOR))] = ANGLE
+    kind[np.isin(joints.kind, JACOBIAN_KINDS)] = JACOBIAN
     pairs = [np.zeros((count, 2)) for _ in range(4)]
     return VelocityConstraints(
         kind,
@@ -68,6 +86,7 @@ def make_velocity_constraints(joints: JointData) -> VelocityConstraints:
         joints.second,
         np.zeros((count, 4)),
         pairs[0],
+        np.zeros((count, 6)),
         np.zeros((count, 3)),
         pairs[1],
         pairs[2],
@@ -110,11 +129,30 @@ def prepare(
         rows.impulse[k, 0] *= kept
         rows.impulse[k, 1] *= kept
         if rows.kind[k] == ANGLE:
-            turned = relative_rotation(i, j, pose)
-            error = _limit_error(rows, k, turned, joints.figures[k, 0], joints.figures[k, 1])
             inverse = inverse_effective_moment(i, j, inverse_moment)
             rows.mass[k, 0] = 1.0 / inverse if inverse > 0.0 else 0.0
+            if joints.kind[k] == MOTOR:
+                rows.target[k, 0] = joints.figures[k, 0]
+                continue
+            turned = relative_rotation(i, j, pose)
+            error = _limit_error(rows, k, turned, joints.figures[k, 0], joints.figures[k, 1])
             rows.target[k, 0] = -rate * error
+            continue
+        if rows.kind[k] == JACOBIAN:
+            value, jacobian = constrained_value(joints, k, pose)
+            set_jacobian(rows.jacobian, rows.normal, k, joints.kind[k], jacobian)
+            inverse = inverse_jacobian_mass(i, j, jacobian, inverse_mass, inverse_moment)
+            rows.mass[k, 0] = 1.0 / inverse if inverse > 0.0 else 0.0
+            lower_limit, upper_limit = value_limits(joints, k)
+            if joints.kind[k] == PULLEY:
+                # The rope may become taut within the step: as Box2D's limits, it bounds the velocity before that.
+                slack = upper_limit - value
+                rows.bound[k, 1] = 0.0
+                rows.target[k, 0] = slack / h if slack > 0.0 else rate * slack
+                continue
+            if lower_limit < upper_limit:
+                value = _limit_error(rows, k, value, lower_limit, upper_limit)
+            rows.target[k, 0] = -rate * value
             continue
         anchors, dx, dy = anchor_separation(joints, k, pose)
         rows.anchor[k, 0], rows.anchor[k, 1], rows.anchor[k, 2], rows.anchor[k, 3] = anchors
@@ -132,6 +170,21 @@ def prepare(
         else:
             error = _limit_error(rows, k, length, joints.figures[k, 0], joints.figures[k, 1])
         rows.target[k, 0] = -rate * error
+
+
+@bare_kernel
+def set_jacobian(jacobian: FloatArray, normal: FloatArray, k: int, kind: int, values: Jacobian) -> None:
+    """Set the Jacobian of row k, and the direction of its impulse on the second body."""
+    ax, ay, aw, bx, by, bw = values
+    jacobian[k, 0], jacobian[k, 1], jacobian[k, 2] = ax, ay, aw
+    jacobian[k, 3], jacobian[k, 4], jacobian[k, 5] = bx, by, bw
+    normal[k, 0], normal[k, 1] = (1.0, 0.0) if kind == GEAR else (bx, by)
+
+
+@bare_kernel
+def _row_jacobian(rows: VelocityConstraints, k: int) -> Jacobian:
+    row = rows.jacobian[k]
+    return row[0], row[1], row[2], row[3], row[4], row[5]
 
 
 @bare_kernel
@@ -158,8 +211,11 @@ def write_joint_impulses(rows: VelocityConstraints, joints: JointData, out: Floa
         joints: the K joints of these rows.
         out: (J, 2), by index of the joint in the setup.
     """
-    along = (rows.kind == DISTANCE)[:, None]
-    out[joints.link] = np.where(along, rows.impulse[:, :1] * rows.normal, rows.impulse)
+    along = ((rows.kind == DISTANCE) | (rows.kind == JACOBIAN))[:, None]
+    impulse = np.where(along, rows.impulse[:, :1] * rows.normal, rows.impulse)
+    out[joints.link] = impulse
+    ends = joints.kind == GROOVE_ENDS
+    out[joints.link[ends]] += impulse[:-1][ends[1:]]  # those across the groove, in the rows before
 
 
 @bare_kernel
@@ -192,6 +248,9 @@ def solve_joints_once(
         if rows.kind[k] == ANGLE:
             missing = rows.target[k, 0] - relative_rotation(i, j, velocity)
             rows.impulse[k, 0] = min(max(old_x + rows.mass[k, 0] * missing, lower), upper)
+        elif rows.kind[k] == JACOBIAN:
+            missing = rows.target[k, 0] - jacobian_rate(i, j, _row_jacobian(rows, k), velocity)
+            rows.impulse[k, 0] = min(max(old_x + rows.mass[k, 0] * missing, lower), upper)
         else:
             anchors = rows.anchor[k, 0], rows.anchor[k, 1], rows.anchor[k, 2], rows.anchor[k, 3]
             vx, vy = relative_velocity(i, j, anchors, velocity)
@@ -212,20 +271,33 @@ def solve_joints_once(
 
 
 @bare_kernel
-def joint_work(rows: VelocityConstraints, velocity: FloatArray) -> float:
-    """Return the work of the accumulated impulses of all rows, J, at velocities (N, 3)."""
-    work = 0.0
+def joint_work(rows: VelocityConstraints, joints: JointData, velocity: FloatArray) -> tuple[float, float]:
+    """Return the work of the accumulated impulses of all rows but motors, and that of motors, J.
+
+    Args:
+        rows: K of them.
+        joints: the K joints of these rows.
+        velocity: (N, 3) m/s and rad/s.
+    """
+    work = motors = 0.0
     for k in range(len(rows.kind)):
         i, j, x, y = rows.first[k], rows.second[k], rows.impulse[k, 0], rows.impulse[k, 1]
         if rows.kind[k] == ANGLE:
-            work += x * relative_rotation(i, j, velocity)
+            done = x * relative_rotation(i, j, velocity)
+            if joints.kind[k] == MOTOR:
+                motors += done
+            else:
+                work += done
+            continue
+        if rows.kind[k] == JACOBIAN:
+            work += x * jacobian_rate(i, j, _row_jacobian(rows, k), velocity)
             continue
         if rows.kind[k] != POINT:
             x, y = x * rows.normal[k, 0], x * rows.normal[k, 1]
         anchors = rows.anchor[k, 0], rows.anchor[k, 1], rows.anchor[k, 2], rows.anchor[k, 3]
         vx, vy = relative_velocity(i, j, anchors, velocity)
         work += x * vx + y * vy
-    return work
+    return work, motors
 
 
 @bare_kernel
@@ -242,6 +314,9 @@ def _apply_row_impulse(
     i, j = rows.first[k], rows.second[k]
     if rows.kind[k] == ANGLE:
         apply_angular_impulse(i, j, x, inverse_moment, velocity)
+        return
+    if rows.kind[k] == JACOBIAN:
+        apply_along_jacobian(i, j, _row_jacobian(rows, k), x, inverse_mass, inverse_moment, velocity)
         return
     if rows.kind[k] != POINT:
         x, y = x * rows.normal[k, 0], x * rows.normal[k, 1]

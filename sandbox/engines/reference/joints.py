@@ -25,7 +25,9 @@ from sandbox.arrays import FloatArray, IntArray
 from sandbox.engines.reference.integrators import State
 from sandbox.engines.reference.joint_data import (
     CONSTRAINTS,
+    GROOVE_ENDS,
     MAX_STRETCH,
+    MOTOR,
     SPRINGS,
     JointData,
     add_spring_forces,
@@ -46,8 +48,8 @@ from sandbox.engines.reference.joint_rows import (
 from sandbox.engines.reference.position_joints import project
 from sandbox.scene.compile.joint_arrays import JointArrays, LinkKind
 
-UNSUPPORTED = (LinkKind.GROOVE, LinkKind.MOTOR, LinkKind.GEAR)
-"""Kinds of joints that are not modelled"""
+LIMITS = (LinkKind.SLIDE, LinkKind.ROTARY_LIMIT, LinkKind.PULLEY, GROOVE_ENDS)
+"""Kinds that act at a limit only"""
 
 METHODS = ("impulses", "relaxation", "xpbd", "rattle")
 
@@ -81,7 +83,7 @@ class JointSolver:
         """Create the solver.
 
         Args:
-            links: the joints, none of a kind in `UNSUPPORTED`.
+            links: the joints.
             inverse_mass: (N,) 1/kg, 0 for fixed bodies.
             inverse_moment: (N,) 1/(kg·m²), 0 for bodies that do not turn.
             bias: fraction of a joint's error that remains after one second of correction, 0 to 1.
@@ -91,11 +93,10 @@ class JointSolver:
                 limit.
 
         Raises:
-            ValueError: a joint is of an unsupported kind, or `method` is unknown.
+            ValueError: `method` is unknown.
         """
-        unsupported = [kind.name.lower() for kind in UNSUPPORTED if (links.kind == kind).any()]
-        if unsupported or method not in METHODS:
-            raise ValueError(f"method {method!r} does not support {unsupported or 'joints'}")
+        if method not in METHODS:
+            raise ValueError(f"the method of joints must be one of {METHODS}, is {method!r}")
         self.links, self.method = links, method
         self._bias, self._iterations, self._max_stretch = bias, iterations, max_stretch
         self.h = math.inf
@@ -110,9 +111,9 @@ class JointSolver:
             inverse_moment: (N,) 1/(kg·m²).
             unbroken: indices of the intact joints.
         """
-        memory = np.zeros((len(self.links), 2))
+        memory = np.zeros((2, len(self.links), 2))  # the second constraints of grooves have their own
         if math.isfinite(self.h):
-            memory[self.constraints.link] = self.rows.impulse
+            memory[self._is_second(), self.constraints.link] = self.rows.impulse
         self.inverse_mass, self.inverse_moment = inverse_mass, inverse_moment
         self._springs: JointData = select_joints(self.links, *SPRINGS, among=unbroken)
         self.constraints: JointData = select_joints(
@@ -122,8 +123,12 @@ class JointSolver:
         if self.method == "relaxation":
             self.constraints = self.constraints.joined(stretch_limits(self._springs, self._max_stretch))
         self.rows: VelocityConstraints = make_velocity_constraints(self.constraints)
-        self.rows.impulse[:] = memory[self.constraints.link]
+        self.rows.impulse[:] = memory[self._is_second(), self.constraints.link]
         self._impulse = np.zeros((len(self.links), 2))
+
+    def _is_second(self) -> IntArray:
+        """Return 1 for rows that are the second constraint of a groove, otherwise 0, (K,)."""
+        return np.asarray(self.constraints.kind == GROOVE_ENDS, dtype=np.int64)
 
     def forget(self) -> None:
         """Forget the impulses of the last step."""
@@ -184,7 +189,7 @@ class JointSolver:
         """
         shift, shake = np.empty_like(moved[0]), self.method == "rattle"
         inverse = self.inverse_mass, self.inverse_moment
-        sums = self.rows.impulse, self.rows.normal
+        sums = self.rows.impulse, self.rows.normal, self.rows.jacobian
         project(self.constraints, moved[0], start[0], h, self._iterations, shake, *inverse, shift, *sums)
         self.rows.impulse[:] /= h
         moved[1] += shift / h
@@ -197,16 +202,22 @@ class JointSolver:
         impulse, bound, h = self.rows.impulse.copy(), self.rows.bound, self.h
         # No bias: positions are already corrected. A row with an impulse is active, at whichever limit.
         prepare(self.rows, self.constraints, moved[0], h, h, 1.0, self.inverse_mass, self.inverse_moment)
-        either = np.isin(self.constraints.kind, (LinkKind.ROD, LinkKind.PIVOT))
+        either = ~np.isin(self.constraints.kind, LIMITS)
         bound[:, 0] = np.where(either | (impulse[:, 0] < 0.0), -h * self.constraints.max_force, 0.0)
         bound[:, 1] = np.where(either | (impulse[:, 0] > 0.0), h * self.constraints.max_force, 0.0)
-        self.rows.impulse[:], self.rows.target[:] = impulse, 0.0  # applied already, but part of the accumulated impulse
+        self.rows.impulse[:] = impulse  # applied already, but part of the accumulated impulse
+        self.rows.target[self.constraints.kind != MOTOR] = 0.0
         for _ in range(self._iterations):
             self.solve_once(moved[1])
 
-    def work(self, velocity: FloatArray) -> float:
-        """Return the work of the joint impulses, J, at the mean (N, 3) of the velocities before and after them."""
-        return joint_work(self.rows, velocity)
+    def work(self, velocity: FloatArray) -> tuple[float, float]:
+        """Return the work of the impulses of joints but motors, and that of motors, J.
+
+        Args:
+            velocity: (N, 3) mean of the velocities before and after the impulses.
+        """
+        work: tuple[float, float] = joint_work(self.rows, self.constraints, velocity)
+        return work
 
     def damper_power(self, x: State) -> float:
         """Return the power of the dampers of springs in a state, W."""

@@ -18,20 +18,30 @@ from sandbox.arrays import FloatArray
 from sandbox.engines.common.geometry import length_and_direction
 from sandbox.engines.common.kernel import bare_kernel
 from sandbox.engines.reference.joint_data import (
+    GEAR,
+    GROOVE,
+    GROOVE_ENDS,
+    MOTOR,
     PIVOT,
+    PULLEY,
     ROTARY_LIMIT,
     ROTARY_SPRING,
     SLIDE,
     SPRING,
     JointData,
     anchor_separation,
+    apply_along_jacobian,
     apply_angular_impulse,
     apply_impulse,
+    constrained_value,
     effective_mass_matrix,
     inverse_effective_mass,
     inverse_effective_moment,
+    inverse_jacobian_mass,
     relative_rotation,
+    value_limits,
 )
+from sandbox.engines.reference.joint_rows import set_jacobian
 
 
 @bare_kernel
@@ -47,6 +57,7 @@ def project(
     shift: FloatArray,
     multiplier: FloatArray,
     direction: FloatArray,
+    jacobian: FloatArray,
 ) -> None:
     """Move bodies so that joints are satisfied; springs are compliant joints.
 
@@ -65,13 +76,18 @@ def project(
             errors of large coordinates, which divided by h are velocities.
         multiplier: (K, 2) λ along the axis, or x and y of a pivot, or of the angle; written.
         direction: (K, 2) axis when it was last solved; 1, 0 for an angle; written.
+        jacobian: (K, 6) of grooves, gears and pulleys, likewise; written.
     """
     shift[:] = 0.0
     multiplier[:] = 0.0
     for _ in range(iterations):
         for k in range(len(joints.kind)):
             kind = joints.kind[k]
-            if kind in (ROTARY_LIMIT, ROTARY_SPRING):
+            if kind in (GROOVE, GROOVE_ENDS, GEAR, PULLEY):
+                inverses = inverse_mass, inverse_moment
+                _solve_value(joints, k, pose, start, h, shake, *inverses, shift, multiplier, direction, jacobian)
+                continue
+            if kind in (ROTARY_LIMIT, ROTARY_SPRING, MOTOR):
                 _solve_angle(joints, k, pose, start, h, inverse_moment, shift, multiplier)
                 direction[k, 0], direction[k, 1] = 1.0, 0.0
                 continue
@@ -115,7 +131,7 @@ def _solve_angle(
     shift: FloatArray,
     multiplier: FloatArray,
 ) -> None:
-    """Solve rotary limit or rotary spring k."""
+    """Solve rotary limit, rotary spring or motor k. A motor turns from the start of the step at its rate."""
     i, j = joints.first[k], joints.second[k]
     inverse = inverse_effective_moment(i, j, inverse_moment)
     if inverse == 0.0:
@@ -124,12 +140,47 @@ def _solve_angle(
     if joints.kind[k] == ROTARY_SPRING:
         displacement = angle - relative_rotation(i, j, start)
         new = old + _compliant_change(joints, k, angle - joints.figures[k, 0], displacement, old, inverse, h)
+    elif joints.kind[k] == MOTOR:
+        target = relative_rotation(i, j, start) + joints.figures[k, 0] * h
+        new = _bounded_multiplier(angle - inverse * old, target, target, inverse)
     else:
         new = _bounded_multiplier(angle - inverse * old, joints.figures[k, 0], joints.figures[k, 1], inverse)
     bound = joints.max_force[k] * h * h
     multiplier[k, 0] = min(max(new, -bound), bound)
     apply_angular_impulse(i, j, multiplier[k, 0] - old, inverse_moment, pose)
     apply_angular_impulse(i, j, multiplier[k, 0] - old, inverse_moment, shift)
+
+
+@bare_kernel
+def _solve_value(
+    joints: JointData,
+    k: int,
+    pose: FloatArray,
+    start: FloatArray,
+    h: float,
+    shake: bool,
+    inverse_mass: FloatArray,
+    inverse_moment: FloatArray,
+    shift: FloatArray,
+    multiplier: FloatArray,
+    direction: FloatArray,
+    jacobian: FloatArray,
+) -> None:
+    """Solve joint k of one of the kinds of `constrained_value`."""
+    i, j = joints.first[k], joints.second[k]
+    value, axes = constrained_value(joints, k, pose)
+    if shake:
+        _, axes = constrained_value(joints, k, start)
+    inverse = inverse_jacobian_mass(i, j, axes, inverse_mass, inverse_moment)
+    if inverse == 0.0:
+        return
+    old, (lower, upper) = multiplier[k, 0], value_limits(joints, k)
+    new, bound = _bounded_multiplier(value - inverse * old, lower, upper, inverse), joints.max_force[k] * h * h
+    new = min(max(new, -bound), bound)
+    multiplier[k, 0] = new
+    set_jacobian(jacobian, direction, k, joints.kind[k], axes)
+    apply_along_jacobian(i, j, axes, new - old, inverse_mass, inverse_moment, pose)
+    apply_along_jacobian(i, j, axes, new - old, inverse_mass, inverse_moment, shift)
 
 
 @bare_kernel

@@ -35,7 +35,9 @@ class SolverWork(NamedTuple):
     """Work in a step that depends on the state of the solver, for the energy ledger."""
 
     joints: float
-    """J, of joint impulses; 0 for joints that are solved by positions"""
+    """J, of joint impulses but those of motors; 0 for joints that are solved by positions"""
+    motors: float
+    """J, of motors"""
     drives: DriveWork | None
     """energy given to driven bodies; None if there are none"""
 
@@ -290,8 +292,10 @@ class WorldState:
         """Return the work of joints and drives in a step of h, s, that ended with rates `end` before its impact."""
         joints, drives = self.joints, self.drives
         by_impulses = joints is not None and joints.method == "impulses"
-        joint_work = joints.work(0.5 * (motion.start[1] + end)) if joints is not None and by_impulses else 0.0
-        return SolverWork(joint_work, None if drives is None else drives.work(before, self.x, h))
+        joint_work, motor_work = (0.0, 0.0) if joints is None else joints.work(0.5 * (motion.start[1] + end))
+        return SolverWork(
+            joint_work if by_impulses else 0.0, motor_work, None if drives is None else drives.work(before, self.x, h)
+        )
 
     def present_contacts(self) -> Manifolds:
         """Return the contacts in the present state; penalty contacts are those of the last motion."""

@@ -26,6 +26,7 @@ from sandbox.measure.analytic.model import (
 )
 from sandbox.measure.analytic.oscillator import oscillator
 from sandbox.measure.analytic.pendulum import pendulum
+from sandbox.measure.analytic.pulley import atwood_machine
 from sandbox.measure.analytic.static_stack import static_stack
 from sandbox.measure.metrics.clearance import plane_clearance
 from sandbox.scene.compile.bodies import Bodies
@@ -33,7 +34,14 @@ from sandbox.scene.compile.demands import on_floor
 from sandbox.scene.compile.scene import Scene
 from sandbox.trajectory import ContactEvent, Contacts, Trajectory
 
-BODY_SOLUTIONS: tuple[Recogniser, ...] = (incline_motion, bouncing_on_only_plane, oscillator, pendulum, kepler)
+BODY_SOLUTIONS: tuple[Recogniser, ...] = (
+    incline_motion,
+    bouncing_on_only_plane,
+    oscillator,
+    pendulum,
+    atwood_machine,
+    kepler,
+)
 """Solutions of one body, tried in this order, if no two moving bodies can collide."""
 COUPLED_SOLUTIONS: tuple[Assembler, ...] = (ballistic_collisions, static_stack)
 """Solutions of all bodies, tried in this order, if some can collide."""

@@ -97,11 +97,12 @@ def momentum_drift(run: Trajectory, scene: Scene) -> float | None:
 
 
 def _acts_on_static(scene: Scene) -> bool:
-    """Return whether a joint or an attraction acts between a moving and a static body."""
+    """Return whether a joint, the wheel of a pulley, or an attraction acts between a moving and a static body."""
     bodies, links = scene.bodies, scene.links
     static = {name for name, fixed in zip(bodies.names, bodies.fixed.tolist(), strict=True) if fixed}
     is_attracted = any(not isinstance(each.toward, str) or each.toward in static for each in scene.attractions)
-    return is_attracted or bool(((links.a < 0) | bodies.fixed[links.a] | bodies.fixed[links.b]).any())
+    is_held = (links.a < 0) | (links.kind == LinkKind.PULLEY) | bodies.fixed[links.a] | bodies.fixed[links.b]
+    return is_attracted or bool(is_held.any())
 
 
 def _ratio(change: float, scale: float) -> float | None:
@@ -120,6 +121,7 @@ CONSTRAINT_KINDS = (
     LinkKind.GROOVE,
     LinkKind.ROTARY_LIMIT,
     LinkKind.GEAR,
+    LinkKind.PULLEY,
 )
 """Kinds of joints that are constraints; springs and motors are not."""
 
@@ -129,8 +131,8 @@ def joint_errors(trajectory: Trajectory, start: Scene | Setup) -> FloatArray:
 
     It is nan for springs, motors and joints that broke or lost a body. In m: of a rod |l − length|, of a pivot the
     distance of its two points, of a slide the excess of the distance over its bounds, of a groove the distance of the
-    point from the groove. In rad: of a rotary limit the excess of the angle over its bounds, of a gear |angle_b·ratio −
-    angle_a − phase|. The error of a diverged state is infinite.
+    point from the groove, of a pulley the stretch of its rope. In rad: of a rotary limit the excess of the angle over
+    its bounds, of a gear |angle_b·ratio − angle_a − phase|. The error of a diverged state is infinite.
 
     Args:
         trajectory: the run; its first bodies are those of `start`.
@@ -157,9 +159,9 @@ def starting_errors(scene: Scene) -> FloatArray:
 def joint_error(trajectory: Trajectory, start: Scene | Setup) -> float | None:
     """Return the largest relative error of any joint in any frame; None if the scene has no constraint.
 
-    Lengths are relative to the length of the rod or the bound of the slide; if that is 0, and for pivots and grooves,
-    to the diameter of the smaller body. Angles are in rad. Only recorded frames count, so that with `record_every`
-    larger errors can occur between them. The error of a diverged state is infinite.
+    Lengths are relative to the length of the rod or rope, or the bound of the slide; if that is 0, and for pivots and
+    grooves, to the diameter of the smaller body. Angles are in rad. Only recorded frames count, so that with
+    `record_every` larger errors can occur between them. The error of a diverged state is infinite.
     """
     setup = Setup.of(start)
     links = setup.links
@@ -173,7 +175,7 @@ def joint_error(trajectory: Trajectory, start: Scene | Setup) -> float | None:
 def joint_scales(links: JointArrays, bodies: Bodies) -> FloatArray:
     """Return the scale of the error of each joint, (J,): a length in m, or 1 rad."""
     diameter = 2.0 * np.minimum(bodies.radius[links.b], np.where(links.a >= 0, bodies.radius[links.a], np.inf))
-    length = np.where(links.kind == LinkKind.ROD, links.figures[:, 0], 0.0)
+    length = np.where(np.isin(links.kind, (LinkKind.ROD, LinkKind.PULLEY)), links.figures[:, 0], 0.0)
     length = np.where(links.kind == LinkKind.SLIDE, links.figures[:, 1], length)
     turning = np.isin(links.kind, (LinkKind.ROTARY_LIMIT, LinkKind.GEAR))
     return np.asarray(np.where(turning, 1.0, np.where(length > 0.0, length, diameter)))
@@ -185,6 +187,8 @@ def _errors(links: JointArrays, position: FloatArray, angle: FloatArray, present
     with np.errstate(over="ignore", invalid="ignore"):
         first, second = links.ends(position, angle)
         apart = np.hypot(*np.moveaxis(second - first, 2, 0))
+        to_first = np.hypot(*np.moveaxis(first - links.wheels[:, :2], 2, 0))
+        to_second = np.hypot(*np.moveaxis(second - links.wheels[:, 2:], 2, 0))
         angle_a, angle_b = turned_by(links, angle)
         by_kind = {
             LinkKind.ROD: np.abs(apart - x),
@@ -193,6 +197,7 @@ def _errors(links: JointArrays, position: FloatArray, angle: FloatArray, present
             LinkKind.GROOVE: _from_groove(links, position, angle, second),
             LinkKind.ROTARY_LIMIT: np.maximum(x - (angle_b - angle_a), angle_b - angle_a - y),
             LinkKind.GEAR: np.abs(angle_b * y - angle_a - x),
+            LinkKind.PULLEY: to_first + y * to_second - x,
         }
     found = np.full(present.shape, np.nan)
     for kind, error in by_kind.items():

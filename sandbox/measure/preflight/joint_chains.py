@@ -35,7 +35,7 @@ from sandbox.scene.description.world import Settings
 
 MEASURED_FRACTION = 0.93
 """Fraction of r/(2λ) from which on chains hold, as measured."""
-IMPULSE_KINDS = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.GROOVE)
+IMPULSE_KINDS = (LinkKind.ROD, LinkKind.PIVOT, LinkKind.SLIDE, LinkKind.GROOVE, LinkKind.PULLEY)
 MIN_MASS_RATIO = 10.0
 """A joint between masses whose ratio exceeds this is named."""
 

@@ -189,7 +189,7 @@ def _static_bounds(scene: Scene) -> Iterator[FloatArray]:
         if not isinstance(each.toward, str):
             yield np.asarray((each.toward, each.toward))
     anchors = links.anchor_a[(links.a < 0) & np.isin(links.kind, ANCHORED)]
-    for anchor in anchors:
+    for anchor in (*anchors, *links.wheels[links.kind == LinkKind.PULLEY].reshape(-1, 2)):
         yield np.asarray((anchor, anchor))
 
 
@@ -206,6 +206,7 @@ SYMBOLS = {
     LinkKind.GROOVE: "rod",
     LinkKind.SPRING: "spring",
     LinkKind.PIVOT: "pivot",
+    LinkKind.PULLEY: "string",
 }
 """Visible kinds of joints, and the symbol of each."""
 
@@ -264,8 +265,9 @@ def _solids(bodies: Bodies, origin: tuple[float, float]) -> list[list[Any]]:
 def _joints(scene: Scene, drawn: IntArray, origin: tuple[float, float]) -> list[list[Any]]:
     """Return the visible joints: number, symbol, first and second body, and the anchor on each.
 
-    A body is its index among those drawn, −1 the world; a joint of a body that is not drawn is omitted, and one to a
-    static body is anchored in the world.
+    The rope of a pulley has three parts: from each wheel to its body, and between the wheels. A body is its index among
+    those drawn, −1 the world; a joint of a body that is not drawn is omitted, and one to a static body is anchored in
+    the world.
     """
     links, bodies = scene.links, scene.bodies
     index_of = np.full(len(bodies) + 1, -2)
@@ -286,8 +288,17 @@ def _joints(scene: Scene, drawn: IntArray, origin: tuple[float, float]) -> list[
             else:
                 row.append(int(index_of[number]))
                 anchors += [_short(value) for value in anchor.tolist()]
-        if -2 not in row[2:4] and row[2:4] != [-1, -1]:
+        if -2 in row[2:4] or row[2:4] == [-1, -1]:
+            continue
+        if links.kind[k] != LinkKind.PULLEY:
             found.append([*row, *anchors])
+            continue
+        number, symbol, a, b = row
+        wheels = links.wheels[k].tolist()
+        first, second = _moved(wheels[:2], origin), _moved(wheels[2:], origin)
+        found.append([number, symbol, -1, a, *first, *anchors[:2]])
+        found.append([number, symbol, -1, -1, *first, *second])
+        found.append([number, symbol, -1, b, *second, *anchors[2:]])
     return found
 
 

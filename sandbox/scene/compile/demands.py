@@ -44,6 +44,7 @@ class Demand(StrEnum):
     GEARS = "gears"
     SPRINGS = "springs"
     ROTARY_SPRINGS = "rotary springs"
+    PULLEYS = "pulleys"
     ATTRACTION = "attraction"
     THRUST = "thrust"
     DRIVES = "drives"
@@ -93,6 +94,7 @@ DEMAND_OF_JOINT = {
     LinkKind.GEAR: Demand.GEARS,
     LinkKind.SPRING: Demand.SPRINGS,
     LinkKind.ROTARY_SPRING: Demand.ROTARY_SPRINGS,
+    LinkKind.PULLEY: Demand.PULLEYS,
 }
 """Demands of each kind of joint."""
 

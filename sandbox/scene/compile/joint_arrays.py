@@ -36,6 +36,8 @@ class LinkKind(IntEnum):
     """rest length, m, stiffness, N/m, damping, N·s/m"""
     ROTARY_SPRING = 8
     """rest angle of angle_b − angle_a, rad, stiffness, N·m/rad, damping, N·m·s/rad"""
+    PULLEY = 9
+    """length of the rope, m, and ratio: length_a + ratio·length_b is at most the length"""
 
 
 TURNING = (LinkKind.GROOVE, LinkKind.ROTARY_LIMIT, LinkKind.MOTOR, LinkKind.GEAR, LinkKind.ROTARY_SPRING)
@@ -58,6 +60,8 @@ class JointArrays:
     """(J, 2) m, in the second body's frame about its centre of mass"""
     figures: FloatArray
     """(J, 3) parameters by kind, unused ones 0"""
+    wheels: FloatArray
+    """(J, 4) m, positions of both wheels of a pulley in the world: ax, ay, bx, by; else 0"""
     most_force: FloatArray
     """(J,) largest force or torque, N or N·m; inf without a limit"""
     collide: BoolArray
@@ -86,6 +90,7 @@ class JointArrays:
             anchor_a=np.empty((0, 2)),
             anchor_b=np.empty((0, 2)),
             figures=np.empty((0, 3)),
+            wheels=np.empty((0, 4)),
             most_force=np.empty(0),
             collide=np.empty(0, np.bool_),
             strength=np.empty(0),
@@ -116,6 +121,7 @@ class JointArrays:
             anchor_a=np.broadcast_to(np.asarray(anchor_a, dtype=np.float64), (count, 2)).copy(),
             anchor_b=np.broadcast_to(np.asarray(anchor_b, dtype=np.float64), (count, 2)).copy(),
             figures=np.broadcast_to(np.asarray(figures, dtype=np.float64), (count, 3)).copy(),
+            wheels=np.zeros((count, 4)),
             most_force=np.full(count, np.inf),
             collide=np.zeros(count, np.bool_),
             strength=np.full(count, np.inf),

@@ -20,6 +20,7 @@ from sandbox.scene.description.joints import (
     Joint,
     Motor,
     Pivot,
+    Pulley,
     Rod,
     RotaryLimit,
     RotarySpring,
@@ -105,6 +106,7 @@ KINDS: dict[type, LinkKind] = {
     Gear: LinkKind.GEAR,
     Spring: LinkKind.SPRING,
     RotarySpring: LinkKind.ROTARY_SPRING,
+    Pulley: LinkKind.PULLEY,
 }
 
 
@@ -122,6 +124,9 @@ def _file_joints(scene: SceneDescription, bodies: Bodies) -> JointArrays:
     a, b, anchor_a, anchor_b, figures = (list(column) for column in zip(*rows, strict=True))
     motors = [joint.max_torque if isinstance(joint, Motor) else None for joint in scene.joints]
     strengths = [joint.strength for joint in scene.joints]
+    wheels = [
+        (*joint.wheels[0], *joint.wheels[1]) if isinstance(joint, Pulley) else (0.0,) * 4 for joint in scene.joints
+    ]
     return JointArrays(
         kind=np.asarray([KINDS[type(joint)] for joint in scene.joints], dtype=np.int64),
         a=np.asarray(a, dtype=np.int64),
@@ -129,6 +134,7 @@ def _file_joints(scene: SceneDescription, bodies: Bodies) -> JointArrays:
         anchor_a=np.asarray(anchor_a, dtype=np.float64).reshape(-1, 2),
         anchor_b=np.asarray(anchor_b, dtype=np.float64).reshape(-1, 2),
         figures=np.asarray(figures, dtype=np.float64).reshape(-1, 3),
+        wheels=np.asarray(wheels, dtype=np.float64).reshape(-1, 4),
         most_force=np.asarray([math.inf if limit is None else limit for limit in motors]),
         collide=np.asarray([joint.collide for joint in scene.joints], dtype=np.bool_),
         strength=np.asarray([math.inf if limit is None else limit for limit in strengths]),
@@ -137,7 +143,7 @@ def _file_joints(scene: SceneDescription, bodies: Bodies) -> JointArrays:
     )
 
 
-def ends_of(joint: Rod, bodies: Bodies, number: dict[str, int]) -> tuple[Point, Point]:
+def ends_of(joint: Rod | Pulley, bodies: Bodies, number: dict[str, int]) -> tuple[Point, Point]:
     """Return the start positions of the two anchors of a joint, m; `number` has the index of each body."""
     a, b, anchor_a, anchor_b, _ = _row(joint, bodies, number)
     return _world(anchor_a, a, bodies), _world(anchor_b, b, bodies)
@@ -173,7 +179,8 @@ def _row(joint: Joint, bodies: Bodies, number: dict[str, int]) -> JointRow:
 def _figures(
     joint: Joint, a: int, b: int, anchor_a: Point, anchor_b: Point, bodies: Bodies
 ) -> tuple[float, float, float]:
-    length = math.dist(_world(anchor_a, a, bodies), _world(anchor_b, b, bodies))
+    end_a, end_b = _world(anchor_a, a, bodies), _world(anchor_b, b, bodies)
+    length = math.dist(end_a, end_b)
     angle_a = 0.0 if a == WORLD else float(bodies.angle[a])
     angle_b = float(bodies.angle[b])
     match joint:
@@ -193,6 +200,9 @@ def _figures(
         case RotarySpring():
             rest = angle_b - angle_a if joint.rest_angle is None else joint.rest_angle
             return rest, joint.stiffness, joint.damping
+        case Pulley():
+            total = math.dist(end_a, joint.wheels[0]) + joint.ratio * math.dist(end_b, joint.wheels[1])
+            return total if joint.length is None else joint.length, joint.ratio, 0.0
         case _:
             return 0.0, 0.0, 0.0
 

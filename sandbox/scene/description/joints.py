@@ -131,6 +131,24 @@ class RotarySpring(Joined):
     """damping c, N·m·s/rad"""
 
 
+class Pulley(Anchored):
+    """A massless rope from one body over two fixed wheels to another: length₁ + ratio·length₂ is at most its length.
+
+    The lengths are those from each wheel to its body. The rope pulls and never pushes. Wheels have no size.
+    """
+
+    kind: Literal["pulley"]
+    between: Annotated[tuple[Name, ...], Field(min_length=2, max_length=2)]
+    """names of two bodies"""
+    wheels: tuple[Point, Point]
+    """positions of the wheels in the world, m, in the order of `between`"""
+    ratio: Annotated[float, Field(ge=1e-6, le=1e6)] = 1.0
+    """tension at the second body / tension at the first; 2 if the second hangs in a loop of the rope"""
+    length: JointDistance | None = None
+    """length of the rope, m; default: length₁ + ratio·length₂ at the start"""
+
+
 Joint = Annotated[
-    Rod | Pivot | Slide | Groove | RotaryLimit | Motor | Gear | Spring | RotarySpring, Field(discriminator="kind")
+    Rod | Pivot | Slide | Groove | RotaryLimit | Motor | Gear | Spring | RotarySpring | Pulley,
+    Field(discriminator="kind"),
 ]

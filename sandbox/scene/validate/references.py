@@ -11,7 +11,7 @@ from sandbox.scene.description.base import BodySource, BodySpec
 from sandbox.scene.description.discs import Ball
 from sandbox.scene.description.fixed import Post, Wall
 from sandbox.scene.description.forces import AnyDrive, Attraction, Driven, PlungerDrive, Thrust, TorqueDrive
-from sandbox.scene.description.joints import Gear, Groove, Joint, Pivot, Rod, RotaryLimit, Slide
+from sandbox.scene.description.joints import Gear, Groove, Joint, Pivot, Pulley, Rod, RotaryLimit, Slide
 from sandbox.scene.description.play import marking_fault
 from sandbox.scene.description.scene import default_name
 from sandbox.scene.description.surface import MISCUE, Floor, Shot, miscues
@@ -54,6 +54,7 @@ def _check_joints(scene: Scene, bodies: Bodies) -> Iterator[LocatedMessage]:
             yield ("joint", k, "between"), message
         else:
             yield from _check_rod(k, joint, bodies, index)
+            yield from _check_pulley(k, joint, bodies, index)
         for key, message in _check_joint(joint):
             yield ("joint", k, key), message
 
@@ -79,6 +80,16 @@ def _check_rod(k: int, joint: Joint, bodies: Bodies, index: dict[str, int]) -> I
             "separate them with `anchors`, or use a pivot"
         )
         yield ("joint", k, "anchors" if "anchors" in joint.model_fields_set else "between"), message
+
+
+def _check_pulley(k: int, joint: Joint, bodies: Bodies, index: dict[str, int]) -> Iterator[LocatedMessage]:
+    """Yield a pulley with an end that starts at its wheel, where the rope has no direction."""
+    if not isinstance(joint, Pulley) or any(name not in index for name in joint.between):
+        return
+    for side, (end, wheel) in enumerate(zip(ends_of(joint, bodies, index), joint.wheels, strict=True)):
+        if math.dist(end, wheel) < SHORTEST:
+            message = f"{joint.between[side]!r} starts at this wheel, where the rope has no direction"
+            yield ("joint", k, "wheels", side), message
 
 
 def _check_joint(joint: Joint) -> Iterator[tuple[str, str]]:

@@ -97,6 +97,10 @@ def joint_segments(view: DrawContext) -> JointSegments:
         width, height = view.camera.size
         margin = 100.0 * view.ui_scale
         low, high = np.minimum(ends[:, :2], ends[:, 2:]), np.maximum(ends[:, :2], ends[:, 2:])
+        over = links.kind == LinkKind.PULLEY
+        for wheel in (links.wheels[over, :2], links.wheels[over, 2:]) if over.any() else ():
+            low[over] = np.minimum(low[over], view.camera.to_screen(wheel))
+            high[over] = np.maximum(high[over], view.camera.to_screen(wheel))
         is_visible &= (high > -margin).all(axis=1) & (low < (width + margin, height + margin)).all(axis=1)
         is_visible &= np.isfinite(ends).all(axis=1)
     return JointSegments(links if is_visible.all() else links.some(is_visible), ends[is_visible])
@@ -111,6 +115,7 @@ def draw_joints(view: DrawContext, joints: JointSegments, discs: CircleRenderer)
     discs.draw(view.surface, anchors, size, tint, CircleStyle(0.0, antialias=view.antialias))
     _draw_rods(view, joints.of(LinkKind.ROD), ROD, 2.4)
     _draw_rods(view, joints.of(LinkKind.SLIDE), STRING, 1.4)
+    _draw_pulleys(view, joints.of(LinkKind.PULLEY), discs)
     springs = joints.of(LinkKind.SPRING)
     if not len(springs.links):
         return
@@ -122,6 +127,21 @@ def draw_joints(view: DrawContext, joints: JointSegments, discs: CircleRenderer)
     for k, row in enumerate(springs.ends.tolist()):
         red, green, blue = SHADES[shade[k]].tolist()
         _draw_coil(view, (row[0], row[1]), (row[2], row[3]), float(rest[k]), (red, green, blue))
+
+
+def _draw_pulleys(view: DrawContext, pulleys: JointSegments, discs: CircleRenderer) -> None:
+    """Draw ropes over two wheels each, and the wheels."""
+    if not len(pulleys.links):
+        return
+    wheels = [view.camera.to_screen(pulleys.links.wheels[:, side]) for side in (slice(0, 2), slice(2, 4))]
+    for start, end in ((pulleys.ends[:, :2], wheels[0]), (wheels[0], wheels[1]), (wheels[1], pulleys.ends[:, 2:])):
+        _draw_rods(view, JointSegments(pulleys.links, np.hstack((start, end))), STRING, 1.4)
+    points = np.vstack(wheels)
+    points = points[view.inside(points, 10.0 * view.ui_scale)]
+    for radius, colour in ((5.0, STRING), (3.4, SURFACE)):
+        tint = np.broadcast_to(np.asarray(colour, np.uint8), (len(points), 3))
+        style = CircleStyle(0.0, antialias=view.antialias)
+        discs.draw(view.surface, points, np.full(len(points), radius * view.ui_scale), tint, style)
 
 
 def strain(springs: JointSegments, scale: float) -> IntArray:
@@ -185,6 +205,7 @@ _TINTS: dict[LinkKind, RgbColour] = {
     LinkKind.GEAR: INK,
     LinkKind.SPRING: INK,
     LinkKind.ROTARY_SPRING: SKY,
+    LinkKind.PULLEY: SKY,
 }
 
 
@@ -213,7 +234,7 @@ def draw_joint_symbols(view: DrawContext, joints: JointSegments, discs: CircleRe
         LinkKind.ROTARY_SPRING: _draw_rotary_springs,
         LinkKind.MOTOR: _draw_motors,
     }
-    for kind in (*renderers, LinkKind.SPRING, LinkKind.PIVOT):
+    for kind in (*renderers, LinkKind.SPRING, LinkKind.PULLEY, LinkKind.PIVOT):
         some = joints.of(kind)
         if len(some.links) > MAX_SYMBOLS:
             tint = np.broadcast_to(
@@ -224,7 +245,10 @@ def draw_joint_symbols(view: DrawContext, joints: JointSegments, discs: CircleRe
             draw_thin_lines(view.surface, some.ends, packed_pixels(tint, view.surface), view.antialias)
         elif len(some.links) and kind in renderers:
             renderers[kind](view, some)
-        if kind in (LinkKind.ROD, LinkKind.SLIDE, LinkKind.SPRING) and 0 < len(some.links) <= MAX_SYMBOLS:
+        if (
+            kind in (LinkKind.ROD, LinkKind.SLIDE, LinkKind.SPRING, LinkKind.PULLEY)
+            and 0 < len(some.links) <= MAX_SYMBOLS
+        ):
             _draw_dots(view, np.vstack((some.ends[:, :2], some.ends[:, 2:])), 2.6, _TINTS[kind], discs)
         if kind in (LinkKind.PIVOT, LinkKind.GROOVE) and 0 < len(some.links) <= MAX_SYMBOLS:
             _draw_rings(view, some.ends[:, 2:], _TINTS[kind], discs)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sandbox.engines.reference.integrators import INTEGRATORS
-from sandbox.engines.reference.joints import METHODS, UNSUPPORTED, JointSolver
+from sandbox.engines.reference.joints import METHODS, JointSolver
 from sandbox.scene.compile.joint_arrays import LinkKind
 from tests.engines.reference.joint_rig import BIAS, G, Rig, compile_joints, link
 
@@ -179,12 +179,6 @@ def test_single_short_step_between_long_ones_causes_no_jolt():
     rig.step(1e-6)
     rig.step(1 / 120)
     assert np.abs(rig.rates).max() < before + 2 * G / 120  # at most one step of falling where iterations are too few
-
-
-@pytest.mark.parametrize("kind", UNSUPPORTED)
-def test_unsupported_kinds_are_refused_by_name(kind):
-    with pytest.raises(ValueError, match=kind.name.lower()):
-        JointSolver(compile_joints(link(kind, -1, 0)), np.ones(1), np.ones(1), BIAS, 10, "impulses")
 
 
 def test_unknown_method_is_refused():
