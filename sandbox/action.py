@@ -285,13 +285,13 @@ _SETTABLE = (
     "surface.curl",
 )
 
-SETTABLE = f"{', '.join(_SETTABLE)}, and any restitution or friction"
+SETTABLE = f"{', '.join(_SETTABLE)}, and any restitution, friction or surface_speed"
 """Parameters of a running scene that can be changed, as text for messages."""
 
 
 def is_settable(path: str) -> bool:
     """Return whether a parameter of a running scene can be changed."""
-    return path in _SETTABLE or path.rpartition(".")[2] in ("restitution", "friction")
+    return path in _SETTABLE or path.rpartition(".")[2] in ("restitution", "friction", "surface_speed")
 
 
 def actions_from_json(text: str) -> tuple[Action, ...]:

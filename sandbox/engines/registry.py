@@ -7,6 +7,7 @@ from sandbox.engines.contract import Engine, Refusal, Simulation
 from sandbox.engines.exact.engine import ExactEngine
 from sandbox.engines.pymunk_adapter.engine import PymunkEngine
 from sandbox.engines.reference.engine import ReferenceEngine
+from sandbox.scene.compile.demands import demands
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
@@ -46,9 +47,15 @@ def engine_named(name: str) -> Engine:
 
 
 def usual(scene: Scene) -> str:
-    """Return the engine that the window uses by default: `exact` on a `[surface]` without curl, else `pymunk`."""
+    """Return the engine that the window uses by default.
+
+    It is `exact` on a `[surface]` without curl, else `pymunk`, or the first engine that models a scene that pymunk does
+    not.
+    """
     has_curl = scene.surface is not None and scene.surface.curl != 0.0  # `exact` needs parabolic paths
-    return "exact" if scene.surface is not None and not has_curl else USUAL
+    if scene.surface is not None and not has_curl:
+        return "exact"
+    return USUAL if demands(Setup.of(scene)) <= ENGINES[USUAL].capabilities else next(iter(able(scene)), USUAL)
 
 
 def able(start: Scene | Setup, settings: Settings | None = None) -> tuple[str, ...]:

@@ -67,6 +67,7 @@ FEATURES: dict[str, Document] = {
     "plane": {"plane": [{"point": [0, 0], "normal": [0, 1]}]},
     "wall": {"wall": [{**_WALL, "points": [[-5, 1], [0, 0.5], [5, 1]], "restitution": 0.5}]},
     "kicking wall": {"wall": [{**_WALL, "kick": {"speed": 2.0}}]},
+    "moving wall": {"wall": [{**_WALL, "surface_speed": 1.0, "friction": 0.5}]},
     "one-way wall": {"wall": [{**_WALL, "one_way": True}]},
     "open wall": {"wall": [{**_WALL, "solid": False}]},
     "post": {"post": [{"position": [0.0, 1.0], "radius": 0.2}]},

@@ -14,6 +14,7 @@ BALL: dict[str, Any] = {"position": [0.0, 0.0], "radius": 1.0}
 ROCK: dict[str, Any] = {**BALL, "fixed": True}
 GHOST: dict[str, Any] = {**BALL, "collides": "none"}
 PLANE: dict[str, Any] = {"point": [0, 0], "normal": [0, 1]}
+BELT: dict[str, Any] = {**PLANE, "surface_speed": 1}
 WALL: dict[str, Any] = {"points": [[0, 0], [1, 0]]}
 POST: dict[str, Any] = {"position": [0, 0], "radius": 1}
 SPARKS: dict[str, Any] = {"position": [0, 0], "count": 3, "velocity_min": [0, 0], "velocity_max": [1, 1], "lifetime": 2}
@@ -99,6 +100,18 @@ CASES: list[tuple[Demand, bool, dict[str, Any], str]] = [
     (Demand.KICKS, True, {"ball": [BALL], "post": [{**POST, "kick": {"speed": 1}}]}, "1 wall or post kicks"),
     (Demand.KICKS, False, {"ball": [GHOST], "post": [{**POST, "kick": {"speed": 1}}]}, "no wall or post kicks"),
     (Demand.KICKS, False, {"title": "t"}, "no wall or post kicks"),
+    (
+        Demand.SURFACE_SPEED,
+        True,
+        {"ball": [{**BALL, "friction": 1}], "plane": [{**PLANE, "surface_speed": 1}]},
+        "1 surface",
+    ),
+    (
+        Demand.SURFACE_SPEED,
+        False,
+        {"ball": [BALL], "plane": [{**PLANE, "surface_speed": 1}]},
+        "no surface with friction",
+    ),
     (Demand.ONE_WAY, True, {"ball": [BALL], "wall": [{**WALL, "one_way": True}] * 2}, "2 one-way walls"),
     (Demand.ONE_WAY, False, {"ball": [BALL], "wall": [WALL]}, "none"),
     (Demand.PASSABLE, True, {"ball": [BALL], "post": [{**POST, "solid": False}]}, "1 wall or post"),

@@ -41,6 +41,7 @@ OWN = frozenset(
     {
         Demand.POLYGONS,
         Demand.PASSABLE,
+        Demand.SURFACE_SPEED,
         Demand.RODS,
         Demand.PIVOTS,
         Demand.SLIDES,

@@ -124,6 +124,7 @@ class Box2DWorld:
         self._first = len(store.scene.fixed)  # user data of shapes: index + number of static colliders
         self._bodies: dict[int, Any] = {}
         self._shapes: dict[int, list[tuple[ShapeRole, Any]]] = {}  # by the index of the body
+        self._speeds: dict[int, list[float]] = {}  # m/s, of their surfaces
         self._open: dict[tuple[int, int], TouchingPair] = {}
         self._touching: dict[tuple[int, int], tuple[int, int]] = {}  # pair of bodies, by the ids of two shapes
         self._batch: ContactBatch | None = NO_CONTACTS
@@ -191,6 +192,7 @@ class Box2DWorld:
         coefficients = getattr(self._materials, role.coefficients)
         material.friction = float(coefficients.friction[surface])
         material.restitution = float(coefficients.restitution[surface])
+        material.tangent_speed = self._store.contact_matrix.surfaces.surfaces[surface].speed * self.scale
         shape_def.material = material
         shape_filter = box2d.Filter()
         shape_filter.category_bits, shape_filter.mask_bits = role.categories, role.mask
@@ -198,6 +200,17 @@ class Box2DWorld:
         shape_def.filter = shape_filter
         shape_def.user_data = index + self._first
         return shape_def
+
+    def _surfaces_of(self, index: int) -> list[int]:
+        """Return the surfaces of the shapes of a body or, with −1 − k, of a static collider, in their order."""
+        if index < 0:
+            return [int(self._store.contact_matrix.surfaces.of_fixed[-1 - index])] * len(self._shapes[index])
+        return [surface for _ in self._roles(index) for surface, _ in self._geometries(index)]
+
+    def _speeds_of(self, index: int) -> list[float]:
+        """Return the speeds of the surfaces of the shapes of a body or static collider, m/s."""
+        surfaces = self._store.contact_matrix.surfaces.surfaces
+        return [surfaces[surface].speed for surface in self._surfaces_of(index)]
 
     def add(self, index: int) -> None:
         """Add a body in its present state."""
@@ -212,6 +225,7 @@ class Box2DWorld:
                 for surface, geometry in self._geometries(index):
                     definition = self._shape_def(index, surface, role, int(bodies.group[index]))
                     self._shapes[index].append((role, body.create_shape(definition, geometry)))
+        self._speeds[index] = self._speeds_of(index)
         if not fixed:
             body.apply_mass_from_shapes()  # finds the extents that decide about continuous collision
             self.set_mass(index)
@@ -279,6 +293,7 @@ class Box2DWorld:
             for geometry in self._static_geometries(collider):
                 shape = body.create_shape(self._shape_def(index, surface, role), geometry)
                 self._shapes[index].append((role, shape))
+        self._speeds[index] = self._speeds_of(index)
 
     def _origin_of(self, collider: Plane | Wall | Post) -> tuple[float, float]:
         """Return the position of the body of a static collider; of a plane, the point nearest to the middle."""
@@ -331,18 +346,19 @@ class Box2DWorld:
         replaced: set[int] = set()
         store, was_split = self._store, self._materials.is_split
         self._materials = self._shape_materials()
-        surfaces = store.contact_matrix.surfaces
-        for index in [n for n in self._shapes if n >= 0]:
+        for index in list(self._shapes):
+            has_new_speed = bool(self._shapes[index]) and self._speeds_of(index) != self._speeds.get(index)
+            if index < 0:
+                if has_new_speed:
+                    self._replace_static(-1 - index)
+                continue
             is_new = not self._shapes[index] and store.contact_matrix.touches[index]
-            if is_new or (self._materials.is_split != was_split and not store.bodies.fixed[index]):
+            if is_new or has_new_speed or (self._materials.is_split != was_split and not store.bodies.fixed[index]):
                 self._replace(index)
                 replaced.add(index)
         for index, shapes in self._shapes.items():
-            if index < 0:
-                of_shapes = [int(surfaces.of_fixed[-1 - index])] * len(shapes)
-            else:
-                of_shapes = [surface for _ in self._roles(index) for surface, _ in self._geometries(index)]
-            for surface, (role, shape) in zip(of_shapes, shapes, strict=False):  # a body without contacts has no shapes
+            # A body without contacts has no shapes.
+            for surface, (role, shape) in zip(self._surfaces_of(index), shapes, strict=False):
                 coefficients = getattr(self._materials, role.coefficients)
                 shape.friction = float(coefficients.friction[surface])
                 shape.restitution = float(coefficients.restitution[surface])
@@ -352,7 +368,10 @@ class Box2DWorld:
         return replaced
 
     def _replace(self, index: int) -> None:
-        """Replace a body by one with other shapes, in the same state: the binding cannot remove shapes."""
+        """Replace a body by one with other shapes, in the same state.
+
+        The binding can neither remove shapes nor change the speed of their surface.
+        """
         damping = self._bodies[index].linear_damping
         self._remove_body(index)
         self.add(index)

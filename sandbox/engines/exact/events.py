@@ -28,9 +28,9 @@ from sandbox.engines.exact.rest import (
     update_supported_motion,
 )
 
-TOO_DENSE, TOO_FAST = 4, 5
+TOO_DENSE, TOO_FAST, MOVING_CORNER = 4, 5, 6
 """Further return codes of `advance`, after those of `state`: more events in one instant than the limit; two successive
-batches of events at a rate above `MAX_BATCH_RATE`."""
+batches of events at a rate above `MAX_BATCH_RATE`; a ball in a corner with a moving surface, which is not modelled."""
 
 EVENTS_PER_CALL = 10_000
 """Events after which the kernel returns so that Python can handle signals: 1/3 s for 1,000 balls, compiled."""
@@ -172,6 +172,8 @@ def advance(data: EventState, until: float) -> int:
     state, tags, times = data.state, data.tags, data.next_time
     moving_balls, counts, world = data.moving_balls, data.counts, data.world
     for _ in range(EVENTS_PER_CALL):
+        if counts[c.IN_MOVING_CORNER] != 0:
+            return MOVING_CORNER
         i = earliest_event(moving_balls, times)
         if i < 0 or times[i] > until:
             return c.DONE

@@ -66,7 +66,14 @@ def friction_impulse(slip: float, mass: float, friction: float, normal: float) -
 
 @kernel
 def collide_fixed(
-    data: EventState, i: int, nx: float, ny: float, separation: float, kick: float, friction: float
+    data: EventState,
+    i: int,
+    nx: float,
+    ny: float,
+    separation: float,
+    kick: float,
+    friction: float,
+    slip_target: float,
 ) -> tuple[float, float]:
     """Apply a collision with a static collider to a ball.
 
@@ -78,6 +85,7 @@ def collide_fixed(
         separation: speed of separation without the kick, m/s.
         kick: speed that a kick adds, m/s.
         friction: coefficient of friction.
+        slip_target: velocity of the ball's rim along the surface without slip, m/s.
 
     Returns:
         The impulse on the ball, N·s.
@@ -88,7 +96,7 @@ def collide_fixed(
     normal = max((closing + separation + kick) / inverse_mass, 0.0)
     across = 0.0
     if friction > 0.0:
-        slip = -state[i, c.VX] * ny + state[i, c.VY] * nx - state[i, c.SPIN] * r
+        slip = -state[i, c.VX] * ny + state[i, c.VY] * nx - state[i, c.SPIN] * r - slip_target
         across = friction_impulse(slip, inverse_mass + r * r * inverse_inertia, friction, normal)
     jx, jy = normal * nx - across * ny, normal * ny + across * nx
     state[i, c.VX] += jx * inverse_mass
@@ -96,7 +104,8 @@ def collide_fixed(
     state[i, c.SPIN] -= r * across * inverse_inertia
     if data.counts[c.ACCOUNTING] != 0:
         # The kick takes the speed from `separation` to `separation + kick`: work is impulse times their mean.
-        account_fixed_hit(data, i, nx, ny, normal, across, kick / inverse_mass * (separation + 0.5 * kick))
+        kick_work = kick / inverse_mass * (separation + 0.5 * kick)
+        account_fixed_hit(data, i, nx, ny, normal, across, kick_work, slip_target)
     return jx, jy
 
 
@@ -135,7 +144,11 @@ def hit_vertex(data: EventState, i: int, k: int) -> None:
     separation = separation_speed(data.world[c.MICRO_BOUNCE], closing, restitution, falloff, press)
     kick = compiled_kicked(data.vertices[k, c.VERTEX_KICK], data.vertices[k, c.VERTEX_THRESHOLD], False, 0.5, closing)
     kick = compiled_kick_gain(restitution, falloff, kick, data.vertices[k, c.VERTEX_TO_APPROACH] != 0.0, closing)
-    jx, jy = collide_fixed(data, i, -nx, -ny, separation, kick, data.surfaces[c.FRICTION, surface, other_surface])
+    friction, slip_target = (
+        data.surfaces[c.FRICTION, surface, other_surface],
+        data.surfaces[c.SLIP_TARGET, surface, other_surface],
+    )
+    jx, jy = collide_fixed(data, i, -nx, -ny, separation, kick, friction, slip_target)
     r = data.state[i, c.RADIUS]
     row = add_row(data, i, -1 - data.vertex_tags[k, c.COLLIDER], state[i, c.X] + r * nx, state[i, c.Y] + r * ny, nx, ny)
     add_impulse(data, row, -jx, -jy)
@@ -188,6 +201,7 @@ def hit_ball(
     friction = surfaces[c.FRICTION, surface, other_surface]
     if friction > 0.0:
         slip = across - (state[i, c.SPIN] * radius_i + state[j, c.SPIN] * radius_j)
+        slip -= surfaces[c.SLIP_TARGET, surface, other_surface]
         tangential = friction_impulse(
             slip,
             inverse_mass_i

@@ -3,7 +3,7 @@
 Motion on a line is in closed form. The slip of the contact point is u = v·t − ω R, where t is the normal rotated left
 by 90°. While u ≠ 0, friction μ N acts against it, u changes at a constant rate and its zero is an event. Afterwards the
 ball rolls (a = ⅔ g·t for a disc) as long as that needs no more friction than μ N, that is while |g·t| ≤ 3 μ |g·n|;
-beyond that it keeps sliding.
+beyond that it keeps sliding. On a moving surface the slip is relative to it: u = v·t − ω R − s.
 """
 
 import math
@@ -54,6 +54,15 @@ def set_supported_velocity(data: EventState, i: int, slot: int, vx: float, vy: f
 
 
 @kernel
+def slip_target_of(data: EventState, i: int, slot: int) -> float:
+    """Return the velocity of a ball's rim along the support in a slot, m/s, at which nothing slips."""
+    surface, other = data.tags[i, c.SURFACE], data.line_tags[data.tags[i, c.SUPPORT + slot], c.COLLIDER_SURFACE]
+    if data.surfaces[c.FRICTION, surface, other] == 0.0:
+        return 0.0
+    return float(data.surfaces[c.SLIP_TARGET, surface, other])
+
+
+@kernel
 def corner_forces(data: EventState, i: int, spin_sign: float) -> tuple[float, float, float, float]:
     """Return the forces on a ball in a corner: normal force and friction of each support, per mass, m/s².
 
@@ -83,6 +92,8 @@ def rest_in_corner(data: EventState, i: int) -> None:
     """Hold a ball in a corner while friction decelerates its spin; release a support that does not press."""
     state, r = data.state, data.state[i, c.RADIUS]
     inverse_mass, inverse_inertia = data.state[i, c.INVERSE_MASS], data.state[i, c.INVERSE_INERTIA]
+    if inverse_inertia > 0.0 and (slip_target_of(data, i, 0) != 0.0 or slip_target_of(data, i, 1) != 0.0):
+        data.counts[c.IN_MOVING_CORNER] = 1
     if (
         abs(state[i, c.SPIN]) * r <= REST_TIME * (abs(data.world[c.GX]) + abs(data.world[c.GY]))
         and inverse_inertia > 0.0
@@ -152,7 +163,8 @@ def hit_line(data: EventState, i: int, f: int) -> None:
         comes_to_rest = flight_time <= REST_FRACTION * abs(state[i, c.T]) or flight_time <= REST_TIME * (
             1.0 - restitution
         )
-    jx, jy = collide_fixed(data, i, nx, ny, 0.0 if comes_to_rest else separation, kick, friction)
+    slip_target = data.surfaces[c.SLIP_TARGET, surface, other_surface]
+    jx, jy = collide_fixed(data, i, nx, ny, 0.0 if comes_to_rest else separation, kick, friction, slip_target)
     record_partner(state, data.tags, i, c.LINE, f)
     recheck_supports(data, i)
     if comes_to_rest and not is_in_corner(data.tags, i):
@@ -198,7 +210,7 @@ def recheck_supports(data: EventState, i: int) -> None:
             release_support(data, i, slot)
         elif normal_velocity < -tolerance:
             friction = data.surfaces[c.FRICTION, data.tags[i, c.SURFACE], data.line_tags[f, c.COLLIDER_SURFACE]]
-            jx, jy = collide_fixed(data, i, nx, ny, 0.0, 0.0, friction)
+            jx, jy = collide_fixed(data, i, nx, ny, 0.0, 0.0, friction, slip_target_of(data, i, slot))
             add_impulse(data, data.tags[i, c.LOG_ROW + slot], -jx, -jy)
 
 
@@ -242,16 +254,18 @@ def move_on_one_line(data: EventState, i: int, f: int, press: float) -> None:
     friction = data.surfaces[c.FRICTION, data.tags[i, c.SURFACE], data.line_tags[f, c.COLLIDER_SURFACE]]
     # acceleration of the contact point relative to that of the centre
     contact_gain = 1.0 + r * r * inverse_inertia / inverse_mass
-    slip = v - state[i, c.SPIN] * r
+    slip_target = slip_target_of(data, i, 0)
+    slip = v - state[i, c.SPIN] * r - slip_target
     slip_end, max_friction = math.inf, friction * press
     friction_acceleration = 0.0  # friction per mass, m/s²
-    if abs(slip) <= NOISE * (abs(v) + abs(state[i, c.SPIN] * r)) + REST_TIME * max_friction * contact_gain:
+    speeds = abs(v) + abs(state[i, c.SPIN] * r) + abs(slip_target)
+    if abs(slip) <= NOISE * speeds + REST_TIME * max_friction * contact_gain:
         slip = 0.0
     if slip == 0.0 and abs(tangential_gravity) <= max_friction * contact_gain:
         friction_acceleration = -tangential_gravity / contact_gain
         if inverse_inertia > 0.0 and friction > 0.0:
-            account_spin(data, i, v / r)
-            state[i, c.SPIN] = v / r
+            account_spin(data, i, (v - slip_target) / r)
+            state[i, c.SPIN] = (v - slip_target) / r
     else:
         slip_direction = slip if slip != 0.0 else tangential_gravity
         friction_acceleration = -max_friction if slip_direction > 0.0 else max_friction
@@ -275,11 +289,12 @@ def end_slip(data: EventState, i: int) -> None:
         account_spin(data, i, 0.0)
         state[i, c.SPIN] = 0.0
     elif data.state[i, c.INVERSE_INERTIA] > 0.0:
-        spin = (-state[i, c.VX] * data.lines[f, c.NY] + state[i, c.VY] * data.lines[f, c.NX]) / state[i, c.RADIUS]
+        v = -state[i, c.VX] * data.lines[f, c.NY] + state[i, c.VY] * data.lines[f, c.NX]
+        spin = (v - slip_target_of(data, i, 0)) / state[i, c.RADIUS]
         account_spin(data, i, spin)
         state[i, c.SPIN] = spin
     else:
-        v = state[i, c.SPIN] * data.state[i, c.RADIUS]
+        v = state[i, c.SPIN] * data.state[i, c.RADIUS] + slip_target_of(data, i, 0)
         set_supported_velocity(data, i, 0, -v * data.lines[f, c.NY], v * data.lines[f, c.NX])
 
 

@@ -18,6 +18,7 @@ from sandbox.engines.exact.common.state import EventState, make_state, rebuild, 
 from sandbox.engines.exact.events import (
     BATCHES_PER_BUDGET,
     MAX_BATCH_RATE,
+    MOVING_CORNER,
     TOO_DENSE,
     TOO_FAST,
     advance,
@@ -53,6 +54,7 @@ class ExactSimulation(EventDrivenSimulation[EventState]):
         Cause.RESTITUTION: (c.BY_NORMAL,),
         Cause.FRICTION: (c.BY_FRICTION,),
         Cause.KICKS: (c.BY_KICKS,),
+        Cause.DRIVES: (c.BY_SURFACES,),
         Cause.PHANTOM: (c.BY_PHANTOM,),
     }
 
@@ -114,8 +116,17 @@ class ExactSimulation(EventDrivenSimulation[EventState]):
         return advance_frames(self._data, rows, self._settings.dt, self._steps, steps, *state)
 
     def _too_many_events(self, status: int) -> str:
-        """Return the message for an exceeded event limit, with the time, the limit and the bodies of the last event."""
+        """Return the message for an exceeded event limit or a motion that is not modelled.
+
+        It has the time, the limit and the bodies of the last event.
+        """
         counts, limit = self._data.counts, int(self._data.counts[c.MAX_EVENTS])
+        if status == MOVING_CORNER:
+            ball = self.bodies.names[int(counts[c.EVENT_BODY])]
+            return (
+                f"at {float(self._data.world[c.NOW]):.9g} s: a ball between two supports, one of which has a moving "
+                f"surface, which the engine does not model; last event of {ball!r}; engines that can: pymunk, reference"
+            )
         if status == TOO_FAST:
             count, span = 2 * limit // BATCHES_PER_BUDGET, 2.0 / (MAX_BATCH_RATE * BATCHES_PER_BUDGET)
             excess = f"{count:,} events within {span:.3g} s where the limit is {limit:,} per second"

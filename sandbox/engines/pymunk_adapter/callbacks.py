@@ -1,6 +1,7 @@
 """Collision callbacks: coefficients by pair, kicks and one-way walls.
 
-`PairCallbacks` sets the coefficients of individual contacts, for those pairs of surfaces that need it. Munk2D separates
+`PairCallbacks` sets the coefficients of individual contacts, for those pairs of surfaces that need it. A moving surface
+needs it as well: Munk2D's own surface velocity is the same vector on all sides of a shape. Munk2D separates
 two bodies at e times their speed of approach before the substep's forces. For another speed of separation, the
 equivalent restitution is set in `pre_solve`, which is called after the forces. Resting bodies do not approach each
 other; they get no kick and no other restitution.
@@ -206,6 +207,8 @@ class PairCoefficients:
     friction: float
     falloff: float = 0.0
     kick: Kick | None = None
+    slip_target: float = 0.0
+    """m/s, as in `PairTable`"""
 
     @property
     def is_constant(self) -> bool:
@@ -255,7 +258,8 @@ class PairCallbacks:
             kick = surfaces.surfaces[a].kick or surfaces.surfaces[b].kick
             restitution, friction = float(surfaces.restitution[a, b]), float(surfaces.friction[a, b])
             known = self._known.setdefault((a, b), [])
-            known.append(PairCoefficients(restitution, friction, float(surfaces.falloff[a, b]), kick))
+            falloff, slip_target = float(surfaces.falloff[a, b]), float(surfaces.slip_target[a, b])
+            known.append(PairCoefficients(restitution, friction, falloff, kick, slip_target))
             self.space.on_collision(a + 1, b + 1, pre_solve=self._set_coefficients, data=known)
             if (a, b) in jointed and not (surfaces.one_way[a] or surfaces.one_way[b]):  # these have a `begin`
                 self.space.on_collision(a + 1, b + 1, begin=self._correct_normal)
@@ -274,6 +278,9 @@ class PairCallbacks:
             correct_normal(arbiter, self.one_way_walls.joints)
         coefficients = known[0]
         arbiter.restitution, arbiter.friction = coefficients.restitution, coefficients.friction
+        if coefficients.slip_target:
+            n = arbiter.normal
+            arbiter.surface_velocity = coefficients.slip_target * n.y, -coefficients.slip_target * n.x
         if coefficients.is_constant:
             return
         closing = closing_speed(arbiter)

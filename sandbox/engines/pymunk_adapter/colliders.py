@@ -155,6 +155,7 @@ def _surface_factors(matrix: ContactMatrix) -> SurfaceFactors:
         *wrong_pairs(surfaces.restitution, touching, elasticity),
         *wrong_pairs(surfaces.friction, touching, friction),
         *_pairs(touching & ~(surfaces.fixed_coefficients & ~(surfaces.one_way | surfaces.one_way[:, None]))),
+        *_pairs(touching & (surfaces.slip_target != 0.0) & (surfaces.friction > 0.0)),
     }
     known = _KNOWN_FACTORS[matrix] = SurfaceFactors(elasticity, friction, frozenset(unfactored))
     return known

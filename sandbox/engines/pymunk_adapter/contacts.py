@@ -126,6 +126,8 @@ class ContactPoints(NamedTuple):
     """(P,) impulse on b to the left of the normal, N·s"""
     kick: FloatArray
     """(P,) work of a kick for each N·s of normal impulse, J; 0 without a kick"""
+    slip_target: FloatArray
+    """(P,) m/s, velocity of b relative to a, to the left of the normal, without slip; not 0 if a surface moves"""
 
     def scaled(self, fraction: float) -> Self:
         """Return a fraction of the impulses."""
@@ -138,13 +140,15 @@ class ContactPoints(NamedTuple):
         impulse = np.column_stack((nx * self.along - ny * self.across, ny * self.along + nx * self.across))
         return JointImpulses(self.a, self.b, self.arm_a, self.arm_b, impulse, np.zeros(len(self.a)))
 
-    def work(self, velocity: FloatArray, spin: FloatArray) -> tuple[float, float, float]:
-        """Return the work, J, of impulses along normals, along surfaces and by kicks, at mean velocities."""
+    def work(self, velocity: FloatArray, spin: FloatArray) -> tuple[float, float, float, float]:
+        """Return the work, J, of impulses along normals, of friction, kicks and moving surfaces, at mean velocities."""
         x, y = self.joint_impulses.separating_velocity(velocity, spin).T
         nx, ny = self.normal.T
         normal_velocity, tangential_velocity = nx * x + ny * y, nx * y - ny * x
         kick_work = float(self.along @ self.kick)
-        return float(self.along @ normal_velocity) - kick_work, float(self.across @ tangential_velocity), kick_work
+        friction_work = float(self.across @ (tangential_velocity - self.slip_target))
+        surface_work = float(self.across @ self.slip_target)
+        return float(self.along @ normal_velocity) - kick_work, friction_work, kick_work, surface_work
 
 
 class ContactPointReader:
@@ -164,6 +168,7 @@ class ContactPointReader:
         first: list[int] = []
         second: list[int] = []
         normal: list[tuple[float, float]] = []
+        slip_target: list[float] = []
         records: list[FloatArray] = []
         addresses: list[int] = []
         kicks = self._pair_callbacks.recorded_kicks
@@ -179,11 +184,13 @@ class ContactPointReader:
             if kicks:
                 addresses.append(address_of(arbiter))
             a, b = index.get(arbiter.body_a, -1), index.get(arbiter.body_b, -1)
-            n = arbiter.n.x, arbiter.n.y
+            n, surface = (arbiter.n.x, arbiter.n.y), arbiter.surface_vr
+            target = surface.x * n[1] - surface.y * n[0]
             for _ in range(len(record)):
                 first.append(a)
                 second.append(b)
                 normal.append(n)
+                slip_target.append(target)
         if warm_start:
             warm_start.clear()
         kick = np.zeros(len(first))
@@ -194,7 +201,8 @@ class ContactPointReader:
         arms, impulses = table[:, ARMS], table[:, IMPULSES]
         indices = np.asarray(first, np.int64), np.asarray(second, np.int64)
         normals = np.asarray(normal, np.float64).reshape(-1, 2)
-        return ContactPoints(*indices, arms[:, :2], arms[:, 2:], normals, impulses[:, 0], impulses[:, 1], kick)
+        points = arms[:, :2], arms[:, 2:], normals, impulses[:, 0], impulses[:, 1]
+        return ContactPoints(*indices, *points, kick, np.asarray(slip_target, np.float64))
 
 
 ColliderPair = tuple[int, int]

@@ -256,9 +256,10 @@ class PymunkEnergyLedger:
         account.add(Cause.DRAG, float(np.sum(applied.drag * velocity[:-1])))
         account.add(Cause.DRIVES, float(np.sum(applied.driven * velocity[:-1]) + applied.angular @ spin[:-1]))
         account.add(Cause.DAMPING, sum(each.work(velocity, spin) for each in by_damping))
-        normal_work, tangential_work, kick_work = points.work(velocity, spin)
+        normal_work, tangential_work, kick_work, surface_work = points.work(velocity, spin)
         account.add_contacts(normal_work, tangential_work)
         account.add(Cause.KICKS, kick_work)
+        account.add(Cause.DRIVES, surface_work)
         if driven_bodies:
             gravity = p.scene.world.gravity
             work = drive_work(driven_bodies, (before, now), (velocity, spin), points, p.bodies, gravity, p.h, fraction)

@@ -129,7 +129,7 @@ def find_contacts(
     if pairs:
         if len(balls.excluded):
             pairs = drop_excluded(keys[:pairs], balls.owner, balls.excluded, balls.group)
-        size = find_ball_contacts(keys[:pairs], position, radius, balls.surface, bodies.friction, 0.0, out, size)
+        size = find_ball_contacts(keys[:pairs], position, radius, balls.surface, bodies.tangential, 0.0, out, size)
     if len(walls.planes) and number.plane_tests:
         size = find_plane_contacts(
             position,
@@ -139,7 +139,7 @@ def find_contacts(
             walls.planes,
             walls.plane_collider,
             walls.collider_surface,
-            bodies.friction,
+            bodies.tangential,
             0.0,
             out,
             size,
@@ -154,7 +154,7 @@ def find_contacts(
             walls.segment_joints,
             walls.segment_collider,
             walls.collider_surface,
-            bodies.friction,
+            bodies.tangential,
             0.0,
             out,
             size,

@@ -294,6 +294,7 @@ def empty_manifolds(size: int) -> Manifolds:
         anchor=np.empty((size, 2)),
         offset=np.zeros((size, 2)),  # remains 0 if only discs collide
         friction=np.empty(size),
+        slip_target=np.empty(size),
         surface_pair=np.empty(size, np.int64),
     )
 
@@ -337,17 +338,17 @@ class CirclePipeline(CollisionPipeline):
         radius, surface, other = store.radius, store.surface, store.fixed_surface
         if len(pairs.balls):
             size = find_ball_contacts(
-                pairs.balls, position, radius, surface, store.friction, max_separation, self._out, size
+                pairs.balls, position, radius, surface, store.tangential, max_separation, self._out, size
             )
         if self._plane_count:
             planes = fixtures.planes, fixtures.plane_collider, other
             size = find_plane_contacts(
-                position, radius, self.can_touch, surface, *planes, store.friction, max_separation, self._out, size
+                position, radius, self.can_touch, surface, *planes, store.tangential, max_separation, self._out, size
             )
         if len(pairs.segments):
             walls = fixtures.segments, fixtures.joints, fixtures.segment_collider, other
             size = find_segment_contacts(
-                pairs.segments, position, radius, surface, *walls, store.friction, max_separation, self._out, size
+                pairs.segments, position, radius, surface, *walls, store.tangential, max_separation, self._out, size
             )
         return size
 
@@ -466,7 +467,7 @@ class ConvexPipeline(CollisionPipeline):
         self._update_pieces(position)
         store, fixtures, pieces, size = self._store, self._store.fixtures, self._pieces, 0
         hulls = pieces.hulls
-        query = NarrowPhaseInput(store.friction, max_separation, self._scratch)
+        query = NarrowPhaseInput(store.tangential, max_separation, self._scratch)
         if len(pairs.balls):
             size = find_body_contacts(pairs.balls, hulls, position, query, self._out, size)
         if self._plane_count:

@@ -285,7 +285,7 @@ def _body_columns(world: WorldState, store: BodyStore) -> BodyColumns:
         inverse_mass=_own(store.inverse_mass),
         inverse_moment=_own(store.inverse_moment),
         restitution=_own(store.restitution.ravel()),
-        friction=_own(store.friction),
+        tangential=_own(store.tangential),
         thrust_body=_own(thrusts.thrust_bodies),
         thrust_point=_own(thrusts.thrust_points),
         thrust_force=_own(thrusts.thrust_forces),

@@ -112,8 +112,10 @@ class StepEnergyLedger:
             spin = mean[:, 2] if mean.shape[1] == 3 else self._no_spin
             along, across = contact_work(contacts, impulse, mean, spin)
             kicks = 0.0 if kick_energy is None else float(impulse[:, 0] @ kick_energy)
-            self.account.add_contacts(along - kicks, across)
+            surfaces = float(impulse[:, 1] @ contacts.slip_target)  # work of moving surfaces
+            self.account.add_contacts(along - kicks, across - surfaces)
             self.account.add(Cause.KICKS, kicks)
+            self.account.add(Cause.DRIVES, surfaces)
 
     def _enter_motion(self, record: StepRecord, motors: float) -> None:
         """Enter forces, joints solved by positions, position correction, and the integrator.

@@ -107,13 +107,15 @@ class ReferenceEngine:
             missing.append("half_kick applies to pymunk only; use integrator 'velocity_verlet'")
         if settings.impact == "dissipative" and (wanted & CONSTRAINTS or Demand.DRIVES in wanted):
             missing.append("impact 'dissipative' does not support joints and drives; use 'newton'")
+        if settings.impact == "dissipative" and Demand.SURFACE_SPEED in wanted:
+            missing.append("impact 'dissipative' does not support surface speed, which adds energy; use 'newton'")
         if settings.persistence not in (None, 1):
             missing.append(f"persistence {settings.persistence} is not supported; it keeps contacts for 1 substep")
         if settings.response == "penalty":
             missing += self._penalty_faults(setup, settings)
             if settings.impact is not None:
                 missing.append("impact applies to response 'impulse' only")
-            for demand in (Demand.FALLOFF, Demand.KICKS):
+            for demand in (Demand.FALLOFF, Demand.KICKS, Demand.SURFACE_SPEED):
                 if demand in wanted:
                     missing.append(f"response 'penalty' does not model {demand}; 'impulse' does")
         else:

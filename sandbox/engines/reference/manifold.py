@@ -144,6 +144,9 @@ class Manifolds(NamedTuple):
     """(K, 2) m, component of each anchor to the left of the normal; 0 for discs"""
     friction: FloatArray
     """(K,) coefficient of friction of the pair"""
+    slip_target: FloatArray
+    """(K,) m/s, velocity of the second body relative to the first, to the left of the normal, without slip; not 0 only
+    if a surface moves"""
     surface_pair: IntArray
     """(K,) index of the pair of surfaces, row·S + column, in tables (S, S) of restitution, damping and falloff"""
 
@@ -169,7 +172,7 @@ def find_ball_contacts(
     position: FloatArray,
     radius: FloatArray,
     surface: IntArray,
-    friction: FloatArray,
+    tangential: FloatArray,
     max_separation: float,
     out: Manifolds,
     row: int,
@@ -191,8 +194,11 @@ def find_ball_contacts(
                 _write_circle_contact(
                     out, row, position[i, 0], position[i, 1], radius[i], radius[j], separation, nx, ny
                 )
-                out.friction[row] = friction[surface[i], surface[j]]
-                out.surface_pair[row] = surface[i] * len(friction) + surface[j]
+                out.friction[row], out.slip_target[row] = (
+                    tangential[surface[i], surface[j], 0],
+                    tangential[surface[i], surface[j], 1],
+                )
+                out.surface_pair[row] = surface[i] * len(tangential) + surface[j]
             row += 1
     return row
 
@@ -206,7 +212,7 @@ def find_plane_contacts(
     planes: FloatArray,
     collider: IntArray,
     collider_surface: IntArray,
-    friction: FloatArray,
+    tangential: FloatArray,
     max_separation: float,
     out: Manifolds,
     row: int,
@@ -225,8 +231,11 @@ def find_plane_contacts(
                     out.key[row] = (1 << KIND) + pair_key(i, p)
                     out.first[row], out.second[row] = i, -1 - collider[p]
                     _write_circle_contact(out, row, position[i, 0], position[i, 1], radius[i], 0.0, separation, nx, ny)
-                    out.friction[row] = friction[surface[i], other]
-                    out.surface_pair[row] = surface[i] * len(friction) + other
+                    out.friction[row], out.slip_target[row] = (
+                        tangential[surface[i], other, 0],
+                        tangential[surface[i], other, 1],
+                    )
+                    out.surface_pair[row] = surface[i] * len(tangential) + other
                 row += 1
     return row
 
@@ -241,7 +250,7 @@ def find_segment_contacts(
     joints: FloatArray,
     collider: IntArray,
     collider_surface: IntArray,
-    friction: FloatArray,
+    tangential: FloatArray,
     max_separation: float,
     out: Manifolds,
     row: int,
@@ -280,8 +289,11 @@ def find_segment_contacts(
                 _write_circle_contact(
                     out, row, position[i, 0], position[i, 1], radius[i], segments[s, 4], separation, nx, ny
                 )
-                out.friction[row] = friction[surface[i], other]
-                out.surface_pair[row] = surface[i] * len(friction) + other
+                out.friction[row], out.slip_target[row] = (
+                    tangential[surface[i], other, 0],
+                    tangential[surface[i], other, 1],
+                )
+                out.surface_pair[row] = surface[i] * len(tangential) + other
             row += 1
     return row
 

@@ -125,7 +125,7 @@ def find_contacts(
         pieces.middle,
     )
     hulls = ConvexHulls(pieces.corner, pieces.first, pieces.radius, pieces.body, pieces.surface)
-    query = NarrowPhaseInput(bodies.friction, 0.0, pieces.points)
+    query = NarrowPhaseInput(bodies.tangential, 0.0, pieces.points)
     middle, radius, keys, wall_keys = pieces.middle, pieces.bounding_radius, scratch.pair_keys, scratch.segment_keys
     pairs, pair_tests = find_near_pairs(number, state, middle, radius, pieces.mask, pieces.moves, keys)
     near, wall_tests = find_near_segments(number, walls, middle, radius, pieces.can_touch, wall_keys)

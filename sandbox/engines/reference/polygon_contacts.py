@@ -187,8 +187,8 @@ def are_separated(a: OrientedBox | FloatArray, b: OrientedBox | FloatArray, marg
 class NarrowPhaseInput(NamedTuple):
     """Parameters of the narrow phase, and its scratch memory."""
 
-    friction: FloatArray
-    """(S, S) of pairs of surfaces"""
+    tangential: FloatArray
+    """(S, S, 2) coefficient of friction and slip target, m/s, of pairs of surfaces"""
     max_separation: float
     """m, separation below which there is a contact"""
     scratch: FloatArray
@@ -358,7 +358,8 @@ def _write(
             out.anchor[row, 1] = (bx - x) * nx + (by - y) * ny - half
             out.offset[row, 0] = (y - ay) * nx - (x - ax) * ny
             out.offset[row, 1] = (y - by) * nx - (x - bx) * ny
-            out.friction[row] = query.friction[surface, other]
-            out.surface_pair[row] = surface * len(query.friction) + other
+            out.friction[row] = query.tangential[surface, other, 0]
+            out.slip_target[row] = query.tangential[surface, other, 1]
+            out.surface_pair[row] = surface * len(query.tangential) + other
         row += 1
     return row

@@ -137,7 +137,7 @@ def solve_contacts_once(
         old_normal, old_tangent = impulse[k, 0], impulse[k, 1]
         impulse[k, 0] = max(old_normal + along, 0.0)
         max_friction = contacts.friction[k] * impulse[k, 0]
-        across = -(vy * nx - vx * ny + slip_of_spin) / across_mass
+        across = -(vy * nx - vx * ny + slip_of_spin - contacts.slip_target[k]) / across_mass
         impulse[k, 1] = min(max(old_tangent + across, -max_friction), max_friction)
         normal, tangent = impulse[k, 0] - old_normal, impulse[k, 1] - old_tangent
         has_changed = has_changed or normal != 0.0 or tangent != 0.0

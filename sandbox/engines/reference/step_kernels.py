@@ -103,8 +103,8 @@ class BodyColumns(NamedTuple):
     inverse_moment: FloatArray
     restitution: FloatArray
     """(S·S,)"""
-    friction: FloatArray
-    """(S, S)"""
+    tangential: FloatArray
+    """(S, S, 2), as in `BodyStore`"""
     thrust_body: IntArray
     """(T,) index of the body that each thrust acts on"""
     thrust_point: FloatArray
@@ -251,6 +251,7 @@ def finish_substep(
         out.anchor[:size],
         out.offset[:size],
         out.friction[:size],
+        out.slip_target[:size],
         out.surface_pair[:size],
     )
     solve_constraints(number, bodies, joints, state, scratch, contacts, warm_start)

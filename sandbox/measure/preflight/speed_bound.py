@@ -100,6 +100,8 @@ class SpeedBounds:
             found.append("attraction without softening")
         if scene.drives:
             found.append("drives")
+        if self.matrix.moving_surfaces:
+            found.append("moving surfaces")
         if len(scene.links.of(LinkKind.MOTOR)):
             found.append("motors")
         if any(thrust.key is not None for thrust in scene.thrusts):

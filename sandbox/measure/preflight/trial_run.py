@@ -235,7 +235,8 @@ def energy_gain(run: Trajectory, scene: Scene) -> float:
     links = scene.links
     if scene.thrusts or scene.drives or any(scene.world.wind) or len(links.of(LinkKind.MOTOR)):
         return 0.0
-    if contact_matrix(scene).surfaces.kicks.any():
+    matrix = contact_matrix(scene)
+    if matrix.surfaces.kicks.any() or matrix.moving_surfaces:
         return 0.0
     energy = energies(run, scene)
     total = energy.total

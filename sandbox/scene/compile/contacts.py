@@ -6,7 +6,8 @@ shape; bodies that can touch only frictionless surfaces need no moment of inerti
 Restitution and friction belong to a *pair* of materials. A `[[pair]]` states them. For other pairs (`mix`) a value
 stated on one side of a contact applies, values on both sides multiply (pymunk's rule), and the default is 0. A value
 stated on a shape takes precedence over its material's. The same holds for the falloff of restitution with speed, except
-that the values of two sides add. Kicks and one-way walls belong to one side.
+that the values of two sides add. Surface speeds add as well: each surface runs clockwise around its object. Kicks and
+one-way walls belong to one side.
 """
 
 from collections.abc import Sequence
@@ -38,6 +39,8 @@ class ContactMaterial(NamedTuple):
     """s/m"""
     kick: Kick | None = None
     one_way: bool = False
+    speed: float = 0.0
+    """m/s"""
 
 
 def mix(a: float | None, b: float | None) -> float:
@@ -64,6 +67,9 @@ class PairTable:
     """(S, S) of each pair, symmetric"""
     falloff: FloatArray
     """(S, S) s/m, of each pair, symmetric"""
+    slip_target: FloatArray
+    """(S, S) m/s, of each pair, symmetric: velocity of the second body relative to the first, to the left of the normal
+    towards the second, at which their surfaces do not slip"""
 
     def __deepcopy__(self, _: dict[int, Any]) -> Self:
         """Return itself: it never changes, so that copies of a simulation can share it."""
@@ -96,6 +102,8 @@ def pair_table(scene: Scene, bodies: Bodies) -> PairTable:
     surfaces = (*surfaces, *more)
     restitution, friction = _mix_pairs([s.restitution for s in surfaces]), _mix_pairs([s.friction for s in surfaces])
     falloff = np.add.outer(*[np.asarray([s.falloff or 0.0 for s in surfaces], dtype=np.float64)] * 2)
+    speed = np.asarray([s.speed for s in surfaces], dtype=np.float64)
+    slip_target = 0.0 - np.add.outer(speed, speed)  # without speeds +0, not −0
     by_material: dict[str | None, list[int]] = {}
     for index, surface in enumerate(surfaces):
         by_material.setdefault(surface.material, []).append(index)
@@ -112,7 +120,7 @@ def pair_table(scene: Scene, bodies: Bodies) -> PairTable:
     if not bodies.round.all():
         shapes = bodies.shapes
         of_shape = of_part[begin[bodies.element[shapes.body]] + shapes.part]
-    return PairTable(surfaces, of_body, of_shape, of_fixed, restitution, friction, falloff)
+    return PairTable(surfaces, of_body, of_shape, of_fixed, restitution, friction, falloff, slip_target)
 
 
 def surface_parts(elements: Sequence[BodySource]) -> list[HasMaterial]:
@@ -135,6 +143,7 @@ def _with_body_surface(part: HasMaterial, body: HasMaterial) -> HasMaterial:
         restitution=body.restitution if part.restitution is None else part.restitution,
         restitution_falloff=body.restitution_falloff if part.restitution_falloff is None else part.restitution_falloff,
         friction=body.friction if part.friction is None else part.friction,
+        surface_speed=part.surface_speed if "surface_speed" in part.model_fields_set else body.surface_speed,
     )
 
 
@@ -161,7 +170,8 @@ def index_surfaces(
         kick = element.kick if isinstance(element, Wall | Post) else None
         one_way = isinstance(element, Wall) and element.one_way
         return index_by_surface.setdefault(
-            ContactMaterial(kept, restitution, friction, falloff, kick, one_way), len(index_by_surface)
+            ContactMaterial(kept, restitution, friction, falloff, kick, one_way, element.surface_speed),
+            len(index_by_surface),
         )
 
     of_element = np.asarray([index_of(element) for element in elements], dtype=np.int64)
@@ -219,6 +229,12 @@ class ContactMatrix:
     def restitution(self) -> float:
         """Largest restitution of any possible contact."""
         return float(np.max(self.surfaces.restitution[self.touching], initial=0.0))
+
+    @property
+    def moving_surfaces(self) -> int:
+        """Number of surfaces with a speed and friction against another that can touch them."""
+        rubs = np.asarray((self.touching & (self.surfaces.friction > 0.0)).any(axis=1))
+        return int(np.count_nonzero(np.asarray([each.speed != 0.0 for each in self.surfaces.surfaces]) & rubs))
 
     @property
     def friction(self) -> float:

@@ -57,6 +57,7 @@ Mass = Annotated[float, Field(ge=1e-15, le=1e30)]
 Density = Annotated[float, Field(ge=1e-30, le=1e30)]
 Restitution = Annotated[float, Field(ge=0, le=1)]
 Friction = Annotated[float, Field(ge=0, le=1000)]
+SurfaceSpeed = Annotated[float, Field(ge=-1e6, le=1e6)]
 Falloff = Annotated[float, Field(ge=0, le=1e6)]
 """Decrease of restitution with speed, s/m: e(v) = e / (1 + f·v), v the speed of approach."""
 
@@ -89,6 +90,9 @@ class HasMaterial(Part):
     added"""
     friction: Friction | None = None
     """Coulomb friction μ; if both sides of a contact have a value, they are multiplied"""
+    surface_speed: SurfaceSpeed = 0.0
+    """speed of the surface, m/s, as of a conveyor belt or a drum: to the right of the outward normal, clockwise around
+    the object"""
     colour: Colour | None = None
     """colour in the window, `#rrggbb`"""
 

@@ -32,6 +32,7 @@ def contacts(*rows):
         anchor=np.array(arms, float),
         offset=np.zeros((count, 2)),
         friction=np.array(friction, float),
+        slip_target=np.zeros(count),
         surface_pair=np.arange(count),
     )
 

@@ -27,8 +27,9 @@ KINDS = {
     "gear": PAIR | {"kind": "gear", "ratio": 2.0},
     "spring": PAIR | {"kind": "spring", "stiffness": 1.0},
     "rotary_spring": PAIR | {"kind": "rotary_spring", "stiffness": 1.0},
+    "pulley": PAIR | {"kind": "pulley", "wheels": [[-3, 2], [3, 2]]},
 }
-WITHOUT_OVERLAY = {"rod", "slide", "spring"}
+WITHOUT_OVERLAY = {"rod", "slide", "spring", "pulley"}
 
 
 def scene_with(*joints: dict) -> Scene:

@@ -173,15 +173,24 @@ def account_hit(data: EventState, i: int, j: int, jx: float, jy: float, nx: floa
     across = 0.0  # without friction `tangential` is rounding error
     if data.surfaces[c.FRICTION, data.tags[i, c.SURFACE], data.tags[j, c.SURFACE]] > 0.0:
         slip = vy * nx - vx * ny - (rim_speed(state, i) + rim_speed(state, j))
+        slip_target = data.surfaces[c.SLIP_TARGET, data.tags[i, c.SURFACE], data.tags[j, c.SURFACE]]
         across = tangential * (
-            slip - 0.5 * tangential * (inverse_mass_at_rim(state, i) + inverse_mass_at_rim(state, j))
+            slip - slip_target - 0.5 * tangential * (inverse_mass_at_rim(state, i) + inverse_mass_at_rim(state, j))
         )
+        world[c.BY_SURFACES] += tangential * slip_target
     account_contact(world, along, across)
 
 
 @kernel
 def account_fixed_hit(
-    data: EventState, i: int, nx: float, ny: float, normal: float, across: float, kick: float
+    data: EventState,
+    i: int,
+    nx: float,
+    ny: float,
+    normal: float,
+    across: float,
+    kick: float,
+    slip_target: float,
 ) -> None:
     """Add the energy change of a collision with a static collider to the ledger.
 
@@ -193,13 +202,15 @@ def account_fixed_hit(
         normal: normal impulse on the ball, N·s.
         across: tangential impulse on the ball, N·s, positive to the left of the normal.
         kick: energy from the kick, J.
+        slip_target: velocity of the ball's rim along the surface without slip, m/s.
     """
     state, world = data.state, data.world
     normal_velocity = state[i, c.VX] * nx + state[i, c.VY] * ny
-    slip = state[i, c.VY] * nx - state[i, c.VX] * ny - rim_speed(state, i)
+    slip = state[i, c.VY] * nx - state[i, c.VX] * ny - rim_speed(state, i) - slip_target
     tangential_work = across * (slip - 0.5 * across * inverse_mass_at_rim(state, i))
     account_contact(world, normal * (normal_velocity - 0.5 * normal * state[i, c.INVERSE_MASS]) - kick, tangential_work)
     world[c.BY_KICKS] += kick
+    world[c.BY_SURFACES] += across * slip_target
 
 
 @kernel
@@ -224,7 +235,7 @@ def account_spin(data: EventState, i: int, spin: float) -> None:
 
 @kernel
 def account_slip(data: EventState, i: int, t: float, residual: float) -> None:
-    """Add the work of sliding friction on a supported ball up to time t + residual to the ledger.
+    """Add the work of friction on a supported ball, and of the moving surface, up to time t + residual to the ledger.
 
     Closed form: the force is constant and the slip velocity changes linearly, so the work is force times slip distance.
     """
@@ -246,7 +257,11 @@ def account_slip(data: EventState, i: int, t: float, residual: float) -> None:
         rotation_speed = 0.0
         if state[i, c.INVERSE_INERTIA] > 0.0:
             rotation_speed = (state[i, c.SPIN] + state[i, c.ALPHA] * middle) * state[i, c.RADIUS]
-        account_energy(data.world, c.BY_FRICTION, force * (vx * tx + vy * ty - rotation_speed) * span)
+        surface, other_surface = data.tags[i, c.SURFACE], data.line_tags[f, c.COLLIDER_SURFACE]
+        slip_target = data.surfaces[c.SLIP_TARGET, surface, other_surface]
+        slip = vx * tx + vy * ty - rotation_speed - slip_target
+        account_energy(data.world, c.BY_FRICTION, force * slip * span)
+        data.world[c.BY_SURFACES] += force * slip_target * span
 
 
 @kernel

@@ -79,19 +79,19 @@ COLLIDER, COLLIDER_SURFACE, ENDS = range(3)
 """Columns of `line_tags` and `vertex_tags`: index of the static collider; its row in `surfaces`; of lines the two
 vertices at the ends, −1 for none."""
 
-RESTITUTION, FRICTION, FALLOFF = range(3)
+RESTITUTION, FRICTION, FALLOFF, SLIP_TARGET = range(4)
 """First index of `surfaces`."""
 
 GX, GY, MICRO_BOUNCE, NOW, NOW_RESIDUAL, SECOND_START, INSTANT_START = range(7)
-BY_NORMAL, BY_FRICTION, BY_PHANTOM, BY_KICKS = range(7, 11)
-BATCH_START, PREVIOUS_BATCH = range(11, 13)
+BY_NORMAL, BY_FRICTION, BY_PHANTOM, BY_KICKS, BY_SURFACES = range(7, 12)
+BATCH_START, PREVIOUS_BATCH = range(12, 14)
 """Indices of `world`:
 
 - GX, GY: gravity, m/s². MICRO_BOUNCE: smallest speed of separation of balls that gravity presses together, m/s.
 - NOW, NOW_RESIDUAL: time of the last event, s.
 - SECOND_START, INSTANT_START: start of the second and of the instant in which events are counted, s.
 - BY_NORMAL, BY_FRICTION: energy change by normal and by friction impulses, J, never positive. BY_PHANTOM: energy that
-  either of them created, J. BY_KICKS: energy from kicks, J.
+  either of them created, J. BY_KICKS: energy from kicks, J. BY_SURFACES: work of moving surfaces, J.
 - BATCH_START, PREVIOUS_BATCH: start of the present batch of events and of the one before, s.
 """
 
@@ -100,7 +100,7 @@ NONE, SLIP_END, LINE_END, LINE, VERTEX, BALL = range(6)
 of the supporting line, collision with a line, with a vertex, with a ball."""
 
 RECORDING, LOG_ROWS, EVENTS, PREDICTIONS, PAIR_TESTS, MAX_EVENTS, ACCOUNTING = range(7)
-EVENT_BODY, EVENT_KIND, EVENT_PARTNER, IN_SECOND, IN_INSTANT, IN_BATCH = range(7, 13)
+EVENT_BODY, EVENT_KIND, EVENT_PARTNER, IN_SECOND, IN_INSTANT, IN_BATCH, IN_MOVING_CORNER = range(7, 14)
 """Indices of `counts`:
 
 - RECORDING: 1 while contacts are recorded. LOG_ROWS: rows of the contact log.
@@ -108,6 +108,7 @@ EVENT_BODY, EVENT_KIND, EVENT_PARTNER, IN_SECOND, IN_INSTANT, IN_BATCH = range(7
 - MAX_EVENTS: largest number of events in one second. ACCOUNTING: 1 while energy is accounted.
 - EVENT_BODY, EVENT_KIND, EVENT_PARTNER: body, kind and partner of the last event.
 - IN_SECOND, IN_INSTANT, IN_BATCH: events in the present second, instant and batch.
+- IN_MOVING_CORNER: 1 once a ball is in a corner with a moving surface, which is not modelled.
 """
 
 BEYOND = -1
@@ -140,7 +141,7 @@ class EventState(NamedTuple):
     targets: IntArray
     """indices of the balls that other balls can collide with"""
     surfaces: FloatArray
-    """(3, S, S) restitution, friction and restitution falloff, s/m, of each pair of surfaces"""
+    """(4, S, S) restitution, friction, restitution falloff, s/m, and slip target, m/s, of each pair of surfaces"""
     lines: FloatArray
     """(F, 15)"""
     line_tags: IntArray
@@ -192,10 +193,10 @@ def make_state(store: BodyStore) -> EventState:
         next_time=np.full(count, np.inf),
         moving_balls=np.empty(0, np.int64),
         targets=np.empty(0, np.int64),
-        surfaces=np.empty((3, 0, 0)),
+        surfaces=np.empty((4, 0, 0)),
         **_collider_arrays(store.scene),
-        world=np.zeros(13),
-        counts=np.zeros(13, np.int64),
+        world=np.zeros(PREVIOUS_BATCH + 1),
+        counts=np.zeros(IN_MOVING_CORNER + 1, np.int64),
         log=np.empty((0, 7)),
         log_pair=np.empty((0, 2), np.int64),
     )
@@ -261,7 +262,7 @@ def rebuild(data: EventState, store: BodyStore) -> EventState:
     return data._replace(
         moving_balls=np.flatnonzero((store.inverse_mass > 0) & (store.collision_mask != NOTHING)),
         targets=np.flatnonzero(store.collision_mask == ALL),
-        surfaces=np.stack((store.restitution, store.friction, store.falloff)),
+        surfaces=np.stack((store.restitution, store.friction, store.falloff, store.tangential[:, :, 1])),
     )
 
 

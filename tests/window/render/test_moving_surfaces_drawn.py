@@ -1,0 +1,52 @@
+"""Drawing of moving surfaces: chevrons on planes, walls, posts and bodies, which travel with the surface."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sandbox.scene.compile.scene import Scene
+from sandbox.scene.files.load import from_document
+from tests.window.render.drawn import CAMERA, changed_pixels, frame, render, snapshot
+
+OBJECTS: dict[str, dict[str, Any]] = {
+    "plane": {"plane": [{"point": [0.0, -1.0], "normal": [0.0, 1.0]}]},
+    "wall": {"wall": [{"points": [[-2.0, 0.0], [0.0, 0.5], [2.0, 0.0]], "thickness": 0.4}]},
+    "closed wall": {"wall": [{"points": [[-2.0, -1.0], [2.0, -1.0], [0.0, 1.0]], "closed": True}]},
+    "post": {"post": [{"position": [0.0, 0.0], "radius": 1.0}]},
+    "box": {"box": [{"position": [0.0, 0.0], "size": [3.0, 1.0], "angle": 0.3}]},
+    "capsule": {"capsule": [{"position": [0.0, 0.0], "length": 2.0, "radius": 0.5}]},
+    "ball": {"ball": [{"position": [0.0, 0.0], "radius": 1.0}]},
+}
+
+
+def scene_of(name: str, speed: float) -> Scene:
+    """Return a scene of one object with a surface speed, m/s."""
+    (kind, (table,)) = next(iter(OBJECTS[name].items()))
+    return from_document({kind: [{**table, "surface_speed": speed}]})
+
+
+@pytest.mark.parametrize("name", OBJECTS)
+@pytest.mark.parametrize("antialias", [True, False])
+def test_moving_surfaces_have_chevrons(name: str, antialias: bool) -> None:
+    still, moving = (render(snapshot(scene_of(name, speed)), antialias=antialias) for speed in (0.0, 1.0))
+    assert changed_pixels(still, moving).sum() > 20
+
+
+def test_chevrons_point_along_the_motion() -> None:
+    """On the upper side of a wall they point right for a positive speed: mirrored for a negative one."""
+    pictures = [render(snapshot(scene_of("wall", speed))) for speed in (0.0, 1.0, -1.0)]
+    right, left = (np.asarray(changed_pixels(pictures[0], each)) for each in pictures[1:])
+    assert (right != left).any()
+
+
+def test_chevrons_travel_with_time() -> None:
+    model = scene_of("plane", 1.0)
+    pictures = [render(snapshot(model, state=frame(model, time=time))) for time in (0.0, 0.1)]
+    assert changed_pixels(*pictures).any()
+
+
+def test_surfaces_far_away_are_not_drawn() -> None:
+    scene = from_document({"wall": [{"points": [[1e9, 0.0], [1e9, 1.0]], "surface_speed": 1.0}]})
+    assert CAMERA is not None
+    render(snapshot(scene))
