@@ -32,7 +32,7 @@ class Cause(StrEnum):
     KICKS = "kicks"
     """kicks of walls and posts, as of bumpers and slingshots"""
     DRIVES = "drives"
-    """thrusts, drives, motors and moving surfaces; forces and pulls by actions; zones that hold a body or have gravity"""
+    """thrusts, drives, motors, moving surfaces; forces and pulls by actions; zones that hold a body or have gravity"""
     CORRECTION = "position correction"
     """position changes that correct overlaps and joints"""
     INTEGRATOR = "integrator"

@@ -237,6 +237,33 @@ def test_actions_change_the_world() -> None:
     simulation.close()
 
 
+def test_spawned_body_moves() -> None:
+    simulation = start(scene_of(ball=[ball(0, 5)]), "box2d")
+    simulation.apply(Spawn(time=0.0, ball=Ball(position=(5.0, 5.0), velocity=(1.0, 0.0), radius=0.5)))
+    for _ in range(50):
+        simulation.step()
+    assert simulation.frame().position[1, 0] == pytest.approx(5.5, rel=1e-5)  # 50 sums of 32 bits
+    simulation.close()
+
+
+def test_drives_by_torque_are_refused() -> None:
+    drive = {"name": "flip", "kind": "torque", "body": "bat", "pivot": [0, 0], "stops": [0.0, 1.0], "torque": 1.0}
+    scene = scene_of(box=[{"name": "bat", "position": [0.4, 0.0], "size": [1.0, 0.1]}], drive=[drive])
+    assert "flip: a drive by torque" in reason(scene)
+
+
+def test_joints_last_when_a_zone_changes_the_layer_of_a_body() -> None:
+    """A pendulum that swings through a zone: its body gets other shapes, and keeps its rod."""
+    joint = {"kind": "rod", "between": ["bob"], "anchors": [[0.0, 0.0], [0.0, 2.0]]}
+    zone = {"position": [0.0, 0.0], "radius": 0.3, "to_layer": "up"}
+    bob = {"name": "bob", "position": [2.0, 2.0], "radius": 0.2}
+    scene = scene_of(ball=[bob], joint=[joint], zone=[zone])
+    result = computed(scene, dt=0.001)
+    assert set(result.layer[:, 0].tolist()) == {0, 1}
+    length = np.hypot(*(result.position[:, 0] - np.asarray([0.0, 2.0])).T)
+    assert length == pytest.approx(np.full(len(length), 2.0), abs=0.01)  # Box2D's joints are soft
+
+
 def test_half_plane_reaches_as_far_as_bodies_go() -> None:
     scene = scene_of(
         world=GRAVITY | {"duration": 20.0}, plane=[FLOOR], solver={"dt": 0.02, "substeps": 4},

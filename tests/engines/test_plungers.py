@@ -7,6 +7,9 @@ import pytest
 
 from tests.engines.flippers import BALL_RADIUS, ball, press, scene
 
+every_engine = pytest.mark.parametrize("engine", ["pymunk", "box2d", "reference"], indirect=True, scope="module")
+"""engines that model kinematic drives; the others of this folder's fixture model drives by torque as well"""
+
 pytestmark = pytest.mark.full  # long runs and sweeps
 
 TRAVEL, SPEED = 0.043, 1.03  # m, m/s: of a pinball machine
@@ -39,6 +42,7 @@ def advance(simulation, steps):
     return simulation.frame()
 
 
+@every_engine
 def test_stroke_turns_at_its_rate_and_stops_on_its_stops(start):
     simulation = start(scene(gate()))
     press(simulation, 0.3)  # any level above 0 is a full stroke
@@ -55,6 +59,7 @@ def test_stroke_turns_at_its_rate_and_stops_on_its_stops(start):
     assert frame.position[0] == pytest.approx([0.04, 0.0], abs=1e-15)
 
 
+@every_engine
 @pytest.mark.parametrize("return_rate", [None, 0.0])
 def test_stroke_without_a_return_rate_holds_or_returns(start, return_rate):
     simulation = start(scene(gate(**({} if return_rate is None else {"return_rate": return_rate}))))
@@ -66,6 +71,7 @@ def test_stroke_without_a_return_rate_holds_or_returns(start, return_rate):
     )
 
 
+@every_engine
 def test_stroke_throws_a_ball_like_a_moving_wall(start):
     """V' = u + e u with u = ω r, the speed of the point that hits the ball at rest."""
     arm = 0.06
@@ -110,6 +116,7 @@ def test_restitution_falls_with_the_speed_of_the_contact_point(start, shape):
     assert frame.angular_velocity[gate_index] == RATE
 
 
+@every_engine
 def test_stroke_is_not_stopped_by_a_heavy_ball(start):
     simulation = start(scene(gate(), {"ball": [ball(0.05, 0.05, 0.0, -8.0, mass=100.0) | {"mass": 100.0}]}))
     frame = advance(simulation, 20)
@@ -117,6 +124,7 @@ def test_stroke_is_not_stopped_by_a_heavy_ball(start):
     assert frame.velocity[0, 1] > 0.0
 
 
+@every_engine
 def test_plunger_is_drawn_at_its_draw_speed_and_stays(start):
     simulation = start(scene(rod()))
     press(simulation, 0.5)
@@ -131,6 +139,7 @@ def test_plunger_is_drawn_at_its_draw_speed_and_stays(start):
     assert frame.position[0, 1] == pytest.approx(-0.05 - 0.25 * TRAVEL, rel=1e-15)
 
 
+@every_engine
 @pytest.mark.parametrize("pull", [0.25, 0.5, 1.0])
 def test_released_plunger_follows_a_cosine(start, pull):
     simulation = start(scene(rod(), dt=1e-3))
@@ -151,6 +160,7 @@ def test_released_plunger_follows_a_cosine(start, pull):
     assert not advance(simulation, 1).velocity.any()
 
 
+@every_engine
 @pytest.mark.parametrize("pull", [0.25, 0.5, 1.0])
 def test_ball_on_a_plunger_leaves_at_the_speed_of_its_pull(start, pull):
     resting = ball(0.0, BALL_RADIUS + 1e-5, restitution=0.3)
@@ -188,6 +198,7 @@ def test_ledger_of_strokes_and_plungers_closes(start):
     assert entries["actions"] == pytest.approx(0.0, abs=1e-15)
 
 
+@every_engine
 def test_driven_body_that_passes_a_wall_is_no_missed_contact(engine):
     """A plunger that springs through a wall at 40 mm a step: driven bodies pass walls by design."""
     import sandbox

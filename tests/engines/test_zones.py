@@ -18,7 +18,15 @@ from sandbox.scene.description.fixed import AWAY, HELD, INSIDE, RELEASED
 from sandbox.scene.files.load import from_document
 from sandbox.trajectory import Trajectory
 
-every_engine = pytest.mark.parametrize("engine", ["pymunk", "reference"])
+every_engine = pytest.mark.parametrize("engine", ["pymunk", "box2d", "reference"])
+with_impulses = pytest.mark.parametrize("engine", ["pymunk", "reference"])
+"""engines that know the impulses of contacts, and account for energy"""
+
+
+def rounding(engine: str, tolerance: float) -> float:
+    """Return a tolerance for rounding errors of 64-bit numbers; with 32-bit numbers, 2²⁹ of it."""
+    return tolerance * 2.0**29 if engine == "box2d" else tolerance
+
 
 H = 0.002
 """Substep of these scenes, s."""
@@ -69,7 +77,8 @@ def test_entry_is_recorded_in_the_substep_in_which_the_centre_enters(engine: str
     )  # the first end of a substep after entry; rounding of sums of h
     assert run.contact_impulse.tolist() == [[0.0, 0.0]]
     assert run.contact_normal.tolist() == [[1.0, 0.0]]
-    assert run.contact_point[0].tolist() == pytest.approx([speed * time, 0.0], abs=1e-9)  # sums of v·h
+    sums = 1e-5 if engine == "box2d" else 1e-9  # of v·h, of up to 700 numbers of 32 bits on Box2D
+    assert run.contact_point[0].tolist() == pytest.approx([speed * time, 0.0], abs=sums)
 
 
 @pytest.mark.full
@@ -160,14 +169,16 @@ def test_gravity_zone_acts_as_a_slope_up_and_down(engine: str) -> None:
 def test_gravity_zone_replaces_world_gravity_while_drag_persists(engine: str) -> None:
     """v̇ = g − k v from rest, with the gravity of the zone: v = g/k·(1 − e^(−kt)).
 
-    Drag on pymunk is exact in each substep; rk4 of the reference has an error of (k·h)⁴·k·T/120, 5e-14.
+    Drag on pymunk is exact in each substep; rk4 of the reference has an error of (k·h)⁴·k·T/120, 5e-14; Box2D's scheme is
+    of order 1, with an error below k·h.
     """
     zone = {"position": [0.0, 0.0], "radius": 50.0, "gravity": [3.0, 1.0]}
     world = {"duration": 1.0, "gravity": [0.0, -9.81], "linear_drag": 0.8}
     scene = scene_of(zone, ball={"velocity": [0.0, 0.0]}, world=world)
     run = run_on(engine, scene, **({"integrator": "rk4"} if engine == "reference" else {}))
     expected = np.asarray([3.0, 1.0]) / 0.8 * -math.expm1(-0.8)
-    assert run.velocity[-1, 0] == pytest.approx(expected, rel=1e-12)  # rounding of 500 substeps
+    # rounding of 500 substeps
+    assert run.velocity[-1, 0] == pytest.approx(expected, rel=0.8 * H if engine == "box2d" else 1e-12)
 
 
 @every_engine
@@ -175,7 +186,7 @@ def test_change_of_world_gravity_does_not_act_inside_a_gravity_zone(engine: str)
     zone = {"position": [0.0, 0.0], "radius": 50.0, "gravity": [1.0, 0.0]}
     change = SetParameter(time=0.5, path="world.gravity", value=[0.0, -5.0])
     run = run_on(engine, scene_of(zone, ball={"velocity": [0.0, 0.0]}, world={"duration": 1.0}), actions=[change])
-    assert run.velocity[-1, 0] == pytest.approx([1.0, 0.0], abs=1e-12)  # rounding of 500 sums
+    assert run.velocity[-1, 0] == pytest.approx([1.0, 0.0], abs=rounding(engine, 1e-12))  # of 500 sums
 
 
 HOLE: dict[str, Any] = {"name": "hole", "position": [1.0, 0.0], "radius": 0.08, "holds": True}
@@ -278,7 +289,8 @@ def test_overlap_does_not_shift_a_held_body(engine: str) -> None:
     hole = {"position": [1.0, 0.0], "radius": 0.1, "holds": True}
     wall = {"points": [[0.0, -0.05], [2.0, -0.05]], "thickness": 0.02}
     simulation = run_until(engine, scene_of(hole, ball={"position": [-5.0, 0.0]}, wall=[wall]), 0.0)
-    simulation.account()
+    if engine != "box2d":
+        simulation.account()
     simulation.apply(Spawn(time=0.0, ball=Ball(name="late", position=(1.0, 0.03), radius=0.2)))
     for _ in range(3):
         simulation.step()
@@ -328,7 +340,7 @@ def test_removal_of_a_held_body_frees_the_zone(engine: str) -> None:
     assert simulation.frame().visits.tolist() == [[AWAY], [HELD]]
 
 
-@every_engine
+@with_impulses
 def test_ledger_closes_with_holding_and_gravity_zones(engine: str) -> None:
     zones = [HOLE, {"points": [[0.2, -1], [0.6, -1], [0.6, 1], [0.2, 1]], "gravity": [4.0, 6.0]}]
     scene = scene_of(*zones, world={"duration": 2.0, "gravity": [0.0, -1.0]}, ball={"position": [0.0, 0.2]})
@@ -380,7 +392,7 @@ def test_half_kick_is_refused_with_zones_that_change_motion() -> None:
         sandbox.start(scene_of(HOLE, solver={"half_kick": True}))
 
 
-@every_engine
+@with_impulses
 def test_lasting_contacts_keep_their_impulses_while_entries_are_recorded(engine: str) -> None:
     """Balls rest while another flies through zones above; resting contacts have the same impulse as without zones."""
     plane = {"point": [0.0, -1.0], "normal": [0.0, 1.0], "layers": ["ground"]}

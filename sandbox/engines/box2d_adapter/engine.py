@@ -11,6 +11,7 @@ from sandbox.engines.common.base import slop_of
 from sandbox.engines.common.workload import overload
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.demands import BALLS, Demand, unmodelled
+from sandbox.scene.compile.drives import names_of
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
@@ -53,6 +54,8 @@ OWN = frozenset(
         Demand.ATTRACTION,
         Demand.THRUST,
         Demand.LAYERS,
+        Demand.ZONES,
+        Demand.DRIVES,
     }
 )
 
@@ -63,8 +66,8 @@ class Box2DEngine:
 
     A step finds contacts once, then advances by its substeps: velocities by gravity and forces, constraints with
     overlap correction, positions by the new velocities (semi-implicit Euler), constraints again without the
-    correction; restitution follows at the end. Springs, thrusts, attraction, quadratic drag and wind are forces that
-    are constant during a substep; with these, each substep is a step of Box2D.
+    correction; restitution follows at the end. Springs, thrusts, attraction, quadratic drag, wind and the gravity of
+    zones are forces that are constant during a substep; with these, zones or drives, each substep is a step of Box2D.
 
     Lengths are scaled so that Box2D's fixed slop, 0.005 of its units, is `slop`. `iterations` has no effect: Box2D
     solves its constraints once in each substep.
@@ -90,6 +93,11 @@ class Box2DEngine:
         ]
         if settings.half_kick:
             missing.append("half_kick applies to pymunk only; remove it")
+        missing += [
+            f"{name}: a drive by torque needs a hinge that contacts can turn back; strokes and plungers are supported"
+            for drive, name in zip(setup.scene.drives, names_of(setup.scene), strict=True)
+            if drive.kind == "torque"
+        ]
         missing += joint_faults(setup.links)
         matrix = contact_matrix(setup)
         missing += unmixable(matrix, surfaces_in_use(setup.bodies, matrix))

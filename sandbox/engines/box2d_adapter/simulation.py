@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from sandbox.action import Action, ActionError
-from sandbox.arrays import FloatArray, IntArray
+from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.engines.box2d_adapter.drives import KinematicDrives
 from sandbox.engines.box2d_adapter.joints import WorldJoints
 from sandbox.engines.box2d_adapter.limits import FARTHEST_LENGTHS, FASTEST_LENGTHS, MAX_TURN, scale_for
 from sandbox.engines.box2d_adapter.materials import unmixable
@@ -16,8 +17,9 @@ from sandbox.engines.box2d_adapter.world import Box2DWorld, StateRows
 from sandbox.engines.common.actions import apply_action, derive_contacts, sets_level
 from sandbox.engines.common.base import BEYOND, SteppedSimulation, observe_path
 from sandbox.engines.common.body_store import BodyStore, HasBodyStore
-from sandbox.engines.common.contact_log import ContactLog
+from sandbox.engines.common.contact_log import ContactLog, join_batches
 from sandbox.engines.common.force_field import ForceField
+from sandbox.engines.common.zoned_bodies import ZonedBodyStore
 from sandbox.engines.contract import Divergence, Observer, Refusal
 from sandbox.engines.energy_ledger import Cause
 from sandbox.frame_table import FrameTable
@@ -41,10 +43,8 @@ SPIN_ROUNDING = 1e-5
 class Box2DBodies(BodyStore):
     """Body store that refuses changes which Box2D does not support."""
 
-    def __init__(self, setup: Setup, settings: Settings) -> None:
-        super().__init__(setup, settings.h)
-        self.scale = scale_for(settings)
-        """Box2D's lengths in a metre"""
+    scale: float
+    """Box2D's lengths in a metre"""
 
     def check_place(self, position: tuple[float, float], radius: float, collides: Collides) -> None:
         """Refuse a position that is too far from the origin for 32-bit numbers.
@@ -87,6 +87,38 @@ class Box2DBodies(BodyStore):
         return super().add(single, name)
 
 
+class ZonedBox2DBodies(Box2DBodies, ZonedBodyStore):
+    """Body store of a scene with zones, with the same refusals."""
+
+
+def make_store(setup: Setup, settings: Settings) -> Box2DBodies:
+    """Return the body store of a scene."""
+    store = (ZonedBox2DBodies if setup.scene.zones else Box2DBodies)(setup, settings.h)
+    store.scale = scale_for(settings)
+    return store
+
+
+class BodyChanges(NamedTuple):
+    """State of N bodies before an action or zones change the body store."""
+
+    position: FloatArray
+    """(N, 2) m"""
+    velocity: FloatArray
+    """(N, 2) m/s"""
+    spin: FloatArray
+    """(N,) rad/s"""
+    layer: IntArray
+    """(N,)"""
+    held: BoolArray
+    """(N,) whether a zone holds each"""
+
+    @classmethod
+    def of(cls, store: BodyStore) -> "BodyChanges":
+        """Copy the state of a body store."""
+        position, velocity, spin = store.position.copy(), store.velocity.copy(), store.angular_velocity.copy()
+        return cls(position, velocity, spin, store.layer.copy(), store.held_by_zone.copy())
+
+
 def far_away(scale: float) -> str:
     """Return why a body is too far from the origin, for a number of Box2D's lengths in a metre."""
     return f"farther than {FARTHEST_LENGTHS / scale:g} m from the origin 32-bit numbers do not resolve the slop"
@@ -110,12 +142,16 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
             TooManyWorldsError: Box2D has no room for another world.
         """
         super().__init__(settings)
-        self._store = Box2DBodies(setup, settings)
+        self._store = make_store(setup, settings)
+        self._zoned = self._store if isinstance(self._store, ZonedBox2DBodies) else None
         self._world = Box2DWorld(self._store, settings, setup.plane_reach)
         self._joints = WorldJoints(self._world, self._store)
+        self._drives = KinematicDrives(self._store, self._world) if setup.scene.drives else None
         self._field = ForceField(self._store)
         self._largest_spin = MAX_TURN * (1.0 - SPIN_ROUNDING) / settings.h
         self._log: ContactLog | None = None
+        self._has_entries = False
+        """whether the last record of the log has entries of zones, which do not last"""
         self._unobserved: tuple[float, FloatArray, FloatArray] | None = None
         """start time of the last step, s, and positions before and after it, which the next step shows the observer"""
         self._set_air(self._store.scene)
@@ -139,8 +175,9 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
 
     @property
     def _has_varying_forces(self) -> bool:
-        """Whether forces depend on the state, so that each substep has to be a step of Box2D."""
-        return self._has_wind or self._joints.has_springs or not self._field.empty
+        """Whether each substep has to be a step of Box2D: forces depend on the state, or there are drives or zones."""
+        forces = self._has_wind or self._joints.has_springs or not self._field.empty
+        return forces or self._drives is not None or self._zoned is not None
 
     @property
     def _has_forces(self) -> bool:
@@ -154,7 +191,10 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         """
         store, air = self._store, self._store.scene.world
         force, torque = store.force.copy(), store.torque.copy()
-        mass, moving = store.bodies.mass, store.moving
+        mass, moving = store.bodies.mass, store.moving & ~store.kinematic
+        gravity = store.gravity
+        if gravity.ndim == 2:  # some bodies have that of a zone
+            force += np.where(moving[:, None], mass[:, None] * (gravity - np.asarray(air.gravity)), 0.0)
         if self._has_wind:
             relative = store.velocity - np.asarray(air.wind)
             speed = np.hypot(relative[:, 0], relative[:, 1])[:, None]
@@ -187,14 +227,32 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         start = store.position.copy() if self._observer is not None else None
         if self._has_forces:
             self._apply_forces(time)
+        if self._drives is not None:
+            self._drives.plan(length)
         rows = world.raw_rows(1)
         changed = world.step(length, substeps, rows, 0)
         world.read(rows, 1, length, substeps)
-        if self._log is not None and changed:
+        if self._drives is not None:
+            self._drives.place()
+        if self._log is not None and (changed or self._has_entries):
             self._log.record(time, world.contact_batch())
+            self._has_entries = False
+        if self._zoned is not None:
+            self._visit_zones(time + length, self._zoned)
         if self._observer is not None and start is not None:
             self._observe_last()
             self._unobserved = time, start, store.position.copy()
+
+    def _visit_zones(self, time: float, store: ZonedBox2DBodies) -> None:
+        """Apply zones to the bodies that have entered or left one, and record the entries at a time, s."""
+        if store.detect(store.position):
+            before = BodyChanges.of(store)
+            if store.apply_zones():
+                self._update_bodies(before)
+        entries = store.tracker.drain_entries()
+        if self._log is not None and entries is not None:
+            self._log.record(time, join_batches(self._world.contact_batch(), entries))
+            self._has_entries = True
 
     def _observe_last(self) -> None:
         """Show the observer the last step but one, with the contacts that were found at its end."""
@@ -352,39 +410,52 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
             if sets_level(action):
                 apply_action(action, store)
                 return
-            before = store.position.copy(), store.velocity.copy(), store.angular_velocity.copy()
+            before = BodyChanges.of(store)
             scene, matrix, inverse_moment = store.scene, store.contact_matrix, store.inverse_moment
             leaving = apply_action(action, store)
             if store.contact_matrix is not matrix or store.inverse_moment is not inverse_moment:
                 self._joints.renew(self._world.update_surfaces())  # first: new shapes need the new values
             self._update_world(before, scene)
-            if store.scene is not scene or len(store.position) > len(before[0]):
+            if store.scene is not scene or len(store.position) > len(before.position):
                 self._set_air(store.scene)
             if leaving is not None:
                 self._remove_bodies(np.asarray([leaving]))
             self._world.extend_planes()
 
-    def _update_world(self, before: tuple[FloatArray, FloatArray, FloatArray], scene: Scene) -> None:
+    def _update_world(self, before: BodyChanges, scene: Scene) -> None:
         """Apply to the world what an action has changed in the body store.
 
         Args:
-            before: position (N, 2), velocity (N, 2) and angular velocity (N,) before it.
+            before: the bodies before it.
             scene: the scene before it.
         """
         store = self._store
-        position, velocity, spin = before
-        count = len(position)
         if store.scene.fixed != scene.fixed:
             pairs = enumerate(zip(scene.fixed, store.scene.fixed, strict=True))
             self._world.update_static([k for k, (old, new) in pairs if _has_other_form(old, new)])
             self._record_contacts()
-        for index in np.flatnonzero((store.position[:count] != position).any(axis=1)).tolist():
-            self._world.set_pose(index)
-        changed = (store.velocity[:count] != velocity).any(axis=1) | (store.angular_velocity[:count] != spin)
-        for index in np.flatnonzero(changed).tolist():
-            self._world.set_motion(index)
-        for index in range(count, len(store.position)):
+        self._update_bodies(before)
+        for index in range(len(before.position), len(store.position)):
             self._world.add(index)
+
+    def _update_bodies(self, before: BodyChanges) -> None:
+        """Apply to the world what has changed in the state of bodies."""
+        store, world = self._store, self._world
+        now, count = BodyChanges.of(store), len(before.position)
+        relayered = np.flatnonzero(now.layer[:count] != before.layer).tolist()
+        for index in relayered:
+            world.replace(index)
+        if relayered:
+            self._joints.renew(set(relayered))
+            self._record_contacts()
+        for index in np.flatnonzero((now.position[:count] != before.position).any(axis=1)).tolist():
+            world.set_pose(index)
+        held = now.held[:count] != before.held
+        for index in np.flatnonzero(held).tolist():
+            world.set_mass(index)
+        moved = (now.velocity[:count] != before.velocity).any(axis=1) | (now.spin[:count] != before.spin)
+        for index in np.flatnonzero(moved | held).tolist():
+            world.set_motion(index)
 
     def frame(self) -> Frame:
         """Return the present state."""
@@ -392,15 +463,27 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         position, velocity, angle = store.position.copy(), store.velocity.copy(), store.angle.copy()
         layer = store.layer.copy() if len(store.scene.layers) > 1 else None
         present, spin = store.present.copy(), store.angular_velocity.copy()
-        return Frame(self.time, position, velocity, angle, spin, present, None, layer)
+        visits = store.visits.copy() if store.scene.zones else None
+        drives = store.drives.copy() if store.scene.drives else None
+        return Frame(self.time, position, velocity, angle, spin, present, None, layer, visits, drives)
 
     def contacts(self) -> Contacts:
-        """Return the contacts since the last call; their impulses are nan, as Box2D does not tell them."""
+        """Return the contacts since the last call, and entries of zones.
+
+        The impulses of contacts are nan, as Box2D does not tell them; those of entries are 0.
+        """
         if self._log is None:
             self._log = ContactLog(len(self._store.scene.fixed_names), can_repeat_pairs=False)
-            self._log.record(self.time, self._world.contact_batch())
-        taken = self._log.take()
-        return replace(taken, impulse=np.full_like(taken.impulse, np.nan)) if len(taken) else taken
+            batch = self._world.contact_batch()
+            entries = None if self._zoned is None else self._zoned.tracker.drain_entries()
+            self._has_entries = entries is not None
+            self._log.record(self.time, batch if entries is None else join_batches(batch, entries))
+        taken, scene = self._log.take(), self._store.scene
+        if not len(taken):
+            return taken
+        colliders = len(scene.fixed) + len(scene.pockets)
+        is_entry: BoolArray = np.asarray(taken.pair.min(axis=1) < -colliders)
+        return replace(taken, impulse=np.tile(np.where(is_entry, 0.0, np.nan)[:, None], 2))
 
     def account(self) -> Mapping[Cause, float]:
         """Refuse: without the impulses of contacts no energy account is possible.

@@ -135,7 +135,7 @@ class Box2DWorld:
         for k in range(self._first):
             self._add_static(k)
         for index in np.flatnonzero(store.present).tolist():
-            self.add(index)
+            self._create(index)
         self._collect()
 
     def _new_world(self, settings: Settings) -> Any:
@@ -214,9 +214,15 @@ class Box2DWorld:
 
     def add(self, index: int) -> None:
         """Add a body in its present state."""
+        self._create(index)
+        self._collect()
+
+    def _create(self, index: int) -> None:
         store, bodies = self._store, self._store.bodies
-        fixed = bool(bodies.fixed[index])
+        fixed, driven = bool(bodies.fixed[index]), index in store.mounts
         create = self._world.create_static_body if fixed else self._world.create_dynamic_body
+        if driven:
+            create = self._world.create_kinematic_body
         body = create(position=self._vector(store.position[index]), rotation=box2d.make_rot(float(store.angle[index])))
         self._bodies[index] = body
         self._shapes[index] = []
@@ -228,8 +234,9 @@ class Box2DWorld:
         self._speeds[index] = self._speeds_of(index)
         if not fixed:
             body.apply_mass_from_shapes()  # finds the extents that decide about continuous collision
-            self.set_mass(index)
             self.set_motion(index)
+        if not (fixed or driven):
+            self.set_mass(index)
 
     def _roles(self, index: int) -> list[ShapeRole]:
         """Return the role of each kind of shape that a body has: one, or one for each kind of partner."""
@@ -248,9 +255,13 @@ class Box2DWorld:
         return [role for role in roles if role.mask]
 
     def set_mass(self, index: int) -> None:
-        """Set mass and moment of inertia of a body; 0 for a body that nothing can turn, so that it keeps its spin."""
+        """Set mass and moment of inertia of a body.
+
+        A body that nothing can turn gets the moment 0, so that it keeps its spin; one that a zone holds the mass 0,
+        which Box2D does not move.
+        """
         data, inverse_moment = box2d.MassData(), float(self._store.inverse_moment[index])
-        data.mass = float(self._store.bodies.mass[index])
+        data.mass = 0.0 if self._store.held_by_zone[index] else float(self._store.bodies.mass[index])
         data.rotational_inertia = self.scale**2 / inverse_moment if inverse_moment else 0.0
         self._bodies[index].mass_data = data
 
@@ -259,6 +270,12 @@ class Box2DWorld:
         body = self._bodies[index]
         body.linear_velocity = self._vector(self._store.velocity[index])
         body.angular_velocity = float(self._store.angular_velocity[index])
+
+    def set_velocity(self, index: int, velocity: tuple[float, float], spin: float) -> None:
+        """Set the velocities of a body, m/s and rad/s, in the world only."""
+        body = self._bodies[index]
+        body.linear_velocity = self._vector(velocity)
+        body.angular_velocity = spin
 
     def set_pose(self, index: int) -> None:
         """Set position and angle of a body to those in the store."""
@@ -362,10 +379,15 @@ class Box2DWorld:
                 coefficients = getattr(self._materials, role.coefficients)
                 shape.friction = float(coefficients.friction[surface])
                 shape.restitution = float(coefficients.restitution[surface])
-            if index >= 0 and not store.bodies.fixed[index]:
+            if index >= 0 and not store.bodies.fixed[index] and index not in store.mounts:
                 self.set_mass(index)
         self._collect()
         return replaced
+
+    def replace(self, index: int) -> None:
+        """Replace a body after a change of its layer; its contacts and joints end."""
+        self._replace(index)
+        self._collect()
 
     def _replace(self, index: int) -> None:
         """Replace a body by one with other shapes, in the same state.
@@ -374,7 +396,7 @@ class Box2DWorld:
         """
         damping = self._bodies[index].linear_damping
         self._remove_body(index)
-        self.add(index)
+        self._create(index)
         self._bodies[index].linear_damping = damping
 
     def set_gravity(self, gravity: tuple[float, float]) -> None:
@@ -401,9 +423,10 @@ class Box2DWorld:
 
     def _collect(self) -> None:
         """Collect the moving bodies, whose states are read at once."""
-        moving = [n for n in sorted(self._bodies) if n >= 0 and not self._store.bodies.fixed[n]]
+        store = self._store
+        moving = [n for n in sorted(self._bodies) if n >= 0 and not store.bodies.fixed[n] and n not in store.mounts]
         self.indices: IntArray = np.asarray(moving, np.int64)
-        """(M,) indices of the moving bodies"""
+        """(M,) indices of the moving bodies without a drive"""
         self._moving = box2d.Bodies()
         for index in moving:
             self._moving.append(self._bodies[index].id)

@@ -92,6 +92,8 @@ class BodyStore:
         self.inverse_moment: FloatArray = np.where(can_turn, 1.0 / bodies.moment, 0.0)
         self.mounts: dict[int, Mount] = {}
         """how drives hold the present bodies, by body index"""
+        self.kinematic: BoolArray = np.zeros(len(bodies), np.bool_)
+        """(N,) moves along its path whatever it collides with (kinematic)"""
         if self._all_mounts:
             self._rebuild_driven()
 
@@ -102,8 +104,6 @@ class BodyStore:
         self.mounts = {n: mount for n, mount in sorted(indices.items()) if self.present[n]}
         self.hinge: FloatArray = np.zeros((len(bodies), 2))
         """(N, 2) m, in the body's frame, the point about which it turns: its centre unless it is on a hinge"""
-        self.kinematic: BoolArray = np.zeros(len(bodies), np.bool_)
-        """(N,) moves along its path whatever it collides with (kinematic)"""
         for n, mount in self.mounts.items():
             self.hinge[n], self.kinematic[n] = mount.hinge, not isinstance(mount.drive, TorqueDrive)
             moment_about_hinge = about_hinge(mount, float(bodies.mass[n]), float(bodies.moment[n]))

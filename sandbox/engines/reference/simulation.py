@@ -16,6 +16,7 @@ from sandbox.engines.common.body_store import BodyStore, HasBodyStore
 from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch, ContactLog, join_batches
 from sandbox.engines.common.frame_rows import free_rows
 from sandbox.engines.common.kernel import warn_if_uncompiled
+from sandbox.engines.common.zoned_bodies import ZonedBodyStore
 from sandbox.engines.contract import Divergence, Exhaustion, Members, Observer
 from sandbox.engines.energy_ledger import Cause
 from sandbox.engines.reference.compiled_stepper import (
@@ -32,7 +33,6 @@ from sandbox.engines.reference.manifold import CONTACT_ROUNDING, Manifolds
 from sandbox.engines.reference.step import StepRecord, WorldState
 from sandbox.engines.reference.step_kernels import STOPPED, UNCHECKED
 from sandbox.engines.reference.world_batch import ConvexWorldBatch
-from sandbox.engines.reference.zones import ZonedBodyStore
 from sandbox.frame_table import FrameTable
 from sandbox.scene.compile.contacts import surface_parts
 from sandbox.scene.compile.scene import Scene

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import sandbox
 from sandbox.action import Impulse, Reshape, Spawn, Toggle
-from sandbox.engines.reference.zones import is_inside, make_zone_shapes
+from sandbox.engines.common.zoned_bodies import is_inside, make_zone_shapes
 from sandbox.engines.switching import SwitchableSimulation, start
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.bodies import Box
