@@ -169,8 +169,8 @@ def test_gravity_zone_acts_as_a_slope_up_and_down(engine: str) -> None:
 def test_gravity_zone_replaces_world_gravity_while_drag_persists(engine: str) -> None:
     """v̇ = g − k v from rest, with the gravity of the zone: v = g/k·(1 − e^(−kt)).
 
-    Drag on pymunk is exact in each substep; rk4 of the reference has an error of (k·h)⁴·k·T/120, 5e-14; Box2D's scheme is
-    of order 1, with an error below k·h.
+    Drag on pymunk is exact in each substep; rk4 of the reference has an error of (k·h)⁴·k·T/120, 5e-14; Box2D's scheme
+    is of order 1, with an error below k·h.
     """
     zone = {"position": [0.0, 0.0], "radius": 50.0, "gravity": [3.0, 1.0]}
     world = {"duration": 1.0, "gravity": [0.0, -9.81], "linear_drag": 0.8}

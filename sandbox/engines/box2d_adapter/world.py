@@ -1,4 +1,4 @@
-"""Bodies in a Box2D world: their creation, steps, state and contacts.
+"""Bodies in a Box2D world: their creation, steps and state.
 
 The world is in Box2D's units of length; see `limits`. All that comes from or goes to it passes here, in SI units. A
 body has its origin at its centre of mass. Each static collider is a static body of its own.
@@ -19,7 +19,8 @@ import numpy as np
 import numpy.typing as npt
 import pyb2d3 as box2d
 
-from sandbox.arrays import ComplexArray, FloatArray, IntArray
+from sandbox.arrays import FloatArray, IntArray
+from sandbox.engines.box2d_adapter.contacts import TouchingPairs
 from sandbox.engines.box2d_adapter.limits import (
     CLAMPED_LENGTHS,
     FARTHEST_LENGTHS,
@@ -32,7 +33,7 @@ from sandbox.engines.box2d_adapter.requirements import surfaces_in_use
 from sandbox.engines.common.body_store import BodyStore
 from sandbox.engines.common.colliders import wall_segments
 from sandbox.engines.common.collision_bits import collision_bits
-from sandbox.engines.common.contact_log import NO_CONTACTS, ContactBatch
+from sandbox.engines.common.contact_log import ContactBatch
 from sandbox.scene.description.base import BACKING
 from sandbox.scene.description.fixed import Plane, PlaneReach, Post, Wall, mask_of
 from sandbox.scene.description.world import Settings
@@ -98,15 +99,6 @@ class TooManyWorldsError(RuntimeError):
     """Box2D has no room for another world."""
 
 
-class TouchingPair:
-    """Pair of bodies that touch, by one or several of their shapes."""
-
-    __slots__ = ("normal", "pair", "point", "shapes")
-
-    def __init__(self, pair: tuple[int, int], normal: complex, point: complex) -> None:
-        self.pair, self.normal, self.point, self.shapes = pair, normal, point, 1
-
-
 class Box2DWorld:
     """A world with the bodies of a body store, by their indices."""
 
@@ -125,9 +117,7 @@ class Box2DWorld:
         self._bodies: dict[int, Any] = {}
         self._shapes: dict[int, list[tuple[ShapeRole, Any]]] = {}  # by the index of the body
         self._speeds: dict[int, list[float]] = {}  # m/s, of their surfaces
-        self._open: dict[tuple[int, int], TouchingPair] = {}
-        self._touching: dict[tuple[int, int], tuple[int, int]] = {}  # pair of bodies, by the ids of two shapes
-        self._batch: ContactBatch | None = NO_CONTACTS
+        self._pairs = TouchingPairs(self._first, self.scale)
         self.ground = self._world.create_static_body(position=(0.0, 0.0))
         """static body at the origin, for joints to the world"""
         self._set_reach(plane_reach)
@@ -417,9 +407,7 @@ class Box2DWorld:
         """Remove a body or static collider with its contacts. Its end events have no shapes and are ignored."""
         self._bodies.pop(index).destroy()
         del self._shapes[index]
-        self._open = {pair: contact for pair, contact in self._open.items() if index not in pair}
-        self._touching = {ids: pair for ids, pair in self._touching.items() if index not in pair}
-        self._batch = None
+        self._pairs.remove(index)
 
     def _collect(self) -> None:
         """Collect the moving bodies, whose states are read at once."""
@@ -469,7 +457,7 @@ class Box2DWorld:
         events = self._world.get_contact_events()
         if not (events.begin_count or events.end_count):
             return False
-        self._update_contacts(events)
+        self._pairs.update(events)
         return True
 
     def quick_bound(self, largest_spin: float) -> tuple[float, float, float]:
@@ -510,43 +498,9 @@ class Box2DWorld:
             store.angle[indices], store.angular_velocity[indices] = angle[-1], spin[-1]
         return states
 
-    def _update_contacts(self, events: Any) -> None:
-        """Update the open contacts by the events of a step: shapes that begin or cease to touch."""
-        self._batch = None
-        for event in events.begin_events():
-            a, b = event.shape_a, event.shape_b
-            pair = a.user_data - self._first, b.user_data - self._first
-            self._touching[a.id, b.id] = pair
-            known = self._open.get(pair)
-            if known is not None:
-                known.shapes += 1
-                continue
-            manifold = event.manifold
-            point = next(iter(manifold.points())).point
-            normal = complex(manifold.normal.x, manifold.normal.y)
-            self._open[pair] = TouchingPair(pair, normal, complex(point.x, point.y) / self.scale)
-        for event in events.end_events():
-            a, b = event.shape_a, event.shape_b
-            if a is None or b is None:  # destroyed
-                continue
-            pair = self._touching.pop((a.id, b.id))
-            contact = self._open[pair]
-            contact.shapes -= 1
-            if not contact.shapes:
-                del self._open[pair]
-
     def contact_batch(self) -> ContactBatch:
         """Return the present contacts. Box2D does not tell their impulses, which are nan."""
-        if self._batch is None:
-            contacts = [self._open[pair] for pair in sorted(self._open)]
-            if not contacts:
-                self._batch = NO_CONTACTS
-                return self._batch
-            pair = np.asarray([contact.pair for contact in contacts], np.int64)
-            unknown: ComplexArray = np.full(len(contacts), complex(math.nan, math.nan))
-            normal, point = (np.asarray([getattr(c, name) for c in contacts]) for name in ("normal", "point"))
-            self._batch = ContactBatch(pair[:, 0].copy(), pair[:, 1].copy(), unknown, normal, point)
-        return self._batch
+        return self._pairs.batch()
 
     def close(self) -> None:
         """Destroy the world; nothing of it may be used afterwards."""
