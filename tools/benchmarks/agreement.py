@@ -11,7 +11,7 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import loads
 from sandbox.trajectory import Frame
 from sandbox.window.render.palette import BACKGROUND
-from tools.benchmarks import connected, drawing, peers
+from tools.benchmarks import box2d_peer, connected, drawing, peers
 from tools.benchmarks.workloads import particles_in_flight
 
 
@@ -27,6 +27,22 @@ def pile(scene: Scene) -> None:
     # after the balls.
     pairs = np.where(found.contact_pair < 0, len(scene.bodies) - 1 - found.contact_pair, found.contact_pair)
     assert {frozenset(pair) for pair in pairs.tolist()} == {frozenset(map(int, row[1:3])) for row in contacts}
+
+
+def pile_on_box2d(scene: Scene) -> None:
+    """Check half a second of balls on box2d against the bare loop: positions, and the number of pairs that touch."""
+    short = scene.model_copy(update={"world": scene.world.model_copy(update={"duration": 0.5})})
+    bare, found = box2d_peer.run_arrays(short), run(short, "box2d", audit=False)
+    # The same calls with the same numbers; the first frame of ours is in 64-bit numbers, as the scene.
+    assert np.array_equal(found.position[1:], bare.position[1:] / box2d_peer.scale_of(short))
+    assert len(found.contact_time) == len(bare.began)
+
+
+def pyramid_stands(scene: Scene, steps: int) -> None:
+    """Check that a pyramid stands on both engines: its boxes move by less than a tenth of a box."""
+    for engine in ("box2d", "pymunk"):
+        moved = stepped(scene, engine, steps).position - scene.bodies.position
+        assert np.abs(moved).max() < 0.1 * float(scene.bodies.radius.min()), engine
 
 
 def balls(scene: Scene) -> None:

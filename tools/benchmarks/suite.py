@@ -1,6 +1,6 @@
 """The rows of the benchmarks: engines, pictures and commands, followed by those of games."""
 
-from tools.benchmarks import agreement, connected, drawing, peers
+from tools.benchmarks import agreement, box2d_peer, connected, drawing, peers
 from tools.benchmarks.environments import ENVIRONMENTS
 from tools.benchmarks.games import GAMES
 from tools.benchmarks.row import Bench
@@ -23,6 +23,7 @@ SPARKS = ("world.duration=1.0", "solver.record_every=1")
 PILE = scene("benchmark/pile")
 TOWER = scene("benchmark/tower")
 SETTLED = scene("benchmark/pile", "world.duration=1.0")
+PYRAMID = scene("benchmark/pyramid", "solver.dt=0.016666666666666666", "solver.substeps=4")
 BOUNCE = scene("tutorial/bounce")
 LOW = scene("tutorial/bounce", "ball.ball.position=[0, 0.55]", "world.duration=0.25")
 
@@ -58,6 +59,30 @@ BENCHES = (
         lambda: running(PILE, engine="reference"),
         lambda: peers.pile_loop(PILE),
         0.6,
+    ),
+    Bench(
+        "pile-box2d",
+        "sandbox.run on the 1,000-ball pile on box2d, not audited / a bare loop over the binding that records the same",
+        lambda: running(PILE, engine="box2d", audit=False),
+        lambda: box2d_peer.loop(PILE),
+        1.05,
+        same=lambda: agreement.pile_on_box2d(PILE),
+    ),
+    Bench(
+        "one-ball-box2d",
+        "sandbox.run of one ball on a plane on box2d, not audited, 10,000 steps / the bare loop over the binding",
+        lambda: running(balls_on_plane(1, 10_000), engine="box2d", audit=False),
+        lambda: box2d_peer.loop(balls_on_plane(1, 10_000)),
+        same=lambda: agreement.pile_on_box2d(balls_on_plane(1, 100)),
+    ),
+    Bench(
+        "pyramid-box2d",
+        "5 s of a pyramid of 55 boxes on box2d with 4 substeps / on pymunk with 10 iterations; both stepped and read",
+        lambda: stepping(PYRAMID, 300, contacts=False, engine="box2d"),
+        lambda: stepping(
+            scene("benchmark/pyramid", "solver.dt=0.016666666666666666", "solver.iterations=10"), 300, contacts=False
+        ),
+        same=lambda: agreement.pyramid_stands(PYRAMID, 300),
     ),
     *(
         Bench(
