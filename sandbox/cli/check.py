@@ -170,7 +170,7 @@ def _check(name: str, overrides: tuple[str, ...], engine: str | None, cover: flo
     rules = fitting_rules(scene, scene_path(name))
     items = bill(scene)
     missing = {each.name: each.missing(scene, scene.solver) for each in ENGINES.values()}
-    safe = largest_safe_dt(scene)
+    safe = largest_safe_dt(scene, engine=engine)
     answer = run_preflight(scene, engine=engine, cover=cover)
     return scene, CheckDocument(
         scene=name,
@@ -184,7 +184,7 @@ def _check(name: str, overrides: tuple[str, ...], engine: str | None, cover: flo
         safe_dt_known=safe is not None,
         trial=answer.tried,
         warnings=answer.warnings,
-        notes=[*notes(scene), *answer.refuted],
+        notes=[*notes(scene, engine), *answer.refuted],
         game=None if rules is None else GameSummary(scene.play.game or "", tuple(rules.controls)),
     )
 

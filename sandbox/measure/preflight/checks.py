@@ -20,6 +20,8 @@ from sandbox.measure.preflight.tunnelling import (
     TunnellingRisk,
     detection_factor,
     entry_warnings,
+    intervals,
+    is_continuous,
     tunnelling_risks,
 )
 from sandbox.scene.compile.contacts import ContactMatrix, contact_matrix, reachable_layers
@@ -66,6 +68,9 @@ FAILED = "failed_forecast"
 EVENT_DRIVEN = frozenset({"exact"})
 """Engines without a time step, which refuse overlaps."""
 
+SINGLE_PRECISION = frozenset({"box2d"})
+"""Engines that compute in 32-bit numbers."""
+
 
 @dataclass(frozen=True)
 class PreflightContext:
@@ -73,6 +78,18 @@ class PreflightContext:
 
     scene: Scene
     settings: Settings
+    engine: str | None = None
+    """name of the engine; None for all"""
+
+    @property
+    def is_single_precision(self) -> bool:
+        """Whether the engine computes in 32-bit numbers."""
+        return self.engine in SINGLE_PRECISION
+
+    @property
+    def is_continuous(self) -> bool:
+        """Whether the engine stops bodies at static objects, however fast they are."""
+        return is_continuous(self.settings, self.engine)
 
     @cached_property
     def matrix(self) -> ContactMatrix:
@@ -108,7 +125,7 @@ def warnings(scene: Scene, settings: Settings | None = None, engine: str | None 
         settings: settings of the run; default: those of the scene.
         engine: name of the engine; default: the checks of all engines.
     """
-    context = PreflightContext(scene, scene.solver if settings is None else settings)
+    context = PreflightContext(scene, scene.solver if settings is None else settings, engine)
     found: list[Diagnostic] = []
     for name, check in CHECKS.items():
         if engine is not None and not check.concerns(engine):
@@ -130,15 +147,20 @@ def _duration(scene: Scene, settings: Settings) -> Iterator[Diagnostic]:
         yield Diagnostic("duration", message, {"dt": settings.dt, "duration": scene.world.duration})
 
 
-def _tunnelling(scene: Scene, settings: Settings, matrix: ContactMatrix) -> Iterator[Diagnostic]:
-    times = detection_factor(settings)
-    at_risk = [passage for passage in tunnelling_risks(scene, matrix) if passage.odds(settings.h / times) > ROUNDING]
+def _tunnelling(context: PreflightContext) -> Iterator[Diagnostic]:
+    scene, settings, times = context.scene, context.settings, detection_factor(context.settings)
+    risks = tunnelling_risks(scene, context.matrix)
+    if context.is_continuous:
+        risks = [passage for passage in risks if passage.thing in (ANOTHER, ANOTHER_BODY)]
+    count = intervals(settings, context.engine)
+    h, interval = settings.dt / count, "substep" if count == settings.substeps else "step"
+    at_risk = [passage for passage in risks if passage.odds(h / times) > ROUNDING]
     unstruck = {passage.thing for passage in at_risk if not passage.struck}
     at_risk = [passage for passage in at_risk if not passage.struck or passage.thing not in unstruck]
     for passage, things in group_alike(at_risk):
-        odds = passage.odds(settings.h / times)
-        safe = passage.safe_h * settings.substeps * times
-        displacement = passage.speed * settings.h
+        odds = passage.odds(h / times)
+        safe = passage.safe_h * count * times
+        displacement = passage.speed * h
         thing = passage.thing if passage.thing in (ANOTHER, ANOTHER_BODY) else repr(passage.thing)
         if things:
             thing += f" and {things:,} other{'s' if things > 1 else ''} like it"
@@ -148,7 +170,7 @@ def _tunnelling(scene: Scene, settings: Settings, matrix: ContactMatrix) -> Iter
         if passage.struck:
             ball += ", struck by others,"
         message = (
-            f"{ball} can approach {thing} at up to {passage.speed:.4g} m/s, {displacement:.3g} m per substep, and "
+            f"{ball} can approach {thing} at up to {passage.speed:.4g} m/s, {displacement:.3g} m per {interval}, and "
             f"tunnel through it undetected: odds up to {100 * odds:.3g} %; dt <= {floor_3_digits(safe)} s is safe"
         )
         details: Details = {
@@ -164,13 +186,14 @@ def _tunnelling(scene: Scene, settings: Settings, matrix: ContactMatrix) -> Iter
         yield Diagnostic("tunnelling", message, details)
 
 
-def _depth(scene: Scene, settings: Settings, matrix: ContactMatrix) -> Iterator[Diagnostic]:
+def _depth(context: PreflightContext) -> Iterator[Diagnostic]:
     """Yield bodies that can penetrate a plane by more than their half width before the contact is detected.
 
     A contact is detected at the end of a substep, up to v·h deep. `bisect`, `swept` and `shrink` return to the time of
-    impact.
+    impact; continuous collision stops the body there.
     """
-    if settings.detection not in (None, "discrete"):
+    scene, settings, matrix = context.scene, context.settings, context.matrix
+    if settings.detection not in (None, "discrete") or context.is_continuous:
         return
     bodies, speeds = scene.bodies, SpeedBounds(scene, matrix)
     layers = reachable_layers(scene, bodies)
@@ -220,11 +243,13 @@ def _iterations(settings: Settings, matrix: ContactMatrix) -> Iterator[Diagnosti
         yield Diagnostic("iterations", message, {"iterations": settings.iterations})
 
 
-def _rounding(scene: Scene, settings: Settings, matrix: ContactMatrix) -> Iterator[Diagnostic]:
-    bodies = scene.bodies
-    colliders = matrix.touches & ~bodies.fixed
+def _rounding(context: PreflightContext) -> Iterator[Diagnostic]:
+    settings, bodies = context.settings, context.scene.bodies
+    colliders = context.matrix.touches & ~bodies.fixed
     if colliders.any():
-        spacing = np.spacing(np.abs(bodies.position[colliders]).max(axis=1)) / bodies.thin[colliders]
+        farthest = np.abs(bodies.position[colliders]).max(axis=1)
+        size = np.spacing(farthest.astype(np.float32) if context.is_single_precision else farthest).astype(np.float64)
+        spacing = size / bodies.thin[colliders]
         worst = float(spacing.max())
         if worst > MAX_ROUNDING:
             name = bodies.names[int(np.flatnonzero(colliders)[np.argmax(spacing)])]
@@ -235,7 +260,6 @@ def _rounding(scene: Scene, settings: Settings, matrix: ContactMatrix) -> Iterat
             yield Diagnostic("rounding", message, {"ball": name, "share": worst})
             return
         displacement = np.hypot(*bodies.velocity[colliders].T) * settings.h
-        size = np.spacing(np.abs(bodies.position[colliders]).max(axis=1))
         lost = np.divide(0.5 * size, displacement, out=np.zeros_like(displacement), where=displacement > 0.0)
         worst = float(lost.max())
         if worst > MAX_LOST_FRACTION:
@@ -250,12 +274,12 @@ def _rounding(scene: Scene, settings: Settings, matrix: ContactMatrix) -> Iterat
 
 CHECKS: dict[str, Check] = {
     "duration": Check(lambda s: _duration(s.scene, s.settings)),
-    "tunnelling": Check(lambda s: _tunnelling(s.scene, s.settings, s.matrix)),
-    "depth": Check(lambda s: _depth(s.scene, s.settings, s.matrix)),
+    "tunnelling": Check(_tunnelling),
+    "depth": Check(_depth),
     "entry": Check(lambda s: entry_warnings(s.scene, s.settings, s.matrix)),
     "overlap": Check(lambda s: overlap_warnings(s.scene, s.matrix, s.close)),
     "iterations": Check(lambda s: _iterations(s.settings, s.matrix), frozenset({"pymunk"})),
-    "rounding": Check(lambda s: _rounding(s.scene, s.settings, s.matrix)),
+    "rounding": Check(_rounding),
     "kicks": Check(lambda s: kick_warnings(s.scene, s.settings, s.matrix)),
     "joints": Check(lambda s: joint_start_warnings(s.scene)),
     "springs": Check(lambda s: spring_warnings(s.scene, s.settings)),

@@ -5,7 +5,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from sandbox.measure.preflight.diagnostic import Diagnostic
+from sandbox.engines.box2d_adapter.engine import Box2DEngine
+from sandbox.engines.box2d_adapter.limits import FARTHEST_LENGTHS, MAX_TURN, scale_for
+from sandbox.measure.preflight.diagnostic import Details, Diagnostic
 from sandbox.measure.preflight.predictability import break_notes, horizon_notes
 from sandbox.measure.preflight.speed_bound import top_speeds
 from sandbox.scene.compile.contacts import contact_matrix
@@ -18,9 +20,15 @@ MAX_OUTLINES = 20
 """Largest number of outlines that get a note each."""
 
 
-def notes(scene: Scene) -> list[Diagnostic]:
-    """Return notes: units that look like pixels, concave outlines, limits of the audit, predictability."""
+def notes(scene: Scene, engine: str | None = None) -> list[Diagnostic]:
+    """Return notes: units that look like pixels, concave outlines, limits of the audit, predictability.
+
+    Args:
+        scene: the scene.
+        engine: with "box2d", its 32-bit numbers and lengths for this scene too.
+    """
     return [
+        *(_box2d(scene) if engine == "box2d" else ()),
         *_pixels(scene),
         *_flight(scene),
         *_outlines(scene),
@@ -105,6 +113,31 @@ def _pieces(element: BodySource) -> list[tuple[int | None, int]]:
                 found.append((outlines, count))
             outlines += 1
     return found
+
+
+def _box2d(scene: Scene) -> Iterator[Diagnostic]:
+    """Yield what 32-bit numbers and the lengths for which Box2D is tuned mean for a scene."""
+    settings = Box2DEngine().resolve(scene, scene.solver)
+    bodies, slop, scale = scene.bodies, settings.slop, scale_for(settings)
+    moving = ~bodies.fixed
+    if not moving.any() or slop is None:
+        return
+    farthest = float(np.abs(bodies.position[moving]).max())
+    spacing = float(np.spacing(np.float32(farthest)))
+    width = 2.0 * float(bodies.thin[moving].min())
+    margin = MARGIN_SLOPS * slop
+    message = (
+        f"box2d: one of its lengths is {1.0 / scale:.3g} m, so that its fixed slop is {slop:.3g} m; contacts act from "
+        f"{margin:.3g} m apart, {margin / width:.2g} of the narrowest body's width; positions {farthest:.3g} m from "
+        f"the origin are multiples of {spacing:.2g} m, {spacing / slop:.2g} of the slop; no body may get "
+        f"{FARTHEST_LENGTHS / scale:.3g} m away or turn faster than {MAX_TURN / settings.h:.3g} rad/s"
+    )
+    details: Details = {"slop": slop, "margin": margin, "spacing": spacing, "scale": scale}
+    yield Diagnostic("box2d", message, details)
+
+
+MARGIN_SLOPS = 4.0
+"""Distance, in slops, from which on Box2D counts bodies as touching: `B2_SPECULATIVE_DISTANCE`"""
 
 
 def _audit(scene: Scene) -> Iterator[Diagnostic]:

@@ -53,18 +53,42 @@ class TunnellingRisk:
         return 1.0 - self.reach / displacement if displacement > self.reach else 0.0
 
 
-def largest_safe_dt(scene: Scene, settings: Settings | None = None) -> float | None:
+CONTINUOUS = frozenset({"box2d"})
+"""Engines with continuous collision of moving bodies with static ones, by the setting `continuous`."""
+
+
+def is_continuous(settings: Settings, engine: str | None) -> bool:
+    """Return whether an engine stops bodies at static objects, however fast they are."""
+    return engine in CONTINUOUS and settings.continuous is not False
+
+
+def intervals(settings: Settings, engine: str | None) -> int:
+    """Return into how many intervals, at whose ends contacts are found, an engine divides a step.
+
+    Box2D finds them once in each step, before its substeps.
+    """
+    return 1 if engine in CONTINUOUS else settings.substeps
+
+
+def largest_safe_dt(scene: Scene, settings: Settings | None = None, engine: str | None = None) -> float | None:
     """Return the largest dt at which no body of the scene can tunnel, s, at its number of substeps.
 
     It is infinite if no body can tunnel at any dt, and None if bodies can collide and are accelerated by an amount that
     no formula bounds.
+
+    Args:
+        scene: the scene.
+        settings: settings of the run; default: those of the scene.
+        engine: name of the engine; default: one that detects contacts at the end of a step.
     """
     settings = scene.solver if settings is None else settings
     matrix = contact_matrix(scene)
     found, times = tunnelling_risks(scene, matrix), detection_factor(settings)
+    if is_continuous(settings, engine):
+        found = [passage for passage in found if passage.thing in (ANOTHER, ANOTHER_BODY)]
     if found and math.isfinite(times) and SpeedBounds(scene, matrix).unknown:
         return None
-    return min((p.safe_h for p in found), default=math.inf) * settings.substeps * times
+    return min((p.safe_h for p in found), default=math.inf) * intervals(settings, engine) * times
 
 
 def detection_factor(settings: Settings) -> float:

@@ -437,7 +437,7 @@ def setting_warnings(scene: Scene, engine: str, settings: Settings) -> list[Diag
     limits = [float(each.details["safe_dt"]) for each in found if each.kind == "tunnelling"]
     if not limits:
         return found
-    safe = largest_safe_dt(scene, settings)
+    safe = largest_safe_dt(scene, settings, engine)
     # It is unknown if an unbounded cause accelerates bodies; then the speeds in the diagnostics decide.
     effect = "prevents tunnelling at these speeds" if safe is None else "prevents tunnelling"
     safe = min(limits) if safe is None else safe

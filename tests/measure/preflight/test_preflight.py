@@ -24,6 +24,30 @@ def bullet(speed: float, radius: float, thickness: float, solver: str = "") -> S
     )
 
 
+def test_continuous_collision_of_box2d_leaves_only_moving_bodies_at_risk() -> None:
+    """The bullet itself is stopped at the wall on box2d, see `tests/engines/test_box2d.py`."""
+    scene = bullet(1e3, 0.01, 0.01, "dt = 0.01")
+    kinds = {engine: {warning.kind for warning in warnings(scene, engine=engine)} for engine in ("pymunk", "box2d")}
+    assert "tunnelling" in kinds["pymunk"] and "tunnelling" not in kinds["box2d"]
+    assert largest_safe_dt(scene, engine="box2d") == math.inf
+    discrete = scene.solver.replace(continuous=False)
+    assert "tunnelling" in {warning.kind for warning in warnings(scene, discrete, "box2d")}
+    assert largest_safe_dt(scene, discrete, "box2d") == largest_safe_dt(scene)
+
+
+def test_box2d_rounds_positions_to_32_bits() -> None:
+    """Float32 has 24 bits: 4,096 m from the origin positions are multiples of 2⁻¹¹ m, 5 % of a radius of 10 mm."""
+    scene = loads(
+        "[[plane]]\npoint = [0, 0]\nnormal = [0, 1]\n[[ball]]\nname = 'b'\nposition = [4100, 1]\nradius = 0.01\n"
+    )
+    assert "rounding" not in {warning.kind for warning in warnings(scene, engine="pymunk")}
+    (found,) = [warning for warning in warnings(scene, engine="box2d") if warning.kind == "rounding"]
+    assert found.details["share"] == pytest.approx(2.0**-11 / 0.01, rel=1e-12)
+    (note,) = [note for note in notes(scene, "box2d") if note.kind == "box2d"]
+    assert note.details["spacing"] == 2.0**-11
+    assert "box2d" not in {note.kind for note in notes(scene)}
+
+
 @given(st.floats(1.0, 1e6), st.floats(1e-3, 1.0), st.floats(0.0, 1.0), st.floats(1e-6, 10.0), st.integers(1, 9))
 def test_tunnelling_odds_are_zero_up_to_the_safe_dt_and_then_grow(
     v: float, r: float, w: float, dt: float, substeps: int
