@@ -81,6 +81,7 @@ DEMANDED = {
     "benchmark/pile": {*FREE_FALL, *COLLISIONS, Demand.BALL_PLANE, Demand.FRICTION, Demand.ROTATION},
     "benchmark/two_balls": COLLISIONS,
     "benchmark/pyramid": {*FREE_FALL, Demand.POLYGONS, Demand.FRICTION, Demand.ROTATION},
+    "benchmark/far_pyramid": {*FREE_FALL, Demand.POLYGONS, Demand.FRICTION, Demand.ROTATION},
     "benchmark/tower": {*FREE_FALL, Demand.POLYGONS, Demand.FRICTION, Demand.ROTATION},
     "billiards/8-ball": POCKETED,
     "billiards/9-ball": POCKETED,
@@ -147,6 +148,8 @@ DEMANDED = {
         Demand.ROTARY_LIMITS,
         Demand.ROTATION,
     },
+    "benchmark/restitution_row": {*FREE_FALL, Demand.BALL_PLANE, Demand.RESTITUTION},
+    "benchmark/friction_ramp": BOX,
     "joints/atwood": {*FREE_FALL, Demand.PULLEYS},
     "joints/slider_crank": {
         Demand.TRANSLATION,
