@@ -132,11 +132,19 @@ DETECTION_SETUPS = (
 """Engine configurations for scenes in which the detection of impacts matters."""
 
 
+SUBSTEPPED_SETUPS = {"box2d": EngineSetup("box2d, 4 substeps", "box2d", {"substeps": 4})}
+"""Second configurations of engines without their own ones above, by engine."""
+
+
 def setups_of_engines(setups: Sequence[EngineSetup], engines: Sequence[str] | None) -> tuple[EngineSetup, ...]:
     """Return the configurations of some engines, default all; an engine without one runs with default settings."""
     names = tuple(ENGINES) if engines is None else tuple(engines)
-    others = (EngineSetup(name, name) for name in names if all(setup.engine != name for setup in setups))
-    return (*(setup for setup in setups if setup.engine in names), *others)
+    found = [setup for setup in setups if setup.engine in names]
+    for name in names:
+        if all(setup.engine != name for setup in setups):
+            found.append(EngineSetup(name, name))
+            found += [SUBSTEPPED_SETUPS[name]] if name in SUBSTEPPED_SETUPS else []
+    return tuple(found)
 
 
 Scale = Literal["log", "linear", "whole"]

@@ -12,13 +12,20 @@ from sandbox.engines.common.base import box2d_settings_in
 from sandbox.engines.common.colliders import StaticColliders, static_colliders
 from sandbox.engines.tabletop.requirements import pockets_at, unsupported_on_surface
 from sandbox.resource_limits import MEMORY, PAIRS
-from sandbox.scene.compile.demands import BALLS, FLOOR, SURFACES, Demand, on_floor, unmodelled
+from sandbox.scene.compile.demands import BALLS, FLOOR, SURFACES, Demand, demands, on_floor, unmodelled
 from sandbox.scene.compile.derived import derived_once
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
 from sandbox.scene.description.world import Settings
 from sandbox.scene.geometry.neighbours import near_pairs
 from sandbox.scene.geometry.vectors import nearest_fractions
+
+REASONS = {
+    Demand.DRAG: "with drag the time of an impact is the root of no polynomial",
+    Demand.ZONES: "a change of gravity or layer within a flight is no event of this engine",
+    Demand.ONE_WAY: "whether a wall stops a ball depends on its path before, which an event does not keep",
+}
+"""Why it does not model a demand that other engines of balls model"""
 
 CAPABILITIES = BALLS - {Demand.DRAG} | FLOOR | SURFACES - {Demand.ONE_WAY}
 """Demands that the engine models"""
@@ -143,6 +150,8 @@ def overlap_message(first: str, second: str, depth: float) -> str:
 def unsupported(setup: Setup, settings: Settings) -> tuple[str, ...]:
     """Return each demand and setting of a scene that the engine does not support."""
     missing = unmodelled(setup, CAPABILITIES) + box2d_settings_in(settings)
+    wanted = demands(setup)
+    missing += [f"{demand}: {reason}" for demand, reason in REASONS.items() if demand in wanted]
     for key in STEPS + OVERLAP + SPRINGS:
         stated = getattr(settings, key)
         if stated is not None:
