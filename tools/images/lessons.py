@@ -213,6 +213,19 @@ def springs(axes: Axes) -> None:
     axes.legend()
 
 
+def machines(axes: Axes) -> None:
+    """Draw the piston of a slider-crank, and the formula."""
+    run = sandbox.run(sandbox.load("slider_crank"), "reference", audit=False)
+    phi = 2.0 * np.pi * run.time
+    axes.plot(run.time, run.position[:, 1, 0], color=BLUE, linewidth=4, alpha=0.5, label="piston on reference")
+    axes.plot(
+        run.time, 0.5 * np.cos(phi) + np.sqrt(1.5**2 - (0.5 * np.sin(phi)) ** 2), "k", linewidth=1, label="formula"
+    )
+    axes.plot(run.time, run.position[:, 0, 0], color=ORANGE, label="middle of the crank")
+    axes.set(xlabel="time, s", ylabel="x, m")
+    axes.legend(loc=(0.62, 0.31))
+
+
 def figure(draw: Callable[[Axes], None]) -> Callable[[Path], None]:
     """Return a function that writes the picture of a figure."""
 
@@ -242,4 +255,5 @@ LESSONS = (
     tunnelling,
     billiards,
     springs,
+    machines,
 )
