@@ -57,7 +57,7 @@ def _colours() -> st.SearchStrategy[str]:
 
 @st.composite
 def _elements(draw: st.DrawFn, required: Document, optional: Document, materials: list[str]) -> Document:
-    optional = {**optional, **_coefficients(), "colour": _colours()}
+    optional = {**optional, **_coefficients(), "surface_speed": numbers(-10, 10), "colour": _colours()}
     if materials:
         optional["material"] = st.sampled_from(materials)
     return dict(draw(st.fixed_dictionaries(required, optional=optional)))
@@ -248,8 +248,11 @@ def _joints(draw: st.DrawFn, names: list[str]) -> Document:
         "spring": {"stiffness": coefficient, "damping": coefficient, "rest_length": coefficient},
         "rotary_spring": {"stiffness": coefficient, "rest_angle": numbers(-3, 3)},
     }
+    if len(names) > 1:
+        kinds["pulley"] = {"wheels": st.just([[-97.5, 98.5], [96.5, 99.5]]), "ratio": coefficient}
     kind = draw(st.sampled_from(list(kinds)))
-    between = st.lists(st.sampled_from(names), min_size=1, max_size=2, unique=True)
+    least = 2 if kind == "pulley" else 1
+    between = st.lists(st.sampled_from(names), min_size=least, max_size=2, unique=True)
     joint = st.fixed_dictionaries({"between": between, **kinds[kind]}, optional={"collide": st.booleans()})
     return {"kind": kind, **draw(joint)}
 

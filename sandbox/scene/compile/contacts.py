@@ -234,7 +234,8 @@ class ContactMatrix:
     def moving_surfaces(self) -> int:
         """Number of surfaces with a speed and friction against another that can touch them."""
         rubs = np.asarray((self.touching & (self.surfaces.friction > 0.0)).any(axis=1))
-        return int(np.count_nonzero(np.asarray([each.speed != 0.0 for each in self.surfaces.surfaces]) & rubs))
+        moves = np.asarray([each.speed != 0.0 for each in self.surfaces.surfaces], np.bool_)
+        return int(np.count_nonzero(moves & rubs))
 
     @property
     def friction(self) -> float:
