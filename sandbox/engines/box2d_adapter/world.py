@@ -116,7 +116,7 @@ class Box2DWorld:
         self._first = len(store.scene.fixed)  # user data of shapes: index + number of static colliders
         self._bodies: dict[int, Any] = {}
         self._shapes: dict[int, list[tuple[ShapeRole, Any]]] = {}  # by the index of the body
-        self._speeds: dict[int, list[float]] = {}  # m/s, of their surfaces
+        self._speeds: dict[int, list[float]] = {}  # m/s, other than 0, of the surfaces of shapes
         self._pairs = TouchingPairs(self._first, self.scale)
         self.ground = self._world.create_static_body(position=(0.0, 0.0))
         """static body at the origin, for joints to the world"""
@@ -182,7 +182,10 @@ class Box2DWorld:
         coefficients = getattr(self._materials, role.coefficients)
         material.friction = float(coefficients.friction[surface])
         material.restitution = float(coefficients.restitution[surface])
-        material.tangent_speed = self._store.contact_matrix.surfaces.surfaces[surface].speed * self.scale
+        speed = self._store.contact_matrix.surfaces.surfaces[surface].speed
+        if speed:
+            material.tangent_speed = speed * self.scale
+            self._speeds.setdefault(index, []).append(speed)
         shape_def.material = material
         shape_filter = box2d.Filter()
         shape_filter.category_bits, shape_filter.mask_bits = role.categories, role.mask
@@ -197,10 +200,14 @@ class Box2DWorld:
             return [int(self._store.contact_matrix.surfaces.of_fixed[-1 - index])] * len(self._shapes[index])
         return [surface for _ in self._roles(index) for surface, _ in self._geometries(index)]
 
-    def _speeds_of(self, index: int) -> list[float]:
-        """Return the speeds of the surfaces of the shapes of a body or static collider, m/s."""
+    def _with_new_speed(self) -> set[int]:
+        """Return the bodies and static colliders whose surfaces have another speed than their shapes."""
         surfaces = self._store.contact_matrix.surfaces.surfaces
-        return [surfaces[surface].speed for surface in self._surfaces_of(index)]
+        speeds = [surface.speed for surface in surfaces]
+        if not (self._speeds or any(speeds)):
+            return set()
+        wanted = {index: [speeds[k] for k in self._surfaces_of(index) if speeds[k]] for index in self._shapes}
+        return {index for index in self._shapes if self._shapes[index] and wanted[index] != self._speeds.get(index, [])}
 
     def add(self, index: int) -> None:
         """Add a body in its present state."""
@@ -221,7 +228,6 @@ class Box2DWorld:
                 for surface, geometry in self._geometries(index):
                     definition = self._shape_def(index, surface, role, int(bodies.group[index]))
                     self._shapes[index].append((role, body.create_shape(definition, geometry)))
-        self._speeds[index] = self._speeds_of(index)
         if not fixed:
             body.apply_mass_from_shapes()  # finds the extents that decide about continuous collision
             self.set_motion(index)
@@ -300,7 +306,6 @@ class Box2DWorld:
             for geometry in self._static_geometries(collider):
                 shape = body.create_shape(self._shape_def(index, surface, role), geometry)
                 self._shapes[index].append((role, shape))
-        self._speeds[index] = self._speeds_of(index)
 
     def _origin_of(self, collider: Plane | Wall | Post) -> tuple[float, float]:
         """Return the position of the body of a static collider; of a plane, the point nearest to the middle."""
@@ -353,14 +358,14 @@ class Box2DWorld:
         replaced: set[int] = set()
         store, was_split = self._store, self._materials.is_split
         self._materials = self._shape_materials()
+        with_new_speed = self._with_new_speed()
         for index in list(self._shapes):
-            has_new_speed = bool(self._shapes[index]) and self._speeds_of(index) != self._speeds.get(index)
             if index < 0:
-                if has_new_speed:
+                if index in with_new_speed:
                     self._replace_static(-1 - index)
                 continue
-            is_new = not self._shapes[index] and store.contact_matrix.touches[index]
-            if is_new or has_new_speed or (self._materials.is_split != was_split and not store.bodies.fixed[index]):
+            is_new = index in with_new_speed or (not self._shapes[index] and store.contact_matrix.touches[index])
+            if is_new or (self._materials.is_split != was_split and not store.bodies.fixed[index]):
                 self._replace(index)
                 replaced.add(index)
         for index, shapes in self._shapes.items():
@@ -407,6 +412,7 @@ class Box2DWorld:
         """Remove a body or static collider with its contacts. Its end events have no shapes and are ignored."""
         self._bodies.pop(index).destroy()
         del self._shapes[index]
+        self._speeds.pop(index, None)
         self._pairs.remove(index)
 
     def _collect(self) -> None:
