@@ -263,6 +263,8 @@ def _is_tethered(scene: Scene, bodies: Bodies) -> BoolArray:
     """Return which bodies are static or connected by joints to the world or to a static body, (N,)."""
     links, found = scene.links.of(*ANCHORED_KINDS), bodies.fixed.copy()
     found[links.b[links.a < 0]] = True
+    pulleys = scene.links.of(LinkKind.PULLEY)
+    found[pulleys.a] = found[pulleys.b] = True
     a, b = links.a[links.a >= 0], links.b[links.a >= 0]
     count = -1
     while (now := int(found.sum())) != count:
