@@ -103,6 +103,7 @@ def joint_segments(view: DrawContext) -> JointSegments:
             high[over] = np.maximum(high[over], view.camera.to_screen(wheel))
         is_visible &= (high > -margin).all(axis=1) & (low < (width + margin, height + margin)).all(axis=1)
         is_visible &= np.isfinite(ends).all(axis=1)
+        is_visible &= ~over | (np.abs(ends) < SDL_COORDINATE_LIMIT).all(axis=1)
     return JointSegments(links if is_visible.all() else links.some(is_visible), ends[is_visible])
 
 

@@ -42,7 +42,7 @@ def test_chevrons_point_along_the_motion() -> None:
 
 def test_chevrons_travel_with_time() -> None:
     model = scene_of("plane", 1.0)
-    pictures = [render(snapshot(model, state=frame(model, time=time))) for time in (0.0, 0.1)]
+    pictures = [render(snapshot(model, frame=frame(model, time=time))) for time in (0.0, 0.1)]
     assert changed_pixels(*pictures).any()
 
 
