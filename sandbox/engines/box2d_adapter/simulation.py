@@ -2,30 +2,27 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
-from sandbox.action import Action, ActionError
+from sandbox.action import Action
 from sandbox.arrays import BoolArray, FloatArray, IntArray
+from sandbox.engines.box2d_adapter.bodies import BodyChanges, ZonedBox2DBodies, far_away, make_store
 from sandbox.engines.box2d_adapter.drives import KinematicDrives
 from sandbox.engines.box2d_adapter.joints import WorldJoints
-from sandbox.engines.box2d_adapter.limits import FARTHEST_LENGTHS, FASTEST_LENGTHS, MAX_TURN, scale_for
-from sandbox.engines.box2d_adapter.materials import unmixable
-from sandbox.engines.box2d_adapter.requirements import shape_faults, surfaces_in_use
+from sandbox.engines.box2d_adapter.limits import FARTHEST_LENGTHS, FASTEST_LENGTHS, MAX_TURN
 from sandbox.engines.box2d_adapter.world import Box2DWorld, StateRows
-from sandbox.engines.common.actions import apply_action, derive_contacts, sets_level
+from sandbox.engines.common.actions import apply_action, sets_level
 from sandbox.engines.common.base import BEYOND, SteppedSimulation, observe_path
-from sandbox.engines.common.body_store import BodyStore, HasBodyStore
+from sandbox.engines.common.body_store import HasBodyStore
 from sandbox.engines.common.contact_log import ContactLog, join_batches
 from sandbox.engines.common.force_field import ForceField
-from sandbox.engines.common.zoned_bodies import ZonedBodyStore
 from sandbox.engines.contract import Divergence, Observer, Refusal
 from sandbox.engines.energy_ledger import Cause
 from sandbox.frame_table import FrameTable
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.compile.setup import Setup
-from sandbox.scene.description.base import BodySource, BodySpec, Collides
 from sandbox.scene.description.fixed import Plane, PlaneReach, Post, Wall
 from sandbox.scene.description.world import Settings
 from sandbox.trajectory import Contacts, Frame
@@ -38,90 +35,6 @@ BATCH_ROWS = 1 << 16
 
 SPIN_ROUNDING = 1e-5
 """relative, rounding of Box2D's clamped spins"""
-
-
-class Box2DBodies(BodyStore):
-    """Body store that refuses changes which Box2D does not support."""
-
-    scale: float
-    """Box2D's lengths in a metre"""
-
-    def check_place(self, position: tuple[float, float], radius: float, collides: Collides) -> None:
-        """Refuse a position that is too far from the origin for 32-bit numbers.
-
-        Raises:
-            ActionError: it is.
-        """
-        del radius, collides
-        if not max(map(abs, position)) * self.scale <= FARTHEST_LENGTHS:
-            raise ActionError(f"{far_away(self.scale)}; the engine 'reference' has no such limit")
-
-    def change(self, setup: Setup, spawned: tuple[BodySource, ...] | None = None) -> None:
-        """Continue with a changed scene, as `BodyStore.change`.
-
-        Raises:
-            ActionError: Box2D cannot mix the coefficients of pairs, or the scene has too many different surfaces.
-        """
-        before, fixtures = (self.setup, self.bodies, self.contact_matrix), self.fixtures
-        super().change(setup, spawned)
-        reason = next(unmixable(self.contact_matrix, surfaces_in_use(self.bodies, self.contact_matrix)), None)
-        if reason is not None:
-            self.fixtures = fixtures
-            self._rebuild(*before)
-            raise ActionError(f"box2d: {reason}")
-
-    def add(self, single: BodySpec, name: str) -> int:
-        """Add a body and return its index, as `BodyStore.add`.
-
-        Raises:
-            ActionError: Box2D cannot represent its shape, or mix its coefficients with those of others.
-        """
-        bodies = self.bodies.joined_by(single, name)
-        matrix = derive_contacts(self.setup, bodies)
-        faults = [
-            *shape_faults(bodies, self.scale, len(bodies) - 1),
-            *unmixable(matrix, surfaces_in_use(bodies, matrix)),
-        ]
-        if faults:
-            raise ActionError(f"box2d: {faults[0]}")
-        return super().add(single, name)
-
-
-class ZonedBox2DBodies(Box2DBodies, ZonedBodyStore):
-    """Body store of a scene with zones, with the same refusals."""
-
-
-def make_store(setup: Setup, settings: Settings) -> Box2DBodies:
-    """Return the body store of a scene."""
-    store = (ZonedBox2DBodies if setup.scene.zones else Box2DBodies)(setup, settings.h)
-    store.scale = scale_for(settings)
-    return store
-
-
-class BodyChanges(NamedTuple):
-    """State of N bodies before an action or zones change the body store."""
-
-    position: FloatArray
-    """(N, 2) m"""
-    velocity: FloatArray
-    """(N, 2) m/s"""
-    spin: FloatArray
-    """(N,) rad/s"""
-    layer: IntArray
-    """(N,)"""
-    held: BoolArray
-    """(N,) whether a zone holds each"""
-
-    @classmethod
-    def of(cls, store: BodyStore) -> "BodyChanges":
-        """Copy the state of a body store."""
-        position, velocity, spin = store.position.copy(), store.velocity.copy(), store.angular_velocity.copy()
-        return cls(position, velocity, spin, store.layer.copy(), store.held_by_zone.copy())
-
-
-def far_away(scale: float) -> str:
-    """Return why a body is too far from the origin, for a number of Box2D's lengths in a metre."""
-    return f"farther than {FARTHEST_LENGTHS / scale:g} m from the origin 32-bit numbers do not resolve the slop"
 
 
 class Box2DSimulation(HasBodyStore, SteppedSimulation):
