@@ -7,7 +7,8 @@ import pytest
 
 import sandbox
 from sandbox.action import SetParameter
-from sandbox.engines.registry import ENGINES
+from sandbox.engines.registry import ENGINES, able
+from sandbox.measure.analytic import solution
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
 from tests.laws.engine_configs import IMPULSE_CONFIGS, EngineConfig, each_config
@@ -55,6 +56,26 @@ def test_box_on_a_belt_reaches_its_speed(config: EngineConfig) -> None:
     expected = np.minimum(MU * G * result.time, SPEED)
     assert result.velocity[:, 0, 0] == pytest.approx(expected, abs=2.0 * STEP)  # of its two contact points
     assert result.velocity[-1, 0, 0] == pytest.approx(SPEED, abs=1e-4)
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.2])
+@pytest.mark.parametrize("shape", ["ball", "box"])
+def test_closed_form_on_a_belt_agrees_with_the_engines(slope: float, shape: str) -> None:
+    """On a belt that runs up a slope: bodies slide down at first, then are carried up, or roll."""
+    belt = {"point": [0, 0], "normal": [-slope, 1.0], "surface_speed": SPEED, "friction": MU}
+    n = np.asarray([-slope, 1.0]) / np.hypot(slope, 1.0)
+    body: dict[str, Any] = {"position": (0.5 * n).tolist(), "velocity": (-0.5 * np.asarray([n[1], -n[0]])).tolist()}
+    body |= {"radius": 0.5} if shape == "ball" else {"size": [2.0, 1.0], "angle": float(np.arctan(slope))}
+    document = {"world": {"gravity": [0.0, -G], "duration": 1.5}, "plane": [belt], shape: [body]}
+    scene = from_document(document)
+    exact = solution(scene)
+    assert exact is not None and exact.about == "motion on a belt"
+    for engine in [name for name in able(scene) if name != "box2d"]:
+        result = sandbox.run(scene, engine, dt=0.001)
+        # a·t·h/2 with up to 7 m/s²; `exact` to rounding
+        error = 1e-12 if engine == "exact" else 7e-3
+        assert result.position == pytest.approx(exact.at(result.time).position, abs=error)
+        assert result.velocity[-1] == pytest.approx(exact.at(result.time[-1:]).velocity[0], abs=error)
 
 
 @each_config(IMPULSE_CONFIGS)

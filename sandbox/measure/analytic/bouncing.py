@@ -160,14 +160,15 @@ def bouncing(facts: SceneFacts, number: int) -> Bouncing | None:
     """Return the bouncing of a ball as long as it collides only with the plane; None if the formula does not apply.
 
     No joint, attraction, thrust or drive acts on it. The scene has one plane, gravity is perpendicular to it or 0, and
-    there are no drag and no friction: its coefficient is 0, or the ball neither spins nor moves along the plane.
+    there are no drag and no friction: its coefficient is 0, or the ball neither spins nor moves along the plane, which
+    does not move either.
     Restitution does not depend on speed.
     """
     bodies, planes = facts.bodies, facts.scene.planes
     collides = bodies.elements[bodies.element[number]].collides
     if not bodies.round[number] or facts.scene.attractions or facts.matrix.held[number] or facts.thrust[number]:
         return None
-    if len(planes) != 1 or not facts.has_no_drag or collides == "none":
+    if len(planes) != 1 or not facts.has_no_drag or collides == "none" or facts.matrix.moving_surfaces:
         return None
     normal, pull = normal_of(planes[0]), facts.gravity
     start, velocity = bodies.position[number], bodies.velocity[number]

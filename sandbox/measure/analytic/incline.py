@@ -1,9 +1,9 @@
 """Motion of one body on an inclined plane: rest, sliding with Coulomb friction, or rolling of a ball.
 
 The acceleration along the plane is piecewise constant. With the speed v along it, the angular velocity ω and the slip
-velocity u = v + r ω at the contact, friction F drives both: v̇ = g_t + F/m, u̇ = g_t + (1 + β) F/m with β = m r²/I, 2
-for a disc and 0 for a body that does not rotate. While the body slips, F is μ N against the slip. Afterwards F
-maintains u = 0, −m g_t/(1 + β), as long as friction allows it.
+velocity u = v + r ω − s at the contact, friction F drives both: v̇ = g_t + F/m, u̇ = g_t + (1 + β) F/m with β = m r²/I, 2
+for a disc and 0 for a body that does not rotate; s is the speed of the surfaces, as of a belt. While the body slips, F
+is μ N against the slip. Afterwards F maintains u = 0, −m g_t/(1 + β), as long as friction allows it.
 """
 
 import math
@@ -84,10 +84,14 @@ class InclineMotion:
     angle: float
     """at time 0, rad"""
     phases: tuple[Phase, ...]
+    surface_speed: float = 0.0
+    """m/s, speed of both surfaces along the plane"""
 
     @property
     def name(self) -> str:
         """Name of the motion."""
+        if self.surface_speed:
+            return "motion on a belt"
         last = self.phases[-1]
         if len(self.phases) == 1 and not last.slips and last.speed == last.tangential_accel == 0.0:
             return "rest on a plane"
@@ -143,9 +147,11 @@ def incline_motion(facts: SceneFacts, number: int) -> InclineMotion | None:
         return None
     if abs(tangential_accel) <= PARALLEL_SINE * normal_accel:
         tangential_accel = 0.0
-    friction = _friction(facts, number)
-    if friction is None:
+    pair = _surface_pair(facts, number)
+    if pair is None:
         return None
+    friction = float(facts.matrix.surfaces.friction[pair])
+    surface_speed = -float(facts.matrix.surfaces.slip_target[pair]) if friction > 0.0 else 0.0
     height = float((start - point) @ normal)
     if bodies.round[number]:
         radius, foot = float(bodies.radius[number]), None
@@ -156,14 +162,14 @@ def incline_motion(facts: SceneFacts, number: int) -> InclineMotion | None:
         radius, inertia, foot = 0.0, 0.0, _footprint(facts, number, point, normal)
         if foot is None or spin != 0.0:
             return None
-    phases = phases_of(tangential_accel, normal_accel, friction, speed, spin, radius, inertia)
+    phases = phases_of(tangential_accel, normal_accel, friction, speed, spin, radius, inertia, surface_speed)
     if phases is None or (
         foot is not None and not all(_is_stable(foot, phase.friction_accel / normal_accel) for phase in phases)
     ):
         return None
     middle = start - height * normal + (0.0 if foot is None else 0.5 * (foot.left + foot.right)) * along
     mass, angle = float(bodies.mass[number]), float(bodies.angle[number])
-    return InclineMotion(number, start, middle, along, normal, normal_accel, mass, angle, phases)
+    return InclineMotion(number, start, middle, along, normal, normal_accel, mass, angle, phases, surface_speed)
 
 
 def phases_of(
@@ -174,6 +180,7 @@ def phases_of(
     spin: float,
     radius: float,
     inertia: float,
+    surface_speed: float = 0.0,
 ) -> tuple[Phase, ...] | None:
     """Return the phases of the motion along a plane; None if friction is at the limit of slipping.
 
@@ -185,11 +192,12 @@ def phases_of(
         spin: angular velocity, rad/s.
         radius: radius of a ball, m; 0 for a body that does not rotate.
         inertia: m r/I of a ball, 1/m; 0 for a body that does not rotate.
+        surface_speed: speed of the surfaces along the plane, m/s.
     """
     inertia_factor, max_friction = 1.0 + inertia * radius, friction * normal_accel
     time = displacement = rotation = 0.0
-    slip = speed + radius * spin
-    if abs(slip) <= PARALLEL_SINE * (abs(speed) + abs(radius * spin)):
+    slip = speed + radius * spin - surface_speed
+    if abs(slip) <= PARALLEL_SINE * (abs(speed) + abs(radius * spin) + abs(surface_speed)):
         slip = 0.0
     phases: list[Phase] = []
     while True:
@@ -213,20 +221,21 @@ def phases_of(
             displacement + t * (speed + 0.5 * a * t),
             rotation + t * (spin + 0.5 * angular_accel * t),
         )
-        # Exactly no slip: a ball then rolls, any other body is at rest.
-        speed, spin = (speed + a * t, -(speed + a * t) / radius) if radius > 0.0 else (0.0, 0.0)
+        # Exactly no slip: a ball then rolls, any other body has the speed of the surface.
+        speed = speed + a * t if radius > 0.0 else surface_speed
+        spin = (surface_speed - speed) / radius if radius > 0.0 else 0.0
         slip = 0.0
 
 
-def _friction(facts: SceneFacts, number: int) -> float | None:
-    """Return μ between a body and the plane; None if its pieces have different values."""
+def _surface_pair(facts: SceneFacts, number: int) -> tuple[int, int] | None:
+    """Return the surfaces of a body and the plane; None if the pieces of the body have different ones."""
     surfaces = facts.matrix.surfaces
     surface = surfaces.of_body[number]
     if not facts.bodies.round[number]:
         begin, end = np.searchsorted(facts.bodies.shapes.body, (number, number + 1)).tolist()
         if (surfaces.of_shape[begin:end] != surface).any():
             return None
-    return float(surfaces.friction[surface, surfaces.of_fixed[0]])
+    return int(surface), int(surfaces.of_fixed[0])
 
 
 def _footprint(facts: SceneFacts, number: int, point: FloatArray, normal: FloatArray) -> Footprint | None:

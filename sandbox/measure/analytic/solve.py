@@ -30,9 +30,8 @@ from sandbox.measure.analytic.pulley import atwood_machine
 from sandbox.measure.analytic.static_stack import static_stack
 from sandbox.measure.metrics.clearance import plane_clearance
 from sandbox.scene.compile.bodies import Bodies
-from sandbox.scene.compile.demands import Demand, demands, on_floor
+from sandbox.scene.compile.demands import on_floor
 from sandbox.scene.compile.scene import Scene
-from sandbox.scene.compile.setup import Setup
 from sandbox.trajectory import ContactEvent, Contacts, Trajectory
 
 BODY_SOLUTIONS: tuple[Recogniser, ...] = (
@@ -107,8 +106,6 @@ def solution(scene: Scene) -> Solution | None:
     otherwise all are solved together.
     """
     if on_floor(scene) or scene.zones or len(scene.layers) > 1:  # no formula includes zones and layers
-        return None
-    if Demand.SURFACE_SPEED in demands(Setup.of(scene)):
         return None
     facts = SceneFacts.of(scene)
     if facts.matrix.mutual:
@@ -213,7 +210,7 @@ def _flying(trajectory: Trajectory, scene: Scene, bodies: Bodies, number: int) -
 
 def _bouncing(trajectory: Trajectory, scene: Scene, number: int) -> ClosedForm | None:
     form = bouncing(SceneFacts.of(scene), number)
-    if form is None or Demand.SURFACE_SPEED in demands(Setup.of(scene)):
+    if form is None:
         return None
     until = min(_first_contact(trajectory, number, besides=-1), _retired(trajectory, number))
     motion = form.at(trajectory.time)

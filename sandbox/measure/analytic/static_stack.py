@@ -91,6 +91,8 @@ def static_stack(facts: SceneFacts) -> StaticStack | None:
         return None
     if any(element.collides != "all" for element in bodies.elements) or scene.world.bounds is not None:
         return None
+    if facts.matrix.moving_surfaces:
+        return None
     if len(facts.links) or scene.attractions or scene.thrusts or scene.drives or not facts.has_no_drag:
         return None
     normal = normal_of(plane)
