@@ -381,6 +381,10 @@ class Engine(Protocol):
     def knows_impulses(self) -> bool:
         """Whether contacts have impulses; if not, they are nan, and energy accounting is refused."""
 
+    @property
+    def epsilon(self) -> float:
+        """Relative spacing of the numbers that it computes in: 2⁻⁵² for 64-bit numbers, 2⁻²³ for 32-bit numbers."""
+
     def missing(self, start: Scene | Setup, settings: Settings) -> tuple[str, ...]:
         """Return each demand and setting that the engine does not support; empty if it can run the scene."""
 

@@ -11,9 +11,6 @@ from sandbox.scene.compile.scene import Scene
 from sandbox.scene.files.load import from_document
 from sandbox.trajectory import Trajectory
 
-SINGLE_PRECISION = frozenset({"box2d"})
-"""engines that compute in 32-bit numbers"""
-
 
 class EngineConfig(NamedTuple):
     """An engine with settings."""
@@ -22,8 +19,8 @@ class EngineConfig(NamedTuple):
     settings: dict[str, Any]
 
     def rounding(self, tolerance: float) -> float:
-        """Return a tolerance for rounding errors of 64-bit numbers, or 2²⁹ of it with 32-bit numbers."""
-        return tolerance * 2.0**29 if self.engine in SINGLE_PRECISION else tolerance
+        """Return a tolerance for rounding errors, given that of 64-bit numbers."""
+        return tolerance * ENGINES[self.engine].epsilon / 2.0**-52
 
     def impact_rounding(self, tolerance: float) -> float:
         """Return a tolerance for results of impacts with an offset, relative to the speed of approach.

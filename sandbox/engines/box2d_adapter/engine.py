@@ -77,6 +77,7 @@ class Box2DEngine:
     about: str = "Box2D v3: fixed step, substeps with soft contacts, continuous collision, 32-bit numbers"
     capabilities: frozenset[Demand] = BALLS | OWN
     knows_impulses: bool = False
+    epsilon: float = 2.0**-23
 
     def missing(self, start: Scene | Setup, settings: Settings) -> tuple[str, ...]:
         """Return each demand and setting that Box2D does not support."""

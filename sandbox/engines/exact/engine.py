@@ -28,6 +28,7 @@ class ExactEngine:
     about: str = "event-driven: closed-form motion between events, next events from stable roots"
     capabilities: frozenset[Demand] = CAPABILITIES
     knows_impulses: bool = True
+    epsilon: float = 2.0**-52
 
     def missing(self, start: Scene | Setup, settings: Settings) -> tuple[str, ...]:
         """Return each demand and setting that this engine does not support."""

@@ -39,6 +39,7 @@ class PymunkEngine:
     about: str = "pymunk (Munk2D): fixed step, discrete contacts, sequential impulses"
     capabilities: frozenset[Demand] = BALLS | JOINTS - {Demand.PULLEYS} | FLOOR | SURFACES | OWN | {Demand.CURL}
     knows_impulses: bool = True
+    epsilon: float = 2.0**-52
 
     def missing(self, start: Scene | Setup, settings: Settings) -> tuple[str, ...]:
         """Return each demand and setting that pymunk does not support."""

@@ -88,6 +88,7 @@ class ReferenceEngine:
         Demand.DRIVES,
     }
     knows_impulses: bool = True
+    epsilon: float = 2.0**-52
 
     def missing(self, start: Scene | Setup, settings: Settings) -> tuple[str, ...]:
         """Return the demands and settings that the engine does not support."""

@@ -13,11 +13,13 @@ from functools import cached_property
 import numpy as np
 
 from sandbox.arrays import FloatArray
+from sandbox.engines.registry import ENGINES
 from sandbox.measure.extremes.experiment import Scenario
 from sandbox.measure.extremes.outcome import Outcome
 from sandbox.measure.metrics.contacts import max_penetration, sampled_frames
 from sandbox.measure.metrics.energy import energies
 from sandbox.measure.metrics.invariants import momentum_drift
+from sandbox.measure.preflight.tunnelling import intervals
 from sandbox.scene.compile.contacts import contact_matrix
 from sandbox.scene.compile.scene import Scene
 from sandbox.scene.description.world import Settings
@@ -27,8 +29,8 @@ MAX_REACH_FACTOR = 10.0
 """Factor of the distance that a body can cover by its initial speed and its fall: diverging chains have stretched to
 1e9 m without a nan.
 """
-MAX_MOMENTUM_CHANGE = 1e-12
-"""Relative: some thousand roundings."""
+MAX_MOMENTUM_CHANGE = 1e-12 / 2.0**-52
+"""Relative, in units of the engine's `epsilon`: some thousand roundings."""
 MAX_JOINT_ERROR = 0.01
 """Largest joint error as a fraction of the length of the joint."""
 REST_FRACTION = 0.02
@@ -113,8 +115,9 @@ def energy(tested: RunUnderTest) -> str | None:
 def momentum(tested: RunUnderTest) -> str | None:
     """Momentum is conserved, apart from gravity and impulses of static bodies."""
     drift = momentum_drift(tested.run, tested.scene)
-    if drift is not None and drift > MAX_MOMENTUM_CHANGE:
-        return f"momentum changed by {drift:.3g}; the limit for rounding is {MAX_MOMENTUM_CHANGE:g}"
+    limit = MAX_MOMENTUM_CHANGE * ENGINES[str(tested.run.info["engine"])].epsilon
+    if drift is not None and drift > limit:
+        return f"momentum changed by {drift:.3g}; the limit for rounding is {limit:.3g}"
     return None
 
 
@@ -126,9 +129,11 @@ def through(tested: RunUnderTest) -> str | None:
 def overlap(tested: RunUnderTest) -> str | None:
     """No overlap exceeds slop + v·h, with the largest speed so far and the fall of one step.
 
-    The slop counts twice: position correction removes the excess gradually, so a resting body lies a little deeper.
+    h is the time between two searches for contacts. The slop counts twice: position correction removes the excess
+    gradually, so a resting body lies a little deeper.
     """
-    run, scene, h = tested.sampled, tested.scene, tested.settings.h
+    run, scene, settings = tested.sampled, tested.scene, tested.settings
+    h = settings.dt / intervals(settings, str(tested.run.info["engine"]))
     fastest = np.maximum.accumulate(np.hypot(run.velocity[..., 0], run.velocity[..., 1]).max(axis=1))
     closing = (2.0 if contact_matrix(scene).mutual else 1.0) * (fastest + math.hypot(*scene.world.gravity) * h)
     deep, allowed = (

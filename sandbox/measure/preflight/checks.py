@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from sandbox.engines.registry import ENGINES
 from sandbox.measure.preflight.diagnostic import ROUNDING, Details, Diagnostic, floor_3_digits
 from sandbox.measure.preflight.initial_contacts import InitialContacts, initial_contacts, overlap_warnings
 from sandbox.measure.preflight.joint_chains import chain_warnings, joint_start_warnings, stretch_warnings
@@ -65,11 +66,11 @@ rounded alike. Measured with a ball of 1 m at 1 m/s, steps of 0.01 s (`sandbox e
 FAILED = "failed_forecast"
 """Kind of the diagnostic of a check that raised an exception."""
 
+DOUBLE_EPSILON = 2.0**-52
+"""Relative spacing of 64-bit numbers."""
+
 EVENT_DRIVEN = frozenset({"exact"})
 """Engines without a time step, which refuse overlaps."""
-
-SINGLE_PRECISION = frozenset({"box2d"})
-"""Engines that compute in 32-bit numbers."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ class PreflightContext:
     @property
     def is_single_precision(self) -> bool:
         """Whether the engine computes in 32-bit numbers."""
-        return self.engine in SINGLE_PRECISION
+        return self.engine in ENGINES and ENGINES[self.engine].epsilon > DOUBLE_EPSILON
 
     @property
     def is_continuous(self) -> bool:
