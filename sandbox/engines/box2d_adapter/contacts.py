@@ -71,10 +71,10 @@ class TouchingPairs:
             if not shapes[key]:
                 self._end(key)
 
-    def remove(self, index: int) -> None:
-        """End the contacts of a body or, with −1 − k, of a static collider. Their end events have no shapes."""
-        number, self._batch = index + self._first, None
-        for key in [key for key in self._shapes if number in (key >> FIRST, key & SECOND)]:
+    def remove(self, indices: set[int]) -> None:
+        """End the contacts of bodies or, with −1 − k, of static colliders. Their end events have no shapes."""
+        numbers, self._batch = {index + self._first for index in indices}, None
+        for key in [key for key in self._shapes if key >> FIRST in numbers or key & SECOND in numbers]:
             self._end(key)
 
     def _end(self, key: int) -> None:

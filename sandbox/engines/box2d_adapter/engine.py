@@ -1,6 +1,7 @@
 """Box2DEngine: the demands that Box2D supports, and its defaults of settings. Only `start` imports the binding."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -60,6 +61,19 @@ OWN = frozenset(
 )
 
 
+MAX_FAULTS = 3
+"""Faults of a kind that are listed; of the others the number is stated"""
+
+
+def _first(faults: Iterable[str]) -> list[str]:
+    """Return the first faults, and the number of the others."""
+    found = list(faults)
+    more = len(found) - MAX_FAULTS
+    return (
+        found if more <= 0 else [*found[:MAX_FAULTS], f"and {more:,} more fault{'s' if more > 1 else ''} of this kind"]
+    )
+
+
 @dataclass(frozen=True)
 class Box2DEngine:
     """Box2D v3: fixed step, soft contacts solved in substeps, continuous collision with static colliders; 32-bit.
@@ -99,10 +113,10 @@ class Box2DEngine:
             for drive, name in zip(setup.scene.drives, names_of(setup.scene), strict=True)
             if drive.kind == "torque"
         ]
-        missing += joint_faults(setup.links)
+        missing += _first(joint_faults(setup.links))
         matrix = contact_matrix(setup)
-        missing += unmixable(matrix, surfaces_in_use(setup.bodies, matrix))
-        missing += size_faults(setup, self.resolve(setup, settings))
+        missing += _first(unmixable(matrix, surfaces_in_use(setup.bodies, matrix)))
+        missing += _first(size_faults(setup, self.resolve(setup, settings)))
         return (*missing, *overload(setup, settings))
 
     def resolve(self, start: Scene | Setup, settings: Settings) -> Settings:

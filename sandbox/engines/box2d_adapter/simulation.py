@@ -301,8 +301,7 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
 
     def _remove_bodies(self, indices: IntArray) -> None:
         self._store.remove_bodies(indices, self.time)
-        for index in indices.tolist():
-            self._world.remove(index)
+        self._world.remove(indices.tolist())
         self._joints.forget()
         self._record_contacts()
 

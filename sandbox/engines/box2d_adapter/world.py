@@ -403,17 +403,22 @@ class Box2DWorld:
         for index in self.indices.tolist():
             self._bodies[index].linear_damping = rate
 
-    def remove(self, index: int) -> None:
-        """Remove a body; its contacts end."""
-        self._remove_body(index)
+    def remove(self, indices: list[int]) -> None:
+        """Remove bodies; their contacts end."""
+        for index in indices:
+            self._destroy(index)
+        self._pairs.remove(set(indices))
         self._collect()
 
     def _remove_body(self, index: int) -> None:
         """Remove a body or static collider with its contacts. Its end events have no shapes and are ignored."""
+        self._destroy(index)
+        self._pairs.remove({index})
+
+    def _destroy(self, index: int) -> None:
         self._bodies.pop(index).destroy()
         del self._shapes[index]
         self._speeds.pop(index, None)
-        self._pairs.remove(index)
 
     def _collect(self) -> None:
         """Collect the moving bodies, whose states are read at once."""
