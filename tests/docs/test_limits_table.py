@@ -10,7 +10,7 @@ from tests.environment import ROOT
 
 STORED = ROOT / "tools" / "calibration" / "boundaries.json"
 PAGE = ROOT / "docs" / "results" / "limits.md"
-COLUMNS = ("pymunk", "pymunk, 4 substeps", "reference", "exact")
+COLUMNS = ("pymunk", "pymunk, 4 substeps", "box2d", "box2d, 4 substeps", "reference", "exact")
 CELL = re.compile(r"(?P<end>≥ |to )?(?P<value>none|refused|[\d.]+(?:e-?\d+)?)(?:: refuses)?(?P<star> \*)?")
 
 
