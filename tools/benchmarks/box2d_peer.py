@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-import pyb2d3 as box2d
 
 from sandbox.arrays import FloatArray
 from sandbox.engines.registry import ENGINES
@@ -27,6 +26,11 @@ class Arrays(NamedTuple):
     """step and both objects of each pair that ceased to touch"""
 
 
+def missing() -> str | None:
+    """Return the reason why Box2D is not installed, or None."""
+    return None if "box2d" in ENGINES else "pyb2d3 is not installed"
+
+
 def scale_of(scene: Scene) -> float:
     """Return the number of Box2D's lengths in a metre, as the engine chooses it."""
     slop = ENGINES["box2d"].resolve(scene, scene.solver).slop
@@ -36,6 +40,8 @@ def scale_of(scene: Scene) -> float:
 
 def make_world(scene: Scene) -> tuple[Any, list[Any]]:
     """Return a world with equal balls and planes of one material, and the balls."""
+    import pyb2d3 as box2d
+
     scale, bodies = scale_of(scene), scene.bodies
     (pair,) = scene.pairs
     world = box2d.World(
@@ -74,6 +80,8 @@ def make_world(scene: Scene) -> tuple[Any, list[Any]]:
 
 def run_arrays(scene: Scene, record_contacts: bool = True) -> Arrays:
     """Run balls on planes, and record states, and the pairs that begin and cease to touch."""
+    import pyb2d3 as box2d
+
     dt, steps, count = scene.solver.dt, round(scene.world.duration / scene.solver.dt), len(scene.bodies)
     world, balls = make_world(scene)
     batch, planes = box2d.Bodies(), len(scene.planes)

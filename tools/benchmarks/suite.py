@@ -66,6 +66,7 @@ BENCHES = (
         lambda: running(PILE, engine="box2d", audit=False),
         lambda: box2d_peer.loop(PILE),
         1.05,
+        missing=box2d_peer.missing,
         same=lambda: agreement.pile_on_box2d(PILE),
     ),
     Bench(
@@ -73,6 +74,7 @@ BENCHES = (
         "sandbox.run of one ball on a plane on box2d, not audited, 10,000 steps / the bare loop over the binding",
         lambda: running(balls_on_plane(1, 10_000), engine="box2d", audit=False),
         lambda: box2d_peer.loop(balls_on_plane(1, 10_000)),
+        missing=box2d_peer.missing,
         same=lambda: agreement.pile_on_box2d(balls_on_plane(1, 100)),
     ),
     Bench(
@@ -82,6 +84,7 @@ BENCHES = (
         lambda: stepping(
             scene("benchmark/pyramid", "solver.dt=0.016666666666666666", "solver.iterations=10"), 300, contacts=False
         ),
+        missing=box2d_peer.missing,
         same=lambda: agreement.pyramid_stands(PYRAMID, 300),
     ),
     *(
