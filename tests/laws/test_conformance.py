@@ -100,6 +100,22 @@ def retired_at(time: float, body: int = 0) -> Callable[[Trajectory], None]:
     return check
 
 
+def both(*checks: Callable[[Trajectory], None]) -> Callable[[Trajectory], None]:
+    """Return a check that makes each of the checks."""
+
+    def check(run: Trajectory) -> None:
+        for each in checks:
+            each(run)
+
+    return check
+
+
+def is_pocketed(run: Trajectory) -> None:
+    """One capture, and the ball lies in the pocket."""
+    assert (run.contact_pair < 0).any(axis=1).sum() == 1
+    assert np.hypot(*(run.position[-1, 0] - np.asarray([0.8, 0.0]))) < 0.3
+
+
 def curls(run: Trajectory) -> None:
     """A sliding puck that turns counter-clockwise deviates to the left by κ/(4 + κ²) of v²/(μ g)."""
     total = 1.0 / (0.1 * 9.81) / (2.0 - 0.5j)
@@ -149,7 +165,7 @@ PROOFS: dict[Demand, Proof] = {
     # the wall, upwards, lets bodies pass from right to left
     Demand.ONE_WAY: Proof(
         scene(ball=[ball(2.0, vx=-2.0), ball(0.0, 0.7, vx=2.0)], wall=[{**WALL, "one_way": True}]),
-        lambda run: (position(0.0, 0.0)(run), position(0.75, 0.7, body=1)(run))[0],
+        both(position(0.0, 0.0), position(0.75, 0.7, body=1)),
     ),
     Demand.PASSABLE: Proof(scene(ball=[ball(vx=2.0)], wall=[{**WALL, "solid": False}]), position(2.0, 0.0)),
     # a turn of 1 rad on a circle of 1 m
@@ -191,7 +207,7 @@ PROOFS: dict[Demand, Proof] = {
                 {"kind": "gear", "between": ["box", "other"], "ratio": 2.0},
             ],
         ),
-        lambda run: (angle(2.4)(run), angle(1.2, body=1)(run))[0],
+        both(angle(2.4), angle(1.2, body=1)),
     ),
     # x = cos ω t with ω² = k/m
     Demand.SPRINGS: Proof(
@@ -244,7 +260,7 @@ PROOFS: dict[Demand, Proof] = {
     Demand.SPIN: Proof(scene(surface=_floor(), ball=[ball(vx=-1.4)]), velocity(-1.0, 0.0)),
     Demand.POCKETS: Proof(
         scene(surface=_floor(), ball=[ball(vx=1.4)], pocket=[{"position": [0.8, 0.0], "radius": 0.3}]),
-        lambda run: _is_pocketed(run),
+        is_pocketed,
     ),
     # s = v²/(2 μ g)
     Demand.PUCKS: Proof(
@@ -263,7 +279,7 @@ PROOFS: dict[Demand, Proof] = {
             ball=[ball(vx=2.0), ball(0.0, 0.7, vx=2.0, layer="ramp")],
             wall=[{**WALL, "layers": ["ramp"]}],
         ),
-        lambda run: (position(2.0, 0.0)(run), position(0.75, 0.7, body=1)(run))[0],
+        both(position(2.0, 0.0), position(0.75, 0.7, body=1)),
     ),
     # gravity within 0.5 m around x = 1: 0.5 s at −4 m/s²
     Demand.ZONES: Proof(
@@ -274,12 +290,6 @@ PROOFS: dict[Demand, Proof] = {
         velocity(2.0, -2.0),
     ),
 }
-
-
-def _is_pocketed(run: Trajectory) -> None:
-    captures = run.contact_pair[(run.contact_pair < -1).any(axis=1) | (run.contact_pair == -1).any(axis=1)]
-    assert len(captures) == 1
-    assert np.hypot(*(run.position[-1, 0] - np.asarray([0.8, 0.0]))) < 0.3
 
 
 def test_there_is_a_proof_of_every_demand() -> None:

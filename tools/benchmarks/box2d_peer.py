@@ -11,9 +11,6 @@ from sandbox.arrays import FloatArray
 from sandbox.engines.registry import ENGINES
 from sandbox.scene.compile.scene import Scene
 
-SLOP = 0.005
-"""Box2D's lengths, its fixed slop"""
-
 
 class Arrays(NamedTuple):
     """What the loop records of a run of T steps with N balls."""
@@ -33,9 +30,9 @@ def missing() -> str | None:
 
 def scale_of(scene: Scene) -> float:
     """Return the number of Box2D's lengths in a metre, as the engine chooses it."""
-    slop = ENGINES["box2d"].resolve(scene, scene.solver).slop
-    assert slop is not None
-    return SLOP / slop
+    from sandbox.engines.box2d_adapter.limits import scale_for
+
+    return scale_for(ENGINES["box2d"].resolve(scene, scene.solver))
 
 
 def make_world(scene: Scene) -> tuple[Any, list[Any]]:
@@ -78,7 +75,7 @@ def make_world(scene: Scene) -> tuple[Any, list[Any]]:
     return world, balls
 
 
-def run_arrays(scene: Scene, record_contacts: bool = True) -> Arrays:
+def run_arrays(scene: Scene) -> Arrays:
     """Run balls on planes, and record states, and the pairs that begin and cease to touch."""
     import pyb2d3 as box2d
 
@@ -96,8 +93,6 @@ def run_arrays(scene: Scene, record_contacts: bool = True) -> Arrays:
         batch.get_transforms(transform[k])
         batch.get_linear_velocities(velocity[k])
         batch.get_angular_velocities(spin[k])
-        if not record_contacts:
-            continue
         events = world.get_contact_events()
         for event in events.begin_events():
             manifold = event.manifold
@@ -109,12 +104,12 @@ def run_arrays(scene: Scene, record_contacts: bool = True) -> Arrays:
     return Arrays(transform[:, :, :2].astype(np.float64), began, ended)
 
 
-def loop(scene: Scene, record_contacts: bool = True) -> Callable[[], float]:
+def loop(scene: Scene) -> Callable[[], float]:
     """Return a workload of such a run; seconds."""
 
     def work() -> float:
         start_time = time.perf_counter()
-        run_arrays(scene, record_contacts)
+        run_arrays(scene)
         return time.perf_counter() - start_time
 
     return work

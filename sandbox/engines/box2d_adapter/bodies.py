@@ -73,7 +73,7 @@ def make_store(setup: Setup, settings: Settings) -> Box2DBodies:
     return store
 
 
-class BodyChanges(NamedTuple):
+class BodyState(NamedTuple):
     """State of N bodies before an action or zones change the body store."""
 
     position: FloatArray
@@ -88,7 +88,7 @@ class BodyChanges(NamedTuple):
     """(N,) whether a zone holds each"""
 
     @classmethod
-    def of(cls, store: BodyStore) -> "BodyChanges":
+    def of(cls, store: BodyStore) -> "BodyState":
         """Copy the state of a body store."""
         position, velocity, spin = store.position.copy(), store.velocity.copy(), store.angular_velocity.copy()
         return cls(position, velocity, spin, store.layer.copy(), store.held_by_zone.copy())

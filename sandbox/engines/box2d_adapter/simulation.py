@@ -8,7 +8,7 @@ import numpy as np
 
 from sandbox.action import Action
 from sandbox.arrays import BoolArray, FloatArray, IntArray
-from sandbox.engines.box2d_adapter.bodies import BodyChanges, ZonedBox2DBodies, far_away, make_store
+from sandbox.engines.box2d_adapter.bodies import BodyState, ZonedBox2DBodies, far_away, make_store
 from sandbox.engines.box2d_adapter.drives import KinematicDrives
 from sandbox.engines.box2d_adapter.joints import WorldJoints
 from sandbox.engines.box2d_adapter.limits import FARTHEST_LENGTHS, FASTEST_LENGTHS, MAX_TURN
@@ -159,7 +159,7 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
     def _visit_zones(self, time: float, store: ZonedBox2DBodies) -> None:
         """Apply zones to the bodies that have entered or left one, and record the entries at a time, s."""
         if store.detect(store.position):
-            before = BodyChanges.of(store)
+            before = BodyState.of(store)
             if store.apply_zones():
                 self._update_bodies(before)
         entries = store.tracker.drain_entries()
@@ -322,7 +322,7 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
             if sets_level(action):
                 apply_action(action, store)
                 return
-            before = BodyChanges.of(store)
+            before = BodyState.of(store)
             scene, matrix, inverse_moment = store.scene, store.contact_matrix, store.inverse_moment
             leaving = apply_action(action, store)
             if store.contact_matrix is not matrix or store.inverse_moment is not inverse_moment:
@@ -334,7 +334,7 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
                 self._remove_bodies(np.asarray([leaving]))
             self._world.extend_planes()
 
-    def _update_world(self, before: BodyChanges, scene: Scene) -> None:
+    def _update_world(self, before: BodyState, scene: Scene) -> None:
         """Apply to the world what an action has changed in the body store.
 
         Args:
@@ -350,10 +350,10 @@ class Box2DSimulation(HasBodyStore, SteppedSimulation):
         for index in range(len(before.position), len(store.position)):
             self._world.add(index)
 
-    def _update_bodies(self, before: BodyChanges) -> None:
+    def _update_bodies(self, before: BodyState) -> None:
         """Apply to the world what has changed in the state of bodies."""
         store, world = self._store, self._world
-        now, count = BodyChanges.of(store), len(before.position)
+        now, count = BodyState.of(store), len(before.position)
         relayered = np.flatnonzero(now.layer[:count] != before.layer).tolist()
         for index in relayered:
             world.replace(index)

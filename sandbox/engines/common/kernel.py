@@ -13,6 +13,7 @@ callee in another file has changed.
 import os
 import shutil
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -96,17 +97,23 @@ def _is_on_disk(dispatcher: Any) -> bool:
     return cache_file is not None and Path(cache_file._index_path).is_file()
 
 
+_CACHE_DIR_LOCK = threading.Lock()
+"""Held while numba's global CACHE_DIR is changed: threads may import modules with kernels at the same time, and a cache
+that reads the folder of another thread's restoration would lie in the working directory."""
+
+
 def _compiled(function: Callable[P, R], options: dict[str, bool]) -> Callable[P, R]:
     config: Any = numba.config
-    numba_folder, folder = config.CACHE_DIR, cache_folder()
-    config.CACHE_DIR = str(folder) if folder is not None else numba_folder
-    try:
-        compiled: Any = numba.njit(error_model="numpy")(function)
-        if folder is not None:
-            cache_class: Any = _KernelCache
-            compiled._cache = cache_class(function)  # as `cache=True` does, with numba's class
-    finally:
-        config.CACHE_DIR = numba_folder
+    with _CACHE_DIR_LOCK:
+        numba_folder, folder = config.CACHE_DIR, cache_folder()
+        config.CACHE_DIR = str(folder) if folder is not None else numba_folder
+        try:
+            compiled: Any = numba.njit(error_model="numpy")(function)
+            if folder is not None:
+                cache_class: Any = _KernelCache
+                compiled._cache = cache_class(function)  # as `cache=True` does, with numba's class
+        finally:
+            config.CACHE_DIR = numba_folder
     compiled.targetoptions.update(options)  # takes effect, because compiling waits for the first call
     return cast("Callable[P, R]", compiled)
 

@@ -1,10 +1,10 @@
 """Collision callbacks: coefficients by pair, kicks and one-way walls.
 
 `PairCallbacks` sets the coefficients of individual contacts, for those pairs of surfaces that need it. A moving surface
-needs it as well: Munk2D's own surface velocity is the same vector on all sides of a shape. Munk2D separates
-two bodies at e times their speed of approach before the substep's forces. For another speed of separation, the
-equivalent restitution is set in `pre_solve`, which is called after the forces. Resting bodies do not approach each
-other; they get no kick and no other restitution.
+needs it as well: Munk2D's own surface velocity is the same vector on all sides of a shape. Munk2D separates two bodies
+at e times their speed of approach before the substep's forces. For another speed of separation, the equivalent
+restitution is set in `pre_solve`, which is called after the forces. Resting bodies do not approach each other; they get
+no kick and no other restitution.
 
 `SpaceOneWayWalls` lets bodies that come from the right of a one-way wall pass, for as long as the two overlap. The
 passing pairs are part of the state from which a run can continue: in the new space, a body that rests on a wall begins

@@ -18,12 +18,9 @@ from sandbox.arrays import FloatArray
 from sandbox.engines.common.geometry import length_and_direction
 from sandbox.engines.common.kernel import bare_kernel
 from sandbox.engines.reference.joint_data import (
-    GEAR,
-    GROOVE,
-    GROOVE_ENDS,
+    JACOBIAN_KINDS,
     MOTOR,
     PIVOT,
-    PULLEY,
     ROTARY_LIMIT,
     ROTARY_SPRING,
     SLIDE,
@@ -83,7 +80,7 @@ def project(
     for _ in range(iterations):
         for k in range(len(joints.kind)):
             kind = joints.kind[k]
-            if kind in (GROOVE, GROOVE_ENDS, GEAR, PULLEY):
+            if kind in JACOBIAN_KINDS:
                 inverses = inverse_mass, inverse_moment
                 _solve_value(joints, k, pose, start, h, shake, *inverses, shift, multiplier, direction, jacobian)
                 continue

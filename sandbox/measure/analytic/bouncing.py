@@ -161,8 +161,7 @@ def bouncing(facts: SceneFacts, number: int) -> Bouncing | None:
 
     No joint, attraction, thrust or drive acts on it. The scene has one plane, gravity is perpendicular to it or 0, and
     there are no drag and no friction: its coefficient is 0, or the ball neither spins nor moves along the plane, which
-    does not move either.
-    Restitution does not depend on speed.
+    does not move either. Restitution does not depend on speed.
     """
     bodies, planes = facts.bodies, facts.scene.planes
     collides = bodies.elements[bodies.element[number]].collides

@@ -55,6 +55,8 @@ class TunnellingRisk:
 
 CONTINUOUS = frozenset({"box2d"})
 """Engines with continuous collision of moving bodies with static ones, by the setting `continuous`."""
+ONE_DETECTION_PER_STEP = frozenset({"box2d"})
+"""Engines that find contacts once in each step, before its substeps; others find them in each substep."""
 
 
 def is_continuous(settings: Settings, engine: str | None) -> bool:
@@ -63,11 +65,8 @@ def is_continuous(settings: Settings, engine: str | None) -> bool:
 
 
 def intervals(settings: Settings, engine: str | None) -> int:
-    """Return into how many intervals, at whose ends contacts are found, an engine divides a step.
-
-    Box2D finds them once in each step, before its substeps.
-    """
-    return 1 if engine in CONTINUOUS else settings.substeps
+    """Return into how many intervals, at whose ends contacts are found, an engine divides a step."""
+    return 1 if engine in ONE_DETECTION_PER_STEP else settings.substeps
 
 
 def largest_safe_dt(scene: Scene, settings: Settings | None = None, engine: str | None = None) -> float | None:

@@ -144,6 +144,28 @@ def test_kernels_work_if_no_cache_is_writable(tmp_path):
     assert out == "(3.0, 0.6000000000000001, 0.8)\n"
 
 
+CONCURRENT_SCRIPT = """
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numba
+
+from sandbox.engines.common.geometry import length_and_direction
+from sandbox.engines.common.kernel import cache_folder, kernel
+
+sys.setswitchinterval(1e-6)  # threads alternate within the creation of a kernel
+plain = length_and_direction.py_func
+with ThreadPoolExecutor(8) as pool:
+    kernels = list(pool.map(kernel, [plain] * 400))
+print(sum(Path(each._cache.cache_path).parent == cache_folder() for each in kernels), repr(numba.config.CACHE_DIR))
+"""
+
+
+def test_kernels_created_by_several_threads_are_all_cached_in_the_same_folder():
+    assert python(CONCURRENT_SCRIPT, NUMBA_DISABLE_JIT="0", NUMBA_CACHE_DIR="")[0] == "400 ''\n"
+
+
 LARGE_SCENE_SCRIPT = """
 from tests.engines.reference.pieces import ball, scene_of, simulation_of
 for _ in range(2):
