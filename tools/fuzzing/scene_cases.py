@@ -275,7 +275,8 @@ def _compare(scene: Scene, _: tuple[Action, ...]) -> None:
     if len(scene.bodies) > 30 or scene.world.duration / scene.solver.h > 300:
         return
     duration = min(scene.world.duration, MAX_COMPARED_STEPS * scene.solver.h)
-    _attempt(lambda: compare(replace(scene, world=replace(scene.world, duration=duration))))
+    world = scene.world.model_copy(update={"duration": duration})
+    _attempt(lambda: compare(scene.model_copy(update={"world": world})))
 
 
 def _record(scene: Scene, actions: tuple[Action, ...]) -> None:
