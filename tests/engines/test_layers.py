@@ -1,4 +1,4 @@
-"""Layers: bodies without a common layer do not affect each other, bit for bit."""
+"""Layers: bodies without a common layer do not affect each other; bit for bit, but for the 32-bit rounding of Box2D."""
 
 from itertools import pairwise
 from typing import Any
@@ -54,21 +54,25 @@ def scene_of(*scatters: dict[str, Any], **more: Any) -> Scene:
 
 @every_engine
 @given(seed=st.floats(-1.0, 1.0), jitter=st.integers(0, 1000))
+@example(seed=1.0, jitter=0)  # 32-bit rounding in Box2D
 @example(seed=0.0, jitter=153)  # two of one layer graze by 0.5 % of their distance and separate between two frames
 @settings(max_examples=15, deadline=None)
 def test_each_layer_runs_as_if_alone(engine: str, seed: float, jitter: int) -> None:
     """The random numbers of generators depend on their order in the file, so the compared generator comes first."""
     world = {"duration": 0.6, "gravity": [0.0, -4.0], "seed": jitter}
     alone = run_on(engine, scene_of(scatter("ground", seed), wall=[FRAME], world=world))
-    # pymunk solves contacts that share a body in the order of its tree, which depends on all bodies.
-    assume(engine != "pymunk" or not has_contacts_that_share_a_body(alone))
+    # pymunk and Box2D solve contacts that share a body in the order of their trees, which depends on all bodies.
+    assume(engine == "reference" or not has_contacts_that_share_a_body(alone))
     post = {"position": [0.0, 0.0], "radius": 0.3, "layers": ["one", "two"]}
     others = (scatter("one", -seed), scatter("two", seed / 2.0))
     full = scene_of(scatter("ground", seed), *others, wall=[FRAME], post=[post], world=world)
     mixed = run_on(engine, full)
     count = alone.position.shape[1]
-    assert np.array_equal(mixed.position[:, :count], alone.position)
-    assert np.array_equal(mixed.velocity[:, :count], alone.velocity)
+    # Box2D also orders candidate pairs that do not touch yet, whose zero impulses round 32-bit positions: measured
+    # 6e-8 m over 640 scenes; a collision multiplies it by about the distance flown over the radius, 10.
+    tolerance = 1e-5 if engine == "box2d" else 0.0
+    np.testing.assert_allclose(mixed.position[:, :count], alone.position, rtol=0.0, atol=tolerance)
+    np.testing.assert_allclose(mixed.velocity[:, :count], alone.velocity, rtol=0.0, atol=10.0 * tolerance)
     layer = full.bodies.layer
     missed = mixed.missed_pair  # bodies of different layers miss no contact; those of one layer may at this dt
     for a, b in (*mixed.contact_pair.tolist(), *missed.tolist()):
